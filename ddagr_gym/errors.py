@@ -1,0 +1,24 @@
+"""Errors that a person caused and can mend: one sentence with the offending value and the remedy."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class InputError(ValueError):
+    """Bad input from the user. The command line prints the message and exits with code 2."""
+
+
+def unknown_name(kind: str, name: object, known: Iterable[str]) -> InputError:
+    """Error for a name that is not in a registry, listing the closest ones.
+
+    Args:
+        kind: what the name stands for, singular ("soil", "robot").
+        name: the offending value.
+        known: the valid names.
+    """
+    names = sorted(known)
+    close = difflib.get_close_matches(str(name), names, n=3, cutoff=0.4)
+    hint = f"did you mean {', '.join(repr(c) for c in close)}" if close else f"choose one of {', '.join(names)}"
+    return InputError(f"unknown {kind} {name!r}: {hint}.")

@@ -1,0 +1,317 @@
+"""Physical parameters as frozen, validated dataclasses: SI units, radians, a source for each field.
+
+Nothing here computes physics. Named sets of values live in :mod:`ddagr_gym.presets`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from typing import Any
+
+from ddagr_gym.errors import InputError
+
+STANDARD_GRAVITY = 9.80665
+"""Standard acceleration of gravity [m/s^2]."""
+
+
+def bounded(
+    unit: str,
+    low: float = -math.inf,
+    high: float = math.inf,
+    *,
+    default: Any = None,
+    open_low: bool = False,
+) -> Any:
+    """Dataclass field that carries its unit and the interval in which it is valid."""
+    metadata = {"unit": unit, "low": low, "high": high, "open_low": open_low}
+    return field(metadata=metadata) if default is None else field(default=default, metadata=metadata)
+
+
+def _check_field(owner: object, name: str, metadata: Mapping[str, Any]) -> None:
+    value = getattr(owner, name)
+    kind = type(owner).__name__
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        raise InputError(f"{kind}.{name} is {value!r}: give a number in {metadata['unit']}.") from None
+    below = number <= metadata["low"] if metadata["open_low"] else number < metadata["low"]
+    if not math.isfinite(number) or below or number > metadata["high"]:
+        bracket = "(" if metadata["open_low"] else "["
+        interval = f"{bracket}{metadata['low']:g}, {metadata['high']:g}]"
+        raise InputError(f"{kind}.{name} is {number:g}: give a finite value in {interval} {metadata['unit']}.")
+
+
+class Validated:
+    """Mixin: checks every field declared with :func:`bounded` after construction."""
+
+    def __post_init__(self) -> None:
+        for item in fields(self):  # type: ignore[arg-type]
+            if "unit" in item.metadata:
+                _check_field(self, item.name, item.metadata)
+        self._check()
+
+    def _check(self) -> None:
+        """Relations between fields; overridden where there are any."""
+
+    def with_values(self, **changes: Any) -> Any:
+        """Copy with some fields changed, validated again."""
+        return replace(self, **changes)  # type: ignore[type-var]
+
+
+@dataclass(frozen=True)
+class TorusWheel(Validated):
+    """Elliptic torus tyre, physics.md section 2 (thesis eq. 3.1: a, b, c).
+
+    Attributes:
+        minor_radius: semi-axis of the section in the wheel plane [m] (thesis a).
+        half_width: semi-axis of the section across the wheel [m] (thesis b).
+        major_radius: hub to the section's centre [m] (thesis c).
+    """
+
+    minor_radius: float = bounded("m", 0.0, 2.0, open_low=True)
+    half_width: float = bounded("m", 0.0, 2.0, open_low=True)
+    major_radius: float = bounded("m", 0.0, 5.0, open_low=True)
+
+    def _check(self) -> None:
+        # Ours: keeps entry angles below 60 degrees, where the kernel's polynomials are accurate.
+        if self.minor_radius > self.major_radius:
+            raise InputError(
+                f"TorusWheel.minor_radius is {self.minor_radius:g} m, more than major_radius "
+                f"{self.major_radius:g} m: split the outer radius so that minor_radius is the smaller part."
+            )
+
+    @property
+    def outer_radius(self) -> float:
+        """Hub to tread [m], R0 = major_radius + minor_radius."""
+        return self.major_radius + self.minor_radius
+
+
+@dataclass(frozen=True)
+class Soil(Validated):
+    """Bekker-Wong-Janosi soil, physics.md section 4 (thesis Table A.1).
+
+    Attributes:
+        cohesion: c [Pa].
+        friction_angle: phi [rad].
+        sinkage_exponent: n [-].
+        cohesive_modulus: k_c [N/m^(n+1)].
+        frictional_modulus: k_phi [N/m^(n+2)].
+        shear_modulus: K, shear displacement modulus [m].
+        peak_stress_coefficient_0: a0 of theta_m = (a0 + a1 slip) theta_f [-] (thesis A.8).
+        peak_stress_coefficient_1: a1 of the same [-].
+        exit_angle_ratio: -theta_r / theta_f [-] (thesis lambda_theta, A.2).
+    """
+
+    cohesion: float = bounded("Pa", 0.0, 1e6)
+    friction_angle: float = bounded("rad", 0.0, 1.2)
+    sinkage_exponent: float = bounded("-", 0.0, 3.0, open_low=True)
+    cohesive_modulus: float = bounded("N/m^(n+1)", -1e9, 1e12)
+    frictional_modulus: float = bounded("N/m^(n+2)", -1e9, 1e14)
+    shear_modulus: float = bounded("m", 0.0, 1.0, open_low=True)
+    peak_stress_coefficient_0: float = bounded("-", 0.0, 1.0)
+    peak_stress_coefficient_1: float = bounded("-", -1.0, 1.0)
+    exit_angle_ratio: float = bounded("-", 0.0, 1.0)
+
+    def pressure(self, sinkage: float, width: float) -> float:
+        """Bekker's plate pressure (k_c/width + k_phi) z^n [Pa] at ``sinkage`` [m] under ``width`` [m]."""
+        modulus = self.cohesive_modulus / width + self.frictional_modulus
+        return float(modulus * sinkage**self.sinkage_exponent)
+
+
+@dataclass(frozen=True)
+class Robot(Validated):
+    """Four-wheel skid-steer robot. Wheels 1 front right, 2 front left, 3 rear right, 4 rear left.
+
+    The body origin is the geometric centre of the four wheels (physics.md section 1).
+
+    Attributes:
+        name: identifier.
+        mass: total mass [kg].
+        yaw_inertia: about the vertical through the centre of mass [kg m^2].
+        half_wheelbase: L, centre to axle [m].
+        half_track: W, centre to wheel plane [m].
+        wheels: one wheel for all four, or four of them in the order above.
+        centre_of_mass: (x, y) from the body origin and height above ground [m].
+        motor_rate: k_omega of the first-order bank speed loop [1/s] (thesis 4.11).
+        maximum_wheel_speed: largest bank speed command that the motors follow [rad/s].
+        standard_deviations: uncertainty of fields by name, in their units; absent means taken as exact.
+        source: where the values come from.
+    """
+
+    name: str
+    mass: float = bounded("kg", 0.0, 1e5, open_low=True)
+    yaw_inertia: float = bounded("kg m^2", 0.0, 1e6, open_low=True)
+    half_wheelbase: float = bounded("m", 0.0, 10.0, open_low=True)
+    half_track: float = bounded("m", 0.0, 10.0, open_low=True)
+    wheels: tuple[TorusWheel, ...] = ()
+    centre_of_mass: tuple[float, float, float] = (0.0, 0.0, 0.5)
+    motor_rate: float = bounded("1/s", 0.0, 1e4, default=4.5, open_low=True)
+    maximum_wheel_speed: float = bounded("rad/s", 0.0, 1e3, default=2.0, open_low=True)
+    standard_deviations: Mapping[str, float] = field(default_factory=dict)
+    source: str = ""
+
+    def _check(self) -> None:
+        if len(self.wheels) == 1:
+            object.__setattr__(self, "wheels", tuple(self.wheels) * 4)
+        if len(self.wheels) != 4:
+            raise InputError(f"Robot.wheels has {len(self.wheels)} wheels: give one wheel for all, or four.")
+        if len(self.centre_of_mass) != 3 or not all(math.isfinite(v) for v in self.centre_of_mass):
+            raise InputError(f"Robot.centre_of_mass is {self.centre_of_mass!r}: give (x, y, height) in m.")
+        x, y, height = self.centre_of_mass
+        if abs(x) >= self.half_wheelbase or abs(y) >= self.half_track or height < 0:
+            raise InputError(
+                f"Robot.centre_of_mass is {self.centre_of_mass!r}: with it outside the wheels' rectangle "
+                f"(+-{self.half_wheelbase:g}, +-{self.half_track:g}) m some wheels leave the ground; move it inside."
+            )
+
+    @property
+    def wheel_x(self) -> tuple[float, float, float, float]:
+        """Hub positions forward of the body origin [m]."""
+        half = self.half_wheelbase
+        return (half, half, -half, -half)
+
+    @property
+    def wheel_y(self) -> tuple[float, float, float, float]:
+        """Hub positions to the left of the body origin [m]."""
+        half = self.half_track
+        return (-half, half, -half, half)
+
+
+@dataclass(frozen=True)
+class Imu(Validated):
+    """Inertial measurement unit sampled once per sensor period.
+
+    Noise figures are standard deviations of one sample at the sample rate.
+
+    Attributes:
+        sample_rate: [Hz] (thesis section 6.2: 125 Hz).
+        accelerometer_noise: [m/s^2].
+        accelerometer_vibration: further noise per travel speed [(m/s^2)/(m/s)].
+        gyro_noise: [rad/s].
+        accelerometer_bias: (x, y) [m/s^2].
+        gyro_bias: [rad/s].
+        accelerometer_scale: (x, y) [-].
+        gyro_scale: [-].
+        position: lever arm (x, y) from the body origin [m].
+        mounting_yaw: rotation of the sensor about z against the body [rad].
+        accelerometer_range: saturation [m/s^2].
+        gyro_range: saturation [rad/s].
+        accelerometer_resolution: quantisation step [m/s^2]; 0 for none.
+        gyro_resolution: quantisation step [rad/s]; 0 for none.
+    """
+
+    sample_rate: float = bounded("Hz", 0.0, 1e4, default=125.0, open_low=True)
+    accelerometer_noise: float = bounded("m/s^2", 0.0, 100.0, default=0.031)
+    accelerometer_vibration: float = bounded("1/s", 0.0, 100.0, default=0.0)
+    gyro_noise: float = bounded("rad/s", 0.0, 10.0, default=6.9e-4)
+    accelerometer_bias: tuple[float, float] = (0.0, 0.0)
+    gyro_bias: float = bounded("rad/s", -10.0, 10.0, default=0.0)
+    accelerometer_scale: tuple[float, float] = (1.0, 1.0)
+    gyro_scale: float = bounded("-", -10.0, 10.0, default=1.0)
+    position: tuple[float, float] = (0.0, 0.0)
+    mounting_yaw: float = bounded("rad", -math.pi, math.pi, default=0.0)
+    accelerometer_range: float = bounded("m/s^2", 0.0, 1e4, default=2 * STANDARD_GRAVITY, open_low=True)
+    gyro_range: float = bounded("rad/s", 0.0, 1e3, default=math.radians(250.0), open_low=True)
+    accelerometer_resolution: float = bounded("m/s^2", 0.0, 10.0, default=STANDARD_GRAVITY / 16384)
+    gyro_resolution: float = bounded("rad/s", 0.0, 1.0, default=math.radians(1 / 131))
+
+
+@dataclass(frozen=True)
+class WheelEncoder(Validated):
+    """Quadrature encoder of a wheel bank: counts differenced at the sensor rate.
+
+    Attributes:
+        counts_per_revolution: quadrature counts per turn of the wheel [-]; 0 for an ideal encoder.
+        speed_noise: standard deviation of one sample besides quantisation [rad/s].
+        scale: (right, left) reading over truth [-].
+    """
+
+    counts_per_revolution: float = bounded("-", 0.0, 1e8, default=20000.0)
+    speed_noise: float = bounded("rad/s", 0.0, 100.0, default=0.0)
+    scale: tuple[float, float] = (1.0, 1.0)
+
+
+@dataclass(frozen=True)
+class PoseReceiver(Validated):
+    """Position and heading receiver; the default noise is that of an RTK GNSS compass.
+
+    Attributes:
+        rate: [Hz]; 0 for none fitted.
+        position_noise: standard deviation per axis [m].
+        yaw_noise: [rad].
+    """
+
+    rate: float = bounded("Hz", 0.0, 1e3, default=0.0)
+    position_noise: float = bounded("m", 0.0, 100.0, default=0.012)
+    yaw_noise: float = bounded("rad", 0.0, 3.2, default=0.008)
+
+
+@dataclass(frozen=True)
+class Sensors:
+    """The sensor suite of a robot."""
+
+    imu: Imu = Imu()
+    encoder: WheelEncoder = WheelEncoder()
+    pose: PoseReceiver = PoseReceiver()
+
+    @property
+    def period(self) -> float:
+        """Time between samples [s]."""
+        return 1.0 / self.imu.sample_rate
+
+
+@dataclass(frozen=True)
+class Numerics(Validated):
+    """Accuracy against cost of the simulator. The default keeps force errors below 1e-3.
+
+    Attributes:
+        section_nodes: Gauss nodes across the tyre (psi), a multiple of 8 (the kernel's vector width).
+        contact_nodes: Gauss nodes along the contact on each side of the stress peak (theta).
+        jacobian_contact_nodes: the same for the derivative that the integrator uses; a W-method
+            keeps its order with any derivative, so this one may be coarse.
+        substeps: integrator steps per sensor sample.
+        launch_substeps: further division of a step in which a bank changes speed fast, as at a start from rest
+            (the damping varies as 1/speed, physics.md section 6).
+        launch_change: change of the rim speed within a step, relative to the wheel's speed, that counts as fast.
+        accepted_error: embedded error estimate of a step above which it is redone by backward Euler [m/s];
+            one percent of the speed is accepted besides.
+        jacobian_refresh: relative change of a wheel's motion after which its derivative is renewed.
+        sinkage_tolerance: |F_z - load| / load above which the sinkage is iterated, not extrapolated.
+        minimum_shear_rate: nu_min of physics.md section 4 [rad/s].
+        rest_speed: |R0 omega + v_x| below which forward and backward travel are blended [m/s]
+            (ours: the stress peak jumps from front to rear there, physics.md section 3).
+    """
+
+    section_nodes: int = 8
+    contact_nodes: int = 7
+    jacobian_contact_nodes: int = 2
+    substeps: int = 1
+    launch_substeps: int = 8
+    launch_change: float = bounded("-", 0.0, 1e9, default=0.1)
+    accepted_error: float = bounded("m/s", 0.0, 1e9, default=5e-4)
+    jacobian_refresh: float = bounded("-", 0.0, 1.0, default=0.05)
+    sinkage_tolerance: float = bounded("-", 0.0, 0.1, default=2e-3, open_low=True)
+    minimum_shear_rate: float = bounded("rad/s", 0.0, 1.0, default=1e-3, open_low=True)
+    rest_speed: float = bounded("m/s", 0.0, 0.1, default=1e-3, open_low=True)
+
+    def _check(self) -> None:
+        if self.section_nodes % 8 or not 8 <= self.section_nodes <= 64:
+            raise InputError(f"Numerics.section_nodes is {self.section_nodes}: give 8, 16, 24 ... 64.")
+        for name, high in (("contact_nodes", 64), ("jacobian_contact_nodes", 64), ("substeps", 1000), ("launch_substeps", 1000)):
+            value = getattr(self, name)
+            if not isinstance(value, int) or not 1 <= value <= high:
+                raise InputError(f"Numerics.{name} is {value!r}: give a whole number from 1 to {high}.")
+
+    @classmethod
+    def finest(cls) -> Numerics:
+        """Converged reference: force error below 1e-6, sinkage to 1e-10 of the load."""
+        return cls(
+            section_nodes=32,
+            contact_nodes=32,
+            jacobian_contact_nodes=8,
+            substeps=8,
+            jacobian_refresh=0.0,
+            sinkage_tolerance=1e-10,
+        )

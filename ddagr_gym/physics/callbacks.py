@@ -1,0 +1,76 @@
+"""How compiled code calls an effect: through a pointer, so that adding one compiles nothing else.
+
+An effect's function has the signature ``f(row, parameters, memory)`` over float64 arrays of ``layout.SIZE``,
+``layout.EFFECT_PARAMETERS`` and ``layout.EFFECT_MEMORY`` entries, and changes ``row`` (and its memory) in place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import carray, types
+from numba.extending import intrinsic
+from numpy.typing import NDArray
+
+from ddagr_gym.jit import compile_callback, kernel
+from ddagr_gym.physics.layout import EFFECT_MEMORY, EFFECT_PARAMETERS, SIZE
+
+_FLOATS = types.CPointer(types.float64)
+_SIGNATURE = types.void(_FLOATS, _FLOATS, _FLOATS)
+
+
+def compile_effect(function: Callable[..., None]) -> int:
+    """Address of the machine code of an effect function.
+
+    Args:
+        function: takes (row, parameters, memory); compiled in nopython mode.
+    """
+    inner = kernel()(function)
+
+    def callback(row_pointer: Any, parameter_pointer: Any, memory_pointer: Any) -> None:
+        row = carray(row_pointer, (SIZE,))
+        parameters = carray(parameter_pointer, (EFFECT_PARAMETERS,))
+        memory = carray(memory_pointer, (EFFECT_MEMORY,))
+        inner(row, parameters, memory)
+
+    callback.__qualname__ = f"callback_{function.__module__}_{function.__name__}"
+    return compile_callback(callback, _SIGNATURE)
+
+
+@intrinsic
+def _call(typing_context: Any, address: Any, row: Any, parameters: Any, memory: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        pointer = ir.IntType(8).as_pointer()
+        function_type = ir.FunctionType(ir.VoidType(), [pointer] * 3)
+        function = builder.inttoptr(arguments[0], function_type.as_pointer())
+        builder.call(function, [builder.inttoptr(argument, pointer) for argument in arguments[1:]])
+        return context.get_dummy_value()
+
+    return types.void(types.int64, types.int64, types.int64, types.int64), generate
+
+
+@kernel()
+def apply_effects(
+    point: int,
+    row: NDArray[np.float64],
+    effect_points: NDArray[np.int64],
+    effect_addresses: NDArray[np.int64],
+    parameters: NDArray[np.float64],
+    memory: NDArray[np.float64],
+) -> None:
+    """Call, in order, the effects attached at ``point`` on one environment.
+
+    Args:
+        point: one of ``layout.POINT_*``.
+        row: (SIZE,).
+        effect_points: (effects,) point of each.
+        effect_addresses: (effects,) from :func:`compile_effect`.
+        parameters: (effects, EFFECT_PARAMETERS).
+        memory: (effects, EFFECT_MEMORY).
+    """
+    for k in range(effect_points.shape[0]):
+        if effect_points[k] == point:
+            _call(effect_addresses[k], row.ctypes.data, parameters[k].ctypes.data, memory[k].ctypes.data)

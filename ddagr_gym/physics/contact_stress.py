@@ -1,0 +1,62 @@
+"""Stresses under a wheel (physics.md sections 3 and 4; thesis A.7-A.25, signs as in physics.md).
+
+Each formula stands here once; the kernel of :mod:`ddagr_gym.physics.contact_patch` sums them over the patch.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ddagr_gym.jit import kernel
+from ddagr_gym.physics.fast_math import exp_negative, log_positive
+
+PEAK_CEILING = 0.9
+"""Ours: theta_m stays below 0.9 theta_f, else the front of the patch vanishes at slip 1 (physics.md section 2)."""
+
+_TINY = 1e-300
+
+
+@kernel(inline=True)
+def slip_ratio(rim_speed: float, v_x: float) -> float:
+    """s (R0 omega - v_x) / max(|R0 omega|, |v_x|), s the sign of the larger; 0 at rest (section 3)."""
+    largest = max(abs(rim_speed), abs(v_x))
+    if largest == 0.0:
+        return 0.0
+    return math.copysign(1.0, rim_speed + v_x) * (rim_speed - v_x) / largest
+
+
+@kernel(inline=True)
+def peak_fraction(coefficient_0: float, coefficient_1: float, slip: float) -> float:
+    """theta_m / theta_f = clip(a0 + a1 slip, 0, PEAK_CEILING) (A.8)."""
+    return min(max(coefficient_0 + coefficient_1 * slip, 0.0), PEAK_CEILING)
+
+
+@kernel(inline=True)
+def pressure_modulus(cohesive: float, frictional: float, half_width: float, sin_edge: float) -> float:
+    """k_c/b_patch + k_phi with b_patch = 2 half_width sin(psi_l) (section 4 in place of A.9)."""
+    return cohesive / (2.0 * half_width * sin_edge) + frictional
+
+
+@kernel(inline=True)
+def normal_stress(modulus: float, exponent: float, depth: float) -> float:
+    """sigma = (k_c/b + k_phi) z^n (A.7)."""
+    return modulus * exp_negative(exponent * log_positive(max(depth, _TINY)))
+
+
+@kernel(inline=True)
+def shear_over_speed(
+    strength: float, displacement_t: float, displacement_l: float, v_t: float, v_l: float, decay: float
+) -> float:
+    """tau/|V|: strength (1 - exp(-|j|/K)) over the sliding speed, so that tau_t = -result * V_t (Janosi).
+
+    Args:
+        strength: cohesion + sigma tan(phi) [Pa].
+        displacement_t: nu j_t, before division by the shear rate [m/s].
+        displacement_l: nu j_l [m/s].
+        v_t: sliding velocity along the tread [m/s].
+        v_l: sliding velocity across it [m/s].
+        decay: -1/(nu K) [s/m].
+    """
+    j = math.sqrt(displacement_t * displacement_t + displacement_l * displacement_l)
+    speed = math.sqrt(v_t * v_t + v_l * v_l + _TINY)
+    return strength * (1.0 - exp_negative(j * decay)) / speed

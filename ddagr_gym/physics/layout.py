@@ -1,0 +1,156 @@
+"""The simulator's row: one float64 vector per environment that holds all of its state and parameters.
+
+A row is plain data: copying it saves the whole simulator state, and a batch is a matrix. Kernels and effects
+name its entries by the constants below; blocks of four are per wheel (1 front right, 2 front left, 3 rear right,
+4 rear left), pairs are (right, left). SI units, radians.
+"""
+
+from __future__ import annotations
+
+_next = 0
+
+
+def _block(size: int = 1) -> int:
+    """Reserve ``size`` consecutive entries and return the first one's index."""
+    global _next
+    first = _next
+    _next += size
+    return first
+
+
+# Time and motion
+TIME = _block()  # [s]
+SAMPLE_PERIOD = _block()  # between sensor samples [s]
+X = _block()  # body origin, world [m]
+Y = _block()
+YAW = _block()  # [rad], not wrapped
+V_X = _block()  # velocity of the body origin, body axes [m/s]
+V_Y = _block()
+YAW_RATE = _block()  # [rad/s]
+OMEGA = _block(2)  # bank speeds [rad/s]
+WHEEL_ANGLE = _block(2)  # bank angles rolled [rad]
+
+# Commands and motors
+COMMAND = _block(2)  # bank speed commands after the command effects [rad/s]
+MOTOR_TARGET = _block(2)  # speed that the motor loop aims at [rad/s]
+MOTOR_RATE = _block(2)  # its rate k_omega [1/s]
+
+# Body, as the load effects leave it
+MASS = _block()  # [kg]
+YAW_INERTIA = _block()  # about the centre of mass [kg m^2]
+CENTRE_OF_MASS = _block(3)  # x, y from the body origin, height above ground [m]
+SLOPE = _block(2)  # gradient of the ground, world dz/dx and dz/dy [-]
+GRAVITY = _block(3)  # gravity in body axes [m/s^2]
+WHEEL = _block(12)  # minor radius x 4, half width x 4, major radius x 4 [m]
+
+# Body, as built: copied to the entries above at each sample, before the load effects
+BASE_BODY = _block(7)  # mass, yaw inertia, centre of mass, slope
+BASE_WHEEL = _block(12)
+HALF_WHEELBASE = _block()  # [m]
+HALF_TRACK = _block()
+BASE_MOTOR_RATE = _block()
+MAXIMUM_WHEEL_SPEED = _block()  # [rad/s]
+
+# Ground under each wheel
+WHEEL_X = _block(4)  # hub, world [m]
+WHEEL_Y = _block(4)
+SOIL = _block(36)  # nine parameters x 4, in the order of SOIL_PARAMETERS
+BASE_SOIL = _block(36)
+LOAD = _block(4)  # normal load [N]
+
+# Wheel kinematics and forces of the last evaluation, body axes
+WHEEL_V_X = _block(4)  # hub velocity [m/s]
+WHEEL_V_Y = _block(4)
+WHEEL_OMEGA = _block(4)  # [rad/s]
+SLIP_RATIO = _block(4)
+SINKAGE = _block(4)  # [m]
+FORCE_X = _block(4)  # soil on wheel [N]
+FORCE_Y = _block(4)
+FORCE_Z = _block(4)
+YAW_MOMENT = _block(4)  # [N m]
+AXLE_TORQUE = _block(4)  # soil's moment about the hub's y axis [N m]
+BOGGED = _block(4)  # 1 where no sinkage carries the load
+EXTRA_FORCE_X = _block(4)  # added by wheel force effects
+EXTRA_FORCE_Y = _block(4)
+EXTRA_YAW_MOMENT = _block(4)
+EXTRA_AXLE_TORQUE = _block(4)
+BODY_FORCE = _block(3)  # added by body force effects: F_x, F_y at the body origin, M_z
+
+# Results
+ACCELERATION = _block(3)  # d/dt of V_X, V_Y, YAW_RATE
+SPECIFIC_FORCE = _block(2)  # non-gravitational force per mass at the body origin [m/s^2]
+READING = _block(8)  # specific force x, y; yaw rate; encoder right, left; pose x, y, yaw
+
+# Sensors
+ACCELEROMETER_NOISE = _block()
+ACCELEROMETER_VIBRATION = _block()  # noise per speed [1/s]
+ACCELEROMETER_BIAS = _block(2)
+ACCELEROMETER_SCALE = _block(2)
+ACCELEROMETER_RANGE = _block()
+ACCELEROMETER_RESOLUTION = _block()
+GYRO_NOISE = _block()
+GYRO_BIAS = _block()
+GYRO_SCALE = _block()
+GYRO_RANGE = _block()
+GYRO_RESOLUTION = _block()
+IMU_POSITION = _block(2)
+IMU_MOUNTING_YAW = _block()
+ENCODER_COUNTS = _block()  # per revolution
+ENCODER_NOISE = _block()
+ENCODER_SCALE = _block(2)
+LAST_COUNT = _block(2)  # encoder counts at the last sample
+POSE_PERIOD = _block()  # [s]; 0 for no receiver
+POSE_POSITION_NOISE = _block()
+POSE_YAW_NOISE = _block()
+NEXT_POSE_TIME = _block()
+
+# The integrator's memory: wheel derivatives and the motion at which they were taken
+DERIVATIVE = _block(60)  # per wheel 15: d(F_x, F_y, F_z, M_z, torque) by v_x, by v_y, by sinkage
+DERIVATIVE_AT = _block(16)  # v_x x 4, v_y x 4, omega x 4, sinkage x 4
+DERIVATIVE_VALID = _block()
+
+SIZE = _next
+"""Entries of a row."""
+
+SOIL_PARAMETERS = (
+    "cohesion",
+    "friction_tangent",
+    "sinkage_exponent",
+    "cohesive_modulus",
+    "frictional_modulus",
+    "shear_modulus",
+    "peak_stress_coefficient_0",
+    "peak_stress_coefficient_1",
+    "exit_angle_ratio",
+)
+"""Order of the nine soil entries of a wheel; SOIL + 9 * wheel + index. tan(phi), not phi."""
+(
+    SOIL_COHESION,
+    SOIL_FRICTION_TANGENT,
+    SOIL_EXPONENT,
+    SOIL_COHESIVE_MODULUS,
+    SOIL_FRICTIONAL_MODULUS,
+    SOIL_SHEAR_MODULUS,
+    SOIL_PEAK_0,
+    SOIL_PEAK_1,
+    SOIL_EXIT_RATIO,
+) = range(9)
+
+# Points at which effects act, in the order of a sample
+POINT_COMMANDS, POINT_MOTORS, POINT_LOADS, POINT_SOIL, POINT_WHEEL_FORCES, POINT_BODY_FORCES, POINT_READINGS = range(7)
+POINTS = ("commands", "motors", "loads", "soil", "wheel_forces", "body_forces", "readings")
+
+EFFECT_PARAMETERS = 8  # floats per effect and environment
+EFFECT_MEMORY = 132  # floats that an effect may keep between samples, zero after a reset
+
+READINGS = (
+    "specific_force_x",
+    "specific_force_y",
+    "yaw_rate",
+    "encoder_right",
+    "encoder_left",
+    "pose_x",
+    "pose_y",
+    "pose_yaw",
+)
+NOISE_CHANNELS = len(READINGS)

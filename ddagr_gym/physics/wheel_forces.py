@@ -1,0 +1,200 @@
+"""Forces on a single wheel: the stable entry points (physics.md section 5)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ddagr_gym.errors import InputError
+from ddagr_gym.jit import kernel
+from ddagr_gym.parameters import Numerics, Soil, TorusWheel
+from ddagr_gym.physics.contact_geometry import contact_rule, section_rule
+from ddagr_gym.physics.contact_patch import WORKSPACE_SIZE, WRENCH, wheel_wrench
+from ddagr_gym.physics.contact_stress import slip_ratio
+from ddagr_gym.physics.sinkage import SinkageStatus, solve_sinkage
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class WheelForce:
+    """Soil's wrench on a wheel, at the hub, in wheel axes (x forward, y left, z up).
+
+    Attributes:
+        force: (..., 3) [N].
+        yaw_moment: (...) M_z [N m].
+        axle_torque: (...) the soil's moment about the hub's y axis [N m]; negative brakes a driven wheel.
+        slip_ratio: (...) [-], physics.md section 3.
+    """
+
+    force: Array
+    yaw_moment: Array
+    axle_torque: Array
+    slip_ratio: Array
+
+
+def soil_vector(soil: Soil) -> Array:
+    """Soil as the kernel reads it, shape (9,), in the order of ``layout.SOIL_PARAMETERS``."""
+    return np.array(
+        [
+            soil.cohesion,
+            math.tan(soil.friction_angle),
+            soil.sinkage_exponent,
+            soil.cohesive_modulus,
+            soil.frictional_modulus,
+            soil.shear_modulus,
+            soil.peak_stress_coefficient_0,
+            soil.peak_stress_coefficient_1,
+            soil.exit_angle_ratio,
+        ]
+    )
+
+
+def wheel_vector(wheel: TorusWheel) -> Array:
+    """Wheel as the kernel reads it: (minor_radius, half_width, major_radius)."""
+    return np.array([wheel.minor_radius, wheel.half_width, wheel.major_radius])
+
+
+@kernel()
+def _wrenches(
+    wheel: Array, soil: Array, states: Array, shear_rate: float, rest_speed: float, section: Array, contact: Array,
+    workspace: Array, wrenches: Array,
+) -> None:  # fmt: skip
+    for i in range(states.shape[0]):
+        wheel_wrench(
+            wheel, soil, states[i, 0], states[i, 1], states[i, 2], states[i, 3], states[i, 4], shear_rate, rest_speed,
+            section, contact, workspace, wrenches[i],
+        )  # fmt: skip
+        wrenches[i, WRENCH] = slip_ratio((wheel[0] + wheel[2]) * states[i, 2], states[i, 0])
+
+
+@kernel()
+def _sinkages(
+    wheel: Array, soil: Array, states: Array, tolerance: float, shear_rate: float, rest_speed: float, section: Array,
+    contact: Array, workspace: Array, wrench: Array, sinkage: Array, status: NDArray[np.int64],
+) -> None:  # fmt: skip
+    for i in range(states.shape[0]):
+        if states[i, 4] <= 0.0:
+            status[i] = 2
+            continue
+        sinkage[i], bogged = solve_sinkage(
+            wheel, soil, states[i, 0], states[i, 1], states[i, 2], states[i, 3], states[i, 4], 0.3 * wheel[0],
+            tolerance, shear_rate, rest_speed, section, contact, workspace, wrench,
+        )  # fmt: skip
+        status[i] = 1 if bogged else 0
+
+
+def _broadcast(names: tuple[str, ...], values: tuple[ArrayLike, ...]) -> tuple[Array, tuple[int, ...]]:
+    arrays = []
+    for name, value in zip(names, values, strict=True):
+        array = np.asarray(value, dtype=np.float64)
+        if not np.all(np.isfinite(array)):
+            bad = array[~np.isfinite(array)].flat[0]
+            raise InputError(f"{name} contains {bad}: give finite values.")
+        arrays.append(array)
+    try:
+        full = np.broadcast_arrays(*arrays)
+    except ValueError:
+        shapes = ", ".join(f"{n} {a.shape}" for n, a in zip(names, arrays, strict=True))
+        raise InputError(f"shapes do not broadcast: {shapes}.") from None
+    return np.ascontiguousarray(np.stack([a.reshape(-1) for a in full], axis=-1)), full[0].shape
+
+
+def _common(numerics: Numerics, nodes: int) -> tuple[Any, ...]:
+    return (
+        numerics.minimum_shear_rate,
+        numerics.rest_speed,
+        section_rule(numerics.section_nodes),
+        contact_rule(nodes),
+        np.empty(WORKSPACE_SIZE),
+    )
+
+
+def wheel_force(
+    wheel: TorusWheel,
+    soil: Soil,
+    v_x: ArrayLike,
+    v_y: ArrayLike,
+    omega: ArrayLike,
+    yaw_rate: ArrayLike,
+    sinkage: ArrayLike,
+    *,
+    numerics: Numerics = Numerics(),
+) -> WheelForce:
+    """Force of the soil on a wheel at a given sinkage (physics.md sections 2-5).
+
+    Args:
+        wheel: geometry.
+        soil: parameters.
+        v_x: hub velocity forward [m/s]; this and the following broadcast against each other.
+        v_y: hub velocity to the left [m/s].
+        omega: wheel speed, rolling forward positive [rad/s].
+        yaw_rate: of the wheel about the vertical, counter-clockwise positive [rad/s].
+        sinkage: in (0, wheel.minor_radius] [m].
+        numerics: quadrature; the default keeps the force within 1e-3 of the converged one.
+
+    Raises:
+        InputError: a value that is not finite, shapes that do not broadcast, a sinkage outside its range.
+    """
+    states, shape = _broadcast(
+        ("v_x", "v_y", "omega", "yaw_rate", "sinkage"), (v_x, v_y, omega, yaw_rate, sinkage)
+    )
+    outside = (states[:, 4] <= 0) | (states[:, 4] > wheel.minor_radius)
+    if outside.any():
+        raise InputError(
+            f"sinkage is {states[outside, 4][0]:g} m: the torus model holds in (0, {wheel.minor_radius:g}] m "
+            "(minor_radius); use equilibrium_sinkage to find one."
+        )
+    wrenches = np.empty((states.shape[0], WRENCH + 1))
+    rate, rest, section, contact, workspace = _common(numerics, numerics.contact_nodes)
+    _wrenches(wheel_vector(wheel), soil_vector(soil), states, rate, rest, section, contact, workspace, wrenches)
+    yaw_moment, torque, slip = (wrenches[:, j].reshape(shape) for j in (3, 4, 5))
+    return WheelForce(wrenches[:, :3].reshape(*shape, 3), yaw_moment, torque, slip)
+
+
+def equilibrium_sinkage(
+    wheel: TorusWheel,
+    soil: Soil,
+    v_x: ArrayLike,
+    v_y: ArrayLike,
+    omega: ArrayLike,
+    yaw_rate: ArrayLike,
+    load: ArrayLike,
+    *,
+    numerics: Numerics = Numerics(),
+) -> tuple[Any, Any]:
+    """Sinkage at which the soil carries the load, and a status for each (thesis A.4).
+
+    Args:
+        wheel: geometry.
+        soil: parameters.
+        v_x: as in :func:`wheel_force`; this and the following broadcast.
+        v_y: hub velocity to the left [m/s].
+        omega: wheel speed [rad/s].
+        yaw_rate: [rad/s].
+        load: vertical load [N].
+        numerics: quadrature and tolerance.
+
+    Returns:
+        ``(sinkage, status)``: arrays of the broadcast shape, or a float and a :class:`SinkageStatus` for scalars.
+        A bogged wheel has sinkage ``minor_radius``; it is never NaN.
+
+    Raises:
+        InputError: a value that is not finite or shapes that do not broadcast.
+    """
+    states, shape = _broadcast(("v_x", "v_y", "omega", "yaw_rate", "load"), (v_x, v_y, omega, yaw_rate, load))
+    sinkage = np.zeros(states.shape[0])
+    status = np.zeros(states.shape[0], dtype=np.int64)
+    rate, rest, section, contact, workspace = _common(numerics, numerics.contact_nodes)
+    tolerance = min(numerics.sinkage_tolerance, 1e-6)
+    _sinkages(
+        wheel_vector(wheel), soil_vector(soil), states, tolerance, rate, rest, section, contact, workspace,
+        np.empty(WRENCH), sinkage, status,
+    )  # fmt: skip
+    if shape == ():
+        return float(sinkage[0]), SinkageStatus(int(status[0]))
+    return sinkage.reshape(shape), status.reshape(shape)

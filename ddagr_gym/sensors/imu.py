@@ -1,0 +1,62 @@
+"""Accelerometer and gyro. The accelerometer feels specific force: no gravity on the flat, none in its model (5.5)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ddagr_gym.jit import kernel
+from ddagr_gym.physics.layout import (
+    ACCELERATION,
+    ACCELEROMETER_BIAS,
+    ACCELEROMETER_NOISE,
+    ACCELEROMETER_RANGE,
+    ACCELEROMETER_RESOLUTION,
+    ACCELEROMETER_SCALE,
+    ACCELEROMETER_VIBRATION,
+    GYRO_BIAS,
+    GYRO_NOISE,
+    GYRO_RANGE,
+    GYRO_RESOLUTION,
+    GYRO_SCALE,
+    IMU_MOUNTING_YAW,
+    IMU_POSITION,
+    READING,
+    SPECIFIC_FORCE,
+    V_X,
+    V_Y,
+    YAW_RATE,
+)
+
+
+@kernel(inline=True)
+def digitise(value: float, resolution: float, limit: float) -> float:
+    """Nearest multiple of ``resolution`` (0: none) inside +-limit."""
+    if resolution > 0.0:
+        value = math.floor(value / resolution + 0.5) * resolution
+    return min(max(value, -limit), limit)
+
+
+@kernel()
+def read_imu(row: NDArray[np.float64], noise: NDArray[np.float64]) -> None:
+    """Write READING[0:3]. ``noise``: standard normal draws for specific force x, y and yaw rate."""
+    rate = row[YAW_RATE]
+    turn = row[ACCELERATION + 2]
+    x = row[IMU_POSITION]
+    y = row[IMU_POSITION + 1]
+    force_x = row[SPECIFIC_FORCE] - turn * y - rate * rate * x
+    force_y = row[SPECIFIC_FORCE + 1] + turn * x - rate * rate * y
+    cosine = math.cos(row[IMU_MOUNTING_YAW])
+    sine = math.sin(row[IMU_MOUNTING_YAW])
+    speed = math.sqrt(row[V_X] * row[V_X] + row[V_Y] * row[V_Y])
+    deviation = row[ACCELEROMETER_NOISE] + row[ACCELEROMETER_VIBRATION] * speed
+    along = row[ACCELEROMETER_SCALE] * (cosine * force_x + sine * force_y) + row[ACCELEROMETER_BIAS]
+    across = row[ACCELEROMETER_SCALE + 1] * (cosine * force_y - sine * force_x) + row[ACCELEROMETER_BIAS + 1]
+    turning = row[GYRO_SCALE] * rate + row[GYRO_BIAS] + row[GYRO_NOISE] * noise[2]
+    resolution = row[ACCELEROMETER_RESOLUTION]
+    limit = row[ACCELEROMETER_RANGE]
+    row[READING] = digitise(along + deviation * noise[0], resolution, limit)
+    row[READING + 1] = digitise(across + deviation * noise[1], resolution, limit)
+    row[READING + 2] = digitise(turning, row[GYRO_RESOLUTION], row[GYRO_RANGE])

@@ -1,0 +1,329 @@
+"""The simulator: functions of (state, command, noise, parameters) over a batch of environments.
+
+The environment, the command line, replay, diagnosis and the tests all run :class:`Simulator`; a single robot is a
+batch of one, so that single and vectorised runs agree to the bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ddagr_gym.errors import InputError
+from ddagr_gym.parameters import Numerics, Robot, Sensors, Soil
+from ddagr_gym.physics import layout
+from ddagr_gym.physics.contact_geometry import contact_rule, section_rule
+from ddagr_gym.physics.contact_patch import WORKSPACE_SIZE
+from ddagr_gym.physics.effects import Effect, effect_table, load_effects
+from ddagr_gym.physics.terrain import SoilField
+from ddagr_gym.physics.wheel_forces import soil_vector
+from ddagr_gym.simulator_kernel import advance_rows, settle_rows
+
+Array = NDArray[np.float64]
+
+INITIAL_STATE = ("x", "y", "yaw", "v_x", "v_y", "yaw_rate", "omega_right", "omega_left")
+"""Names that an initial state may set; the others start at zero."""
+
+_MOTION = {
+    "x": layout.X,
+    "y": layout.Y,
+    "yaw": layout.YAW,
+    "v_x": layout.V_X,
+    "v_y": layout.V_Y,
+    "yaw_rate": layout.YAW_RATE,
+    "omega_right": layout.OMEGA,
+    "omega_left": layout.OMEGA + 1,
+}
+
+TRUTH: dict[str, int] = {f"true_{name}": index for name, index in _MOTION.items()}
+for _name, _first in (
+    ("slip_ratio", layout.SLIP_RATIO),
+    ("sinkage", layout.SINKAGE),
+    ("load", layout.LOAD),
+    ("force_x", layout.FORCE_X),
+    ("force_y", layout.FORCE_Y),
+    ("axle_torque", layout.AXLE_TORQUE),
+    ("bogged", layout.BOGGED),
+):
+    TRUTH |= {f"true_{_name}_{wheel + 1}": _first + wheel for wheel in range(4)}
+"""Truth columns of a simulated drive and where they stand in a row."""
+
+Soils = Soil | Sequence[Soil]
+
+
+def _soils(soil: Soils) -> Array:
+    per_wheel = [soil] * 4 if isinstance(soil, Soil) else list(soil)
+    if len(per_wheel) != 4:
+        raise InputError(f"{len(per_wheel)} soils given: give one for all wheels, or four (1 front right ... 4 rear left).")
+    return np.concatenate([soil_vector(item) for item in per_wheel])
+
+
+def _sensor_entries(sensors: Sensors) -> dict[int, Any]:
+    imu, encoder, pose = sensors.imu, sensors.encoder, sensors.pose
+    return {
+        layout.SAMPLE_PERIOD: sensors.period,
+        layout.ACCELEROMETER_NOISE: imu.accelerometer_noise,
+        layout.ACCELEROMETER_VIBRATION: imu.accelerometer_vibration,
+        layout.ACCELEROMETER_BIAS: imu.accelerometer_bias,
+        layout.ACCELEROMETER_SCALE: imu.accelerometer_scale,
+        layout.ACCELEROMETER_RANGE: imu.accelerometer_range,
+        layout.ACCELEROMETER_RESOLUTION: imu.accelerometer_resolution,
+        layout.GYRO_NOISE: imu.gyro_noise,
+        layout.GYRO_BIAS: imu.gyro_bias,
+        layout.GYRO_SCALE: imu.gyro_scale,
+        layout.GYRO_RANGE: imu.gyro_range,
+        layout.GYRO_RESOLUTION: imu.gyro_resolution,
+        layout.IMU_POSITION: imu.position,
+        layout.IMU_MOUNTING_YAW: imu.mounting_yaw,
+        layout.ENCODER_COUNTS: encoder.counts_per_revolution,
+        layout.ENCODER_NOISE: encoder.speed_noise,
+        layout.ENCODER_SCALE: encoder.scale,
+        layout.POSE_PERIOD: 1.0 / pose.rate if pose.rate > 0 else 0.0,
+        layout.POSE_POSITION_NOISE: pose.position_noise,
+        layout.POSE_YAW_NOISE: pose.yaw_noise,
+    }
+
+
+def build_row(robot: Robot, soil: Soils, sensors: Sensors) -> Array:
+    """Row of a robot at rest at the world origin, shape (layout.SIZE,)."""
+    row = np.zeros(layout.SIZE)
+    wheels = [[getattr(w, name) for w in robot.wheels] for name in ("minor_radius", "half_width", "major_radius")]
+    entries: dict[int, Any] = {
+        layout.BASE_BODY: (robot.mass, robot.yaw_inertia, *robot.centre_of_mass, 0.0, 0.0),
+        layout.BASE_WHEEL: np.ravel(wheels),
+        layout.HALF_WHEELBASE: robot.half_wheelbase,
+        layout.HALF_TRACK: robot.half_track,
+        layout.BASE_MOTOR_RATE: robot.motor_rate,
+        layout.MAXIMUM_WHEEL_SPEED: robot.maximum_wheel_speed,
+        layout.BASE_SOIL: _soils(soil),
+        **_sensor_entries(sensors),
+    }
+    for index, value in entries.items():
+        values = np.atleast_1d(np.asarray(value, dtype=np.float64))
+        row[index : index + values.size] = values
+    return row
+
+
+class Simulator:
+    """A batch of robots, stepped at the sensor rate.
+
+    Args:
+        count: number of environments N.
+        numerics: accuracy against cost.
+        effects: missing physics, the same kinds in every environment (see ``effect_parameters`` for sizes).
+        fields: soil grids of equal shape that environments may drive on.
+        threads: threads that share the batch; results do not depend on it.
+
+    Attributes:
+        rows: (N, layout.SIZE) state and parameters; copy to save, assign to restore.
+        effect_parameters: (N, actions, layout.EFFECT_PARAMETERS).
+        effect_memory: (N, actions, layout.EFFECT_MEMORY).
+        field_index: (N,) soil grid of each environment, -1 for the row's own soils.
+    """
+
+    def __init__(
+        self,
+        count: int = 1,
+        *,
+        numerics: Numerics = Numerics(),
+        effects: Sequence[Effect | str] = (),
+        fields: Sequence[SoilField] = (),
+        threads: int = 1,
+    ) -> None:
+        if count < 1 or threads < 1:
+            raise InputError(f"count is {count} and threads {threads}: both must be at least 1.")
+        self.count = count
+        self.numerics = numerics
+        self.effects = load_effects(effects)
+        self.rows = np.zeros((count, layout.SIZE))
+        self._points, self._addresses, parameters = effect_table(self.effects)
+        self.effect_parameters = np.repeat(parameters[None], count, axis=0)
+        self.effect_memory = np.zeros((count, len(parameters), layout.EFFECT_MEMORY))
+        self.field_index = np.full(count, -1, dtype=np.int64)
+        self._set_fields(fields)
+        self._options = np.array(
+            [
+                numerics.jacobian_refresh,
+                numerics.sinkage_tolerance,
+                numerics.minimum_shear_rate,
+                numerics.rest_speed,
+                numerics.launch_change,
+                numerics.accepted_error,
+            ]
+        )
+        self._division = np.array([numerics.substeps, numerics.launch_substeps], dtype=np.int64)
+        self._rules = (
+            section_rule(numerics.section_nodes),
+            contact_rule(numerics.contact_nodes),
+            contact_rule(numerics.jacobian_contact_nodes),
+        )
+        self._chunks = np.linspace(0, count, min(threads, count) + 1).astype(int)
+        self._scratch = [self._workspaces() for _ in self._chunks[1:]]
+        self._pool = ThreadPoolExecutor(len(self._scratch)) if len(self._scratch) > 1 else None
+
+    @staticmethod
+    def _workspaces() -> tuple[Array, Array, Array, Array]:
+        return np.zeros(WORKSPACE_SIZE), np.zeros((8, 8)), np.zeros((6, 3)), np.zeros(layout.SIZE)
+
+    def _set_fields(self, fields: Sequence[SoilField]) -> None:
+        if len({field.values.shape for field in fields}) > 1:
+            shapes = sorted({field.values.shape for field in fields})
+            raise InputError(f"soil fields of shapes {shapes}: give all fields of one batch the same shape.")
+        values = [field.values for field in fields] or [np.zeros((2, 2, 9))]
+        geometry = [(*field.origin, *field.spacing) for field in fields] or [(0.0, 0.0, 1.0, 1.0)]
+        self._fields = np.ascontiguousarray(np.stack(values), dtype=np.float64)
+        self._field_geometry = np.array(geometry, dtype=np.float64)
+
+    def configure(self, index: int, robot: Robot, soil: Soils, sensors: Sensors = Sensors()) -> None:
+        """Give environment ``index`` its robot, soil and sensors; it stands at rest until :meth:`reset`."""
+        self.rows[index] = build_row(robot, soil, sensors)
+
+    def reset(
+        self, chosen: ArrayLike | None = None, state: Mapping[str, ArrayLike] | None = None, *, time: float = 0.0
+    ) -> None:
+        """Put environments at a state, forget the past, and settle their sinkages.
+
+        Args:
+            chosen: indices, all by default.
+            state: values or (len(chosen),) arrays for some of ``INITIAL_STATE``; zero for the others.
+            time: of the state [s].
+
+        Raises:
+            InputError: unknown name or a value that is not finite.
+        """
+        indices = np.arange(self.count) if chosen is None else np.atleast_1d(np.asarray(chosen, dtype=np.int64))
+        given = dict(state or {})
+        for name in given:
+            if name not in _MOTION:
+                raise InputError(f"initial state has no {name!r}: it takes {', '.join(_MOTION)}.")
+        for name, index in _MOTION.items():
+            values = np.asarray(given.get(name, 0.0), dtype=np.float64)
+            if not np.isfinite(values).all():
+                raise InputError(f"initial {name} is {given[name]!r}: give finite values.")
+            self.rows[indices, index] = values
+        self.rows[indices, layout.TIME] = time
+        self.rows[indices, layout.NEXT_POSE_TIME] = time
+        for index, size in ((layout.WHEEL_ANGLE, 2), (layout.LAST_COUNT, 2), (layout.SINKAGE, 4)):
+            self.rows[np.ix_(indices, np.arange(index, index + size))] = 0.0
+        self.effect_memory[indices] = 0.0
+        workspace, scratch = self._scratch[0][:2]
+        settle_rows(self.rows, indices, *self._ground(), *self._effects(), self._options, *self._rules, workspace, scratch)
+
+    def _ground(self) -> tuple[Array, Array, NDArray[np.int64]]:
+        return self._fields, self._field_geometry, self.field_index
+
+    def _effects(self) -> tuple[NDArray[np.int64], NDArray[np.int64], Array, Array]:
+        return self._points, self._addresses, self.effect_parameters, self.effect_memory
+
+    def advance(self, commands: Array, noise: Array, recorded: NDArray[np.int64], readings: Array, record: Array) -> None:
+        """Advance all environments by the samples in ``noise``, without checks; see :func:`advance_rows`.
+
+        Args:
+            commands: (N, samples or 1, 2) right and left bank speed commands [rad/s].
+            noise: (N, samples, layout.NOISE_CHANNELS) standard normal draws.
+            recorded: (K,) row entries to record after each sample.
+            readings: (N, samples, 8), written in the order of ``layout.READINGS``.
+            record: (N, samples, K), written.
+        """
+
+        def run(part: int) -> None:
+            workspaces = self._scratch[part]
+            advance_rows(
+                self.rows, self._chunks[part], self._chunks[part + 1], commands, noise, *self._ground(),
+                *self._effects(), self._options, self._division, *self._rules, *workspaces, readings, recorded,
+                record,
+            )  # fmt: skip
+
+        if self._pool is None:
+            run(0)
+        else:
+            list(self._pool.map(run, range(len(self._scratch))))
+
+    def step(
+        self, commands: ArrayLike, noise: ArrayLike | None = None, *, recorded: Sequence[int] = (), samples: int = 1
+    ) -> tuple[Array, Array]:
+        """Advance by ``samples`` sensor samples, or by as many as ``commands`` has.
+
+        Args:
+            commands: (N, 2) held, or (N, T, 2) one per sample [rad/s].
+            noise: (N, T, layout.NOISE_CHANNELS) standard normal draws; none by default.
+            recorded: row entries to record.
+            samples: T for held commands.
+
+        Returns:
+            readings (N, T, 8) and record (N, T, len(recorded)).
+
+        Raises:
+            InputError: commands of the wrong shape or not finite.
+        """
+        given = np.ascontiguousarray(commands, dtype=np.float64)
+        if given.ndim == 2:
+            given = given[:, None, :]
+        if given.ndim != 3 or given.shape[0] != self.count or given.shape[2] != 2:
+            raise InputError(f"commands have shape {given.shape}: give ({self.count}, 2) or ({self.count}, T, 2).")
+        if not np.isfinite(given).all():
+            raise InputError("commands contain NaN or infinity: give finite bank speeds in rad/s.")
+        steps = given.shape[1] if given.shape[1] > 1 else samples
+        draws = np.zeros((self.count, steps, layout.NOISE_CHANNELS)) if noise is None else np.asarray(noise, dtype=float)
+        entries = np.asarray(recorded, dtype=np.int64).reshape(-1)
+        readings = np.empty((self.count, steps, len(layout.READINGS)))
+        record = np.empty((self.count, steps, entries.size))
+        self.advance(given, np.ascontiguousarray(draws), entries, readings, record)
+        return readings, record
+
+    @property
+    def bogged(self) -> NDArray[np.bool_]:
+        """(N,) whether any wheel has found no sinkage that carries it."""
+        return np.asarray(self.rows[:, layout.BOGGED : layout.BOGGED + 4].any(axis=1))
+
+
+def simulate(
+    robot: Robot,
+    soil: Soils,
+    commands: ArrayLike,
+    *,
+    sensors: Sensors = Sensors(),
+    effects: Sequence[Effect | str] = (),
+    field: SoilField | None = None,
+    numerics: Numerics = Numerics(),
+    initial_state: Mapping[str, float] | None = None,
+    seed: int = 0,
+) -> dict[str, Array]:
+    """Drive one robot by a series of commands and return what a recording of it would hold, and the truth.
+
+    Args:
+        robot: the robot.
+        soil: one soil, or one per wheel.
+        commands: (T, 2) right and left bank speed commands at the sensor rate [rad/s].
+        sensors: instruments; ``sensors.imu.sample_rate`` sets the rate.
+        effects: objects or ``name=size`` texts.
+        field: soil by place, instead of ``soil``.
+        numerics: accuracy.
+        initial_state: see :meth:`Simulator.reset`; at rest at the origin by default.
+        seed: of the sensor noise.
+
+    Returns:
+        Columns (T,) by name: ``t``, commands, readings (NaN where a channel has no new sample) and ``true_*``.
+        Row k holds the command applied from ``t[k] - period`` to ``t[k]`` and the readings at ``t[k]``.
+
+    Raises:
+        InputError: bad shapes or values, each in one sentence.
+    """
+    given = np.asarray(commands, dtype=np.float64)
+    if given.ndim != 2 or given.shape[1] != 2 or given.shape[0] < 1:
+        raise InputError(f"commands have shape {given.shape}: give (T, 2) right and left bank speeds, T >= 1.")
+    simulator = Simulator(1, numerics=numerics, effects=effects, fields=() if field is None else (field,))
+    simulator.configure(0, robot, soil, sensors)
+    simulator.field_index[0] = -1 if field is None else 0
+    simulator.reset(state=initial_state)
+    noise = np.random.default_rng(seed).standard_normal((1, len(given), layout.NOISE_CHANNELS))
+    readings, record = simulator.step(given[None], noise, recorded=list(TRUTH.values()))
+    columns = {"t": sensors.period * np.arange(1, len(given) + 1)}
+    columns |= {"command_right": given[:, 0].copy(), "command_left": given[:, 1].copy()}
+    columns |= {name: readings[0, :, i].copy() for i, name in enumerate(layout.READINGS)}
+    columns |= {name: record[0, :, i].copy() for i, name in enumerate(TRUTH)}
+    return columns

@@ -1,0 +1,165 @@
+"""One sensor sample of the simulator, compiled: the only place where the order of things is set.
+
+    commands -> motors -> loads -> soil -> body (forces inside) -> readings
+
+Environments are rows of a matrix and independent of each other; see :mod:`ddagr_gym.physics.layout`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ddagr_gym.jit import kernel
+from ddagr_gym.physics.body_dynamics import evaluate_forces, place_wheels, restore_body
+from ddagr_gym.physics.callbacks import apply_effects
+from ddagr_gym.physics.integrators import advance_body
+from ddagr_gym.physics.layout import (
+    BASE_MOTOR_RATE,
+    COMMAND,
+    DERIVATIVE_VALID,
+    MAXIMUM_WHEEL_SPEED,
+    MOTOR_RATE,
+    MOTOR_TARGET,
+    OMEGA,
+    POINT_COMMANDS,
+    POINT_LOADS,
+    POINT_MOTORS,
+    POINT_READINGS,
+    POINT_SOIL,
+    READING,
+    SAMPLE_PERIOD,
+    V_X,
+    WHEEL,
+)
+from ddagr_gym.physics.terrain import sample_soil
+from ddagr_gym.sensors.imu import read_imu
+from ddagr_gym.sensors.pose_receiver import read_pose
+from ddagr_gym.sensors.wheel_encoder import read_encoders
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+@kernel()
+def _drive(row: Array, command: Array, points: Integers, addresses: Integers, parameters: Array, memory: Array) -> None:
+    """Commands and motor loops for the coming sample."""
+    row[COMMAND] = command[0]
+    row[COMMAND + 1] = command[1]
+    apply_effects(POINT_COMMANDS, row, points, addresses, parameters, memory)
+    for bank in range(2):
+        limit = row[MAXIMUM_WHEEL_SPEED]
+        row[COMMAND + bank] = min(max(row[COMMAND + bank], -limit), limit)
+        row[MOTOR_TARGET + bank] = row[COMMAND + bank]
+        row[MOTOR_RATE + bank] = row[BASE_MOTOR_RATE]
+    apply_effects(POINT_MOTORS, row, points, addresses, parameters, memory)
+
+
+@kernel()
+def _division(row: Array, substeps: int, launch_substeps: int, launch_change: float) -> int:
+    """Steps for the coming sample: more while a bank's rim speed changes fast against the wheel's speed."""
+    step = row[SAMPLE_PERIOD] / substeps
+    for bank in range(2):
+        rim = row[WHEEL + bank] + row[WHEEL + 8 + bank]
+        change = (row[MOTOR_TARGET + bank] - row[OMEGA + bank]) * (1.0 - math.exp(-row[MOTOR_RATE + bank] * step))
+        speed = max(abs(rim * row[OMEGA + bank]), abs(row[V_X]))
+        if abs(rim * change) > launch_change * speed and change != 0.0:
+            return substeps * launch_substeps
+    return substeps
+
+
+@kernel()
+def _prepare_ground(
+    row: Array, values: Array, geometry: Array, use_field: bool, points: Integers, addresses: Integers,
+    parameters: Array, memory: Array,
+) -> None:  # fmt: skip
+    """Loads and soil as the effects leave them."""
+    restore_body(row)
+    apply_effects(POINT_LOADS, row, points, addresses, parameters, memory)
+    place_wheels(row)
+    sample_soil(row, values, geometry, use_field)
+    apply_effects(POINT_SOIL, row, points, addresses, parameters, memory)
+
+
+@kernel()
+def settle_rows(
+    rows: Array, chosen: Integers, fields: Array, field_geometry: Array, field_index: Integers, points: Integers,
+    addresses: Integers, parameters: Array, memory: Array, numerics: Array, section: Array, contact: Array,
+    coarse: Array, workspace: Array, scratch: Array,
+) -> None:  # fmt: skip
+    """Sinkages and forces at the rows' present motion, from nothing; arguments as :func:`advance_rows`."""
+    for n in chosen:
+        row = rows[n]
+        use_field = field_index[n] >= 0
+        values = fields[max(field_index[n], 0)]
+        geometry = field_geometry[max(field_index[n], 0)]
+        _prepare_ground(row, values, geometry, use_field, points, addresses, parameters[n], memory[n])
+        row[DERIVATIVE_VALID] = 0.0
+        evaluate_forces(
+            row, numerics[0], numerics[1], numerics[2], numerics[3], section, contact, coarse, workspace, scratch,
+            points, addresses, parameters[n], memory[n],
+        )  # fmt: skip
+
+
+@kernel()
+def advance_rows(
+    rows: Array, first: int, last: int, commands: Array, noise: Array, fields: Array, field_geometry: Array,
+    field_index: Integers, points: Integers, addresses: Integers, parameters: Array, memory: Array, numerics: Array,
+    division: Integers, section: Array, contact: Array, coarse: Array, workspace: Array, scratch: Array,
+    jacobian: Array, saved: Array, readings: Array, recorded: Integers, record: Array,
+) -> None:  # fmt: skip
+    """Advance rows ``first`` to ``last`` (exclusive) by the samples in ``readings``.
+
+    Args:
+        rows: (N, layout.SIZE), updated.
+        first: first row.
+        last: one past the last row.
+        commands: (N, samples or 1, 2) bank speed commands; one is held over all samples.
+        noise: (N, samples, NOISE_CHANNELS) standard normal draws.
+        fields: (fields or 1, nx, ny, 9) soil grids.
+        field_geometry: (fields or 1, 4).
+        field_index: (N,) grid of each row, -1 for its base soils.
+        points: (effects,).
+        addresses: (effects,).
+        parameters: (N, effects, EFFECT_PARAMETERS).
+        memory: (N, effects, EFFECT_MEMORY), updated.
+        numerics: refresh, tolerance, minimum shear rate, rest speed, launch change, accepted error.
+        division: steps per sample, and their further division at launches.
+        section: section rule.
+        contact: contact rule.
+        coarse: contact rule of the derivative.
+        workspace: of the contact kernel.
+        scratch: (8, 8).
+        jacobian: (6, 3).
+        saved: (layout.SIZE,).
+        readings: (N, samples, 8), written.
+        recorded: (K,) row entries to record.
+        record: (N, samples, K), written.
+    """
+    samples = readings.shape[1]
+    held = commands.shape[1] == 1
+    for n in range(first, last):
+        row = rows[n]
+        use_field = field_index[n] >= 0
+        values = fields[max(field_index[n], 0)]
+        geometry = field_geometry[max(field_index[n], 0)]
+        for k in range(samples):
+            _drive(row, commands[n, 0 if held else k], points, addresses, parameters[n], memory[n])
+            _prepare_ground(row, values, geometry, use_field, points, addresses, parameters[n], memory[n])
+            steps = _division(row, division[0], division[1], numerics[4])
+            step = row[SAMPLE_PERIOD] / steps
+            for _ in range(steps):
+                advance_body(
+                    row, step, numerics[0], numerics[1], numerics[2], numerics[3], numerics[5], section, contact,
+                    coarse, workspace, scratch, jacobian[:3], jacobian[3:], saved, points, addresses, parameters[n], memory[n],
+                )  # fmt: skip
+            read_imu(row, noise[n, k, 0:3])
+            read_encoders(row, noise[n, k, 3:5], row[SAMPLE_PERIOD])
+            read_pose(row, noise[n, k, 5:8])
+            apply_effects(POINT_READINGS, row, points, addresses, parameters[n], memory[n])
+            for j in range(8):
+                readings[n, k, j] = row[READING + j]
+            for j in range(recorded.shape[0]):
+                record[n, k, j] = row[recorded[j]]
