@@ -288,11 +288,11 @@ class Numerics(Validated):
     contact_nodes: int = 7
     jacobian_contact_nodes: int = 2
     substeps: int = 1
-    launch_substeps: int = 8
+    launch_substeps: int = 4
     launch_change: float = bounded("-", 0.0, 1e9, default=0.1)
-    accepted_error: float = bounded("m/s", 0.0, 1e9, default=5e-4)
+    accepted_error: float = bounded("m/s", 0.0, 1e9, default=4e-3)
     jacobian_refresh: float = bounded("-", 0.0, 1.0, default=0.05)
-    sinkage_tolerance: float = bounded("-", 0.0, 0.1, default=2e-3, open_low=True)
+    sinkage_tolerance: float = bounded("-", 0.0, 0.1, default=8e-3, open_low=True)
     minimum_shear_rate: float = bounded("rad/s", 0.0, 1.0, default=1e-3, open_low=True)
     rest_speed: float = bounded("m/s", 0.0, 0.1, default=1e-3, open_low=True)
 

@@ -178,6 +178,27 @@ class Simulator:
         self._fields = np.ascontiguousarray(np.stack(values), dtype=np.float64)
         self._field_geometry = np.array(geometry, dtype=np.float64)
 
+    def set_field(self, index: int, field: SoilField | None) -> None:
+        """Let environment ``index`` drive on a soil grid of its own, or, with None, on its row's soils.
+
+        Raises:
+            InputError: a grid of another shape than the batch's.
+        """
+        if field is None:
+            self.field_index[index] = -1
+            return
+        if self._fields.shape[0] != self.count or self._fields.shape[1:] != field.values.shape:
+            if (self.field_index >= 0).any():
+                raise InputError(
+                    f"soil field of shape {field.values.shape} in a batch of shape {self._fields.shape[1:]}: "
+                    "give all fields of one batch the same shape."
+                )
+            self._fields = np.zeros((self.count, *field.values.shape))
+            self._field_geometry = np.ones((self.count, 4))
+        self._fields[index] = field.values
+        self._field_geometry[index] = (*field.origin, *field.spacing)
+        self.field_index[index] = index
+
     def configure(self, index: int, robot: Robot, soil: Soils, sensors: Sensors = Sensors()) -> None:
         """Give environment ``index`` its robot, soil and sensors; it stands at rest until :meth:`reset`."""
         self.rows[index] = build_row(robot, soil, sensors)
@@ -274,6 +295,11 @@ class Simulator:
         record = np.empty((self.count, steps, entries.size))
         self.advance(given, np.ascontiguousarray(draws), entries, readings, record)
         return readings, record
+
+    def close(self) -> None:
+        """Stop the threads; may be called again."""
+        if self._pool is not None:
+            self._pool.shutdown()
 
     @property
     def bogged(self) -> NDArray[np.bool_]:

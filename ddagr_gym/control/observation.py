@@ -1,0 +1,50 @@
+"""What a controller sees of a row turn: the layout and the scaling of the observation."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+OBSERVATION = (
+    ("specific_force_x", "m/s^2", 1.0),
+    ("specific_force_y", "m/s^2", 1.0),
+    ("yaw_rate", "rad/s", 0.5),
+    ("encoder_right", "rad/s", 2.0),
+    ("encoder_left", "rad/s", 2.0),
+    ("last_action_right", "-", 1.0),
+    ("last_action_left", "-", 1.0),
+    ("side", "-", 1.0),
+    ("target_radius", "m", 1.0),
+    ("target_speed", "m/s", 0.25),
+    ("heading_to_go", "rad", math.pi),
+    ("run_in_to_go", "m", 1.0),
+)
+"""Entries: name, unit, and the value that is observed as 1."""
+
+SCALES = np.array([entry[2] for entry in OBSERVATION])
+
+
+class TurnObservation(NamedTuple):
+    """An observation in its units; see :data:`OBSERVATION`."""
+
+    specific_force_x: float
+    specific_force_y: float
+    yaw_rate: float
+    encoder_right: float
+    encoder_left: float
+    last_action_right: float
+    last_action_left: float
+    side: float
+    target_radius: float
+    target_speed: float
+    heading_to_go: float
+    run_in_to_go: float
+
+
+def decode(observation: ArrayLike) -> TurnObservation:
+    """Observation (entries,) of the environment in SI units; entries beyond the basic ones are ignored."""
+    values = np.asarray(observation, dtype=float)[: len(SCALES)] * SCALES
+    return TurnObservation(*values.tolist())

@@ -1,0 +1,93 @@
+"""Keyword arguments of ``gym.make`` turned into settings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+from gymnasium import spaces
+
+from ddagr_gym.envs.settings import Randomisation, RewardWeights, TurnSettings
+from ddagr_gym.errors import InputError, unknown_name
+from ddagr_gym.parameters import Numerics, Robot, Sensors, Soil
+from ddagr_gym.physics.effects import Effect, load_effects
+from ddagr_gym.physics.soil_draws import SoilDistribution, distribution_names, get_distribution
+from ddagr_gym.presets import get_robot, get_soil, soil_names
+
+DEFAULT_SOIL = "thesis_a1_range"
+INFO_LEVELS = ("small", "full")
+
+Effects = str | Path | Effect | Iterable[str | Effect]
+
+
+def find_soil(soil: str | Soil | SoilDistribution) -> Soil | SoilDistribution:
+    """Soil or distribution by name; objects pass through.
+
+    Raises:
+        InputError: unknown name, with the closest ones.
+    """
+    if not isinstance(soil, str):
+        return soil
+    if soil in distribution_names():
+        return get_distribution(soil)
+    if soil in soil_names():
+        return get_soil(soil)
+    raise unknown_name("soil", soil, [*distribution_names(), *soil_names()])
+
+
+def make_settings(
+    *,
+    robot: str | Robot = "ddagr",
+    soil: str | Soil | SoilDistribution = DEFAULT_SOIL,
+    radius: float | tuple[float, float] = 0.80,
+    side: str = "random",
+    run_in: float = 0.5,
+    run_out: float = 0.5,
+    speed: float = 0.20,
+    sensors: Sensors = Sensors(),
+    randomisation: bool | Randomisation = True,
+    reward: RewardWeights = RewardWeights(),
+    effects: Effects = (),
+    numerics: Numerics = Numerics(),
+) -> TurnSettings:
+    """Settings from what ``gym.make("DDAGR-Turn-v0", ...)`` takes; see :class:`ddagr_gym.envs.TurnEnv`.
+
+    Raises:
+        InputError: any value that is not valid, in one sentence.
+    """
+    if isinstance(randomisation, bool):
+        randomisation = Randomisation() if randomisation else Randomisation.none()
+    return TurnSettings(
+        robot=get_robot(robot) if isinstance(robot, str) else robot,
+        soil=find_soil(soil),
+        radius=radius,
+        side=side,
+        run_in=run_in,
+        run_out=run_out,
+        speed=speed,
+        sensors=sensors,
+        randomisation=randomisation,
+        reward=reward,
+        effects=load_effects(effects),
+        numerics=numerics,
+    )
+
+
+def check_info_level(level: str) -> str:
+    """``level`` if it is one of INFO_LEVELS, else an InputError."""
+    if level not in INFO_LEVELS:
+        raise unknown_name("info_level", level, INFO_LEVELS)
+    return level
+
+
+def check_mode(mode: str | None, allowed: Iterable[str | None]) -> str | None:
+    """``mode`` if it is None or allowed, else an InputError."""
+    if mode is not None and mode not in allowed:
+        raise InputError(f"render_mode is {mode!r}: give None, {', '.join(repr(m) for m in allowed)}.")
+    return mode
+
+
+def action_space() -> spaces.Box:
+    """Right and left bank speed command over the robot's maximum_wheel_speed."""
+    return spaces.Box(-1.0, 1.0, (2,), np.float32)

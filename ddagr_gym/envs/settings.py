@@ -1,0 +1,191 @@
+"""Settings of the row-turn environment, and the episodes that they draw."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields, replace
+
+import numpy as np
+
+from ddagr_gym.control.row_turn import SIDES, RowTurn
+from ddagr_gym.errors import InputError, unknown_name
+from ddagr_gym.parameters import Imu, Numerics, Robot, Sensors, Soil, Validated, bounded
+from ddagr_gym.physics.effects import Effect
+from ddagr_gym.physics.soil_draws import SoilDistribution, draw_soil, soil_field
+from ddagr_gym.physics.terrain import SoilField
+from ddagr_gym.presets import ddagr
+
+
+@dataclass(frozen=True)
+class Randomisation(Validated):
+    """What differs from episode to episode besides the soil. Standard deviations unless said otherwise.
+
+    Attributes:
+        mass: relative [-]; tank, battery and fruit.
+        yaw_inertia: relative [-]; the thesis states 100 kg m^2 without a source.
+        motor_rate: relative [-]; the thesis has 4.5 1/s and, retuned, 1.4 1/s.
+        command_delay: largest dead time [s], drawn uniformly from 0.
+        gyro_bias: [rad/s]; what a still calibration of the MPU 6050 leaves over a morning.
+        accelerometer_bias: per axis [m/s^2]; datasheet zero-g tolerance 50 mg, of which calibration leaves a tenth.
+        lateral_offset: of the start [m].
+        heading_offset: of the start [rad].
+        soil_variation: of soil strength along the drive, relative [-]; 0 for one soil everywhere.
+        correlation_length: of that variation [m].
+    """
+
+    mass: float = bounded("-", 0.0, 0.3, default=0.03)
+    yaw_inertia: float = bounded("-", 0.0, 0.3, default=0.10)
+    motor_rate: float = bounded("-", 0.0, 0.3, default=0.05)
+    command_delay: float = bounded("s", 0.0, 0.4, default=0.04)
+    gyro_bias: float = bounded("rad/s", 0.0, 0.5, default=2e-3)
+    accelerometer_bias: float = bounded("m/s^2", 0.0, 5.0, default=0.05)
+    lateral_offset: float = bounded("m", 0.0, 0.3, default=0.01)
+    heading_offset: float = bounded("rad", 0.0, 0.3, default=0.01)
+    soil_variation: float = bounded("-", 0.0, 0.5, default=0.05)
+    correlation_length: float = bounded("m", 0.05, 100.0, default=0.5)
+
+    @classmethod
+    def none(cls) -> Randomisation:
+        """Every episode alike."""
+        zeros = {item.name: 0.0 for item in fields(cls) if item.name != "correlation_length"}
+        return cls(**zeros)
+
+
+@dataclass(frozen=True)
+class RewardWeights(Validated):
+    """Weights of the reward's named terms, each documented in :mod:`ddagr_gym.envs.turn_kernel`."""
+
+    progress: float = bounded("1/m", 0.0, 1e3, default=2.0)
+    cross_track: float = bounded("1/(m s)", 0.0, 1e3, default=4.0)
+    curvature: float = bounded("1/s", 0.0, 1e3, default=0.5)
+    action_rate: float = bounded("-", 0.0, 1e3, default=0.05)
+    slip_power: float = bounded("1/J", 0.0, 1e3, default=1e-3)
+    exit_error: float = bounded("-", 0.0, 1e3, default=5.0)
+    success: float = bounded("-", 0.0, 1e3, default=10.0)
+    failure: float = bounded("-", 0.0, 1e3, default=10.0)
+
+
+@dataclass(frozen=True)
+class Episode:
+    """Everything that one episode needs besides noise; pass one as ``options={"episode": ...}`` to repeat it.
+
+    Attributes:
+        turn: the commanded manoeuvre.
+        robot: as built, with its true mass and inertia.
+        soils: one per wheel, or one for all.
+        sensors: with their true biases.
+        command_delay: [s].
+        lateral_offset: of the start, to the left [m].
+        heading_offset: [rad].
+        field: soil by place instead of ``soils``.
+        rejected_soils: immobilising draws before this one.
+    """
+
+    turn: RowTurn
+    robot: Robot
+    soils: Soil | tuple[Soil, ...]
+    sensors: Sensors
+    command_delay: float = 0.0
+    lateral_offset: float = 0.0
+    heading_offset: float = 0.0
+    field: SoilField | None = None
+    rejected_soils: int = 0
+
+
+@dataclass(frozen=True)
+class TurnSettings(Validated):
+    """Settings shared by the single and the batched environment.
+
+    Attributes:
+        robot: nominal robot.
+        soil: a soil, or a distribution from which each episode draws one.
+        radius: R* [m], or (low, high) to draw from.
+        side: "left", "right" or "random".
+        run_in: straight before the turn [m].
+        run_out: straight after it [m].
+        speed: reference speed [m/s].
+        sensors: nominal sensors.
+        randomisation: what differs from episode to episode.
+        reward: weights.
+        effects: missing physics.
+        numerics: accuracy.
+    """
+
+    robot: Robot = field(default_factory=ddagr)
+    soil: Soil | SoilDistribution | None = None
+    radius: float | tuple[float, float] = 0.80
+    side: str = "random"
+    run_in: float = bounded("m", 0.0, 5.0, default=0.5)
+    run_out: float = bounded("m", 0.05, 5.0, default=0.5)
+    speed: float = bounded("m/s", 0.0, 2.0, default=0.20, open_low=True)
+    sensors: Sensors = Sensors()
+    randomisation: Randomisation = Randomisation()
+    reward: RewardWeights = RewardWeights()
+    effects: tuple[Effect, ...] = ()
+    numerics: Numerics = Numerics()
+
+    def _check(self) -> None:
+        if self.soil is None:
+            raise InputError("TurnSettings.soil is missing: give a soil or a soil distribution.")
+        if self.side != "random" and self.side not in SIDES:
+            raise unknown_name("side", self.side, [*SIDES, "random"])
+        for radius in np.atleast_1d(np.asarray(self.radius, dtype=float)):
+            self._turn(float(radius), "left")
+
+    def _turn(self, radius: float, side: str) -> RowTurn:
+        return RowTurn(radius=radius, side=side, run_in=self.run_in, run_out=self.run_out, speed=self.speed)
+
+    def draw(self, rng: np.random.Generator) -> Episode:
+        """One episode; the same generator state gives the same episode."""
+        spread = self.randomisation
+        side = ("left", "right")[int(rng.integers(2))] if self.side == "random" else self.side
+        radius = self.radius if isinstance(self.radius, (int, float)) else float(rng.uniform(*self.radius))
+        robot = self._draw_robot(rng)
+        soil, rejected = (self.soil, 0) if isinstance(self.soil, Soil) else draw_soil(self.soil, rng, robot)
+        turn = self._turn(float(radius), side)
+        return Episode(
+            turn=turn,
+            robot=robot,
+            soils=soil,
+            sensors=self._draw_sensors(rng),
+            command_delay=float(rng.uniform(0.0, spread.command_delay)),
+            lateral_offset=float(spread.lateral_offset * rng.standard_normal()),
+            heading_offset=float(spread.heading_offset * rng.standard_normal()),
+            field=self._draw_field(soil, turn, rng),
+            rejected_soils=rejected,
+        )
+
+    def _draw_robot(self, rng: np.random.Generator) -> Robot:
+        spread = self.randomisation
+        # truncated at three standard deviations so that nothing changes sign
+        mass, inertia, rate = 1.0 + np.array([spread.mass, spread.yaw_inertia, spread.motor_rate]) * np.clip(
+            rng.standard_normal(3), -3.0, 3.0
+        )
+        robot = self.robot
+        return replace(
+            robot,
+            mass=float(robot.mass * mass),
+            yaw_inertia=float(robot.yaw_inertia * inertia),
+            motor_rate=float(robot.motor_rate * rate),
+        )
+
+    def _draw_sensors(self, rng: np.random.Generator) -> Sensors:
+        spread, imu = self.randomisation, self.sensors.imu
+        draws = rng.standard_normal(3)
+        biased: Imu = replace(
+            imu,
+            gyro_bias=float(imu.gyro_bias + spread.gyro_bias * draws[0]),
+            accelerometer_bias=(
+                float(imu.accelerometer_bias[0] + spread.accelerometer_bias * draws[1]),
+                float(imu.accelerometer_bias[1] + spread.accelerometer_bias * draws[2]),
+            ),
+        )
+        return replace(self.sensors, imu=biased)
+
+    def _draw_field(self, soil: Soil, turn: RowTurn, rng: np.random.Generator) -> SoilField | None:
+        spread = self.randomisation
+        if spread.soil_variation == 0.0:
+            return None
+        # one extent for all episodes, so that a batch can hold their grids in one array
+        radius = float(np.max(self.radius))
+        extent = (-turn.run_in - 0.5, radius + 1.0, -2.0 * radius - 0.8, 2.0 * radius + 0.8)
+        return soil_field(soil, rng, spread.soil_variation, spread.correlation_length, extent)

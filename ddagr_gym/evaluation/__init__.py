@@ -1,0 +1,1 @@
+"""How drives are judged: metrics (pure functions), runs over scenarios, and their statistics."""

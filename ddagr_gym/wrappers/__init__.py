@@ -1,0 +1,1 @@
+"""Adapters between the environments and other libraries."""

@@ -1,0 +1,88 @@
+"""The native batch as a Stable-Baselines3 ``VecEnv`` (SB3 refuses ``gymnasium.vector.VectorEnv``)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+from stable_baselines3.common.vec_env import VecEnv
+from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvObs, VecEnvStepReturn
+
+from ddagr_gym.envs.turn_vector_env import TurnVectorEnv
+
+
+class TurnVecEnv(VecEnv):
+    """N row turns for SB3: ``TurnVecEnv(64, radius=0.8)``; arguments as :class:`TurnVectorEnv`.
+
+    Infos are empty but for environments that have just ended: ``terminal_observation``, ``TimeLimit.truncated``,
+    ``is_success`` and the small info of the ending.
+    """
+
+    def __init__(self, num_envs: int, **arguments: Any) -> None:
+        self.env = TurnVectorEnv(num_envs, autoreset_mode="SameStep", **arguments)
+        super().__init__(num_envs, self.env.single_observation_space, self.env.single_action_space)
+        self._actions = np.zeros((num_envs, 2), dtype=np.float32)
+
+    def reset(self) -> VecEnvObs:
+        """Reset all environments; seeds come from :meth:`seed`."""
+        seeds = self._seeds if any(seed is not None for seed in self._seeds) else None
+        observations, _ = self.env.reset(seed=seeds)
+        self._reset_seeds()
+        self._reset_options()
+        self.reset_infos = [{} for _ in range(self.num_envs)]
+        return observations
+
+    def step_async(self, actions: np.ndarray) -> None:
+        """Keep the actions for :meth:`step_wait`."""
+        self._actions = actions
+
+    def step_wait(self) -> VecEnvStepReturn:
+        """One control interval; ended environments return the first observation of their next episode."""
+        observations, rewards, terminated, truncated, info = self.env.step(self._actions)
+        infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        dones = terminated | truncated
+        for n in np.flatnonzero(dones):
+            last = {key: value[n].item() for key, value in info["final_info"].items() if _is_scalar(key, value)}
+            infos[n] = {
+                "terminal_observation": info["final_obs"][n],
+                "TimeLimit.truncated": bool(truncated[n] and not terminated[n]),
+                "is_success": bool(last["success"]),
+                **last,
+            }
+        return observations, rewards.astype(np.float32), dones, infos
+
+    def close(self) -> None:
+        """Stop the threads."""
+        self.env.close()
+
+    def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
+        """The batch's attribute, once for each index."""
+        value = getattr(self.env, attr_name)
+        return [value for _ in self._get_indices(indices)]
+
+    def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
+        """Set an attribute of the batch: it is shared by all environments."""
+        setattr(self.env, attr_name, value)
+
+    def env_method(
+        self, method_name: str, *method_args: Any, indices: VecEnvIndices = None, **method_kwargs: Any
+    ) -> list[Any]:
+        """Call a method of the batch once; its result is repeated for each index."""
+        result = getattr(self.env, method_name)(*method_args, **method_kwargs)
+        return [result for _ in self._get_indices(indices)]
+
+    def env_is_wrapped(self, wrapper_class: type, indices: VecEnvIndices = None) -> list[bool]:
+        """No single environment is wrapped."""
+        return [False for _ in self._get_indices(indices)]
+
+    def get_images(self) -> Sequence[np.ndarray | None]:
+        """No pictures: the batch does not render."""
+        return [None for _ in range(self.num_envs)]
+
+    def _get_indices(self, indices: None | int | Iterable[int]) -> Iterable[int]:
+        return super()._get_indices(indices)
+
+
+def _is_scalar(key: str, value: Any) -> bool:
+    return not key.startswith("_") and isinstance(value, np.ndarray) and value.ndim == 1
