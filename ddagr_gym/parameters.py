@@ -271,7 +271,8 @@ class Numerics(Validated):
         contact_nodes: Gauss nodes along the contact on each side of the stress peak (theta).
         jacobian_contact_nodes: the same for the derivative that the integrator uses; a W-method
             keeps its order with any derivative, so this one may be coarse.
-        substeps: integrator steps per sensor sample.
+        substeps: least number of integrator steps per sensor sample.
+        maximum_step: longest integrator step [s].
         launch_substeps: further division of a step in which a bank changes speed fast, as at a start from rest
             (the damping varies as 1/speed, physics.md section 6).
         launch_change: change of the rim speed within a step, relative to the wheel's speed, that counts as fast.
@@ -288,6 +289,7 @@ class Numerics(Validated):
     contact_nodes: int = 7
     jacobian_contact_nodes: int = 2
     substeps: int = 1
+    maximum_step: float = bounded("s", 0.0, 1.0, default=0.010, open_low=True)
     launch_substeps: int = 4
     launch_change: float = bounded("-", 0.0, 1e9, default=0.1)
     accepted_error: float = bounded("m/s", 0.0, 1e9, default=4e-3)
@@ -303,6 +305,14 @@ class Numerics(Validated):
             value = getattr(self, name)
             if not isinstance(value, int) or not 1 <= value <= high:
                 raise InputError(f"Numerics.{name} is {value!r}: give a whole number from 1 to {high}.")
+
+    @classmethod
+    def smooth(cls) -> Numerics:
+        """For fits: predictions that vary smoothly with the parameters, also where the robot stops.
+
+        Derivatives are renewed at every step, slowing down is resolved, and friction is a little softer at rest.
+        """
+        return cls(jacobian_refresh=0.0, launch_change=0.03, minimum_shear_rate=0.02, rest_speed=0.01)
 
     @classmethod
     def finest(cls) -> Numerics:

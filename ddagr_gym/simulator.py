@@ -46,6 +46,7 @@ for _name, _first in (
     ("load", layout.LOAD),
     ("force_x", layout.FORCE_X),
     ("force_y", layout.FORCE_Y),
+    ("yaw_moment", layout.YAW_MOMENT),
     ("axle_torque", layout.AXLE_TORQUE),
     ("bogged", layout.BOGGED),
 ):
@@ -153,6 +154,7 @@ class Simulator:
                 numerics.rest_speed,
                 numerics.launch_change,
                 numerics.accepted_error,
+                numerics.maximum_step,
             ]
         )
         self._division = np.array([numerics.substeps, numerics.launch_substeps], dtype=np.int64)

@@ -20,7 +20,10 @@ from ddagr_gym.physics.layout import (
     BASE_MOTOR_RATE,
     COMMAND,
     DERIVATIVE_VALID,
+    GRAVITY,
     MAXIMUM_WHEEL_SPEED,
+    MEAN_SPECIFIC_FORCE,
+    MEAN_YAW_ACCELERATION,
     MOTOR_RATE,
     MOTOR_TARGET,
     OMEGA,
@@ -32,7 +35,9 @@ from ddagr_gym.physics.layout import (
     READING,
     SAMPLE_PERIOD,
     V_X,
+    V_Y,
     WHEEL,
+    YAW_RATE,
 )
 from ddagr_gym.physics.terrain import sample_soil
 from ddagr_gym.sensors.imu import read_imu
@@ -58,8 +63,9 @@ def _drive(row: Array, command: Array, points: Integers, addresses: Integers, pa
 
 
 @kernel()
-def _division(row: Array, substeps: int, launch_substeps: int, launch_change: float) -> int:
+def _division(row: Array, least: int, maximum_step: float, launch_substeps: int, launch_change: float) -> int:
     """Steps for the coming sample: more while a bank's rim speed changes fast against the wheel's speed."""
+    substeps = max(least, int(math.ceil(row[SAMPLE_PERIOD] / maximum_step - 1e-9)))
     step = row[SAMPLE_PERIOD] / substeps
     for bank in range(2):
         rim = row[WHEEL + bank] + row[WHEEL + 8 + bank]
@@ -81,6 +87,20 @@ def _prepare_ground(
     place_wheels(row)
     sample_soil(row, values, geometry, use_field)
     apply_effects(POINT_SOIL, row, points, addresses, parameters, memory)
+
+
+@kernel()
+def _average_motion(row: Array, v_x: float, v_y: float, yaw_rate: float) -> None:
+    """Mean specific force and yaw acceleration over the sample that began at the given motion.
+
+    The change of velocity in body axes is that of the inertial one less the turning of the axes and gravity.
+    """
+    period = row[SAMPLE_PERIOD]
+    turning_x = 0.5 * (yaw_rate * v_y + row[YAW_RATE] * row[V_Y])
+    turning_y = 0.5 * (yaw_rate * v_x + row[YAW_RATE] * row[V_X])
+    row[MEAN_SPECIFIC_FORCE] = (row[V_X] - v_x) / period - turning_x - row[GRAVITY]
+    row[MEAN_SPECIFIC_FORCE + 1] = (row[V_Y] - v_y) / period + turning_y - row[GRAVITY + 1]
+    row[MEAN_YAW_ACCELERATION] = (row[YAW_RATE] - yaw_rate) / period
 
 
 @kernel()
@@ -125,8 +145,9 @@ def advance_rows(
         addresses: (effects,).
         parameters: (N, effects, EFFECT_PARAMETERS).
         memory: (N, effects, EFFECT_MEMORY), updated.
-        numerics: refresh, tolerance, minimum shear rate, rest speed, launch change, accepted error.
-        division: steps per sample, and their further division at launches.
+        numerics: refresh, tolerance, minimum shear rate, rest speed, launch change, accepted error,
+            maximum step.
+        division: least steps per sample, and their further division at launches.
         section: section rule.
         contact: contact rule.
         coarse: contact rule of the derivative.
@@ -148,13 +169,15 @@ def advance_rows(
         for k in range(samples):
             _drive(row, commands[n, 0 if held else k], points, addresses, parameters[n], memory[n])
             _prepare_ground(row, values, geometry, use_field, points, addresses, parameters[n], memory[n])
-            steps = _division(row, division[0], division[1], numerics[4])
+            v_x, v_y, yaw_rate = row[V_X], row[V_Y], row[YAW_RATE]
+            steps = _division(row, division[0], numerics[6], division[1], numerics[4])
             step = row[SAMPLE_PERIOD] / steps
             for _ in range(steps):
                 advance_body(
                     row, step, numerics[0], numerics[1], numerics[2], numerics[3], numerics[5], section, contact,
                     coarse, workspace, scratch, jacobian[:3], jacobian[3:], saved, points, addresses, parameters[n], memory[n],
                 )  # fmt: skip
+            _average_motion(row, v_x, v_y, yaw_rate)
             read_imu(row, noise[n, k, 0:3])
             read_encoders(row, noise[n, k, 3:5], row[SAMPLE_PERIOD])
             read_pose(row, noise[n, k, 5:8])

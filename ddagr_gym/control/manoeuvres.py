@@ -131,7 +131,9 @@ def read_manoeuvre(path: Path) -> Manoeuvre:
     columns = ("t", "command_right", "command_left")
     missing = [name for name in columns if not rows or name not in rows[0]]
     if missing:
-        raise InputError(f"{path} has no column {missing[0]!r}: give t, command_right, command_left and a row at least.")
+        raise InputError(
+            f"{path} has no column {missing[0]!r}: give t, command_right, command_left and a row at least."
+        )
     try:
         table = np.array([[float(row[name]) for name in columns] for row in rows])
     except (TypeError, ValueError) as error:

@@ -129,9 +129,10 @@ class TurnSettings(Validated):
         if self.side != "random" and self.side not in SIDES:
             raise unknown_name("side", self.side, [*SIDES, "random"])
         for radius in np.atleast_1d(np.asarray(self.radius, dtype=float)):
-            self._turn(float(radius), "left")
+            self.turn(float(radius), "left")
 
-    def _turn(self, radius: float, side: str) -> RowTurn:
+    def turn(self, radius: float, side: str) -> RowTurn:
+        """The commanded manoeuvre of a radius [m] and side."""
         return RowTurn(radius=radius, side=side, run_in=self.run_in, run_out=self.run_out, speed=self.speed)
 
     def draw(self, rng: np.random.Generator) -> Episode:
@@ -141,7 +142,7 @@ class TurnSettings(Validated):
         radius = self.radius if isinstance(self.radius, (int, float)) else float(rng.uniform(*self.radius))
         robot = self._draw_robot(rng)
         soil, rejected = (self.soil, 0) if isinstance(self.soil, Soil) else draw_soil(self.soil, rng, robot)
-        turn = self._turn(float(radius), side)
+        turn = self.turn(float(radius), side)
         return Episode(
             turn=turn,
             robot=robot,

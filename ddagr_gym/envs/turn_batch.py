@@ -34,17 +34,20 @@ class TurnBatch:
         settings: shared settings.
         count: N.
         threads: see :class:`Simulator`.
+        recorded: further simulator row entries to record at the sensor rate, after x, y and yaw.
 
     Attributes:
         simulator: the physics.
         tasks: (N, turn_kernel.TASK_SIZE).
         episodes: what each environment is driving.
         readings: (N, CONTROL_INTERVAL, 8) of the last interval.
-        record: (N, CONTROL_INTERVAL, 3) true x, y, yaw of the last interval.
+        record: (N, CONTROL_INTERVAL, 3 + len(recorded)) true x, y, yaw and what else is recorded, of the last interval.
         terms: (N, len(TERMS)) unweighted reward terms of the last interval.
     """
 
-    def __init__(self, settings: TurnSettings, count: int = 1, threads: int = 1) -> None:
+    def __init__(
+        self, settings: TurnSettings, count: int = 1, threads: int = 1, recorded: Sequence[int] = ()
+    ) -> None:
         self.settings = settings
         self.count = count
         self.simulator = Simulator(
@@ -53,7 +56,8 @@ class TurnBatch:
         self.tasks = np.zeros((count, kernel.TASK_SIZE))
         self.episodes: list[Episode | None] = [None] * count
         self.readings = np.zeros((count, CONTROL_INTERVAL, len(layout.READINGS)))
-        self.record = np.zeros((count, CONTROL_INTERVAL, len(_POSE)))
+        self._recorded = np.concatenate([_POSE, np.asarray(recorded, dtype=np.int64)])
+        self.record = np.zeros((count, CONTROL_INTERVAL, len(self._recorded)))
         self.terms = np.zeros((count, len(kernel.TERMS)))
         self.commands = np.zeros((count, 2))
         """(N, 2) bank speed commands of the last interval [rad/s]."""
@@ -149,7 +153,7 @@ class TurnBatch:
         np.multiply(actions, self.command_limit, out=self.commands)
         for n in range(self.count) if active is None else active:
             rngs[n].standard_normal(out=self._noise[n])
-        self.simulator.advance(self.commands[:, None, :], self._noise, _POSE, self.readings, self.record)
+        self.simulator.advance(self.commands[:, None, :], self._noise, self._recorded, self.readings, self.record)
         kernel.judge_rows(
             self.tasks, self.simulator.rows, actions, self.readings, self.record, self._weights, self._outer_radius,
             self.terms, rewards, observations,

@@ -1,12 +1,13 @@
 """Time step of the body: a two-stage, second-order, linearly implicit W-method.
 
-    (I - gamma h A) k1 = h f(y_n)
-    (I - gamma h A) k2 = h f(y_n + k1) - 2 k1
+    (I - gamma h A) k1 = h f(t_n, y_n) + gamma h^2 f_t
+    (I - gamma h A) k2 = h f(t_n + h, y_n + k1) - 2 k1 - gamma h^2 f_t
     y_{n+1} = y_n + 3/2 k1 + 1/2 k2
 
 with gamma = 1 - 1/sqrt(2) (Verwer, Spee, Blom and Hundsdorfer, SIAM J. Sci. Comput. 20 (1999) 1456, eq. 2.7). It
 is L-stable with the exact Jacobian A and of order two with any A, so A may be coarse and kept over steps; it acts
-on the three velocities, where the stiffness is (physics.md section 6). Bank speeds are solved exactly.
+on the three velocities, where the stiffness is (physics.md section 6). Bank speeds are solved exactly; their change
+enters through f_t, without which the robot would lag behind its wheels when it creeps.
 
 Near rest friction saturates within micrometres per second and a linearised step can overshoot to the other side. The
 embedded first-order solution y_n + k1 shows it; such a step is redone by backward Euler with damped Newton
@@ -36,11 +37,15 @@ from ddagr_gym.physics.layout import (
     HALF_TRACK,
     LOAD,
     MASS,
+    MOTOR_RATE,
+    MOTOR_TARGET,
+    OMEGA,
     POINT_BODY_FORCES,
     POINT_WHEEL_FORCES,
     TIME,
     V_X,
     V_Y,
+    WHEEL_V_X,
     X,
     Y,
     YAW,
@@ -54,13 +59,19 @@ GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
 NEWTON_ITERATIONS = 40
 NEWTON_TOLERANCE = 1e-9  # [m/s]
 HALVINGS = 12
+LEAST_OMEGA = 1e-6  # [rad/s], below which a bank's drift is left out
 RELATIVE_ERROR = 0.01  # of the speed, accepted besides Numerics.accepted_error
 
 
 @kernel()
-def _wheel_jacobian(row: Array, jacobian: Array) -> None:
-    """d(F_x, F_y, M_z)/d(v_x, v_y, yaw rate) of all wheels, the sinkage following its load."""
+def _wheel_jacobian(row: Array, jacobian: Array, drift: Array) -> None:
+    """d(F_x, F_y, M_z)/d(v_x, v_y, yaw rate) of all wheels, the sinkage following its load, and their drift d/dt.
+
+    The drift comes from the bank speeds. Forces depend on ratios of velocities only, so by Euler's theorem
+    omega dF/d omega = -(v_x dF/dv_x + v_y dF/dv_y), the small part of the yaw rate left out.
+    """
     jacobian[:, :] = 0.0
+    drift[:3] = 0.0
     for i in range(4):
         d = DERIVATIVE + 15 * i
         stiffness = row[d + 12]
@@ -68,6 +79,10 @@ def _wheel_jacobian(row: Array, jacobian: Array) -> None:
             continue
         x = hub_x(row, i)
         y = hub_y(row, i)
+        bank = i % 2
+        omega = row[OMEGA + bank]
+        change = row[MOTOR_RATE + bank] * (row[MOTOR_TARGET + bank] - omega)
+        relative = -change / omega if abs(omega) > LEAST_OMEGA else 0.0
         for direction in range(2):
             settle = row[d + 5 * direction + 2] / stiffness
             f_x = row[d + 5 * direction] - settle * row[d + 10]
@@ -75,6 +90,10 @@ def _wheel_jacobian(row: Array, jacobian: Array) -> None:
             m_z = row[d + 5 * direction + 3] - settle * row[d + 13]
             moment = x * f_y - y * f_x + m_z
             arm = x if direction == 1 else -y
+            speed = relative * row[WHEEL_V_X + 4 * direction + i]
+            drift[0] += speed * f_x
+            drift[1] += speed * f_y
+            drift[2] += speed * moment
             jacobian[0, direction] += f_x
             jacobian[1, direction] += f_y
             jacobian[2, direction] += moment
@@ -146,18 +165,21 @@ def _w_step(
 ) -> None:  # fmt: skip
     """One W-step; returns the size of the embedded error estimate [m/s]. Arguments as :func:`advance_body`."""
     start, first, second = scratch[4], scratch[5], scratch[6]
-    _wheel_jacobian(row, jacobian)
+    drift = scratch[3]
+    _wheel_jacobian(row, jacobian, drift)
     _add_effect_jacobian(
         row, jacobian, effect_points, effect_addresses, parameters, memory, scratch[6], scratch[7]
     )  # fmt: skip
     _damping_inverse(row, GAMMA * step, jacobian, inverse)
+    drift_x = GAMMA * step * step * drift[0] / row[MASS]
+    drift_y = GAMMA * step * step * drift[1] / row[MASS]
+    drift_yaw = GAMMA * step * step * drift[2] / row[YAW_INERTIA]
+    right_x = step * row[ACCELERATION] + drift_x
+    right_y = step * row[ACCELERATION + 1] + drift_y
+    right_yaw = step * row[ACCELERATION + 2] + drift_yaw
     for j in range(3):
         start[j] = row[V_X + j]
-        first[j] = step * (
-            inverse[j, 0] * row[ACCELERATION]
-            + inverse[j, 1] * row[ACCELERATION + 1]
-            + inverse[j, 2] * row[ACCELERATION + 2]
-        )
+        first[j] = inverse[j, 0] * right_x + inverse[j, 1] * right_y + inverse[j, 2] * right_yaw
     start[3], start[4], start[5] = row[X], row[Y], row[YAW]
     first[3] = step * (row[V_X] * math.cos(row[YAW]) - row[V_Y] * math.sin(row[YAW]))
     first[4] = step * (row[V_X] * math.sin(row[YAW]) + row[V_Y] * math.cos(row[YAW]))
@@ -171,8 +193,9 @@ def _w_step(
         row, -1.0, tolerance, shear_rate, rest_speed, section, contact, coarse, workspace, scratch, effect_points,
         effect_addresses, parameters, memory,
     )  # fmt: skip
-    for j in range(3):
-        second[j] = step * row[ACCELERATION + j] - 2.0 * first[j]
+    second[0] = step * row[ACCELERATION] - 2.0 * first[0] - drift_x
+    second[1] = step * row[ACCELERATION + 1] - 2.0 * first[1] - drift_y
+    second[2] = step * row[ACCELERATION + 2] - 2.0 * first[2] - drift_yaw
     rate_x = row[V_X] * math.cos(row[YAW]) - row[V_Y] * math.sin(row[YAW])
     rate_y = row[V_X] * math.sin(row[YAW]) + row[V_Y] * math.cos(row[YAW])
     rate_yaw = row[YAW_RATE]
@@ -221,7 +244,7 @@ def _backward_euler_step(
         size = _defect(row, start, step, defect)
         if size <= NEWTON_TOLERANCE:
             break
-        _wheel_jacobian(row, jacobian)
+        _wheel_jacobian(row, jacobian, change)
         _add_effect_jacobian(
             row, jacobian, effect_points, effect_addresses, parameters, memory, change, before
         )  # fmt: skip

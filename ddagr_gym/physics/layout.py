@@ -79,6 +79,8 @@ BODY_FORCE = _block(3)  # added by body force effects: F_x, F_y at the body orig
 # Results
 ACCELERATION = _block(3)  # d/dt of V_X, V_Y, YAW_RATE
 SPECIFIC_FORCE = _block(2)  # non-gravitational force per mass at the body origin [m/s^2]
+MEAN_SPECIFIC_FORCE = _block(2)  # over the last sample period, body axes [m/s^2]
+MEAN_YAW_ACCELERATION = _block()
 READING = _block(8)  # specific force x, y; yaw rate; encoder right, left; pose x, y, yaw
 
 # Sensors
