@@ -30,7 +30,7 @@ class Refit:
         prediction: (W, T, 8).
         cost: half the sum of squares of weighted residuals, priors included.
         iterations: Gauss-Newton steps taken.
-        converged: whether the last step changed the cost by less than one part in 1000.
+        converged: whether the last step lowered the cost by less than the tolerance, relative.
         at_bound: names of parameters that sit at a bound.
     """
 
@@ -107,7 +107,9 @@ class Refitter:
         cost = 0.5 * float((residual**2).sum() + ((values / self._prior) ** 2).sum() + (start**2).sum())
         return cost if np.isfinite(cost) else np.inf, prediction
 
-    def fit(self, values: Array | None = None, states: Array | None = None, iterations: int = 12) -> Refit:
+    def fit(
+        self, values: Array | None = None, states: Array | None = None, iterations: int = 12, tolerance: float = 1e-4
+    ) -> Refit:
         """Gauss-Newton from ``values`` (0 by default) and ``states`` (the windows' first guess)."""
         values = np.zeros(len(self._prior)) if values is None else values.copy()
         states = self.model.windows.initial.copy() if states is None else states.copy()
@@ -127,7 +129,7 @@ class Refitter:
                     values, states, cost, prediction = tried, new_states, new_cost, new_prediction
                     break
             self._progress()
-            if before - cost < 1e-3 * cost:
+            if before - cost < tolerance * cost:
                 converged = True
                 break
         deviations = np.sqrt(np.diag(np.linalg.inv(information)))

@@ -1,4 +1,4 @@
-"""Quadrature encoders on the banks: counts differenced at the sample rate."""
+"""Quadrature encoders on the banks: counts differenced at the sample rate, so the mean speed over a sample."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from ddagr_gym.physics.layout import (
     ENCODER_NOISE,
     ENCODER_SCALE,
     LAST_COUNT,
-    OMEGA,
     READING,
     WHEEL_ANGLE,
 )
@@ -22,11 +21,12 @@ from ddagr_gym.physics.layout import (
 @kernel()
 def read_encoders(row: NDArray[np.float64], noise: NDArray[np.float64], period: float) -> None:
     """Write READING[3:5] (right, left) [rad/s]. ``noise``: two standard normal draws; ``period`` [s]."""
+    ideal = row[ENCODER_COUNTS] <= 0.0
+    per_radian = 1.0 if ideal else row[ENCODER_COUNTS] / (2.0 * math.pi)
     for bank in range(2):
-        speed = row[ENCODER_SCALE + bank] * row[OMEGA + bank]
-        if row[ENCODER_COUNTS] > 0.0:
-            per_radian = row[ENCODER_COUNTS] / (2.0 * math.pi)
-            count = math.floor(row[ENCODER_SCALE + bank] * row[WHEEL_ANGLE + bank] * per_radian)
-            speed = (count - row[LAST_COUNT + bank]) / (per_radian * period)
-            row[LAST_COUNT + bank] = count
+        count = row[ENCODER_SCALE + bank] * row[WHEEL_ANGLE + bank] * per_radian
+        if not ideal:
+            count = math.floor(count)
+        speed = (count - row[LAST_COUNT + bank]) / (per_radian * period)
+        row[LAST_COUNT + bank] = count
         row[READING + 3 + bank] = speed + row[ENCODER_NOISE] * noise[bank]
