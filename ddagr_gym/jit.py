@@ -7,6 +7,7 @@ is therefore cached under a stamp over all kernel sources of the package: edit o
 from __future__ import annotations
 
 import hashlib
+import inspect
 from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
@@ -17,6 +18,8 @@ from numba.core.ccallback import CFunc
 
 _PACKAGE = Path(__file__).parent
 _SHARED_SOURCES = ("jit.py", "simulator_kernel.py", "physics", "sensors")
+_CALLED_BY_POINTER = _PACKAGE / "physics" / "effects"
+"""Code that kernels call through pointers only: it is in no kernel, so its edits recompile nothing but itself."""
 
 
 @lru_cache
@@ -26,9 +29,31 @@ def kernel_stamp(folder: str = "") -> str:
     for source in (*_SHARED_SOURCES, folder):
         path = _PACKAGE / source
         for file in sorted(path.rglob("*.py")) if path.is_dir() and source else [path]:
-            if file.is_file():
+            if file.is_file() and _CALLED_BY_POINTER not in file.parents:
                 digest.update(file.name.encode() + file.read_bytes())
     return digest.hexdigest()
+
+
+@lru_cache
+def _folder_stamp(folder: Path) -> str:
+    digest = hashlib.sha256(kernel_stamp().encode())
+    for file in sorted(folder.glob("*.py")):
+        digest.update(file.name.encode() + file.read_bytes())
+    return digest.hexdigest()
+
+
+def callback_stamp(function: Callable[..., Any]) -> str | None:
+    """Hash over the kernels' sources and those beside ``function``.
+
+    None for a function without a file, and for one made inside another, whose captured values its text does not show.
+    """
+    if "<locals>" in function.__qualname__:
+        return None
+    try:
+        file = Path(inspect.getfile(function))
+    except TypeError:
+        return None
+    return _folder_stamp(file.parent) if file.is_file() else None
 
 
 def _stamp(compiled: Any, module: str) -> None:
@@ -39,7 +64,9 @@ def _stamp(compiled: Any, module: str) -> None:
         cache_file._source_stamp = (cache_file._source_stamp, kernel_stamp(folder))
 
 
-def kernel(*, inline: bool = False, reassociate: bool = False) -> Callable[[Callable[..., Any]], Any]:
+def kernel(
+    *, inline: bool = False, reassociate: bool = False, cached: bool = True
+) -> Callable[[Callable[..., Any]], Any]:
     """Decorator: nopython, no GIL, no divide checks, fused multiply-add, cached.
 
     Arithmetic is bit-reproducible on one machine: the compiled code does not depend on the batch, and NaN
@@ -48,27 +75,39 @@ def kernel(*, inline: bool = False, reassociate: bool = False) -> Callable[[Call
     Args:
         inline: force LLVM to inline (its fast-math flags stay its own).
         reassociate: allow sums to be reordered, which vectorises reductions.
+        cached: keep the machine code on disk; not worth it for what is only compiled into something cached.
     """
     fastmath = {"contract", "reassoc", "nsz"} if reassociate else {"contract"}
 
     def decorate(function: Callable[..., Any]) -> Any:
-        compiled = numba.njit(
-            fastmath=fastmath, error_model="numpy", nogil=True, cache=True, forceinline=inline
-        )(function)
-        _stamp(compiled, function.__module__)
+        compiled = numba.njit(fastmath=fastmath, error_model="numpy", nogil=True, cache=cached, forceinline=inline)(
+            function
+        )
+        if cached:
+            _stamp(compiled, function.__module__)
         return compiled
 
     return decorate
 
 
-def compile_callback(function: Callable[..., None], signature: Any) -> int:
+def compile_callback(function: Callable[..., None], signature: Any, stamp: str | None) -> int:
     """Compile ``function`` to machine code callable through a pointer and return its address.
 
     The returned address stays valid for the life of the process.
+
+    Args:
+        function: a plain function. One with a closure over a kernel would never be found in the cache again, because
+            numba's key then holds the kernel's identity, which is new in every process.
+        signature: C types.
+        stamp: the machine code is kept on disk and taken from there while this is the same; None: not kept.
     """
-    callback = CFunc(function, numba.core.sigutils.normalize_signature(signature), locals={}, options={})
-    callback.enable_caching()
-    _stamp(callback, function.__module__)
+    if function.__closure__ is not None:
+        raise TypeError(f"{function.__qualname__} has a closure: bind what it needs as globals.")
+    callback: Any = CFunc(function, numba.core.sigutils.normalize_signature(signature), locals={}, options={})
+    if stamp is not None:
+        callback.enable_caching()
+        cache_file = callback._cache._cache_file
+        cache_file._source_stamp = (cache_file._source_stamp, stamp)
     callback.compile()
     _KEEP_ALIVE.append(callback)
     return int(callback.address)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
+from numbers import Real
 from typing import Any
 
 from ddagr_gym.errors import InputError
@@ -23,24 +24,38 @@ def bounded(
     *,
     default: Any = None,
     open_low: bool = False,
+    length: int = 0,
 ) -> Any:
-    """Dataclass field that carries its unit and the interval in which it is valid."""
-    metadata = {"unit": unit, "low": low, "high": high, "open_low": open_low}
+    """Dataclass field that carries its unit and the interval in which it is valid; ``length`` > 0 for a tuple."""
+    metadata = {"unit": unit, "low": low, "high": high, "open_low": open_low, "length": length}
     return field(metadata=metadata) if default is None else field(default=default, metadata=metadata)
 
 
 def _check_field(owner: object, name: str, metadata: Mapping[str, Any]) -> None:
     value = getattr(owner, name)
-    kind = type(owner).__name__
-    try:
-        number = float(value)
-    except (TypeError, ValueError):
-        raise InputError(f"{kind}.{name} is {value!r}: give a number in {metadata['unit']}.") from None
+    place = f"{type(owner).__name__}.{name}"
+    length = metadata.get("length", 0)
+    if not length:
+        _check_number(place, value, metadata)
+        return
+    if not isinstance(value, tuple | list) or len(value) != length:
+        raise InputError(f"{place} is {value!r}: give {length} numbers in {metadata['unit']}.")
+    for number in value:
+        _check_number(place, number, metadata)
+
+
+def _check_number(place: str, value: object, metadata: Mapping[str, Any]) -> None:
+    if not isinstance(value, Real) or isinstance(value, bool):
+        raise InputError(f"{place} is {value!r}: give a number in {metadata['unit']}.")
+    number = float(value)
     below = number <= metadata["low"] if metadata["open_low"] else number < metadata["low"]
     if not math.isfinite(number) or below or number > metadata["high"]:
         bracket = "(" if metadata["open_low"] else "["
         interval = f"{bracket}{metadata['low']:g}, {metadata['high']:g}]"
-        raise InputError(f"{kind}.{name} is {number:g}: give a finite value in {interval} {metadata['unit']}.")
+        raise InputError(f"{place} is {number:g}: give a finite value in {interval} {metadata['unit']}.")
+
+
+_DEVIATION = {"unit": "the unit of the field", "low": 0.0, "high": math.inf, "open_low": False}
 
 
 class Validated:
@@ -146,19 +161,21 @@ class Robot(Validated):
     half_wheelbase: float = bounded("m", 0.0, 10.0, open_low=True)
     half_track: float = bounded("m", 0.0, 10.0, open_low=True)
     wheels: tuple[TorusWheel, ...] = ()
-    centre_of_mass: tuple[float, float, float] = (0.0, 0.0, 0.5)
+    centre_of_mass: tuple[float, float, float] = bounded("m", -100.0, 100.0, default=(0.0, 0.0, 0.5), length=3)
     motor_rate: float = bounded("1/s", 0.0, 1e4, default=4.5, open_low=True)
     maximum_wheel_speed: float = bounded("rad/s", 0.0, 1e3, default=2.0, open_low=True)
     standard_deviations: Mapping[str, float] = field(default_factory=dict)
     source: str = ""
 
     def _check(self) -> None:
+        if not isinstance(self.wheels, tuple | list) or not all(isinstance(w, TorusWheel) for w in self.wheels):
+            raise InputError(f"Robot.wheels is {self.wheels!r}: give a tuple of TorusWheel.")
         if len(self.wheels) == 1:
             object.__setattr__(self, "wheels", tuple(self.wheels) * 4)
         if len(self.wheels) != 4:
             raise InputError(f"Robot.wheels has {len(self.wheels)} wheels: give one wheel for all, or four.")
-        if len(self.centre_of_mass) != 3 or not all(math.isfinite(v) for v in self.centre_of_mass):
-            raise InputError(f"Robot.centre_of_mass is {self.centre_of_mass!r}: give (x, y, height) in m.")
+        for name, deviation in self.standard_deviations.items():
+            _check_number(f"Robot.standard_deviations[{name!r}]", deviation, _DEVIATION)
         x, y, height = self.centre_of_mass
         if abs(x) >= self.half_wheelbase or abs(y) >= self.half_track or height < 0:
             raise InputError(
@@ -206,11 +223,11 @@ class Imu(Validated):
     accelerometer_noise: float = bounded("m/s^2", 0.0, 100.0, default=0.031)
     accelerometer_vibration: float = bounded("1/s", 0.0, 100.0, default=0.0)
     gyro_noise: float = bounded("rad/s", 0.0, 10.0, default=6.9e-4)
-    accelerometer_bias: tuple[float, float] = (0.0, 0.0)
+    accelerometer_bias: tuple[float, float] = bounded("m/s^2", -100.0, 100.0, default=(0.0, 0.0), length=2)
     gyro_bias: float = bounded("rad/s", -10.0, 10.0, default=0.0)
-    accelerometer_scale: tuple[float, float] = (1.0, 1.0)
+    accelerometer_scale: tuple[float, float] = bounded("-", -10.0, 10.0, default=(1.0, 1.0), length=2)
     gyro_scale: float = bounded("-", -10.0, 10.0, default=1.0)
-    position: tuple[float, float] = (0.0, 0.0)
+    position: tuple[float, float] = bounded("m", -10.0, 10.0, default=(0.0, 0.0), length=2)
     mounting_yaw: float = bounded("rad", -math.pi, math.pi, default=0.0)
     accelerometer_range: float = bounded("m/s^2", 0.0, 1e4, default=2 * STANDARD_GRAVITY, open_low=True)
     gyro_range: float = bounded("rad/s", 0.0, 1e3, default=math.radians(250.0), open_low=True)
@@ -230,7 +247,7 @@ class WheelEncoder(Validated):
 
     counts_per_revolution: float = bounded("-", 0.0, 1e8, default=20000.0)
     speed_noise: float = bounded("rad/s", 0.0, 100.0, default=0.0)
-    scale: tuple[float, float] = (1.0, 1.0)
+    scale: tuple[float, float] = bounded("-", -10.0, 10.0, default=(1.0, 1.0), length=2)
 
 
 @dataclass(frozen=True)
@@ -299,11 +316,11 @@ class Numerics(Validated):
     rest_speed: float = bounded("m/s", 0.0, 0.1, default=1e-3, open_low=True)
 
     def _check(self) -> None:
-        if self.section_nodes % 8 or not 8 <= self.section_nodes <= 64:
-            raise InputError(f"Numerics.section_nodes is {self.section_nodes}: give 8, 16, 24 ... 64.")
+        if not isinstance(self.section_nodes, int) or self.section_nodes not in range(8, 65, 8):
+            raise InputError(f"Numerics.section_nodes is {self.section_nodes!r}: give 8, 16, 24 ... 64.")
         for name, high in (("contact_nodes", 64), ("jacobian_contact_nodes", 64), ("substeps", 1000), ("launch_substeps", 1000)):
             value = getattr(self, name)
-            if not isinstance(value, int) or not 1 <= value <= high:
+            if not isinstance(value, int) or isinstance(value, bool) or not 1 <= value <= high:
                 raise InputError(f"Numerics.{name} is {value!r}: give a whole number from 1 to {high}.")
 
     @classmethod

@@ -20,7 +20,7 @@ from ddagr_gym.physics.contact_geometry import contact_rule, section_rule
 from ddagr_gym.physics.contact_patch import WORKSPACE_SIZE
 from ddagr_gym.physics.effects import Effect, effect_table, load_effects
 from ddagr_gym.physics.terrain import SoilField
-from ddagr_gym.physics.wheel_forces import soil_vector
+from ddagr_gym.physics.wheel_forces import finite_array, soil_vector
 from ddagr_gym.simulator_kernel import advance_rows, settle_rows
 
 Array = NDArray[np.float64]
@@ -224,9 +224,9 @@ class Simulator:
             if name not in _MOTION:
                 raise InputError(f"initial state has no {name!r}: it takes {', '.join(_MOTION)}.")
         for name, index in _MOTION.items():
-            values = np.asarray(given.get(name, 0.0), dtype=np.float64)
-            if not np.isfinite(values).all():
-                raise InputError(f"initial {name} is {given[name]!r}: give finite values.")
+            values = finite_array(f"initial {name}", given.get(name, 0.0))
+            if values.shape not in ((), indices.shape):
+                raise InputError(f"initial {name} has shape {values.shape}: give one value, or {indices.shape}.")
             self.rows[indices, index] = values
         self.rows[indices, layout.TIME] = time
         self.rows[indices, layout.NEXT_POSE_TIME] = time
@@ -281,18 +281,21 @@ class Simulator:
             readings (N, T, 8) and record (N, T, len(recorded)).
 
         Raises:
-            InputError: commands of the wrong shape or not finite.
+            InputError: commands or noise of the wrong shape or not finite, entries that a row does not have.
         """
-        given = np.ascontiguousarray(commands, dtype=np.float64)
+        given = np.ascontiguousarray(finite_array("commands", commands))
         if given.ndim == 2:
             given = given[:, None, :]
         if given.ndim != 3 or given.shape[0] != self.count or given.shape[2] != 2:
             raise InputError(f"commands have shape {given.shape}: give ({self.count}, 2) or ({self.count}, T, 2).")
-        if not np.isfinite(given).all():
-            raise InputError("commands contain NaN or infinity: give finite bank speeds in rad/s.")
         steps = given.shape[1] if given.shape[1] > 1 else samples
-        draws = np.zeros((self.count, steps, layout.NOISE_CHANNELS)) if noise is None else np.asarray(noise, dtype=float)
+        shape = (self.count, steps, layout.NOISE_CHANNELS)
+        draws = np.zeros(shape) if noise is None else finite_array("noise", noise)
+        if draws.shape != shape or steps < 1:
+            raise InputError(f"noise has shape {draws.shape} for {steps} samples: give {shape}, samples >= 1.")
         entries = np.asarray(recorded, dtype=np.int64).reshape(-1)
+        if ((entries < 0) | (entries >= layout.SIZE)).any():
+            raise InputError(f"recorded holds {entries.tolist()}: give row entries from 0 to {layout.SIZE - 1}.")
         readings = np.empty((self.count, steps, len(layout.READINGS)))
         record = np.empty((self.count, steps, entries.size))
         self.advance(given, np.ascontiguousarray(draws), entries, readings, record)
@@ -341,7 +344,7 @@ def simulate(
     Raises:
         InputError: bad shapes or values, each in one sentence.
     """
-    given = np.asarray(commands, dtype=np.float64)
+    given = finite_array("commands", commands)
     if given.ndim != 2 or given.shape[1] != 2 or given.shape[0] < 1:
         raise InputError(f"commands have shape {given.shape}: give (T, 2) right and left bank speeds, T >= 1.")
     simulator = Simulator(1, numerics=numerics, effects=effects, fields=() if field is None else (field,))

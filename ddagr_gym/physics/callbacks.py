@@ -7,6 +7,7 @@ An effect's function has the signature ``f(row, parameters, memory)`` over float
 from __future__ import annotations
 
 from collections.abc import Callable
+from types import FunctionType
 from typing import Any
 
 import numpy as np
@@ -15,29 +16,30 @@ from numba import carray, types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from ddagr_gym.jit import compile_callback, kernel
+from ddagr_gym.jit import callback_stamp, compile_callback, kernel
 from ddagr_gym.physics.layout import EFFECT_MEMORY, EFFECT_PARAMETERS, SIZE
 
 _FLOATS = types.CPointer(types.float64)
 _SIGNATURE = types.void(_FLOATS, _FLOATS, _FLOATS)
 
 
+def _callback(row_pointer: Any, parameter_pointer: Any, memory_pointer: Any) -> None:
+    row = carray(row_pointer, (SIZE,))
+    parameters = carray(parameter_pointer, (EFFECT_PARAMETERS,))
+    memory = carray(memory_pointer, (EFFECT_MEMORY,))
+    action(row, parameters, memory)  # type: ignore[name-defined]  # noqa: F821 (bound by compile_effect)
+
+
 def compile_effect(function: Callable[..., None]) -> int:
-    """Address of the machine code of an effect function.
+    """Address of the machine code of an effect function, kept on disk while its folder's sources stay the same.
 
     Args:
         function: takes (row, parameters, memory); compiled in nopython mode.
     """
-    inner = kernel()(function)
-
-    def callback(row_pointer: Any, parameter_pointer: Any, memory_pointer: Any) -> None:
-        row = carray(row_pointer, (SIZE,))
-        parameters = carray(parameter_pointer, (EFFECT_PARAMETERS,))
-        memory = carray(memory_pointer, (EFFECT_MEMORY,))
-        inner(row, parameters, memory)
-
-    callback.__qualname__ = f"callback_{function.__module__}_{function.__name__}"
-    return compile_callback(callback, _SIGNATURE)
+    scope = {**globals(), "action": kernel(cached=False)(function)}
+    callback = FunctionType(_callback.__code__, scope, "callback")
+    callback.__qualname__ = f"callback_{function.__module__}_{function.__qualname__}"
+    return compile_callback(callback, _SIGNATURE, callback_stamp(function))
 
 
 @intrinsic

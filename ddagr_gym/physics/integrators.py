@@ -45,6 +45,7 @@ from ddagr_gym.physics.layout import (
     TIME,
     V_X,
     V_Y,
+    WHEEL,
     WHEEL_V_X,
     X,
     Y,
@@ -61,6 +62,8 @@ NEWTON_TOLERANCE = 1e-9  # [m/s]
 HALVINGS = 12
 LEAST_OMEGA = 1e-6  # [rad/s], below which a bank's drift is left out
 RELATIVE_ERROR = 0.01  # of the speed, accepted besides Numerics.accepted_error
+FULL_ERROR_SPEED = 0.02  # [m/s], below which less is accepted: a robot that stands on a slope would chatter
+LEAST_ERROR = 1e-6  # [m/s], accepted at rest
 
 
 @kernel()
@@ -274,6 +277,15 @@ def _backward_euler_step(
     )  # fmt: skip
 
 
+@kernel(inline=True)
+def _fastest(row: Array) -> float:
+    """Largest of the body's and the rims' speeds [m/s]."""
+    speed = max(abs(row[V_X]), abs(row[V_Y]))
+    for bank in range(2):
+        speed = max(speed, abs(row[OMEGA + bank]) * (row[WHEEL + bank] + row[WHEEL + 8 + bank]))
+    return speed
+
+
 @kernel()
 def advance_body(
     row: Array, step: float, refresh: float, tolerance: float, shear_rate: float, rest_speed: float,
@@ -290,7 +302,7 @@ def advance_body(
         tolerance: see there.
         shear_rate: see there.
         rest_speed: see there.
-        accepted_error: embedded error estimate above which the step is redone [m/s].
+        accepted_error: embedded error estimate of a moving robot above which the step is redone [m/s].
         section: see there.
         contact: see there.
         coarse: see there.
@@ -309,8 +321,9 @@ def advance_body(
         row, step, refresh, tolerance, shear_rate, rest_speed, section, contact, coarse, workspace, scratch, jacobian,
         inverse, effect_points, effect_addresses, parameters, memory,
     )  # fmt: skip
-    speed = max(abs(row[V_X]), abs(row[V_Y]))
-    if not estimate <= accepted_error + RELATIVE_ERROR * speed:
+    speed = _fastest(row)
+    accepted = accepted_error * min(speed / FULL_ERROR_SPEED, 1.0) + RELATIVE_ERROR * speed + LEAST_ERROR
+    if not estimate <= accepted:
         row[:] = saved
         _backward_euler_step(
             row, step, tolerance, shear_rate, rest_speed, section, contact, coarse, workspace, scratch, jacobian,

@@ -36,8 +36,11 @@ class SoilField:
             )
         if not np.isfinite(self.values).all():
             raise InputError("SoilField.values contains NaN or infinity: give finite soil parameters.")
-        if min(self.spacing) <= 0:
-            raise InputError(f"SoilField.spacing is {self.spacing}: give positive distances in m.")
+        if not np.isfinite((*self.origin, *self.spacing)).all() or min(self.spacing) <= 0:
+            raise InputError(
+                f"SoilField has origin {self.origin} and spacing {self.spacing}: give finite places and positive "
+                "distances in m."
+            )
 
     @classmethod
     def sample(
@@ -47,6 +50,9 @@ class SoilField:
         xs, ys = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
         if xs.size < 2 or ys.size < 2:
             raise InputError(f"the grid has {xs.size} x {ys.size} nodes: give at least 2 x 2.")
+        for name, nodes in (("x", xs), ("y", ys)):
+            if not np.allclose(np.diff(nodes), nodes[1] - nodes[0], rtol=1e-6, atol=0.0):
+                raise InputError(f"{name} of the grid is {nodes.tolist()}: give evenly spaced nodes.")
         values = np.array([[soil_vector(soil_at(float(a), float(b))) for b in ys] for a in xs])
         spacing = (float(xs[1] - xs[0]), float(ys[1] - ys[0]))
         return cls((float(xs[0]), float(ys[0])), spacing, values)

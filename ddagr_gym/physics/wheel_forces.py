@@ -88,14 +88,20 @@ def _sinkages(
         status[i] = 1 if bogged else 0
 
 
+def finite_array(name: str, values: ArrayLike) -> Array:
+    """``values`` as float64, or one sentence when they are no finite numbers."""
+    try:
+        array = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"{name} is {values!r}: give numbers, in an array of regular shape.") from None
+    if not np.all(np.isfinite(array)):
+        bad = array[~np.isfinite(array)].flat[0]
+        raise InputError(f"{name} contains {bad}: give finite values.")
+    return array
+
+
 def _broadcast(names: tuple[str, ...], values: tuple[ArrayLike, ...]) -> tuple[Array, tuple[int, ...]]:
-    arrays = []
-    for name, value in zip(names, values, strict=True):
-        array = np.asarray(value, dtype=np.float64)
-        if not np.all(np.isfinite(array)):
-            bad = array[~np.isfinite(array)].flat[0]
-            raise InputError(f"{name} contains {bad}: give finite values.")
-        arrays.append(array)
+    arrays = [finite_array(name, value) for name, value in zip(names, values, strict=True)]
     try:
         full = np.broadcast_arrays(*arrays)
     except ValueError:

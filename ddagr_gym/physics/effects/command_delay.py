@@ -2,44 +2,43 @@
 
 from dataclasses import dataclass
 
-from ddagr_gym.physics.effects.base import Effect, size
+from ddagr_gym.physics.effects.base import Effect, Vector, size
+from ddagr_gym.physics.effects.history import fill_node, push, recall, ring_is_empty, ring_stride
 from ddagr_gym.physics.layout import COMMAND, OMEGA, POINT_COMMANDS, SAMPLE_PERIOD
 
-_DEPTH = 64  # samples kept: 0.5 s at 125 Hz
-_CURSOR = 2 * _DEPTH
-_FILLED = _CURSOR + 1
+_LONGEST = 0.49  # [s]
+_NODES = 64  # every sample at 125 Hz and below
 
 
-def delay_command(row, parameters, memory):  # type: ignore[no-untyped-def]
-    if memory[_FILLED] == 0.0:
+def delay_command(row: Vector, parameters: Vector, memory: Vector) -> None:
+    """Commands of ``parameters[0]`` seconds ago."""
+    period = row[SAMPLE_PERIOD]
+    stride = ring_stride(_LONGEST, period, _NODES)
+    if ring_is_empty(memory, 2, _NODES):
         # before the first sample the commands are taken to have equalled the bank speeds
-        for k in range(_DEPTH):
-            memory[2 * k] = row[OMEGA]
-            memory[2 * k + 1] = row[OMEGA + 1]
-        memory[_FILLED] = 1.0
-    cursor = int(memory[_CURSOR])
-    memory[2 * cursor] = row[COMMAND]
-    memory[2 * cursor + 1] = row[COMMAND + 1]
-    samples = min(parameters[0] / row[SAMPLE_PERIOD], _DEPTH - 2.0)
-    whole = int(samples)
-    part = samples - whole
-    newer = (cursor - whole) % _DEPTH
-    older = (cursor - whole - 1) % _DEPTH
+        for k in range(1, _NODES):
+            for bank in range(2):
+                fill_node(memory, 2, _NODES, k, stride, bank, row[OMEGA + bank])
+    push(memory, 2, _NODES, stride, row[COMMAND : COMMAND + 2])
     for bank in range(2):
-        row[COMMAND + bank] = (1.0 - part) * memory[2 * newer + bank] + part * memory[2 * older + bank]
-    memory[_CURSOR] = (cursor + 1) % _DEPTH
+        row[COMMAND + bank] = recall(memory, 2, _NODES, stride, bank, parameters[0] / period, row[COMMAND + bank])
 
 
 @dataclass(frozen=True)
 class CommandDelay(Effect):
-    """The motors receive the command of ``delay`` seconds ago, interpolated between samples."""
+    """The motors receive the command of some time ago, interpolated between samples.
+
+    Attributes:
+        delay: least: half a period of a usual 25 Hz control loop.
+    """
 
     name = "command_delay"
     title = "Command delay"
+    group = "commands and motors"
     equation = "command(t) -> command(t - delay)"
-    source = "diagnosis vocabulary"
+    source = "dead time of a transport lag (Astrom and Murray, Feedback Systems, section 3.2)"
     signature = "bank speeds follow commands late by a constant time, then at the usual rate"
-    confused_with = ("motor_lag",)
+    confused_with = ("motor_lag", "sensor_hold")
     actions = ((POINT_COMMANDS, delay_command),)
 
-    delay: float = size("s", 0.0, 0.49, least=0.02)
+    delay: float = size("s", 0.0, _LONGEST, least=0.02, step=0.008)

@@ -3,13 +3,14 @@
 import math
 from dataclasses import dataclass
 
-from ddagr_gym.physics.effects.base import Effect, size
+from ddagr_gym.physics.effects.base import DriveExtent, Effect, Vector, shape, size
 from ddagr_gym.physics.layout import BODY_FORCE, POINT_BODY_FORCES, V_X, V_Y, YAW_RATE
 
 _SMOOTHING_SPEED = 0.01  # [m/s], ours: the sign of the velocity, made differentiable
 
 
-def drag_behind(row, parameters, memory):  # type: ignore[no-untyped-def]
+def drag_behind(row: Vector, parameters: Vector, memory: Vector) -> None:
+    """Force ``parameters[0]`` against the velocity of a hitch ``parameters[1]`` behind the origin."""
     v_y = row[V_Y] - row[YAW_RATE] * parameters[1]
     speed = math.sqrt(row[V_X] * row[V_X] + v_y * v_y + _SMOOTHING_SPEED * _SMOOTHING_SPEED)
     force_x = -parameters[0] * row[V_X] / speed
@@ -21,15 +22,27 @@ def drag_behind(row, parameters, memory):  # type: ignore[no-untyped-def]
 
 @dataclass(frozen=True)
 class TowedDrag(Effect):
-    """Force of constant size against the velocity of a hitch ``hitch_distance`` behind the body origin."""
+    """Force of constant size against the velocity of a hitch behind the body origin.
+
+    Attributes:
+        force: least: 10 N, a tenth of the rolling resistance of a 170 kg robot on soil.
+        hitch_distance: behind the body origin.
+    """
 
     name = "towed_drag"
     title = "Towed drag"
+    group = "robot"
     equation = "F = -force v_h/|v_h| at the hitch, v_h = (v_x, v_y - hitch_distance yaw_rate)"
     source = "Coulomb friction of a towed sledge"
     signature = "slower at every speed and heading; steadies yaw through the hitch"
-    confused_with = ("viscous_drag", "soil_change", "slope")
+    confused_with = ("lateral_bulldozing", "slip_sinkage", "slope", "soil_change", "viscous_drag")
     actions = ((POINT_BODY_FORCES, drag_behind),)
 
-    force: float = size("N", 0.0, 2000.0, least=10.0)
-    hitch_distance: float = size("m", 0.0, 5.0, least=0.0, default=0.5)
+    force: float = size("N", 0.0, 2000.0, least=10.0, step=5.0)
+    hitch_distance: float = shape("m", 0.0, 5.0, default=0.5, step=0.1)
+
+    @classmethod
+    def probes(cls, extent: DriveExtent) -> tuple[Effect, ...]:
+        """Pulled at the centre, and at one metre behind it, where it steadies yaw as well."""
+        step = cls.parameter("force").metadata["step"]
+        return (cls(step, 0.0), cls(step, 1.0))

@@ -1,0 +1,159 @@
+"""``ddagr test``: everything that continuous integration runs, from the checkout."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+from xml.etree import ElementTree
+
+from ddagr_gym.errors import InputError
+
+EXAMPLES = (
+    "ddagr test",
+    "ddagr test --slow",
+    "ddagr test --only types",
+    "ddagr test --paths tests/test_config.py",
+)
+
+# pytest's exit code when a selection holds no test
+_NOTHING_SELECTED = 5
+
+# import-linter has no module to run with -m
+_LINT_IMPORTS = """
+import sys
+from importlinter.cli import lint_imports
+
+sys.path.insert(0, ".")
+sys.exit(lint_imports(no_logo=True))
+"""
+
+
+@dataclass(frozen=True)
+class Arguments:
+    """Run everything that continuous integration runs.
+
+    In order: lint, format, types, import contracts, tests (all but the slow ones), and the tests of the wheel installed
+    in an environment of its own outside the checkout. The exit code is 1 when anything failed.
+
+    Attributes:
+        slow: run the tests marked slow instead of everything else.
+        workers: processes that share the tests.
+        only: one check instead of all.
+        paths: test files or folders instead of all tests; nothing but tests is run then.
+    """
+
+    slow: bool = False
+    workers: int = 2
+    only: Literal["all", "lint", "format", "types", "contracts", "tests", "wheel"] = "all"
+    paths: tuple[Path, ...] = ()
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a check came to: how many of its parts passed, failed and were skipped."""
+
+    passed: int = 0
+    failed: int = 0
+    skipped: int = 0
+
+
+def run(arguments: Arguments) -> int:
+    """Run the checks, print a summary that ends with ``N passed, N failed``, and return the exit code."""
+    root = _checkout()
+    if arguments.workers < 1:
+        raise InputError(f"--workers is {arguments.workers}: give 1 or more.")
+    checks = _checks(root, arguments)
+    selected = checks if arguments.only == "all" else {arguments.only: checks[arguments.only]}
+    if arguments.slow or arguments.paths:
+        selected = {"tests": checks["tests"]}
+    outcomes: dict[str, tuple[Outcome, float]] = {}
+    for name, check in selected.items():
+        print(f"\n==== {name}", flush=True)
+        start = time.monotonic()
+        outcomes[name] = (check(), time.monotonic() - start)
+    _print_summary(outcomes)
+    return 1 if any(outcome.failed for outcome, _ in outcomes.values()) else 0
+
+
+def _checkout() -> Path:
+    root = Path(__file__).resolve().parents[2]
+    if not (root / "pyproject.toml").is_file() or not (root / "tests").is_dir():
+        raise InputError("`ddagr test` needs a checkout of ddagr-gym: clone the repository and run ./ddagr test there.")
+    return root
+
+
+def _checks(root: Path, arguments: Arguments) -> dict[str, Callable[[], Outcome]]:
+    return {
+        "lint": lambda: _tool(root, "-m", "ruff", "check", "."),
+        "format": lambda: _tool(root, "-m", "ruff", "format", "--check", "."),
+        "types": lambda: _tool(root, "-m", "mypy", "ddagr_gym"),
+        "contracts": lambda: _tool(root, "-c", _LINT_IMPORTS),
+        "tests": lambda: _tests(root, arguments),
+        "wheel": lambda: _installed_wheel(root),
+    }
+
+
+def _tool(root: Path, *words: str) -> Outcome:
+    done = subprocess.run([sys.executable, *words], cwd=root, stdin=subprocess.DEVNULL)
+    return Outcome(passed=1) if done.returncode == 0 else Outcome(failed=1)
+
+
+def _tests(root: Path, arguments: Arguments) -> Outcome:
+    paths = [str(path.resolve()) for path in arguments.paths]
+    marker = "slow" if arguments.slow else "not slow"
+    parallel = ["-n", str(arguments.workers)] if arguments.workers > 1 else []
+    return _pytest([sys.executable], root, "-m", marker, *parallel, *paths, may_be_empty=arguments.slow)
+
+
+def _pytest(python: list[str], folder: Path, *words: str, may_be_empty: bool = False) -> Outcome:
+    with tempfile.TemporaryDirectory(prefix="ddagr-test-") as temporary:
+        report = Path(temporary) / "report.xml"
+        command = [*python, "-m", "pytest", "-q", f"--junitxml={report}", *words]
+        code = subprocess.run(command, cwd=folder, stdin=subprocess.DEVNULL).returncode
+        if code == _NOTHING_SELECTED and may_be_empty:
+            return Outcome()
+        outcome = _read_report(report) if report.is_file() else Outcome(failed=1)
+    # pytest can end with an error after all tests passed (a plugin, a collection error).
+    return Outcome(outcome.passed, 1, outcome.skipped) if code and not outcome.failed else outcome
+
+
+def _read_report(report: Path) -> Outcome:
+    suites = ElementTree.parse(report).getroot().iter("testsuite")
+    counts = [{k: int(suite.get(k, 0)) for k in ("tests", "failures", "errors", "skipped")} for suite in suites]
+    total, failures, errors, skipped = (sum(c[k] for c in counts) for k in ("tests", "failures", "errors", "skipped"))
+    failed = failures + errors
+    return Outcome(passed=total - failed - skipped, failed=failed, skipped=skipped)
+
+
+def _installed_wheel(root: Path) -> Outcome:
+    """Build the wheel, install it with its core dependencies outside the checkout, and run tests/installed on it."""
+    from ddagr_gym.commands import wheel
+
+    with tempfile.TemporaryDirectory(prefix="ddagr-wheel-") as temporary:
+        folder = Path(temporary).resolve()
+        try:
+            python = wheel.install(root, folder)
+        except subprocess.CalledProcessError as error:
+            print(f"{' '.join(map(str, error.cmd))} ended with exit code {error.returncode}.", file=sys.stderr)
+            return Outcome(failed=1)
+        tests = wheel.copy_tests(root, folder)
+        environment = ["env", "-u", "PYTHONPATH", str(python), "-P"]
+        return _pytest(environment, tests, "-p", "no:cacheprovider", "--import-mode=importlib", ".")
+
+
+def _print_summary(outcomes: dict[str, tuple[Outcome, float]]) -> None:
+    print("\n==== summary")
+    for name, (outcome, seconds) in outcomes.items():
+        verdict = "FAILED" if outcome.failed else "ok"
+        skipped = f", {outcome.skipped} skipped" if outcome.skipped else ""
+        counts = f"{outcome.passed} passed, {outcome.failed} failed{skipped}"
+        print(f"{name:<10} {verdict:<7} {seconds:6.1f} s  {counts}")
+    passed = sum(outcome.passed for outcome, _ in outcomes.values())
+    failed = sum(outcome.failed for outcome, _ in outcomes.values())
+    print(f"{passed} passed, {failed} failed", flush=True)

@@ -1,0 +1,173 @@
+"""Forces of the soil on one wheel as functions of slip: four parameters, closed derivatives.
+
+======================  ======  =========================================================================
+name                    thesis  meaning
+======================  ======  =========================================================================
+traction_limit          a1      longitudinal force at full slip [N]
+traction_rate           a2      how fast slip mobilises it [-]: 1/a2 is the slip at 63 %
+lateral_stiffness       b       lateral force per slip angle at small slip [N/rad]
+motion_resistance       Rc      force against rolling, which the thesis's law lacks [N]
+======================  ======  =========================================================================
+
+Slip (physics.md section 3), with ``rim = R0 omega`` and ours at rest, ``d = sqrt(max(rim^2, v_x^2) + rest_speed^2)``:
+``s_x = (rim - v_x)/d``, ``s_y = -v_y/d``. Resistance is ``-Rc v_x/sqrt(v_x^2 + rest_speed^2)`` (ours: sgn, smoothed).
+
+Every function returns 16 numbers: F_x, its derivatives by v_x, v_y, rim, ln a1, ln a2, ln b, ln Rc; the same for F_y.
+"""
+
+from __future__ import annotations
+
+import math
+from enum import IntEnum
+
+from ddagr_gym.jit import kernel
+
+_SLIP_FLOOR = 1e-12
+"""Added to the squared slip so that its direction has a derivative at zero slip."""
+
+Gradient = tuple[
+    float, float, float, float, float, float, float, float, float, float, float, float, float, float, float, float
+]
+
+
+class ForceLaw(IntEnum):
+    """Choice of force law.
+
+    Attributes:
+        thesis: (3.15), (3.16) with consistent signs and motion resistance: ``F_x = a1 sgn(s)(1 - exp(-a2 |s|)) - Rc``,
+            ``F_y = -b beta``.
+        coupled: ours; slip and slip angle share one traction, see :func:`coupled_law`.
+    """
+
+    thesis = 0
+    coupled = 1
+
+
+@kernel(inline=True)
+def _slip(v_x: float, rim: float, rest_speed: float) -> tuple[float, float, float, float, float, float]:
+    """Slip s_x, its derivatives by v_x and rim; the divisor d and its derivatives."""
+    if abs(rim) >= abs(v_x):
+        divisor = math.sqrt(rim * rim + rest_speed * rest_speed)
+        divisor_v, divisor_rim = 0.0, rim / divisor
+    else:
+        divisor = math.sqrt(v_x * v_x + rest_speed * rest_speed)
+        divisor_v, divisor_rim = v_x / divisor, 0.0
+    slip = (rim - v_x) / divisor
+    slip_v = -(1.0 + slip * divisor_v) / divisor
+    slip_rim = (1.0 - slip * divisor_rim) / divisor
+    return slip, slip_v, slip_rim, divisor, divisor_v, divisor_rim
+
+
+@kernel(inline=True)
+def _resistance(v_x: float, rim: float, resistance: float, reversal_speed: float) -> tuple[float, float]:
+    """Force against rolling [N] and its derivative by v_x, which is also that by rim."""
+    travel = rim + v_x
+    inverse = 1.0 / math.sqrt(travel * travel + reversal_speed * reversal_speed)
+    direction = travel * inverse
+    return -resistance * direction, -resistance * (1.0 - direction * direction) * inverse
+
+
+@kernel(inline=True)
+def thesis_law(
+    v_x: float,
+    v_y: float,
+    rim: float,
+    limit: float,
+    rate: float,
+    stiffness: float,
+    resistance: float,
+    rest_speed: float,
+    reversal_speed: float,
+) -> Gradient:
+    """Thesis (3.15), (3.16) in the signs of physics.md section 8, plus motion resistance.
+
+    Args:
+        v_x: hub velocity forward [m/s].
+        v_y: hub velocity to the left [m/s].
+        rim: R0 omega [m/s].
+        limit: a1 [N].
+        rate: a2 [-].
+        stiffness: b [N/rad].
+        resistance: Rc [N].
+        rest_speed: smoothing near standstill [m/s].
+    """
+    slip, slip_v, slip_rim, _, _, _ = _slip(v_x, rim, rest_speed)
+    decay = math.exp(-rate * abs(slip))
+    traction = math.copysign(limit * (1.0 - decay), slip)
+    slope = limit * rate * decay
+    drag, drag_v = _resistance(v_x, rim, resistance, reversal_speed)
+    speed = math.sqrt(v_x * v_x + rest_speed * rest_speed)
+    lateral = -stiffness * math.atan2(v_y, speed)
+    squared = speed * speed + v_y * v_y
+    return (
+        traction + drag, slope * slip_v + drag_v, 0.0, slope * slip_rim + drag_v, traction, slope * slip, 0.0, drag,
+        lateral, stiffness * v_y * v_x / (speed * squared), -stiffness * speed / squared, 0.0, 0.0, 0.0, lateral, 0.0,
+    )  # fmt: skip
+
+
+@kernel(inline=True)
+def coupled_law(
+    v_x: float,
+    v_y: float,
+    rim: float,
+    limit: float,
+    rate: float,
+    stiffness: float,
+    resistance: float,
+    rest_speed: float,
+    reversal_speed: float,
+) -> Gradient:
+    """One traction shared by slip and slip angle (ours). Arguments as :func:`thesis_law`.
+
+    The forces derive from one dissipation potential of the slip ``q = sqrt(s_x^2 + c s_y^2)``, ``c = b/(a1 a2)``:
+    ``F_x = g s_x - Rc``, ``F_y = g c s_y`` with ``g = a1 (1 - exp(-a2 q))/q``. At s_y = 0 that is (3.15), at small
+    slip (3.16); a wheel that slides sideways has no full longitudinal force left, and the reverse.
+    """
+    slip, slip_v, slip_rim, divisor, divisor_v, divisor_rim = _slip(v_x, rim, rest_speed)
+    lateral_slip = -v_y / divisor
+    ratio = stiffness / (limit * rate)
+    total = math.sqrt(slip * slip + ratio * lateral_slip * lateral_slip + _SLIP_FLOOR)
+    mobilised = limit * rate * math.exp(-rate * total)
+    g = (limit - mobilised / rate) / total
+    # dg/dq divided by q: every derivative of q carries 1/q
+    g_q = (mobilised - g) / (total * total)
+    g_slip = g_q * slip
+    g_lateral = g_q * ratio * lateral_slip
+    g_ratio = 0.5 * g_lateral * lateral_slip  # by ln c
+    side = ratio * lateral_slip
+    x_slip, x_lateral = g + g_slip * slip, g_lateral * slip
+    y_slip, y_lateral = g_slip * side, g * ratio + g_lateral * side
+    lateral_v = -lateral_slip * divisor_v / divisor
+    lateral_rim = -lateral_slip * divisor_rim / divisor
+    drag, drag_v = _resistance(v_x, rim, resistance, reversal_speed)
+    x_ratio = g_ratio * slip
+    y_ratio = (g + g_ratio) * side
+    return (
+        g * slip + drag,
+        x_slip * slip_v + x_lateral * lateral_v + drag_v,
+        -x_lateral / divisor,
+        x_slip * slip_rim + x_lateral * lateral_rim + drag_v,
+        g * slip - x_ratio,
+        mobilised * slip - x_ratio,
+        x_ratio,
+        drag,
+        g * side,
+        y_slip * slip_v + y_lateral * lateral_v,
+        -y_lateral / divisor,
+        y_slip * slip_rim + y_lateral * lateral_rim,
+        g * side - y_ratio,
+        mobilised * side - y_ratio,
+        y_ratio,
+        0.0,
+    )
+
+
+@kernel(inline=True)
+def wheel_law(
+    law: float, v_x: float, v_y: float, rim: float, limit: float, rate: float, stiffness: float, resistance: float,
+    rest_speed: float, reversal_speed: float,
+) -> Gradient:  # fmt: skip
+    """The law ``law`` (a :class:`ForceLaw`); the other arguments as :func:`thesis_law`."""
+    if law == 1.0:
+        return coupled_law(v_x, v_y, rim, limit, rate, stiffness, resistance, rest_speed, reversal_speed)
+    return thesis_law(v_x, v_y, rim, limit, rate, stiffness, resistance, rest_speed, reversal_speed)

@@ -1,0 +1,91 @@
+"""Names of the entries of the filter's state, of its measurements and of the packed model vector."""
+
+from __future__ import annotations
+
+STATE = (
+    "v_x",
+    "v_y",
+    "yaw_rate",
+    "omega_right",
+    "omega_left",
+    "log_traction_limit",
+    "log_traction_rate",
+    "log_lateral_stiffness",
+    "log_motion_resistance",
+    "gyro_bias",
+    "accelerometer_bias_x",
+    "accelerometer_bias_y",
+)
+"""Entries of the state, see :mod:`ddagr_gym.estimation` for units."""
+
+STATE_SIZE = 12
+VELOCITY = 0  # v_x, v_y, yaw_rate
+OMEGA = 3  # right, left
+PARAMETER = 5  # ln a1, ln a2, ln b, ln Rc
+GYRO_BIAS = 9
+ACCELEROMETER_BIAS = 10  # x, y
+
+MOTION_SIZE = 9
+"""Entries 0-8 are those on which forces depend: velocities, bank speeds, parameters."""
+
+CHANNELS = ("specific_force_x", "specific_force_y", "yaw_rate", "encoder_right", "encoder_left")
+"""Measured channels, in the order of a measurement vector; names of the columns of a recording."""
+
+CHANNEL_SIZE = 5
+FORCE_CHANNEL = 0
+GYRO_CHANNEL = 2
+ENCODER_CHANNEL = 3
+
+_next = 0
+
+
+def _block(size: int = 1) -> int:
+    global _next
+    first = _next
+    _next += size
+    return first
+
+
+# Packed model: one float64 vector that the kernels read
+LAW = _block()  # 0 thesis, 1 coupled
+MASS = _block()  # [kg]
+YAW_INERTIA = _block()  # [kg m^2]
+HALF_WHEELBASE = _block()  # [m]
+HALF_TRACK = _block()  # [m]
+OUTER_RADIUS = _block()  # [m]
+MOTOR_RATE = _block()  # [1/s]
+MOTOR_RATE_VARIANCE = _block()  # [1/s^2]
+REST_SPEED = _block()  # [m/s]
+REVERSAL_SPEED = _block()  # [m/s]
+IMU_POSITION = _block(2)  # [m]
+MAXIMUM_STEP = _block()  # [s]
+GATE = _block()  # standard deviations
+EXCITATION = _block()  # slip ratio
+EXCITATION_SPEED = _block()  # [m/s]
+STANDSTILL_WHEEL_SPEED = _block()  # [rad/s]
+STANDSTILL_SPEED = _block()  # [m/s]
+STANDSTILL_VARIANCE = _block(3)  # of v_x, v_y [m^2/s^2], yaw rate [rad^2/s^2]
+ACCELEROMETER_INTERVAL = _block()  # samples
+PROCESS = _block(STATE_SIZE)  # noise densities, unit of the state squared per second
+SOIL_COVARIANCE = _block(16)  # of the logs before driving
+SOIL_RATE = _block()  # share of it that is added per time [1/s]
+SOIL_AGITATION = _block()  # and per change of rim speed [1/(m/s)]
+MEASUREMENT = _block(CHANNEL_SIZE)  # noise variances
+DEWEIGHTING = _block(CHANNEL_SIZE)  # further variance that only the gain sees
+LEARNING = _block(CHANNEL_SIZE)  # the same for the gain rows of the parameters
+FLOOR = _block(STATE_SIZE)  # least variances
+CEILING = _block(STATE_SIZE)  # largest variances
+LOW = _block(STATE_SIZE)  # least values of the state
+HIGH = _block(STATE_SIZE)  # largest values
+MODEL_SIZE = _next
+
+# Rows of the kernels' scratch, (SCRATCH_ROWS, STATE_SIZE)
+FORCE_ROW = 0  # specific force x, y [m/s^2], yaw acceleration [rad/s^2]
+GRADIENT_ROW = 1  # their derivatives by the motion entries, three rows
+TRANSITION_ROW = 4  # rows of the transition matrix of the velocities
+PRODUCT_ROW = 7  # three rows
+ROW_ROW = 10  # row of the measurement matrix
+COLUMN_ROW = 11  # covariance times that row
+GAIN_ROW = 12
+READING_ROW = 13  # the sample as used
+SCRATCH_ROWS = 14

@@ -1,0 +1,209 @@
+"""How the state moves: rigid body on the plane, bank speeds, constant logs and biases.
+
+    dv_x/dt      = F_x/m + yaw_rate v_y + slope_x
+    dv_y/dt      = F_y/m - yaw_rate v_x + slope_y
+    dyaw_rate/dt = M/I
+    domega/dt    = k_omega (command - omega)           per bank (4.11)
+
+with ``F_x, F_y, M`` the sums over the wheels of :mod:`~ddagr_gym.estimation.force_laws` (4.6), (4.7), (4.10) in the
+signs of physics.md section 8, the centre of mass at the body origin, and slope the gravity along the body axes (6.3).
+
+Integration. Damping reaches 1e3 1/s near a locked wheel, so that a step of 8 ms must not be explicit. The bank speeds
+have an exact solution. For the velocities v, with f and A = df/dv at the start of a step h and the bank speeds at its
+middle, and g = 1 - 1/sqrt(2),
+
+    v+ = v + h psi(hA) f,   psi(z) = (1 - g^2 z)/(1 - g z)^2
+
+is second order and L-stable (1 + z psi(z) is the stability function of ROS2). The same ``G = h psi(hA)`` gives the
+transition matrix (``I + G A``, and ``G`` times the derivative of f by bank speeds and parameters) and the effect of an
+acceleration that is constant over the step: state, covariance and process noise share one scheme. The derivatives of
+A are left out of the transition matrix, as in any extended Kalman filter.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ddagr_gym.estimation.force_laws import wheel_law
+from ddagr_gym.estimation.layout import (
+    FORCE_ROW,
+    GRADIENT_ROW,
+    HALF_TRACK,
+    HALF_WHEELBASE,
+    LAW,
+    MASS,
+    MOTION_SIZE,
+    MOTOR_RATE,
+    OMEGA,
+    OUTER_RADIUS,
+    PARAMETER,
+    PRODUCT_ROW,
+    REST_SPEED,
+    REVERSAL_SPEED,
+    TRANSITION_ROW,
+    YAW_INERTIA,
+)
+from ddagr_gym.jit import kernel
+
+Array = NDArray[np.float64]
+
+_GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
+_LEAST_DETERMINANT = 1e-9
+_REST_FRACTION = 4.0
+_REST_SUBSTEPS = 4
+
+_Bank = tuple[
+    float, float, float, float, float, float, float, float, float, float, float, float, float, float,
+    float, float, float, float, float, float, float, float, float, float, float, float, float,
+]  # fmt: skip
+
+
+@kernel(inline=True)
+def _bank_forces(
+    model: Array, v_x: float, v_front: float, v_rear: float, rim: float, y: float,
+    limit: float, rate: float, stiffness: float, resistance: float,
+) -> _Bank:  # fmt: skip
+    """Force x, force y, moment of one bank, and their derivatives by v_x, v_y, yaw rate, rim and four logs.
+
+    The hubs stand at (+-L, y) and move with v_x = v_x,body - yaw_rate y and v_y = v_y,body +- yaw_rate L.
+    """
+    length = model[HALF_WHEELBASE]
+    rest, reversal = model[REST_SPEED], model[REVERSAL_SPEED]
+    a = wheel_law(model[LAW], v_x, v_front, rim, limit, rate, stiffness, resistance, rest, reversal)
+    b = wheel_law(model[LAW], v_x, v_rear, rim, limit, rate, stiffness, resistance, rest, reversal)
+    x_v, y_v = a[1] + b[1], a[9] + b[9]
+    x_w, y_w = a[2] + b[2], a[10] + b[10]
+    x_turn = length * (a[2] - b[2]) - y * x_v
+    y_turn = length * (a[10] - b[10]) - y * y_v
+    moment_v = length * (a[9] - b[9]) - y * x_v
+    moment_w = length * (a[10] - b[10]) - y * x_w
+    moment_turn = length * (length * y_w - y * (a[9] - b[9])) - y * x_turn
+    return (
+        a[0] + b[0], x_v, x_w, x_turn, a[3] + b[3], a[4] + b[4], a[5] + b[5], a[6] + b[6], a[7] + b[7],
+        a[8] + b[8], y_v, y_w, y_turn, a[11] + b[11], a[12] + b[12], a[13] + b[13], a[14] + b[14], a[15] + b[15],
+        length * (a[8] - b[8]) - y * (a[0] + b[0]), moment_v, moment_w, moment_turn,
+        length * (a[11] - b[11]) - y * (a[3] + b[3]), length * (a[12] - b[12]) - y * (a[4] + b[4]),
+        length * (a[13] - b[13]) - y * (a[5] + b[5]), length * (a[14] - b[14]) - y * (a[6] + b[6]),
+        length * (a[15] - b[15]) - y * (a[7] + b[7]),
+    )  # fmt: skip
+
+
+@kernel()
+def body_forces(model: Array, state: Array, scratch: Array) -> None:
+    """Specific force and yaw acceleration, and their derivatives by the motion entries of the state.
+
+    Args:
+        model: packed model.
+        state: (STATE_SIZE,).
+        scratch: FORCE_ROW holds force x, y per mass [m/s^2] and moment per inertia [rad/s^2] afterwards, the three
+            rows from GRADIENT_ROW their derivatives by state entries 0 to MOTION_SIZE - 1.
+    """
+    length, width, radius = model[HALF_WHEELBASE], model[HALF_TRACK], model[OUTER_RADIUS]
+    limit, rate = math.exp(state[PARAMETER]), math.exp(state[PARAMETER + 1])
+    stiffness, resistance = math.exp(state[PARAMETER + 2]), math.exp(state[PARAMETER + 3])
+    front, rear = state[1] + state[2] * length, state[1] - state[2] * length
+    turning = state[2] * width
+    right = _bank_forces(
+        model, state[0] + turning, front, rear, radius * state[OMEGA], -width, limit, rate, stiffness, resistance
+    )
+    left = _bank_forces(
+        model, state[0] - turning, front, rear, radius * state[OMEGA + 1], width, limit, rate, stiffness, resistance
+    )
+    for row in range(3):
+        scale = 1.0 / (model[YAW_INERTIA] if row == 2 else model[MASS])
+        first = 9 * row
+        scratch[FORCE_ROW, row] = scale * (right[first] + left[first])
+        gradient = scratch[GRADIENT_ROW + row]
+        gradient[0] = scale * (right[first + 1] + left[first + 1])
+        gradient[1] = scale * (right[first + 2] + left[first + 2])
+        gradient[2] = scale * (right[first + 3] + left[first + 3])
+        gradient[3] = scale * radius * right[first + 4]
+        gradient[4] = scale * radius * left[first + 4]
+        gradient[5] = scale * (right[first + 5] + left[first + 5])
+        gradient[6] = scale * (right[first + 6] + left[first + 6])
+        gradient[7] = scale * (right[first + 7] + left[first + 7])
+        gradient[8] = scale * (right[first + 8] + left[first + 8])
+
+
+@kernel()
+def _response(step: float, scratch: Array) -> None:
+    """Write ``G = h psi(hA)`` to the first three entries of the rows from PRODUCT_ROW.
+
+    Needs the derivatives A of the accelerations by the velocities in the first three entries of the GRADIENT rows.
+    """
+    a = scratch[GRADIENT_ROW : GRADIENT_ROW + 3]
+    h = _GAMMA * step
+    m00, m01, m02 = 1.0 - h * a[0, 0], -h * a[0, 1], -h * a[0, 2]
+    m10, m11, m12 = -h * a[1, 0], 1.0 - h * a[1, 1], -h * a[1, 2]
+    m20, m21, m22 = -h * a[2, 0], -h * a[2, 1], 1.0 - h * a[2, 2]
+    c0, c1, c2 = m11 * m22 - m12 * m21, m12 * m20 - m10 * m22, m10 * m21 - m11 * m20
+    determinant = m00 * c0 + m01 * c1 + m02 * c2
+    if abs(determinant) < _LEAST_DETERMINANT:
+        determinant = math.copysign(_LEAST_DETERMINANT, determinant)
+    scale = 1.0 / determinant
+    i00, i01, i02 = scale * c0, scale * (m02 * m21 - m01 * m22), scale * (m01 * m12 - m02 * m11)
+    i10, i11, i12 = scale * c1, scale * (m00 * m22 - m02 * m20), scale * (m02 * m10 - m00 * m12)
+    i20, i21, i22 = scale * c2, scale * (m01 * m20 - m00 * m21), scale * (m00 * m11 - m01 * m10)
+    # psi = W^-1 ((1 - g) W^-1 + g) with W = 1 - g h A
+    twice, once = step * (1.0 - _GAMMA), step * _GAMMA
+    g = scratch[PRODUCT_ROW : PRODUCT_ROW + 3]
+    g[0, 0] = twice * (i00 * i00 + i01 * i10 + i02 * i20) + once * i00
+    g[0, 1] = twice * (i00 * i01 + i01 * i11 + i02 * i21) + once * i01
+    g[0, 2] = twice * (i00 * i02 + i01 * i12 + i02 * i22) + once * i02
+    g[1, 0] = twice * (i10 * i00 + i11 * i10 + i12 * i20) + once * i10
+    g[1, 1] = twice * (i10 * i01 + i11 * i11 + i12 * i21) + once * i11
+    g[1, 2] = twice * (i10 * i02 + i11 * i12 + i12 * i22) + once * i12
+    g[2, 0] = twice * (i20 * i00 + i21 * i10 + i22 * i20) + once * i20
+    g[2, 1] = twice * (i20 * i01 + i21 * i11 + i22 * i21) + once * i21
+    g[2, 2] = twice * (i20 * i02 + i21 * i12 + i22 * i22) + once * i22
+
+
+@kernel()
+def advance_state(
+    model: Array, state: Array, command_right: float, command_left: float, slope_x: float, slope_y: float,
+    step: float, scratch: Array,
+) -> float:  # fmt: skip
+    """Advance the state by one step and leave its transition in ``scratch``.
+
+    Args:
+        model: packed model.
+        state: (STATE_SIZE,), updated.
+        command_right: speed command of the right bank [rad/s].
+        command_left: of the left bank [rad/s].
+        slope_x: gravity along body x [m/s^2].
+        slope_y: gravity along body y [m/s^2].
+        step: h [s].
+        scratch: the rows from TRANSITION_ROW hold the velocities' transition by the motion entries afterwards, those
+            from PRODUCT_ROW the response G.
+
+    Returns:
+        Factor by which a deviation of a bank speed shrinks over the step.
+    """
+    half = math.exp(-0.5 * model[MOTOR_RATE] * step)
+    state[OMEGA] = command_right + (state[OMEGA] - command_right) * half
+    state[OMEGA + 1] = command_left + (state[OMEGA + 1] - command_left) * half
+    body_forces(model, state, scratch)
+    force, a = scratch[FORCE_ROW], scratch[GRADIENT_ROW : GRADIENT_ROW + 3]
+    f_x = force[0] + state[2] * state[1] + slope_x
+    f_y = force[1] - state[2] * state[0] + slope_y
+    f_turn = force[2]
+    a[0, 1] += state[2]
+    a[0, 2] += state[1]
+    a[1, 0] -= state[2]
+    a[1, 2] -= state[0]
+    _response(step, scratch)
+    for i in range(3):
+        g_x, g_y, g_turn = scratch[PRODUCT_ROW + i, 0], scratch[PRODUCT_ROW + i, 1], scratch[PRODUCT_ROW + i, 2]
+        state[i] += g_x * f_x + g_y * f_y + g_turn * f_turn
+        row = scratch[TRANSITION_ROW + i]
+        for j in range(MOTION_SIZE):
+            row[j] = g_x * a[0, j] + g_y * a[1, j] + g_turn * a[2, j]
+        row[i] += 1.0
+        row[OMEGA] *= half
+        row[OMEGA + 1] *= half
+    state[OMEGA] = command_right + (state[OMEGA] - command_right) * half
+    state[OMEGA + 1] = command_left + (state[OMEGA + 1] - command_left) * half
+    return half * half

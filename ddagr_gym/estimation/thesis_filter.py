@@ -1,0 +1,216 @@
+"""The thesis's own filter (chapter 5), put right and kept for comparison; nothing of ours is added.
+
+States v_x, v_y, yaw rate, omega_right, omega_left, a1, a2, b: linear parameters, no resistance, no biases (5.1).
+Put right: signs of the force law and rows of the model (physics.md section 8), specific force F/m as the
+accelerometer's reading instead of the body velocity's derivative (5.5), innovation y - h(x) (5.12 prints y - Hx), the
+transpose in the Joseph form (5.11). Kept: fourth-order Runge-Kutta of state and covariance (5.7), (5.8), the vector
+update (5.10), noise of (6.2). Ours, because the thesis says nothing: initial parameters (those of our prior), the least value at which
+parameters are held positive, and how many Runge-Kutta steps a sample takes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ddagr_gym.errors import InputError
+from ddagr_gym.estimation.filter import FilterRun
+from ddagr_gym.estimation.filter_model import FilterModel
+from ddagr_gym.estimation.force_laws import ForceLaw
+from ddagr_gym.estimation.layout import (
+    CHANNEL_SIZE,
+    CHANNELS,
+    FORCE_ROW,
+    GRADIENT_ROW,
+    MOTOR_RATE,
+    PARAMETER,
+    SCRATCH_ROWS,
+    STATE_SIZE,
+)
+from ddagr_gym.estimation.process_model import body_forces
+from ddagr_gym.jit import kernel
+from ddagr_gym.parameters import Robot, Validated, bounded
+
+Array = NDArray[np.float64]
+
+THESIS_STATE = ("v_x", "v_y", "yaw_rate", "omega_right", "omega_left", "a1", "a2", "b")
+"""Entries of the thesis's state (5.1)."""
+
+_SIZE = 8
+_NO_RESISTANCE = np.log(1e-12)
+
+
+@dataclass(frozen=True)
+class ThesisModel(Validated):
+    """The thesis filter's knowledge: robot, noise, start.
+
+    Attributes:
+        robot: mass, inertia, geometry and motor rate.
+        process: diagonal of Q per second, in the order of THESIS_STATE (6.2).
+        measurement: diagonal of R, in the order of CHANNELS (6.2).
+        initial_variance: diagonal of P0; (6.2) for the parameters, ours for a1 and b, whose unit is the newton.
+        parameters: initial a1 [N], a2 [-], b [N/rad].
+        least_parameter: a1, a2, b are held at or above it.
+        sample_period: [s].
+        steps: Runge-Kutta steps per sample; they must follow eigenvalues of 1e3 1/s.
+    """
+
+    robot: Robot
+    process: tuple[float, ...] = (1e-6, 1e-5, 1e-6, 0.0, 0.0, 1e-7, 1e-9, 1e-7)
+    measurement: tuple[float, ...] = (5e-3, 5e-3, 7e-5, 1e-1, 1e-1)
+    initial_variance: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0, 0.0, 2500.0, 1.0, 10000.0)
+    parameters: tuple[float, float, float] = (165.0, 5.0, 840.0)
+    least_parameter: float = bounded("-", 0.0, 1.0, default=1e-2, open_low=True)
+    sample_period: float = bounded("s", 0.0, 1.0, default=0.008, open_low=True)
+    steps: int = 16
+
+    def _check(self) -> None:
+        for name, length in (("process", _SIZE), ("measurement", CHANNEL_SIZE), ("initial_variance", _SIZE)):
+            values = np.asarray(getattr(self, name), dtype=np.float64)
+            if values.shape != (length,) or not (np.isfinite(values).all() and (values >= 0.0).all()):
+                raise InputError(f"ThesisModel.{name} is {getattr(self, name)!r}: give {length} variances.")
+        if self.steps < 1:
+            raise InputError(f"ThesisModel.steps is {self.steps}: give 1 or more.")
+
+
+@kernel()
+def _derivative(
+    model: Array, x: Array, p: Array, command: Array, noise: Array, logs: Array, a: Array, x_dot: Array, p_dot: Array,
+    scratch: Array,
+) -> None:  # fmt: skip
+    """Right-hand sides of (5.7) and (5.8)."""
+    _evaluate(model, x, logs, scratch)
+    a[:] = 0.0
+    for row in range(3):
+        for j in range(5):
+            a[row, j] = scratch[GRADIENT_ROW + row, j]
+        for j in range(5, _SIZE):
+            a[row, j] = scratch[GRADIENT_ROW + row, j] / x[j]
+    a[0, 1] += x[2]
+    a[0, 2] += x[1]
+    a[1, 0] -= x[2]
+    a[1, 2] -= x[0]
+    x_dot[:] = 0.0
+    x_dot[0] = scratch[FORCE_ROW, 0] + x[2] * x[1]
+    x_dot[1] = scratch[FORCE_ROW, 1] - x[2] * x[0]
+    x_dot[2] = scratch[FORCE_ROW, 2]
+    for bank in range(2):
+        a[3 + bank, 3 + bank] = -model[MOTOR_RATE]
+        x_dot[3 + bank] = model[MOTOR_RATE] * (command[bank] - x[3 + bank])
+    product = a @ p
+    for i in range(_SIZE):
+        for j in range(_SIZE):
+            p_dot[i, j] = product[i, j] + product[j, i]
+        p_dot[i, i] += noise[i]
+
+
+@kernel()
+def _evaluate(model: Array, x: Array, logs: Array, scratch: Array) -> None:
+    """Forces of the thesis law at the linear parameters; derivatives by the logs."""
+    for i in range(5):
+        logs[i] = x[i]
+    for i in range(5, _SIZE):
+        logs[i] = np.log(x[i])
+    logs[PARAMETER + 3] = _NO_RESISTANCE
+    body_forces(model, logs, scratch)
+
+
+@kernel()
+def _correct(model: Array, x: Array, p: Array, reading: Array, variances: Array, logs: Array, scratch: Array) -> Array:
+    """Vector update (5.10)-(5.12) with the channels that have a sample; returns standardised innovations."""
+    _evaluate(model, x, logs, scratch)
+    full = np.zeros((CHANNEL_SIZE, _SIZE))
+    predicted = np.empty(CHANNEL_SIZE)
+    for axis in range(2):
+        predicted[axis] = scratch[FORCE_ROW, axis]
+        for j in range(_SIZE):
+            full[axis, j] = scratch[GRADIENT_ROW + axis, j] / (x[j] if j >= 5 else 1.0)
+    for channel in range(2, CHANNEL_SIZE):
+        full[channel, channel] = 1.0
+        predicted[channel] = x[channel]
+    used = np.flatnonzero(np.isfinite(reading))
+    standardised = np.full(CHANNEL_SIZE, np.nan)
+    if used.size == 0:
+        return standardised
+    h = full[used]
+    r = np.diag(variances[used])
+    s = h @ p @ h.T + r
+    innovation = reading[used] - predicted[used]
+    gain = np.linalg.solve(s, h @ p).T
+    x += gain @ innovation
+    rest = np.eye(_SIZE) - gain @ h
+    p[:] = rest @ p @ rest.T + gain @ r @ gain.T
+    p[:] = 0.5 * (p + p.T)
+    for i in range(used.size):
+        standardised[used[i]] = innovation[i] / np.sqrt(s[i, i])
+    return standardised
+
+
+@kernel()
+def _run(
+    model: Array, x: Array, p: Array, commands: Array, readings: Array, durations: Array, noise: Array,
+    variances: Array, least: float, steps: int, states: Array, covariances: Array, standardised: Array,
+) -> None:  # fmt: skip
+    scratch = np.zeros((SCRATCH_ROWS, STATE_SIZE))
+    logs, a = np.zeros(STATE_SIZE), np.zeros((_SIZE, _SIZE))
+    kx, kp = np.zeros((4, _SIZE)), np.zeros((4, _SIZE, _SIZE))
+    for k in range(readings.shape[0]):
+        h = durations[k] / steps
+        for _ in range(steps):
+            _derivative(model, x, p, commands[k], noise, logs, a, kx[0], kp[0], scratch)
+            _derivative(
+                model, x + 0.5 * h * kx[0], p + 0.5 * h * kp[0], commands[k], noise, logs, a, kx[1], kp[1], scratch
+            )
+            _derivative(
+                model, x + 0.5 * h * kx[1], p + 0.5 * h * kp[1], commands[k], noise, logs, a, kx[2], kp[2], scratch
+            )
+            _derivative(model, x + h * kx[2], p + h * kp[2], commands[k], noise, logs, a, kx[3], kp[3], scratch)
+            x += h / 6.0 * (kx[0] + 2.0 * kx[1] + 2.0 * kx[2] + kx[3])
+            p += h / 6.0 * (kp[0] + 2.0 * kp[1] + 2.0 * kp[2] + kp[3])
+        standardised[k] = _correct(model, x, p, readings[k], variances, logs, scratch)
+        x[5:] = np.maximum(x[5:], least)
+        states[k] = x
+        covariances[k] = p
+
+
+def run_thesis_filter(model: ThesisModel, columns: Mapping[str, ArrayLike]) -> FilterRun:
+    """The thesis's filter over a recording, from rest.
+
+    Args:
+        model: its knowledge.
+        columns: as for :func:`~ddagr_gym.estimation.filter.run_filter`; commands are needed.
+
+    Returns:
+        States (T, 8) in the order of THESIS_STATE; they may be NaN from the sample on at which the filter broke down,
+        which is a result of the comparison, not an error.
+
+    Raises:
+        InputError: columns missing or of different lengths.
+    """
+    missing = [name for name in ("t", "command_right", "command_left") if name not in columns]
+    if missing:
+        raise InputError(f"columns lack {', '.join(missing)}: the thesis's filter needs time and commands.")
+    t = np.asarray(columns["t"], dtype=np.float64)
+
+    def stack(names: tuple[str, ...]) -> Array:
+        series = [np.asarray(columns.get(name, np.full(t.size, np.nan)), dtype=np.float64) for name in names]
+        if any(values.shape != t.shape for values in series):
+            raise InputError(
+                f"columns {', '.join(names)} differ from t {t.shape} in shape: give columns of one length."
+            )
+        return np.ascontiguousarray(np.stack(series, axis=1))
+
+    states, covariances = np.empty((t.size, _SIZE)), np.empty((t.size, _SIZE, _SIZE))
+    standardised = np.empty((t.size, CHANNEL_SIZE))
+    x = np.concatenate([np.zeros(5), model.parameters])
+    packed = FilterModel(model.robot, law=ForceLaw.thesis).pack()
+    _run(
+        packed, x, np.diag(np.asarray(model.initial_variance, dtype=np.float64)),
+        stack(("command_right", "command_left")), stack(CHANNELS), np.diff(t, prepend=t[:1] - model.sample_period),
+        np.asarray(model.process, dtype=np.float64), np.asarray(model.measurement, dtype=np.float64),
+        model.least_parameter, model.steps, states, covariances, standardised,
+    )  # fmt: skip
+    return FilterRun(t, states, covariances, standardised)

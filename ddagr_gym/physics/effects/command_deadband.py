@@ -1,0 +1,43 @@
+"""Commands that get lost near zero."""
+
+import math
+from dataclasses import dataclass
+
+from ddagr_gym.physics.effects.base import Effect, Vector, shape, size
+from ddagr_gym.physics.layout import COMMAND, POINT_COMMANDS
+
+_EDGE = 0.1  # share of the band over which a command that passes whole sets in, ours
+
+
+def lose_small_commands(row: Vector, parameters: Vector, memory: Vector) -> None:
+    """Dead zone of half width ``parameters[0]``; ``parameters[1]`` of it is lost beyond as well."""
+    width = parameters[0]
+    if width <= 0.0:
+        return
+    for bank in range(2):
+        command = row[COMMAND + bank]
+        inside = min(max((abs(command) / width - 1.0 + _EDGE) / _EDGE, 0.0), 1.0)
+        passing = inside * inside * (3.0 - 2.0 * inside)
+        row[COMMAND + bank] = math.copysign(passing * max(abs(command) - parameters[1] * width, 0.0), command)
+
+
+@dataclass(frozen=True)
+class CommandDeadband(Effect):
+    """Small commands have no effect, and larger ones lose the same amount (a dead zone) or nothing (a threshold).
+
+    Attributes:
+        width: half width of the dead zone; least: 3 percent of the 0.7 rad/s of a row turn.
+        loss: share of the width that commands beyond it lose: 1 for friction, 0 for a driver's threshold.
+    """
+
+    name = "command_deadband"
+    title = "Command deadband"
+    group = "commands and motors"
+    equation = "command -> 0 where |command| < width, else command - loss width sgn(command)"
+    source = "dead zone (Tao and Kokotovic, IEEE Trans. Automatic Control 39 (1994) 59, eq. 1.1)"
+    signature = "encoders miss a constant amount of every command, all of a small one"
+    confused_with = ("motor_droop",)
+    actions = ((POINT_COMMANDS, lose_small_commands),)
+
+    width: float = size("rad/s", 0.0, 1.0, least=0.02)
+    loss: float = shape("-", 0.0, 1.0, default=1.0, step=-0.05)

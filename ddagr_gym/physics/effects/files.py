@@ -1,0 +1,193 @@
+"""Effects files: what a diagnosis found, for ``gym.make``, the simulator and replay to load.
+
+::
+
+    version: 1
+    source: diagnosis of drives 1 to 3           # for people
+    data_hash: 9f86d081884c7d65...               # of the recordings that the values were fitted to
+    effects:
+      - name: slope
+        parameters:
+          angle: {value: 0.065, unit: rad, interval: [0.060, 0.069]}
+          direction: 0.56                        # a number alone will do
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from ddagr_gym.config import load_config
+from ddagr_gym.errors import InputError
+from ddagr_gym.physics.effects.base import Effect, build_effect
+from ddagr_gym.physics.effects.registry import effect_kind, parse_effect
+
+VERSION = 1
+_ENDINGS = (".yaml", ".yml", ".json")
+Intervals = Sequence[Mapping[str, tuple[float, float]]]
+
+
+@dataclass(frozen=True)
+class ParameterEntry:
+    """A parameter with what is known about it.
+
+    Attributes:
+        value: in ``unit``.
+        unit: must be the parameter's own.
+        interval: low and high, where the value was estimated.
+    """
+
+    value: float
+    unit: str = ""
+    interval: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class EffectEntry:
+    """One effect of a file.
+
+    Attributes:
+        name: of the effect.
+        parameters: by name; those with a default may be left out.
+    """
+
+    name: str
+    parameters: Mapping[str, float | ParameterEntry] = field(default_factory=dict)
+
+    def build(self) -> Effect:
+        """The effect; InputError for an unknown name, parameter or unit, or a value out of bounds."""
+        kind = effect_kind(self.name)
+        values: dict[str, object] = {}
+        for name, entry in self.parameters.items():
+            values[name] = entry.value if isinstance(entry, ParameterEntry) else entry
+        effect = build_effect(kind, values)
+        for name, entry in self.parameters.items():
+            unit = kind.parameter(name).metadata["unit"]
+            if isinstance(entry, ParameterEntry) and entry.unit not in ("", unit):
+                raise InputError(f"effect {self.name!r} gives {name!r} in {entry.unit!r}: give it in {unit}.")
+        return effect
+
+
+@dataclass(frozen=True)
+class EffectsFile:
+    """Content of an effects file.
+
+    Attributes:
+        effects: in the order in which they act.
+        version: of this format.
+        source: where the values come from, for people.
+        data_hash: of the recordings that they were fitted to.
+    """
+
+    effects: tuple[EffectEntry, ...]
+    version: int = VERSION
+    source: str = ""
+    data_hash: str = ""
+
+    def __post_init__(self) -> None:
+        if self.version != VERSION:
+            raise InputError(f"effects file has version {self.version}: this program reads version {VERSION}.")
+
+
+def read_effects_file(path: str | os.PathLike[str]) -> EffectsFile:
+    """Content of an effects file, YAML or JSON.
+
+    Raises:
+        InputError: unreadable file, or content that does not fit; one sentence with file and place.
+    """
+    file = Path(path).expanduser()
+    if not file.is_file():
+        raise InputError(f"effects file {str(path)!r} does not exist: give a YAML or JSON file, or name=size.")
+    return load_config(file, EffectsFile)
+
+
+def load_effects(specification: str | os.PathLike[str] | Effect | Iterable[str | Effect]) -> tuple[Effect, ...]:
+    """Effects from objects, ``name=size`` texts or an effects file (YAML or JSON, by its ending).
+
+    Raises:
+        InputError: anything that is not an effect, with the reason.
+    """
+    if isinstance(specification, Effect):
+        return (specification,)
+    if isinstance(specification, os.PathLike) or (
+        isinstance(specification, str) and Path(specification).suffix in _ENDINGS
+    ):
+        return tuple(entry.build() for entry in read_effects_file(specification).effects)
+    if isinstance(specification, str):
+        return (parse_effect(specification),)
+    if not isinstance(specification, Iterable):
+        raise InputError(f"effects are {specification!r}: give effects, name=size texts or the path of a file.")
+    return tuple(effect for item in specification for effect in load_effects(item))
+
+
+def save_effects(
+    path: str | os.PathLike[str],
+    effects: Iterable[Effect],
+    *,
+    intervals: Intervals = (),
+    data_hash: str = "",
+    source: str = "",
+) -> None:
+    """Write effects so that :func:`load_effects` returns equal ones; the file is whole or as it was before.
+
+    Args:
+        path: ends in .yaml, .yml or .json; its folder must exist.
+        effects: in the order in which they act.
+        intervals: per effect, (low, high) by parameter name; empty for none.
+        data_hash: of the recordings that the values were fitted to.
+        source: where they come from, for people.
+
+    Raises:
+        InputError: another ending, no such folder, or intervals that do not belong to the effects.
+    """
+    file = Path(path).expanduser()
+    if file.suffix not in _ENDINGS:
+        raise InputError(f"effects file {str(path)!r} ends in {file.suffix!r}: end it in {', '.join(_ENDINGS)}.")
+    chosen = tuple(effects)
+    content = {"version": VERSION, "source": source, "data_hash": data_hash, "effects": _entries(chosen, intervals)}
+    if file.suffix == ".json":
+        _replace(file, json.dumps(content, indent=2, allow_nan=False) + "\n")
+    else:
+        _replace(file, yaml.safe_dump(content, sort_keys=False, allow_unicode=True))
+
+
+def _entries(effects: tuple[Effect, ...], intervals: Intervals) -> list[dict[str, Any]]:
+    if intervals and len(intervals) != len(effects):
+        raise InputError(
+            f"{len(intervals)} sets of intervals for {len(effects)} effects: give one per effect, or none."
+        )
+    entries = []
+    for effect, known in zip(effects, intervals or ({},) * len(effects), strict=True):
+        item = effect.as_mapping()
+        for name in known:
+            if name not in item["parameters"]:
+                raise InputError(f"interval for {name!r}, which effect {effect.name!r} does not have: remove it.")
+        item["parameters"] = {name: _entry(effect, name, known.get(name)) for name in item["parameters"]}
+        entries.append(item)
+    return entries
+
+
+def _entry(effect: Effect, name: str, interval: tuple[float, float] | None) -> dict[str, Any]:
+    entry: dict[str, Any] = {"value": float(getattr(effect, name)), "unit": effect.parameter(name).metadata["unit"]}
+    return entry if interval is None else entry | {"interval": [float(bound) for bound in interval]}
+
+
+def _replace(file: Path, text: str) -> None:
+    if not file.parent.is_dir():
+        raise InputError(f"effects file {str(file)!r} has no folder: make {str(file.parent)!r} first.")
+    handle, name = tempfile.mkstemp(prefix=f".{file.stem}-", suffix=file.suffix, dir=file.parent)
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8") as stream:
+            stream.write(text)
+        os.chmod(name, 0o644)
+        os.replace(name, file)
+    except BaseException:
+        os.unlink(name)
+        raise

@@ -1,0 +1,66 @@
+"""Motors that cannot turn, or cannot speed up, as fast as they are told."""
+
+from dataclasses import dataclass
+
+from ddagr_gym.physics.effects.base import DriveExtent, Effect, Vector, size
+from ddagr_gym.physics.layout import MOTOR_RATE, MOTOR_TARGET, OMEGA, POINT_MOTORS
+
+_NO_SPEED_LIMIT = 1e3
+_NO_ACCELERATION_LIMIT = 1e6
+_BINDING = 0.95  # of what the drive reaches: limits above it cost less than 5 percent
+_PROBED = (0.9, 0.6)
+
+
+def limit_motors(row: Vector, parameters: Vector, memory: Vector) -> None:
+    """Clip the speed that each bank aims at, and the rate at which it may approach it."""
+    for bank in range(2):
+        target = min(max(row[MOTOR_TARGET + bank], -parameters[0]), parameters[0])
+        reach = parameters[1] / row[MOTOR_RATE + bank]
+        if abs(target - row[OMEGA + bank]) > reach:
+            target = row[OMEGA + bank] + (reach if target > row[OMEGA + bank] else -reach)
+        row[MOTOR_TARGET + bank] = target
+
+
+@dataclass(frozen=True)
+class MotorSaturation(Effect):
+    """Limits of bank speed (supply voltage) and of its rate of change (current, thus torque).
+
+    A limit that a drive never reaches changes nothing, so there is no derivative at neutral.
+
+    Attributes:
+        speed_limit: largest bank speed; meaningful when it cuts at least 5 percent off a drive's fastest.
+        acceleration_limit: largest change of bank speed per time; meaningful in the same way.
+    """
+
+    name = "motor_saturation"
+    title = "Motor saturation"
+    group = "commands and motors"
+    equation = "|omega_target| <= speed_limit; |d omega/dt| <= acceleration_limit"
+    source = "actuator saturation and rate limit (Astrom and Murray, Feedback Systems, section 10.4)"
+    signature = "encoders stay at a ceiling while commands rise; ramps of constant slope after large steps"
+    confused_with = ("motor_droop", "motor_lag")
+    differentiable = False
+    actions = ((POINT_MOTORS, limit_motors),)
+
+    speed_limit: float = size("rad/s", 0.01, _NO_SPEED_LIMIT, least=0.02, neutral=_NO_SPEED_LIMIT, step=-0.02)
+    acceleration_limit: float = size(
+        "rad/s^2",
+        0.01,
+        _NO_ACCELERATION_LIMIT,
+        least=0.05,
+        default=_NO_ACCELERATION_LIMIT,
+        neutral=_NO_ACCELERATION_LIMIT,
+        step=-0.05,
+    )
+
+    def is_meaningful(self, extent: DriveExtent) -> bool:
+        """Whether a limit cuts at least 5 percent off what the drive would reach."""
+        slow = self.speed_limit <= _BINDING * extent.wheel_speed
+        return slow or self.acceleration_limit <= _BINDING * extent.wheel_acceleration
+
+    @classmethod
+    def probes(cls, extent: DriveExtent) -> tuple[Effect, ...]:
+        """Limits somewhat and well below what the drive reaches, one at a time."""
+        slow = [cls(max(share * extent.wheel_speed, 0.01)) for share in _PROBED]
+        limits = [max(share * extent.wheel_acceleration, 0.01) for share in _PROBED]
+        return (*slow, *(cls(_NO_SPEED_LIMIT, limit) for limit in limits))

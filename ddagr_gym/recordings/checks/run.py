@@ -1,0 +1,32 @@
+"""All checks of one recording."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ddagr_gym.recordings.checks.accelerometer import accelerometer
+from ddagr_gym.recordings.checks.clock_offsets import clock_offsets
+from ddagr_gym.recordings.checks.extremes import extremes
+from ddagr_gym.recordings.checks.findings import CheckReport, Finding
+from ddagr_gym.recordings.checks.gravity import gravity
+from ddagr_gym.recordings.checks.held import held
+from ddagr_gym.recordings.checks.noise import noise
+from ddagr_gym.recordings.checks.timing import timing
+from ddagr_gym.recordings.checks.travel import travel
+from ddagr_gym.recordings.checks.turning import turning
+from ddagr_gym.recordings.schema import Recording
+
+
+def check_recording(recording: Recording, rng: np.random.Generator) -> CheckReport:
+    """Every finding about a recording.
+
+    Args:
+        recording: any that the schema admits; questions that it cannot answer come back as not testable.
+        rng: for the resampled intervals.
+    """
+    findings: list[Finding] = []
+    if len(recording) >= 3:
+        findings += timing(recording) + held(recording) + extremes(recording)
+        findings += clock_offsets(recording, rng) + turning(recording, rng) + travel(recording, rng)
+        findings += accelerometer(recording, rng) + noise(recording) + gravity(recording)
+    return CheckReport.of(recording, findings)

@@ -1,0 +1,107 @@
+"""Signals that several checks share: held values, integrals, unwrapped headings, standstill."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ddagr_gym.recordings.schema import BoolArray, FloatArray, Recording
+
+STILL_SPEED = 0.02
+"""Bank speed below which a wheel counts as standing [rad/s] (6 mm/s at the rim of a 0.3 m wheel)."""
+
+
+def filled(recording: Recording, name: str) -> FloatArray:
+    """Channel with the last sample held inside each span, NaN before the first."""
+    values = recording[name]
+    out = np.full(len(recording), np.nan)
+    for span in recording.spans():
+        rows = np.arange(span.start, span.stop)
+        last = np.maximum.accumulate(np.where(np.isfinite(values[span]), rows, -1))
+        out[span] = np.where(last >= 0, values[last], np.nan)
+    return out
+
+
+def new_rows(recording: Recording, *names: str) -> BoolArray:
+    """Rows with a new sample of any of the channels."""
+    return np.any([np.isfinite(recording[name]) for name in names], axis=0)
+
+
+def integral(recording: Recording, values: FloatArray) -> FloatArray:
+    """Trapezoidal integral over time from the start of each span; missing values count as interpolated."""
+    out = np.full(len(recording), np.nan)
+    for span in recording.spans():
+        t, known = recording.t[span], np.isfinite(values[span])
+        if np.count_nonzero(known) >= 2:
+            v = np.interp(t, t[known], values[span][known])
+            out[span] = np.concatenate([[0.0], np.cumsum(0.5 * (v[1:] + v[:-1]) * np.diff(t))])
+    return out
+
+
+def smoothed(recording: Recording, values: FloatArray, width: float) -> FloatArray:
+    """Running mean over ``width`` seconds inside each span; NaN near the ends and where a span lacks samples."""
+    half = max(1, round(0.5 * width / recording.period))
+    out = np.full(len(recording), np.nan)
+    for span in recording.spans():
+        known = np.isfinite(values[span])
+        if np.count_nonzero(known) > max(2 * half, known.size // 2):
+            t = recording.t[span]
+            total = np.concatenate([[0.0], np.cumsum(np.interp(t, t[known], values[span][known]))])
+            mean = (total[2 * half + 1 :] - total[: -2 * half - 1]) / (2 * half + 1)
+            out[span.start + half : span.stop - half] = mean
+    return out
+
+
+def slope(recording: Recording, values: FloatArray) -> FloatArray:
+    """Central difference over time inside each span [per s]; NaN beside missing values."""
+    out = np.full(len(recording), np.nan)
+    for span in recording.spans():
+        if span.stop - span.start >= 3:
+            out[span] = np.gradient(values[span], recording.t[span])
+    return out
+
+
+def wrap(angle: FloatArray) -> FloatArray:
+    """Angle in [-pi, pi)."""
+    return (angle + np.pi) % (2 * np.pi) - np.pi
+
+
+def standing(recording: Recording, margin: float = 0.5, shortest: float = 1.0) -> list[slice]:
+    """Pieces of segments in which both banks stand still.
+
+    Args:
+        recording: any.
+        margin: time after and before motion that is left out [s], for the body to come to rest.
+        shortest: least length of a piece [s].
+
+    Returns:
+        Slices; none where the recording has no encoders.
+    """
+    right, left = filled(recording, "encoder_right"), filled(recording, "encoder_left")
+    moving = ~((np.abs(right) < STILL_SPEED) & (np.abs(left) < STILL_SPEED))
+    # Before the first sample of a span the encoders are unknown; a command shows that the robot may move.
+    unknown = ~(np.isfinite(right) & np.isfinite(left))
+    commanded = np.nan_to_num(np.abs(recording["command_right"]) + np.abs(recording["command_left"])) > 0
+    moving = (moving & ~unknown) | (unknown & commanded)
+    pieces = []
+    for segment in recording.segments():
+        pieces.extend(_quiet(recording.t, moving, segment, margin, shortest))
+    return pieces
+
+
+def _quiet(t: FloatArray, moving: BoolArray, segment: slice, margin: float, shortest: float) -> list[slice]:
+    edges = np.flatnonzero(np.diff(np.concatenate([[True], moving[segment], [True]]).astype(int)))
+    pieces = []
+    for start, stop in zip(edges[::2] + segment.start, edges[1::2] + segment.start, strict=True):
+        low = t[start] + (margin if start > segment.start else 0.0)
+        high = t[stop - 1] - (margin if stop < segment.stop else 0.0)
+        a, b = int(np.searchsorted(t, low)), int(np.searchsorted(t, high, side="right"))
+        if b - a >= 8 and t[b - 1] - t[a] >= shortest:
+            pieces.append(slice(a, b))
+    return pieces
+
+
+def moving_mask(recording: Recording) -> BoolArray:
+    """Rows in which a bank turns or the gyro shows a turn well above its noise at rest."""
+    right, left = filled(recording, "encoder_right"), filled(recording, "encoder_left")
+    turning = np.nan_to_num(np.maximum(np.abs(right), np.abs(left))) >= STILL_SPEED
+    return turning | (np.nan_to_num(np.abs(recording["yaw_rate"])) > 0.1)

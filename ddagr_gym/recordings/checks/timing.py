@@ -1,0 +1,135 @@
+"""Rates, jitter, gaps, duplicated rows, and how long each channel goes without a new sample."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+
+from ddagr_gym.recordings.checks.findings import Finding, Interval, judge, not_testable
+from ddagr_gym.recordings.checks.signals import moving_mask
+from ddagr_gym.recordings.schema import CHANNELS, COMMANDS, BoolArray, FloatArray, Recording
+
+CHECK = "timing"
+
+JITTER_RANGE = (0.0, 0.3)
+"""95 % quantile of |time step - median| over the median [-]."""
+GAP_RANGE = (0.0, 0.02)
+"""Share of the spans' time that gaps of more than 2.5 periods take [-]."""
+DUPLICATE_RANGE = (0.0, 0.001)
+"""Share of rows whose time repeats the row before [-]."""
+HOLD_RANGE = (0.0, 0.15)
+"""Share of the driving time in which a channel waits more than five of its periods for a sample [-]; 0.07 at most on
+the open recordings, whose poses come irregularly."""
+LONG_HOLD = 5.0
+"""Wait, in median periods, from which a channel counts as held."""
+
+
+def timing(recording: Recording) -> list[Finding]:
+    """Findings on the rows' times and on each channel's rate."""
+    return [*_row_findings(recording), *_rate_findings(recording)]
+
+
+def _fixed(value: float) -> Interval:
+    """Interval of a quantity that is counted, not estimated."""
+    return (value, value)
+
+
+def _row_findings(recording: Recording) -> list[Finding]:
+    steps = np.concatenate([np.diff(recording.t[s]) for s in recording.segments()] or [np.empty(0)])
+    if steps.size < 2:
+        return [not_testable(CHECK, "t", "There are fewer than three rows in a row.", "Record for longer.")]
+    period = float(np.median(steps))
+    jitter = float(np.quantile(np.abs(steps - period), 0.95)) / period
+    across = np.concatenate([np.diff(recording.t[s]) for s in recording.spans()])
+    lost = float(np.sum(across[across > 2.5 * period] - period) / np.sum(across))
+    count = recording.meta.duplicates_dropped
+    duplicates = count / (count + len(recording))
+    return [
+        judge(
+            CHECK,
+            "t, jitter",
+            jitter,
+            _fixed(jitter),
+            JITTER_RANGE,
+            "-",
+            meaning=f"Rows come at {1 / period:.4g} Hz; 19 of 20 steps lie within {100 * jitter:.2g} % of the period.",
+            remedy="Use the sensor's own stamps instead of the logger's.",
+        ),
+        judge(
+            CHECK,
+            "t, gaps",
+            lost,
+            _fixed(lost),
+            GAP_RANGE,
+            "-",
+            meaning=f"{100 * lost:.2g} % of the time is lost in gaps; {len(recording.meta.segments)} segments.",
+            remedy="Look for a logger that lost messages; segments around the gaps are used apart.",
+        ),
+        judge(
+            CHECK,
+            "t, duplicates",
+            duplicates,
+            _fixed(duplicates),
+            DUPLICATE_RANGE,
+            "-",
+            meaning=f"{count} rows repeated the time of the row before and were left out.",
+            remedy="Look for rows that were logged twice.",
+        ),
+    ]
+
+
+def _rate_findings(recording: Recording) -> list[Finding]:
+    driving = moving_mask(recording)
+    findings = []
+    for name, channel in CHANNELS.items():
+        if recording.has(name):
+            # Commands may come only when they change.
+            if name not in COMMANDS:
+                findings.append(_hold_finding(recording, name, driving))
+        elif channel.core:
+            why = "The channel has no samples."
+            findings.append(not_testable("rate", name, why, "Record it, or correct the map."))
+    return findings
+
+
+def waits(recording: Recording, name: str, driving: BoolArray) -> FloatArray:
+    """Times between new samples of a channel while the robot drives [s]; a span's ends count as samples.
+
+    Args:
+        recording: any.
+        name: channel.
+        driving: (n,) rows in which the robot moves; a wait counts when most of its rows do.
+    """
+    found: list[float] = []
+    for span in recording.spans():
+        rows = span.start + np.flatnonzero(np.isfinite(recording[name][span]))
+        rows = np.unique(np.concatenate([[span.start], rows, [span.stop - 1]]))
+        moved = np.concatenate([[0], np.cumsum(driving)])
+        for a, b in itertools.pairwise(rows.tolist()):
+            if 2 * (moved[b] - moved[a]) > b - a:
+                found.append(float(recording.t[b] - recording.t[a]))
+    return np.array(found)
+
+
+def _hold_finding(recording: Recording, name: str, driving: BoolArray) -> Finding:
+    between = waits(recording, name, driving)
+    if between.size < 20:
+        return not_testable("rate", name, "The robot hardly drives.", "Record a drive.")
+    median = float(np.median(between))
+    share = float(np.sum(between[between > LONG_HOLD * median]) / np.sum(between))
+    return judge(
+        "rate",
+        name,
+        share,
+        _fixed(share),
+        HOLD_RANGE,
+        "-",
+        meaning=(
+            f"New samples come at {1 / median:.3g} Hz while driving, at worst after {float(between.max()):.2f} "
+            "s; waits of "
+            f"more than {LONG_HOLD:g} periods take {100 * share:.2g} % of the time."
+        ),
+        remedy="Look for a sensor that stops or a logger that drops its messages.",
+        suspects=("sensor_hold",),
+    )

@@ -1,0 +1,208 @@
+"""Signs and scales of what measures travel: pose against encoders, and encoders against commands."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ddagr_gym.recordings.checks.blocks import cut_blocks
+from ddagr_gym.recordings.checks.clock_offsets import gyro_direction, pose_offset, unwrapped_heading
+from ddagr_gym.recordings.checks.findings import Finding, judge, not_testable
+from ddagr_gym.recordings.checks.regression import Estimate, blocks_in_spans, estimate, inside, sampled
+from ddagr_gym.recordings.checks.signals import filled, integral
+from ddagr_gym.recordings.schema import BoolArray, FloatArray, Recording
+
+CHECK = "sign_and_scale"
+
+TRAVEL_RANGE = (0.5, 1.05)
+"""Travelled over rolled distance [-]: 1 without slip; more than 1 only when pushed or with a wrong radius or scale."""
+DIRECTION_RANGE = (-0.12, 0.12)
+"""Direction of travel against the pose's heading [rad] (7 degrees): skid-steer robots travel where they point."""
+GAIN_RANGE = (0.6, 1.15)
+"""Steady bank speed over its command [-]: motors droop under load and do not overshoot for long."""
+GAIN_BALANCE_RANGE = (0.9, 1.11)
+"""Right bank's gain over the left's [-]."""
+SETTLED = 2.0
+"""Time after a command's change from which the bank counts as steady [s]."""
+WINDOW = 2.0
+"""Time over which distances are compared [s]."""
+
+
+def travel(recording: Recording, rng: np.random.Generator) -> list[Finding]:
+    """Findings on pose against encoders and on encoders against commands.
+
+    Args:
+        recording: any; distances are not testable without the robot's wheel radius.
+        rng: for the resampling.
+    """
+    return [*_travel_findings(recording, rng), *_gain_findings(recording, rng)]
+
+
+def travelled_over_rolled(recording: Recording, rng: np.random.Generator) -> Estimate | None:
+    """Travelled over rolled distance as forward and sideways shares, (2,).
+
+    The rolled path is the wheel radius times the banks' mean speed, laid along the gyro's heading; both paths are
+    compared as vectors over :data:`WINDOW` with the pose's clock matched.
+
+    Returns:
+        None without pose, gyro, motion or the robot's geometry.
+    """
+    geometry = recording.meta.geometry
+    needed = ("pose_x", "pose_y", "pose_yaw", "yaw_rate", "encoder_right", "encoder_left")
+    if geometry is None or not recording.has(*needed):
+        return None
+    offset = pose_offset(recording, rng)
+    lag = offset.lag if offset is not None else 0.0
+    speed = 0.5 * geometry.wheel_radius * (filled(recording, "encoder_right") + filled(recording, "encoder_left"))
+    heading = gyro_direction(recording) * integral(recording, recording["yaw_rate"])
+    rolled = [integral(recording, speed * np.cos(heading)), integral(recording, speed * np.sin(heading))]
+    pose_heading = unwrapped_heading(recording)
+    sums = []
+    for span, block in blocks_in_spans(recording):
+        rows = block.start + np.flatnonzero(np.isfinite(pose_heading[block]))
+        at = recording.t[rows] - lag
+        rows, at = rows[inside(recording, span, at)], at[inside(recording, span, at)]
+        path = np.stack([sampled(recording, span, component, at) for component in rolled])
+        turn = pose_heading[rows] - sampled(recording, span, heading, at)
+        position = np.stack([recording["pose_x"][rows], recording["pose_y"][rows]])
+        sums.append(_moments(at, path, position, turn))
+    return estimate([s for s in sums if s[2] > 0], _shares, rng)
+
+
+def _moments(at: FloatArray, path: FloatArray, position: FloatArray, turn: FloatArray) -> FloatArray:
+    """Sums over windows of rolled and travelled vectors: along, across, squared rolled length.
+
+    Args:
+        at: times of the poses (n,) [s].
+        path: rolled position (2, n) in the gyro's frame.
+        position: pose (2, n).
+        turn: heading of the pose's frame against the gyro's (n,) [rad].
+    """
+    end = np.searchsorted(at, at + WINDOW)
+    first = np.flatnonzero(end < len(at))
+    last = end[first]
+    angle = 0.5 * (turn[first] + turn[last])
+    dx, dy = path[:, last] - path[:, first]
+    rolled = np.stack([np.cos(angle) * dx - np.sin(angle) * dy, np.sin(angle) * dx + np.cos(angle) * dy])
+    travelled = position[:, last] - position[:, first]
+    along = np.sum(rolled * travelled)
+    across = np.sum(rolled[0] * travelled[1] - rolled[1] * travelled[0])
+    moments = np.array([along, across, np.sum(rolled**2)])
+    return moments if np.all(np.isfinite(moments)) else np.zeros(3)
+
+
+def _shares(totals: FloatArray) -> FloatArray:
+    return totals[:, :2] / totals[:, 2:]
+
+
+def command_gains(recording: Recording, rng: np.random.Generator) -> Estimate | None:
+    """Steady bank speed over command: right, left, right over left, (3,).
+
+    Returns:
+        None without steady driving by command.
+    """
+    commands = recording.held_commands()
+    settled = _settled(recording, commands)
+    sums = []
+    for block in cut_blocks(recording):
+        row = []
+        for name, command in zip(("encoder_right", "encoder_left"), commands, strict=True):
+            rows = block.start + np.flatnonzero(settled[block] & np.isfinite(recording[name][block]))
+            row += [float(command[rows] @ recording[name][rows]), float(command[rows] @ command[rows])]
+        if row[1] > 0 and row[3] > 0:
+            sums.append(np.array(row))
+
+    def values(totals: FloatArray) -> FloatArray:
+        right, left = totals[:, 0] / totals[:, 1], totals[:, 2] / totals[:, 3]
+        return np.stack([right, left, right / left], axis=1)
+
+    return estimate(sums, values, rng)
+
+
+def _settled(recording: Recording, commands: tuple[FloatArray, FloatArray]) -> BoolArray:
+    """Rows in which both commands have not changed for :data:`SETTLED` seconds inside the span."""
+    settled = np.zeros(len(recording), dtype=bool)
+    for span in recording.spans():
+        pair = np.stack([c[span] for c in commands])
+        known = np.all(np.isfinite(pair), axis=0)
+        changed = np.ones(pair.shape[1], dtype=bool)
+        changed[1:] = np.any(pair[:, 1:] != pair[:, :-1], axis=0) | ~known[1:]
+        since = recording.t[span][np.maximum.accumulate(np.where(changed, np.arange(changed.size), 0))]
+        settled[span] = known & (recording.t[span] - since >= SETTLED)
+    return settled
+
+
+def _travel_findings(recording: Recording, rng: np.random.Generator) -> list[Finding]:
+    pair = "encoder to pose"
+    found = travelled_over_rolled(recording, rng)
+    if found is None:
+        missing = recording.meta.geometry is None
+        why = "The robot's wheel radius is not known." if missing else "There is no travel with a pose to compare."
+        return [
+            not_testable(CHECK, pair, why, "Name the robot with --robot." if missing else "Record poses while driving.")
+        ]
+    along, across = (float(v) for v in found.values)
+    angle = float(np.arctan2(across, along))
+    low, high = found.intervals[1]
+    spread = max(abs(along), 1e-3)
+    return [
+        judge(
+            CHECK,
+            pair,
+            along,
+            found.intervals[0],
+            TRAVEL_RANGE,
+            "-",
+            meaning=f"The pose travels {along:.3f} of what the wheels roll.",
+            remedy="Check the encoders' sign and unit, the wheel radius, and the pose's unit.",
+            suspects=("encoder_scale",),
+        ),
+        judge(
+            "direction",
+            "pose",
+            angle,
+            (angle + (low - across) / spread, angle + (high - across) / spread),
+            DIRECTION_RANGE,
+            "rad",
+            meaning=f"The robot travels {angle:.3f} rad to the left of the pose's heading.",
+            remedy="Check the heading's zero, sign and frame against REP 103; a steady side slope makes robots crab.",
+            suspects=("slope",),
+        ),
+    ]
+
+
+def _gain_findings(recording: Recording, rng: np.random.Generator) -> list[Finding]:
+    found = command_gains(recording, rng)
+    if found is None:
+        why = "No command was held long enough for the banks to settle."
+        return [not_testable(CHECK, "command to encoder", why, f"Hold commands for more than {SETTLED:g} s.")]
+    findings = []
+    for index, bank in enumerate(("right", "left")):
+        gain = float(found.values[index])
+        findings.append(
+            judge(
+                CHECK,
+                f"command_{bank} to encoder_{bank}",
+                gain,
+                found.intervals[index],
+                GAIN_RANGE,
+                "-",
+                meaning=f"The {bank} bank settles at {gain:.3f} of its command.",
+                remedy="Check units and signs; if they are right, the motors droop or saturate.",
+                suspects=("encoder_scale", "motor_droop", "motor_saturation"),
+            )
+        )
+    balance = float(found.values[2])
+    findings.append(
+        judge(
+            "balance",
+            "command to encoder, right to left",
+            balance,
+            found.intervals[2],
+            GAIN_BALANCE_RANGE,
+            "-",
+            meaning=f"The right bank reaches {balance:.3f} times the share of its command that the left reaches.",
+            remedy="Compare the banks' encoder scales and loads.",
+            suspects=("encoder_scale", "soil_split", "centre_of_mass_offset"),
+        )
+    )
+    return findings

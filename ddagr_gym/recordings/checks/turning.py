@@ -1,0 +1,184 @@
+"""Signs and scales of what measures turning: gyro, pose and the encoders' difference."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ddagr_gym.recordings.checks.clock_offsets import encoder_offset, pose_offset, unwrapped_heading
+from ddagr_gym.recordings.checks.findings import Finding, judge, not_testable
+from ddagr_gym.recordings.checks.regression import (
+    Estimate,
+    blocks_in_spans,
+    estimate,
+    inside,
+    normal_equations,
+    sampled,
+    solve,
+)
+from ddagr_gym.recordings.checks.signals import filled, integral, new_rows
+from ddagr_gym.recordings.schema import FloatArray, Recording
+
+CHECK = "sign_and_scale"
+
+GYRO_SCALE_RANGE = (0.95, 1.05)
+"""Gyro over pose [-]; data sheets promise 3 % for low-cost gyros."""
+GYRO_BIAS_RANGE = (-0.02, 0.02)
+"""Gyro bias against the pose [rad/s]: 70 degrees a minute is more than a zeroed low-cost gyro drifts."""
+TRACK_RANGE = (0.9, 3.5)
+"""Effective over geometric track [-]: 1.3 to 1.9 for fielded skid-steer robots, more on loose ground; never below 1."""
+BALANCE_RANGE = (0.95, 1.055)
+"""Right over left bank's share in the yaw rate [-]; 1 for equal radii, scales and ground, 1.02 to 1.04 on the open
+recordings."""
+LEAST_TURN = 0.05
+"""Root mean square yaw rate below which turns tell nothing [rad/s]."""
+
+_DRIVE = "Drive turns to both sides at several speeds."
+
+
+def turning(recording: Recording, rng: np.random.Generator) -> list[Finding]:
+    """Findings on gyro against pose and on encoders against gyro.
+
+    Args:
+        recording: any; what needs wheel radius and track is not testable without the robot.
+        rng: for the resampling.
+    """
+    return [*_gyro_findings(recording, rng), *_track_findings(recording, rng)]
+
+
+def gyro_against_pose(recording: Recording, rng: np.random.Generator) -> Estimate | None:
+    """Scale [-] and bias [rad/s] of the gyro, (2,): turned = scale heading + bias t in each block, clocks matched.
+
+    Returns:
+        None without poses or turns.
+    """
+    offset = pose_offset(recording, rng) if recording.has("pose_yaw", "yaw_rate") else None
+    if offset is None:
+        return None
+    heading, turned = unwrapped_heading(recording), integral(recording, recording["yaw_rate"])
+    sums = []
+    for span, block in blocks_in_spans(recording):
+        rows = block.start + np.flatnonzero(np.isfinite(heading[block]))
+        at = recording.t[rows] - offset.lag
+        rows, at = rows[inside(recording, span, at)], at[inside(recording, span, at)]
+        gyro = sampled(recording, span, turned, at)
+        if rows.size >= 5 and np.all(np.isfinite(gyro)):
+            design = np.stack([heading[rows], at], axis=1)
+            sums.append(normal_equations(design - design.mean(axis=0), gyro - gyro.mean()))
+    return estimate(sums, solve, rng)
+
+
+def effective_track(recording: Recording, rng: np.random.Generator) -> Estimate | None:
+    """Effective over geometric track chi [-] and the right over the left bank's share in the yaw rate [-], (2,).
+
+    Yaw rate = a right - b left + c by least squares with the encoders' clock matched. Without slip a = b = R/(2 W);
+    chi = R/(W (a + b)), the share a/b.
+
+    Returns:
+        None without encoders, gyro or the robot's geometry.
+    """
+    geometry = recording.meta.geometry
+    if geometry is None or not recording.has("encoder_right", "encoder_left", "yaw_rate"):
+        return None
+    offset = encoder_offset(recording, rng)
+    lag = offset.lag if offset is not None and abs(offset.lag) < 0.5 else 0.0
+    sums = _track_sums(recording, lag)
+    ratio = geometry.wheel_radius / geometry.half_track
+
+    def values(totals: FloatArray) -> FloatArray:
+        a, b, _ = solve(totals).T
+        return np.stack([ratio / (a + b), a / b], axis=1)
+
+    return estimate(sums, values, rng)
+
+
+def _track_sums(recording: Recording, lag: float) -> list[FloatArray]:
+    right, left = filled(recording, "encoder_right"), filled(recording, "encoder_left")
+    usable = new_rows(recording, "encoder_right", "encoder_left") & np.isfinite(right) & np.isfinite(left)
+    sums = []
+    for span, block in blocks_in_spans(recording):
+        rows = block.start + np.flatnonzero(usable[block])
+        at = recording.t[rows] - lag
+        rows, at = rows[inside(recording, span, at)], at[inside(recording, span, at)]
+        gyro = sampled(recording, span, recording["yaw_rate"], at)
+        if rows.size >= 5 and np.all(np.isfinite(gyro)):
+            sums.append(normal_equations(np.stack([right[rows], -left[rows], np.ones(rows.size)], axis=1), gyro))
+    return sums
+
+
+def _turns(recording: Recording) -> bool:
+    rate = recording["yaw_rate"][np.isfinite(recording["yaw_rate"])]
+    return bool(rate.size) and float(np.sqrt(np.mean(rate**2))) >= LEAST_TURN
+
+
+def _gyro_findings(recording: Recording, rng: np.random.Generator) -> list[Finding]:
+    pair = "yaw_rate to pose_yaw"
+    found = gyro_against_pose(recording, rng) if _turns(recording) else None
+    if found is None:
+        why = "There are no turns with a pose to hold the gyro against."
+        return [not_testable(CHECK, pair, why, "Record a pose with heading. " + _DRIVE)]
+    scale, bias = (float(v) for v in found.values)
+    sign = "the wrong way" if scale < 0 else f"{scale:.3f} times what the pose turns"
+    return [
+        judge(
+            CHECK,
+            pair,
+            scale,
+            found.intervals[0],
+            GYRO_SCALE_RANGE,
+            "-",
+            meaning=f"The gyro turns {sign}.",
+            remedy="Correct the gyro's sign or scale in the map, or fit gyro_scale.",
+            suspects=("gyro_sign",) if scale < 0 else ("gyro_scale",),
+        ),
+        judge(
+            "bias",
+            pair,
+            bias,
+            found.intervals[1],
+            GYRO_BIAS_RANGE,
+            "rad/s",
+            meaning=f"The gyro drifts by {bias:.4f} rad/s against the pose.",
+            remedy="Subtract the bias, or fit gyro_bias.",
+            suspects=("gyro_bias",),
+        ),
+    ]
+
+
+def _track_findings(recording: Recording, rng: np.random.Generator) -> list[Finding]:
+    pair = "encoder to yaw_rate"
+    found = effective_track(recording, rng) if _turns(recording) else None
+    if found is None:
+        missing = "The robot's wheel radius and track are not known." if recording.meta.geometry is None else ""
+        why = missing or "Encoders and gyro share too few turns."
+        return [not_testable(CHECK, pair, why, "Name the robot with --robot." if missing else _DRIVE)]
+    chi, share = (float(v) for v in found.values)
+    return [
+        judge(
+            CHECK,
+            pair,
+            chi,
+            found.intervals[0],
+            TRACK_RANGE,
+            "-",
+            meaning=_track_sentence(chi),
+            remedy="Check the signs of gyro and encoders, whether the banks are swapped, and the units.",
+            suspects=("gyro_sign",) if chi < 0 else ("gyro_scale", "encoder_scale"),
+        ),
+        judge(
+            "balance",
+            "encoder_right to encoder_left",
+            share,
+            found.intervals[1],
+            BALANCE_RANGE,
+            "-",
+            meaning=f"A turn of the right wheels turns the robot {share:.3f} times as much as one of the left.",
+            remedy="Compare the banks' encoder scales and wheel radii; ground that differs by side does the same.",
+            suspects=("encoder_scale", "wheel_radius_mismatch", "soil_split", "centre_of_mass_offset"),
+        ),
+    ]
+
+
+def _track_sentence(chi: float) -> str:
+    if chi < 0:
+        return "The gyro turns against the encoders' difference."
+    return f"The robot turns as if its track were {chi:.2f} times as wide as it is."

@@ -1,0 +1,177 @@
+"""CSV files, plain or gzip, read in blocks of a megabyte with a bound on rows and bytes."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ddagr_gym.errors import InputError, unknown_name
+from ddagr_gym.recordings.column_map import ColumnMap
+from ddagr_gym.recordings.conversion import RawTable
+from ddagr_gym.recordings.files import DEFAULT_LIMITS, Limits, open_text
+from ddagr_gym.recordings.schema import FloatArray
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+_BLOCK = 2**20
+_LONGEST_HEADER = 64 * 1024
+_MOST_LABELS = 100_000
+
+
+def csv_columns(path: Path, limits: Limits = DEFAULT_LIMITS, delimiter: str = ",") -> tuple[str, ...]:
+    """Names in the header of a CSV file.
+
+    Raises:
+        InputError: no text, no header, or a name that occurs twice.
+    """
+    with open_text(path, limits) as stream:
+        head = b""
+        while b"\n" not in head and len(head) < _LONGEST_HEADER and (block := stream.read(_LONGEST_HEADER)):
+            head += block
+    line = head.split(b"\n", 1)[0]
+    try:
+        text = line.decode("utf-8-sig").rstrip("\r")
+    except UnicodeDecodeError:
+        raise InputError(f"{path.name} is not a text file in UTF-8: give CSV, Parquet, MCAP or a bag.") from None
+    if not text.isprintable() and not text.replace("\t", "").isprintable():
+        raise InputError(f"{path.name} has unprintable characters in its header: give CSV, Parquet, MCAP or a bag.")
+    names = tuple(name.strip() for name in next(csv.reader([text], delimiter=delimiter), []))
+    if not any(names) or len(line) >= _LONGEST_HEADER:
+        raise InputError(f"{path.name} has no header line with column names: add one.")
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"{path.name} has the column {name!r} twice: rename one.")
+    return names
+
+
+def read_csv(path: Path, column_map: ColumnMap, limits: Limits = DEFAULT_LIMITS) -> RawTable:
+    """Columns of a CSV file that a map asks for.
+
+    Args:
+        path: plain or gzip CSV with a header line.
+        column_map: which columns to read.
+        limits: on rows and bytes.
+
+    Raises:
+        InputError: missing columns, text where numbers belong, damage, or too large a file.
+    """
+    names = csv_columns(path, limits, column_map.delimiter)
+    numbers, labels = wanted_columns(path, column_map, names)
+    collector = Collector(numbers, labels, limits, path)
+    for batch in _batches(path, column_map, numbers, labels, limits):
+        collector.add(batch)
+    return collector.table()
+
+
+def wanted_columns(
+    path: Path, column_map: ColumnMap, names: tuple[str, ...]
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Number and label columns of a map that a file has; a lacking column that is not optional is an error."""
+    for column in column_map.needed_columns():
+        if column not in names and not (column == column_map.time.column and _absolute(column_map, names)):
+            error = unknown_name("column", column, names)
+            raise InputError(
+                f"{path.name} does not fit the map {column_map.name}: {error.args[0].rstrip('.')} in the file; "
+                "correct the map or choose another."
+            )
+    numbers = [c for c in column_map.number_columns() if c in names]
+    if _absolute(column_map, names):
+        numbers.append(str(column_map.time.absolute_column))
+    return tuple(dict.fromkeys(numbers)), tuple(c for c in column_map.label_columns() if c in names)
+
+
+def _absolute(column_map: ColumnMap, names: tuple[str, ...]) -> bool:
+    return column_map.time.absolute_column in names
+
+
+def _batches(
+    path: Path, column_map: ColumnMap, numbers: tuple[str, ...], labels: tuple[str, ...], limits: Limits
+) -> Iterator[pa.RecordBatch]:
+    import pyarrow as pa
+    from pyarrow import csv as arrow_csv
+
+    # A column may serve both as a number and as a label; text converts to either.
+    columns = tuple(dict.fromkeys((*numbers, *labels)))
+    types = {name: pa.string() if name in labels else pa.float64() for name in columns}
+    try:
+        with open_text(path, limits) as stream:
+            reader = arrow_csv.open_csv(
+                pa.PythonFile(stream, mode="r"),
+                read_options=arrow_csv.ReadOptions(block_size=_BLOCK, use_threads=False),
+                parse_options=arrow_csv.ParseOptions(delimiter=column_map.delimiter),
+                convert_options=arrow_csv.ConvertOptions(
+                    include_columns=list(columns), column_types=types, strings_can_be_null=False
+                ),
+            )
+            yield from reader
+    except pa.ArrowException as error:
+        reason = " ".join(str(error).split())[:160]
+        raise InputError(f"{path.name} is not a sound CSV file ({reason}): correct or delete that place.") from None
+
+
+class Collector:
+    """Gathers record batches into float arrays and coded labels under the limits."""
+
+    def __init__(self, numbers: tuple[str, ...], labels: tuple[str, ...], limits: Limits, path: Path) -> None:
+        self._numbers: dict[str, list[FloatArray]] = {name: [] for name in numbers}
+        self._labels: dict[str, list[npt.NDArray[np.int64]]] = {name: [] for name in labels}
+        self._codes: dict[str, dict[str, int]] = {name: {} for name in labels}
+        self._limits = limits
+        self._path = path
+        self._rows = 0
+
+    def add(self, batch: pa.RecordBatch) -> None:
+        """Take the columns of one batch."""
+        self._rows += batch.num_rows
+        self._limits.check_rows(self._rows, self._path)
+        for name, parts in self._numbers.items():
+            parts.append(self._floats(name, batch.column(name)))
+        for name, codes in self._labels.items():
+            codes.append(self._coded(name, batch.column(name)))
+
+    def table(self) -> RawTable:
+        """All that was gathered."""
+        empty_float, empty_int = np.empty(0), np.empty(0, dtype=np.int64)
+        return RawTable(
+            {name: np.concatenate(parts or [empty_float]) for name, parts in self._numbers.items()},
+            {name: np.concatenate(parts or [empty_int]) for name, parts in self._labels.items()},
+            {name: tuple(codes) for name, codes in self._codes.items()},
+        )
+
+    def _floats(self, name: str, column: Any) -> FloatArray:
+        import pyarrow as pa
+
+        try:
+            if pa.types.is_temporal(column.type):
+                # Time stamps count in the unit of their own type; the map's unit is then seconds.
+                column = column.cast(pa.timestamp("ns")).cast(pa.int64())
+                values = column.cast(pa.float64(), safe=False).to_numpy(zero_copy_only=False) * 1e-9
+            else:
+                column = column.cast(pa.float64(), safe=False)
+                values = column.to_numpy(zero_copy_only=False)
+        except pa.ArrowException as error:
+            reason = " ".join(str(error).split())[:120]
+            raise InputError(
+                f"{self._path.name}, column {name}, does not hold numbers ({reason}): correct it."
+            ) from None
+        return np.array(values, dtype=np.float64)
+
+    def _coded(self, name: str, column: Any) -> npt.NDArray[np.int64]:
+        import pyarrow as pa
+
+        known = self._codes[name]
+        encoded = column.cast(pa.string()).fill_null("").dictionary_encode()
+        local = [known.setdefault(str(text), len(known)) for text in encoded.dictionary.to_pylist()]
+        if len(known) > _MOST_LABELS:
+            raise InputError(
+                f"{self._path.name}, column {name}, has more than {_MOST_LABELS} different values: it cannot number "
+                "pieces or states; correct the map."
+            )
+        codes = np.asarray(encoded.indices.to_numpy(zero_copy_only=False), dtype=np.int64)
+        return np.asarray(local, dtype=np.int64)[codes] if local else codes

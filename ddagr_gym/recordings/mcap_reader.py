@@ -1,0 +1,204 @@
+"""MCAP files with JSON or ROS 2 (CDR) messages through the ``mcap`` library, read from front to back."""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+from ddagr_gym.errors import InputError
+from ddagr_gym.recordings.files import DEFAULT_LIMITS, Limits, open_source, sha256_of
+from ddagr_gym.recordings.schema import Recording, RobotGeometry
+from ddagr_gym.recordings.streams import StreamCollector
+from ddagr_gym.recordings.topic_map import Topic, TopicMap, choose_topics
+
+Decoder = Callable[[bytes], Any]
+
+
+def mcap_topics(path: Path, limits: Limits = DEFAULT_LIMITS) -> tuple[Topic, ...]:
+    """Topics of an MCAP file with their message types and counts.
+
+    Raises:
+        InputError: damaged or too large.
+    """
+    counts: dict[int, int] = {}
+    contents = _Contents()
+    for record in _records(path, limits):
+        message = contents.take(record)
+        if message is not None:
+            counts[message.channel_id] = counts.get(message.channel_id, 0) + 1
+    totals: dict[tuple[str, str], int] = {}
+    for number, channel in contents.channels.items():
+        key = (channel.topic, contents.message_type(channel))
+        totals[key] = totals.get(key, 0) + counts.get(number, 0)
+    return tuple(Topic(name, kind, count) for (name, kind), count in sorted(totals.items()))
+
+
+def read_mcap(
+    path: Path,
+    topic_map: TopicMap,
+    geometry: RobotGeometry | None = None,
+    limits: Limits = DEFAULT_LIMITS,
+) -> Recording:
+    """Recording from an MCAP file.
+
+    Args:
+        path: MCAP file.
+        topic_map: which topics hold what.
+        geometry: robot's wheel radius and track, for Twist commands.
+        limits: on messages and unpacked bytes.
+
+    Raises:
+        InputError: damaged file, missing topics, or an encoding other than JSON and CDR.
+    """
+    chosen = choose_topics(topic_map, mcap_topics(path, limits), path.name)
+    collector = StreamCollector(topic_map, chosen, geometry, limits, path)
+    names = {topic.name for topic in chosen.values()}
+    contents, decoders = _Contents(), _Decoders(path)
+    for record in _records(path, limits):
+        message = contents.take(record)
+        channel = contents.channels.get(message.channel_id) if message is not None else None
+        if channel is not None and channel.topic in names:
+            decoded = decoders.decode(channel, contents.schemas.get(channel.schema_id), message.data)
+            collector.add(channel.topic, message.log_time * 1e-9, decoded)
+    return collector.recording(sha256_of(path))
+
+
+class _Contents:
+    """Schemas and channels met so far."""
+
+    def __init__(self) -> None:
+        self.schemas: dict[int, Any] = {}
+        self.channels: dict[int, Any] = {}
+
+    def take(self, record: Any) -> Any:
+        """Remember a schema or channel; give back a message."""
+        from mcap.records import Channel, Message, Schema
+
+        if isinstance(record, Schema):
+            self.schemas[record.id] = record
+        elif isinstance(record, Channel):
+            self.channels[record.id] = record
+        return record if isinstance(record, Message) else None
+
+    def message_type(self, channel: Any) -> str:
+        """Type's name without its package, as in sensor_msgs/msg/Imu, sensor_msgs.Imu or Imu."""
+        schema = self.schemas.get(channel.schema_id)
+        name = schema.name if schema is not None else channel.metadata.get("type", "unknown")
+        return str(name).replace(".", "/").rsplit("/", 1)[-1]
+
+
+class _Decoders:
+    """One decoder for each channel, made when its first message comes."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._decoders: dict[int, Decoder] = {}
+
+    def decode(self, channel: Any, schema: Any, data: bytes) -> Any:
+        """Message as an object or a mapping.
+
+        Raises:
+            InputError: unknown encoding, or data that do not decode.
+        """
+        if channel.id not in self._decoders:
+            self._decoders[channel.id] = self._make(channel, schema)
+        try:
+            return self._decoders[channel.id](data)
+        except InputError:
+            raise
+        except Exception as error:  # decoders of generated types raise whatever the bytes lead them to
+            reason = " ".join(str(error).split())[:120] or type(error).__name__
+            raise InputError(
+                f"{self._path.name}, topic {channel.topic}: a message does not decode ({reason}); record it again."
+            ) from None
+
+    def _make(self, channel: Any, schema: Any) -> Decoder:
+        if channel.message_encoding == "json":
+            return json.loads
+        if channel.message_encoding == "cdr" and schema is not None and schema.encoding == "ros2msg":
+            return _cdr_decoder(schema)
+        encoding = schema.encoding if schema is not None else "no schema"
+        raise InputError(
+            f"{self._path.name}, topic {channel.topic}, is encoded as {channel.message_encoding!r} "
+            f"({encoding!r}): convert it "
+            "to JSON or to ROS 2 (cdr with ros2msg)."
+        )
+
+
+def _cdr_decoder(schema: Any) -> Decoder:
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+    store = get_typestore(Stores.EMPTY)
+    name = schema.name if "/msg/" in schema.name else schema.name.replace("/", "/msg/", 1)
+    store.register(get_types_from_msg(schema.data.decode("utf-8"), name))
+    return lambda data: store.deserialize_cdr(data, name)
+
+
+def _records(path: Path, limits: Limits) -> Iterator[Any]:
+    """Records of the file and of its chunks; chunks unpack to no more than the limit."""
+    from mcap.exceptions import McapError
+    from mcap.records import Chunk
+    from mcap.stream_reader import StreamReader
+
+    unpacked = 0
+    try:
+        with open_source(path) as stream:
+            for record in StreamReader(stream, emit_chunks=True, record_size_limit=limits.bytes).records:
+                if not isinstance(record, Chunk):
+                    yield record
+                    continue
+                data = _unpack(record, limits.bytes - unpacked, path)
+                unpacked += len(data)
+                yield from _inner(data)
+    except (InputError, GeneratorExit):
+        raise
+    except McapError as error:
+        raise _damaged(path, error) from None
+    except Exception as error:  # struct, unicode and codec errors of damaged files
+        raise _damaged(path, error) from None
+
+
+def _damaged(path: Path, error: BaseException) -> InputError:
+    reason = " ".join(str(error).split())[:160] or type(error).__name__
+    return InputError(f"{path.name} is damaged or truncated ({reason}): run `mcap recover` or record it again.")
+
+
+def _inner(data: bytes) -> Iterator[Any]:
+    from mcap.exceptions import EndOfFile
+    from mcap.stream_reader import StreamReader
+
+    stream = io.BytesIO(data)
+    records = StreamReader(stream, skip_magic=True).records
+    while stream.tell() < len(data):
+        try:
+            yield next(records)
+        except EndOfFile:
+            raise ValueError("a chunk ends inside a record") from None
+
+
+def _unpack(chunk: Any, limit: int, path: Path) -> bytes:
+    """Content of a chunk.
+
+    Raises:
+        InputError: more than ``limit`` bytes, or an unknown compression.
+    """
+    if chunk.compression == "":
+        data = bytes(chunk.data)
+    elif chunk.compression == "zstd":
+        import zstandard
+
+        data = zstandard.ZstdDecompressor().stream_reader(chunk.data, read_size=2**16).read(limit + 1)
+    elif chunk.compression == "lz4":
+        import lz4.frame  # type: ignore[import-untyped]
+
+        data = lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, limit + 1)
+    else:
+        raise InputError(f"{path.name} is compressed with {chunk.compression!r}: convert it to zstd, lz4 or none.")
+    if len(data) > limit:
+        raise InputError(f"{path.name} unpacks to more bytes than allowed: cut it, or raise --maximum-bytes.")
+    if len(data) != chunk.uncompressed_size:
+        raise ValueError(f"a chunk unpacks to {len(data)} bytes, not {chunk.uncompressed_size}")
+    return data

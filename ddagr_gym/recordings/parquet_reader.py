@@ -1,0 +1,77 @@
+"""Parquet tables of others, read through a column map in batches."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ddagr_gym.errors import InputError
+from ddagr_gym.recordings.column_map import ColumnMap
+from ddagr_gym.recordings.conversion import RawTable
+from ddagr_gym.recordings.csv_reader import Collector, wanted_columns
+from ddagr_gym.recordings.files import DEFAULT_LIMITS, Limits, open_source
+
+if TYPE_CHECKING:
+    import pyarrow.parquet as pq
+
+_BATCH = 65_536
+
+
+@contextmanager
+def open_parquet(path: Path, limits: Limits) -> Iterator[pq.ParquetFile]:
+    """Parquet file whose footer parses and promises no more than the limits.
+
+    Raises:
+        InputError: damaged, or larger than the limits.
+    """
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    try:
+        with open_source(path) as stream:
+            file = parquet.ParquetFile(
+                stream,
+                thrift_string_size_limit=2**24,
+                thrift_container_size_limit=2**20,
+                page_checksum_verification=True,
+            )
+            limits.check_rows(file.metadata.num_rows, path)
+            unpacked = sum(file.metadata.row_group(i).total_byte_size for i in range(file.metadata.num_row_groups))
+            if unpacked > limits.bytes:
+                raise InputError(
+                    f"{path.name} unpacks to {unpacked:,} bytes, above {limits.bytes:,}: cut it into drives, "
+                    "or raise "
+                    "--maximum-bytes."
+                )
+            yield file
+    except (pa.ArrowException, OSError, MemoryError, UnicodeDecodeError) as error:
+        reason = " ".join(str(error).split())[:160]
+        raise InputError(f"{path.name} is a damaged Parquet file ({reason}): write it again.") from None
+
+
+def parquet_columns(path: Path, limits: Limits = DEFAULT_LIMITS) -> tuple[str, ...]:
+    """Names of the columns of a Parquet file."""
+    with open_parquet(path, limits) as file:
+        return tuple(file.schema_arrow.names)
+
+
+def read_parquet(path: Path, column_map: ColumnMap, limits: Limits = DEFAULT_LIMITS) -> RawTable:
+    """Columns of a Parquet table that a map asks for.
+
+    Args:
+        path: Parquet file.
+        column_map: which columns to read.
+        limits: on rows and bytes.
+
+    Raises:
+        InputError: missing columns, columns that are not numbers, damage, or too large a file.
+    """
+    with open_parquet(path, limits) as file:
+        numbers, labels = wanted_columns(path, column_map, tuple(file.schema_arrow.names))
+        collector = Collector(numbers, labels, limits, path)
+        columns = list(dict.fromkeys((*numbers, *labels)))
+        for batch in file.iter_batches(batch_size=_BATCH, columns=columns):
+            collector.add(batch)
+        return collector.table()

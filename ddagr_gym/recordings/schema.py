@@ -1,0 +1,388 @@
+"""The one form of a drive: real ones, bags and simulated ones alike.
+
+A :class:`Recording` is a structure of arrays with one row per instant of its time base.
+
+Conventions
+    Units are SI and radians; axes follow REP 103 (x forward, y left, z up, yaw counter-clockwise).
+    Banks are ordered right, left. ``t`` starts at 0 and increases strictly.
+    NaN in a channel means "no new sample at this row": a value that a logger merely repeats is NaN here.
+    Accelerometers give raw specific force: gravity is in z (+9.8) when the robot stands level.
+
+Index ranges (half open, ``(start, stop)``)
+    *segments* hold every sample of the time base; between two of them samples are missing.
+    *spans* are one or more segments that share one clock and one pose frame: elapsed time and pose
+    differences mean something inside a span and nothing across two.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ddagr_gym.errors import InputError, unknown_name
+from ddagr_gym.parameters import Robot
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+Ranges = tuple[tuple[int, int], ...]
+
+GAP_IN_PERIODS = 1.8
+"""Time between rows, in median periods, above which a segment ends (ours: one lost sample makes it 2)."""
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One column of the schema.
+
+    Attributes:
+        unit: SI unit.
+        description: what it holds.
+        limit: largest magnitude that a ground robot's sensor gives [unit]; beyond it the unit is in doubt.
+        core: whether the checks and the diagnosis need it.
+    """
+
+    unit: str
+    description: str
+    limit: float
+    core: bool = True
+
+
+CHANNELS: Mapping[str, Channel] = {
+    "command_right": Channel("rad/s", "right bank speed command", 200.0),
+    "command_left": Channel("rad/s", "left bank speed command", 200.0),
+    "encoder_right": Channel("rad/s", "right bank speed, forward positive", 200.0),
+    "encoder_left": Channel("rad/s", "left bank speed, forward positive", 200.0),
+    "specific_force_x": Channel("m/s^2", "raw accelerometer, forward", 320.0),
+    "specific_force_y": Channel("m/s^2", "raw accelerometer, to the left", 320.0),
+    "specific_force_z": Channel("m/s^2", "raw accelerometer, up; gravity included", 320.0, core=False),
+    "yaw_rate": Channel("rad/s", "gyro about z, counter-clockwise", 10.0),
+    "roll": Channel("rad", "attitude about x", 1.6, core=False),
+    "pitch": Channel("rad", "attitude about y, nose down positive", 1.6, core=False),
+    "pose_x": Channel("m", "position in the span's frame", 1e7, core=False),
+    "pose_y": Channel("m", "position in the span's frame", 1e7, core=False),
+    "pose_yaw": Channel("rad", "heading in the span's frame", 1e3, core=False),
+    "current_right": Channel("A", "right motors' current", 2000.0, core=False),
+    "current_left": Channel("A", "left motors' current", 2000.0, core=False),
+}
+"""The channels of the schema by name, in the order in which files hold them."""
+
+COMMANDS = ("command_right", "command_left")
+
+
+@dataclass(frozen=True)
+class RobotGeometry:
+    """What body-speed commands and scale checks need of a robot.
+
+    Attributes:
+        name: of the robot.
+        wheel_radius: hub to tread [m].
+        half_track: body centre to wheel plane [m].
+    """
+
+    name: str
+    wheel_radius: float
+    half_track: float
+
+    def __post_init__(self) -> None:
+        for label in ("wheel_radius", "half_track"):
+            value = getattr(self, label)
+            if not (isinstance(value, int | float) and math.isfinite(value) and 0 < value < 10):
+                raise InputError(f"RobotGeometry.{label} is {value!r}: give metres between 0 and 10.")
+
+    @classmethod
+    def of(cls, robot: Robot) -> RobotGeometry:
+        """Geometry of a robot; the wheel radius is the mean of its four outer radii."""
+        radius = math.fsum(wheel.outer_radius for wheel in robot.wheels) / len(robot.wheels)
+        return cls(robot.name, radius, robot.half_track)
+
+
+def bank_speeds(forward: Any, turn: Any, geometry: RobotGeometry) -> tuple[Any, Any]:
+    """Bank speeds (right, left) [rad/s] of a body speed command.
+
+    Args:
+        forward: v [m/s].
+        turn: w [rad/s], counter-clockwise.
+        geometry: wheel radius R and half track W; right = (v + w W)/R, left = (v - w W)/R.
+    """
+    return (
+        (forward + turn * geometry.half_track) / geometry.wheel_radius,
+        (forward - turn * geometry.half_track) / geometry.wheel_radius,
+    )
+
+
+@dataclass(frozen=True)
+class RecordingMeta:
+    """Where a recording came from and how to read it.
+
+    Attributes:
+        robot: name of the robot, "" where unknown.
+        source: name of the file it came from, or "simulation".
+        source_sha256: hash of that file, "" for a simulation.
+        column_map: name of the map that was applied, "" for none.
+        geometry: wheel radius and half track that converted the commands, None where unknown.
+        start_time: clock reading at t = 0 [s], 0 where the source counts from 0.
+        segments: index ranges without a missing sample.
+        spans: index ranges with one clock and one pose frame.
+        held: channels that the source repeats between updates, with the nominal update period [s], 0 if unstated.
+        duplicates_dropped: rows left out because their time repeated the row before.
+        notes: sentences on every conversion and assumption made on the way in.
+    """
+
+    robot: str = ""
+    source: str = ""
+    source_sha256: str = ""
+    column_map: str = ""
+    geometry: RobotGeometry | None = None
+    start_time: float = 0.0
+    segments: Ranges = ()
+    spans: Ranges = ()
+    held: Mapping[str, float] = field(default_factory=dict)
+    duplicates_dropped: int = 0
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """One drive in the schema of this module.
+
+    Attributes:
+        t: time [s], (n,), strictly increasing.
+        channels: arrays (n,) by name of :data:`CHANNELS`; a channel that the source lacks is absent.
+        command_valid: (n,), where the commands are what the robot received.
+        meta: provenance and index ranges.
+        extras: further arrays (n,), such as a simulator's ``true_...`` columns; nothing downstream needs them.
+
+    Raises:
+        InputError: arrays of unequal length, a time that does not increase, unknown channels, bad ranges.
+    """
+
+    t: FloatArray
+    channels: Mapping[str, FloatArray]
+    command_valid: BoolArray
+    meta: RecordingMeta
+    extras: Mapping[str, FloatArray] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        _check_arrays(self)
+        for kind in ("segments", "spans"):
+            _check_ranges(kind, getattr(self.meta, kind), len(self.t))
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def __getitem__(self, name: str) -> FloatArray:
+        """Channel by name; all NaN where the source lacks it."""
+        if name not in CHANNELS:
+            raise unknown_name("channel", name, CHANNELS)
+        return self.channels[name] if name in self.channels else np.full(len(self), np.nan)
+
+    def has(self, *names: str) -> bool:
+        """Whether every one of the channels holds at least two samples."""
+        return all(np.count_nonzero(np.isfinite(self[name])) >= 2 for name in names)
+
+    @property
+    def period(self) -> float:
+        """Median time between rows inside segments [s]."""
+        steps = np.concatenate([np.diff(self.t[a:b]) for a, b in self.meta.segments] or [np.empty(0)])
+        return float(np.median(steps)) if steps.size else math.nan
+
+    def spans(self) -> Iterator[slice]:
+        """Slices with one clock and one pose frame."""
+        return (slice(a, b) for a, b in self.meta.spans)
+
+    def segments(self) -> Iterator[slice]:
+        """Slices without a missing sample."""
+        return (slice(a, b) for a, b in self.meta.segments)
+
+    def rates(self) -> dict[str, float]:
+        """New samples per second of each channel inside the spans (median) [Hz]."""
+        return {name: self.rate(name) for name in self.channels}
+
+    def rate(self, name: str) -> float:
+        """New samples per second of one channel inside the spans (median) [Hz]; 0 where it has none."""
+        known = np.isfinite(self[name])
+        steps = np.concatenate([np.diff(self.t[s][known[s]]) for s in self.spans()] or [np.empty(0)])
+        return float(1.0 / np.median(steps)) if steps.size else 0.0
+
+    def columns(self) -> dict[str, FloatArray]:
+        """All columns by name, ``t`` first."""
+        return {"t": self.t, **self.channels, **self.extras}
+
+    def validate(self) -> tuple[str, ...]:
+        """Sentences on what in the values is missing or hard to believe; empty for a sound recording."""
+        return tuple(_doubts(self))
+
+    def held_commands(self, maximum_age: float = math.inf) -> tuple[FloatArray, FloatArray]:
+        """Commands (right, left) in force at every row: the last valid sample of the span, NaN before the first.
+
+        Args:
+            maximum_age: age [s] beyond which a command counts as lapsed (NaN).
+        """
+        return _hold(self, "command_right", maximum_age), _hold(self, "command_left", maximum_age)
+
+    @classmethod
+    def from_columns(
+        cls,
+        columns: Mapping[str, npt.ArrayLike],
+        robot: Robot | RobotGeometry | None = None,
+        *,
+        source: str = "simulation",
+        command_valid: npt.ArrayLike | None = None,
+        segments: Iterable[tuple[int, int]] | None = None,
+        spans: Iterable[tuple[int, int]] | None = None,
+        notes: Iterable[str] = (),
+    ) -> Recording:
+        """Recording from columns that carry the schema's names already, as the simulator returns them.
+
+        Args:
+            columns: arrays (n,) by name with ``t``; names outside the schema become extras.
+            robot: robot that drove, for its name and geometry.
+            source: what meta data name as the source.
+            command_valid: (n,) booleans; all true where absent.
+            segments: index ranges; found from the gaps in ``t`` where absent.
+            spans: index ranges; one span where absent.
+            notes: sentences for the meta data.
+
+        Raises:
+            InputError: no ``t``, unequal lengths, or a time that does not increase.
+        """
+        arrays = {name: np.asarray(value, dtype=np.float64) for name, value in columns.items()}
+        if "t" not in arrays:
+            raise InputError(f"the columns {sorted(arrays)} hold no time: add a column t in seconds.")
+        t = arrays.pop("t")
+        geometry = RobotGeometry.of(robot) if isinstance(robot, Robot) else robot
+        whole: Ranges = ((0, len(t)),) if len(t) else ()
+        span_ranges = whole if spans is None else tuple((int(a), int(b)) for a, b in spans)
+        meta = RecordingMeta(
+            robot=geometry.name if geometry else "",
+            source=source,
+            geometry=geometry,
+            start_time=float(t[0]) if t.size else 0.0,
+            segments=split_at_gaps(t, span_ranges)
+            if segments is None
+            else tuple((int(a), int(b)) for a, b in segments),
+            spans=span_ranges,
+            notes=tuple(notes),
+        )
+        channels = {name: arrays[name] for name in CHANNELS if name in arrays}
+        valid = np.ones(len(t), dtype=bool) if command_valid is None else np.asarray(command_valid, dtype=bool)
+        extras = {name: value for name, value in arrays.items() if name not in CHANNELS}
+        return cls(t - t[0] if t.size else t, channels, valid, meta, extras)
+
+    def with_meta(self, **changes: Any) -> Recording:
+        """Copy with some meta data changed."""
+        return replace(self, meta=replace(self.meta, **changes))
+
+
+def split_at_gaps(t: FloatArray, spans: Ranges) -> Ranges:
+    """Cut spans wherever more than :data:`GAP_IN_PERIODS` median periods lie between rows.
+
+    Args:
+        t: time [s], (n,), increasing inside spans.
+        spans: index ranges.
+    """
+    steps = np.concatenate([np.diff(t[a:b]) for a, b in spans] or [np.empty(0)])
+    if not steps.size:
+        return spans
+    limit = GAP_IN_PERIODS * float(np.median(steps))
+    ranges: list[tuple[int, int]] = []
+    for start, stop in spans:
+        cuts = start + 1 + np.flatnonzero(np.diff(t[start:stop]) > limit)
+        edges = [start, *cuts.tolist(), stop]
+        ranges.extend(itertools.pairwise(edges))
+    return tuple(ranges)
+
+
+def _check_arrays(recording: Recording) -> None:
+    n = len(recording.t)
+    if recording.t.ndim != 1 or not np.all(np.isfinite(recording.t)):
+        raise InputError("the recording's time holds NaN, infinity or more than one dimension: clean it first.")
+    back = np.flatnonzero(np.diff(recording.t) <= 0)
+    if back.size:
+        raise InputError(f"the recording's time does not increase at row {back[0] + 1}: sort it or drop repeated rows.")
+    for name in recording.channels:
+        if name not in CHANNELS:
+            raise unknown_name("channel", name, CHANNELS)
+    for name, value in {**recording.channels, **recording.extras, "command_valid": recording.command_valid}.items():
+        if np.shape(value) != (n,):
+            raise InputError(f"column {name} has the shape {np.shape(value)} where t has ({n},): make them equal.")
+
+
+def _check_ranges(kind: str, ranges: Ranges, n: int) -> None:
+    previous = 0
+    for start, stop in ranges:
+        if not previous <= start < stop <= n:
+            raise InputError(
+                f"the recording's {kind} hold ({start}, {stop}) after row {previous} of {n}: "
+                "give ordered, non-empty, non-overlapping index ranges."
+            )
+        previous = stop
+
+
+def _hold(recording: Recording, name: str, maximum_age: float) -> FloatArray:
+    values = recording[name]
+    known = np.isfinite(values) & recording.command_valid
+    held = np.full(len(recording), np.nan)
+    for span in recording.spans():
+        rows = np.arange(span.start, span.stop)
+        last = np.maximum.accumulate(np.where(known[span], rows, -1))
+        fresh = (last >= 0) & (recording.t[span] - recording.t[last] <= maximum_age)
+        held[span] = np.where(fresh, values[last], np.nan)
+    held[~recording.command_valid] = np.nan
+    return held
+
+
+def _doubts(recording: Recording) -> Iterator[str]:
+    if not len(recording):
+        yield "the recording holds no rows."
+        return
+    for name, channel in CHANNELS.items():
+        values = recording[name]
+        finite = np.abs(values[np.isfinite(values)])
+        if not finite.size:
+            if channel.core:
+                yield f"{name} holds no samples: checks and diagnosis that need it will be left out."
+            continue
+        # A single wild sample is not a wrong unit: look at the hundredth-largest share.
+        high = float(np.quantile(finite, 0.99))
+        if high > channel.limit:
+            yield (
+                f"{name} reaches {high:.4g} {channel.unit}, beyond the {channel.limit:g} {channel.unit} of a ground "
+                f"robot: check its unit in the column map{_unit_hint(channel.unit)}."
+            )
+    yield from _degrees(recording)
+    yield from _gravity(recording)
+    if not recording.command_valid.any():
+        yield "no row has valid commands: the recording can be checked but not replayed from commands."
+
+
+def _unit_hint(unit: str) -> str:
+    return {"rad/s": " (deg/s?)", "rad": " (deg?)", "m/s^2": " (g?)", "m": " (mm?)"}.get(unit, "")
+
+
+def _degrees(recording: Recording) -> Iterator[str]:
+    yaw = recording["pose_yaw"][np.isfinite(recording["pose_yaw"])]
+    if not yaw.size or np.max(np.abs(yaw)) > 360.5 or np.max(np.abs(yaw)) < 7.0:
+        return
+    # Continuous radians grow by small steps; wrapped degrees jump by 360.
+    if np.any(np.abs(np.abs(np.diff(yaw)) - 360.0) < 20.0):
+        yield f"pose_yaw jumps by 360 and reaches {np.max(np.abs(yaw)):.4g}: degrees? Say unit: deg in the map."
+
+
+def _gravity(recording: Recording) -> Iterator[str]:
+    z = recording["specific_force_z"]
+    if not np.any(np.isfinite(z)):
+        return
+    middle = float(np.nanmedian(z))
+    if abs(middle - 1.0) < 0.1 or abs(middle + 1.0) < 0.1:
+        yield f"specific_force_z has the median {middle:.3g}: the accelerometer is in g; say unit: g in the map."
+    elif abs(middle + 9.8) < 1.0:
+        yield f"specific_force_z has the median {middle:.3g} m/s^2: z points down here; give the axes signs in the map."
+    elif abs(middle) < 1.0:
+        yield f"specific_force_z has the median {middle:.3g} m/s^2: gravity was taken out; the schema wants it in."

@@ -1,0 +1,109 @@
+"""Figure of any simulated drive: its path, and what its wheels did."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ddagr_gym.errors import InputError
+from ddagr_gym.parameters import Robot
+from ddagr_gym.reporting import palette
+from ddagr_gym.reporting.figures import WHEELS, draw_robot, house_style, save_figure
+
+DRIVE_FIGURE_COLUMNS = (
+    "t",
+    "command_right",
+    "command_left",
+    "true_omega_right",
+    "true_omega_left",
+    "true_x",
+    "true_y",
+    "true_yaw",
+    "true_v_x",
+    "true_v_y",
+    "yaw_rate",
+    "true_yaw_rate",
+    *(f"true_slip_ratio_{i}" for i in (1, 2, 3, 4)),
+    *(f"true_sinkage_{i}" for i in (1, 2, 3, 4)),
+)
+"""Columns of a simulated drive that :func:`drive_figure` draws."""
+
+
+def drive_figure(
+    columns: Mapping[str, ArrayLike], path: str | Path, *, robot: Robot, soil_name: str, title: str
+) -> tuple[Path, Path]:
+    """Path, bank speeds, body speeds, yaw rate, slip and sinkage of a simulated drive.
+
+    Args:
+        columns: :data:`DRIVE_FIGURE_COLUMNS`, each (T,).
+        path: where, with or without a suffix.
+        robot: for its outline.
+        soil_name: for the title.
+        title: of the drive.
+
+    Returns:
+        Paths of the PNG and of the SVG.
+
+    Raises:
+        InputError: a column is missing, or matplotlib is not installed.
+    """
+    missing = [name for name in DRIVE_FIGURE_COLUMNS if name not in columns]
+    if missing:
+        raise InputError(f"column {missing[0]!r} is missing: this figure needs {', '.join(DRIVE_FIGURE_COLUMNS)}.")
+    data = {name: np.asarray(columns[name], dtype=float) for name in DRIVE_FIGURE_COLUMNS}
+    with house_style():
+        from matplotlib.figure import Figure
+
+        figure = Figure(figsize=(7.4, 5.6), layout="constrained")
+        grid = figure.add_gridspec(5, 2, width_ratios=(1.1, 1.0))
+        _draw_path(figure.add_subplot(grid[:, 0]), data, robot, f"{title} on {soil_name}")
+        axes = [figure.add_subplot(grid[0, 1])]
+        axes += [figure.add_subplot(grid[row, 1], sharex=axes[0]) for row in (1, 2, 3, 4)]
+        _draw_time_series(axes, data)
+        figure.align_ylabels(axes)
+        return save_figure(figure, path)
+
+
+def _draw_path(axes: Any, data: Mapping[str, Any], robot: Robot, title: str) -> None:
+    for index in np.linspace(0, len(data["t"]) - 1, 6).astype(int):
+        draw_robot(axes, robot, [float(data[f"true_{name}"][index]) for name in ("x", "y", "yaw")])
+    axes.plot(data["true_x"], data["true_y"], color=palette.TRUE, linewidth=1.6)
+    axes.plot(data["true_x"][0], data["true_y"][0], "o", color=palette.INK, markersize=4)
+    axes.set(aspect="equal", xlabel="x [m]", ylabel="y [m]")
+    axes.margins(0.05)
+    axes.set_title(title)
+
+
+def _draw_time_series(axes: list[Any], data: Mapping[str, Any]) -> None:
+    t = data["t"]
+    speeds, body, yaw_rate, slip, sinkage = axes
+    for bank, colour in (("right", palette.RIGHT), ("left", palette.LEFT)):
+        speeds.plot(t, data[f"command_{bank}"], color=colour, linewidth=0.8, linestyle=(0, (3, 1.5)))
+        speeds.plot(t, data[f"true_omega_{bank}"], color=colour, label=bank)
+    body.plot(t, data["true_v_x"], color=palette.TRUE, label="forward")
+    body.plot(t, data["true_v_y"], color=palette.TARGET, label="to the left")
+    measured = np.isfinite(data["yaw_rate"])
+    yaw_rate.plot(t[measured], data["yaw_rate"][measured], color=palette.PALE, linewidth=0.8, label="gyro")
+    yaw_rate.plot(t, data["true_yaw_rate"], color=palette.TRUE, label="true")
+    for index, name, colour, line in WHEELS:
+        slip.plot(t, data[f"true_slip_ratio_{index}"], color=colour, linestyle=line, label=name)
+        sinkage.plot(t, 1000.0 * data[f"true_sinkage_{index}"], color=colour, linestyle=line)
+    titles = (
+        (speeds, "Bank speeds, commands dashed", "[rad/s]", 2),
+        (body, "Body speed", "[m/s]", 2),
+        (yaw_rate, "Yaw rate", "[rad/s]", 2),
+        (slip, "Slip ratio", "[-]", 4),
+        (sinkage, "Sinkage", "[mm]", 0),
+    )
+    for panel, title, unit, columns in titles:
+        panel.set_title(title)
+        panel.set_ylabel(unit)
+        panel.tick_params(labelbottom=panel is sinkage)
+        if columns:
+            panel.legend(loc="lower right", bbox_to_anchor=(1.0, 0.97), ncols=columns, columnspacing=1.0)
+    sinkage.set(xlabel="time [s]", xlim=(t[0], t[-1]))
+    sinkage.set_ylim(bottom=0.0)

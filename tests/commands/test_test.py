@@ -1,0 +1,91 @@
+"""``ddagr test`` itself: what it counts, and that a failure of any check is a failure."""
+
+from __future__ import annotations
+
+import sys
+
+import pytest
+
+from ddagr_gym.commands import test as command
+from ddagr_gym.commands.test import Arguments, Outcome
+from ddagr_gym.errors import InputError
+
+MIXED = """
+import pytest
+
+def test_passes(): pass
+
+def test_fails(): assert False
+
+@pytest.fixture
+def broken(): raise RuntimeError
+
+def test_error(broken): pass
+
+@pytest.mark.skip
+def test_skipped(): pass
+"""
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "pytest.ini").write_text("[pytest]\n")
+    return tmp_path
+
+
+def pytest_on(folder, source: str, **options) -> Outcome:
+    (folder / "test_it.py").write_text(source)
+    return command._pytest([sys.executable], folder, "-p", "no:cacheprovider", **options)
+
+
+def test_pytest_is_counted(folder):
+    assert pytest_on(folder, MIXED) == Outcome(passed=1, failed=2, skipped=1)
+    assert pytest_on(folder, "def test_passes(): pass") == Outcome(passed=1)
+
+
+def test_collection_errors_and_empty_selections_fail(folder):
+    assert pytest_on(folder, "import no_such_module").failed == 1
+    assert pytest_on(folder, "").failed == 1
+    assert pytest_on(folder, "", may_be_empty=True) == Outcome()
+
+
+def test_a_failing_tool_is_counted(tmp_path):
+    assert command._tool(tmp_path, "-c", "pass") == Outcome(passed=1)
+    assert command._tool(tmp_path, "-c", "raise SystemExit(3)") == Outcome(failed=1)
+
+
+@pytest.mark.parametrize(("failing", "code"), [(None, 0), ("types", 1), ("wheel", 1)])
+def test_summary_and_exit_code(monkeypatch, capsys, failing, code):
+    names = ("lint", "format", "types", "contracts", "tests", "wheel")
+    ran = []
+
+    def check(name):
+        ran.append(name)
+        return Outcome(failed=1) if name == failing else Outcome(passed=2, skipped=1)
+
+    monkeypatch.setattr(command, "_checks", lambda *_: {name: (lambda name=name: check(name)) for name in names})
+    assert command.run(Arguments()) == code
+    assert tuple(ran) == names
+    last = capsys.readouterr().out.splitlines()[-1]
+    assert last == ("12 passed, 0 failed" if failing is None else "10 passed, 1 failed")
+
+
+def test_selections(monkeypatch, capsys):
+    ran = []
+    names = ("lint", "types", "tests")
+    monkeypatch.setattr(
+        command,
+        "_checks",
+        lambda *_: {name: (lambda name=name: ran.append(name) or Outcome(passed=1)) for name in names},
+    )
+    command.run(Arguments(only="types"))
+    command.run(Arguments(slow=True))
+    assert ran == ["types", "tests"]
+
+
+def test_outside_a_checkout_it_says_so(monkeypatch, tmp_path):
+    package = tmp_path / "site-packages" / "ddagr_gym" / "commands"
+    package.mkdir(parents=True)
+    monkeypatch.setattr(command, "__file__", str(package / "test.py"))
+    with pytest.raises(InputError, match="needs a checkout"):
+        command.run(Arguments())

@@ -1,0 +1,328 @@
+"""The environment's contract: conformance, determinism, endings, observation, bad input."""
+
+import dataclasses
+import math
+import warnings
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+import ddagr_gym  # noqa: F401  registers the ids
+from ddagr_gym.control.constant_speeds import ConstantSpeeds
+from ddagr_gym.control.observation import OBSERVATION, decode
+from ddagr_gym.control.row_turn import RowTurn
+from ddagr_gym.envs import Episode, Randomisation
+from ddagr_gym.envs.registration import TURN_ID, register_environments
+from ddagr_gym.envs.turn_kernel import TERMS
+from ddagr_gym.errors import InputError
+from ddagr_gym.evaluation.calibration import calibrate_constant_speeds
+from ddagr_gym.parameters import Sensors, Soil
+from ddagr_gym.physics import layout
+from ddagr_gym.presets import get_robot, get_soil
+
+
+def make(**arguments):
+    return gymnasium.make(TURN_ID, **arguments)
+
+
+def assert_same(a, b):
+    """Equal to the bit, nested dictionaries included."""
+    if isinstance(a, dict):
+        assert a.keys() == b.keys()
+        for key in a:
+            assert_same(a[key], b[key])
+    else:
+        np.testing.assert_array_equal(a, b)
+        assert type(a) is type(b)
+
+
+@pytest.fixture(scope="module")
+def nominal_controller() -> ConstantSpeeds:
+    return calibrate_constant_speeds(get_robot("ddagr"), get_soil("thesis_a1"), RowTurn())
+
+
+@pytest.mark.parametrize("level", ["small", "full"])
+def test_gymnasium_checker_finds_nothing(level):
+    env = make(info_level=level, render_mode=None)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(env.unwrapped, skip_render_check=True)
+    env.close()
+
+
+def test_sb3_checker_finds_nothing():
+    sb3 = pytest.importorskip("stable_baselines3.common.env_checker", reason="the extra rl is not installed")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        sb3.check_env(make().unwrapped, warn=True, skip_render_check=True)
+
+
+def test_registration_is_idempotent_and_by_module_name():
+    register_environments()
+    register_environments()
+    assert isinstance(gymnasium.make(f"ddagr_gym:{TURN_ID}").unwrapped, gymnasium.Env)
+
+
+def rollout(seed, level="full", steps=60):
+    env = make(info_level=level)
+    trace = [env.reset(seed=seed)]
+    actions = np.random.default_rng(seed).uniform(-1, 1, (steps, 2)).astype(np.float32)
+    trace += [env.step(action) for action in actions]
+    return trace
+
+
+def test_same_seed_gives_the_same_bits():
+    for a, b in zip(rollout(7), rollout(7), strict=True):
+        for left, right in zip(a, b, strict=True):
+            assert_same(left, right)
+
+
+def test_other_seed_gives_another_episode():
+    first, second = rollout(1, steps=3), rollout(2, steps=3)
+    assert not np.array_equal(first[-1][4]["true_soil"], second[-1][4]["true_soil"])
+
+
+def test_a_second_reset_continues_the_stream_of_the_seed():
+    env = make(info_level="full")
+    env.reset(seed=3)
+    _, first = env.reset()
+    _, second = env.reset()
+    env.reset(seed=3)
+    _, again = env.reset()
+    assert_same(first, again)
+    assert not np.array_equal(first["true_soil"], second["true_soil"])
+
+
+def test_observation_is_new_and_has_documented_entries():
+    env = make()
+    first, info = env.reset(seed=0)
+    assert first.dtype == np.float32
+    assert first.shape == (len(OBSERVATION),)
+    second, *_, info_2 = env.step(np.zeros(2, np.float32))
+    assert first is not second
+    assert info is not info_2
+    assert all(name in env.unwrapped.__doc__ for name, _, _ in OBSERVATION)
+
+
+def test_observation_means_the_raw_block():
+    env = make(info_level="full")
+    env.reset(seed=0)
+    for _ in range(20):
+        observation, *_, info = env.step(np.array([0.5, 0.3], np.float32))
+    seen = decode(observation)
+    mean = info["samples"].mean(axis=0)
+    np.testing.assert_allclose(seen[:5], mean, rtol=1e-6, atol=1e-6)
+    assert info["samples"].shape == (10, 5)
+    np.testing.assert_allclose(info["command"], [1.0, 0.6], rtol=1e-6)
+
+
+def test_heading_to_go_follows_the_gyro_and_the_side():
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        env = make(side=side, info_level="full", randomisation=False)
+        observation, _ = env.reset(seed=0)
+        assert decode(observation).heading_to_go == pytest.approx(math.pi, rel=1e-6)
+        for _ in range(50):
+            observation, *_, info = env.step(np.array([0.5 + 0.3 * sign, 0.5 - 0.3 * sign], np.float32))
+        turned = sign * info["true_yaw"]
+        assert turned > 0.2
+        assert decode(observation).heading_to_go == pytest.approx(math.pi - turned, abs=0.01)
+
+
+def test_run_in_counts_down_with_the_encoders():
+    env = make(randomisation=False, info_level="full", run_in=0.6)
+    observation, _ = env.reset(seed=0)
+    assert decode(observation).run_in_to_go == pytest.approx(0.6)
+    while decode(observation).run_in_to_go > 0:
+        observation, *_, info = env.step(np.array([0.36, 0.36], np.float32))
+    # the wheels slip by about a percent, so the robot is a little short of the boundary
+    assert -0.02 < info["true_x"] < 0.02
+
+
+def drive(env, controller, **reset):
+    observation, _ = env.reset(**reset)
+    total = 0.0
+    while True:
+        observation, reward, terminated, truncated, info = env.step(controller(observation))
+        total += reward
+        if terminated or truncated:
+            return total, terminated, truncated, info
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_calibrated_turn_reaches_the_next_row(side, nominal_controller):
+    env = make(soil="thesis_a1", side=side, randomisation=False)
+    total, terminated, truncated, info = drive(env, nominal_controller, seed=0)
+    assert terminated
+    assert not truncated
+    assert info["ending"] == 1
+    assert info["success"] is True
+    assert abs(info["exit_lateral_error"]) < 0.03
+    assert total > 5.0
+
+
+def test_success_is_what_the_metrics_say(nominal_controller):
+    from ddagr_gym.control.row_turn import wheels_fit_furrow
+
+    env = make(soil="thesis_a1", side="left", randomisation=False)
+    outcomes = set()
+    for outer in (nominal_controller.outer, 0.9 * nominal_controller.outer):
+        controller = dataclasses.replace(nominal_controller, outer=outer)
+        *_, info = drive(env, controller, seed=0)
+        fits = wheels_fit_furrow(info["exit_lateral_error"], info["exit_heading_error"], 0.33)
+        assert info["success"] == fits
+        outcomes.add(fits)
+    assert outcomes == {True, False}
+
+
+def test_ending_3_off_the_headland():
+    env = make(randomisation=False)
+    *_, info = drive(env, lambda _: np.array([1.0, 1.0], np.float32), seed=0)
+    assert info["ending"] == 3
+
+
+def test_ending_2_bogged():
+    slurry = Soil(500.0, 0.05, 1.0, 0.0, 2.0e4, 0.02, 0.4, 0.15, 0.3)
+    env = make(soil=slurry, randomisation=False)
+    env.reset(seed=0)
+    *_, terminated, _, info = env.step(np.zeros(2, np.float32))
+    assert terminated
+    assert info["ending"] == 2
+
+
+def test_time_truncates():
+    env = make(randomisation=False)
+    _, terminated, truncated, info = drive(env, lambda _: np.zeros(2, np.float32), seed=0)
+    assert truncated
+    assert not terminated
+    assert info["ending"] == 0
+
+
+def test_reward_is_the_weighted_sum_of_its_named_terms():
+    env = make(info_level="full")
+    env.reset(seed=4)
+    weights = dataclasses.asdict(env.unwrapped.settings.reward)
+    assert set(weights) == set(TERMS)
+    rng = np.random.default_rng(0)
+    for _ in range(40):
+        _, reward, *_, info = env.step(rng.uniform(-1, 1, 2).astype(np.float32))
+        terms = {name: info[f"reward_{name}"] for name in TERMS}
+        assert reward == pytest.approx(sum(weights[name] * terms[name] for name in TERMS), rel=1e-12)
+
+
+def test_an_episode_can_be_repeated():
+    env = make(info_level="full")
+    env.reset(seed=11)
+    episode = env.unwrapped.episode
+    assert isinstance(episode, Episode)
+    _, first = env.reset(seed=1, options={"episode": episode})
+    _, again = env.reset(seed=1, options={"episode": episode})
+    assert_same(first, again)
+
+
+def test_settings_reach_the_simulator():
+    env = make(robot="husky", soil="firm_ground", radius=0.65, side="left", effects=["slope=0.05", "towed_drag=40"])
+    env.reset(seed=0)
+    simulator = env.unwrapped.batch.simulator
+    assert [effect.name for effect in simulator.effects] == ["command_delay", "slope", "towed_drag"]
+    env.step(np.zeros(2, np.float32))
+    assert simulator.rows[0, layout.SLOPE] == pytest.approx(math.tan(0.05))
+    assert env.unwrapped.episode.turn.radius == 0.65
+
+
+def test_radius_range_and_sides_are_drawn():
+    env = make(radius=(0.65, 1.2))
+    turns = []
+    for seed in range(12):
+        env.reset(seed=seed)
+        turns.append(env.unwrapped.episode.turn)
+    assert {turn.side for turn in turns} == {"left", "right"}
+    assert 0.65 <= min(t.radius for t in turns) < max(t.radius for t in turns) <= 1.2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"soil": "thesis_a2"}, "thesis_a1"),
+        ({"robot": "huskey"}, "husky"),
+        ({"radius": -1.0}, "radius"),
+        ({"radius": float("nan")}, "radius"),
+        ({"side": "up"}, "side"),
+        ({"effects": ["slop=0.1"]}, "slope"),
+        ({"info_level": "ful"}, "full"),
+        ({"render_mode": "ansi"}, "render_mode"),
+        ({"speed": 0.0}, "speed"),
+    ],
+)
+def test_bad_arguments_are_one_sentence(arguments, words):
+    with pytest.raises(InputError, match=words) as caught:
+        gymnasium.make(TURN_ID, disable_env_checker=True, **arguments).reset(seed=0)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("action", "words"),
+    [
+        (np.zeros(3, np.float32), "shape"),
+        (0.0, "shape"),
+        (np.array([np.nan, 0.0]), "not finite"),
+        (np.array([np.inf, 0.0]), "not finite"),
+        ("left", "numbers"),
+    ],
+)
+def test_bad_actions_are_one_sentence(action, words):
+    env = make().unwrapped
+    env.reset(seed=0)
+    with pytest.raises(InputError, match=words):
+        env.step(action)
+
+
+def test_actions_beyond_the_box_are_clipped():
+    env = make(info_level="full").unwrapped
+    env.reset(seed=0)
+    *_, info = env.step(np.array([5.0, -5.0]))
+    np.testing.assert_array_equal(info["command"], [2.0, -2.0])
+
+
+def test_step_before_reset_is_refused():
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        make().unwrapped.step(np.zeros(2, np.float32))
+
+
+def test_unknown_reset_option_is_refused():
+    with pytest.raises(InputError, match="soyl"):
+        make().reset(seed=0, options={"soyl": 1})
+
+
+def test_randomisation_none_gives_one_robot():
+    env = make(soil="thesis_a1", randomisation=Randomisation.none(), side="left")
+    env.reset(seed=0)
+    first = env.unwrapped.episode
+    env.reset(seed=1)
+    assert env.unwrapped.episode == first
+    assert first.robot == get_robot("ddagr")
+    assert first.sensors == Sensors()
+
+
+def test_close_may_be_called_twice():
+    env = make()
+    env.reset(seed=0)
+    env.close()
+    env.close()
+
+
+def test_rgb_array_renders_and_changes():
+    pytest.importorskip("pygame", reason="the extra render is not installed")
+    env = make(render_mode="rgb_array")
+    env.reset(seed=0)
+    first = env.render()
+    for _ in range(40):
+        env.step(np.array([0.5, 0.5], np.float32))
+    second = env.render()
+    assert first.dtype == np.uint8
+    assert first.ndim == 3
+    assert first.shape[2] == 3
+    assert (first != second).any()
+    env.close()
+    env.close()

@@ -1,0 +1,82 @@
+"""What a user of the installed wheel gets; run by `ddagr test` outside the checkout, with core dependencies only."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import subprocess
+import sys
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+import pytest
+
+import ddagr_gym
+from ddagr_gym.config import configs_dir
+
+ENVIRONMENT = Path(sys.prefix).resolve()
+DDAGR = Path(sys.prefix) / "bin" / "ddagr"
+
+
+def run(*words: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([str(DDAGR), *words], capture_output=True, text=True, stdin=subprocess.DEVNULL)
+
+
+def test_package_comes_from_the_wheel():
+    assert Path(ddagr_gym.__file__).resolve().is_relative_to(ENVIRONMENT)
+    assert importlib.metadata.version("ddagr-gym") == ddagr_gym.__version__
+
+
+def test_configurations_are_in_the_package():
+    assert configs_dir() == Path(ddagr_gym.__file__).resolve().parent / "configs"
+    assert (configs_dir() / "robots").is_dir()
+
+
+def test_no_optional_package_is_there():
+    names = {distribution.metadata["Name"].lower() for distribution in importlib.metadata.distributions()}
+    assert not names & {"torch", "matplotlib", "pyarrow", "pygame-ce", "stable-baselines3"}
+
+
+def test_console_script():
+    done = run("--version")
+    assert (done.returncode, done.stdout.strip()) == (0, f"ddagr-gym {ddagr_gym.__version__}")
+
+
+def test_every_command_shows_its_help():
+    from ddagr_gym.commands import NAMES
+
+    for name in NAMES:
+        done = run(name, "--help")
+        assert done.returncode == 0, done.stderr.splitlines()[-1:]
+        assert "Examples:" in done.stdout
+
+
+def test_soils_are_listed():
+    done = run("soils")
+    assert done.returncode == 0, done.stderr.splitlines()[-1:]
+    assert "thesis_a1" in done.stdout
+
+
+def test_an_episode_runs():
+    environment = gymnasium.make("DDAGR-Turn-v0")
+    observation, _ = environment.reset(seed=1)
+    assert observation in environment.observation_space
+    for _ in range(5):
+        observation, reward, *_ = environment.step(np.array([0.5, 0.8], dtype=np.float32))
+        assert observation in environment.observation_space
+        assert np.isfinite(reward)
+    environment.close()
+
+
+@pytest.mark.parametrize("make", ["make", "make_vec"])
+def test_the_id_with_its_module_needs_no_import(make):
+    program = f"import gymnasium; gymnasium.{make}('ddagr_gym:DDAGR-Turn-v0').close()"
+    done = subprocess.run([sys.executable, "-P", "-c", program], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr.splitlines()[-1:]
+
+
+def test_test_needs_a_checkout():
+    done = run("test")
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert "checkout" in done.stderr

@@ -1,0 +1,87 @@
+from __future__ import annotations
+
+import pytest
+
+from ddagr_gym.config import find_config, load_config
+from ddagr_gym.errors import InputError
+from ddagr_gym.recordings.column_map import ColumnMap, load_column_map, most_specific_map, shipped_column_maps
+
+STEPS = (
+    "seq,calib_step,window,t,phase,cmd_left,cmd_right,enc_left,enc_right,imu_gz,imu_ax,imu_ay,imu_az,"
+    "x,y,z,roll,pitch,yaw"
+).split(",")
+CONCEALED = "t,cmd_right,cmd_left,enc_right,enc_left,imu_ax,imu_ay,imu_gz".split(",")
+
+BASIC = """
+time: {column: t}
+channels:
+  yaw_rate: {column: gz}
+"""
+
+
+def write(tmp_path, text):
+    path = tmp_path / "map.yaml"
+    path.write_text(text)
+    return str(path)
+
+
+def test_shipped_maps_load_and_carry_their_name():
+    assert set(shipped_column_maps()) == {"concealed", "drive_continuous", "drive_steps"}
+    for name in shipped_column_maps():
+        assert load_column_map(name).name == name
+
+
+def test_the_commented_example_is_valid():
+    example = load_config(find_config("recordings", "example"), ColumnMap)
+    assert example.channels["encoder_left"].sign == -1
+
+
+def test_a_map_of_ones_own_takes_the_name_of_its_file(tmp_path):
+    column_map = load_column_map(write(tmp_path, BASIC))
+    assert column_map.name == "map"
+    assert column_map.needed_columns() == ("t", "gz")
+
+
+@pytest.mark.parametrize(("columns", "name"), [(STEPS, "drive_steps"), (CONCEALED, "concealed")])
+def test_the_most_specific_shipped_map_is_found(columns, name):
+    assert most_specific_map(tuple(columns), "file.csv").name == name
+
+
+def test_no_fitting_map_says_what_there_is():
+    with pytest.raises(InputError, match=r"alpha, beta.*drive_steps"):
+        most_specific_map(("alpha", "beta"), "file.csv")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (BASIC + "include: other.yaml\n", "include"),
+        (BASIC + "robot: !!python/object/apply:os.system ['true']\n", "not valid YAML"),
+        (BASIC.replace("yaw_rate", "yawrate"), "yaw_rate"),
+        (BASIC.replace("{column: gz}", "{column: gz, unit: furlong}"), "furlong"),
+        (BASIC.replace("{column: gz}", "{column: gz, sign: 2}"), "sign"),
+        (BASIC.replace("{column: gz}", "gz"), "yaw_rate"),
+        (BASIC.replace("{column: t}", "{column: t, unit: fortnight}"), "fortnight"),
+        ("channels: {}\n", "time"),
+        (BASIC + "held:\n  - {channels: [pose_x]}\n", "pose_x"),
+        (BASIC + "held:\n  - {channels: [yaw_rate], zero_period: -1}\n", "zero_period"),
+        (BASIC + "pieces: {span_columns: [a], span_gap: 0}\n", "span_gap"),
+        (BASIC + "delimiter: '::'\n", "delimiter"),
+        (
+            BASIC + "  command_right: {column: a}\nbody_commands: {forward: {column: v}, turn: {column: w}}\n",
+            "keep one of them",
+        ),
+        (BASIC + "body_commands: {forward: {column: v, unit: deg}, turn: {column: w}}\n", "deg"),
+        ("[" * 5000, "YAML|nested"),
+        ("a: &a [1]\nb: *a\n", "anchors"),
+    ],
+)
+def test_a_bad_map_gets_one_sentence(tmp_path, text, words):
+    with pytest.raises(InputError, match=words) as caught:
+        load_column_map(write(tmp_path, text))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_name_that_leaves_the_folder_is_not_a_map():
+    with pytest.raises(InputError, match="unknown"):
+        load_column_map("../robots/husky")

@@ -1,0 +1,127 @@
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ddagr_gym.errors import InputError
+from ddagr_gym.recordings.ros_messages import (
+    extractor,
+    header_stamp,
+    imu,
+    joint_state,
+    metres_from,
+    nav_sat_fix,
+    pose,
+)
+from ddagr_gym.recordings.topic_map import TopicSource
+
+
+def quaternion(roll, pitch, yaw):
+    cr, sr, cp, sp, cy, sy = (f(a / 2) for a in (roll, pitch, yaw) for f in (math.cos, math.sin))
+    return {
+        "x": sr * cp * cy - cr * sp * sy,
+        "y": cr * sp * cy + sr * cp * sy,
+        "z": cr * cp * sy - sr * sp * cy,
+        "w": cr * cp * cy + sr * sp * sy,
+    }
+
+
+@given(st.floats(-3.1, 3.1), st.floats(-1.5, 1.5), st.floats(-3.1, 3.1), st.floats(0.8, 1.2))
+def test_attitude_of_a_quaternion_of_any_near_unit_length(roll, pitch, yaw, length):
+    q = {name: length * value for name, value in quaternion(roll, pitch, yaw).items()}
+    sample = pose("pose")({"pose": {"position": {"x": 1, "y": 2}, "orientation": q}})
+    assert sample["roll"] == pytest.approx(roll, abs=1e-6)
+    assert sample["pitch"] == pytest.approx(pitch, abs=1e-6)
+    assert sample["pose_yaw"] == pytest.approx(yaw, abs=1e-6)
+    assert (sample["pose_x"], sample["pose_y"]) == (1, 2)
+
+
+def test_a_quaternion_of_zeros_means_no_attitude():
+    sample = pose("pose")({"pose": {"position": {"x": 1, "y": 2}, "orientation": dict.fromkeys("xyzw", 0)}})
+    assert math.isnan(sample["pose_yaw"])
+
+
+@pytest.mark.parametrize(
+    ("stamp", "seconds"),
+    [
+        ({"sec": 3, "nanosec": 500_000_000}, 3.5),
+        ({"secs": 3, "nsecs": 500_000_000}, 3.5),
+        ({"sec": 3, "nsec": 500_000_000}, 3.5),
+        ({"sec": 0, "nanosec": 0}, None),
+        ({}, None),
+    ],
+)
+def test_stamps_of_ros_1_ros_2_and_json(stamp, seconds):
+    assert header_stamp({"header": {"stamp": stamp}}) == seconds
+    as_object = SimpleNamespace(header=SimpleNamespace(stamp=SimpleNamespace(**stamp)))
+    assert header_stamp(as_object) == seconds
+
+
+def test_messages_without_a_header_have_no_stamp():
+    assert header_stamp({"linear": {"x": 1}}) is None
+
+
+def test_imu_takes_attitude_only_when_asked():
+    message = {
+        "linear_acceleration": {"x": 1, "y": 2, "z": 3},
+        "angular_velocity": {"z": 4},
+        "orientation": quaternion(0.1, 0.2, 0.3),
+    }
+    assert set(imu(TopicSource())(message)) == {"specific_force_x", "specific_force_y", "specific_force_z", "yaw_rate"}
+    assert imu(TopicSource(orientation=True))(message)["pitch"] == pytest.approx(0.2)
+
+
+def test_bank_speeds_are_means_over_matching_joints():
+    message = {
+        "name": ["front_left_wheel", "Front_RIGHT_wheel", "rear_left_wheel", "rear_right_wheel", "arm"],
+        "velocity": [1.0, 2.0, 3.0, 5.0, 99.0],
+    }
+    assert joint_state(TopicSource())(message) == {"encoder_right": 3.5, "encoder_left": 2.0}
+    only_front = joint_state(TopicSource(right=("front_right*",), left=("front_left*",)))(message)
+    assert only_front == {"encoder_right": 2.0, "encoder_left": 1.0}
+
+
+@pytest.mark.parametrize(
+    ("message", "words"),
+    [
+        ({"name": ["a", "b"], "velocity": []}, "0 speeds"),
+        ({"name": ["a"], "velocity": [1.0]}, "matches the right bank"),
+    ],
+)
+def test_joint_states_without_wheels_are_refused(message, words):
+    with pytest.raises(InputError, match=words):
+        joint_state(TopicSource())(message)
+
+
+@pytest.mark.parametrize(
+    ("latitude", "metres"),
+    # Length of one degree of latitude and of longitude on the WGS 84 ellipsoid (NGA tables).
+    [(0.0, (111319.5, 110574.3)), (45.0, (78846.8, 111131.7)), (60.0, (55800.0, 111412.2))],
+)
+def test_degrees_become_metres_on_the_ellipsoid(latitude, metres):
+    half = 0.0005
+    east, _ = metres_from(latitude, 10.0, latitude, 10.0 + half)
+    _, north = metres_from(latitude, 10.0, latitude + half, 10.0)
+    assert east / half == pytest.approx(metres[0], rel=2e-5)
+    assert north / half == pytest.approx(metres[1], rel=2e-5)
+
+
+def test_longitude_may_cross_the_date_line():
+    east, _ = metres_from(0.0, 179.9999, 0.0, -179.9999)
+    assert east == pytest.approx(22.26, abs=0.01)
+
+
+def test_fixes_without_satellites_are_no_samples():
+    extract = nav_sat_fix()
+    assert math.isnan(extract({"latitude": 50.0, "longitude": 8.0, "status": {"status": -1}})["pose_x"])
+    assert extract({"latitude": 50.0, "longitude": 8.0, "status": {"status": 0}}) == {"pose_x": 0.0, "pose_y": 0.0}
+    assert math.isnan(extract({"latitude": 95.0, "longitude": 8.0, "status": {"status": 0}})["pose_x"])
+
+
+def test_twists_need_the_robot():
+    with pytest.raises(InputError, match="--robot"):
+        extractor("Twist", TopicSource(), None, "file.bag")

@@ -1,0 +1,96 @@
+import sys
+import xml.etree.ElementTree as ElementTree
+
+import numpy as np
+import pytest
+
+from ddagr_gym.control.row_turn import RowTurn
+from ddagr_gym.errors import InputError
+from ddagr_gym.presets import get_robot
+from ddagr_gym.reporting.figures import TURN_FIGURE_COLUMNS, headland_times, house_style, save_figure, turn_figure
+
+matplotlib = pytest.importorskip("matplotlib", reason="needs the extra report")
+
+ROBOT = get_robot("ddagr")
+
+
+def columns_of(turn):
+    t = np.arange(0.0, turn.duration, 0.02)
+    distance = turn.distance_at(t)
+    x, y = turn.position(distance).T
+    columns = {name: np.sin(t + index) for index, name in enumerate(TURN_FIGURE_COLUMNS)}
+    columns |= {f"true_sinkage_{wheel}": 0.01 + 0.001 * wheel * np.cos(t) for wheel in range(1, 5)}
+    columns["yaw_rate"] = np.where(np.arange(len(t)) % 7, 0.2, np.nan)
+    return columns | {"t": t, "true_x": x, "true_y": y, "true_yaw": turn.heading(distance)}
+
+
+@pytest.mark.parametrize(("side", "radius"), [("left", 0.8), ("right", 1.2)])
+def test_turn_figure_writes_both_formats(tmp_path, side, radius):
+    turn = RowTurn(radius=radius, side=side)
+    png, svg = turn_figure(columns_of(turn), turn, tmp_path / "turn", robot=ROBOT, soil_name="thesis_a1")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["turn.png", "turn.svg"] == [png.name, svg.name]
+    assert png.read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+    width, height = (int.from_bytes(png.read_bytes()[i : i + 4]) for i in (16, 20))
+    assert (width, height) == (1628, 1012)
+    assert ElementTree.parse(svg).getroot().tag.endswith("svg")
+    assert svg.stat().st_size < 400_000
+
+
+def test_same_data_same_bytes_whatever_the_user_has_set(tmp_path):
+    turn = RowTurn()
+    first = turn_figure(columns_of(turn), turn, tmp_path / "a.png", robot=ROBOT, soil_name="soil")
+    with matplotlib.rc_context({"lines.linewidth": 9.0, "font.size": 20.0, "figure.facecolor": "black"}):
+        second = turn_figure(columns_of(turn), turn, tmp_path / "b.svg", robot=ROBOT, soil_name="soil")
+    for one, other in zip(first, second, strict=True):
+        assert one.read_bytes() == other.read_bytes()
+
+
+def test_nothing_global_changes(tmp_path):
+    before = dict(matplotlib.rcParams)
+    turn_figure(columns_of(RowTurn()), RowTurn(), tmp_path / "turn", robot=ROBOT, soil_name="soil")
+    assert dict(matplotlib.rcParams) == before
+    with pytest.raises(ZeroDivisionError), house_style():
+        assert matplotlib.rcParams["axes.spines.top"] is False
+        raise ZeroDivisionError
+    assert dict(matplotlib.rcParams) == before
+
+
+def test_headland_times():
+    t = np.arange(8.0)
+    assert headland_times(t, np.array([-1, -1, 0, 1, 1, -1, -1, -1.0])) == [(2.0, 4.0)]
+    assert headland_times(t, np.array([1, -1, -1, -1, 1, 1, 1, 1.0])) == [(0.0, 0.0), (4.0, 7.0)]
+    assert headland_times(t, -np.ones(8)) == []
+
+
+def test_a_turn_that_never_turned_is_drawn_too(tmp_path):
+    turn = RowTurn()
+    columns = columns_of(turn)
+    columns |= {"true_x": 0 * columns["t"] - 1.0, "true_y": 0 * columns["t"], "true_yaw": 0 * columns["t"]}
+    png, _ = turn_figure(columns, turn, tmp_path / "turn", robot=ROBOT, soil_name="soil")
+    assert png.exists()
+
+
+def test_bad_input_is_one_sentence_and_writes_nothing(tmp_path, monkeypatch):
+    turn = RowTurn()
+    columns = columns_of(turn)
+    with pytest.raises(InputError, match=r"folder .* does not exist"):
+        turn_figure(columns, turn, tmp_path / "absent" / "turn", robot=ROBOT, soil_name="soil")
+    monkeypatch.setitem(sys.modules, "matplotlib.style", None)
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    with pytest.raises(InputError, match=r'pip install "ddagr-gym\[report\]"'):
+        turn_figure(columns, turn, tmp_path / "turn", robot=ROBOT, soil_name="soil")
+    del columns["true_slip_ratio_2"]
+    with pytest.raises(InputError, match="column 'true_slip_ratio_2' is missing"):
+        turn_figure(columns, turn, tmp_path / "turn", robot=ROBOT, soil_name="soil")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_failed_save_leaves_no_file(tmp_path):
+    class Broken:
+        def savefig(self, path, **options):
+            path.write_text("half")
+            raise RuntimeError("no memory")
+
+    with pytest.raises(RuntimeError, match="no memory"):
+        save_figure(Broken(), tmp_path / "turn")
+    assert list(tmp_path.iterdir()) == []

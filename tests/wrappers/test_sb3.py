@@ -1,0 +1,39 @@
+"""The batch as an SB3 VecEnv."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip("stable_baselines3", reason="the extra rl is not installed")
+
+from stable_baselines3 import PPO
+from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
+
+from ddagr_gym.envs.turn_vector_env import TurnVectorEnv
+from ddagr_gym.wrappers.sb3 import TurnVecEnv
+
+
+def test_endings_carry_the_terminal_observation():
+    env = TurnVecEnv(2, max_episode_steps=3)
+    env.seed(4)
+    first = env.reset()
+    twin = TurnVectorEnv(2, max_episode_steps=3, autoreset_mode="SameStep")
+    np.testing.assert_array_equal(first, twin.reset(seed=4)[0])
+    for _ in range(3):
+        observations, rewards, dones, infos = env.step(np.zeros((2, 2), np.float32))
+        expected = twin.step(np.zeros((2, 2), np.float32))
+    np.testing.assert_array_equal(observations, expected[0])
+    assert dones.all()
+    assert rewards.dtype == np.float32
+    for n, info in enumerate(infos):
+        np.testing.assert_array_equal(info["terminal_observation"], expected[4]["final_obs"][n])
+        assert info["TimeLimit.truncated"] is True
+        assert info["is_success"] is False
+
+
+def test_ppo_learns_a_few_steps_on_it():
+    env = VecNormalize(VecMonitor(TurnVecEnv(4)))
+    model = PPO("MlpPolicy", env, n_steps=16, batch_size=32, n_epochs=1, seed=0, device="cpu")
+    before = model.policy.action_net.weight.detach().clone()
+    model.learn(64)
+    assert model.num_timesteps == 64
+    assert bool((model.policy.action_net.weight != before).any())
