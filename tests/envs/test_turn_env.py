@@ -167,8 +167,8 @@ def test_success_is_what_the_metrics_say(nominal_controller):
 
     env = make(soil="thesis_a1", side="left", randomisation=False)
     outcomes = set()
-    for outer in (nominal_controller.outer, 0.9 * nominal_controller.outer):
-        controller = dataclasses.replace(nominal_controller, outer=outer)
+    for inner in (nominal_controller.inner, 0.35):  # the faster inner bank widens the turn
+        controller = dataclasses.replace(nominal_controller, inner=inner)
         *_, info = drive(env, controller, seed=0)
         fits = wheels_fit_furrow(info["exit_lateral_error"], info["exit_heading_error"], 0.33)
         assert info["success"] == fits
