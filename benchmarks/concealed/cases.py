@@ -56,6 +56,8 @@ class Case:
         structure: name of a structural change of the simulator, "" for none.
         manoeuvres: number of the manoeuvre set.
         receiver: whether poses are logged.
+        command_row: "issued" where a row holds the command sent at its time, "acting" where it holds the one that
+            acted during the sample just ended, as a logger that runs after the controller writes it.
     """
 
     set_name: str
@@ -65,6 +67,7 @@ class Case:
     structure: str = ""
     manoeuvres: int = 0
     receiver: bool = True
+    command_row: str = "issued"
 
     @property
     def name(self) -> str:
@@ -107,14 +110,15 @@ def _outside(set_name: str, rng: np.random.Generator) -> list[Draft]:
 
 
 def _complete(case: Case, seed: int) -> Case:
-    """Draw what does not depend on the label: manoeuvres, receiver, and the structure of cases with effects."""
+    """Draw what does not depend on the label: manoeuvres, receiver, logging, structure of cases with effects."""
     rng = stream(seed, case.set_name, case.number, "plan")
     manoeuvres, receiver = int(rng.integers(MANOEUVRE_SETS)), bool(rng.random() < RECEIVER_SHARE)
     structure, structured = str(rng.choice(list(STRUCTURES)[1:])), bool(rng.random() < STRUCTURED_SHARE)
+    row = str(rng.choice(["issued", "acting"]))
     needed = any(form.needs_pose for form, _ in case.effects)
     if case.effects and structured:
         case = replace(case, structure=structure)
-    return replace(case, manoeuvres=manoeuvres, receiver=receiver or needed)
+    return replace(case, manoeuvres=manoeuvres, receiver=receiver or needed, command_row=row)
 
 
 def plan(set_name: str, seed: int) -> list[Case]:

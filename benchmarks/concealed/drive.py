@@ -216,11 +216,12 @@ def motor_step(motors, drives, bank, command, omega, power, time, dt):  # type: 
     limit = max(motors.speed_limit - motors.load_line * abs(state[4]), 0.05)
     wanted = min(max(wanted, -limit), limit)
     acceleration, state[1] = (wanted - state[1]) / dt, wanted
-    proportional = 2.0 * motors.damping * motors.bandwidth * motors.inertia
-    integral = motors.bandwidth**2 * motors.inertia
+    moved = motors.inertia + motors.carried_inertia
+    proportional = 2.0 * motors.damping * motors.bandwidth * moved
+    integral = motors.bandwidth**2 * moved
     leak = integral * motors.droop / (1.0 - min(proportional * motors.droop, 0.95))
     error = wanted * (1.0 - motors.sag * power) - omega
-    torque = motors.inertia * acceleration + proportional * error + integral * state[2]
+    torque = moved * acceleration + proportional * error + integral * state[2]
     ceiling = motors.torque_limit * fade
     if abs(torque) < ceiling:
         state[2] = (state[2] + dt * error) / (1.0 + dt * leak)

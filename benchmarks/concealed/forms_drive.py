@@ -57,7 +57,7 @@ def lag_when_speeding_up(size: float, rng: Rng, site: Site) -> Change:
     return Change({"added_time_constant": size}, plant=lambda p: with_motors(p, rate_up=rate))
 
 
-@form("motor_droop", "leaky integrator", "same", 3, 8, "speed falls by D per torque: the loop's integrator leaks")
+@form("motor_droop", "leaky integrator", "same", 2, 3.9, "speed falls by D per torque: the loop's integrator leaks")
 def leaky_integrator(size: float, rng: Rng, site: Site) -> Change:
     return Change({"droop": size}, plant=lambda p: with_motors(p, droop=size))
 

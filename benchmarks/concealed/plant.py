@@ -47,10 +47,11 @@ class Wheels(NamedTuple):
 class Motors(NamedTuple):
     """Speed loop of each bank: reference filter, then a PI on torque with the reference's acceleration fed forward."""
 
-    rate_up: float = 4.4  # reference filter while speeding up [1/s]; the loop leads, in all k_omega 4.5
-    rate_down: float = 4.4  # and while slowing down [1/s]
+    rate_up: float = 4.5  # reference filter while speeding up, k_omega [1/s]
+    rate_down: float = 4.5  # and while slowing down [1/s]
     second_lag: float = 0.0  # time constant of a second pole [s]
     inertia: float = 4.0  # of a bank at the wheel, gear included [kg m^2]
+    carried_inertia: float = 6.6  # half the robot's mass at the wheel's radius, as the loop was tuned for [kg m^2]
     bandwidth: float = 25.0  # of the PI loop [rad/s]
     damping: float = 0.9  # of the PI loop [-]
     torque_limit: float = 300.0  # per bank [N m]

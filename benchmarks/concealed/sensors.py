@@ -74,7 +74,7 @@ def readings(
     Args:
         truth: from :func:`benchmarks.concealed.drive.drive`.
         plant: that was driven.
-        commands: (samples, 2) as sent [rad/s].
+        commands: (samples, 2) as logged [rad/s].
         changes: sensor effects are taken from these.
         rng: for effects that draw numbers.
 

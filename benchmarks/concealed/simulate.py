@@ -53,6 +53,11 @@ def _commands(case: Case, run: str) -> np.ndarray:
     return programme(run, case.manoeuvres + (0 if case.set_name == "development" else 1000))
 
 
+def _logged_commands(case: Case, run: str) -> np.ndarray:
+    commands = _commands(case, run)
+    return np.concatenate([np.zeros((1, 2)), commands[:-1]]) if case.command_row == "acting" else commands
+
+
 def _log(
     case: Case, plant: Plant, changes: tuple[Change, ...], truth: Mapping[str, np.ndarray], run: str, seed: int
 ) -> Log:
@@ -61,7 +66,7 @@ def _log(
         plant = change.plant(plant) if change.plant else plant
     effect_rng = stream(seed, case.set_name, case.number, "sensor effect", run)
     noise_rng = stream(seed, case.set_name, case.number, "noise", run)
-    clean = readings(truth, plant, _commands(case, run), changes, effect_rng)
+    clean = readings(truth, plant, _logged_commands(case, run), changes, effect_rng)
     return with_noise(clean, truth, field_noise(case, seed), changes, case.receiver, noise_rng)
 
 
@@ -125,6 +130,7 @@ def simulate_case(case: Case, seed: int) -> tuple[dict[str, Log], dict[str, Any]
         "structure": case.structure,
         "receiver": case.receiver,
         "manoeuvres": case.manoeuvres,
+        "command_row": case.command_row,
         "difference": _differences(logs, bare_logs) if case.effects else {},
     }
     return dict(zip(RUNS, logs, strict=True)), label

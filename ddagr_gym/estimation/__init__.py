@@ -50,12 +50,12 @@ from ddagr_gym.estimation.consistency import (
     normalised_estimation_error,
 )
 from ddagr_gym.estimation.derived import Estimates, estimates, slip_ratio
-from ddagr_gym.estimation.ekf import Correction, Prediction, correct, predict
 from ddagr_gym.estimation.filter import BatchFilter, Filter, FilterRun, roll_out, run_filter
 from ddagr_gym.estimation.filter_model import FilterModel, FilterNoise, SoilPrior
 from ddagr_gym.estimation.force_laws import ForceLaw
 from ddagr_gym.estimation.layout import CHANNELS, STATE
 from ddagr_gym.estimation.matched_truth import draw_drive
+from ddagr_gym.estimation.steps import Correction, Prediction, correct, predict
 from ddagr_gym.estimation.thesis_filter import THESIS_STATE, ThesisModel, run_thesis_filter
 
 __all__ = [

@@ -1,6 +1,4 @@
-"""Predict and correct: one robot, one sample, in place.
-
-The Python functions :func:`predict` and :func:`correct` are pure; the kernels behind them are what the filters run.
+"""Predict and correct: one robot, one sample, in place on the kernels' workspace.
 
 Ours, beyond the textbook:
 
@@ -22,23 +20,20 @@ Ours, beyond the textbook:
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from ddagr_gym.errors import InputError
 from ddagr_gym.estimation.covariance import joseph_update, limit_covariance, propagate
-from ddagr_gym.estimation.filter_model import FilterModel
 from ddagr_gym.estimation.layout import (
     CHANNEL_SIZE,
-    COLUMN_ROW,
+    COLUMN,
     DEWEIGHTING,
     ENCODER_CHANNEL,
     EXCITATION,
     EXCITATION_SPEED,
     FORCE_CHANNEL,
-    GAIN_ROW,
+    GAIN,
     GATE,
     GYRO_BIAS,
     GYRO_CHANNEL,
@@ -53,32 +48,37 @@ from ddagr_gym.estimation.layout import (
     OMEGA,
     OUTER_RADIUS,
     PARAMETER,
+    PARAMETER_SIZE,
     PROCESS,
-    PRODUCT_ROW,
-    ROW_ROW,
-    SCRATCH_ROWS,
+    READING,
+    RESPONSE,
     SOIL_AGITATION,
     SOIL_COVARIANCE,
     SOIL_RATE,
+    STANDARDISED,
     STANDSTILL_SPEED,
     STANDSTILL_VARIANCE,
     STANDSTILL_WHEEL_SPEED,
     STATE_SIZE,
+    STRIDE,
+    P,
+    X,
 )
-from ddagr_gym.estimation.measurement_models import specific_force
+from ddagr_gym.estimation.measurement_models import entry_column, gyro_column, row_column, specific_force
 from ddagr_gym.estimation.process_model import advance_state, body_forces
 from ddagr_gym.jit import kernel
-from ddagr_gym.parameters import STANDARD_GRAVITY
 
 Array = NDArray[np.float64]
 
-_PARAMETERS = 4
+_ABSURD = 1e12
+"""Standardised innovations from here on are no readings: their squares would overflow."""
 
 
 @kernel()
-def _limit_state(model: Array, state: Array) -> None:
+def limit_state(model: Array, work: Array) -> None:
+    """Hold the state inside the model's box."""
     for i in range(STATE_SIZE):
-        state[i] = min(max(state[i], model[LOW + i]), model[HIGH + i])
+        work[X + i] = min(max(work[X + i], model[LOW + i]), model[HIGH + i])
 
 
 @kernel(inline=True)
@@ -98,280 +98,184 @@ def step_noise(
     )
 
 
+@kernel(inline=True)
+def _acceleration_noise(model: Array, rate: float, i: int, j: int, work: Array) -> float:
+    """Entry i, j of ``G Q G^T / h``: white acceleration, constant over a step."""
+    total = 0.0
+    for k in range(3):
+        total += work[RESPONSE + STRIDE * i + k] * work[RESPONSE + STRIDE * j + k] * model[PROCESS + k]
+    return total * rate
+
+
 @kernel()
 def _step(
-    model: Array, state: Array, covariance: Array, right: float, left: float, slope_x: float, slope_y: float,
-    step: float, scratch: Array,
+    model: Array, work: Array, right: float, left: float, slope_x: float, slope_y: float, step: float
 ) -> None:  # fmt: skip
     """One step of state and covariance with process noise."""
-    lag_right, lag_left = right - state[OMEGA], left - state[OMEGA + 1]
-    bank_decay = advance_state(model, state, right, left, slope_x, slope_y, step, scratch)
-    g = scratch[PRODUCT_ROW : PRODUCT_ROW + 3]
-    noise = model[PROCESS : PROCESS + STATE_SIZE]
-    q_x, q_y, q_turn = noise[0] / step, noise[1] / step, noise[2] / step
-    n00 = g[0, 0] * g[0, 0] * q_x + g[0, 1] * g[0, 1] * q_y + g[0, 2] * g[0, 2] * q_turn
-    n01 = g[0, 0] * g[1, 0] * q_x + g[0, 1] * g[1, 1] * q_y + g[0, 2] * g[1, 2] * q_turn
-    n02 = g[0, 0] * g[2, 0] * q_x + g[0, 1] * g[2, 1] * q_y + g[0, 2] * g[2, 2] * q_turn
-    n11 = g[1, 0] * g[1, 0] * q_x + g[1, 1] * g[1, 1] * q_y + g[1, 2] * g[1, 2] * q_turn
-    n12 = g[1, 0] * g[2, 0] * q_x + g[1, 1] * g[2, 1] * q_y + g[1, 2] * g[2, 2] * q_turn
-    n22 = g[2, 0] * g[2, 0] * q_x + g[2, 1] * g[2, 1] * q_y + g[2, 2] * g[2, 2] * q_turn
-    propagate(covariance, bank_decay, scratch)
-    covariance[0, 0] += n00
-    covariance[1, 1] += n11
-    covariance[2, 2] += n22
-    covariance[0, 1] += n01
-    covariance[1, 0] += n01
-    covariance[0, 2] += n02
-    covariance[2, 0] += n02
-    covariance[1, 2] += n12
-    covariance[2, 1] += n12
+    lag_right, lag_left = right - work[X + OMEGA], left - work[X + OMEGA + 1]
+    bank_decay = advance_state(model, work, right, left, slope_x, slope_y, step)
+    propagate(work, bank_decay)
+    rate = 1.0 / step
+    for i in range(3):
+        for j in range(3):
+            work[P + STRIDE * i + j] += _acceleration_noise(model, rate, i, j, work)
     right_variance, left_variance, share = step_noise(model, lag_right, lag_left, bank_decay, step)
-    covariance[OMEGA, OMEGA] += right_variance
-    covariance[OMEGA + 1, OMEGA + 1] += left_variance
-    for i in range(_PARAMETERS):
-        for j in range(_PARAMETERS):
-            covariance[PARAMETER + i, PARAMETER + j] += share * model[SOIL_COVARIANCE + _PARAMETERS * i + j]
+    work[P + (STRIDE + 1) * OMEGA] += right_variance
+    work[P + (STRIDE + 1) * (OMEGA + 1)] += left_variance
+    for i in range(PARAMETER_SIZE):
+        for j in range(PARAMETER_SIZE):
+            work[P + STRIDE * (PARAMETER + i) + PARAMETER + j] += (
+                share * model[SOIL_COVARIANCE + PARAMETER_SIZE * i + j]
+            )
     for i in range(GYRO_BIAS, STATE_SIZE):
-        covariance[i, i] += step * noise[i]
-    _limit_state(model, state)
+        work[P + (STRIDE + 1) * i] += step * model[PROCESS + i]
+    limit_state(model, work)
 
 
 @kernel()
 def predict_kernel(
-    model: Array, state: Array, covariance: Array, right: float, left: float, slope_x: float, slope_y: float,
-    duration: float, scratch: Array,
-) -> None:  # fmt: skip
-    """Advance state and covariance by ``duration`` in equal steps of at most the model's maximum."""
+    model: Array, work: Array, right: float, left: float, slope_x: float, slope_y: float, duration: float
+) -> None:
+    """Advance state and covariance by ``duration`` in equal steps of at most the model's maximum.
+
+    Args:
+        model: packed model.
+        work: workspace with state and covariance, updated.
+        right: speed command of the right bank [rad/s]; not finite: the bank keeps its speed.
+        left: of the left bank.
+        slope_x: gravity along body x [m/s^2].
+        slope_y: gravity along body y [m/s^2].
+        duration: [s].
+    """
     steps = max(math.ceil(duration / model[MAXIMUM_STEP] - 1e-9), 1)
-    command_right = right if math.isfinite(right) else state[OMEGA]
-    command_left = left if math.isfinite(left) else state[OMEGA + 1]
+    target_right = right if math.isfinite(right) else work[X + OMEGA]
+    target_left = left if math.isfinite(left) else work[X + OMEGA + 1]
     for _ in range(steps):
-        _step(
-            model, state, covariance, command_right, command_left, slope_x, slope_y, duration / steps, scratch
-        )  # fmt: skip
+        _step(model, work, target_right, target_left, slope_x, slope_y, duration / steps)
 
 
-@kernel()
-def _excited(model: Array, state: Array) -> bool:
+@kernel(inline=True)
+def _weighted_slip(model: Array, rim: float, speed: float) -> float:
+    floor = model[EXCITATION_SPEED]
+    return (rim - speed) / math.sqrt(max(rim * rim, speed * speed) + floor * floor)
+
+
+@kernel(inline=True)
+def _excited(model: Array, work: Array) -> bool:
     """Whether the banks slip differently enough to tell about the soil."""
-    radius, turning = model[OUTER_RADIUS], state[2] * model[HALF_TRACK]
-    rest = model[EXCITATION_SPEED]
-    rim, speed = radius * state[OMEGA], state[0] + turning
-    right = (rim - speed) / math.sqrt(max(rim * rim, speed * speed) + rest * rest)
-    rim, speed = radius * state[OMEGA + 1], state[0] - turning
-    left = (rim - speed) / math.sqrt(max(rim * rim, speed * speed) + rest * rest)
+    radius, turning = model[OUTER_RADIUS], work[X + 2] * model[HALF_TRACK]
+    right = _weighted_slip(model, radius * work[X + OMEGA], work[X] + turning)
+    left = _weighted_slip(model, radius * work[X + OMEGA + 1], work[X] - turning)
     return abs(right - left) > model[EXCITATION]
 
 
+@kernel(inline=True)
+def _set_gain(total: float, deweighting: float, learning: float, learn: bool, scaled: bool, work: Array) -> None:
+    """Gain of one channel from COLUMN: de-weighted, and only what the channel can teach of the parameters."""
+    scale = 1.0 / (total + deweighting)
+    for i in range(STATE_SIZE):
+        work[GAIN + i] = work[COLUMN + i] * scale
+    slower = 1.0 / (total + learning) if learn else 0.0
+    for i in range(PARAMETER, PARAMETER + PARAMETER_SIZE):
+        work[GAIN + i] = work[COLUMN + i] * slower
+    if not scaled:
+        common = work[GAIN + PARAMETER]
+        work[GAIN + PARAMETER] = 0.0
+        work[GAIN + PARAMETER + 2] -= common
+        work[GAIN + PARAMETER + 3] -= common
+
+
 @kernel()
-def _update(
-    model: Array, state: Array, covariance: Array, innovation: float, expected: float, variance: float,
-    deweighting: float, learning: float, learn: bool, scaled: bool, scratch: Array,
+def update(
+    model: Array, work: Array, innovation: float, expected: float, variance: float, deweighting: float,
+    learning: float, learn: bool, scaled: bool,
 ) -> float:  # fmt: skip
     """Use one innovation.
 
     Args:
         model: packed model.
-        state: (12,), updated.
-        covariance: (12, 12), updated.
+        work: workspace with P h^T in COLUMN; state and covariance are updated.
         innovation: reading less prediction.
-        expected: h P h^T; COLUMN_ROW of ``scratch`` holds P h^T.
+        expected: h P h^T.
         variance: of the reading.
         deweighting: further variance that the gain sees.
         learning: the same for the gain rows of the parameters, instead.
         learn: whether parameters may change.
         scaled: whether the channel tells the common scale of all forces.
-        scratch: of the kernels.
 
     Returns:
-        The standardised innovation.
+        The standardised innovation; NaN where the reading is no number of this world and was not used.
     """
     total = max(expected, 0.0) + variance
     standardised = innovation / math.sqrt(total)
+    if not abs(standardised) < _ABSURD:
+        return math.nan
     excess = abs(standardised) / model[GATE]
     if excess > 1.0:
         variance += total * (excess - 1.0)
         total *= excess
-    gain, column = scratch[GAIN_ROW], scratch[COLUMN_ROW]
-    scale = 1.0 / (total + deweighting)
+    _set_gain(total, deweighting, learning, learn, scaled, work)
     for i in range(STATE_SIZE):
-        gain[i] = column[i] * scale
-    for i in range(PARAMETER, PARAMETER + _PARAMETERS):
-        gain[i] = column[i] / (total + learning) if learn else 0.0
-    if learn and not scaled:
-        common = gain[PARAMETER]
-        gain[PARAMETER] = 0.0
-        gain[PARAMETER + 2] -= common
-        gain[PARAMETER + 3] -= common
-    for i in range(STATE_SIZE):
-        state[i] += gain[i] * innovation
-    joseph_update(covariance, expected, variance, scratch)
+        work[X + i] += work[GAIN + i] * innovation
+    joseph_update(work, expected, variance)
     return standardised
 
 
 @kernel()
-def _hold_still(model: Array, state: Array, covariance: Array, scratch: Array) -> None:
-    """Measure the three velocities as zero."""
-    column = scratch[COLUMN_ROW]
-    for axis in range(3):
-        for i in range(STATE_SIZE):
-            column[i] = covariance[axis, i]
-        _update(
-            model,
-            state,
-            covariance,
-            -state[axis],
-            column[axis],
-            model[STANDSTILL_VARIANCE + axis],
-            0.0,
-            0.0,
-            False,
-            False,
-            scratch,
-        )
+def _correct_channel(
+    model: Array, work: Array, channel: int, predicted: float, expected: float, learn: bool, scaled: bool
+) -> None:
+    work[STANDARDISED + channel] = update(
+        model, work, work[READING + channel] - predicted, expected, model[MEASUREMENT + channel],
+        model[DEWEIGHTING + channel], model[LEARNING + channel], learn, scaled,
+    )  # fmt: skip
 
 
 @kernel()
-def at_rest(model: Array, state: Array, right: float, left: float) -> bool:
+def _hold_still(model: Array, work: Array) -> None:
+    """Measure the three velocities as zero."""
+    for axis in range(3):
+        expected = entry_column(work, axis)
+        update(model, work, -work[X + axis], expected, model[STANDSTILL_VARIANCE + axis], 0.0, 0.0, False, False)
+
+
+@kernel()
+def at_rest(model: Array, work: Array, right: float, left: float) -> bool:
     """Whether commands, banks and body are all at rest."""
     wheel, speed = model[STANDSTILL_WHEEL_SPEED], model[STANDSTILL_SPEED]
     commands = max(abs(right), abs(left))
-    banks = max(abs(state[OMEGA]), abs(state[OMEGA + 1]))
-    return commands < wheel and banks < wheel and abs(state[0]) < speed and abs(state[1]) < speed
+    banks = max(abs(work[X + OMEGA]), abs(work[X + OMEGA + 1]))
+    return commands < wheel and banks < wheel and abs(work[X]) < speed and abs(work[X + 1]) < speed
 
 
 @kernel()
-def correct_kernel(
-    model: Array, state: Array, covariance: Array, reading: Array, standardised: Array, standing: bool, scratch: Array
-) -> None:
-    """Use one sample, channel by channel, all linearised at the predicted state; see :func:`correct`."""
-    learn = _excited(model, state)
-    row, column = scratch[ROW_ROW], scratch[COLUMN_ROW]
+def correct_kernel(model: Array, work: Array, standing: bool) -> None:
+    """Use the sample in READING, channel by channel; innovations go to STANDARDISED, NaN without a finite reading.
+
+    Gyro and encoders first: they are linear, and the accelerometer is linearised at what they leave.
+
+    Args:
+        model: packed model.
+        work: workspace, updated.
+        standing: whether the robot is known to stand.
+    """
+    learn = _excited(model, work)
     for channel in range(CHANNEL_SIZE):
-        standardised[channel] = math.nan
-    if math.isfinite(reading[GYRO_CHANNEL]):
-        for i in range(STATE_SIZE):
-            column[i] = covariance[2, i] + covariance[GYRO_BIAS, i]
-        standardised[GYRO_CHANNEL] = _update(
-            model, state, covariance, reading[GYRO_CHANNEL] - state[2] - state[GYRO_BIAS],
-            column[2] + column[GYRO_BIAS], model[MEASUREMENT + GYRO_CHANNEL], model[DEWEIGHTING + GYRO_CHANNEL],
-            model[LEARNING + GYRO_CHANNEL], learn, False, scratch,
-        )  # fmt: skip
+        work[STANDARDISED + channel] = math.nan
+    if math.isfinite(work[READING + GYRO_CHANNEL]):
+        expected = gyro_column(work)
+        _correct_channel(model, work, GYRO_CHANNEL, work[X + 2] + work[X + GYRO_BIAS], expected, learn, False)
     for bank in range(2):
-        channel = ENCODER_CHANNEL + bank
-        if math.isfinite(reading[channel]):
-            for i in range(STATE_SIZE):
-                column[i] = covariance[OMEGA + bank, i]
-            standardised[channel] = _update(
-                model, state, covariance, reading[channel] - state[OMEGA + bank], column[OMEGA + bank],
-                model[MEASUREMENT + channel], model[DEWEIGHTING + channel], model[LEARNING + channel], learn, False,
-                scratch,
-            )  # fmt: skip
+        if math.isfinite(work[READING + ENCODER_CHANNEL + bank]):
+            expected = entry_column(work, OMEGA + bank)
+            _correct_channel(model, work, ENCODER_CHANNEL + bank, work[X + OMEGA + bank], expected, learn, False)
     for axis in range(2):
-        channel = FORCE_CHANNEL + axis
-        if math.isfinite(reading[channel]):
-            body_forces(model, state, scratch)
-            predicted = specific_force(model, state, axis, scratch)
-            expected = 0.0
-            for i in range(STATE_SIZE):
-                total = 0.0
-                for j in range(STATE_SIZE):
-                    total += covariance[i, j] * row[j]
-                column[i] = total
-                expected += total * row[i]
-            standardised[channel] = _update(
-                model, state, covariance, reading[channel] - predicted, expected, model[MEASUREMENT + channel],
-                model[DEWEIGHTING + channel], model[LEARNING + channel], learn, True, scratch,
-            )  # fmt: skip
+        if math.isfinite(work[READING + FORCE_CHANNEL + axis]):
+            body_forces(model, work)
+            predicted = specific_force(model, work, axis)
+            expected = row_column(work)
+            _correct_channel(model, work, FORCE_CHANNEL + axis, predicted, expected, learn, True)
     if standing:
-        _hold_still(model, state, covariance, scratch)
-    _limit_state(model, state)
-    limit_covariance(model, covariance)
-
-
-class Prediction(NamedTuple):
-    """State (12,) and covariance (12, 12)."""
-
-    state: Array
-    covariance: Array
-
-
-class Correction(NamedTuple):
-    """State (12,), covariance (12, 12) and standardised innovations (5,), NaN where there was no reading."""
-
-    state: Array
-    covariance: Array
-    standardised: Array
-
-    @property
-    def normalised_squared(self) -> Array:
-        """Contribution of each channel to the NIS, (5,)."""
-        return self.standardised**2
-
-
-def predict(
-    model: FilterModel,
-    state: ArrayLike,
-    covariance: ArrayLike,
-    command: tuple[float, float],
-    duration: float | None = None,
-    attitude: tuple[float, float] = (0.0, 0.0),
-) -> Prediction:
-    """State and covariance after driving by one command. Pure.
-
-    Args:
-        model: filter model.
-        state: (12,), see :mod:`ddagr_gym.estimation`.
-        covariance: (12, 12).
-        command: speed commands of the right and left bank [rad/s]; NaN holds the bank's speed.
-        duration: [s]; the model's sample period by default.
-        attitude: roll and pitch [rad], REP 103: roll right side down, pitch nose down positive.
-
-    Raises:
-        InputError: wrong shapes, or a duration that is not positive.
-    """
-    x, p = _checked(state, covariance)
-    time = model.sample_period if duration is None else float(duration)
-    if not 0.0 < time < math.inf:
-        raise InputError(f"duration is {time:g} s: give a positive time.")
-    slope = gravity_along_body(*attitude)
-    scratch = np.zeros((SCRATCH_ROWS, STATE_SIZE))
-    predict_kernel(model.pack(), x, p, command[0], command[1], float(slope[0]), float(slope[1]), time, scratch)
-    return Prediction(x, p)
-
-
-def correct(model: FilterModel, state: ArrayLike, covariance: ArrayLike, reading: ArrayLike) -> Correction:
-    """State and covariance after one sample, and its standardised innovations. Pure.
-
-    Args:
-        model: filter model.
-        state: (12,).
-        covariance: (12, 12).
-        reading: (5,) specific force x, y [m/s^2], yaw rate [rad/s], encoder right, left [rad/s]; NaN: no sample.
-
-    Raises:
-        InputError: wrong shapes.
-    """
-    x, p = _checked(state, covariance)
-    z = np.array(reading, dtype=np.float64)
-    if z.shape != (CHANNEL_SIZE,):
-        raise InputError(f"reading has shape {z.shape}: give ({CHANNEL_SIZE},), NaN for a channel without sample.")
-    standardised = np.empty(CHANNEL_SIZE)
-    correct_kernel(model.pack(), x, p, z, standardised, False, np.zeros((SCRATCH_ROWS, STATE_SIZE)))
-    return Correction(x, p, standardised)
-
-
-def gravity_along_body(roll: ArrayLike, pitch: ArrayLike) -> Array:
-    """Gravity along body x and y [m/s^2], shape ``roll.shape + (2,)``; (6.3) in z-up axes."""
-    roll, pitch = np.asarray(roll, dtype=np.float64), np.asarray(pitch, dtype=np.float64)
-    return STANDARD_GRAVITY * np.stack([np.sin(pitch), -np.sin(roll) * np.cos(pitch)], axis=-1)
-
-
-def _checked(state: ArrayLike, covariance: ArrayLike) -> tuple[Array, Array]:
-    x, p = np.array(state, dtype=np.float64), np.array(covariance, dtype=np.float64)
-    if x.shape != (STATE_SIZE,) or p.shape != (STATE_SIZE, STATE_SIZE):
-        raise InputError(
-            f"state and covariance have shapes {x.shape} and {p.shape}: give ({STATE_SIZE},) and "
-            f"({STATE_SIZE}, {STATE_SIZE})."
-        )
-    return x, p
+        _hold_still(model, work)
+    limit_state(model, work)
+    limit_covariance(model, work)

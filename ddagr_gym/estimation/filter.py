@@ -9,96 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ddagr_gym.errors import InputError
-from ddagr_gym.estimation.ekf import at_rest, correct_kernel, gravity_along_body, predict_kernel
+from ddagr_gym.estimation.filter_kernels import filter_rows, filter_series, roll_out_kernel
 from ddagr_gym.estimation.filter_model import FilterModel
-from ddagr_gym.estimation.layout import (
-    ACCELEROMETER_INTERVAL,
-    CHANNEL_SIZE,
-    CHANNELS,
-    FORCE_CHANNEL,
-    READING_ROW,
-    SCRATCH_ROWS,
-    STATE_SIZE,
-)
-from ddagr_gym.estimation.process_model import advance_state
-from ddagr_gym.jit import kernel
+from ddagr_gym.estimation.layout import CHANNEL_SIZE, CHANNELS, STATE_SIZE, WORK_SIZE
+from ddagr_gym.estimation.steps import gravity_along_body, positive_duration
 
 Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 _LEVEL = np.zeros((1, 1, 2))
-
-
-@kernel()
-def _filter_sample(
-    model: Array, state: Array, covariance: Array, command: Array, reading: Array, slope: Array, duration: float,
-    use_accelerometer: bool, standardised: Array, scratch: Array,
-) -> None:  # fmt: skip
-    predict_kernel(model, state, covariance, command[0], command[1], slope[0], slope[1], duration, scratch)
-    used = scratch[READING_ROW, :CHANNEL_SIZE]
-    for channel in range(CHANNEL_SIZE):
-        used[channel] = reading[channel]
-    if not use_accelerometer:
-        used[FORCE_CHANNEL] = np.nan
-        used[FORCE_CHANNEL + 1] = np.nan
-    standing = at_rest(model, state, command[0], command[1])
-    correct_kernel(model, state, covariance, used, standardised, standing, scratch)
-
-
-@kernel()
-def filter_rows(
-    model: Array, states: Array, covariances: Array, counts: Integers, commands: Array, readings: Array, slopes: Array,
-    durations: Array, standardised: Array, scratch: Array,
-) -> None:  # fmt: skip
-    """Predict and correct every robot through all its samples.
-
-    Args:
-        model: packed model.
-        states: (N, 12), updated.
-        covariances: (N, 12, 12), updated.
-        counts: (N,) samples seen, updated; sets which samples use the accelerometer.
-        commands: (N, K or 1, 2) [rad/s]; one is held over all samples.
-        readings: (N, K, 5).
-        slopes: (N or 1, K or 1, 2) gravity along the body [m/s^2].
-        durations: (K or 1,) since the sample before [s].
-        standardised: (N, K, 5) innovations, written.
-        scratch: (SCRATCH_ROWS, 12).
-    """
-    interval = int(model[ACCELEROMETER_INTERVAL])
-    for n in range(states.shape[0]):
-        for k in range(readings.shape[1]):
-            counts[n] += 1
-            _filter_sample(
-                model, states[n], covariances[n], commands[n, min(k, commands.shape[1] - 1)], readings[n, k],
-                slopes[min(n, slopes.shape[0] - 1), min(k, slopes.shape[1] - 1)],
-                durations[min(k, durations.shape[0] - 1)], counts[n] % interval == 0, standardised[n, k], scratch,
-            )  # fmt: skip
-
-
-@kernel()
-def _filter_series(
-    model: Array, state: Array, covariance: Array, commands: Array, readings: Array, slopes: Array, durations: Array,
-    states: Array, covariances: Array, standardised: Array, scratch: Array,
-) -> None:  # fmt: skip
-    """One robot through a series, keeping every posterior."""
-    interval = int(model[ACCELEROMETER_INTERVAL])
-    for k in range(readings.shape[0]):
-        _filter_sample(
-            model, state, covariance, commands[k], readings[k], slopes[k], durations[k], (k + 1) % interval == 0,
-            standardised[k], scratch,
-        )  # fmt: skip
-        states[k] = state
-        covariances[k] = covariance
-
-
-@kernel()
-def _roll_out(
-    model: Array, state: Array, commands: Array, slopes: Array, step: float, states: Array, scratch: Array
-) -> None:
-    for k in range(commands.shape[0]):
-        slope = slopes[min(k, slopes.shape[0] - 1)]
-        advance_state(model, state, commands[k, 0], commands[k, 1], slope[0], slope[1], step, scratch)
-        states[k] = state
 
 
 class BatchFilter:
@@ -123,7 +41,7 @@ class BatchFilter:
         self._packed = model.pack()
         self._initial = model.initial()
         self._counts = np.zeros(count, dtype=np.int64)
-        self._scratch = np.zeros((SCRATCH_ROWS, STATE_SIZE))
+        self._work = np.zeros(WORK_SIZE)
         self._period = np.array([model.sample_period])
         self.reset()
 
@@ -175,10 +93,10 @@ class BatchFilter:
                     f"{name} have {array.shape[1]} samples, readings {samples.shape[1]}: give as many, or 1."
                 )
         standardised = np.empty(samples.shape)
-        durations = self._period if duration is None else np.array([_positive(duration)])
+        durations = self._period if duration is None else np.array([positive_duration(duration)])
         filter_rows(
             self._packed, self.states, self.covariances, self._counts, drive, samples, slopes, durations, standardised,
-            self._scratch,
+            self._work,
         )  # fmt: skip
         return standardised.reshape(given.shape)
 
@@ -276,10 +194,9 @@ def run_filter(model: FilterModel, columns: Mapping[str, ArrayLike], motion: Arr
     one.reset(motion)
     states, covariances = np.empty((t.size, STATE_SIZE)), np.empty((t.size, STATE_SIZE, STATE_SIZE))
     standardised = np.empty((t.size, CHANNEL_SIZE))
-    _filter_series(
-        model.pack(), one.state.copy(), one.covariance.copy(), stack(("command_right", "command_left"), np.nan),
-        stack(CHANNELS, np.nan), slopes, durations, states, covariances, standardised,
-        np.zeros((SCRATCH_ROWS, STATE_SIZE)),
+    filter_series(
+        model.pack(), one.state, one.covariance, stack(("command_right", "command_left"), np.nan),
+        stack(CHANNELS, np.nan), slopes, durations, states, covariances, standardised, np.zeros(WORK_SIZE),
     )  # fmt: skip
     return FilterRun(t, states, covariances, standardised)
 
@@ -303,7 +220,7 @@ def roll_out(model: FilterModel, state: ArrayLike, commands: ArrayLike, attitude
     angles = np.atleast_2d(np.asarray(attitude, dtype=np.float64))
     states = np.empty((len(drive), STATE_SIZE))
     slopes = np.ascontiguousarray(gravity_along_body(angles[:, 0], angles[:, 1]))
-    _roll_out(model.pack(), x, drive, slopes, model.sample_period, states, np.zeros((SCRATCH_ROWS, STATE_SIZE)))
+    roll_out_kernel(model.pack(), x, drive, slopes, model.sample_period, states, np.zeros(WORK_SIZE))
     return states
 
 
@@ -312,9 +229,3 @@ def _three_axes(array: Array, width: int, count: int, name: str) -> Array:
     if shaped.ndim != 3 or shaped.shape[0] != count or shaped.shape[2] != width:
         raise InputError(f"{name} have shape {array.shape}: give ({count}, {width}) or ({count}, K, {width}).")
     return shaped
-
-
-def _positive(duration: float) -> float:
-    if not 0.0 < duration < np.inf:
-        raise InputError(f"duration is {duration:g} s: give a positive time.")
-    return float(duration)

@@ -47,10 +47,10 @@ class FilterNoise(Validated):
         learning_deweighting: the same for the parameters' rows of the gains of gyro and encoders.
     """
 
-    acceleration: float = bounded("m/s^2/sqrt(Hz)", 0.0, 100.0, default=1e-3)
-    yaw_acceleration: float = bounded("rad/s^2/sqrt(Hz)", 0.0, 100.0, default=1e-3)
-    bank_speed: float = bounded("rad/s/sqrt(s)", 0.0, 100.0, default=1e-3)
-    soil: float = bounded("1/sqrt(s)", 0.0, 10.0, default=0.1)
+    acceleration: float = bounded("m/s^2/sqrt(Hz)", 0.0, 100.0, default=3e-4)
+    yaw_acceleration: float = bounded("rad/s^2/sqrt(Hz)", 0.0, 100.0, default=3e-4)
+    bank_speed: float = bounded("rad/s/sqrt(s)", 0.0, 100.0, default=5e-4)
+    soil: float = bounded("1/sqrt(s)", 0.0, 10.0, default=0.05)
     soil_agitation: float = bounded("1/sqrt(m/s)", 0.0, 10.0, default=0.0)
     gyro_bias: float = bounded("rad/s/sqrt(s)", 0.0, 1.0, default=1e-6)
     accelerometer_bias: float = bounded("m/s^2/sqrt(s)", 0.0, 10.0, default=1e-5)
@@ -248,7 +248,7 @@ class FilterModel(Validated):
 
     @staticmethod
     def _floors() -> Array:
-        return np.square([1e-4] * 2 + [1e-4] + [1e-6] * 2 + [1e-4] * 4 + [1e-7] + [1e-6] * 2)
+        return np.square([1e-5] * 3 + [1e-6] * 2 + [1e-4] * 4 + [1e-7] + [1e-6] * 2)
 
     @staticmethod
     def _ceilings() -> Array:

@@ -9,10 +9,11 @@ lateral_stiffness       b       lateral force per slip angle at small slip [N/ra
 motion_resistance       Rc      force against rolling, which the thesis's law lacks [N]
 ======================  ======  =========================================================================
 
-Slip (physics.md section 3), with ``rim = R0 omega`` and ours at rest, ``d = sqrt(max(rim^2, v_x^2) + rest_speed^2)``:
-``s_x = (rim - v_x)/d``, ``s_y = -v_y/d``. Resistance is ``-Rc v_x/sqrt(v_x^2 + rest_speed^2)`` (ours: sgn, smoothed).
+Slip (physics.md section 3): ``s_x = (rim - v_x)/d``, ``s_y = -v_y/d`` with ``rim = R0 omega`` and, ours near rest,
+``d = sqrt(max(rim^2, v_x^2) + rest_speed^2)``. Resistance is ``-Rc t/sqrt(t^2 + reversal_speed^2)``, ``t = rim + v_x``:
+soil piles up on the side to which the wheel rolls, also while its hub already moves the other way (ours: smoothed).
 
-Every function returns 16 numbers: F_x, its derivatives by v_x, v_y, rim, ln a1, ln a2, ln b, ln Rc; the same for F_y.
+The laws return 16 numbers: F_x, its derivatives by v_x, v_y, rim, ln a1, ln a2, ln b, ln Rc; the same for F_y.
 """
 
 from __future__ import annotations
@@ -34,9 +35,8 @@ class ForceLaw(IntEnum):
     """Choice of force law.
 
     Attributes:
-        thesis: (3.15), (3.16) with consistent signs and motion resistance: ``F_x = a1 sgn(s)(1 - exp(-a2 |s|)) - Rc``,
-            ``F_y = -b beta``.
-        coupled: ours; slip and slip angle share one traction, see :func:`coupled_law`.
+        thesis: (3.15), (3.16) with consistent signs, and resistance: see :func:`thesis_law`.
+        coupled: ours; slip and slip angle share one traction: see :func:`coupled_law`.
     """
 
     thesis = 0
@@ -45,17 +45,16 @@ class ForceLaw(IntEnum):
 
 @kernel(inline=True)
 def _slip(v_x: float, rim: float, rest_speed: float) -> tuple[float, float, float, float, float, float]:
-    """Slip s_x, its derivatives by v_x and rim; the divisor d and its derivatives."""
-    if abs(rim) >= abs(v_x):
-        divisor = math.sqrt(rim * rim + rest_speed * rest_speed)
-        divisor_v, divisor_rim = 0.0, rim / divisor
-    else:
-        divisor = math.sqrt(v_x * v_x + rest_speed * rest_speed)
-        divisor_v, divisor_rim = v_x / divisor, 0.0
-    slip = (rim - v_x) / divisor
-    slip_v = -(1.0 + slip * divisor_v) / divisor
-    slip_rim = (1.0 - slip * divisor_rim) / divisor
-    return slip, slip_v, slip_rim, divisor, divisor_v, divisor_rim
+    """Slip s_x, its derivatives by v_x and rim; 1/d; derivatives of ln d by v_x and rim."""
+    rim_squared, speed_squared = rim * rim, v_x * v_x
+    driven = rim_squared >= speed_squared
+    inverse = 1.0 / math.sqrt(max(rim_squared, speed_squared) + rest_speed * rest_speed)
+    divisor_v = 0.0 if driven else v_x * inverse
+    divisor_rim = rim * inverse if driven else 0.0
+    slip = (rim - v_x) * inverse
+    slip_v = -(1.0 + slip * divisor_v) * inverse
+    slip_rim = (1.0 - slip * divisor_rim) * inverse
+    return slip, slip_v, slip_rim, inverse, divisor_v * inverse, divisor_rim * inverse
 
 
 @kernel(inline=True)
@@ -69,17 +68,12 @@ def _resistance(v_x: float, rim: float, resistance: float, reversal_speed: float
 
 @kernel(inline=True)
 def thesis_law(
-    v_x: float,
-    v_y: float,
-    rim: float,
-    limit: float,
-    rate: float,
-    stiffness: float,
-    resistance: float,
-    rest_speed: float,
-    reversal_speed: float,
-) -> Gradient:
-    """Thesis (3.15), (3.16) in the signs of physics.md section 8, plus motion resistance.
+    v_x: float, v_y: float, rim: float, limit: float, rate: float, stiffness: float, resistance: float,
+    rest_speed: float, reversal_speed: float,
+) -> Gradient:  # fmt: skip
+    """``F_x = a1 sgn(s_x) (1 - exp(-a2 |s_x|)) - resistance``, ``F_y = -b atan2(v_y, |v_x|)``.
+
+    Thesis (3.15), (3.16) in the signs of physics.md section 8, plus motion resistance.
 
     Args:
         v_x: hub velocity forward [m/s].
@@ -89,7 +83,8 @@ def thesis_law(
         rate: a2 [-].
         stiffness: b [N/rad].
         resistance: Rc [N].
-        rest_speed: smoothing near standstill [m/s].
+        rest_speed: smoothing of slip near standstill [m/s].
+        reversal_speed: smoothing of the resistance where rolling reverses [m/s].
     """
     slip, slip_v, slip_rim, _, _, _ = _slip(v_x, rim, rest_speed)
     decay = math.exp(-rate * abs(slip))
@@ -107,59 +102,42 @@ def thesis_law(
 
 @kernel(inline=True)
 def coupled_law(
-    v_x: float,
-    v_y: float,
-    rim: float,
-    limit: float,
-    rate: float,
-    stiffness: float,
-    resistance: float,
-    rest_speed: float,
-    reversal_speed: float,
-) -> Gradient:
-    """One traction shared by slip and slip angle (ours). Arguments as :func:`thesis_law`.
+    v_x: float, v_y: float, rim: float, limit: float, rate: float, stiffness: float, resistance: float,
+    rest_speed: float, reversal_speed: float,
+) -> Gradient:  # fmt: skip
+    """``F_x = g s_x - resistance``, ``F_y = g c s_y`` (ours): one traction for slip and slip angle.
 
-    The forces derive from one dissipation potential of the slip ``q = sqrt(s_x^2 + c s_y^2)``, ``c = b/(a1 a2)``:
-    ``F_x = g s_x - Rc``, ``F_y = g c s_y`` with ``g = a1 (1 - exp(-a2 q))/q``. At s_y = 0 that is (3.15), at small
-    slip (3.16); a wheel that slides sideways has no full longitudinal force left, and the reverse.
+    ``g = a1 (1 - exp(-a2 q))/q``, ``q^2 = s_x^2 + c s_y^2``, ``c = b/(a1 a2)``: both forces derive from one
+    dissipation potential of q. Without lateral slip F_x is (3.15), at small slip F_y is (3.16); a wheel that
+    skids sideways has no full longitudinal force left, and the reverse. Arguments as :func:`thesis_law`.
     """
-    slip, slip_v, slip_rim, divisor, divisor_v, divisor_rim = _slip(v_x, rim, rest_speed)
-    lateral_slip = -v_y / divisor
-    ratio = stiffness / (limit * rate)
-    total = math.sqrt(slip * slip + ratio * lateral_slip * lateral_slip + _SLIP_FLOOR)
-    mobilised = limit * rate * math.exp(-rate * total)
-    g = (limit - mobilised / rate) / total
-    # dg/dq divided by q: every derivative of q carries 1/q
-    g_q = (mobilised - g) / (total * total)
-    g_slip = g_q * slip
-    g_lateral = g_q * ratio * lateral_slip
-    g_ratio = 0.5 * g_lateral * lateral_slip  # by ln c
+    slip, slip_v, slip_rim, inverse, divisor_v, divisor_rim = _slip(v_x, rim, rest_speed)
+    lateral_slip = -v_y * inverse
+    full = limit * rate
+    ratio = stiffness / full
+    total_squared = slip * slip + ratio * lateral_slip * lateral_slip + _SLIP_FLOOR
+    inverse_total = 1.0 / math.sqrt(total_squared)
+    left = math.exp(-rate * total_squared * inverse_total)
+    mobilised = full * left
+    g = limit * (1.0 - left) * inverse_total
+    # dg/dq over q, from which all derivatives of q follow
+    g_q = (mobilised - g) * inverse_total * inverse_total
     side = ratio * lateral_slip
+    g_slip, g_lateral = g_q * slip, g_q * side
+    g_ratio = 0.5 * g_lateral * lateral_slip  # by ln c
     x_slip, x_lateral = g + g_slip * slip, g_lateral * slip
     y_slip, y_lateral = g_slip * side, g * ratio + g_lateral * side
-    lateral_v = -lateral_slip * divisor_v / divisor
-    lateral_rim = -lateral_slip * divisor_rim / divisor
+    lateral_v, lateral_rim = -lateral_slip * divisor_v, -lateral_slip * divisor_rim
     drag, drag_v = _resistance(v_x, rim, resistance, reversal_speed)
-    x_ratio = g_ratio * slip
-    y_ratio = (g + g_ratio) * side
+    x_ratio, y_ratio = g_ratio * slip, (g + g_ratio) * side
     return (
-        g * slip + drag,
-        x_slip * slip_v + x_lateral * lateral_v + drag_v,
-        -x_lateral / divisor,
+        g * slip + drag, x_slip * slip_v + x_lateral * lateral_v + drag_v, -x_lateral * inverse,
         x_slip * slip_rim + x_lateral * lateral_rim + drag_v,
-        g * slip - x_ratio,
-        mobilised * slip - x_ratio,
-        x_ratio,
-        drag,
-        g * side,
-        y_slip * slip_v + y_lateral * lateral_v,
-        -y_lateral / divisor,
+        g * slip - x_ratio, mobilised * slip - x_ratio, x_ratio, drag,
+        g * side, y_slip * slip_v + y_lateral * lateral_v, -y_lateral * inverse,
         y_slip * slip_rim + y_lateral * lateral_rim,
-        g * side - y_ratio,
-        mobilised * side - y_ratio,
-        y_ratio,
-        0.0,
-    )
+        g * side - y_ratio, mobilised * side - y_ratio, y_ratio, 0.0,
+    )  # fmt: skip
 
 
 @kernel(inline=True)

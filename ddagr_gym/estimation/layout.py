@@ -25,6 +25,8 @@ PARAMETER = 5  # ln a1, ln a2, ln b, ln Rc
 GYRO_BIAS = 9
 ACCELEROMETER_BIAS = 10  # x, y
 
+PARAMETER_SIZE = 4
+
 MOTION_SIZE = 9
 """Entries 0-8 are those on which forces depend: velocities, bank speeds, parameters."""
 
@@ -79,13 +81,21 @@ LOW = _block(STATE_SIZE)  # least values of the state
 HIGH = _block(STATE_SIZE)  # largest values
 MODEL_SIZE = _next
 
-# Rows of the kernels' scratch, (SCRATCH_ROWS, STATE_SIZE)
-FORCE_ROW = 0  # specific force x, y [m/s^2], yaw acceleration [rad/s^2]
-GRADIENT_ROW = 1  # their derivatives by the motion entries, three rows
-TRANSITION_ROW = 4  # rows of the transition matrix of the velocities
-PRODUCT_ROW = 7  # three rows
-ROW_ROW = 10  # row of the measurement matrix
-COLUMN_ROW = 11  # covariance times that row
-GAIN_ROW = 12
-READING_ROW = 13  # the sample as used
-SCRATCH_ROWS = 14
+# The kernels' workspace of one robot: one float64 vector, so that the compiler knows what does not overlap. Rows of
+# matrices lie STRIDE apart, a multiple of the vector width.
+STRIDE = 16
+_next = 0
+X = _block(STRIDE)  # state
+P = _block(STATE_SIZE * STRIDE)  # covariance
+FORCE = _block(STRIDE)  # specific force x, y [m/s^2], yaw acceleration [rad/s^2]
+GRADIENT = _block(3 * STRIDE)  # their derivatives by the motion entries
+RESPONSE = _block(3 * STRIDE)  # velocities gained per constant acceleration over a step [s], 3 x 3
+TRANSITION = _block(3 * STRIDE)  # rows of the transition matrix of the velocities
+PRODUCT = _block(3 * STRIDE)  # those rows times the covariance
+ROW = _block(STRIDE)  # row h of the measurement matrix
+COLUMN = _block(STRIDE)  # P h^T
+GAIN = _block(STRIDE)  # K
+REST = _block(STRIDE)  # what the Joseph form takes off besides K c^T
+READING = _block(STRIDE)  # the sample, CHANNEL_SIZE entries
+STANDARDISED = _block(STRIDE)  # its standardised innovations, CHANNEL_SIZE entries
+WORK_SIZE = _next

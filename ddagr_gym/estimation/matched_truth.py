@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -17,10 +19,13 @@ from ddagr_gym.estimation.layout import (
     MEASUREMENT,
     OMEGA,
     PARAMETER,
+    PARAMETER_SIZE,
     PROCESS,
-    PRODUCT_ROW,
-    SCRATCH_ROWS,
+    RESPONSE,
     STATE_SIZE,
+    STRIDE,
+    WORK_SIZE,
+    X,
 )
 from ddagr_gym.estimation.measurement_models import specific_force
 from ddagr_gym.estimation.process_model import advance_state, body_forces
@@ -30,35 +35,47 @@ Array = NDArray[np.float64]
 
 
 @kernel()
+def _perturb(model: Array, work: Array, root: Array, lags: Array, decay: float, step: float, draw: Array) -> None:
+    """Process noise of one step after :func:`advance_state`; ``draw`` (12,) standard normal."""
+    for i in range(3):
+        for j in range(3):
+            work[X + i] += work[RESPONSE + STRIDE * i + j] * math.sqrt(model[PROCESS + j] / step) * draw[j]
+    right_variance, left_variance, share = step_noise(model, lags[0], lags[1], decay, step)
+    work[X + OMEGA] += math.sqrt(right_variance) * draw[3]
+    work[X + OMEGA + 1] += math.sqrt(left_variance) * draw[4]
+    for i in range(PARAMETER_SIZE):
+        for j in range(PARAMETER_SIZE):
+            work[X + PARAMETER + i] += math.sqrt(share) * root[i, j] * draw[PARAMETER + j]
+    for i in range(GYRO_BIAS, STATE_SIZE):
+        work[X + i] += math.sqrt(step * model[PROCESS + i]) * draw[i]
+
+
+@kernel()
+def _read(model: Array, work: Array, draw: Array, reading: Array) -> None:
+    """One sample of all channels; ``draw`` (5,) standard normal."""
+    body_forces(model, work)
+    for axis in range(2):
+        reading[FORCE_CHANNEL + axis] = specific_force(model, work, axis)
+    reading[GYRO_CHANNEL] = work[X + 2] + work[X + GYRO_BIAS]
+    reading[ENCODER_CHANNEL] = work[X + OMEGA]
+    reading[ENCODER_CHANNEL + 1] = work[X + OMEGA + 1]
+    for channel in range(CHANNEL_SIZE):
+        reading[channel] += math.sqrt(model[MEASUREMENT + channel]) * draw[channel]
+
+
+@kernel()
 def _draw(
-    model: Array, state: Array, root: Array, commands: Array, step: float, normal: Array, states: Array,
-    readings: Array, scratch: Array,
-) -> None:  # fmt: skip
+    model: Array, work: Array, root: Array, commands: Array, step: float, normal: Array, states: Array, readings: Array
+) -> None:
+    lags = np.empty(2)
     for k in range(commands.shape[0]):
-        right, left = commands[k, 0], commands[k, 1]
-        lag_right, lag_left = right - state[OMEGA], left - state[OMEGA + 1]
-        draw = normal[k]
-        decay = advance_state(model, state, right, left, 0.0, 0.0, step, scratch)
-        for i in range(3):
-            for j in range(3):
-                state[i] += scratch[PRODUCT_ROW + i, j] * np.sqrt(model[PROCESS + j] / step) * draw[j]
-        right_variance, left_variance, share = step_noise(model, lag_right, lag_left, decay, step)
-        state[OMEGA] += np.sqrt(right_variance) * draw[3]
-        state[OMEGA + 1] += np.sqrt(left_variance) * draw[4]
-        for i in range(4):
-            for j in range(4):
-                state[PARAMETER + i] += np.sqrt(share) * root[i, j] * draw[5 + j]
-        for i in range(GYRO_BIAS, STATE_SIZE):
-            state[i] += np.sqrt(step * model[PROCESS + i]) * draw[i]
-        body_forces(model, state, scratch)
-        for axis in range(2):
-            readings[k, FORCE_CHANNEL + axis] = specific_force(model, state, axis, scratch)
-        readings[k, GYRO_CHANNEL] = state[2] + state[GYRO_BIAS]
-        readings[k, ENCODER_CHANNEL] = state[OMEGA]
-        readings[k, ENCODER_CHANNEL + 1] = state[OMEGA + 1]
-        for channel in range(CHANNEL_SIZE):
-            readings[k, channel] += np.sqrt(model[MEASUREMENT + channel]) * draw[STATE_SIZE + channel]
-        states[k] = state
+        for bank in range(2):
+            lags[bank] = commands[k, bank] - work[X + OMEGA + bank]
+        decay = advance_state(model, work, commands[k, 0], commands[k, 1], 0.0, 0.0, step)
+        _perturb(model, work, root, lags, decay, step, normal[k, :STATE_SIZE])
+        _read(model, work, normal[k, STATE_SIZE:], readings[k])
+        for i in range(STATE_SIZE):
+            states[k, i] = work[X + i]
 
 
 def draw_drive(
@@ -83,6 +100,7 @@ def draw_drive(
     root = np.linalg.cholesky(model.prior.logs(model.wheel_load)[1])
     normal = rng.standard_normal((len(drive), STATE_SIZE + CHANNEL_SIZE))
     states, readings = np.empty((len(drive), STATE_SIZE)), np.empty((len(drive), CHANNEL_SIZE))
-    scratch = np.zeros((SCRATCH_ROWS, STATE_SIZE))
-    _draw(model.pack(), x, root, drive, model.sample_period, normal, states, readings, scratch)
+    work = np.zeros(WORK_SIZE)
+    work[X : X + STATE_SIZE] = x
+    _draw(model.pack(), work, root, drive, model.sample_period, normal, states, readings)
     return states, readings

@@ -29,22 +29,24 @@ from numpy.typing import NDArray
 
 from ddagr_gym.estimation.force_laws import wheel_law
 from ddagr_gym.estimation.layout import (
-    FORCE_ROW,
-    GRADIENT_ROW,
+    FORCE,
+    GRADIENT,
     HALF_TRACK,
     HALF_WHEELBASE,
     LAW,
     MASS,
-    MOTION_SIZE,
     MOTOR_RATE,
     OMEGA,
     OUTER_RADIUS,
     PARAMETER,
-    PRODUCT_ROW,
+    RESPONSE,
     REST_SPEED,
     REVERSAL_SPEED,
-    TRANSITION_ROW,
+    STATE_SIZE,
+    STRIDE,
+    TRANSITION,
     YAW_INERTIA,
+    X,
 )
 from ddagr_gym.jit import kernel
 
@@ -52,8 +54,6 @@ Array = NDArray[np.float64]
 
 _GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
 _LEAST_DETERMINANT = 1e-9
-_REST_FRACTION = 4.0
-_REST_SUBSTEPS = 4
 
 _Bank = tuple[
     float, float, float, float, float, float, float, float, float, float, float, float, float, float,
@@ -92,53 +92,49 @@ def _bank_forces(
 
 
 @kernel()
-def body_forces(model: Array, state: Array, scratch: Array) -> None:
+def body_forces(model: Array, work: Array) -> None:
     """Specific force and yaw acceleration, and their derivatives by the motion entries of the state.
 
     Args:
         model: packed model.
-        state: (STATE_SIZE,).
-        scratch: FORCE_ROW holds force x, y per mass [m/s^2] and moment per inertia [rad/s^2] afterwards, the three
-            rows from GRADIENT_ROW their derivatives by state entries 0 to MOTION_SIZE - 1.
+        work: workspace with the state; FORCE holds force x, y per mass [m/s^2] and moment per inertia [rad/s^2]
+            afterwards, the rows of GRADIENT their derivatives by state entries 0 to MOTION_SIZE - 1.
     """
     length, width, radius = model[HALF_WHEELBASE], model[HALF_TRACK], model[OUTER_RADIUS]
-    limit, rate = math.exp(state[PARAMETER]), math.exp(state[PARAMETER + 1])
-    stiffness, resistance = math.exp(state[PARAMETER + 2]), math.exp(state[PARAMETER + 3])
-    front, rear = state[1] + state[2] * length, state[1] - state[2] * length
-    turning = state[2] * width
+    limit, rate = math.exp(work[X + PARAMETER]), math.exp(work[X + PARAMETER + 1])
+    stiffness, resistance = math.exp(work[X + PARAMETER + 2]), math.exp(work[X + PARAMETER + 3])
+    v_x, turn = work[X], work[X + 2]
+    front, rear = work[X + 1] + turn * length, work[X + 1] - turn * length
     right = _bank_forces(
-        model, state[0] + turning, front, rear, radius * state[OMEGA], -width, limit, rate, stiffness, resistance
+        model, v_x + turn * width, front, rear, radius * work[X + OMEGA], -width, limit, rate, stiffness, resistance
     )
     left = _bank_forces(
-        model, state[0] - turning, front, rear, radius * state[OMEGA + 1], width, limit, rate, stiffness, resistance
+        model, v_x - turn * width, front, rear, radius * work[X + OMEGA + 1], width, limit, rate, stiffness, resistance
     )
     for row in range(3):
         scale = 1.0 / (model[YAW_INERTIA] if row == 2 else model[MASS])
         first = 9 * row
-        scratch[FORCE_ROW, row] = scale * (right[first] + left[first])
-        gradient = scratch[GRADIENT_ROW + row]
-        gradient[0] = scale * (right[first + 1] + left[first + 1])
-        gradient[1] = scale * (right[first + 2] + left[first + 2])
-        gradient[2] = scale * (right[first + 3] + left[first + 3])
-        gradient[3] = scale * radius * right[first + 4]
-        gradient[4] = scale * radius * left[first + 4]
-        gradient[5] = scale * (right[first + 5] + left[first + 5])
-        gradient[6] = scale * (right[first + 6] + left[first + 6])
-        gradient[7] = scale * (right[first + 7] + left[first + 7])
-        gradient[8] = scale * (right[first + 8] + left[first + 8])
+        work[FORCE + row] = scale * (right[first] + left[first])
+        base = GRADIENT + STRIDE * row
+        work[base] = scale * (right[first + 1] + left[first + 1])
+        work[base + 1] = scale * (right[first + 2] + left[first + 2])
+        work[base + 2] = scale * (right[first + 3] + left[first + 3])
+        work[base + 3] = scale * radius * right[first + 4]
+        work[base + 4] = scale * radius * left[first + 4]
+        work[base + 5] = scale * (right[first + 5] + left[first + 5])
+        work[base + 6] = scale * (right[first + 6] + left[first + 6])
+        work[base + 7] = scale * (right[first + 7] + left[first + 7])
+        work[base + 8] = scale * (right[first + 8] + left[first + 8])
 
 
-@kernel()
-def _response(step: float, scratch: Array) -> None:
-    """Write ``G = h psi(hA)`` to the first three entries of the rows from PRODUCT_ROW.
-
-    Needs the derivatives A of the accelerations by the velocities in the first three entries of the GRADIENT rows.
-    """
-    a = scratch[GRADIENT_ROW : GRADIENT_ROW + 3]
+@kernel(inline=True)
+def _respond(step: float, work: Array) -> None:
+    """Write ``G = h psi(hA)`` to RESPONSE, from A in the first three columns of GRADIENT."""
     h = _GAMMA * step
-    m00, m01, m02 = 1.0 - h * a[0, 0], -h * a[0, 1], -h * a[0, 2]
-    m10, m11, m12 = -h * a[1, 0], 1.0 - h * a[1, 1], -h * a[1, 2]
-    m20, m21, m22 = -h * a[2, 0], -h * a[2, 1], 1.0 - h * a[2, 2]
+    a, b, c = GRADIENT, GRADIENT + STRIDE, GRADIENT + 2 * STRIDE
+    m00, m01, m02 = 1.0 - h * work[a], -h * work[a + 1], -h * work[a + 2]
+    m10, m11, m12 = -h * work[b], 1.0 - h * work[b + 1], -h * work[b + 2]
+    m20, m21, m22 = -h * work[c], -h * work[c + 1], 1.0 - h * work[c + 2]
     c0, c1, c2 = m11 * m22 - m12 * m21, m12 * m20 - m10 * m22, m10 * m21 - m11 * m20
     determinant = m00 * c0 + m01 * c1 + m02 * c2
     if abs(determinant) < _LEAST_DETERMINANT:
@@ -149,61 +145,62 @@ def _response(step: float, scratch: Array) -> None:
     i20, i21, i22 = scale * c2, scale * (m01 * m20 - m00 * m21), scale * (m00 * m11 - m01 * m10)
     # psi = W^-1 ((1 - g) W^-1 + g) with W = 1 - g h A
     twice, once = step * (1.0 - _GAMMA), step * _GAMMA
-    g = scratch[PRODUCT_ROW : PRODUCT_ROW + 3]
-    g[0, 0] = twice * (i00 * i00 + i01 * i10 + i02 * i20) + once * i00
-    g[0, 1] = twice * (i00 * i01 + i01 * i11 + i02 * i21) + once * i01
-    g[0, 2] = twice * (i00 * i02 + i01 * i12 + i02 * i22) + once * i02
-    g[1, 0] = twice * (i10 * i00 + i11 * i10 + i12 * i20) + once * i10
-    g[1, 1] = twice * (i10 * i01 + i11 * i11 + i12 * i21) + once * i11
-    g[1, 2] = twice * (i10 * i02 + i11 * i12 + i12 * i22) + once * i12
-    g[2, 0] = twice * (i20 * i00 + i21 * i10 + i22 * i20) + once * i20
-    g[2, 1] = twice * (i20 * i01 + i21 * i11 + i22 * i21) + once * i21
-    g[2, 2] = twice * (i20 * i02 + i21 * i12 + i22 * i22) + once * i22
+    a, b, c = RESPONSE, RESPONSE + STRIDE, RESPONSE + 2 * STRIDE
+    work[a] = twice * (i00 * i00 + i01 * i10 + i02 * i20) + once * i00
+    work[a + 1] = twice * (i00 * i01 + i01 * i11 + i02 * i21) + once * i01
+    work[a + 2] = twice * (i00 * i02 + i01 * i12 + i02 * i22) + once * i02
+    work[b] = twice * (i10 * i00 + i11 * i10 + i12 * i20) + once * i10
+    work[b + 1] = twice * (i10 * i01 + i11 * i11 + i12 * i21) + once * i11
+    work[b + 2] = twice * (i10 * i02 + i11 * i12 + i12 * i22) + once * i12
+    work[c] = twice * (i20 * i00 + i21 * i10 + i22 * i20) + once * i20
+    work[c + 1] = twice * (i20 * i01 + i21 * i11 + i22 * i21) + once * i21
+    work[c + 2] = twice * (i20 * i02 + i21 * i12 + i22 * i22) + once * i22
 
 
 @kernel()
 def advance_state(
-    model: Array, state: Array, command_right: float, command_left: float, slope_x: float, slope_y: float,
-    step: float, scratch: Array,
-) -> float:  # fmt: skip
-    """Advance the state by one step and leave its transition in ``scratch``.
+    model: Array, work: Array, right: float, left: float, slope_x: float, slope_y: float, step: float
+) -> float:
+    """Advance the state by one step and leave its transition behind.
 
     Args:
         model: packed model.
-        state: (STATE_SIZE,), updated.
-        command_right: speed command of the right bank [rad/s].
-        command_left: of the left bank [rad/s].
+        work: workspace with the state, which is updated; TRANSITION holds the velocities' transition by the motion
+            entries afterwards, RESPONSE the response G.
+        right: speed command of the right bank [rad/s].
+        left: of the left bank [rad/s].
         slope_x: gravity along body x [m/s^2].
         slope_y: gravity along body y [m/s^2].
         step: h [s].
-        scratch: the rows from TRANSITION_ROW hold the velocities' transition by the motion entries afterwards, those
-            from PRODUCT_ROW the response G.
 
     Returns:
         Factor by which a deviation of a bank speed shrinks over the step.
     """
     half = math.exp(-0.5 * model[MOTOR_RATE] * step)
-    state[OMEGA] = command_right + (state[OMEGA] - command_right) * half
-    state[OMEGA + 1] = command_left + (state[OMEGA + 1] - command_left) * half
-    body_forces(model, state, scratch)
-    force, a = scratch[FORCE_ROW], scratch[GRADIENT_ROW : GRADIENT_ROW + 3]
-    f_x = force[0] + state[2] * state[1] + slope_x
-    f_y = force[1] - state[2] * state[0] + slope_y
-    f_turn = force[2]
-    a[0, 1] += state[2]
-    a[0, 2] += state[1]
-    a[1, 0] -= state[2]
-    a[1, 2] -= state[0]
-    _response(step, scratch)
+    work[X + OMEGA] = right + (work[X + OMEGA] - right) * half
+    work[X + OMEGA + 1] = left + (work[X + OMEGA + 1] - left) * half
+    body_forces(model, work)
+    v_x, v_y, turn = work[X], work[X + 1], work[X + 2]
+    f_x = work[FORCE] + turn * v_y + slope_x
+    f_y = work[FORCE + 1] - turn * v_x + slope_y
+    f_turn = work[FORCE + 2]
+    work[GRADIENT + 1] += turn
+    work[GRADIENT + 2] += v_y
+    work[GRADIENT + STRIDE] -= turn
+    work[GRADIENT + STRIDE + 2] -= v_x
+    _respond(step, work)
     for i in range(3):
-        g_x, g_y, g_turn = scratch[PRODUCT_ROW + i, 0], scratch[PRODUCT_ROW + i, 1], scratch[PRODUCT_ROW + i, 2]
-        state[i] += g_x * f_x + g_y * f_y + g_turn * f_turn
-        row = scratch[TRANSITION_ROW + i]
-        for j in range(MOTION_SIZE):
-            row[j] = g_x * a[0, j] + g_y * a[1, j] + g_turn * a[2, j]
-        row[i] += 1.0
-        row[OMEGA] *= half
-        row[OMEGA + 1] *= half
-    state[OMEGA] = command_right + (state[OMEGA] - command_right) * half
-    state[OMEGA + 1] = command_left + (state[OMEGA + 1] - command_left) * half
+        base = RESPONSE + STRIDE * i
+        g_x, g_y, g_turn = work[base], work[base + 1], work[base + 2]
+        work[X + i] += g_x * f_x + g_y * f_y + g_turn * f_turn
+        base = TRANSITION + STRIDE * i
+        for j in range(STATE_SIZE):
+            work[base + j] = (
+                g_x * work[GRADIENT + j] + g_y * work[GRADIENT + STRIDE + j] + g_turn * work[GRADIENT + 2 * STRIDE + j]
+            )
+        work[base + i] += 1.0
+        work[base + OMEGA] *= half
+        work[base + OMEGA + 1] *= half
+    work[X + OMEGA] = right + (work[X + OMEGA] - right) * half
+    work[X + OMEGA + 1] = left + (work[X + OMEGA + 1] - left) * half
     return half * half

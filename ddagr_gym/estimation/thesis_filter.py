@@ -4,8 +4,8 @@ States v_x, v_y, yaw rate, omega_right, omega_left, a1, a2, b: linear parameters
 Put right: signs of the force law and rows of the model (physics.md section 8), specific force F/m as the
 accelerometer's reading instead of the body velocity's derivative (5.5), innovation y - h(x) (5.12 prints y - Hx), the
 transpose in the Joseph form (5.11). Kept: fourth-order Runge-Kutta of state and covariance (5.7), (5.8), the vector
-update (5.10), noise of (6.2). Ours, because the thesis says nothing: initial parameters (those of our prior), the least value at which
-parameters are held positive, and how many Runge-Kutta steps a sample takes.
+update (5.10), noise of (6.2). Ours, because the thesis says nothing: initial parameters and their
+variances, the least value at which parameters are held positive, and how many Runge-Kutta steps a sample takes.
 """
 
 from __future__ import annotations
@@ -23,12 +23,13 @@ from ddagr_gym.estimation.force_laws import ForceLaw
 from ddagr_gym.estimation.layout import (
     CHANNEL_SIZE,
     CHANNELS,
-    FORCE_ROW,
-    GRADIENT_ROW,
+    FORCE,
+    GRADIENT,
     MOTOR_RATE,
     PARAMETER,
-    SCRATCH_ROWS,
-    STATE_SIZE,
+    STRIDE,
+    WORK_SIZE,
+    X,
 )
 from ddagr_gym.estimation.process_model import body_forces
 from ddagr_gym.jit import kernel
@@ -40,6 +41,7 @@ THESIS_STATE = ("v_x", "v_y", "yaw_rate", "omega_right", "omega_left", "a1", "a2
 """Entries of the thesis's state (5.1)."""
 
 _SIZE = 8
+_STAGES = np.array([0.0, 0.5, 0.5, 1.0])
 _NO_RESISTANCE = np.log(1e-12)
 
 
@@ -78,25 +80,22 @@ class ThesisModel(Validated):
 
 @kernel()
 def _derivative(
-    model: Array, x: Array, p: Array, command: Array, noise: Array, logs: Array, a: Array, x_dot: Array, p_dot: Array,
-    scratch: Array,
-) -> None:  # fmt: skip
+    model: Array, x: Array, p: Array, command: Array, noise: Array, a: Array, x_dot: Array, p_dot: Array, work: Array
+) -> None:
     """Right-hand sides of (5.7) and (5.8)."""
-    _evaluate(model, x, logs, scratch)
+    _evaluate(model, x, work)
     a[:] = 0.0
     for row in range(3):
-        for j in range(5):
-            a[row, j] = scratch[GRADIENT_ROW + row, j]
-        for j in range(5, _SIZE):
-            a[row, j] = scratch[GRADIENT_ROW + row, j] / x[j]
+        for j in range(_SIZE):
+            a[row, j] = work[GRADIENT + STRIDE * row + j]
     a[0, 1] += x[2]
     a[0, 2] += x[1]
     a[1, 0] -= x[2]
     a[1, 2] -= x[0]
     x_dot[:] = 0.0
-    x_dot[0] = scratch[FORCE_ROW, 0] + x[2] * x[1]
-    x_dot[1] = scratch[FORCE_ROW, 1] - x[2] * x[0]
-    x_dot[2] = scratch[FORCE_ROW, 2]
+    x_dot[0] = work[FORCE] + x[2] * x[1]
+    x_dot[1] = work[FORCE + 1] - x[2] * x[0]
+    x_dot[2] = work[FORCE + 2]
     for bank in range(2):
         a[3 + bank, 3 + bank] = -model[MOTOR_RATE]
         x_dot[3 + bank] = model[MOTOR_RATE] * (command[bank] - x[3 + bank])
@@ -108,26 +107,29 @@ def _derivative(
 
 
 @kernel()
-def _evaluate(model: Array, x: Array, logs: Array, scratch: Array) -> None:
-    """Forces of the thesis law at the linear parameters; derivatives by the logs."""
-    for i in range(5):
-        logs[i] = x[i]
-    for i in range(5, _SIZE):
-        logs[i] = np.log(x[i])
-    logs[PARAMETER + 3] = _NO_RESISTANCE
-    body_forces(model, logs, scratch)
+def _evaluate(model: Array, x: Array, work: Array) -> None:
+    """Forces of the thesis law at the linear parameters, and their derivatives by the state."""
+    for i in range(PARAMETER):
+        work[X + i] = x[i]
+    for i in range(PARAMETER, _SIZE):
+        work[X + i] = np.log(x[i])
+    work[X + PARAMETER + 3] = _NO_RESISTANCE
+    body_forces(model, work)
+    for row in range(3):
+        for i in range(PARAMETER, _SIZE):
+            work[GRADIENT + STRIDE * row + i] /= x[i]
 
 
 @kernel()
-def _correct(model: Array, x: Array, p: Array, reading: Array, variances: Array, logs: Array, scratch: Array) -> Array:
+def _correct(model: Array, x: Array, p: Array, reading: Array, variances: Array, work: Array) -> Array:
     """Vector update (5.10)-(5.12) with the channels that have a sample; returns standardised innovations."""
-    _evaluate(model, x, logs, scratch)
+    _evaluate(model, x, work)
     full = np.zeros((CHANNEL_SIZE, _SIZE))
     predicted = np.empty(CHANNEL_SIZE)
     for axis in range(2):
-        predicted[axis] = scratch[FORCE_ROW, axis]
+        predicted[axis] = work[FORCE + axis]
         for j in range(_SIZE):
-            full[axis, j] = scratch[GRADIENT_ROW + axis, j] / (x[j] if j >= 5 else 1.0)
+            full[axis, j] = work[GRADIENT + STRIDE * axis + j]
     for channel in range(2, CHANNEL_SIZE):
         full[channel, channel] = 1.0
         predicted[channel] = x[channel]
@@ -154,23 +156,20 @@ def _run(
     model: Array, x: Array, p: Array, commands: Array, readings: Array, durations: Array, noise: Array,
     variances: Array, least: float, steps: int, states: Array, covariances: Array, standardised: Array,
 ) -> None:  # fmt: skip
-    scratch = np.zeros((SCRATCH_ROWS, STATE_SIZE))
-    logs, a = np.zeros(STATE_SIZE), np.zeros((_SIZE, _SIZE))
+    work, a = np.zeros(WORK_SIZE), np.zeros((_SIZE, _SIZE))
     kx, kp = np.zeros((4, _SIZE)), np.zeros((4, _SIZE, _SIZE))
     for k in range(readings.shape[0]):
         h = durations[k] / steps
         for _ in range(steps):
-            _derivative(model, x, p, commands[k], noise, logs, a, kx[0], kp[0], scratch)
-            _derivative(
-                model, x + 0.5 * h * kx[0], p + 0.5 * h * kp[0], commands[k], noise, logs, a, kx[1], kp[1], scratch
-            )
-            _derivative(
-                model, x + 0.5 * h * kx[1], p + 0.5 * h * kp[1], commands[k], noise, logs, a, kx[2], kp[2], scratch
-            )
-            _derivative(model, x + h * kx[2], p + h * kp[2], commands[k], noise, logs, a, kx[3], kp[3], scratch)
+            for stage in range(4):
+                part = h * _STAGES[stage]
+                last = max(stage - 1, 0)
+                _derivative(
+                    model, x + part * kx[last], p + part * kp[last], commands[k], noise, a, kx[stage], kp[stage], work
+                )
             x += h / 6.0 * (kx[0] + 2.0 * kx[1] + 2.0 * kx[2] + kx[3])
             p += h / 6.0 * (kp[0] + 2.0 * kp[1] + 2.0 * kp[2] + kp[3])
-        standardised[k] = _correct(model, x, p, readings[k], variances, logs, scratch)
+        standardised[k] = _correct(model, x, p, readings[k], variances, work)
         x[5:] = np.maximum(x[5:], least)
         states[k] = x
         covariances[k] = p

@@ -28,11 +28,11 @@ from ddagr_gym.physics.contact_geometry import (
     lateral_edge,
 )
 from ddagr_gym.physics.contact_stress import (
+    forward_slip_ratio,
     normal_stress,
     peak_fraction,
     pressure_modulus,
     shear_over_speed,
-    slip_ratio,
 )
 from ddagr_gym.physics.fast_math import cos_small, sin_small
 from ddagr_gym.physics.layout import (
@@ -107,6 +107,7 @@ def integrate_patch(
     yaw_rate: float,
     sinkage: float,
     minimum_shear_rate: float,
+    rest_speed: float,
     section_nodes: NDArray[np.float64],
     contact_nodes: NDArray[np.float64],
     workspace: NDArray[np.float64],
@@ -123,6 +124,7 @@ def integrate_patch(
         yaw_rate: spin of the wheel about the vertical [rad/s].
         sinkage: [m].
         minimum_shear_rate: nu_min [rad/s].
+        rest_speed: see :func:`wheel_wrench` [m/s].
         section_nodes: from ``contact_geometry.section_rule``.
         contact_nodes: from ``contact_geometry.contact_rule``.
         workspace: WORKSPACE_SIZE floats, overwritten.
@@ -130,7 +132,7 @@ def integrate_patch(
     """
     outer_radius = wheel[0] + wheel[2]
     edge = lateral_edge(wheel[0], sinkage)
-    slip = slip_ratio(outer_radius * omega, v_x)
+    slip = forward_slip_ratio(outer_radius * omega, v_x, rest_speed)
     peak = peak_fraction(soil[SOIL_PEAK_0], soil[SOIL_PEAK_1], slip)
     modulus = pressure_modulus(soil[SOIL_COHESIVE_MODULUS], soil[SOIL_FRICTIONAL_MODULUS], wheel[1], math.sin(edge))
     rate = max(max(abs(omega), abs(v_x) / outer_radius), minimum_shear_rate)
@@ -204,15 +206,15 @@ def wheel_wrench(
         blend = 0.0
     if blend > 0.0:
         integrate_patch(
-            wheel, soil, v_x, v_y, omega, yaw_rate, sinkage, minimum_shear_rate, section_nodes, contact_nodes,
-            workspace, wrench,
+            wheel, soil, v_x, v_y, omega, yaw_rate, sinkage, minimum_shear_rate, rest_speed, section_nodes,
+            contact_nodes, workspace, wrench,
         )  # fmt: skip
         if blend == 1.0:
             return
     f_x, f_y, f_z, m_z, torque = wrench[0], wrench[1], wrench[2], wrench[3], wrench[4]
     integrate_patch(
-        wheel, soil, -v_x, v_y, -omega, -yaw_rate, sinkage, minimum_shear_rate, section_nodes, contact_nodes,
-        workspace, wrench,
+        wheel, soil, -v_x, v_y, -omega, -yaw_rate, sinkage, minimum_shear_rate, rest_speed, section_nodes,
+        contact_nodes, workspace, wrench,
     )  # fmt: skip
     wrench[0] = -wrench[0]
     wrench[3] = -wrench[3]

@@ -26,6 +26,15 @@ def slip_ratio(rim_speed: float, v_x: float) -> float:
 
 
 @kernel(inline=True)
+def forward_slip_ratio(rim_speed: float, v_x: float, rest_speed: float) -> float:
+    """:func:`slip_ratio` of a wheel that travels forward, continued smoothly through rest and reversal (ours).
+
+    It is exact from R0 omega + v_x = rest_speed on; the sign and the direction of a vanishing motion would jump.
+    """
+    return (rim_speed - v_x) / max(max(abs(rim_speed), abs(v_x)), 0.5 * rest_speed)
+
+
+@kernel(inline=True)
 def peak_fraction(coefficient_0: float, coefficient_1: float, slip: float) -> float:
     """theta_m / theta_f = clip(a0 + a1 slip, 0, PEAK_CEILING) (A.8)."""
     return min(max(coefficient_0 + coefficient_1 * slip, 0.0), PEAK_CEILING)

@@ -1,6 +1,6 @@
 """Branch-free exp, log, sin, cos and asin that LLVM vectorises (numba ships no vector math library).
 
-Polynomials on reduced ranges; largest errors measured in ``tests/physics/test_fast_math.py``: 1e-12 relative or
+Polynomials on reduced ranges; largest errors measured in ``tests/physics/test_fast_math.py``: 1e-11 relative or
 better on the stated domains.
 """
 

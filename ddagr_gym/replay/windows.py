@@ -41,11 +41,12 @@ class WindowSet:
         recording: (W,) index of the recording that each came from.
         start: (W,) row of the recording at which it starts.
         time: (W,) recording time at the start [s].
-        commands: (W, T + H, 2) right and left commands [rad/s]; command [H + k] is in force in the period that ends
-            at sample k, the first H belong to the past (for delays).
+        commands: (W, H + T + A, 2) right and left commands [rad/s]; command [H + k] is in force in the period that
+            ends at sample k, the first H belong to the past (for delays), the last A to the future (for late clocks).
         history: H.
         measured: (W, T, 8) in the order of CHANNELS, NaN where there is no new sample.
         initial: (W, 8) first guess of STATE at the start.
+        ahead: A.
     """
 
     period: float
@@ -56,6 +57,7 @@ class WindowSet:
     history: int
     measured: Array
     initial: Array
+    ahead: int = 0
 
     @property
     def count(self) -> int:
@@ -66,6 +68,25 @@ class WindowSet:
     def samples(self) -> int:
         """T."""
         return int(self.measured.shape[1])
+
+    @property
+    def duration(self) -> float:
+        """Of a window [s]."""
+        return self.samples * self.period
+
+    def drive(self, delay: float = 0.0) -> Array:
+        """(W, T, 2) commands as they act after ``delay`` [s]; a negative one takes them from later rows.
+
+        Between samples of the period they are interpolated; before and after what was kept, held.
+        """
+        whole = int(np.floor(delay / self.period))
+        part = delay / self.period - whole
+        rows = self.history + np.arange(self.samples) - whole
+        last = self.commands.shape[1] - 1
+        newer, older = np.clip(rows, 0, last), np.clip(rows - 1, 0, last)
+        if part == 0.0:
+            return np.ascontiguousarray(self.commands[:, newer])
+        return np.ascontiguousarray((1.0 - part) * self.commands[:, newer] + part * self.commands[:, older])
 
     def subset(self, chosen: NDArray[np.int64] | NDArray[np.bool_]) -> WindowSet:
         """Only the chosen windows."""
@@ -82,6 +103,7 @@ def cut_windows(
     half_track: float,
     drive_by: str = "commands",
     history: float = 0.5,
+    ahead: float = 0.0,
 ) -> WindowSet:
     """Windows of ``duration`` inside the segments of recordings of one sample period.
 
@@ -93,6 +115,7 @@ def cut_windows(
         half_track: for the first guess of the yaw rate where no gyro is [m].
         drive_by: "commands", or "encoders" to impose the recorded wheel speeds.
         history: commands kept from before the start [s].
+        ahead: commands kept from after the end [s].
 
     Raises:
         InputError: periods differ, no window fits, or commands or encoders are absent.
@@ -100,23 +123,80 @@ def cut_windows(
     period = _common_period(recordings)
     samples = max(int(round(duration / period)), 2)
     step = samples if stride is None else max(int(round(stride / period)), 1)
-    past = int(round(history / period))
+    past, later = int(round(history / period)), int(round(ahead / period))
     parts = []
     for number, recording in enumerate(recordings):
         drive = _drive(recording, drive_by)
         for segment in recording.segments():
             for first in range(segment.start, segment.stop - samples, step):
-                part = _window(recording, number, drive, first, samples, past, segment.start)
+                part = _window(recording, number, drive, first, samples, (past, later), segment)
                 if part is not None:
                     parts.append(part)
     if not parts:
         names = ", ".join(r.meta.source for r in recordings)
         raise InputError(f"{names}: no window of {duration:g} s fits into valid {drive_by}: choose a shorter one.")
-    number_, start, time, commands, measured = (np.array(column) for column in zip(*parts, strict=True))
-    initial = np.stack(
-        [_guess(recordings[n], int(s), wheel_radius, half_track) for n, s in zip(number_, start, strict=True)]
+    return _stack(recordings, parts, period, (past, later), wheel_radius, half_track)
+
+
+def cut_runs(
+    recordings: Sequence[Recording],
+    *,
+    wheel_radius: float,
+    half_track: float,
+    drive_by: str = "commands",
+    shortest: float = 1.0,
+    history: float = 0.5,
+    ahead: float = 0.0,
+) -> tuple[WindowSet, ...]:
+    """The longest possible windows: each stretch of a segment with a known drive is one; one set per length.
+
+    Args:
+        recordings: see :func:`cut_windows`, and the others.
+        wheel_radius: see there.
+        half_track: see there.
+        drive_by: see there.
+        shortest: stretch that counts [s].
+        history: see there.
+        ahead: see there.
+
+    Returns:
+        Sets in the order of length, none where nothing is long enough.
+    """
+    period = _common_period(recordings)
+    past, later = int(round(history / period)), int(round(ahead / period))
+    by_length: dict[int, list[_Part]] = {}
+    for number, recording in enumerate(recordings):
+        drive = _drive(recording, drive_by)
+        for segment in recording.segments():
+            known = np.isfinite(drive[segment]).all(axis=1)
+            edges = segment.start + np.flatnonzero(np.diff(np.concatenate([[False], known, [False]]).astype(int)))
+            for first, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+                samples = stop - first - 1
+                part = _window(recording, number, drive, first, samples, (past, later), segment) if samples > 1 else None
+                if part is not None and samples * period >= shortest - 0.5 * period:
+                    by_length.setdefault(samples, []).append(part)
+    return tuple(
+        _stack(recordings, by_length[n], period, (past, later), wheel_radius, half_track) for n in sorted(by_length)
     )
-    return WindowSet(period, number_, start, time, commands, past, measured, initial)
+
+
+_Part = tuple[int, int, float, Array, Array]
+
+
+def _stack(
+    recordings: Sequence[Recording],
+    parts: Sequence[_Part],
+    period: float,
+    kept: tuple[int, int],
+    wheel_radius: float,
+    half_track: float,
+) -> WindowSet:
+    number, start, time, commands, measured = (np.array(column) for column in zip(*parts, strict=True))
+    guesses = [
+        _guess(recordings[n], int(s), drive, wheel_radius, half_track)
+        for n, s, drive in zip(number, start, commands[:, max(kept[0] - 1, 0)], strict=True)
+    ]
+    return WindowSet(period, number, start, time, commands, kept[0], measured, np.stack(guesses), kept[1])
 
 
 def _common_period(recordings: Sequence[Recording]) -> float:
@@ -152,11 +232,12 @@ def _interpolated(recording: Recording, name: str, gap: float = 0.6) -> Array:
 
 
 def _window(
-    recording: Recording, number: int, drive: Array, first: int, samples: int, past: int, earliest: int
-) -> tuple[int, int, float, Array, Array] | None:
-    rows = np.arange(first + 1 - past, first + 1 + samples)
-    commands = drive[np.maximum(rows, earliest)]
-    if not np.isfinite(commands[past:]).all():
+    recording: Recording, number: int, drive: Array, first: int, samples: int, kept: tuple[int, int], segment: slice
+) -> _Part | None:
+    past, later = kept
+    rows = np.arange(first + 1 - past, first + 1 + samples + later)
+    commands = drive[np.clip(rows, segment.start, segment.stop - 1)]
+    if not np.isfinite(commands[past : past + samples]).all():
         return None
     # before the first known command of the segment the robot is taken to have had that one
     known = np.isfinite(commands).all(axis=1)
@@ -166,10 +247,13 @@ def _window(
     return number, first, float(recording.t[first]), commands, measured
 
 
-def _guess(recording: Recording, row: int, wheel_radius: float, half_track: float) -> Array:
-    """Initial state from the samples around the start."""
+def _guess(recording: Recording, row: int, drive: Array, wheel_radius: float, half_track: float) -> Array:
+    """Initial state from the samples around the start; without encoders the banks turn as they are driven."""
     value = {name: _near(recording, name, row) for name in CHANNELS}
-    right, left = value["encoder_right"], value["encoder_left"]
+    right, left = (
+        value[name] if np.isfinite(value[name]) else drive[bank]
+        for bank, name in enumerate(("encoder_right", "encoder_left"))
+    )
     yaw_rate = value["yaw_rate"]
     if not np.isfinite(yaw_rate):
         yaw_rate = wheel_radius * (right - left) / (2.0 * half_track) / 1.5

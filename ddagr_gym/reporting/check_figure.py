@@ -36,7 +36,7 @@ def check_figure(recording: Recording, report: CheckReport, rng: np.random.Gener
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(12.5, 8.4), layout="constrained")
-    grid = figure.add_gridspec(4, 3, width_ratios=(1.3, 1.0, 1.25))
+    grid = figure.add_gridspec(4, 3, width_ratios=(1.0, 1.1, 1.2))
     _speeds(figure.add_subplot(grid[0, :2]), recording)
     _turn_rate(figure.add_subplot(grid[1, :2]), recording)
     _path(figure.add_subplot(grid[2:, 0]), recording)
@@ -115,7 +115,7 @@ def _path(axes: Any, recording: Recording) -> None:
 
 
 def _clocks(axes: Any, found: dict[str, Offset | None]) -> None:
-    axes.set_title("correlation against clock offset, 99 % interval")
+    axes.set_title("clock offsets, 99 % intervals")
     told = {pair: offset for pair, offset in found.items() if offset is not None}
     if not told:
         _nothing(axes, "no motion to compare")
@@ -127,7 +127,7 @@ def _clocks(axes: Any, found: dict[str, Offset | None]) -> None:
         )
     axes.set_xlabel("offset [s], positive: the second is late")
     axes.set_ylabel("correlation")
-    axes.legend(loc="best")
+    axes.legend(loc="lower right", frameon=True, framealpha=0.9, edgecolor="none", facecolor=palette.PAPER)
     axes.margins(x=0)
 
 
@@ -138,11 +138,13 @@ def _gravity(axes: Any, recording: Recording) -> None:
         _nothing(axes, "the robot never stands")
         return
     headings = np.array([rest.heading for rest in found])
-    known = np.isfinite(headings).all()
+    # Headings of different spans have no common zero.
+    known = np.isfinite(headings).all() and len({rest.span for rest in found}) == 1
     across = np.degrees(headings) if known else np.arange(len(found))
     for index, (axis, colour) in enumerate((("x", RIGHT), ("y", LEFT))):
         axes.plot(across, [rest.force[index] for rest in found], "o", color=colour, label=f"f_{axis}")
     axes.axhline(0.0, color=palette.PALE, lw=0.8)
+    axes.margins(x=0.1)
     axes.set_xlabel("heading [deg]" if known else "rest number")
     axes.set_ylabel("[m/s$^2$]")
     axes.legend()
@@ -185,7 +187,7 @@ def shown_findings(report: CheckReport) -> list[Finding]:
 
 
 def _ranges(axes: Any, report: CheckReport) -> None:
-    axes.set_title("values in their sound ranges, 99 % intervals")
+    axes.set_title("values in their sound ranges")
     findings = shown_findings(report)[::-1]
     axes.axvspan(-1, 1, color=palette.SHADE, lw=0)
     for row, finding in enumerate(findings):

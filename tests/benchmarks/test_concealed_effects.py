@@ -178,7 +178,7 @@ def test_delay_shifts_the_encoder():
     [
         ("motor_lag", "slower loop", 0.2, STRAIGHT[:50], "omega_right", -1, 0.05),
         ("motor_lag", "second pole", 0.2, STRAIGHT[:50], "omega_right", -1, 0.05),
-        ("motor_droop", "leaky integrator", 0.003, TURN, "omega_left", -1, 0.05),
+        ("motor_droop", "leaky integrator", 0.0018, TURN, "omega_left", -1, 0.05),
         ("motor_droop", "battery sag", 0.003, TURN, "omega_left", -1, 0.05),
         ("motor_saturation", "speed limit", 0.2, TURN, "omega_left", -1, 0.2),
         ("motor_saturation", "torque limit", 0.4, TURN, "omega_left", -1, 0.02),

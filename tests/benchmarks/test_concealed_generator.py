@@ -108,6 +108,18 @@ def test_manoeuvres_noise_and_soil_do_not_depend_on_the_label(short_drives):
     assert label["difference"]["imu_ax"] == 0.0
 
 
+def test_logged_commands_lead_or_accompany_the_wheels(short_drives):
+    rows = {}
+    for row in ("issued", "acting"):
+        case = cases.Case("development", 1, "null", (), command_row=row)
+        rows[row] = simulate.simulate_case(case, SEED)[0]["run_1"]
+    np.testing.assert_array_equal(rows["acting"]["cmd_left"][1:], rows["issued"]["cmd_left"][:-1])
+    np.testing.assert_array_equal(rows["acting"]["enc_left"], rows["issued"]["enc_left"])
+    started = np.argmax(rows["issued"]["cmd_left"] != 0)
+    assert np.all(np.abs(rows["issued"]["enc_left"][: started + 1]) < 0.02)
+    assert {case.command_row for case in cases.plan("sealed", SEED)} == {"issued", "acting"}
+
+
 def test_manoeuvres_are_what_their_names_say():
     for seed in range(cases.MANOEUVRE_SETS):
         straight, arcs, anything = (manoeuvres.programme(run, seed) for run in manoeuvres.RUNS)

@@ -1,8 +1,8 @@
 """Independent reference for the forces on a torus wheel, and the writer of ``wheel_forces.csv`` beside it.
 
 Written from the vector form of the model (surface point, directions, velocity field, stresses) with a Gauss rule on
-panels graded towards the edges of the patch. It shares nothing with ``ddagr_gym``: no closed form of the shear displacement, no
-substitution, no mirror kernel. Run ``python tests/golden/wheel_reference.py`` to write the CSV again.
+panels graded towards the edges of the patch. It shares nothing with ``ddagr_gym``: no closed form of the shear
+displacement, no substitution, no mirror kernel. Run ``python tests/golden/wheel_reference.py`` to write the CSV again.
 """
 
 from __future__ import annotations

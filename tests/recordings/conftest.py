@@ -41,7 +41,7 @@ def delayed(t: np.ndarray, values: np.ndarray, delay: float) -> np.ndarray:
 def drive(
     geometry: RobotGeometry, faults: Faults = Faults(), *, seed: int = 0, seconds: float = 120.0, period: float = 0.02
 ) -> Recording:
-    """Steps of both bank commands with rests; first-order motors; the robot turns with a wider track and slips a little."""
+    """Steps of both bank commands with rests; first-order motors; a wider effective track and a little slip."""
     rng = np.random.default_rng(seed)
     t = np.arange(0.0, seconds, period)
     command = np.zeros((t.size, 2))

@@ -132,7 +132,8 @@ def test_memory_stays_bounded_on_a_file_that_is_refused(tmp_path):
         "import resource, sys\n"
         "from ddagr_gym.errors import InputError\n"
         "from ddagr_gym.recordings.load import load_recording\n"
-        "try:\n    load_recording(sys.argv[1], sys.argv[2])\nexcept InputError as e:\n    assert '--maximum' in str(e)\n"
+        "try:\n    load_recording(sys.argv[1], sys.argv[2])\n"
+        "except InputError as error:\n    assert '--maximum' in str(error)\n"
         "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)\n"
     )
     peak = [

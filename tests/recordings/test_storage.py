@@ -120,7 +120,8 @@ def test_a_failed_write_leaves_the_old_file_and_nothing_else(tmp_path, make_driv
     save_parquet(make_drive(seconds=10), path)
     before = path.read_bytes()
 
-    def full_disk(*_arguments, **_options):
+    def full_disk(_table, where, **_options):
+        where.write_bytes(b"half")
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(parquet, "write_table", full_disk)

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 from ddagr_gym.physics.effects.base import Effect, Vector, size
 from ddagr_gym.physics.layout import (
-    ACCELERATION,
     ACCELEROMETER_SCALE,
     IMU_MOUNTING_YAW,
+    MEAN_YAW_ACCELERATION,
     POINT_READINGS,
     READING,
     YAW_RATE,
@@ -17,7 +17,7 @@ from ddagr_gym.physics.layout import (
 def move_sensor(row: Vector, parameters: Vector, memory: Vector) -> None:
     """Add the transport terms of a lever arm ``parameters[:2]``, in the sensor's axes."""
     rate = row[YAW_RATE]
-    turn = row[ACCELERATION + 2]
+    turn = row[MEAN_YAW_ACCELERATION]
     force_x = -turn * parameters[1] - rate * rate * parameters[0]
     force_y = turn * parameters[0] - rate * rate * parameters[1]
     cosine = math.cos(row[IMU_MOUNTING_YAW])

@@ -17,10 +17,10 @@ from ddagr_gym.recordings.schema import FloatArray, Recording
 
 CHECK = "accelerometer"
 
-FORWARD_RANGE = (0.5, 1.6)
-"""Coefficient of dv/dt in f_x [-]; slip while accelerating lowers it."""
-SIDEWAYS_RANGE = (0.4, 1.6)
-"""Coefficient of v w in f_y [-]; slip lowers it (0.8 to 1.15 on the open recordings)."""
+FORWARD_RANGE = (0.2, 1.6)
+"""Coefficient of dv/dt in f_x [-]; slip while accelerating lowers it (1.0 to 1.2 on the open recordings)."""
+SIDEWAYS_RANGE = (0.2, 1.6)
+"""Coefficient of v w in f_y [-]; slip lowers it (0.8 to 1.0 on the open recordings)."""
 MOUNTING_RANGE = (-0.1, 0.1)
 """Mounting angle about z [rad] (6 degrees)."""
 OFFSET_RANGE = (-0.9, 0.9)

@@ -23,6 +23,8 @@ CHECKED = (
 )
 REPEAT_RANGE = (0.0, 0.05)
 """Share of repeats while driving beyond what the resolution explains [-]; 0.002 at most on the open recordings."""
+FROZEN_RANGE = (0.0, 1.0)
+"""Longest time for which a fine-grained channel may show one value while driving [s] (ours)."""
 QUANTA = 3.0
 """A channel whose changes are mostly this many quanta or fewer repeats itself naturally (ours)."""
 
@@ -33,7 +35,14 @@ def held(recording: Recording) -> list[Finding]:
     Exact zeros are left out: a locked bank repeats them, and :mod:`.extremes` looks at them.
     """
     driving = moving_mask(recording)
-    return [_finding(recording, name, driving) for name in CHECKED if _undeclared(recording, name)]
+    findings = []
+    for name in CHECKED:
+        if _undeclared(recording, name):
+            steps = np.abs(changes(recording, name, driving))
+            findings.append(_repeats(name, steps))
+            if steps.size >= 50 and natural_repeats(steps) < 0.5:
+                findings.append(_frozen(recording, name, driving))
+    return findings
 
 
 def _undeclared(recording: Recording, name: str) -> bool:
@@ -70,8 +79,7 @@ def natural_repeats(steps: FloatArray) -> float:
     return 0.5 * float(np.mean((steps > 0) & (steps <= 1.5 * quantum)))
 
 
-def _finding(recording: Recording, name: str, driving: BoolArray) -> Finding:
-    steps = np.abs(changes(recording, name, driving))
+def _repeats(name: str, steps: FloatArray) -> Finding:
     if steps.size < 50:
         return not_testable(CHECK, name, "The channel has too few samples while driving.", "Record a longer drive.")
     share, natural = float(np.mean(steps == 0)), natural_repeats(steps)
@@ -88,5 +96,41 @@ def _finding(recording: Recording, name: str, driving: BoolArray) -> Finding:
             f"its resolution explains {100 * min(natural, share):.2g} %."
         ),
         remedy="If the logger holds this channel, declare it under held in the map; else look at the sensor.",
+        suspects=("sensor_hold",),
+    )
+
+
+def longest_freeze(recording: Recording, name: str, driving: BoolArray) -> float:
+    """Longest time for which a channel shows one value other than 0 while driving [s].
+
+    Args:
+        recording: any.
+        name: channel.
+        driving: (n,) rows in which the robot moves.
+    """
+    longest = 0.0
+    for span in recording.spans():
+        rows = span.start + np.flatnonzero(np.isfinite(recording[name][span]) & driving[span])
+        values = recording[name][rows]
+        # A row starts a new value where it differs from the row before or where driving paused in between.
+        starts = np.flatnonzero(np.concatenate([[True], (np.diff(values) != 0) | (np.diff(rows) > 1)]))
+        stops = np.concatenate([starts[1:], [rows.size]]) - 1
+        if rows.size:
+            lasted = recording.t[rows[stops]] - recording.t[rows[starts]]
+            longest = max(longest, float(np.max(np.where(values[starts] != 0, lasted, 0.0))))
+    return longest
+
+
+def _frozen(recording: Recording, name: str, driving: BoolArray) -> Finding:
+    longest = longest_freeze(recording, name, driving)
+    return judge(
+        "frozen",
+        name,
+        longest,
+        (longest, longest),
+        FROZEN_RANGE,
+        "s",
+        meaning=f"While driving it shows one value for {longest:.2f} s at most.",
+        remedy="Look for a sensor that hangs; leave that piece out.",
         suspects=("sensor_hold",),
     )

@@ -21,6 +21,11 @@ DUPLICATE_RANGE = (0.0, 0.001)
 HOLD_RANGE = (0.0, 0.15)
 """Share of the driving time in which a channel waits more than five of its periods for a sample [-]; 0.07 at most on
 the open recordings, whose poses come irregularly."""
+LONGEST_WAIT = 2.0
+"""Longest wait for a sample while driving [s], or twelve of the channel's periods if that is longer; 1.25 s on the open
+recordings."""
+SLOWEST = {"encoder": 2.0, "specific_force": 10.0, "yaw_rate": 10.0, "pose": 1.0}
+"""Rate below which a channel cannot follow a robot's motion [Hz] (ours), by the beginning of its name."""
 LONG_HOLD = 5.0
 """Wait, in median periods, from which a channel counts as held."""
 
@@ -81,12 +86,12 @@ def _row_findings(recording: Recording) -> list[Finding]:
 
 def _rate_findings(recording: Recording) -> list[Finding]:
     driving = moving_mask(recording)
-    findings = []
+    findings: list[Finding] = []
     for name, channel in CHANNELS.items():
         if recording.has(name):
             # Commands may come only when they change.
             if name not in COMMANDS:
-                findings.append(_hold_finding(recording, name, driving))
+                findings += _hold_findings(recording, name, driving)
         elif channel.core:
             why = "The channel has no samples."
             findings.append(not_testable("rate", name, why, "Record it, or correct the map."))
@@ -112,24 +117,45 @@ def waits(recording: Recording, name: str, driving: BoolArray) -> FloatArray:
     return np.array(found)
 
 
-def _hold_finding(recording: Recording, name: str, driving: BoolArray) -> Finding:
+def _hold_findings(recording: Recording, name: str, driving: BoolArray) -> list[Finding]:
     between = waits(recording, name, driving)
     if between.size < 20:
-        return not_testable("rate", name, "The robot hardly drives.", "Record a drive.")
-    median = float(np.median(between))
+        return [not_testable("rate", name, "The robot hardly drives.", "Record a drive.")]
+    median, longest = float(np.median(between)), float(between.max())
     share = float(np.sum(between[between > LONG_HOLD * median]) / np.sum(between))
-    return judge(
-        "rate",
-        name,
-        share,
-        _fixed(share),
-        HOLD_RANGE,
-        "-",
-        meaning=(
-            f"New samples come at {1 / median:.3g} Hz while driving, at worst after {float(between.max()):.2f} "
-            "s; waits of "
-            f"more than {LONG_HOLD:g} periods take {100 * share:.2g} % of the time."
+    slowest = next((rate for start, rate in SLOWEST.items() if name.startswith(start)), 0.0)
+    return [
+        judge(
+            "rate",
+            name,
+            1 / median,
+            _fixed(1 / median),
+            (slowest, np.inf),
+            "Hz",
+            meaning=f"New samples come at {1 / median:.3g} Hz while driving.",
+            remedy="Raise the sensor's rate, or declare the channel as held if the logger repeats it.",
+            suspects=("sensor_hold",),
         ),
-        remedy="Look for a sensor that stops or a logger that drops its messages.",
-        suspects=("sensor_hold",),
-    )
+        judge(
+            "wait",
+            name,
+            longest,
+            _fixed(longest),
+            (0.0, max(LONGEST_WAIT, 12 * median)),
+            "s",
+            meaning=f"While driving it goes without a new sample for {longest:.2f} s at most.",
+            remedy="Look for a sensor that stops or a logger that drops its messages.",
+            suspects=("sensor_hold",),
+        ),
+        judge(
+            "wait",
+            f"{name}, share",
+            share,
+            _fixed(share),
+            HOLD_RANGE,
+            "-",
+            meaning=f"Waits of more than {LONG_HOLD:g} periods take {100 * share:.2g} % of the driving time.",
+            remedy="Look for a sensor that stops or a logger that drops its messages.",
+            suspects=("sensor_hold",),
+        ),
+    ]

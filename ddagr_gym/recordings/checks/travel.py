@@ -13,8 +13,12 @@ from ddagr_gym.recordings.schema import BoolArray, FloatArray, Recording
 
 CHECK = "sign_and_scale"
 
-TRAVEL_RANGE = (0.5, 1.05)
-"""Travelled over rolled distance [-]: 1 without slip; more than 1 only when pushed or with a wrong radius or scale."""
+TRAVEL_RANGE = (0.2, 1.05)
+"""Travelled over rolled distance [-]: 1 without slip, little on ice; more than 1 only when pushed or with a wrong
+radius or scale."""
+COHERENCE_RANGE = (0.6, 1.0)
+"""Cosine between rolled and travelled paths [-]: 0.95 to 0.99 on the open recordings, 0.3 at most with a
+mirrored axis."""
 DIRECTION_RANGE = (-0.12, 0.12)
 """Direction of travel against the pose's heading [rad] (7 degrees): skid-steer robots travel where they point."""
 GAIN_RANGE = (0.6, 1.15)
@@ -38,10 +42,11 @@ def travel(recording: Recording, rng: np.random.Generator) -> list[Finding]:
 
 
 def travelled_over_rolled(recording: Recording, rng: np.random.Generator) -> Estimate | None:
-    """Travelled over rolled distance as forward and sideways shares, (2,).
+    """Travelled over rolled distance as forward and sideways shares, and their coherence, (3,).
 
     The rolled path is the wheel radius times the banks' mean speed, laid along the gyro's heading; both paths are
-    compared as vectors over :data:`WINDOW` with the pose's clock matched.
+    compared as vectors over :data:`WINDOW`, the pose's clock matched. Coherence is the cosine between them, weighted
+    by length: 1 where every rolled piece is travelled in its direction in one proportion.
 
     Returns:
         None without pose, gyro, motion or the robot's geometry.
@@ -65,11 +70,11 @@ def travelled_over_rolled(recording: Recording, rng: np.random.Generator) -> Est
         turn = pose_heading[rows] - sampled(recording, span, heading, at)
         position = np.stack([recording["pose_x"][rows], recording["pose_y"][rows]])
         sums.append(_moments(at, path, position, turn))
-    return estimate([s for s in sums if s[2] > 0], _shares, rng)
+    return estimate([s for s in sums if s[2] > 0 and s[3] > 0], _shares, rng)
 
 
 def _moments(at: FloatArray, path: FloatArray, position: FloatArray, turn: FloatArray) -> FloatArray:
-    """Sums over windows of rolled and travelled vectors: along, across, squared rolled length.
+    """Sums over windows of rolled and travelled vectors: along, across, squared rolled and travelled length.
 
     Args:
         at: times of the poses (n,) [s].
@@ -86,12 +91,13 @@ def _moments(at: FloatArray, path: FloatArray, position: FloatArray, turn: Float
     travelled = position[:, last] - position[:, first]
     along = np.sum(rolled * travelled)
     across = np.sum(rolled[0] * travelled[1] - rolled[1] * travelled[0])
-    moments = np.array([along, across, np.sum(rolled**2)])
-    return moments if np.all(np.isfinite(moments)) else np.zeros(3)
+    moments = np.array([along, across, np.sum(rolled**2), np.sum(travelled**2)])
+    return moments if np.all(np.isfinite(moments)) else np.zeros(4)
 
 
 def _shares(totals: FloatArray) -> FloatArray:
-    return totals[:, :2] / totals[:, 2:]
+    along, across, rolled, travelled = totals.T
+    return np.stack([along / rolled, across / rolled, along / np.sqrt(rolled * travelled)], axis=1)
 
 
 def command_gains(recording: Recording, rng: np.random.Generator) -> Estimate | None:
@@ -140,7 +146,7 @@ def _travel_findings(recording: Recording, rng: np.random.Generator) -> list[Fin
         return [
             not_testable(CHECK, pair, why, "Name the robot with --robot." if missing else "Record poses while driving.")
         ]
-    along, across = (float(v) for v in found.values)
+    along, across, coherence = (float(v) for v in found.values)
     angle = float(np.arctan2(across, along))
     low, high = found.intervals[1]
     spread = max(abs(along), 1e-3)
@@ -166,6 +172,17 @@ def _travel_findings(recording: Recording, rng: np.random.Generator) -> list[Fin
             meaning=f"The robot travels {angle:.3f} rad to the left of the pose's heading.",
             remedy="Check the heading's zero, sign and frame against REP 103; a steady side slope makes robots crab.",
             suspects=("slope",),
+        ),
+        judge(
+            "coherence",
+            pair,
+            coherence,
+            found.intervals[2],
+            COHERENCE_RANGE,
+            "-",
+            meaning=f"Rolled and travelled paths agree by {coherence:.2f}, 1 being along each other at all times.",
+            remedy="Check the signs of the pose's axes and heading, the encoders' signs, and the clocks.",
+            suspects=("encoder_scale", "gyro_sign", "pose_latency"),
         ),
     ]
 

@@ -24,8 +24,9 @@ GYRO_SCALE_RANGE = (0.95, 1.05)
 """Gyro over pose [-]; data sheets promise 3 % for low-cost gyros."""
 GYRO_BIAS_RANGE = (-0.02, 0.02)
 """Gyro bias against the pose [rad/s]: 70 degrees a minute is more than a zeroed low-cost gyro drifts."""
-TRACK_RANGE = (0.9, 3.5)
-"""Effective over geometric track [-]: 1.3 to 1.9 for fielded skid-steer robots, more on loose ground; never below 1."""
+TRACK_RANGE = (0.9, 6.0)
+"""Effective over geometric track [-]: 1.3 to 1.9 for fielded skid-steer robots, more on loose ground and on ice;
+never below 1."""
 BALANCE_RANGE = (0.95, 1.055)
 """Right over left bank's share in the yaw rate [-]; 1 for equal radii, scales and ground, 1.02 to 1.04 on the open
 recordings."""

@@ -68,11 +68,12 @@ def act():
     return run
 
 
-def straight(speed, samples=400):
-    """Commands for a straight drive, started from a drive at that speed."""
-    return np.full((samples, 2), speed)
+@pytest.fixture(scope="session")
+def straight(robot):
+    """straight(speed, samples): commands (samples, 2), and the motion of a robot that drives so already."""
 
+    def build(speed, samples=300):
+        state = {"v_x": 0.99 * robot.wheels[0].outer_radius * speed, "omega_right": speed, "omega_left": speed}
+        return np.full((samples, 2), speed), state
 
-def moving(speed):
-    """Initial state that goes with :func:`straight` for the DDAGR."""
-    return {"v_x": 0.277 * speed, "omega_right": speed, "omega_left": speed}
+    return build

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -16,7 +17,7 @@ def test_blocks_cover_every_span_without_overlap_or_crossing():
     blocks = cut_blocks(recording)
     assert blocks[0].start == 0
     assert blocks[-1].stop == len(t)
-    assert all(a.stop == b.start for a, b in zip(blocks[:-1], blocks[1:], strict=True))
+    assert all(a.stop == b.start for a, b in itertools.pairwise(blocks))
     assert any(b.start == 610 for b in blocks)
     assert 2.5 < np.median([t[b.stop - 1] - t[b.start] for b in blocks]) < 4
 

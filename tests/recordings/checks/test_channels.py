@@ -9,7 +9,7 @@ import pytest
 
 from ddagr_gym.recordings.checks.extremes import extremes, false_zeros, saturated_share
 from ddagr_gym.recordings.checks.findings import Status
-from ddagr_gym.recordings.checks.held import held, natural_repeats
+from ddagr_gym.recordings.checks.held import held, longest_freeze, natural_repeats
 from ddagr_gym.recordings.checks.timing import timing
 from ddagr_gym.recordings.schema import Recording
 
@@ -51,8 +51,38 @@ def test_a_sensor_that_stops_for_a_third_of_the_time(make_drive):
         return v
 
     drive = changed(make_drive(), encoder_right=dropping)
-    assert status_of(timing(drive), "rate", "encoder_right") is Status.SUSPICIOUS
-    assert status_of(timing(drive), "rate", "encoder_left") is Status.PASS
+    assert status_of(timing(drive), "wait", "encoder_right, share") is Status.SUSPICIOUS
+    assert status_of(timing(drive), "wait", "encoder_left, share") is Status.PASS
+
+
+def test_a_sensor_that_stops_once(make_drive):
+    def stopping(v):
+        v[3000:3200] = np.nan
+        return v
+
+    drive = changed(make_drive(), yaw_rate=stopping)
+    assert status_of(timing(drive), "wait", "yaw_rate") is Status.SUSPICIOUS
+    assert status_of(timing(drive), "wait", "yaw_rate, share") is Status.PASS
+
+
+def test_a_sensor_that_hangs_once(make_drive):
+    def hanging(v):
+        v[3000:3100] = v[3000]
+        return v
+
+    drive = changed(make_drive(), yaw_rate=hanging)
+    assert status_of(held(drive), "frozen", "yaw_rate") is Status.SUSPICIOUS
+    assert status_of(held(drive), "held", "yaw_rate") is Status.PASS
+    assert longest_freeze(drive, "yaw_rate", np.ones(len(drive), dtype=bool)) == pytest.approx(99 * 0.02)
+
+
+def test_a_sensor_that_is_too_slow(make_drive):
+    def thinned(v):
+        v[np.arange(v.size) % 50 != 0] = np.nan
+        return v
+
+    drive = changed(make_drive(), encoder_left=thinned)
+    assert status_of(timing(drive), "rate", "encoder_left") is Status.SUSPICIOUS
 
 
 def test_a_core_channel_without_samples_is_not_testable(make_drive):
@@ -63,7 +93,7 @@ def test_a_core_channel_without_samples_is_not_testable(make_drive):
 @pytest.mark.parametrize("count", [2, 5])
 def test_undeclared_repeats_are_suspicious(make_drive, count):
     drive = changed(make_drive(), yaw_rate=repeated(count))
-    findings = {f.channel: f for f in held(drive)}
+    findings = {f.channel: f for f in held(drive) if f.check == "held"}
     assert findings["yaw_rate"].status is Status.SUSPICIOUS
     assert findings["yaw_rate"].value == pytest.approx(1 - 1 / count, abs=0.01)
     assert findings["specific_force_x"].status is Status.PASS

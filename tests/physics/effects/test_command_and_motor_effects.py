@@ -1,0 +1,155 @@
+"""Commands and motors: each effect against the closed form of the bank speed it should give."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ddagr_gym.parameters import Imu, Sensors, WheelEncoder
+from ddagr_gym.physics import layout
+from ddagr_gym.physics.effects import parse_effect
+
+PERIOD = 0.008
+RATE = 4.5
+
+
+@pytest.fixture
+def steps():
+    """Commands (300, 2): rest, then different speeds of the banks, then one reversed."""
+    commands = np.zeros((300, 2))
+    commands[70:180] = (0.7, 0.5)
+    commands[180:] = (0.7, -0.3)
+    return commands
+
+
+@pytest.mark.parametrize("samples", [1, 5, 61])
+def test_delay_of_whole_samples_shifts_the_bank_speeds(drive, steps, samples):
+    prompt = drive((), steps)["encoder_right"]
+    late = drive([f"command_delay={samples * PERIOD}"], steps)["encoder_right"]
+    np.testing.assert_allclose(late[samples:], prompt[:-samples], atol=1e-12)
+    np.testing.assert_array_equal(late[:samples], 0.0)
+
+
+@pytest.mark.parametrize("sample_rate", [50.0, 125.0, 400.0, 1000.0])
+@pytest.mark.parametrize("delay", [0.013, 0.2, 0.49])
+def test_delay_of_a_ramp_is_exact_at_every_rate(act, turning_row, sample_rate, delay):
+    effect = parse_effect(f"command_delay={delay}")
+    row = turning_row.copy()
+    row[layout.SAMPLE_PERIOD] = 1.0 / sample_rate
+    row[layout.OMEGA : layout.OMEGA + 2] = 0.0
+    memory = np.zeros(layout.EFFECT_MEMORY)
+    for k in range(int(1.5 * sample_rate)):
+        time = k / sample_rate
+        row[layout.COMMAND : layout.COMMAND + 2] = (0.3 * time, -0.1 * time)
+        changed = act(effect, row, memory)
+        if time > 0.7:
+            np.testing.assert_allclose(
+                changed[layout.COMMAND : layout.COMMAND + 2], (0.3 * (time - delay), -0.1 * (time - delay)), atol=1e-12
+            )
+
+
+def test_before_the_first_command_the_delay_holds_the_bank_speeds(drive):
+    state = {"v_x": 0.14, "omega_right": 0.5, "omega_left": 0.5}
+    columns = drive(["command_delay=0.24"], np.full((40, 2), 0.9), initial_state=state)
+    np.testing.assert_allclose(columns["encoder_right"][:30], 0.5, atol=1e-12)
+    assert columns["encoder_right"][-1] > 0.55
+
+
+@pytest.mark.parametrize("lag", [0.0, 0.05, 0.4921])
+def test_lag_lengthens_the_time_constant(drive, steps, lag):
+    speed = drive([f"motor_lag={lag}"], steps)["true_omega_left"]
+    time = PERIOD * np.arange(1, 111)
+    np.testing.assert_allclose(speed[70:180], 0.5 * (1 - np.exp(-time / (1 / RATE + lag))), rtol=1e-9)
+
+
+def test_negative_lag_cannot_reverse_time(act, turning_row):
+    row = turning_row.copy()
+    row[layout.MOTOR_RATE : layout.MOTOR_RATE + 2] = 50.0
+    rates = act(parse_effect("motor_lag=-0.05"), row)[layout.MOTOR_RATE : layout.MOTOR_RATE + 2]
+    np.testing.assert_allclose(rates, 1000.0)
+
+
+def torque(columns, bank):
+    return columns[f"true_axle_torque_{1 + bank}"] + columns[f"true_axle_torque_{3 + bank}"]
+
+
+def test_droop_lowers_the_speed_in_proportion_to_the_bank_torque(drive):
+    columns = drive(["motor_droop=0.002"], np.tile((0.9, 0.5), (700, 1)))
+    for bank, side in enumerate(("right", "left")):
+        expected = (0.9, 0.5)[bank] + 0.002 * torque(columns, bank)
+        np.testing.assert_allclose(columns[f"true_omega_{side}"][-50:], expected[-50:], atol=2e-5)
+    assert torque(columns, 0)[-1] < -20
+
+
+def test_droop_lets_a_locked_bank_creep_with_the_robot(drive):
+    columns = drive(["motor_droop=0.002"], np.tile((0.7, 0.0), (500, 1)))
+    assert columns["true_omega_left"][-1] > 0.01
+    mirrored = drive(["motor_droop=0.002"], np.tile((0.0, -0.7), (500, 1)))
+    assert mirrored["true_omega_right"][-1] < -0.01
+
+
+def test_droop_comes_to_rest(drive):
+    commands = np.zeros((900, 2))
+    commands[:250] = 0.6
+    columns = drive(["motor_droop=0.002"], commands)
+    assert np.abs(columns["true_omega_right"][-50:]).max() < 5e-4
+    assert np.abs(columns["specific_force_x"][-50:]).max() < 0.02
+
+
+def test_speed_limit_clips_and_leaves_slower_commands_alone(drive, steps):
+    free = drive((), steps)
+    limited = drive(["motor_saturation=0.6"], steps)
+    np.testing.assert_array_equal(limited["true_omega_left"], free["true_omega_left"])
+    assert limited["true_omega_right"].max() == pytest.approx(0.6, abs=1e-3)
+    time = PERIOD * np.arange(1, 111)
+    np.testing.assert_allclose(limited["true_omega_right"][70:180], 0.6 * (1 - np.exp(-RATE * time)), rtol=1e-9)
+
+
+def test_acceleration_limit_makes_ramps_that_end_in_the_nominal_loop(drive, steps):
+    limit = 0.8
+    speed = drive([f"motor_saturation=1000,acceleration_limit={limit}"], steps)["true_omega_right"]
+    within_a_sample = (1 - np.exp(-RATE * PERIOD)) / (RATE * PERIOD)
+    # the ramp ends where the nominal loop becomes slower: 0.7 - omega = limit/rate
+    ramp = np.diff(speed[70:150])
+    bound = int((0.7 - limit / RATE) / (limit * PERIOD))
+    np.testing.assert_allclose(ramp[: bound - 1], limit * PERIOD * within_a_sample, rtol=1e-9)
+    assert (ramp[bound + 3 :] < 0.97 * ramp[0]).all()
+
+
+def test_dead_zone_takes_its_width_from_every_command(drive):
+    columns = drive(["command_deadband=0.1"], np.tile((0.7, 0.09), (600, 1)))
+    assert columns["true_omega_right"][-1] == pytest.approx(0.6, abs=1e-6)
+    assert columns["true_omega_left"][-1] == 0.0
+    backwards = drive(["command_deadband=0.1"], np.tile((-0.7, -0.2), (600, 1)))
+    assert backwards["true_omega_right"][-1] == pytest.approx(-0.6, abs=1e-6)
+    assert backwards["true_omega_left"][-1] == pytest.approx(-0.1, abs=1e-6)
+
+
+def test_threshold_lets_larger_commands_pass_whole(act, turning_row):
+    effect = parse_effect("command_deadband=0.1,loss=0")
+    row = turning_row.copy()
+    for command, expected in ((0.0, 0.0), (0.089, 0.0), (0.1, 0.1), (0.7, 0.7), (-0.05, 0.0), (-0.3, -0.3)):
+        row[layout.COMMAND] = command
+        assert act(effect, row)[layout.COMMAND] == pytest.approx(expected, abs=1e-12)
+
+
+@pytest.mark.parametrize("loss", [0.0, 0.4, 1.0])
+def test_deadband_is_continuous_and_monotone(act, turning_row, loss):
+    effect = parse_effect(f"command_deadband=0.1,loss={loss}")
+    row = turning_row.copy()
+    commands = np.linspace(-0.3, 0.3, 2401)
+    received = []
+    for command in commands:
+        row[layout.COMMAND] = command
+        received.append(act(effect, row)[layout.COMMAND])
+    slopes = np.diff(received) / np.diff(commands)
+    assert slopes.min() >= 0.0
+    assert slopes.max() < 17.0
+
+
+def test_rates_of_the_motor_effects_do_not_depend_on_the_sample_rate(drive, steps):
+    slow = Sensors(imu=Imu(sample_rate=62.5, accelerometer_noise=0.0), encoder=WheelEncoder(counts_per_revolution=0.0))
+    effects = ["motor_lag=0.2", "motor_droop=0.001"]
+    fine = drive(effects, steps)["true_omega_right"][1::2]
+    coarse = drive(effects, steps[::2], sensors=slow)["true_omega_right"]
+    np.testing.assert_allclose(coarse, fine, atol=6e-3)

@@ -1,0 +1,139 @@
+"""Robot: loads, masses, radii and drags against statics, rigid-body mechanics and balance of power."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ddagr_gym.parameters import STANDARD_GRAVITY
+from ddagr_gym.physics import layout
+from ddagr_gym.physics.effects import parse_effect
+from ddagr_gym.presets import get_robot
+from ddagr_gym.simulator import Simulator
+
+FINITE = st.floats(-2.0, 2.0)
+
+
+def loads(columns):
+    return np.array([columns[f"true_load_{wheel}"][-1] for wheel in (1, 2, 3, 4)])
+
+
+def settled(robot, soil, effects, state=None):
+    simulator = Simulator(1, effects=effects)
+    simulator.configure(0, robot, soil)
+    simulator.reset(state=state)
+    return simulator.rows[0]
+
+
+def test_payload_is_the_union_of_two_bodies(robot, soil):
+    """Against point masses: the robot as two masses that have its mass and inertia, and the load as a third."""
+    row = settled(robot, soil, ["payload=40,x=-0.25,y=0.1,height=0.8"])
+    arm = np.sqrt(robot.yaw_inertia / robot.mass)
+    masses = np.array([robot.mass / 2, robot.mass / 2, 40.0])
+    places = np.array([[arm, 0.0, 0.45], [-arm, 0.0, 0.45], [-0.25, 0.1, 0.8]])
+    centre = masses @ places / masses.sum()
+    inertia = masses @ ((places - centre)[:, :2] ** 2).sum(axis=1)
+    assert row[layout.MASS] == pytest.approx(masses.sum())
+    assert row[layout.YAW_INERTIA] == pytest.approx(inertia)
+    np.testing.assert_allclose(row[layout.CENTRE_OF_MASS : layout.CENTRE_OF_MASS + 3], centre)
+    assert row[layout.LOAD : layout.LOAD + 4].sum() == pytest.approx(masses.sum() * STANDARD_GRAVITY)
+
+
+def test_payload_presses_the_nearest_wheel_down(robot, soil):
+    row = settled(robot, soil, ["payload=30,x=0.2,y=0.3"])
+    carried = row[layout.LOAD : layout.LOAD + 4]
+    sunk = row[layout.SINKAGE : layout.SINKAGE + 4]
+    assert carried.argmax() == sunk.argmax() == 1
+    assert carried.argmin() == sunk.argmin() == 2
+
+
+def test_load_taken_off_again_leaves_the_robot(act, turning_row):
+    loaded = act(parse_effect("payload=25,x=0.1,y=-0.2,height=0.9"), turning_row)
+    unloaded = act(parse_effect("payload=-25,x=0.1,y=-0.2,height=0.9"), loaded)
+    body = slice(layout.MASS, layout.MASS + 5)
+    np.testing.assert_allclose(unloaded[body], turning_row[body], rtol=1e-12, atol=1e-12)
+
+
+def test_offset_centre_shares_the_load_by_statics(robot, drive):
+    columns = drive(["centre_of_mass_offset=0.066,y=-0.058"], np.zeros((5, 2)))
+    weight = robot.mass * STANDARD_GRAVITY / 4
+    x, y = 0.066 / robot.half_wheelbase, -0.058 / robot.half_track
+    expected = [weight * (1 + sx * x) * (1 + sy * y) for sx, sy in ((1, -1), (1, 1), (-1, -1), (-1, 1))]
+    np.testing.assert_allclose(loads(columns), expected)
+
+
+@pytest.mark.parametrize("effect", ["centre_of_mass_offset=0,y={}", "wheel_radius_mismatch={}"])
+def test_mirrored_asymmetry_mirrors_the_drive(drive, straight, effect):
+    commands, state = straight(0.7)
+    left = drive([effect.format(0.04)], commands, initial_state=state)
+    right = drive([effect.format(-0.04)], commands, initial_state=state)
+    np.testing.assert_allclose(left["yaw_rate"], -right["yaw_rate"], atol=1e-7)
+    np.testing.assert_allclose(left["specific_force_x"], right["specific_force_x"], atol=1e-4)
+    assert abs(left["yaw_rate"][-1]) > 5e-6
+
+
+def test_offset_to_the_left_drags_the_robot_left(drive, straight):
+    """The heavier bank sinks deeper and resists more: a little, while its speed loop holds it, more as it droops."""
+    commands, state = straight(0.7)
+    offset = "centre_of_mass_offset=0,y=0.1"
+    held = drive([offset], commands, initial_state=state)["yaw_rate"][-1]
+    drooping = drive([offset, "motor_droop=0.001"], commands, initial_state=state)["yaw_rate"][-1]
+    assert drooping > 10 * held > 1e-4
+
+
+def test_radius_mismatch_turns_with_the_same_curvature_at_every_speed(drive, straight):
+    curvatures = []
+    for speed in (0.4, 1.2):
+        commands, state = straight(speed, 500)
+        columns = drive(["wheel_radius_mismatch=0.02"], commands, initial_state=state)
+        np.testing.assert_allclose(columns["encoder_right"], columns["encoder_left"], atol=1e-12)
+        curvatures.append(columns["yaw_rate"][-1] / columns["true_v_x"][-1])
+    assert curvatures[0] == pytest.approx(curvatures[1], rel=0.01)
+    # no faster than without side slip, and no slower than the widest effective track of fielded robots allows
+    kinematic = 0.02 / (2 * get_robot("ddagr").half_track)
+    assert 0.4 * kinematic < curvatures[0] < kinematic
+
+
+def test_radius_mismatch_gives_the_stated_radii(act, turning_row):
+    row = act(parse_effect("wheel_radius_mismatch=0.1"), turning_row)
+    radius = row[layout.WHEEL : layout.WHEEL + 4] + row[layout.WHEEL + 8 : layout.WHEEL + 12]
+    nominal = 0.2794
+    np.testing.assert_allclose(radius, nominal * np.array([1.05, 0.95, 1.05, 0.95]))
+
+
+@pytest.mark.parametrize(("effect", "force"), [("towed_drag=60", 60.0), ("viscous_drag=300", None)])
+def test_wheels_pull_the_drag_in_steady_travel(drive, straight, effect, force):
+    commands, state = straight(0.7, 800)
+    columns = drive([effect], commands, initial_state=state)
+    pull = sum(columns[f"true_force_x_{wheel}"][-1] for wheel in (1, 2, 3, 4))
+    speed = columns["true_v_x"][-1]
+    expected = 300.0 * speed if force is None else force * speed / np.hypot(speed, 0.01)
+    assert pull == pytest.approx(expected, rel=1e-3)
+
+
+def test_hitch_behind_the_robot_steadies_yaw(drive):
+    commands = np.tile((0.8, 0.5), (500, 1))
+    rates = [drive([f"towed_drag=80,hitch_distance={d}"], commands)["yaw_rate"][-1] for d in (0.0, 0.5, 1.0)]
+    assert rates[0] > rates[1] > rates[2] > 0
+
+
+@given(v_x=FINITE, v_y=FINITE, yaw_rate=FINITE, hitch=st.floats(0.0, 5.0), size=st.floats(0.0, 2000.0))
+def test_drags_take_power(v_x, v_y, yaw_rate, hitch, size):
+    for effect in (parse_effect(f"towed_drag={size},hitch_distance={hitch}"), parse_effect(f"viscous_drag={size}")):
+        row = np.zeros(layout.SIZE)
+        row[layout.V_X], row[layout.V_Y], row[layout.YAW_RATE] = v_x, v_y, yaw_rate
+        effect.actions[0][1](row, effect.vector(), np.zeros(layout.EFFECT_MEMORY))
+        force = row[layout.BODY_FORCE : layout.BODY_FORCE + 3]
+        assert force @ (v_x, v_y, yaw_rate) <= 1e-12
+
+
+def test_effects_of_the_robot_add_up(robot, soil):
+    """Two payloads are one of both masses at their common centre."""
+    row = settled(robot, soil, ["payload=10,x=0.2,y=0.1,height=0.5", "payload=30,x=-0.2,y=0.1,height=0.9"])
+    other = settled(robot, soil, ["payload=40,x=-0.1,y=0.1,height=0.8"])
+    np.testing.assert_allclose(row[layout.LOAD : layout.LOAD + 4], other[layout.LOAD : layout.LOAD + 4], rtol=1e-9)
+    # the two have an inertia of their own about it
+    own = 10 * 30 / 40 * 0.4**2
+    assert row[layout.YAW_INERTIA] - other[layout.YAW_INERTIA] == pytest.approx(own)
