@@ -45,7 +45,7 @@ def _check_field(owner: object, name: str, metadata: Mapping[str, Any]) -> None:
 
 
 def _check_number(place: str, value: object, metadata: Mapping[str, Any]) -> None:
-    if not isinstance(value, Real) or isinstance(value, bool):
+    if isinstance(value, bool) or not isinstance(value, Real):
         raise InputError(f"{place} is {value!r}: give a number in {metadata['unit']}.")
     number = float(value)
     below = number <= metadata["low"] if metadata["open_low"] else number < metadata["low"]
@@ -318,7 +318,12 @@ class Numerics(Validated):
     def _check(self) -> None:
         if not isinstance(self.section_nodes, int) or self.section_nodes not in range(8, 65, 8):
             raise InputError(f"Numerics.section_nodes is {self.section_nodes!r}: give 8, 16, 24 ... 64.")
-        for name, high in (("contact_nodes", 64), ("jacobian_contact_nodes", 64), ("substeps", 1000), ("launch_substeps", 1000)):
+        for name, high in (
+            ("contact_nodes", 64),
+            ("jacobian_contact_nodes", 64),
+            ("substeps", 1000),
+            ("launch_substeps", 1000),
+        ):
             value = getattr(self, name)
             if not isinstance(value, int) or isinstance(value, bool) or not 1 <= value <= high:
                 raise InputError(f"Numerics.{name} is {value!r}: give a whole number from 1 to {high}.")

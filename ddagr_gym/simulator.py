@@ -59,7 +59,9 @@ Soils = Soil | Sequence[Soil]
 def _soils(soil: Soils) -> Array:
     per_wheel = [soil] * 4 if isinstance(soil, Soil) else list(soil)
     if len(per_wheel) != 4:
-        raise InputError(f"{len(per_wheel)} soils given: give one for all wheels, or four (1 front right ... 4 rear left).")
+        raise InputError(
+            f"{len(per_wheel)} soils given: give one for all wheels, or four (1 front right ... 4 rear left)."
+        )
     return np.concatenate([soil_vector(item) for item in per_wheel])
 
 
@@ -234,7 +236,9 @@ class Simulator:
             self.rows[np.ix_(indices, np.arange(index, index + size))] = 0.0
         self.effect_memory[indices] = 0.0
         workspace, scratch = self._scratch[0][:2]
-        settle_rows(self.rows, indices, *self._ground(), *self._effects(), self._options, *self._rules, workspace, scratch)
+        settle_rows(
+            self.rows, indices, *self._ground(), *self._effects(), self._options, *self._rules, workspace, scratch
+        )
 
     def _ground(self) -> tuple[Array, Array, NDArray[np.int64]]:
         return self._fields, self._field_geometry, self.field_index
@@ -242,7 +246,9 @@ class Simulator:
     def _effects(self) -> tuple[NDArray[np.int64], NDArray[np.int64], Array, Array]:
         return self._points, self._addresses, self.effect_parameters, self.effect_memory
 
-    def advance(self, commands: Array, noise: Array, recorded: NDArray[np.int64], readings: Array, record: Array) -> None:
+    def advance(
+        self, commands: Array, noise: Array, recorded: NDArray[np.int64], readings: Array, record: Array
+    ) -> None:
         """Advance all environments by the samples in ``noise``, without checks; see :func:`advance_rows`.
 
         Args:
@@ -353,7 +359,7 @@ def simulate(
     simulator.reset(state=initial_state)
     noise = np.random.default_rng(seed).standard_normal((1, len(given), layout.NOISE_CHANNELS))
     readings, record = simulator.step(given[None], noise, recorded=list(TRUTH.values()))
-    columns = {"t": sensors.period * np.arange(1, len(given) + 1)}
+    columns: dict[str, Array] = {"t": np.arange(1.0, len(given) + 1.0) * sensors.period}
     columns |= {"command_right": given[:, 0].copy(), "command_left": given[:, 1].copy()}
     columns |= {name: readings[0, :, i].copy() for i, name in enumerate(layout.READINGS)}
     columns |= {name: record[0, :, i].copy() for i, name in enumerate(TRUTH)}

@@ -65,7 +65,7 @@ def _drive(row: Array, command: Array, points: Integers, addresses: Integers, pa
 @kernel()
 def _division(row: Array, least: int, maximum_step: float, launch_substeps: int, launch_change: float) -> int:
     """Steps for the coming sample: more while a bank's rim speed changes fast against the wheel's speed."""
-    substeps = max(least, int(math.ceil(row[SAMPLE_PERIOD] / maximum_step - 1e-9)))
+    substeps = max(least, math.ceil(row[SAMPLE_PERIOD] / maximum_step - 1e-9))
     step = row[SAMPLE_PERIOD] / substeps
     for bank in range(2):
         rim = row[WHEEL + bank] + row[WHEEL + 8 + bank]
@@ -175,7 +175,8 @@ def advance_rows(
             for _ in range(steps):
                 advance_body(
                     row, step, numerics[0], numerics[1], numerics[2], numerics[3], numerics[5], section, contact,
-                    coarse, workspace, scratch, jacobian[:3], jacobian[3:], saved, points, addresses, parameters[n], memory[n],
+                    coarse, workspace, scratch, jacobian[:3], jacobian[3:], saved, points, addresses,
+                    parameters[n], memory[n],
                 )  # fmt: skip
             _average_motion(row, v_x, v_y, yaw_rate)
             read_imu(row, noise[n, k, 0:3])

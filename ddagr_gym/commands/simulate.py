@@ -13,7 +13,7 @@ from ddagr_gym.errors import InputError
 
 EXAMPLES = (
     "ddagr simulate --manoeuvre table_6_2 --soil thesis_a1 --output run.parquet",
-    "ddagr simulate --manoeuvre arcs --soil sandy_loam_lll_15 --effect towed_drag=80 --effect slope=0.05 --figure arcs.png",
+    "ddagr simulate --manoeuvre arcs --soil lete_sand_wong --effect towed_drag=80 --effect slope=0.05 --video a.mp4",
     "ddagr simulate --manoeuvre commands.csv --robot husky --soil firm_ground --output run.csv --video run.mp4",
 )
 

@@ -16,6 +16,7 @@ from ddagr_gym.physics.soil_draws import SoilDistribution, distribution_names, g
 from ddagr_gym.presets import get_robot, get_soil, soil_names
 
 DEFAULT_SOIL = "thesis_a1_range"
+DEFAULT_REWARD = RewardWeights()
 INFO_LEVELS = ("small", "full")
 
 Effects = str | Path | Effect | Iterable[str | Effect]
@@ -47,7 +48,7 @@ def make_settings(
     speed: float = 0.20,
     sensors: Sensors = Sensors(),
     randomisation: bool | Randomisation = True,
-    reward: RewardWeights = RewardWeights(),
+    reward: RewardWeights = DEFAULT_REWARD,
     effects: Effects = (),
     numerics: Numerics = Numerics(),
 ) -> TurnSettings:

@@ -34,7 +34,9 @@ class SceneHistory:
         """The present instant."""
         row = self._batch.simulator.rows[0]
         track = np.array(self._track)
-        speed, angle, command = (tuple(map(float, row[i : i + 2])) for i in (layout.OMEGA, layout.WHEEL_ANGLE, layout.COMMAND))
+        speed, angle, command = (
+            tuple(map(float, row[i : i + 2])) for i in (layout.OMEGA, layout.WHEEL_ANGLE, layout.COMMAND)
+        )
         slip = tuple(float(v) for v in row[layout.SLIP_RATIO : layout.SLIP_RATIO + 4])
         return Scene(
             stage=self._stage,
@@ -45,5 +47,5 @@ class SceneHistory:
             command=(command[0], command[1]),
             slip_ratio=(slip[0], slip[1], slip[2], slip[3]),
             wheel_angle=(angle[0], angle[1]),
-            radius=running_radius(*track.T, self._turn.side),
+            radius=running_radius(track[:, 0], track[:, 1], track[:, 2], self._turn.side),
         )

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field, fields, replace
 import numpy as np
 
 from ddagr_gym.control.row_turn import SIDES, RowTurn
-from ddagr_gym.errors import InputError, unknown_name
+from ddagr_gym.errors import unknown_name
 from ddagr_gym.parameters import Imu, Numerics, Robot, Sensors, Soil, Validated, bounded
 from ddagr_gym.physics.effects import Effect
-from ddagr_gym.physics.soil_draws import SoilDistribution, draw_soil, soil_field
+from ddagr_gym.physics.soil_draws import SoilDistribution, draw_soil, get_distribution, soil_field
 from ddagr_gym.physics.terrain import SoilField
 from ddagr_gym.presets import ddagr
 
@@ -111,7 +111,7 @@ class TurnSettings(Validated):
     """
 
     robot: Robot = field(default_factory=ddagr)
-    soil: Soil | SoilDistribution | None = None
+    soil: Soil | SoilDistribution = field(default_factory=lambda: get_distribution("thesis_a1_range"))
     radius: float | tuple[float, float] = 0.80
     side: str = "random"
     run_in: float = bounded("m", 0.0, 5.0, default=0.5)
@@ -124,8 +124,6 @@ class TurnSettings(Validated):
     numerics: Numerics = Numerics()
 
     def _check(self) -> None:
-        if self.soil is None:
-            raise InputError("TurnSettings.soil is missing: give a soil or a soil distribution.")
         if self.side != "random" and self.side not in SIDES:
             raise unknown_name("side", self.side, [*SIDES, "random"])
         for radius in np.atleast_1d(np.asarray(self.radius, dtype=float)):

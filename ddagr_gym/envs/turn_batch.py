@@ -45,9 +45,7 @@ class TurnBatch:
         terms: (N, len(TERMS)) unweighted reward terms of the last interval.
     """
 
-    def __init__(
-        self, settings: TurnSettings, count: int = 1, threads: int = 1, recorded: Sequence[int] = ()
-    ) -> None:
+    def __init__(self, settings: TurnSettings, count: int = 1, threads: int = 1, recorded: Sequence[int] = ()) -> None:
         self.settings = settings
         self.count = count
         self.simulator = Simulator(
@@ -104,7 +102,9 @@ class TurnBatch:
     def _episode_option(options: dict[str, Any] | None) -> Episode | None:
         unknown = set(options or {}) - {"episode", "reset_mask"}
         if unknown:
-            raise InputError(f"reset option {sorted(unknown)[0]!r} is unknown: the options are 'episode', 'reset_mask'.")
+            raise InputError(
+                f"reset option {sorted(unknown)[0]!r} is unknown: the options are 'episode', 'reset_mask'."
+            )
         episode = (options or {}).get("episode")
         if episode is not None and not isinstance(episode, Episode):
             raise InputError(f"reset option 'episode' is {episode!r}: give a ddagr_gym.envs.Episode.")
@@ -180,4 +180,3 @@ def check_action(action: Any, shape: tuple[int, ...]) -> Array:
     if not np.isfinite(values).all():
         raise InputError(f"action {values.tolist()} is not finite: give numbers in [-1, 1].")
     return np.clip(values, -1.0, 1.0)
-

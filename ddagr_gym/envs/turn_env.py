@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -77,13 +77,13 @@ class TurnEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     v0: first.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 12.5}
+    metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 12.5}  # noqa: RUF012
 
     def __init__(self, render_mode: str | None = None, info_level: str = "small", **settings: Any) -> None:
         self.render_mode = check_mode(render_mode, self.metadata["render_modes"])
         self.info_level = check_info_level(info_level)
         self.settings = make_settings(**settings)
-        self.action_space = action_space()
+        self.action_space = action_space()  # type: ignore[assignment]
         self.batch = TurnBatch(self.settings)
         self.observation_space = self.batch.observation_space
         self._rewards = np.zeros(1)

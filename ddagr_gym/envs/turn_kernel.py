@@ -181,7 +181,9 @@ def observe(task: Array, readings: Array, outer_radius: float, observation: NDAr
 
 
 @kernel()
-def judge(task: Array, row: Array, action: Array, readings: Array, record: Array, weights: Array, terms: Array) -> float:
+def judge(
+    task: Array, row: Array, action: Array, readings: Array, record: Array, weights: Array, terms: Array
+) -> float:
     """Reward of one control interval; updates the task vector.
 
     Args:

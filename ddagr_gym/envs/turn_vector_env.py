@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -41,8 +41,7 @@ class TurnVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]):
         settings: as :class:`TurnEnv`.
     """
 
-    metadata: dict[str, Any] = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}
-    spec: ClassVar[Any] = None
+    metadata: dict[str, Any] = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
 
     def __init__(
         self,
@@ -75,7 +74,7 @@ class TurnVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]):
         self._steps = np.zeros(num_envs, dtype=np.int64)
         self._ended = np.zeros(num_envs, dtype=np.bool_)
 
-    @property
+    @property  # type: ignore[misc]
     def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
         """Generators, one per environment."""
         self._seed(None)
@@ -125,7 +124,12 @@ class TurnVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]):
         mask = (options or {}).get("reset_mask")
         if mask is None:
             return np.arange(self.num_envs)
-        if not isinstance(mask, np.ndarray) or mask.shape != (self.num_envs,) or mask.dtype != np.bool_ or not mask.any():
+        if (
+            not isinstance(mask, np.ndarray)
+            or mask.shape != (self.num_envs,)
+            or mask.dtype != np.bool_
+            or not mask.any()
+        ):
             raise InputError(f"reset_mask is {mask!r}: give a boolean array ({self.num_envs},) with one True at least.")
         return np.flatnonzero(mask)
 

@@ -67,7 +67,7 @@ def turning_speeds(robot: Robot, soil: Soil, speed: float, curvature: float) -> 
     if np.abs(found.fun).max() > 2e-3:
         raise InputError(
             f"no bank speeds within {limit:g} rad/s turn robot {robot.name!r} at {speed:g} m/s and radius "
-            f"{1 / abs(curvature) if curvature else math.inf:g} m on this soil: choose a lower speed or a larger radius."
+            f"{1 / abs(curvature) if curvature else math.inf:g} m on this soil: choose a lower speed or a wider turn."
         )
     return float(found.x[0]), float(found.x[1])
 

@@ -49,9 +49,7 @@ class TurnRun:
     total_reward: float
 
 
-def drive_turn(
-    controller: Controller, settings: TurnSettings, seed: int, episode: Episode | None = None
-) -> TurnRun:
+def drive_turn(controller: Controller, settings: TurnSettings, seed: int, episode: Episode | None = None) -> TurnRun:
     """Drive one turn to its end; the same seed gives the same bits as the environment of that seed.
 
     Args:
@@ -86,8 +84,8 @@ def drive_turn(
 
 
 def _columns(episode: Episode, commands: Array, readings: Array, records: Array) -> dict[str, Array]:
-    columns = {"t": episode.sensors.period * np.arange(1, len(commands) + 1)}
-    columns |= {"command_right": commands[:, 0], "command_left": commands[:, 1]}
+    columns: dict[str, Array] = {"t": np.arange(1.0, len(commands) + 1.0) * episode.sensors.period}
+    columns |= {"command_right": commands[:, 0].copy(), "command_left": commands[:, 1].copy()}
     columns |= {name: readings[:, i].copy() for i, name in enumerate(layout.READINGS)}
     columns |= {name: records[:, 3 + i].copy() for i, name in enumerate(TRUTH)}
     return columns

@@ -51,12 +51,12 @@ from ddagr_gym.physics.layout import (
     WHEEL_V_Y,
     WHEEL_X,
     WHEEL_Y,
-    X,
-    Y,
     YAW,
     YAW_INERTIA,
     YAW_MOMENT,
     YAW_RATE,
+    X,
+    Y,
 )
 from ddagr_gym.physics.sinkage import solve_sinkage
 
@@ -262,9 +262,7 @@ def sum_extra(row: Array, total: Array) -> None:
         total[0] += row[EXTRA_FORCE_X + i]
         total[1] += row[EXTRA_FORCE_Y + i]
         total[2] += (
-            hub_x(row, i) * row[EXTRA_FORCE_Y + i]
-            - hub_y(row, i) * row[EXTRA_FORCE_X + i]
-            + row[EXTRA_YAW_MOMENT + i]
+            hub_x(row, i) * row[EXTRA_FORCE_Y + i] - hub_y(row, i) * row[EXTRA_FORCE_X + i] + row[EXTRA_YAW_MOMENT + i]
         )
 
 

@@ -47,11 +47,11 @@ from ddagr_gym.physics.layout import (
     V_Y,
     WHEEL,
     WHEEL_V_X,
-    X,
-    Y,
     YAW,
     YAW_INERTIA,
     YAW_RATE,
+    X,
+    Y,
 )
 
 Array = NDArray[np.float64]
@@ -137,9 +137,21 @@ def _invert(matrix: Array, inverse: Array) -> None:
     d, e, f = matrix[1, 0], matrix[1, 1], matrix[1, 2]
     g, h, i = matrix[2, 0], matrix[2, 1], matrix[2, 2]
     scale = 1.0 / (a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g))
-    inverse[0, 0], inverse[0, 1], inverse[0, 2] = (e * i - f * h) * scale, (c * h - b * i) * scale, (b * f - c * e) * scale
-    inverse[1, 0], inverse[1, 1], inverse[1, 2] = (f * g - d * i) * scale, (a * i - c * g) * scale, (c * d - a * f) * scale
-    inverse[2, 0], inverse[2, 1], inverse[2, 2] = (d * h - e * g) * scale, (b * g - a * h) * scale, (a * e - b * d) * scale
+    inverse[0, 0], inverse[0, 1], inverse[0, 2] = (
+        (e * i - f * h) * scale,
+        (c * h - b * i) * scale,
+        (b * f - c * e) * scale,
+    )
+    inverse[1, 0], inverse[1, 1], inverse[1, 2] = (
+        (f * g - d * i) * scale,
+        (a * i - c * g) * scale,
+        (c * d - a * f) * scale,
+    )
+    inverse[2, 0], inverse[2, 1], inverse[2, 2] = (
+        (d * h - e * g) * scale,
+        (b * g - a * h) * scale,
+        (a * e - b * d) * scale,
+    )
 
 
 @kernel()
@@ -165,7 +177,7 @@ def _w_step(
     row: Array, step: float, refresh: float, tolerance: float, shear_rate: float, rest_speed: float, section: Array,
     contact: Array, coarse: Array, workspace: Array, scratch: Array, jacobian: Array, inverse: Array,
     effect_points: NDArray[np.int64], effect_addresses: NDArray[np.int64], parameters: Array, memory: Array,
-) -> None:  # fmt: skip
+) -> float:  # fmt: skip
     """One W-step; returns the size of the embedded error estimate [m/s]. Arguments as :func:`advance_body`."""
     start, first, second = scratch[4], scratch[5], scratch[6]
     drift = scratch[3]

@@ -76,10 +76,7 @@ def solve_sinkage(
             power = min(max((log_force - last_log_force) / (log_sinkage - last_log_sinkage), 0.2), 5.0)
         last_log_sinkage = log_sinkage
         last_log_force = log_force
-        if force > 0.0:
-            sinkage = math.exp(log_sinkage + (math.log(load) - log_force) / power)
-        else:
-            sinkage = high
+        sinkage = math.exp(log_sinkage + (math.log(load) - log_force) / power) if force > 0.0 else high
         if sinkage >= high and high == wheel[0]:
             sinkage = high
         elif not low < sinkage < high or iteration % 8 == 7:

@@ -183,21 +183,17 @@ def draw_soil(
 def immobilises(soil: Soil, robot: Robot, *, turn_radius: float = 0.8) -> bool:
     """Whether ``robot`` cannot drive or turn on a soil, by the balance of forces at steady speed (ours).
 
-    True when, at the static load of the heaviest wheel, (1) a wheel is bogged at a slip from 0 to 1 or in the turn;
-    (2) no slip gives net traction; or (3) no pair of bank slips up to 0.9 keeps both the speed and the yaw rate of a
-    turn of ``turn_radius`` [m] without side slip of the body origin. It errs towards True: a little side slip lets some
-    robots turn that it gives up.
+    True when, at the static load of the heaviest wheel, (1) a wheel is bogged at a slip from 0 to 1; (2) no slip gives
+    net traction; or (3) no pair of bank slips up to 0.9 keeps, with no wheel bogged, both the speed and the yaw rate of
+    a turn of ``turn_radius`` [m] without side slip of the body origin.
     """
     forward, bogged = _straight_pull(soil, robot)
     if bogged or forward <= 0.0:
         return True
     yaw_rate = _SPEED / max(turn_radius, _TIGHTEST * robot.half_track)
-    outer, outer_bogged = _turning_wrench(soil, robot, yaw_rate, 1.0, _OUTER_SLIPS)
-    inner, inner_bogged = _turning_wrench(soil, robot, yaw_rate, -1.0, _INNER_SLIPS)
-    if outer_bogged or inner_bogged:
-        return True
-    pull = outer[0][:, None] + inner[0][None, :]
-    moment = outer[1][:, None] + inner[1][None, :]
+    outer = _turning_wrench(soil, robot, yaw_rate, 1.0, _OUTER_SLIPS)
+    inner = _turning_wrench(soil, robot, yaw_rate, -1.0, _INNER_SLIPS)
+    pull, moment = (outer[k][:, None] + inner[k][None, :] for k in (0, 1))
     return not bool(((pull >= 0.0) & (moment >= 0.0)).any())
 
 
@@ -218,12 +214,12 @@ def _wheel_speed(v_x: Array, slip: Array, radius: float) -> tuple[Array, Array]:
 
 def _carried(
     soil: Soil, robot: Robot, v_x: Array, v_y: Array, omega: Array, yaw_rate: float
-) -> tuple[Array, Array, bool]:
-    """Forces (..., 3) and yaw moments of a wheel at the sinkage that carries it, and whether any is bogged."""
+) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Forces (..., 3) and yaw moments of a wheel at the sinkage that carries it, and where it is bogged."""
     wheel, load = robot.wheels[0], _static_load(robot)
     sinkage, status = equilibrium_sinkage(wheel, soil, v_x, v_y, omega, yaw_rate, load, numerics=_COARSE)
     result = wheel_force(wheel, soil, v_x, v_y, omega, yaw_rate, sinkage, numerics=_COARSE)
-    return result.force, result.yaw_moment, bool((status == SinkageStatus.BOGGED).any())
+    return result.force, result.yaw_moment, np.asarray(status == SinkageStatus.BOGGED)
 
 
 def _straight_pull(soil: Soil, robot: Robot) -> tuple[float, bool]:
@@ -231,15 +227,13 @@ def _straight_pull(soil: Soil, robot: Robot) -> tuple[float, bool]:
     radius = robot.wheels[0].outer_radius
     v_x, omega = _wheel_speed(np.full(_STRAIGHT_SLIPS.size, _SPEED), _STRAIGHT_SLIPS, radius)
     force, _, bogged = _carried(soil, robot, v_x, np.zeros_like(v_x), omega, 0.0)
-    return float(force[:, 0].max()), bogged
+    return float(force[:, 0].max()), bool(bogged.any())
 
 
-def _turning_wrench(
-    soil: Soil, robot: Robot, yaw_rate: float, bank: float, slips: Array
-) -> tuple[tuple[Array, Array], bool]:
+def _turning_wrench(soil: Soil, robot: Robot, yaw_rate: float, bank: float, slips: Array) -> tuple[Array, Array]:
     """Pull and moment about the body origin of one bank's two wheels at each slip, in a left turn.
 
-    ``bank`` is 1 for the outer (right) one, -1 for the inner.
+    ``bank`` is 1 for the outer (right) one, -1 for the inner. Minus infinity where a wheel is bogged.
     """
     y = -bank * robot.half_track
     hub = np.full(slips.size, _SPEED - yaw_rate * y)
@@ -250,7 +244,8 @@ def _turning_wrench(
         soil, robot, np.broadcast_to(v_x, v_y.shape), v_y, np.broadcast_to(omega, v_y.shape), yaw_rate
     )
     moment = (x * force[..., 1] - y * force[..., 0] + own).sum(axis=0)
-    return (force[..., 0].sum(axis=0), moment), bogged
+    stuck = bogged.any(axis=0)
+    return np.where(stuck, -np.inf, force[..., 0].sum(axis=0)), np.where(stuck, -np.inf, moment)
 
 
 # Soil that varies from place to place

@@ -32,7 +32,7 @@ class SoilField:
     def __post_init__(self) -> None:
         if self.values.ndim != 3 or self.values.shape[2] != len(SOIL_PARAMETERS) or min(self.values.shape[:2]) < 2:
             raise InputError(
-                f"SoilField.values has shape {self.values.shape}: give (nx, ny, {len(SOIL_PARAMETERS)}), nx and ny >= 2."
+                f"SoilField.values has shape {self.values.shape}: give (nx, ny, {len(SOIL_PARAMETERS)}), nx, ny >= 2."
             )
         if not np.isfinite(self.values).all():
             raise InputError("SoilField.values contains NaN or infinity: give finite soil parameters.")
@@ -43,9 +43,7 @@ class SoilField:
             )
 
     @classmethod
-    def sample(
-        cls, soil_at: Callable[[float, float], Soil], x: ArrayLike, y: ArrayLike
-    ) -> SoilField:
+    def sample(cls, soil_at: Callable[[float, float], Soil], x: ArrayLike, y: ArrayLike) -> SoilField:
         """Field from a function of place, sampled on evenly spaced ``x`` (nx,) and ``y`` (ny,) [m]."""
         xs, ys = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
         if xs.size < 2 or ys.size < 2:

@@ -146,9 +146,7 @@ def wheel_force(
     Raises:
         InputError: a value that is not finite, shapes that do not broadcast, a sinkage outside its range.
     """
-    states, shape = _broadcast(
-        ("v_x", "v_y", "omega", "yaw_rate", "sinkage"), (v_x, v_y, omega, yaw_rate, sinkage)
-    )
+    states, shape = _broadcast(("v_x", "v_y", "omega", "yaw_rate", "sinkage"), (v_x, v_y, omega, yaw_rate, sinkage))
     outside = (states[:, 4] <= 0) | (states[:, 4] > wheel.minor_radius)
     if outside.any():
         raise InputError(

@@ -28,10 +28,12 @@ class Refit:
         deviations: (P,) Gauss-Newton standard deviations; resampled intervals are wider and more honest.
         states: (W, 8) initial states.
         prediction: (W, T, 8).
-        cost: half the sum of squares of weighted residuals, priors included.
+        cost: half the sum of squares of weighted residuals (Huber's loss where asked for), priors included.
         iterations: Gauss-Newton steps taken.
         converged: whether the last step lowered the cost by less than the tolerance, relative.
         at_bound: names of parameters that sit at a bound.
+        window_deviations: (P,) the same from the scatter of the windows' scores (sandwich), which allows for
+            correlated residuals inside a window.
     """
 
     values: Array
@@ -42,6 +44,7 @@ class Refit:
     iterations: int
     converged: bool
     at_bound: tuple[str, ...]
+    window_deviations: Array
 
 
 def weighted(measured: Array, prediction: Array, sigma: Array) -> Array:
@@ -81,6 +84,8 @@ class Refitter:
         sigma: (8,) or (W, T, 8) standard deviations of the channels; infinity leaves a channel out.
         effects: missing physics that stays fixed.
         progress: called after each iteration.
+        robust: size of a weighted residual from which its cost grows linearly (P. J. Huber, Ann. Math. Statist. 35
+            (1964) 73); infinity for plain least squares.
     """
 
     def __init__(
@@ -89,6 +94,7 @@ class Refitter:
         sigma: Array,
         effects: Sequence[Effect] = (),
         progress: Callable[[], None] = lambda: None,
+        robust: float = np.inf,
     ) -> None:
         self.model = model
         windows = model.windows
@@ -96,6 +102,7 @@ class Refitter:
         self._mask = (np.isfinite(windows.measured) & np.isfinite(self._sigma)).astype(float)
         self._effects = tuple(effects)
         self._progress = progress
+        self._robust = robust
         self._prior = np.array([p.prior for p in model.parameters])
         self._low = np.array([p.low for p in model.parameters])
         self._high = np.array([p.high for p in model.parameters])
@@ -104,7 +111,11 @@ class Refitter:
         prediction = self.model.predict(values, states, self._effects)
         residual = weighted(self.model.windows.measured, prediction, self._sigma) * self._mask
         start = (states - self.model.windows.initial) / STATE_PRIOR
-        cost = 0.5 * float((residual**2).sum() + ((values / self._prior) ** 2).sum() + (start**2).sum())
+        size = np.abs(residual)
+        # inf - inf where the loss is quadratic throughout
+        linear = self._robust * (2.0 * size - self._robust) if np.isfinite(self._robust) else size**2
+        misfit = np.where(size <= self._robust, size**2, linear).sum()
+        cost = 0.5 * float(misfit + ((values / self._prior) ** 2).sum() + (start**2).sum())
         return cost if np.isfinite(cost) else np.inf, prediction
 
     def fit(
@@ -115,10 +126,10 @@ class Refitter:
         states = self.model.windows.initial.copy() if states is None else states.copy()
         cost, prediction = self._cost(values, states)
         converged, done = False, 0
-        information = np.diag(1.0 / self._prior**2)
+        information, scores = np.diag(1.0 / self._prior**2), np.zeros((1, len(values)))
         for _ in range(iterations):
             done += 1
-            d_values, d_states, information = self._step(values, states, prediction)
+            d_values, d_states, information, scores = self._step(values, states, prediction)
             before = cost
             for damping in _DAMPING:
                 tried = np.clip(values + damping * d_values, self._low, self._high)
@@ -132,27 +143,37 @@ class Refitter:
             if before - cost < tolerance * cost:
                 converged = True
                 break
-        deviations = np.sqrt(np.diag(np.linalg.inv(information)))
+        covariance = np.linalg.inv(information)
+        spread = scores @ covariance
         bound = (values <= self._low + 1e-9) | (values >= self._high - 1e-9)
         names = tuple(p.name for p, stuck in zip(self.model.parameters, bound, strict=True) if stuck)
-        return Refit(values, deviations, states, prediction, cost, done, converged, names)
+        return Refit(
+            values, np.sqrt(np.diag(covariance)), states, prediction, cost, done, converged, names,
+            np.sqrt((spread**2).sum(axis=0)),
+        )  # fmt: skip
 
     def linearise(self, values: Array, states: Array, prediction: Array) -> tuple[Array, Array, Array, Array]:
-        """Weighted residual (W, M), state Jacobian (W, M, 8), parameter Jacobian (W, M, P) and mask (W, M)."""
+        """Weighted residual (W, M), state Jacobian (W, M, 8), parameter Jacobian (W, M, P) and mask (W, M).
+
+        The mask is 0 where there is no sample; with a robust loss it holds the root of each residual's weight.
+        """
         count = self.model.windows.count
         residual = weighted(self.model.windows.measured, prediction, self._sigma)
         by_state = self.model.state_derivatives(values, states, prediction, self._effects)
         by_value = self.model.parameter_derivatives(values, states, prediction, self._effects)
         scale = self._sigma[..., None]
+        mask = self._mask * np.sqrt(self._robust / np.maximum(np.abs(residual), self._robust)) if np.isfinite(
+            self._robust
+        ) else self._mask
         flat = (count, -1)
         return (
             residual.reshape(flat),
             (by_state / scale).reshape(count, -1, by_state.shape[-1]),
             (by_value / scale).reshape(count, -1, by_value.shape[-1]),
-            self._mask.reshape(flat),
+            mask.reshape(flat),
         )
 
-    def _step(self, values: Array, states: Array, prediction: Array) -> tuple[Array, Array, Array]:
+    def _step(self, values: Array, states: Array, prediction: Array) -> tuple[Array, Array, Array, Array]:
         residual, by_state, by_value, mask = self.linearise(values, states, prediction)
         # further rows: the prior pulls the states towards their first guess
         offset = (self.model.windows.initial - states) / STATE_PRIOR
@@ -160,9 +181,10 @@ class Refitter:
         left = np.concatenate([by_value * mask[..., None], np.zeros((*offset.shape, len(values)))], axis=1)
         columns, explained = project(np.concatenate([right[..., None], left], axis=2), with_prior(by_state, mask))
         r, b = columns[..., 0], columns[..., 1:]
-        information = np.einsum("wmp,wmq->pq", b, b) + np.diag(1.0 / self._prior**2)
-        gradient = np.einsum("wmp,wm->p", b, r) - values / self._prior**2
+        information = np.tensordot(b, b, axes=((0, 1), (0, 1))) + np.diag(1.0 / self._prior**2)
+        scores = np.einsum("wmp,wm->wp", b, r)
+        gradient = scores.sum(axis=0) - values / self._prior**2
         d_values = np.linalg.solve(information, gradient)
         d_values = np.clip(values + d_values, self._low, self._high) - values
         d_states = explained[..., 0] - explained[..., 1:] @ d_values
-        return d_values, d_states, information
+        return d_values, d_states, information, scores

@@ -30,7 +30,7 @@ class TurnVecEnv(VecEnv):
         observations, _ = self.env.reset(seed=seeds)
         self._reset_seeds()
         self._reset_options()
-        self.reset_infos = [{} for _ in range(self.num_envs)]
+        self.reset_infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         return observations
 
     def step_async(self, actions: np.ndarray) -> None:
@@ -80,7 +80,7 @@ class TurnVecEnv(VecEnv):
         """No pictures: the batch does not render."""
         return [None for _ in range(self.num_envs)]
 
-    def _get_indices(self, indices: None | int | Iterable[int]) -> Iterable[int]:
+    def _get_indices(self, indices: int | Iterable[int] | None) -> Iterable[int]:
         return super()._get_indices(indices)
 
 
