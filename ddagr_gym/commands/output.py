@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import stat
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -16,46 +15,21 @@ from pathlib import Path
 from typing import Any
 
 from ddagr_gym.errors import InputError
+from ddagr_gym.files import atomic_path, make_folder
+
+__all__ = [
+    "atomic_path",
+    "format_fields",
+    "format_table",
+    "format_value",
+    "make_folder",
+    "output_folder",
+    "write_bytes",
+    "write_text",
+]
 
 FOLDER_MARK = ".ddagr-output"
 """Empty file in every folder that a command wrote; only such a folder is ever replaced."""
-
-
-@contextmanager
-def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Path to write to in place of ``path``, moved there when the block ends without an error.
-
-    The temporary file stands in the same folder and keeps the suffix (writers choose a format by it); parent folders
-    are made. After an error it is removed and ``path`` is as it was.
-
-    Raises:
-        InputError: ``path`` is a folder or a device, or a part of it is a file.
-    """
-    final = Path(path).expanduser()
-    final = final.resolve() if final.is_symlink() else final
-    if final.is_dir():
-        raise InputError(f"{final} is a folder: give the path of a file.")
-    if final.exists() and not stat.S_ISREG(final.stat().st_mode):
-        raise InputError(f"{final} is not a regular file: give another path.")
-    make_folder(final.parent)
-    handle, name = tempfile.mkstemp(prefix=f".{final.stem}-", suffix=final.suffix, dir=final.parent)
-    os.close(handle)
-    temporary = Path(name)
-    try:
-        yield temporary
-        os.chmod(temporary, _mode_of(final))
-        os.replace(temporary, final)
-    finally:
-        temporary.unlink(missing_ok=True)
-
-
-def _mode_of(path: Path) -> int:
-    """Permissions of the file that is replaced; those that the umask gives when there is none."""
-    if path.exists():
-        return stat.S_IMODE(path.stat().st_mode)
-    mask = os.umask(0)
-    os.umask(mask)
-    return 0o666 & ~mask
 
 
 def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
@@ -67,16 +41,6 @@ def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
 def write_text(path: str | os.PathLike[str], text: str) -> None:
     """Write ``text`` (UTF-8, its line ends as they are) so that ``path`` holds all of it or what it held before."""
     write_bytes(path, text.encode())
-
-
-def make_folder(path: str | os.PathLike[str]) -> Path:
-    """Folder at ``path`` with its parents, made where absent; InputError when a file stands in the way."""
-    folder = Path(path).expanduser()
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except (FileExistsError, NotADirectoryError):
-        raise InputError(f"{folder} cannot be a folder, a file stands in the way: choose another path.") from None
-    return folder
 
 
 @contextmanager

@@ -51,8 +51,9 @@ CORRELATIONS = np.array(
 _MOST_REJECTIONS = 1000
 _SPEED = 0.2  # [m/s]; forces do not depend on it
 _STRAIGHT_SLIPS = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
-_OUTER_SLIPS = np.array([0.1, 0.25, 0.5, 0.75, 0.9])
-_INNER_SLIPS = np.array([-0.95, -0.6, -0.3, -0.1, 0.0, 0.1, 0.25, 0.5, 0.75])
+_OUTER_SLIPS = np.array([0.05, 0.1, 0.2, 0.35, 0.55, 0.75, 0.9])
+_INNER_SLIPS = np.array([-0.95, -0.5, -0.2, -0.1, -0.05, 0.0, 0.05, 0.1, 0.2, 0.35, 0.55, 0.75, 0.9])
+_PARTS = 6  # between two slips the forces are interpolated
 _TIGHTEST = 1.05  # half tracks: closer in, the inner bank stands still or reverses and slip says nothing
 _COARSE = Numerics(contact_nodes=4)
 
@@ -244,8 +245,15 @@ def _turning_wrench(soil: Soil, robot: Robot, yaw_rate: float, bank: float, slip
         soil, robot, np.broadcast_to(v_x, v_y.shape), v_y, np.broadcast_to(omega, v_y.shape), yaw_rate
     )
     moment = (x * force[..., 1] - y * force[..., 0] + own).sum(axis=0)
-    stuck = bogged.any(axis=0)
-    return np.where(stuck, -np.inf, force[..., 0].sum(axis=0)), np.where(stuck, -np.inf, moment)
+    stuck = np.asarray(bogged.any(axis=0))
+    fine = np.interp(np.arange(_PARTS * (slips.size - 1) + 1) / _PARTS, np.arange(slips.size), slips)
+    return _between(slips, force[..., 0].sum(axis=0), stuck, fine), _between(slips, moment, stuck, fine)
+
+
+def _between(slips: Array, values: Array, stuck: NDArray[np.bool_], fine: Array) -> Array:
+    """Values at the slips ``fine``, linear between ``slips``; minus infinity beside a slip at which they are stuck."""
+    blocked = np.interp(fine, slips, stuck.astype(float)) > 0.0
+    return np.where(blocked, -np.inf, np.interp(fine, slips, values))
 
 
 # Soil that varies from place to place

@@ -6,8 +6,6 @@ import contextlib
 import gzip
 import hashlib
 import io
-import os
-import secrets
 import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -15,6 +13,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from ddagr_gym.errors import InputError
+from ddagr_gym.files import atomic_path
 
 _MAGIC = (
     (b"PAR1", "parquet"),
@@ -168,11 +167,8 @@ def write_atomically(path: Path, write: Callable[[Path], None]) -> None:
         raise InputError(f"{path} is a folder: give the name of the file to write.")
     if not path.parent.is_dir():
         raise InputError(f"{path} cannot be written: the folder {path.parent} does not exist.")
-    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
     try:
-        write(temporary)
-        os.replace(temporary, path)
+        with atomic_path(path) as temporary:
+            write(temporary)
     except OSError as error:
         raise InputError(f"{path} cannot be written ({error.strerror or error}): check space and rights.") from None
-    finally:
-        temporary.unlink(missing_ok=True)

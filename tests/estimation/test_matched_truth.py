@@ -153,7 +153,8 @@ def test_a_turn_does_shrink_it(default_study, at_rest):
 
 
 def test_drawn_readings_have_the_noise_they_should(robot, rng):
-    model = FilterModel(robot, noise=FilterNoise(accelerometer=0.05, gyro=2e-3, encoder=0.03))
+    still = dict.fromkeys(("acceleration", "yaw_acceleration", "bank_speed", "soil"), 0.0)
+    model = FilterModel(robot, noise=FilterNoise(accelerometer=0.05, gyro=2e-3, encoder=0.03, **still))
     commands = np.zeros((4000, 2))
     state = model.initial()[0]
     _, readings = draw_drive(model, commands, rng, state=state)
