@@ -29,6 +29,7 @@ NAMES = (
     "check",
     "robots",
     "soils",
+    "effects",
     "test",
 )
 """Every command, in the order of ``ddagr --help``."""

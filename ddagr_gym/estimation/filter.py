@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ddagr_gym.errors import InputError
+from ddagr_gym.estimation.columns import sample_times, stack_columns
 from ddagr_gym.estimation.filter_kernels import filter_rows, filter_series, roll_out_kernel
 from ddagr_gym.estimation.filter_model import FilterModel
 from ddagr_gym.estimation.layout import CHANNEL_SIZE, CHANNELS, STATE_SIZE, WORK_SIZE
@@ -175,28 +176,18 @@ def run_filter(model: FilterModel, columns: Mapping[str, ArrayLike], motion: Arr
     Raises:
         InputError: no time, time that does not increase, columns of different lengths, or no measured channel.
     """
-    t = np.asarray(columns["t"], dtype=np.float64) if "t" in columns else np.empty(0)
-    durations = np.diff(t, prepend=t[:1] - model.sample_period)
-    if not t.size or not (durations > 0).all():
-        raise InputError("columns need a time column t that increases: sort the recording and drop repeated samples.")
+    t, durations = sample_times(columns, model.sample_period)
     if not any(name in columns for name in CHANNELS):
         raise InputError(f"columns hold none of {', '.join(CHANNELS)}: the filter has nothing to correct by.")
-
-    def stack(names: tuple[str, ...], missing: float) -> Array:
-        series = [np.asarray(columns.get(name, np.full(t.size, missing)), dtype=np.float64) for name in names]
-        for name, values in zip(names, series, strict=True):
-            if values.shape != t.shape:
-                raise InputError(f"column {name} has shape {values.shape}, t {t.shape}: give columns of one length.")
-        return np.ascontiguousarray(np.stack(series, axis=1))
-
-    slopes = np.nan_to_num(gravity_along_body(*stack(("roll", "pitch"), 0.0).T))
+    attitude = stack_columns(columns, ("roll", "pitch"), 0.0)
+    slopes = np.nan_to_num(gravity_along_body(attitude[:, 0], attitude[:, 1]))
     one = Filter(model)
     one.reset(motion)
     states, covariances = np.empty((t.size, STATE_SIZE)), np.empty((t.size, STATE_SIZE, STATE_SIZE))
     standardised = np.empty((t.size, CHANNEL_SIZE))
     filter_series(
-        model.pack(), one.state, one.covariance, stack(("command_right", "command_left"), np.nan),
-        stack(CHANNELS, np.nan), slopes, durations, states, covariances, standardised, np.zeros(WORK_SIZE),
+        model.pack(), one.state, one.covariance, stack_columns(columns, ("command_right", "command_left"), np.nan),
+        stack_columns(columns, CHANNELS, np.nan), slopes, durations, states, covariances, standardised, np.zeros(WORK_SIZE),
     )  # fmt: skip
     return FilterRun(t, states, covariances, standardised)
 

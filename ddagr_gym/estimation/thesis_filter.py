@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ddagr_gym.errors import InputError
+from ddagr_gym.estimation.columns import sample_times, stack_columns
 from ddagr_gym.estimation.filter import FilterRun
 from ddagr_gym.estimation.filter_model import FilterModel
 from ddagr_gym.estimation.force_laws import ForceLaw
@@ -99,11 +100,16 @@ def _derivative(
     for bank in range(2):
         a[3 + bank, 3 + bank] = -model[MOTOR_RATE]
         x_dot[3 + bank] = model[MOTOR_RATE] * (command[bank] - x[3 + bank])
-    product = a @ p
     for i in range(_SIZE):
         for j in range(_SIZE):
-            p_dot[i, j] = product[i, j] + product[j, i]
-        p_dot[i, i] += noise[i]
+            p_dot[i, j] = noise[i] if i == j else 0.0
+    for i in range(PARAMETER):
+        for j in range(_SIZE):
+            total = 0.0
+            for k in range(_SIZE):
+                total += a[i, k] * p[k, j]
+            p_dot[i, j] += total
+            p_dot[j, i] += total
 
 
 @kernel()
@@ -121,58 +127,45 @@ def _evaluate(model: Array, x: Array, work: Array) -> None:
 
 
 @kernel()
-def _correct(model: Array, x: Array, p: Array, reading: Array, variances: Array, work: Array) -> Array:
-    """Vector update (5.10)-(5.12) with the channels that have a sample; returns standardised innovations."""
-    _evaluate(model, x, work)
-    full = np.zeros((CHANNEL_SIZE, _SIZE))
-    predicted = np.empty(CHANNEL_SIZE)
+def _predict(
+    model: Array, x: Array, p: Array, command: Array, noise: Array, duration: float, steps: int, k_x: Array, k_p: Array,
+    a: Array, work: Array,
+) -> None:  # fmt: skip
+    """Fourth-order Runge-Kutta of state (8,) and covariance (8, 8); ``k_x`` (5, 8), ``k_p`` (5, 8, 8) are scratch."""
+    h = duration / steps
+    for _ in range(steps):
+        for stage in range(4):
+            part = h * _STAGES[stage]
+            last = max(stage - 1, 0)
+            for i in range(_SIZE):
+                k_x[4, i] = x[i] + part * k_x[last, i]
+                for j in range(_SIZE):
+                    k_p[4, i, j] = p[i, j] + part * k_p[last, i, j]
+            _derivative(model, k_x[4], k_p[4], command, noise, a, k_x[stage], k_p[stage], work)
+        for i in range(_SIZE):
+            x[i] += h / 6.0 * (k_x[0, i] + 2.0 * k_x[1, i] + 2.0 * k_x[2, i] + k_x[3, i])
+            for j in range(_SIZE):
+                p[i, j] += h / 6.0 * (k_p[0, i, j] + 2.0 * k_p[1, i, j] + 2.0 * k_p[2, i, j] + k_p[3, i, j])
+
+
+def _correct(packed: Array, x: Array, p: Array, reading: Array, variances: Array, work: Array) -> Array:
+    """Vector update (5.10)-(5.12) in place with the channels that have a sample; returns standardised innovations."""
+    _evaluate(packed, x, work)
+    h, predicted = np.eye(CHANNEL_SIZE, _SIZE), x[:CHANNEL_SIZE].copy()
     for axis in range(2):
         predicted[axis] = work[FORCE + axis]
-        for j in range(_SIZE):
-            full[axis, j] = work[GRADIENT + STRIDE * axis + j]
-    for channel in range(2, CHANNEL_SIZE):
-        full[channel, channel] = 1.0
-        predicted[channel] = x[channel]
-    used = np.flatnonzero(np.isfinite(reading))
+        h[axis] = work[GRADIENT + STRIDE * axis : GRADIENT + STRIDE * axis + _SIZE]
+    used = np.isfinite(reading)
+    h, r, innovation = h[used], np.diag(variances[used]), (reading - predicted)[used]
     standardised = np.full(CHANNEL_SIZE, np.nan)
-    if used.size == 0:
-        return standardised
-    h = full[used]
-    r = np.diag(variances[used])
     s = h @ p @ h.T + r
-    innovation = reading[used] - predicted[used]
     gain = np.linalg.solve(s, h @ p).T
     x += gain @ innovation
     rest = np.eye(_SIZE) - gain @ h
     p[:] = rest @ p @ rest.T + gain @ r @ gain.T
     p[:] = 0.5 * (p + p.T)
-    for i in range(used.size):
-        standardised[used[i]] = innovation[i] / np.sqrt(s[i, i])
+    standardised[used] = innovation / np.sqrt(np.diag(s))
     return standardised
-
-
-@kernel()
-def _run(
-    model: Array, x: Array, p: Array, commands: Array, readings: Array, durations: Array, noise: Array,
-    variances: Array, least: float, steps: int, states: Array, covariances: Array, standardised: Array,
-) -> None:  # fmt: skip
-    work, a = np.zeros(WORK_SIZE), np.zeros((_SIZE, _SIZE))
-    kx, kp = np.zeros((4, _SIZE)), np.zeros((4, _SIZE, _SIZE))
-    for k in range(readings.shape[0]):
-        h = durations[k] / steps
-        for _ in range(steps):
-            for stage in range(4):
-                part = h * _STAGES[stage]
-                last = max(stage - 1, 0)
-                _derivative(
-                    model, x + part * kx[last], p + part * kp[last], commands[k], noise, a, kx[stage], kp[stage], work
-                )
-            x += h / 6.0 * (kx[0] + 2.0 * kx[1] + 2.0 * kx[2] + kx[3])
-            p += h / 6.0 * (kp[0] + 2.0 * kp[1] + 2.0 * kp[2] + kp[3])
-        standardised[k] = _correct(model, x, p, readings[k], variances, work)
-        x[5:] = np.maximum(x[5:], least)
-        states[k] = x
-        covariances[k] = p
 
 
 def run_thesis_filter(model: ThesisModel, columns: Mapping[str, ArrayLike]) -> FilterRun:
@@ -192,24 +185,18 @@ def run_thesis_filter(model: ThesisModel, columns: Mapping[str, ArrayLike]) -> F
     missing = [name for name in ("t", "command_right", "command_left") if name not in columns]
     if missing:
         raise InputError(f"columns lack {', '.join(missing)}: the thesis's filter needs time and commands.")
-    t = np.asarray(columns["t"], dtype=np.float64)
-
-    def stack(names: tuple[str, ...]) -> Array:
-        series = [np.asarray(columns.get(name, np.full(t.size, np.nan)), dtype=np.float64) for name in names]
-        if any(values.shape != t.shape for values in series):
-            raise InputError(
-                f"columns {', '.join(names)} differ from t {t.shape} in shape: give columns of one length."
-            )
-        return np.ascontiguousarray(np.stack(series, axis=1))
-
+    t, durations = sample_times(columns, model.sample_period)
+    commands = stack_columns(columns, ("command_right", "command_left"), np.nan)
+    readings = stack_columns(columns, CHANNELS, np.nan)
     states, covariances = np.empty((t.size, _SIZE)), np.empty((t.size, _SIZE, _SIZE))
-    standardised = np.empty((t.size, CHANNEL_SIZE))
-    x = np.concatenate([np.zeros(5), model.parameters])
+    standardised = np.empty(readings.shape)
+    x, p = np.concatenate([np.zeros(5), model.parameters]), np.diag(np.asarray(model.initial_variance, dtype=float))
     packed = FilterModel(model.robot, law=ForceLaw.thesis).pack()
-    _run(
-        packed, x, np.diag(np.asarray(model.initial_variance, dtype=np.float64)),
-        stack(("command_right", "command_left")), stack(CHANNELS), np.diff(t, prepend=t[:1] - model.sample_period),
-        np.asarray(model.process, dtype=np.float64), np.asarray(model.measurement, dtype=np.float64),
-        model.least_parameter, model.steps, states, covariances, standardised,
-    )  # fmt: skip
+    noise, variances = np.asarray(model.process, dtype=float), np.asarray(model.measurement, dtype=float)
+    scratch = np.zeros((5, _SIZE)), np.zeros((5, _SIZE, _SIZE)), np.zeros((_SIZE, _SIZE)), np.zeros(WORK_SIZE)
+    for k in range(t.size):
+        _predict(packed, x, p, commands[k], noise, durations[k], model.steps, *scratch)
+        standardised[k] = _correct(packed, x, p, readings[k], variances, scratch[3])
+        x[5:] = np.maximum(x[5:], model.least_parameter)
+        states[k], covariances[k] = x, p
     return FilterRun(t, states, covariances, standardised)

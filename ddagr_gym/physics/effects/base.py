@@ -6,6 +6,8 @@ An effect is a frozen dataclass of parameters plus one or more compiled actions 
 
 from __future__ import annotations
 
+import inspect
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import Field, dataclass, field, fields
 from functools import cache
@@ -118,6 +120,18 @@ class Effect(Validated):
     def parameter(cls, name: str) -> Field[Any]:
         """Field by name; its ``metadata`` holds unit, low, high, least, neutral (None for a shape) and step."""
         return {item.name: item for item in fields(cls)}[name]
+
+    @classmethod
+    def description(cls) -> str:
+        """The class's docstring without its list of attributes."""
+        return inspect.cleandoc(cls.__doc__ or "").partition("\n\nAttributes:")[0]
+
+    @classmethod
+    def meaning(cls, name: str) -> str:
+        """What the docstring says about a field, in one line."""
+        attributes = inspect.cleandoc(cls.__doc__ or "").partition("\nAttributes:\n")[2]
+        found = re.search(rf"^    {name}: (.*(?:\n     .*)*)", attributes, re.MULTILINE)
+        return " ".join(found.group(1).split()) if found else ""
 
     @classmethod
     def neutral(cls, **shapes: float) -> Any:

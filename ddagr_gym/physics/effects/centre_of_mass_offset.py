@@ -26,7 +26,9 @@ class CentreOfMassOffset(Effect):
     group = "robot"
     equation = "N_i = N/4 (1 +- x_c/L)(1 +- y_c/W)"
     source = "statics of four wheels (physics.md section 6; diagnosis vocabulary)"
-    signature = "y: pulls to the heavier side, little while speed loops hold; turns to either side differ; x: turns about it"
+    signature = (
+        "y: pulls to the heavier side, little while speed loops hold; turns to either side differ; x: turns about it"
+    )
     confused_with = ("imu_lever_arm", "multipass", "payload", "slope", "soil_split", "wheel_radius_mismatch")
     actions = ((POINT_LOADS, move_centre),)
 

@@ -42,7 +42,9 @@ class Multipass(Effect):
     group = "ground"
     equation = "k_rear = k (1 + stiffening exp(-(v_y^2 + (yaw_rate L)^2) t^2/(2 half_width)^2)), t = 2 L/|v_x|"
     source = "multi-pass effect (Holm, J. Terramechanics 6 (1969) 47; Senatore and Sandu, ibid. 48 (2011) 265)"
-    signature = "rear wheels less deep when straight, as if the ground changed with curvature; wide turns slide sideways"
+    signature = (
+        "rear wheels less deep when straight, as if the ground changed with curvature; wide turns slide sideways"
+    )
     confused_with = ("centre_of_mass_offset", "slip_sinkage", "soil_change")
     actions = ((POINT_SOIL, stiffen_ruts),)
 

@@ -38,10 +38,10 @@ class SensorHold(Effect):
         duration: for which a reading is repeated after it was new; least: 0.04 s, a period of a 25 Hz control loop.
         interval: between the starts of holds; 0: one after the other, as of a sensor slower than the log.
         first: time of the start of the first hold.
-        accelerometer: 1 when it is held, 0 when not; the same for the others.
-        gyro: see above.
-        encoders: see above.
-        pose: see above.
+        accelerometer: 1 when it is held, 0 when not.
+        gyro: 1 when it is held, 0 when not.
+        encoders: 1 when they are held, 0 when not.
+        pose: 1 when it is held, 0 when not.
     """
 
     name = "sensor_hold"

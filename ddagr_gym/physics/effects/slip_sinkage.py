@@ -51,7 +51,9 @@ class SlipSinkage(Effect):
     group = "ground"
     equation = "n = n0 + growth |slip|, slip followed over 0.1 m of way"
     source = "Ding et al., J. Terramechanics 47 (2010) 189 and 48 (2011) 27: n = n0 + n1 s"
-    signature = "wheels with large slip or skid, as of a locked bank, sink and drag more; straight drives stay as they are"
+    signature = (
+        "wheels with large slip or skid, as of a locked bank, sink and drag more; straight drives stay as they are"
+    )
     confused_with = ("multipass", "soil_change", "towed_drag", "viscous_drag")
     actions = ((POINT_SOIL, dig_in),)
 

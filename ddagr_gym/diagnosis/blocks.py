@@ -1,0 +1,113 @@
+"""Windows thinned to block means, with the standard deviation of each mean.
+
+Means over about 0.1 s keep what a robot of this size can do (its motors take 0.2 s), cost a fifth of the samples at
+50 Hz, average the rounding of a differenced counter away and leave little of the correlation between samples.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ddagr_gym.diagnosis.noise import ChannelNoise
+from ddagr_gym.recordings.schema import Recording
+from ddagr_gym.replay.windows import CHANNELS, STATE, WindowSet
+
+Array = NDArray[np.float64]
+
+BLOCK = 0.1
+"""Length of a block [s]."""
+
+YAW = CHANNELS.index("pose_yaw")
+
+
+@dataclass(frozen=True, eq=False)
+class BlockedWindows:
+    """Windows and what is compared of them: M = B * 8 block means per window.
+
+    Attributes:
+        windows: all samples.
+        weights: (W, B, n, 8) of the samples in each mean, 0 where there is none; they add up to 1 or 0.
+        sigma: (W, B, 8) standard deviation of each mean, infinite where there is no sample.
+    """
+
+    windows: WindowSet
+    weights: Array
+    sigma: Array
+
+    @property
+    def mask(self) -> Array:
+        """(W, M) 1 where a mean exists."""
+        return np.isfinite(self.sigma).astype(float).reshape(self.windows.count, -1)
+
+    def means(self, values: Array) -> Array:
+        """Block means over sigma, (W, M) or (W, M, K), of values (W, T, 8) or (W, T, 8, K); 0 where there is none."""
+        count, blocks, length, channels = self.weights.shape
+        kept = values[:, : blocks * length].reshape(count, blocks, length, *values.shape[2:])
+        shape = self.weights.shape + (1,) * (values.ndim - 3)
+        mean = (self.weights.reshape(shape) * kept).sum(axis=2)
+        sigma = self.sigma.reshape(self.sigma.shape + (1,) * (values.ndim - 3))
+        return (mean / sigma).reshape(count, blocks * channels, *values.shape[3:])
+
+    def residual(self, prediction: Array) -> Array:
+        """(W, M) block means of measured less predicted over sigma; headings compared on the circle."""
+        difference = self.windows.measured - prediction
+        difference[..., YAW] = np.angle(np.exp(1j * difference[..., YAW]))
+        return self.means(np.nan_to_num(difference))
+
+    def subset(self, chosen: NDArray[np.int64] | NDArray[np.bool_]) -> BlockedWindows:
+        """Only the chosen windows."""
+        return BlockedWindows(self.windows.subset(chosen), self.weights[chosen], self.sigma[chosen])
+
+
+def block_windows(
+    windows: WindowSet, noise: Sequence[ChannelNoise | None], wheel_radius: float, block: float = BLOCK
+) -> BlockedWindows:
+    """Blocks of windows with the noise of each channel at the speed of each block.
+
+    Args:
+        windows: at least one block long.
+        noise: of the eight channels; an absent one is left out.
+        wheel_radius: hub to tread [m].
+        block: length of a block [s].
+    """
+    length = max(int(round(block / windows.period)), 1)
+    count = windows.samples // length
+    measured = windows.measured[:, : count * length].reshape(windows.count, count, length, len(CHANNELS))
+    known = np.isfinite(measured)
+    present = known.sum(axis=2)
+    weights = known / np.maximum(present, 1)[:, :, None]
+    driven = windows.commands[:, windows.history : windows.history + count * length]
+    driven = np.abs(driven).mean(axis=2).reshape(windows.count, count, length).mean(axis=2)
+    sigma = np.full((windows.count, count, len(CHANNELS)), np.inf)
+    for channel, found in enumerate(noise):
+        if found is None:
+            continue
+        for samples in np.unique(present[..., channel]):
+            if samples > 0:
+                chosen = present[..., channel] == samples
+                sigma[..., channel][chosen] = found.of_mean(int(samples), wheel_radius * driven)[chosen]
+    return BlockedWindows(windows, weights, sigma)
+
+
+def located(windows: WindowSet, recordings: Sequence[Recording], wheel_radius: float) -> WindowSet:
+    """Windows whose first guess has a heading and a place also where there is no pose.
+
+    Without a receiver the heading is the integral of the gyro and the place that of the rim speed, from the origin of
+    each recording on: enough to tell directions and places of one drive apart, not those of two drives.
+    """
+    initial = windows.initial.copy()
+    for number, recording in enumerate(recordings):
+        if recording.has("pose_x", "pose_y", "pose_yaw"):
+            continue
+        step = recording.period
+        yaw = np.cumsum(np.nan_to_num(recording["yaw_rate"])) * step
+        banks = [np.nan_to_num(recording[name]) for name in ("encoder_right", "encoder_left")]
+        travel = wheel_radius * 0.5 * (banks[0] + banks[1]) * step
+        path = np.stack([np.cumsum(travel * np.cos(yaw)), np.cumsum(travel * np.sin(yaw)), yaw], axis=1)
+        chosen = windows.recording == number
+        initial[np.ix_(chosen, [STATE.index(name) for name in ("x", "y", "yaw")])] = path[windows.start[chosen]]
+    return replace(windows, initial=initial)

@@ -1,0 +1,174 @@
+"""Noise of each channel from the recordings alone: level, growth with speed, correlation, quantisation.
+
+Differences over one and two samples leave the motion out and keep the noise. For a first-order autoregressive noise
+with standard deviation s and correlation r, var(x[k+1] - x[k]) = 2 s^2 (1 - r) and var(x[k+2] - x[k]) = 2 s^2 (1 - r^2),
+so that their ratio is 1 + r. Poses come seldom and are differenced three times (variance 20 s^2) instead.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ddagr_gym.recordings.schema import Recording
+from ddagr_gym.replay.windows import CHANNELS
+
+Array = NDArray[np.float64]
+
+FASTEST_POSE_RATE = 0.5
+"""Share of the sample rate below which a channel counts as sparse and is differenced three times (ours)."""
+
+_CENTRAL = 0.8
+"""Share of the differences that is used: command steps move the others (ours)."""
+
+_FEWEST = 40
+"""Differences that a level needs (ours)."""
+
+
+@dataclass(frozen=True)
+class ChannelNoise:
+    """Noise of one channel.
+
+    Attributes:
+        sigma: standard deviation of one sample at rest, in the channel's unit.
+        per_speed: further standard deviation per travel speed [unit/(m/s)]; both add in quadrature.
+        correlation: of successive samples [-], -0.5 (a differenced counter) to 0.95.
+        quantum: smallest step between values, 0 where none was found.
+    """
+
+    sigma: float
+    per_speed: float
+    correlation: float
+    quantum: float
+
+    def of_mean(self, samples: int, speed: Array | float = 0.0) -> Array:
+        """Standard deviation of the mean of ``samples`` successive samples at a travel speed [m/s]."""
+        lags = np.arange(1, samples)
+        factor = (1.0 + 2.0 * np.sum((1.0 - lags / samples) * self.correlation**lags)) / samples
+        return np.sqrt(np.maximum(factor, 0.0) * (self.sigma**2 + (self.per_speed * np.asarray(speed)) ** 2))
+
+
+def _central_square(differences: Array) -> float:
+    """Mean square of a normal variable, from the central part of a sample of it."""
+    if len(differences) < _FEWEST:
+        return np.nan
+    from scipy.special import ndtri
+
+    size = np.abs(differences)
+    limit = np.quantile(size, _CENTRAL)
+    inside = size[size <= limit]
+    z = float(ndtri(0.5 + 0.5 * _CENTRAL))
+    kept = 1.0 - 2.0 * z * np.exp(-0.5 * z * z) / np.sqrt(2.0 * np.pi) / _CENTRAL
+    return float(np.mean(inside**2) / kept)
+
+
+def _quantum(values: Array) -> float:
+    """Step of a channel whose values repeat a ladder; 0 for a continuous one."""
+    levels = np.unique(values)
+    if len(levels) < 3 or len(levels) > 0.3 * len(values):
+        return 0.0
+    return float(np.quantile(np.diff(levels), 0.1))
+
+
+def _pairs(values: list[Array], speeds: list[Array], lag: int) -> tuple[Array, Array]:
+    """Differences over ``lag`` rows and the speed in between, pieces joined; missing samples left out."""
+    differences = [v[lag:] - v[:-lag] for v in values]
+    between = [0.5 * (s[lag:] + s[:-lag]) for s in speeds]
+    both = np.concatenate(differences), np.concatenate(between)
+    known = np.isfinite(both[0])
+    return both[0][known], both[1][known]
+
+
+def channel_noise(values: Sequence[Array], speeds: Sequence[Array], sparse: bool) -> ChannelNoise | None:
+    """Noise of one channel from pieces without gaps.
+
+    Args:
+        values: pieces (n,), NaN where there is no sample.
+        speeds: travel speed at the same rows [m/s].
+        sparse: difference the samples that exist three times instead of neighbouring rows.
+
+    Returns:
+        None where there are too few samples.
+    """
+    known = np.concatenate([v[np.isfinite(v)] for v in values] or [np.empty(0)])
+    if len(known) < _FEWEST:
+        return None
+    quantum = 0.0 if sparse else _quantum(known)
+    if sparse:
+        thirds = np.concatenate([np.diff(v[np.isfinite(v)], 3) for v in values])
+        square = _central_square(thirds) / 20.0
+        return ChannelNoise(float(np.sqrt(square)), 0.0, 0.0, 0.0) if np.isfinite(square) else None
+    if quantum > 0.0:
+        # a differenced counter: the rounding of a position enters two successive samples with opposite signs
+        return ChannelNoise(quantum / np.sqrt(6.0), 0.0, -0.5, quantum)
+    return _coloured(list(values), list(speeds))
+
+
+def _coloured(values: list[Array], speeds: list[Array]) -> ChannelNoise | None:
+    """AR(1) noise whose variance grows with the square of the speed."""
+    one, speed = _pairs(values, speeds, 1)
+    two, _ = _pairs(values, speeds, 2)
+    first, second = _central_square(one), _central_square(two)
+    if not (first > 0.0 and second > 0.0):
+        return None
+    correlation = float(np.clip(second / first - 1.0, -0.5, 0.95))
+    edges = np.unique(np.quantile(speed, np.linspace(0.0, 1.0, 7)))
+    which = np.clip(np.searchsorted(edges, speed, side="right") - 1, 0, max(len(edges) - 2, 0))
+    rows = [
+        (np.mean(speed[which == k] ** 2), _central_square(one[which == k]))
+        for k in range(max(len(edges) - 1, 1))
+        if np.count_nonzero(which == k) >= _FEWEST
+    ]
+    rest, growth = _line([r for r in rows if np.isfinite(r[1])], first)
+    scale = 2.0 * (1.0 - correlation)
+    return ChannelNoise(float(np.sqrt(rest / scale)), float(np.sqrt(growth / scale)), correlation, 0.0)
+
+
+def _line(rows: list[tuple[float, float]], fallback: float) -> tuple[float, float]:
+    """Non-negative intercept and slope of variance over squared speed, fitted to relative errors."""
+    from scipy.optimize import nnls
+
+    if len(rows) < 2:
+        return fallback, 0.0
+    square, variance = np.array(rows).T
+    if np.ptp(square) <= 0.0 or (variance <= 0.0).all():
+        return fallback, 0.0
+    floor = np.maximum(variance, 1e-3 * variance.max())
+    found, _ = nnls(np.stack([1.0 / floor, square / floor], axis=1), variance / floor)
+    return (float(found[0]), float(found[1])) if found.any() else (fallback, 0.0)
+
+
+def travel_speed(recording: Recording, wheel_radius: float) -> Array:
+    """Rim speed (n,) averaged over the banks [m/s], from the encoders or else the commands; 0 where unknown."""
+    names = ("encoder_right", "encoder_left")
+    banks = [recording[name] for name in names] if recording.has(*names) else recording.held_commands()
+    return np.nan_to_num(wheel_radius * 0.5 * (np.abs(banks[0]) + np.abs(banks[1])))
+
+
+def recording_noise(recordings: Sequence[Recording], wheel_radius: float) -> tuple[ChannelNoise | None, ...]:
+    """Noise of the eight channels of :data:`ddagr_gym.replay.windows.CHANNELS`; None for an absent one.
+
+    Args:
+        recordings: of one robot and one set of sensors.
+        wheel_radius: hub to tread [m].
+    """
+    speeds = [travel_speed(r, wheel_radius)[s] for r in recordings for s in r.segments()]
+    found = []
+    for name in CHANNELS:
+        pieces = [r[name][s] for r in recordings for s in r.segments()]
+        rates = [r.rate(name) * r.period for r in recordings if r.has(name)]
+        sparse = bool(rates) and (max(rates) < FASTEST_POSE_RATE or name.startswith("pose"))
+        if name == "pose_yaw":
+            pieces = [_unwrapped(piece) for piece in pieces]
+        found.append(channel_noise(pieces, speeds, sparse))
+    return tuple(found)
+
+
+def _unwrapped(values: Array) -> Array:
+    known = np.isfinite(values)
+    result = values.copy()
+    result[known] = np.unwrap(values[known])
+    return result

@@ -1,0 +1,121 @@
+"""What a diagnosis must not mistake for missing physics: the uncertain nominal model.
+
+*Global* parameters hold in all windows: soil, robot, biases of each recording, the sample in which commands act.
+*Local* ones differ from window to window around the global value: fields vary by some percent from place to place and
+their relief tilts the robot. Both have normal priors and are projected out of every sensitivity.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from ddagr_gym.parameters import Robot
+from ddagr_gym.physics import layout
+from ddagr_gym.replay.parameters import (
+    ModelParameter,
+    command_shift,
+    robot_parameters,
+    sensor_parameters,
+    soil_parameters,
+)
+
+
+@dataclass(frozen=True)
+class NuisancePriors:
+    """Standard deviations of what is uncertain, all ours: orders of magnitude of fields and sensor specifications.
+
+    Attributes:
+        strength: logarithm of the whole field's factor on cohesion and tan(phi).
+        stiffness: the same on k_c and k_phi.
+        shear_modulus: logarithm of the factor on K.
+        exit_angle: exit angle ratio, absolute.
+        friction: logarithm of a factor on tan(phi) alone.
+        exponent: logarithm of the factor on n.
+        peak: coefficients of the stress peak, absolute.
+        gyro_bias: of a recording [rad/s].
+        accelerometer_bias: of a recording [m/s^2].
+        local_strength: as strength, of one window against the field.
+        local_stiffness: as stiffness, of one window.
+        local_split: strength under the right wheels alone, of one window.
+        local_accelerometer: relief under one window [m/s^2].
+        local_gyro: wandering of the gyro in one window [rad/s].
+    """
+
+    strength: float = 0.12
+    stiffness: float = 0.2
+    shear_modulus: float = 0.4
+    exit_angle: float = 0.1
+    friction: float = 0.1
+    exponent: float = 0.15
+    peak: float = 0.1
+    gyro_bias: float = 2e-4
+    accelerometer_bias: float = 0.01
+    local_strength: float = 0.05
+    local_stiffness: float = 0.1
+    local_split: float = 0.03
+    local_accelerometer: float = 0.02
+    local_gyro: float = 3e-4
+
+
+@dataclass(frozen=True)
+class Nuisances:
+    """Parameters of a diagnosis.
+
+    Attributes:
+        parameters: (P,) global ones, with their priors.
+        local: (L,) index of the parameter that each local variation moves, and its standard deviation.
+    """
+
+    parameters: tuple[ModelParameter, ...]
+    local: tuple[tuple[int, float], ...]
+
+
+def _soil(index: int, wheels: Sequence[int] = range(4)) -> tuple[int, ...]:
+    return tuple(layout.BASE_SOIL + 9 * wheel + index for wheel in wheels)
+
+
+def _structural(priors: NuisancePriors) -> tuple[ModelParameter, ...]:
+    """Directions in which another soil law differs from the nominal one."""
+    friction = (*_soil(layout.SOIL_FRICTION_TANGENT),)
+    right = (*_soil(layout.SOIL_COHESION, (0, 2)), *_soil(layout.SOIL_FRICTION_TANGENT, (0, 2)))
+    return (
+        ModelParameter("friction", "-", friction, True, priors.friction, 0.02, -0.8, 0.8),
+        ModelParameter("sinkage_exponent", "-", _soil(layout.SOIL_EXPONENT), True, priors.exponent, 0.02, -0.7, 0.7),
+        ModelParameter("stress_peak", "-", _soil(layout.SOIL_PEAK_0), False, priors.peak, 0.02, -0.3, 0.3),
+        ModelParameter("stress_peak_slip", "-", _soil(layout.SOIL_PEAK_1), False, priors.peak, 0.02, -0.3, 0.3),
+        # only local: as a global parameter it would be the effect soil_split
+        ModelParameter("strength_right", "-", right, True, 0.0, 0.02, 0.0, 0.0),
+    )
+
+
+def nuisances(robot: Robot, recordings: int, period: float, priors: NuisancePriors = NuisancePriors()) -> Nuisances:
+    """Global and local parameters for some recordings of a robot.
+
+    Args:
+        robot: with the standard deviations of what it states as uncertain.
+        recordings: how many.
+        period: between samples [s].
+        priors: standard deviations of the others.
+    """
+    deviations = {
+        "soil_strength": priors.strength,
+        "soil_stiffness": priors.stiffness,
+        "shear_modulus": priors.shear_modulus,
+        "exit_angle_ratio": priors.exit_angle,
+    }
+    soil = tuple(replace(p, prior=deviations[p.name]) for p in soil_parameters())
+    parameters = (
+        *soil,
+        *_structural(priors),
+        *robot_parameters(robot),
+        command_shift(period),
+        *sensor_parameters(recordings, priors.gyro_bias, priors.accelerometer_bias),
+    )
+    names = [p.name for p in parameters]
+    local = (
+        (names.index("soil_strength"), priors.local_strength),
+        (names.index("soil_stiffness"), priors.local_stiffness),
+        (names.index("strength_right"), priors.local_split),
+    )
+    return Nuisances(parameters, local)

@@ -1,0 +1,52 @@
+"""Reference tables: columns of a CSV as arrays, each mistake in the file one sentence."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ddagr_gym.errors import InputError
+
+
+def read_columns(
+    path: str | Path, numbers: Sequence[str], texts: Sequence[str] = ()
+) -> tuple[dict[str, NDArray[np.float64]], dict[str, list[str]]]:
+    """Columns of a CSV with a header.
+
+    Args:
+        path: the file.
+        numbers: names of the columns to read as float64, (rows,) each.
+        texts: names of the columns to read as text.
+
+    Raises:
+        InputError: the file is missing or empty, lacks a column, or holds something that is no number.
+    """
+    file = Path(path)
+    if not file.is_file():
+        raise InputError(f"{file} does not exist: give the folder of the reference data.")
+    with file.open(newline="", encoding="utf-8") as handle:
+        reader = csv.DictReader(handle)
+        missing = [name for name in (*numbers, *texts) if name not in (reader.fieldnames or ())]
+        if missing:
+            raise InputError(f"{file} has no column {missing[0]!r}: it is not the reference table expected here.")
+        rows = list(reader)
+    if not rows:
+        raise InputError(f"{file} has no rows: it is not the reference table expected here.")
+    values = {name: np.array([_number(file, i, name, row[name]) for i, row in enumerate(rows)]) for name in numbers}
+    return values, {name: [row[name] for row in rows] for name in texts}
+
+
+def _number(file: Path, index: int, name: str, text: str | None) -> float:
+    try:
+        return float(text or "")
+    except ValueError:
+        raise InputError(f"{file} holds {text!r} in row {index + 1}, column {name}: give a number.") from None
+
+
+def root_mean_square(values: NDArray[np.float64]) -> float:
+    """Root of the mean square, NaN for none."""
+    return float(np.sqrt(np.mean(values**2))) if values.size else float("nan")
