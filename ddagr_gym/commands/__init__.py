@@ -29,7 +29,9 @@ NAMES = (
     "check",
     "robots",
     "soils",
+    "validate",
     "effects",
+    "freeze-scenarios",
     "test",
 )
 """Every command, in the order of ``ddagr --help``."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -52,7 +54,7 @@ def _overview(kinds: list[type[Effect]]) -> str:
     for kind in sorted(kinds, key=lambda kind: GROUPS.index(kind.group)):
         main = kind.size_names()[0]
         item = kind.parameter(main).metadata
-        bounds = (item["neutral"], item["low"], item["high"], item["least"])
+        bounds = (item["neutral"], item["low"], item["high"], _matters_from(item))
         rows.append((kind.group, kind.name, f"{main} [{item['unit']}]", *bounds, kind.title))
     header = ("acts on", "effect", "size", "none at", "from", "to", "matters from", "what it is")
     return f"{format_table(header, rows)}\n\nEquation, signature and rivals of one: ddagr effects NAME"
@@ -76,6 +78,11 @@ def _card(kind: type[Effect]) -> str:
     return "\n".join([*lines, "", "parameters", *(_parameter(kind, name) for name in names)])
 
 
+def _matters_from(item: Mapping[str, float]) -> float:
+    """Value of the size at which somebody begins to care, on the side where its step points."""
+    return item["neutral"] + math.copysign(item["least"], item["step"])
+
+
 def _parameter(kind: type[Effect], name: str) -> str:
     """A parameter's numbers and what it means, in two lines."""
     field = kind.parameter(name)
@@ -84,5 +91,5 @@ def _parameter(kind: type[Effect], name: str) -> str:
     if item["neutral"] is None:
         words += f", {field.default:g} unless given"
     else:
-        words += f", no effect at {item['neutral']:g}, matters {item['least']:g} from there"
+        words += f", no effect at {item['neutral']:g}, matters from {_matters_from(item):g}"
     return f"  {name:<20} {words}\n  {'':<20} {kind.meaning(name)}"

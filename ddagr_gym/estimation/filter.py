@@ -12,7 +12,7 @@ from ddagr_gym.errors import InputError
 from ddagr_gym.estimation.columns import sample_times, stack_columns
 from ddagr_gym.estimation.filter_kernels import filter_rows, filter_series, roll_out_kernel
 from ddagr_gym.estimation.filter_model import FilterModel
-from ddagr_gym.estimation.layout import CHANNEL_SIZE, CHANNELS, STATE_SIZE, WORK_SIZE
+from ddagr_gym.estimation.layout import CHANNEL_SIZE, CHANNELS, COMMANDS, STATE_SIZE, WORK_SIZE
 from ddagr_gym.estimation.steps import gravity_along_body, positive_duration
 
 Array = NDArray[np.float64]
@@ -186,8 +186,9 @@ def run_filter(model: FilterModel, columns: Mapping[str, ArrayLike], motion: Arr
     states, covariances = np.empty((t.size, STATE_SIZE)), np.empty((t.size, STATE_SIZE, STATE_SIZE))
     standardised = np.empty((t.size, CHANNEL_SIZE))
     filter_series(
-        model.pack(), one.state, one.covariance, stack_columns(columns, ("command_right", "command_left"), np.nan),
-        stack_columns(columns, CHANNELS, np.nan), slopes, durations, states, covariances, standardised, np.zeros(WORK_SIZE),
+        model.pack(), one.state, one.covariance, stack_columns(columns, COMMANDS, np.nan),
+        stack_columns(columns, CHANNELS, np.nan), slopes, durations, states, covariances, standardised,
+        np.zeros(WORK_SIZE),
     )  # fmt: skip
     return FilterRun(t, states, covariances, standardised)
 

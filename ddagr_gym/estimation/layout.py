@@ -33,6 +33,9 @@ MOTION_SIZE = 9
 CHANNELS = ("specific_force_x", "specific_force_y", "yaw_rate", "encoder_right", "encoder_left")
 """Measured channels, in the order of a measurement vector; names of the columns of a recording."""
 
+COMMANDS = ("command_right", "command_left")
+"""Names of the columns of bank speed commands."""
+
 CHANNEL_SIZE = 5
 FORCE_CHANNEL = 0
 GYRO_CHANNEL = 2

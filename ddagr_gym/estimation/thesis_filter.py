@@ -5,11 +5,12 @@ Put right: signs of the force law and rows of the model (physics.md section 8), 
 accelerometer's reading instead of the body velocity's derivative (5.5), innovation y - h(x) (5.12 prints y - Hx), the
 transpose in the Joseph form (5.11). Kept: fourth-order Runge-Kutta of state and covariance (5.7), (5.8), the vector
 update (5.10), noise of (6.2). Ours, because the thesis says nothing: initial parameters and their
-variances, the least value at which parameters are held positive, and how many Runge-Kutta steps a sample takes.
+variances, the least value at which parameters are held positive, and Runge-Kutta steps that follow the stiffness.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -24,6 +25,7 @@ from ddagr_gym.estimation.force_laws import ForceLaw
 from ddagr_gym.estimation.layout import (
     CHANNEL_SIZE,
     CHANNELS,
+    COMMANDS,
     FORCE,
     GRADIENT,
     MOTOR_RATE,
@@ -42,6 +44,7 @@ THESIS_STATE = ("v_x", "v_y", "yaw_rate", "omega_right", "omega_left", "a1", "a2
 """Entries of the thesis's state (5.1)."""
 
 _SIZE = 8
+_LEAST_STEPS = 8
 _STAGES = np.array([0.0, 0.5, 0.5, 1.0])
 _NO_RESISTANCE = np.log(1e-12)
 
@@ -58,7 +61,8 @@ class ThesisModel(Validated):
         parameters: initial a1 [N], a2 [-], b [N/rad].
         least_parameter: a1, a2, b are held at or above it.
         sample_period: [s].
-        steps: Runge-Kutta steps per sample; they must follow eigenvalues of 1e3 1/s.
+        stability: Runge-Kutta step times largest row sum of the model's derivative, which reaches 1e4 1/s near rest;
+            the method is stable up to 2.78, a positive covariance needs less.
     """
 
     robot: Robot
@@ -68,15 +72,13 @@ class ThesisModel(Validated):
     parameters: tuple[float, float, float] = (165.0, 5.0, 840.0)
     least_parameter: float = bounded("-", 0.0, 1.0, default=1e-2, open_low=True)
     sample_period: float = bounded("s", 0.0, 1.0, default=0.008, open_low=True)
-    steps: int = 16
+    stability: float = bounded("-", 0.0, 2.0, default=0.4, open_low=True)
 
     def _check(self) -> None:
         for name, length in (("process", _SIZE), ("measurement", CHANNEL_SIZE), ("initial_variance", _SIZE)):
             values = np.asarray(getattr(self, name), dtype=np.float64)
             if values.shape != (length,) or not (np.isfinite(values).all() and (values >= 0.0).all()):
                 raise InputError(f"ThesisModel.{name} is {getattr(self, name)!r}: give {length} variances.")
-        if self.steps < 1:
-            raise InputError(f"ThesisModel.steps is {self.steps}: give 1 or more.")
 
 
 @kernel()
@@ -128,10 +130,18 @@ def _evaluate(model: Array, x: Array, work: Array) -> None:
 
 @kernel()
 def _predict(
-    model: Array, x: Array, p: Array, command: Array, noise: Array, duration: float, steps: int, k_x: Array, k_p: Array,
-    a: Array, work: Array,
+    model: Array, x: Array, p: Array, command: Array, noise: Array, duration: float, stability: float, k_x: Array,
+    k_p: Array, a: Array, work: Array,
 ) -> None:  # fmt: skip
     """Fourth-order Runge-Kutta of state (8,) and covariance (8, 8); ``k_x`` (5, 8), ``k_p`` (5, 8, 8) are scratch."""
+    _derivative(model, x, p, command, noise, a, k_x[0], k_p[0], work)
+    steepest = 0.0
+    for i in range(PARAMETER):
+        total = 0.0
+        for j in range(PARAMETER):
+            total += abs(a[i, j])
+        steepest = max(steepest, total)
+    steps = max(math.ceil(duration * steepest / stability), _LEAST_STEPS)
     h = duration / steps
     for _ in range(steps):
         for stage in range(4):
@@ -182,11 +192,11 @@ def run_thesis_filter(model: ThesisModel, columns: Mapping[str, ArrayLike]) -> F
     Raises:
         InputError: columns missing or of different lengths.
     """
-    missing = [name for name in ("t", "command_right", "command_left") if name not in columns]
+    missing = [name for name in ("t", *COMMANDS) if name not in columns]
     if missing:
         raise InputError(f"columns lack {', '.join(missing)}: the thesis's filter needs time and commands.")
     t, durations = sample_times(columns, model.sample_period)
-    commands = stack_columns(columns, ("command_right", "command_left"), np.nan)
+    commands = stack_columns(columns, COMMANDS, np.nan)
     readings = stack_columns(columns, CHANNELS, np.nan)
     states, covariances = np.empty((t.size, _SIZE)), np.empty((t.size, _SIZE, _SIZE))
     standardised = np.empty(readings.shape)
@@ -195,8 +205,10 @@ def run_thesis_filter(model: ThesisModel, columns: Mapping[str, ArrayLike]) -> F
     noise, variances = np.asarray(model.process, dtype=float), np.asarray(model.measurement, dtype=float)
     scratch = np.zeros((5, _SIZE)), np.zeros((5, _SIZE, _SIZE)), np.zeros((_SIZE, _SIZE)), np.zeros(WORK_SIZE)
     for k in range(t.size):
-        _predict(packed, x, p, commands[k], noise, durations[k], model.steps, *scratch)
-        standardised[k] = _correct(packed, x, p, readings[k], variances, scratch[3])
+        _predict(packed, x, p, commands[k], noise, durations[k], model.stability, *scratch)
+        # A filter that has broken down carries NaN on; that is its result.
+        with np.errstate(invalid="ignore", over="ignore"):
+            standardised[k] = _correct(packed, x, p, readings[k], variances, scratch[3])
         x[5:] = np.maximum(x[5:], model.least_parameter)
         states[k], covariances[k] = x, p
     return FilterRun(t, states, covariances, standardised)

@@ -10,7 +10,6 @@ import math
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -145,7 +144,6 @@ def distribution_names() -> tuple[str, ...]:
     return config_names("soils")
 
 
-@lru_cache
 def get_distribution(name: str | os.PathLike[str]) -> SoilDistribution:
     """Soil distribution by name, or from a YAML file of one's own.
 

@@ -11,10 +11,13 @@ Where the model fails in kind, because it leaves the mechanism out:
 - **Braked wheels plough.** Locked at slip angle 0 the wheel needs twice its load and sinks 50 mm; shear and
   compaction on its own surface cannot exceed about 0.9 of the load. Slip sinkage and the wall of soil pushed ahead
   are missing.
+- **Rolling resistance is too large.** At slip 0 and slip angle 0 the wheel needs 0.05 of its load, the model 0.36: it
+  sinks 23 mm instead of 14, and its pressure acts on the front of the tyre with the strength of the static plate
+  tests. This is the largest error inside the region where the model is meant to hold; driven harder, it fades.
 - **Side walls bulldoze.** Beyond 60 degrees, and with any braking, the lateral force grows to two or three times the
   load: passive earth pressure on the wall, not shear under the tread.
-- **Slip sinkage.** Measured sinkage grows from 14 mm (rolling) to 26 mm (slip 0.9) and to 33 mm at 60 degrees; the
-  model's hardly moves, because it has no such term.
+- **Slip sinkage.** Measured sinkage grows from 14 mm (rolling) to 26 mm (slip 0.9) and to 34 mm at 60 degrees; the
+  model's stays between 23 and 26 mm, because it has no such term.
 
 The effects ``slip_sinkage`` and ``lateral_bulldozing`` of the library stand for the last two.
 """
@@ -156,7 +159,7 @@ def approximating_torus() -> TorusWheel:
     return TorusWheel(minor_radius=0.029, half_width=0.025, major_radius=0.029)
 
 
-def predict(trials: WheelTrials, wheel: TorusWheel, soil: Soil, numerics: Numerics = Numerics()) -> Prediction:
+def predict(trials: WheelTrials, wheel: TorusWheel, soil: Soil, numerics: Numerics = Numerics.finest()) -> Prediction:
     """Forces and sinkage of the model for the measured motions and loads.
 
     Args:
@@ -185,16 +188,18 @@ def regions(trials: WheelTrials) -> Mapping[str, NDArray[np.bool_]]:
     }
 
 
+def rolling_freely(trials: WheelTrials) -> NDArray[np.bool_]:
+    """Which trials (N,) of the first region roll with rim and carriage at one speed: the model's worst ones there."""
+    return next(iter(regions(trials).values())) & (np.abs(trials.slip) < 0.05)
+
+
 def region_errors(trials: WheelTrials, prediction: Prediction) -> list[RegionError]:
-    """Errors of a prediction in every region of :func:`regions`."""
-    return [
-        measure_errors(trials, prediction, name, chosen) for name, chosen in regions(trials).items() if chosen.any()
-    ]
+    """Errors of a prediction in every region of :func:`regions`, and in the rolling part of the first."""
+    parts = dict(regions(trials)) | {"of the first: slip = 0": rolling_freely(trials)}
+    return [measure_errors(trials, prediction, name, chosen) for name, chosen in parts.items() if chosen.any()]
 
 
-def measure_errors(
-    trials: WheelTrials, prediction: Prediction, name: str, chosen: NDArray[np.bool_]
-) -> RegionError:
+def measure_errors(trials: WheelTrials, prediction: Prediction, name: str, chosen: NDArray[np.bool_]) -> RegionError:
     """Errors over the ``chosen`` (N,) trials."""
     drawbar = ((prediction.drawbar - trials.drawbar) / trials.load)[chosen]
     lateral = ((prediction.lateral - trials.lateral) / trials.load)[chosen]

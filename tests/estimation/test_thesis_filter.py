@@ -103,7 +103,7 @@ def test_missing_samples(robot, recording):
         (lambda r, d: run_thesis_filter(ThesisModel(r), {"t": d["t"]}), "needs time and commands"),
         (lambda r, d: run_thesis_filter(ThesisModel(r), d | {"yaw_rate": [0.0]}), "one length"),
         (lambda r, d: ThesisModel(r, process=(1.0,)), "give 8 variances"),
-        (lambda r, d: ThesisModel(r, steps=0), "give 1 or more"),
+        (lambda r, d: ThesisModel(r, stability=0.0), "stability is 0"),
     ],
 )
 def test_errors_name_the_remedy(robot, recording, call, message):

@@ -18,7 +18,7 @@ import json
 import os
 import tempfile
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -64,15 +64,14 @@ class EffectEntry:
     def build(self) -> Effect:
         """The effect; InputError for an unknown name, parameter or unit, or a value out of bounds."""
         kind = effect_kind(self.name)
+        units = {item.name: item.metadata["unit"] for item in fields(kind)}
         values: dict[str, object] = {}
         for name, entry in self.parameters.items():
-            values[name] = entry.value if isinstance(entry, ParameterEntry) else entry
-        effect = build_effect(kind, values)
-        for name, entry in self.parameters.items():
-            unit = kind.parameter(name).metadata["unit"]
-            if isinstance(entry, ParameterEntry) and entry.unit not in ("", unit):
-                raise InputError(f"effect {self.name!r} gives {name!r} in {entry.unit!r}: give it in {unit}.")
-        return effect
+            given = entry if isinstance(entry, ParameterEntry) else ParameterEntry(entry)
+            if name in units and given.unit not in ("", units[name]):
+                raise InputError(f"effect {self.name!r} gives {name!r} in {given.unit!r}: give it in {units[name]}.")
+            values[name] = given.value
+        return build_effect(kind, values)
 
 
 @dataclass(frozen=True)
@@ -119,12 +118,20 @@ def load_effects(specification: str | os.PathLike[str] | Effect | Iterable[str |
     if isinstance(specification, os.PathLike) or (
         isinstance(specification, str) and Path(specification).suffix in _ENDINGS
     ):
-        return tuple(entry.build() for entry in read_effects_file(specification).effects)
+        return _build_all(specification)
     if isinstance(specification, str):
         return (parse_effect(specification),)
     if not isinstance(specification, Iterable):
         raise InputError(f"effects are {specification!r}: give effects, name=size texts or the path of a file.")
     return tuple(effect for item in specification for effect in load_effects(item))
+
+
+def _build_all(path: str | os.PathLike[str]) -> tuple[Effect, ...]:
+    entries = read_effects_file(path).effects
+    try:
+        return tuple(entry.build() for entry in entries)
+    except InputError as error:
+        raise InputError(f"{os.fspath(path)}: {error}") from None
 
 
 def save_effects(

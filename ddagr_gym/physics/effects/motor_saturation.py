@@ -7,6 +7,8 @@ from ddagr_gym.physics.layout import MOTOR_RATE, MOTOR_TARGET, OMEGA, POINT_MOTO
 
 _NO_SPEED_LIMIT = 1e3
 _NO_ACCELERATION_LIMIT = 1e6
+_HIGHEST_SPEED_LIMIT = 20.0  # [rad/s] that any of the preset robots would meet
+_HIGHEST_ACCELERATION_LIMIT = 200.0  # [rad/s^2], the same
 _BINDING = 0.95  # of what the drive reaches: limits above it cost less than 5 percent
 _PROBED = (0.9, 0.6)
 
@@ -28,8 +30,8 @@ class MotorSaturation(Effect):
     A limit that a drive never reaches changes nothing, so there is no derivative at neutral.
 
     Attributes:
-        speed_limit: largest bank speed; meaningful when it cuts at least 5 percent off a drive's fastest.
-        acceleration_limit: largest change of bank speed per time; meaningful in the same way.
+        speed_limit: largest bank speed; least: it cuts 5 percent off a drive's fastest (20 rad/s where none is known).
+        acceleration_limit: largest change of bank speed per time; least: the same (200 rad/s^2).
     """
 
     name = "motor_saturation"
@@ -42,12 +44,19 @@ class MotorSaturation(Effect):
     differentiable = False
     actions = ((POINT_MOTORS, limit_motors),)
 
-    speed_limit: float = size("rad/s", 0.01, _NO_SPEED_LIMIT, least=0.02, neutral=_NO_SPEED_LIMIT, step=-0.02)
+    speed_limit: float = size(
+        "rad/s",
+        0.01,
+        _NO_SPEED_LIMIT,
+        least=_NO_SPEED_LIMIT - _HIGHEST_SPEED_LIMIT,
+        neutral=_NO_SPEED_LIMIT,
+        step=-0.02,
+    )
     acceleration_limit: float = size(
         "rad/s^2",
         0.01,
         _NO_ACCELERATION_LIMIT,
-        least=0.05,
+        least=_NO_ACCELERATION_LIMIT - _HIGHEST_ACCELERATION_LIMIT,
         default=_NO_ACCELERATION_LIMIT,
         neutral=_NO_ACCELERATION_LIMIT,
         step=-0.05,

@@ -127,8 +127,10 @@ class TestEveryEffect:
         attributes = kind.__doc__.split("Attributes:")[1]
         for field in (*kind.size_names(), *kind.shape_names()):
             assert f"        {field}: " in attributes, field
-        main = attributes.split(f"        {kind.size_names()[0]}: ")[1]
-        assert "least" in main or "meaningful" in main or kind.categorical
+            assert len(kind.meaning(field)) > 5
+        assert kind.description()
+        assert "Attributes" not in kind.description()
+        assert kind.categorical or "least: " in kind.meaning(kind.size_names()[0])
 
     def test_confusions_are_known_and_mutual(self, name):
         others = KINDS[name].confused_with

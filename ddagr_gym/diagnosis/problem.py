@@ -1,0 +1,185 @@
+"""The fit problem of a diagnosis: block means of windows, nuisances, and whatever effects are assumed.
+
+Unknowns of every window (initial state and local variations, all with priors) are eliminated linearly by a QR
+factorisation, so that a sensitivity that they could explain counts for nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ddagr_gym.diagnosis.blocks import BlockedWindows
+from ddagr_gym.diagnosis.nuisance import Nuisances, NuisancePriors
+from ddagr_gym.parameters import Numerics, Robot, Soil
+from ddagr_gym.physics import layout
+from ddagr_gym.physics.effects import Effect
+from ddagr_gym.replay.model import WindowModel
+from ddagr_gym.replay.refit import STATE_PRIOR
+from ddagr_gym.replay.windows import CHANNELS
+
+Array = NDArray[np.float64]
+Chosen = NDArray[np.bool_]
+
+_BIAS_CHANNEL = {
+    layout.ACCELEROMETER_BIAS: CHANNELS.index("specific_force_x"),
+    layout.ACCELEROMETER_BIAS + 1: CHANNELS.index("specific_force_y"),
+    layout.GYRO_BIAS: CHANNELS.index("yaw_rate"),
+}
+"""Entries that add to one channel, whose derivative needs no simulation."""
+
+
+def fit_numerics() -> Numerics:
+    """Smooth predictions at steps of 20 ms, which leave 3 mm/s^2 rms of integration error in the thesis's drives."""
+    return replace(Numerics.smooth(), maximum_step=0.02)
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """Where a model stands.
+
+    Attributes:
+        values: (P,) nuisance parameters.
+        states: (W, 8) initial states.
+        effects: assumed missing physics.
+    """
+
+    values: Array
+    states: Array
+    effects: tuple[Effect, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Elimination:
+    """Orthonormal basis of what the unknowns of each window explain.
+
+    Attributes:
+        basis: (W, M + S, S).
+        upper: (W, S, S) triangular factor.
+    """
+
+    basis: Array
+    upper: Array
+
+    def project(self, columns: Array) -> Array:
+        """Columns (W, M + S, K) without what the basis explains."""
+        return columns - np.matmul(self.basis, np.matmul(self.basis.transpose(0, 2, 1), columns))
+
+    def explain(self, columns: Array) -> Array:
+        """(W, S, K) changes of the unknowns that explain columns (W, M + S, K) best."""
+        return np.linalg.solve(self.upper, np.matmul(self.basis.transpose(0, 2, 1), columns))
+
+    def subset(self, chosen: Chosen) -> Elimination:
+        """Only the chosen windows."""
+        return Elimination(self.basis[chosen], self.upper[chosen])
+
+
+class Problem:
+    """Windows, model and nuisances of a diagnosis.
+
+    Args:
+        robot: nominal robot.
+        soil: nominal soil.
+        blocked: windows with their noise.
+        nuisances: what is uncertain.
+        priors: their standard deviations, for the local variations of the sensors.
+        threads: of the simulator.
+        numerics: of the simulator.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        soil: Soil,
+        blocked: BlockedWindows,
+        nuisances: Nuisances,
+        priors: NuisancePriors = NuisancePriors(),
+        *,
+        threads: int = 1,
+        numerics: Numerics | None = None,
+    ) -> None:
+        self.blocked = blocked
+        self.nuisances = nuisances
+        self.priors = priors
+        self._setting = (robot, soil, threads, fit_numerics() if numerics is None else numerics)
+        windows = blocked.windows
+        self.model = WindowModel(
+            robot, soil, windows, nuisances.parameters, numerics=self._setting[3], threads=threads
+        )
+        self.prior = np.array([p.prior for p in nuisances.parameters])
+        self.low = np.array([p.low for p in nuisances.parameters])
+        self.high = np.array([p.high for p in nuisances.parameters])
+
+    def subset(self, chosen: NDArray[np.int64] | Chosen) -> Problem:
+        """The same problem on some of the windows."""
+        robot, soil, threads, numerics = self._setting
+        return Problem(
+            robot, soil, self.blocked.subset(chosen), self.nuisances, self.priors, threads=threads, numerics=numerics
+        )
+
+    @property
+    def free(self) -> Chosen:
+        """(P,) global parameters that a fit moves."""
+        return np.asarray(self.prior > 0.0)
+
+    def start(self, effects: Sequence[Effect] = ()) -> Point:
+        """The nominal model at the windows' first guess."""
+        return Point(np.zeros(len(self.prior)), self.blocked.windows.initial.copy(), tuple(effects))
+
+    def predict(self, point: Point) -> Array:
+        """(W, T, 8)."""
+        return self.model.predict(point.values, point.states, point.effects)
+
+    def residual(self, point: Point, prediction: Array) -> Array:
+        """Weighted block residuals with the states' prior below, (W, M + S)."""
+        offset = np.zeros((self.blocked.windows.count, len(self._unknown_priors)))
+        offset[:, : len(STATE_PRIOR)] = (self.blocked.windows.initial - point.states) / STATE_PRIOR
+        return np.concatenate([self.blocked.residual(prediction), offset], axis=1)
+
+    @property
+    def _unknown_priors(self) -> Array:
+        """(S,) of the states, the local parameters and the local sensor biases."""
+        sensors = [self.priors.local_accelerometer, self.priors.local_accelerometer, self.priors.local_gyro]
+        return np.array([*STATE_PRIOR, *(deviation for _, deviation in self.nuisances.local), *sensors])
+
+    def padded(self, columns: Array) -> Array:
+        """Columns (W, M, K) with the rows of the unknowns' priors below, (W, M + S, K)."""
+        rows = np.zeros((columns.shape[0], len(self._unknown_priors), columns.shape[2]))
+        return np.concatenate([columns, rows], axis=1)
+
+    def parameter_columns(self, point: Point, base: Array, progress: Callable[[], None] = lambda: None) -> Array:
+        """Weighted sensitivity to every nuisance parameter, (W, M, P)."""
+        columns = []
+        for k, parameter in enumerate(self.nuisances.parameters):
+            channel = _BIAS_CHANNEL.get(parameter.entries[0]) if len(parameter.entries) == 1 else None
+            if channel is not None and not parameter.factor:
+                columns.append(self._bias_column(channel, parameter.recording))
+                continue
+            step = parameter.step if point.values[k] + parameter.step <= max(parameter.high, 0.03) else -parameter.step
+            moved = point.values.copy()
+            moved[k] += step
+            columns.append(self.blocked.means(self.predict(replace(point, values=moved)) - base) / step)
+            progress()
+        return np.stack(columns, axis=2)
+
+    def _bias_column(self, channel: int, recording: int | None) -> Array:
+        windows = self.blocked.windows
+        ones = np.zeros(windows.measured.shape)
+        chosen = slice(None) if recording is None else windows.recording == recording
+        ones[chosen, :, channel] = 1.0
+        return self.blocked.means(ones)
+
+    def eliminate(self, point: Point, base: Array, by_parameter: Array) -> Elimination:
+        """Basis of the unknowns of each window at a point."""
+        by_state = self.blocked.means(self.model.state_derivatives(point.values, point.states, base, point.effects))
+        local = by_parameter[..., [index for index, _ in self.nuisances.local]]
+        sensors = np.stack([self._bias_column(channel, None) for channel in range(3)], axis=2)
+        columns = np.concatenate([by_state, local, sensors], axis=2)
+        rows = np.broadcast_to(
+            np.diag(1.0 / self._unknown_priors), (columns.shape[0], columns.shape[2], columns.shape[2])
+        )
+        basis, upper = np.linalg.qr(np.concatenate([columns * self.blocked.mask[..., None], rows], axis=1))
+        return Elimination(basis, upper)

@@ -1,0 +1,230 @@
+"""Joint fit of nuisance parameters, initial states and the parameters of assumed effects by Gauss-Newton."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ddagr_gym.diagnosis.problem import Elimination, Point, Problem
+from ddagr_gym.physics.effects import Effect
+from ddagr_gym.replay.refit import STATE_PRIOR
+
+Array = NDArray[np.float64]
+
+_DAMPING = (1.0, 0.5, 0.25, 0.1, 0.03)
+_STATES = len(STATE_PRIOR)
+
+
+@dataclass(frozen=True)
+class EffectParameter:
+    """One moving field of an assumed effect.
+
+    Attributes:
+        effect: its place among the assumed effects.
+        field: name of the field.
+        step: for finite differences, in its unit.
+        low: bound.
+        high: bound.
+    """
+
+    effect: int
+    field: str
+    step: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """A fitted model.
+
+    Attributes:
+        point: where it stands.
+        prediction: (W, T, 8).
+        cost: half the sum of squares of weighted residuals and priors, the windows' unknowns eliminated.
+        elimination: of the windows' unknowns at the last derivatives.
+        by_parameter: (W, M, P) weighted nuisance sensitivities there.
+        iterations: steps taken.
+        converged: whether the last step lowered the cost by less than the tolerance.
+        window_cost: (W,) share of each window in the cost, without the parameters' priors.
+    """
+
+    point: Point
+    prediction: Array
+    cost: float
+    elimination: Elimination
+    by_parameter: Array
+    iterations: int
+    converged: bool
+    window_cost: Array
+
+
+def effect_parameters(effects: Sequence[Effect], fixed: frozenset[str] = frozenset()) -> tuple[EffectParameter, ...]:
+    """Fields of effects that a fit moves: all with a step, but none of a categorical effect and no flags.
+
+    Args:
+        effects: assumed.
+        fixed: names of fields to leave alone.
+    """
+    found = []
+    for number, effect in enumerate(effects):
+        if effect.categorical or not effect.differentiable:
+            continue
+        for name in (*effect.size_names(), *effect.shape_names()):
+            data = effect.parameter(name).metadata
+            if data["step"] > 0.0 and name not in fixed and abs(getattr(effect, name)) < 1e5:
+                found.append(EffectParameter(number, name, data["step"], data["low"], data["high"]))
+    return tuple(found)
+
+
+def moved(effects: tuple[Effect, ...], parameters: Sequence[EffectParameter], values: Array) -> tuple[Effect, ...]:
+    """Effects with parameters at values, clipped to their bounds."""
+    changed = list(effects)
+    for parameter, value in zip(parameters, values, strict=True):
+        inside = float(min(max(value, parameter.low), parameter.high))
+        changed[parameter.effect] = changed[parameter.effect].with_values(**{parameter.field: inside})
+    return tuple(changed)
+
+
+def read(effects: Sequence[Effect], parameters: Sequence[EffectParameter]) -> Array:
+    """Values of parameters of effects."""
+    return np.array([getattr(effects[p.effect], p.field) for p in parameters], dtype=np.float64)
+
+
+def effect_columns(problem: Problem, point: Point, base: Array, parameters: Sequence[EffectParameter]) -> Array:
+    """Weighted sensitivity to effect parameters, (W, M, E)."""
+    columns = np.empty((*problem.blocked.mask.shape, len(parameters)))
+    values = read(point.effects, parameters)
+    for k, parameter in enumerate(parameters):
+        step = parameter.step if values[k] + parameter.step <= parameter.high else -parameter.step
+        tried = values.copy()
+        tried[k] += step
+        changed = problem.predict(replace(point, effects=moved(point.effects, parameters, tried)))
+        columns[..., k] = problem.blocked.means(changed - base) / step
+    return columns
+
+
+def cost_of(problem: Problem, point: Point, prediction: Array, elimination: Elimination) -> tuple[float, Array]:
+    """Cost with the windows' unknowns eliminated, and the windows' shares (W,); infinite where predictions fail."""
+    residual = elimination.project(problem.residual(point, prediction)[..., None])[..., 0]
+    shares = 0.5 * (residual**2).sum(axis=1)
+    free = problem.free
+    prior = 0.5 * float(((point.values[free] / problem.prior[free]) ** 2).sum())
+    total = float(shares.sum()) + prior
+    return (total if np.isfinite(total) else np.inf), shares
+
+
+def fit(
+    problem: Problem,
+    start: Point | None = None,
+    *,
+    iterations: int = 10,
+    tolerance: float = 2e-4,
+    renewals: int = 2,
+    reuse: Fitted | None = None,
+    fixed: frozenset[str] = frozenset(),
+    progress: Callable[[], None] = lambda: None,
+) -> Fitted:
+    """Fit from ``start`` (the nominal model by default).
+
+    Args:
+        problem: what to fit.
+        start: first point with its effects.
+        iterations: most steps.
+        tolerance: relative gain of a step that ends the fit.
+        renewals: how often the sensitivities are computed before they are kept; those of the result are new.
+        reuse: fit whose nuisance sensitivities are kept, so that only those of the effects are simulated.
+        fixed: names of effect parameters to leave alone.
+        progress: called after each step.
+    """
+    point = problem.start() if start is None else start
+    parameters = effect_parameters(point.effects, fixed)
+    prediction = problem.predict(point)
+    if not np.isfinite(prediction).all():
+        point = replace(point, states=problem.blocked.windows.initial.copy())
+        prediction = problem.predict(point)
+    by_parameter, elimination = (reuse.by_parameter, reuse.elimination) if reuse else _sensitivities(problem, point, prediction)
+    by_effect = effect_columns(problem, point, prediction, parameters)
+    cost, _ = cost_of(problem, point, prediction, elimination)
+    converged, done = False, 0
+    while done < iterations and not converged:
+        done += 1
+        before = cost
+        point, prediction, cost = _step(
+            problem, point, prediction, cost, elimination, by_parameter, by_effect, parameters
+        )
+        converged = before - cost < tolerance * cost
+        progress()
+        if done < renewals and not converged:
+            if reuse is None:
+                by_parameter, elimination = _sensitivities(problem, point, prediction)
+            by_effect = effect_columns(problem, point, prediction, parameters)
+            cost, _ = cost_of(problem, point, prediction, elimination)
+    if reuse is None:
+        by_parameter, elimination = _sensitivities(problem, point, prediction)
+    cost, shares = cost_of(problem, point, prediction, elimination)
+    return Fitted(point, prediction, cost, elimination, by_parameter, done, converged, shares)
+
+
+def _sensitivities(problem: Problem, point: Point, prediction: Array) -> tuple[Array, Elimination]:
+    by_parameter = problem.parameter_columns(point, prediction)
+    return by_parameter, problem.eliminate(point, prediction, by_parameter)
+
+
+def _step(
+    problem: Problem,
+    point: Point,
+    prediction: Array,
+    cost: float,
+    elimination: Elimination,
+    by_parameter: Array,
+    by_effect: Array,
+    parameters: Sequence[EffectParameter],
+) -> tuple[Point, Array, float]:
+    """One damped Gauss-Newton step; the point itself where none lowers the cost."""
+    free = np.flatnonzero(problem.free)
+    raw = np.concatenate(
+        [problem.residual(point, prediction)[..., None], problem.padded(np.concatenate([by_parameter[..., free], by_effect], axis=2))],
+        axis=2,
+    )  # fmt: skip
+    columns = elimination.project(raw)
+    right, left = columns[..., 0], columns[..., 1:]
+    precision = np.concatenate([1.0 / problem.prior[free] ** 2, np.zeros(len(parameters))])
+    here = np.concatenate([point.values[free], read(point.effects, parameters)])
+    low = np.concatenate([problem.low[free], [p.low for p in parameters]])
+    high = np.concatenate([problem.high[free], [p.high for p in parameters]])
+    information = np.einsum("wmp,wmq->pq", left, left, optimize=True) + np.diag(precision)
+    gradient = np.einsum("wmp,wm->p", left, right) - precision * here
+    change = bounded_step(information, gradient, low - here, high - here)
+    explained = elimination.explain(raw)
+    states = explained[:, :_STATES, 0] - explained[:, :_STATES, 1:] @ change
+    for damping in _DAMPING:
+        values = point.values.copy()
+        values[free] += damping * change[: len(free)]
+        effects = moved(point.effects, parameters, here[len(free) :] + damping * change[len(free) :])
+        tried = Point(values, point.states + damping * states, effects)
+        predicted = problem.predict(tried)
+        after, _ = cost_of(problem, tried, predicted, elimination)
+        if after < cost:
+            return tried, predicted, after
+    return point, prediction, cost
+
+
+def bounded_step(information: Array, gradient: Array, low: Array, high: Array) -> Array:
+    """Newton step inside bounds: what would leave them is put on them, one after the other."""
+    ridge = 1e-10 * np.diag(np.maximum(np.diag(information), 1e-30))
+    step = np.zeros(len(gradient))
+    held = np.zeros(len(gradient), dtype=bool)
+    for _ in range(len(gradient) + 1):
+        rest = gradient - information[:, held] @ step[held]
+        open_ = ~held
+        step[open_] = np.linalg.solve((information + ridge)[np.ix_(open_, open_)], rest[open_])
+        outside = open_ & ((step < low - 1e-12) | (step > high + 1e-12))
+        if not outside.any():
+            break
+        step[outside] = np.clip(step[outside], low[outside], high[outside])
+        held |= outside
+    return step

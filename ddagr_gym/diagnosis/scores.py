@@ -1,0 +1,382 @@
+"""The scan: what each effect of the library would explain of the residual, everything uncertain projected out.
+
+One simulation per probe gives a column of sensitivities; per window all inner products of residual, nuisances and
+probes are kept (:class:`Terms`). Scores, gains, held-out gains and resampled ones follow from sums of these small
+matrices, without another simulation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ddagr_gym.diagnosis.problem import Problem
+from ddagr_gym.diagnosis.refit import Fitted
+from ddagr_gym.physics.effects import Effect
+from ddagr_gym.physics.effects.base import DriveExtent
+from ddagr_gym.physics.effects.registry import effect_kinds
+from ddagr_gym.replay.windows import STATE
+
+Array = NDArray[np.float64]
+
+_NEAR_PATCH = 1.5
+"""Distance of wheels from the body's path that may still touch a patch [m], about a robot's half diagonal and more."""
+
+_BEFORE_ONSET = 3.0
+"""Time before an onset in which it already shows [s]: six widths of the smoothed step."""
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """Probes of one effect that are tried together.
+
+    Attributes:
+        name: of the effect.
+        columns: (k,) their places among all probes.
+        probes: (k,) the effects themselves.
+        one_sided: (k,) whether only positive multiples exist.
+        whole: multiple of the only probe at which a categorical effect stands, None for others.
+    """
+
+    name: str
+    columns: tuple[int, ...]
+    probes: tuple[Effect, ...]
+    one_sided: tuple[bool, ...]
+    whole: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Terms:
+    """Inner products per window after elimination of its unknowns.
+
+    Attributes:
+        normals: (W, 1 + P + K, 1 + P + K) of residual, free nuisances and probes, in this order.
+        nuisances: P.
+        precision: (P,) of the nuisances' priors.
+        values: (P,) where the nuisances stand.
+        candidates: what the probes are of.
+        recording: (W,) of each window.
+        time: (W,) of each window [s].
+    """
+
+    normals: Array
+    nuisances: int
+    precision: Array
+    values: Array
+    candidates: tuple[Candidate, ...]
+    recording: NDArray[np.int64]
+    time: Array
+
+
+@dataclass(frozen=True)
+class Gain:
+    """What a candidate explains.
+
+    Attributes:
+        candidate: index among the candidates.
+        name: of the effect.
+        gain: fall of the cost (half a sum of squares).
+        multiples: of the probes.
+    """
+
+    candidate: int
+    name: str
+    gain: float
+    multiples: tuple[float, ...]
+
+
+def candidates_of(kind: type[Effect], extent: DriveExtent, first: int) -> list[Candidate]:
+    """Candidates of one kind: up to two probes span it; more are grouped by their shapes (place, onset, limit).
+
+    Args:
+        kind: the effect.
+        extent: of the drives.
+        first: place of its first probe among all.
+    """
+    probes = kind.probes(extent)
+    if kind.categorical:
+        return [
+            Candidate(kind.name, (first + k,), (probe,), (True,), _whole(probe)) for k, probe in enumerate(probes)
+        ]
+    if len(probes) <= 2:
+        groups = [list(range(len(probes)))]
+    else:
+        by_shape: dict[tuple[float, ...], list[int]] = {}
+        for k, probe in enumerate(probes):
+            by_shape.setdefault(tuple(getattr(probe, name) for name in kind.shape_names()), []).append(k)
+        groups = list(by_shape.values())
+    return [
+        Candidate(
+            kind.name,
+            tuple(first + k for k in group),
+            tuple(probes[k] for k in group),
+            tuple(_one_sided(probes[k]) for k in group),
+        )
+        for group in groups
+    ]
+
+
+def _one_sided(probe: Effect) -> bool:
+    """Whether neutral lies at a bound of the size that the probe moves."""
+    for name in probe.size_names():
+        data = probe.parameter(name).metadata
+        if getattr(probe, name) != data["neutral"]:
+            return bool(data["neutral"] in (data["low"], data["high"]) or not probe.differentiable)
+    return False
+
+
+def _whole(probe: Effect) -> float:
+    """Multiple of a categorical probe that stands at its bound."""
+    for name in probe.size_names():
+        data = probe.parameter(name).metadata
+        moved = getattr(probe, name) - data["neutral"]
+        if moved != 0.0:
+            return float((data["high"] - data["neutral"]) / moved)
+    return 1.0
+
+
+def drive_extent(problem: Problem, prediction: Array) -> DriveExtent:
+    """What the windows cover."""
+    windows = problem.blocked.windows
+    x, y = prediction[..., 5], prediction[..., 6]
+    commands = windows.commands[:, windows.history : windows.history + windows.samples]
+    change = np.abs(np.diff(prediction[..., 3:5], axis=1)).max() / windows.period
+    return DriveExtent(
+        float((windows.time + windows.duration).max()),
+        (float(x.min()), float(x.max())),
+        (float(y.min()), float(y.max())),
+        float(np.abs(commands).max()),
+        float(change),
+    )
+
+
+def touched(probe: Effect, problem: Problem, prediction: Array) -> NDArray[np.bool_]:
+    """(W,) windows whose readings a probe can change: others need no simulation."""
+    windows = problem.blocked.windows
+    result = np.ones(windows.count, dtype=bool)
+    names = probe.shape_names()
+    if {"centre_x", "centre_y", "radius", "edge"} <= set(names):
+        place = probe.as_mapping()["parameters"]
+        distance = np.hypot(prediction[..., 5] - place["centre_x"], prediction[..., 6] - place["centre_y"])
+        result &= distance.min(axis=1) < place["radius"] + _NEAR_PATCH + 4.0 * place["edge"]
+    if "onset" in names:
+        result &= windows.time + windows.duration > probe.as_mapping()["parameters"]["onset"] - _BEFORE_ONSET
+    return result
+
+
+def probe_column(problem: Problem, fitted: Fitted, probe: Effect) -> Array:
+    """Weighted change of the block means by a probe at the fitted model, (W, M)."""
+    chosen = touched(probe, problem, fitted.prediction)
+    column = np.zeros(problem.blocked.mask.shape)
+    if not chosen.any():
+        return column
+    part = problem if chosen.all() else problem.subset(chosen)
+    point = replace(fitted.point, states=fitted.point.states[chosen], effects=(*fitted.point.effects, probe))
+    column[chosen] = part.blocked.means(part.predict(point) - fitted.prediction[chosen])
+    return np.nan_to_num(column)
+
+
+def scan(
+    problem: Problem,
+    fitted: Fitted,
+    kinds: Mapping[str, type[Effect]] | None = None,
+    progress: Callable[[str], None] = lambda name: None,
+) -> Terms:
+    """Terms of all effects of the library at a fitted model.
+
+    Args:
+        problem: what was fitted.
+        fitted: the fit, with or without effects.
+        kinds: effects to try, all by default; those assumed already are left out.
+        progress: called with the name of each effect when it is done.
+    """
+    extent = drive_extent(problem, fitted.prediction)
+    assumed = {effect.name for effect in fitted.point.effects}
+    candidates: list[Candidate] = []
+    columns: list[Array] = []
+    for name, kind in (effect_kinds() if kinds is None else kinds).items():
+        if name in assumed:
+            continue
+        for candidate in candidates_of(kind, extent, len(columns)):
+            candidates.append(candidate)
+            columns += [probe_column(problem, fitted, probe) for probe in candidate.probes]
+        progress(name)
+    free = _open(problem, fitted)
+    raw = np.concatenate(
+        [
+            problem.residual(fitted.point, fitted.prediction)[..., None],
+            problem.padded(np.concatenate([fitted.by_parameter[..., free], np.stack(columns, axis=2)], axis=2)),
+        ],
+        axis=2,
+    )
+    projected = fitted.elimination.project(raw)
+    windows = problem.blocked.windows
+    return Terms(
+        np.matmul(projected.transpose(0, 2, 1), projected),
+        len(free),
+        1.0 / problem.prior[free] ** 2,
+        fitted.point.values[free],
+        tuple(candidates),
+        windows.recording,
+        windows.time,
+    )
+
+
+def _open(problem: Problem, fitted: Fitted) -> NDArray[np.int64]:
+    """Nuisances that may still move: those held at a bound explain nothing more."""
+    values = fitted.point.values
+    held = (values <= problem.low + 1e-9) | (values >= problem.high - 1e-9)
+    return np.flatnonzero(problem.free & ~held)
+
+
+@dataclass(frozen=True, eq=False)
+class Reduced:
+    """Gradient and information of all probes with the nuisances projected out.
+
+    Attributes:
+        gradient: (K,).
+        information: (K, K).
+        nuisance: (P, 1 + K) best nuisance change without probes, and its answer to each probe.
+    """
+
+    gradient: Array
+    information: Array
+    nuisance: Array
+
+
+def reduce(terms: Terms, weights: Array | None = None) -> Reduced:
+    """Sum the windows, with weights (W,) if given, and project the nuisances out."""
+    total = terms.normals.sum(axis=0) if weights is None else np.tensordot(weights, terms.normals, axes=1)
+    share = 1.0 if weights is None else float(np.mean(weights))
+    p = terms.nuisances
+    inside = total[1 : 1 + p, 1 : 1 + p] + np.diag(terms.precision * share)
+    right = np.concatenate([total[1 : 1 + p, :1], total[1 : 1 + p, 1 + p :]], axis=1)
+    right[:, 0] -= terms.precision * share * terms.values
+    answer = np.linalg.solve(inside, right)
+    cross = total[1 + p :, 1 : 1 + p]
+    return Reduced(total[1 + p :, 0] - cross @ answer[:, 0], total[1 + p :, 1 + p :] - cross @ answer[:, 1:], answer)
+
+
+def best_multiples(reduced: Reduced, candidate: Candidate, dispersion: float = 1.0) -> tuple[float, Array]:
+    """Gain and multiples of a candidate's probes, inside what exists in nature.
+
+    Args:
+        reduced: sums over windows.
+        candidate: which probes.
+        dispersion: variance of the weighted residuals by which the gain is divided.
+    """
+    index = np.array(candidate.columns)
+    gradient = reduced.gradient[index]
+    information = reduced.information[np.ix_(index, index)]
+    if candidate.whole is not None:
+        theta = np.array([candidate.whole])
+    else:
+        theta = _solve_one_sided(information, gradient, np.array(candidate.one_sided))
+    gain = float(theta @ gradient - 0.5 * theta @ information @ theta)
+    return gain / dispersion, theta
+
+
+def _solve_one_sided(information: Array, gradient: Array, one_sided: NDArray[np.bool_]) -> Array:
+    """Least squares with some unknowns not negative; by trying which of them are zero (there are at most two)."""
+    size = len(gradient)
+    ridge = 1e-8 * np.diag(np.maximum(np.diag(information), 1e-12))
+    best, found = 0.0, np.zeros(size)
+    for pattern in range(1, 2**size):
+        used = np.array([bool(pattern >> k & 1) for k in range(size)])
+        theta = np.zeros(size)
+        theta[used] = np.linalg.solve((information + ridge)[np.ix_(used, used)], gradient[used])
+        if (theta[one_sided] < 0.0).any():
+            continue
+        gain = float(theta @ gradient - 0.5 * theta @ information @ theta)
+        if gain > best:
+            best, found = gain, theta
+    return found
+
+
+def gains(terms: Terms, weights: Array | None = None, dispersion: float = 1.0) -> list[Gain]:
+    """Gain of the best candidate of each effect, largest first."""
+    reduced = reduce(terms, weights)
+    best: dict[str, Gain] = {}
+    for k, candidate in enumerate(terms.candidates):
+        gain, theta = best_multiples(reduced, candidate, dispersion)
+        if candidate.name not in best or gain > best[candidate.name].gain:
+            best[candidate.name] = Gain(k, candidate.name, gain, tuple(theta.tolist()))
+    return sorted(best.values(), key=lambda item: -item.gain)
+
+
+def dispersion_of(problem: Problem, fitted: Fitted) -> float:
+    """Mean square of the weighted residuals of the fit, at least 1."""
+    unknowns = fitted.elimination.basis.shape[2] * problem.blocked.windows.count
+    count = float(problem.blocked.mask.sum()) - unknowns - float(problem.free.sum())
+    return max(2.0 * float(fitted.window_cost.sum()) / max(count, 1.0), 1.0)
+
+
+def scores(terms: Terms, gains_: Sequence[Gain]) -> dict[str, float]:
+    """Cluster-robust score of each effect along its best direction: sum over windows over its own scatter [-].
+
+    The scatter is the sandwich estimate by window, so that correlated errors inside windows do not count as evidence.
+    """
+    reduced = reduce(terms)
+    p = terms.nuisances
+    result = {}
+    for gain in gains_:
+        candidate = terms.candidates[gain.candidate]
+        theta = np.array(gain.multiples)
+        direction = np.zeros(terms.normals.shape[1])
+        direction[1 + p + np.array(candidate.columns)] = theta
+        direction[1 : 1 + p] = -(reduced.nuisance[:, 1 + np.array(candidate.columns)] @ theta)
+        by_window = terms.normals[:, 0] @ direction
+        mean = by_window.mean()
+        scatter = np.sqrt(((by_window - mean) ** 2).sum())
+        result[gain.name] = float(by_window.sum() / scatter) if scatter > 0.0 else 0.0
+    return result
+
+
+def fold_of(terms: Terms, folds: int, length: float) -> NDArray[np.int64]:
+    """(W,) fold of each window: stretches of ``length`` [s] of every recording are dealt out in turn."""
+    stretch = np.floor(terms.time / length).astype(np.int64)
+    return np.asarray((stretch + terms.recording) % folds)
+
+
+def held_out_gains(terms: Terms, dispersion: float = 1.0, folds: int = 4, length: float = 6.0) -> dict[str, float]:
+    """Fall of the cost on windows that were left out while multiples and nuisances were fitted, by effect.
+
+    Args:
+        terms: of a scan.
+        dispersion: see :func:`best_multiples`.
+        folds: parts.
+        length: of the stretches that are dealt out to the parts [s].
+    """
+    fold = fold_of(terms, folds, length)
+    total: dict[str, float] = {}
+    for part in range(folds):
+        outside = (fold != part).astype(float)
+        if not outside.any() or outside.all():
+            continue
+        reduced = reduce(terms, outside)
+        inside = terms.normals[fold == part].sum(axis=0)
+        for gain in gains(terms, outside):
+            change = _held_out(terms, reduced, inside, gain)
+            total[gain.name] = total.get(gain.name, 0.0) + change / dispersion
+    return total
+
+
+def _held_out(terms: Terms, reduced: Reduced, inside: Array, gain: Gain) -> float:
+    """Fall of the cost on other windows by a candidate fitted elsewhere, beside the nuisances fitted elsewhere."""
+    p = terms.nuisances
+    columns = np.array(terms.candidates[gain.candidate].columns)
+    theta = np.array(gain.multiples)
+    base = reduced.nuisance[:, 0]
+
+    def cost(change: Array, multiples: Array) -> float:
+        vector = np.zeros(inside.shape[0])
+        vector[0] = 1.0
+        vector[1 : 1 + p] = -change
+        vector[1 + p + columns] = -multiples
+        return 0.5 * float(vector @ inside @ vector)
+
+    answered = base - reduced.nuisance[:, 1 + columns] @ theta
+    return cost(base, np.zeros(len(theta))) - cost(answered, theta)
