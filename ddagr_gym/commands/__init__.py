@@ -31,6 +31,7 @@ NAMES = (
     "soils",
     "validate",
     "effects",
+    "evaluate",
     "freeze-scenarios",
     "test",
 )

@@ -2,13 +2,14 @@
 
 Differences over one and two samples leave the motion out and keep the noise. For a first-order autoregressive noise
 with standard deviation s and correlation r, var(x[k+1] - x[k]) = 2 s^2 (1 - r) and var(x[k+2] - x[k]) = 2 s^2 (1 - r^2),
-so that their ratio is 1 + r. Poses come seldom and are differenced three times (variance 20 s^2) instead.
+so that their ratio is 1 + r. Poses come seldom and are differenced three times (variance 20 s^2) instead. What slower
+components add to means over several samples is measured on differences of such means over three (variance 2 s^2).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,17 +38,20 @@ class ChannelNoise:
         per_speed: further standard deviation per travel speed [unit/(m/s)]; both add in quadrature.
         correlation: of successive samples [-], -0.5 (a differenced counter) to 0.95.
         quantum: smallest step between values, 0 where none was found.
+        inflation: standard deviation of means over what the correlation predicts [-].
     """
 
     sigma: float
     per_speed: float
     correlation: float
     quantum: float
+    inflation: float = 1.0
 
     def of_mean(self, samples: int, speed: Array | float = 0.0) -> Array:
         """Standard deviation of the mean of ``samples`` successive samples at a travel speed [m/s]."""
         lags = np.arange(1, samples)
         factor = (1.0 + 2.0 * np.sum((1.0 - lags / samples) * self.correlation**lags)) / samples
+        factor *= self.inflation**2 if samples > 1 else 1.0
         return np.sqrt(np.maximum(factor, 0.0) * (self.sigma**2 + (self.per_speed * np.asarray(speed)) ** 2))
 
 
@@ -103,7 +107,7 @@ def channel_noise(values: Sequence[Array], speeds: Sequence[Array], sparse: bool
         return ChannelNoise(float(np.sqrt(square)), 0.0, 0.0, 0.0) if np.isfinite(square) else None
     if quantum > 0.0:
         # a differenced counter: the rounding of a position enters two successive samples with opposite signs
-        return ChannelNoise(quantum / np.sqrt(6.0), 0.0, -0.5, quantum)
+        return ChannelNoise(float(quantum / np.sqrt(6.0)), 0.0, -0.5, quantum)
     return _coloured(list(values), list(speeds))
 
 
@@ -124,7 +128,22 @@ def _coloured(values: list[Array], speeds: list[Array]) -> ChannelNoise | None:
     ]
     rest, growth = _line([r for r in rows if np.isfinite(r[1])], first)
     scale = 2.0 * (1.0 - correlation)
-    return ChannelNoise(float(np.sqrt(rest / scale)), float(np.sqrt(growth / scale)), correlation, 0.0)
+    plain = ChannelNoise(float(np.sqrt(rest / scale)), float(np.sqrt(growth / scale)), correlation, 0.0)
+    return replace(plain, inflation=_inflation(plain, values, speeds))
+
+
+def _inflation(plain: ChannelNoise, values: list[Array], speeds: list[Array], samples: int = 5) -> float:
+    """How much more than predicted means over ``samples`` scatter, 0.5 to 3."""
+    standardised = []
+    for value, speed in zip(values, speeds, strict=True):
+        rows = len(value) // samples * samples
+        means = value[:rows].reshape(-1, samples).mean(axis=1)
+        expected = plain.of_mean(samples, speed[:rows].reshape(-1, samples).mean(axis=1))
+        spread = np.hypot(expected[3:], expected[:-3])
+        third = (means[3:] - means[:-3]) / np.maximum(spread, 1e-12)
+        standardised.append(third[np.isfinite(third)])
+    square = _central_square(np.concatenate(standardised))
+    return float(np.clip(np.sqrt(square), 0.5, 3.0)) if np.isfinite(square) else 1.0
 
 
 def _line(rows: list[tuple[float, float]], fallback: float) -> tuple[float, float]:

@@ -67,7 +67,7 @@ def estimates(model: FilterModel, states: ArrayLike, covariances: ArrayLike) -> 
         curvature = np.where(x[..., 0] == 0.0, np.inf, x[..., 2] / x[..., 0])
         spread = p[..., 0, 0] - 2.0 * radius * p[..., 0, 2] + radius**2 * p[..., 2, 2]
         radius_deviation = np.sqrt(np.maximum(spread, 0.0)) / np.abs(x[..., 2])
-    prior = np.diagonal(model.prior.logs(model.wheel_load)[1])
+    prior = np.diagonal(model.soil_prior.logs(model.wheel_load)[1])
     return Estimates(
         velocity=x[..., :3],
         velocity_deviation=np.sqrt(variances[..., :3]),

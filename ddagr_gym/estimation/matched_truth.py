@@ -97,7 +97,7 @@ def draw_drive(
         raise InputError(f"commands have shape {drive.shape}: give (T, 2).")
     mean, covariance = model.initial()
     x = rng.multivariate_normal(mean, covariance) if state is None else np.array(state, dtype=np.float64)
-    root = np.linalg.cholesky(model.prior.logs(model.wheel_load)[1])
+    root = np.linalg.cholesky(model.soil_prior.logs(model.wheel_load)[1])
     normal = rng.standard_normal((len(drive), STATE_SIZE + CHANNEL_SIZE))
     states, readings = np.empty((len(drive), STATE_SIZE)), np.empty((len(drive), CHANNEL_SIZE))
     work = np.zeros(WORK_SIZE)

@@ -184,7 +184,7 @@ def test_more_resistance_slows_the_straight(robot):
         speeds.append(roll_out(model, model.initial()[0], np.full((600, 2), 0.7))[-1, 0])
     rolling = model.outer_radius * 0.7
     # a1 (1 - exp(-a2 s)) = Rc on a straight
-    expected = [rolling * (1 + math.log(1 - share) / 5.0) for share in (0.05, 0.15, 0.30)]
+    expected = [rolling * (1 + math.log(1 - share) / model.soil_prior.traction_rate) for share in (0.05, 0.15, 0.30)]
     np.testing.assert_allclose(speeds, expected, rtol=1e-3)
 
 

@@ -1,0 +1,65 @@
+"""From what the scan found to an effect to start a fit from."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from ddagr_gym.diagnosis.scores import Candidate
+from ddagr_gym.physics.effects import Effect
+
+
+def first_guess(candidate: Candidate, multiples: Sequence[float]) -> Effect:
+    """Effect that the multiples of a candidate's probes stand for, inside its bounds.
+
+    Probes that move different sizes add up; probes of one size in different directions (slope) or at different
+    distances (towed drag) make one effect between them.
+
+    Args:
+        candidate: probes of one effect.
+        multiples: of each.
+    """
+    kind = type(candidate.probes[0])
+    if candidate.whole is not None or not kind.differentiable:
+        return candidate.probes[0] if candidate.whole is None else _whole(candidate)
+    if kind.name == "slope":
+        return _slope(candidate, multiples)
+    values: dict[str, float] = {}
+    for name in kind.size_names():
+        data = kind.parameter(name).metadata
+        total = sum(
+            m * (getattr(p, name) - data["neutral"]) for m, p in zip(multiples, candidate.probes, strict=True)
+        )
+        values[name] = min(max(data["neutral"] + total, data["low"]), data["high"])
+    weight = [abs(m) for m in multiples]
+    for name in kind.shape_names():
+        shapes = [getattr(p, name) for p in candidate.probes]
+        if sum(weight) > 0.0:
+            values[name] = sum(w * s for w, s in zip(weight, shapes, strict=True)) / sum(weight)
+        else:
+            values[name] = shapes[0]
+    return kind(**values)
+
+
+def _whole(candidate: Candidate) -> Effect:
+    """A categorical probe taken to its bound."""
+    probe = candidate.probes[0]
+    for name in probe.size_names():
+        data = probe.parameter(name).metadata
+        if getattr(probe, name) != data["neutral"]:
+            return probe.with_values(**{name: data["high"]})  # type: ignore[no-any-return]
+    return probe
+
+
+def _slope(candidate: Candidate, multiples: Sequence[float]) -> Effect:
+    """The two components of the gradient as an angle and a direction."""
+    parts = [
+        (m * p.as_mapping()["parameters"]["angle"], p.as_mapping()["parameters"]["direction"])
+        for m, p in zip(multiples, candidate.probes, strict=True)
+    ]
+    x = sum(angle * math.cos(direction) for angle, direction in parts)
+    y = sum(angle * math.sin(direction) for angle, direction in parts)
+    high = candidate.probes[0].parameter("angle").metadata["high"]
+    return candidate.probes[0].with_values(  # type: ignore[no-any-return]
+        angle=min(math.hypot(x, y), high), direction=math.atan2(y, x)
+    )

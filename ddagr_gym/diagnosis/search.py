@@ -1,0 +1,202 @@
+"""Naming: forward, swap and backward moves over joint refits, each through the gate of the null bank."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ddagr_gym.diagnosis.hypotheses import first_guess
+from ddagr_gym.diagnosis.problem import Problem
+from ddagr_gym.diagnosis.refit import Fitted, fit
+from ddagr_gym.diagnosis.scores import Gain, Terms, dispersion_of, drive_extent, gains, held_out_gains, scan, scores
+from ddagr_gym.diagnosis.thresholds import Thresholds
+from ddagr_gym.physics.effects import Effect
+
+Array = NDArray[np.float64]
+
+MOST_EFFECTS = 3
+"""Simultaneous effects that a search goes up to (diagnosis.md, step 6)."""
+
+_HOLDS = (0.04, 0.06, 0.08, 0.1, 0.15, 0.2, 0.3, 0.4)
+"""Durations tried for held readings, which have no derivative [s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """A model and what the scan at it says about every effect that it lacks.
+
+    Attributes:
+        fitted: the model.
+        terms: of the scan.
+        gains: of absent effects over the dispersion, largest first.
+        scores: cluster-robust, by name.
+        held_out: gains on left-out windows over the dispersion, by name.
+        dispersion: mean square of the weighted residuals of this model.
+    """
+
+    fitted: Fitted
+    terms: Terms
+    gains: tuple[Gain, ...]
+    scores: dict[str, float]
+    held_out: dict[str, float]
+    dispersion: float
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Assumed effects."""
+        return tuple(effect.name for effect in self.fitted.point.effects)
+
+
+@dataclass(frozen=True, eq=False)
+class Rival:
+    """A joint refit with one further effect.
+
+    Attributes:
+        name: of the effect.
+        fitted: the refit.
+        gain: fall of the cost against the model before, over the dispersion.
+    """
+
+    name: str
+    fitted: Fitted
+    gain: float
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """Result of a search.
+
+    Attributes:
+        nominal: the refitted nominal model.
+        standings: models from the nominal one to the chosen one.
+        rivals: refits of the step that chose the first effect, best first.
+    """
+
+    standings: tuple[Standing, ...]
+    rivals: tuple[Rival, ...]
+
+    @property
+    def nominal(self) -> Standing:
+        """The refitted nominal model."""
+        return self.standings[0]
+
+    @property
+    def chosen(self) -> Standing:
+        """The last model."""
+        return self.standings[-1]
+
+
+def stand(problem: Problem, fitted: Fitted, progress: Callable[[str], None] = lambda text: None) -> Standing:
+    """Scan the library at a fitted model."""
+    terms = scan(problem, fitted, progress=progress)
+    dispersion = dispersion_of(problem, fitted)
+    found = tuple(gains(terms, dispersion=dispersion))
+    return Standing(fitted, terms, found, scores(terms, found), held_out_gains(terms, dispersion), dispersion)
+
+
+def refit_with(problem: Problem, standing: Standing, effect: Effect, *, full: bool = False) -> Fitted:
+    """Joint refit from a model with one further effect; nuisance sensitivities are kept unless ``full``."""
+    start = replace(standing.fitted.point, effects=(*standing.fitted.point.effects, effect))
+    if effect.name == "sensor_hold":
+        trials = [_with_hold(problem, standing, start, duration) for duration in _HOLDS]
+        return min(trials, key=lambda trial: trial.cost)
+    return fit(problem, start, iterations=6, renewals=3, reuse=None if full else standing.fitted)
+
+
+def _with_hold(problem: Problem, standing: Standing, start: object, duration: float) -> Fitted:
+    point = replace(standing.fitted.point, effects=start.effects)  # type: ignore[attr-defined]
+    held = point.effects[-1].with_values(duration=duration)
+    return fit(problem, replace(point, effects=(*point.effects[:-1], held)), iterations=2, reuse=standing.fitted)
+
+
+def rivals_of(problem: Problem, standing: Standing, thresholds: Thresholds, most: int) -> list[Rival]:
+    """Joint refits of the effects that pass the gate, best first."""
+    passing = [gain for gain in standing.gains if thresholds.passes(gain.name, gain.gain, standing)]
+    ranked = sorted(passing, key=lambda item: -item.gain / thresholds.of(item.name).gain)[: 2 * most]
+    ranked = sorted(ranked, key=lambda item: -item.gain)[:most]
+    extent = drive_extent(problem, standing.fitted.prediction)
+    rivals = []
+    for gain in ranked:
+        effect = first_guess(standing.terms.candidates[gain.candidate], gain.multiples)
+        fitted = refit_with(problem, standing, effect)
+        if fitted.point.effects[-1].is_meaningful(extent):
+            rivals.append(Rival(gain.name, fitted, (standing.fitted.cost - fitted.cost) / standing.dispersion))
+    return sorted(rivals, key=lambda rival: -rival.gain)
+
+
+def search(
+    problem: Problem,
+    thresholds: Thresholds,
+    *,
+    rivals: int = 4,
+    most: int = MOST_EFFECTS,
+    progress: Callable[[str], None] = lambda text: None,
+) -> Found:
+    """Refit, scan, and add effects while one passes the gate.
+
+    Args:
+        problem: windows and model.
+        thresholds: of the null bank.
+        rivals: effects that are refitted jointly at each step.
+        most: effects at the same time.
+        progress: called with what is being done.
+    """
+    progress("nominal refit")
+    standing = stand(problem, fit(problem), progress)
+    standings, first = [standing], ()
+    while len(standing.names) < most:
+        tried = rivals_of(problem, standing, thresholds, rivals)
+        tried = [rival for rival in tried if rival.gain > thresholds.of(rival.name).gain]
+        if not tried:
+            break
+        first = first or tuple(tried)
+        progress(f"joint refit with {tried[0].name}")
+        best = fit(problem, tried[0].fitted.point, iterations=6)
+        standing = stand(problem, best, progress)
+        standing = _without_idle(problem, standing, thresholds, progress)
+        if standing.names == standings[-1].names:
+            break
+        standings.append(standing)
+    return Found(tuple(standings), first)
+
+
+def _without_idle(
+    problem: Problem, standing: Standing, thresholds: Thresholds, progress: Callable[[str], None]
+) -> Standing:
+    """Backward move: the effect whose removal costs less than its threshold goes."""
+    effects = standing.fitted.point.effects
+    if len(effects) < 2:
+        return standing
+    losses = []
+    for number, effect in enumerate(effects):
+        kept = (*effects[:number], *effects[number + 1 :])
+        without = fit(problem, replace(standing.fitted.point, effects=kept), iterations=4, reuse=standing.fitted)
+        losses.append(((without.cost - standing.fitted.cost) / standing.dispersion / thresholds.of(effect.name).gain, without))
+    least = min(losses, key=lambda item: item[0])
+    if least[0] >= 1.0:
+        return standing
+    return stand(problem, fit(problem, least[1].point, iterations=4), progress)
+
+
+def bootstrap_weights(
+    terms: Terms, names: Sequence[str], rng: np.random.Generator, draws: int = 200
+) -> dict[str, float]:
+    """Share of resamplings of the windows in which each of some effects explains most; they add up to 1.
+
+    Args:
+        terms: of the scan at the model without any of them.
+        names: of the effects to compare.
+        rng: of the resampling.
+        draws: how often.
+    """
+    wanted = tuple(c for c in terms.candidates if c.name in names)
+    reduced_terms = replace(terms, candidates=wanted)
+    count = len(terms.time)
+    wins = dict.fromkeys(names, 0)
+    for _ in range(draws):
+        weights = np.bincount(rng.integers(count, size=count), minlength=count).astype(float)
+        wins[gains(reduced_terms, weights)[0].name] += 1
+    return {name: number / draws for name, number in wins.items()}

@@ -1,0 +1,145 @@
+"""Thresholds of the gate: what drives with nothing missing reach, by effect and overall.
+
+They come from the null bank (:mod:`ddagr_gym.diagnosis.null_bank`); nothing is set by hand except the levels at which
+its quantiles are taken.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from ddagr_gym.errors import InputError
+
+LEVEL = 0.05
+"""False alarms that a gate lets through, over the whole library (diagnosis.md, step 3)."""
+
+VERSION = 1
+
+
+class Scores(Protocol):
+    """What a scan says by effect."""
+
+    @property
+    def scores(self) -> dict[str, float]: ...  # noqa: D102
+    @property
+    def held_out(self) -> dict[str, float]: ...  # noqa: D102
+
+
+@dataclass(frozen=True)
+class Gate:
+    """Least values for one effect.
+
+    Attributes:
+        gain: fall of the cost over the dispersion.
+        score: cluster-robust score.
+        held_out: gain on left-out windows.
+    """
+
+    gain: float
+    score: float
+    held_out: float
+
+
+@dataclass(frozen=True)
+class Thresholds:
+    """Gates by effect, and where they come from.
+
+    Attributes:
+        gates: by name of the effect.
+        nulls: null runs that they were taken from.
+        bank: hash of the bank's data.
+        level: of false alarms over the whole library.
+    """
+
+    gates: Mapping[str, Gate]
+    nulls: int
+    bank: str
+    level: float = LEVEL
+
+    def of(self, name: str) -> Gate:
+        """Gate of an effect; one that the bank did not know has the strictest of all."""
+        if name in self.gates:
+            return self.gates[name]
+        every = list(self.gates.values())
+        return Gate(max(g.gain for g in every), max(g.score for g in every), max(g.held_out for g in every))
+
+    def passes(self, name: str, gain: float, scan: Scores) -> bool:
+        """Whether an effect explains more than in drives with nothing missing, on left-out windows too."""
+        gate = self.of(name)
+        return gain > gate.gain and abs(scan.scores[name]) > gate.score and scan.held_out.get(name, 0.0) > gate.held_out
+
+
+@dataclass(frozen=True)
+class NullRun:
+    """What one null run reached.
+
+    Attributes:
+        kind: of the structural change.
+        gains: by effect.
+        scores: by effect.
+        held_out: by effect.
+    """
+
+    kind: str
+    gains: dict[str, float]
+    scores: dict[str, float]
+    held_out: dict[str, float]
+
+
+def thresholds_from(runs: Sequence[NullRun], bank: str, level: float = LEVEL) -> Thresholds:
+    """Gates such that the share ``level`` of null runs passes any of them.
+
+    Gains of an effect are divided by their upper quantile over the runs; the quantile of the largest of these ratios
+    over all effects then widens all gates alike (a max-statistic correction for the size of the library).
+
+    Raises:
+        InputError: too few runs for the level.
+    """
+    if len(runs) < 1.0 / level:
+        raise InputError(f"{len(runs)} null runs cannot give a level of {level:g}: make at least {int(1 / level)}.")
+    names = sorted({name for run in runs for name in run.gains})
+    table = np.array([[max(run.gains.get(name, 0.0), 0.0) for name in names] for run in runs])
+    scale = np.maximum(np.quantile(table, 1.0 - level, axis=0), 1.0)
+    widening = max(float(np.quantile((table / scale).max(axis=1), 1.0 - level)), 1.0)
+    held = np.array([[run.held_out.get(name, 0.0) for name in names] for run in runs])
+    score = np.array([[abs(run.scores.get(name, 0.0)) for name in names] for run in runs])
+    # the gain carries the level; the other two only refuse what few windows carry, at the nulls' median
+    gates = {
+        name: Gate(
+            float(widening * scale[k]), float(np.median(score[:, k])), float(max(np.median(held[:, k]), 0.0))
+        )
+        for k, name in enumerate(names)
+    }
+    return Thresholds(gates, len(runs), bank, level)
+
+
+def save_thresholds(thresholds: Thresholds, path: Path) -> None:
+    """Write thresholds as JSON, all or nothing."""
+    import os
+
+    body = {"version": VERSION, **asdict(thresholds)}
+    part = path.with_name(f".{path.name}.part")
+    part.write_text(json.dumps(body, indent=1, sort_keys=True) + "\n")
+    os.replace(part, path)
+
+
+def load_thresholds(path: Path) -> Thresholds:
+    """Read thresholds.
+
+    Raises:
+        InputError: a file that is missing, no JSON, or of another version.
+    """
+    try:
+        body = json.loads(path.read_text())
+    except (OSError, json.JSONDecodeError) as error:
+        raise InputError(f"{path} cannot be read as thresholds ({error}): make it with `ddagr null-bank`.") from None
+    if not isinstance(body, dict) or body.get("version") != VERSION:
+        raise InputError(f"{path} is not a thresholds file of version {VERSION}: make it with `ddagr null-bank`.")
+    gates = {str(name): Gate(**gate) for name, gate in body["gates"].items()}
+    return Thresholds(gates, int(body["nulls"]), str(body["bank"]), float(body["level"]))

@@ -1,0 +1,71 @@
+"""Noise estimates against noise of known level, colour and rounding."""
+
+import numpy as np
+import pytest
+
+from ddagr_gym.diagnosis.noise import ChannelNoise, channel_noise
+
+
+def coloured(rng: np.random.Generator, count: int, sigma: float, correlation: float) -> np.ndarray:
+    from scipy.signal import lfilter
+
+    return sigma * np.sqrt(1 - correlation**2) * lfilter([1.0], [1.0, -correlation], rng.standard_normal(count + 200))[200:]
+
+
+@pytest.mark.parametrize("correlation", [0.0, 0.3, 0.7])
+def test_level_and_correlation_of_coloured_noise_beside_a_drive(correlation: float) -> None:
+    rng = np.random.default_rng(1)
+    t = np.arange(9000) / 50.0
+    motion = 0.3 * np.sin(0.7 * t)
+    found = channel_noise([motion + coloured(rng, len(t), 0.05, correlation)], [np.zeros(len(t))], sparse=False)
+    assert found is not None
+    assert found.sigma == pytest.approx(0.05, rel=0.12)
+    assert found.correlation == pytest.approx(correlation, abs=0.08)
+
+
+def test_growth_with_speed() -> None:
+    rng = np.random.default_rng(2)
+    speed = np.repeat([0.0, 0.1, 0.2, 0.3], 2500)
+    values = rng.standard_normal(10000) * np.hypot(0.03, 0.4 * speed)
+    found = channel_noise([values], [speed], sparse=False)
+    assert found is not None
+    assert found.sigma == pytest.approx(0.03, rel=0.1)
+    assert found.per_speed == pytest.approx(0.4, rel=0.1)
+
+
+def test_standard_deviation_of_means_is_the_measured_one() -> None:
+    rng = np.random.default_rng(3)
+    values = coloured(rng, 50000, 0.05, 0.6) + 0.02 * rng.standard_normal(50000)
+    found = channel_noise([values], [np.zeros(50000)], sparse=False)
+    assert found is not None
+    measured = values.reshape(-1, 5).mean(axis=1).std()
+    assert float(found.of_mean(5)) == pytest.approx(measured, rel=0.12)
+
+
+def test_counter_is_recognised_by_its_quantum() -> None:
+    rng = np.random.default_rng(4)
+    quantum = 0.0157
+    angle = np.cumsum(rng.uniform(0.5, 0.9, 3000))
+    speed = np.diff(np.floor(angle / quantum)) * quantum
+    found = channel_noise([speed], [np.ones(2999)], sparse=False)
+    assert found is not None
+    assert found.quantum == pytest.approx(quantum, rel=1e-6)
+    assert float(found.of_mean(5)) < 0.5 * found.sigma
+
+
+def test_sparse_poses() -> None:
+    rng = np.random.default_rng(5)
+    values = np.full(6000, np.nan)
+    values[::10] = 0.02 * np.arange(600) + 0.012 * rng.standard_normal(600)
+    found = channel_noise([values], [np.ones(6000)], sparse=True)
+    assert found is not None
+    assert found.sigma == pytest.approx(0.012, rel=0.12)
+
+
+def test_too_few_samples_give_nothing() -> None:
+    assert channel_noise([np.full(500, np.nan)], [np.zeros(500)], sparse=False) is None
+
+
+def test_mean_of_white_noise() -> None:
+    assert float(ChannelNoise(0.1, 0.0, 0.0, 0.0).of_mean(4)) == pytest.approx(0.05)
+    assert float(ChannelNoise(0.0, 1.0, 0.0, 0.0).of_mean(1, 0.3)) == pytest.approx(0.3)
