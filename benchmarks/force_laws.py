@@ -2,9 +2,9 @@
 
     python -m benchmarks.force_laws [--soils N] [--output FILE]
 
-Each soil is fitted by each law twice: on the thesis's grid of slip and slip angle (chapter 3) and on wheel states of row
-turns. Errors are relative to the largest force of the fitted set. The medians and standard deviations of the logs over
-the soils of configs/soils/field.yaml are the defaults of ddagr_gym.estimation.SoilPrior.
+Each soil is fitted by each law twice: on the thesis's grid of slip and slip angle (chapter 3) and on wheel states of
+row turns. Errors are relative to the largest force of the fitted set. The geometric means of the turn fits' medians
+over thesis_a1_range and field are the medians of ddagr_gym.estimation.SoilPrior.
 """
 
 from __future__ import annotations

@@ -32,54 +32,71 @@ def ddagr() -> Robot:
 
 
 def warthog() -> Robot:
-    """Clearpath Warthog as NorLab drove it. Radius, track and mass with the recordings; the rest from the data sheet."""
+    """Clearpath Warthog as NorLab drove it.
+
+    Wheel radius, track (that of its speed controller) and mass are stated with the recordings. The controller's track
+    is not quite the wheels': the manual's width of 1.38 m less the tyre gives 1.13 m, the maker's robot description
+    1.165 m; the deviation of the half track covers them. The maximum speed is the manual's 18 km/h without load.
+    """
     return Robot(
         name="warthog",
         mass=470.0,
-        yaw_inertia=165.0,
+        yaw_inertia=150.0,
         half_wheelbase=0.457,
         half_track=0.54,
-        wheels=(TorusWheel(minor_radius=0.12, half_width=0.127, major_radius=0.18),),
+        wheels=(TorusWheel(minor_radius=0.12, half_width=0.125, major_radius=0.18),),
         centre_of_mass=(0.0, 0.0, 0.45),
         motor_rate=6.0,
-        maximum_wheel_speed=18.0,
+        maximum_wheel_speed=16.7,
         standard_deviations={
             "mass": 40.0,
-            "yaw_inertia": 50.0,
-            "half_wheelbase": 0.02,
-            "half_track": 0.02,
+            "yaw_inertia": 40.0,
+            "half_wheelbase": 0.01,
+            "half_track": 0.03,
             "motor_rate": 4.0,
-            "maximum_wheel_speed": 1.5,
-            "half_width": 0.02,
+            "maximum_wheel_speed": 2.0,
+            "half_width": 0.015,
             "outer_radius": 0.01,
         },
-        source="data sheet (1.52 x 1.38 m, 24 inch tyres about 10 inches wide); inertia: a box of these sides",
+        source=(
+            "Clearpath user manual (1.52 x 1.38 m, 280 kg bare, 272 kg payload, 18 km/h, 24 inch tyres) and "
+            "warthog_description (axles at 0.457 m, wheels 0.25 m wide); inertia: its bodies, with the further 210 kg "
+            "as a box of the chassis's sides; motor rate, height of the centre of mass and deviations are estimates"
+        ),
     )
 
 
 def husky() -> Robot:
-    """Clearpath Husky A200 with sensors. Radius, track and mass with the recordings; the rest from the data sheet."""
+    """Clearpath Husky A200 with sensors.
+
+    Wheel radius, track and mass are stated with the recordings; the maker's robot description has 0.1651 m and
+    0.5708 m, which the deviations cover. The maximum speed is the manual's 1.0 m/s.
+    """
     return Robot(
         name="husky",
         mass=75.0,
-        yaw_inertia=8.9,
+        yaw_inertia=5.0,
         half_wheelbase=0.256,
         half_track=0.26925,
-        wheels=(TorusWheel(minor_radius=0.05, half_width=0.057, major_radius=0.10875),),
+        wheels=(TorusWheel(minor_radius=0.05, half_width=0.05715, major_radius=0.10875),),
         centre_of_mass=(0.0, 0.0, 0.2),
         motor_rate=8.0,
-        maximum_wheel_speed=7.0,
+        maximum_wheel_speed=6.3,
         standard_deviations={
             "mass": 8.0,
-            "yaw_inertia": 3.0,
-            "half_wheelbase": 0.01,
-            "half_track": 0.02,
+            "yaw_inertia": 2.0,
+            "half_wheelbase": 0.005,
+            "half_track": 0.015,
             "motor_rate": 5.0,
-            "maximum_wheel_speed": 0.7,
+            "maximum_wheel_speed": 0.6,
             "half_width": 0.005,
-            "outer_radius": 0.005,
+            "outer_radius": 0.006,
         },
-        source="data sheet (0.99 x 0.67 m, wheel base 0.512 m, 4.5 inch tyres); inertia: a box of these sides",
+        source=(
+            "Clearpath user manual (0.99 x 0.67 m, 50 kg bare, 75 kg payload, 1.0 m/s) and husky_description (wheel "
+            "base 0.512 m, tyres 0.1143 m wide, body 46 kg and 2.03 kg m^2, wheels 2.64 kg); inertia: their sum, with "
+            "the further 18 kg 0.25 m from the centre; motor rate, centre of mass and deviations are estimates"
+        ),
     )
 
 

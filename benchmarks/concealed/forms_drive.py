@@ -79,9 +79,9 @@ def load_line(size: float, rng: Rng, site: Site) -> Change:
     return Change({"speed_limit": limit}, plant=lambda p: with_motors(p, speed_limit=limit, load_line=0.003))
 
 
-@form("motor_saturation", "torque limit", "different", 3, 6, "|torque| <= 62 (1 - S) N m per bank")
+@form("motor_saturation", "torque limit", "different", 3, 6, "|torque| <= 70 (1 - S) N m per bank")
 def torque_limit(size: float, rng: Rng, site: Site) -> Change:
-    limit = 62.0 * (1.0 - size)
+    limit = 70.0 * (1.0 - size)
     return Change({"torque_limit": limit}, plant=lambda p: with_motors(p, torque_limit=limit))
 
 

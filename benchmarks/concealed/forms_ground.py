@@ -110,12 +110,12 @@ def berm(size: float, rng: Rng, site: Site) -> Change:
     return Change({"gain": size}, plant=lambda p: with_ground(p, bulldozing_mode=2, bulldozing_gain=size))
 
 
-@form("slip_sinkage", "immediate", "same", 4, 10, "stiffness divided by sqrt(1 + s |slip|): sinkage times 1 + s |slip|")
+@form("slip_sinkage", "immediate", "same", 6, 12, "stiffness divided by sqrt(1 + s |slip|): sinkage times 1 + s |slip|")
 def slip_sinkage(size: float, rng: Rng, site: Site) -> Change:
     return Change({"gain": size}, plant=lambda p: with_ground(p, sinkage_mode=1, sinkage_gain=size))
 
 
-@form("slip_sinkage", "digging", "different", 4, 10, "slip replaced by the soil dug out, left behind over 0.3 m")
+@form("slip_sinkage", "digging", "different", 6, 12, "slip replaced by the soil dug out, left behind over 0.3 m")
 def digging(size: float, rng: Rng, site: Site) -> Change:
     return Change({"gain": size}, plant=lambda p: with_ground(p, sinkage_mode=2, sinkage_gain=size))
 

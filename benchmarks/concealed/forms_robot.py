@@ -11,14 +11,14 @@ from .change import Change, Rng, Site, form, signed, with_body, with_external, w
 from .plant import Body, Plant, Wheels
 
 
-@form("payload", "low", "same", 3, 8, "mass + m at the centre, inertia + m 0.2^2")
+@form("payload", "low", "same", 4, 8, "mass + m at the centre, inertia + m 0.2^2")
 def low_payload(size: float, rng: Rng, site: Site) -> Change:
     body = Body()
     values = {"mass": body.mass + size, "inertia": body.inertia + 0.04 * size}
     return Change({"mass": size}, plant=lambda p: with_body(p, **values))
 
 
-@form("payload", "mast", "variant", 3, 8, "mass + m spread out 0.5 m wide, and centre of mass higher by m 0.6/(M + m)")
+@form("payload", "mast", "variant", 4, 8, "mass + m spread out 0.5 m wide, and centre of mass higher by m 0.6/(M + m)")
 def high_payload(size: float, rng: Rng, site: Site) -> Change:
     body = Body()
     height = (body.mass * body.mass_height + size * (body.mass_height + 0.6)) / (body.mass + size)

@@ -1,0 +1,20 @@
+"""Which physics a nominal simulator leaves out, from recordings: where, what, how big, how sure, what else.
+
+    recordings -> held -> noise -> windows (setting, blocks) -> problem -> refit -> scores -> search -> verdict
+
+Method (measured reasons in the study that the project follows)
+    *noise*       level, growth with speed and colour of each channel from the recordings alone.
+    *held*        repeated readings, found in the values; repeats count as missing samples afterwards.
+    *blocks*      windows of 2 s as means over 0.1 s. The error of the nominal speed loop adds to their noise.
+    *nuisance*    what is uncertain about soil, robot, biases and clocks, as global parameters with priors, and how the
+                  field differs from window to window, as local ones. Initial states and local parameters are eliminated
+                  from every sensitivity by a QR factorisation per window.
+    *refit*       Gauss-Newton with priors and bounds; jointly with any effect that is assumed.
+    *scores*      one simulation per probe of the library; from inner products per window follow gains (fall of the
+                  cost), cluster-robust scores, gains on left-out windows and resampled gains without another one.
+    *null_bank*   the same scan of drives from structurally different simulators; *thresholds* are its quantiles.
+    *search*      forward and backward moves over joint refits, each through the gate.
+
+Conventions: SI units, radians, channels and states in the order of :mod:`ddagr_gym.replay.windows`. Costs are half sums
+of squares in units of the noise; gains are divided by the dispersion of the model they start from.
+"""

@@ -21,7 +21,13 @@ Array = NDArray[np.float64]
 BLOCK = 0.1
 """Length of a block [s]."""
 
-TRACKING_ERROR = {"encoder_right": 0.06, "encoder_left": 0.06, "yaw_rate": 0.015, "specific_force_x": 0.07, "specific_force_y": 0.07}
+TRACKING_ERROR = {
+    "encoder_right": 0.06,
+    "encoder_left": 0.06,
+    "yaw_rate": 0.015,
+    "specific_force_x": 0.07,
+    "specific_force_y": 0.07,
+}
 """Error of the nominal model per difference between command and bank speed [unit of the channel/(rad/s)].
 
 Real speed loops are not first-order lags: on null drives of the project's own blind generator (a PI loop on torque) the
@@ -81,7 +87,7 @@ def block_windows(
         wheel_radius: hub to tread [m].
         block: length of a block [s].
     """
-    length = max(int(round(block / windows.period)), 1)
+    length = max(round(block / windows.period), 1)
     count = windows.samples // length
     measured = windows.measured[:, : count * length].reshape(windows.count, count, length, len(CHANNELS))
     known = np.isfinite(measured)

@@ -27,9 +27,7 @@ def first_guess(candidate: Candidate, multiples: Sequence[float]) -> Effect:
     values: dict[str, float] = {}
     for name in kind.size_names():
         data = kind.parameter(name).metadata
-        total = sum(
-            m * (getattr(p, name) - data["neutral"]) for m, p in zip(multiples, candidate.probes, strict=True)
-        )
+        total = sum(m * (getattr(p, name) - data["neutral"]) for m, p in zip(multiples, candidate.probes, strict=True))
         values[name] = min(max(data["neutral"] + total, data["low"]), data["high"])
     weight = [abs(m) for m in multiples]
     for name in kind.shape_names():

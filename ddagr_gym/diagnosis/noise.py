@@ -1,9 +1,10 @@
 """Noise of each channel from the recordings alone: level, growth with speed, correlation, quantisation.
 
 Differences over one and two samples leave the motion out and keep the noise. For a first-order autoregressive noise
-with standard deviation s and correlation r, var(x[k+1] - x[k]) = 2 s^2 (1 - r) and var(x[k+2] - x[k]) = 2 s^2 (1 - r^2),
-so that their ratio is 1 + r. Poses come seldom and are differenced three times (variance 20 s^2) instead. What slower
-components add to means over several samples is measured on differences of such means over three (variance 2 s^2).
+with standard deviation s and correlation r, var(x[k+1] - x[k]) = 2 s^2 (1 - r) and
+var(x[k+2] - x[k]) = 2 s^2 (1 - r^2), so that their ratio is 1 + r. Poses come seldom and are differenced three times
+(variance 20 s^2) instead. What slower components add to means over several samples is measured on differences of such
+means over three (variance 2 s^2).
 """
 
 from __future__ import annotations
@@ -19,11 +20,14 @@ from ddagr_gym.replay.windows import CHANNELS
 
 Array = NDArray[np.float64]
 
-FASTEST_POSE_RATE = 0.5
-"""Share of the sample rate below which a channel counts as sparse and is differenced three times (ours)."""
+SPARSE_SHARE = 0.6
+"""Share of the rows below which a channel counts as sparse and is differenced three times (ours)."""
 
 _CENTRAL = 0.8
 """Share of the differences that is used: command steps move the others (ours)."""
+
+_COARSE = 1.5
+"""Quanta by which successive samples of a channel differ at most (rms) if its rounding is what limits it (ours)."""
 
 _FEWEST = 40
 """Differences that a level needs (ours)."""
@@ -105,10 +109,12 @@ def channel_noise(values: Sequence[Array], speeds: Sequence[Array], sparse: bool
         thirds = np.concatenate([np.diff(v[np.isfinite(v)], 3) for v in values])
         square = _central_square(thirds) / 20.0
         return ChannelNoise(float(np.sqrt(square)), 0.0, 0.0, 0.0) if np.isfinite(square) else None
-    if quantum > 0.0:
+    one, _ = _pairs(list(values), list(speeds), 1)
+    if quantum > 0.0 and _central_square(one) < (_COARSE * quantum) ** 2:
         # a differenced counter: the rounding of a position enters two successive samples with opposite signs
         return ChannelNoise(float(quantum / np.sqrt(6.0)), 0.0, -0.5, quantum)
-    return _coloured(list(values), list(speeds))
+    found = _coloured(list(values), list(speeds))
+    return None if found is None else replace(found, quantum=quantum)
 
 
 def _coloured(values: list[Array], speeds: list[Array]) -> ChannelNoise | None:
@@ -178,8 +184,8 @@ def recording_noise(recordings: Sequence[Recording], wheel_radius: float) -> tup
     found = []
     for name in CHANNELS:
         pieces = [r[name][s] for r in recordings for s in r.segments()]
-        rates = [r.rate(name) * r.period for r in recordings if r.has(name)]
-        sparse = bool(rates) and (max(rates) < FASTEST_POSE_RATE or name.startswith("pose"))
+        shares = [np.isfinite(r[name]).mean() for r in recordings if r.has(name)]
+        sparse = bool(shares) and (max(shares) < SPARSE_SHARE or name.startswith("pose"))
         if name == "pose_yaw":
             pieces = [_unwrapped(piece) for piece in pieces]
         found.append(channel_noise(pieces, speeds, sparse))

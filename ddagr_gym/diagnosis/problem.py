@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.diagnosis.blocks import BlockedWindows
-from ddagr_gym.diagnosis.nuisance import Nuisances, NuisancePriors
+from ddagr_gym.diagnosis.nuisance import NuisancePriors, Nuisances
 from ddagr_gym.parameters import Numerics, Robot, Soil
 from ddagr_gym.physics import layout
 from ddagr_gym.physics.effects import Effect
@@ -66,11 +66,13 @@ class Elimination:
 
     def project(self, columns: Array) -> Array:
         """Columns (W, M + S, K) without what the basis explains."""
-        return columns - np.matmul(self.basis, np.matmul(self.basis.transpose(0, 2, 1), columns))
+        return np.asarray(columns - np.matmul(self.basis, np.matmul(self.basis.transpose(0, 2, 1), columns)))
 
     def explain(self, columns: Array) -> Array:
         """(W, S, K) changes of the unknowns that explain columns (W, M + S, K) best."""
-        return np.linalg.solve(self.upper, np.matmul(self.basis.transpose(0, 2, 1), columns))
+        return np.asarray(
+            np.linalg.solve(self.upper, np.matmul(self.basis.transpose(0, 2, 1), columns)), dtype=np.float64
+        )
 
     def subset(self, chosen: Chosen) -> Elimination:
         """Only the chosen windows."""
@@ -96,19 +98,17 @@ class Problem:
         soil: Soil,
         blocked: BlockedWindows,
         nuisances: Nuisances,
-        priors: NuisancePriors = NuisancePriors(),
+        priors: NuisancePriors | None = None,
         *,
         threads: int = 1,
         numerics: Numerics | None = None,
     ) -> None:
         self.blocked = blocked
         self.nuisances = nuisances
-        self.priors = priors
+        self.priors = NuisancePriors() if priors is None else priors
         self._setting = (robot, soil, threads, fit_numerics() if numerics is None else numerics)
         windows = blocked.windows
-        self.model = WindowModel(
-            robot, soil, windows, nuisances.parameters, numerics=self._setting[3], threads=threads
-        )
+        self.model = WindowModel(robot, soil, windows, nuisances.parameters, numerics=self._setting[3], threads=threads)
         self.prior = np.array([p.prior for p in nuisances.parameters])
         self.low = np.array([p.low for p in nuisances.parameters])
         self.high = np.array([p.high for p in nuisances.parameters])

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.diagnosis.problem import Elimination, Point, Problem
+from ddagr_gym.diagnosis.size_prior import size_penalty, size_scale
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.replay.refit import STATE_PRIOR
 
@@ -16,6 +17,7 @@ Array = NDArray[np.float64]
 
 _DAMPING = (1.0, 0.5, 0.25, 0.1, 0.03)
 _STATES = len(STATE_PRIOR)
+_NEVER = 1e5  # an onset at which an effect holds always, or never
 
 
 @dataclass(frozen=True)
@@ -28,6 +30,8 @@ class EffectParameter:
         step: for finite differences, in its unit.
         low: bound.
         high: bound.
+        neutral: value without effect; of a shape its default, which costs nothing.
+        scale: standard deviation about neutral before any data, infinite for a shape.
     """
 
     effect: int
@@ -35,6 +39,8 @@ class EffectParameter:
     step: float
     low: float
     high: float
+    neutral: float
+    scale: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,12 +77,17 @@ def effect_parameters(effects: Sequence[Effect], fixed: frozenset[str] = frozens
     """
     found = []
     for number, effect in enumerate(effects):
-        if effect.categorical or not effect.differentiable:
+        if effect.categorical or effect.name == "sensor_hold":
             continue
         for name in (*effect.size_names(), *effect.shape_names()):
             data = effect.parameter(name).metadata
-            if data["step"] > 0.0 and name not in fixed and abs(getattr(effect, name)) < 1e5:
-                found.append(EffectParameter(number, name, data["step"], data["low"], data["high"]))
+            at_neutral = not effect.differentiable and getattr(effect, name) == data["neutral"]
+            if data["step"] == 0.0 or name in fixed or abs(getattr(effect, name)) > _NEVER or at_neutral:
+                continue
+            of_size = data["neutral"] is not None and effect.differentiable
+            scale = size_scale(effect, name) if of_size else np.inf
+            neutral = data["neutral"] if of_size else 0.0
+            found.append(EffectParameter(number, name, data["step"], data["low"], data["high"], neutral, scale))
     return tuple(found)
 
 
@@ -113,7 +124,7 @@ def cost_of(problem: Problem, point: Point, prediction: Array, elimination: Elim
     shares = 0.5 * (residual**2).sum(axis=1)
     free = problem.free
     prior = 0.5 * float(((point.values[free] / problem.prior[free]) ** 2).sum())
-    total = float(shares.sum()) + prior
+    total = float(shares.sum()) + prior + size_penalty(point.effects)
     return (total if np.isfinite(total) else np.inf), shares
 
 
@@ -146,7 +157,9 @@ def fit(
     if not np.isfinite(prediction).all():
         point = replace(point, states=problem.blocked.windows.initial.copy())
         prediction = problem.predict(point)
-    by_parameter, elimination = (reuse.by_parameter, reuse.elimination) if reuse else _sensitivities(problem, point, prediction)
+    by_parameter, elimination = (
+        (reuse.by_parameter, reuse.elimination) if reuse else _sensitivities(problem, point, prediction)
+    )
     by_effect = effect_columns(problem, point, prediction, parameters)
     cost, _ = cost_of(problem, point, prediction, elimination)
     converged, done = False, 0
@@ -186,18 +199,17 @@ def _step(
 ) -> tuple[Point, Array, float]:
     """One damped Gauss-Newton step; the point itself where none lowers the cost."""
     free = np.flatnonzero(problem.free)
-    raw = np.concatenate(
-        [problem.residual(point, prediction)[..., None], problem.padded(np.concatenate([by_parameter[..., free], by_effect], axis=2))],
-        axis=2,
-    )  # fmt: skip
+    sensitivities = np.concatenate([by_parameter[..., free], by_effect], axis=2)
+    raw = np.concatenate([problem.residual(point, prediction)[..., None], problem.padded(sensitivities)], axis=2)
     columns = elimination.project(raw)
     right, left = columns[..., 0], columns[..., 1:]
-    precision = np.concatenate([1.0 / problem.prior[free] ** 2, np.zeros(len(parameters))])
+    precision = np.concatenate([1.0 / problem.prior[free] ** 2, [p.scale**-2 for p in parameters]])
+    middle = np.concatenate([np.zeros(len(free)), [p.neutral for p in parameters]])
     here = np.concatenate([point.values[free], read(point.effects, parameters)])
     low = np.concatenate([problem.low[free], [p.low for p in parameters]])
     high = np.concatenate([problem.high[free], [p.high for p in parameters]])
     information = np.einsum("wmp,wmq->pq", left, left, optimize=True) + np.diag(precision)
-    gradient = np.einsum("wmp,wm->p", left, right) - precision * here
+    gradient = np.einsum("wmp,wm->p", left, right) - precision * (here - middle)
     change = bounded_step(information, gradient, low - here, high - here)
     explained = elimination.explain(raw)
     states = explained[:, :_STATES, 0] - explained[:, :_STATES, 1:] @ change

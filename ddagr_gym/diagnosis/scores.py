@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from ddagr_gym.diagnosis.problem import Problem
 from ddagr_gym.diagnosis.refit import Fitted
+from ddagr_gym.diagnosis.size_prior import size_scale
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.effects.base import DriveExtent
 from ddagr_gym.physics.effects.registry import effect_kinds
-from ddagr_gym.replay.windows import STATE
 
 Array = NDArray[np.float64]
 
@@ -38,6 +38,7 @@ class Candidate:
         columns: (k,) their places among all probes.
         probes: (k,) the effects themselves.
         one_sided: (k,) whether only positive multiples exist.
+        scales: (k,) standard deviation of each multiple before any data, see :mod:`ddagr_gym.diagnosis.size_prior`.
         whole: multiple of the only probe at which a categorical effect stands, None for others.
     """
 
@@ -45,6 +46,7 @@ class Candidate:
     columns: tuple[int, ...]
     probes: tuple[Effect, ...]
     one_sided: tuple[bool, ...]
+    scales: tuple[float, ...]
     whole: float | None = None
 
 
@@ -99,7 +101,8 @@ def candidates_of(kind: type[Effect], extent: DriveExtent, first: int) -> list[C
     probes = kind.probes(extent)
     if kind.categorical:
         return [
-            Candidate(kind.name, (first + k,), (probe,), (True,), _whole(probe)) for k, probe in enumerate(probes)
+            Candidate(kind.name, (first + k,), (probe,), (True,), (np.inf,), _whole(probe))
+            for k, probe in enumerate(probes)
         ]
     if len(probes) <= 2:
         groups = [list(range(len(probes)))]
@@ -114,6 +117,7 @@ def candidates_of(kind: type[Effect], extent: DriveExtent, first: int) -> list[C
             tuple(first + k for k in group),
             tuple(probes[k] for k in group),
             tuple(_one_sided(probes[k]) for k in group),
+            tuple(_scale(probes[k]) for k in group),
         )
         for group in groups
     ]
@@ -126,6 +130,15 @@ def _one_sided(probe: Effect) -> bool:
         if getattr(probe, name) != data["neutral"]:
             return bool(data["neutral"] in (data["low"], data["high"]) or not probe.differentiable)
     return False
+
+
+def _scale(probe: Effect) -> float:
+    """Standard deviation of a probe's multiple; infinite for an effect without a derivative."""
+    for name in probe.size_names():
+        away = getattr(probe, name) - probe.parameter(name).metadata["neutral"]
+        if away != 0.0 and probe.differentiable:
+            return size_scale(probe, name) / abs(away)
+    return np.inf
 
 
 def _whole(probe: Effect) -> float:
@@ -198,7 +211,8 @@ def scan(
     candidates: list[Candidate] = []
     columns: list[Array] = []
     for name, kind in (effect_kinds() if kinds is None else kinds).items():
-        if name in assumed:
+        # held readings are found in the values themselves (ddagr_gym.diagnosis.held)
+        if name in assumed or name == "sensor_hold":
             continue
         for candidate in candidates_of(kind, extent, len(columns)):
             candidates.append(candidate)
@@ -270,7 +284,7 @@ def best_multiples(reduced: Reduced, candidate: Candidate, dispersion: float = 1
     """
     index = np.array(candidate.columns)
     gradient = reduced.gradient[index]
-    information = reduced.information[np.ix_(index, index)]
+    information = reduced.information[np.ix_(index, index)] + np.diag(1.0 / np.array(candidate.scales) ** 2)
     if candidate.whole is not None:
         theta = np.array([candidate.whole])
     else:
@@ -359,13 +373,17 @@ def held_out_gains(terms: Terms, dispersion: float = 1.0, folds: int = 4, length
         reduced = reduce(terms, outside)
         inside = terms.normals[fold == part].sum(axis=0)
         for gain in gains(terms, outside):
-            change = _held_out(terms, reduced, inside, gain)
+            change = _held_out(terms, reduced, inside, gain, 1.0 / folds)
             total[gain.name] = total.get(gain.name, 0.0) + change / dispersion
     return total
 
 
-def _held_out(terms: Terms, reduced: Reduced, inside: Array, gain: Gain) -> float:
-    """Fall of the cost on other windows by a candidate fitted elsewhere, beside the nuisances fitted elsewhere."""
+def _held_out(terms: Terms, reduced: Reduced, inside: Array, gain: Gain, share: float) -> float:
+    """Fall of the cost on other windows by a candidate fitted elsewhere, beside the nuisances fitted elsewhere.
+
+    The nuisances' priors count with the windows' ``share``: an effect that lets them return to what is known of soil
+    and robot explains something even where the readings fit as well without it.
+    """
     p = terms.nuisances
     columns = np.array(terms.candidates[gain.candidate].columns)
     theta = np.array(gain.multiples)
@@ -376,7 +394,8 @@ def _held_out(terms: Terms, reduced: Reduced, inside: Array, gain: Gain) -> floa
         vector[0] = 1.0
         vector[1 : 1 + p] = -change
         vector[1 + p + columns] = -multiples
-        return 0.5 * float(vector @ inside @ vector)
+        prior = 0.5 * share * float((terms.precision * (terms.values + change) ** 2).sum())
+        return 0.5 * float(vector @ inside @ vector) + prior
 
     answered = base - reduced.nuisance[:, 1 + columns] @ theta
     return cost(base, np.zeros(len(theta))) - cost(answered, theta)

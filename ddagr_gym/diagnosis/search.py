@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.diagnosis.hypotheses import first_guess
+from ddagr_gym.diagnosis.misfit import channel_misfit
 from ddagr_gym.diagnosis.problem import Problem
 from ddagr_gym.diagnosis.refit import Fitted, fit
 from ddagr_gym.diagnosis.scores import Gain, Terms, dispersion_of, drive_extent, gains, held_out_gains, scan, scores
@@ -19,9 +20,6 @@ Array = NDArray[np.float64]
 
 MOST_EFFECTS = 3
 """Simultaneous effects that a search goes up to (diagnosis.md, step 6)."""
-
-_HOLDS = (0.04, 0.06, 0.08, 0.1, 0.15, 0.2, 0.3, 0.4)
-"""Durations tried for held readings, which have no derivative [s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +32,8 @@ class Standing:
         gains: of absent effects over the dispersion, largest first.
         scores: cluster-robust, by name.
         held_out: gains on left-out windows over the dispersion, by name.
-        dispersion: mean square of the weighted residuals of this model.
+        dispersion: mean square of the weighted residuals of this model, at least 1.
+        misfit: mean square of the residuals by channel.
     """
 
     fitted: Fitted
@@ -43,6 +42,7 @@ class Standing:
     scores: dict[str, float]
     held_out: dict[str, float]
     dispersion: float
+    misfit: dict[str, float]
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -94,22 +94,15 @@ def stand(problem: Problem, fitted: Fitted, progress: Callable[[str], None] = la
     terms = scan(problem, fitted, progress=progress)
     dispersion = dispersion_of(problem, fitted)
     found = tuple(gains(terms, dispersion=dispersion))
-    return Standing(fitted, terms, found, scores(terms, found), held_out_gains(terms, dispersion), dispersion)
+    held_out = held_out_gains(terms, dispersion)
+    misfit = channel_misfit(problem, fitted)
+    return Standing(fitted, terms, found, scores(terms, found), held_out, dispersion, misfit)
 
 
 def refit_with(problem: Problem, standing: Standing, effect: Effect, *, full: bool = False) -> Fitted:
     """Joint refit from a model with one further effect; nuisance sensitivities are kept unless ``full``."""
     start = replace(standing.fitted.point, effects=(*standing.fitted.point.effects, effect))
-    if effect.name == "sensor_hold":
-        trials = [_with_hold(problem, standing, start, duration) for duration in _HOLDS]
-        return min(trials, key=lambda trial: trial.cost)
     return fit(problem, start, iterations=6, renewals=3, reuse=None if full else standing.fitted)
-
-
-def _with_hold(problem: Problem, standing: Standing, start: object, duration: float) -> Fitted:
-    point = replace(standing.fitted.point, effects=start.effects)  # type: ignore[attr-defined]
-    held = point.effects[-1].with_values(duration=duration)
-    return fit(problem, replace(point, effects=(*point.effects[:-1], held)), iterations=2, reuse=standing.fitted)
 
 
 def rivals_of(problem: Problem, standing: Standing, thresholds: Thresholds, most: int) -> list[Rival]:
@@ -146,7 +139,8 @@ def search(
     """
     progress("nominal refit")
     standing = stand(problem, fit(problem), progress)
-    standings, first = [standing], ()
+    standings: list[Standing] = [standing]
+    first: tuple[Rival, ...] = ()
     while len(standing.names) < most:
         tried = rivals_of(problem, standing, thresholds, rivals)
         tried = [rival for rival in tried if rival.gain > thresholds.of(rival.name).gain]
@@ -174,7 +168,8 @@ def _without_idle(
     for number, effect in enumerate(effects):
         kept = (*effects[:number], *effects[number + 1 :])
         without = fit(problem, replace(standing.fitted.point, effects=kept), iterations=4, reuse=standing.fitted)
-        losses.append(((without.cost - standing.fitted.cost) / standing.dispersion / thresholds.of(effect.name).gain, without))
+        loss = (without.cost - standing.fitted.cost) / standing.dispersion
+        losses.append((loss / thresholds.of(effect.name).gain, without))
     least = min(losses, key=lambda item: item[0])
     if least[0] >= 1.0:
         return standing

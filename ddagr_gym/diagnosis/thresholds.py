@@ -52,12 +52,14 @@ class Thresholds:
 
     Attributes:
         gates: by name of the effect.
+        misfit: mean square of the residuals by channel, above which something is missing.
         nulls: null runs that they were taken from.
         bank: hash of the bank's data.
         level: of false alarms over the whole library.
     """
 
     gates: Mapping[str, Gate]
+    misfit: Mapping[str, float]
     nulls: int
     bank: str
     level: float = LEVEL
@@ -84,12 +86,14 @@ class NullRun:
         gains: by effect.
         scores: by effect.
         held_out: by effect.
+        misfit: mean square of the residuals by channel.
     """
 
     kind: str
     gains: dict[str, float]
     scores: dict[str, float]
     held_out: dict[str, float]
+    misfit: dict[str, float]
 
 
 def thresholds_from(runs: Sequence[NullRun], bank: str, level: float = LEVEL) -> Thresholds:
@@ -111,12 +115,19 @@ def thresholds_from(runs: Sequence[NullRun], bank: str, level: float = LEVEL) ->
     score = np.array([[abs(run.scores.get(name, 0.0)) for name in names] for run in runs])
     # the gain carries the level; the other two only refuse what few windows carry, at the nulls' median
     gates = {
-        name: Gate(
-            float(widening * scale[k]), float(np.median(score[:, k])), float(max(np.median(held[:, k]), 0.0))
-        )
+        name: Gate(float(widening * scale[k]), float(np.median(score[:, k])), float(max(np.median(held[:, k]), 0.0)))
         for k, name in enumerate(names)
     }
-    return Thresholds(gates, len(runs), bank, level)
+    return Thresholds(gates, _misfit_limits(runs, level), len(runs), bank, level)
+
+
+def _misfit_limits(runs: Sequence[NullRun], level: float) -> dict[str, float]:
+    """Limits that the share ``level`` of null runs passes in any channel."""
+    channels = sorted({name for run in runs for name in run.misfit})
+    table = np.array([[run.misfit.get(name, 0.0) for name in channels] for run in runs])
+    scale = np.maximum(np.median(table, axis=0), 1e-6)
+    widening = float(np.quantile((table / scale).max(axis=1), 1.0 - level))
+    return {name: widening * float(scale[k]) for k, name in enumerate(channels)}
 
 
 def save_thresholds(thresholds: Thresholds, path: Path) -> None:
@@ -142,4 +153,5 @@ def load_thresholds(path: Path) -> Thresholds:
     if not isinstance(body, dict) or body.get("version") != VERSION:
         raise InputError(f"{path} is not a thresholds file of version {VERSION}: make it with `ddagr null-bank`.")
     gates = {str(name): Gate(**gate) for name, gate in body["gates"].items()}
-    return Thresholds(gates, int(body["nulls"]), str(body["bank"]), float(body["level"]))
+    misfit = {str(name): float(value) for name, value in body["misfit"].items()}
+    return Thresholds(gates, misfit, int(body["nulls"]), str(body["bank"]), float(body["level"]))

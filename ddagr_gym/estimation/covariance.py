@@ -52,20 +52,21 @@ def _transition_times_covariance(work: Array) -> None:
 
 
 @kernel()
-def propagate(work: Array, bank_decay: float) -> None:
+def propagate(work: Array, decay_right: float, decay_left: float) -> None:
     """``P <- Phi P Phi^T`` with the rows of Phi that :func:`~process_model.advance_state` left behind.
 
     Args:
         work: workspace; P symmetric before and after, PRODUCT overwritten.
-        bank_decay: diagonal of Phi at the bank speeds; at parameters and biases it is 1.
+        decay_right: diagonal of Phi at the right bank's speed; at parameters and biases it is 1.
+        decay_left: at the left bank's.
     """
     _transition_times_covariance(work)
     for j in range(STATE_SIZE):
-        work[P + STRIDE * OMEGA + j] *= bank_decay
-        work[P + STRIDE * (OMEGA + 1) + j] *= bank_decay
+        work[P + STRIDE * OMEGA + j] *= decay_right
+        work[P + STRIDE * (OMEGA + 1) + j] *= decay_left
     for j in range(STATE_SIZE):
-        work[P + STRIDE * j + OMEGA] *= bank_decay
-        work[P + STRIDE * j + OMEGA + 1] *= bank_decay
+        work[P + STRIDE * j + OMEGA] *= decay_right
+        work[P + STRIDE * j + OMEGA + 1] *= decay_left
     for i in range(3):
         base = PRODUCT + STRIDE * i
         for j in range(i, 3):
@@ -74,8 +75,8 @@ def propagate(work: Array, bank_decay: float) -> None:
                 total += work[base + k] * work[TRANSITION + STRIDE * j + k]
             work[P + STRIDE * i + j] = total
             work[P + STRIDE * j + i] = total
-        work[base + OMEGA] *= bank_decay
-        work[base + OMEGA + 1] *= bank_decay
+        work[base + OMEGA] *= decay_right
+        work[base + OMEGA + 1] *= decay_left
         for j in range(3, STATE_SIZE):
             work[P + STRIDE * i + j] = work[base + j]
             work[P + STRIDE * j + i] = work[base + j]

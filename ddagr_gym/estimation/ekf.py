@@ -52,7 +52,6 @@ from ddagr_gym.estimation.layout import (
     PROCESS,
     READING,
     RESPONSE,
-    SOIL_AGITATION,
     SOIL_COVARIANCE,
     SOIL_RATE,
     STANDARDISED,
@@ -61,6 +60,7 @@ from ddagr_gym.estimation.layout import (
     STANDSTILL_WHEEL_SPEED,
     STATE_SIZE,
     STRIDE,
+    UNKNOWN_COMMAND,
     P,
     X,
 )
@@ -82,20 +82,15 @@ def limit_state(model: Array, work: Array) -> None:
 
 
 @kernel(inline=True)
-def step_noise(
-    model: Array, lag_right: float, lag_left: float, bank_decay: float, step: float
-) -> tuple[float, float, float]:
-    """Variances that one step adds to the bank speeds [rad^2/s^2], and the share of the prior it adds to the logs.
+def bank_noise(model: Array, bank: int, lag: float, step: float) -> float:
+    """Variance that one step adds to a bank speed that is ``lag`` from its command [rad^2/s^2].
 
-    An uncertain motor rate acts while a bank lags behind its command, correlated over about 1/k_omega.
+    An uncertain motor rate acts while the bank lags, correlated over about 1/k_omega; a bank without known command
+    (``lag`` not finite) wanders.
     """
-    motor = 2.0 * step * model[MOTOR_RATE_VARIANCE] / model[MOTOR_RATE]
-    change = (1.0 - bank_decay) * model[OUTER_RADIUS] * (abs(lag_right) + abs(lag_left))
-    return (
-        step * model[PROCESS + OMEGA] + motor * lag_right * lag_right,
-        step * model[PROCESS + OMEGA + 1] + motor * lag_left * lag_left,
-        step * model[SOIL_RATE] + change * model[SOIL_AGITATION],
-    )
+    if not math.isfinite(lag):
+        return step * model[UNKNOWN_COMMAND]
+    return step * (model[PROCESS + OMEGA + bank] + 2.0 * model[MOTOR_RATE_VARIANCE] / model[MOTOR_RATE] * lag * lag)
 
 
 @kernel(inline=True)
@@ -113,15 +108,15 @@ def _step(
 ) -> None:  # fmt: skip
     """One step of state and covariance with process noise."""
     lag_right, lag_left = right - work[X + OMEGA], left - work[X + OMEGA + 1]
-    bank_decay = advance_state(model, work, right, left, slope_x, slope_y, step)
-    propagate(work, bank_decay)
+    decay_right, decay_left = advance_state(model, work, right, left, slope_x, slope_y, step)
+    propagate(work, decay_right, decay_left)
     rate = 1.0 / step
     for i in range(3):
         for j in range(3):
             work[P + STRIDE * i + j] += _acceleration_noise(model, rate, i, j, work)
-    right_variance, left_variance, share = step_noise(model, lag_right, lag_left, bank_decay, step)
-    work[P + (STRIDE + 1) * OMEGA] += right_variance
-    work[P + (STRIDE + 1) * (OMEGA + 1)] += left_variance
+    work[P + (STRIDE + 1) * OMEGA] += bank_noise(model, 0, lag_right, step)
+    work[P + (STRIDE + 1) * (OMEGA + 1)] += bank_noise(model, 1, lag_left, step)
+    share = step * model[SOIL_RATE]
     for i in range(PARAMETER_SIZE):
         for j in range(PARAMETER_SIZE):
             work[P + STRIDE * (PARAMETER + i) + PARAMETER + j] += (
@@ -141,17 +136,15 @@ def predict_kernel(
     Args:
         model: packed model.
         work: workspace with state and covariance, updated.
-        right: speed command of the right bank [rad/s]; not finite: the bank keeps its speed.
+        right: speed command of the right bank [rad/s]; not finite: unknown, the bank may drift from its speed.
         left: of the left bank.
         slope_x: gravity along body x [m/s^2].
         slope_y: gravity along body y [m/s^2].
         duration: [s].
     """
     steps = max(math.ceil(duration / model[MAXIMUM_STEP] - 1e-9), 1)
-    target_right = right if math.isfinite(right) else work[X + OMEGA]
-    target_left = left if math.isfinite(left) else work[X + OMEGA + 1]
     for _ in range(steps):
-        _step(model, work, target_right, target_left, slope_x, slope_y, duration / steps)
+        _step(model, work, right, left, slope_x, slope_y, duration / steps)
 
 
 @kernel(inline=True)

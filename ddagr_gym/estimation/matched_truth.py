@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ddagr_gym.errors import InputError
-from ddagr_gym.estimation.ekf import step_noise
+from ddagr_gym.estimation.ekf import bank_noise
 from ddagr_gym.estimation.filter_model import FilterModel
 from ddagr_gym.estimation.layout import (
     CHANNEL_SIZE,
@@ -22,6 +22,7 @@ from ddagr_gym.estimation.layout import (
     PARAMETER_SIZE,
     PROCESS,
     RESPONSE,
+    SOIL_RATE,
     STATE_SIZE,
     STRIDE,
     WORK_SIZE,
@@ -35,17 +36,16 @@ Array = NDArray[np.float64]
 
 
 @kernel()
-def _perturb(model: Array, work: Array, root: Array, lags: Array, decay: float, step: float, draw: Array) -> None:
+def _perturb(model: Array, work: Array, root: Array, lags: Array, step: float, draw: Array) -> None:
     """Process noise of one step after :func:`advance_state`; ``draw`` (12,) standard normal."""
     for i in range(3):
         for j in range(3):
             work[X + i] += work[RESPONSE + STRIDE * i + j] * math.sqrt(model[PROCESS + j] / step) * draw[j]
-    right_variance, left_variance, share = step_noise(model, lags[0], lags[1], decay, step)
-    work[X + OMEGA] += math.sqrt(right_variance) * draw[3]
-    work[X + OMEGA + 1] += math.sqrt(left_variance) * draw[4]
+    for bank in range(2):
+        work[X + OMEGA + bank] += math.sqrt(bank_noise(model, bank, lags[bank], step)) * draw[OMEGA + bank]
     for i in range(PARAMETER_SIZE):
         for j in range(PARAMETER_SIZE):
-            work[X + PARAMETER + i] += math.sqrt(share) * root[i, j] * draw[PARAMETER + j]
+            work[X + PARAMETER + i] += math.sqrt(step * model[SOIL_RATE]) * root[i, j] * draw[PARAMETER + j]
     for i in range(GYRO_BIAS, STATE_SIZE):
         work[X + i] += math.sqrt(step * model[PROCESS + i]) * draw[i]
 
@@ -71,8 +71,8 @@ def _draw(
     for k in range(commands.shape[0]):
         for bank in range(2):
             lags[bank] = commands[k, bank] - work[X + OMEGA + bank]
-        decay = advance_state(model, work, commands[k, 0], commands[k, 1], 0.0, 0.0, step)
-        _perturb(model, work, root, lags, decay, step, normal[k, :STATE_SIZE])
+        advance_state(model, work, commands[k, 0], commands[k, 1], 0.0, 0.0, step)
+        _perturb(model, work, root, lags, step, normal[k, :STATE_SIZE])
         _read(model, work, normal[k, STATE_SIZE:], readings[k])
         for i in range(STATE_SIZE):
             states[k, i] = work[X + i]

@@ -157,28 +157,41 @@ def _respond(step: float, work: Array) -> None:
     work[c + 2] = twice * (i20 * i02 + i21 * i12 + i22 * i22) + once * i22
 
 
+@kernel(inline=True)
+def _half_decay(model: Array, command: float, step: float) -> float:
+    """Factor of a bank's deviation from its command over half a step; 1 where the command is not known."""
+    return math.exp(-0.5 * model[MOTOR_RATE] * step) if math.isfinite(command) else 1.0
+
+
+@kernel(inline=True)
+def _advance_banks(work: Array, right: float, left: float, decay_right: float, decay_left: float) -> None:
+    if decay_right < 1.0:
+        work[X + OMEGA] = right + (work[X + OMEGA] - right) * decay_right
+    if decay_left < 1.0:
+        work[X + OMEGA + 1] = left + (work[X + OMEGA + 1] - left) * decay_left
+
+
 @kernel()
 def advance_state(
     model: Array, work: Array, right: float, left: float, slope_x: float, slope_y: float, step: float
-) -> float:
+) -> tuple[float, float]:
     """Advance the state by one step and leave its transition behind.
 
     Args:
         model: packed model.
         work: workspace with the state, which is updated; TRANSITION holds the velocities' transition by the motion
             entries afterwards, RESPONSE the response G.
-        right: speed command of the right bank [rad/s].
-        left: of the left bank [rad/s].
+        right: speed command of the right bank [rad/s]; not finite: unknown, the bank keeps its speed.
+        left: of the left bank.
         slope_x: gravity along body x [m/s^2].
         slope_y: gravity along body y [m/s^2].
         step: h [s].
 
     Returns:
-        Factor by which a deviation of a bank speed shrinks over the step.
+        Factors by which deviations of the bank speeds shrink over the step, right and left.
     """
-    half = math.exp(-0.5 * model[MOTOR_RATE] * step)
-    work[X + OMEGA] = right + (work[X + OMEGA] - right) * half
-    work[X + OMEGA + 1] = left + (work[X + OMEGA + 1] - left) * half
+    half_right, half_left = _half_decay(model, right, step), _half_decay(model, left, step)
+    _advance_banks(work, right, left, half_right, half_left)
     body_forces(model, work)
     v_x, v_y, turn = work[X], work[X + 1], work[X + 2]
     f_x = work[FORCE] + turn * v_y + slope_x
@@ -199,8 +212,7 @@ def advance_state(
                 g_x * work[GRADIENT + j] + g_y * work[GRADIENT + STRIDE + j] + g_turn * work[GRADIENT + 2 * STRIDE + j]
             )
         work[base + i] += 1.0
-        work[base + OMEGA] *= half
-        work[base + OMEGA + 1] *= half
-    work[X + OMEGA] = right + (work[X + OMEGA] - right) * half
-    work[X + OMEGA + 1] = left + (work[X + OMEGA + 1] - left) * half
-    return half * half
+        work[base + OMEGA] *= half_right
+        work[base + OMEGA + 1] *= half_left
+    _advance_banks(work, right, left, half_right, half_left)
+    return half_right * half_right, half_left * half_left

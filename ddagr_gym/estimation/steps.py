@@ -60,7 +60,8 @@ def predict(
         model: filter model.
         state: (12,), see :mod:`ddagr_gym.estimation`.
         covariance: (12, 12).
-        command: speed commands of the right and left bank [rad/s]; NaN: the bank keeps its speed.
+        command: speed commands of the right and left bank [rad/s]; NaN: unknown, the bank holds its speed with
+            growing doubt.
         duration: [s]; the model's sample period by default.
         attitude: roll and pitch [rad], REP 103: roll right side down, pitch nose down positive.
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.parameters import Robot
+from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.physics import layout
 
 Array = NDArray[np.float64]
@@ -60,15 +60,30 @@ def _soil(index: int) -> list[int]:
     return [layout.BASE_SOIL + 9 * wheel + index for wheel in range(4)]
 
 
-def soil_parameters() -> tuple[ModelParameter, ...]:
-    """Soil: strength and stiffness vary by some ten percent from field to field, the shear modulus by more."""
+FIELD_STIFFNESS_DEVIATION = 0.4
+"""Spread of the soil's stiffness within a field, as the deviation of its logarithm (ours)."""
+
+KIND_STIFFNESS_DEVIATION = 1.2
+"""The same over soils of one kind: 1.19 for the pressure at 3 cm over the nine sands of ``published_soils``."""
+
+
+def soil_parameters(
+    soil: Soil | None = None, stiffness_deviation: float = FIELD_STIFFNESS_DEVIATION
+) -> tuple[ModelParameter, ...]:
+    """Soil: strength varies by some ten percent (0.26 over published sands), stiffness and shear modulus by more.
+
+    Args:
+        soil: nominal one, which bounds the exit angle ratio; bounds that suit any preset's by default.
+        stiffness_deviation: prior of the logarithm of the stiffness.
+    """
     strength = _soil(layout.SOIL_COHESION) + _soil(layout.SOIL_FRICTION_TANGENT)
     stiffness = _soil(layout.SOIL_COHESIVE_MODULUS) + _soil(layout.SOIL_FRICTIONAL_MODULUS)
+    low, high = (-0.85, 0.1) if soil is None else (-soil.exit_angle_ratio, 1.0 - soil.exit_angle_ratio)
     return (
         _log("soil_strength", strength, 0.3),
-        _log("soil_stiffness", stiffness, 0.4),
+        _log("soil_stiffness", stiffness, stiffness_deviation, max(1.6, 3.0 * stiffness_deviation)),
         _log("shear_modulus", _soil(layout.SOIL_SHEAR_MODULUS), 0.5),
-        ModelParameter("exit_angle_ratio", "-", tuple(_soil(layout.SOIL_EXIT_RATIO)), False, 0.2, 0.02, -0.85, 0.1),
+        ModelParameter("exit_angle_ratio", "-", tuple(_soil(layout.SOIL_EXIT_RATIO)), False, 0.2, 0.02, low, high),
     )
 
 

@@ -181,7 +181,7 @@ def test_delay_shifts_the_encoder():
         ("motor_droop", "leaky integrator", 0.0018, TURN, "omega_left", -1, 0.05),
         ("motor_droop", "battery sag", 0.003, TURN, "omega_left", -1, 0.05),
         ("motor_saturation", "speed limit", 0.2, TURN, "omega_left", -1, 0.2),
-        ("motor_saturation", "torque limit", 0.4, TURN, "omega_left", -1, 0.02),
+        ("motor_saturation", "torque limit", 0.45, TURN, "omega_left", -1, 0.02),
         ("command_deadband", "offset", 0.1, STRAIGHT, "omega_left", -1, 0.09),
         ("payload", "low", 40.0, STRAIGHT, "sinkage_3", 1, 3e-4),
         ("towed_drag", "hitch", 60.0, STRAIGHT, "torque_left", 1, 5.0),

@@ -9,7 +9,8 @@ from ddagr_gym.diagnosis.noise import ChannelNoise, channel_noise
 def coloured(rng: np.random.Generator, count: int, sigma: float, correlation: float) -> np.ndarray:
     from scipy.signal import lfilter
 
-    return sigma * np.sqrt(1 - correlation**2) * lfilter([1.0], [1.0, -correlation], rng.standard_normal(count + 200))[200:]
+    white = rng.standard_normal(count + 200)
+    return sigma * np.sqrt(1 - correlation**2) * lfilter([1.0], [1.0, -correlation], white)[200:]
 
 
 @pytest.mark.parametrize("correlation", [0.0, 0.3, 0.7])
@@ -69,3 +70,12 @@ def test_too_few_samples_give_nothing() -> None:
 def test_mean_of_white_noise() -> None:
     assert float(ChannelNoise(0.1, 0.0, 0.0, 0.0).of_mean(4)) == pytest.approx(0.05)
     assert float(ChannelNoise(0.0, 1.0, 0.0, 0.0).of_mean(1, 0.3)) == pytest.approx(0.3)
+
+
+def test_fine_rounding_is_not_taken_for_a_counter() -> None:
+    rng = np.random.default_rng(6)
+    values = np.round(0.03 * rng.standard_normal(6000) / 6e-4) * 6e-4
+    found = channel_noise([values], [np.zeros(6000)], sparse=False)
+    assert found is not None
+    assert found.sigma == pytest.approx(0.03, rel=0.1)
+    assert found.quantum == pytest.approx(6e-4, rel=1e-6)

@@ -21,13 +21,13 @@ def test_propagation_is_phi_p_phi_transposed(load, view, rng):
     covariance = random_covariance(rng)
     rows = np.zeros((3, 12))
     rows[:, : layout.MOTION_SIZE] = rng.standard_normal((3, layout.MOTION_SIZE))
-    decay = 0.83
+    decay_right, decay_left = 0.83, 1.0
     phi = np.eye(12)
     phi[:3] = rows
-    phi[3, 3] = phi[4, 4] = decay
+    phi[3, 3], phi[4, 4] = decay_right, decay_left
     work = load(np.zeros(12), covariance)
     view(work, layout.TRANSITION, 3)[:] = rows
-    propagate(work, decay)
+    propagate(work, decay_right, decay_left)
     np.testing.assert_allclose(view(work, layout.P, 12), phi @ covariance @ phi.T, rtol=1e-11, atol=1e-18)
 
 

@@ -169,10 +169,12 @@ def test_a_commanded_robot_is_not_held_still(model):
     assert batch.states[0, 0] > 0.15
 
 
-def test_missing_command_holds_the_bank_speed(model, turning_state):
+def test_missing_command_holds_the_bank_speed_with_doubt(model, turning_state):
     state, covariance = turning_state
-    held = predict(model, state, covariance, (NAN, NAN))
+    held = predict(model, state, covariance, (NAN, 0.05))
     np.testing.assert_allclose(held.state[3:5], state[3:5], rtol=1e-12)
+    assert held.covariance[3, 3] > covariance[3, 3] + 0.9 * 0.008 * model.noise.unknown_command**2
+    assert held.covariance[4, 4] < covariance[4, 4] + 1e-7
 
 
 def test_long_gaps_are_bridged_in_short_steps(model, turning_state):
@@ -192,8 +194,16 @@ def test_uncertainty_grows_without_measurements(model, turning_state):
 
 def test_uncertain_motors_widen_transients_only(robot, turning_state):
     state, covariance = turning_state
-    sure = FilterModel(replace(robot, standard_deviations={}))
-    unsure = FilterModel(replace(robot, standard_deviations={"motor_rate": 1.0}))
+    exact = replace(robot, standard_deviations={})
+    sure = FilterModel(exact, motor_uncertainty=0.0)
+    for unsure in (
+        FilterModel(replace(robot, standard_deviations={"motor_rate": 1.0}), motor_uncertainty=0.0),
+        FilterModel(exact, motor_uncertainty=0.25),
+    ):
+        compare(sure, unsure, state, covariance)
+
+
+def compare(sure, unsure, state, covariance):
     settled = [predict(m, state, covariance, (1.19, 0.05)).covariance[3, 3] for m in (sure, unsure)]
     moving = [predict(m, state, covariance, (0.5, 0.05)).covariance[3, 3] for m in (sure, unsure)]
     assert settled[0] == pytest.approx(settled[1])

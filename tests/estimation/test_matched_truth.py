@@ -88,7 +88,8 @@ def default_study(at_rest):
 def textbook_study(at_rest):
     """The same without de-weighting or consider update, on soils known to 5 %."""
     noise = FilterNoise(accelerometer_deweighting=0.0, learning_deweighting=0.0)
-    textbook = replace(at_rest, prior=prior(0.05), noise=noise, excitation=0.0, accelerometer_interval=1)
+    plain = {"excitation": 0.0, "accelerometer_interval": 1, "motor_uncertainty": 0.0}
+    textbook = replace(at_rest, prior=prior(0.05), noise=noise, **plain)
     return monte_carlo(textbook, seed=7)
 
 

@@ -73,10 +73,20 @@ def test_gradient_against_fourth_order_differences(robot, load, view, law, motio
 def test_motors_follow_their_exact_solution(model, load):
     state, _ = model.initial()
     work = load(state)
-    decay = advance_state(model.pack(), work, 1.2, -0.4, 0.0, 0.0, 0.05)
+    decays = advance_state(model.pack(), work, 1.2, -0.4, 0.0, 0.0, 0.05)
     expected = math.exp(-model.robot.motor_rate * 0.05)
-    assert decay == pytest.approx(expected, rel=1e-14)
+    assert decays == pytest.approx((expected, expected), rel=1e-14)
     np.testing.assert_allclose(work[3:5], [1.2 * (1 - expected), -0.4 * (1 - expected)], rtol=1e-14)
+
+
+def test_a_bank_without_known_command_keeps_its_speed(model, load):
+    state, _ = model.initial()
+    state[3:5] = 0.4, 0.7
+    work = load(state)
+    decay_right, decay_left = advance_state(model.pack(), work, math.nan, 0.7, 0.0, 0.0, 0.05)
+    assert decay_right == 1.0
+    assert decay_left < 1.0
+    np.testing.assert_allclose(work[3:5], [0.4, 0.7], rtol=1e-14)
 
 
 def reference(model, state, command, duration):

@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import json
 import os
-import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -26,6 +25,7 @@ import yaml
 
 from ddagr_gym.config import load_config
 from ddagr_gym.errors import InputError
+from ddagr_gym.files import atomic_path
 from ddagr_gym.physics.effects.base import Effect, build_effect
 from ddagr_gym.physics.effects.registry import effect_kind, parse_effect
 
@@ -145,24 +145,24 @@ def save_effects(
     """Write effects so that :func:`load_effects` returns equal ones; the file is whole or as it was before.
 
     Args:
-        path: ends in .yaml, .yml or .json; its folder must exist.
+        path: ends in .yaml, .yml or .json; its folder is made where absent.
         effects: in the order in which they act.
         intervals: per effect, (low, high) by parameter name; empty for none.
         data_hash: of the recordings that the values were fitted to.
         source: where they come from, for people.
 
     Raises:
-        InputError: another ending, no such folder, or intervals that do not belong to the effects.
+        InputError: another ending, a path that cannot be a file, or intervals that do not belong to the effects.
     """
     file = Path(path).expanduser()
     if file.suffix not in _ENDINGS:
         raise InputError(f"effects file {str(path)!r} ends in {file.suffix!r}: end it in {', '.join(_ENDINGS)}.")
     chosen = tuple(effects)
     content = {"version": VERSION, "source": source, "data_hash": data_hash, "effects": _entries(chosen, intervals)}
-    if file.suffix == ".json":
-        _replace(file, json.dumps(content, indent=2, allow_nan=False) + "\n")
-    else:
-        _replace(file, yaml.safe_dump(content, sort_keys=False, allow_unicode=True))
+    is_json = file.suffix == ".json"
+    text = json.dumps(content, indent=2) + "\n" if is_json else yaml.safe_dump(content, sort_keys=False)
+    with atomic_path(file) as temporary:
+        temporary.write_text(text, encoding="utf-8")
 
 
 def _entries(effects: tuple[Effect, ...], intervals: Intervals) -> list[dict[str, Any]]:
@@ -184,17 +184,3 @@ def _entries(effects: tuple[Effect, ...], intervals: Intervals) -> list[dict[str
 def _entry(effect: Effect, name: str, interval: tuple[float, float] | None) -> dict[str, Any]:
     entry: dict[str, Any] = {"value": float(getattr(effect, name)), "unit": effect.parameter(name).metadata["unit"]}
     return entry if interval is None else entry | {"interval": [float(bound) for bound in interval]}
-
-
-def _replace(file: Path, text: str) -> None:
-    if not file.parent.is_dir():
-        raise InputError(f"effects file {str(file)!r} has no folder: make {str(file.parent)!r} first.")
-    handle, name = tempfile.mkstemp(prefix=f".{file.stem}-", suffix=file.suffix, dir=file.parent)
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8") as stream:
-            stream.write(text)
-        os.chmod(name, 0o644)
-        os.replace(name, file)
-    except BaseException:
-        os.unlink(name)
-        raise

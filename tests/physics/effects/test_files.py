@@ -122,7 +122,6 @@ def test_failed_write_leaves_the_old_file_and_nothing_else(tmp_path, monkeypatch
     ("name", "options", "sentence"),
     [
         ("effects.txt", {}, r"ends in '.txt': end it in .yaml, .yml, .json"),
-        ("missing/effects.yaml", {}, "has no folder"),
         ("effects.yaml", {"intervals": [{}, {}]}, "2 sets of intervals for 1 effects"),
         (
             "effects.yaml",

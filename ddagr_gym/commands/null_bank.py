@@ -1,0 +1,120 @@
+"""``ddagr null-bank``: thresholds of the diagnosis from drives in which nothing is missing."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tyro.conf import Positional
+
+from ddagr_gym.commands.output import atomic_path
+from ddagr_gym.commands.progress import Progress
+from ddagr_gym.errors import InputError
+
+if TYPE_CHECKING:
+    from ddagr_gym.diagnosis.null_bank import Template
+    from ddagr_gym.diagnosis.setting import Setting
+    from ddagr_gym.diagnosis.thresholds import NullRun
+    from ddagr_gym.parameters import Robot, Soil
+
+EXAMPLES = (
+    "ddagr null-bank run_1.csv.gz run_2.csv.gz run_3.csv.gz --robot ddagr --soil thesis_a1 --output thresholds.json",
+)
+
+
+@dataclass(frozen=True)
+class Arguments:
+    """Make a bank of null drives and the thresholds of a diagnosis from it.
+
+    Each null drive follows the commands of the given recordings in a simulator of another structure (soil law, speed
+    loop, relief, soil that varies from place to place) with the recordings' noise, and goes through the same refit and
+    scan as real drives. An interrupted bank goes on where it stopped.
+
+    Attributes:
+        runs: recordings of one robot, as `ddagr diagnose` takes them.
+        output: thresholds to write, .json; the runs themselves lie beside it.
+        robot: nominal robot.
+        soil: nominal soil.
+        map: column map, for sources that are not imported yet.
+        count: null drives; at least 20 for the level of 5 percent.
+        seed: of the bank.
+        stride: seconds between the starts of windows; 2 uses all samples.
+        processes: that work at the same time.
+    """
+
+    runs: Positional[tuple[Path, ...]]
+    output: Path
+    robot: str = "ddagr"
+    soil: str = "thesis_a1"
+    map: str = ""
+    count: int = 60
+    seed: int = 0
+    stride: float = 2.0
+    processes: int = 2
+
+
+def run(arguments: Arguments) -> None:
+    """Make what is missing of the bank, then write the thresholds."""
+    from ddagr_gym.diagnosis.noise import recording_noise
+    from ddagr_gym.diagnosis.null_bank import bank_hash, template_of
+    from ddagr_gym.diagnosis.setting import Setting, wheel_radius
+    from ddagr_gym.diagnosis.thresholds import NullRun, save_thresholds, thresholds_from
+    from ddagr_gym.presets import get_robot, get_soil
+    from ddagr_gym.recordings.load import load_recording
+
+    if not arguments.runs:
+        raise InputError("no recording is given: name those whose commands the null drives shall follow.")
+    robot, soil = get_robot(arguments.robot), get_soil(arguments.soil)
+    recordings = [load_recording(path, arguments.map or None, arguments.robot) for path in arguments.runs]
+    setting = Setting(stride=arguments.stride)
+    template = template_of(recordings, recording_noise(recordings, wheel_radius(robot)))
+    bank = bank_hash(robot, soil, template, setting, arguments.count, arguments.seed)
+    folder = arguments.output.with_suffix(".bank")
+    folder.mkdir(parents=True, exist_ok=True)
+    missing = [n for n in range(arguments.count) if not _part(folder, bank, n).exists()]
+    if missing:
+        _make(arguments, robot, soil, template, setting, folder, bank, missing)
+    runs = [NullRun(**json.loads(_part(folder, bank, n).read_text())) for n in range(arguments.count)]
+    save_thresholds(thresholds_from(runs, bank), arguments.output)
+    print(f"{arguments.output}: thresholds of {len(runs)} null drives, bank {bank[:12]}")
+
+
+def _part(folder: Path, bank: str, number: int) -> Path:
+    return folder / f"{bank[:16]}_{number:03d}.json"
+
+
+def _make(
+    arguments: Arguments,
+    robot: Robot,
+    soil: Soil,
+    template: Template,
+    setting: Setting,
+    folder: Path,
+    bank: str,
+    missing: list[int],
+) -> None:
+    """Run the missing nulls, in processes of their own."""
+    import multiprocessing
+
+    tasks = [(robot, soil, template, setting, arguments.seed, n, _part(folder, bank, n)) for n in missing]
+    with Progress(len(tasks), "null drives") as progress:
+        if arguments.processes == 1:
+            for task in tasks:
+                _one(task)
+                progress.advance()
+            return
+        with multiprocessing.get_context("spawn").Pool(min(arguments.processes, len(tasks))) as pool:
+            for _ in pool.imap_unordered(_one, tasks):
+                progress.advance()
+
+
+def _one(task: tuple[Robot, Soil, Template, Setting, int, int, Path]) -> None:
+    from ddagr_gym.diagnosis.null_bank import null_run
+    from ddagr_gym.diagnosis.structural_nulls import KINDS
+
+    robot, soil, template, setting, seed, number, path = task
+    made: NullRun = null_run(robot, soil, template, KINDS[number % len(KINDS)], setting, (seed, number))
+    with atomic_path(path) as part:
+        part.write_text(json.dumps(asdict(made)))

@@ -1,0 +1,115 @@
+"""Held readings, found in the values themselves: a noisy sensor hardly ever reads exactly the same twice.
+
+No model is needed, and none could say it as surely. Repeats are then treated as what they are, "no new sample", and the
+rest of the diagnosis sees the readings that were new.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ddagr_gym.physics.effects.sensor_hold import SensorHold
+from ddagr_gym.recordings.schema import Recording
+
+Flags = NDArray[np.bool_]
+
+SENSORS = {
+    "accelerometer": ("specific_force_x", "specific_force_y"),
+    "gyro": ("yaw_rate",),
+    "encoders": ("encoder_right", "encoder_left"),
+    "pose": ("pose_x", "pose_y", "pose_yaw"),
+}
+"""Channels by flag of the effect."""
+
+LEAST_SHARE = 0.2
+"""Share of repeats that counts as holding; white noise of 100 quanta repeats in 0.3 percent, a hold every other sample
+in 50 (ours, between the two)."""
+
+FEWEST = 30
+"""Samples that a share needs (ours)."""
+
+_REACH = 5
+_QUANTA = 20.0
+
+
+@dataclass(frozen=True)
+class Held:
+    """A sensor that repeats its readings.
+
+    Attributes:
+        sensor: of SENSORS.
+        share: of samples that repeat the one before.
+        duration: mean time for which a reading is repeated after it was new [s].
+        samples: that were looked at.
+    """
+
+    sensor: str
+    share: float
+    duration: float
+    samples: int
+
+
+def _repeats(recording: Recording, names: Sequence[str]) -> tuple[Flags, Flags]:
+    """Samples in which all channels of a sensor repeat, and which of them say something, in the order of new samples.
+
+    A standing robot's encoders repeat zeros, and a steady one's the same count: only samples in which the reading
+    changes by two quanta per sample are looked at.
+    """
+    values = np.stack([recording[name] for name in names], axis=1)
+    values = values[np.isfinite(values).all(axis=1)]
+    if len(values) < 2 * _REACH + 2:
+        return np.zeros(0, dtype=bool), np.zeros(0, dtype=bool)
+    repeat = np.zeros(len(values), dtype=bool)
+    repeat[1:] = (values[1:] == values[:-1]).all(axis=1)
+    telling = np.zeros(len(values), dtype=bool)
+    steps = np.abs(np.diff(values, axis=0))
+    quantum = np.array([np.min(s[s > 0.0], initial=np.inf) for s in steps.T])
+    change = np.abs(values[2 * _REACH :] - values[: -2 * _REACH])
+    telling[_REACH:-_REACH] = (change > _QUANTA * quantum).any(axis=1)
+    return repeat, telling
+
+
+def find_held(recordings: Sequence[Recording]) -> tuple[Held, ...]:
+    """Sensors that repeat their readings in more than :data:`LEAST_SHARE` of the samples that say something."""
+    found = []
+    for sensor, names in SENSORS.items():
+        pairs = [(*_repeats(r, names), r) for r in recordings if r.has(*names)]
+        telling = sum(int(t.sum()) for _, t, _ in pairs)
+        if telling < FEWEST:
+            continue
+        share = sum(int((repeat & t).sum()) for repeat, t, _ in pairs) / telling
+        if share > LEAST_SHARE:
+            period = 1.0 / np.median([r.rate(names[0]) for _, _, r in pairs])
+            found.append(Held(sensor, share, float(period * share / max(1.0 - share, 1e-3)), telling))
+    return tuple(found)
+
+
+def without_repeats(recording: Recording, held: Sequence[Held]) -> Recording:
+    """Recording in which repeated readings of the held sensors are missing samples."""
+    channels = dict(recording.channels)
+    for item in held:
+        names = [name for name in SENSORS[item.sensor] if recording.has(name)]
+        if not names:
+            continue
+        values = np.stack([recording[name] for name in names], axis=1)
+        rows = np.flatnonzero(np.isfinite(values).all(axis=1))
+        same = np.zeros(len(rows), dtype=bool)
+        same[1:] = (values[rows[1:]] == values[rows[:-1]]).all(axis=1)
+        # a standing robot's encoders say zero all the time and mean it
+        same &= ~(values[rows] == 0.0).all(axis=1)
+        for name in names:
+            changed = channels[name].copy()
+            changed[rows[same]] = np.nan
+            channels[name] = changed
+    return replace(recording, channels=channels)
+
+
+def hold_effect(held: Sequence[Held]) -> SensorHold:
+    """The finding as an effect of the library: one duration, that of the sensor held longest."""
+    flags = {sensor: float(any(item.sensor == sensor for item in held)) for sensor in SENSORS}
+    longest = max(item.duration for item in held)
+    return SensorHold(longest, **flags)

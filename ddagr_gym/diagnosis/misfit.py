@@ -1,0 +1,36 @@
+"""What a model leaves of each channel, in units of its noise."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ddagr_gym.diagnosis.problem import Problem
+from ddagr_gym.diagnosis.refit import Fitted
+from ddagr_gym.replay.windows import CHANNELS
+
+
+def channel_misfit(problem: Problem, fitted: Fitted) -> dict[str, float]:
+    """Mean square of the residuals of every channel with samples, windows' unknowns eliminated [-].
+
+    About 1 where the model is right and the noise is estimated well; unknowns of the windows take a share away.
+    """
+    blocked = problem.blocked
+    rows = blocked.mask.shape[1]
+    residual = fitted.elimination.project(problem.residual(fitted.point, fitted.prediction)[..., None])
+    squares = (residual[:, :rows, 0] ** 2).reshape(blocked.sigma.shape).sum(axis=(0, 1))
+    counts = blocked.mask.reshape(blocked.sigma.shape).sum(axis=(0, 1))
+    return {name: float(squares[k] / counts[k]) for k, name in enumerate(CHANNELS) if counts[k] > 0}
+
+
+def roughest(misfit: dict[str, float], limits: dict[str, float]) -> tuple[str, float]:
+    """Channel whose misfit stands highest over its limit, and by how much (a ratio); channels without one are left out.
+
+    Args:
+        misfit: of a model.
+        limits: of the null bank.
+    """
+    ratios = {name: value / limits[name] for name, value in misfit.items() if limits.get(name, 0.0) > 0.0}
+    if not ratios:
+        return "", 0.0
+    worst = max(ratios, key=lambda name: ratios[name])
+    return worst, float(np.float64(ratios[worst]))

@@ -1,0 +1,158 @@
+"""The null bank: what the scan says of drives in which nothing is missing, made by structurally different simulators.
+
+Every run drives the given commands in a world of its own (:mod:`ddagr_gym.diagnosis.structural_nulls`), reads it with
+the noise of the given sensors, and goes through the same refit and scan as a real drive.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ddagr_gym.diagnosis.noise import ChannelNoise
+from ddagr_gym.diagnosis.setting import Setting, make_problem
+from ddagr_gym.diagnosis.structural_nulls import KINDS, NullWorld, draw_world
+from ddagr_gym.diagnosis.thresholds import NullRun
+from ddagr_gym.parameters import Robot, Soil
+from ddagr_gym.recordings.schema import Recording
+from ddagr_gym.replay.model import ideal_sensors
+from ddagr_gym.replay.windows import CHANNELS
+from ddagr_gym.simulator import simulate
+
+Array = NDArray[np.float64]
+
+_MARGIN = 3.0
+"""Ground beyond the straight-line reach of a drive [m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Template:
+    """What null drives copy of real ones.
+
+    Attributes:
+        commands: of each recording, (n, 2) [rad/s].
+        period: between samples [s].
+        present: of each recording, (n, 8) where a channel has a sample.
+        noise: of the channels.
+        starts: of each recording, world x, y, yaw.
+    """
+
+    commands: tuple[Array, ...]
+    period: float
+    present: tuple[NDArray[np.bool_], ...]
+    noise: tuple[ChannelNoise | None, ...]
+    starts: tuple[tuple[float, float, float], ...]
+
+
+def template_of(recordings: Sequence[Recording], noise: Sequence[ChannelNoise | None]) -> Template:
+    """Commands, sampling and noise of recordings; commands before the first known one are zero."""
+    commands = tuple(np.nan_to_num(np.stack(r.held_commands(), axis=1)) for r in recordings)
+    present = tuple(np.stack([np.isfinite(r[name]) for name in CHANNELS], axis=1) for r in recordings)
+    return Template(
+        commands, recordings[0].period, present, tuple(noise), tuple(_start(recording) for recording in recordings)
+    )
+
+
+def _start(recording: Recording) -> tuple[float, float, float]:
+    found = []
+    for name in ("pose_x", "pose_y", "pose_yaw"):
+        known = recording[name][np.isfinite(recording[name])]
+        found.append(float(known[0]) if known.size else 0.0)
+    return found[0], found[1], found[2]
+
+
+def null_recordings(
+    robot: Robot, soil: Soil, template: Template, kind: str, rng: np.random.Generator
+) -> tuple[Recording, ...]:
+    """Drives of the template's commands in one world of a kind, with noise.
+
+    Args:
+        robot: nominal.
+        soil: nominal.
+        template: what to drive and to read.
+        kind: of KINDS.
+        rng: source of randomness.
+    """
+    fastest = max(float(np.abs(c).mean(axis=1).sum()) * template.period for c in template.commands)
+    places = max(max(abs(s[0]), abs(s[1])) for s in template.starts)
+    reach = min(fastest * robot.wheels[0].outer_radius, 40.0) + places + _MARGIN
+    world = draw_world(kind, soil, reach, rng)
+    return tuple(_drive(robot, soil, template, world, number, rng) for number in range(len(template.commands)))
+
+
+def _drive(
+    robot: Robot, soil: Soil, template: Template, world: NullWorld, number: int, rng: np.random.Generator
+) -> Recording:
+    commands = template.commands[number]
+    x, y, yaw = template.starts[number]
+    columns = simulate(
+        robot, soil, commands, sensors=ideal_sensors(template.period), effects=world.changes, field=world.field,
+        numerics=world.numerics, initial_state={"x": x, "y": y, "yaw": yaw},
+    )  # fmt: skip
+    speed = robot.wheels[0].outer_radius * 0.5 * (np.abs(columns["encoder_right"]) + np.abs(columns["encoder_left"]))
+    read = {"t": columns["t"], "command_right": commands[:, 0], "command_left": commands[:, 1]}
+    for k, name in enumerate(CHANNELS):
+        found = template.noise[k]
+        clean = columns[name]
+        noisy = clean if found is None else _noisy(clean, found, speed, template.period, rng)
+        read[name] = np.where(template.present[number][:, k], noisy, np.nan)
+    return Recording.from_columns(read, robot)
+
+
+def _noisy(clean: Array, noise: ChannelNoise, speed: Array, period: float, rng: np.random.Generator) -> Array:
+    """Coloured noise that grows with speed; a counter's speed is rounded in its angle instead."""
+    from scipy.signal import lfilter
+
+    if noise.quantum > 0.0:
+        counts = np.floor(np.cumsum(clean) / noise.quantum + rng.random())
+        return np.diff(counts, prepend=0.0) * noise.quantum
+    white = rng.standard_normal(len(clean) + 100)
+    coloured = lfilter([1.0], [1.0, -noise.correlation], white)[100:] * np.sqrt(1.0 - noise.correlation**2)
+    return clean + coloured * np.hypot(noise.sigma, noise.per_speed * speed) * max(noise.inflation, 1.0)
+
+
+def null_run(robot: Robot, soil: Soil, template: Template, kind: str, setting: Setting, seed: Sequence[int]) -> NullRun:
+    """Refit and scan of one null world.
+
+    Args:
+        robot: nominal.
+        soil: nominal.
+        template: see :func:`null_recordings`.
+        kind: of KINDS.
+        setting: of the diagnosis.
+        seed: of this run alone.
+    """
+    from ddagr_gym.diagnosis.refit import fit
+    from ddagr_gym.diagnosis.search import stand
+
+    rng = np.random.default_rng(list(seed))
+    recordings = null_recordings(robot, soil, template, kind, rng)
+    problem = make_problem(robot, soil, recordings, setting)
+    standing = stand(problem, fit(problem))
+    return NullRun(kind, {g.name: g.gain for g in standing.gains}, standing.scores, standing.held_out, standing.misfit)
+
+
+def null_runs(
+    robot: Robot, soil: Soil, template: Template, setting: Setting, count: int, seed: int
+) -> Iterator[NullRun]:
+    """``count`` null runs, going through KINDS; the same seed gives the same runs whatever their number."""
+    for number in range(count):
+        yield null_run(robot, soil, template, KINDS[number % len(KINDS)], setting, (seed, number))
+
+
+def bank_hash(robot: Robot, soil: Soil, template: Template, setting: Setting, count: int, seed: int) -> str:
+    """Hash of everything that a bank depends on, the sources of the diagnosis and the simulator included."""
+    from ddagr_gym.diagnosis.sources import source_digest
+
+    digest = hashlib.sha256(source_digest().encode())
+    noise = [None if n is None else asdict(n) for n in template.noise]
+    text = json.dumps([repr(robot), repr(soil), repr(setting), noise, template.period, count, seed], sort_keys=True)
+    digest.update(text.encode())
+    for commands in template.commands:
+        digest.update(np.ascontiguousarray(commands).tobytes())
+    return digest.hexdigest()

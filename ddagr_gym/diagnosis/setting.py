@@ -1,0 +1,75 @@
+"""How a diagnosis cuts and weighs recordings, and the problem that follows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from ddagr_gym.diagnosis.blocks import BLOCK, block_windows, located
+from ddagr_gym.diagnosis.noise import ChannelNoise, recording_noise
+from ddagr_gym.diagnosis.nuisance import NuisancePriors, nuisances
+from ddagr_gym.diagnosis.problem import Problem
+from ddagr_gym.parameters import Robot, Soil
+from ddagr_gym.recordings.schema import Recording
+from ddagr_gym.replay.windows import cut_windows
+
+HISTORY = 0.6
+"""Commands kept from before a window [s]: longer than the longest delay of the library."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """Choices of a diagnosis.
+
+    Attributes:
+        duration: of a window [s].
+        stride: between the starts of windows [s].
+        block: length of the means that are compared [s].
+        priors: of what is uncertain.
+        threads: of the simulator.
+    """
+
+    duration: float = 2.0
+    stride: float = 2.0
+    block: float = BLOCK
+    priors: NuisancePriors = field(default_factory=NuisancePriors)
+    threads: int = 1
+
+
+def wheel_radius(robot: Robot) -> float:
+    """Mean hub to tread [m]."""
+    return sum(wheel.outer_radius for wheel in robot.wheels) / len(robot.wheels)
+
+
+def make_problem(
+    robot: Robot,
+    soil: Soil,
+    recordings: Sequence[Recording],
+    setting: Setting = Setting(),
+    noise: Sequence[ChannelNoise | None] | None = None,
+) -> Problem:
+    """Windows of recordings with their noise, and what is uncertain about them.
+
+    Args:
+        robot: nominal.
+        soil: nominal.
+        recordings: of one robot and period.
+        setting: choices.
+        noise: of the channels, where it is known; estimated by default.
+
+    Raises:
+        InputError: see :func:`ddagr_gym.replay.windows.cut_windows`.
+    """
+    radius = wheel_radius(robot)
+    windows = cut_windows(
+        recordings,
+        setting.duration,
+        stride=setting.stride,
+        wheel_radius=radius,
+        half_track=robot.half_track,
+        history=HISTORY,
+    )
+    found = recording_noise(recordings, radius) if noise is None else noise
+    blocked = block_windows(located(windows, recordings, radius), found, radius, setting.block)
+    uncertain = nuisances(robot, len(recordings), windows.period, setting.priors)
+    return Problem(robot, soil, blocked, uncertain, setting.priors, threads=setting.threads)

@@ -1,0 +1,34 @@
+"""How large effects are before any data: an effect worth naming is some times its least meaningful size.
+
+Without it two effects with the same traces (a tilted and a biased accelerometer) tie whatever sizes they need, and a
+direction that the data hardly see is blown up until it explains noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ddagr_gym.physics.effects import Effect
+
+TYPICAL_MULTIPLE = 5.0
+"""Standard deviation of a size in least meaningful sizes (ours: effects of 2 to 10 times are worth a diagnosis)."""
+
+
+def size_scale(effect: Effect | type[Effect], name: str) -> float:
+    """Standard deviation of a size about neutral, in its unit."""
+    return TYPICAL_MULTIPLE * float(effect.parameter(name).metadata["least"])
+
+
+def size_penalty(effects: Sequence[Effect]) -> float:
+    """Cost of the sizes of effects: half the sum of squares over their standard deviations.
+
+    Categorical effects and those whose neutral is a limit out of reach (motor saturation) cost nothing.
+    """
+    total = 0.0
+    for effect in effects:
+        if effect.categorical or not effect.differentiable:
+            continue
+        for name in effect.size_names():
+            away = getattr(effect, name) - effect.parameter(name).metadata["neutral"]
+            total += 0.5 * (away / size_scale(effect, name)) ** 2
+    return total

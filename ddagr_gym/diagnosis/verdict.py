@@ -1,0 +1,190 @@
+"""The answer of a diagnosis and its JSON form."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ddagr_gym.errors import InputError
+
+SCHEMA = "ddagr-diagnosis/1"
+
+NONE = "none"
+UNKNOWN = "unknown"
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A parameter of a named effect.
+
+    Attributes:
+        value: in unit.
+        unit: SI.
+        interval: 90 %, resampled over windows; None where the parameter was not fitted.
+    """
+
+    value: float
+    unit: str
+    interval: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One named effect.
+
+    Attributes:
+        name: word of the verdict's table.
+        parameters: by name.
+        gain: fall of the cost over the dispersion when it was added (linear scan).
+        gate: what the gain had to pass.
+        score: cluster-robust, along the fitted direction.
+        held_out: gain on left-out windows.
+        channels: share of each channel in the fall of its misfit.
+        equivalence_set: names that the same windows may mean, with their share of resamplings; itself included.
+    """
+
+    name: str
+    parameters: Mapping[str, Estimate]
+    gain: float
+    gate: float
+    score: float
+    held_out: float
+    channels: Mapping[str, float] = field(default_factory=dict)
+    equivalence_set: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What recordings say about the physics that the nominal simulator leaves out.
+
+    Attributes:
+        verdict: names of the table, or ("none",) or ("unknown",).
+        complete: whether nothing more is left than in drives with nothing missing.
+        findings: one per name, in the order in which they were found.
+        sentence: the answer in words.
+        misfit: mean square of each channel's residual for "nominal" and "corrected", and the null bank's "limit".
+        detectable: least detectable distance from neutral by effect and field (None: none, however large).
+        nuisances: refitted nominal parameters by name.
+        recordings: names of the sources.
+        thresholds: where the gates come from: nulls, bank hash, level.
+        seconds: of the run.
+        version: of the package.
+        schema: of this file.
+    """
+
+    verdict: tuple[str, ...]
+    complete: bool
+    findings: tuple[Finding, ...]
+    sentence: str
+    misfit: Mapping[str, Mapping[str, float]]
+    detectable: Mapping[str, Mapping[str, float | None]]
+    nuisances: Mapping[str, float]
+    recordings: tuple[str, ...]
+    thresholds: Mapping[str, Any]
+    seconds: float
+    version: str
+    schema: str = SCHEMA
+
+
+def as_mapping(diagnosis: Diagnosis) -> dict[str, Any]:
+    """Plain mapping as it stands in ``diagnosis.json``."""
+    return json.loads(json.dumps(_finite(asdict(diagnosis))))  # type: ignore[no-any-return]
+
+
+def _finite(value: Any) -> Any:
+    """Infinite and undefined numbers as None, which JSON can hold."""
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, Mapping):
+        return {str(key): _finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    return value
+
+
+_TYPES: dict[str, type | tuple[type, ...]] = {
+    "schema": str,
+    "verdict": list,
+    "complete": bool,
+    "findings": list,
+    "sentence": str,
+    "misfit": dict,
+    "detectable": dict,
+    "nuisances": dict,
+    "recordings": list,
+    "thresholds": dict,
+    "seconds": (int, float),
+    "version": str,
+}
+_FINDING_TYPES: dict[str, type | tuple[type, ...]] = {
+    "name": str,
+    "parameters": dict,
+    "gain": (int, float),
+    "gate": (int, float),
+    "score": (int, float),
+    "held_out": (int, float),
+    "channels": dict,
+    "equivalence_set": dict,
+}
+
+
+def validate(mapping: Mapping[str, Any]) -> None:
+    """Check a mapping against the schema.
+
+    Raises:
+        InputError: another schema, a missing or wrong entry, names that no library has.
+    """
+    from ddagr_gym.physics.effects.registry import effect_kinds
+
+    if mapping.get("schema") != SCHEMA:
+        raise InputError(f"the diagnosis has schema {mapping.get('schema')!r}: this version reads {SCHEMA!r}.")
+    _check_types("the diagnosis", mapping, _TYPES)
+    known = {NONE, UNKNOWN, *effect_kinds()}
+    wrong = [name for name in mapping["verdict"] if name not in known]
+    if wrong or not mapping["verdict"]:
+        raise InputError(
+            f"the diagnosis has the verdict {mapping['verdict']!r}: give names of effects, none or unknown."
+        )
+    for finding in mapping["findings"]:
+        _check_types(f"finding {finding.get('name')!r}", finding, _FINDING_TYPES)
+    named = [finding["name"] for finding in mapping["findings"]]
+    if mapping["verdict"] not in ([NONE], [UNKNOWN]) and sorted(named) != sorted(mapping["verdict"]):
+        raise InputError(f"the diagnosis names {mapping['verdict']!r} and has findings on {named!r}: make them agree.")
+
+
+def _check_types(place: str, mapping: Mapping[str, Any], types: Mapping[str, type | tuple[type, ...]]) -> None:
+    for key, kind in types.items():
+        if key not in mapping:
+            raise InputError(f"{place} has no entry {key!r}: make it again with `ddagr diagnose`.")
+        if not isinstance(mapping[key], kind):
+            raise InputError(f"{place} has {key} = {mapping[key]!r}: give {kind}.")
+
+
+def save(diagnosis: Diagnosis, path: Path) -> None:
+    """Write ``diagnosis.json``, all or nothing, after validation."""
+    mapping = as_mapping(diagnosis)
+    validate(mapping)
+    part = path.with_name(f".{path.name}.part")
+    part.write_text(json.dumps(mapping, indent=1, allow_nan=False) + "\n")
+    os.replace(part, path)
+
+
+def load(path: Path) -> dict[str, Any]:
+    """Read and validate a ``diagnosis.json``.
+
+    Raises:
+        InputError: no such file, no JSON, or not of this schema.
+    """
+    try:
+        mapping = json.loads(path.read_text())
+    except (OSError, json.JSONDecodeError) as error:
+        raise InputError(f"{path} cannot be read as a diagnosis ({error}): make it with `ddagr diagnose`.") from None
+    if not isinstance(mapping, dict):
+        raise InputError(f"{path} holds no mapping: make it with `ddagr diagnose`.")
+    validate(mapping)
+    return mapping

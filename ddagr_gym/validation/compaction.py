@@ -1,0 +1,69 @@
+"""What if pressure pushed up only: the model without the horizontal part of the pressure on its tyres."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ddagr_gym.parameters import Numerics
+from ddagr_gym.physics.contact_geometry import contact_rule, section_rule
+from ddagr_gym.physics.contact_patch import WORKSPACE_SIZE, WRENCH, wheel_wrench
+from ddagr_gym.physics.effects.base import Effect, Vector, size
+from ddagr_gym.physics.layout import (
+    EXTRA_FORCE_X,
+    POINT_WHEEL_FORCES,
+    SINKAGE,
+    SOIL,
+    SOIL_COHESION,
+    SOIL_FRICTION_TANGENT,
+    WHEEL,
+    WHEEL_OMEGA,
+    WHEEL_V_X,
+    WHEEL_V_Y,
+    YAW_RATE,
+)
+
+_SECTION = section_rule(Numerics().section_nodes).copy()
+_CONTACT = contact_rule(Numerics().contact_nodes).copy()
+_SHEAR_RATE = Numerics().minimum_shear_rate
+_REST_SPEED = Numerics().rest_speed
+
+
+def cancel_compaction(row: Vector, parameters: Vector, memory: Vector) -> None:
+    """Take away the share ``parameters[0]`` of what the tyre would feel along the wheel in soil without strength."""
+    workspace = np.empty(WORKSPACE_SIZE)
+    wrench = np.empty(WRENCH)
+    wheel = np.empty(3)
+    for i in range(4):
+        if row[SINKAGE + i] <= 0.0:
+            continue
+        for j in range(3):
+            wheel[j] = row[WHEEL + 4 * j + i]
+        soil = row[SOIL + 9 * i : SOIL + 9 * i + 9].copy()
+        soil[SOIL_COHESION] = 0.0
+        soil[SOIL_FRICTION_TANGENT] = 0.0
+        wheel_wrench(
+            wheel, soil, row[WHEEL_V_X + i], row[WHEEL_V_Y + i], row[WHEEL_OMEGA + i], row[YAW_RATE],
+            row[SINKAGE + i], _SHEAR_RATE, _REST_SPEED, _SECTION, _CONTACT, workspace, wrench,
+        )  # fmt: skip
+        row[EXTRA_FORCE_X + i] -= parameters[0] * wrench[0]
+
+
+@dataclass(frozen=True)
+class NoCompactionResistance(Effect):
+    """A what-if for comparing models, no physics of its own: it is not in the library of effects.
+
+    Attributes:
+        share: of the compaction resistance that is taken away.
+    """
+
+    name = "no_compaction_resistance"
+    title = "No compaction resistance"
+    group = "ground"
+    equation = "F_x -> F_x + share * integral of sigma n_x dS"
+    source = "ours"
+    signature = "less slip for the same speed"
+    actions = ((POINT_WHEEL_FORCES, cancel_compaction),)
+
+    share: float = size("-", 0.0, 1.0, least=0.1, default=1.0)

@@ -1,0 +1,49 @@
+"""Held readings are found in the values, and only there."""
+
+import numpy as np
+import pytest
+
+from ddagr_gym.diagnosis.held import find_held, hold_effect, without_repeats
+from ddagr_gym.recordings.schema import Recording
+
+PERIOD, COUNT = 0.02, 2000
+
+
+def drive(held: dict[str, int]) -> Recording:
+    rng = np.random.default_rng(1)
+    t = PERIOD * np.arange(COUNT)
+    quantum = 0.0157
+    columns = {"t": t, "command_right": np.sin(t), "command_left": np.cos(t)}
+    for k, name in enumerate(("encoder_right", "encoder_left")):
+        angle = np.cumsum(0.6 + 0.5 * np.sin((5.0 + 0.5 * k) * t)) / quantum
+        columns[name] = np.diff(np.floor(angle), prepend=0.0) * quantum
+    for name in ("specific_force_x", "specific_force_y", "yaw_rate"):
+        columns[name] = 0.1 * np.sin(t) + 0.03 * rng.standard_normal(COUNT)
+    for name, samples in held.items():
+        columns[name] = columns[name][np.arange(COUNT) // samples * samples]
+    return Recording.from_columns(columns)
+
+
+def test_nothing_is_held_in_a_sound_drive() -> None:
+    assert find_held([drive({})]) == ()
+
+
+@pytest.mark.parametrize(
+    ("channels", "sensor"),
+    [(("specific_force_x", "specific_force_y"), "accelerometer"), (("yaw_rate",), "gyro"),
+     (("encoder_right", "encoder_left"), "encoders")],
+)  # fmt: skip
+def test_a_held_sensor_is_named_with_its_duration(channels: tuple[str, ...], sensor: str) -> None:
+    found = find_held([drive(dict.fromkeys(channels, 5))])
+    assert [item.sensor for item in found] == [sensor]
+    assert found[0].duration == pytest.approx(4 * PERIOD, rel=0.15)
+    effect = hold_effect(found)
+    assert getattr(effect, sensor) == 1.0
+    assert sum(getattr(effect, flag) for flag in ("accelerometer", "gyro", "encoders", "pose")) == 1.0
+
+
+def test_repeats_become_missing_samples() -> None:
+    recording = drive({"yaw_rate": 4})
+    cleaned = without_repeats(recording, find_held([recording]))
+    assert np.isfinite(cleaned["yaw_rate"]).mean() == pytest.approx(0.25, abs=0.01)
+    assert np.isfinite(cleaned["encoder_right"]).all()

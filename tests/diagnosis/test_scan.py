@@ -1,0 +1,75 @@
+"""Refit and scan on drives of the simulator itself: sensitivities, names, sizes."""
+
+import numpy as np
+import pytest
+
+from ddagr_gym.diagnosis.hypotheses import first_guess
+from ddagr_gym.diagnosis.misfit import channel_misfit
+from ddagr_gym.diagnosis.refit import fit
+from ddagr_gym.diagnosis.scores import gains, held_out_gains, scan
+from ddagr_gym.diagnosis.search import bootstrap_weights, refit_with, stand
+from ddagr_gym.diagnosis.uncertainty import intervals, resampled_parameters
+from ddagr_gym.physics.effects.registry import effect_kinds, parse_effect
+
+FEW = ("gyro_scale", "slope", "motor_lag", "towed_drag", "encoder_scale")
+
+
+@pytest.fixture(scope="module")
+def few() -> dict:
+    return {name: effect_kinds()[name] for name in FEW}
+
+
+def test_elimination_takes_away_what_the_unknowns_explain(drive, problem_of) -> None:
+    problem = problem_of(drive(seconds=6.0))
+    point = problem.start()
+    base = problem.predict(point)
+    by_parameter = problem.parameter_columns(point, base)
+    elimination = problem.eliminate(point, base, by_parameter)
+    moved = point.states.copy()
+    moved[:, 3] += 1e-3
+    changed = problem.blocked.means(problem.model.predict(point.values, moved) - base)
+    column = problem.padded(changed[..., None])
+    # what is left of a change of the initial speed is what its prior alone resists
+    assert np.linalg.norm(elimination.project(column)) < 0.02 * np.linalg.norm(column)
+    residual = elimination.project(problem.residual(point, base)[..., None])
+    assert np.abs(np.matmul(elimination.basis.transpose(0, 2, 1), residual)).max() < 1e-8
+
+
+def test_a_drive_with_nothing_missing_is_explained(drive, problem_of, few) -> None:
+    problem = problem_of(drive())
+    fitted = fit(problem)
+    assert all(value < 1.3 for value in channel_misfit(problem, fitted).values())
+    terms = scan(problem, fitted, few)
+    assert max(item.gain for item in gains(terms)) < 6.0
+
+
+@pytest.mark.parametrize(
+    ("text", "size"), [("gyro_scale=1.05", "scale"), ("motor_lag=0.15", "lag"), ("slope=0.05", "angle")]
+)
+def test_an_effect_is_named_and_sized(drive, problem_of, few, text: str, size: str) -> None:
+    truth = parse_effect(text)
+    problem = problem_of(drive((text,)))
+    fitted = fit(problem)
+    terms = scan(problem, fitted, few)
+    found = gains(terms)
+    assert found[0].name == truth.name
+    assert found[0].gain > 2.0 * found[1].gain
+    assert held_out_gains(terms)[truth.name] > 0.3 * found[0].gain
+    guess = first_guess(terms.candidates[found[0].candidate], found[0].multiples)
+    neutral = truth.parameter(size).metadata["neutral"]
+    assert abs(getattr(guess, size) - neutral) == pytest.approx(abs(getattr(truth, size) - neutral), rel=0.4)
+    weights = bootstrap_weights(terms, [truth.name, found[1].name], np.random.default_rng(1), draws=50)
+    assert weights[truth.name] > 0.9
+
+
+def test_joint_refit_recovers_the_size_with_an_interval_that_holds_it(drive, problem_of) -> None:
+    problem = problem_of(drive(("gyro_scale=1.05",)))
+    fitted = fit(problem)
+    standing = stand(problem, fitted)
+    refitted = refit_with(problem, standing, parse_effect("gyro_scale=1.02"))
+    assert refitted.cost < fitted.cost - 20.0
+    assert refitted.point.effects[0].scale == pytest.approx(1.05, abs=0.012)
+    _, draws = resampled_parameters(problem, refitted, np.random.default_rng(2))
+    low, high = intervals(draws)[0]
+    assert low < refitted.point.effects[0].scale < high
+    assert 1e-4 < high - low < 0.05
