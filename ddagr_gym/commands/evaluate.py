@@ -30,7 +30,7 @@ class Arguments:
         processes: workers.
     """
 
-    controllers: str = "B0,B1,B2,B3,true_curvature"
+    controllers: str = "B0,B1,B2,B3,B4,true_curvature"
     scenarios: str = "S0"
     output: Path = Path("ddagr_evaluation")
     processes: int = 2

@@ -26,6 +26,25 @@ OBSERVATION = (
 
 SCALES = np.array([entry[2] for entry in OBSERVATION])
 
+EKF_FEATURES = (
+    ("estimated_v_x", "m/s", 0.25),
+    ("estimated_yaw_rate", "rad/s", 0.5),
+    ("log_traction_limit", "-", 1.0),
+    ("log_traction_rate", "-", 1.0),
+    ("log_lateral_stiffness", "-", 1.0),
+    ("log_motion_resistance", "-", 1.0),
+    ("estimated_slip_right", "-", 1.0),
+    ("estimated_slip_left", "-", 1.0),
+    ("deviation_log_traction_limit", "-", 1.0),
+    ("deviation_log_traction_rate", "-", 1.0),
+    ("deviation_log_lateral_stiffness", "-", 1.0),
+    ("deviation_log_motion_resistance", "-", 1.0),
+)
+"""Entries that the filter's features append, in the same form. The logs are those of a1, a2, b, Rc over their prior
+medians; their standard deviations say how much has been observed."""
+
+FEATURE_SCALES = np.array([entry[2] for entry in EKF_FEATURES])
+
 
 class TurnObservation(NamedTuple):
     """An observation in its units; see :data:`OBSERVATION`."""

@@ -16,6 +16,7 @@ from ddagr_gym.replay.refit import STATE_PRIOR
 Array = NDArray[np.float64]
 
 _DAMPING = (1.0, 0.5, 0.25, 0.1, 0.03)
+_LONGEST = 3.0  # standard deviations that a parameter moves in one step: beyond, the sensitivities are of no use
 _STATES = len(STATE_PRIOR)
 _NEVER = 1e5  # an onset at which an effect holds always, or never
 
@@ -144,7 +145,7 @@ def fit(
     Args:
         problem: what to fit.
         start: first point with its effects.
-        iterations: most steps.
+        iterations: most steps; 0 only computes the sensitivities at the start.
         tolerance: relative gain of a step that ends the fit.
         renewals: how often the sensitivities are computed before they are kept; those of the result are new.
         reuse: fit whose nuisance sensitivities are kept, so that only those of the effects are simulated.
@@ -176,7 +177,7 @@ def fit(
                 by_parameter, elimination = _sensitivities(problem, point, prediction)
             by_effect = effect_columns(problem, point, prediction, parameters)
             cost, _ = cost_of(problem, point, prediction, elimination)
-    if reuse is None:
+    if reuse is None and done:
         by_parameter, elimination = _sensitivities(problem, point, prediction)
     cost, shares = cost_of(problem, point, prediction, elimination)
     return Fitted(point, prediction, cost, elimination, by_parameter, done, converged, shares)
@@ -210,7 +211,8 @@ def _step(
     high = np.concatenate([problem.high[free], [p.high for p in parameters]])
     information = np.einsum("wmp,wmq->pq", left, left, optimize=True) + np.diag(precision)
     gradient = np.einsum("wmp,wm->p", left, right) - precision * (here - middle)
-    change = bounded_step(information, gradient, low - here, high - here)
+    reach = _LONGEST * np.concatenate([problem.prior[free], [p.scale for p in parameters]])
+    change = bounded_step(information, gradient, np.maximum(low - here, -reach), np.minimum(high - here, reach))
     explained = elimination.explain(raw)
     states = explained[:, :_STATES, 0] - explained[:, :_STATES, 1:] @ change
     for damping in _DAMPING:
@@ -226,17 +228,21 @@ def _step(
 
 
 def bounded_step(information: Array, gradient: Array, low: Array, high: Array) -> Array:
-    """Newton step inside bounds: what would leave them is put on them, one after the other."""
-    ridge = 1e-10 * np.diag(np.maximum(np.diag(information), 1e-30))
-    step = np.zeros(len(gradient))
-    held = np.zeros(len(gradient), dtype=bool)
-    for _ in range(len(gradient) + 1):
-        rest = gradient - information[:, held] @ step[held]
-        open_ = ~held
-        step[open_] = np.linalg.solve((information + ridge)[np.ix_(open_, open_)], rest[open_])
-        outside = open_ & ((step < low - 1e-12) | (step > high + 1e-12))
-        if not outside.any():
-            break
-        step[outside] = np.clip(step[outside], low[outside], high[outside])
-        held |= outside
-    return step
+    """Newton step inside bounds: the minimum of the quadratic model there (bounded-variable least squares).
+
+    Args:
+        information: (P, P), positive definite or nearly so.
+        gradient: (P,) downhill.
+        low: (P,) at most 0.
+        high: (P,) at least 0.
+    """
+    from scipy.optimize import lsq_linear
+
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(information), 1e-30))
+    scaled = information * np.outer(scale, scale) + 1e-9 * np.eye(len(scale))
+    lower = np.linalg.cholesky(scaled)
+    right = np.linalg.solve(lower, gradient * scale)
+    # a fixed parameter would be an empty interval
+    bounds = (np.minimum(low, 0.0) / scale - 1e-12, np.maximum(high, 0.0) / scale + 1e-12)
+    found = lsq_linear(lower.T, right, bounds=bounds, method="bvls")
+    return np.asarray(found.x * scale)

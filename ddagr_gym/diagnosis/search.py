@@ -99,13 +99,27 @@ def stand(problem: Problem, fitted: Fitted, progress: Callable[[str], None] = la
     return Standing(fitted, terms, found, scores(terms, found), held_out, dispersion, misfit)
 
 
-def refit_with(problem: Problem, standing: Standing, effect: Effect, *, full: bool = False) -> Fitted:
-    """Joint refit from a model with one further effect; nuisance sensitivities are kept unless ``full``."""
-    start = replace(standing.fitted.point, effects=(*standing.fitted.point.effects, effect))
-    return fit(problem, start, iterations=6, renewals=3, reuse=None if full else standing.fitted)
+def refit_with(problem: Problem, standing: Standing, effect: Effect, raw: Fitted) -> Fitted:
+    """Joint refit with one further effect, from the standing model and from the raw nominal one; the better of both.
+
+    A nominal refit bends soil and robot to make up for what is missing, so far that no step leads back. Sensitivities
+    of the nuisances are those of the two starting points.
+
+    Args:
+        problem: what to fit.
+        standing: the model so far.
+        effect: first guess of what to add.
+        raw: the nominal model with its sensitivities.
+    """
+    effects = (*standing.fitted.point.effects, effect)
+    starts = ((standing.fitted.point, standing.fitted), (raw.point, raw))
+    trials = [
+        fit(problem, replace(point, effects=effects), iterations=6, renewals=3, reuse=reuse) for point, reuse in starts
+    ]
+    return min(trials, key=lambda trial: trial.cost)
 
 
-def rivals_of(problem: Problem, standing: Standing, thresholds: Thresholds, most: int) -> list[Rival]:
+def rivals_of(problem: Problem, standing: Standing, raw: Fitted, thresholds: Thresholds, most: int) -> list[Rival]:
     """Joint refits of the effects that pass the gate, best first."""
     passing = [gain for gain in standing.gains if thresholds.passes(gain.name, gain.gain, standing)]
     ranked = sorted(passing, key=lambda item: -item.gain / thresholds.of(item.name).gain)[: 2 * most]
@@ -114,7 +128,7 @@ def rivals_of(problem: Problem, standing: Standing, thresholds: Thresholds, most
     rivals = []
     for gain in ranked:
         effect = first_guess(standing.terms.candidates[gain.candidate], gain.multiples)
-        fitted = refit_with(problem, standing, effect)
+        fitted = refit_with(problem, standing, effect, raw)
         if fitted.point.effects[-1].is_meaningful(extent):
             rivals.append(Rival(gain.name, fitted, (standing.fitted.cost - fitted.cost) / standing.dispersion))
     return sorted(rivals, key=lambda rival: -rival.gain)
@@ -138,11 +152,12 @@ def search(
         progress: called with what is being done.
     """
     progress("nominal refit")
+    raw = fit(problem, iterations=0)
     standing = stand(problem, fit(problem), progress)
     standings: list[Standing] = [standing]
     first: tuple[Rival, ...] = ()
     while len(standing.names) < most:
-        tried = rivals_of(problem, standing, thresholds, rivals)
+        tried = rivals_of(problem, standing, raw, thresholds, rivals)
         tried = [rival for rival in tried if rival.gain > thresholds.of(rival.name).gain]
         if not tried:
             break

@@ -51,6 +51,7 @@ def make_settings(
     reward: RewardWeights = DEFAULT_REWARD,
     effects: Effects = (),
     numerics: Numerics = Numerics(),
+    ekf_features: bool = False,
 ) -> TurnSettings:
     """Settings from what ``gym.make("DDAGR-Turn-v0", ...)`` takes; see :class:`ddagr_gym.envs.TurnEnv`.
 
@@ -72,6 +73,7 @@ def make_settings(
         reward=reward,
         effects=load_effects(effects),
         numerics=numerics,
+        ekf_features=ekf_features,
     )
 
 

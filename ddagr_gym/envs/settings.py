@@ -108,6 +108,7 @@ class TurnSettings(Validated):
         reward: weights.
         effects: missing physics.
         numerics: accuracy.
+        ekf_features: append the filter's estimates to the observation.
     """
 
     robot: Robot = field(default_factory=ddagr)
@@ -122,6 +123,7 @@ class TurnSettings(Validated):
     reward: RewardWeights = RewardWeights()
     effects: tuple[Effect, ...] = ()
     numerics: Numerics = Numerics()
+    ekf_features: bool = False
 
     def _check(self) -> None:
         if self.side != "random" and self.side not in SIDES:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ddagr_gym.control.observation import OBSERVATION
 from ddagr_gym.envs import turn_kernel as kernel
 from ddagr_gym.envs.constants import CONTROL_INTERVAL
+from ddagr_gym.envs.ekf_features import FEATURE_COUNT, EkfFeatureBatch
 from ddagr_gym.envs.settings import Episode, TurnSettings
 from ddagr_gym.errors import InputError
 from ddagr_gym.physics import layout
@@ -62,9 +63,9 @@ class TurnBatch:
         self._noise = np.zeros((count, CONTROL_INTERVAL, layout.NOISE_CHANNELS))
         self._outer_radius = np.zeros(count)
         self._weights = np.array(astuple(settings.reward))
-        self.observation_space = spaces.Box(
-            -kernel.OBSERVATION_LIMIT, kernel.OBSERVATION_LIMIT, (len(OBSERVATION),), np.float32
-        )
+        self._features = EkfFeatureBatch(settings.robot, settings.sensors, count) if settings.ekf_features else None
+        entries = len(OBSERVATION) + (FEATURE_COUNT if settings.ekf_features else 0)
+        self.observation_space = spaces.Box(-kernel.OBSERVATION_LIMIT, kernel.OBSERVATION_LIMIT, (entries,), np.float32)
         self.command_limit = settings.robot.maximum_wheel_speed
 
     def reset(self, chosen: Sequence[int], rngs: Sequence[np.random.Generator], options: dict[str, Any] | None) -> None:
@@ -97,6 +98,8 @@ class TurnBatch:
         self.readings[indices] = 0.0
         self.terms[indices] = 0.0
         self.commands[indices] = 0.0
+        if self._features is not None:
+            self._features.reset(indices)
 
     @staticmethod
     def _episode_option(options: dict[str, Any] | None) -> Episode | None:
@@ -127,7 +130,12 @@ class TurnBatch:
 
     def observe_start(self, chosen: Sequence[int], observations: NDArray[np.float32]) -> None:
         """Write the first observation of the ``chosen`` environments into ``observations`` (N, entries)."""
-        kernel.observe_start(self.tasks, np.asarray(chosen, dtype=np.int64), self._outer_radius, observations)
+        indices = np.asarray(chosen, dtype=np.int64)
+        kernel.observe_start(self.tasks, indices, self._outer_radius, observations)
+        if self._features is not None:
+            features = np.empty((self.count, FEATURE_COUNT), dtype=np.float32)
+            self._features.write(features)
+            observations[indices, len(OBSERVATION) :] = features[indices]
 
     def new_observations(self) -> NDArray[np.float32]:
         """Zeroed observations (N, entries)."""
@@ -158,6 +166,9 @@ class TurnBatch:
             self.tasks, self.simulator.rows, actions, self.readings, self.record, self._weights, self._outer_radius,
             self.terms, rewards, observations,
         )  # fmt: skip
+        if self._features is not None:
+            self._features.update(self.commands, self.readings)
+            self._features.write(observations[:, len(OBSERVATION) :])
 
     @property
     def endings(self) -> NDArray[np.int64]:

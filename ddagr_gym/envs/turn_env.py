@@ -50,6 +50,9 @@ class TurnEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     11   run_in_to_go        m         1.0           distance left before the turn, from the encoders
     ===  ==================  ========  ============  ==========================================================
 
+    ``ekf_features=True``, or the id ``DDAGR-Turn-EKF-v0``, appends the twelve entries of
+    :data:`ddagr_gym.control.observation.EKF_FEATURES`: what the filter makes of the raw samples.
+
     ## Reward
     Weighted sum of named terms, :data:`ddagr_gym.envs.turn_kernel.TERMS`; weights by ``reward=RewardWeights(...)``.
     It uses the true state and serves training only.
@@ -69,8 +72,9 @@ class TurnEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     state and the reward's terms.
 
     ## Arguments
-    ``robot, soil, radius, side, run_in, run_out, speed, sensors, randomisation, reward, effects, numerics`` as in
-    :func:`ddagr_gym.envs.options.make_settings`; ``render_mode``, ``info_level``. ``reset(options={"episode": e})``
+    ``robot, soil, radius, side, run_in, run_out, speed, sensors, randomisation, reward, effects, numerics,
+    ekf_features`` as in :func:`ddagr_gym.envs.options.make_settings`; ``render_mode``, ``info_level``.
+    ``reset(options={"episode": e})``
     repeats a given :class:`Episode`; ``env.unwrapped.episode`` is the present one.
 
     ## Versions

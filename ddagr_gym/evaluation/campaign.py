@@ -14,7 +14,7 @@ import numpy as np
 
 from ddagr_gym.envs.options import make_settings
 from ddagr_gym.envs.settings import TurnSettings
-from ddagr_gym.evaluation.controllers import find_controller
+from ddagr_gym.evaluation.controllers import EKF_CONTROLLERS, find_controller
 from ddagr_gym.evaluation.metrics import turn_metrics
 from ddagr_gym.evaluation.runs import TurnRun, drive_turn
 from ddagr_gym.evaluation.scenarios import Scenario, load_scenarios
@@ -32,16 +32,24 @@ class Task:
     numbers: tuple[int, ...]
 
 
-def scenario_settings(scenario: Scenario) -> TurnSettings:
+def scenario_settings(scenario: Scenario, ekf_features: bool = False) -> TurnSettings:
     """Settings of the environment in which a scenario is driven; the episode itself is frozen."""
     turn = scenario.episode.turn
-    return make_settings(radius=turn.radius, side=turn.side, speed=turn.speed, run_in=turn.run_in, run_out=turn.run_out)
+    return make_settings(
+        radius=turn.radius,
+        side=turn.side,
+        speed=turn.speed,
+        run_in=turn.run_in,
+        run_out=turn.run_out,
+        ekf_features=ekf_features,
+    )
 
 
 def drive_scenario(controller: str, scenario: Scenario) -> TurnRun:
     """One scenario by one controller."""
     made = find_controller(controller, scenario.episode.turn)
-    return drive_turn(made, scenario_settings(scenario), scenario.seed, scenario.episode)
+    settings = scenario_settings(scenario, controller in EKF_CONTROLLERS)
+    return drive_turn(made, settings, scenario.seed, scenario.episode)
 
 
 def episode_row(controller: str, scenario: Scenario, run: TurnRun) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.errors import InputError
+from ddagr_gym.frames import wrap_angle
 from ddagr_gym.replay.windows import CHANNELS, WindowSet
 
 Array = NDArray[np.float64]
@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 _OMEGA = slice(6, 8)
 _POSE = slice(0, 3)
 _DELAY_STEP = 0.01
+_REWEIGHTINGS = 20
 
 
 @dataclass(frozen=True)
@@ -97,9 +98,15 @@ def bank_speeds_at_samples(windows: WindowSet, delay: float = 0.0) -> Array:
 
 
 def fit_track(
-    windows: WindowSet, wheel_radius: float, half_track: float, motor: Motor | None = None
-) -> KinematicModel:
-    """Effective track, and without a motor the lateness of the encoders, by least squares on the gyro.
+    windows: WindowSet,
+    wheel_radius: float,
+    half_track: float,
+    motor: Motor | None = None,
+    *,
+    sigma: float = np.inf,
+    robust: float = np.inf,
+) -> KinematicModel | None:
+    """Effective track, and without a motor the lateness of the encoders, from the gyro or else the poses' headings.
 
     Args:
         windows: training part; without ``motor`` driven by encoders, with as much drive kept before and after as
@@ -107,28 +114,54 @@ def fit_track(
         wheel_radius: [m].
         half_track: geometric [m].
         motor: that follows the commands, for windows driven by commands.
+        sigma: of the gyro [rad/s], for the loss.
+        robust: weighted residual from which the loss is linear, as for :class:`~ddagr_gym.replay.refit.Refitter`.
 
-    Raises:
-        InputError: no gyro samples, or no turning.
+    Returns:
+        None where nothing measures a turn that goes with the wheel speeds.
     """
     before, after = windows.history * windows.period, windows.ahead * windows.period
     delays = np.arange(-after, before - windows.period, _DELAY_STEP) if motor is None else np.zeros(1)
-    measured = windows.measured[..., CHANNELS.index("yaw_rate")]
-    known = np.isfinite(measured)
     best: tuple[float, float, float] | None = None
     for delay in delays:
         speeds = bank_speeds_at_samples(windows, delay) if motor is None else motor.speeds(windows)
-        turning = 0.5 * wheel_radius * (speeds[:, 1:, 0] - speeds[:, 1:, 1]) / half_track
-        power = float(turning[known] @ turning[known])
-        share = float(turning[known] @ measured[known]) / power if power > 0.0 else 0.0
-        misfit = float(((measured - share * turning)[known] ** 2).sum())
-        if share > 0.0 and (best is None or misfit < best[0]):
-            best = (misfit, 1.0 / share, float(delay))
-    if best is None:
-        raise InputError(
-            "the training part holds no turn that gyro and wheel speeds agree on: no effective track can be fitted."
-        )
-    return KinematicModel(wheel_radius, half_track, best[1], motor, best[2])
+        turning = 0.5 * wheel_radius * (speeds[..., 0] - speeds[..., 1]) / half_track
+        measured, model = _turns(windows, turning)
+        share, loss = _robust_share(measured, model, sigma, robust)
+        if share > 0.0 and (best is None or loss < best[0]):
+            best = (loss, 1.0 / share, float(delay))
+    return None if best is None else KinematicModel(wheel_radius, half_track, best[1], motor, best[2])
+
+
+def _turns(windows: WindowSet, turning: Array) -> tuple[Array, Array]:
+    """Measured and no-slip yaw rates (n,) at the gyro's samples; between poses where the gyro is absent or dead."""
+    gyro = windows.measured[..., CHANNELS.index("yaw_rate")]
+    known = np.isfinite(gyro)
+    if known.any() and np.ptp(gyro[known]) > 0.0:
+        return gyro[known], turning[:, 1:][known]
+    headings = windows.measured[..., CHANNELS.index("pose_yaw")]
+    turned = np.cumsum(0.5 * windows.period * (turning[:, 1:] + turning[:, :-1]), axis=1)
+    measured, model = [np.empty(0)], [np.empty(0)]
+    for heading, angle in zip(headings, turned, strict=True):
+        rows = np.flatnonzero(np.isfinite(heading))
+        time = np.diff(rows) * windows.period
+        measured.append(wrap_angle(np.diff(heading[rows])) / time)
+        model.append(np.diff(angle[rows]) / time)
+    return np.concatenate(measured), np.concatenate(model)
+
+
+def _robust_share(measured: Array, model: Array, sigma: float, robust: float) -> tuple[float, float]:
+    """Factor on the model and Huber's loss, by reweighted least squares; 0 where there is no turn."""
+    if not model.size or not model @ model > 0.0:
+        return 0.0, np.inf
+    limit = robust * sigma if np.isfinite(robust) and np.isfinite(sigma) else np.inf
+    share = float(model @ measured) / float(model @ model)
+    for _ in range(_REWEIGHTINGS if np.isfinite(limit) else 0):
+        weight = limit / np.maximum(np.abs(measured - share * model), limit)
+        share = float((weight * model) @ measured) / float((weight * model) @ model)
+    size = np.abs(measured - share * model)
+    loss = np.where(size <= limit, size**2, limit * (2.0 * np.minimum(size, 1e300) - limit) if limit < np.inf else 0.0)
+    return share, float(loss.sum())
 
 
 def fit_motor(windows: WindowSet, rate: float, maximum_speed: float, noise: float) -> Motor:

@@ -107,16 +107,28 @@ class Refitter:
         self._low = np.array([p.low for p in model.parameters])
         self._high = np.array([p.high for p in model.parameters])
 
+    def _window_costs(self, states: Array, prediction: Array) -> Array:
+        """(W,) half sums of squares (Huber's loss where asked for), with the states' prior; infinite for NaN."""
+        size = np.abs(weighted(self.model.windows.measured, prediction, self._sigma)) * self._mask
+        if np.isfinite(self._robust):
+            misfit = np.where(size <= self._robust, size**2, self._robust * (2.0 * size - self._robust))
+        else:
+            misfit = size**2
+        start = (states - self.model.windows.initial) / STATE_PRIOR
+        cost = 0.5 * (misfit.sum(axis=(1, 2)) + (start**2).sum(axis=1))
+        broken = ~np.isfinite(np.where(self._mask > 0.0, prediction, 0.0)).all(axis=(1, 2))
+        return np.where(broken, np.inf, cost)
+
+    def _robust_roots(self, residual: Array) -> Array:
+        """Roots of Huber's weights (W, T, 8)."""
+        if not np.isfinite(self._robust):
+            return np.ones_like(residual)
+        return np.asarray(np.sqrt(self._robust / np.maximum(np.abs(residual), self._robust)))
+
     def _cost(self, values: Array, states: Array) -> tuple[float, Array]:
         prediction = self.model.predict(values, states, self._effects)
-        residual = weighted(self.model.windows.measured, prediction, self._sigma) * self._mask
-        start = (states - self.model.windows.initial) / STATE_PRIOR
-        size = np.abs(residual)
-        # inf - inf where the loss is quadratic throughout
-        linear = self._robust * (2.0 * size - self._robust) if np.isfinite(self._robust) else size**2
-        misfit = np.where(size <= self._robust, size**2, linear).sum()
-        cost = 0.5 * float(misfit + ((values / self._prior) ** 2).sum() + (start**2).sum())
-        return cost if np.isfinite(cost) else np.inf, prediction
+        cost = float(self._window_costs(states, prediction).sum() + 0.5 * ((values / self._prior) ** 2).sum())
+        return cost, prediction
 
     def fit(
         self, values: Array | None = None, states: Array | None = None, iterations: int = 12, tolerance: float = 1e-4
@@ -152,6 +164,33 @@ class Refitter:
             np.sqrt((spread**2).sum(axis=0)),
         )  # fmt: skip
 
+    def fit_states(self, values: Array, states: Array | None = None, iterations: int = 2) -> tuple[Array, Array]:
+        """Initial states (W, 8) and prediction (W, T, 8) at fixed parameters.
+
+        Args:
+            values: (P,).
+            states: to start from; the windows' first guess by default.
+            iterations: Gauss-Newton steps; a step that raises a window's cost is not taken in that window.
+        """
+        windows = self.model.windows
+        states = windows.initial.copy() if states is None else states.copy()
+        prediction = self.model.predict(values, states, self._effects)
+        cost = self._window_costs(states, prediction)
+        for _ in range(iterations):
+            residual = weighted(windows.measured, prediction, self._sigma)
+            mask = self._mask * self._robust_roots(residual)
+            by_state = self.model.state_derivatives(values, states, prediction, self._effects) / self._sigma[..., None]
+            flat = (windows.count, -1)
+            right = np.concatenate([(residual * mask).reshape(flat), (windows.initial - states) / STATE_PRIOR], axis=1)
+            left = with_prior(by_state.reshape(*flat, by_state.shape[-1]), mask.reshape(flat))
+            _, change = project(right[..., None], left)
+            tried = states + change[..., 0]
+            moved = self.model.predict(values, tried, self._effects)
+            new_cost = self._window_costs(tried, moved)
+            better = new_cost < cost
+            states[better], prediction[better], cost[better] = tried[better], moved[better], new_cost[better]
+        return states, prediction
+
     def linearise(self, values: Array, states: Array, prediction: Array) -> tuple[Array, Array, Array, Array]:
         """Weighted residual (W, M), state Jacobian (W, M, 8), parameter Jacobian (W, M, P) and mask (W, M).
 
@@ -162,9 +201,7 @@ class Refitter:
         by_state = self.model.state_derivatives(values, states, prediction, self._effects)
         by_value = self.model.parameter_derivatives(values, states, prediction, self._effects)
         scale = self._sigma[..., None]
-        mask = self._mask * np.sqrt(self._robust / np.maximum(np.abs(residual), self._robust)) if np.isfinite(
-            self._robust
-        ) else self._mask
+        mask = self._mask * self._robust_roots(residual)
         flat = (count, -1)
         return (
             residual.reshape(flat),
@@ -184,7 +221,21 @@ class Refitter:
         information = np.tensordot(b, b, axes=((0, 1), (0, 1))) + np.diag(1.0 / self._prior**2)
         scores = np.einsum("wmp,wm->wp", b, r)
         gradient = scores.sum(axis=0) - values / self._prior**2
-        d_values = np.linalg.solve(information, gradient)
-        d_values = np.clip(values + d_values, self._low, self._high) - values
+        d_values = _bounded_step(information, gradient, self._low - values, self._high - values)
         d_states = explained[..., 0] - explained[..., 1:] @ d_values
         return d_values, d_states, information, scores
+
+
+def _bounded_step(information: Array, gradient: Array, low: Array, high: Array) -> Array:
+    """Minimum of the quadratic model within bounds on the step: what would leave them is held at its bound."""
+    step = np.zeros(len(gradient))
+    free = np.ones(len(gradient), dtype=bool)
+    while free.any():
+        right = gradient[free] - information[np.ix_(free, ~free)] @ step[~free]
+        step[free] = np.linalg.solve(information[np.ix_(free, free)], right)
+        outside = free & ((step < low) | (step > high))
+        if not outside.any():
+            break
+        step[outside] = np.clip(step[outside], low[outside], high[outside])
+        free &= ~outside
+    return step

@@ -29,9 +29,7 @@ def drive() -> Callable[..., Recording]:
     def make(effects: tuple[str, ...] = (), seconds: float = 24.0, seed: int = 1) -> Recording:
         robot = get_robot("ddagr")
         sensors = Sensors(Imu(sample_rate=RATE), WheelEncoder(), PoseReceiver(5.0))
-        columns = simulate(
-            robot, get_soil("thesis_a1"), commands(seconds), sensors=sensors, effects=effects, seed=seed
-        )
+        columns = simulate(robot, get_soil("thesis_a1"), commands(seconds), sensors=sensors, effects=effects, seed=seed)
         return Recording.from_columns(columns, robot)
 
     return make

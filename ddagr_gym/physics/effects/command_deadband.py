@@ -34,7 +34,7 @@ class CommandDeadband(Effect):
     title = "Command deadband"
     group = "commands and motors"
     equation = "command -> 0 where |command| < width, else command - loss width sgn(command)"
-    source = "dead zone (Tao and Kokotovic, IEEE Trans. Automatic Control 39 (1994) 59, eq. 1.1)"
+    source = "dead zone (Tao and Kokotovic, IEEE Trans. Automatic Control 39 (1994) 59)"
     signature = "encoders miss a constant amount of every command, all of a small one"
     confused_with = ("motor_droop",)
     actions = ((POINT_COMMANDS, lose_small_commands),)

@@ -36,7 +36,7 @@ class CommandDelay(Effect):
     title = "Command delay"
     group = "commands and motors"
     equation = "command(t) -> command(t - delay)"
-    source = "dead time of a transport lag (Astrom and Murray, Feedback Systems, section 3.2)"
+    source = "dead time, as of a transport lag (Astrom and Murray, Feedback Systems)"
     signature = "bank speeds follow commands late by a constant time, then at the usual rate"
     confused_with = ("motor_lag", "sensor_hold")
     actions = ((POINT_COMMANDS, delay_command),)

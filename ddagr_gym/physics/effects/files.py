@@ -15,6 +15,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
@@ -183,4 +184,9 @@ def _entries(effects: tuple[Effect, ...], intervals: Intervals) -> list[dict[str
 
 def _entry(effect: Effect, name: str, interval: tuple[float, float] | None) -> dict[str, Any]:
     entry: dict[str, Any] = {"value": float(getattr(effect, name)), "unit": effect.parameter(name).metadata["unit"]}
-    return entry if interval is None else entry | {"interval": [float(bound) for bound in interval]}
+    if interval is None:
+        return entry
+    bounds = [float(bound) for bound in interval]
+    if len(bounds) != 2 or not all(map(math.isfinite, bounds)):
+        raise InputError(f"interval of {effect.name!r} {name!r} is {bounds}: give a finite low and high.")
+    return entry | {"interval": bounds}

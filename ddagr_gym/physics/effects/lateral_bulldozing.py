@@ -82,7 +82,7 @@ class LateralBulldozing(Effect):
     title = "Lateral bulldozing"
     group = "ground"
     equation = "F_y = -scale integral (D1 c h + D1 D2 density g h^2/2) dx v_y/|v_y|, h the flank's depth along x"
-    source = "Hegedus (1960), as in Ishigami et al., J. Field Robotics 24 (2007) 233, eqs. 15-17"
+    source = "Hegedus (1960), as in Ishigami et al., J. Field Robotics 24 (2007) 233"
     signature = "turns slower and wider, the more the deeper it sinks; nothing in straight drives"
     confused_with = ("gyro_scale", "soil_change", "towed_drag")
     actions = ((POINT_WHEEL_FORCES, push_soil_aside),)

@@ -37,7 +37,9 @@ class MotorDroop(Effect):
     title = "Motor droop"
     group = "commands and motors"
     equation = "omega_target = command + droop (T_front + T_rear), the soil's torques (braking < 0) over 0.1 s"
-    source = "speed-torque line of a direct-current motor (Siegwart et al., Autonomous Mobile Robots; IEC 60034)"
+    source = (
+        "speed-torque line of a direct-current motor (Krause et al., Analysis of Electric Machinery); 0.1 s is ours"
+    )
     signature = "encoders settle below the command, more in turns and soft places; a locked bank creeps"
     confused_with = ("command_deadband", "encoder_scale", "motor_saturation")
     actions = ((POINT_MOTORS, droop_speed),)

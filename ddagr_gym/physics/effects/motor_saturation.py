@@ -38,7 +38,7 @@ class MotorSaturation(Effect):
     title = "Motor saturation"
     group = "commands and motors"
     equation = "|omega_target| <= speed_limit; |d omega/dt| <= acceleration_limit"
-    source = "actuator saturation and rate limit (Astrom and Murray, Feedback Systems, section 10.4)"
+    source = "actuator saturation and rate limit (Astrom and Murray, Feedback Systems)"
     signature = "encoders stay at a ceiling while commands rise; ramps of constant slope after large steps"
     confused_with = ("motor_droop", "motor_lag")
     differentiable = False

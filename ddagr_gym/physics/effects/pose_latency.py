@@ -46,7 +46,7 @@ class PoseLatency(Effect):
     title = "Late pose"
     group = "sensors"
     equation = "pose(t) -> pose(t - latency)"
-    source = "time stamping of GNSS solutions (NovAtel OEM7 manual: solution latency); transport lag"
+    source = "latency of a GNSS solution, stamped on arrival instead of at its epoch; transport lag"
     signature = "pose behind the path by speed times latency, heading behind in turns; gone at rest"
     confused_with = ("sensor_hold",)
     actions = ((POINT_READINGS, delay_pose),)

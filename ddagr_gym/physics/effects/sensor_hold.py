@@ -48,7 +48,7 @@ class SensorHold(Effect):
     title = "Held readings"
     group = "sensors"
     equation = "reading(t_k) = reading(t_j), j the last sample outside a hold"
-    source = "zero-order hold (Astrom and Wittenmark, Computer-Controlled Systems, section 2.3)"
+    source = "zero-order hold (Astrom and Wittenmark, Computer-Controlled Systems)"
     signature = "runs of equal values in a noisy channel; late by half a run on average"
     confused_with = ("command_delay", "pose_latency")
     differentiable = False

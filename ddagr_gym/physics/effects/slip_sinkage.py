@@ -50,7 +50,7 @@ class SlipSinkage(Effect):
     title = "Slip and skid sinkage"
     group = "ground"
     equation = "n = n0 + growth |slip|, slip followed over 0.1 m of way"
-    source = "Ding et al., J. Terramechanics 47 (2010) 189 and 48 (2011) 27: n = n0 + n1 s"
+    source = "Ding et al., J. Cent. South Univ. Technol. 17 (2010) 129: n = n0 + n1 s; for skid and the way: ours"
     signature = (
         "wheels with large slip or skid, as of a locked bank, sink and drag more; straight drives stay as they are"
     )

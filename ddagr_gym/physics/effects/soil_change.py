@@ -38,7 +38,7 @@ class SoilChange(Effect):
     title = "Changed soil"
     group = "ground"
     equation = "c, tan(phi) -> strength c, strength tan(phi); k_c, k_phi -> stiffness k_c, stiffness k_phi"
-    source = "Bekker-Mohr-Coulomb parameters (Wong, Theory of Ground Vehicles, sections 2.4 and 2.5)"
+    source = "Bekker-Mohr-Coulomb parameters (Wong, Theory of Ground Vehicles, chapter 2)"
     signature = "other slip, turn rate and resistance for the same commands, in every direction alike"
     confused_with = (
         "encoder_scale",

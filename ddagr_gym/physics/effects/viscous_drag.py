@@ -24,7 +24,7 @@ class ViscousDrag(Effect):
     title = "Viscous drag"
     group = "robot"
     equation = "F = -coefficient (v_x, v_y) at the body origin"
-    source = "linear damping (Fossen, Handbook of Marine Craft Hydrodynamics, section 6.4)"
+    source = "linear damping (Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control)"
     signature = "slower the faster it drives; nothing near rest"
     confused_with = ("slip_sinkage", "slope", "soil_change", "towed_drag")
     actions = ((POINT_BODY_FORCES, drag_body),)

@@ -123,6 +123,7 @@ def test_failed_write_leaves_the_old_file_and_nothing_else(tmp_path, monkeypatch
     [
         ("effects.txt", {}, r"ends in '.txt': end it in .yaml, .yml, .json"),
         ("effects.yaml", {"intervals": [{}, {}]}, "2 sets of intervals for 1 effects"),
+        ("effects.yaml", {"intervals": [{"angle": (0, float("nan"))}]}, "give a finite low and high"),
         (
             "effects.yaml",
             {"intervals": [{"slope": (0, 1)}]},

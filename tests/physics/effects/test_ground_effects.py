@@ -117,7 +117,7 @@ def test_patch_acts_on_the_wheels_in_it(act, turning_row):
 
 @given(friction=st.floats(0.0, 45.0), cohesion=st.floats(0.0, 5e4), depth=st.floats(1e-3, 0.2))
 def test_bulldozing_pressure_is_hegedus_as_printed(friction, cohesion, depth):
-    """Ishigami et al. (2007) eqs. 15-17, with the angles that the effect's closed form has resolved."""
+    """Ishigami et al. (2007), with the angles that the effect's closed form has resolved."""
     phi = math.radians(friction)
     weight = 1500 * STANDARD_GRAVITY
     wedge = math.pi / 4 - phi / 2

@@ -1,0 +1,119 @@
+"""Errors at the end of a window: how far a prediction has drifted after so many seconds.
+
+Headings and yaw rates are judged by the gyro, which is exact over seconds; position, speed and once more heading by
+the poses, whose time is uncertain; bank speeds by the encoders. A window starts at the state that the samples around
+its start suggest, the same for every model.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ddagr_gym.frames import rotation_matrix, wrap_angle
+from ddagr_gym.replay.windows import CHANNELS, WindowSet
+
+Array = NDArray[np.float64]
+
+HORIZONS = (1.0, 5.0, 30.0)
+"""[s]"""
+
+METRICS = {
+    "heading": ("rad", "change of heading, by the integrated gyro"),
+    "yaw_rate": ("rad/s", "mean yaw rate over the last 0.5 s, by the gyro"),
+    "heading_pose": ("rad", "change of heading, by the poses"),
+    "position": ("m", "distance from the pose"),
+    "speed": ("m/s", "mean speed over the last second, by the poses"),
+    "wheel_speed": ("rad/s", "bank speeds over the last 0.5 s, by the encoders, root mean square of both"),
+}
+"""Unit and meaning of every metric."""
+
+LAST = 0.5
+SPEED_TIME = 1.0
+LEAST_GYRO_SHARE = 0.9
+
+_GYRO = CHANNELS.index("yaw_rate")
+_ENCODERS = [CHANNELS.index("encoder_right"), CHANNELS.index("encoder_left")]
+_XY = [CHANNELS.index("pose_x"), CHANNELS.index("pose_y")]
+_YAW = CHANNELS.index("pose_yaw")
+
+
+def horizon_errors(windows: WindowSet, prediction: Array) -> dict[str, Array]:
+    """Errors (W,) by name of METRICS, prediction less measurement; NaN where nothing measures them.
+
+    Args:
+        windows: as long as the horizon.
+        prediction: (W, T, 8), from the windows' first guess.
+    """
+    last = slice(-max(round(LAST / windows.period), 1), None)
+    gyro = prediction[..., _GYRO] - windows.measured[..., _GYRO]
+    wheels = (prediction - windows.measured)[:, last][..., _ENCODERS]
+    return {
+        "heading": integrated(gyro, windows.period),
+        "yaw_rate": _mean(gyro[:, last]),
+        **_pose_errors(windows, prediction),
+        "wheel_speed": np.sqrt(_mean((wheels**2).reshape(windows.count, -1))),
+    }
+
+
+def integrated(rate: Array, period: float) -> Array:
+    """Integral over each window (W,) of rates (W, T); missing ones count as the mean, NaN where too many are."""
+    share = np.isfinite(rate).mean(axis=1)
+    return np.where(share >= LEAST_GYRO_SHARE, _mean(rate) * rate.shape[1] * period, np.nan)
+
+
+def heading_growth(windows: WindowSet, prediction: Array) -> Array:
+    """Root mean square heading error over the windows after each sample, (T,) [rad], by the gyro."""
+    error = np.nan_to_num(prediction[..., _GYRO] - windows.measured[..., _GYRO])
+    known = np.isfinite(windows.measured[..., _GYRO]).mean(axis=1) >= LEAST_GYRO_SHARE
+    if not known.any():
+        return np.full(windows.samples, np.nan)
+    return np.asarray(np.sqrt(np.mean((np.cumsum(error[known], axis=1) * windows.period) ** 2, axis=0)))
+
+
+def _mean(values: Array) -> Array:
+    """Mean along the last axis without NaN; NaN where there is nothing else."""
+    known = np.isfinite(values)
+    count = known.sum(axis=-1)
+    return np.where(count > 0, np.where(known, values, 0.0).sum(axis=-1) / np.maximum(count, 1), np.nan)
+
+
+def _pose_errors(windows: WindowSet, prediction: Array) -> dict[str, Array]:
+    """Heading, position and speed errors; the start's heading comes from all poses of a window through the gyro."""
+    errors = {name: np.full(windows.count, np.nan) for name in ("heading_pose", "position", "speed")}
+    known = np.isfinite(windows.measured[..., _XY]).all(axis=-1)
+    reach, back = round(LAST / windows.period), round(SPEED_TIME / windows.period)
+    start_heading = _start_heading(windows)
+    for w in range(windows.count):
+        rows = np.flatnonzero(known[w])
+        if rows.size < 3 or rows[0] > reach or rows[-1] < windows.samples - 1 - reach:
+            continue
+        end = rows[-1]
+        turn = start_heading[w] - windows.initial[w, 2]
+        rotation = rotation_matrix(0.0 if np.isnan(turn) else turn)
+        moved = (prediction[w][:, _XY] - windows.initial[w, :2]) @ rotation.T
+        measured = windows.measured[w][:, _XY] - windows.initial[w, :2]
+        errors["position"][w] = np.hypot(*(moved[end] - measured[end]))
+        if np.isfinite(turn):
+            change = windows.measured[w, end, _YAW] - start_heading[w]
+            errors["heading_pose"][w] = wrap_angle(prediction[w, end, _YAW] - windows.initial[w, 2] - change)
+        earlier = rows[np.argmin(np.abs(rows - (end - back)))]
+        if end > earlier:
+            distance = np.hypot(*(moved[end] - moved[earlier])) - np.hypot(*(measured[end] - measured[earlier]))
+            errors["speed"][w] = distance / ((end - earlier) * windows.period)
+    return errors
+
+
+def _start_heading(windows: WindowSet) -> Array:
+    """Heading at the start (W,) [rad]: circular mean over the window's poses less what the gyro turned until them.
+
+    Without a gyro the first guess; NaN where no pose has a heading.
+    """
+    yaw = windows.measured[..., _YAW]
+    known = np.isfinite(yaw)
+    gyro = windows.measured[..., _GYRO]
+    with_gyro = np.isfinite(gyro).mean(axis=1) >= LEAST_GYRO_SHARE
+    turned = np.cumsum(np.nan_to_num(gyro), axis=1) * windows.period
+    start = np.where(known, np.exp(1j * (np.nan_to_num(yaw) - turned)), 0.0).sum(axis=1)
+    heading = np.where(with_gyro, np.angle(start), windows.initial[:, 2])
+    return np.where(known.any(axis=1), heading, np.nan)

@@ -1,0 +1,85 @@
+"""The filter's features: one result through constructor, id, batch and wrappers."""
+
+import warnings
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
+
+import ddagr_gym  # noqa: F401  registers the ids
+from ddagr_gym.control.observation import EKF_FEATURES, OBSERVATION
+from ddagr_gym.envs.registration import TURN_EKF_ID, TURN_ID
+from ddagr_gym.errors import InputError
+from ddagr_gym.wrappers.ekf import EkfFeatures, VectorEkfFeatures
+
+NAMES = [name for name, _, _ in (*OBSERVATION, *EKF_FEATURES)]
+SCALES = np.array([scale for _, _, scale in (*OBSERVATION, *EKF_FEATURES)])
+
+
+def actions(steps, count):
+    return np.random.default_rng(0).uniform(-0.2, 0.8, (steps, count, 2)).astype(np.float32)
+
+
+def test_checker_finds_nothing():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(gymnasium.make(TURN_EKF_ID).unwrapped, skip_render_check=True)
+
+
+def test_wrapper_equals_the_composed_id():
+    composed = gymnasium.make(TURN_EKF_ID)
+    wrapped = EkfFeatures(gymnasium.make(TURN_ID, info_level="full"))
+    assert wrapped.observation_space == composed.observation_space
+    for seed in (3, 4):
+        np.testing.assert_array_equal(composed.reset(seed=seed)[0], wrapped.reset(seed=seed)[0])
+        for action in actions(30, 1)[:, 0]:
+            np.testing.assert_array_equal(composed.step(action)[0], wrapped.step(action)[0])
+
+
+@pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
+def test_batch_equals_single_environments(mode):
+    single = SyncVectorEnv([lambda: gymnasium.make(TURN_EKF_ID, max_episode_steps=12)] * 3, autoreset_mode=mode)
+    native = gymnasium.make_vec(TURN_EKF_ID, num_envs=3, max_episode_steps=12, autoreset_mode=mode)
+    np.testing.assert_array_equal(single.reset(seed=1)[0], native.reset(seed=1)[0])
+    for action in actions(40, 3):
+        np.testing.assert_array_equal(single.step(action)[0], native.step(action)[0])
+
+
+def test_vector_wrapper_equals_the_native_batch():
+    arguments = {"num_envs": 3, "max_episode_steps": 12}
+    native = gymnasium.make_vec(TURN_EKF_ID, **arguments)
+    wrapped = VectorEkfFeatures(gymnasium.make_vec(TURN_ID, info_level="full", **arguments))
+    np.testing.assert_array_equal(native.reset(seed=1)[0], wrapped.reset(seed=1)[0])
+    for action in actions(40, 3):
+        np.testing.assert_array_equal(native.step(action)[0], wrapped.step(action)[0])
+
+
+def test_features_follow_the_truth():
+    env = gymnasium.make(TURN_EKF_ID, soil="thesis_a1", randomisation=False, info_level="full", side="left")
+    env.reset(seed=0)
+    for _ in range(120):
+        observation, *_, info = env.step(np.array([0.70, 0.10], np.float32))
+    seen = dict(zip(NAMES, observation * SCALES, strict=True))
+    radius = np.hypot(info["true_v_x"], info["true_v_y"]) / info["true_yaw_rate"]
+    assert seen["estimated_v_x"] / seen["estimated_yaw_rate"] == pytest.approx(radius, rel=0.05)
+    assert seen["estimated_slip_right"] == pytest.approx(info["true_slip_ratio"][0], abs=0.03)
+    assert seen["estimated_slip_left"] == pytest.approx(info["true_slip_ratio"][1], abs=0.06)
+    assert seen["deviation_log_traction_limit"] > 0.0
+
+
+def test_a_reset_forgets():
+    env = gymnasium.make(TURN_EKF_ID)
+    first, _ = env.reset(seed=2)
+    for action in actions(20, 1)[:, 0]:
+        env.step(action)
+    again, _ = env.reset(seed=2)
+    np.testing.assert_array_equal(first, again)
+
+
+def test_samples_are_needed():
+    with pytest.raises(InputError, match="full"):
+        EkfFeatures(gymnasium.make(TURN_ID)).reset(seed=0)
+    with pytest.raises(InputError, match="SameStep"):
+        VectorEkfFeatures(gymnasium.make_vec(TURN_ID, num_envs=2, info_level="full", autoreset_mode="SameStep"))
