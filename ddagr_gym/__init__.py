@@ -26,7 +26,8 @@ Bad input raises :class:`ddagr_gym.errors.InputError`: one sentence with the off
 """
 
 from ddagr_gym.envs.registration import register_environments
+from ddagr_gym.version import __version__
 
-__version__ = "0.1.0"
+__all__ = ["__version__", "register_environments"]
 
 register_environments()

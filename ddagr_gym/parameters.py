@@ -281,7 +281,10 @@ class Sensors:
 
 @dataclass(frozen=True)
 class Numerics(Validated):
-    """Accuracy against cost of the simulator. The default keeps force errors below 1e-3.
+    """Accuracy against cost of the simulator. The default keeps force errors below 1e-3 of the force.
+
+    That holds for every reference row and in nine of ten states of turns on 24 soils (median 3e-5). A wheel whose
+    sliding velocity changes sign inside the patch at almost no lateral motion reaches 1 to 3 percent (section 5).
 
     Attributes:
         section_nodes: Gauss nodes across the tyre (psi), a multiple of 8 (the kernel's vector width).

@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from ddagr_gym import __version__
 from ddagr_gym.diagnosis.held import Held, find_held, hold_effect, without_repeats
 from ddagr_gym.diagnosis.misfit import roughest
 from ddagr_gym.diagnosis.problem import Problem
@@ -19,6 +18,7 @@ from ddagr_gym.diagnosis.verdict import NONE, UNKNOWN, Diagnosis, Estimate, Find
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.recordings.schema import Recording
+from ddagr_gym.version import __version__
 
 EQUIVALENT = 0.05
 """Share of resamplings in which a rival must explain most to stand in the equivalence set (ours, with the level)."""

@@ -91,7 +91,9 @@ class Gain:
 
 
 def candidates_of(kind: type[Effect], extent: DriveExtent, first: int) -> list[Candidate]:
-    """Candidates of one kind: up to two probes span it; more are grouped by their shapes (place, onset, limit).
+    """Candidates of one kind: up to two probes span it; more are grouped by their shapes (place, onset).
+
+    Probes of an effect without a derivative (limits) stand alone.
 
     Args:
         kind: the effect.
@@ -104,7 +106,9 @@ def candidates_of(kind: type[Effect], extent: DriveExtent, first: int) -> list[C
             Candidate(kind.name, (first + k,), (probe,), (True,), (np.inf,), _whole(probe))
             for k, probe in enumerate(probes)
         ]
-    if len(probes) <= 2:
+    if not kind.differentiable:
+        groups = [[k] for k in range(len(probes))]
+    elif len(probes) <= 2:
         groups = [list(range(len(probes)))]
     else:
         by_shape: dict[tuple[float, ...], list[int]] = {}
