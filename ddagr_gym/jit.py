@@ -14,7 +14,12 @@ from pathlib import Path
 from typing import Any
 
 import numba
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
 from numba.core.ccallback import CFunc
+from numba.extending import intrinsic
+from numba.np.arrayobj import populate_array
 
 _PACKAGE = Path(__file__).parent
 _SHARED_SOURCES = ("jit.py", "simulator_kernel.py", "physics", "sensors")
@@ -64,9 +69,7 @@ def _stamp(compiled: Any, module: str) -> None:
         cache_file._source_stamp = (cache_file._source_stamp, kernel_stamp(folder))
 
 
-def kernel(
-    *, inline: bool = False, reassociate: bool = False, cached: bool = True
-) -> Callable[[Callable[..., Any]], Any]:
+def kernel(*, inline: bool = False, fused: bool = True, cached: bool = True) -> Callable[[Callable[..., Any]], Any]:
     """Decorator: nopython, no GIL, no divide checks, fused multiply-add, cached.
 
     Arithmetic is bit-reproducible on one machine: the compiled code does not depend on the batch, and NaN
@@ -74,10 +77,10 @@ def kernel(
 
     Args:
         inline: force LLVM to inline (its fast-math flags stay its own).
-        reassociate: allow sums to be reordered, which vectorises reductions.
+        fused: allow fused multiply-add. Without it a function gives the same bits wherever it is inlined.
         cached: keep the machine code on disk; not worth it for what is only compiled into something cached.
     """
-    fastmath = {"contract", "reassoc", "nsz"} if reassociate else {"contract"}
+    fastmath = {"contract"} if fused else False
 
     def decorate(function: Callable[..., Any]) -> Any:
         compiled = numba.njit(fastmath=fastmath, error_model="numpy", nogil=True, cache=cached, forceinline=inline)(
@@ -114,3 +117,28 @@ def compile_callback(function: Callable[..., None], signature: Any, stamp: str |
 
 
 _KEEP_ALIVE: list[Any] = []
+
+
+@intrinsic
+def stack_array(typing_context: Any, size: Any) -> Any:
+    """Uninitialised float64 array of a constant size, on the stack of the kernel that calls this.
+
+    The compiler knows that it overlaps nothing and keeps it in registers where it can; an array that is passed in
+    allows neither. It must not outlive the call.
+    """
+    if not isinstance(size, types.IntegerLiteral):
+        return None
+    count = size.literal_value
+    array_type = types.Array(types.float64, 1, "C")
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        memory = cgutils.alloca_once(builder, ir.ArrayType(ir.DoubleType(), count))
+        memory.align = 64
+        array = context.make_array(array_type)(context, builder)
+        itemsize = context.get_constant(types.intp, 8)
+        shape = context.get_constant(types.intp, count)
+        data = builder.bitcast(memory, array.data.type)
+        populate_array(array, data=data, shape=(shape,), strides=(itemsize,), itemsize=itemsize, meminfo=None)
+        return array._getvalue()
+
+    return array_type(size), generate

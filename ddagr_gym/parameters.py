@@ -293,11 +293,13 @@ class Numerics(Validated):
             keeps its order with any derivative, so this one may be coarse.
         substeps: least number of integrator steps per sensor sample.
         maximum_step: longest integrator step [s].
-        launch_substeps: further division of a step in which a bank changes speed fast, as at a start from rest
-            (the damping varies as 1/speed, physics.md section 6).
-        launch_change: change of the rim speed within a step, relative to the wheel's speed, that counts as fast.
-        accepted_error: embedded error estimate of a step above which it is redone by backward Euler [m/s];
-            one percent of the speed is accepted besides.
+        launch_substeps: steps into which a step is divided at a launch, and where its error estimate is too large.
+        launch_change: change of a rim speed within a step, relative to the wheel's speed, above which it is divided
+            beforehand, as at a start from rest (the damping varies as 1/speed, physics.md section 6).
+        accepted_error: embedded error estimate of a step above which it is redone, divided [m/s]; more at speed,
+            twice that at 0.33 m/s.
+        force_extrapolation: relative change of a wheel's motion up to which the forces that begin a step are
+            extrapolated from the middle of the last one; 0 evaluates them always.
         jacobian_refresh: relative change of a wheel's motion after which its derivative is renewed.
         sinkage_tolerance: |F_z - load| / load above which the sinkage is iterated, not extrapolated.
         minimum_shear_rate: nu_min of physics.md section 4 [rad/s].
@@ -311,9 +313,10 @@ class Numerics(Validated):
     substeps: int = 1
     maximum_step: float = bounded("s", 0.0, 1.0, default=0.010, open_low=True)
     launch_substeps: int = 4
-    launch_change: float = bounded("-", 0.0, 1e9, default=0.1)
-    accepted_error: float = bounded("m/s", 0.0, 1e9, default=4e-3)
-    jacobian_refresh: float = bounded("-", 0.0, 1.0, default=0.05)
+    launch_change: float = bounded("-", 0.0, 1e9, default=0.5)
+    accepted_error: float = bounded("m/s", 0.0, 1e9, default=1e-3)
+    force_extrapolation: float = bounded("-", 0.0, 1.0, default=0.03)
+    jacobian_refresh: float = bounded("-", 0.0, 1.0, default=0.1)
     sinkage_tolerance: float = bounded("-", 0.0, 0.1, default=8e-3, open_low=True)
     minimum_shear_rate: float = bounded("rad/s", 0.0, 1.0, default=1e-3, open_low=True)
     rest_speed: float = bounded("m/s", 0.0, 0.1, default=1e-3, open_low=True)
@@ -337,7 +340,14 @@ class Numerics(Validated):
 
         Derivatives are renewed at every step, slowing down is resolved, and friction is a little softer at rest.
         """
-        return cls(jacobian_refresh=0.0, launch_change=0.03, minimum_shear_rate=0.02, rest_speed=0.01)
+        return cls(
+            jacobian_refresh=0.0,
+            force_extrapolation=0.0,
+            launch_change=0.03,
+            accepted_error=4e-3,
+            minimum_shear_rate=0.02,
+            rest_speed=0.01,
+        )
 
     @classmethod
     def finest(cls) -> Numerics:
@@ -348,5 +358,6 @@ class Numerics(Validated):
             jacobian_contact_nodes=8,
             substeps=8,
             jacobian_refresh=0.0,
+            force_extrapolation=0.0,
             sinkage_tolerance=1e-10,
         )

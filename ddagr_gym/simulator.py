@@ -17,7 +17,6 @@ from ddagr_gym.errors import InputError
 from ddagr_gym.parameters import Numerics, Robot, Sensors, Soil
 from ddagr_gym.physics import layout
 from ddagr_gym.physics.contact_geometry import contact_rule, section_rule
-from ddagr_gym.physics.contact_patch import WORKSPACE_SIZE
 from ddagr_gym.physics.effects import Effect, effect_table, load_effects
 from ddagr_gym.physics.terrain import SoilField
 from ddagr_gym.physics.wheel_forces import finite_array, soil_vector
@@ -111,6 +110,23 @@ def build_row(robot: Robot, soil: Soils, sensors: Sensors) -> Array:
     return row
 
 
+def _options(numerics: Numerics) -> Array:
+    """Numerics as the kernels read them."""
+    values = {
+        layout.OPTION_REFRESH: numerics.jacobian_refresh,
+        layout.OPTION_TOLERANCE: numerics.sinkage_tolerance,
+        layout.OPTION_SHEAR_RATE: numerics.minimum_shear_rate,
+        layout.OPTION_REST_SPEED: numerics.rest_speed,
+        layout.OPTION_EXTRAPOLATION: numerics.force_extrapolation,
+        layout.OPTION_ACCEPTED_ERROR: numerics.accepted_error,
+        layout.OPTION_DIVISIONS: numerics.launch_substeps,
+        layout.OPTION_LAUNCH_CHANGE: numerics.launch_change,
+        layout.OPTION_STEPS: numerics.substeps,
+        layout.OPTION_MAXIMUM_STEP: numerics.maximum_step,
+    }
+    return np.array([float(values[k]) for k in range(len(values))])
+
+
 class Simulator:
     """A batch of robots, stepped at the sensor rate.
 
@@ -148,30 +164,15 @@ class Simulator:
         self.effect_memory = np.zeros((count, len(parameters), layout.EFFECT_MEMORY))
         self.field_index = np.full(count, -1, dtype=np.int64)
         self._set_fields(fields)
-        self._options = np.array(
-            [
-                numerics.jacobian_refresh,
-                numerics.sinkage_tolerance,
-                numerics.minimum_shear_rate,
-                numerics.rest_speed,
-                numerics.launch_change,
-                numerics.accepted_error,
-                numerics.maximum_step,
-            ]
-        )
-        self._division = np.array([numerics.substeps, numerics.launch_substeps], dtype=np.int64)
+        self._options = _options(numerics)
         self._rules = (
             section_rule(numerics.section_nodes),
             contact_rule(numerics.contact_nodes),
             contact_rule(numerics.jacobian_contact_nodes),
         )
         self._chunks = np.linspace(0, count, min(threads, count) + 1).astype(int)
-        self._scratch = [self._workspaces() for _ in self._chunks[1:]]
-        self._pool = ThreadPoolExecutor(len(self._scratch)) if len(self._scratch) > 1 else None
-
-    @staticmethod
-    def _workspaces() -> tuple[Array, Array, Array, Array]:
-        return np.zeros(WORKSPACE_SIZE), np.zeros((8, 8)), np.zeros((6, 3)), np.zeros(layout.SIZE)
+        parts = len(self._chunks) - 1
+        self._pool = ThreadPoolExecutor(parts) if parts > 1 else None
 
     def _set_fields(self, fields: Sequence[SoilField]) -> None:
         if len({field.values.shape for field in fields}) > 1:
@@ -235,10 +236,7 @@ class Simulator:
         for index, size in ((layout.WHEEL_ANGLE, 2), (layout.LAST_COUNT, 2), (layout.SINKAGE, 4)):
             self.rows[np.ix_(indices, np.arange(index, index + size))] = 0.0
         self.effect_memory[indices] = 0.0
-        workspace, scratch = self._scratch[0][:2]
-        settle_rows(
-            self.rows, indices, *self._ground(), *self._effects(), self._options, *self._rules, workspace, scratch
-        )
+        settle_rows(self.rows, indices, *self._ground(), *self._effects(), self._options, *self._rules)
 
     def _ground(self) -> tuple[Array, Array, NDArray[np.int64]]:
         return self._fields, self._field_geometry, self.field_index
@@ -260,17 +258,15 @@ class Simulator:
         """
 
         def run(part: int) -> None:
-            workspaces = self._scratch[part]
             advance_rows(
                 self.rows, self._chunks[part], self._chunks[part + 1], commands, noise, *self._ground(),
-                *self._effects(), self._options, self._division, *self._rules, *workspaces, readings, recorded,
-                record,
+                *self._effects(), self._options, *self._rules, readings, recorded, record,
             )  # fmt: skip
 
         if self._pool is None:
             run(0)
         else:
-            list(self._pool.map(run, range(len(self._scratch))))
+            list(self._pool.map(run, range(len(self._chunks) - 1)))
 
     def step(
         self, commands: ArrayLike, noise: ArrayLike | None = None, *, recorded: Sequence[int] = (), samples: int = 1

@@ -27,6 +27,11 @@ from ddagr_gym.physics.layout import (
     MOTOR_RATE,
     MOTOR_TARGET,
     OMEGA,
+    OPTION_DIVISIONS,
+    OPTION_LAUNCH_CHANGE,
+    OPTION_MAXIMUM_STEP,
+    OPTION_REFRESH,
+    OPTION_STEPS,
     POINT_COMMANDS,
     POINT_LOADS,
     POINT_MOTORS,
@@ -63,17 +68,17 @@ def _drive(row: Array, command: Array, points: Integers, addresses: Integers, pa
 
 
 @kernel()
-def _division(row: Array, least: int, maximum_step: float, launch_substeps: int, launch_change: float) -> int:
+def _division(row: Array, options: Array) -> int:
     """Steps for the coming sample: more while a bank's rim speed changes fast against the wheel's speed."""
-    substeps = max(least, math.ceil(row[SAMPLE_PERIOD] / maximum_step - 1e-9))
-    step = row[SAMPLE_PERIOD] / substeps
+    steps = max(int(options[OPTION_STEPS]), math.ceil(row[SAMPLE_PERIOD] / options[OPTION_MAXIMUM_STEP] - 1e-9))
+    step = row[SAMPLE_PERIOD] / steps
     for bank in range(2):
         rim = row[WHEEL + bank] + row[WHEEL + 8 + bank]
         change = (row[MOTOR_TARGET + bank] - row[OMEGA + bank]) * (1.0 - math.exp(-row[MOTOR_RATE + bank] * step))
         speed = max(abs(rim * row[OMEGA + bank]), abs(row[V_X]))
-        if abs(rim * change) > launch_change * speed and change != 0.0:
-            return substeps * launch_substeps
-    return substeps
+        if abs(rim * change) > options[OPTION_LAUNCH_CHANGE] * speed and change != 0.0:
+            return steps * int(options[OPTION_DIVISIONS])
+    return steps
 
 
 @kernel()
@@ -106,8 +111,8 @@ def _average_motion(row: Array, v_x: float, v_y: float, yaw_rate: float) -> None
 @kernel()
 def settle_rows(
     rows: Array, chosen: Integers, fields: Array, field_geometry: Array, field_index: Integers, points: Integers,
-    addresses: Integers, parameters: Array, memory: Array, numerics: Array, section: Array, contact: Array,
-    coarse: Array, workspace: Array, scratch: Array,
+    addresses: Integers, parameters: Array, memory: Array, options: Array, section: Array, contact: Array,
+    coarse: Array,
 ) -> None:  # fmt: skip
     """Sinkages and forces at the rows' present motion, from nothing; arguments as :func:`advance_rows`."""
     for n in chosen:
@@ -118,17 +123,16 @@ def settle_rows(
         _prepare_ground(row, values, geometry, use_field, points, addresses, parameters[n], memory[n])
         row[DERIVATIVE_VALID] = 0.0
         evaluate_forces(
-            row, numerics[0], numerics[1], numerics[2], numerics[3], section, contact, coarse, workspace, scratch,
-            points, addresses, parameters[n], memory[n],
+            row, options[OPTION_REFRESH], options, section, contact, coarse, points, addresses, parameters[n],
+            memory[n],
         )  # fmt: skip
 
 
 @kernel()
 def advance_rows(
     rows: Array, first: int, last: int, commands: Array, noise: Array, fields: Array, field_geometry: Array,
-    field_index: Integers, points: Integers, addresses: Integers, parameters: Array, memory: Array, numerics: Array,
-    division: Integers, section: Array, contact: Array, coarse: Array, workspace: Array, scratch: Array,
-    jacobian: Array, saved: Array, readings: Array, recorded: Integers, record: Array,
+    field_index: Integers, points: Integers, addresses: Integers, parameters: Array, memory: Array, options: Array,
+    section: Array, contact: Array, coarse: Array, readings: Array, recorded: Integers, record: Array,
 ) -> None:  # fmt: skip
     """Advance rows ``first`` to ``last`` (exclusive) by the samples in ``readings``.
 
@@ -145,16 +149,10 @@ def advance_rows(
         addresses: (effects,).
         parameters: (N, effects, EFFECT_PARAMETERS).
         memory: (N, effects, EFFECT_MEMORY), updated.
-        numerics: refresh, tolerance, minimum shear rate, rest speed, launch change, accepted error,
-            maximum step.
-        division: least steps per sample, and their further division at launches.
+        options: numerics in the order of ``layout.OPTION_*``.
         section: section rule.
         contact: contact rule.
         coarse: contact rule of the derivative.
-        workspace: of the contact kernel.
-        scratch: (8, 8).
-        jacobian: (6, 3).
-        saved: (layout.SIZE,).
         readings: (N, samples, 8), written.
         recorded: (K,) row entries to record.
         record: (N, samples, K), written.
@@ -170,12 +168,10 @@ def advance_rows(
             _drive(row, commands[n, 0 if held else k], points, addresses, parameters[n], memory[n])
             _prepare_ground(row, values, geometry, use_field, points, addresses, parameters[n], memory[n])
             v_x, v_y, yaw_rate = row[V_X], row[V_Y], row[YAW_RATE]
-            steps = _division(row, division[0], numerics[6], division[1], numerics[4])
-            step = row[SAMPLE_PERIOD] / steps
+            steps = _division(row, options)
             for _ in range(steps):
                 advance_body(
-                    row, step, numerics[0], numerics[1], numerics[2], numerics[3], numerics[5], section, contact,
-                    coarse, workspace, scratch, jacobian[:3], jacobian[3:], saved, points, addresses,
+                    row, row[SAMPLE_PERIOD] / steps, options, section, contact, coarse, points, addresses,
                     parameters[n], memory[n],
                 )  # fmt: skip
             _average_motion(row, v_x, v_y, yaw_rate)

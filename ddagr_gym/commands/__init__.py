@@ -33,6 +33,7 @@ NAMES = (
     "effects",
     "evaluate",
     "freeze-scenarios",
+    "benchmark",
     "test",
 )
 """Every command, in the order of ``ddagr --help``."""

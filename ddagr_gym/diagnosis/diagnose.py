@@ -21,7 +21,7 @@ from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.version import __version__
 
 EQUIVALENT = 0.05
-"""Share of resamplings in which a rival must explain most to stand in the equivalence set (ours, with the level)."""
+"""Weight that a rival needs to stand in the equivalence set (ours, with the level)."""
 
 _NEAR = 0.7
 """Share of the best joint gain below which a rival is not compared (ours: far beyond what resampling moves)."""
@@ -127,7 +127,7 @@ def _before(found: Found, name: str) -> Standing:
 
 
 def _equivalents(before: Standing, found: Found, name: str, rng: np.random.Generator) -> dict[str, float]:
-    """Names that explain nearly as much, with their share of resamplings."""
+    """Names that explain nearly as much, with their weights."""
     best = next(item.gain for item in before.gains if item.name == name)
     near = [item.name for item in before.gains if item.gain > _NEAR * best]
     names = list(dict.fromkeys([name, *near]))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from ddagr_gym.diagnosis.scores import Candidate
+from ddagr_gym.diagnosis.candidates import Candidate
 from ddagr_gym.physics.effects import Effect
 
 

@@ -194,7 +194,10 @@ def _without_idle(
 def bootstrap_weights(
     terms: Terms, names: Sequence[str], rng: np.random.Generator, draws: int = 200
 ) -> dict[str, float]:
-    """Share of resamplings of the windows in which each of some effects explains most; they add up to 1.
+    """Weight of each of some effects as the better explanation, averaged over resamplings of the windows.
+
+    In a resampling an effect has the weight exp(gain) over the sum of all: two that explain the same share it equally
+    even where one is always ahead by a little. The weights add up to 1.
 
     Args:
         terms: of the scan at the model without any of them.
@@ -202,11 +205,13 @@ def bootstrap_weights(
         rng: of the resampling.
         draws: how often.
     """
-    wanted = tuple(c for c in terms.candidates if c.name in names)
-    reduced_terms = replace(terms, candidates=wanted)
+    wanted = replace(terms, candidates=tuple(c for c in terms.candidates if c.name in names))
     count = len(terms.time)
-    wins = dict.fromkeys(names, 0)
+    total = dict.fromkeys(names, 0.0)
     for _ in range(draws):
         weights = np.bincount(rng.integers(count, size=count), minlength=count).astype(float)
-        wins[gains(reduced_terms, weights)[0].name] += 1
-    return {name: number / draws for name, number in wins.items()}
+        found = gains(wanted, weights)
+        relative = np.exp(np.array([item.gain for item in found]) - found[0].gain)
+        for item, share in zip(found, relative / relative.sum(), strict=True):
+            total[item.name] += float(share) / draws
+    return total

@@ -45,7 +45,7 @@ class Finding:
         score: cluster-robust, along the fitted direction.
         held_out: gain on left-out windows.
         channels: share of each channel in the fall of its misfit.
-        equivalence_set: names that the same windows may mean, with their share of resamplings; itself included.
+        equivalence_set: names that the same windows may mean, with their weights; itself included.
     """
 
     name: str

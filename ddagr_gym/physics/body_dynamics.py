@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.jit import kernel
+from ddagr_gym.jit import kernel, stack_array
 from ddagr_gym.parameters import STANDARD_GRAVITY
 from ddagr_gym.physics.callbacks import apply_effects
 from ddagr_gym.physics.contact_patch import WRENCH, wheel_wrench
@@ -20,8 +20,6 @@ from ddagr_gym.physics.layout import (
     BODY_FORCE,
     BOGGED,
     CENTRE_OF_MASS,
-    DERIVATIVE,
-    DERIVATIVE_AT,
     DERIVATIVE_VALID,
     EXTRA_AXLE_TORQUE,
     EXTRA_FORCE_X,
@@ -36,6 +34,9 @@ from ddagr_gym.physics.layout import (
     LOAD,
     MASS,
     OMEGA,
+    OPTION_REST_SPEED,
+    OPTION_SHEAR_RATE,
+    OPTION_TOLERANCE,
     POINT_BODY_FORCES,
     POINT_WHEEL_FORCES,
     SINKAGE,
@@ -59,6 +60,14 @@ from ddagr_gym.physics.layout import (
     Y,
 )
 from ddagr_gym.physics.sinkage import solve_sinkage
+from ddagr_gym.physics.wheel_derivatives import (
+    change_of,
+    is_stale,
+    predict_sinkage,
+    refresh_derivative,
+    relative_motion,
+    stiffness_of,
+)
 
 Array = NDArray[np.float64]
 
@@ -134,96 +143,60 @@ def share_load(row: Array) -> None:
         row[LOAD + i] = 0.25 * row[MASS] * normal * front * side
 
 
+@kernel(inline=True, fused=False)
+def _set_wheel_kinematics(row: Array, i: int) -> None:
+    """Not fused: effects compute it again, and the next evaluation starts from the motion of the last one."""
+    row[WHEEL_V_X + i] = row[V_X] - row[YAW_RATE] * hub_y(row, i)
+    row[WHEEL_V_Y + i] = row[V_Y] + row[YAW_RATE] * hub_x(row, i)
+    row[WHEEL_OMEGA + i] = row[OMEGA + i % 2]
+    rim = (row[WHEEL + i] + row[WHEEL + 8 + i]) * row[WHEEL_OMEGA + i]
+    row[SLIP_RATIO + i] = slip_ratio(rim, row[WHEEL_V_X + i])
+
+
 @kernel()
 def set_kinematics(row: Array) -> None:
     """Hub velocities and slip from the body's motion (physics.md section 1)."""
     for i in range(4):
-        row[WHEEL_V_X + i] = row[V_X] - row[YAW_RATE] * hub_y(row, i)
-        row[WHEEL_V_Y + i] = row[V_Y] + row[YAW_RATE] * hub_x(row, i)
-        row[WHEEL_OMEGA + i] = row[OMEGA + i % 2]
-        rim = (row[WHEEL + i] + row[WHEEL + 8 + i]) * row[WHEEL_OMEGA + i]
-        row[SLIP_RATIO + i] = slip_ratio(rim, row[WHEEL_V_X + i])
+        _set_wheel_kinematics(row, i)
 
 
-@kernel()
-def _load_wheel(row: Array, i: int, wheel: Array) -> None:
+@kernel(inline=True)
+def _load_wheel(row: Array, i: int, wheel: Array, soil: Array) -> None:
     for j in range(3):
         wheel[j] = row[WHEEL + 4 * j + i]
-
-
-@kernel()
-def _refresh_derivative(
-    row: Array, i: int, wheel: Array, shear_rate: float, rest_speed: float, section: Array, coarse: Array,
-    workspace: Array, base: Array, moved: Array,
-) -> None:  # fmt: skip
-    """Forward differences of the wrench by v_x, v_y and sinkage on the coarse rule."""
-    v_x = row[WHEEL_V_X + i]
-    v_y = row[WHEEL_V_Y + i]
-    omega = row[WHEEL_OMEGA + i]
-    sinkage = row[SINKAGE + i]
-    soil = row[SOIL + 9 * i : SOIL + 9 * i + 9]
-    speed_step = 1e-4 * max(abs(v_x), abs((wheel[0] + wheel[2]) * omega)) + 1e-6
-    sinkage_step = -1e-4 * sinkage
-    wheel_wrench(
-        wheel, soil, v_x, v_y, omega, row[YAW_RATE], sinkage, shear_rate, rest_speed, section, coarse, workspace, base
-    )  # fmt: skip
-    for direction in range(3):
-        d_x = speed_step if direction == 0 else 0.0
-        d_y = speed_step if direction == 1 else 0.0
-        d_z = sinkage_step if direction == 2 else 0.0
-        wheel_wrench(
-            wheel, soil, v_x + d_x, v_y + d_y, omega, row[YAW_RATE], sinkage + d_z, shear_rate, rest_speed, section,
-            coarse, workspace, moved,
-        )  # fmt: skip
-        for j in range(WRENCH):
-            row[DERIVATIVE + 15 * i + 5 * direction + j] = (moved[j] - base[j]) / (d_x + d_y + d_z)
-    row[DERIVATIVE_AT + i] = v_x
-    row[DERIVATIVE_AT + 4 + i] = v_y
-    row[DERIVATIVE_AT + 8 + i] = omega
-    row[DERIVATIVE_AT + 12 + i] = sinkage
-
-
-@kernel()
-def _derivative_is_stale(row: Array, i: int, outer_radius: float, refresh: float) -> bool:
-    speed = refresh * max(abs(row[WHEEL_V_X + i]), abs(outer_radius * row[WHEEL_OMEGA + i]))
-    return (
-        row[DERIVATIVE_VALID] == 0.0
-        or abs(row[WHEEL_V_X + i] - row[DERIVATIVE_AT + i]) > speed
-        or abs(row[WHEEL_V_Y + i] - row[DERIVATIVE_AT + 4 + i]) > speed
-        or abs(row[WHEEL_OMEGA + i] - row[DERIVATIVE_AT + 8 + i]) * outer_radius > speed
-        or abs(row[SINKAGE + i] - row[DERIVATIVE_AT + 12 + i]) > refresh * row[SINKAGE + i]
-    )
+    for j in range(9):
+        soil[j] = row[SOIL + 9 * i + j]
 
 
 @kernel()
 def _carry_load(
-    row: Array, i: int, wheel: Array, tolerance: float, shear_rate: float, rest_speed: float, section: Array,
-    contact: Array, workspace: Array, wrench: Array,
-) -> None:  # fmt: skip
-    """Wrench at the sinkage that carries the wheel's load, warm-started at the last one.
+    row: Array, i: int, wheel: Array, soil: Array, options: Array, section: Array, contact: Array, wrench: Array
+) -> None:
+    """Wrench at the sinkage that carries the wheel's load, warm-started at the one in ``row``.
 
-    While the load error at the last sinkage is small the wrench is extrapolated with the derivative by sinkage
-    (its error is of second order); otherwise the sinkage is iterated.
+    While the load error there is small the wrench is extrapolated with the derivative by sinkage (its error is of
+    second order); otherwise the sinkage is iterated.
     """
     load = row[LOAD + i]
-    soil = row[SOIL + 9 * i : SOIL + 9 * i + 9]
     row[BOGGED + i] = 0.0
     if load <= 0.0:
         row[SINKAGE + i] = 0.0
-        wrench[:WRENCH] = 0.0
+        for j in range(WRENCH):
+            wrench[j] = 0.0
         return
+    tolerance = options[OPTION_TOLERANCE]
     sinkage = row[SINKAGE + i]
-    stiffness = row[DERIVATIVE + 15 * i + 12]
-    if row[DERIVATIVE_VALID] == 1.0 and stiffness > 0.0 and sinkage > 0.0:
+    stiffness = stiffness_of(row, i)
+    if stiffness > 0.0 and sinkage > 0.0:
         wheel_wrench(
             wheel, soil, row[WHEEL_V_X + i], row[WHEEL_V_Y + i], row[WHEEL_OMEGA + i], row[YAW_RATE], sinkage,
-            shear_rate, rest_speed, section, contact, workspace, wrench,
+            options[OPTION_SHEAR_RATE], options[OPTION_REST_SPEED], section, contact, wrench,
         )  # fmt: skip
         step = (load - wrench[2]) / stiffness
         within = abs(load - wrench[2]) <= tolerance * load and abs(step) <= _EXTRAPOLATION_LIMIT * sinkage
         if within and sinkage + step <= wheel[0]:
             for j in range(WRENCH):
-                wrench[j] += step * row[DERIVATIVE + 15 * i + 10 + j]
+                wrench[j] += change_of(row, i, j, 0.0, 0.0, 0.0, step)
             row[SINKAGE + i] = sinkage + step
             return
         sinkage += min(max(step, -0.5 * sinkage), 0.5 * sinkage)
@@ -232,7 +205,7 @@ def _carry_load(
     # Half the extrapolation error that is accepted above, so that the next step can extrapolate again.
     row[SINKAGE + i], bogged = solve_sinkage(
         wheel, soil, row[WHEEL_V_X + i], row[WHEEL_V_Y + i], row[WHEEL_OMEGA + i], row[YAW_RATE], load, sinkage,
-        0.05 * tolerance, shear_rate, rest_speed, section, contact, workspace, wrench,
+        0.05 * tolerance, options[OPTION_SHEAR_RATE], options[OPTION_REST_SPEED], section, contact, wrench,
     )  # fmt: skip
     row[BOGGED + i] = 1.0 if bogged else 0.0
 
@@ -286,47 +259,11 @@ def accelerate(row: Array, total: Array) -> None:
 
 
 @kernel()
-def evaluate_forces(
-    row: Array, refresh: float, tolerance: float, shear_rate: float, rest_speed: float, section: Array,
-    contact: Array, coarse: Array, workspace: Array, scratch: Array, effect_points: NDArray[np.int64],
-    effect_addresses: NDArray[np.int64], parameters: Array, memory: Array,
-) -> None:  # fmt: skip
-    """Wheel forces, sinkages and accelerations for the motion in ``row``.
-
-    Args:
-        row: reads motion, loads, soil; writes kinematics, forces, ACCELERATION, SPECIFIC_FORCE.
-        refresh: relative change of motion that renews a wheel's derivative; negative: leave it alone.
-        tolerance: relative load error that is extrapolated.
-        shear_rate: nu_min [rad/s].
-        rest_speed: blending width [m/s].
-        section: section rule.
-        contact: contact rule.
-        coarse: contact rule of the derivative.
-        workspace: of the kernel.
-        scratch: (4, 8) small vectors.
-        effect_points: as in :func:`apply_effects`, and the following.
-        effect_addresses: see there.
-        parameters: see there.
-        memory: see there.
-    """
-    tilt_gravity(row)
-    share_load(row)
-    set_kinematics(row)
-    wheel, wrench, moved, total = scratch[0], scratch[1], scratch[2], scratch[3]
-    for i in range(4):
-        _load_wheel(row, i, wheel)
-        _carry_load(row, i, wheel, tolerance, shear_rate, rest_speed, section, contact, workspace, wrench)
-        row[FORCE_X + i] = wrench[0]
-        row[FORCE_Y + i] = wrench[1]
-        row[FORCE_Z + i] = wrench[2]
-        row[YAW_MOMENT + i] = wrench[3]
-        row[AXLE_TORQUE + i] = wrench[4]
-        if refresh >= 0.0 and row[LOAD + i] > 0.0 and _derivative_is_stale(row, i, wheel[0] + wheel[2], refresh):
-            _refresh_derivative(
-                row, i, wheel, shear_rate, rest_speed, section, coarse, workspace, wrench, moved
-            )  # fmt: skip
-    if refresh >= 0.0:
-        row[DERIVATIVE_VALID] = 1.0
+def _gather_forces(
+    row: Array, effect_points: NDArray[np.int64], effect_addresses: NDArray[np.int64], parameters: Array, memory: Array
+) -> None:
+    """Add the effects' forces to those of the wheels, which are in ``row`` without them, and accelerate the body."""
+    total = stack_array(3)
     extra_forces(row, effect_points, effect_addresses, parameters, memory)
     sum_extra(row, total)
     for i in range(4):
@@ -338,3 +275,93 @@ def evaluate_forces(
         row[YAW_MOMENT + i] += row[EXTRA_YAW_MOMENT + i]
         row[AXLE_TORQUE + i] += row[EXTRA_AXLE_TORQUE + i]
     accelerate(row, total)
+
+
+@kernel()
+def evaluate_forces(
+    row: Array, refresh: float, options: Array, section: Array, contact: Array, coarse: Array,
+    effect_points: NDArray[np.int64], effect_addresses: NDArray[np.int64], parameters: Array, memory: Array,
+) -> None:  # fmt: skip
+    """Wheel forces, sinkages and accelerations for the motion in ``row``.
+
+    Args:
+        row: reads motion, loads, soil; writes kinematics, forces, ACCELERATION, SPECIFIC_FORCE.
+        refresh: relative change of motion that renews a wheel's derivative; negative: leave it alone.
+        options: numerics in the order of ``layout.OPTION_*``.
+        section: section rule.
+        contact: contact rule.
+        coarse: contact rule of the derivative.
+        effect_points: as in :func:`apply_effects`, and the following.
+        effect_addresses: see there.
+        parameters: see there.
+        memory: see there.
+    """
+    tilt_gravity(row)
+    share_load(row)
+    wheel, soil, wrench = stack_array(3), stack_array(9), stack_array(WRENCH)
+    for i in range(4):
+        v_x, v_y, rim, _ = relative_motion(row, i)
+        _set_wheel_kinematics(row, i)
+        predict_sinkage(row, i, v_x, v_y, rim)
+        _load_wheel(row, i, wheel, soil)
+        _carry_load(row, i, wheel, soil, options, section, contact, wrench)
+        row[FORCE_X + i] = wrench[0]
+        row[FORCE_Y + i] = wrench[1]
+        row[FORCE_Z + i] = wrench[2]
+        row[YAW_MOMENT + i] = wrench[3]
+        row[AXLE_TORQUE + i] = wrench[4]
+        if refresh >= 0.0 and row[LOAD + i] > 0.0 and is_stale(row, i, refresh):
+            refresh_derivative(row, i, wheel, soil, options, section, coarse)
+    if refresh >= 0.0:
+        row[DERIVATIVE_VALID] = 1.0
+    _gather_forces(row, effect_points, effect_addresses, parameters, memory)
+
+
+@kernel()
+def _may_extrapolate(row: Array, limit: float) -> bool:
+    for i in range(4):
+        v_x, _, rim, speed = relative_motion(row, i)
+        change = limit * max(abs(v_x), abs(rim)) * speed
+        d_x = row[V_X] - row[YAW_RATE] * hub_y(row, i) - row[WHEEL_V_X + i]
+        d_y = row[V_Y] + row[YAW_RATE] * hub_x(row, i) - row[WHEEL_V_Y + i]
+        if not (abs(d_x) < change and abs(d_y) < change and stiffness_of(row, i) > 0.0 and row[BOGGED + i] == 0.0):
+            return False
+    return True
+
+
+@kernel()
+def extrapolate_forces(
+    row: Array, limit: float, effect_points: NDArray[np.int64], effect_addresses: NDArray[np.int64], parameters: Array,
+    memory: Array,
+) -> bool:  # fmt: skip
+    """Forces for a motion close to that of the last evaluation, by the wheels' derivatives (error of second order).
+
+    Args:
+        row: as in :func:`evaluate_forces`.
+        limit: change of a wheel's velocity over its speed up to which this is done.
+        effect_points: as in :func:`apply_effects`, and the following.
+        effect_addresses: see there.
+        parameters: see there.
+        memory: see there.
+
+    Returns:
+        Whether it was done; otherwise ``row`` is as before.
+    """
+    if not _may_extrapolate(row, limit):
+        return False
+    tilt_gravity(row)
+    share_load(row)
+    for i in range(4):
+        v_x, v_y, rim, _ = relative_motion(row, i)
+        _set_wheel_kinematics(row, i)
+        new_x, new_y, new_rim, _ = relative_motion(row, i)
+        d_x, d_y, d_rim = new_x - v_x, new_y - v_y, new_rim - rim
+        d_z = (row[LOAD + i] - row[FORCE_Z + i] - change_of(row, i, 2, d_x, d_y, d_rim, 0.0)) / stiffness_of(row, i)
+        row[SINKAGE + i] = min(row[SINKAGE + i] + d_z, row[WHEEL + i])
+        row[FORCE_X + i] += change_of(row, i, 0, d_x, d_y, d_rim, d_z) - row[EXTRA_FORCE_X + i]
+        row[FORCE_Y + i] += change_of(row, i, 1, d_x, d_y, d_rim, d_z) - row[EXTRA_FORCE_Y + i]
+        row[FORCE_Z + i] += change_of(row, i, 2, d_x, d_y, d_rim, d_z)
+        row[YAW_MOMENT + i] += change_of(row, i, 3, d_x, d_y, d_rim, d_z) - row[EXTRA_YAW_MOMENT + i]
+        row[AXLE_TORQUE + i] += change_of(row, i, 4, d_x, d_y, d_rim, d_z) - row[EXTRA_AXLE_TORQUE + i]
+    _gather_forces(row, effect_points, effect_addresses, parameters, memory)
+    return True

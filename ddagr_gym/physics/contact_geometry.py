@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.jit import kernel
-from ddagr_gym.physics.fast_math import asin_half, cos_small, sin_small
+from ddagr_gym.physics.fast_math import asin_half, cos_small, inverse_sqrt, sin_small
 
 LANES = 8
 """Section nodes that the kernel treats at once; the compiler turns them into one vector."""
@@ -31,9 +31,21 @@ def lateral_edge(minor_radius: float, sinkage: float) -> float:
 
 
 @kernel(inline=True)
+def sin_edge(minor_radius: float, sinkage: float) -> float:
+    """sin(psi_l)."""
+    return math.sqrt(max(sinkage * (2.0 * minor_radius - sinkage), 0.0)) / minor_radius
+
+
+@kernel(inline=True)
+def _square_of_half(rho: float, hub_height: float) -> float:
+    """sin^2 of half the entry angle."""
+    return max((rho - hub_height) / (2.0 * rho), 0.0)
+
+
+@kernel(inline=True)
 def entry_angle(rho: float, hub_height: float) -> float:
     """theta_f = acos(hub_height/rho), as 2 asin sqrt((1 - cos)/2); 0 where the slice is clear of the soil."""
-    return 2.0 * asin_half(math.sqrt(max((rho - hub_height) / (2.0 * rho), 0.0)))
+    return 2.0 * asin_half(math.sqrt(_square_of_half(rho, hub_height)))
 
 
 @kernel(inline=True)
@@ -53,30 +65,31 @@ def fill_section(
 
     AREA is dS per unit u of the contact substitution: rho D (d psi) theta_f.
     """
-    # One array with constant offsets below: the compiler then knows that nothing overlaps, and vectorises.
     for i in range(LANES):
         workspace[NODE + i] = section_nodes[2 * first + i]
         workspace[WEIGHT + i] = section_nodes[2 * first + LANES + i]
     for i in range(LANES):
-        psi = edge * workspace[NODE + i]
         weight = edge * workspace[WEIGHT + i]
-        sin_psi = sin_small(psi)
-        cos_psi = cos_small(psi)
+        half_psi = 0.5 * edge * workspace[NODE + i]
+        sin_half = sin_small(half_psi)
+        sin_psi = 2.0 * sin_half * cos_small(half_psi)
+        cos_psi = 1.0 - 2.0 * sin_half * sin_half
         rho = major_radius + minor_radius * cos_psi
         theta_f = entry_angle(rho, hub_height)
+        square = _square_of_half(rho, hub_height)
         a = minor_radius * sin_psi
         b = half_width * cos_psi
-        d = math.sqrt(a * a + b * b)
+        inverse_d = inverse_sqrt(a * a + b * b)
         y = half_width * sin_psi
         workspace[RHO + i] = rho
         workspace[ENTRY + i] = theta_f
-        workspace[COS_ENTRY + i] = cos_small(theta_f)
-        workspace[SIN_ENTRY + i] = sin_small(theta_f)
-        workspace[NORMAL_Y + i] = a / d
-        workspace[LATERAL_Y + i] = b / d
+        workspace[COS_ENTRY + i] = 1.0 - 2.0 * square
+        workspace[SIN_ENTRY + i] = 2.0 * math.sqrt(square * (1.0 - square))
+        workspace[NORMAL_Y + i] = a * inverse_d
+        workspace[LATERAL_Y + i] = b * inverse_d
         workspace[V_X_LOCAL + i] = v_x - yaw_rate * y
         workspace[Y_LOCAL + i] = y
-        workspace[AREA + i] = rho * d * weight * theta_f
+        workspace[AREA + i] = rho * (a * a + b * b) * inverse_d * weight * theta_f
 
 
 @lru_cache(maxsize=32)

@@ -6,12 +6,10 @@ rear of the patch share the normal stress: behind the peak A.7 maps each angle t
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.jit import kernel
+from ddagr_gym.jit import kernel, stack_array
 from ddagr_gym.physics.contact_geometry import (
     AREA,
     COS_ENTRY,
@@ -26,6 +24,7 @@ from ddagr_gym.physics.contact_geometry import (
     Y_LOCAL,
     fill_section,
     lateral_edge,
+    sin_edge,
 )
 from ddagr_gym.physics.contact_stress import (
     forward_slip_ratio,
@@ -47,60 +46,80 @@ from ddagr_gym.physics.layout import (
     SOIL_SHEAR_MODULUS,
 )
 
+Array = NDArray[np.float64]
+
 WRENCH = 5
 """F_x, F_y, F_z [N], M_z, axle torque [N m] of the soil on the wheel, at the hub, wheel axes."""
 
-_SUM = SECTION_SIZE
-WORKSPACE_SIZE = SECTION_SIZE + WRENCH * LANES
+# Rows besides those of the section, LANES entries each: the slice's motion, sums over theta of its normal, lateral and
+# tangential force per area, plain and times cos(theta) and sin(theta), and its wrench
+(
+    RIM_SPEED, SIDE, TURN, PRESSURE, PRESSURE_COS, PRESSURE_SIN, LATERAL, LATERAL_COS, LATERAL_SIN, TANGENTIAL,
+    TANGENTIAL_COS, TANGENTIAL_SIN, _WRENCH,
+) = (SECTION_SIZE + LANES * i for i in range(13))  # fmt: skip
+_SIZE = _WRENCH + WRENCH * LANES
+
+
+@kernel(inline=True)
+def _begin_slices(work: Array, v_y: float, omega: float, yaw_rate: float) -> None:
+    """Motion of the slices, V_t = V_X_LOCAL cos(theta) - RIM_SPEED, V_l = SIDE + TURN sin(theta), and empty sums."""
+    for i in range(LANES):
+        work[RIM_SPEED + i] = omega * work[RHO + i]
+        work[SIDE + i] = work[LATERAL_Y + i] * v_y
+        work[TURN + i] = work[LATERAL_Y + i] * yaw_rate * work[RHO + i] - work[NORMAL_Y + i] * work[V_X_LOCAL + i]
+    for i in range(PRESSURE, _WRENCH):
+        work[i] = 0.0
 
 
 @kernel(inline=True)
 def _add_node(
-    i: int,
-    workspace: NDArray[np.float64],
-    cos_theta: float,
-    sin_theta: float,
-    swept: float,
-    v_y: float,
-    omega: float,
-    yaw_rate: float,
-    sigma: float,
-    strength: float,
-    decay: float,
-    weight: float,
+    i: int, work: Array, cos_theta: float, sin_theta: float, swept: float, sigma: float, strength: float, decay: float
 ) -> None:
-    """Add the force on one surface element at theta = theta_f - swept."""
-    rho = workspace[RHO + i]
-    normal_y = workspace[NORMAL_Y + i]
-    lateral_y = workspace[LATERAL_Y + i]
-    v_x = workspace[V_X_LOCAL + i]
-    area = workspace[AREA + i] * weight
-    side = lateral_y * v_y
-    turn = lateral_y * yaw_rate * rho - normal_y * v_x
-    v_t = v_x * cos_theta - omega * rho
-    v_l = side + sin_theta * turn
-    j_t = v_x * (workspace[SIN_ENTRY + i] - sin_theta) - omega * rho * swept
-    j_l = turn * (cos_theta - workspace[COS_ENTRY + i]) + side * swept
-    drag = -area * shear_over_speed(strength, j_t, j_l, v_t, v_l, decay)
-    pressure = area * sigma
+    """Add the stresses at theta = theta_f - swept, already times the weight of the node, to the sums of slice i."""
+    v_x = work[V_X_LOCAL + i]
+    v_t = v_x * cos_theta - work[RIM_SPEED + i]
+    v_l = work[SIDE + i] + sin_theta * work[TURN + i]
+    j_t = v_x * (work[SIN_ENTRY + i] - sin_theta) - work[RIM_SPEED + i] * swept
+    j_l = work[TURN + i] * (cos_theta - work[COS_ENTRY + i]) + work[SIDE + i] * swept
+    drag = shear_over_speed(strength, j_t, j_l, v_t, v_l, decay)
     lateral = drag * v_l
-    # radial and tangential parts of the force in the wheel plane, then the world directions
-    radial = pressure * lateral_y + lateral * normal_y
     tangential = drag * v_t
-    f_x = tangential * cos_theta - radial * sin_theta
-    f_y = lateral * lateral_y - pressure * normal_y
-    f_z = tangential * sin_theta + radial * cos_theta
-    workspace[_SUM + i] += f_x
-    workspace[_SUM + LANES + i] += f_y
-    workspace[_SUM + 2 * LANES + i] += f_z
-    workspace[_SUM + 3 * LANES + i] += rho * sin_theta * f_y - workspace[Y_LOCAL + i] * f_x
-    workspace[_SUM + 4 * LANES + i] -= rho * tangential
+    work[PRESSURE + i] += sigma
+    work[PRESSURE_COS + i] += sigma * cos_theta
+    work[PRESSURE_SIN + i] += sigma * sin_theta
+    work[LATERAL + i] += lateral
+    work[LATERAL_COS + i] += lateral * cos_theta
+    work[LATERAL_SIN + i] += lateral * sin_theta
+    work[TANGENTIAL + i] += tangential
+    work[TANGENTIAL_COS + i] += tangential * cos_theta
+    work[TANGENTIAL_SIN + i] += tangential * sin_theta
+
+
+@kernel(inline=True)
+def _add_slices(work: Array) -> None:
+    """Add the wrench of each slice, dF = -(sigma n + tau_t t + tau_l l) dS, in the axes of the wheel."""
+    for i in range(LANES):
+        normal_y = work[NORMAL_Y + i]
+        lateral_y = work[LATERAL_Y + i]
+        area = work[AREA + i]
+        rho = work[RHO + i]
+        # n and l in the wheel plane point along (sin, -cos) and (-sin, cos) of theta
+        radial_cos = lateral_y * work[PRESSURE_COS + i] - normal_y * work[LATERAL_COS + i]
+        radial_sin = lateral_y * work[PRESSURE_SIN + i] - normal_y * work[LATERAL_SIN + i]
+        f_x = -area * (work[TANGENTIAL_COS + i] + radial_sin)
+        f_y = -area * (lateral_y * work[LATERAL + i] + normal_y * work[PRESSURE + i])
+        f_y_sin = -area * (lateral_y * work[LATERAL_SIN + i] + normal_y * work[PRESSURE_SIN + i])
+        work[_WRENCH + i] += f_x
+        work[_WRENCH + LANES + i] += f_y
+        work[_WRENCH + 2 * LANES + i] += area * (radial_cos - work[TANGENTIAL_SIN + i])
+        work[_WRENCH + 3 * LANES + i] += rho * f_y_sin - work[Y_LOCAL + i] * f_x
+        work[_WRENCH + 4 * LANES + i] += rho * area * work[TANGENTIAL + i]
 
 
 @kernel()
 def integrate_patch(
-    wheel: NDArray[np.float64],
-    soil: NDArray[np.float64],
+    wheel: Array,
+    soil: Array,
     v_x: float,
     v_y: float,
     omega: float,
@@ -108,10 +127,9 @@ def integrate_patch(
     sinkage: float,
     minimum_shear_rate: float,
     rest_speed: float,
-    section_nodes: NDArray[np.float64],
-    contact_nodes: NDArray[np.float64],
-    workspace: NDArray[np.float64],
-    wrench: NDArray[np.float64],
+    section_nodes: Array,
+    contact_nodes: Array,
+    wrench: Array,
 ) -> None:
     """Wrench on a wheel that travels forward (R0 omega + v_x >= 0) at a given sinkage in (0, minor_radius].
 
@@ -127,59 +145,58 @@ def integrate_patch(
         rest_speed: see :func:`wheel_wrench` [m/s].
         section_nodes: from ``contact_geometry.section_rule``.
         contact_nodes: from ``contact_geometry.contact_rule``.
-        workspace: WORKSPACE_SIZE floats, overwritten.
         wrench: WRENCH floats, the result.
     """
     outer_radius = wheel[0] + wheel[2]
+    hub_height = outer_radius - sinkage
     edge = lateral_edge(wheel[0], sinkage)
     slip = forward_slip_ratio(outer_radius * omega, v_x, rest_speed)
     peak = peak_fraction(soil[SOIL_PEAK_0], soil[SOIL_PEAK_1], slip)
-    modulus = pressure_modulus(soil[SOIL_COHESIVE_MODULUS], soil[SOIL_FRICTIONAL_MODULUS], wheel[1], math.sin(edge))
+    modulus = pressure_modulus(
+        soil[SOIL_COHESIVE_MODULUS], soil[SOIL_FRICTIONAL_MODULUS], wheel[1], sin_edge(wheel[0], sinkage)
+    )
     rate = max(max(abs(omega), abs(v_x) / outer_radius), minimum_shear_rate)
     decay = -1.0 / (rate * soil[SOIL_SHEAR_MODULUS])
-    exponent = soil[SOIL_EXPONENT]
-    cohesion = soil[SOIL_COHESION]
-    friction = soil[SOIL_FRICTION_TANGENT]
     front = 1.0 - peak
     rear = peak + soil[SOIL_EXIT_RATIO]
-    contact = 1.0 + soil[SOIL_EXIT_RATIO]
-    for i in range(WRENCH * LANES):
-        workspace[_SUM + i] = 0.0
+    work = stack_array(_SIZE)
+    for i in range(_WRENCH, _SIZE):
+        work[i] = 0.0
     for first in range(0, section_nodes.shape[0] // 2, LANES):
-        fill_section(
-            wheel[0], wheel[1], wheel[2], outer_radius - sinkage, edge, v_x, yaw_rate, section_nodes, first, workspace
-        )
+        fill_section(wheel[0], wheel[1], wheel[2], hub_height, edge, v_x, yaw_rate, section_nodes, first, work)
+        _begin_slices(work, v_y, omega, yaw_rate)
         for k in range(contact_nodes.shape[1]):
-            u_squared = contact_nodes[0, k]
-            weight = contact_nodes[1, k]
+            front_swept = front * contact_nodes[0, k]
+            rear_swept = front + rear - rear * contact_nodes[0, k]
+            front_weight = front * contact_nodes[1, k]
+            rear_weight = rear * contact_nodes[1, k]
             for i in range(LANES):
-                theta_f = workspace[ENTRY + i]
-                swept = theta_f * front * u_squared
-                cos_theta = cos_small(theta_f - swept)
-                depth = workspace[RHO + i] * (cos_theta - workspace[COS_ENTRY + i])
-                sigma = normal_stress(modulus, exponent, depth)
-                strength = cohesion + sigma * friction
-                sin_theta = sin_small(theta_f - swept)
+                swept = work[ENTRY + i] * front_swept
+                cos_theta = cos_small(work[ENTRY + i] - swept)
+                sigma = normal_stress(modulus, soil[SOIL_EXPONENT], work[RHO + i] * cos_theta - hub_height)
+                strength = soil[SOIL_COHESION] + sigma * soil[SOIL_FRICTION_TANGENT]
                 _add_node(
-                    i, workspace, cos_theta, sin_theta, swept, v_y, omega, yaw_rate, sigma, strength, decay,
-                    weight * front,
+                    i, work, cos_theta, sin_small(work[ENTRY + i] - swept), swept, front_weight * sigma,
+                    front_weight * strength, decay,
                 )  # fmt: skip
-                swept = theta_f * (contact - rear * u_squared)
+                swept = work[ENTRY + i] * rear_swept
                 _add_node(
-                    i, workspace, cos_small(theta_f - swept), sin_small(theta_f - swept), swept, v_y, omega, yaw_rate,
-                    sigma, strength, decay, weight * rear,
+                    i, work, cos_small(work[ENTRY + i] - swept), sin_small(work[ENTRY + i] - swept), swept,
+                    rear_weight * sigma, rear_weight * strength, decay,
                 )  # fmt: skip
+        _add_slices(work)
+    for half in (4, 2, 1):
+        for j in range(WRENCH):
+            for i in range(half):
+                work[_WRENCH + LANES * j + i] += work[_WRENCH + LANES * j + half + i]
     for j in range(WRENCH):
-        total = 0.0
-        for i in range(LANES):
-            total += workspace[_SUM + LANES * j + i]
-        wrench[j] = total
+        wrench[j] = work[_WRENCH + LANES * j]
 
 
 @kernel()
 def wheel_wrench(
-    wheel: NDArray[np.float64],
-    soil: NDArray[np.float64],
+    wheel: Array,
+    soil: Array,
     v_x: float,
     v_y: float,
     omega: float,
@@ -187,10 +204,9 @@ def wheel_wrench(
     sinkage: float,
     minimum_shear_rate: float,
     rest_speed: float,
-    section_nodes: NDArray[np.float64],
-    contact_nodes: NDArray[np.float64],
-    workspace: NDArray[np.float64],
-    wrench: NDArray[np.float64],
+    section_nodes: Array,
+    contact_nodes: Array,
+    wrench: Array,
 ) -> None:
     """As :func:`integrate_patch` for any direction of travel; backwards is the mirror image in x.
 
@@ -207,14 +223,14 @@ def wheel_wrench(
     if blend > 0.0:
         integrate_patch(
             wheel, soil, v_x, v_y, omega, yaw_rate, sinkage, minimum_shear_rate, rest_speed, section_nodes,
-            contact_nodes, workspace, wrench,
+            contact_nodes, wrench,
         )  # fmt: skip
         if blend == 1.0:
             return
     f_x, f_y, f_z, m_z, torque = wrench[0], wrench[1], wrench[2], wrench[3], wrench[4]
     integrate_patch(
         wheel, soil, -v_x, v_y, -omega, -yaw_rate, sinkage, minimum_shear_rate, rest_speed, section_nodes,
-        contact_nodes, workspace, wrench,
+        contact_nodes, wrench,
     )  # fmt: skip
     wrench[0] = -wrench[0]
     wrench[3] = -wrench[3]

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from ddagr_gym.jit import kernel
-from ddagr_gym.physics.fast_math import exp_negative, log_positive
+from ddagr_gym.physics.fast_math import LOG2_E, exp2_bounded, inverse_sqrt, log2_positive
 
 PEAK_CEILING = 0.9
 """Ours: theta_m stays below 0.9 theta_f, else the front of the patch vanishes at slip 1 (physics.md section 2)."""
@@ -49,7 +49,7 @@ def pressure_modulus(cohesive: float, frictional: float, half_width: float, sin_
 @kernel(inline=True)
 def normal_stress(modulus: float, exponent: float, depth: float) -> float:
     """sigma = (k_c/b + k_phi) z^n (A.7)."""
-    return modulus * exp_negative(exponent * log_positive(max(depth, _TINY)))
+    return modulus * exp2_bounded(exponent * log2_positive(max(depth, _TINY)))
 
 
 @kernel(inline=True)
@@ -66,6 +66,6 @@ def shear_over_speed(
         v_l: sliding velocity across it [m/s].
         decay: -1/(nu K) [s/m].
     """
-    j = math.sqrt(displacement_t * displacement_t + displacement_l * displacement_l)
-    speed = math.sqrt(v_t * v_t + v_l * v_l + _TINY)
-    return strength * (1.0 - exp_negative(j * decay)) / speed
+    square = displacement_t * displacement_t + (displacement_l * displacement_l + _TINY)
+    growth = 1.0 - exp2_bounded(square * inverse_sqrt(square) * (decay * LOG2_E))
+    return strength * growth * inverse_sqrt(v_t * v_t + (v_l * v_l + _TINY))

@@ -106,9 +106,11 @@ POSE_POSITION_NOISE = _block()
 POSE_YAW_NOISE = _block()
 NEXT_POSE_TIME = _block()
 
-# The integrator's memory: wheel derivatives and the motion at which they were taken
-DERIVATIVE = _block(60)  # per wheel 15: d(F_x, F_y, F_z, M_z, torque) by v_x, by v_y, by sinkage
-DERIVATIVE_AT = _block(16)  # v_x x 4, v_y x 4, omega x 4, sinkage x 4
+# The integrator's memory: derivatives of the wheels' wrenches and the motion at which they were taken
+DERIVATIVE_SIZE = 20  # per wheel: F_x, F_y, F_z, M_z, torque, each by four things
+BY_V_X, BY_V_Y, BY_RIM, BY_SINKAGE = 0, 5, 10, 15  # velocities over the wheel's speed, sinkage [m]
+DERIVATIVE = _block(4 * DERIVATIVE_SIZE)
+DERIVATIVE_AT = _block(16)  # per wheel: v_x, v_y, rim speed over the wheel's speed, sinkage
 DERIVATIVE_VALID = _block()
 
 SIZE = _next
@@ -137,6 +139,20 @@ SOIL_PARAMETERS = (
     SOIL_PEAK_1,
     SOIL_EXIT_RATIO,
 ) = range(9)
+
+# Options of the numerics, as the kernels read them (see ``parameters.Numerics``)
+(
+    OPTION_REFRESH,
+    OPTION_TOLERANCE,
+    OPTION_SHEAR_RATE,
+    OPTION_REST_SPEED,
+    OPTION_EXTRAPOLATION,
+    OPTION_ACCEPTED_ERROR,
+    OPTION_DIVISIONS,
+    OPTION_LAUNCH_CHANGE,
+    OPTION_STEPS,
+    OPTION_MAXIMUM_STEP,
+) = range(10)
 
 # Points at which effects act, in the order of a sample
 POINT_COMMANDS, POINT_MOTORS, POINT_LOADS, POINT_SOIL, POINT_WHEEL_FORCES, POINT_BODY_FORCES, POINT_READINGS = range(7)

@@ -40,7 +40,6 @@ def solve_sinkage(
     rest_speed: float,
     section_nodes: NDArray[np.float64],
     contact_nodes: NDArray[np.float64],
-    workspace: NDArray[np.float64],
     wrench: NDArray[np.float64],
 ) -> tuple[float, bool]:
     """Root of F_z(sinkage) = load in (0, minor_radius], and whether the wheel is bogged.
@@ -57,7 +56,7 @@ def solve_sinkage(
     for iteration in range(MAXIMUM_ITERATIONS):
         wheel_wrench(
             wheel, soil, v_x, v_y, omega, yaw_rate, sinkage, minimum_shear_rate, rest_speed, section_nodes,
-            contact_nodes, workspace, wrench,
+            contact_nodes, wrench,
         )  # fmt: skip
         force = wrench[2]
         if abs(force - load) <= tolerance * load:

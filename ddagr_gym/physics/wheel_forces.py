@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ddagr_gym.errors import InputError
-from ddagr_gym.jit import kernel
+from ddagr_gym.jit import kernel, stack_array
 from ddagr_gym.parameters import Numerics, Soil, TorusWheel
 from ddagr_gym.physics.contact_geometry import contact_rule, section_rule
-from ddagr_gym.physics.contact_patch import WORKSPACE_SIZE, WRENCH, wheel_wrench
+from ddagr_gym.physics.contact_patch import WRENCH, wheel_wrench
 from ddagr_gym.physics.contact_stress import slip_ratio
 from ddagr_gym.physics.sinkage import SinkageStatus, solve_sinkage
 
@@ -62,12 +62,12 @@ def wheel_vector(wheel: TorusWheel) -> Array:
 @kernel()
 def _wrenches(
     wheel: Array, soil: Array, states: Array, shear_rate: float, rest_speed: float, section: Array, contact: Array,
-    workspace: Array, wrenches: Array,
+    wrenches: Array,
 ) -> None:  # fmt: skip
     for i in range(states.shape[0]):
         wheel_wrench(
             wheel, soil, states[i, 0], states[i, 1], states[i, 2], states[i, 3], states[i, 4], shear_rate, rest_speed,
-            section, contact, workspace, wrenches[i],
+            section, contact, wrenches[i],
         )  # fmt: skip
         wrenches[i, WRENCH] = slip_ratio((wheel[0] + wheel[2]) * states[i, 2], states[i, 0])
 
@@ -75,15 +75,16 @@ def _wrenches(
 @kernel()
 def _sinkages(
     wheel: Array, soil: Array, states: Array, tolerance: float, shear_rate: float, rest_speed: float, section: Array,
-    contact: Array, workspace: Array, wrench: Array, sinkage: Array, status: NDArray[np.int64],
+    contact: Array, sinkage: Array, status: NDArray[np.int64],
 ) -> None:  # fmt: skip
+    wrench = stack_array(WRENCH)
     for i in range(states.shape[0]):
         if states[i, 4] <= 0.0:
             status[i] = 2
             continue
         sinkage[i], bogged = solve_sinkage(
             wheel, soil, states[i, 0], states[i, 1], states[i, 2], states[i, 3], states[i, 4], 0.3 * wheel[0],
-            tolerance, shear_rate, rest_speed, section, contact, workspace, wrench,
+            tolerance, shear_rate, rest_speed, section, contact, wrench,
         )  # fmt: skip
         status[i] = 1 if bogged else 0
 
@@ -116,7 +117,6 @@ def _common(numerics: Numerics, nodes: int) -> tuple[Any, ...]:
         numerics.rest_speed,
         section_rule(numerics.section_nodes),
         contact_rule(nodes),
-        np.empty(WORKSPACE_SIZE),
     )
 
 
@@ -154,8 +154,8 @@ def wheel_force(
             "(minor_radius); use equilibrium_sinkage to find one."
         )
     wrenches = np.empty((states.shape[0], WRENCH + 1))
-    rate, rest, section, contact, workspace = _common(numerics, numerics.contact_nodes)
-    _wrenches(wheel_vector(wheel), soil_vector(soil), states, rate, rest, section, contact, workspace, wrenches)
+    rate, rest, section, contact = _common(numerics, numerics.contact_nodes)
+    _wrenches(wheel_vector(wheel), soil_vector(soil), states, rate, rest, section, contact, wrenches)
     yaw_moment, torque, slip = (wrenches[:, j].reshape(shape) for j in (3, 4, 5))
     return WheelForce(wrenches[:, :3].reshape(*shape, 3), yaw_moment, torque, slip)
 
@@ -193,11 +193,11 @@ def equilibrium_sinkage(
     states, shape = _broadcast(("v_x", "v_y", "omega", "yaw_rate", "load"), (v_x, v_y, omega, yaw_rate, load))
     sinkage = np.zeros(states.shape[0])
     status = np.zeros(states.shape[0], dtype=np.int64)
-    rate, rest, section, contact, workspace = _common(numerics, numerics.contact_nodes)
+    rate, rest, section, contact = _common(numerics, numerics.contact_nodes)
     tolerance = min(numerics.sinkage_tolerance, 1e-6)
     _sinkages(
-        wheel_vector(wheel), soil_vector(soil), states, tolerance, rate, rest, section, contact, workspace,
-        np.empty(WRENCH), sinkage, status,
+        wheel_vector(wheel), soil_vector(soil), states, tolerance, rate, rest, section, contact, sinkage,
+        status,
     )  # fmt: skip
     if shape == ():
         return float(sinkage[0]), SinkageStatus(int(status[0]))

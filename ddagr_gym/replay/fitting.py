@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ddagr_gym.frames import wrap_angle
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.replay.kinematic import Motor
@@ -37,8 +38,29 @@ MOST_WINDOWS = 150
 UNKNOWN_GYRO_BIAS = 0.005
 ACCELEROMETER_BIAS = 0.5
 """Priors [rad/s] where the robot never stood, and [m/s^2]: 3 degrees of tilt."""
-ITERATIONS = 10
+PASSES = 2
+ITERATIONS = 8
 TOLERANCE = 5e-4
+_NORMAL = 1.4826
+_STRONGEST = 0.98
+_FEWEST = 20
+
+
+@dataclass(frozen=True, eq=False)
+class Weights:
+    """Weights of a fit.
+
+    Correlated samples count for less: with the correlation r of successive ones (1 + r)/(1 - r) of them are worth one
+    (M. S. Bartlett 1946). Their standard deviation is enlarged by the root of that, the size from which the loss is
+    linear reduced by it, so that outliers are judged by the size of single samples.
+
+    Attributes:
+        sigma: (W, 1, 8) enlarged standard deviations; infinite for channels that are left out.
+        robust: (8,) weighted residuals from which the loss is linear.
+    """
+
+    sigma: Array
+    robust: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,20 +70,69 @@ class ArmFit:
     Attributes:
         parameters: (P,).
         fit: their values and deviations.
-        windows: that it used.
+        weights: of the last pass.
+        windows: number that it used.
     """
 
     parameters: tuple[ModelParameter, ...]
     fit: Refit
+    weights: Weights
     windows: int
 
 
-def channel_sigma(noise: Sequence[RecordingNoise], windows: WindowSet, imposed: bool, dead: Sequence[str]) -> Array:
-    """Standard deviations (W, 1, 8) of each window's channels; infinite for what is imposed or dead."""
-    sigma = np.stack([item.sigma for item in noise])[windows.recording][:, None, :].copy()
+def noise_weights(noise: Sequence[RecordingNoise], windows: WindowSet, imposed: bool, dead: Sequence[str]) -> Weights:
+    """Weights by the recordings' noise.
+
+    Args:
+        noise: one per recording.
+        windows: to be fitted.
+        imposed: True where the encoders drive, and so cannot judge.
+        dead: channels to leave out.
+    """
+    roots = np.stack([[_root(item.channels[name].correlation) for name in CHANNELS] for item in noise])
+    sigma = (np.stack([item.sigma for item in noise]) * roots)[windows.recording][:, None, :]
     left_out = [*dead, *(("encoder_right", "encoder_left") if imposed else ())]
     sigma[..., [CHANNELS.index(name) for name in left_out]] = np.inf
-    return sigma
+    return Weights(sigma, ROBUST / roots.max(axis=0))
+
+
+def misfit_weights(windows: WindowSet, prediction: Array, before: Weights) -> Weights:
+    """Weights by the residuals of a fit: their robust size and their correlation, never below the noise's.
+
+    Args:
+        windows: that were fitted.
+        prediction: (W, T, 8) of the fit.
+        before: weights of the fit.
+    """
+    sigma, robust = before.sigma.copy(), before.robust.copy()
+    for k, name in enumerate(CHANNELS):
+        residual = windows.measured[..., k] - prediction[..., k]
+        residual = wrap_angle(residual) if name == "pose_yaw" else residual
+        known = np.isfinite(residual)
+        if known.sum() < _FEWEST or not np.isfinite(sigma[..., k]).any():
+            continue
+        size = _NORMAL * float(np.median(np.abs(residual[known])))
+        root = _root(_correlation(residual))
+        sigma[..., k] = np.maximum(sigma[..., k], size * root)
+        robust[k] = min(robust[k], ROBUST / root)
+    return Weights(sigma, robust)
+
+
+def _root(correlation: float) -> float:
+    """Root of the samples that are worth one."""
+    kept = min(max(correlation, 0.0), _STRONGEST)
+    return float(np.sqrt((1.0 + kept) / (1.0 - kept)))
+
+
+def _correlation(residual: Array) -> float:
+    """Correlation of successive known samples within windows (W, T), of the residual's middle part."""
+    limit = 3.0 * _NORMAL * float(np.nanmedian(np.abs(residual)))
+    product, power = 0.0, 0.0
+    for row in np.clip(residual, -limit, limit):
+        known = row[np.isfinite(row)]
+        product += float(known[1:] @ known[:-1])
+        power += float(known[1:] @ known[1:] + known[:-1] @ known[:-1]) / 2.0
+    return product / power if power > 0.0 else 0.0
 
 
 def arm_parameters(
@@ -88,7 +159,7 @@ def fit_arm(
     soil: Soil,
     windows: WindowSet,
     parameters: Sequence[ModelParameter],
-    sigma: Array,
+    weights: Weights,
     *,
     imposed: bool,
     start: dict[str, float] | None = None,
@@ -96,29 +167,32 @@ def fit_arm(
     threads: int = 1,
     progress: Callable[[], None] = lambda: None,
 ) -> ArmFit:
-    """Refit on training windows.
+    """Refit on training windows, first by the sensors' noise, then by what that fit leaves unexplained.
 
     Args:
         robot: nominal.
         soil: nominal.
         windows: training part.
         parameters: see :func:`arm_parameters`.
-        sigma: see :func:`channel_sigma`, for these windows.
+        weights: from the noise, see :func:`noise_weights`.
         imposed: whether recorded wheel speeds drive.
         start: values to start from by name; 0 for the others.
         effects: missing physics that stays fixed.
         threads: of the simulator.
-        progress: called after each of at most ITERATIONS iterations.
+        progress: called after each of at most PASSES * ITERATIONS iterations.
     """
-    model = WindowModel(
-        robot, soil, windows, parameters, imposed=imposed, numerics=fit_numerics(), threads=threads
-    )
+    model = WindowModel(robot, soil, windows, parameters, imposed=imposed, numerics=fit_numerics(), threads=threads)
     given = start or {}
-    values = np.clip(
-        [given.get(p.name, 0.0) for p in parameters], [p.low for p in parameters], [p.high for p in parameters]
-    )
-    refitter = Refitter(model, sigma, effects, progress, robust=ROBUST)
-    return ArmFit(tuple(parameters), refitter.fit(values, iterations=ITERATIONS, tolerance=TOLERANCE), windows.count)
+    low, high = ([getattr(p, bound) for p in parameters] for bound in ("low", "high"))
+    values = np.clip([given.get(p.name, 0.0) for p in parameters], low, high)
+    states = None
+    for number in range(PASSES):
+        refitter = Refitter(model, weights.sigma, effects, progress, robust=weights.robust)
+        fit = refitter.fit(values, states, iterations=ITERATIONS, tolerance=TOLERANCE)
+        values, states = fit.values, fit.states
+        if number < PASSES - 1:
+            weights = misfit_weights(windows, fit.prediction, weights)
+    return ArmFit(tuple(parameters), fit, weights, windows.count)
 
 
 def motor_start(robot: Robot, motor: Motor) -> dict[str, float]:

@@ -191,7 +191,9 @@ def fit_motor(windows: WindowSet, rate: float, maximum_speed: float, noise: floa
     longest = max((windows.history - 1) * windows.period, windows.period)
     low = [math.log(0.1), math.log(0.05 * maximum_speed), 0.0]
     high = [math.log(200.0), math.log(20.0 * maximum_speed), longest]
-    # a delay of zero has no slope where commands are steps: start inside
-    start = [math.log(rate), math.log(maximum_speed), 0.5 * min(longest, 2.0 * windows.period)]
+    # no slope where commands are steps without delay, or all below the ceiling: start inside
+    largest = float(np.nanmax(np.abs(windows.commands)))
+    ceiling = float(np.clip(min(maximum_speed, 0.9 * largest), 0.06 * maximum_speed, None))
+    start = [math.log(rate), math.log(ceiling), 0.5 * min(longest, 2.0 * windows.period)]
     found = least_squares(misfit, start, bounds=(low, high), loss="soft_l1", x_scale=(0.5, 0.1, 0.05), diff_step=1e-3)
     return Motor(math.exp(found.x[0]), math.exp(found.x[1]), float(found.x[2]))

@@ -85,7 +85,7 @@ class Refitter:
         effects: missing physics that stays fixed.
         progress: called after each iteration.
         robust: size of a weighted residual from which its cost grows linearly (P. J. Huber, Ann. Math. Statist. 35
-            (1964) 73); infinity for plain least squares.
+            (1964) 73), one or (8,); infinity for plain least squares.
     """
 
     def __init__(
@@ -94,7 +94,7 @@ class Refitter:
         sigma: Array,
         effects: Sequence[Effect] = (),
         progress: Callable[[], None] = lambda: None,
-        robust: float = np.inf,
+        robust: float | Array = np.inf,
     ) -> None:
         self.model = model
         windows = model.windows
@@ -102,7 +102,7 @@ class Refitter:
         self._mask = (np.isfinite(windows.measured) & np.isfinite(self._sigma)).astype(float)
         self._effects = tuple(effects)
         self._progress = progress
-        self._robust = robust
+        self._robust = np.broadcast_to(np.asarray(robust, dtype=np.float64), windows.measured.shape)
         self._prior = np.array([p.prior for p in model.parameters])
         self._low = np.array([p.low for p in model.parameters])
         self._high = np.array([p.high for p in model.parameters])
@@ -110,10 +110,8 @@ class Refitter:
     def _window_costs(self, states: Array, prediction: Array) -> Array:
         """(W,) half sums of squares (Huber's loss where asked for), with the states' prior; infinite for NaN."""
         size = np.abs(weighted(self.model.windows.measured, prediction, self._sigma)) * self._mask
-        if np.isfinite(self._robust):
-            misfit = np.where(size <= self._robust, size**2, self._robust * (2.0 * size - self._robust))
-        else:
-            misfit = size**2
+        linear = np.minimum(size, self._robust)
+        misfit = linear * (2.0 * size - linear)
         start = (states - self.model.windows.initial) / STATE_PRIOR
         cost = 0.5 * (misfit.sum(axis=(1, 2)) + (start**2).sum(axis=1))
         broken = ~np.isfinite(np.where(self._mask > 0.0, prediction, 0.0)).all(axis=(1, 2))
@@ -121,9 +119,8 @@ class Refitter:
 
     def _robust_roots(self, residual: Array) -> Array:
         """Roots of Huber's weights (W, T, 8)."""
-        if not np.isfinite(self._robust):
-            return np.ones_like(residual)
-        return np.asarray(np.sqrt(self._robust / np.maximum(np.abs(residual), self._robust)))
+        size = np.abs(residual)
+        return np.asarray(np.sqrt(np.minimum(size, self._robust) / np.where(size > 0.0, size, 1.0), where=size > 0.0, out=np.ones_like(size)))
 
     def _cost(self, values: Array, states: Array) -> tuple[float, Array]:
         prediction = self.model.predict(values, states, self._effects)

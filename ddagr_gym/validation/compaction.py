@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
+from ddagr_gym.jit import stack_array
 from ddagr_gym.parameters import Numerics
 from ddagr_gym.physics.contact_geometry import contact_rule, section_rule
-from ddagr_gym.physics.contact_patch import WORKSPACE_SIZE, WRENCH, wheel_wrench
+from ddagr_gym.physics.contact_patch import WRENCH, wheel_wrench
 from ddagr_gym.physics.effects.base import Effect, Vector, size
 from ddagr_gym.physics.layout import (
     EXTRA_FORCE_X,
@@ -32,20 +31,21 @@ _REST_SPEED = Numerics().rest_speed
 
 def cancel_compaction(row: Vector, parameters: Vector, memory: Vector) -> None:
     """Take away the share ``parameters[0]`` of what the tyre would feel along the wheel in soil without strength."""
-    workspace = np.empty(WORKSPACE_SIZE)
-    wrench = np.empty(WRENCH)
-    wheel = np.empty(3)
+    wrench = stack_array(WRENCH)
+    wheel = stack_array(3)
+    soil = stack_array(9)
     for i in range(4):
         if row[SINKAGE + i] <= 0.0:
             continue
         for j in range(3):
             wheel[j] = row[WHEEL + 4 * j + i]
-        soil = row[SOIL + 9 * i : SOIL + 9 * i + 9].copy()
+        for j in range(9):
+            soil[j] = row[SOIL + 9 * i + j]
         soil[SOIL_COHESION] = 0.0
         soil[SOIL_FRICTION_TANGENT] = 0.0
         wheel_wrench(
             wheel, soil, row[WHEEL_V_X + i], row[WHEEL_V_Y + i], row[WHEEL_OMEGA + i], row[YAW_RATE],
-            row[SINKAGE + i], _SHEAR_RATE, _REST_SPEED, _SECTION, _CONTACT, workspace, wrench,
+            row[SINKAGE + i], _SHEAR_RATE, _REST_SPEED, _SECTION, _CONTACT, wrench,
         )  # fmt: skip
         row[EXTRA_FORCE_X + i] -= parameters[0] * wrench[0]
 

@@ -49,6 +49,7 @@ SMOOTH = Numerics(
     substeps=4,
     launch_substeps=1,
     jacobian_refresh=0.0,
+    force_extrapolation=0.0,
     jacobian_contact_nodes=4,
     sinkage_tolerance=1e-8,
     accepted_error=1e9,
@@ -215,7 +216,7 @@ class TestEveryEffect:
             changes = [np.linalg.norm(slopes[i] - slopes[i + 1]) / np.linalg.norm(slopes[2]) for i in range(2)]
             # a first-order remainder halves with the step; linear effects have none
             assert changes[0] < 0.1
-            assert changes[1] < 0.6 * changes[0] + 1e-3
+            assert changes[1] < 0.6 * changes[0] + 2e-3
 
     def test_stays_finite_over_rough_drives(self, name, drive, rough):
         generator = np.random.default_rng(7)
