@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.physics.contact_geometry import contact_rule, section_rule
-from ddagr_gym.physics.contact_patch import WORKSPACE_SIZE, wheel_wrench
+from ddagr_gym.physics.contact_patch import wheel_wrench
 from ddagr_gym.physics.wheel_forces import soil_vector, wheel_vector
 from ddagr_gym.presets import get_robot, get_soil
 
@@ -42,12 +42,10 @@ def random_states(count: int = 256) -> Array:
 
 
 @numba.njit(nogil=True)  # type: ignore[untyped-decorator]
-def _ours(
-    wheel: Array, soil: Array, states: Array, section: Array, contact: Array, workspace: Array, out: Array
-) -> None:
+def _ours(wheel: Array, soil: Array, states: Array, section: Array, contact: Array, out: Array) -> None:
     for n in range(states.shape[0]):
         s = states[n]
-        wheel_wrench(wheel, soil, s[0], s[1], s[2], s[3], s[4], 1e-3, 1e-3, section, contact, workspace, out[n])
+        wheel_wrench(wheel, soil, s[0], s[1], s[2], s[3], s[4], 1e-3, 1e-3, section, contact, out[n])
 
 
 def kernel_candidates(section_nodes: int, contact_nodes: int) -> tuple[dict[str, Callable[[], object]], int, float]:
@@ -55,10 +53,10 @@ def kernel_candidates(section_nodes: int, contact_nodes: int) -> tuple[dict[str,
     states = random_states()
     wheel, soil = wheel_vector(get_robot("ddagr").wheels[0]), soil_vector(get_soil("thesis_a1"))
     section, contact = section_rule(section_nodes), contact_rule(contact_nodes)
-    mine, theirs, workspace = np.zeros((len(states), 5)), np.zeros((len(states), 5)), np.zeros(WORKSPACE_SIZE)
+    mine, theirs = np.zeros((len(states), 5)), np.zeros((len(states), 5))
 
     def ours() -> object:
-        _ours(wheel, soil, states, section, contact, workspace, mine)
+        _ours(wheel, soil, states, section, contact, mine)
         return mine
 
     candidates: dict[str, Callable[[], object]] = {"ours": ours}

@@ -13,7 +13,7 @@ SKID_STEER = """
     <geom name="ground" type="plane" size="50 50 1" friction="0.8 0.01 0.001"/>
     <body name="robot" pos="0 0 0.4">
       <freejoint/>
-      <inertial pos="0 0 0" mass="148" diaginertia="40 40 90"/>
+      <inertial pos="0 0 0" mass="148" diaginertia="55 55 90"/>
       <geom type="box" size="0.5 0.4 0.1" contype="0" conaffinity="0"/>
       {wheels}
     </body>

@@ -14,6 +14,7 @@ import platform
 import resource
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -56,8 +57,8 @@ def _single(noisy: bool) -> Callable[[], object]:
     return run
 
 
-def _batch(count: int, threads: int, noisy: bool) -> Callable[[], object]:
-    env = gymnasium.make_vec("DDAGR-Turn-v0", num_envs=count, threads=threads)
+def _batch(count: int, threads: int, noisy: bool, numerics: Numerics | None = None) -> Callable[[], object]:
+    env = gymnasium.make_vec("DDAGR-Turn-v0", num_envs=count, threads=threads, numerics=numerics or Numerics())
     env.reset(seed=0)
     rng = np.random.default_rng(0)
     steady = np.tile(STEADY, (count, 1))
@@ -148,8 +149,9 @@ def accuracy_cost(rounds: int, count: int = 200) -> list[dict[str, Any]]:
             force = wheel_force(wheel, soil, *states.T, sinkage, numerics=numerics).force
             errors.append(np.linalg.norm(force - reference, axis=1) / np.linalg.norm(reference, axis=1))
         pooled = np.concatenate(errors)
-        soil, sinkage, _ = cases[0]
-        timed = interleaved({"x": lambda: wheel_force(wheel, soil, *states.T, sinkage, numerics=numerics)}, rounds)
+        timed = interleaved(
+            {"x": partial(wheel_force, wheel, cases[0][0], *states.T, cases[0][1], numerics=numerics)}, rounds
+        )
         table.append(
             {
                 "section_nodes": section,
@@ -163,12 +165,11 @@ def accuracy_cost(rounds: int, count: int = 200) -> list[dict[str, Any]]:
     return table
 
 
-def kernel_share(kernel: dict[str, Any], environments: dict[str, Any]) -> dict[str, float]:
-    """Share of a steady batch step spent in the kernel: two evaluations a step of 8 ms and wheel, derivatives kept."""
-    nodes = 8 * 2 * 7
-    per_sample = 2 * 4 * nodes * kernel["default"]["ours"]["ns_per_node"] * 1e-9
-    total = 0.008 / environments["make_vec(64), steady turn"]["simulated_seconds_per_second"]
-    return {"kernel_seconds_per_sample": per_sample, "seconds_per_sample": total, "share": per_sample / total}
+def kernel_share(rounds: int) -> dict[str, float]:
+    """Share of a batch step that grows with the quadrature nodes: what doubling them along the contact adds."""
+    doubled = Numerics(contact_nodes=2 * Numerics().contact_nodes)
+    found = interleaved({"default": _batch(64, 1, False), "doubled": _batch(64, 1, False, doubled)}, 3 * rounds)
+    return {"share": found["doubled"].low / found["default"].low - 1.0}
 
 
 def reset_memory(resets: int) -> dict[str, float]:
@@ -207,11 +208,11 @@ def measure(quick: bool) -> dict[str, Any]:
         ("peers", lambda: peer_speed(rounds)),
         ("kernel", lambda: kernel_speed(rounds)),
         ("accuracy", lambda: accuracy_cost(rounds)),
+        ("kernel_share", lambda: kernel_share(rounds)),
         ("memory", lambda: reset_memory(resets)),
     ):
         print(f"measuring {name} ...", flush=True)
         result[name] = call()
-    result["kernel_share"] = kernel_share(result["kernel"], result["environments"])
     return result
 
 
