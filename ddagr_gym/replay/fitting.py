@@ -28,6 +28,8 @@ from ddagr_gym.replay.windows import CHANNELS, WindowSet
 
 Array = NDArray[np.float64]
 
+UNFITTED = ("specific_force_x", "specific_force_y")
+"""Not fitted: tilt of the ground, lever arm and vibration are all in them and nothing of that is in the nominal model."""
 MOTOR_PARAMETERS = ("motor_rate", "maximum_wheel_speed")
 LATEST_CLOCK = 0.5
 """Drive kept before and after every window, and so the largest lateness of a clock that a fit can find [s]."""
@@ -36,8 +38,7 @@ ROBUST = 2.0
 MOST_WINDOWS = 150
 """Training windows that a fit uses, evenly chosen: 5 min of 2 s windows."""
 UNKNOWN_GYRO_BIAS = 0.005
-ACCELEROMETER_BIAS = 0.5
-"""Priors [rad/s] where the robot never stood, and [m/s^2]: 3 degrees of tilt."""
+"""Prior where the robot never stood [rad/s]."""
 PASSES = 2
 ITERATIONS = 8
 TOLERANCE = 5e-4
@@ -91,7 +92,7 @@ def noise_weights(noise: Sequence[RecordingNoise], windows: WindowSet, imposed: 
     """
     roots = np.stack([[_root(item.channels[name].correlation) for name in CHANNELS] for item in noise])
     sigma = (np.stack([item.sigma for item in noise]) * roots)[windows.recording][:, None, :]
-    left_out = [*dead, *(("encoder_right", "encoder_left") if imposed else ())]
+    left_out = [*UNFITTED, *dead, *(("encoder_right", "encoder_left") if imposed else ())]
     sigma[..., [CHANNELS.index(name) for name in left_out]] = np.inf
     return Weights(sigma, ROBUST / roots.max(axis=0))
 
@@ -149,7 +150,7 @@ def arm_parameters(
     """
     robots = tuple(p for p in robot_parameters(robot) if not (imposed and p.name in MOTOR_PARAMETERS))
     biases = [UNKNOWN_GYRO_BIAS if item.gyro_bias is None else float(np.hypot(*item.gyro_bias)) for item in noise]
-    sensors = sensor_parameters(len(noise), max(biases), ACCELEROMETER_BIAS)
+    sensors = [p for p in sensor_parameters(len(noise), max(biases), 1.0) if p.name.startswith("gyro_bias")]
     shift = wheel_speed_shift(LATEST_CLOCK - period) if imposed else command_shift(period)
     return (*soil_parameters(soil, KIND_STIFFNESS_DEVIATION), *robots, *sensors, shift)
 

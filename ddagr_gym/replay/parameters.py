@@ -112,7 +112,7 @@ def robot_parameters(robot: Robot) -> tuple[ModelParameter, ...]:
         "outer_radius": robot.wheels[0].major_radius,
     }
     return tuple(
-        _log(name, _ROBOT_ENTRIES[name], deviation / nominal[name])
+        _log(name, _ROBOT_ENTRIES[name], deviation / nominal[name], max(1.6, 4.0 * deviation / nominal[name]))
         for name, deviation in robot.standard_deviations.items()
         if name in nominal and deviation > 0.0
     )

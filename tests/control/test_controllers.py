@@ -15,9 +15,14 @@ from ddagr_gym.control.true_curvature import TrueCurvature
 from ddagr_gym.control.yaw_rate_pid import YawRatePid
 from ddagr_gym.envs.options import make_settings
 from ddagr_gym.errors import InputError
+from ddagr_gym.estimation import FilterModel, roll_out
+from ddagr_gym.estimation.force_balance import arc_bank_speeds
+from ddagr_gym.estimation.layout import STATE
 from ddagr_gym.evaluation.calibration import calibrate_constant_speeds, steady_motion, turning_speeds
+from ddagr_gym.evaluation.controllers import find_controller
 from ddagr_gym.evaluation.metrics import turn_metrics
 from ddagr_gym.evaluation.runs import drive_turn
+from ddagr_gym.parameters import Sensors
 from ddagr_gym.presets import get_robot, get_soil
 
 ROBOT = get_robot("ddagr")
@@ -131,3 +136,29 @@ def test_feedback_of_the_true_state_beats_constants_and_these_beat_kinematics():
         for name, controller in controllers.items()
     }
     assert errors["bound"] < errors["constants"] < errors["rolling"]
+
+
+def test_force_balance_solves_the_steady_arc_of_its_law():
+    model = FilterModel.of(ROBOT, Sensors())
+    parameters = np.exp(model.soil_prior.logs(model.wheel_load)[0])
+    right, left = arc_bank_speeds(model, parameters, 0.2, 1 / 0.8)
+    mirrored = arc_bank_speeds(model, parameters, 0.2, -1 / 0.8)
+    assert mirrored == pytest.approx((left, right), rel=1e-6)
+    # rolled out with the same law, these speeds hold speed and radius
+    motion = np.zeros(len(STATE))
+    motion[:5] = [0.2, 0.0, 0.25, right, left]
+    motion[5:9] = np.log(parameters)
+    end = roll_out(model, motion, np.tile([right, left], (1000, 1)))[-1]
+    assert end[0] == pytest.approx(0.2, rel=0.02)
+    assert end[0] / end[2] == pytest.approx(0.8, rel=0.02)
+
+
+def test_force_balance_controller_needs_features_and_beats_constants():
+    controller = find_controller("B4", RowTurn())
+    with pytest.raises(InputError, match="EKF"):
+        controller(observation())
+    errors = {}
+    for name in ("B1", "B4"):
+        settings = make_settings(ekf_features=name == "B4")
+        errors[name] = np.median([radius_error(find_controller(name, RowTurn()), settings, 50 + k) for k in range(6)])
+    assert errors["B4"] < errors["B1"]
