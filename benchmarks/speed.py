@@ -1,238 +1,167 @@
-"""How fast the simulator is, as ratios against peers and references in one run.
+"""Speed of the simulator: ratios taken in one run, as a table, JSON and a figure.
 
-    python -m benchmarks.speed [--quick] [--output FOLDER]      (or: ddagr benchmark)
+    python -m benchmarks.speed [--quick] [--output FOLDER]        (also: ddagr benchmark)
 
-Times are processor time of this process, candidates interleaved; medians with minimum and maximum. Absolute figures
-hold for one machine only; quote the ratios.
+Contestants take turns (:mod:`benchmarks.speeds.timing`) at three workloads (:mod:`benchmarks.speeds.workloads`). Peers
+need ``pip install "gymnasium[mujoco]"``, the comparison with C a C compiler; where one is missing its part is left out
+and the results say why. Absolute figures hold for one machine: quote the ratios.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import os
 import platform
-import resource
-import time
 from collections.abc import Callable
-from functools import partial
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import gymnasium
+import numba
 import numpy as np
 
-import ddagr_gym
-from benchmarks.c_kernel import kernel_candidates
-from benchmarks.peers import ant_step, skid_steer_steps
-from benchmarks.timing import interleaved
-from ddagr_gym.parameters import Numerics
-from ddagr_gym.physics import equilibrium_sinkage, wheel_force
-from ddagr_gym.presets import get_robot, get_soil
+from benchmarks.speeds import accuracy, environments, kernel_share, kernel_time, memory, peers, workloads
+from benchmarks.speeds.figure import speed_figure
+from benchmarks.speeds.tables import tables_of
+from benchmarks.speeds.timing import Contestant, race, ratio
+from ddagr_gym.commands.output import make_folder, write_text
+from ddagr_gym.errors import InputError
+from ddagr_gym.version import __version__
 
-CONTROL_INTERVAL = 0.08
-"""Simulated seconds of an environment step."""
-
-STEADY = np.array([0.74, 0.03], np.float32)
-"""Action of a steady row turn."""
+RESULTS = Path(__file__).with_name("results")
+OURS = "DDAGR-Turn-v0"
 
 
-def policy_like(rng: np.random.Generator, count: int) -> np.ndarray:
-    """Actions of a policy that still explores: the steady turn with noise of 0.15."""
-    return np.clip(STEADY + 0.15 * rng.standard_normal((count, 2)), -1, 1).astype(np.float32)
+@dataclass(frozen=True)
+class Effort:
+    """How much is measured.
+
+    Attributes:
+        repeats: turns of each contestant.
+        steps: environment steps in a turn.
+        batches: numbers of environments.
+        evaluations: of the kernel in a turn.
+        states: of wheels per soil for the force errors.
+        samples: of a drive for the step errors and the kernel's share.
+        resets: over which memory is watched.
+    """
+
+    repeats: int = 15
+    steps: int = 1500
+    batches: tuple[int, ...] = (1, 4, 16, 64, 256)
+    evaluations: int = 40_000
+    states: int = 100
+    samples: int = 2000
+    resets: int = 10_000
+
+    @classmethod
+    def quick(cls) -> Effort:
+        """Half a minute; the figures scatter by some ten percent."""
+        return cls(repeats=5, steps=300, batches=(1, 16, 64), evaluations=10_000, states=20, samples=600, resets=500)
 
 
-def _single(noisy: bool) -> Callable[[], object]:
-    env = gymnasium.make("DDAGR-Turn-v0")
-    env.reset(seed=0)
-    rng = np.random.default_rng(0)
+def measure(effort: Effort, report: Callable[[str], None]) -> dict[str, Any]:
+    """All results, JSON-ready.
 
-    def run() -> object:
-        for _ in range(50):
-            action = policy_like(rng, 1)[0] if noisy else STEADY
-            _, _, terminated, truncated, _ = env.step(action)
-            if terminated or truncated:
-                env.reset()
-        return env
+    Args:
+        effort: how much is measured.
+        report: takes the name of each part as it starts.
+    """
+    tables = workloads.action_tables()
+    results: dict[str, Any] = {
+        "version": __version__,
+        "machine": machine(),
+        "workloads": " ".join((workloads.__doc__ or "").split()),
+        "units": "rates of one thread per CPU second, of two per wall second; steps of 80 ms, samples of 8 ms",
+    }
+    parts: dict[str, Callable[[], Any]] = {
+        "steps_per_second": lambda: steps_per_second(tables, effort),
+        "batch": lambda: {name: batch(actions, effort) for name, actions in tables.items()},
+        "kernel_share": lambda: {
+            name: kernel_share.share(actions[:4], effort.samples, effort.repeats, effort.evaluations)
+            for name, actions in tables.items()
+        },
+        "kernel_beside_c": lambda: kernel_time.against_c(effort.repeats, effort.evaluations),
+        "quadrature": lambda: accuracy.quadrature(effort.states, effort.repeats, effort.evaluations),
+        "time_step": lambda: accuracy.time_steps(tables, effort.samples, effort.repeats),
+        "memory": lambda: memory.over_resets(effort.resets, warm_up=max(200, effort.resets // 10)),
+    }
+    for name, part in parts.items():
+        report(name)
+        results[name] = part()
+    return results
 
-    return run
 
-
-def _batch(count: int, threads: int, noisy: bool, numerics: Numerics | None = None) -> Callable[[], object]:
-    env = gymnasium.make_vec("DDAGR-Turn-v0", num_envs=count, threads=threads, numerics=numerics or Numerics())
-    env.reset(seed=0)
-    rng = np.random.default_rng(0)
-    steady = np.tile(STEADY, (count, 1))
-
-    def run() -> object:
-        for _ in range(max(1, 400 // count)):
-            env.step(policy_like(rng, count) if noisy else steady)
-        return env
-
-    return run
-
-
-def environment_speed(rounds: int) -> dict[str, Any]:
-    """Simulated seconds per processor second of one environment and of the native batch on one core."""
-    candidates, steps = {}, {}
-    for noisy in (False, True):
-        label = "policy-like" if noisy else "steady turn"
-        candidates[f"gym.make, {label}"], steps[f"gym.make, {label}"] = _single(noisy), 50
-        for count in (4, 16, 64, 256):
-            name = f"make_vec({count}), {label}"
-            candidates[name], steps[name] = _batch(count, 1, noisy), count * max(1, 400 // count)
-    found = interleaved(candidates, rounds)
+def machine() -> dict[str, Any]:
+    """What the figures were measured on."""
+    names = Path("/proc/cpuinfo")
+    lines = names.read_text(encoding="utf-8").splitlines() if names.exists() else []
+    models = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
     return {
-        name: {"simulated_seconds_per_second": CONTROL_INTERVAL * steps[name] / t.median, "seconds": t.as_mapping()}
-        for name, t in found.items()
+        "processor": models[0] if models else platform.machine(),
+        "cores": os.cpu_count(),
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "numba": numba.__version__,
     }
 
 
-def thread_speed(rounds: int) -> dict[str, Any]:
-    """Wall-clock gain of two threads on a batch of 256 (needs two idle cores to say anything)."""
-    found = interleaved({"one": _batch(256, 1, True), "two": _batch(256, 2, True)}, rounds, time.perf_counter)
-    return {"wall_seconds": {k: t.as_mapping() for k, t in found.items()}, "gain": found["one"].low / found["two"].low}
+def steps_per_second(tables: dict[str, np.ndarray], effort: Effort) -> dict[str, Any]:
+    """One environment through ``gym.make`` at each workload, and the peers, one core each."""
+    ours = {f"{OURS}, {name.replace('_', ' ')}": table for name, table in tables.items()}
+    contestants = [environments.single(name, table, effort.steps) for name, table in ours.items()]
+    seconds = dict.fromkeys(ours, environments.STEP_SECONDS)
+    reason = peers.missing()
+    if reason is None:
+        for contestant, per_step in peers.contestants(tables["row_turn"], effort.steps):
+            contestants.append(contestant)
+            seconds[contestant.name] = per_step
+    rates = race(contestants, effort.repeats)
+    results: dict[str, Any] = {
+        "rates": {name: found.summary() for name, found in rates.items()},
+        "simulated_seconds_per_second": {name: round(seconds[name] * rates[name].median, 1) for name in rates},
+        "ratios": [ratio(rates, next(iter(ours)), name) for name in rates if name not in ours],
+    }
+    if reason is not None:
+        return results | {"skipped": reason}
+    return results | {"rigid_skid_steer_at_1.0_and_0.5_rad_per_s": peers.turning_on_rigid_ground()}
 
 
-def peer_speed(rounds: int) -> dict[str, Any]:
-    """Environment steps and simulated seconds per second beside MuJoCo's Ant-v5 and a rigid-ground skid-steer."""
-    ant, rigid = ant_step(), skid_steer_steps()
-    if ant is None or rigid is None:
-        return {"skipped": "MuJoCo is not installed: pip install mujoco 'gymnasium[mujoco]'"}
-    ours = _single(noisy=False)
+def batch(actions: np.ndarray, effort: Effort) -> list[dict[str, Any]]:
+    """Simulated seconds per second of the native batch, over numbers of environments, with one thread and two."""
 
-    def many(call: Callable[[], object]) -> Callable[[], object]:
-        return lambda: [call() for _ in range(50)]
+    def contestant(count: int, threads: int) -> Contestant:
+        steps = max(2, effort.steps // count)
+        return environments.batch(f"{count} x {threads}", actions, steps, count, threads)
 
-    found = interleaved({"ours": ours, "Ant-v5": many(ant), "rigid skid-steer, 2 ms": many(rigid)}, rounds)
-    simulated = {"ours": CONTROL_INTERVAL, "Ant-v5": 0.05, "rigid skid-steer, 2 ms": CONTROL_INTERVAL}
-    return {
-        name: {
-            "steps_per_second": 50 / t.median,
-            "simulated_seconds_per_second": 50 * simulated[name] / t.median,
-            "seconds": t.as_mapping(),
+    rates = race([contestant(count, threads) for count in effort.batches for threads in (1, 2)], effort.repeats)
+    return [
+        {
+            "environments": count,
+            "one_thread": rates[f"{count} x 1"].summary(),
+            "two_threads": rates[f"{count} x 2"].summary(),
+            "gain_of_two": ratio(rates, f"{count} x 2", f"{count} x 1", wall=True),
         }
-        for name, t in found.items()
-    }
-
-
-def kernel_speed(rounds: int) -> dict[str, Any]:
-    """Our kernel against the same kernel in C, nanoseconds per node, at the default and a fine rule."""
-    result = {}
-    for label, nodes in (("default", (8, 7)), ("fine", (16, 16))):
-        candidates, treated, difference = kernel_candidates(*nodes)
-        found = interleaved(candidates, 20 * rounds)
-        item: dict[str, Any] = {k: {"ns_per_node": 1e9 * t.low / treated} for k, t in found.items()}
-        if "C" in found:
-            item |= {"ours_over_C": found["ours"].low / found["C"].low, "largest_difference": difference}
-        else:
-            item["skipped"] = "no C compiler"
-        result[label] = item
-    return result
-
-
-def accuracy_cost(rounds: int, count: int = 200) -> list[dict[str, Any]]:
-    """Force error against the finest rule, and cost, over quadrature sizes; random wheels of turns on several soils."""
-    rng = np.random.default_rng(1)
-    wheel = get_robot("ddagr").wheels[0]
-    low, high = np.array([0.05, -0.15, 0.3, -0.4]), np.array([0.4, 0.15, 1.6, 0.4])
-    states = low + (high - low) * rng.uniform(size=(count, 4))
-    cases = []
-    for name in ("thesis_a1", "lete_sand_wong", "sandy_loam_lll_15", "upland_sandy_loam_wong_51"):
-        soil = get_soil(name)
-        sinkage, _ = equilibrium_sinkage(wheel, soil, *states.T, 412.0, numerics=Numerics.finest())
-        cases.append((soil, sinkage, wheel_force(wheel, soil, *states.T, sinkage, numerics=Numerics.finest()).force))
-    table = []
-    for section, contact in ((8, 2), (8, 3), (8, 4), (8, 5), (8, 7), (8, 10), (16, 8), (16, 16)):
-        numerics = Numerics(section_nodes=section, contact_nodes=contact)
-        errors = []
-        for soil, sinkage, reference in cases:
-            force = wheel_force(wheel, soil, *states.T, sinkage, numerics=numerics).force
-            errors.append(np.linalg.norm(force - reference, axis=1) / np.linalg.norm(reference, axis=1))
-        pooled = np.concatenate(errors)
-        timed = interleaved(
-            {"x": partial(wheel_force, wheel, cases[0][0], *states.T, cases[0][1], numerics=numerics)}, rounds
-        )
-        table.append(
-            {
-                "section_nodes": section,
-                "contact_nodes": contact,
-                "nodes": 2 * section * contact,
-                "force_error_median": float(np.median(pooled)),
-                "force_error_p99": float(np.quantile(pooled, 0.99)),
-                "microseconds_per_wheel": 1e6 * timed["x"].low / count,
-            }
-        )
-    return table
-
-
-def kernel_share(rounds: int) -> dict[str, float]:
-    """Share of a batch step that grows with the quadrature nodes: what doubling them along the contact adds."""
-    doubled = Numerics(contact_nodes=2 * Numerics().contact_nodes)
-    found = interleaved({"default": _batch(64, 1, False), "doubled": _batch(64, 1, False, doubled)}, 3 * rounds)
-    return {"share": found["doubled"].low / found["default"].low - 1.0}
-
-
-def reset_memory(resets: int) -> dict[str, float]:
-    """Growth of the resident set over many resets, after a warm-up [MB]."""
-    env = gymnasium.make("DDAGR-Turn-v0")
-    env.reset(seed=0)
-    for _ in range(max(50, resets // 20)):
-        env.reset()
-    before = _resident()
-    for _ in range(resets):
-        env.reset()
-        env.step(STEADY)
-    return {"resets": resets, "growth_megabytes": _resident() - before}
-
-
-def _resident() -> float:
-    """Resident set of this process [MB]."""
-    status = Path("/proc/self/status")
-    if status.exists():
-        line = next(row for row in status.read_text().splitlines() if row.startswith("VmRSS"))
-        return float(line.split()[1]) / 1024.0
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
-
-
-def measure(quick: bool) -> dict[str, Any]:
-    """All figures; ``quick`` for a look in a minute."""
-    rounds, resets = (3, 300) if quick else (9, 10_000)
-    result: dict[str, Any] = {
-        "version": ddagr_gym.__version__,
-        "machine": {"processor": platform.machine(), "python": platform.python_version()},
-        "quick": quick,
-    }
-    for name, call in (
-        ("environments", lambda: environment_speed(rounds)),
-        ("threads", lambda: thread_speed(rounds)),
-        ("peers", lambda: peer_speed(rounds)),
-        ("kernel", lambda: kernel_speed(rounds)),
-        ("accuracy", lambda: accuracy_cost(rounds)),
-        ("kernel_share", lambda: kernel_share(rounds)),
-        ("memory", lambda: reset_memory(resets)),
-    ):
-        print(f"measuring {name} ...", flush=True)
-        result[name] = call()
-    return result
+        for count in effort.batches
+    ]
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Measure, print, and write speed.json, speed.png and speed.svg."""
-    from benchmarks.speed_report import print_tables, speed_figure
-
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--quick", action="store_true", help="fewer rounds and 300 resets instead of 10,000")
-    parser.add_argument("--output", type=Path, default=Path("benchmarks/results"), help="folder to write")
+    """Measure, print, and write speed.json and the figure."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--quick", action="store_true", help="half a minute, rougher figures, 500 resets")
+    parser.add_argument("--output", type=Path, default=RESULTS, help="folder for speed.json, speed.png, speed.svg")
     given = parser.parse_args(arguments)
-    result = measure(given.quick)
-    given.output.mkdir(parents=True, exist_ok=True)
-    from ddagr_gym.files import atomic_path
-
-    with atomic_path(given.output / "speed.json") as temporary:
-        temporary.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
-    print_tables(result)
-    speed_figure(result, given.output / "speed.png")
-    print(f"\nspeed.json and speed.png are in {given.output.resolve()}")
+    folder = make_folder(given.output)
+    effort = Effort.quick() if given.quick else Effort()
+    results = measure(effort, lambda part: print(f"measuring {part} ...", flush=True))
+    write_text(folder / "speed.json", json.dumps(results, indent=1, allow_nan=False) + "\n")
+    print(f"\n{tables_of(results)}\n\nwritten: {folder / 'speed.json'}")
+    try:
+        print("\n".join(f"written: {path}" for path in speed_figure(results, folder / "speed")))
+    except InputError as error:
+        print(f"no figure: {error}")
 
 
 if __name__ == "__main__":

@@ -79,6 +79,19 @@ def load_line(size: float, rng: Rng, site: Site) -> Change:
     return Change({"speed_limit": limit}, plant=lambda p: with_motors(p, speed_limit=limit, load_line=0.003))
 
 
+@form("motor_saturation", "slew limit", "variant", 3, 8, "command passes a limit of 3 (1 - 1.5 S) rad/s^2 on its slew")
+def slew_limit(size: float, rng: Rng, site: Site) -> Change:
+    limit = 3.0 * (1.0 - 1.5 * size)
+
+    def command(commands: Array, r: Rng) -> Array:
+        passed = commands.copy()
+        for k in range(1, len(passed)):
+            passed[k] = passed[k - 1] + np.clip(commands[k] - passed[k - 1], -limit * STEP, limit * STEP)
+        return passed
+
+    return Change({"acceleration_limit": limit}, command=command)
+
+
 @form("motor_saturation", "torque limit", "different", 3, 6, "|torque| <= 70 (1 - S) N m per bank")
 def torque_limit(size: float, rng: Rng, site: Site) -> Change:
     limit = 70.0 * (1.0 - size)

@@ -8,6 +8,7 @@ import numpy as np
 
 from .change import Change, Rng, Site, form, patch_row, signed, with_ground, with_soil
 from .ground import BAND, DISC
+from .manoeuvres import PAUSE_BETWEEN_RUNS
 from .plant import Plant
 
 RIGHT = np.array([1.0, 0.0, 1.0, 0.0])
@@ -35,6 +36,21 @@ def all_changed(size: float, rng: Rng, site: Site) -> Change:
     ln = signed(rng) * size
     factors = {"strength": math.exp(ln), "stiffness": math.exp(1.5 * ln)}
     return Change({"ln_strength": ln, "ln_stiffness": 1.5 * ln}, plant=lambda p: with_soil(p, **factors))
+
+
+@form(
+    "soil_change",
+    "onset",
+    "variant",
+    3,
+    6,
+    "strength exp(s), stiffness exp(1.5 s) from a moment in the second drive on",
+)
+def changed_from(size: float, rng: Rng, site: Site) -> Change:
+    ln, onset = signed(rng) * size, PAUSE_BETWEEN_RUNS + rng.uniform(15.0, 45.0)
+    values = {"onset": onset, "onset_strength": ln, "onset_stiffness": 1.5 * ln}
+    parameters = {"ln_strength": ln, "ln_stiffness": 1.5 * ln, "onset_in_run_2": onset - PAUSE_BETWEEN_RUNS}
+    return Change(parameters, plant=lambda p: with_ground(p, **values))
 
 
 @form("soil_change", "another soil", "different", 3, 6, "cohesion exp(-s), tan phi exp(s), K exp(2 s): clay to sand")

@@ -48,6 +48,9 @@ class Ground(NamedTuple):
     bowl_curvature: float = 0.0  # [1/m]
     bowl_limit: float = 0.08  # steepest gradient of the bowl [-]
     drying: float = 0.0  # growth of ln strength [1/s]
+    onset: float = 0.0  # clock time of a change of the soil [s]
+    onset_strength: float = 0.0  # that change of ln strength [-]
+    onset_stiffness: float = 0.0  # and of ln stiffness [-]
     aging: float = 0.0  # gain of ln strength after long rest [-]
     furrow: float = 0.0  # relative growth of lateral force across the furrows [-]
     furrow_angle: float = 0.0  # of the furrows [rad]
@@ -84,6 +87,9 @@ def local_factors(ground, wheel, x, y, time):  # type: ignore[no-untyped-def]
     """Factors on (strength, stiffness) of the soil under a wheel at (x, y) and ``time`` [s]."""
     strength = ground.strength_spread * field_value(ground.strength_waves, x, y) + ground.drying * time
     stiffness = ground.stiffness_spread * field_value(ground.stiffness_waves, x, y)
+    if time >= ground.onset:
+        strength += ground.onset_strength
+        stiffness += ground.onset_stiffness
     for k in range(ground.patches.shape[0]):
         cover = patch_cover(ground.patches[k], x, y)
         strength += cover * ground.patches[k, 5]

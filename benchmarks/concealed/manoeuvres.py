@@ -12,6 +12,8 @@ SAMPLE_RATE = 50
 DURATION = 60.0
 """[s]"""
 RUNS = ("run_1", "run_2", "run_3")
+PAUSE_BETWEEN_RUNS = 70.0
+"""From the start of one drive to the start of the next [s]."""
 FASTEST = 1.2
 """Largest bank speed command [rad/s]."""
 

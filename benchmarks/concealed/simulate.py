@@ -11,13 +11,11 @@ from .cases import Case, field_noise, field_plant
 from .catalogue import least_size
 from .change import Change, Site
 from .drive import SUBSTEPS, drive
-from .manoeuvres import RUNS, programme
+from .manoeuvres import PAUSE_BETWEEN_RUNS, RUNS, programme
 from .plant import Plant
 from .sensors import POSITION_NOISE, YAW_NOISE, readings, with_noise
 from .streams import stream
 
-PAUSE_BETWEEN_RUNS = 70.0
-"""From the start of one drive to the start of the next [s]."""
 NOISE_SCALE = {
     "enc_right": 0.01,
     "enc_left": 0.01,

@@ -100,7 +100,7 @@ def _page(summary: str) -> str:
 <title>ddagr-gym demo</title>
 <style>
 body {{ font: 16px/1.5 system-ui, sans-serif; max-width: 60rem; margin: 2rem auto; padding: 0 1rem; color: #222; }}
-img, video {{ max-width: 100%; height: auto; display: block; margin: 1rem 0; }}
+img, video {{ width: 100%; height: auto; display: block; margin: 1rem 0; }}
 pre {{ background: #f4f4f2; padding: .8rem; overflow-x: auto; }}
 </style></head><body>
 <h1>A row turn on soft soil</h1>

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.frames import wrap_angle
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.replay.kinematic import Motor
@@ -24,6 +23,7 @@ from ddagr_gym.replay.parameters import (
     wheel_speed_shift,
 )
 from ddagr_gym.replay.refit import Refit, Refitter
+from ddagr_gym.replay.residuals import residuals, successive_correlation
 from ddagr_gym.replay.windows import CHANNELS, WindowSet
 
 Array = NDArray[np.float64]
@@ -106,14 +106,15 @@ def misfit_weights(windows: WindowSet, prediction: Array, before: Weights) -> We
         before: weights of the fit.
     """
     sigma, robust = before.sigma.copy(), before.robust.copy()
-    for k, name in enumerate(CHANNELS):
-        residual = windows.measured[..., k] - prediction[..., k]
-        residual = wrap_angle(residual) if name == "pose_yaw" else residual
+    left = residuals(windows, prediction)
+    for k in range(len(CHANNELS)):
+        residual = left[..., k]
         known = np.isfinite(residual)
         if known.sum() < _FEWEST or not np.isfinite(sigma[..., k]).any():
             continue
         size = _NORMAL * float(np.median(np.abs(residual[known])))
-        root = _root(_correlation(residual))
+        limit = 3.0 * size
+        root = _root(successive_correlation(np.clip(residual, -limit, limit)))
         sigma[..., k] = np.maximum(sigma[..., k], size * root)
         robust[k] = min(robust[k], ROBUST / root)
     return Weights(sigma, robust)
@@ -123,17 +124,6 @@ def _root(correlation: float) -> float:
     """Root of the samples that are worth one."""
     kept = min(max(correlation, 0.0), _STRONGEST)
     return float(np.sqrt((1.0 + kept) / (1.0 - kept)))
-
-
-def _correlation(residual: Array) -> float:
-    """Correlation of successive known samples within windows (W, T), of the residual's middle part."""
-    limit = 3.0 * _NORMAL * float(np.nanmedian(np.abs(residual)))
-    product, power = 0.0, 0.0
-    for row in np.clip(residual, -limit, limit):
-        known = row[np.isfinite(row)]
-        product += float(known[1:] @ known[:-1])
-        power += float(known[1:] @ known[1:] + known[:-1] @ known[:-1]) / 2.0
-    return product / power if power > 0.0 else 0.0
 
 
 def arm_parameters(

@@ -94,6 +94,13 @@ def recording_noise(recording: Recording, rng: np.random.Generator) -> Recording
     return RecordingNoise(channels, lateness, jitter, _gyro_bias(recording))
 
 
+def dead_channels(recording: Recording) -> tuple[str, ...]:
+    """Channels of CHANNELS that hold one and the same value while the robot moves: stuck, or zeros logged as data."""
+    present = [name for name in CHANNELS if recording.has(name)]
+    ranges = {name: float(np.ptp(recording[name][np.isfinite(recording[name])])) for name in present}
+    return tuple(name for name in present if ranges[name] == 0.0) if any(ranges.values()) else ()
+
+
 def pose_lateness(offset: Offset | None) -> float:
     """Lateness to correct for [s]: 0 unless the clocks' correlation is clear; poses do not come early."""
     if offset is None or abs(offset.correlation) < LEAST_CORRELATION:

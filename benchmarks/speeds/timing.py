@@ -1,0 +1,98 @@
+"""Races on a busy machine: contestants take turns, each repeat gives one rate, medians and quartiles are reported.
+
+Rates of one thread are per second of CPU time, so that waiting for a core that others hold does not count; on an idle
+machine that is wall time. Rates of several threads are per second of wall time, and are held against one thread by the
+same clock. How much of the wall time was computed is reported beside: far below the number of threads, the machine was
+busy with other things and the rates of several threads say little.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Contestant:
+    """Something to time.
+
+    Attributes:
+        name: in tables and results.
+        run: does a chunk of work and returns its amount.
+        threads: that it uses.
+    """
+
+    name: str
+    run: Callable[[], float]
+    threads: int = 1
+
+
+@dataclass(frozen=True)
+class Rates:
+    """Amounts per second, one per repeat.
+
+    Attributes:
+        per_cpu_second: (repeats,).
+        per_wall_second: (repeats,).
+        threads: of the contestant.
+    """
+
+    per_cpu_second: np.ndarray
+    per_wall_second: np.ndarray
+    threads: int = 1
+
+    @property
+    def values(self) -> np.ndarray:
+        """(repeats,) by the clock that counts, see the module."""
+        return self.per_cpu_second if self.threads == 1 else self.per_wall_second
+
+    @property
+    def median(self) -> float:
+        """Median of :attr:`values`."""
+        return float(np.median(self.values))
+
+    def summary(self) -> dict[str, object]:
+        """For the results: median, quartiles, range, repeats, and CPU time over wall time."""
+        return {
+            **_spread(self.values),
+            "range": [round(float(self.values.min()), 3), round(float(self.values.max()), 3)],
+            "repeats": int(self.values.size),
+            "cpu_over_wall": round(float(np.median(self.per_wall_second / self.per_cpu_second)), 3),
+        }
+
+
+def race(contestants: Sequence[Contestant], repeats: int) -> dict[str, Rates]:
+    """Let the contestants take turns, each repeat from another starting place; first one turn that does not count.
+
+    Args:
+        contestants: with different names.
+        repeats: turns of each that count.
+    """
+    for contestant in contestants:
+        contestant.run()
+    turns: dict[str, list[tuple[float, float]]] = {contestant.name: [] for contestant in contestants}
+    for repeat in range(repeats):
+        first = repeat % len(contestants)
+        for contestant in (*contestants[first:], *contestants[:first]):
+            turns[contestant.name].append(_turn(contestant))
+    return {c.name: Rates(*np.array(turns[c.name]).T, threads=c.threads) for c in contestants}
+
+
+def _turn(contestant: Contestant) -> tuple[float, float]:
+    wall, cpu = time.perf_counter(), time.process_time()
+    amount = contestant.run()
+    return amount / (time.process_time() - cpu), amount / (time.perf_counter() - wall)
+
+
+def ratio(rates: dict[str, Rates], name: str, to: str, *, wall: bool = False) -> dict[str, object]:
+    """Ratio of two contestants' rates, paired by repeat: median and quartiles."""
+    both = [rates[n].per_wall_second if wall else rates[n].values for n in (name, to)]
+    return {"of": name, "to": to, **_spread(both[0] / both[1])}
+
+
+def _spread(values: np.ndarray) -> dict[str, object]:
+    low, median, high = np.percentile(values, [25, 50, 75])
+    return {"median": round(float(median), 3), "quartiles": [round(float(low), 3), round(float(high), 3)]}

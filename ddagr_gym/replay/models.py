@@ -1,0 +1,148 @@
+"""The models that a replay compares, each a function from windows to predictions."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ddagr_gym.parameters import Numerics, Robot, Soil
+from ddagr_gym.physics.effects import Effect
+from ddagr_gym.replay.fitting import ROBUST, ArmFit, noise_weights
+from ddagr_gym.replay.kinematic import KinematicModel, Motor, fit_motor, fit_track
+from ddagr_gym.replay.model import WindowModel, fit_numerics
+from ddagr_gym.replay.prepare import Prepared
+from ddagr_gym.replay.refit import Refitter
+from ddagr_gym.replay.report import BaselineReport, Speed
+from ddagr_gym.replay.windows import CHANNELS, WindowSet
+
+Array = NDArray[np.float64]
+
+
+class SimulatorOfArm:
+    """The simulator in one arm, nominal or refitted.
+
+    Args:
+        robot: nominal.
+        soil: nominal.
+        effects: missing physics.
+        imposed: whether recorded wheel speeds drive.
+        delay: of the drive [s], for the nominal simulator.
+        fit: parameters, or None for the nominal simulator.
+        threads: of the simulator.
+
+    Attributes:
+        simulated: robot time predicted [s].
+        cpu: processor time spent on it [s].
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        soil: Soil,
+        effects: Sequence[Effect],
+        *,
+        imposed: bool,
+        delay: float,
+        fit: ArmFit | None = None,
+        threads: int = 1,
+    ) -> None:
+        self._robot, self._soil, self._effects = robot, soil, tuple(effects)
+        self._imposed, self._threads = imposed, threads
+        self._delay = delay if fit is None else 0.0
+        self._parameters = () if fit is None else fit.parameters
+        self.values = np.zeros(0) if fit is None else fit.fit.values
+        self.simulated, self.cpu = 0.0, 0.0
+
+    def model(self, windows: WindowSet, numerics: Numerics) -> WindowModel:
+        """Model of these windows."""
+        return WindowModel(
+            self._robot, self._soil, windows, self._parameters, imposed=self._imposed, numerics=numerics,
+            threads=self._threads, delay=self._delay,
+        )  # fmt: skip
+
+    def predict(self, windows: WindowSet) -> Array:
+        """Channels (W, T, 8) from the windows' first guess, with the default accuracy; the time is taken."""
+        model = self.model(windows, Numerics())
+        before = time.process_time()
+        prediction = model.predict(self.values, windows.initial, self._effects)
+        self.cpu += time.process_time() - before
+        self.simulated += windows.count * windows.duration
+        return prediction
+
+    def warm_up(self, windows: WindowSet) -> None:
+        """Load the compiled kernels, which is not the simulator's time."""
+        first = windows.subset(np.zeros(1, dtype=np.int64))
+        self.model(first, Numerics()).predict(self.values, first.initial, self._effects)
+
+    def with_free_states(self, windows: WindowSet, sigma: Array, entries: Sequence[int]) -> tuple[Array, Array]:
+        """Channels (W, T, 8) from fitted initial states, and row entries (W, T, K); sigma (W, 1, 8)."""
+        model = self.model(windows, fit_numerics())
+        states, _ = Refitter(model, sigma, self._effects, robust=ROBUST).fit_states(self.values)
+        return model.predict_recorded(self.values, states, entries, self._effects)
+
+    def speed(self) -> Speed:
+        """What :meth:`predict` has cost so far."""
+        return Speed(self.simulated, self.cpu, self.simulated / self.cpu if self.cpu > 0.0 else 0.0)
+
+
+@dataclass(frozen=True)
+class Baselines:
+    """Kinematic models of one arm.
+
+    Attributes:
+        no_slip: geometric track.
+        effective_track: fitted; None where no turn was measured.
+        motor: between commands and speeds; None in the encoders' arm.
+    """
+
+    no_slip: KinematicModel
+    effective_track: KinematicModel | None
+    motor: Motor | None
+
+    @property
+    def delay(self) -> float:
+        """Of recorded wheel speeds [s]; 0 in the commands' arm, whose motor has its own."""
+        return self.no_slip.delay
+
+    def report(self) -> BaselineReport:
+        """For the document."""
+        motor, track = self.motor, self.effective_track
+        return BaselineReport(
+            None if track is None else track.track_ratio,
+            self.delay,
+            None if motor is None else motor.rate,
+            None if motor is None else motor.maximum_speed,
+            None if motor is None else motor.delay,
+        )
+
+
+def fit_baselines(prepared: Prepared, robot: Robot, drive_by: str, training: WindowSet | None) -> Baselines:
+    """Kinematic models fitted on the training windows; the nominal motor and no effective track without any."""
+    radius, half_track = prepared.geometry.wheel_radius, prepared.geometry.half_track
+    sigma = dict(zip(CHANNELS, prepared.sigma.tolist(), strict=True))
+    motor = None
+    if drive_by == "commands":
+        motor = Motor(robot.motor_rate, robot.maximum_wheel_speed)
+        if training is not None:
+            motor = fit_motor(training, motor.rate, motor.maximum_speed, sigma["encoder_right"])
+    track = None
+    if training is not None:
+        track = fit_track(training, radius, half_track, motor, sigma=sigma["yaw_rate"], robust=ROBUST)
+    delay = 0.0 if track is None else track.delay
+    return Baselines(KinematicModel(radius, half_track, 1.0, motor, delay), track, motor)
+
+
+def weights_of(prepared: Prepared, windows: WindowSet, imposed: bool) -> Array:
+    """Standard deviations (W, 1, 8) by which initial states are fitted."""
+    return noise_weights(prepared.noise, windows, imposed, prepared.dead).sigma
+
+
+def predict_all(
+    simulators: Mapping[str, SimulatorOfArm], kinematic: Mapping[str, KinematicModel], windows: WindowSet
+) -> dict[str, Array]:
+    """Predictions of all models by name."""
+    return {name: model.predict(windows) for name, model in {**simulators, **kinematic}.items()}

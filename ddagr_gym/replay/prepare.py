@@ -1,0 +1,130 @@
+"""Recordings made ready for a replay: clocks, noise, parts, and the windows cut from them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ddagr_gym.errors import InputError
+from ddagr_gym.parameters import Robot
+from ddagr_gym.recordings.schema import Recording, RobotGeometry
+from ddagr_gym.replay.fitting import LATEST_CLOCK
+from ddagr_gym.replay.noise import RecordingNoise, dead_channels, recording_noise
+from ddagr_gym.replay.pieces import aligned_poses, bridged
+from ddagr_gym.replay.split import Split, evenly, split_recording
+from ddagr_gym.replay.windows import WindowSet, cut_runs, cut_windows
+
+Array = NDArray[np.float64]
+Part = Callable[[WindowSet, Sequence[Split]], NDArray[np.bool_]]
+
+DRIVES = ("commands", "encoders")
+"""What can drive the simulator."""
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """Recordings of one robot on one ground, ready to be cut.
+
+    Attributes:
+        recordings: bridged, with poses at their own time.
+        noise: of each.
+        splits: of each.
+        geometry: of the robot.
+        dead: channels without information in any of them.
+        notes: sentences on what was left out or corrected.
+    """
+
+    recordings: tuple[Recording, ...]
+    noise: tuple[RecordingNoise, ...]
+    splits: tuple[Split, ...]
+    geometry: RobotGeometry
+    dead: tuple[str, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def period(self) -> float:
+        """Between samples [s]."""
+        return self.recordings[0].period
+
+    @property
+    def sigma(self) -> Array:
+        """(8,) noise of the channels, the largest of the recordings'."""
+        return np.asarray(np.max([item.sigma for item in self.noise], axis=0))
+
+    def windows(
+        self, duration: float, drive_by: str, *, stride: float | None = None, part: Part | None = None, most: int = 600
+    ) -> WindowSet | None:
+        """Windows of ``duration`` [s], at most ``most`` evenly chosen ones; None where none fits.
+
+        Args:
+            duration: of a window [s].
+            drive_by: of DRIVES.
+            stride: between starts [s].
+            part: picks a part, such as :func:`ddagr_gym.replay.split.training`.
+            most: windows.
+        """
+        try:
+            windows = cut_windows(
+                self.recordings, duration, stride=stride, wheel_radius=self.geometry.wheel_radius,
+                half_track=self.geometry.half_track, drive_by=drive_by, history=LATEST_CLOCK, ahead=LATEST_CLOCK,
+            )  # fmt: skip
+        except InputError:
+            return None
+        chosen = np.ones(windows.count, dtype=bool) if part is None else part(windows, self.splits)
+        rows = np.flatnonzero(chosen)
+        return windows.subset(rows[evenly(rows.size, most)]) if rows.size else None
+
+    def runs(self, drive_by: str) -> tuple[WindowSet, ...]:
+        """Every stretch with a known drive as one window; see :func:`ddagr_gym.replay.windows.cut_runs`."""
+        return cut_runs(
+            self.recordings, wheel_radius=self.geometry.wheel_radius, half_track=self.geometry.half_track,
+            drive_by=drive_by, history=LATEST_CLOCK, ahead=LATEST_CLOCK,
+        )  # fmt: skip
+
+
+def prepare(recordings: Sequence[Recording], robot: Robot, rng: np.random.Generator) -> Prepared:
+    """Correct clocks, judge noise, split.
+
+    Args:
+        recordings: of ``robot``, of one sample period.
+        robot: that drove.
+        rng: for the interval of the poses' lateness.
+
+    Raises:
+        InputError: a recording of another robot, or without time.
+    """
+    for recording in recordings:
+        if recording.meta.robot not in ("", robot.name):
+            raise InputError(
+                f"{recording.meta.source} is a recording of the robot {recording.meta.robot!r}: "
+                f"replay it with --robot {recording.meta.robot}, not {robot.name}."
+            )
+        if not np.isfinite(recording.period):
+            raise InputError(f"{recording.meta.source} has {len(recording)} rows: a replay needs a drive.")
+    noise = tuple(recording_noise(recording, rng) for recording in recordings)
+    even = [aligned_poses(bridged(r), n.pose_lateness) for r, n in zip(recordings, noise, strict=True)]
+    dead = sorted({name for recording in recordings for name in dead_channels(recording)})
+    return Prepared(
+        tuple(even),
+        noise,
+        tuple(split_recording(recording) for recording in even),
+        RobotGeometry.of(robot),
+        tuple(dead),
+        tuple(_notes(recordings, noise, dead)),
+    )
+
+
+def _notes(recordings: Sequence[Recording], noise: Sequence[RecordingNoise], dead: Sequence[str]) -> Iterator[str]:
+    for name in dead:
+        yield f"{name} never changes and was left out of every fit: stuck, or zeros logged as data."
+    for recording, item in zip(recordings, noise, strict=True):
+        if item.pose_lateness > 0.0:
+            yield (
+                f"{recording.meta.source}: poses come {item.pose_lateness:.2f} s behind the gyro and were moved back; "
+                f"their lateness scatters by about {item.pose_jitter:.2f} s."
+            )
+        for sentence in recording.validate():
+            yield f"{recording.meta.source}: {sentence}"

@@ -1,0 +1,175 @@
+"""What a prediction leaves unexplained: per channel, and against slip, yaw rate, speed, heading and time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ddagr_gym.frames import wrap_angle
+from ddagr_gym.physics import layout
+from ddagr_gym.recordings.schema import CHANNELS as SCHEMA
+from ddagr_gym.replay.windows import CHANNELS, WindowSet
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+REGIMES = {
+    "slip": ("-", "mean size of the four wheels' slip ratios, predicted"),
+    "yaw_rate": ("rad/s", "predicted"),
+    "speed": ("m/s", "forward, predicted"),
+    "heading": ("rad", "predicted, in the pose's frame"),
+    "time": ("s", "of the recording"),
+}
+"""Unit and meaning of what residuals are drawn against."""
+
+RECORDED = (*range(layout.SLIP_RATIO, layout.SLIP_RATIO + 4), layout.YAW_RATE, layout.V_X, layout.YAW)
+"""Entries of the simulator's row that :func:`regimes` needs, as :meth:`WindowModel.predict_recorded` records them."""
+
+BINS = 12
+LEAST_IN_BIN = 20
+
+
+@dataclass(frozen=True)
+class ChannelResidual:
+    """Residual of one channel, measurement less prediction, over windows with free initial states.
+
+    Attributes:
+        channel: of CHANNELS.
+        unit: of the channel.
+        count: samples.
+        rms: root mean square.
+        bias: mean.
+        correlation: of successive samples in a window [-].
+        noise: standard deviation of the sensor and of vibration.
+        relative: rms over noise; 1 where nothing is left to explain.
+    """
+
+    channel: str
+    unit: str
+    count: int
+    rms: float
+    bias: float
+    correlation: float
+    noise: float
+    relative: float
+
+
+@dataclass(frozen=True)
+class Regime:
+    """Residual of a channel in bins of something that the robot did, each with about as many samples.
+
+    Attributes:
+        channel: of CHANNELS.
+        against: of REGIMES.
+        unit: of ``against``.
+        centres: medians of the bins.
+        means: mean residuals.
+        deviations: their standard errors, samples of one window counted as one.
+        counts: samples.
+    """
+
+    channel: str
+    against: str
+    unit: str
+    centres: tuple[float, ...]
+    means: tuple[float, ...]
+    deviations: tuple[float, ...]
+    counts: tuple[int, ...]
+
+
+def residuals(windows: WindowSet, prediction: Array) -> Array:
+    """Measurement less prediction (W, T, 8), NaN where there is no sample; headings on the circle."""
+    difference = windows.measured - prediction
+    difference[..., CHANNELS.index("pose_yaw")] = wrap_angle(difference[..., CHANNELS.index("pose_yaw")])
+    return difference
+
+
+def channel_residuals(residual: Array, sigma: Array, left_out: tuple[str, ...] = ()) -> tuple[ChannelResidual, ...]:
+    """Table of the channels that have samples.
+
+    Args:
+        residual: (W, T, 8), see :func:`residuals`.
+        sigma: (8,) noise.
+        left_out: channels that say nothing about the prediction.
+    """
+    table = []
+    for k, name in enumerate(CHANNELS):
+        values = residual[..., k]
+        known = np.isfinite(values)
+        if name in left_out or known.sum() < 2:
+            continue
+        size = float(np.sqrt(np.mean(values[known] ** 2)))
+        unit, bias = SCHEMA[name].unit, float(values[known].mean())
+        correlation, noise = successive_correlation(values), float(sigma[k])
+        table.append(ChannelResidual(name, unit, int(known.sum()), size, bias, correlation, noise, size / noise))
+    return tuple(table)
+
+
+def successive_correlation(values: Array) -> float:
+    """Correlation of successive known samples inside the windows (W, T); 0 for none."""
+    product, power = 0.0, 0.0
+    for row in values:
+        known = row[np.isfinite(row)]
+        product += float(known[1:] @ known[:-1])
+        power += 0.5 * float(known[1:] @ known[1:] + known[:-1] @ known[:-1])
+    return product / power if power > 0.0 else 0.0
+
+
+def regime_values(windows: WindowSet, record: Array) -> Mapping[str, Array]:
+    """What residuals are drawn against (W, T), by name of REGIMES; ``record`` (W, T, 7) of RECORDED."""
+    has_heading = np.isfinite(windows.measured[..., CHANNELS.index("pose_yaw")]).any(axis=1, keepdims=True)
+    return {
+        "slip": np.abs(record[..., :4]).mean(axis=-1),
+        "yaw_rate": record[..., 4],
+        "speed": record[..., 5],
+        "heading": np.where(has_heading, wrap_angle(record[..., 6]), np.nan),
+        "time": windows.time[:, None] + windows.period * np.arange(1, windows.samples + 1),
+    }
+
+
+def regimes(residual: Array, values: Mapping[str, Array], left_out: tuple[str, ...] = ()) -> tuple[Regime, ...]:
+    """Binned residuals of the channels that are rates; positions depend on where a window starts.
+
+    Args:
+        residual: (W, T, 8).
+        values: (W, T) by name of REGIMES.
+        left_out: channels that say nothing about the prediction.
+    """
+    made = []
+    for k, name in enumerate(CHANNELS):
+        if name.startswith("pose") or name in left_out or not np.isfinite(residual[..., k]).any():
+            continue
+        for against in REGIMES:
+            regime = _regime(name, residual[..., k], against, values[against])
+            if regime is not None:
+                made.append(regime)
+    return tuple(made)
+
+
+def _regime(channel: str, residual: Array, against: str, values: Array) -> Regime | None:
+    window, sample = np.nonzero(np.isfinite(residual) & np.isfinite(values))
+    r, x = residual[window, sample], values[window, sample]
+    if r.size < LEAST_IN_BIN or np.ptp(x) == 0.0:
+        return None
+    bins = min(BINS, r.size // LEAST_IN_BIN)
+    edges = np.unique(np.quantile(x, np.linspace(0.0, 1.0, bins + 1)))
+    index = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, max(len(edges) - 2, 0))
+    rows = [index == b for b in range(max(len(edges) - 1, 1)) if (index == b).any()]
+    return Regime(
+        channel,
+        against,
+        REGIMES[against][0],
+        tuple(float(np.median(x[b])) for b in rows),
+        tuple(float(r[b].mean()) for b in rows),
+        tuple(_standard_error(r[b], window[b]) for b in rows),
+        tuple(int(b.sum()) for b in rows),
+    )
+
+
+def _standard_error(values: Array, window: Integers) -> float:
+    """Of the mean of clustered values: the root of the summed squares of the clusters' totals, over the count."""
+    totals = np.bincount(np.unique(window, return_inverse=True)[1], values - values.mean())
+    return float(np.sqrt((totals**2).sum() * totals.size / max(totals.size - 1, 1)) / values.size)

@@ -1,0 +1,111 @@
+"""A whole replay: recordings in, results and report out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ddagr_gym.errors import InputError
+from ddagr_gym.parameters import Robot, Soil
+from ddagr_gym.recordings.schema import Recording
+from ddagr_gym.replay.arm import STEPS, ArmResult, ArmSettings, replay_arm
+from ddagr_gym.replay.prepare import DRIVES, Prepared, prepare
+from ddagr_gym.replay.report import SCHEMA, SCHEMA_VERSION, ReplayReport, RunReport
+from ddagr_gym.replay.windows import CHANNELS
+
+SHORTEST_WINDOW = 0.2
+LONGEST_WINDOW = 60.0
+
+
+@dataclass(frozen=True, eq=False)
+class RunResult:
+    """Replay of one recording, or of several together.
+
+    Attributes:
+        prepared: recordings as they were replayed.
+        arms: one per drive that they hold.
+        report: for the document.
+    """
+
+    prepared: Prepared
+    arms: tuple[ArmResult, ...]
+    report: RunReport
+
+
+def steps(groups: int) -> int:
+    """Steps of progress of a replay of so many groups of recordings."""
+    return groups * len(DRIVES) * STEPS
+
+
+def replay_run(
+    recordings: Sequence[Recording],
+    robot: Robot,
+    soil: Soil,
+    settings: ArmSettings = ArmSettings(),
+    advance: Callable[[int], None] = lambda _: None,
+) -> RunResult:
+    """Replay recordings of one robot on one ground, driven by wheel speeds and by commands.
+
+    A refit starts with the wheel speeds, where motors do not matter; the commands' refit starts from its values.
+
+    Args:
+        recordings: one, or several that share one set of parameters; of one sample period.
+        robot: nominal.
+        soil: nominal.
+        settings: see there.
+        advance: told of progress, ``steps(1)`` in all.
+
+    Raises:
+        InputError: nothing can be replayed, with the reason.
+    """
+    if not SHORTEST_WINDOW <= settings.window <= LONGEST_WINDOW:
+        raise InputError(
+            f"the window is {settings.window:g} s: give {SHORTEST_WINDOW:g} to {LONGEST_WINDOW:g} s."
+        )
+    prepared = prepare(recordings, robot, np.random.default_rng(settings.seed))
+    found: dict[str, ArmResult] = {}
+    values: dict[str, float] = {}
+    for drive_by in reversed(DRIVES):
+        replayed = replay_arm(prepared, robot, soil, drive_by, settings, values, advance)
+        if replayed is not None:
+            found[drive_by], values = replayed
+    if not found:
+        names = ", ".join(r.meta.source for r in recordings)
+        raise InputError(
+            f"{names}: no window of {settings.window:g} s has valid commands or wheel speeds: "
+            "give a shorter --window or another recording."
+        )
+    arms = tuple(found[d] for d in DRIVES if d in found)
+    absent = tuple(f"no window of {settings.window:g} s has known {d}." for d in DRIVES if d not in found)
+    return RunResult(prepared, arms, _run_report(recordings, prepared, arms, absent))
+
+
+def _run_report(
+    recordings: Sequence[Recording], prepared: Prepared, arms: Sequence[ArmResult], absent: Sequence[str]
+) -> RunReport:
+    return RunReport(
+        tuple(r.meta.source for r in recordings),
+        tuple(r.meta.source_sha256 for r in recordings),
+        sum(len(r) for r in recordings),
+        float(sum(r.t[b - 1] - r.t[a] for r in recordings for a, b in r.meta.spans)),
+        prepared.period,
+        "; ".join(dict.fromkeys(split.rule for split in prepared.splits)),
+        dict(zip(CHANNELS, prepared.sigma.tolist(), strict=True)),
+        tuple(item.pose_lateness for item in prepared.noise),
+        tuple(item.pose_jitter for item in prepared.noise),
+        (*prepared.notes, *absent),
+        tuple(arm.report for arm in arms),
+    )
+
+
+def make_report(runs: Sequence[RunResult], robot: str, soil: str, settings: ArmSettings) -> ReplayReport:
+    """The document of several runs with the same settings; ``robot`` and ``soil`` by name."""
+    from ddagr_gym import __version__
+
+    effects = tuple({"name": e.name, **e.as_mapping()["parameters"]} for e in settings.effects)
+    return ReplayReport(
+        SCHEMA, SCHEMA_VERSION, __version__, robot, soil, effects, settings.window, settings.refit, settings.seed,
+        tuple(run.report for run in runs),
+    )  # fmt: skip
