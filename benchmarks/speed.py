@@ -141,7 +141,8 @@ def batch(actions: np.ndarray, effort: Effort) -> list[dict[str, Any]]:
             "environments": count,
             "one_thread": rates[f"{count} x 1"].summary(),
             "two_threads": rates[f"{count} x 2"].summary(),
-            "gain_of_two": ratio(rates, f"{count} x 2", f"{count} x 1", wall=True),
+            "gain_of_two": ratio(rates, f"{count} x 2", f"{count} x 1", clock="wall"),
+            "cpu_seconds_of_one_over_two": ratio(rates, f"{count} x 2", f"{count} x 1", clock="cpu"),
         }
         for count in effort.batches
     ]

@@ -37,11 +37,22 @@ def _batch(batch: dict[str, list[dict[str, Any]]]) -> str:
         (
             workload, row["environments"], row["one_thread"]["median"], *row["one_thread"]["quartiles"],
             row["two_threads"]["median"], row["gain_of_two"]["median"], row["two_threads"]["cpu_over_wall"],
+            row["cpu_seconds_of_one_over_two"]["median"],
         )
         for workload, found in batch.items()
         for row in found
     ]  # fmt: skip
-    header = ("workload", "environments", "simulated s/s", "from", "to", "two threads (wall)", "gain", "cores got")
+    header = (
+        "workload",
+        "environments",
+        "simulated s/s",
+        "from",
+        "to",
+        "two threads (wall)",
+        "gain",
+        "cores got",
+        "CPU of one over two",
+    )
     return "Native batch, resets included\n" + format_table(header, rows)
 
 

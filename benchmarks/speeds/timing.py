@@ -11,6 +11,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -54,7 +55,7 @@ class Rates:
         """Median of :attr:`values`."""
         return float(np.median(self.values))
 
-    def summary(self) -> dict[str, object]:
+    def summary(self) -> dict[str, Any]:
         """For the results: median, quartiles, range, repeats, and CPU time over wall time."""
         return {
             **_spread(self.values),
@@ -87,12 +88,20 @@ def _turn(contestant: Contestant) -> tuple[float, float]:
     return amount / (time.process_time() - cpu), amount / (time.perf_counter() - wall)
 
 
-def ratio(rates: dict[str, Rates], name: str, to: str, *, wall: bool = False) -> dict[str, object]:
-    """Ratio of two contestants' rates, paired by repeat: median and quartiles."""
-    both = [rates[n].per_wall_second if wall else rates[n].values for n in (name, to)]
-    return {"of": name, "to": to, **_spread(both[0] / both[1])}
+def ratio(rates: dict[str, Rates], name: str, to: str, *, clock: str = "") -> dict[str, Any]:
+    """Ratio of two contestants' rates, paired by repeat: median and quartiles.
+
+    Args:
+        rates: of a race.
+        name: numerator.
+        to: denominator.
+        clock: "cpu", "wall", or by default the one that counts for each.
+    """
+    clocks = {"": "values", "cpu": "per_cpu_second", "wall": "per_wall_second"}
+    first, second = (getattr(rates[n], clocks[clock]) for n in (name, to))
+    return {"of": name, "to": to, **_spread(first / second)}
 
 
-def _spread(values: np.ndarray) -> dict[str, object]:
+def _spread(values: np.ndarray) -> dict[str, Any]:
     low, median, high = np.percentile(values, [25, 50, 75])
     return {"median": round(float(median), 3), "quartiles": [round(float(low), 3), round(float(high), 3)]}

@@ -19,9 +19,11 @@ EXAMPLES = (
 class Arguments:
     """Measure the simulator's speed beside peers and a C kernel, and its accuracy against cost.
 
+    Peers need pip install "gymnasium[mujoco]", the kernel in C a C compiler; what is missing is left out and named.
+
     Attributes:
-        quick: fewer rounds and 300 resets instead of 10,000.
-        output: folder for speed.json and the figure; benchmarks/results of the checkout by default.
+        quick: half a minute instead of several, rougher figures, 500 resets instead of 10,000.
+        output: folder for speed.json, speed.png and speed.svg; benchmarks/results of the checkout by default.
     """
 
     quick: bool = False

@@ -104,11 +104,14 @@ def finite_array(name: str, values: ArrayLike) -> Array:
 def _broadcast(names: tuple[str, ...], values: tuple[ArrayLike, ...]) -> tuple[Array, tuple[int, ...]]:
     arrays = [finite_array(name, value) for name, value in zip(names, values, strict=True)]
     try:
-        full = np.broadcast_arrays(*arrays)
+        shape = np.broadcast_shapes(*(array.shape for array in arrays))
     except ValueError:
         shapes = ", ".join(f"{n} {a.shape}" for n, a in zip(names, arrays, strict=True))
         raise InputError(f"shapes do not broadcast: {shapes}.") from None
-    return np.ascontiguousarray(np.stack([a.reshape(-1) for a in full], axis=-1)), full[0].shape
+    states = np.empty((*shape, len(arrays)))
+    for j, array in enumerate(arrays):
+        states[..., j] = array
+    return states.reshape(-1, len(arrays)), shape
 
 
 def _common(numerics: Numerics, nodes: int) -> tuple[Any, ...]:

@@ -11,7 +11,16 @@ from numpy.typing import NDArray
 
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.physics.effects import Effect
-from ddagr_gym.replay.fitting import ITERATIONS, MOST_WINDOWS, PASSES, ArmFit, arm_parameters, fit_arm, motor_start, noise_weights
+from ddagr_gym.replay.fitting import (
+    ITERATIONS,
+    MOST_WINDOWS,
+    PASSES,
+    ArmFit,
+    arm_parameters,
+    fit_arm,
+    motor_start,
+    noise_weights,
+)
 from ddagr_gym.replay.horizons import HORIZONS, METRICS, heading_growth, horizon_errors
 from ddagr_gym.replay.intervals import compare, error_statistics
 from ddagr_gym.replay.kinematic import KinematicModel

@@ -29,12 +29,12 @@ from ddagr_gym.replay.windows import CHANNELS, WindowSet
 Array = NDArray[np.float64]
 
 UNFITTED = ("specific_force_x", "specific_force_y")
-"""Not fitted: tilt of the ground, lever arm and vibration are all in them and nothing of that is in the nominal model."""
+"""Not fitted: tilt of the ground, lever arm and vibration are all in them, and not in the nominal model."""
 MOTOR_PARAMETERS = ("motor_rate", "maximum_wheel_speed")
 LATEST_CLOCK = 0.5
 """Drive kept before and after every window, and so the largest lateness of a clock that a fit can find [s]."""
 ROBUST = 2.0
-"""Weighted residual from which the loss is linear: what the model cannot explain, such as digging in, must not bend it."""
+"""Weighted residual from which the loss is linear: what the model cannot explain must not bend it."""
 MOST_WINDOWS = 150
 """Training windows that a fit uses, evenly chosen: 5 min of 2 s windows."""
 UNKNOWN_GYRO_BIAS = 0.005

@@ -81,7 +81,7 @@ def _mean(values: Array) -> Array:
 def _pose_errors(windows: WindowSet, prediction: Array) -> dict[str, Array]:
     """Heading, position and speed errors; the start's heading comes from all poses of a window through the gyro."""
     errors = {name: np.full(windows.count, np.nan) for name in ("heading_pose", "position", "speed")}
-    known = np.isfinite(windows.measured[..., _XY]).all(axis=-1)
+    known = np.asarray(np.isfinite(windows.measured[..., _XY]).all(axis=-1))
     reach, back = round(LAST / windows.period), round(SPEED_TIME / windows.period)
     start_heading = _start_heading(windows)
     for w in range(windows.count):

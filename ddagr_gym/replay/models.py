@@ -145,4 +145,5 @@ def predict_all(
     simulators: Mapping[str, SimulatorOfArm], kinematic: Mapping[str, KinematicModel], windows: WindowSet
 ) -> dict[str, Array]:
     """Predictions of all models by name."""
-    return {name: model.predict(windows) for name, model in {**simulators, **kinematic}.items()}
+    simulated = {name: model.predict(windows) for name, model in simulators.items()}
+    return simulated | {name: model.predict(windows) for name, model in kinematic.items()}

@@ -139,9 +139,7 @@ def sensor_parameters(recordings: int, gyro_bias: float, accelerometer_bias: flo
 
 def command_shift(period: float) -> ModelParameter:
     """Delay of the commands within the two samples by which loggers differ in what a row's command means."""
-    return ModelParameter(
-        "command_shift", "s", (), False, period, 0.1 * period, 0.0, 2.0 * period, shift=True
-    )
+    return ModelParameter("command_shift", "s", (), False, period, 0.1 * period, 0.0, 2.0 * period, shift=True)
 
 
 def wheel_speed_shift(limit: float, prior: float = 0.1) -> ModelParameter:

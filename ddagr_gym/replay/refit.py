@@ -120,7 +120,8 @@ class Refitter:
     def _robust_roots(self, residual: Array) -> Array:
         """Roots of Huber's weights (W, T, 8)."""
         size = np.abs(residual)
-        return np.asarray(np.sqrt(np.minimum(size, self._robust) / np.where(size > 0.0, size, 1.0), where=size > 0.0, out=np.ones_like(size)))
+        ratio = np.minimum(size, self._robust) / np.where(size > 0.0, size, 1.0)
+        return np.where(size > 0.0, np.sqrt(ratio), 1.0)
 
     def _cost(self, values: Array, states: Array) -> tuple[float, Array]:
         prediction = self.model.predict(values, states, self._effects)

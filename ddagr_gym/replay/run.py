@@ -39,11 +39,14 @@ def steps(groups: int) -> int:
     return groups * len(DRIVES) * STEPS
 
 
+DEFAULT_SETTINGS = ArmSettings()
+
+
 def replay_run(
     recordings: Sequence[Recording],
     robot: Robot,
     soil: Soil,
-    settings: ArmSettings = ArmSettings(),
+    settings: ArmSettings = DEFAULT_SETTINGS,
     advance: Callable[[int], None] = lambda _: None,
 ) -> RunResult:
     """Replay recordings of one robot on one ground, driven by wheel speeds and by commands.
@@ -61,9 +64,7 @@ def replay_run(
         InputError: nothing can be replayed, with the reason.
     """
     if not SHORTEST_WINDOW <= settings.window <= LONGEST_WINDOW:
-        raise InputError(
-            f"the window is {settings.window:g} s: give {SHORTEST_WINDOW:g} to {LONGEST_WINDOW:g} s."
-        )
+        raise InputError(f"the window is {settings.window:g} s: give {SHORTEST_WINDOW:g} to {LONGEST_WINDOW:g} s.")
     prepared = prepare(recordings, robot, np.random.default_rng(settings.seed))
     found: dict[str, ArmResult] = {}
     values: dict[str, float] = {}
@@ -102,7 +103,7 @@ def _run_report(
 
 def make_report(runs: Sequence[RunResult], robot: str, soil: str, settings: ArmSettings) -> ReplayReport:
     """The document of several runs with the same settings; ``robot`` and ``soil`` by name."""
-    from ddagr_gym import __version__
+    from ddagr_gym.version import __version__
 
     effects = tuple({"name": e.name, **e.as_mapping()["parameters"]} for e in settings.effects)
     return ReplayReport(

@@ -89,4 +89,6 @@ def clusters(windows: WindowSet, splits: Sequence[Split]) -> Integers:
 
 def evenly(count: int, most: int) -> Integers:
     """Indices of at most ``most`` of ``count`` items, evenly spread."""
-    return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(np.int64)) if count else np.zeros(0, int)
+    if not count:
+        return np.zeros(0, dtype=np.int64)
+    return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(np.int64))

@@ -121,9 +121,9 @@ def cut_windows(
         InputError: periods differ, no window fits, or commands or encoders are absent.
     """
     period = _common_period(recordings)
-    samples = max(int(round(duration / period)), 2)
-    step = samples if stride is None else max(int(round(stride / period)), 1)
-    past, later = int(round(history / period)), int(round(ahead / period))
+    samples = max(round(duration / period), 2)
+    step = samples if stride is None else max(round(stride / period), 1)
+    past, later = round(history / period), round(ahead / period)
     parts = []
     for number, recording in enumerate(recordings):
         drive = _drive(recording, drive_by)
@@ -163,7 +163,7 @@ def cut_runs(
         Sets in the order of length, none where nothing is long enough.
     """
     period = _common_period(recordings)
-    past, later = int(round(history / period)), int(round(ahead / period))
+    past, later = round(history / period), round(ahead / period)
     by_length: dict[int, list[_Part]] = {}
     for number, recording in enumerate(recordings):
         drive = _drive(recording, drive_by)
@@ -172,7 +172,9 @@ def cut_runs(
             edges = segment.start + np.flatnonzero(np.diff(np.concatenate([[False], known, [False]]).astype(int)))
             for first, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
                 samples = stop - first - 1
-                part = _window(recording, number, drive, first, samples, (past, later), segment) if samples > 1 else None
+                if samples <= 1:
+                    continue
+                part = _window(recording, number, drive, first, samples, (past, later), segment)
                 if part is not None and samples * period >= shortest - 0.5 * period:
                     by_length.setdefault(samples, []).append(part)
     return tuple(

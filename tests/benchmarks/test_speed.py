@@ -1,34 +1,155 @@
-"""The speed benchmark runs on tiny sizes and measures what it says; no time is asserted."""
+"""The speed benchmark at tiny sizes: it runs, and measures what it says. No time is asserted."""
+
+from __future__ import annotations
 
 import json
+from collections import Counter
 
 import numpy as np
 import pytest
 
 from benchmarks import speed
-from benchmarks.speeds import kernel_time, memory
+from benchmarks.speeds import accuracy, environments, kernel_share, kernel_time, memory, peers, tables, workloads
+from benchmarks.speeds.figure import speed_figure
+from benchmarks.speeds.timing import Contestant, Rates, race, ratio
+from ddagr_gym.commands import benchmark
+from ddagr_gym.errors import InputError
+from ddagr_gym.parameters import Numerics
+
+TINY = speed.Effort(repeats=2, steps=4, batches=(1, 2), evaluations=256, states=2, samples=20, resets=3)
 
 
-def test_kernel_in_c_gives_the_same_forces_and_leaves_the_process_alone():
-    found = kernel_time.against_c(repeats=1, evaluations=256)
+@pytest.fixture(scope="module")
+def actions():
+    return workloads.action_tables()
+
+
+@pytest.fixture(scope="module")
+def results():
+    parts = []
+    found = speed.measure(TINY, parts.append)
+    assert len(parts) == 7
+    return found
+
+
+def test_contestants_take_turns_from_changing_places():
+    calls = []
+
+    def contestant(name):
+        return Contestant(name, lambda: calls.append(name) or 1.0)
+
+    rates = race([contestant("a"), contestant("b"), contestant("c")], 3)
+    assert calls == [*"abc", *"abc", *"bca", *"cab"]
+    assert all(found.values.shape == (3,) for found in rates.values())
+
+
+def test_ratios_are_paired_by_repeat_and_by_the_clock_asked_for():
+    rates = {
+        "one": Rates(np.array([1.0, 2.0, 4.0]), np.array([1.0, 1.0, 1.0])),
+        "two": Rates(np.array([2.0, 4.0, 8.0]), np.array([3.0, 3.0, 6.0]), threads=2),
+    }
+    assert ratio(rates, "two", "one", clock="cpu") == {"of": "two", "to": "one", "median": 2.0, "quartiles": [2.0, 2.0]}
+    assert ratio(rates, "two", "one", clock="wall")["median"] == 3.0
+    # several threads count by the wall clock, one by its processor time
+    assert ratio(rates, "two", "one")["median"] == 1.5
+
+
+def test_workloads_are_actions_that_differ_by_their_noise(actions):
+    assert tuple(actions) == workloads.WORKLOADS
+    for table in actions.values():
+        assert table.shape == (workloads.EPISODES, 312, 2)
+        assert table.dtype == np.float32
+        assert np.abs(table).max() <= 1.0
+    turn = actions["row_turn"]
+    assert (turn == turn[0]).all()
+    assert np.ptp(turn[0, :, 0]) > 0.1
+    assert np.std(actions["trained_policy"] - turn) == pytest.approx(0.15, abs=0.01)
+    assert np.mean(np.abs(actions["untrained_policy"]) == 1.0) == pytest.approx(0.317, abs=0.02)
+
+
+def test_an_episode_that_ends_is_reset_and_the_next_sequence_played():
+    calls = Counter()
+
+    class Short:
+        def reset(self):
+            calls["reset"] += 1
+
+        def step(self, action):
+            calls[f"action {action[0]:g}"] += 1
+            return None, 0.0, action[0] == 1 and calls["action 1"] == 2, False, {}
+
+    environments.play(Short(), np.array([[[1.0, 0.0]] * 3, [[2.0, 0.0]] * 3]), 5)
+    assert calls == {"reset": 3, "action 1": 2, "action 2": 3}
+
+
+def test_kernel_in_c_gives_the_same_wrenches():
+    found = kernel_time.against_c(1, 256)
     if "skipped" in found:
-        pytest.skip(str(found["skipped"]))
-    # a library linked with -ffast-math would have switched off subnormal numbers for all later tests
-    assert np.float64(2.0**-1022) * np.float64(0.5) > 0.0
+        pytest.skip(found["skipped"])
+    assert set(found["nanoseconds"]) == {"ours", *kernel_time.BUILDS}
+    assert found["nodes"] == 112
+
+
+def test_a_missing_compiler_is_named(monkeypatch):
+    monkeypatch.setattr(kernel_time, "compiler", lambda: None)
+    assert "no C compiler" in kernel_time.against_c(1, 256)["skipped"]
+
+
+def test_missing_peers_are_named_and_left_out(monkeypatch, actions):
+    monkeypatch.setattr(peers, "missing", lambda: "peers left out: reason.")
+    found = speed.steps_per_second(actions, TINY)
+    assert found["skipped"] == "peers left out: reason."
+    assert len(found["rates"]) == 3
+
+
+def test_rigid_skid_steer_turns_left_when_the_right_bank_is_faster():
+    if peers.missing():
+        pytest.skip(peers.missing())
+    motion = peers.turning_on_rigid_ground()
+    assert motion["yaw_rate"] > 0.01
+    assert motion["speed"] == pytest.approx(0.21, abs=0.03)
+
+
+def test_finer_rules_have_smaller_errors():
+    states = accuracy.wheel_states(10)
+    median = [
+        np.median(accuracy.force_errors(Numerics(section_nodes=section, contact_nodes=contact), states))
+        for section, contact in ((8, 2), (8, 7), (16, 16))
+    ]
+    assert median[0] > 10 * median[1] > 100 * median[2]
+
+
+def test_kernel_share_is_read_off_slopes(actions):
+    found = kernel_share.share(actions["row_turn"][:1], 50, 2, 256)
+    assert found["microseconds_per_sample"] > 0
+    assert min(found.values()) >= 0
 
 
 def test_memory_is_flat_over_resets():
-    found = memory.over_resets(resets=200, warm_up=100)
+    found = memory.over_resets(150, 100)
     if "skipped" in found:
-        pytest.skip(str(found["skipped"]))
-    assert found["growth_mebibytes"] < 5.0
+        pytest.skip(found["skipped"])
+    assert len(found["resident_mebibytes"]) == 11
+    assert found["growth_mebibytes"] < 2.0
 
 
-def test_everything_is_measured_and_written(tmp_path, monkeypatch):
-    tiny = speed.Effort(repeats=1, steps=5, batches=(1, 2), evaluations=256, states=4, samples=30, resets=20)
-    monkeypatch.setattr(speed.Effort, "quick", classmethod(lambda cls: tiny))
-    speed.main(["--quick", "--output", str(tmp_path)])
-    result = json.loads((tmp_path / "speed.json").read_text())
-    assert (tmp_path / "speed.png").stat().st_size > 10_000
-    assert {"machine"} <= set(result)
-    assert len(result) >= 5
+def test_results_are_complete_and_become_tables(results):
+    again = json.loads(json.dumps(results, allow_nan=False))
+    text = tables.tables_of(again)
+    for words in ("row turn", "untrained_policy", "Native batch", "share in the kernel", "default", "Memory"):
+        assert words in text
+    assert [row["environments"] for row in results["batch"]["row_turn"]] == [1, 2]
+    assert sum(row["default"] for row in results["quadrature"]) == 1
+    assert set(results["time_step"]) == set(workloads.WORKLOADS)
+
+
+def test_figure_is_written(results, tmp_path):
+    pytest.importorskip("matplotlib")
+    for path in speed_figure(results, tmp_path / "speed"):
+        assert path.stat().st_size > 10_000
+
+
+def test_command_outside_a_checkout_says_so(monkeypatch, tmp_path):
+    monkeypatch.setattr(benchmark, "__file__", str(tmp_path / "site-packages/ddagr_gym/commands/benchmark.py"))
+    with pytest.raises(InputError, match="from a checkout"):
+        benchmark.run(benchmark.Arguments())

@@ -57,4 +57,3 @@ def test_exponential_is_clamped_instead_of_underflowing():
 @given(st.floats(1e-6, 0.4), st.floats(0.1, 1.6))
 def test_power_of_a_depth_as_the_kernel_takes_it(depth, exponent):
     assert exp2_bounded(exponent * log2_positive(depth)) == pytest.approx(depth**exponent, rel=1e-12)
-

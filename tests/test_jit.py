@@ -1,0 +1,64 @@
+"""What the package's kernels promise: arrays on the stack, the same bits wherever inlined."""
+
+import numpy as np
+import pytest
+from numba.core.errors import NumbaError
+
+from ddagr_gym.jit import kernel, stack_array
+
+
+@kernel(cached=False)
+def fill_two(values, sums):
+    first, second = stack_array(8), stack_array(8)
+    for i in range(8):
+        first[i] = values[i]
+        second[i] = -values[i]
+    for i in range(8):
+        first[i] += 1.0
+    for i in range(8):
+        sums[i] = first[i] + second[i]
+
+
+@kernel(cached=False)
+def depth(level, result):
+    mine = stack_array(4)
+    for i in range(4):
+        mine[i] = level + i
+    if level < 5:
+        depth(level + 1, result)
+    for i in range(4):
+        result[level, i] = mine[i]
+
+
+def test_stack_arrays_do_not_overlap():
+    sums = np.zeros(8)
+    fill_two(np.arange(8.0), sums)
+    np.testing.assert_array_equal(sums, 1.0)
+
+
+def test_every_call_has_its_own_stack_array():
+    result = np.zeros((6, 4))
+    depth(0, result)
+    np.testing.assert_array_equal(result, np.add.outer(np.arange(6), np.arange(4)))
+
+
+def test_stack_array_needs_a_constant_size():
+    @kernel(cached=False)
+    def variable(size):
+        return stack_array(size)[0]
+
+    with pytest.raises(NumbaError):
+        variable(3)
+
+
+def test_unfused_function_gives_plain_arithmetic():
+    @kernel(cached=False, inline=True, fused=False)
+    def apart(a, b, c):
+        return a * b + c
+
+    @kernel(cached=False)
+    def around(a, b, c):
+        return apart(a, b, c)
+
+    a, b = 1.0 + 2.0**-30, 1.0 - 2.0**-30
+    assert around(a, b, -1.0) == a * b - 1.0
