@@ -160,25 +160,25 @@ def advance_rows(
     samples = readings.shape[1]
     held = commands.shape[1] == 1
     for n in range(first, last):
-        row = rows[n]
+        row, own_parameters, own_memory = rows[n], parameters[n], memory[n]
         use_field = field_index[n] >= 0
         values = fields[max(field_index[n], 0)]
         geometry = field_geometry[max(field_index[n], 0)]
         for k in range(samples):
-            _drive(row, commands[n, 0 if held else k], points, addresses, parameters[n], memory[n])
-            _prepare_ground(row, values, geometry, use_field, points, addresses, parameters[n], memory[n])
+            _drive(row, commands[n, 0 if held else k], points, addresses, own_parameters, own_memory)
+            _prepare_ground(row, values, geometry, use_field, points, addresses, own_parameters, own_memory)
             v_x, v_y, yaw_rate = row[V_X], row[V_Y], row[YAW_RATE]
             steps = _division(row, options)
             for _ in range(steps):
                 advance_body(
                     row, row[SAMPLE_PERIOD] / steps, options, section, contact, coarse, points, addresses,
-                    parameters[n], memory[n],
+                    own_parameters, own_memory,
                 )  # fmt: skip
             _average_motion(row, v_x, v_y, yaw_rate)
             read_imu(row, noise[n, k, 0:3])
             read_encoders(row, noise[n, k, 3:5], row[SAMPLE_PERIOD])
             read_pose(row, noise[n, k, 5:8])
-            apply_effects(POINT_READINGS, row, points, addresses, parameters[n], memory[n])
+            apply_effects(POINT_READINGS, row, points, addresses, own_parameters, own_memory)
             for j in range(8):
                 readings[n, k, j] = row[READING + j]
             for j in range(recorded.shape[0]):

@@ -44,11 +44,29 @@ from ddagr_gym.replay.split import clusters, held_out, training
 from ddagr_gym.replay.windows import WindowSet
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 STEPS = PASSES * ITERATIONS + len(HORIZONS) + 3
 """Steps of progress that one arm makes: its fit, its horizons, baselines, residuals, roll-outs."""
 
 ENCODERS = ("encoder_right", "encoder_left")
+
+
+@dataclass(frozen=True, eq=False)
+class HorizonResult:
+    """Errors after one horizon on the part that no fit has seen.
+
+    Attributes:
+        clusters: (W,) windows that are resampled together share a number.
+        errors: (W,) by model and metric, NaN where nothing measures them.
+        growth: by model, root mean square heading error (T,) after each sample [rad].
+        period: between samples [s].
+    """
+
+    clusters: Integers
+    errors: Mapping[str, Mapping[str, Array]]
+    growth: Mapping[str, Array]
+    period: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +78,7 @@ class ArmResult:
         windows: with free initial states, of the whole recording.
         in_training: (W,) which of them a fit may have seen.
         residuals: (W, T, 8) by simulator.
-        growth: by horizon [s] and model, root mean square heading error (T,) after each sample.
+        horizons: by length [s].
         rollouts: windows and predictions by model, one pair per length.
     """
 
@@ -68,7 +86,7 @@ class ArmResult:
     windows: WindowSet
     in_training: NDArray[np.bool_]
     residuals: Mapping[str, Array]
-    growth: Mapping[float, Mapping[str, Array]]
+    horizons: Mapping[float, HorizonResult]
     rollouts: tuple[tuple[WindowSet, Mapping[str, Array]], ...]
 
 
@@ -82,6 +100,7 @@ class ArmSettings:
         effects: missing physics.
         threads: of the simulator.
         seed: of resampled intervals.
+        swapped: let training and judging part change their roles.
     """
 
     window: float = 2.0
@@ -89,6 +108,7 @@ class ArmSettings:
     effects: tuple[Effect, ...] = ()
     threads: int = 1
     seed: int = 0
+    swapped: bool = False
 
 
 def replay_arm(
@@ -114,7 +134,6 @@ def replay_arm(
     Returns:
         The result and the fitted values by name; None where no window has a known drive.
     """
-    imposed = drive_by == "encoders"
     windows = prepared.windows(settings.window, drive_by)
     if windows is None:
         advance(STEPS)
@@ -122,40 +141,40 @@ def replay_arm(
     seen = prepared.windows(settings.window, drive_by, part=training, most=MOST_WINDOWS)
     baselines = fit_baselines(prepared, robot, drive_by, seen)
     advance(1)
-    fit, cpu = None, 0.0
+    fit, refit = None, None
     if settings.refit and seen is not None:
-        before = time.process_time()
-        fit = _fit(prepared, robot, soil, seen, baselines, imposed, settings, start, advance)
-        cpu = time.process_time() - before
+        fit, refit = _fit(prepared, robot, soil, seen, baselines, settings, start, advance)
     else:
         advance(PASSES * ITERATIONS)
-    simulators = _simulators(robot, soil, settings, imposed, baselines, fit)
+    simulators = _simulators(robot, soil, settings, baselines, fit)
     for simulator in simulators.values():
         simulator.warm_up(windows)
-    free = _residuals(prepared, simulators, windows, imposed)
+    tables, residual = _residuals(prepared, simulators, windows, drive_by)
     advance(1)
-    kinematic = {NO_SLIP: baselines.no_slip}
-    if baselines.effective_track is not None:
-        kinematic[EFFECTIVE_TRACK] = baselines.effective_track
-    errors, comparisons, growth = _horizons(prepared, simulators, kinematic, drive_by, settings, advance)
-    rolled = tuple((run, predict_all(simulators, kinematic, run)) for run in prepared.runs(drive_by))
+    found: dict[float, HorizonResult] = {}
+    for horizon in HORIZONS:
+        result = _horizon(prepared, simulators, baselines.models(), drive_by, horizon)
+        found |= {} if result is None else {horizon: result}
+        advance(1)
+    rolled = tuple((run, predict_all(simulators, baselines.models(), run)) for run in prepared.runs(drive_by))
     advance(1)
+    sizes, pairs = horizon_tables(found, settings.seed)
     judged = prepared.windows(settings.window, drive_by, part=held_out)
     report = ArmReport(
-        "encoders" if imposed else "commands",
+        "encoders" if drive_by == "encoders" else "commands",
         0 if seen is None else seen.count,
         0 if judged is None else judged.count,
-        free[0],
-        errors,
-        comparisons,
-        _rollouts(rolled, imposed),
+        tables,
+        sizes,
+        pairs,
+        _rollouts(rolled, drive_by),
         baselines.report(),
-        None if fit is None else _refit_report(fit, settings.window, cpu),
+        refit,
         simulators[max(simulators)].speed(),
     )
     values = {} if fit is None else dict(zip((p.name for p in fit.parameters), fit.fit.values.tolist(), strict=True))
-    result = ArmResult(report, windows, training(windows, prepared.splits), free[1], growth, rolled)
-    return result, values
+    in_training = training(windows, prepared.splits)
+    return ArmResult(report, windows, in_training, residual, found, rolled), values
 
 
 def _fit(
@@ -164,12 +183,13 @@ def _fit(
     soil: Soil,
     seen: WindowSet,
     baselines: Baselines,
-    imposed: bool,
     settings: ArmSettings,
     start: Mapping[str, float],
     advance: Callable[[int], None],
-) -> ArmFit:
+) -> tuple[ArmFit, RefitReport]:
     made = 0
+    before = time.process_time()
+    imposed = baselines.motor is None
 
     def step() -> None:
         nonlocal made
@@ -190,23 +210,25 @@ def _fit(
         progress=step,
     )
     advance(PASSES * ITERATIONS - made)
-    return fit
+    return fit, _refit_report(fit, settings.window, time.process_time() - before)
 
 
 def _simulators(
-    robot: Robot, soil: Soil, settings: ArmSettings, imposed: bool, baselines: Baselines, fit: ArmFit | None
+    robot: Robot, soil: Soil, settings: ArmSettings, baselines: Baselines, fit: ArmFit | None
 ) -> dict[str, SimulatorOfArm]:
     def make(fitted: ArmFit | None) -> SimulatorOfArm:
         return SimulatorOfArm(
-            robot, soil, settings.effects, imposed=imposed, delay=baselines.delay, fit=fitted, threads=settings.threads
-        )
+            robot, soil, settings.effects, imposed=baselines.motor is None, delay=baselines.delay, fit=fitted,
+            threads=settings.threads,
+        )  # fmt: skip
 
     return {NOMINAL: make(None)} | ({} if fit is None else {REFITTED: make(fit)})
 
 
 def _residuals(
-    prepared: Prepared, simulators: Mapping[str, SimulatorOfArm], windows: WindowSet, imposed: bool
+    prepared: Prepared, simulators: Mapping[str, SimulatorOfArm], windows: WindowSet, drive_by: str
 ) -> tuple[tuple[ModelResiduals, ...], dict[str, Array]]:
+    imposed = drive_by == "encoders"
     left_out = (*prepared.dead, *(ENCODERS if imposed else ()))
     judged = held_out(windows, prepared.splits)
     sigma = weights_of(prepared, windows, imposed)
@@ -220,30 +242,46 @@ def _residuals(
     return tuple(tables), arrays
 
 
-def _horizons(
+def _horizon(
     prepared: Prepared,
     simulators: Mapping[str, SimulatorOfArm],
     kinematic: Mapping[str, KinematicModel],
     drive_by: str,
-    settings: ArmSettings,
-    advance: Callable[[int], None],
-) -> tuple[tuple[HorizonError, ...], tuple[HorizonComparison, ...], dict[float, dict[str, Array]]]:
-    table: list[HorizonError] = []
+    horizon: float,
+) -> HorizonResult | None:
+    windows = prepared.windows(horizon, drive_by, stride=max(1.0, horizon / 6.0), part=held_out)
+    if windows is None:
+        return None
+    predictions = predict_all(simulators, kinematic, windows)
+    known = _metrics(prepared, drive_by)
+    errors = {name: horizon_errors(windows, p) for name, p in predictions.items()}
+    return HorizonResult(
+        clusters(windows, prepared.splits),
+        {name: {metric: error[metric] for metric in known} for name, error in errors.items()},
+        {name: heading_growth(windows, p) for name, p in predictions.items()},
+        windows.period,
+    )
+
+
+def horizon_tables(
+    results: Mapping[float, HorizonResult], seed: int
+) -> tuple[tuple[HorizonError, ...], tuple[HorizonComparison, ...]]:
+    """Sizes of all errors, and simulators against kinematic models.
+
+    Args:
+        results: by horizon [s].
+        seed: of the resampling; the same draws for every model.
+    """
+    sizes: list[HorizonError] = []
     pairs: list[HorizonComparison] = []
-    growth: dict[float, dict[str, Array]] = {}
-    for horizon in HORIZONS:
-        windows = prepared.windows(horizon, drive_by, stride=max(1.0, horizon / 6.0), part=held_out)
-        if windows is not None:
-            predictions = predict_all(simulators, kinematic, windows)
-            growth[horizon] = {name: heading_growth(windows, p) for name, p in predictions.items()}
-            errors = {name: horizon_errors(windows, p) for name, p in predictions.items()}
-            near = clusters(windows, prepared.splits)
-            for metric in _metrics(prepared, drive_by):
-                sizes = {name: error[metric] for name, error in errors.items()}
-                table += _sizes(horizon, metric, sizes, near, settings.seed)
-                pairs += _pairs(horizon, metric, sizes, tuple(simulators), tuple(kinematic), near, settings.seed)
-        advance(1)
-    return tuple(table), tuple(pairs), growth
+    for horizon, result in results.items():
+        metrics = next(iter(result.errors.values()))
+        for metric in metrics:
+            for model, errors in result.errors.items():
+                size = error_statistics(errors[metric], result.clusters, np.random.default_rng(seed))
+                sizes.append(HorizonError(model, horizon, metric, METRICS[metric][0], size))
+            pairs += _pairs(horizon, metric, result, seed)
+    return tuple(sizes), tuple(pairs)
 
 
 def _metrics(prepared: Prepared, drive_by: str) -> list[str]:
@@ -252,42 +290,26 @@ def _metrics(prepared: Prepared, drive_by: str) -> list[str]:
     return [m for m in METRICS if m not in by_gyro and not (m == "wheel_speed" and drive_by == "encoders")]
 
 
-def _sizes(
-    horizon: float, metric: str, sizes: Mapping[str, Array], near: NDArray[np.int64], seed: int
-) -> list[HorizonError]:
-    # the same draws for every model
-    return [
-        HorizonError(name, horizon, metric, METRICS[metric][0], error_statistics(e, near, np.random.default_rng(seed)))
-        for name, e in sizes.items()
-    ]
-
-
-def _pairs(
-    horizon: float,
-    metric: str,
-    sizes: Mapping[str, Array],
-    candidates: Sequence[str],
-    baselines: Sequence[str],
-    near: NDArray[np.int64],
-    seed: int,
-) -> list[HorizonComparison]:
+def _pairs(horizon: float, metric: str, result: HorizonResult, seed: int) -> list[HorizonComparison]:
     made = []
-    for candidate in candidates:
-        for baseline in baselines:
-            pair = compare(candidate, sizes[candidate], baseline, sizes[baseline], near, np.random.default_rng(seed))
-            if pair is not None:
-                made.append(HorizonComparison(horizon, metric, pair))
+    for candidate in (NOMINAL, REFITTED):
+        for baseline in (NO_SLIP, EFFECTIVE_TRACK):
+            if candidate in result.errors and baseline in result.errors:
+                ours, theirs = result.errors[candidate][metric], result.errors[baseline][metric]
+                rng = np.random.default_rng(seed)
+                pair = compare(candidate, ours, baseline, theirs, result.clusters, rng)
+                made += [] if pair is None else [HorizonComparison(horizon, metric, pair)]
     return made
 
 
-def _rollouts(rolled: Sequence[tuple[WindowSet, Mapping[str, Array]]], imposed: bool) -> tuple[Rollout, ...]:
+def _rollouts(rolled: Sequence[tuple[WindowSet, Mapping[str, Array]]], drive_by: str) -> tuple[Rollout, ...]:
     made = []
     for windows, predictions in rolled:
         for name, prediction in predictions.items():
             errors = horizon_errors(windows, prediction)
             for w in range(windows.count):
                 ends = {m: float(e[w]) if np.isfinite(e[w]) else None for m, e in errors.items()}
-                if imposed:
+                if drive_by == "encoders":
                     ends["wheel_speed"] = None
                 made.append(Rollout(name, float(windows.time[w]), windows.duration, ends))
     return tuple(made)

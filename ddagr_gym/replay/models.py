@@ -16,7 +16,7 @@ from ddagr_gym.replay.kinematic import KinematicModel, Motor, fit_motor, fit_tra
 from ddagr_gym.replay.model import WindowModel, fit_numerics
 from ddagr_gym.replay.prepare import Prepared
 from ddagr_gym.replay.refit import Refitter
-from ddagr_gym.replay.report import BaselineReport, Speed
+from ddagr_gym.replay.report import EFFECTIVE_TRACK, NO_SLIP, BaselineReport, Speed
 from ddagr_gym.replay.windows import CHANNELS, WindowSet
 
 Array = NDArray[np.float64]
@@ -107,6 +107,12 @@ class Baselines:
     def delay(self) -> float:
         """Of recorded wheel speeds [s]; 0 in the commands' arm, whose motor has its own."""
         return self.no_slip.delay
+
+    def models(self) -> dict[str, KinematicModel]:
+        """Those that there are, by name."""
+        return {NO_SLIP: self.no_slip} | (
+            {} if self.effective_track is None else {EFFECTIVE_TRACK: self.effective_track}
+        )
 
     def report(self) -> BaselineReport:
         """For the document."""

@@ -85,13 +85,14 @@ class Prepared:
         )  # fmt: skip
 
 
-def prepare(recordings: Sequence[Recording], robot: Robot, rng: np.random.Generator) -> Prepared:
+def prepare(recordings: Sequence[Recording], robot: Robot, rng: np.random.Generator, swapped: bool = False) -> Prepared:
     """Correct clocks, judge noise, split.
 
     Args:
         recordings: of ``robot``, of one sample period.
         robot: that drove.
         rng: for the interval of the poses' lateness.
+        swapped: let training and judging part change their roles.
 
     Raises:
         InputError: a recording of another robot, or without time.
@@ -110,7 +111,7 @@ def prepare(recordings: Sequence[Recording], robot: Robot, rng: np.random.Genera
     return Prepared(
         tuple(even),
         noise,
-        tuple(split_recording(recording) for recording in even),
+        tuple(split_recording(recording, swapped) for recording in even),
         RobotGeometry.of(robot),
         tuple(dead),
         tuple(_notes(recordings, noise, dead)),

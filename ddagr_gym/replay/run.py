@@ -65,7 +65,7 @@ def replay_run(
     """
     if not SHORTEST_WINDOW <= settings.window <= LONGEST_WINDOW:
         raise InputError(f"the window is {settings.window:g} s: give {SHORTEST_WINDOW:g} to {LONGEST_WINDOW:g} s.")
-    prepared = prepare(recordings, robot, np.random.default_rng(settings.seed))
+    prepared = prepare(recordings, robot, np.random.default_rng(settings.seed), settings.swapped)
     found: dict[str, ArmResult] = {}
     values: dict[str, float] = {}
     for drive_by in reversed(DRIVES):

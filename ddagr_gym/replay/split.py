@@ -37,22 +37,28 @@ class Split:
     rule: str
 
 
-def split_recording(recording: Recording) -> Split:
-    """Alternate spans, or blocks of time where there are few spans; neighbours in time go to different parts."""
+def split_recording(recording: Recording, swapped: bool = False) -> Split:
+    """Alternate spans, or blocks of time where there are few spans; neighbours in time go to different parts.
+
+    Args:
+        recording: any.
+        swapped: let the parts change their roles, for cross-validation.
+    """
+    order = "the first judges, the second trains" if swapped else "the first trains, the second judges"
     spans = list(recording.spans())
     block = np.zeros(len(recording), dtype=np.int64)
     if len(spans) >= MANY_SPANS:
         for number, span in enumerate(spans):
-            block[span] = number
-        return Split(block, f"{len(spans)} spans alternate: the first trains, the second judges, and so on")
+            block[span] = number + swapped
+        return Split(block, f"{len(spans)} spans alternate: {order}, and so on")
     total = sum(float(recording.t[s.stop - 1] - recording.t[s.start]) for s in spans)
     length = min(max(total / BLOCKS, SHORTEST_BLOCK), LONGEST_BLOCK)
-    first = 0
+    first = int(swapped)
     for span in spans:
         number = ((recording.t[span] - recording.t[span.start]) / length).astype(np.int64)
         block[span] = first + number
         first = int(block[span.stop - 1]) + 1
-    return Split(block, f"blocks of {length:.3g} s alternate: the first trains, the second judges, and so on")
+    return Split(block, f"blocks of {length:.3g} s alternate: {order}, and so on")
 
 
 def window_blocks(windows: WindowSet, splits: Sequence[Split]) -> Integers:

@@ -69,6 +69,35 @@ def test_default_numerics_follow_the_converged_solution_through_a_locked_turn():
     assert error[:, 200:].max() < 2e-4
 
 
+CONVERGED = Numerics(
+    substeps=32, accepted_error=2e-4, jacobian_refresh=0.02, force_extrapolation=0.0, sinkage_tolerance=1e-7
+)
+
+
+@pytest.mark.parametrize("name", ["thesis_a1", "firm_ground"])
+def test_default_numerics_follow_the_converged_solution_under_an_untrained_policy(name):
+    """Bank speeds drawn anew every 80 ms: wheels reverse, the robot creeps, steps are divided."""
+    commands = np.random.default_rng(3).uniform(-2.0, 2.0, (60, 2)).repeat(10, axis=0)
+    error = _stack(_drive(commands, soil=get_soil(name)))
+    error -= _stack(_drive(commands, soil=get_soil(name), numerics=CONVERGED))
+    assert np.sqrt(np.mean(error**2, axis=1)).max() < 3e-4
+
+
+@pytest.mark.parametrize("limit", [0.0, 0.03])
+def test_forces_extrapolated_between_steps_cost_no_accuracy(limit):
+    commands = np.concatenate([np.tile([0.8, 0.8], (100, 1)), np.tile([0.4, 1.2], (200, 1))])
+    drive = _drive(commands, numerics=Numerics(force_extrapolation=limit))
+    error = _stack(drive) - _stack(_drive(commands, numerics=CONVERGED))
+    assert np.sqrt(np.mean(error**2, axis=1)).max() < 5e-5
+    # the forces handed out belong to the motion handed out
+    for i in range(1, 5):
+        velocity = drive["true_v_x"] + (1 if i % 2 else -1) * ROBOT.half_track * drive["true_yaw_rate"]
+        rim = ROBOT.wheels[0].outer_radius * drive["true_omega_right" if i % 2 else "true_omega_left"]
+        larger = np.maximum(np.abs(velocity), np.abs(rim))[50:]
+        slip = drive[f"true_slip_ratio_{i}"][50:]
+        np.testing.assert_allclose(slip * larger, (rim - velocity)[50:], atol=1e-12)
+
+
 # Rest
 
 
