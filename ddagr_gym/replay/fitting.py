@@ -38,7 +38,8 @@ ROBUST = 2.0
 MOST_WINDOWS = 150
 """Training windows that a fit uses, evenly chosen: 5 min of 2 s windows."""
 UNKNOWN_GYRO_BIAS = 0.005
-"""Prior where the robot never stood [rad/s]."""
+"""Prior where a robot never stood [rad/s]."""
+LEAST_GYRO_BIAS = 2e-4
 PASSES = 2
 ITERATIONS = 8
 TOLERANCE = 5e-4
@@ -139,8 +140,9 @@ def arm_parameters(
         imposed: True where recorded wheel speeds drive, so that motors do not matter.
     """
     robots = tuple(p for p in robot_parameters(robot) if not (imposed and p.name in MOTOR_PARAMETERS))
-    biases = [UNKNOWN_GYRO_BIAS if item.gyro_bias is None else float(np.hypot(*item.gyro_bias)) for item in noise]
-    sensors = [p for p in sensor_parameters(len(noise), max(biases), 1.0) if p.name.startswith("gyro_bias")]
+    known = [float(np.hypot(*item.gyro_bias)) for item in noise if item.gyro_bias is not None]
+    bias = max(*known, LEAST_GYRO_BIAS) if len(known) == len(noise) else UNKNOWN_GYRO_BIAS
+    sensors = [p for p in sensor_parameters(len(noise), bias, 1.0) if p.name.startswith("gyro_bias")]
     shift = wheel_speed_shift(LATEST_CLOCK - period) if imposed else command_shift(period)
     return (*soil_parameters(soil, KIND_STIFFNESS_DEVIATION), *robots, *sensors, shift)
 

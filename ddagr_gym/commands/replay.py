@@ -1,0 +1,244 @@
+"""``ddagr replay``: recorded drives driven again in the simulator, and what it gets wrong."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import tyro
+from tyro.conf import Positional
+
+from ddagr_gym.commands.output import format_table, output_folder, write_text
+from ddagr_gym.commands.progress import Progress
+from ddagr_gym.errors import InputError
+
+if TYPE_CHECKING:
+    from ddagr_gym.recordings.schema import Recording
+    from ddagr_gym.replay.report import ArmReport, ReplayReport
+    from ddagr_gym.replay.run import RunResult
+
+EXAMPLES = (
+    "ddagr replay run.parquet --robot ddagr --soil thesis_a1 --output replayed",
+    "ddagr replay drive.csv.gz --map drive_steps --robot warthog --soil lete_sand_wong --refit --window 5 -o sand",
+    "ddagr replay run_1.parquet run_2.parquet --robot ddagr --soil thesis_a1 --refit --together "
+    "--effects slope=0.05 --output both",
+)
+
+SAMPLE = "replay_demo.parquet"
+"""Simulated drive that ships with the package, in ``ddagr_gym/data``."""
+SAMPLE_SOIL = "sandy_loam_lll_15"
+"""Soil from which the sample's refit starts; it was driven on a somewhat different one."""
+
+
+@dataclass(frozen=True)
+class Arguments:
+    """Replay recordings in the simulator: residuals, roll-outs, error growth, kinematic baselines, refit.
+
+    The simulator is driven by the recorded commands and, as a second arm, by the recorded wheel speeds: in short
+    windows with free initial states, and from the state at a start over 1, 5 and 30 s and over every whole stretch.
+    Parameters and baselines are fitted on one part of each recording (alternate steps, or blocks of time) and judged
+    on the other.
+
+    Attributes:
+        runs: recordings: Parquet of `ddagr import`, or any source that it takes.
+        output: folder to write: replay.json, figures as PNG and SVG, and one page, index.html.
+        soil: nominal soil (see `ddagr soils`).
+        robot: robot that drove (see `ddagr robots`); that of the recordings when it is left out.
+        map: shipped map by name or the path of one's own YAML file, for sources that are not imported yet.
+        effects: missing physics to add, name=size or an effects file; may be repeated.
+        window: length of the windows with free initial states [s]; fit with windows as long as the horizon that counts.
+        refit: fit soil and uncertain robot parameters.
+        together: let all runs share one set of fitted parameters; otherwise each is fitted on its own.
+        overwrite: replace an output folder that an earlier command wrote.
+        threads: of the simulator.
+        seed: of the resampled intervals.
+        maximum_rows: refuse a recording with more rows or messages.
+        maximum_bytes: refuse a recording that unpacks to more bytes.
+    """
+
+    runs: Positional[tuple[Path, ...]]
+    output: Annotated[Path, tyro.conf.arg(aliases=("-o",))]
+    soil: str
+    robot: str = ""
+    map: str = ""
+    effects: Annotated[tuple[str, ...], tyro.conf.UseAppendAction] = ()
+    window: float = 2.0
+    refit: bool = False
+    together: bool = False
+    overwrite: bool = False
+    threads: int = 1
+    seed: int = 0
+    maximum_rows: int = 2_000_000
+    maximum_bytes: int = 4 * 2**30
+
+
+def run(arguments: Arguments) -> None:
+    """Replay, print the tables, write report, figures and page."""
+    from ddagr_gym.physics.effects import load_effects
+    from ddagr_gym.presets import get_robot, get_soil
+    from ddagr_gym.replay.arm import ArmSettings
+
+    if arguments.threads < 1:
+        raise InputError(f"--threads is {arguments.threads}: give at least 1.")
+    soil = get_soil(arguments.soil)
+    effects = tuple(effect for item in arguments.effects for effect in load_effects(item))
+    recordings = _load(arguments)
+    robot = get_robot(_robot_name(arguments.robot, recordings))
+    settings = ArmSettings(arguments.window, arguments.refit, effects, threads=arguments.threads, seed=arguments.seed)
+    groups = [recordings] if arguments.together else [[recording] for recording in recordings]
+    with output_folder(arguments.output, overwrite=arguments.overwrite) as folder:
+        report = replay_groups(groups, robot, soil, arguments.soil, settings, folder)
+    for text in summary(report):
+        print(text)
+    print(f"\nreport, figures and page: {arguments.output}")
+
+
+def _load(arguments: Arguments) -> list[Recording]:
+    from ddagr_gym.recordings.files import Limits
+    from ddagr_gym.recordings.load import load_recording
+
+    if not arguments.runs:
+        raise InputError("no recording is given: name one or more files.")
+    limits = Limits(arguments.maximum_rows, arguments.maximum_bytes)
+    return [load_recording(r, arguments.map or None, arguments.robot or None, limits) for r in arguments.runs]
+
+
+def _robot_name(asked: str, recordings: Sequence[Recording]) -> str:
+    names = sorted({recording.meta.robot for recording in recordings} - {""})
+    if len(names) > 1:
+        raise InputError(f"the runs are of the robots {', '.join(names)}: replay one robot at a time.")
+    if not asked and not names:
+        raise InputError("the recordings do not say which robot drove: name it with --robot.")
+    return asked or names[0]
+
+
+def replay_groups(
+    groups: Sequence[Sequence[Recording]], robot: Any, soil: Any, soil_name: str, settings: Any, folder: Path
+) -> ReplayReport:
+    """Replay groups of recordings and write report, figures and page into a folder.
+
+    Args:
+        groups: recordings that share fitted parameters.
+        robot: nominal.
+        soil: nominal.
+        soil_name: for the report.
+        settings: :class:`~ddagr_gym.replay.arm.ArmSettings`.
+        folder: that exists.
+    """
+    from ddagr_gym.replay.report import save_report
+    from ddagr_gym.replay.run import make_report, replay_run, steps
+    from ddagr_gym.reporting.replay_page import replay_page
+
+    results = []
+    with Progress(steps(len(groups)), "replaying", stream=sys.stderr) as progress:
+        for group in groups:
+            results.append(replay_run(group, robot, soil, settings, progress.advance))
+    report = make_report(results, robot.name, soil_name, settings)
+    figures = _draw(results, folder)
+    save_report(report, folder / "replay.json")
+    write_text(folder / "index.html", replay_page(report, figures))
+    return report
+
+
+def _draw(results: Sequence[RunResult], folder: Path) -> dict[tuple[int, str], list[Path]]:
+    from ddagr_gym.reporting.replay_figures import replay_overview, replay_residuals
+
+    figures: dict[tuple[int, str], list[Path]] = {}
+    with Progress(sum(len(result.arms) for result in results), "drawing") as progress:
+        for number, result in enumerate(results):
+            stem = _stem(result, number, len(results))
+            for arm in result.arms:
+                title = f"{', '.join(result.report.sources)}, driven by {_DRIVEN[arm.report.drive]}"
+                overview, _ = replay_overview(arm, folder / f"{stem}_{arm.report.drive}", title)
+                detail, _ = replay_residuals(arm, folder / f"{stem}_{arm.report.drive}_residuals", title)
+                figures[number, arm.report.drive] = [overview, detail]
+                progress.advance()
+    return figures
+
+
+_DRIVEN = {"commands": "commands", "encoders": "wheel speeds"}
+
+
+def _stem(result: RunResult, number: int, count: int) -> str:
+    name = Path(result.report.sources[0]).name.split(".", 1)[0] or "run"
+    name = f"{name}_and_{len(result.report.sources) - 1}_more" if len(result.report.sources) > 1 else name
+    return f"{number + 1}_{name}" if count > 1 else name
+
+
+def summary(report: ReplayReport) -> list[str]:
+    """Tables of a report as text, one per arm of each run."""
+    texts = []
+    for item in report.runs:
+        texts.append(f"\n{', '.join(item.sources)}: {item.seconds:.0f} s; {item.split}")
+        texts += [f"note: {note}" for note in item.notes]
+        texts += [arm_text(arm) for arm in item.arms]
+    return texts
+
+
+def arm_text(arm: ArmReport) -> str:
+    """Errors and residuals of one arm as tables."""
+    from ddagr_gym.replay.report import MODELS
+
+    models = [m for m in MODELS if any(e.model == m for e in arm.horizons)]
+    rows = []
+    for horizon, metric in dict.fromkeys((e.horizon, e.metric) for e in arm.horizons if e.error.count):
+        found = {e.model: e for e in arm.horizons if (e.horizon, e.metric) == (horizon, metric)}
+        sizes = [_number(found[m].error.rms) for m in models]
+        first = found[models[0]]
+        rows.append((f"{metric} after {horizon:g} s", first.unit, str(first.error.count), *sizes))
+    errors = format_table(("root mean square error", "unit", "windows", *models), rows) if rows else "no unseen windows"
+    names = [table.model for table in arm.residuals]
+    channels = [
+        (c.channel, c.unit, _number(c.noise), *(_number(t.channels[k].rms) for t in arm.residuals),
+         *(_number(t.channels[k].bias) for t in arm.residuals), f"{c.correlation:.2f}")
+        for k, c in enumerate(arm.residuals[0].channels)
+    ]  # fmt: skip
+    head = ("residual", "unit", "noise", *(f"rms {n}" for n in names), *(f"bias {n}" for n in names), "correlation")
+    parts = [f"\ndriven by {_DRIVEN[arm.drive]}", errors]
+    parts += [format_table(head, channels)] if channels else []
+    parts.append(_fit_text(arm))
+    parts.append(f"simulator: {arm.speed.times_real_time:.0f} times real time on one core")
+    return "\n".join(part for part in parts if part)
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3g}"
+
+
+def _fit_text(arm: ArmReport) -> str:
+    if arm.refit is None:
+        return ""
+    rows = [
+        (p.name, "ln factor" if p.unit == "-" else p.unit, f"{p.value:+.3f}", f"{p.window_deviation:.3f}",
+         f"{p.prior:.3f}", f"{p.pull:+.1f}", "at bound" if p.at_bound else "pulled" if abs(p.pull) > 3.0 else "")
+        for p in arm.refit.parameters
+    ]  # fmt: skip
+    return format_table(("refitted", "unit", "value", "deviation", "prior", "pull", ""), rows)
+
+
+def replay_demo(recording_path: Path | None, folder: Path, robot: str = "") -> ReplayReport:
+    """What ``ddagr demo`` shows of a replay: a recording driven again, with a refit.
+
+    Args:
+        recording_path: a recording; None for a simulated drive that ships with the package.
+        folder: that exists, for report, figures and page.
+        robot: that drove, where the recording does not say.
+
+    Returns:
+        The report; :func:`summary` has it as text.
+
+    Raises:
+        InputError: the recording cannot be read or replayed.
+    """
+    from ddagr_gym.presets import get_robot, get_soil
+    from ddagr_gym.recordings.load import load_recording
+    from ddagr_gym.replay.arm import ArmSettings
+
+    path = Path(__file__).resolve().parents[1] / "data" / SAMPLE if recording_path is None else recording_path
+    recording = load_recording(path, None, robot or None)
+    name = _robot_name(robot, [recording])
+    soil = SAMPLE_SOIL if name == "ddagr" else "firm_ground"
+    return replay_groups([[recording]], get_robot(name), get_soil(soil), soil, ArmSettings(refit=True), folder)

@@ -1,0 +1,316 @@
+"""Figures of a replay: paths, growth of the errors, and what the residuals depend on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ddagr_gym.frames import rotation_matrix
+from ddagr_gym.replay.arm import ArmResult
+from ddagr_gym.replay.report import EFFECTIVE_TRACK, MODELS, NO_SLIP, NOMINAL, REFITTED, HorizonError
+from ddagr_gym.replay.residuals import REGIMES
+from ddagr_gym.replay.split import evenly
+from ddagr_gym.replay.windows import CHANNELS, WindowSet
+from ddagr_gym.reporting import palette
+from ddagr_gym.reporting.figures import DASHED, house_style, save_figure
+
+Array = NDArray[np.float64]
+
+MODEL_STYLES: dict[str, tuple[str, str, Any]] = {
+    NOMINAL: ("simulator, nominal", palette.SKY_BLUE, "-"),
+    REFITTED: ("simulator, refitted", palette.VERMILLION, "-"),
+    NO_SLIP: ("kinematic, no slip", palette.GREY, (0, (1, 1.4))),
+    EFFECTIVE_TRACK: ("kinematic, effective track", palette.GREEN, DASHED),
+}
+"""Label, colour and line of each model."""
+
+CELLS = 12
+"""Roll-outs that are drawn, evenly chosen."""
+ROW = 4
+
+_POSE = [CHANNELS.index(name) for name in ("pose_x", "pose_y", "pose_yaw")]
+_YAW_RATE = CHANNELS.index("yaw_rate")
+_SHOWN = ("yaw_rate", "specific_force_x", "specific_force_y", "encoder_right", "encoder_left")
+_LABELS = {
+    "specific_force_x": "specific force x", "specific_force_y": "specific force y", "yaw_rate": "yaw rate",
+    "encoder_right": "encoder right", "encoder_left": "encoder left", "pose_x": "pose x", "pose_y": "pose y",
+    "pose_yaw": "pose heading",
+}  # fmt: skip
+
+
+def replay_overview(arm: ArmResult, path: Path, title: str) -> tuple[Path, Path]:
+    """Roll-outs on the measured path, residuals along it, and errors against the horizon.
+
+    Args:
+        arm: one arm of a replay.
+        path: where, with or without a suffix.
+        title: names the recording and the arm.
+
+    Returns:
+        Paths of the PNG and of the SVG.
+    """
+    with house_style():
+        from matplotlib.figure import Figure
+
+        figure = Figure(figsize=(10.0, 8.0))
+        figure.text(0.045, 0.965, title, fontsize=11.0, fontweight="bold")
+        _legend(figure, arm)
+        _draw_rollouts(figure.add_axes((0.045, 0.475, 0.475, 0.395)), arm)
+        _draw_along_path(figure, figure.add_axes((0.045, 0.05, 0.41, 0.345)), arm)
+        _draw_growth(figure.add_axes((0.605, 0.61, 0.375, 0.26)), arm)
+        _draw_horizons(figure.add_axes((0.605, 0.335, 0.375, 0.2)), arm, "heading", "Heading error", "[rad]")
+        _draw_horizons(figure.add_axes((0.605, 0.06, 0.375, 0.2)), arm, "position", "Position error", "[m]")
+        return save_figure(figure, path)
+
+
+def replay_residuals(arm: ArmResult, path: Path, title: str) -> tuple[Path, Path]:
+    """Residuals over their noise by channel, and against slip, yaw rate, speed, heading and time.
+
+    Args:
+        arm: one arm of a replay.
+        path: where, with or without a suffix.
+        title: names the recording and the arm.
+
+    Returns:
+        Paths of the PNG and of the SVG.
+    """
+    with house_style():
+        from matplotlib.figure import Figure
+
+        regimes = arm.report.residuals[0].regimes
+        channels = [name for name in _SHOWN if any(r.channel == name for r in regimes)]
+        height = 3.0 + 1.55 * len(channels)
+        figure = Figure(figsize=(10.0, height))
+        figure.text(0.045, 1.0 - 0.28 / height, title, fontsize=11.0, fontweight="bold")
+        _legend(figure, arm, (NOMINAL, REFITTED))
+        _draw_channels(figure.add_axes((0.115, 1.0 - 2.15 / height, 0.865, 1.2 / height)), arm)
+        for row, channel in enumerate(channels):
+            bottom = 1.0 - (4.15 + 1.55 * row) / height
+            _draw_regimes(figure, arm, channel, bottom, 1.05 / height, row == len(channels) - 1)
+        return save_figure(figure, path)
+
+
+def _legend(figure: Any, arm: ArmResult, models: Sequence[str] = MODELS) -> None:
+    from matplotlib.lines import Line2D
+
+    present = {error.model for error in arm.report.horizons} | set(arm.residuals)
+    measured = [Line2D([], [], color=palette.INK, linewidth=1.6, label="measured")] if len(models) > 2 else []
+    lines = [
+        Line2D([], [], color=colour, linestyle=line, linewidth=1.6, label=label)
+        for name, (label, colour, line) in MODEL_STYLES.items()
+        if name in present and name in models
+    ]
+    height = figure.get_figheight()
+    figure.legend(
+        handles=measured + lines, loc="upper left", bbox_to_anchor=(0.04, 1.0 - 0.33 / height), ncols=5,
+        columnspacing=1.6,
+    )  # fmt: skip
+
+
+def _chosen(arm: ArmResult) -> list[tuple[WindowSet, dict[str, Array], int]]:
+    """Roll-outs to draw, longest first."""
+    runs = [(w, dict(p), i) for w, p in reversed(arm.rollouts) for i in range(w.count)]
+    return [runs[i] for i in evenly(len(runs), CELLS)]
+
+
+def _in_body_frame(path: Array, start: Array) -> Array:
+    """Positions (n, 2) seen from a start (x, y, yaw)."""
+    return np.asarray((path - start[:2]) @ rotation_matrix(start[2]))
+
+
+def _cells(paths: list[list[Array]]) -> tuple[list[Array], float]:
+    """Offsets (2,) that put groups of paths beside each other, and the cells' size."""
+    spans = []
+    for group in paths:
+        points = np.concatenate(group)
+        points = points[np.isfinite(points).all(axis=1)]
+        spans.append((points.min(axis=0), points.max(axis=0)))
+    size = max(float((high - low).max()) for low, high in spans) * 1.12 + 1e-6
+    columns = min(ROW, len(paths))
+    return [
+        np.array([(k % columns) * size, -(k // columns) * size]) - 0.5 * (low + high)
+        for k, (low, high) in enumerate(spans)
+    ], size
+
+
+def _draw_rollouts(axes: Any, arm: ArmResult) -> None:
+    count = sum(w.count for w, _ in arm.rollouts)
+    chosen = _chosen(arm)
+    axes.set_title(f"Long roll-outs ({len(chosen)} of {count}), turned to start along x", pad=6.0)
+    if not chosen:
+        return _nothing(axes, "no stretch with a known drive")
+    groups = []
+    for windows, predictions, w in chosen:
+        start = windows.initial[w, :3]
+        measured = _in_body_frame(windows.measured[w][:, _POSE[:2]], start)
+        models = [_in_body_frame(predictions[name][w][:, _POSE[:2]], start) for name in predictions]
+        groups.append([measured, *models])
+    offsets, _ = _cells([g if np.isfinite(g[0]).any() else g[1:] for g in groups])
+    for (_, predictions, _), group, offset in zip(chosen, groups, offsets, strict=True):
+        for name, path in zip(predictions, group[1:], strict=True):
+            _, colour, line = MODEL_STYLES[name]
+            axes.plot(*(path + offset).T, color=colour, linestyle=line, linewidth=1.1)
+        known = np.isfinite(group[0]).all(axis=1)
+        axes.plot(*(group[0][known] + offset).T, color=palette.INK, linewidth=1.2)
+        axes.plot(*offset, "o", color=palette.INK, markersize=2.5)
+    _as_map(axes)
+
+
+def _as_map(axes: Any) -> None:
+    axes.set_aspect("equal", adjustable="datalim", anchor="C")
+    axes.margins(0.03)
+    axes.grid(False)
+    axes.tick_params(length=0.0, labelleft=False, labelbottom=False)
+    low, high = axes.get_xlim()
+    length = 10.0 ** np.floor(np.log10(max(high - low, 1e-6) / 4.0))
+    length = float(length * max(f for f in (1.0, 2.0, 5.0) if f * length <= (high - low) / 4.0))
+    bottom, top = axes.get_ylim()
+    y = bottom + 0.03 * (top - bottom)
+    axes.plot([low + 0.03 * (high - low), low + 0.03 * (high - low) + length], [y, y], color=palette.INK, linewidth=2.0)
+    axes.text(low + 0.03 * (high - low), y + 0.015 * (top - bottom), f"{length:g} m", fontsize=7.5)
+
+
+def _draw_along_path(figure: Any, axes: Any, arm: ArmResult) -> None:
+    from matplotlib.collections import LineCollection
+    from matplotlib.colors import LinearSegmentedColormap
+
+    name = REFITTED if REFITTED in arm.residuals else NOMINAL
+    axes.set_title(f"Mean yaw rate residual of windows along the path, {MODEL_STYLES[name][0]}", pad=6.0)
+    residual = arm.residuals[name][..., _YAW_RATE]
+    known = np.isfinite(residual)
+    mean = np.where(known, residual, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
+    starts = [(w.recording[i], w.time[i], w.time[i] + w.duration, w.initial[i, :3]) for w, _, i in _chosen(arm)]
+    pieces, values, groups = [], [], []
+    for recording, first, last, start in starts:
+        group = []
+        for k in np.flatnonzero((arm.windows.recording == recording) & (arm.windows.time >= first - 1e-6)):
+            pose = arm.windows.measured[k][:, _POSE[:2]]
+            pose = pose[np.isfinite(pose).all(axis=1)]
+            if arm.windows.time[k] < last and len(pose) > 1 and known[k].any():
+                group.append((_in_body_frame(pose, start), mean[k]))
+        groups.append(group)
+    groups = [g for g in groups if g]
+    if not groups:
+        return _nothing(axes, "no pose or no gyro")
+    offsets, _ = _cells([[path for path, _ in g] for g in groups])
+    for group, offset in zip(groups, offsets, strict=True):
+        pieces += [path + offset for path, _ in group]
+        values += [value for _, value in group]
+    limit = float(np.quantile(np.abs(values), 0.95)) or 1.0
+    colours = LinearSegmentedColormap.from_list("residual", (palette.BLUE, palette.PALE, palette.VERMILLION))
+    lines = LineCollection(pieces, array=np.array(values), cmap=colours, clim=(-limit, limit), linewidths=2.2)
+    axes.add_collection(lines)
+    axes.autoscale()
+    _as_map(axes)
+    left, bottom, width, height = axes.get_position().bounds
+    bar = figure.colorbar(lines, cax=figure.add_axes((left + width + 0.012, bottom, 0.012, height)))
+    bar.set_label("measured less predicted [rad/s]")
+    bar.outline.set_visible(False)
+    return None
+
+
+def _nothing(axes: Any, text: str) -> None:
+    axes.text(0.5, 0.5, text, ha="center", va="center", color=palette.GREY, transform=axes.transAxes)
+    axes.set_xticks([])
+    axes.set_yticks([])
+    axes.grid(False)
+
+
+def _draw_growth(axes: Any, arm: ArmResult) -> None:
+    axes.set_title("Growth of the heading error, by the gyro", pad=5.0)
+    judged = {h: r for h, r in arm.horizons.items() if any("heading" in e for e in r.errors.values())}
+    if not judged:
+        return _nothing(axes, "no part of the recording is unseen, or no gyro")
+    longest = max(judged)
+    for name, curve in judged[longest].growth.items():
+        _, colour, line = MODEL_STYLES[name]
+        times = judged[longest].period * np.arange(1, len(curve) + 1)
+        axes.plot(times, curve, color=colour, linestyle=line, linewidth=1.6)
+    best = [c[-1] for n, c in judged[longest].growth.items() if n != NO_SLIP and np.isfinite(c[-1])]
+    if best:
+        axes.set_ylim(0.0, 1.25 * max(best))
+    axes.set(xlim=(0.0, longest), xlabel="time since the start [s]", ylabel="root mean square [rad]")
+    return None
+
+
+def _draw_horizons(axes: Any, arm: ArmResult, metric: str, title: str, unit: str) -> None:
+    axes.set_title(f"{title}: median (dot) and r.m.s. (bar) with 95 % intervals", pad=5.0)
+    shown = [e for e in arm.report.horizons if e.metric == metric and e.error.count]
+    if not shown:
+        return _nothing(axes, "nothing measures it")
+    horizons = sorted({e.horizon for e in shown})
+    for error in shown:
+        place = horizons.index(error.horizon) + 0.16 * (MODELS.index(error.model) - 1.5)
+        _draw_error(axes, place, error)
+    axes.set_yscale("log")
+    axes.set(xlim=(-0.5, len(horizons) - 0.5), ylabel=unit)
+    axes.set_xticks(range(len(horizons)), [f"after {h:g} s" for h in horizons])
+    axes.tick_params(axis="x", length=0.0)
+    axes.grid(False, axis="x")
+    return None
+
+
+def _draw_error(axes: Any, place: float, item: HorizonError) -> None:
+    colour, error = MODEL_STYLES[item.model][1], item.error
+    for value, interval, marker, size, shift in (
+        (error.rms, error.rms_interval, "_", 8.0, -0.02),
+        (error.median, error.median_interval, "o", 3.0, 0.02),
+    ):
+        if value is None or value <= 0.0:
+            continue
+        if interval is not None and interval[0] > 0.0:
+            axes.plot([place + shift] * 2, interval, color=colour, linewidth=1.0)
+        axes.plot(place + shift, value, marker, color=colour, markersize=size, markeredgewidth=1.6)
+
+
+def _draw_channels(axes: Any, arm: ArmResult) -> None:
+    axes.set_title("Residual over noise, windows with free initial states, unseen part (1: nothing left to explain)")
+    names = [c.channel for c in arm.report.residuals[0].channels]
+    if not names:
+        return _nothing(axes, "no part of the recording is unseen")
+    for model, table in enumerate(arm.report.residuals):
+        colour = MODEL_STYLES[table.model][1]
+        places = np.arange(len(names)) + 0.3 * (model - 0.5 * (len(arm.report.residuals) - 1))
+        axes.bar(places, [c.relative for c in table.channels], width=0.28, color=colour)
+    axes.axhline(1.0, color=palette.INK, linewidth=0.8, linestyle=DASHED)
+    axes.set_yscale("log")
+    axes.set_ylabel("[-]")
+    axes.set_xticks(range(len(names)), [_LABELS[name] for name in names])
+    axes.tick_params(axis="x", length=0.0)
+    axes.grid(False, axis="x")
+    return None
+
+
+def _draw_regimes(figure: Any, arm: ArmResult, channel: str, bottom: float, height: float, last: bool) -> None:
+    limit = 0.0
+    panels = []
+    for column, (against, (unit, _)) in enumerate(REGIMES.items()):
+        axes = figure.add_axes((0.115 + 0.1765 * column, bottom, 0.15, height))
+        panels.append(axes)
+        axes.axhline(0.0, color=palette.GREY, linewidth=0.6)
+        for table in arm.report.residuals:
+            for regime in table.regimes:
+                if regime.channel != channel or regime.against != against:
+                    continue
+                centres, means, spread = (np.array(v) for v in (regime.centres, regime.means, regime.deviations))
+                colour = MODEL_STYLES[table.model][1]
+                axes.fill_between(centres, means - 2 * spread, means + 2 * spread, color=colour, alpha=0.2, linewidth=0)
+                axes.plot(centres, means, "o-", color=colour, markersize=2.5, linewidth=1.0)
+                limit = max(limit, float(np.quantile(np.abs(means) + spread, 0.95)))
+        axes.tick_params(labelleft=column == 0)
+        if last:
+            name = against.replace("_", " ")
+            axes.set_xlabel(f"{name} [{unit}]" if unit != "-" else f"mean |{name} ratio| [-]")
+    for axes in panels:
+        axes.set_ylim(-1.3 * (limit or 1.0), 1.3 * (limit or 1.0))
+    panels[0].set_ylabel(f"{_LABELS[channel]}\n[{_unit(channel)}]")
+
+
+def _unit(channel: str) -> str:
+    from ddagr_gym.recordings.schema import CHANNELS as SCHEMA
+
+    return SCHEMA[channel].unit
