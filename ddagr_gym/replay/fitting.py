@@ -82,7 +82,13 @@ class ArmFit:
     windows: int
 
 
-def noise_weights(noise: Sequence[RecordingNoise], windows: WindowSet, imposed: bool, dead: Sequence[str]) -> Weights:
+def noise_weights(
+    noise: Sequence[RecordingNoise],
+    windows: WindowSet,
+    imposed: bool,
+    dead: Sequence[str],
+    unfitted: Sequence[str] = UNFITTED,
+) -> Weights:
     """Weights by the recordings' noise.
 
     Args:
@@ -90,10 +96,11 @@ def noise_weights(noise: Sequence[RecordingNoise], windows: WindowSet, imposed: 
         windows: to be fitted.
         imposed: True where the encoders drive, and so cannot judge.
         dead: channels to leave out.
+        unfitted: further ones; parameters are fitted without UNFITTED, initial states with all.
     """
     roots = np.stack([[_root(item.channels[name].correlation) for name in CHANNELS] for item in noise])
     sigma = (np.stack([item.sigma for item in noise]) * roots)[windows.recording][:, None, :]
-    left_out = [*UNFITTED, *dead, *(("encoder_right", "encoder_left") if imposed else ())]
+    left_out = [*unfitted, *dead, *(("encoder_right", "encoder_left") if imposed else ())]
     sigma[..., [CHANNELS.index(name) for name in left_out]] = np.inf
     return Weights(sigma, ROBUST / roots.max(axis=0))
 

@@ -83,7 +83,7 @@ def _pose_errors(windows: WindowSet, prediction: Array) -> dict[str, Array]:
     errors = {name: np.full(windows.count, np.nan) for name in ("heading_pose", "position", "speed")}
     known = np.asarray(np.isfinite(windows.measured[..., _XY]).all(axis=-1))
     reach, back = round(LAST / windows.period), round(SPEED_TIME / windows.period)
-    start_heading = _start_heading(windows)
+    start_heading = start_headings(windows)
     for w in range(windows.count):
         rows = np.flatnonzero(known[w])
         if rows.size < 3 or rows[0] > reach or rows[-1] < windows.samples - 1 - reach:
@@ -104,7 +104,7 @@ def _pose_errors(windows: WindowSet, prediction: Array) -> dict[str, Array]:
     return errors
 
 
-def _start_heading(windows: WindowSet) -> Array:
+def start_headings(windows: WindowSet) -> Array:
     """Heading at the start (W,) [rad]: circular mean over the window's poses less what the gyro turned until them.
 
     Without a gyro the first guess; NaN where no pose has a heading.

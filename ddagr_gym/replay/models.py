@@ -144,7 +144,7 @@ def fit_baselines(prepared: Prepared, robot: Robot, drive_by: str, training: Win
 
 def weights_of(prepared: Prepared, windows: WindowSet, imposed: bool) -> Array:
     """Standard deviations (W, 1, 8) by which initial states are fitted."""
-    return noise_weights(prepared.noise, windows, imposed, prepared.dead).sigma
+    return noise_weights(prepared.noise, windows, imposed, prepared.dead, unfitted=()).sigma
 
 
 def predict_all(

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from ddagr_gym.errors import InputError
 from ddagr_gym.parameters import Robot
 from ddagr_gym.reporting import palette
-from ddagr_gym.reporting.figures import WHEELS, draw_robot, house_style, save_figure
+from ddagr_gym.reporting.figures import DASHED, WHEELS, draw_robot, house_style, save_figure
 
 DRIVE_FIGURE_COLUMNS = (
     "t",
@@ -58,11 +58,10 @@ def drive_figure(
     with house_style():
         from matplotlib.figure import Figure
 
-        figure = Figure(figsize=(7.4, 5.6), layout="constrained")
-        grid = figure.add_gridspec(5, 2, width_ratios=(1.1, 1.0))
-        _draw_path(figure.add_subplot(grid[:, 0]), data, robot, f"{title} on {soil_name}")
-        axes = [figure.add_subplot(grid[0, 1])]
-        axes += [figure.add_subplot(grid[row, 1], sharex=axes[0]) for row in (1, 2, 3, 4)]
+        # fixed places: a layout engine would push titles and the legends beside them into each other
+        figure = Figure(figsize=(7.4, 5.6))
+        _draw_path(figure.add_axes((0.078, 0.1, 0.425, 0.83)), data, robot, f"{title} on {soil_name}")
+        axes = [figure.add_axes((0.605, 0.835 - 0.1835 * row, 0.385, 0.115)) for row in range(5)]
         _draw_time_series(axes, data)
         figure.align_ylabels(axes)
         return save_figure(figure, path)
@@ -73,7 +72,8 @@ def _draw_path(axes: Any, data: Mapping[str, Any], robot: Robot, title: str) -> 
         draw_robot(axes, robot, [float(data[f"true_{name}"][index]) for name in ("x", "y", "yaw")])
     axes.plot(data["true_x"], data["true_y"], color=palette.TRUE, linewidth=1.6)
     axes.plot(data["true_x"][0], data["true_y"][0], "o", color=palette.INK, markersize=4)
-    axes.set(aspect="equal", xlabel="x [m]", ylabel="y [m]")
+    axes.set(xlabel="x [m]", ylabel="y [m]")
+    axes.set_aspect("equal", anchor="NW")
     axes.margins(0.05)
     axes.set_title(title)
 
@@ -82,28 +82,33 @@ def _draw_time_series(axes: list[Any], data: Mapping[str, Any]) -> None:
     t = data["t"]
     speeds, body, yaw_rate, slip, sinkage = axes
     for bank, colour in (("right", palette.RIGHT), ("left", palette.LEFT)):
-        speeds.plot(t, data[f"command_{bank}"], color=colour, linewidth=0.8, linestyle=(0, (3, 1.5)))
         speeds.plot(t, data[f"true_omega_{bank}"], color=colour, label=bank)
+        speeds.plot(t, data[f"command_{bank}"], color=palette.INK, linewidth=0.8, linestyle=DASHED)
+    speeds.plot([], [], color=palette.INK, linewidth=0.8, linestyle=DASHED, label="command")
     body.plot(t, data["true_v_x"], color=palette.TRUE, label="forward")
     body.plot(t, data["true_v_y"], color=palette.TARGET, label="to the left")
     measured = np.isfinite(data["yaw_rate"])
     yaw_rate.plot(t[measured], data["yaw_rate"][measured], color=palette.PALE, linewidth=0.8, label="gyro")
     yaw_rate.plot(t, data["true_yaw_rate"], color=palette.TRUE, label="true")
-    for index, name, colour, line in WHEELS:
-        slip.plot(t, data[f"true_slip_ratio_{index}"], color=colour, linestyle=line, label=name)
+    for index, _, colour, line in WHEELS:
+        slip.plot(t, data[f"true_slip_ratio_{index}"], color=colour, linestyle=line)
         sinkage.plot(t, 1000.0 * data[f"true_sinkage_{index}"], color=colour, linestyle=line)
     titles = (
-        (speeds, "Bank speeds, commands dashed", "[rad/s]", 2),
+        (speeds, "Bank speed", "[rad/s]", 3),
         (body, "Body speed", "[m/s]", 2),
         (yaw_rate, "Yaw rate", "[rad/s]", 2),
-        (slip, "Slip ratio", "[-]", 4),
+        (slip, "Slip ratio", "[-]", 0),
         (sinkage, "Sinkage", "[mm]", 0),
     )
     for panel, title, unit, columns in titles:
-        panel.set_title(title)
-        panel.set_ylabel(unit)
-        panel.tick_params(labelbottom=panel is sinkage)
+        panel.set_title(title, fontsize=8.0, pad=4.0)
+        panel.set(ylabel=unit, xlim=(t[0], t[-1]))
+        panel.tick_params(labelbottom=panel is sinkage, length=2.5)
         if columns:
-            panel.legend(loc="lower right", bbox_to_anchor=(1.0, 0.97), ncols=columns, columnspacing=1.0)
-    sinkage.set(xlabel="time [s]", xlim=(t[0], t[-1]))
+            panel.legend(
+                loc="lower right", bbox_to_anchor=(1.01, 0.955), ncols=columns, columnspacing=1.0, fontsize=7.0
+            )
+        else:
+            panel.text(1.0, 1.07, "front solid, rear dashed", transform=panel.transAxes, fontsize=7.0, ha="right")
+    sinkage.set_xlabel("time [s]")
     sinkage.set_ylim(bottom=0.0)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ddagr_gym.frames import rotation_matrix
 from ddagr_gym.replay.arm import ArmResult
+from ddagr_gym.replay.horizons import start_headings
 from ddagr_gym.replay.report import EFFECTIVE_TRACK, MODELS, NO_SLIP, NOMINAL, REFITTED, HorizonError
 from ddagr_gym.replay.residuals import REGIMES
 from ddagr_gym.replay.split import evenly
@@ -31,8 +32,10 @@ MODEL_STYLES: dict[str, tuple[str, str, Any]] = {
 CELLS = 12
 """Roll-outs that are drawn, evenly chosen."""
 ROW = 4
+LEAST_EXTENT = 0.5
+"""Smallest cell of a roll-out [m]."""
 
-_POSE = [CHANNELS.index(name) for name in ("pose_x", "pose_y", "pose_yaw")]
+_POSE = [CHANNELS.index(name) for name in ("pose_x", "pose_y")]
 _YAW_RATE = CHANNELS.index("yaw_rate")
 _SHOWN = ("yaw_rate", "specific_force_x", "specific_force_y", "encoder_right", "encoder_left")
 _LABELS = {
@@ -59,11 +62,11 @@ def replay_overview(arm: ArmResult, path: Path, title: str) -> tuple[Path, Path]
         figure = Figure(figsize=(10.0, 8.0))
         figure.text(0.045, 0.965, title, fontsize=11.0, fontweight="bold")
         _legend(figure, arm)
-        _draw_rollouts(figure.add_axes((0.045, 0.475, 0.475, 0.395)), arm)
-        _draw_along_path(figure, figure.add_axes((0.045, 0.05, 0.41, 0.345)), arm)
-        _draw_growth(figure.add_axes((0.605, 0.61, 0.375, 0.26)), arm)
-        _draw_horizons(figure.add_axes((0.605, 0.335, 0.375, 0.2)), arm, "heading", "Heading error", "[rad]")
-        _draw_horizons(figure.add_axes((0.605, 0.06, 0.375, 0.2)), arm, "position", "Position error", "[m]")
+        _draw_rollouts(figure.add_axes((0.045, 0.465, 0.475, 0.41)), arm)
+        _draw_along_path(figure, figure.add_axes((0.045, 0.02, 0.395, 0.385)), arm)
+        _draw_growth(figure.add_axes((0.605, 0.655, 0.375, 0.22)), arm)
+        _draw_horizons(figure.add_axes((0.605, 0.345, 0.375, 0.2)), arm, "heading", "Heading error", "[rad]")
+        _draw_horizons(figure.add_axes((0.605, 0.045, 0.375, 0.2)), arm, "position", "Position error", "[m]")
         return save_figure(figure, path)
 
 
@@ -83,13 +86,13 @@ def replay_residuals(arm: ArmResult, path: Path, title: str) -> tuple[Path, Path
 
         regimes = arm.report.residuals[0].regimes
         channels = [name for name in _SHOWN if any(r.channel == name for r in regimes)]
-        height = 3.0 + 1.55 * len(channels)
+        height = 2.6 + 1.45 * len(channels)
         figure = Figure(figsize=(10.0, height))
         figure.text(0.045, 1.0 - 0.28 / height, title, fontsize=11.0, fontweight="bold")
         _legend(figure, arm, (NOMINAL, REFITTED))
         _draw_channels(figure.add_axes((0.115, 1.0 - 2.15 / height, 0.865, 1.2 / height)), arm)
         for row, channel in enumerate(channels):
-            bottom = 1.0 - (4.15 + 1.55 * row) / height
+            bottom = 1.0 - (3.6 + 1.45 * row) / height
             _draw_regimes(figure, arm, channel, bottom, 1.05 / height, row == len(channels) - 1)
         return save_figure(figure, path)
 
@@ -117,61 +120,68 @@ def _chosen(arm: ArmResult) -> list[tuple[WindowSet, dict[str, Array], int]]:
     return [runs[i] for i in evenly(len(runs), CELLS)]
 
 
+def _start(windows: WindowSet, row: int) -> Array:
+    """Position and heading (x, y, yaw) at a roll-out's start; the heading from all of its poses through the gyro."""
+    heading = float(start_headings(windows.subset(np.array([row])))[0])
+    start = windows.initial[row, :3].copy()
+    start[2] = heading if np.isfinite(heading) else start[2]
+    return start
+
+
 def _in_body_frame(path: Array, start: Array) -> Array:
     """Positions (n, 2) seen from a start (x, y, yaw)."""
     return np.asarray((path - start[:2]) @ rotation_matrix(start[2]))
 
 
-def _cells(paths: list[list[Array]]) -> tuple[list[Array], float]:
-    """Offsets (2,) that put groups of paths beside each other, and the cells' size."""
-    spans = []
-    for group in paths:
+def _fitted_to_cells(groups: list[list[Array]]) -> tuple[list[list[Array]], list[tuple[float, float, float]]]:
+    """Groups of paths, each scaled to a cell of its own, and the cells as (left, bottom, metres across)."""
+    fitted, cells = [], []
+    columns = min(ROW, len(groups))
+    for k, group in enumerate(groups):
         points = np.concatenate(group)
         points = points[np.isfinite(points).all(axis=1)]
-        spans.append((points.min(axis=0), points.max(axis=0)))
-    size = max(float((high - low).max()) for low, high in spans) * 1.12 + 1e-6
-    columns = min(ROW, len(paths))
-    return [
-        np.array([(k % columns) * size, -(k // columns) * size]) - 0.5 * (low + high)
-        for k, (low, high) in enumerate(spans)
-    ], size
+        low, high = points.min(axis=0), points.max(axis=0)
+        size = max(float((high - low).max()), LEAST_EXTENT)
+        centre = np.array([k % columns, -(k // columns)])
+        fitted.append([centre + 0.84 * (path - 0.5 * (low + high)) / size for path in group])
+        cells.append((float(centre[0]) - 0.46, float(centre[1]) - 0.46, size / 0.84))
+    return fitted, cells
+
+
+def _as_map(axes: Any, cells: Sequence[tuple[float, float, float]]) -> None:
+    """No axes, but a scale in every cell."""
+    axes.set_aspect("equal", anchor="NW")
+    axes.axis("off")
+    left, bottom = min(c[0] for c in cells), min(c[1] for c in cells)
+    right, top = max(c[0] for c in cells) + 0.92, max(c[1] for c in cells) + 0.92
+    axes.set(xlim=(left, right), ylim=(bottom - 0.02, top))
+    for x, y, metres in cells:
+        steps = [f * 10.0**e for e in range(-4, 6) for f in (1.0, 2.0, 5.0)]
+        length = max(step for step in steps if step <= 0.3 * metres)
+        axes.plot([x, x + length / metres], [y, y], color=palette.INK, linewidth=1.4, solid_capstyle="butt")
+        axes.text(x, y + 0.015, f"{length:g} m", fontsize=6.5, color=palette.GREY)
 
 
 def _draw_rollouts(axes: Any, arm: ArmResult) -> None:
     count = sum(w.count for w, _ in arm.rollouts)
     chosen = _chosen(arm)
-    axes.set_title(f"Long roll-outs ({len(chosen)} of {count}), turned to start along x", pad=6.0)
+    axes.set_title(f"Long roll-outs ({len(chosen)} of {count}), first heading to the right", pad=4.0)
     if not chosen:
         return _nothing(axes, "no stretch with a known drive")
     groups = []
     for windows, predictions, w in chosen:
-        start = windows.initial[w, :3]
-        measured = _in_body_frame(windows.measured[w][:, _POSE[:2]], start)
-        models = [_in_body_frame(predictions[name][w][:, _POSE[:2]], start) for name in predictions]
-        groups.append([measured, *models])
-    offsets, _ = _cells([g if np.isfinite(g[0]).any() else g[1:] for g in groups])
-    for (_, predictions, _), group, offset in zip(chosen, groups, offsets, strict=True):
-        for name, path in zip(predictions, group[1:], strict=True):
+        start, guess = _start(windows, w), windows.initial[w, :3]
+        measured = _in_body_frame(windows.measured[w][:, _POSE], start)
+        models = [_in_body_frame(predictions[name][w][:, _POSE], guess) for name in predictions]
+        groups.append([measured[np.isfinite(measured).all(axis=1)], *models, np.zeros((1, 2))])
+    fitted, cells = _fitted_to_cells(groups)
+    for (_, predictions, _), group in zip(chosen, fitted, strict=True):
+        for name, path in zip(predictions, group[1:-1], strict=True):
             _, colour, line = MODEL_STYLES[name]
-            axes.plot(*(path + offset).T, color=colour, linestyle=line, linewidth=1.1)
-        known = np.isfinite(group[0]).all(axis=1)
-        axes.plot(*(group[0][known] + offset).T, color=palette.INK, linewidth=1.2)
-        axes.plot(*offset, "o", color=palette.INK, markersize=2.5)
-    _as_map(axes)
-
-
-def _as_map(axes: Any) -> None:
-    axes.set_aspect("equal", adjustable="datalim", anchor="C")
-    axes.margins(0.03)
-    axes.grid(False)
-    axes.tick_params(length=0.0, labelleft=False, labelbottom=False)
-    low, high = axes.get_xlim()
-    length = 10.0 ** np.floor(np.log10(max(high - low, 1e-6) / 4.0))
-    length = float(length * max(f for f in (1.0, 2.0, 5.0) if f * length <= (high - low) / 4.0))
-    bottom, top = axes.get_ylim()
-    y = bottom + 0.03 * (top - bottom)
-    axes.plot([low + 0.03 * (high - low), low + 0.03 * (high - low) + length], [y, y], color=palette.INK, linewidth=2.0)
-    axes.text(low + 0.03 * (high - low), y + 0.015 * (top - bottom), f"{length:g} m", fontsize=7.5)
+            axes.plot(*path.T, color=colour, linestyle=line, linewidth=1.1)
+        axes.plot(*group[0].T, color=palette.INK, linewidth=1.2)
+        axes.plot(*group[-1].T, "o", color=palette.INK, markersize=2.5)
+    return _as_map(axes, cells)
 
 
 def _draw_along_path(figure: Any, axes: Any, arm: ArmResult) -> None:
@@ -179,38 +189,39 @@ def _draw_along_path(figure: Any, axes: Any, arm: ArmResult) -> None:
     from matplotlib.colors import LinearSegmentedColormap
 
     name = REFITTED if REFITTED in arm.residuals else NOMINAL
-    axes.set_title(f"Mean yaw rate residual of windows along the path, {MODEL_STYLES[name][0]}", pad=6.0)
-    residual = arm.residuals[name][..., _YAW_RATE]
-    known = np.isfinite(residual)
-    mean = np.where(known, residual, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
-    starts = [(w.recording[i], w.time[i], w.time[i] + w.duration, w.initial[i, :3]) for w, _, i in _chosen(arm)]
-    pieces, values, groups = [], [], []
-    for recording, first, last, start in starts:
-        group = []
-        for k in np.flatnonzero((arm.windows.recording == recording) & (arm.windows.time >= first - 1e-6)):
-            pose = arm.windows.measured[k][:, _POSE[:2]]
-            pose = pose[np.isfinite(pose).all(axis=1)]
-            if arm.windows.time[k] < last and len(pose) > 1 and known[k].any():
-                group.append((_in_body_frame(pose, start), mean[k]))
-        groups.append(group)
-    groups = [g for g in groups if g]
-    if not groups:
+    axes.set_title(f"Yaw rate residual along the path, {MODEL_STYLES[name][0]}", pad=4.0)
+    pieces = [_residual_pieces(arm, name, *run) for run in _chosen(arm)]
+    pieces = [piece for piece in pieces if piece]
+    if not pieces:
         return _nothing(axes, "no pose or no gyro")
-    offsets, _ = _cells([[path for path, _ in g] for g in groups])
-    for group, offset in zip(groups, offsets, strict=True):
-        pieces += [path + offset for path, _ in group]
-        values += [value for _, value in group]
+    fitted, cells = _fitted_to_cells([[path for path, _ in piece] for piece in pieces])
+    values = np.array([value for piece in pieces for _, value in piece])
     limit = float(np.quantile(np.abs(values), 0.95)) or 1.0
     colours = LinearSegmentedColormap.from_list("residual", (palette.BLUE, palette.PALE, palette.VERMILLION))
-    lines = LineCollection(pieces, array=np.array(values), cmap=colours, clim=(-limit, limit), linewidths=2.2)
+    paths = [path for group in fitted for path in group]
+    lines = LineCollection(paths, array=values, cmap=colours, clim=(-limit, limit), linewidths=2.2)
     axes.add_collection(lines)
-    axes.autoscale()
-    _as_map(axes)
-    left, bottom, width, height = axes.get_position().bounds
-    bar = figure.colorbar(lines, cax=figure.add_axes((left + width + 0.012, bottom, 0.012, height)))
-    bar.set_label("measured less predicted [rad/s]")
+    _as_map(axes, cells)
+    bar = figure.colorbar(lines, cax=figure.add_axes((0.455, 0.06, 0.01, 0.28)))
+    bar.set_label("mean of windows [rad/s]")
     bar.outline.set_visible(False)
     return None
+
+
+def _residual_pieces(
+    arm: ArmResult, model: str, run: WindowSet, predictions: Mapping[str, Array], row: int
+) -> list[tuple[Array, float]]:
+    """Paths (n, 2) of the windows inside a roll-out, seen from its start, with their mean yaw rate residual."""
+    start, first = _start(run, row), run.time[row]
+    windows, pieces = arm.windows, []
+    near = (windows.recording == run.recording[row]) & (windows.time >= first - 1e-6)
+    for k in np.flatnonzero(near & (windows.time < first + run.duration)):
+        pose = windows.measured[k][:, _POSE]
+        pose = pose[np.isfinite(pose).all(axis=1)]
+        residual = arm.residuals[model][k, :, _YAW_RATE]
+        if len(pose) > 1 and np.isfinite(residual).any():
+            pieces.append((_in_body_frame(pose, start), float(np.nanmean(residual))))
+    return pieces
 
 
 def _nothing(axes: Any, text: str) -> None:
@@ -238,7 +249,7 @@ def _draw_growth(axes: Any, arm: ArmResult) -> None:
 
 
 def _draw_horizons(axes: Any, arm: ArmResult, metric: str, title: str, unit: str) -> None:
-    axes.set_title(f"{title}: median (dot) and r.m.s. (bar) with 95 % intervals", pad=5.0)
+    axes.set_title(f"{title}: median (dot), r.m.s. (bar), 95 %", pad=5.0)
     shown = [e for e in arm.report.horizons if e.metric == metric and e.error.count]
     if not shown:
         return _nothing(axes, "nothing measures it")
@@ -246,12 +257,24 @@ def _draw_horizons(axes: Any, arm: ArmResult, metric: str, title: str, unit: str
     for error in shown:
         place = horizons.index(error.horizon) + 0.16 * (MODELS.index(error.model) - 1.5)
         _draw_error(axes, place, error)
-    axes.set_yscale("log")
+    _log_scale(axes)
     axes.set(xlim=(-0.5, len(horizons) - 0.5), ylabel=unit)
     axes.set_xticks(range(len(horizons)), [f"after {h:g} s" for h in horizons])
     axes.tick_params(axis="x", length=0.0)
     axes.grid(False, axis="x")
     return None
+
+
+def _log_scale(axes: Any) -> None:
+    """Logarithmic, with plain numbers at 1, 2, 5, or at powers of ten where these are many."""
+    from matplotlib.ticker import LogLocator, NullFormatter
+
+    axes.set_yscale("log")
+    low, high = axes.get_ylim()
+    subs = (1.0, 2.0, 5.0) if high < 50.0 * low else (1.0,)
+    axes.yaxis.set_major_locator(LogLocator(subs=subs))
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.yaxis.set_minor_formatter(NullFormatter())
 
 
 def _draw_error(axes: Any, place: float, item: HorizonError) -> None:
@@ -277,7 +300,7 @@ def _draw_channels(axes: Any, arm: ArmResult) -> None:
         places = np.arange(len(names)) + 0.3 * (model - 0.5 * (len(arm.report.residuals) - 1))
         axes.bar(places, [c.relative for c in table.channels], width=0.28, color=colour)
     axes.axhline(1.0, color=palette.INK, linewidth=0.8, linestyle=DASHED)
-    axes.set_yscale("log")
+    _log_scale(axes)
     axes.set_ylabel("[-]")
     axes.set_xticks(range(len(names)), [_LABELS[name] for name in names])
     axes.tick_params(axis="x", length=0.0)
