@@ -86,7 +86,12 @@ def load_config(path: str | os.PathLike[str], kind: type[Config]) -> Config:
 def parse_config(text: str, kind: type[Config], *, source: str = "configuration") -> Config:
     """The same as :func:`load_config` for a text; ``source`` stands first in error messages."""
     content = _parse_yaml(text, source)
-    return typing.cast(Config, _convert({} if content is None else content, kind, source))
+    return config_from({} if content is None else content, kind, source=source)
+
+
+def config_from(content: Any, kind: type[Config], *, source: str = "configuration") -> Config:
+    """The same as :func:`load_config` for content that is read already, such as JSON's dictionaries and lists."""
+    return typing.cast(Config, _convert(content, kind, source))
 
 
 def dump_config(config: Any) -> str:

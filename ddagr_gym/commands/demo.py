@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -12,37 +14,125 @@ from ddagr_gym.commands.output import output_folder, write_text
 EXAMPLES = (
     "ddagr demo",
     "ddagr demo --output my_demo --seed 7",
+    "ddagr demo --recording drive.csv.gz --robot warthog --soil lete_sand_wong",
 )
+
+HARD_GROUND = "firm_ground"
+"""Nominal soil of a given recording, unless another is named: the refit moves it."""
 
 
 @dataclass(frozen=True)
 class Arguments:
-    """Drive a row turn and write a report folder: page, figure, video and CSV.
+    """Drive a row turn, replay a recording, and write a report folder: page, figures, video and CSV.
 
     Attributes:
         output: folder to write; one that an earlier command wrote is replaced.
         radius: of the turn [m].
         side: left or right.
         seed: of the soil and the sensor noise.
+        recording: drive to replay, in any format that `ddagr import` takes; a simulated one that ships with the
+            package when it is left out.
+        robot: that drove, where the recording does not say.
+        soil: from which the replay's refit starts.
     """
 
     output: Path = Path("ddagr_demo")
     radius: float = 0.80
     side: str = "left"
     seed: int = 1
+    recording: Path | None = None
+    robot: str = ""
+    soil: str = ""
+
+
+@dataclass(frozen=True)
+class Section:
+    """What one step shows.
+
+    Attributes:
+        title: of the section.
+        text: table, printed and on the page.
+        html: figures and links below it, relative to the page.
+    """
+
+    title: str
+    text: str
+    html: str
 
 
 def run(arguments: Arguments) -> None:
     """Run the demonstration and print where its page lies."""
     start = time.monotonic()
+    drive = _drive_to_replay(arguments)
     with output_folder(arguments.output, overwrite=True) as folder:
-        print("Calibrating two constant bank speeds on the nominal soil ...", flush=True)
-        turn_run, summary = _drive(arguments)
-        print("Writing the CSV, the figure and the video ...", flush=True)
-        _write(folder, turn_run)
-        write_text(folder / "index.html", _page(summary))
-    print(summary)
+        sections = [turn_step(arguments, folder), replay_step(drive, folder)]
+        write_text(folder / "index.html", _page(sections))
+    for section in sections:
+        print(f"\n{section.title}\n{section.text}")
     print(f"\nDone in {time.monotonic() - start:.0f} s. Open {arguments.output.resolve() / 'index.html'}")
+
+
+def turn_step(arguments: Arguments, folder: Path) -> Section:
+    """A row turn by constant speeds on a drawn soil; figure, video and CSV into the folder."""
+    print("Calibrating two constant bank speeds on the nominal soil ...", flush=True)
+    driven, summary = _drive(arguments)
+    print("Writing the CSV, the figure and the video ...", flush=True)
+    _write(folder, driven)
+    html = """<video controls muted loop src="row_turn.mp4"></video>
+<div class="wide"><img src="row_turn.svg" alt="Path, speeds, yaw rate, slip and sinkage of the turn"></div>
+<p>Data: <a href="row_turn.csv">row_turn.csv</a> (sensor columns, and the truth as <code>true_...</code>).</p>"""
+    return Section("A row turn on soft soil", summary, html)
+
+
+@dataclass(frozen=True)
+class DriveToReplay:
+    """What the replay step needs.
+
+    Attributes:
+        recording: the drive.
+        robot: nominal robot's name.
+        soil: nominal soil's name.
+        words: what the recording is.
+    """
+
+    recording: Any
+    robot: str
+    soil: str
+    words: str
+
+
+def _drive_to_replay(arguments: Arguments) -> DriveToReplay:
+    """Read first, so that a wrong path or name ends the demonstration before it has begun."""
+    from ddagr_gym.commands.replay import SAMPLE, SAMPLE_SOIL, robot_name
+    from ddagr_gym.presets import get_robot, get_soil
+    from ddagr_gym.recordings.load import load_recording
+
+    shipped = Path(__file__).resolve().parents[1] / "data" / SAMPLE
+    path = shipped if arguments.recording is None else arguments.recording
+    recording = load_recording(path, None, arguments.robot or None)
+    name = robot_name(arguments.robot, [recording])
+    soil = arguments.soil or (SAMPLE_SOIL if arguments.recording is None else HARD_GROUND)
+    get_robot(name), get_soil(soil)
+    words = "a simulated drive on weaker soil, with slower motors, than the nominal simulator's"
+    return DriveToReplay(recording, name, soil, words if arguments.recording is None else path.name)
+
+
+def replay_step(drive: DriveToReplay, folder: Path) -> Section:
+    """A recording driven again in the simulator, with a refit; report, figures and page into ``folder/replay``."""
+    from ddagr_gym.commands.replay import lead_text, replay_groups
+    from ddagr_gym.presets import get_robot, get_soil
+    from ddagr_gym.replay.arm import ArmSettings
+
+    print(f"Replaying {drive.recording.meta.source} and refitting the simulator ...", flush=True)
+    replayed = folder / "replay"
+    replayed.mkdir()
+    robot, soil = get_robot(drive.robot), get_soil(drive.soil)
+    report = replay_groups([[drive.recording]], robot, soil, drive.soil, ArmSettings(refit=True), replayed)
+    overview = min(path.name for path in replayed.glob("*.png") if not path.stem.endswith("_residuals"))
+    html = f"""<p>Replayed: {escape(drive.words)}. Errors are those on the part of the drive that no fit has seen.</p>
+<div class="wide"><a href="replay/index.html"><img src="replay/{escape(overview)}" alt="Roll-outs and errors"></a></div>
+<p>Everything about it: <a href="replay/index.html">page</a>, <a href="replay/replay.json">JSON</a>.</p>"""
+    return Section("A recording driven again in the simulator", lead_text(report), html)
 
 
 def _drive(arguments: Arguments) -> tuple[Any, str]:
@@ -92,21 +182,18 @@ def _write(folder: Path, driven: Any) -> None:
     renderer.close()
 
 
-def _page(summary: str) -> str:
-    from html import escape
-
+def _page(sections: Sequence[Section]) -> str:
+    parts = [f"<h1>{escape(s.title)}</h1>\n<pre>{escape(s.text)}</pre>\n{s.html}" for s in sections]
     return f"""<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
 <title>ddagr-gym demo</title>
 <style>
 body {{ font: 16px/1.5 system-ui, sans-serif; max-width: 60rem; margin: 2rem auto; padding: 0 1rem; color: #222; }}
+h1 {{ font-size: 1.5rem; margin-top: 3rem }} h1:first-child {{ margin-top: 0 }}
 img, video {{ width: 100%; height: auto; display: block; margin: 1rem 0; }}
-pre {{ background: #f4f4f2; padding: .8rem; overflow-x: auto; }}
+.wide {{ overflow-x: auto }} .wide img {{ min-width: 40rem }}
+pre {{ background: #f4f4f2; padding: .8rem; overflow-x: auto; font-size: .85rem }}
 </style></head><body>
-<h1>A row turn on soft soil</h1>
-<pre>{escape(summary)}</pre>
-<video controls muted loop src="row_turn.mp4"></video>
-<img src="row_turn.svg" alt="Path, speeds, yaw rate, slip and sinkage of the turn">
-<p>Data: <a href="row_turn.csv">row_turn.csv</a> (sensor columns, and the truth as <code>true_...</code>).</p>
+{chr(10).join(parts)}
 </body></html>
 """

@@ -2,91 +2,233 @@
 
 from __future__ import annotations
 
-import hashlib
 import sys
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
+import tyro
 from tyro.conf import Positional
 
-from ddagr_gym.commands.output import format_table, output_folder
+from ddagr_gym.commands.output import check_output_folder, format_table, output_folder
+from ddagr_gym.commands.progress import Progress
 from ddagr_gym.errors import InputError
 
-EXAMPLES = ("ddagr diagnose run_1.csv.gz run_2.csv.gz run_3.csv.gz --thresholds thresholds.json --output diagnosis",)
+if TYPE_CHECKING:
+    from ddagr_gym.diagnosis.pipeline import Outcome, Task
+    from ddagr_gym.diagnosis.thresholds import Thresholds
+    from ddagr_gym.diagnosis.verdict import Diagnosis
+    from ddagr_gym.recordings.schema import Recording
+
+EXAMPLES = (
+    "ddagr diagnose run_1.csv.gz run_2.csv.gz run_3.csv.gz --output diagnosis",
+    "ddagr diagnose drives --robot ddagr --soil thesis_a1 --thresholds thresholds.json --output diagnosis",
+)
+
+_ENDINGS = (".csv", ".csv.gz", ".parquet", ".mcap", ".bag")
+_SHOWN = ("position", "pose_yaw", "heading", "yaw_rate", "speed", "specific_force_x", "specific_force_y")
 
 
 @dataclass(frozen=True)
 class Arguments:
-    """Find the physics that a nominal simulator leaves out, from recordings of one robot.
+    """Find the physics that a nominal simulator leaves out: where, what, how big, how sure, what else.
+
+    Several recordings of one robot on one ground are diagnosed together; each is then predicted by a model whose sizes
+    were fitted to the others. With a single one its halves judge each other, which is weaker: place, day and biases are
+    the same. A diagnosis that was stopped goes on after its last finished step when the command is given again.
 
     Attributes:
-        runs: recordings; several of one robot are diagnosed together.
-        thresholds: of `ddagr null-bank`, made with these or similar drives.
-        output: folder for diagnosis.json and effects.json.
-        robot: nominal robot.
-        soil: nominal soil.
-        map: column map, for sources that are not imported yet.
+        runs: recordings (Parquet of `ddagr import`, or any source that it takes), or folders of them.
+        output: folder to write: index.html with its figures, diagnosis.json, evidence.npz, and effects.json and
+            effects.yaml, which `gym.make`, `ddagr simulate` and `ddagr replay` load.
+        robot: nominal robot (see `ddagr robots`).
+        soil: nominal soil (see `ddagr soils`).
+        map: shipped map by name or the path of one's own YAML file, for sources that are not imported yet.
+        thresholds: of `ddagr null-bank`, made with these or similar drives; those that ship with the package when it is
+            left out.
         stride: seconds between the starts of windows; 2 uses all samples.
         seed: of the resampling.
         threads: of the simulator.
-        overwrite: replace an output folder that an earlier diagnosis wrote.
+        overwrite: replace an output folder that an earlier command wrote.
+        maximum_rows: refuse a recording with more rows or messages.
+        maximum_bytes: refuse a recording that unpacks to more bytes.
     """
 
     runs: Positional[tuple[Path, ...]]
-    thresholds: Path
-    output: Path
+    output: Annotated[Path, tyro.conf.arg(aliases=("-o",))]
     robot: str = "ddagr"
     soil: str = "thesis_a1"
     map: str = ""
+    thresholds: Path | None = None
     stride: float = 2.0
     seed: int = 0
     threads: int = 2
     overwrite: bool = False
+    maximum_rows: int = 2_000_000
+    maximum_bytes: int = 4 * 2**30
 
 
-def run(arguments: Arguments) -> None:
-    """Diagnose, write the files, print the answer."""
-    import numpy as np
+def run(arguments: Arguments) -> int | None:
+    """Diagnose, write the folder, print the answer; 130 when interrupted."""
+    from ddagr_gym.diagnosis.inputs import check_recordings
+    from ddagr_gym.diagnosis.store import StepStore, part_folder
 
-    from ddagr_gym.diagnosis.diagnose import diagnose
+    check_output_folder(arguments.output, overwrite=arguments.overwrite)
+    task = _task(arguments)
+    check_recordings(task.recordings, task.robot, task.setting)
+    parts = part_folder(arguments.output.expanduser().resolve())
+    store = StepStore(parts, task.key())
+    try:
+        outcome = diagnosed(task, store)
+        with output_folder(arguments.output, overwrite=arguments.overwrite) as folder:
+            write_outcome(outcome, folder)
+    except KeyboardInterrupt:
+        print(f"ddagr: interrupted; the same command goes on from {parts}.", file=sys.stderr)
+        return 130
+    store.clear()
+    print(outcome_text(outcome.diagnosis))
+    print(f"\npage, figures, diagnosis.json and effects.json: {arguments.output}")
+    return None
+
+
+def _task(arguments: Arguments) -> Task:
+    from ddagr_gym.diagnosis.pipeline import Task
     from ddagr_gym.diagnosis.setting import Setting
-    from ddagr_gym.diagnosis.thresholds import load_thresholds
-    from ddagr_gym.diagnosis.verdict import save
-    from ddagr_gym.physics.effects.files import save_effects
     from ddagr_gym.presets import get_robot, get_soil
+    from ddagr_gym.recordings.files import Limits
     from ddagr_gym.recordings.load import load_recording
 
-    if not arguments.runs:
-        raise InputError("no recording is given: name one or more files.")
-    thresholds = load_thresholds(arguments.thresholds)
-    recordings = [load_recording(path, arguments.map or None, arguments.robot) for path in arguments.runs]
-    setting = Setting(stride=arguments.stride, threads=arguments.threads)
-    found, effects = diagnose(
-        get_robot(arguments.robot),
-        get_soil(arguments.soil),
-        recordings,
-        thresholds,
-        np.random.default_rng(arguments.seed),
-        setting,
-        lambda step: print(f"ddagr diagnose: {step}", file=sys.stderr),
-    )
-    intervals = [
-        {n: e.interval for n, e in finding.parameters.items() if e.interval is not None} for finding in found.findings
+    for name, least in (("threads", 1), ("stride", 0.1), ("seed", 0)):
+        if getattr(arguments, name) < least:
+            raise InputError(f"--{name} is {getattr(arguments, name)}: give at least {least}.")
+    robot, soil = get_robot(arguments.robot), get_soil(arguments.soil)
+    limits = Limits(arguments.maximum_rows, arguments.maximum_bytes)
+    recordings: list[Recording] = [
+        load_recording(path, arguments.map or None, arguments.robot, limits) for path in _sources(arguments.runs)
     ]
-    hashes = hashlib.sha256("".join(r.meta.source_sha256 for r in recordings).encode()).hexdigest()
-    with output_folder(arguments.output, overwrite=arguments.overwrite) as folder:
+    setting = Setting(stride=arguments.stride, threads=arguments.threads)
+    return Task(robot, soil, tuple(recordings), _thresholds(arguments), setting, arguments.seed)
+
+
+def _sources(runs: Sequence[Path]) -> list[Path]:
+    """Files as they are; of a folder the recordings in it, unless it is one itself (a ROS 2 bag)."""
+    found: list[Path] = []
+    for path in runs:
+        if not path.is_dir() or (path / "metadata.yaml").exists() or any(path.glob("*.db3")):
+            found.append(path)
+            continue
+        inside = sorted(item for item in path.iterdir() if item.is_file() and item.name.endswith(_ENDINGS))
+        if not inside:
+            raise InputError(f"the folder {path} holds no recording ({', '.join(_ENDINGS)}): name another one.")
+        found += inside
+    if not found:
+        raise InputError("no recording is given: name one or more files, or a folder of them.")
+    return found
+
+
+def _thresholds(arguments: Arguments) -> Thresholds:
+    from ddagr_gym.diagnosis.thresholds import default_thresholds, load_thresholds
+
+    if arguments.thresholds is None:
+        return default_thresholds(arguments.robot)
+    return load_thresholds(arguments.thresholds)
+
+
+def diagnosed(task: Task, store: Any = None) -> Outcome:
+    """Run all steps with progress on standard error.
+
+    Args:
+        task: what and how.
+        store: :class:`~ddagr_gym.diagnosis.store.StepStore` of finished steps.
+    """
+    from ddagr_gym.diagnosis import pipeline
+
+    with _steps(len(pipeline.STEPS), store) as began:
+        return pipeline.run(task, store, began)
+
+
+@contextmanager
+def _steps(count: int, store: Any) -> Iterator[Any]:
+    """Function to call with the name of each step when it begins; the last one ends with the block."""
+    names: list[str] = []
+    with Progress(count, "diagnosing") as progress:
+
+        def began(name: str) -> None:
+            if names:
+                progress.advance()
+            names.append(name)
+            kept = ", kept from before" if store is not None and store.has(name) else ""
+            print(f"ddagr diagnose: step {len(names)} of {count}, {name}{kept}", file=sys.stderr, flush=True)
+
+        yield began
+        progress.advance()
+
+
+def write_outcome(outcome: Outcome, folder: Path) -> None:
+    """Diagnosis, effects, evidence and page into a folder that exists.
+
+    Args:
+        outcome: of the pipeline.
+        folder: to fill.
+    """
+    from ddagr_gym.diagnosis.pipeline import data_hash, effect_intervals
+    from ddagr_gym.diagnosis.verdict import as_mapping, save
+    from ddagr_gym.physics.effects.files import save_effects
+    from ddagr_gym.reporting import diagnosis_page, evidence
+
+    diagnosis = outcome.diagnosis
+    for name in ("effects.json", "effects.yaml"):
         save_effects(
-            folder / "effects.json",
-            effects,
-            intervals=intervals if effects else (),
-            data_hash=hashes,
-            source=found.sentence,
+            folder / name,
+            outcome.effects,
+            intervals=effect_intervals(diagnosis) if outcome.effects else (),
+            data_hash=data_hash(diagnosis),
+            source=diagnosis.sentence,
         )
-        save(found, folder / "diagnosis.json")
-    print(found.sentence)
-    if found.findings:
-        rows = [
-            [f.name, f"{f.gain:.1f}", f"{f.gate:.1f}", f"{f.score:.1f}", ", ".join(f.equivalence_set)]
-            for f in found.findings
-        ]
-        print(format_table(["effect", "gain", "gate", "score", "could also be"], rows))
+    save(diagnosis, folder / "diagnosis.json")
+    outcome.evidence.save(folder / evidence.NAME)
+    diagnosis_page.write_report(folder, as_mapping(diagnosis), outcome.evidence)
+
+
+def outcome_text(diagnosis: Diagnosis) -> str:
+    """Answer, findings and errors at the horizons, as tables."""
+    parts = [diagnosis.sentence]
+    if diagnosis.findings:
+        head = ("effect", "size", "90 % interval", "unit", "gain", "gate", "could also be")
+        parts.append(format_table(head, [row for finding in diagnosis.findings for row in _finding_rows(finding)]))
+    if diagnosis.fit is not None:
+        parts += _fit_texts(diagnosis.fit)
+    return "\n\n".join(parts)
+
+
+def _finding_rows(finding: Any) -> Iterator[tuple[str, ...]]:
+    """One row per parameter; what the finding as a whole has stands in the first."""
+    others = [f"{name} {weight:.2f}" for name, weight in finding.equivalence_set.items() if name != finding.name]
+    whole = (f"{finding.gain:.1f}", f"{finding.gate:.1f}", ", ".join(others) or "nothing else")
+    for number, (name, estimate) in enumerate(finding.parameters.items()):
+        interval = "" if estimate.interval is None else f"{estimate.interval[0]:.3g} to {estimate.interval[1]:.3g}"
+        first = number == 0
+        label = f"{finding.name if first else ''} {name}".strip()
+        yield label, f"{estimate.value:.3g}", interval, estimate.unit, *(whole if first else ("", "", ""))
+
+
+def _fit_texts(fit: Mapping[str, Any]) -> Iterator[str]:
+    models = ("raw", "refitted", "corrected", "black_box", "ceiling")
+    rows = [
+        (f"{channel} after {horizon} s", *(f"{entry[model]['value']:.3g}" for model in models), entry["unit"])
+        for channel in _SHOWN
+        for horizon, entry in fit["channels"].get(channel, {}).items()
+    ]
+    if rows:
+        head = ("error on unseen drives", "raw", "refitted", "corrected", "black box", "ceiling", "unit")
+        yield format_table(head, rows)
+    shares = [
+        f"{100.0 * share['value']:.0f} % after {horizon} s"
+        for horizon, share in fit["gain_share"].items()
+        if share is not None
+    ]
+    if shares:
+        yield f"Share of the explainable error that the named effects explain: {', '.join(shares)}."
+    yield f"Predicted {fit['folds']}. {fit['note']}"

@@ -1,19 +1,20 @@
-"""``ddagr evaluate``: controllers over frozen scenario sets."""
+"""``ddagr evaluate``: controllers and trained policies over frozen scenario sets."""
 
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from ddagr_gym.commands.output import atomic_path, format_table, make_folder, write_text
 from ddagr_gym.commands.progress import Progress
-from ddagr_gym.errors import InputError
+from ddagr_gym.errors import InputError, unknown_name
 
 EXAMPLES = (
     "ddagr evaluate --controllers B0,B1,B3 --scenarios S0 --output evaluation",
-    "ddagr evaluate --controllers B1,true_curvature --scenarios S0,V --output evaluation",
+    "ddagr evaluate --controllers B1,B4,B5 --scenarios S0,V --workers 2 --output evaluation",
+    "ddagr evaluate --controllers B4 --scenarios T --episodes 5 --output smoke_test",
 )
 
 
@@ -21,43 +22,57 @@ EXAMPLES = (
 class Arguments:
     """Drive controllers over frozen scenarios and say which, how far off, how sure.
 
-    An interrupted run continues where it stopped when it is started again with the same folder.
+    An interrupted run continues where it stopped when it is started again with the same folder. The upper bounds
+    true_curvature, true_soil and true_path see the true state: they are never deployable, are driven on every set to
+    say which scenarios are feasible, and are in the tables only where they are asked for.
 
     Attributes:
-        controllers: names, separated by commas.
-        scenarios: names of frozen sets, separated by commas.
-        output: folder for episodes.parquet, summary.json and the figure.
-        processes: workers.
+        controllers: names, separated by commas: B0 to B5, upper bounds, trained policies or their files.
+        scenarios: names of frozen sets, separated by commas: S0 to S8, V for tuning, T for another soil law.
+        output: folder for episodes.parquet, summary.json, claims.json and the figure.
+        workers: processes.
+        episodes: only so many of each set; all by default. Claims are then not checked.
     """
 
     controllers: str = "B0,B1,B2,B3,B4,true_curvature"
     scenarios: str = "S0"
     output: Path = Path("ddagr_evaluation")
-    processes: int = 2
+    workers: int = 2
+    episodes: int | None = None
 
 
 def run(arguments: Arguments) -> None:
-    """Drive, summarise, print the table."""
-    from ddagr_gym.evaluation.campaign import run_campaign
+    """Drive, summarise, print the tables."""
+    from ddagr_gym.evaluation.campaign import run_campaign, wanted_episodes, with_bounds
     from ddagr_gym.evaluation.controllers import controller_title
-    from ddagr_gym.evaluation.scenarios import load_scenarios
+    from ddagr_gym.evaluation.scenarios import scenario_names
     from ddagr_gym.evaluation.summary import summaries
 
     controllers = _names(arguments.controllers, "controllers")
     sets = _names(arguments.scenarios, "scenarios")
     for name in controllers:
         controller_title(name)
-    if arguments.processes < 1:
-        raise InputError(f"--processes {arguments.processes}: give at least 1.")
-    total = len(controllers) * sum(len(load_scenarios(name)) for name in sets)
+    for name in sets:
+        if name not in scenario_names():
+            raise unknown_name("scenario set", name, scenario_names())
+    if arguments.workers < 1:
+        raise InputError(f"--workers {arguments.workers}: give at least 1.")
+    total = len(wanted_episodes(with_bounds(controllers), sets, arguments.episodes))
     folder = make_folder(arguments.output)
     with Progress(total, "driving") as progress:
         rows = run_campaign(
-            controllers, sets, folder / "episodes.jsonl", processes=arguments.processes, progress=progress.advance
+            controllers,
+            sets,
+            folder / "episodes.jsonl",
+            processes=arguments.workers,
+            count=arguments.episodes,
+            progress=progress.advance,
         )
     summary = summaries(rows)
     _write(folder, rows, summary)
     print(format_table(*_table(summary)))
+    if arguments.episodes is None:
+        _check_claims(folder, summary)
     print(f"\nEpisodes, summary and figure are in {folder.resolve()}")
 
 
@@ -76,30 +91,55 @@ def _write(folder: Path, rows: list[dict[str, Any]], summary: dict[str, Any]) ->
 
     with atomic_path(folder / "episodes.parquet") as temporary:
         parquet.write_table(pa.Table.from_pylist(rows), temporary)
-    write_text(folder / "summary.json", json.dumps(summary, indent=1))
+    write_text(folder / "summary.json", json.dumps(summary, indent=1) + "\n")
     radius_error_figure(rows, folder / "radius_error.png")
 
 
+def _check_claims(folder: Path, summary: dict[str, Any]) -> None:
+    """Write what became of every claim, and print those on something that was driven."""
+    from ddagr_gym.evaluation.claims import check_claims, claims_table, load_claims
+
+    checked = check_claims(load_claims(), summary)
+    write_text(folder / "claims.json", json.dumps([asdict(item) for item in checked], indent=1) + "\n")
+    driven = [item for item in checked if item.verdict != "not driven"]
+    if driven:
+        print("\nClaims (configs/evaluation/claims.yaml)\n")
+        print(format_table(*claims_table(driven)))
+
+
 def _table(summary: dict[str, Any]) -> tuple[tuple[str, ...], list[tuple[object, ...]]]:
-    header = ("controller", "set", "episodes", "|e_R| median", "95 % interval", "|e_R| 95th percentile", "success")
+    header = ("controller", "set", "episodes", "|e_R| median", "95 % interval", "|e_R| 95th percentile", "success",
+              "infeasible")  # fmt: skip
     rows: list[tuple[object, ...]] = []
     for controller, sets in summary.items():
         for name, item in sets.items():
+            shown = (controller + _mark(controller), name, item["episodes"])
             if "radius_error_median" not in item:
+                rows.append((*shown, "-", "-", "-", "-", item["infeasible"]))
                 continue
             median, share = item["radius_error_median"], item["success_rate"]
             rows.append(
                 (
-                    controller,
-                    name,
-                    item["episodes"],
+                    *shown,
                     _percent(median["value"]),
-                    f"{_percent(median['low'])} to {_percent(median['high'])}",
+                    _span(median["interval"]),
                     _percent(item["radius_error_p95"]["value"]),
-                    f"{_percent(share['value'])} ({_percent(share['low'])} to {_percent(share['high'])})",
+                    f"{_percent(share['value'])} ({_span(share['interval'])})",
+                    item["infeasible"],
                 )
             )
     return header, rows
+
+
+def _mark(controller: str) -> str:
+    """What a table says of an arm that sees the truth."""
+    from ddagr_gym.evaluation.controllers import BOUNDS
+
+    return " (upper bound)" if controller in BOUNDS or controller.endswith("@true") else ""
+
+
+def _span(interval: list[float | None] | None) -> str:
+    return "-" if interval is None else f"{_percent(interval[0])} to {_percent(interval[1])}"
 
 
 def _percent(value: float | None) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,15 +11,18 @@ from tyro.conf import Positional
 
 from ddagr_gym.commands.output import atomic_path
 from ddagr_gym.commands.progress import Progress
-from ddagr_gym.errors import InputError
 
 if TYPE_CHECKING:
     from ddagr_gym.diagnosis.null_bank import Template
     from ddagr_gym.diagnosis.setting import Setting
     from ddagr_gym.diagnosis.thresholds import NullRun
     from ddagr_gym.parameters import Robot, Soil
+    from ddagr_gym.recordings.schema import Recording
+
+    _Task = tuple[Robot, Soil, Template | Recording | None, Setting, int, int, Path]
 
 EXAMPLES = (
+    "ddagr null-bank --robot ddagr --soil thesis_a1 --output thresholds.json",
     "ddagr null-bank run_1.csv.gz run_2.csv.gz run_3.csv.gz --robot ddagr --soil thesis_a1 --output thresholds.json",
 )
 
@@ -33,7 +36,10 @@ class Arguments:
     scan as real drives. An interrupted bank goes on where it stopped.
 
     Attributes:
-        runs: recordings of one robot, as `ddagr diagnose` takes them.
+        runs: recordings of one robot, as `ddagr diagnose` takes them; without any, three drives of 60 s are drawn.
+        ordinary: take the runs themselves for null drives: real ones in which nothing is wrong. They are cut into
+            pieces, and no drive is simulated.
+        piece: length of such a piece [s].
         output: thresholds to write, .json; the runs themselves lie beside it.
         robot: nominal robot.
         soil: nominal soil.
@@ -44,11 +50,13 @@ class Arguments:
         processes: that work at the same time.
     """
 
-    runs: Positional[tuple[Path, ...]]
     output: Path
+    runs: Positional[tuple[Path, ...]] = ()
     robot: str = "ddagr"
     soil: str = "thesis_a1"
     map: str = ""
+    ordinary: bool = False
+    piece: float = 60.0
     count: int = 60
     seed: int = 0
     stride: float = 2.0
@@ -58,24 +66,32 @@ class Arguments:
 def run(arguments: Arguments) -> None:
     """Make what is missing of the bank, then write the thresholds."""
     from ddagr_gym.diagnosis.noise import recording_noise
-    from ddagr_gym.diagnosis.null_bank import bank_hash, template_of
+    from ddagr_gym.diagnosis.null_bank import bank_hash, pieces_of, template_of
     from ddagr_gym.diagnosis.setting import Setting, wheel_radius
     from ddagr_gym.diagnosis.thresholds import NullRun, save_thresholds, thresholds_from
     from ddagr_gym.presets import get_robot, get_soil
     from ddagr_gym.recordings.load import load_recording
 
-    if not arguments.runs:
-        raise InputError("no recording is given: name those whose commands the null drives shall follow.")
     robot, soil = get_robot(arguments.robot), get_soil(arguments.soil)
     recordings = [load_recording(path, arguments.map or None, arguments.robot) for path in arguments.runs]
     setting = Setting(stride=arguments.stride)
-    template = template_of(recordings, recording_noise(recordings, wheel_radius(robot)))
+    if arguments.ordinary:
+        pieces = [piece for recording in recordings for piece in pieces_of(recording, arguments.piece)]
+        arguments = replace(arguments, count=len(pieces))
+        template = template_of(pieces, (None,) * 8)
+    else:
+        pieces = []
+        template = template_of(recordings, recording_noise(recordings, wheel_radius(robot))) if recordings else None
     bank = bank_hash(robot, soil, template, setting, arguments.count, arguments.seed)
     folder = arguments.output.with_suffix(".bank")
     folder.mkdir(parents=True, exist_ok=True)
     missing = [n for n in range(arguments.count) if not _part(folder, bank, n).exists()]
     if missing:
-        _make(arguments, robot, soil, template, setting, folder, bank, missing)
+        drives = [template] * arguments.count if not pieces else pieces
+        _make(
+            [(robot, soil, drives[n], setting, arguments.seed, n, _part(folder, bank, n)) for n in missing],
+            arguments.processes,
+        )
     runs = [NullRun(**json.loads(_part(folder, bank, n).read_text())) for n in range(arguments.count)]
     save_thresholds(thresholds_from(runs, bank), arguments.output)
     print(f"{arguments.output}: thresholds of {len(runs)} null drives, bank {bank[:12]}")
@@ -85,36 +101,31 @@ def _part(folder: Path, bank: str, number: int) -> Path:
     return folder / f"{bank[:16]}_{number:03d}.json"
 
 
-def _make(
-    arguments: Arguments,
-    robot: Robot,
-    soil: Soil,
-    template: Template,
-    setting: Setting,
-    folder: Path,
-    bank: str,
-    missing: list[int],
-) -> None:
+def _make(tasks: list[_Task], processes: int) -> None:
     """Run the missing nulls, in processes of their own."""
     import multiprocessing
 
-    tasks = [(robot, soil, template, setting, arguments.seed, n, _part(folder, bank, n)) for n in missing]
     with Progress(len(tasks), "null drives") as progress:
-        if arguments.processes == 1:
+        if processes == 1:
             for task in tasks:
                 _one(task)
                 progress.advance()
             return
-        with multiprocessing.get_context("spawn").Pool(min(arguments.processes, len(tasks))) as pool:
+        with multiprocessing.get_context("spawn").Pool(min(processes, len(tasks))) as pool:
             for _ in pool.imap_unordered(_one, tasks):
                 progress.advance()
 
 
-def _one(task: tuple[Robot, Soil, Template, Setting, int, int, Path]) -> None:
-    from ddagr_gym.diagnosis.null_bank import null_run
+def _one(task: _Task) -> None:
+    from ddagr_gym.diagnosis.null_bank import null_run, scanned
     from ddagr_gym.diagnosis.structural_nulls import KINDS
+    from ddagr_gym.recordings.schema import Recording
 
-    robot, soil, template, setting, seed, number, path = task
-    made: NullRun = null_run(robot, soil, template, KINDS[number % len(KINDS)], setting, (seed, number))
+    robot, soil, drives, setting, seed, number, path = task
+    made: NullRun
+    if isinstance(drives, Recording):
+        made = scanned(robot, soil, [drives], "real", setting)
+    else:
+        made = null_run(robot, soil, drives, KINDS[number % len(KINDS)], setting, (seed, number))
     with atomic_path(path) as part:
         part.write_text(json.dumps(asdict(made)))

@@ -19,6 +19,7 @@ from ddagr_gym.files import atomic_path, make_folder
 
 __all__ = [
     "atomic_path",
+    "check_output_folder",
     "format_fields",
     "format_table",
     "format_value",
@@ -70,6 +71,11 @@ def output_folder(path: str | os.PathLike[str], *, overwrite: bool = False) -> I
         _replace_folder(temporary, final)
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
+
+
+def check_output_folder(path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
+    """Refuse before long work what :func:`output_folder` would refuse after it; the same InputError."""
+    _check_replaceable(Path(path).expanduser().resolve(), overwrite)
 
 
 def _check_replaceable(folder: Path, overwrite: bool) -> None:

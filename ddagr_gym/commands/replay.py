@@ -28,14 +28,14 @@ EXAMPLES = (
 )
 
 SAMPLE = "replay_demo.parquet"
-"""Simulated drive that ships with the package, in ``ddagr_gym/data``."""
+"""Simulated drive that ships with the package, in ``ddagr_gym/data``; ``ddagr demo`` replays it."""
 SAMPLE_SOIL = "sandy_loam_lll_15"
 """Soil from which the sample's refit starts; it was driven on a somewhat different one."""
 
 
 @dataclass(frozen=True)
 class Arguments:
-    """Replay recordings in the simulator: residuals, roll-outs, error growth, kinematic baselines, refit.
+    """Drive recordings again in the simulator: residuals, error growth, refit, kinematic baselines.
 
     The simulator is driven by the recorded commands and, as a second arm, by the recorded wheel speeds: in short
     windows with free initial states, and from the state at a start over 1, 5 and 30 s and over every whole stretch.
@@ -86,7 +86,7 @@ def run(arguments: Arguments) -> None:
     soil = get_soil(arguments.soil)
     effects = tuple(effect for item in arguments.effects for effect in load_effects(item))
     recordings = _load(arguments)
-    robot = get_robot(_robot_name(arguments.robot, recordings))
+    robot = get_robot(robot_name(arguments.robot, recordings))
     settings = ArmSettings(arguments.window, arguments.refit, effects, threads=arguments.threads, seed=arguments.seed)
     groups = [recordings] if arguments.together else [[recording] for recording in recordings]
     with output_folder(arguments.output, overwrite=arguments.overwrite) as folder:
@@ -106,7 +106,12 @@ def _load(arguments: Arguments) -> list[Recording]:
     return [load_recording(r, arguments.map or None, arguments.robot or None, limits) for r in arguments.runs]
 
 
-def _robot_name(asked: str, recordings: Sequence[Recording]) -> str:
+def robot_name(asked: str, recordings: Sequence[Recording]) -> str:
+    """Robot that drove: the one asked for, else the recordings' own.
+
+    Raises:
+        InputError: recordings of two robots, or none named.
+    """
     names = sorted({recording.meta.robot for recording in recordings} - {""})
     if len(names) > 1:
         raise InputError(f"the runs are of the robots {', '.join(names)}: replay one robot at a time.")
@@ -160,6 +165,8 @@ def _draw(results: Sequence[RunResult], folder: Path) -> dict[tuple[int, str], l
 
 
 _DRIVEN = {"commands": "commands", "encoders": "wheel speeds"}
+_SHORT = ("simulator", "refitted", "no slip", "effective track")
+"""Of the models, in their order."""
 
 
 def _stem(result: RunResult, number: int, count: int) -> str:
@@ -193,15 +200,29 @@ def arm_text(arm: ArmReport) -> str:
     names = [table.model for table in arm.residuals]
     channels = [
         (c.channel, c.unit, _number(c.noise), *(_number(t.channels[k].rms) for t in arm.residuals),
-         *(_number(t.channels[k].bias) for t in arm.residuals), f"{c.correlation:.2f}")
+         *(_number(t.channels[k].bias) for t in arm.residuals), f"{arm.residuals[-1].channels[k].correlation:.2f}")
         for k, c in enumerate(arm.residuals[0].channels)
     ]  # fmt: skip
     head = ("residual", "unit", "noise", *(f"rms {n}" for n in names), *(f"bias {n}" for n in names), "correlation")
     parts = [f"\ndriven by {_DRIVEN[arm.drive]}", errors]
     parts += [format_table(head, channels)] if channels else []
+    parts += [f"note: {note}" for note in arm.notes]
     parts.append(_fit_text(arm))
     parts.append(f"simulator: {arm.speed.times_real_time:.0f} times real time on one core")
     return "\n".join(part for part in parts if part)
+
+
+def lead_text(report: ReplayReport) -> str:
+    """Heading errors after 5 s of every model as one short table, a row per run and arm."""
+    from ddagr_gym.replay.report import MODELS, lead_errors
+
+    rows = []
+    for item in report.runs:
+        for arm in item.arms:
+            found = lead_errors(arm)
+            errors = (_number(found[m].error.rms) if m in found else "-" for m in MODELS)
+            rows.append((", ".join(item.sources), _DRIVEN[arm.drive], *errors))
+    return format_table(("heading error after 5 s [rad]", "driven by", *_SHORT), rows)
 
 
 def _number(value: float | None) -> str:
@@ -217,28 +238,3 @@ def _fit_text(arm: ArmReport) -> str:
         for p in arm.refit.parameters
     ]  # fmt: skip
     return format_table(("refitted", "unit", "value", "deviation", "prior", "pull", ""), rows)
-
-
-def replay_demo(recording_path: Path | None, folder: Path, robot: str = "") -> ReplayReport:
-    """What ``ddagr demo`` shows of a replay: a recording driven again, with a refit.
-
-    Args:
-        recording_path: a recording; None for a simulated drive that ships with the package.
-        folder: that exists, for report, figures and page.
-        robot: that drove, where the recording does not say.
-
-    Returns:
-        The report; :func:`summary` has it as text.
-
-    Raises:
-        InputError: the recording cannot be read or replayed.
-    """
-    from ddagr_gym.presets import get_robot, get_soil
-    from ddagr_gym.recordings.load import load_recording
-    from ddagr_gym.replay.arm import ArmSettings
-
-    path = Path(__file__).resolve().parents[1] / "data" / SAMPLE if recording_path is None else recording_path
-    recording = load_recording(path, None, robot or None)
-    name = _robot_name(robot, [recording])
-    soil = SAMPLE_SOIL if name == "ddagr" else "firm_ground"
-    return replay_groups([[recording]], get_robot(name), get_soil(soil), soil, ArmSettings(refit=True), folder)

@@ -68,6 +68,14 @@ def _weave() -> tuple[tuple[float, float, float], ...]:
     return tuple((step, round(float(0.9 + d), 6), round(float(0.9 - d), 6)) for d in swing)
 
 
+def _ramps() -> tuple[tuple[float, float, float], ...]:
+    """Sampled ramps of both banks: up to 1.3 rad/s and down, then the same backwards to -0.8 rad/s, 26 s long."""
+    step = 0.2
+    t = np.arange(0.0, 26.0, step) + step / 2
+    speed = np.interp(t, [0.0, 8.0, 14.0, 20.0, 26.0], [0.0, 1.3, 0.0, -0.8, 0.0])
+    return tuple((step, round(float(v), 6), round(float(v), 6)) for v in speed)
+
+
 MANOEUVRES = {
     item.name: item
     for item in (
@@ -94,6 +102,41 @@ MANOEUVRES = {
         ),
         Manoeuvre("s_weave", _weave(), "sinusoidal weave, 10 s period"),
         Manoeuvre("spin", ((8.0, 0.8, -0.8), (8.0, -0.8, 0.8)), "turning on the spot to both sides"),
+        Manoeuvre(
+            "two_speeds", ((10.0, 0.4, 0.4), (10.0, 1.2, 1.2)), "straight at a low and at three times that speed"
+        ),
+        Manoeuvre("ramps", _ramps(), "straight with slowly rising and falling speed, also backwards"),
+        Manoeuvre(
+            "reversing",
+            tuple(s for v in (0.8, -0.8) for s in ((5.0, v, v), (5.0, 0.5 * v, 1.3 * v), (5.0, 1.3 * v, 0.5 * v))),
+            "straight and arcs, forwards and then backwards",
+        ),
+        Manoeuvre(
+            "two_headings",
+            ((9.0, 0.8, 0.8), (8.0, 0.8, -0.8), (9.0, 0.8, 0.8)),
+            "straight, a turn on the spot of about a right angle, straight",
+        ),
+        Manoeuvre(
+            "four_headings",
+            tuple(s for _ in range(4) for s in ((6.0, 0.8, 0.8), (8.0, 0.8, -0.8))),
+            "straights in four headings with turns on the spot between them",
+        ),
+        Manoeuvre(
+            "two_radii",
+            tuple((8.0, 0.8 + d, 0.8 - d) for d in (0.15, 0.5, -0.15, -0.5)),
+            "a wide and a narrow arc to both sides",
+        ),
+        Manoeuvre("figure_eight", ((22.0, 1.15, 0.55), (22.0, 0.55, 1.15)), "a circle to either side at one speed"),
+        Manoeuvre(
+            "row_turn",
+            ((6.0, 0.8, 0.8), (16.0, 1.1, 0.1), (6.0, 0.8, 0.8)),
+            "along a row, around its end, back along the next",
+        ),
+        Manoeuvre(
+            "steps",
+            tuple((1.5, r, q) for r, q in ((0.9, 0.9), (0.3, 0.9), (0.9, 0.3), (0.0, 0.0), (-0.6, 0.6), (1.1, 1.1)) * 3),
+            "a new command every 1.5 s",
+        ),
     )
 }
 """The built-in drives by name."""

@@ -9,11 +9,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ddagr_gym.control.observation import TurnObservation, decode
-from ddagr_gym.control.row_turn import Phase
+from ddagr_gym.control.row_turn import SIDES, Phase, RowTurn
 from ddagr_gym.parameters import Robot
 
 CONTROL_PERIOD = 0.08
 """Time between actions [s]: ten sensor samples at 125 Hz."""
+
+
+def commanded_turn(seen: TurnObservation) -> RowTurn:
+    """The manoeuvre that an episode's first observation commands; the run-out is not observed."""
+    side = next(name for name, sign in SIDES.items() if sign == (1 if seen.side > 0.0 else -1))
+    return RowTurn(radius=seen.target_radius, side=side, run_in=seen.run_in_to_go, speed=seen.target_speed)
 
 
 class TurnController:

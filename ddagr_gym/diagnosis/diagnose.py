@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ddagr_gym.diagnosis.equivalence import equivalence_weights
 from ddagr_gym.diagnosis.held import Held, find_held, hold_effect, without_repeats
+from ddagr_gym.diagnosis.inputs import data_source
 from ddagr_gym.diagnosis.misfit import roughest
 from ddagr_gym.diagnosis.problem import Problem
-from ddagr_gym.diagnosis.search import Found, Standing, bootstrap_weights, search
+from ddagr_gym.diagnosis.search import Found, Standing, search
 from ddagr_gym.diagnosis.setting import Setting, make_problem
 from ddagr_gym.diagnosis.thresholds import Thresholds
 from ddagr_gym.diagnosis.uncertainty import intervals, least_detectable, resampled_parameters
@@ -20,11 +23,69 @@ from ddagr_gym.physics.effects import Effect
 from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.version import __version__
 
-EQUIVALENT = 0.05
-"""Weight that a rival needs to stand in the equivalence set (ours, with the level)."""
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """Recordings ready for a search.
 
-_NEAR = 0.7
-"""Share of the best joint gain below which a rival is not compared (ours: far beyond what resampling moves)."""
+    Attributes:
+        recordings: with repeats as missing samples.
+        held: sensors that repeat their readings.
+        problem: their windows.
+    """
+
+    recordings: tuple[Recording, ...]
+    held: tuple[Held, ...]
+    problem: Problem
+
+
+def prepare(robot: Robot, soil: Soil, recordings: Sequence[Recording], setting: Setting) -> Prepared:
+    """Held readings, noise, windows.
+
+    Args:
+        robot: nominal.
+        soil: nominal.
+        recordings: at least one, of one period.
+        setting: choices.
+    """
+    held = find_held(recordings)
+    clean = tuple(without_repeats(recording, held) for recording in recordings) if held else tuple(recordings)
+    return Prepared(clean, tuple(held), make_problem(robot, soil, clean, setting))
+
+
+def conclude(
+    prepared: Prepared, found: Found, thresholds: Thresholds, rng: np.random.Generator
+) -> tuple[Diagnosis, tuple[Effect, ...]]:
+    """Findings with intervals and equivalence sets, and the verdict.
+
+    Args:
+        prepared: what was searched.
+        found: by the search.
+        thresholds: of the null bank.
+        rng: of the resampling.
+
+    Returns:
+        The diagnosis (its time is 0), and the effects that it names with their fitted sizes.
+    """
+    problem, held = prepared.problem, prepared.held
+    findings = [*_held_findings(held), *_findings(problem, found, thresholds, rng)]
+    verdict, complete = _verdict(found, [f.name for f in findings], thresholds)
+    effects = (*((hold_effect(held),) if held else ()), *found.chosen.fitted.point.effects)
+    values = found.chosen.fitted.point.values
+    diagnosis = Diagnosis(
+        verdict,
+        complete,
+        tuple(findings),
+        _sentence(verdict, complete, findings),
+        {"nominal": found.nominal.misfit, "corrected": found.chosen.misfit, "limit": dict(thresholds.misfit)},
+        least_detectable(found.nominal.terms, thresholds, found.nominal.dispersion),  # type: ignore[arg-type]
+        {p.name: float(v) for p, v in zip(problem.nuisances.parameters, values, strict=True) if p.prior > 0.0},
+        tuple(recording.meta.source for recording in prepared.recordings),
+        {"nulls": thresholds.nulls, "bank": thresholds.bank, "level": thresholds.level},
+        0.0,
+        __version__,
+        data=tuple(data_source(recording) for recording in prepared.recordings),
+    )
+    return diagnosis, effects if verdict != (UNKNOWN,) else ()
 
 
 def diagnose(
@@ -36,7 +97,7 @@ def diagnose(
     setting: Setting | None = None,
     progress: Callable[[str], None] = lambda text: None,
 ) -> tuple[Diagnosis, tuple[Effect, ...]]:
-    """Diagnose recordings of one robot on one soil.
+    """Name what is missing, without certification and what follows; :mod:`ddagr_gym.diagnosis.pipeline` has it all.
 
     Args:
         robot: nominal.
@@ -51,30 +112,11 @@ def diagnose(
         The diagnosis, and the effects that it names with their fitted sizes.
     """
     began = time.monotonic()
-    setting = Setting() if setting is None else setting
-    held = find_held(recordings)
-    clean = [without_repeats(recording, held) for recording in recordings] if held else list(recordings)
-    problem = make_problem(robot, soil, clean, setting)
-    found = search(problem, thresholds, progress=progress)
+    prepared = prepare(robot, soil, recordings, Setting() if setting is None else setting)
+    found = search(prepared.problem, thresholds, progress=progress)
     progress("doubt")
-    findings = [*_held_findings(held), *_findings(problem, found, thresholds, rng)]
-    verdict, complete = _verdict(found, [f.name for f in findings], thresholds)
-    effects = (*((hold_effect(held),) if held else ()), *found.chosen.fitted.point.effects)
-    values = found.chosen.fitted.point.values
-    diagnosis = Diagnosis(
-        verdict,
-        complete,
-        tuple(findings),
-        _sentence(verdict, complete, findings),
-        {"nominal": found.nominal.misfit, "corrected": found.chosen.misfit, "limit": dict(thresholds.misfit)},
-        least_detectable(found.nominal.terms, thresholds, found.nominal.dispersion),  # type: ignore[arg-type]
-        {p.name: float(v) for p, v in zip(problem.nuisances.parameters, values, strict=True) if p.prior > 0.0},
-        tuple(recording.meta.source for recording in recordings),
-        {"nulls": thresholds.nulls, "bank": thresholds.bank, "level": thresholds.level},
-        time.monotonic() - began,
-        __version__,
-    )
-    return diagnosis, effects if verdict != (UNKNOWN,) else ()
+    diagnosis, effects = conclude(prepared, found, thresholds, rng)
+    return replace(diagnosis, seconds=time.monotonic() - began), effects
 
 
 def _held_findings(held: Sequence[Held]) -> list[Finding]:
@@ -115,7 +157,7 @@ def _findings(problem: Problem, found: Found, thresholds: Thresholds, rng: np.ra
                 before.scores[effect.name],
                 before.held_out.get(effect.name, 0.0),
                 _channel_shares(found.nominal, chosen),
-                _equivalents(before, found, effect.name, rng),
+                _equivalents(found, effect.name, rng),
             )
         )
     return findings
@@ -126,15 +168,13 @@ def _before(found: Found, name: str) -> Standing:
     return next(s for s in reversed(found.standings) if name not in s.names)
 
 
-def _equivalents(before: Standing, found: Found, name: str, rng: np.random.Generator) -> dict[str, float]:
-    """Names that explain nearly as much, with their weights."""
-    best = next(item.gain for item in before.gains if item.name == name)
-    near = [item.name for item in before.gains if item.gain > _NEAR * best]
-    names = list(dict.fromkeys([name, *near]))
-    weights = bootstrap_weights(before.terms, names, rng)
-    kept = {key: value for key, value in weights.items() if value >= EQUIVALENT or key == name}
-    total = sum(kept.values())
-    return {key: value / total for key, value in kept.items()} if total > 0.0 else {name: 1.0}
+def _equivalents(found: Found, name: str, rng: np.random.Generator) -> dict[str, float]:
+    """Names that explain nearly as much as the one that was chosen, with their weights."""
+    for step, before in zip(found.steps, found.standings, strict=False):
+        if name in [rival.name for rival in step]:
+            chosen_first = sorted(step, key=lambda rival: rival.name != name)
+            return equivalence_weights(chosen_first, before.dispersion, rng)
+    return {name: 1.0}
 
 
 def _channel_shares(nominal: Standing, chosen: Standing) -> dict[str, float]:

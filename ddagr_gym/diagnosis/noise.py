@@ -29,6 +29,12 @@ _CENTRAL = 0.8
 _COARSE = 1.5
 """Quanta by which successive samples of a channel differ at most (rms) if its rounding is what limits it (ours)."""
 
+_STEADY = 0.8
+"""Time without a change of command after which a robot's motion counts as steady [s]: three time constants of a bank."""
+
+_STEADY_CHANGE = 0.02
+"""Change of a bank's command that still counts as none [rad/s] (ours)."""
+
 _FEWEST = 40
 """Differences that a level needs (ours)."""
 
@@ -54,7 +60,9 @@ class ChannelNoise:
     def of_mean(self, samples: int, speed: Array | float = 0.0) -> Array:
         """Standard deviation of the mean of ``samples`` successive samples at a travel speed [m/s]."""
         lags = np.arange(1, samples)
-        factor = (1.0 + 2.0 * np.sum((1.0 - lags / samples) * self.correlation**lags)) / samples
+        # the rounding of a differenced counter is correlated over one sample only, that of AR(1) noise over all
+        powers = np.where(lags == 1, self.correlation, 0.0) if self.quantum > 0.0 else self.correlation**lags
+        factor = (1.0 + 2.0 * np.sum((1.0 - lags / samples) * powers)) / samples
         factor *= self.inflation**2 if samples > 1 else 1.0
         return np.sqrt(np.maximum(factor, 0.0) * (self.sigma**2 + (self.per_speed * np.asarray(speed)) ** 2))
 
@@ -181,6 +189,7 @@ def recording_noise(recordings: Sequence[Recording], wheel_radius: float) -> tup
         wheel_radius: hub to tread [m].
     """
     speeds = [travel_speed(r, wheel_radius)[s] for r in recordings for s in r.segments()]
+    steady = [steady_rows(r)[s] for r in recordings for s in r.segments()]
     found = []
     for name in CHANNELS:
         pieces = [r[name][s] for r in recordings for s in r.segments()]
@@ -188,8 +197,31 @@ def recording_noise(recordings: Sequence[Recording], wheel_radius: float) -> tup
         sparse = bool(shares) and (max(shares) < SPARSE_SHARE or name.startswith("pose"))
         if name == "pose_yaw":
             pieces = [_unwrapped(piece) for piece in pieces]
+        if not sparse:
+            pieces = _where_steady(pieces, steady)
         found.append(channel_noise(pieces, speeds, sparse))
     return tuple(found)
+
+
+def steady_rows(recording: Recording) -> NDArray[np.bool_]:
+    """(n,) rows at which the commands have not changed for a while, so that what changes in a reading is noise."""
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
+    size = max(round(_STEADY / recording.period), 1)
+    steady = np.ones(len(recording), dtype=bool)
+    for command in recording.held_commands():
+        known = np.nan_to_num(command)
+        highest = maximum_filter1d(known, size, origin=(size - 1) // 2)
+        lowest = minimum_filter1d(known, size, origin=(size - 1) // 2)
+        steady &= highest - lowest < _STEADY_CHANGE
+    return steady
+
+
+def _where_steady(pieces: list[Array], steady: list[NDArray[np.bool_]]) -> list[Array]:
+    """Pieces with the unsteady rows missing, unless hardly any rows would be left."""
+    kept = [np.where(rows, piece, np.nan) for piece, rows in zip(pieces, steady, strict=True)]
+    left = sum(int(np.isfinite(piece).sum()) for piece in kept)
+    return kept if left >= 10 * _FEWEST else pieces
 
 
 def _unwrapped(values: Array) -> Array:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -116,43 +116,105 @@ def _noisy(clean: Array, noise: ChannelNoise, speed: Array, period: float, rng: 
     return clean + coloured * np.hypot(noise.sigma, noise.per_speed * speed) * max(noise.inflation, 1.0)
 
 
-def null_run(robot: Robot, soil: Soil, template: Template, kind: str, setting: Setting, seed: Sequence[int]) -> NullRun:
+def null_run(
+    robot: Robot, soil: Soil, template: Template | None, kind: str, setting: Setting, seed: Sequence[int]
+) -> NullRun:
     """Refit and scan of one null world.
 
     Args:
         robot: nominal.
         soil: nominal.
-        template: see :func:`null_recordings`.
+        template: see :func:`null_recordings`; None draws drives of its own
+            (:mod:`ddagr_gym.diagnosis.standard_drives`).
         kind: of KINDS.
         setting: of the diagnosis.
         seed: of this run alone.
     """
-    from ddagr_gym.diagnosis.refit import fit
-    from ddagr_gym.diagnosis.search import stand
-
     rng = np.random.default_rng(list(seed))
-    recordings = null_recordings(robot, soil, template, kind, rng)
+    if template is None:
+        from ddagr_gym.diagnosis.standard_drives import standard_template
+
+        template = standard_template(robot, rng)
+    return scanned(robot, soil, null_recordings(robot, soil, template, kind, rng), kind, setting)
+
+
+def scanned(robot: Robot, soil: Soil, recordings: Sequence[Recording], kind: str, setting: Setting) -> NullRun:
+    """Refit and scan of drives in which nothing is missing.
+
+    Args:
+        robot: nominal.
+        soil: nominal.
+        recordings: null drives of one world, or pieces of real drives that are known to be ordinary.
+        kind: of KINDS, or "real".
+        setting: of the diagnosis.
+    """
+    from ddagr_gym.diagnosis.search import begin
+
     problem = make_problem(robot, soil, recordings, setting)
-    standing = stand(problem, fit(problem))
-    return NullRun(kind, {g.name: g.gain for g in standing.gains}, standing.scores, standing.held_out, standing.misfit)
+    _, standing = begin(problem)
+    return NullRun(
+        kind,
+        {g.name: g.gain for g in standing.gains},
+        standing.scores,
+        standing.held_out,
+        standing.misfit,
+        problem.blocked.windows.count,
+    )
+
+
+def pieces_of(recording: Recording, length: float) -> list[Recording]:
+    """An ordinary drive cut into pieces of about ``length`` [s] at the joints of its segments, each a null run.
+
+    A drive of one long segment is cut inside it.
+    """
+    ends = [end for _, end in recording.meta.segments]
+    if len(ends) == 1:
+        rows = max(round(length / recording.period), 1)
+        ends = [*range(rows, ends[0], rows), ends[0]]
+    pieces, first = [], recording.meta.segments[0][0]
+    for end in ends:
+        if (end - first) * recording.period >= length or end == ends[-1]:
+            pieces.append(cut(recording, first, end))
+            first = end
+    return pieces
+
+
+def cut(recording: Recording, first: int, last: int) -> Recording:
+    """Rows ``first`` to ``last`` (exclusive) of a recording."""
+
+    def inside(ranges: Sequence[tuple[int, int]]) -> tuple[tuple[int, int], ...]:
+        kept = ((max(a, first) - first, min(b, last) - first) for a, b in ranges)
+        return tuple((a, b) for a, b in kept if b > a)
+
+    meta = replace(recording.meta, segments=inside(recording.meta.segments), spans=inside(recording.meta.spans))
+    rows = slice(first, last)
+    return replace(
+        recording,
+        t=recording.t[rows],
+        channels={name: values[rows] for name, values in recording.channels.items()},
+        command_valid=recording.command_valid[rows],
+        meta=meta,
+        extras={name: values[rows] for name, values in recording.extras.items()},
+    )
 
 
 def null_runs(
-    robot: Robot, soil: Soil, template: Template, setting: Setting, count: int, seed: int
+    robot: Robot, soil: Soil, template: Template | None, setting: Setting, count: int, seed: int
 ) -> Iterator[NullRun]:
     """``count`` null runs, going through KINDS; the same seed gives the same runs whatever their number."""
     for number in range(count):
         yield null_run(robot, soil, template, KINDS[number % len(KINDS)], setting, (seed, number))
 
 
-def bank_hash(robot: Robot, soil: Soil, template: Template, setting: Setting, count: int, seed: int) -> str:
+def bank_hash(robot: Robot, soil: Soil, template: Template | None, setting: Setting, count: int, seed: int) -> str:
     """Hash of everything that a bank depends on, the sources of the diagnosis and the simulator included."""
     from ddagr_gym.diagnosis.sources import source_digest
 
     digest = hashlib.sha256(source_digest().encode())
-    noise = [None if n is None else asdict(n) for n in template.noise]
-    text = json.dumps([repr(robot), repr(soil), repr(setting), noise, template.period, count, seed], sort_keys=True)
+    noise = [None if n is None else asdict(n) for n in template.noise] if template else []
+    period = template.period if template else 0.0
+    text = json.dumps([repr(robot), repr(soil), repr(setting), noise, period, count, seed], sort_keys=True)
     digest.update(text.encode())
-    for commands in template.commands:
+    for commands in template.commands if template else ():
         digest.update(np.ascontiguousarray(commands).tobytes())
     return digest.hexdigest()

@@ -19,7 +19,7 @@ from ddagr_gym.physics import layout
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.replay.model import WindowModel
 from ddagr_gym.replay.refit import STATE_PRIOR
-from ddagr_gym.replay.windows import CHANNELS
+from ddagr_gym.replay.windows import CHANNELS, WindowSet
 
 Array = NDArray[np.float64]
 Chosen = NDArray[np.bool_]
@@ -108,7 +108,7 @@ class Problem:
         self.priors = NuisancePriors() if priors is None else priors
         self._setting = (robot, soil, threads, fit_numerics() if numerics is None else numerics)
         windows = blocked.windows
-        self.model = WindowModel(robot, soil, windows, nuisances.parameters, numerics=self._setting[3], threads=threads)
+        self.model = self.model_of(windows)
         self.prior = np.array([p.prior for p in nuisances.parameters])
         self.low = np.array([p.low for p in nuisances.parameters])
         self.high = np.array([p.high for p in nuisances.parameters])
@@ -119,6 +119,21 @@ class Problem:
         return Problem(
             robot, soil, self.blocked.subset(chosen), self.nuisances, self.priors, threads=threads, numerics=numerics
         )
+
+    def on(self, blocked: BlockedWindows) -> Problem:
+        """The same problem on other windows of the same recordings."""
+        robot, soil, threads, numerics = self._setting
+        return Problem(robot, soil, blocked, self.nuisances, self.priors, threads=threads, numerics=numerics)
+
+    def model_of(self, windows: WindowSet) -> WindowModel:
+        """The same model over other windows of the same recordings."""
+        robot, soil, threads, numerics = self._setting
+        return WindowModel(robot, soil, windows, self.nuisances.parameters, numerics=numerics, threads=threads)
+
+    @property
+    def robot(self) -> Robot:
+        """The nominal robot."""
+        return self._setting[0]
 
     @property
     def free(self) -> Chosen:

@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 
 _DAMPING = (1.0, 0.5, 0.25, 0.1, 0.03)
 _LONGEST = 3.0  # standard deviations that a parameter moves in one step: beyond, the sensitivities are of no use
+_EFFECT_RENEWALS = 5  # effects are less linear than nuisances, and fewer
 _STATES = len(STATE_PRIOR)
 _NEVER = 1e5  # an onset at which an effect holds always, or never
 
@@ -123,10 +124,13 @@ def cost_of(problem: Problem, point: Point, prediction: Array, elimination: Elim
     """Cost with the windows' unknowns eliminated, and the windows' shares (W,); infinite where predictions fail."""
     residual = elimination.project(problem.residual(point, prediction)[..., None])[..., 0]
     shares = 0.5 * (residual**2).sum(axis=1)
-    free = problem.free
-    prior = 0.5 * float(((point.values[free] / problem.prior[free]) ** 2).sum())
-    total = float(shares.sum()) + prior + size_penalty(point.effects)
+    total = float(shares.sum()) + _prior_cost(problem, point)
     return (total if np.isfinite(total) else np.inf), shares
+
+
+def _prior_cost(problem: Problem, point: Point) -> float:
+    free = problem.free
+    return 0.5 * float(((point.values[free] / problem.prior[free]) ** 2).sum()) + size_penalty(point.effects)
 
 
 def fit(
@@ -137,6 +141,7 @@ def fit(
     tolerance: float = 2e-4,
     renewals: int = 2,
     reuse: Fitted | None = None,
+    first: Fitted | None = None,
     fixed: frozenset[str] = frozenset(),
     progress: Callable[[], None] = lambda: None,
 ) -> Fitted:
@@ -147,8 +152,9 @@ def fit(
         start: first point with its effects.
         iterations: most steps; 0 only computes the sensitivities at the start.
         tolerance: relative gain of a step that ends the fit.
-        renewals: how often the sensitivities are computed before they are kept; those of the result are new.
+        renewals: how often the nuisances' sensitivities are computed before they are kept; those of the result are new.
         reuse: fit whose nuisance sensitivities are kept, so that only those of the effects are simulated.
+        first: fit at ``start`` whose nuisance sensitivities serve for the first step only.
         fixed: names of effect parameters to leave alone.
         progress: called after each step.
     """
@@ -158,8 +164,9 @@ def fit(
     if not np.isfinite(prediction).all():
         point = replace(point, states=problem.blocked.windows.initial.copy())
         prediction = problem.predict(point)
+    known = reuse or first
     by_parameter, elimination = (
-        (reuse.by_parameter, reuse.elimination) if reuse else _sensitivities(problem, point, prediction)
+        (known.by_parameter, known.elimination) if known else _sensitivities(problem, point, prediction)
     )
     by_effect = effect_columns(problem, point, prediction, parameters)
     cost, _ = cost_of(problem, point, prediction, elimination)
@@ -172,11 +179,11 @@ def fit(
         )
         converged = before - cost < tolerance * cost
         progress()
-        if done < renewals and not converged:
-            if reuse is None:
-                by_parameter, elimination = _sensitivities(problem, point, prediction)
-            by_effect = effect_columns(problem, point, prediction, parameters)
+        if done < renewals and not converged and reuse is None:
+            by_parameter, elimination = _sensitivities(problem, point, prediction)
             cost, _ = cost_of(problem, point, prediction, elimination)
+        if parameters and done < max(renewals, _EFFECT_RENEWALS) and not converged:
+            by_effect = effect_columns(problem, point, prediction, parameters)
     if reuse is None and done:
         by_parameter, elimination = _sensitivities(problem, point, prediction)
     cost, shares = cost_of(problem, point, prediction, elimination)
@@ -219,12 +226,27 @@ def _step(
         values = point.values.copy()
         values[free] += damping * change[: len(free)]
         effects = moved(point.effects, parameters, here[len(free) :] + damping * change[len(free) :])
-        tried = Point(values, point.states + damping * states, effects)
-        predicted = problem.predict(tried)
-        after, _ = cost_of(problem, tried, predicted, elimination)
+        trials = [Point(values, point.states + share * states, effects) for share in (damping, 0.0)]
+        tried, predicted, after = _best_by_window(problem, trials, elimination)
         if after < cost:
             return tried, predicted, after
     return point, prediction, cost
+
+
+def _best_by_window(problem: Problem, trials: Sequence[Point], elimination: Elimination) -> tuple[Point, Array, float]:
+    """Of points that differ in their initial states, the best state of each window.
+
+    Windows share nothing but the parameters; one near rest whose linear step fails must not stop all others.
+    """
+    predictions = [problem.predict(trial) for trial in trials]
+    costs = [cost_of(problem, trial, y, elimination)[1] for trial, y in zip(trials, predictions, strict=True)]
+    shares = np.nan_to_num(np.stack(costs), nan=np.inf)
+    best = np.argmin(shares, axis=0)
+    rows = np.arange(len(best))
+    states = np.stack([trial.states for trial in trials])[best, rows]
+    prior = _prior_cost(problem, trials[0])
+    total = float(shares[best, rows].sum()) + prior
+    return replace(trials[0], states=states), np.stack(predictions)[best, rows], total
 
 
 def bounded_step(information: Array, gradient: Array, low: Array, high: Array) -> Array:

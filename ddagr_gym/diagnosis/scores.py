@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ddagr_gym.diagnosis.candidates import Candidate, candidates_of
 from ddagr_gym.diagnosis.problem import Problem
 from ddagr_gym.diagnosis.refit import Fitted
+from ddagr_gym.diagnosis.reread import Drives, acts_on_readings_only, record_drives
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.effects.base import DriveExtent
 from ddagr_gym.physics.effects.registry import effect_kinds
@@ -98,8 +99,17 @@ def touched(probe: Effect, problem: Problem, prediction: Array) -> NDArray[np.bo
     return result
 
 
-def probe_column(problem: Problem, fitted: Fitted, probe: Effect) -> Array:
-    """Weighted change of the block means by a probe at the fitted model, (W, M)."""
+def probe_column(problem: Problem, fitted: Fitted, probe: Effect, drives: Drives | None = None) -> Array:
+    """Weighted change of the block means by a probe at the fitted model, (W, M).
+
+    Args:
+        problem: what was fitted.
+        fitted: the model.
+        probe: effect at a size.
+        drives: simulation of the fitted model, with which an effect on readings needs none of its own.
+    """
+    if drives is not None and acts_on_readings_only(probe):
+        return np.nan_to_num(problem.blocked.means(drives.readings(probe) - fitted.prediction))
     chosen = touched(probe, problem, fitted.prediction)
     column = np.zeros(problem.blocked.mask.shape)
     if not chosen.any():
@@ -128,13 +138,14 @@ def scan(
     assumed = {effect.name for effect in fitted.point.effects}
     candidates: list[Candidate] = []
     columns: list[Array] = []
+    drives = record_drives(problem, fitted.point)
     for name, kind in (effect_kinds() if kinds is None else kinds).items():
         # held readings are found in the values themselves (ddagr_gym.diagnosis.held)
         if name in assumed or name == "sensor_hold":
             continue
         for candidate in candidates_of(kind, extent, len(columns)):
             candidates.append(candidate)
-            columns += [probe_column(problem, fitted, probe) for probe in candidate.probes]
+            columns += [probe_column(problem, fitted, probe, drives) for probe in candidate.probes]
         progress(name)
     free = _open(problem, fitted)
     raw = np.concatenate(

@@ -13,10 +13,15 @@ from ddagr_gym.diagnosis.misfit import channel_misfit
 from ddagr_gym.diagnosis.problem import Problem
 from ddagr_gym.diagnosis.refit import Fitted, fit
 from ddagr_gym.diagnosis.scores import Gain, Terms, dispersion_of, drive_extent, gains, held_out_gains, scan, scores
+from ddagr_gym.diagnosis.size_prior import implausibility
 from ddagr_gym.diagnosis.thresholds import Thresholds
 from ddagr_gym.physics.effects import Effect
 
 Array = NDArray[np.float64]
+
+_TRIAL_STEPS = 3
+_HOPELESS = 0.05  # share of the best linear gain below which no joint refit is tried
+_CLOSE = 0.6  # share of the best joint gain above which a rival is fitted to the end
 
 MOST_EFFECTS = 3
 """Simultaneous effects that a search goes up to (diagnosis.md, step 6)."""
@@ -70,13 +75,14 @@ class Found:
     """Result of a search.
 
     Attributes:
-        nominal: the refitted nominal model.
         standings: models from the nominal one to the chosen one.
         rivals: refits of the step that chose the first effect, best first.
+        steps: refits of every step, best first; of the steps that added an effect, in the order of ``standings[1:]``.
     """
 
     standings: tuple[Standing, ...]
     rivals: tuple[Rival, ...]
+    steps: tuple[tuple[Rival, ...], ...] = ()
 
     @property
     def nominal(self) -> Standing:
@@ -99,48 +105,69 @@ def stand(problem: Problem, fitted: Fitted, progress: Callable[[str], None] = la
     return Standing(fitted, terms, found, scores(terms, found), held_out, dispersion, misfit)
 
 
-def refit_with(problem: Problem, standing: Standing, effect: Effect, raw: Fitted) -> Fitted:
-    """Joint refit with one further effect, from the standing model and from the raw nominal one; the better of both.
+def _trial(problem: Problem, standing: Standing, effect: Effect, raw: Fitted) -> Fitted:
+    """A few steps with one further effect, from the standing model and from the raw nominal one; the better of both.
 
     A nominal refit bends soil and robot to make up for what is missing, so far that no step leads back. Sensitivities
     of the nuisances are those of the two starting points.
-
-    Args:
-        problem: what to fit.
-        standing: the model so far.
-        effect: first guess of what to add.
-        raw: the nominal model with its sensitivities.
     """
     effects = (*standing.fitted.point.effects, effect)
     starts = ((standing.fitted.point, standing.fitted), (raw.point, raw))
     trials = [
-        fit(problem, replace(point, effects=effects), iterations=6, renewals=3, reuse=reuse) for point, reuse in starts
+        fit(problem, replace(point, effects=effects), iterations=_TRIAL_STEPS, renewals=2, reuse=reuse)
+        for point, reuse in starts
     ]
     return min(trials, key=lambda trial: trial.cost)
 
 
 def rivals_of(problem: Problem, standing: Standing, raw: Fitted, thresholds: Thresholds, most: int) -> list[Rival]:
-    """Joint refits of the effects that pass the gate, best first."""
+    """Joint refits of the effects that pass the gate, best first: all for a few steps, the close ones to the end.
+
+    Args:
+        problem: what to fit.
+        standing: the model so far.
+        raw: the nominal model with its sensitivities.
+        thresholds: of the gate.
+        most: effects that are tried.
+    """
     passing = [gain for gain in standing.gains if thresholds.passes(gain.name, gain.gain, standing)]
-    ranked = sorted(passing, key=lambda item: -item.gain / thresholds.of(item.name).gain)[: 2 * most]
-    ranked = sorted(ranked, key=lambda item: -item.gain)[:most]
+    ranked = sorted(passing, key=lambda item: -(item.gain - thresholds.of(item.name).gain))
+    ranked = [item for item in ranked[:most] if item.gain > _HOPELESS * ranked[0].gain]
     extent = drive_extent(problem, standing.fitted.prediction)
-    rivals = []
+    tried = []
     for gain in ranked:
         effect = first_guess(standing.terms.candidates[gain.candidate], gain.multiples)
-        fitted = refit_with(problem, standing, effect, raw)
-        if fitted.point.effects[-1].is_meaningful(extent):
-            rivals.append(Rival(gain.name, fitted, (standing.fitted.cost - fitted.cost) / standing.dispersion))
-    return sorted(rivals, key=lambda rival: -rival.gain)
+        tried.append(_rival(standing, gain.name, _trial(problem, standing, effect, raw)))
+    best = max((rival.gain for rival in tried), default=0.0)
+    rivals = [_finish(problem, standing, rival) if rival.gain > _CLOSE * best else rival for rival in tried]
+    kept = [rival for rival in rivals if rival.fitted.point.effects[-1].is_meaningful(extent)]
+    return sorted(kept, key=lambda rival: implausibility(rival.fitted.point.effects[-1]) - rival.gain)
+
+
+def _rival(standing: Standing, name: str, fitted: Fitted) -> Rival:
+    return Rival(name, fitted, (standing.fitted.cost - fitted.cost) / standing.dispersion)
+
+
+def _finish(problem: Problem, standing: Standing, rival: Rival) -> Rival:
+    fitted = fit(problem, rival.fitted.point, iterations=6, renewals=2, reuse=rival.fitted)
+    return _rival(standing, rival.name, min(fitted, rival.fitted, key=lambda trial: trial.cost))
+
+
+def begin(problem: Problem, progress: Callable[[str], None] = lambda text: None) -> tuple[Fitted, Standing]:
+    """The raw nominal model with its sensitivities, and the refitted one with its scan."""
+    progress("nominal refit")
+    raw = fit(problem, iterations=0)
+    return raw, stand(problem, fit(problem, raw.point, first=raw), progress)
 
 
 def search(
     problem: Problem,
     thresholds: Thresholds,
     *,
-    rivals: int = 4,
+    rivals: int = 5,
     most: int = MOST_EFFECTS,
     progress: Callable[[str], None] = lambda text: None,
+    begun: tuple[Fitted, Standing] | None = None,
 ) -> Found:
     """Refit, scan, and add effects while one passes the gate.
 
@@ -150,26 +177,40 @@ def search(
         rivals: effects that are refitted jointly at each step.
         most: effects at the same time.
         progress: called with what is being done.
+        begun: raw and refitted nominal model of an earlier :func:`begin`.
     """
-    progress("nominal refit")
-    raw = fit(problem, iterations=0)
-    standing = stand(problem, fit(problem), progress)
+    raw, standing = begin(problem, progress) if begun is None else begun
     standings: list[Standing] = [standing]
-    first: tuple[Rival, ...] = ()
+    steps: list[tuple[Rival, ...]] = []
     while len(standing.names) < most:
         tried = rivals_of(problem, standing, raw, thresholds, rivals)
         tried = [rival for rival in tried if rival.gain > thresholds.of(rival.name).gain]
         if not tried:
             break
-        first = first or tuple(tried)
         progress(f"joint refit with {tried[0].name}")
-        best = fit(problem, tried[0].fitted.point, iterations=6)
-        standing = stand(problem, best, progress)
+        best = _swapped(problem, tried[0].fitted, steps)
+        standing = stand(problem, fit(problem, best.point, iterations=4, renewals=1, first=best), progress)
         standing = _without_idle(problem, standing, thresholds, progress)
-        if standing.names == standings[-1].names:
+        if set(standing.names) in [set(s.names) for s in standings]:
             break
         standings.append(standing)
-    return Found(tuple(standings), first)
+        steps.append(tuple(tried))
+    return Found(tuple(standings), steps[0] if steps else (), tuple(steps))
+
+
+def _swapped(problem: Problem, fitted: Fitted, steps: Sequence[tuple[Rival, ...]]) -> Fitted:
+    """Swap move: the model with a close rival in place of an effect that an earlier step chose, where it fits better."""
+    best = fitted
+    for number, rivals in enumerate(steps):
+        for rival in rivals[1:]:
+            names = {effect.name for effect in best.point.effects}
+            if rival.gain < _CLOSE * rivals[0].gain or rival.name in names:
+                continue
+            effects = list(best.point.effects)
+            effects[number] = rival.fitted.point.effects[number]
+            tried = fit(problem, replace(best.point, effects=tuple(effects)), iterations=4, reuse=fitted)
+            best = min(best, tried, key=lambda trial: trial.cost)
+    return best
 
 
 def _without_idle(

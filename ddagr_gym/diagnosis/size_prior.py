@@ -6,6 +6,7 @@ direction that the data hardly see is blown up until it explains noise.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from ddagr_gym.physics.effects import Effect
@@ -32,3 +33,24 @@ def size_penalty(effects: Sequence[Effect]) -> float:
             away = getattr(effect, name) - effect.parameter(name).metadata["neutral"]
             total += 0.5 * (away / size_scale(effect, name)) ** 2
     return total
+
+
+_SPREAD = 0.7
+"""Standard deviation of the logarithm of a size about the typical one (ours: most are 2 to 15 times the least)."""
+
+
+def implausibility(effect: Effect) -> float:
+    """Half the square of how far a size is from a typical one, on a logarithmic scale; it settles ties only.
+
+    A biased and a tilted accelerometer leave the same traces: 0.1 m/s^2 is an ordinary bias and hardly a tilt, 0.5 m/s^2
+    an ordinary tilt and hardly a bias.
+    """
+    if effect.categorical or not effect.differentiable:
+        return 0.0
+    multiples = [
+        (getattr(effect, name) - data["neutral"]) / data["least"]
+        for name in effect.size_names()
+        for data in (effect.parameter(name).metadata,)
+    ]
+    size = math.sqrt(sum(multiple**2 for multiple in multiples))
+    return 0.5 * (math.log(max(size, 0.1) / TYPICAL_MULTIPLE) / _SPREAD) ** 2

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Protocol
 
@@ -52,6 +52,8 @@ class Thresholds:
         nulls: null runs that they were taken from.
         bank: hash of the bank's data.
         level: of false alarms over the whole library.
+        maxima: of each null run, the largest gain over its gate, in increasing order.
+        windows: of a null run, their median; 0 where unknown.
     """
 
     gates: Mapping[str, Gate]
@@ -59,6 +61,30 @@ class Thresholds:
     nulls: int
     bank: str
     level: float = LEVEL
+    maxima: tuple[float, ...] = ()
+    windows: float = 0.0
+
+    def for_windows(self, count: int) -> Thresholds:
+        """The same for recordings of another length.
+
+        What a null run reaches beyond noise comes from the structure of the simulator and grows with the number of
+        windows; shorter recordings keep the gates of the bank.
+        """
+        if self.windows <= 0.0 or count <= self.windows:
+            return self
+        share = count / self.windows
+        gates = {name: Gate(gate.gain * share, gate.held_out * share) for name, gate in self.gates.items()}
+        return replace(self, gates=gates, windows=float(count))
+
+    def p_value(self, name: str, gain: float) -> float | None:
+        """Share of null runs in which some effect stands as high over its gate, the run at hand counted with them.
+
+        None without a bank that kept its runs.
+        """
+        if not self.maxima:
+            return None
+        above = sum(value >= gain / self.of(name).gain for value in self.maxima)
+        return (1 + above) / (1 + len(self.maxima))
 
     def of(self, name: str) -> Gate:
         """Gate of an effect; one that the bank did not know has the strictest of all."""
@@ -88,6 +114,7 @@ class NullRun:
         scores: by effect.
         held_out: by effect.
         misfit: mean square of the residuals by channel.
+        windows: of the run.
     """
 
     kind: str
@@ -95,6 +122,7 @@ class NullRun:
     scores: dict[str, float]
     held_out: dict[str, float]
     misfit: dict[str, float]
+    windows: int = 0
 
 
 def thresholds_from(runs: Sequence[NullRun], bank: str, level: float = LEVEL) -> Thresholds:
@@ -117,7 +145,9 @@ def thresholds_from(runs: Sequence[NullRun], bank: str, level: float = LEVEL) ->
     gates = {
         name: Gate(float(widening * scale[k]), float(max(np.median(held[:, k]), 0.0))) for k, name in enumerate(names)
     }
-    return Thresholds(gates, _misfit_limits(runs, level), len(runs), bank, level)
+    maxima = np.sort((table / (widening * scale)).max(axis=1))
+    windows = float(np.median([run.windows for run in runs]))
+    return Thresholds(gates, _misfit_limits(runs, level), len(runs), bank, level, tuple(maxima.tolist()), windows)
 
 
 def _misfit_limits(runs: Sequence[NullRun], level: float) -> dict[str, float]:
@@ -153,4 +183,28 @@ def load_thresholds(path: Path) -> Thresholds:
         raise InputError(f"{path} is not a thresholds file of version {VERSION}: make it with `ddagr null-bank`.")
     gates = {str(name): Gate(**gate) for name, gate in body["gates"].items()}
     misfit = {str(name): float(value) for name, value in body["misfit"].items()}
-    return Thresholds(gates, misfit, int(body["nulls"]), str(body["bank"]), float(body["level"]))
+    maxima = tuple(float(value) for value in body.get("maxima", ()))
+    return Thresholds(
+        gates,
+        misfit,
+        int(body["nulls"]),
+        str(body["bank"]),
+        float(body["level"]),
+        maxima,
+        float(body.get("windows", 0.0)),
+    )
+
+
+def default_thresholds(robot: str) -> Thresholds:
+    """Thresholds that ship with the package for drives of three times 60 s.
+
+    Raises:
+        InputError: no bank ships for the robot.
+    """
+    path = Path(__file__).resolve().parents[1] / "data" / f"null_bank_{robot}.json"
+    if not path.is_file():
+        raise InputError(
+            f"no null bank ships for robot {robot!r}: make one with `ddagr null-bank RUN... --robot {robot}` and give "
+            "it as --thresholds."
+        )
+    return load_thresholds(path)

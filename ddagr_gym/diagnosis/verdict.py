@@ -1,4 +1,4 @@
-"""The answer of a diagnosis and its JSON form."""
+"""The answer of a diagnosis and its JSON form, which ``docs/diagnosis_schema.md`` explains entry by entry."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from typing import Any
 
 from ddagr_gym.errors import InputError
 
-SCHEMA = "ddagr-diagnosis/1"
+SCHEMA = "ddagr-diagnosis/2"
+"""Name and version of the JSON form: raised whenever an entry is renamed, removed or changes its meaning."""
 
 NONE = "none"
 UNKNOWN = "unknown"
@@ -46,6 +47,8 @@ class Finding:
         held_out: gain on left-out windows.
         channels: share of each channel in the fall of its misfit.
         equivalence_set: names that the same windows may mean, with their weights; itself included.
+        where: where it shows: a mapping of :mod:`ddagr_gym.diagnosis.localisation`; None where it was not asked.
+        calibrated_p: share of null drives that reach its evidence; None where no bank was asked.
     """
 
     name: str
@@ -56,6 +59,25 @@ class Finding:
     held_out: float
     channels: Mapping[str, float] = field(default_factory=dict)
     equivalence_set: Mapping[str, float] = field(default_factory=dict)
+    where: Mapping[str, Any] | None = None
+    calibrated_p: float | None = None
+
+
+@dataclass(frozen=True)
+class DataSource:
+    """A recording that was used.
+
+    Attributes:
+        source: its name.
+        sha256: of the file it came from, or of its values where it came from no file.
+        rows: how many.
+        seconds: from the first to the last.
+    """
+
+    source: str
+    sha256: str
+    rows: int
+    seconds: float
 
 
 @dataclass(frozen=True)
@@ -74,6 +96,11 @@ class Diagnosis:
         thresholds: where the gates come from: nulls, bank hash, level.
         seconds: of the run.
         version: of the package.
+        fit: errors of the models on drives that they were not fitted to (:mod:`ddagr_gym.diagnosis.certify`).
+        localisation: where something is missing (:mod:`ddagr_gym.diagnosis.localisation`).
+        unnamed: terms without a name, with their equations, where the verdict is incomplete or unknown.
+        next_drive: the drive that would tell the remaining rivals apart best.
+        data: the recordings, with hashes.
         schema: of this file.
     """
 
@@ -88,6 +115,11 @@ class Diagnosis:
     thresholds: Mapping[str, Any]
     seconds: float
     version: str
+    fit: Mapping[str, Any] | None = None
+    localisation: Mapping[str, Any] | None = None
+    unnamed: Mapping[str, Any] | None = None
+    next_drive: Mapping[str, Any] | None = None
+    data: tuple[DataSource, ...] = ()
     schema: str = SCHEMA
 
 
@@ -107,7 +139,14 @@ def _finite(value: Any) -> Any:
     return value
 
 
-_TYPES: dict[str, type | tuple[type, ...]] = {
+_Kinds = dict[str, type | tuple[type, ...]]
+_NUMBER = (int, float)
+_MAYBE_MAPPING = (dict, type(None))
+_WORDS = {
+    str: "a text", bool: "true or false", int: "a whole number", float: "a number", list: "a list",
+    dict: "a mapping", type(None): "null",
+}  # fmt: skip
+_TYPES: _Kinds = {
     "schema": str,
     "verdict": list,
     "complete": bool,
@@ -118,18 +157,32 @@ _TYPES: dict[str, type | tuple[type, ...]] = {
     "nuisances": dict,
     "recordings": list,
     "thresholds": dict,
-    "seconds": (int, float),
+    "seconds": _NUMBER,
     "version": str,
+    "fit": _MAYBE_MAPPING,
+    "localisation": _MAYBE_MAPPING,
+    "unnamed": _MAYBE_MAPPING,
+    "next_drive": _MAYBE_MAPPING,
+    "data": list,
 }
-_FINDING_TYPES: dict[str, type | tuple[type, ...]] = {
+_FINDING_TYPES: _Kinds = {
     "name": str,
     "parameters": dict,
-    "gain": (int, float),
-    "gate": (int, float),
-    "score": (int, float),
-    "held_out": (int, float),
+    "gain": _NUMBER,
+    "gate": _NUMBER,
+    "score": _NUMBER,
+    "held_out": _NUMBER,
     "channels": dict,
     "equivalence_set": dict,
+    "where": _MAYBE_MAPPING,
+    "calibrated_p": (*_NUMBER, type(None)),
+}
+_ESTIMATE_TYPES: _Kinds = {"value": _NUMBER, "unit": str, "interval": (list, type(None))}
+_DATA_TYPES: _Kinds = {"source": str, "sha256": str, "rows": int, "seconds": _NUMBER}
+_FIT_TYPES: _Kinds = {"folds": str, "note": str, "horizons": list, "level": _NUMBER, "channels": dict, "gain_share": dict}
+_ERROR_TYPES: _Kinds = {name: dict for name in ("raw", "refitted", "corrected", "black_box", "ceiling")} | {
+    "unit": str,
+    "count": int,
 }
 
 
@@ -151,18 +204,38 @@ def validate(mapping: Mapping[str, Any]) -> None:
             f"the diagnosis has the verdict {mapping['verdict']!r}: give names of effects, none or unknown."
         )
     for finding in mapping["findings"]:
-        _check_types(f"finding {finding.get('name')!r}", finding, _FINDING_TYPES)
+        place = f"finding {finding.get('name')!r}"
+        _check_types(place, finding, _FINDING_TYPES)
+        for name, estimate in finding["parameters"].items():
+            _check_types(f"{place}, {name}", estimate, _ESTIMATE_TYPES)
+    for number, source in enumerate(mapping["data"]):
+        _check_types(f"data {number + 1}", source, _DATA_TYPES)
+    _check_fit(mapping["fit"])
     named = [finding["name"] for finding in mapping["findings"]]
     if mapping["verdict"] not in ([NONE], [UNKNOWN]) and sorted(named) != sorted(mapping["verdict"]):
         raise InputError(f"the diagnosis names {mapping['verdict']!r} and has findings on {named!r}: make them agree.")
 
 
-def _check_types(place: str, mapping: Mapping[str, Any], types: Mapping[str, type | tuple[type, ...]]) -> None:
-    for key, kind in types.items():
+def _check_fit(fit: Mapping[str, Any] | None) -> None:
+    """Errors at horizons; InputError for what is missing or of a wrong type."""
+    if fit is None:
+        return
+    _check_types("the fit", fit, _FIT_TYPES)
+    for channel, by_horizon in fit["channels"].items():
+        for horizon, entry in by_horizon.items():
+            place = f"the fit of {channel} after {horizon} s"
+            _check_types(place, entry, _ERROR_TYPES)
+            for model in ("raw", "refitted", "corrected", "black_box", "ceiling"):
+                _check_types(f"{place}, {model}", entry[model], {"value": _NUMBER, "interval": (list, type(None))})
+
+
+def _check_types(place: str, mapping: Mapping[str, Any], kinds: _Kinds) -> None:
+    for key, kind in kinds.items():
         if key not in mapping:
             raise InputError(f"{place} has no entry {key!r}: make it again with `ddagr diagnose`.")
         if not isinstance(mapping[key], kind):
-            raise InputError(f"{place} has {key} = {mapping[key]!r}: give {kind}.")
+            words = " or ".join(_WORDS[k] for k in (kind if isinstance(kind, tuple) else (kind,)))
+            raise InputError(f"{place} has {key} = {mapping[key]!r}: give {words}.")
 
 
 def save(diagnosis: Diagnosis, path: Path) -> None:

@@ -63,7 +63,7 @@ class TurnBatch:
         self._noise = np.zeros((count, CONTROL_INTERVAL, layout.NOISE_CHANNELS))
         self._outer_radius = np.zeros(count)
         self._weights = np.array(astuple(settings.reward))
-        self._features = EkfFeatureBatch(settings.robot, settings.sensors, count) if settings.ekf_features else None
+        self.features = EkfFeatureBatch(settings.robot, settings.sensors, count) if settings.ekf_features else None
         entries = len(OBSERVATION) + (FEATURE_COUNT if settings.ekf_features else 0)
         self.observation_space = spaces.Box(-kernel.OBSERVATION_LIMIT, kernel.OBSERVATION_LIMIT, (entries,), np.float32)
         self.command_limit = settings.robot.maximum_wheel_speed
@@ -98,8 +98,8 @@ class TurnBatch:
         self.readings[indices] = 0.0
         self.terms[indices] = 0.0
         self.commands[indices] = 0.0
-        if self._features is not None:
-            self._features.reset(indices)
+        if self.features is not None:
+            self.features.reset(indices)
 
     @staticmethod
     def _episode_option(options: dict[str, Any] | None) -> Episode | None:
@@ -132,9 +132,9 @@ class TurnBatch:
         """Write the first observation of the ``chosen`` environments into ``observations`` (N, entries)."""
         indices = np.asarray(chosen, dtype=np.int64)
         kernel.observe_start(self.tasks, indices, self._outer_radius, observations)
-        if self._features is not None:
+        if self.features is not None:
             features = np.empty((self.count, FEATURE_COUNT), dtype=np.float32)
-            self._features.write(features)
+            self.features.write(features)
             observations[indices, len(OBSERVATION) :] = features[indices]
 
     def new_observations(self) -> NDArray[np.float32]:
@@ -166,9 +166,9 @@ class TurnBatch:
             self.tasks, self.simulator.rows, actions, self.readings, self.record, self._weights, self._outer_radius,
             self.terms, rewards, observations,
         )  # fmt: skip
-        if self._features is not None:
-            self._features.update(self.commands, self.readings)
-            self._features.write(observations[:, len(OBSERVATION) :])
+        if self.features is not None:
+            self.features.update(self.commands, self.readings)
+            self.features.write(observations[:, len(OBSERVATION) :])
 
     @property
     def endings(self) -> NDArray[np.int64]:

@@ -164,7 +164,12 @@ class FilterRun(NamedTuple):
         return np.sqrt(np.diagonal(self.covariances, axis1=1, axis2=2))
 
 
-def run_filter(model: FilterModel, columns: Mapping[str, ArrayLike], motion: ArrayLike | None = None) -> FilterRun:
+def run_filter(
+    model: FilterModel,
+    columns: Mapping[str, ArrayLike],
+    motion: ArrayLike | None = None,
+    start: tuple[ArrayLike, ArrayLike] | None = None,
+) -> FilterRun:
     """Filter a recording.
 
     Args:
@@ -172,10 +177,14 @@ def run_filter(model: FilterModel, columns: Mapping[str, ArrayLike], motion: Arr
         columns: ``t``, and of ``command_right``, ``command_left``, ``CHANNELS``, ``roll``, ``pitch`` those there are,
             each (T,); NaN where a channel has no sample.
         motion: (5,) initial v_x, v_y, yaw rate, bank speeds right, left; at rest by default.
+        start: state (12,) and covariance (12, 12) to start from instead of the prior.
 
     Raises:
-        InputError: no time, time that does not increase, columns of different lengths, or no measured channel.
+        InputError: no time, time that does not increase, columns of different lengths, no measured channel, or both
+            ``motion`` and ``start``.
     """
+    if motion is not None and start is not None:
+        raise InputError("motion and start are both given: put the motion into the start's state.")
     t, durations = sample_times(columns, model.sample_period)
     if not any(name in columns for name in CHANNELS):
         raise InputError(f"columns hold none of {', '.join(CHANNELS)}: the filter has nothing to correct by.")
@@ -183,6 +192,8 @@ def run_filter(model: FilterModel, columns: Mapping[str, ArrayLike], motion: Arr
     slopes = np.nan_to_num(gravity_along_body(attitude[:, 0], attitude[:, 1]))
     one = Filter(model)
     one.reset(motion)
+    if start is not None:
+        one.state[:], one.covariance[:] = start
     states, covariances = np.empty((t.size, STATE_SIZE)), np.empty((t.size, STATE_SIZE, STATE_SIZE))
     standardised = np.empty((t.size, CHANNEL_SIZE))
     filter_series(

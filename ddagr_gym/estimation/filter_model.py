@@ -57,8 +57,8 @@ class FilterNoise(Validated):
     accelerometer: float = bounded("m/s^2", 0.0, 100.0, default=0.031, open_low=True)
     gyro: float = bounded("rad/s", 0.0, 10.0, default=7e-4, open_low=True)
     encoder: float = bounded("rad/s", 0.0, 100.0, default=0.016, open_low=True)
-    accelerometer_deweighting: float = bounded("-", 0.0, 1e9, default=300.0)
-    learning_deweighting: float = bounded("-", 0.0, 1e9, default=100.0)
+    accelerometer_deweighting: float = bounded("-", 0.0, 1e9, default=1000.0)
+    learning_deweighting: float = bounded("-", 0.0, 1e9, default=300.0)
 
     @classmethod
     def from_sensors(cls, sensors: Sensors, **others: float) -> FilterNoise:

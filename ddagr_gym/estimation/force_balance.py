@@ -97,3 +97,57 @@ def arc_bank_speeds(
         return None
     radius = model.outer_radius
     return float(unknown[0] / radius), float(unknown[1] / radius)
+
+
+@kernel()
+def arc_speed_rows(
+    law: float, speeds: Array, curvatures: Array, parameters: Array, robot: Array, rest_speed: float,
+    reversal_speed: float, fallback: float, banks: Array,
+) -> None:  # fmt: skip
+    """Rim speeds (N, 2) right, left [m/s] of steady arcs; ``robot`` is mass, half wheelbase, half track.
+
+    Where the law has no solution the rim speeds are kinematic, with ``fallback`` as effective over geometric track.
+    """
+    unknown = np.zeros(3)
+    for n in range(speeds.shape[0]):
+        spread = robot[2] * curvatures[n]
+        unknown[0] = speeds[n] * (1.0 + 1.3 * spread)
+        unknown[1] = speeds[n] * (1.0 - 1.3 * spread)
+        unknown[2] = 0.0
+        found = _solve(
+            law, speeds[n], speeds[n] * curvatures[n], robot[0], robot[1], robot[2], parameters[n], rest_speed,
+            reversal_speed, unknown,
+        )  # fmt: skip
+        banks[n, 0] = unknown[0] if found else speeds[n] * (1.0 + fallback * spread)
+        banks[n, 1] = unknown[1] if found else speeds[n] * (1.0 - fallback * spread)
+
+
+def arc_bank_speed_rows(
+    model: FilterModel, parameters: Array, speeds: Array, curvatures: Array, fallback: float = 1.3
+) -> Array:
+    """:func:`arc_bank_speeds` of N robots that share a model, kinematic where the law has no solution.
+
+    Args:
+        model: robot and law of the filter.
+        parameters: (N, 4) a1 [N], a2 [-], b [N/rad], Rc [N].
+        speeds: (N,) v_x [m/s].
+        curvatures: (N,) [1/m].
+        fallback: effective over geometric track of the kinematic bank speeds [-].
+
+    Returns:
+        (N, 2) right and left bank speeds [rad/s].
+    """
+    robot = model.robot
+    banks = np.empty((len(speeds), 2))
+    arc_speed_rows(
+        1.0 if model.law is ForceLaw.coupled else 0.0,
+        np.ascontiguousarray(speeds, dtype=np.float64),
+        np.ascontiguousarray(curvatures, dtype=np.float64),
+        np.ascontiguousarray(parameters, dtype=np.float64),
+        np.array([robot.mass, robot.half_wheelbase, robot.half_track]),
+        model.rest_speed,
+        model.reversal_speed,
+        fallback,
+        banks,
+    )
+    return banks / model.outer_radius

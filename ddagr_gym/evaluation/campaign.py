@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +16,30 @@ import numpy as np
 
 from ddagr_gym.envs.options import make_settings
 from ddagr_gym.envs.settings import TurnSettings
-from ddagr_gym.evaluation.controllers import EKF_CONTROLLERS, find_controller
+from ddagr_gym.errors import InputError
+from ddagr_gym.estimation import FilterModel
+from ddagr_gym.evaluation.controllers import (
+    BOUNDS,
+    controller_arm,
+    controller_version,
+    drives_on,
+    find_controller,
+    needs_filter,
+)
+from ddagr_gym.evaluation.estimator_metrics import estimator_errors
 from ddagr_gym.evaluation.metrics import turn_metrics
+from ddagr_gym.evaluation.other_ground import ground_effects
 from ddagr_gym.evaluation.runs import TurnRun, drive_turn
-from ddagr_gym.evaluation.scenarios import Scenario, load_scenarios
+from ddagr_gym.evaluation.scenarios import Scenario, load_scenarios, set_hash
+from ddagr_gym.files import atomic_path
+from ddagr_gym.parameters import Sensors
+from ddagr_gym.presets import ddagr
 
 _CHUNK = 10
 """Episodes per task of a worker: a resumed run loses at most this many."""
+
+Key = tuple[str, str, int]
+"""Controller, set and number of an episode."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +60,7 @@ def scenario_settings(scenario: Scenario, ekf_features: bool = False) -> TurnSet
         speed=turn.speed,
         run_in=turn.run_in,
         run_out=turn.run_out,
+        effects=ground_effects(scenario.law),
         ekf_features=ekf_features,
     )
 
@@ -48,21 +68,31 @@ def scenario_settings(scenario: Scenario, ekf_features: bool = False) -> TurnSet
 def drive_scenario(controller: str, scenario: Scenario) -> TurnRun:
     """One scenario by one controller."""
     made = find_controller(controller, scenario.episode.turn)
-    settings = scenario_settings(scenario, controller in EKF_CONTROLLERS)
+    settings = scenario_settings(scenario, needs_filter(controller))
     return drive_turn(made, settings, scenario.seed, scenario.episode)
 
 
+@lru_cache(maxsize=1)
+def _nominal_filter() -> FilterModel:
+    return FilterModel.of(ddagr(), Sensors())
+
+
 def episode_row(controller: str, scenario: Scenario, run: TurnRun) -> dict[str, Any]:
-    """Metrics 1 to 5 of a driven scenario as one flat row; what is undefined is None."""
-    metrics = turn_metrics(run.columns, run.episode.turn, run.episode.robot)
+    """Metrics 1 to 6 of a driven scenario as one flat row; what is undefined is None."""
+    episode = run.episode
+    metrics = turn_metrics(run.columns, episode.turn, episode.robot)
+    start = (-episode.turn.run_in, episode.lateral_offset, episode.heading_offset)
+    estimator = estimator_errors(_nominal_filter(), run.columns, episode.turn, start)
     turn, leave = metrics.turn, metrics.exit
+    arm, repeat = controller_arm(controller)
     row = {
         "controller": controller,
+        "arm": arm,
+        "run": repeat,
         "set": scenario.set_name,
         "number": scenario.number,
-        "feasible": scenario.feasible,
-        "radius": run.episode.turn.radius,
-        "side": run.episode.turn.side,
+        "radius": episode.turn.radius,
+        "side": episode.turn.side,
         "ending": run.ending,
         "status": turn.status.name,
         "radius_error": turn.error,
@@ -82,27 +112,62 @@ def episode_row(controller: str, scenario: Scenario, run: TurnRun) -> dict[str, 
         "bank_stalls": metrics.bank_stalls,
         "robot_stalls": metrics.robot_stalls,
     }
+    row |= {f"estimator_{name}": value for name, value in asdict(estimator).items()}
     return {key: value.item() if isinstance(value, np.generic) else value for key, value in row.items()}
+
+
+def provenance(controller: str, set_name: str) -> str:
+    """What a row was made of, shortened: scenarios, controller, filter; a row of others is driven again."""
+    parts = (set_hash(set_name), controller_version(controller), repr(_nominal_filter()))
+    return hashlib.sha256(" ".join(parts).encode()).hexdigest()[:12]
 
 
 def _work(task: Task) -> list[dict[str, Any]]:
     scenarios = load_scenarios(task.set_name)
+    made_of = provenance(task.controller, task.set_name)
     rows = []
     for number in task.numbers:
         scenario = scenarios[number]
-        rows.append(episode_row(task.controller, scenario, drive_scenario(task.controller, scenario)))
+        row = episode_row(task.controller, scenario, drive_scenario(task.controller, scenario))
+        rows.append(row | {"made_of": made_of})
     return rows
 
 
-def plan(controllers: Sequence[str], sets: Sequence[str], done: set[tuple[str, str, int]]) -> list[Task]:
+def with_bounds(controllers: Sequence[str]) -> list[str]:
+    """Controllers, and the upper bounds that say which scenarios are feasible."""
+    return list(dict.fromkeys([*controllers, *BOUNDS]))
+
+
+def numbers_of(set_name: str, count: int | None = None) -> range:
+    """Numbers of a set's scenarios, the first ``count`` of them where it is given; InputError below 1."""
+    if count is not None and count < 1:
+        raise InputError(f"{count} episodes of each set: give at least 1.")
+    whole = len(load_scenarios(set_name))
+    return range(whole if count is None else min(count, whole))
+
+
+def wanted_episodes(controllers: Sequence[str], sets: Sequence[str], count: int | None = None) -> list[Key]:
+    """Episodes of controllers on sets; a bound that does not know a set's soil law is left out there."""
+    return [
+        (controller, name, number)
+        for name in sets
+        for controller in controllers
+        if drives_on(controller, load_scenarios(name)[0].law)
+        for number in numbers_of(name, count)
+    ]
+
+
+def plan(controllers: Sequence[str], sets: Sequence[str], done: set[Key], count: int | None = None) -> list[Task]:
     """Tasks for all episodes that are not done, small enough to resume by."""
-    tasks = []
-    for set_name in sets:
-        count = len(load_scenarios(set_name))
-        for controller in controllers:
-            open_ = [n for n in range(count) if (controller, set_name, n) not in done]
-            tasks += [Task(controller, set_name, tuple(open_[k : k + _CHUNK])) for k in range(0, len(open_), _CHUNK)]
-    return tasks
+    groups: dict[tuple[str, str], list[int]] = {}
+    for controller, set_name, number in wanted_episodes(controllers, sets, count):
+        if (controller, set_name, number) not in done:
+            groups.setdefault((controller, set_name), []).append(number)
+    return [
+        Task(controller, set_name, tuple(numbers[k : k + _CHUNK]))
+        for (controller, set_name), numbers in groups.items()
+        for k in range(0, len(numbers), _CHUNK)
+    ]
 
 
 def read_rows(journal: Path) -> list[dict[str, Any]]:
@@ -123,32 +188,64 @@ def run_campaign(
     journal: Path,
     *,
     processes: int = 2,
+    count: int | None = None,
     progress: Callable[[int], None] = lambda episodes: None,
 ) -> list[dict[str, Any]]:
     """Drive every controller on every scenario of the sets, continuing what the journal holds.
 
+    The upper bounds are driven as well, asked for or not: a scenario is feasible if one of them succeeds.
+
     Args:
         controllers: names.
         sets: names of frozen sets.
-        journal: JSON lines, appended as episodes end.
+        journal: JSON lines, appended as episodes end; rows of other gains, policies or scenarios are driven again.
         processes: workers.
-        progress: called with the number of episodes that a task added.
+        count: only the first scenarios of each set.
+        progress: called with the number of episodes that a task added, those of the bounds included.
 
     Returns:
-        All rows, ordered by controller, set and number.
+        The rows of ``controllers`` with ``feasible``, ordered by controller, set and number.
     """
-    rows = read_rows(journal)
-    wanted = [row for row in rows if row["controller"] in controllers and row["set"] in sets]
-    done = {(row["controller"], row["set"], row["number"]) for row in wanted}
-    if wanted:
-        progress(len(wanted))
-    for added in _results(plan(controllers, sets, done), processes):
+    everyone = with_bounds(controllers)
+    wanted = set(wanted_episodes(everyone, sets, count))
+    rows = _rows_to_keep(read_rows(journal), wanted)
+    _rewrite(journal, rows)
+    kept = {(row["controller"], row["set"], row["number"]) for row in rows}
+    if kept & wanted:
+        progress(len(kept & wanted))
+    for added in _results(plan(everyone, sets, kept, count), processes):
         with journal.open("a", encoding="utf-8") as file:
             file.writelines(json.dumps(row) + "\n" for row in added)
-        wanted += added
+        rows += added
         progress(len(added))
+    return _judged([row for row in rows if (row["controller"], row["set"], row["number"]) in wanted], controllers, sets)
+
+
+def _rows_to_keep(rows: Sequence[dict[str, Any]], wanted: set[Key]) -> list[dict[str, Any]]:
+    """One row an episode, and of those that are wanted only such as are made of what there is now."""
+    now = {pair: provenance(*pair) for pair in {(controller, name) for controller, name, _ in wanted}}
+    kept: dict[Key, dict[str, Any]] = {}
+    for row in rows:
+        key = (row["controller"], row["set"], row["number"])
+        if key not in wanted or row.get("made_of") == now[key[:2]]:
+            kept[key] = row
+    return list(kept.values())
+
+
+def _rewrite(journal: Path, rows: Sequence[dict[str, Any]]) -> None:
+    """Leave only whole and valid rows, so that the next one starts on a line of its own."""
+    if journal.is_file():
+        with atomic_path(journal) as temporary:
+            temporary.write_text("".join(json.dumps(row) + "\n" for row in rows), encoding="utf-8")
+
+
+def _judged(rows: Sequence[dict[str, Any]], controllers: Sequence[str], sets: Sequence[str]) -> list[dict[str, Any]]:
+    """Rows of ``controllers`` with the verdict of the bounds."""
+    made = {(row["set"], row["number"]) for row in rows if row["controller"] in BOUNDS and row["success"]}
     order = {name: k for k, name in enumerate(controllers)}
-    return sorted(wanted, key=lambda row: (order[row["controller"]], row["set"], row["number"]))
+    place = {name: k for k, name in enumerate(sets)}
+    mine = [row | {"feasible": (row["set"], row["number"]) in made} for row in rows if row["controller"] in order]
+    return sorted(mine, key=lambda row: (order[row["controller"]], place[row["set"]], row["number"]))
 
 
 def _results(tasks: list[Task], processes: int) -> Iterator[list[dict[str, Any]]]:

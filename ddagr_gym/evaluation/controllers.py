@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,41 +13,76 @@ from numpy.typing import NDArray
 from ddagr_gym.config import configs_dir, load_config
 from ddagr_gym.control.constant_speeds import ConstantSpeeds
 from ddagr_gym.control.force_balance import ForceBalance
+from ddagr_gym.control.model_predictive import ModelPredictive, PredictiveSettings
 from ddagr_gym.control.pid import PidGains
+from ddagr_gym.control.predictive_model import PredictiveModel
 from ddagr_gym.control.radial_pid import RadialPid
 from ddagr_gym.control.rolling import RollingWithoutSlip
 from ddagr_gym.control.row_turn import RowTurn
 from ddagr_gym.control.true_curvature import TrueCurvature
+from ddagr_gym.control.true_path import TruePath
+from ddagr_gym.control.true_soil import TrueSoil
+from ddagr_gym.control.turn_controller import CONTROL_PERIOD
 from ddagr_gym.control.yaw_rate_pid import YawRatePid
-from ddagr_gym.errors import unknown_name
+from ddagr_gym.errors import InputError, unknown_name
 from ddagr_gym.estimation import FilterModel
 from ddagr_gym.estimation.force_balance import arc_bank_speeds
+from ddagr_gym.evaluation.arms import policy_arm, policy_version
 from ddagr_gym.evaluation.calibration import calibrate_constant_speeds
+from ddagr_gym.evaluation.other_ground import NOMINAL_LAW
 from ddagr_gym.evaluation.runs import Controller
-from ddagr_gym.parameters import Sensors
+from ddagr_gym.evaluation.true_ground import soil_of, steady_bank_speeds
+from ddagr_gym.parameters import Sensors, Validated, bounded
 from ddagr_gym.presets import ddagr, get_soil
 
 
 @dataclass(frozen=True)
+class LoopSettings(Validated):
+    """A closed loop of the ladder.
+
+    Attributes:
+        gains: of the loop.
+        lead_factor: heading before the end of the turn at which it straightens, over that of the constant speeds.
+    """
+
+    gains: PidGains
+    lead_factor: float = bounded("-", 0.0, 5.0, default=1.0)
+
+
+@dataclass(frozen=True)
 class LadderGains:
-    """Gains of the closed loops.
+    """What the search on the validation set found.
 
     Attributes:
         yaw_rate: of B2, curvature per yaw rate.
         radial: of B3, curvature per distance.
         force_balance: of B4.
-        true_curvature: of the upper bound.
+        predictive: of B5.
+        true_curvature: of the upper bound of that name.
+        true_soil: likewise.
+        true_path: likewise, curvature per lateral error.
+        true_path_heading: its curvature per heading error [1/(m rad)].
     """
 
-    yaw_rate: PidGains
-    radial: PidGains
-    force_balance: PidGains
-    true_curvature: PidGains
+    yaw_rate: LoopSettings
+    radial: LoopSettings
+    force_balance: LoopSettings
+    predictive: PredictiveSettings
+    true_curvature: LoopSettings
+    true_soil: LoopSettings
+    true_path: LoopSettings
+    true_path_heading: float = 3.0
 
 
+@lru_cache(maxsize=1)
 def ladder_gains() -> LadderGains:
     """Gains of ``configs/evaluation/ladder_gains.yaml``, where the search writes its result."""
-    return load_config(configs_dir() / "evaluation" / "ladder_gains.yaml", LadderGains)
+    return load_config(gains_file(), LadderGains)
+
+
+def gains_file() -> Path:
+    """Where :func:`ladder_gains` reads."""
+    return configs_dir() / "evaluation" / "ladder_gains.yaml"
 
 
 @lru_cache(maxsize=64)
@@ -60,66 +96,165 @@ def _track_ratio(constants: ConstantSpeeds, turn: RowTurn) -> float:
     return spread * turn.radius / ddagr().half_track
 
 
-def _make_yaw_rate(turn: RowTurn) -> Controller:
-    constants = nominal_constants(turn)
-    return YawRatePid(ddagr(), ladder_gains().yaw_rate, _track_ratio(constants, turn), constants.lead)
+def _make_yaw_rate(turn: RowTurn, gains: LadderGains) -> Controller:
+    constants, loop = nominal_constants(turn), gains.yaw_rate
+    return YawRatePid(ddagr(), loop.gains, _track_ratio(constants, turn), loop.lead_factor * constants.lead)
 
 
-def _make_radial(turn: RowTurn) -> Controller:
-    constants = nominal_constants(turn)
-    robot = ddagr()
+def _make_radial(turn: RowTurn, gains: LadderGains) -> Controller:
+    constants, robot, loop = nominal_constants(turn), ddagr(), gains.radial
     speed_ratio = turn.speed / (robot.wheels[0].outer_radius * 0.5 * (constants.outer + constants.inner))
-    return RadialPid(robot, ladder_gains().radial, _track_ratio(constants, turn), speed_ratio, constants.lead)
+    lead = loop.lead_factor * constants.lead
+    return RadialPid(robot, loop.gains, _track_ratio(constants, turn), speed_ratio, lead)
 
 
-def _make_bound(turn: RowTurn) -> Controller:
-    constants = nominal_constants(turn)
-    return TrueCurvature(ddagr(), ladder_gains().true_curvature, _track_ratio(constants, turn), constants.lead)
+@lru_cache(maxsize=1)
+def _filter_knowledge() -> tuple[FilterModel, NDArray[np.float64]]:
+    """The filter's model, and the logs of the parameters that its features count from."""
+    model = FilterModel.of(ddagr(), Sensors())
+    return model, model.soil_prior.logs(model.wheel_load)[0]
 
 
-def _make_force_balance(turn: RowTurn) -> Controller:
-    constants, robot = nominal_constants(turn), ddagr()
-    model = FilterModel.of(robot, Sensors())
-    prior = model.soil_prior.logs(model.wheel_load)[0]
+def _make_force_balance(turn: RowTurn, gains: LadderGains) -> Controller:
+    constants, loop = nominal_constants(turn), gains.force_balance
+    model, prior = _filter_knowledge()
 
     def feed_forward(logs: NDArray[np.float64], speed: float, curvature: float) -> tuple[float, float] | None:
         return arc_bank_speeds(model, np.exp(prior + logs), speed, curvature)
 
-    gains = ladder_gains().force_balance
-    return ForceBalance(robot, gains, feed_forward, _track_ratio(constants, turn), constants.lead)
+    ratio, lead = _track_ratio(constants, turn), loop.lead_factor * constants.lead
+    return ForceBalance(ddagr(), loop.gains, feed_forward, ratio, lead)
 
 
-EKF_CONTROLLERS = ("B4",)
+@lru_cache(maxsize=8)
+def _predictive(settings: PredictiveSettings) -> ModelPredictive:
+    model, prior = _filter_knowledge()
+    prediction = PredictiveModel(
+        ddagr(), model.outer_radius, model.rest_speed, model.reversal_speed, period=CONTROL_PERIOD
+    )
+    return ModelPredictive(prediction, prior, settings)
+
+
+def _make_true_curvature(turn: RowTurn, gains: LadderGains) -> Controller:
+    constants, loop = nominal_constants(turn), gains.true_curvature
+    return TrueCurvature(ddagr(), loop.gains, _track_ratio(constants, turn), loop.lead_factor * constants.lead)
+
+
+def _make_true_soil(turn: RowTurn, gains: LadderGains) -> Controller:
+    constants, loop, robot = nominal_constants(turn), gains.true_soil, ddagr()
+
+    def feed_forward(soil: NDArray[np.float64], speed: float, curvature: float) -> tuple[float, float] | None:
+        return steady_bank_speeds(robot, soil_of(soil), speed, curvature)
+
+    ratio, lead = _track_ratio(constants, turn), loop.lead_factor * constants.lead
+    return TrueSoil(robot, loop.gains, feed_forward, ratio, lead)
+
+
+def _make_true_path(turn: RowTurn, gains: LadderGains) -> Controller:
+    constants, loop = nominal_constants(turn), gains.true_path
+    ratio, lead = _track_ratio(constants, turn), loop.lead_factor * constants.lead
+    return TruePath(ddagr(), loop.gains, gains.true_path_heading, ratio, lead)
+
+
+EKF_CONTROLLERS = ("B4", "B5")
 """Controllers that need the filter's features in the observation."""
 
-_LADDER: dict[str, tuple[Callable[[RowTurn], Controller], str]] = {
-    "B0": (lambda turn: RollingWithoutSlip(ddagr()), "wheel speeds of a robot that rolls without slip"),
-    "B1": (nominal_constants, "two constant speeds calibrated on the nominal soil"),
+BOUNDS = ("true_curvature", "true_soil", "true_path")
+"""Upper bounds, never deployable: they see the true state. A turn that none of them makes is infeasible."""
+
+_Maker = Callable[[RowTurn, LadderGains], Controller]
+
+_LADDER: dict[str, tuple[_Maker, str]] = {
+    "B0": (lambda turn, gains: RollingWithoutSlip(ddagr()), "wheel speeds of a robot that rolls without slip"),
+    "B1": (lambda turn, gains: nominal_constants(turn), "two constant speeds calibrated on the nominal soil"),
     "B2": (_make_yaw_rate, "PID on the yaw rate (naive)"),
     "B3": (_make_radial, "feed-forward and PID on the radial error of dead reckoning"),
     "B4": (_make_force_balance, "force balance at the filter's estimate and PI on the estimated curvature"),
-    "true_curvature": (_make_bound, "upper bound: PI on the true curvature, not deployable"),
+    "B5": (lambda turn, gains: _predictive(gains.predictive), "model-predictive control at the filter's estimate"),
+    "true_curvature": (_make_true_curvature, "upper bound, not deployable: PI on the true curvature"),
+    "true_soil": (_make_true_soil, "upper bound, not deployable: B4 with the true soil and the true curvature"),
+    "true_path": (_make_true_path, "upper bound, not deployable: follows the path by the true pose"),
 }
 
 
 def controller_names() -> tuple[str, ...]:
-    """Names that :func:`find_controller` takes."""
+    """Names of the ladder, the upper bounds included; :func:`find_controller` takes trained policies besides."""
     return tuple(_LADDER)
 
 
+def _policy(name: str) -> bool:
+    from ddagr_gym.policies.controller import is_policy_name
+
+    return name not in _LADDER and is_policy_name(name)
+
+
+def _unknown(name: str) -> InputError:
+    from ddagr_gym.policies.shipped import policy_names
+
+    return unknown_name("controller", name, [*_LADDER, *policy_names()])
+
+
 def controller_title(name: str) -> str:
-    """What a controller is, in a phrase."""
+    """What a controller is, in a phrase; InputError as :func:`find_controller`."""
+    if _policy(name):
+        from ddagr_gym.policies.controller import policy_title
+
+        return policy_title(name)
     if name not in _LADDER:
-        raise unknown_name("controller", name, _LADDER)
+        raise _unknown(name)
     return _LADDER[name][1]
 
 
-def find_controller(name: str, turn: RowTurn) -> Controller:
-    """Controller by name for a commanded turn.
+def needs_filter(name: str) -> bool:
+    """Whether the environment must append the filter's features for this controller."""
+    if _policy(name):
+        from ddagr_gym.policies.controller import policy_needs_filter
+
+        return policy_needs_filter(name)
+    return name in EKF_CONTROLLERS
+
+
+def is_deployable(name: str) -> bool:
+    """Whether a controller does without the true state."""
+    if _policy(name):
+        from ddagr_gym.policies.controller import is_deployable_policy
+
+        return is_deployable_policy(name)
+    return name not in BOUNDS
+
+
+def drives_on(name: str, law: str) -> bool:
+    """Whether a controller is meant for ground of a soil law: the bound with the true soil knows only one law."""
+    return name != "true_soil" or law == NOMINAL_LAW
+
+
+def controller_arm(name: str) -> tuple[str, int]:
+    """Arm and run: the training's seed of a policy, 0 of a controller that is not trained."""
+    return policy_arm(name) if _policy(name) else (name, 0)
+
+
+def controller_version(name: str) -> str:
+    """Text that changes when a controller's gains or weights do."""
+    if _policy(name):
+        return policy_version(name)
+    return f"{name} {ladder_gains()!r}" if name not in ("B0", "B1") else name
+
+
+def find_controller(name: str, turn: RowTurn, gains: LadderGains | None = None) -> Controller:
+    """Controller or trained policy by name for a commanded turn.
+
+    Args:
+        name: of the ladder, or of a policy as :func:`ddagr_gym.policies.controller.policy_controller` takes it.
+        turn: the commanded manoeuvre.
+        gains: instead of :func:`ladder_gains`.
 
     Raises:
         InputError: unknown name, with the closest ones.
     """
+    if _policy(name):
+        from ddagr_gym.policies.controller import policy_controller
+
+        return policy_controller(name)
     if name not in _LADDER:
-        raise unknown_name("controller", name, _LADDER)
-    return _LADDER[name][0](turn)
+        raise _unknown(name)
+    return _LADDER[name][0](turn, ladder_gains() if gains is None else gains)

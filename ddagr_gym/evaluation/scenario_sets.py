@@ -1,7 +1,7 @@
-"""How the scenario sets S0 to S8 and the validation set V were drawn (control.md, "Protocol").
+"""How the scenario sets S0 to S8, V (validation) and T (transfer) were drawn (control.md, "Protocol").
 
-Sets are frozen once by ``ddagr freeze-scenarios`` and then read, never drawn again; S2 to S8 are opened only after the
-claims of ``configs/evaluation/claims.yaml`` are written.
+Sets are frozen once by ``ddagr freeze-scenarios`` and then read, never drawn again. V alone serves tuning and
+selection; the others are opened only after the claims of ``configs/evaluation/claims.yaml`` are written.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 
 from ddagr_gym.envs.options import make_settings
 from ddagr_gym.envs.settings import Episode, Randomisation, TurnSettings
+from ddagr_gym.evaluation.other_ground import LAW, NOMINAL_LAW
 from ddagr_gym.evaluation.scenarios import GroundRecipe, Scenario, build_field
 
 _ROOT_SEED = 20_261_120
@@ -27,11 +28,15 @@ class SetPlan:
         description: one line.
         count: scenarios in it.
         draw: (rng, number) -> episode without grid, and the recipe of its grid.
+        same_as: set whose scenarios these are, on the ground of another law.
+        law: name of the soil's law.
     """
 
     description: str
     count: int
     draw: Callable[[np.random.Generator, int], tuple[Episode, GroundRecipe]]
+    same_as: str | None = None
+    law: str = NOMINAL_LAW
 
 
 def _settings(soil: str, **changes: object) -> TurnSettings:
@@ -57,7 +62,7 @@ def _on(soil: str) -> Callable[[np.random.Generator, int], tuple[Episode, Ground
 
 
 def _changing(rng: np.random.Generator, number: int) -> tuple[Episode, GroundRecipe]:
-    """Soil step at 45 to 135 degrees of the turn, or a patch on the way, weaker or stiffer."""
+    """A soil step that the turn crosses at 30 and 150 degrees, or a patch at 45 to 135 degrees; weaker or stiffer."""
     episode = _settings("thesis_a1_range").draw(rng)
     turn = episode.turn
     angle = math.radians(float(rng.uniform(45.0, 135.0)))
@@ -94,13 +99,19 @@ def _slow_motors(rng: np.random.Generator, number: int) -> tuple[Episode, Ground
 
 
 def _mirrored(rng: np.random.Generator, number: int) -> tuple[Episode, GroundRecipe]:
-    """Pairs: every odd scenario is the even one before it, turned to the other side."""
+    """Pairs: every odd scenario is the even one before it, mirrored; the sensors' noise is drawn anew."""
     twin = np.random.default_rng([_ROOT_SEED, 7, number // 2])
     episode = _settings("thesis_a1_range", side="left").draw(twin)
     if number % 2:
-        turn = replace(episode.turn, side="right")
+        turn, imu = replace(episode.turn, side="right"), episode.sensors.imu
+        along, across = imu.accelerometer_bias
+        imu = replace(imu, gyro_bias=-imu.gyro_bias, accelerometer_bias=(along, -across))
         episode = replace(
-            episode, turn=turn, lateral_offset=-episode.lateral_offset, heading_offset=-episode.heading_offset
+            episode,
+            turn=turn,
+            sensors=replace(episode.sensors, imu=imu),
+            lateral_offset=-episode.lateral_offset,
+            heading_offset=-episode.heading_offset,
         )
     return episode, GroundRecipe()
 
@@ -124,6 +135,7 @@ PLANS = {
     "S7": SetPlan("mirrored pairs", 100, _mirrored),
     "S8": SetPlan("other radii and speeds", 100, _other_geometry),
     "V": SetPlan("validation, in range: for tuning and selection only", 100, _on("thesis_a1_range")),
+    "T": SetPlan("transfer: the first hundred of S1 on another soil law", 100, _on("thesis_a1_range"), "S1", LAW),
 }
 """The sets by name."""
 
@@ -131,7 +143,7 @@ PLANS = {
 def draw_set(name: str) -> list[tuple[int, Episode, GroundRecipe]]:
     """Noise seed, episode and ground recipe of each scenario of a set, from seeds of the set's own."""
     plan = PLANS[name]
-    number_of_set = list(PLANS).index(name)
+    number_of_set = list(PLANS).index(plan.same_as or name)
     drawn = []
     for number in range(plan.count):
         rng = np.random.default_rng([_ROOT_SEED, number_of_set, number])
@@ -144,4 +156,6 @@ def as_scenario(name: str, number: int, seed: int, episode: Episode, recipe: Gro
     """A drawn scenario with its grid, before it is frozen."""
     soil = episode.soils
     assert not isinstance(soil, tuple)
-    return Scenario(name, number, seed, replace(episode, field=build_field(recipe, soil, episode.turn)))
+    return Scenario(
+        name, number, seed, replace(episode, field=build_field(recipe, soil, episode.turn)), PLANS[name].law
+    )

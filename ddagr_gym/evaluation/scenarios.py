@@ -1,15 +1,21 @@
 """Frozen scenario sets: what every controller drives, the same soils and the same noise (control.md, "Protocol").
 
-A set is a JSON file of episodes with their seeds, and a SHA-256 over everything that the simulator will see, soil grids
-included. Grids are rebuilt from their own seed; a set whose hash no longer agrees is refused, not driven.
+A set is a compressed JSON file of episodes with their noise seeds, and a SHA-256 over all of them. Soil grids are
+rebuilt from their own seed and checked against a sum that the file holds. A set that no longer agrees is refused, not
+driven. Whether a scenario's turn can be made at all is no part of it: the upper bounds say so when they drive it
+(:mod:`ddagr_gym.evaluation.campaign`).
 """
 
 from __future__ import annotations
 
+import gzip
 import hashlib
 import json
-from collections.abc import Mapping
+import math
+import zlib
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -19,12 +25,17 @@ from ddagr_gym.config import configs_dir
 from ddagr_gym.control.row_turn import RowTurn
 from ddagr_gym.envs.settings import Episode
 from ddagr_gym.errors import InputError, unknown_name
+from ddagr_gym.evaluation.other_ground import NOMINAL_LAW
 from ddagr_gym.files import atomic_path
 from ddagr_gym.parameters import Robot, Sensors, Soil
 from ddagr_gym.physics.terrain import SoilField
 from ddagr_gym.presets import get_robot
 
 FORMAT = 1
+SUFFIX = ".json.gz"
+
+_GRID_TOLERANCE = 1e-9
+"""Relative; the last bits of exp and fft differ between machines."""
 
 SENSOR_FIELDS = ("gyro_bias", "gyro_scale", "gyro_noise", "accelerometer_noise", "accelerometer_bias")
 """Fields of the IMU that scenarios may change."""
@@ -41,14 +52,14 @@ class Scenario:
         number: in the set, from 0.
         seed: of the sensor noise.
         episode: what is driven.
-        feasible: whether the controller with the true state makes this turn.
+        law: name of the soil's law, see :mod:`ddagr_gym.evaluation.other_ground`.
     """
 
     set_name: str
     number: int
     seed: int
     episode: Episode
-    feasible: bool = True
+    law: str = NOMINAL_LAW
 
 
 @dataclass(frozen=True)
@@ -107,36 +118,39 @@ def _with_change(field: SoilField, recipe: GroundRecipe) -> SoilField:
     return SoilField(field.origin, field.spacing, values)
 
 
-def _fingerprint(scenarios: list[Scenario]) -> str:
-    digest = hashlib.sha256()
-    for scenario in scenarios:
-        field = scenario.episode.field
-        digest.update(json.dumps(_to_json(scenario, GroundRecipe()), sort_keys=True).encode())
-        if field is not None:
-            # to nine digits: the last bits of exp and fft differ between machines
-            digest.update(np.array([f"{v:.9e}" for v in field.values[:, :, :5].ravel()]).tobytes())
-    return digest.hexdigest()
+def _fingerprint(law: str, items: Sequence[Mapping[str, Any]]) -> str:
+    """SHA-256 over a law and scenarios as they stand in a file."""
+    return hashlib.sha256(json.dumps([law, *items], sort_keys=True).encode()).hexdigest()
 
 
-def _to_json(scenario: Scenario, recipe: GroundRecipe) -> dict[str, Any]:
-    episode, robot, imu = scenario.episode, scenario.episode.robot, scenario.episode.sensors.imu
+def _grid_sum(field: SoilField | None) -> float:
+    """Sum over a grid's nodes that every value enters with a weight of its own; 0 without a grid."""
+    if field is None:
+        return 0.0
+    values = field.values.ravel()
+    return float(np.log1p(np.abs(values)) @ np.cos(np.arange(values.size)) + np.log1p(np.abs(values)).sum())
+
+
+def _to_json(seed: int, episode: Episode, recipe: GroundRecipe) -> dict[str, Any]:
+    robot, imu, soil = episode.robot, episode.sensors.imu, episode.soils
+    assert not isinstance(soil, tuple)  # the plans draw one soil for all wheels
     named = {"name": robot.name} | {key: getattr(robot, key) for key in ROBOT_FIELDS}
     return {
-        "seed": scenario.seed,
-        "feasible": scenario.feasible,
+        "seed": seed,
         "turn": asdict(episode.turn),
         "robot": named,
-        "soil": asdict(episode.soils),  # type: ignore[arg-type]
+        "soil": asdict(soil),
         "imu": {name: getattr(imu, name) for name in SENSOR_FIELDS},
         "encoder_scale": list(episode.sensors.encoder.scale),
         "command_delay": episode.command_delay,
         "lateral_offset": episode.lateral_offset,
         "heading_offset": episode.heading_offset,
         "ground": asdict(recipe),
+        "grid_sum": _grid_sum(build_field(recipe, soil, episode.turn)),
     }
 
 
-def _from_json(set_name: str, number: int, item: Mapping[str, Any]) -> Scenario:
+def _from_json(set_name: str, number: int, item: Mapping[str, Any], law: str) -> Scenario:
     given = dict(item["robot"])
     robot: Robot = replace(get_robot(given.pop("name")), **given)
     soil, turn, recipe = Soil(**item["soil"]), RowTurn(**item["turn"]), GroundRecipe(**item["ground"])
@@ -149,6 +163,12 @@ def _from_json(set_name: str, number: int, item: Mapping[str, Any]) -> Scenario:
         imu=replace(nominal.imu, **imu),
         encoder=replace(nominal.encoder, scale=tuple(item["encoder_scale"])),
     )
+    field = build_field(recipe, soil, turn)
+    if not math.isclose(_grid_sum(field), item["grid_sum"], rel_tol=_GRID_TOLERANCE, abs_tol=_GRID_TOLERANCE):
+        raise InputError(
+            f"scenario {number} of set {set_name!r} gets another soil grid than the one that was frozen: use the "
+            "version of ddagr-gym and numpy that froze it, or freeze the set anew."
+        )
     episode = Episode(
         turn=turn,
         robot=robot,
@@ -157,9 +177,9 @@ def _from_json(set_name: str, number: int, item: Mapping[str, Any]) -> Scenario:
         command_delay=item["command_delay"],
         lateral_offset=item["lateral_offset"],
         heading_offset=item["heading_offset"],
-        field=build_field(recipe, soil, turn),
+        field=field,
     )
-    return Scenario(set_name, number, item["seed"], episode, item["feasible"])
+    return Scenario(set_name, number, item["seed"], episode, law)
 
 
 def scenario_folder() -> Path:
@@ -169,41 +189,75 @@ def scenario_folder() -> Path:
 
 def scenario_names() -> tuple[str, ...]:
     """Names of the frozen sets."""
-    return tuple(sorted(path.stem for path in scenario_folder().glob("*.json")))
+    return tuple(sorted(path.name.removesuffix(SUFFIX) for path in scenario_folder().glob(f"*{SUFFIX}")))
+
+
+def set_hash(name: str) -> str:
+    """SHA-256 of a frozen set, checked against its content; InputError as :func:`load_scenarios`."""
+    content = _read(name, scenario_folder() / f"{name}{SUFFIX}")
+    return str(content["sha256"])
 
 
 def load_scenarios(name: str) -> list[Scenario]:
     """A frozen set by name.
 
     Raises:
-        InputError: unknown name, another format, or a hash that does not agree.
+        InputError: unknown name, another format, a hash or a soil grid that does not agree.
     """
+    return list(_load(name, scenario_folder()))
+
+
+@lru_cache(maxsize=4)
+def _load(name: str, folder: Path) -> tuple[Scenario, ...]:
+    content = _read(name, folder / f"{name}{SUFFIX}")
+    law = content["law"]
+    return tuple(_from_json(name, number, item, law) for number, item in enumerate(content["scenarios"]))
+
+
+def _read(name: str, path: Path) -> dict[str, Any]:
+    """Content of a set's file, once its hash agrees."""
     if name not in scenario_names():
         raise unknown_name("scenario set", name, scenario_names())
-    content = json.loads((scenario_folder() / f"{name}.json").read_text(encoding="utf-8"))
+    try:
+        content: dict[str, Any] = json.loads(gzip.decompress(path.read_bytes()))
+    except (OSError, EOFError, zlib.error, ValueError):
+        raise InputError(f"{path} is not a scenario set: restore the file, or freeze the set anew.") from None
     if content.get("format") != FORMAT:
         raise InputError(f"scenario set {name!r} has format {content.get('format')!r}: this version reads {FORMAT}.")
-    scenarios = [_from_json(name, number, item) for number, item in enumerate(content["scenarios"])]
-    if _fingerprint(scenarios) != content["sha256"]:
+    if _fingerprint(content["law"], content["scenarios"]) != content["sha256"]:
         raise InputError(f"scenario set {name!r} is not what its hash says: restore its file, or freeze it anew.")
-    return scenarios
+    return content
 
 
 def save_scenarios(
-    name: str, description: str, drawn: list[tuple[int, Episode, GroundRecipe, bool]], path: Path | None = None
+    name: str,
+    description: str,
+    drawn: Sequence[tuple[int, Episode, GroundRecipe]],
+    folder: Path | None = None,
+    law: str = NOMINAL_LAW,
 ) -> Path:
-    """Freeze a set: (noise seed, episode without grid, recipe of the grid, feasible) each.
+    """Freeze a set: (noise seed, episode without grid, recipe of the grid) each.
+
+    Args:
+        name: of the set, and of its file.
+        description: one line.
+        drawn: the scenarios.
+        folder: of the file; that of the shipped sets by default.
+        law: name of the soil's law.
 
     Returns:
         The file.
     """
-    items = [
-        _to_json(Scenario(name, n, seed, episode, feasible), recipe)
-        for n, (seed, episode, recipe, feasible) in enumerate(drawn)
-    ]
-    scenarios = [_from_json(name, number, item) for number, item in enumerate(json.loads(json.dumps(items)))]
-    content = {"format": FORMAT, "name": name, "description": description, "sha256": _fingerprint(scenarios)}
-    target = scenario_folder() / f"{name}.json" if path is None else path
+    items = json.loads(json.dumps([_to_json(*item) for item in drawn]))
+    content = {
+        "format": FORMAT,
+        "name": name,
+        "description": description,
+        "law": law,
+        "sha256": _fingerprint(law, items),
+        "scenarios": items,
+    }
+    target = (scenario_folder() if folder is None else folder) / f"{name}{SUFFIX}"
     with atomic_path(target) as temporary:
-        temporary.write_text(json.dumps({**content, "scenarios": items}, indent=0), encoding="utf-8")
+        temporary.write_bytes(gzip.compress(json.dumps(content, separators=(",", ":")).encode(), mtime=0))
     return target

@@ -94,6 +94,28 @@ def wilson_interval(successes: float, trials: int, confidence: float = 0.95) -> 
     return Interval(share, low, high, confidence)
 
 
+def median_interval(values: ArrayLike, confidence: float = 0.95) -> Interval:
+    """Median with the distribution-free interval between two order statistics.
+
+    The k-th smallest of n values lies below the median with a probability that the binomial distribution gives (W. J.
+    Conover, Practical Nonparametric Statistics, 3rd ed. 1999, section 3.2); with few values the interval is their range
+    and covers less than ``confidence``. Median: the lower of the middle two, so that infinite values make no NaN.
+
+    Args:
+        values: independent (n,), n at least 1.
+        confidence: two-sided level.
+    """
+    from scipy.stats import binom
+
+    _check_confidence(confidence)
+    ordered = np.sort(score_matrix(np.ravel(values), "values").ravel())
+    count = len(ordered)
+    below = max(int(binom.ppf((1.0 - confidence) / 2.0, count, 0.5)) - 1, 0)
+    return Interval(
+        float(ordered[(count - 1) // 2]), float(ordered[below]), float(ordered[count - 1 - below]), confidence
+    )
+
+
 def _draw(shape: tuple[int, int], resampling: Resampling, rng: np.random.Generator) -> tuple[Indices, Indices]:
     """Row and column indices (runs, tasks) of one bootstrap resample of a score matrix."""
     runs, tasks = shape

@@ -1,4 +1,10 @@
-"""From episodes to the table that answers: which controller, how far off, how sure."""
+"""From episodes to the tables that answer: which controller, how far off, how sure.
+
+A summary is ``{arm: {set: {metric: {"value": number, "interval": [low, high]}}}}``; an arm is a controller, or all
+training seeds of one policy. Intervals are of 95 %. None stands for a value that a failure makes infinite, and for an
+interval that nothing was left to draw from. Counts are plain integers. Failures count as worst, never as absent;
+scenarios that no upper bound makes are left out of the metrics and counted apart.
+"""
 
 from __future__ import annotations
 
@@ -9,93 +15,216 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ddagr_gym.errors import InputError
 from ddagr_gym.evaluation.campaign import absolute_errors
 from ddagr_gym.evaluation.statistics import (
+    Interval,
+    Resampling,
     bootstrap,
     interquartile_mean,
+    median_interval,
     paired_probability_of_improvement,
+    performance_profile,
+    probability_of_improvement,
     wilson_interval,
 )
 
 Rows = Sequence[dict[str, Any]]
+Array = NDArray[np.float64]
+Value = dict[str, Any]
+
+BASELINES = ("B1", "B4")
+"""Arms against which every other one is compared (control.md, "The ladder of controllers")."""
+
+PROFILE_THRESHOLDS = tuple(round(0.005 * k, 3) for k in range(41))
+"""|e_R| at which performance profiles are given: 0 to 20 %."""
+
+_RESAMPLES = 1000
 _SEED = 0
+
+_LOST_WITH_THE_TURN = (
+    "exit_lateral_error",
+    "exit_heading_error",
+    "fit_residual",
+    "radial_error_rms",
+    "radial_error_maximum",
+)
+"""Sizes whose median is given; undefined means that the turn failed, which is the worst value."""
+
+_KNOWN_OR_NOT = (
+    "headland_depth",
+    "duration",
+    "slip_energy",
+    "wheel_speed_variation",
+    "estimator_speed_rms",
+    "estimator_yaw_rate_rms",
+    "estimator_slip_rms",
+    "estimator_radius",
+    "estimator_prediction_1s",
+    "estimator_prediction_5s",
+    "estimator_dead_reckoning",
+    "estimator_innovation",
+)
+"""Sizes whose median is given over the episodes that have them."""
 
 
 def _finite(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-def _interval(values: Sequence[float], statistic: Callable[[NDArray[np.float64]], float]) -> dict[str, float | None]:
-    """Estimate with 95 % bootstrap interval over scenarios; failures are infinite and come out as None."""
-    scores = np.asarray(values, dtype=float)[None, :]
-    if scores.shape[1] < 2:
-        estimate = float(statistic(scores))
-        return {"value": _finite(estimate), "low": None, "high": None}
-    found = bootstrap(scores, statistic, np.random.default_rng(_SEED), resampling="crossed", resamples=1000)
-    return {"value": _finite(found.estimate), "low": _finite(found.low), "high": _finite(found.high)}
+def _as_value(found: Interval) -> Value:
+    return {"value": _finite(found.estimate), "interval": [_finite(found.low), _finite(found.high)]}
 
 
-def _quantile(level: float) -> Callable[[NDArray[np.float64]], float]:
+def _interval(scores: Array, statistic: Callable[[Array], float], resampling: Resampling = "crossed") -> Value:
+    """Estimate with its bootstrap interval over scenarios, and over runs where there are several."""
+    if scores.size < 2:
+        return {"value": _finite(float(statistic(scores))), "interval": None}
+    rng = np.random.default_rng(_SEED)
+    return _as_value(bootstrap(scores, statistic, rng, resampling=resampling, resamples=_RESAMPLES))
+
+
+def _quantile(level: float) -> Callable[[Array], float]:
     # an order statistic, so that a few infinite scores make no NaN
     return lambda scores: float(np.quantile(scores, level, method="inverted_cdf"))
 
 
-def _share(rows: Rows, key: str) -> dict[str, float | None]:
-    found = wilson_interval(sum(bool(row[key]) for row in rows), len(rows))
-    return {"value": found.estimate, "low": found.low, "high": found.high}
+class _Table:
+    """Rows of one arm on one set as matrices (runs, scenarios)."""
+
+    def __init__(self, rows: Rows) -> None:
+        by_run: dict[Any, dict[int, dict[str, Any]]] = {}
+        for row in rows:
+            by_run.setdefault(row.get("run", 0), {})[row["number"]] = row
+        self.numbers = sorted(set.intersection(*(set(run) for run in by_run.values())))
+        dropped = sum(len(run) for run in by_run.values()) - len(by_run) * len(self.numbers)
+        if dropped:
+            raise InputError(
+                f"{rows[0].get('arm', rows[0]['controller'])!r} lacks {dropped} episodes of set {rows[0]['set']!r} in "
+                "some of its runs: evaluate all of its seeds on the same scenarios."
+            )
+        self._runs = [[by_run[run][number] for number in self.numbers] for run in sorted(by_run)]
+
+    @property
+    def runs(self) -> int:
+        return len(self._runs)
+
+    @property
+    def rows(self) -> list[dict[str, Any]]:
+        return [row for run in self._runs for row in run]
+
+    def errors(self) -> Array:
+        return np.array([absolute_errors(run) for run in self._runs])
+
+    def sizes(self, key: str) -> Array:
+        """|value|, infinite where it is undefined."""
+        return np.array([[math.inf if row.get(key) is None else abs(row[key]) for row in run] for run in self._runs])
+
+    def share(self, key: str) -> Value:
+        """Share of true values; Wilson's interval counts a scenario once, however many seeds drive it (ours)."""
+        count = sum(bool(row[key]) for row in self.rows)
+        return _as_value(wilson_interval(count / self.runs, len(self.numbers)))
 
 
 def summarise(rows: Rows) -> dict[str, Any]:
-    """Summary of one controller on one set; infeasible scenarios are counted apart.
+    """Summary of one arm on one set.
 
     Returns:
         ``radius_error_median``, ``radius_error_p95``, ``radius_error_iqm`` of |e_R|, ``radius_error_signed_median``,
-        ``success_rate``, ``practice_rate``, each {value, low, high} (95 %), and plain medians of the costs.
+        ``success_rate``, ``practice_rate``, ``stall_rate``, ``<size>_median`` of exits (as sizes), costs and estimator
+        errors; ``profile`` with thresholds, share, low and high; counts.
     """
     feasible = [row for row in rows if row["feasible"]]
-    errors = absolute_errors(feasible)
-    signed = [row["radius_error"] for row in feasible if row["radius_error"] is not None]
+    left_out = [row for row in rows if not row["feasible"]]
     summary: dict[str, Any] = {
         "episodes": len(feasible),
-        "infeasible": len(rows) - len(feasible),
-        "undefined_radius": sum(not math.isfinite(error) for error in errors),
+        "runs": len({row.get("run", 0) for row in rows}),
+        "infeasible": len({row["number"] for row in left_out}),
+        "infeasible_but_made": sum(bool(row["success"]) for row in left_out),
+        "undefined_radius": sum(row["radius_error"] is None for row in feasible),
         "inconsistent_radius": sum(not row["radius_consistent"] for row in feasible),
     }
-    if not feasible:
-        return summary
-    summary["radius_error_median"] = _interval(errors, _quantile(0.5))
-    summary["radius_error_p95"] = _interval(errors, _quantile(0.95))
-    summary["radius_error_iqm"] = _interval(errors, interquartile_mean)
+    return summary | _metrics(_Table(feasible)) if feasible else summary
+
+
+def _metrics(table: _Table) -> dict[str, Any]:
+    errors, rows = table.errors(), table.rows
+    resampling: Resampling = "stratified" if table.runs > 1 else "crossed"
+    found: dict[str, Any] = {
+        "radius_error_median": _interval(errors, _quantile(0.5)),
+        "radius_error_p95": _interval(errors, _quantile(0.95)),
+        "radius_error_iqm": _interval(errors, interquartile_mean, resampling),
+    }
+    signed = [row["radius_error"] for row in rows if row["radius_error"] is not None]
     if signed:
-        summary["radius_error_signed_median"] = _interval(signed, _quantile(0.5))
-    summary["success_rate"] = _share(feasible, "success")
-    summary["practice_rate"] = _share(feasible, "within_practice")
-    for key in ("headland_depth", "duration", "slip_energy", "wheel_speed_variation", "radial_error_rms"):
-        known = [row[key] for row in feasible if row[key] is not None]
-        summary[f"{key}_median"] = float(np.median(known)) if known else None
-    return summary
+        found["radius_error_signed_median"] = _interval(np.array([signed]), _quantile(0.5))
+    found["success_rate"] = table.share("success")
+    found["practice_rate"] = table.share("within_practice")
+    stalled = [{**row, "stalled": bool(row.get("bank_stalls") or row.get("robot_stalls"))} for row in rows]
+    found["stall_rate"] = _Table(stalled).share("stalled")
+    for key in _LOST_WITH_THE_TURN:
+        found[f"{key}_median"] = _as_value(median_interval(_per_scenario(table.sizes(key))))
+    for key in _KNOWN_OR_NOT:
+        known = _per_scenario(table.sizes(key))
+        known = known[np.isfinite(known)]
+        found[f"{key}_median"] = _as_value(median_interval(known)) if known.size else None
+    found["profile"] = _profile(errors)
+    return found
+
+
+def _per_scenario(sizes: Array) -> Array:
+    """Median over runs of each scenario, so that scenarios stay independent of each other."""
+    return np.asarray(np.quantile(sizes, 0.5, axis=0, method="inverted_cdf"))
+
+
+def _profile(errors: Array) -> dict[str, list[float]] | None:
+    if errors.size < 2:
+        return None
+    rng = np.random.default_rng(_SEED)
+    found = performance_profile(errors, PROFILE_THRESHOLDS, rng, resampling="crossed", resamples=_RESAMPLES)
+    return {name: getattr(found, name).tolist() for name in ("thresholds", "share", "low", "high")}
+
+
+def arm_of(row: dict[str, Any]) -> str:
+    """Arm of a row: its controller where there is none."""
+    return str(row.get("arm", row["controller"]))
 
 
 def summaries(rows: Rows) -> dict[str, dict[str, Any]]:
-    """``{controller: {set: summary}}``."""
+    """``{arm: {set: summary}}``, with ``improvement_over_B1`` and ``_B4`` where those were driven on the set too."""
     result: dict[str, dict[str, Any]] = {}
-    for controller in dict.fromkeys(row["controller"] for row in rows):
-        mine = [row for row in rows if row["controller"] == controller]
-        result[controller] = {
+    for arm in dict.fromkeys(arm_of(row) for row in rows):
+        mine = [row for row in rows if arm_of(row) == arm]
+        result[arm] = {
             name: summarise([row for row in mine if row["set"] == name])
-            for name in dict.fromkeys(r["set"] for r in mine)
+            for name in dict.fromkeys(row["set"] for row in mine)
         }
+        for name, summary in result[arm].items():
+            for baseline in BASELINES:
+                found = improvement(rows, arm, baseline, name) if arm != baseline else None
+                if found is not None:
+                    summary[f"improvement_over_{baseline}"] = found
     return result
 
 
-def improvement(rows: Rows, candidate: str, baseline: str, set_name: str) -> dict[str, float | None] | None:
-    """Probability that ``candidate`` has the smaller |e_R| on feasible scenarios of a set; None without common ones."""
-    pairs = []
-    for controller in (candidate, baseline):
-        chosen = [r for r in rows if r["controller"] == controller and r["set"] == set_name and r["feasible"]]
-        pairs.append(dict(zip([r["number"] for r in chosen], absolute_errors(chosen), strict=True)))
-    common = sorted(set(pairs[0]) & set(pairs[1]))
+def improvement(rows: Rows, candidate: str, baseline: str, set_name: str) -> Value | None:
+    """Probability that the arm ``candidate`` has the smaller |e_R| on a feasible scenario of a set, ties one half.
+
+    Scenarios are paired: the same soil and the same noise. One run each: Wilson's interval; several: bootstrap over
+    runs and scenarios. None where one of them has no such scenario.
+    """
+    chosen = {
+        arm: [row for row in rows if arm_of(row) == arm and row["set"] == set_name and row["feasible"]]
+        for arm in (candidate, baseline)
+    }
+    if not all(chosen.values()):
+        return None
+    first, second = _Table(chosen[candidate]), _Table(chosen[baseline])
+    common = sorted(set(first.numbers) & set(second.numbers))
     if not common:
         return None
-    found = paired_probability_of_improvement([pairs[0][n] for n in common], [pairs[1][n] for n in common])
-    return {"value": found.estimate, "low": found.low, "high": found.high}
+    scores = [table.errors()[:, [table.numbers.index(number) for number in common]] for table in (first, second)]
+    if first.runs == second.runs == 1:
+        return _as_value(paired_probability_of_improvement(scores[0][0], scores[1][0]))
+    rng = np.random.default_rng(_SEED)
+    return _as_value(probability_of_improvement(scores[0], scores[1], rng, resampling="crossed", resamples=_RESAMPLES))

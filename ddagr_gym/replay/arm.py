@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,6 +38,7 @@ from ddagr_gym.replay.report import (
     ModelResiduals,
     RefitReport,
     Rollout,
+    Speed,
 )
 from ddagr_gym.replay.residuals import RECORDED, channel_residuals, regime_values, regimes, residuals
 from ddagr_gym.replay.split import clusters, held_out, training
@@ -170,11 +171,40 @@ def replay_arm(
         _rollouts(rolled, drive_by),
         baselines.report(),
         refit,
-        simulators[max(simulators)].speed(),
+        _speed(simulators.values()),
+        tuple(_notes(settings, seen, judged, baselines, found)),
     )
     values = {} if fit is None else dict(zip((p.name for p in fit.parameters), fit.fit.values.tolist(), strict=True))
     in_training = training(windows, prepared.splits)
     return ArmResult(report, windows, in_training, residual, found, rolled), values
+
+
+def _speed(simulators: Iterable[SimulatorOfArm]) -> Speed:
+    """Of all simulators of an arm together."""
+    speeds = [simulator.speed() for simulator in simulators]
+    simulated, cpu = sum(s.simulated_seconds for s in speeds), sum(s.cpu_seconds for s in speeds)
+    return Speed(simulated, cpu, simulated / cpu if cpu > 0.0 else 0.0)
+
+
+def _notes(
+    settings: ArmSettings,
+    seen: WindowSet | None,
+    judged: WindowSet | None,
+    baselines: Baselines,
+    found: Mapping[float, HorizonResult],
+) -> Iterator[str]:
+    if seen is None:
+        yield f"no window of {settings.window:g} s lies in the part for fits: nothing was fitted."
+    elif baselines.effective_track is None:
+        yield (
+            "no effective track could be fitted: the robot did not turn, or turned against its drive, in the part for "
+            "fits; see ddagr check."
+        )
+    if judged is None:
+        yield f"no window of {settings.window:g} s lies in the unseen part: its residuals are not judged."
+    for horizon in HORIZONS:
+        if horizon not in found:
+            yield f"no unseen stretch with a known drive lasts {horizon:g} s: errors after that time are not judged."
 
 
 def _fit(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,13 +59,37 @@ class Comparison:
     share_smaller: float
 
 
-def resampled_rows(clusters: Integers, rng: np.random.Generator) -> list[Integers]:
-    """Rows of RESAMPLES bootstrap samples in which whole clusters are drawn; none for fewer than two clusters."""
-    members = [np.flatnonzero(clusters == c) for c in np.unique(clusters)]
-    if len(members) < 2:
-        return []
-    draws = rng.integers(len(members), size=(RESAMPLES, len(members)))
-    return [np.concatenate([members[c] for c in draw]) for draw in draws]
+def resampled_counts(clusters: Integers, rng: np.random.Generator) -> Integers | None:
+    """How often each window is in each of RESAMPLES bootstrap samples, (RESAMPLES, W).
+
+    Whole clusters are drawn; None for fewer than two of them.
+
+    Args:
+        clusters: (W,) windows that are drawn together share a number.
+        rng: draws.
+    """
+    index = np.unique(clusters, return_inverse=True)[1].reshape(-1)
+    count = int(index.max()) + 1
+    if count < 2:
+        return None
+    draws = rng.integers(count, size=(RESAMPLES, count))
+    drawn = np.bincount((draws + count * np.arange(RESAMPLES)[:, None]).ravel(), minlength=RESAMPLES * count)
+    return np.asarray(drawn.reshape(RESAMPLES, count)[:, index])
+
+
+def resampled_rms(errors: Array, counts: Integers) -> Array:
+    """Root mean square (RESAMPLES,) of errors (W,) in bootstrap samples (RESAMPLES, W)."""
+    return np.asarray(np.sqrt((counts @ errors**2) / counts.sum(axis=1)))
+
+
+def resampled_median(errors: Array, counts: Integers) -> Array:
+    """Median absolute value (RESAMPLES,) of errors (W,) in bootstrap samples (RESAMPLES, W)."""
+    order = np.argsort(np.abs(errors))
+    sizes, reached = np.abs(errors)[order], np.cumsum(counts[:, order], axis=1)
+    total = reached[:, -1:]
+    low = np.argmax(reached > (total - 1) // 2, axis=1)
+    high = np.argmax(reached > total // 2, axis=1)
+    return np.asarray(0.5 * (sizes[low] + sizes[high]))
 
 
 def rms(errors: Array) -> float:
@@ -83,13 +108,13 @@ def error_statistics(errors: Array, clusters: Integers, rng: np.random.Generator
     values = errors[known]
     if not values.size:
         return ErrorStatistics(0, None, None, None, None, None)
-    rows = resampled_rows(clusters[known], rng)
+    counts = resampled_counts(clusters[known], rng)
     return ErrorStatistics(
         int(values.size),
         rms(values),
-        _interval([rms(values[r]) for r in rows]),
+        None if counts is None else _interval(resampled_rms(values, counts)),
         median(values),
-        _interval([median(values[r]) for r in rows]),
+        None if counts is None else _interval(resampled_median(values, counts)),
         float(values.mean()),
     )
 
@@ -102,20 +127,24 @@ def compare(
     ours, theirs = errors[known], others[known]
     if not ours.size or rms(theirs) == 0.0 or median(theirs) == 0.0:
         return None
-    rows = resampled_rows(clusters[known], rng)
+    counts = resampled_counts(clusters[known], rng)
     return Comparison(
         model,
         baseline,
         rms(ours) / rms(theirs),
-        _interval([rms(ours[r]) / max(rms(theirs[r]), 1e-300) for r in rows]),
+        _ratios(resampled_rms, ours, theirs, counts),
         median(ours) / median(theirs),
-        _interval([median(ours[r]) / max(median(theirs[r]), 1e-300) for r in rows]),
+        _ratios(resampled_median, ours, theirs, counts),
         float(np.mean(np.abs(ours) < np.abs(theirs))),
     )
 
 
-def _interval(values: list[float]) -> tuple[float, float] | None:
-    if not values:
-        return None
+def _ratios(
+    size: Callable[[Array, Integers], Array], ours: Array, theirs: Array, counts: Integers | None
+) -> tuple[float, float] | None:
+    return None if counts is None else _interval(size(ours, counts) / np.maximum(size(theirs, counts), 1e-300))
+
+
+def _interval(values: Array) -> tuple[float, float]:
     low, high = np.quantile(values, [(1.0 - CONFIDENCE) / 2.0, (1.0 + CONFIDENCE) / 2.0])
     return float(low), float(high)

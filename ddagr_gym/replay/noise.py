@@ -31,6 +31,8 @@ FLOOR = {
 
 MPU 6050 accelerometer and gyro, encoder quantisation at 0.2 m/s, RTK GNSS compass (thesis section 6.2)."""
 
+TIMING_PIECE = 10.0
+"""Length of the pieces in which poses are held against the integrated gyro [s] (ours)."""
 LEAST_CORRELATION = 0.5
 WIDEST_LATENESS = 0.8
 
@@ -62,12 +64,14 @@ class RecordingNoise:
         pose_lateness: by which poses come behind the gyro [s]; 0 where it cannot be told.
         pose_jitter: scatter of that lateness [s].
         gyro_bias: mean gyro reading at rest [rad/s] and its standard deviation, None where the robot never stood.
+        opposed: whether poses and gyro clearly turn opposite ways, so that one of them has the wrong sign.
     """
 
     channels: dict[str, ChannelNoise]
     pose_lateness: float
     pose_jitter: float
     gyro_bias: tuple[float, float] | None
+    opposed: bool = False
 
     @property
     def sigma(self) -> Array:
@@ -91,7 +95,8 @@ def recording_noise(recording: Recording, rng: np.random.Generator) -> Recording
     for name in ("pose_x", "pose_y"):
         channels[name] = ChannelNoise(None, None, 0.0, max(FLOOR[name], jitter * speed))
     channels["pose_yaw"] = ChannelNoise(None, None, 0.0, max(FLOOR["pose_yaw"], heading))
-    return RecordingNoise(channels, lateness, jitter, _gyro_bias(recording))
+    opposed = offset is not None and offset.correlation < -LEAST_CORRELATION
+    return RecordingNoise(channels, lateness, jitter, _gyro_bias(recording), opposed)
 
 
 def dead_channels(recording: Recording) -> tuple[str, ...]:
@@ -151,10 +156,10 @@ def _about_lines(recording: Recording, name: str, pieces: list[slice]) -> tuple[
 
 
 def _timing(recording: Recording, lateness: float) -> tuple[float, float]:
-    """Scatter of the poses' lateness [s], and of their heading against the gyro [rad], inside spans."""
+    """Scatter of the poses' lateness [s], and of their heading against the gyro [rad], inside pieces of spans."""
     heading, turned = unwrapped_heading(recording), integral(recording, recording["yaw_rate"])
     misfits, rates = [], []
-    for span in recording.spans():
+    for span in _pieces(recording, TIMING_PIECE):
         rows = span.start + np.flatnonzero(np.isfinite(heading[span]))
         if rows.size < 4:
             continue
@@ -168,6 +173,14 @@ def _timing(recording: Recording, lateness: float) -> tuple[float, float]:
     scatter = float(np.sqrt(np.mean(np.concatenate(misfits) ** 2)))
     rate = float(np.sqrt(np.mean(np.concatenate(rates) ** 2)))
     return (scatter / rate if rate > FLOOR["yaw_rate"] else 0.0), scatter
+
+
+def _pieces(recording: Recording, seconds: float) -> Iterator[slice]:
+    """Pieces of spans, so short that a gyro's bias does not turn the heading within them."""
+    length = max(round(seconds / recording.period), 2)
+    for span in recording.spans():
+        for start in range(span.start, span.stop, length):
+            yield slice(start, min(start + length, span.stop))
 
 
 def _typical_speed(recording: Recording) -> float:

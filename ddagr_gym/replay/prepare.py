@@ -122,10 +122,11 @@ def _notes(recordings: Sequence[Recording], noise: Sequence[RecordingNoise], dea
     for name in dead:
         yield f"{name} never changes and was left out of every fit: stuck, or zeros logged as data."
     for recording, item in zip(recordings, noise, strict=True):
+        if item.opposed:
+            yield f"{recording.meta.source}: gyro and poses turn opposite ways, see ddagr check; nothing was corrected."
         if item.pose_lateness > 0.0:
-            yield (
-                f"{recording.meta.source}: poses come {item.pose_lateness:.2f} s behind the gyro and were moved back; "
-                f"their lateness scatters by about {item.pose_jitter:.2f} s."
-            )
+            scatter = "" if item.opposed else f"; their lateness scatters by about {item.pose_jitter:.2f} s"
+            late = f"{item.pose_lateness:.2f} s behind the gyro and were moved back{scatter}"
+            yield f"{recording.meta.source}: poses come {late}."
         for sentence in recording.validate():
             yield f"{recording.meta.source}: {sentence}"

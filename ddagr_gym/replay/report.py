@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from ddagr_gym.config import parse_config
+from ddagr_gym.config import config_from
 from ddagr_gym.errors import InputError
 from ddagr_gym.replay.intervals import Comparison, ErrorStatistics
 from ddagr_gym.replay.residuals import ChannelResidual, Regime
@@ -192,6 +192,7 @@ class ArmReport:
         baselines: kinematic models.
         refit: null where none was asked for.
         speed: of the simulator.
+        notes: sentences on what could not be fitted or judged, and why.
     """
 
     drive: Literal["commands", "encoders"]
@@ -204,6 +205,7 @@ class ArmReport:
     baselines: BaselineReport
     refit: RefitReport | None
     speed: Speed
+    notes: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -273,6 +275,15 @@ class ReplayReport:
             )
 
 
+def lead_errors(arm: ArmReport, horizon: float = 5.0) -> dict[str, HorizonError]:
+    """Heading errors of an arm after a horizon [s] by model: by the gyro, else by the poses, else none."""
+    for metric in ("heading", "heading_pose"):
+        found = {e.model: e for e in arm.horizons if (e.horizon, e.metric) == (horizon, metric) and e.error.count}
+        if found:
+            return found
+    return {}
+
+
 def to_json(report: ReplayReport) -> dict[str, Any]:
     """The report in JSON's types."""
     return asdict(report)
@@ -290,8 +301,7 @@ def load_report(path: Path) -> ReplayReport:
         InputError: not JSON, a field that is missing, unknown or of the wrong type, or another version.
     """
     try:
-        text = path.read_text(encoding="utf-8")
-        json.loads(text)
+        content = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise InputError(f"{path} is not a replay report in JSON ({error}): write it with ddagr replay.") from None
-    return parse_config(text, ReplayReport, source=str(path))
+    return config_from(content, ReplayReport, source=str(path))

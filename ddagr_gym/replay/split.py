@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,8 @@ LONGEST_BLOCK = 40.0
 SHORTEST_BLOCK = 3.0
 BLOCKS = 4
 """A continuous drive falls into this many blocks at least, of at most LONGEST_BLOCK seconds (a 30 s horizon fits)."""
+LEAST_SHARE = 0.2
+"""Share of the commanded time that each part must have, else commanded stretches are cut by themselves (ours)."""
 CLUSTER = 10.0
 """Time within which errors count as dependent when intervals are resampled [s] (ours)."""
 
@@ -46,19 +49,50 @@ def split_recording(recording: Recording, swapped: bool = False) -> Split:
     """
     order = "the first judges, the second trains" if swapped else "the first trains, the second judges"
     spans = list(recording.spans())
-    block = np.zeros(len(recording), dtype=np.int64)
     if len(spans) >= MANY_SPANS:
+        block = np.zeros(len(recording), dtype=np.int64)
         for number, span in enumerate(spans):
-            block[span] = number + swapped
-        return Split(block, f"{len(spans)} spans alternate: {order}, and so on")
-    total = sum(float(recording.t[s.stop - 1] - recording.t[s.start]) for s in spans)
+            block[span] = number
+        return Split(block + swapped, f"{len(spans)} spans alternate: {order}, and so on")
+    block, length = _time_blocks(recording, spans)
+    rule = f"blocks of {length:.3g} s alternate: {order}, and so on"
+    if _lopsided(recording, block):
+        commanded = recording.command_valid
+        pieces = [slice(a, b) for span in spans for a, b in _stretches(commanded, span)]
+        driven, length = _time_blocks(recording, [piece for piece in pieces if commanded[piece.start]])
+        block = np.where(commanded, driven + 2 * (int(block.max()) // 2 + 1), block)
+        rule += f"; where commands are known, blocks of {length:.3g} s"
+    return Split(block + swapped, rule)
+
+
+def _time_blocks(recording: Recording, pieces: Sequence[slice]) -> tuple[Integers, float]:
+    """Blocks (n,) numbered through the pieces, 0 outside them, and their length [s]."""
+    block = np.zeros(len(recording), dtype=np.int64)
+    total = sum(float(recording.t[s.stop - 1] - recording.t[s.start]) for s in pieces)
     length = min(max(total / BLOCKS, SHORTEST_BLOCK), LONGEST_BLOCK)
-    first = int(swapped)
-    for span in spans:
-        number = ((recording.t[span] - recording.t[span.start]) / length).astype(np.int64)
-        block[span] = first + number
-        first = int(block[span.stop - 1]) + 1
-    return Split(block, f"blocks of {length:.3g} s alternate: {order}, and so on")
+    first = 0
+    for piece in pieces:
+        # the last row ends a block: it does not start one of its own
+        time = recording.t[piece] - recording.t[piece.start] - 0.5 * recording.period
+        block[piece] = first + np.maximum(time / length, 0.0).astype(np.int64)
+        first = int(block[piece.stop - 1]) + 1
+    return block, length
+
+
+def _lopsided(recording: Recording, block: Integers) -> bool:
+    """Whether commands are known in a part of the drive only, nearly all of it in one of the two parts."""
+    commanded = recording.command_valid
+    if commanded.all() or not commanded.any():
+        return False
+    share = float(np.mean(block[commanded] % 2))
+    return not LEAST_SHARE <= share <= 1.0 - LEAST_SHARE
+
+
+def _stretches(commanded: Booleans, span: slice) -> list[tuple[int, int]]:
+    """Rows of a span between which the commands become known or unknown."""
+    edges = span.start + 1 + np.flatnonzero(np.diff(commanded[span].astype(np.int8)))
+    bounds = [span.start, *edges.tolist(), span.stop]
+    return list(pairwise(bounds))
 
 
 def window_blocks(windows: WindowSet, splits: Sequence[Split]) -> Integers:
@@ -68,9 +102,8 @@ def window_blocks(windows: WindowSet, splits: Sequence[Split]) -> Integers:
         windows: cut from the recordings that were split.
         splits: one per recording.
     """
-    pairs = zip(windows.recording, windows.start, strict=True)
-    first, last = zip(*((splits[r].block[s], splits[r].block[s + windows.samples]) for r, s in pairs), strict=True)
-    return np.where(np.equal(first, last), first, -1).astype(np.int64)
+    rows = [splits[r].block[s : s + windows.samples + 1] for r, s in zip(windows.recording, windows.start, strict=True)]
+    return np.array([row[0] if row[0] == row[-1] and not np.ptp(row) else -1 for row in rows], dtype=np.int64)
 
 
 def training(windows: WindowSet, splits: Sequence[Split]) -> Booleans:

@@ -32,6 +32,8 @@ MODEL_STYLES: dict[str, tuple[str, str, Any]] = {
 CELLS = 12
 """Roll-outs that are drawn, evenly chosen."""
 ROW = 4
+LEAST_WINDOWS = 3
+"""Windows from which on a curve of their mean error is worth drawing."""
 LEAST_EXTENT = 0.5
 """Smallest cell of a roll-out [m]."""
 
@@ -101,6 +103,7 @@ def _legend(figure: Any, arm: ArmResult, models: Sequence[str] = MODELS) -> None
     from matplotlib.lines import Line2D
 
     present = {error.model for error in arm.report.horizons} | set(arm.residuals)
+    present |= {rollout.model for rollout in arm.report.rollouts}
     measured = [Line2D([], [], color=palette.INK, linewidth=1.6, label="measured")] if len(models) > 2 else []
     lines = [
         Line2D([], [], color=colour, linestyle=line, linewidth=1.6, label=label)
@@ -235,15 +238,19 @@ def _draw_growth(axes: Any, arm: ArmResult) -> None:
     axes.set_title("Growth of the heading error, by the gyro", pad=5.0)
     judged = {h: r for h, r in arm.horizons.items() if any("heading" in e for e in r.errors.values())}
     if not judged:
-        return _nothing(axes, "no part of the recording is unseen, or no gyro")
-    longest = max(judged)
-    for name, curve in judged[longest].growth.items():
+        return _nothing(axes, "not judged: no unseen stretch, or no gyro")
+    # the growth in one or two windows is their manoeuvres, not the models' error
+    many = [horizon for horizon, result in judged.items() if len(result.clusters) >= LEAST_WINDOWS]
+    longest = max(many or judged)
+    result = judged[longest]
+    axes.set_title(f"Growth of the heading error, by the gyro ({len(result.clusters)} windows)", pad=5.0)
+    for name, curve in result.growth.items():
         _, colour, line = MODEL_STYLES[name]
-        times = judged[longest].period * np.arange(1, len(curve) + 1)
+        times = result.period * np.arange(1, len(curve) + 1)
         axes.plot(times, curve, color=colour, linestyle=line, linewidth=1.6)
-    best = [c[-1] for n, c in judged[longest].growth.items() if n != NO_SLIP and np.isfinite(c[-1])]
+    best = [np.max(curve) for name, curve in result.growth.items() if name != NO_SLIP and np.isfinite(curve).all()]
     if best:
-        axes.set_ylim(0.0, 1.25 * max(best))
+        axes.set_ylim(0.0, 1.15 * max(best))
     axes.set(xlim=(0.0, longest), xlabel="time since the start [s]", ylabel="root mean square [rad]")
     return None
 
@@ -252,7 +259,7 @@ def _draw_horizons(axes: Any, arm: ArmResult, metric: str, title: str, unit: str
     axes.set_title(f"{title}: median (dot), r.m.s. (bar), 95 %", pad=5.0)
     shown = [e for e in arm.report.horizons if e.metric == metric and e.error.count]
     if not shown:
-        return _nothing(axes, "nothing measures it")
+        return _nothing(axes, "not judged: no unseen stretch, or nothing measures it")
     horizons = sorted({e.horizon for e in shown})
     for error in shown:
         place = horizons.index(error.horizon) + 0.16 * (MODELS.index(error.model) - 1.5)
@@ -298,8 +305,8 @@ def _draw_channels(axes: Any, arm: ArmResult) -> None:
     for model, table in enumerate(arm.report.residuals):
         colour = MODEL_STYLES[table.model][1]
         places = np.arange(len(names)) + 0.3 * (model - 0.5 * (len(arm.report.residuals) - 1))
-        axes.bar(places, [c.relative for c in table.channels], width=0.28, color=colour)
-    axes.axhline(1.0, color=palette.INK, linewidth=0.8, linestyle=DASHED)
+        axes.bar(places, [c.relative - 1.0 for c in table.channels], width=0.28, bottom=1.0, color=colour)
+    axes.axhline(1.0, color=palette.INK, linewidth=0.8)
     _log_scale(axes)
     axes.set_ylabel("[-]")
     axes.set_xticks(range(len(names)), [_LABELS[name] for name in names])
@@ -326,14 +333,15 @@ def _draw_regimes(figure: Any, arm: ArmResult, channel: str, bottom: float, heig
                 limit = max(limit, float(np.quantile(np.abs(means) + spread, 0.95)))
         axes.tick_params(labelleft=column == 0)
         if last:
-            name = against.replace("_", " ")
-            axes.set_xlabel(f"{name} [{unit}]" if unit != "-" else f"mean |{name} ratio| [-]")
+            name = {"slip": "mean size of slip ratio"}.get(against, against.replace("_", " "))
+            axes.set_xlabel(f"{name} [{unit}]")
     for axes in panels:
         axes.set_ylim(-1.3 * (limit or 1.0), 1.3 * (limit or 1.0))
     panels[0].set_ylabel(f"{_LABELS[channel]}\n[{_unit(channel)}]")
+    panels[0].yaxis.set_label_coords(-0.4, 0.5)
 
 
 def _unit(channel: str) -> str:
     from ddagr_gym.recordings.schema import CHANNELS as SCHEMA
 
-    return SCHEMA[channel].unit
+    return SCHEMA[channel].unit.replace("^2", "²")

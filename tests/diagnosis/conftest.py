@@ -1,13 +1,18 @@
 """Short simulated drives and the problem that they make."""
 
 from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pytest
 
+from ddagr_gym.diagnosis.certify import certify
 from ddagr_gym.diagnosis.problem import Problem
+from ddagr_gym.diagnosis.refit import Fitted, fit
 from ddagr_gym.diagnosis.setting import Setting, make_problem
 from ddagr_gym.parameters import Imu, PoseReceiver, Sensors, WheelEncoder
+from ddagr_gym.physics.effects import load_effects
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.simulator import simulate
@@ -43,3 +48,39 @@ def problem_of() -> Callable[..., Problem]:
         return make_problem(get_robot("ddagr"), get_soil("thesis_a1"), recordings, Setting())
 
     return make
+
+
+@dataclass(frozen=True, eq=False)
+class Sloping:
+    """Two drives on ground that slopes, fitted with and without the slope.
+
+    Attributes:
+        recordings: of 24 s.
+        problem: their windows.
+        nominal: fit without the slope.
+        chosen: fit with it.
+        certificate: of both.
+    """
+
+    recordings: tuple[Recording, ...]
+    problem: Problem
+    nominal: Fitted
+    chosen: Fitted
+    certificate: dict[str, Any]
+
+
+SLOPE = "slope=0.06,direction=0.8"
+
+
+@pytest.fixture(scope="session")
+def sloping(drive: Callable[..., Recording], problem_of: Callable[..., Problem]) -> Sloping:
+    """A slope of 0.06 rad that the sizes are fitted to from another guess."""
+    recordings = (drive((SLOPE,), seed=1), drive((SLOPE,), seed=2))
+    problem = problem_of(*recordings)
+    nominal = fit(problem, iterations=2, renewals=1)
+    start = replace(nominal.point, effects=load_effects("slope=0.05,direction=0.7"))
+    chosen = fit(problem, start, iterations=6, renewals=2, first=nominal)
+    rng = np.random.default_rng(0)
+    return Sloping(
+        recordings, problem, nominal, chosen, certify(problem, nominal, chosen, get_robot("ddagr"), recordings, rng)
+    )

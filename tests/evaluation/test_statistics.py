@@ -11,6 +11,7 @@ from ddagr_gym.evaluation.statistics import (
     bootstrap,
     improvement_share,
     interquartile_mean,
+    median_interval,
     paired_probability_of_improvement,
     performance_profile,
     probability_of_improvement,
@@ -162,3 +163,20 @@ def test_performance_profile_is_the_empirical_distribution():
 def test_bad_input_is_one_sentence(call, message):
     with pytest.raises(InputError, match=message):
         call(np.random.default_rng(0))
+
+
+def test_median_interval_covers_the_median_as_often_as_it_says():
+    rng = np.random.default_rng(5)
+    for count in (15, 40, 101):
+        found = [median_interval(rng.exponential(size=count)) for _ in range(600)]
+        covered = np.mean([item.low <= math.log(2.0) <= item.high for item in found])
+        assert 0.93 <= covered <= 1.0
+    assert np.mean([item.high - item.low for item in found]) < 0.6  # 4/sqrt(n) of a density of 1/2
+
+
+def test_median_interval_of_few_and_of_failures():
+    found = median_interval([3.0, 1.0, math.inf, 2.0])
+    assert (found.low, found.estimate, found.high) == (1.0, 2.0, math.inf)
+    assert median_interval([4.0]).estimate == 4.0
+    with pytest.raises(InputError, match="NaN"):
+        median_interval([1.0, math.nan])

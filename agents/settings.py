@@ -1,0 +1,172 @@
+"""What a training run is: everything that its YAML file in configs/training says, strictly read."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import asdict, dataclass, field
+from typing import Any, Literal
+
+from ddagr_gym.envs.settings import Randomisation, RewardWeights
+from ddagr_gym.errors import InputError
+from ddagr_gym.estimation import FilterModel
+from ddagr_gym.parameters import Sensors, Validated, bounded
+from ddagr_gym.policies.design import PolicyDesign
+from ddagr_gym.presets import ddagr
+
+
+@dataclass(frozen=True)
+class TaskSettings(Validated):
+    """The turns that are trained on.
+
+    Attributes:
+        soil: distribution that each episode draws from.
+        radius: R*, lowest and highest [m].
+        speed: reference speed [m/s].
+        randomisation: what differs from episode to episode besides the soil.
+        reward: weights of the terms.
+    """
+
+    soil: str = "thesis_a1_range"
+    radius: tuple[float, float] = (0.80, 0.80)
+    speed: float = bounded("m/s", 0.0, 2.0, default=0.20, open_low=True)
+    randomisation: Randomisation = Randomisation()
+    reward: RewardWeights = RewardWeights()
+
+    def environment(self, design: PolicyDesign) -> dict[str, Any]:
+        """Keyword arguments of the environment."""
+        low, high = self.radius
+        return {
+            "soil": self.soil,
+            "radius": low if low == high else (low, high),
+            "speed": self.speed,
+            "randomisation": self.randomisation,
+            "reward": self.reward,
+            "ekf_features": design.needs_filter,
+        }
+
+
+@dataclass(frozen=True)
+class ImitationSettings(Validated):
+    """The head start that a teacher gives who sees the truth; see :mod:`agents.imitation`.
+
+    Attributes:
+        rounds: of driving and fitting; 0 for none.
+        steps: control steps per environment and round.
+        epochs: passes over all data so far, per round.
+        batch: samples per gradient step.
+        learning_rate: of Adam; falls linearly in each round.
+        exploration: standard deviation added to the outputs while driving [-].
+        cross_track: the teacher's curvature over 1/R* per distance over R* [-].
+        heading: the teacher's curvature over 1/R* per heading error [1/rad].
+    """
+
+    rounds: int = 0
+    steps: int = 250
+    epochs: int = 6
+    batch: int = 512
+    learning_rate: float = bounded("-", 0.0, 1.0, default=2e-3, open_low=True)
+    exploration: float = bounded("-", 0.0, 1.0, default=0.05)
+    cross_track: float = bounded("-", 0.0, 100.0, default=2.5)
+    heading: float = bounded("1/rad", 0.0, 100.0, default=2.5)
+
+
+@dataclass(frozen=True)
+class PpoSettings(Validated):
+    """Proximal policy optimisation (Schulman et al. 2017), as Stable-Baselines3 names its parts.
+
+    Attributes:
+        rollout: control steps per environment between updates.
+        batch: samples per gradient step.
+        epochs: passes over a rollout.
+        learning_rate: at the start; falls linearly to a twentieth.
+        discount: per control step [-].
+        trace: lambda of the generalised advantage [-].
+        clip: of the probability ratio [-].
+        entropy: weight of the entropy bonus [-].
+        initial_deviation: of the outputs [-].
+        hidden: units of the two layers of policy and value.
+        critic_first: share of the training in which only the value learns [-].
+    """
+
+    rollout: int = 64
+    batch: int = 1024
+    epochs: int = 5
+    learning_rate: float = bounded("-", 0.0, 1.0, default=1e-3, open_low=True)
+    discount: float = bounded("-", 0.0, 1.0, default=0.98)
+    trace: float = bounded("-", 0.0, 1.0, default=0.9)
+    clip: float = bounded("-", 0.0, 1.0, default=0.2, open_low=True)
+    entropy: float = bounded("-", 0.0, 1.0, default=0.0)
+    initial_deviation: float = bounded("-", 0.0, 2.0, default=0.2, open_low=True)
+    hidden: tuple[int, ...] = (64, 64)
+    critic_first: float = bounded("-", 0.0, 1.0, default=0.0)
+
+
+@dataclass(frozen=True)
+class SacSettings(Validated):
+    """Soft actor-critic (Haarnoja et al. 2018), as Stable-Baselines3 names its parts.
+
+    Attributes:
+        buffer: transitions kept.
+        batch: samples per gradient step.
+        start: control steps with random outputs before learning.
+        learning_rate: of actor and critics.
+        discount: per control step [-].
+        smoothing: of the target critics [-].
+        gradient_steps: per step of the whole batch of environments.
+        hidden: units of the layers of actor and critics.
+    """
+
+    buffer: int = 200_000
+    batch: int = 256
+    start: int = 2_000
+    learning_rate: float = bounded("-", 0.0, 1.0, default=1e-3, open_low=True)
+    discount: float = bounded("-", 0.0, 1.0, default=0.98)
+    smoothing: float = bounded("-", 0.0, 1.0, default=0.01, open_low=True)
+    gradient_steps: int = 8
+    hidden: tuple[int, ...] = (64, 64)
+
+
+@dataclass(frozen=True)
+class TrainingSettings:
+    """One training arm.
+
+    Attributes:
+        description: one line.
+        algorithm: "ppo" or "sac".
+        seeds: how many training seeds, from 0.
+        steps: control steps of one training, all environments together.
+        environments: in the batch.
+        validation_interval: control steps between drives of the validation set.
+        design: what the policy sees and does.
+        task: what it is trained on.
+        imitation: head start, of PPO only.
+        ppo: of the algorithm.
+        sac: of the algorithm.
+    """
+
+    description: str
+    algorithm: Literal["ppo", "sac"] = "ppo"
+    seeds: int = 1
+    steps: int = 1_000_000
+    environments: int = 128
+    validation_interval: int = 250_000
+    design: PolicyDesign = field(default_factory=PolicyDesign)
+    task: TaskSettings = field(default_factory=TaskSettings)
+    imitation: ImitationSettings = field(default_factory=ImitationSettings)
+    ppo: PpoSettings = field(default_factory=PpoSettings)
+    sac: SacSettings = field(default_factory=SacSettings)
+
+    def __post_init__(self) -> None:
+        for name in ("seeds", "steps", "environments", "validation_interval"):
+            if getattr(self, name) < 1:
+                raise InputError(f"TrainingSettings.{name} is {getattr(self, name)}: give at least 1.")
+
+    def digest(self) -> str:
+        """SHA-256 over everything that decides the result of a seed."""
+        content = asdict(self)
+        for name in ("description", "seeds", "validation_interval"):
+            del content[name]
+        # the policy is fitted to this filter: with another one it has to be trained anew
+        content["filter"] = asdict(FilterModel.of(ddagr(), Sensors()))
+        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()

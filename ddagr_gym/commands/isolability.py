@@ -1,0 +1,121 @@
+"""``ddagr isolability``: what manoeuvres and sensors could show and tell apart, before any data."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ddagr_gym.commands.output import check_output_folder, format_table, output_folder, write_text
+from ddagr_gym.commands.progress import Progress
+
+if TYPE_CHECKING:
+    from ddagr_gym.diagnosis.isolability import Isolability
+    from ddagr_gym.diagnosis.thresholds import Thresholds
+
+EXAMPLES = (
+    "ddagr isolability --manoeuvres straight two_headings --output isolability",
+    "ddagr isolability --robot warthog --soil firm_ground --manoeuvres stops arcs spin --sensors imu encoders "
+    "--output isolability",
+)
+
+
+@dataclass(frozen=True)
+class Arguments:
+    """Say before any drive which effects it could show, how small, and which it could tell apart.
+
+    The nominal robot is simulated over the manoeuvres with the sensors' default noise; from its sensitivities follow the
+    least detectable size of each effect and the share of its trace that every other effect cannot imitate.
+
+    Attributes:
+        output: folder for isolability.json, isolability.txt and the figure.
+        manoeuvres: names of built-in drives, or CSV files of commands.
+        sensors: some of imu, encoders, pose.
+        robot: nominal robot.
+        soil: nominal soil.
+        thresholds: gates of `ddagr null-bank`; without them those of chance alone (chi-square, the smallest that any
+            sizes could be).
+        seed: of the sensor noise.
+        overwrite: replace an output folder that an earlier command wrote.
+    """
+
+    output: Path
+    manoeuvres: tuple[str, ...] = ("stops", "arcs", "spin", "s_weave")
+    sensors: tuple[str, ...] = ("imu", "encoders", "pose")
+    robot: str = "ddagr"
+    soil: str = "thesis_a1"
+    thresholds: Path | None = None
+    seed: int = 0
+    overwrite: bool = False
+
+
+def run(arguments: Arguments) -> None:
+    """Make the table, write it, print it."""
+    from ddagr_gym.control.manoeuvres import find_manoeuvre
+    from ddagr_gym.diagnosis.isolability import isolability
+    from ddagr_gym.physics.effects.registry import effect_kinds
+    from ddagr_gym.presets import get_robot, get_soil
+    from ddagr_gym.reporting.isolability_figure import isolability_figure
+
+    check_output_folder(arguments.output, overwrite=arguments.overwrite)
+    robot, soil = get_robot(arguments.robot), get_soil(arguments.soil)
+    manoeuvres = [find_manoeuvre(name) for name in arguments.manoeuvres]
+    thresholds = _thresholds(arguments.thresholds)
+    with Progress(len(effect_kinds()), "effects") as progress:
+        table = isolability(
+            robot,
+            soil,
+            manoeuvres,
+            arguments.sensors,
+            thresholds=thresholds,
+            seed=arguments.seed,
+            soil_name=arguments.soil,
+            progress=lambda name: progress.advance(),
+        )
+    text = table_text(table)
+    with output_folder(arguments.output, overwrite=arguments.overwrite) as folder:
+        mapping = table.as_mapping()
+        write_text(folder / "isolability.json", json.dumps(mapping, indent=1, allow_nan=False) + "\n")
+        write_text(folder / "isolability.txt", text + "\n")
+        isolability_figure(mapping, folder / "isolability.png")
+    print(text)
+    print(f"\ntable, JSON and figure: {arguments.output}")
+
+
+def _thresholds(path: Path | None) -> Thresholds | None:
+    from ddagr_gym.diagnosis.thresholds import load_thresholds
+
+    return None if path is None else load_thresholds(path)
+
+
+def table_text(table: Isolability) -> str:
+    """One line per size of an effect, the effects that show at the smallest sizes first."""
+    order = sorted(table.effects, key=lambda name: table.of(name).multiples)
+    rows = []
+    for name in order:
+        for item in (entry for entry in table.detectable if entry.effect == name):
+            rows.append((name, item.field, _size(item.size), item.unit, _multiples(item.multiples), _rivals(table, name)))
+    header = ("effect", "size", "least detectable", "unit", "/ least meaningful", "not told from (share of its own)")
+    head = (
+        f"{table.robot} on {table.soil}: {', '.join(table.manoeuvres)} ({table.duration:.0f} s) with "
+        f"{', '.join(table.sensors)}; gates: {table.gates}"
+    )
+    return f"{head}\n\n{format_table(header, rows)}"
+
+
+def _size(value: float) -> str:
+    return f"{value:.3g}" if math.isfinite(value) else "none"
+
+
+def _multiples(value: float) -> str:
+    return f"{value:.2g}" if value < 1e3 else "not seen"
+
+
+def _rivals(table: Isolability, name: str) -> str:
+    if table.of(name).multiples >= 1e3:
+        return ""
+    row = table.share[table.effects.index(name)]
+    pairs = [f"{rival} ({row[table.effects.index(rival)]:.2f})" for rival in table.confused(name)]
+    return ", ".join(pairs)

@@ -1,0 +1,75 @@
+"""``ddagr train``: learn to turn."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import tyro
+
+from ddagr_gym.errors import InputError
+
+EXAMPLES = (
+    "ddagr train ppo --config ppo_ekf --seed 0 --output runs",
+    "ddagr train ppo --config ppo_raw --set steps=200000 ppo.learning_rate=3e-4",
+    "ddagr train all --output runs",
+)
+
+
+@dataclass(frozen=True)
+class Arguments:
+    """Train a policy by reinforcement learning, or all published ones; an interrupted training goes on.
+
+    Needs the checkout, where agents/ and configs/training/ are.
+
+    Attributes:
+        what: algorithm of one training, or "all" for every published policy with its record and model card.
+        config: name of a file in configs/training, or a YAML file.
+        seed: of the training.
+        output: folder for checkpoints, TensorBoard, results and policies.
+        set: changes of the configuration, as ppo.learning_rate=3e-4.
+        publish: with "all", replace the policies in agents/policies by the result.
+    """
+
+    what: tyro.conf.Positional[Literal["ppo", "sac", "all"]]
+    config: str = "ppo_ekf"
+    seed: int = 0
+    output: Path = Path("ddagr_training")
+    set: tuple[str, ...] = ()
+    publish: bool = False
+
+
+def run(arguments: Arguments) -> None:
+    """Train and print what came of it."""
+    if arguments.seed < 0:
+        raise InputError(f"--seed {arguments.seed}: give 0 or more.")
+    if arguments.what == "all":
+        _agents("train_all").train_all(arguments.output, write=arguments.publish)
+        return
+    result = _agents("main").train_one(
+        arguments.what, arguments.config, arguments.seed, arguments.output, arguments.set
+    )
+    found = result["validation"]
+    print(
+        f"After {result['steps']} control steps, on the validation set: median |e_R| "
+        f"{100 * found['radius_error_median']:.2f} %, 95th percentile {100 * found['radius_error_p95']:.2f} %, success "
+        f"{100 * found['success_rate']:.0f} %."
+    )
+    print(f"Policy, checkpoint and TensorBoard are in {arguments.output.resolve()}")
+
+
+def _agents(module: str) -> Any:
+    """A module of the checkout's folder agents.
+
+    Raises:
+        InputError: the package was installed without its checkout.
+    """
+    root = Path(__file__).resolve().parents[2]
+    if not (root / "pyproject.toml").is_file() or not (root / "agents" / "main.py").is_file():
+        raise InputError("training needs the folder agents/ of the source: clone the repository and run ./ddagr train.")
+    if str(root) not in sys.path:
+        sys.path.insert(0, str(root))
+    return importlib.import_module(f"agents.{module}")

@@ -1,0 +1,53 @@
+"""``ddagr tune-controllers``: search the gains of the ladder's closed loops on the validation set."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+from ddagr_gym.commands.output import write_text
+from ddagr_gym.commands.progress import Progress
+from ddagr_gym.files import make_folder
+
+EXAMPLES = (
+    "ddagr tune-controllers --output gains",
+    "ddagr tune-controllers --controllers B3,B4 --output gains --seed 1",
+)
+
+
+@dataclass(frozen=True)
+class Arguments:
+    """Search the controllers' gains on the validation set.
+
+    Every controller gets the same budget, scenarios and objective: see ddagr_gym.evaluation.gain_search. An interrupted
+    search continues when it is started again with the same folder. The result, ladder_gains.yaml and gain_search.json,
+    takes effect in configs/evaluation.
+
+    Attributes:
+        controllers: names, separated by commas.
+        output: folder for the journal and the result.
+        seed: of the candidates.
+    """
+
+    controllers: str = "B2,B3,B4,B5,true_curvature,true_soil,true_path"
+    output: Path = Path("ddagr_gains")
+    seed: int = 0
+
+
+def run(arguments: Arguments) -> None:
+    """Search, write, print what was found."""
+    from ddagr_gym.evaluation.gain_search import STAGES, GainSearch, check_names, episodes_of, write_gains
+
+    names = check_names([name.strip() for name in arguments.controllers.split(",") if name.strip()])
+    folder = make_folder(arguments.output)
+    records = []
+    with Progress(len(names) * episodes_of(STAGES), "searching") as progress:
+        for name in names:
+            journal = folder / f"{name}_seed_{arguments.seed}.jsonl"
+            records.append(GainSearch(name, journal, seed=arguments.seed, progress=progress.advance).run())
+    write_gains(records, folder / "ladder_gains.yaml")
+    write_text(folder / "gain_search.json", json.dumps(records, indent=1) + "\n")
+    for record in records:
+        print(f"{record['controller']:15s} objective {record['objective']:.4f}  {record['best']}")
+    print(f"\nGains and record are in {folder.resolve()}")

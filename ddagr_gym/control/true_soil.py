@@ -1,0 +1,70 @@
+"""Upper bound, never deployable: the strong classical controller with the true soil and the true motion."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ddagr_gym.control.observation import TurnObservation, decode
+from ddagr_gym.control.pid import Pid, PidGains
+from ddagr_gym.control.row_turn import Phase
+from ddagr_gym.control.turn_controller import CONTROL_PERIOD, TurnController
+from ddagr_gym.errors import InputError
+from ddagr_gym.parameters import Robot
+
+TrueFeedForward = Callable[[NDArray[np.float64], float, float], tuple[float, float] | None]
+"""(soil (9,) in the simulator's order, speed, curvature) -> bank speeds [rad/s] or None."""
+
+
+class TrueSoil(TurnController):
+    """B4 with the truth for its estimate: bank speeds by the true soil's own force law, PI on the true curvature.
+
+    Needs ``info_level="full"``. Where the soil has no steady solution the kinematic bank speeds with ``track_ratio``
+    serve.
+
+    Args:
+        robot: nominal robot.
+        gains: the loop's output and error are curvatures [1/m].
+        feed_forward: steady bank speeds on a soil.
+        track_ratio: see :class:`TurnController`.
+        lead: see there.
+    """
+
+    def __init__(
+        self, robot: Robot, gains: PidGains, feed_forward: TrueFeedForward, track_ratio: float = 1.0, lead: float = 0.0
+    ) -> None:
+        super().__init__(robot, track_ratio, lead)
+        self._feed_forward = feed_forward
+        self._pid = Pid(gains, CONTROL_PERIOD)
+
+    def reset(self) -> None:
+        """Forget the integral."""
+        self._pid.reset()
+
+    def __call__(self, observation: ArrayLike, info: Any = None) -> NDArray[np.float32]:
+        """Action (2,), right and left bank speed over the robot's maximum."""
+        if info is None or "true_soil" not in info:
+            raise InputError('this controller needs the true soil: make the environment with info_level="full".')
+        seen = decode(observation)
+        phase = self.phase(seen)
+        commanded = seen.side / seen.target_radius if phase == Phase.TURN else 0.0
+        soil = np.asarray(info["true_soil"], dtype=float).reshape(4, 9).mean(axis=0)
+        steady = self._feed_forward(soil, seen.target_speed, commanded)
+        if steady is None:
+            steady = self.bank_speeds(seen.target_speed, commanded)
+        correction = self.curvature(seen, phase, info) - commanded
+        spread = seen.target_speed * self.track_ratio * self.robot.half_track / self.robot.wheels[0].outer_radius
+        speeds = np.array([steady[0] + spread * correction, steady[1] - spread * correction])
+        return np.clip(speeds / self.robot.maximum_wheel_speed, -1.0, 1.0).astype(np.float32)
+
+    def curvature(self, seen: TurnObservation, phase: Phase, info: Any) -> float:
+        """Commanded curvature, corrected in the turn by the true one."""
+        commanded = super().curvature(seen, phase, info)
+        if phase != Phase.TURN:
+            return commanded
+        speed = max(math.hypot(info["true_v_x"], info["true_v_y"]), 0.25 * seen.target_speed)
+        return commanded + self._pid.update(commanded - info["true_yaw_rate"] / speed)

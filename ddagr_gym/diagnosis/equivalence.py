@@ -1,0 +1,50 @@
+"""What else it could be: rivals that the same windows may mean, with weights."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ddagr_gym.diagnosis.search import Rival
+from ddagr_gym.diagnosis.size_prior import implausibility
+
+Array = NDArray[np.float64]
+
+LEAST_WEIGHT = 0.05
+"""Weight that a rival needs to stand in the equivalence set (ours, with the level)."""
+
+
+def equivalence_weights(
+    rivals: Sequence[Rival], dispersion: float, rng: np.random.Generator, draws: int = 400
+) -> dict[str, float]:
+    """Weight of each rival as the better explanation, averaged over resamplings of the windows.
+
+    In a resampling a joint refit has the weight exp(-cost/dispersion) over the sum of all: two that explain the same
+    share it equally even where one is always ahead by a little.
+
+    Args:
+        rivals: joint refits of one step of the search, best first.
+        dispersion: of the model before.
+        rng: of the resampling.
+        draws: how often.
+
+    Returns:
+        Weights that add up to 1, of the first rival and of all with :data:`LEAST_WEIGHT`.
+    """
+    windows = np.stack([rival.fitted.window_cost for rival in rivals])
+    priors = np.array([rival.fitted.cost for rival in rivals]) - windows.sum(axis=1)
+    unusual = np.array([implausibility(rival.fitted.point.effects[-1]) for rival in rivals])
+    count = windows.shape[1]
+    counts = rng.multinomial(count, np.full(count, 1.0 / count), size=draws).astype(float)
+    costs = (counts @ windows.T + priors) / dispersion + unusual
+    relative = np.exp(costs.min(axis=1, keepdims=True) - costs)
+    weights = (relative / relative.sum(axis=1, keepdims=True)).mean(axis=0)
+    kept = {
+        rival.name: float(weight)
+        for number, (rival, weight) in enumerate(zip(rivals, weights, strict=True))
+        if number == 0 or weight >= LEAST_WEIGHT
+    }
+    total = sum(kept.values())
+    return {name: weight / total for name, weight in kept.items()} if total > 0.0 else {rivals[0].name: 1.0}

@@ -1,0 +1,165 @@
+"""All steps of a diagnosis in their order, each kept when it is finished.
+
+    windows -> search -> verdict -> certification -> localisation -> unnamed terms -> evidence
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ddagr_gym.diagnosis.certify import certify
+from ddagr_gym.diagnosis.diagnose import Prepared, conclude, prepare
+from ddagr_gym.diagnosis.evidence import Evidence, gather_evidence
+from ddagr_gym.diagnosis.inputs import check_recordings, content_hash
+from ddagr_gym.diagnosis.localisation import locate
+from ddagr_gym.diagnosis.search import Found, search
+from ddagr_gym.diagnosis.setting import Setting
+from ddagr_gym.diagnosis.sources import source_digest
+from ddagr_gym.diagnosis.store import StepStore
+from ddagr_gym.diagnosis.thresholds import Thresholds
+from ddagr_gym.diagnosis.unnamed import unnamed_terms
+from ddagr_gym.diagnosis.verdict import UNKNOWN, Diagnosis
+from ddagr_gym.parameters import Robot, Soil
+from ddagr_gym.physics.effects import Effect
+from ddagr_gym.recordings.schema import Recording
+
+STEPS = ("search", "verdict", "certification", "localisation", "unnamed terms", "evidence")
+"""Names of the steps that are kept."""
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """What is diagnosed, and how.
+
+    Attributes:
+        robot: nominal.
+        soil: nominal.
+        recordings: at least one, of one robot and period.
+        thresholds: of the null bank.
+        setting: choices.
+        seed: of everything random.
+    """
+
+    robot: Robot
+    soil: Soil
+    recordings: tuple[Recording, ...]
+    thresholds: Thresholds
+    setting: Setting
+    seed: int = 0
+
+    def key(self) -> str:
+        """Hash of all that the results depend on; the number of threads is not among it."""
+        digest = hashlib.sha256(source_digest().encode())
+        for recording in self.recordings:
+            digest.update(content_hash(recording).encode())
+        setting = replace(self.setting, threads=1)
+        texts = [repr(self.robot), repr(self.soil), repr(setting), asdict(self.thresholds), self.seed]
+        digest.update(json.dumps(texts, sort_keys=True).encode())
+        return digest.hexdigest()
+
+    def rng(self, step: str) -> np.random.Generator:
+        """Randomness of one step, the same whatever was done before it."""
+        return np.random.default_rng([self.seed, *step.encode()])
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """Result of a diagnosis.
+
+    Attributes:
+        diagnosis: the answer.
+        effects: what it names, with fitted sizes.
+        prepared: windows and model.
+        found: by the search.
+        evidence: what the page draws.
+    """
+
+    diagnosis: Diagnosis
+    effects: tuple[Effect, ...]
+    prepared: Prepared
+    found: Found
+    evidence: Evidence
+
+
+def run(
+    task: Task,
+    store: StepStore | None = None,
+    began_step: Callable[[str], None] = lambda name: None,
+    progress: Callable[[str], None] = lambda text: None,
+) -> Outcome:
+    """Diagnose.
+
+    Args:
+        task: what and how.
+        store: of finished steps; nothing is kept without one.
+        began_step: called with the name of each of STEPS when it begins.
+        progress: called with what is being done inside a step.
+
+    Raises:
+        InputError: recordings that cannot be diagnosed.
+    """
+    began = time.monotonic()
+    store = StepStore(None, "") if store is None else store
+    check_recordings(task.recordings, task.robot, task.setting)
+    prepared = prepare(task.robot, task.soil, task.recordings, task.setting)
+
+    def step(name: str, work: Callable[[], Any]) -> Any:
+        began_step(name)
+        return store.step(name, work)
+
+    found = step("search", lambda: search(prepared.problem, task.thresholds, progress=progress))
+    diagnosis, effects = step("verdict", lambda: conclude(prepared, found, task.thresholds, task.rng("verdict")))
+    fit = step("certification", lambda: _certified(task, prepared, found, diagnosis, progress))
+    where = step("localisation", lambda: asdict(locate(prepared.problem, found)))
+    unnamed = step("unnamed terms", lambda: _unnamed(task, prepared, found, diagnosis))
+    evidence = step("evidence", lambda: gather_evidence(prepared.problem, found, task.thresholds))
+    findings = tuple(replace(f, where=where["findings"].get(f.name)) for f in diagnosis.findings)
+    seconds = time.monotonic() - began
+    diagnosis = replace(
+        diagnosis, findings=findings, fit=fit, localisation=where, unnamed=unnamed, seconds=seconds
+    )
+    return Outcome(diagnosis, effects, prepared, found, evidence)
+
+
+def _unnamed(task: Task, prepared: Prepared, found: Found, diagnosis: Diagnosis) -> Mapping[str, Any] | None:
+    """Terms without a name, where names do not explain everything."""
+    if diagnosis.complete:
+        return None
+    standing = found.nominal if diagnosis.verdict == (UNKNOWN,) else found.chosen
+    return unnamed_terms(prepared.problem, standing, task.rng("unnamed terms")).as_mapping()
+
+
+def _certified(
+    task: Task, prepared: Prepared, found: Found, diagnosis: Diagnosis, progress: Callable[[str], None]
+) -> Mapping[str, Any]:
+    """Errors of the models; one that names nothing has no corrected model of its own."""
+    chosen = found.nominal if diagnosis.verdict == (UNKNOWN,) else found.chosen
+    return certify(
+        prepared.problem,
+        found.nominal.fitted,
+        chosen.fitted,
+        task.robot,
+        prepared.recordings,
+        task.rng("certification"),
+        progress,
+    )
+
+
+def effect_intervals(diagnosis: Diagnosis) -> Sequence[Mapping[str, tuple[float, float]]]:
+    """Intervals of the named effects' parameters, in the order of the findings."""
+    return [
+        {name: e.interval for name, e in finding.parameters.items() if e.interval is not None}
+        for finding in diagnosis.findings
+    ]
+
+
+def data_hash(diagnosis: Diagnosis) -> str:
+    """SHA-256 over the hashes of the recordings."""
+    return hashlib.sha256("".join(source.sha256 for source in diagnosis.data).encode()).hexdigest()

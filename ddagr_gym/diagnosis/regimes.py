@@ -1,0 +1,290 @@
+"""Where in what the robot did something stands out: regimes of motion, command, time and place.
+
+What is tested is a list of pieces with a weight each (the gain of an effect, or the mismatch). Ordered by a regime's
+value, the share of the weight runs ahead of the share of the time where the weight is concentrated; the largest excess
+over all ranges is N. Kuiper's statistic, over all discs for places. Its null distribution shifts the weights along each
+recording, which keeps their correlation; the largest standardised excess over all regimes is what a finding is held
+against (a max-statistic), so that noise makes no phrases.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+REGIMES: Mapping[str, tuple[str, str]] = {
+    "speed": ("m/s", "forward speed, predicted"),
+    "slip": ("-", "mean size of the four wheels' slip ratios, predicted"),
+    "turning": ("rad/s", "size of the yaw rate, predicted"),
+    "yaw_rate": ("rad/s", "predicted, positive to the left"),
+    "heading": ("rad", "predicted, in the world's frame"),
+    "command": ("rad/s", "larger of the two banks' speed commands"),
+    "command_change": ("rad/s", "largest change of a command in the piece and the one before"),
+    "time": ("s", "of the recording"),
+}
+"""Unit and meaning of the ordered regimes; places and recordings come beside them."""
+
+LEVEL = 0.05
+"""Of the test over all regimes."""
+
+LEAST_EXCESS = 0.3
+"""Share of the weight beyond the share of the time from which a regime is worth naming (ours)."""
+
+BINS = 6
+
+_NEAR_END = 0.05
+"""Share of the pieces beyond a range up to which it counts as open (ours)."""
+
+_PERMUTATIONS = 300
+_RADII = (0.5, 1.0, 1.5, 2.5, 4.0)
+_MOST_CENTRES = 60
+
+
+@dataclass(frozen=True, eq=False)
+class Pieces:
+    """What the robot did in each piece.
+
+    Attributes:
+        recording: (n,) number.
+        values: (n,) by name of REGIMES; NaN where unknown.
+        x: (n,) world [m].
+        y: (n,) the same.
+    """
+
+    recording: Integers
+    values: Mapping[str, Array]
+    x: Array
+    y: Array
+
+
+@dataclass(frozen=True)
+class RegimeShare:
+    """How a weight lies over one regime.
+
+    Attributes:
+        name: of REGIMES, or "place".
+        unit: of the edges.
+        edges: of the bins, each with about as much time; of a place its centre and radius (x, y, r).
+        time_share: of each bin; of a place the disc's.
+        weight_share: of each bin.
+        low: of the range that stands out; None where it is open.
+        high: the same.
+        excess: share of the weight less share of the time in that range.
+        weight_inside: share of the weight in it.
+        time_inside: share of the time in it.
+        p: of an excess as large in any regime, by shifting the weights.
+    """
+
+    name: str
+    unit: str
+    edges: tuple[float, ...]
+    time_share: tuple[float, ...]
+    weight_share: tuple[float, ...]
+    low: float | None
+    high: float | None
+    excess: float
+    weight_inside: float
+    time_inside: float
+    p: float
+
+    @property
+    def stands_out(self) -> bool:
+        """Whether it is worth a phrase."""
+        return self.p < LEVEL and self.excess >= LEAST_EXCESS
+
+
+def shifted(weight: Array, recording: Integers, rng: np.random.Generator, count: int) -> Array:
+    """(count, n) weights, each recording's shifted along itself by a random number of pieces."""
+    order = np.tile(np.arange(len(weight)), (count, 1))
+    for number in np.unique(recording):
+        rows = np.flatnonzero(recording == number)
+        moves = rng.integers(len(rows), size=(count, 1))
+        order[:, rows] = rows[(np.arange(len(rows)) + moves) % len(rows)]
+    return np.asarray(weight[order])
+
+
+def shares(weight: Array, pieces: Pieces, rng: np.random.Generator) -> tuple[RegimeShare, ...]:
+    """How a weight lies over all regimes, the one that stands out most first; none where the weight sums to nothing.
+
+    Args:
+        weight: (n,) of the pieces; single ones may be negative.
+        pieces: what the robot did.
+        rng: of the shifts.
+    """
+    total = float(weight.sum())
+    if total <= 0.0 or len(weight) < 2 * BINS:
+        return ()
+    trials = shifted(weight / total, pieces.recording, rng, _PERMUTATIONS)
+    every = np.concatenate([weight[None] / total, trials])
+    found: list[tuple[RegimeShare, Array]] = []
+    for name, values in pieces.values.items():
+        known = np.isfinite(values)
+        if known.all() and np.ptp(values) > 0.0:
+            found.append(_ordered(name, every, values, np.full(len(values), 1.0 / len(values))))
+    found.append(_places(every, pieces))
+    return _with_p(found)
+
+
+def _with_p(found: list[tuple[RegimeShare, Array]]) -> tuple[RegimeShare, ...]:
+    """Probabilities over all regimes at once, from statistics (1 + permutations,) of each."""
+    table = np.stack([statistic for _, statistic in found])
+    middle, spread = table[:, 1:].mean(axis=1), np.maximum(table[:, 1:].std(axis=1), 1e-9)
+    standard = (table - middle[:, None]) / spread[:, None]
+    largest = standard[:, 1:].max(axis=0)
+    probability = [(1.0 + float((largest >= own).sum())) / (1.0 + len(largest)) for own in standard[:, 0]]
+    named = [replace(share, p=p) for (share, _), p in zip(found, probability, strict=True)]
+    return tuple(sorted(named, key=lambda share: (not share.stands_out, -share.excess)))
+
+
+def _ordered(name: str, every: Array, values: Array, usual: Array) -> tuple[RegimeShare, Array]:
+    """Kuiper's statistic of weights (P, n) over values (n,), and the range that stands out for the first row.
+
+    Args:
+        name: of the regime.
+        every: the weights, and trials of the null distribution.
+        values: of the regime.
+        usual: (n,) weights where nothing stands out.
+    """
+    order = np.argsort(values, kind="stable")
+    count = len(values)
+    ahead = np.cumsum((every - usual)[:, order], axis=1)
+    ahead = np.concatenate([np.zeros((len(every), 1)), ahead], axis=1)
+    statistic = ahead.max(axis=1) - ahead.min(axis=1)
+    first, last = int(ahead[0].argmin()), int(ahead[0].argmax())
+    inside = np.zeros(count, dtype=bool)
+    if first < last:
+        inside[order[first:last]] = True
+    else:  # the range wraps around both ends: of a circle one range, else the better of its two halves
+        inside[order[first:]] = True
+        inside[order[:last]] = True
+        if name != "heading":
+            first, last = _better_end(every[0][order], first, last)
+            inside[:] = False
+            inside[order[first:last]] = True
+    ends = _ends(values, order, first, last, name == "heading")
+    edges = np.unique(np.quantile(values, np.linspace(0.0, 1.0, BINS + 1)))
+    place = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, max(len(edges) - 2, 0))
+    bins = max(len(edges) - 1, 1)
+    weight, time = float(every[0][inside].sum()), float(inside.mean())
+    share = RegimeShare(
+        name, REGIMES[name][0], tuple(edges.tolist()),
+        tuple((np.bincount(place, minlength=bins) / count).tolist()),
+        tuple(np.bincount(place, every[0], minlength=bins).tolist()),
+        ends[0], ends[1], weight - time, weight, time, 1.0,
+    )  # fmt: skip
+    return share, statistic
+
+
+def _better_end(weight: Array, first: int, last: int) -> tuple[int, int]:
+    """Of two ranges at the ends of sorted weights, the one with the larger excess."""
+    count = len(weight)
+    low = float(weight[:last].sum()) - last / count
+    high = float(weight[first:].sum()) - (count - first) / count
+    return (0, last) if low > high else (first, count)
+
+
+def _ends(values: Array, order: Integers, first: int, last: int, circular: bool) -> tuple[float | None, float | None]:
+    """Limits of a range of sorted values; None at an open end."""
+    ranked = values[order]
+    count = len(ranked)
+    if circular:
+        return float(ranked[first % count]), float(ranked[(last - 1) % count])
+    near = _NEAR_END * count
+    low = None if first <= near else float(0.5 * (ranked[first - 1] + ranked[first]))
+    high = None if last >= count - near else float(0.5 * (ranked[last - 1] + ranked[last]))
+    return low, high
+
+
+def _places(every: Array, pieces: Pieces) -> tuple[RegimeShare, Array]:
+    """Largest excess of weights (P, n) in a disc."""
+    step = max(len(pieces.x) // _MOST_CENTRES, 1)
+    centres = np.stack([pieces.x, pieces.y], axis=1)[::step]
+    distance = np.hypot(pieces.x[:, None] - centres[:, 0], pieces.y[:, None] - centres[:, 1])
+    discs = np.concatenate([distance <= radius for radius in _RADII], axis=1).astype(float)
+    excess = every @ discs - discs.mean(axis=0)
+    best = int(excess[0].argmax())
+    inside = discs[:, best] > 0.0
+    weight = np.maximum(every[0][inside], 0.0)
+    scale = max(float(weight.sum()), 1e-12)
+    x, y = float(pieces.x[inside] @ weight) / scale, float(pieces.y[inside] @ weight) / scale
+    radius = float(_RADII[best // len(centres)])
+    share, time = float(every[0][inside].sum()), float(inside.mean())
+    found = RegimeShare("place", "m", (x, y, radius), (time,), (share,), None, None, share - time, share, time, 1.0)
+    return found, excess.max(axis=1)
+
+
+@dataclass(frozen=True)
+class Unevenness:
+    """A regime in which the size of an effect differs from that elsewhere.
+
+    Attributes:
+        name: of REGIMES.
+        unit: of the limits.
+        low: of the range; None where it is open.
+        high: the same.
+        size_inside: over the fitted size [-].
+        size_outside: the same.
+        p: of a difference as clear in any regime.
+    """
+
+    name: str
+    unit: str
+    low: float | None
+    high: float | None
+    size_inside: float
+    size_outside: float
+    p: float
+
+
+def uneven(
+    remainder: Array, information: Array, window: Integers, pieces: Pieces, rng: np.random.Generator
+) -> Unevenness | None:
+    """The regime in which a fitted effect's size departs most, if that is no chance: a score test of its constancy.
+
+    Ordered by a regime, the running sum of what is left along the effect wanders off where its size is not the same
+    (A. Zeileis, K. Hornik, 2007, generalised M-fluctuation tests); signs drawn by window give the null distribution.
+
+    Args:
+        remainder: (n,) inner product of the residual beside the effect and the effect.
+        information: (n,) squared size of the effect.
+        window: (n,) number of each piece's window, within which errors are alike.
+        pieces: what the robot did.
+        rng: of the signs.
+    """
+    whole = float(information.sum())
+    if whole <= 0.0 or len(remainder) < 2 * BINS:
+        return None
+    _, group = np.unique(window, return_inverse=True)
+    signs = rng.choice([-1.0, 1.0], size=(_PERMUTATIONS, int(group.max()) + 1))[:, group]
+    every = np.concatenate([remainder[None], signs * remainder])
+    every = every - every.sum(axis=1, keepdims=True) * information / whole
+    every /= max(float(np.sqrt((np.bincount(group, remainder) ** 2).sum())), 1e-12)
+    found = [
+        _ordered(name, every, values, np.zeros(len(values)))
+        for name, values in pieces.values.items()
+        if np.isfinite(values).all() and np.ptp(values) > 0.0
+    ]
+    if not found:
+        return None
+    tested = _with_p(found)
+    best = min(tested, key=lambda item: (item.p, -item.excess))
+    inside = _inside(pieces.values[best.name], best)
+    if best.p >= LEVEL or not information[inside].any() or not information[~inside].any():
+        return None
+    sizes = [1.0 + float(remainder[s].sum() / information[s].sum()) for s in (inside, ~inside)]
+    return Unevenness(best.name, best.unit, best.low, best.high, sizes[0], sizes[1], best.p)
+
+
+def _inside(values: Array, share: RegimeShare) -> NDArray[np.bool_]:
+    """(n,) whether values lie in the range of a regime; one of headings may wrap around."""
+    low = -np.inf if share.low is None else share.low
+    high = np.inf if share.high is None else share.high
+    if low > high:
+        return np.asarray((values >= low) | (values <= high))
+    return np.asarray((values >= low) & (values <= high))

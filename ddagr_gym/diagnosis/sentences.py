@@ -1,0 +1,43 @@
+"""The answer of a diagnosis in one sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ddagr_gym.diagnosis.verdict import NONE, UNKNOWN, Finding
+from ddagr_gym.reporting.wording import amounts, describe
+
+
+def headline(
+    verdict: Sequence[str], complete: bool, findings: Sequence[Finding], misfit_share: float | None = None
+) -> str:
+    """What is missing, how big, how much of the mismatch that is, and whether more is left.
+
+    Args:
+        verdict: names of the table, or ("none",) or ("unknown",).
+        complete: whether nothing more is left than in drives with nothing missing.
+        findings: one per name.
+        misfit_share: share of the mismatch above the noise that the findings explain (0 to 1), None where unknown.
+    """
+    if tuple(verdict) == (NONE,):
+        return "Nothing is missing that these recordings can show."
+    if tuple(verdict) == (UNKNOWN,):
+        return "Something is missing that no effect of the library explains."
+    found = _joined([describe(item.name, amounts(item.parameters)) for item in findings])
+    share = "" if misfit_share is None else f"; {share_in_words(misfit_share)} of the mismatch"
+    rest = "nothing else above what these data can show" if complete else "something more is left that has no name here"
+    return f"{found[:1].upper()}{found[1:]}{share}; {rest}."
+
+
+def share_in_words(share: float) -> str:
+    """A share as percent, between "less than 1 %" and "all"."""
+    percent = 100.0 * share
+    if percent < 1.0:
+        return "less than 1 %"
+    return "all" if percent >= 99.5 else f"{percent:.0f} %"
+
+
+def _joined(parts: Sequence[str]) -> str:
+    if len(parts) < 2:
+        return "".join(parts)
+    return f"{'; '.join(parts[:-1])}; and {parts[-1]}" if len(parts) > 2 else f"{parts[0]}, and {parts[1]}"

@@ -1,0 +1,145 @@
+"""Results of finished steps in a folder, so that a diagnosis that was stopped goes on where it was.
+
+A step's result is any tree of the package's frozen dataclasses, arrays, mappings, sequences, texts and numbers. It is
+kept as JSON beside one archive of arrays, never as a pickle; a folder of another key (other data, sources, thresholds
+or setting) is emptied.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+import json
+import shutil
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ddagr_gym.errors import InputError
+from ddagr_gym.files import atomic_path, make_folder
+from ddagr_gym.physics.effects.base import Effect, build_effect
+from ddagr_gym.physics.effects.registry import effect_kind
+
+Result = TypeVar("Result")
+
+_KEY = "key.txt"
+_PACKAGE = __name__.split(".", 1)[0]
+
+
+class StepStore:
+    """A folder of finished steps.
+
+    Args:
+        folder: made where it is absent; None keeps nothing.
+        key: of everything that the steps depend on.
+
+    Raises:
+        InputError: the folder holds something else.
+    """
+
+    def __init__(self, folder: Path | None, key: str) -> None:
+        self._folder = folder
+        if folder is None:
+            return
+        if folder.exists() and any(folder.iterdir()) and not (folder / _KEY).is_file():
+            raise InputError(f"{folder} holds files of something else: move it away or choose another --output.")
+        if folder.exists() and (folder / _KEY).is_file() and (folder / _KEY).read_text() != key:
+            shutil.rmtree(folder)
+        make_folder(folder)
+        with atomic_path(folder / _KEY) as part:
+            part.write_text(key)
+
+    def has(self, name: str) -> bool:
+        """Whether the step is finished."""
+        return self._folder is not None and (self._folder / f"{name}.json").is_file()
+
+    def step(self, name: str, work: Callable[[], Result]) -> Result:
+        """Result of a step: the kept one, or that of ``work``, which is kept."""
+        if self._folder is None:
+            return work()
+        if self.has(name):
+            return _load(self._folder, name)  # type: ignore[no-any-return]
+        made = work()
+        _save(self._folder, name, made)
+        return made
+
+    def clear(self) -> None:
+        """Remove the folder."""
+        if self._folder is not None:
+            shutil.rmtree(self._folder, ignore_errors=True)
+
+
+def _save(folder: Path, name: str, value: Any) -> None:
+    arrays: dict[int, tuple[str, NDArray[Any]]] = {}
+    tree = encode(value, arrays)
+    with atomic_path(folder / f"{name}.npz") as part, open(part, "wb") as stream:
+        np.savez(stream, **{key: array for key, array in arrays.values()})  # type: ignore[arg-type]
+    # the JSON marks the step as finished, and comes last
+    with atomic_path(folder / f"{name}.json") as part:
+        part.write_text(json.dumps(tree))
+
+
+def _load(folder: Path, name: str) -> Any:
+    with np.load(folder / f"{name}.npz", allow_pickle=False) as archive:
+        arrays = {key: archive[key] for key in archive.files}
+    return decode(json.loads((folder / f"{name}.json").read_text()), arrays)
+
+
+def encode(value: Any, arrays: dict[int, tuple[str, NDArray[Any]]]) -> Any:
+    """Tree of JSON values; arrays go to ``arrays`` by identity, so that a shared one is kept once."""
+    if value is None or isinstance(value, str | bool):
+        return value
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, int | float):
+        return value
+    if isinstance(value, np.ndarray):
+        key, _ = arrays.setdefault(id(value), (f"array_{len(arrays)}", value))
+        return {"array": key}
+    if isinstance(value, Effect):
+        return {"effect": value.as_mapping()}
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        fields = {item.name: encode(getattr(value, item.name), arrays) for item in dataclasses.fields(value)}
+        return {"class": f"{type(value).__module__}:{type(value).__qualname__}", "fields": fields}
+    if isinstance(value, Mapping):
+        return {"items": [[encode(k, arrays), encode(v, arrays)] for k, v in value.items()]}
+    if isinstance(value, tuple | list):
+        return {"tuple" if isinstance(value, tuple) else "list": [encode(item, arrays) for item in value]}
+    raise TypeError(f"a step's result holds a {type(value).__name__}, which has no form on disk")
+
+
+def decode(tree: Any, arrays: Mapping[str, NDArray[Any]]) -> Any:
+    """Value of a tree that :func:`encode` made."""
+    if not isinstance(tree, dict):
+        return tree
+    ((kind, content), *rest) = tree.items()
+    if kind == "array":
+        return arrays[content]
+    if kind == "effect":
+        return build_effect(effect_kind(content["name"]), content["parameters"])
+    if kind == "class":
+        return _dataclass(content)(**{name: decode(item, arrays) for name, item in rest[0][1].items()})
+    if kind == "items":
+        return {decode(key, arrays): decode(item, arrays) for key, item in content}
+    made = [decode(item, arrays) for item in content]
+    return tuple(made) if kind == "tuple" else made
+
+
+def _dataclass(name: str) -> type[Any]:
+    module, _, qualified = name.partition(":")
+    if module.split(".", 1)[0] != _PACKAGE:
+        raise TypeError(f"{name} is no class of this package")
+    found = importlib.import_module(module)
+    for part in qualified.split("."):
+        found = getattr(found, part)
+    if not (isinstance(found, type) and dataclasses.is_dataclass(found)):
+        raise TypeError(f"{name} is no dataclass")
+    return found
+
+
+def part_folder(output: Path) -> Path:
+    """Where the steps of a diagnosis that ends up in ``output`` are kept meanwhile."""
+    return output.with_name(f"{output.name}.part")

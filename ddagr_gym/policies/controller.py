@@ -1,0 +1,109 @@
+"""A trained policy as a controller: ``(observation, info) -> action`` with numpy alone."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ddagr_gym.errors import InputError, unknown_name
+from ddagr_gym.parameters import Robot, Sensors
+from ddagr_gym.policies.archive import Policy
+from ddagr_gym.policies.estimates import ESTIMATES
+from ddagr_gym.policies.shipped import SUFFIX, find_policy, policy_names
+from ddagr_gym.policies.view import PolicyView
+from ddagr_gym.presets import ddagr
+
+SEPARATOR = "@"
+
+
+class PolicyController:
+    """Drives a turn by a trained policy without exploration.
+
+    Args:
+        policy: what drives.
+        robot: nominal robot.
+        sensors: nominal sensors.
+        estimate: one of ``ESTIMATES``; all but "live" are for ablations and need ``info_level="full"``.
+    """
+
+    def __init__(
+        self, policy: Policy, robot: Robot | None = None, sensors: Sensors = Sensors(), estimate: str = "live"
+    ) -> None:
+        if estimate not in ESTIMATES:
+            raise unknown_name("estimate", estimate, ESTIMATES)
+        if estimate != "live" and not policy.design.needs_filter:
+            raise InputError(f"estimate {estimate!r}: this policy does not see the filter, give only its name.")
+        nominal = ddagr() if robot is None else robot
+        self.policy = policy
+        self._view = PolicyView(policy.design, nominal, sensors)
+        self._estimate = ESTIMATES[estimate][0](nominal, sensors)
+
+    def reset(self) -> None:
+        """Forget the last episode."""
+        self._view.reset()
+        self._estimate.reset()
+
+    def __call__(self, observation: ArrayLike, info: Any = None) -> NDArray[np.float32]:
+        """Action (2,): right and left bank speed over the robot's maximum.
+
+        Raises:
+            InputError: an observation of another environment than the policy was trained for.
+        """
+        given = np.asarray(observation, dtype=np.float32)
+        size = self.policy.design.observation_size
+        if given.shape != (size,):
+            needed = "DDAGR-Turn-EKF-v0" if self.policy.design.needs_filter else "DDAGR-Turn-v0"
+            raise InputError(f"observation has shape {given.shape}: this policy needs {needed}, ({size},).")
+        told = self._estimate(given, info)[None]
+        action: NDArray[np.float32] = self._view.act(self.policy(self._view.observe(told)), told)[0]
+        return action
+
+
+def is_policy_name(name: str) -> bool:
+    """Whether a controller's name means a policy: a trained one, or a path, with or without an estimate."""
+    stem = name.rpartition(SEPARATOR)[0] if _has_estimate(name) else name
+    return stem.endswith(SUFFIX) or stem in policy_names()
+
+
+def _has_estimate(name: str) -> bool:
+    return SEPARATOR in name and not name.endswith(SUFFIX)
+
+
+def _split(name: str) -> tuple[str, str]:
+    stem, _, estimate = name.rpartition(SEPARATOR) if _has_estimate(name) else (name, "", "live")
+    return stem, estimate
+
+
+def policy_controller(name: str) -> PolicyController:
+    """Controller by name: ``ppo_ekf``, a path ending in ``.npz``, or either with ``@frozen``, ``@wrong``, ``@true``.
+
+    Raises:
+        InputError: unknown policy or estimate, with the closest names.
+    """
+    stem, estimate = _split(name)
+    return PolicyController(find_policy(stem), estimate=estimate)
+
+
+def policy_needs_filter(name: str) -> bool:
+    """Whether the environment must append the filter's features for this policy."""
+    return find_policy(_split(name)[0]).design.needs_filter
+
+
+def policy_title(name: str) -> str:
+    """What a policy is, in a phrase."""
+    stem, estimate = _split(name)
+    if estimate not in ESTIMATES:
+        raise unknown_name("estimate", estimate, ESTIMATES)
+    design = find_policy(stem).design
+    sees = "the filter's features" if design.needs_filter else "raw sensors"
+    history = f" and {design.frames} instants" if design.frames > 1 else ""
+    told = "" if estimate == "live" else f", {ESTIMATES[estimate][1]}"
+    acts = "bank speeds" if design.action == "absolute" else "a correction of the feed-forward"
+    return f"learned policy: {sees}{history} to {acts}{told}"
+
+
+def is_deployable_policy(name: str) -> bool:
+    """Whether it does without the true state."""
+    return _split(name)[1] != "true"

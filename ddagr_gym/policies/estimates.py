@@ -1,0 +1,125 @@
+"""What a policy is told of the soil instead of the filter's estimate, for ablations: frozen, wrong, true.
+
+They need the raw samples or the true state (``info_level="full"``), so they are for evaluation only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ddagr_gym.control.observation import FEATURE_SCALES, OBSERVATION
+from ddagr_gym.envs.ekf_features import FEATURE_COUNT, EkfFeatureBatch
+from ddagr_gym.envs.turn_kernel import OBSERVATION_LIMIT
+from ddagr_gym.errors import InputError
+from ddagr_gym.estimation import BatchFilter, FilterModel, SoilPrior
+from ddagr_gym.parameters import Robot, Sensors
+
+Observation = NDArray[np.float32]
+
+_BASE = len(OBSERVATION)
+
+_NEVER_LEARNS = 1e9
+"""De-weighting with which the parameters do not move [-]."""
+
+WRONG_LIMIT, WRONG_RATE = 2.0, 0.5
+"""Factors on the prior's traction limit and rate of the deliberately wrong soil: strong but slippery (ours)."""
+
+
+class LiveEstimate:
+    """The filter as it is."""
+
+    def reset(self) -> None:
+        """Nothing to forget."""
+
+    def __call__(self, observation: Observation, info: Any) -> Observation:
+        """The observation as it came."""
+        return observation
+
+
+class TrueMotion:
+    """The true speed, yaw rate and slips in place of the estimated ones.
+
+    The force law's parameters stay the filter's: on a terramechanic soil they have no true value.
+    """
+
+    def reset(self) -> None:
+        """Nothing to forget."""
+
+    def __call__(self, observation: Observation, info: Any) -> Observation:
+        """The observation with the true motion of ``info_level="full"``."""
+        given = _full(info, "true_v_x")
+        slip = given["true_slip_ratio"]
+        told = observation.copy()
+        values = np.array([given["true_v_x"], given["true_yaw_rate"]])
+        told[_BASE : _BASE + 2] = values / FEATURE_SCALES[:2]
+        told[_BASE + 6 : _BASE + 8] = [0.5 * (slip[0] + slip[2]), 0.5 * (slip[1] + slip[3])]
+        return np.clip(told, -OBSERVATION_LIMIT, OBSERVATION_LIMIT)
+
+
+class HeldSoil:
+    """A filter of its own that never learns the soil: it stays what ``prior`` says, and so do its deviations.
+
+    Args:
+        robot: nominal robot.
+        sensors: nominal sensors.
+        prior: soil that is held; the filter's own by default.
+    """
+
+    def __init__(self, robot: Robot, sensors: Sensors, prior: SoilPrior | None = None) -> None:
+        nominal = FilterModel.of(robot, sensors)
+        noise = replace(
+            nominal.noise, soil=0.0, accelerometer_deweighting=_NEVER_LEARNS, learning_deweighting=_NEVER_LEARNS
+        )
+        self._features = EkfFeatureBatch(robot, sensors, 1)  # counts the logs from the nominal prior
+        self._features.filter = BatchFilter(replace(nominal, noise=noise, prior=prior), 1)
+        self._started = False
+
+    def reset(self) -> None:
+        """Back to the prior, at rest."""
+        self._features.reset([0])
+        self._started = False
+
+    def __call__(self, observation: Observation, info: Any) -> Observation:
+        """The observation with this filter's features."""
+        given = _full(info, "samples")
+        if self._started:
+            self._features.update(given["command"][None], given["samples"][None])
+        self._started = True
+        features = np.empty((1, FEATURE_COUNT), dtype=np.float32)
+        self._features.write(features)
+        return np.concatenate([observation[:_BASE], features[0]])
+
+
+def _full(info: Any, key: str) -> Any:
+    if info is None or key not in info:
+        raise InputError('this ablation needs the samples and the true state: use info_level="full".')
+    return info
+
+
+Estimate = LiveEstimate | TrueMotion | HeldSoil
+
+ESTIMATES: dict[str, tuple[Callable[[Robot, Sensors], Estimate], str]] = {
+    "live": (lambda robot, sensors: LiveEstimate(), "the filter's estimate"),
+    "frozen": (HeldSoil, "the soil frozen at the filter's prior"),
+    "wrong": (
+        lambda robot, sensors: HeldSoil(robot, sensors, wrong_prior()),
+        "the soil held at deliberately wrong values",
+    ),
+    "true": (lambda robot, sensors: TrueMotion(), "the true speed, yaw rate and slip"),
+}
+"""By name: how it is made, and what it is in a phrase."""
+
+
+def wrong_prior() -> SoilPrior:
+    """Twice the traction limit, half the rate at which slip mobilises it."""
+    nominal = SoilPrior()
+    return replace(
+        nominal,
+        traction_limit_over_load=WRONG_LIMIT * nominal.traction_limit_over_load,
+        traction_rate=WRONG_RATE * nominal.traction_rate,
+    )

@@ -1,0 +1,47 @@
+"""The trained policies that come with the package, and policies from files, by name."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+
+from ddagr_gym.errors import InputError, unknown_name
+from ddagr_gym.policies.archive import Policy, load_policy
+
+SUFFIX = ".npz"
+
+
+def policies_dir() -> Path:
+    """Folder of the trained policies: ``agents/policies`` of the checkout, else the installed package's."""
+    package = Path(__file__).resolve().parents[1]
+    checkout = package.parent / "agents" / "policies"
+    if checkout.is_dir() and (package.parent / "pyproject.toml").is_file():
+        return checkout
+    return package / "data" / "policies"
+
+
+def policy_names() -> tuple[str, ...]:
+    """Names of the trained policies: the folders that hold a ``policy.npz``."""
+    return tuple(sorted(file.parent.name for file in policies_dir().glob(f"*/policy{SUFFIX}")))
+
+
+def policy_file(name: str) -> Path:
+    """File of a trained policy by name, or a path that ends in ``.npz``.
+
+    Raises:
+        InputError: no such policy, with the closest names.
+    """
+    if name.endswith(SUFFIX):
+        path = Path(name).expanduser()
+        if not path.is_file():
+            raise InputError(f"{path}: no such policy file.")
+        return path
+    if name not in policy_names():
+        raise unknown_name("policy", name, policy_names())
+    return policies_dir() / name / f"policy{SUFFIX}"
+
+
+@lru_cache(maxsize=32)
+def find_policy(name: str) -> Policy:
+    """A trained policy by name or path."""
+    return load_policy(policy_file(name))

@@ -1,0 +1,197 @@
+"""The page of a diagnosis: one file without links to anywhere, the answer first, pictures next."""
+
+from __future__ import annotations
+
+import base64
+import io
+import re
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ddagr_gym.errors import InputError
+from ddagr_gym.files import atomic_path, make_folder
+from ddagr_gym.reporting import diagnosis_figures as figures
+from ddagr_gym.reporting import diagnosis_tables as tables
+from ddagr_gym.reporting.evidence import Evidence
+from ddagr_gym.reporting.figures import house_style
+from ddagr_gym.reporting.wording import title
+
+PAGE = "report.html"
+PICTURES = "figures"
+_POINTS_PER_PIXEL = 72.0 / 96.0
+
+Progress = Callable[[str], None]
+
+
+class _Studio:
+    """Turns figures into pictures of the page, and keeps each as PNG too."""
+
+    def __init__(self, folder: Path, progress: Progress) -> None:
+        self._folder = folder
+        self._progress = progress
+
+    def picture(self, figure: Any, name: str, alt: str, **more: Any) -> dict[str, Any]:
+        """Data of an SVG with its text as paths, so that it looks the same everywhere."""
+        self._progress(name)
+        stream = io.StringIO()
+        figure.savefig(stream, format="svg", metadata={"Date": None})
+        with atomic_path(self._folder / f"{name}.png") as path:
+            figure.savefig(path, format="png", dpi=160, facecolor="white", metadata={"Software": None})
+        width, height = figure.get_size_inches()
+        data = base64.b64encode(_rounded(stream.getvalue()).encode()).decode()
+        pixels = {"width": round(72 * width / _POINTS_PER_PIXEL), "height": round(72 * height / _POINTS_PER_PIXEL)}
+        return {"data": f"data:image/svg+xml;base64,{data}", "alt": alt, **pixels, **more}
+
+
+def _rounded(svg: str) -> str:
+    """An SVG whose paths and places have two decimals: a fiftieth of a pixel, and a third less to carry."""
+    return re.sub(r'(?<= )(?:d|x|y)="[^"]*"', lambda found: re.sub(r"(\.\d\d)\d+", r"\1", found[0]), svg)
+
+
+def write_report(
+    folder: Path, diagnosis: Mapping[str, Any], evidence: Evidence, progress: Progress = lambda name: None
+) -> None:
+    """Write ``report.html`` and, in ``figures``, its pictures as PNG.
+
+    Args:
+        folder: to write to; made where absent.
+        diagnosis: content of ``diagnosis.json``; entries that later steps add may be absent.
+        evidence: of the same diagnosis.
+        progress: called with the name of each figure.
+
+    Raises:
+        InputError: matplotlib or jinja2 is not installed, or the folder cannot be one.
+    """
+    page = _template()
+    pictures = make_folder(make_folder(folder) / PICTURES)
+    with house_style():
+        context = _context(diagnosis, evidence, _Studio(pictures, progress))
+    with atomic_path(folder / PAGE) as path:
+        path.write_text(page.render(context), encoding="utf-8")
+
+
+def _template() -> Any:
+    try:
+        from jinja2 import Environment, PackageLoader, StrictUndefined
+    except ImportError:
+        raise InputError(
+            'reports need jinja2, which is not installed: run pip install "ddagr-gym[report]".'
+        ) from None
+    loader = PackageLoader("ddagr_gym.reporting", "templates")
+    environment = Environment(
+        loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    return environment.get_template("diagnosis.html")
+
+
+def _context(diagnosis: Mapping[str, Any], evidence: Evidence, studio: _Studio) -> dict[str, Any]:
+    findings = diagnosis.get("findings") or []
+    localisation = diagnosis.get("localisation") or {}
+    return {
+        "raw": figures.RAW,
+        "before": figures.BEFORE,
+        "after": figures.AFTER,
+        "verdict": ", ".join(diagnosis["verdict"]),
+        "sentence": diagnosis["sentence"],
+        "recordings": diagnosis["recordings"],
+        "tiles": tables.tiles(diagnosis, _seconds(evidence)),
+        "findings": [tables.finding_card(item, diagnosis["recordings"]) for item in findings],
+        "mismatch": tables.phrase(localisation.get("mismatch")) if findings else "",
+        "remaining": tables.phrase(localisation.get("remaining")),
+        "window": f"{evidence.duration:.3g}",
+        "regime_rows": tables.regime_rows(localisation, findings),
+        "gate_note": tables.gate_note(diagnosis["thresholds"]),
+        "wrench_rows": tables.wrench_rows(localisation),
+        "unnamed": tables.unnamed(diagnosis.get("unnamed")),
+        "next_drive": tables.next_drive(diagnosis.get("next_drive")),
+        "detectable": tables.detectable(diagnosis.get("detectable") or {}),
+        "sources": tables.sources(diagnosis),
+        "nuisances": tables.nuisances(diagnosis.get("nuisances") or {}),
+        "fit": _fit(diagnosis.get("fit"), studio),
+        **_pictures(diagnosis, evidence, findings, studio),
+    }
+
+
+def _seconds(evidence: Evidence) -> float:
+    """Driven time that windows cover, overlaps counted once."""
+    total = 0.0
+    for number in np.unique(evidence.recording):
+        start = np.sort(evidence.time[evidence.recording == number])
+        total += float(np.minimum(np.diff(start), evidence.duration).sum()) + evidence.duration
+    return total
+
+
+def _pictures(
+    diagnosis: Mapping[str, Any], evidence: Evidence, findings: Iterable[Mapping[str, Any]], studio: _Studio
+) -> dict[str, Any]:
+    maps = zip(figures.map_figures(evidence, list(findings)), figures.MODELS, strict=True)
+    force_before, force_after = figures.wrench_figures(evidence)
+    rows = figures.best_stretch(evidence)
+    return {
+        "maps": [
+            studio.picture(figure, f"map_{model}", f"Map of the drives, coloured by the mismatch of the {label} model")
+            for figure, (model, label, _) in maps
+        ],
+        "misfit": studio.picture(
+            figures.misfit_figure(diagnosis["misfit"]), "misfit", "Residual over noise of each channel"
+        ),
+        "stretch": _stretch(evidence, rows, diagnosis["recordings"]),
+        "channels": [
+            studio.picture(
+                figures.channel_figure(evidence, name, rows), f"channel_{name}", f"{figures.LABELS[name]} over time"
+            )
+            for name in figures.present(evidence)
+        ],
+        "scores": _scores(evidence, findings, studio),
+        "regimes": _regimes(evidence, studio),
+        "gains": studio.picture(
+            figures.gain_figure(evidence, title), "gains", "Gain of each effect of the library, with its gate"
+        ),
+        "forces": [
+            studio.picture(force_before, "force_before", "Residual force over the ground before"),
+            studio.picture(force_after, "force_after", "Residual force over the ground after"),
+        ],
+    }
+
+
+def _stretch(evidence: Evidence, rows: Any, recordings: list[str]) -> str:
+    number = int(evidence.recording[rows[0]])
+    start, end = float(evidence.time[rows[0]]), float(evidence.time[rows[-1]]) + evidence.duration
+    name = recordings[number] if number < len(recordings) else f"recording {number + 1}"
+    return f"stretch in which the correction helps most: {start:.0f} to {end:.0f} s of {name}"
+
+
+def _scores(evidence: Evidence, findings: Iterable[Mapping[str, Any]], studio: _Studio) -> list[dict[str, Any]]:
+    by_name = {str(item["name"]): item for item in findings}
+    return [
+        studio.picture(
+            figures.score_figure(evidence, number, by_name.get(name, {})),
+            f"score_{number + 1}",
+            f"Score of {title(name)} over time",
+            title=title(name),
+        )
+        for number, name in enumerate(evidence.findings)
+    ]
+
+
+def _regimes(evidence: Evidence, studio: _Studio) -> list[dict[str, Any]]:
+    drawn = [(name, figures.regime_figure(evidence, name)) for name in evidence.regime_names]
+    return [
+        studio.picture(figure, f"regime_{name}", f"Residual over noise against {name.replace('_', ' ')}")
+        for name, figure in drawn
+        if figure is not None
+    ]
+
+
+def _fit(fit: Mapping[str, Any] | None, studio: _Studio) -> dict[str, Any] | None:
+    channels = (fit or {}).get("channels") or {}
+    if fit is None or not channels:
+        return None
+    pictures = [
+        studio.picture(figures.horizon_figure(channels, name), f"errors_{number + 1}", f"Held-out errors of {name}")
+        for number, name in enumerate(channels)
+    ]
+    return {**tables.fit_table(fit), "pictures": pictures}

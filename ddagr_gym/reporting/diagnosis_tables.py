@@ -1,0 +1,281 @@
+"""What the page of a diagnosis says in words and numbers, from ``diagnosis.json``."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from ddagr_gym.reporting.diagnosis_figures import LABELS
+from ddagr_gym.reporting.wording import DEGREES, Amount, amounts, describe, number, quantity, title
+
+Entry = Mapping[str, Any]
+
+_MOST_SPANS = 8
+_ANGLES = {"rad": "degrees", "rad/s": "rad/s"}
+
+
+def tiles(diagnosis: Entry, seconds: float) -> list[dict[str, str]]:
+    """The few numbers under the headline.
+
+    Args:
+        diagnosis: content of ``diagnosis.json``.
+        seconds: of drive.
+    """
+    verdict = ", ".join(title(name) if name not in ("none", "unknown") else name for name in diagnosis["verdict"])
+    status = "complete: nothing else shows" if diagnosis["complete"] else "incomplete: something is left"
+    explained = (diagnosis.get("localisation") or {}).get("explained")
+    gain = ((diagnosis.get("fit") or {}).get("gain_share") or {}).get("value")
+    found = [
+        {"value": verdict, "label": status},
+        {"value": f"{seconds:.0f} s", "label": f"of drive in {len(diagnosis['recordings'])} recordings"},
+        {"value": str(diagnosis["thresholds"].get("nulls", "–")), "label": "null drives behind the gates"},
+    ]
+    if explained is not None and diagnosis.get("findings"):
+        found.insert(1, {"value": percent(explained), "label": "of the mismatch above the noise explained"})
+    if gain is not None:
+        found.insert(2, {"value": percent(gain), "label": "of what is explicable on unseen drives"})
+    return found
+
+
+def percent(share: float) -> str:
+    """A share in percent."""
+    return f"{100.0 * share:.0f} %"
+
+
+def phrase(where: Entry | None) -> str:
+    """Where something lies, in words; "" where nothing says."""
+    return str((where or {}).get("phrase") or "")
+
+
+def finding_card(finding: Entry, recordings: Sequence[str]) -> dict[str, Any]:
+    """One finding in words.
+
+    Args:
+        finding: of ``diagnosis.json``.
+        recordings: names of the sources.
+    """
+    name, parameters = str(finding["name"]), amounts(finding["parameters"])
+    sentence = describe(name, parameters)
+    equivalents = _equivalents(name, finding.get("equivalence_set") or {})
+    where = finding.get("where") or {}
+    return {
+        "title": title(name),
+        "sentence": f"{sentence[:1].upper()}{sentence[1:]}.",
+        "where": where.get("phrase") or "not located",
+        "evidence": _evidence(finding),
+        "sizes": [f"{key.replace('_', ' ')} {size(item)}" for key, item in parameters.items()],
+        "spans": _spans(where.get("spans") or [], recordings),
+        "equivalents": equivalents,
+        "equivalence_note": _equivalence_note(name, equivalents),
+    }
+
+
+def size(amount: Amount) -> str:
+    """A parameter with its interval and unit; angles in degrees."""
+    unit = amount.unit.replace("^2", "²")
+    if unit == "rad":
+        return quantity(amount.scaled(DEGREES), "degrees", signed=amount.value < 0.0)
+    return quantity(amount, "" if unit == "-" else unit, signed=amount.value < 0.0)
+
+
+def _evidence(finding: Entry) -> str:
+    gate = finding.get("gate") or 0.0
+    parts = [f"gain {number(finding['gain'], 3)}"]
+    if gate > 0.0:
+        parts.append(f"{finding['gain'] / gate:.1f} times its gate of {number(gate, 3)}")
+    parts.append(f"{number(finding['held_out'], 3)} on left-out windows")
+    parts.append(f"score {number(finding['score'], 2)}")
+    if finding.get("calibrated_p") is not None:
+        parts.append(f"p = {number(finding['calibrated_p'], 2)} against the null drives")
+    return ", ".join(parts)
+
+
+def _spans(spans: Sequence[Entry], recordings: Sequence[str]) -> str:
+    """The stretches that hold most of the gain, in the order of time."""
+    chosen = sorted(spans, key=lambda item: -item["share"])[:_MOST_SPANS]
+    parts = []
+    for item in sorted(chosen, key=lambda item: (item["recording"], item["start"])):
+        index = int(item["recording"])
+        name = recordings[index] if index < len(recordings) else f"recording {index + 1}"
+        parts.append(f"{name} {item['start']:.0f}–{item['end']:.0f} s ({percent(item['share'])})")
+    more = f"; and {len(spans) - len(chosen)} shorter stretches" if len(spans) > len(chosen) else ""
+    return "; ".join(parts) + more
+
+
+def _equivalents(name: str, weights: Mapping[str, float]) -> list[dict[str, Any]]:
+    ordered = sorted((weights or {name: 1.0}).items(), key=lambda item: -item[1])
+    return [
+        {"title": title(key), "percent": round(100.0 * weight), "own": key == name} for key, weight in ordered
+    ]
+
+
+def _equivalence_note(name: str, equivalents: Sequence[Entry]) -> str:
+    if len(equivalents) > 1:
+        others = " or ".join(item["title"].lower() for item in equivalents if not item["own"])
+        return f"These recordings do not separate it from {others}: weights by resampling the windows."
+    from ddagr_gym.physics.effects.registry import effect_kinds
+
+    kind = effect_kinds().get(name)
+    rivals = ", ".join(title(other).lower() for other in (kind.confused_with if kind else ()))
+    usual = f" It is often confused with {rivals}; not here." if rivals else ""
+    return f"Nothing else in the library explains these windows nearly as well.{usual}"
+
+
+def regime_rows(localisation: Entry, findings: Sequence[Entry]) -> list[dict[str, str]]:
+    """Regimes that stand out, of what was found, of the mismatch and of what remains."""
+    sources = [(title(str(f["name"])), f.get("where") or {}) for f in findings]
+    sources += [("what is explained", localisation.get("mismatch") or {})] if len(findings) > 1 else []
+    sources.append(("what remains", localisation.get("remaining") or {}))
+    rows = []
+    for what, where in sources:
+        for item in where.get("regimes") or []:
+            if item["p"] < 0.05 and item["excess"] >= 0.2:
+                inside = min(item["weight_inside"], 1.0)
+                rows.append(
+                    {
+                        "what": what,
+                        "where": _range(item),
+                        "share": percent(inside),
+                        "time": percent(item["time_inside"]),
+                        "p": number(item["p"], 1),
+                    }
+                )
+    return rows
+
+
+def _range(item: Entry) -> str:
+    name, low, high = str(item["name"]).replace("_", " "), item.get("low"), item.get("high")
+    if name == "place":
+        x, y, radius = item["edges"]
+        return f"within {number(radius)} m of ({number(x)}, {number(y)}) m"
+    factor, unit = (DEGREES, "degrees") if item["unit"] == "rad" else (1.0, item["unit"].strip("-"))
+    ends = [None if end is None else number(factor * end) for end in (low, high)]
+    if ends[0] is None or ends[1] is None:
+        return f"{name} {'below' if ends[0] is None else 'above'} {ends[1] or ends[0] or 'all'} {unit}".strip()
+    return f"{name} from {ends[0]} to {ends[1]} {unit}".strip()
+
+
+def gate_note(thresholds: Entry) -> str:
+    """What the gates are made of."""
+    nulls, level = thresholds.get("nulls") or 0, thresholds.get("level")
+    if not nulls or level is None:
+        return "no null drives stand behind it here."
+    return (
+        f"of {nulls} simulated drives with nothing missing, made by structurally different simulators, "
+        f"{percent(level)} pass any gate."
+    )
+
+
+def wrench_rows(localisation: Entry) -> list[list[str]]:
+    """Table of the residual wrench."""
+    return [
+        [
+            f"{item['component']} [{item['unit']}]",
+            *(number(item[key], 2) for key in ("before", "after", "deviation", "chi_before", "chi_after")),
+        ]
+        for item in localisation.get("wrench") or []
+    ]
+
+
+def fit_table(fit: Entry) -> dict[str, Any]:
+    """Held-out errors as rows of text."""
+    rows = []
+    for channel, horizons in fit["channels"].items():
+        for horizon, arms in horizons.items():
+            unit = str(arms.get("unit") or "").replace("^2", "²")
+            name = LABELS.get(channel, str(channel).replace("_", " "))
+            cells = [_error(arms.get(arm)) for arm in ("raw", "refitted", "corrected", "ceiling")]
+            rows.append([f"{name} after {float(horizon):g} s [{unit}]", *cells])
+    gain = fit.get("gain_share") or {}
+    interval = gain.get("interval")
+    span = f" ({percent(interval[0])} to {percent(interval[1])})" if interval else ""
+    share = "" if gain.get("value") is None else f"{percent(gain['value'])}{span}"
+    return {"rows": rows, "folds": fit.get("folds") or "by recording", "gain": share}
+
+
+def _error(item: Entry | None) -> str:
+    if not item or item.get("value") is None:
+        return "–"
+    interval = item.get("interval")
+    return number(item["value"], 3) + (f" ({number(interval[0])} to {number(interval[1])})" if interval else "")
+
+
+def unnamed(item: Entry | None) -> dict[str, Any] | None:
+    """The unnamed term as text."""
+    if not item or not item.get("equation"):
+        return None
+    rows = []
+    for term in item.get("terms") or []:
+        interval = term.get("interval")
+        span = "–" if not interval else f"{number(interval[0])} to {number(interval[1])}"
+        stability = "–" if term.get("stability") is None else percent(term["stability"])
+        rows.append([term["regressor"], term["target"], number(term["coefficient"], 3), span, term["unit"], stability])
+    share = item.get("ceiling_share")
+    return {
+        "equation": item["equation"],
+        "where": item.get("where") or "",
+        "rows": rows,
+        "ceiling": "" if share is None else percent(share),
+    }
+
+
+def next_drive(item: Entry | None) -> dict[str, Any] | None:
+    """The proposed manoeuvre as text."""
+    if not item or not item.get("manoeuvre"):
+        return None
+    power = item.get("power")
+    others = [_alternative(other) for other in item.get("alternatives") or []]
+    return {
+        "manoeuvre": str(item["manoeuvre"]).replace("_", " "),
+        "why": item.get("why") or "",
+        "separates": [" from ".join(title(str(name)).lower() for name in pair) for pair in item.get("separates") or []],
+        "power": "" if power is None else percent(power),
+        "alternatives": others,
+    }
+
+
+def _alternative(other: Any) -> str:
+    name = other.get("manoeuvre", other) if isinstance(other, Mapping) else other
+    return str(name).replace("_", " ")
+
+
+def detectable(table: Mapping[str, Mapping[str, float | None]]) -> list[dict[str, str]]:
+    """Least sizes by effect and field."""
+    from ddagr_gym.physics.effects.registry import effect_kinds
+
+    rows = []
+    for name, sizes in table.items():
+        kind = effect_kinds().get(name)
+        for key, value in sizes.items():
+            unit = str(kind.parameter(key).metadata["unit"]) if kind and key in kind.size_names() else "-"
+            shown = "none, however large"
+            if value is not None and math.isfinite(value):
+                shown = size(Amount(value, unit))
+            rows.append({"title": title(name), "field": key.replace("_", " "), "size": shown})
+    return rows
+
+
+def sources(diagnosis: Entry) -> list[tuple[str, str]]:
+    """Recordings, gates and version behind the numbers."""
+    thresholds = diagnosis["thresholds"]
+    rows = [("Recordings", ", ".join(diagnosis["recordings"]))]
+    for label, key in (("Hash of the data", "data_hash"), ("Robot", "robot"), ("Soil", "soil"), ("Seed", "seed")):
+        if diagnosis.get(key) is not None:
+            rows.append((label, str(diagnosis[key])))
+    rows += [
+        ("Gates", f"{thresholds.get('nulls', 0)} null drives, level {thresholds.get('level', '–')}"),
+        ("Null bank", str(thresholds.get("bank", "–"))),
+        ("Intervals", "90 %, by resampling windows"),
+        ("Version", f"ddagr-gym {diagnosis['version']}, schema {diagnosis['schema']}"),
+        ("Time taken", f"{diagnosis['seconds']:.0f} s"),
+    ]
+    return rows
+
+
+def nuisances(values: Mapping[str, float | None]) -> list[tuple[str, str]]:
+    """Refitted nominal parameters."""
+    return [
+        (name.replace("_", " "), "–" if value is None else f"{value:+.3g}".replace("-", "−"))
+        for name, value in values.items()
+    ]

@@ -1,0 +1,307 @@
+"""Effects in plain words: what is missing and how big it is, in units that people use.
+
+``±`` is half of the 90 % interval, where it is nearly symmetric; otherwise the interval stands in brackets.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from ddagr_gym.physics.effects.registry import effect_kinds
+
+DEGREES = 180.0 / math.pi
+_LOPSIDED = 0.35
+"""Distance of a value from the middle of its interval, over the half width, beyond which the interval is written."""
+_UNBOUNDED = 1e5
+"""Onsets and limits beyond it mean always, and none."""
+
+
+@dataclass(frozen=True)
+class Amount:
+    """A size with its interval.
+
+    Attributes:
+        value: in ``unit``.
+        unit: SI, "-" for none.
+        interval: low and high; None where nothing was estimated.
+    """
+
+    value: float
+    unit: str = "-"
+    interval: tuple[float, float] | None = None
+
+    def scaled(self, factor: float, shift: float = 0.0) -> Amount:
+        """The same in another unit: ``factor * value + shift``."""
+        ends = None if self.interval is None else sorted(factor * end + shift for end in self.interval)
+        return Amount(factor * self.value + shift, self.unit, None if ends is None else (ends[0], ends[1]))
+
+
+Amounts = Mapping[str, Amount]
+
+
+def amounts(parameters: Mapping[str, Any]) -> dict[str, Amount]:
+    """Amounts of a finding's parameters, given as mappings (of a JSON file) or as objects, with the same entries."""
+    return {str(name): _amount(item) for name, item in parameters.items()}
+
+
+def _amount(item: Any) -> Amount:
+    get = item.get if isinstance(item, Mapping) else lambda key: getattr(item, key, None)
+    value, interval = get("value"), get("interval")
+    known = interval is not None and len(interval) == 2 and all(end is not None for end in interval)
+    ends = (float(interval[0]), float(interval[1])) if known else None
+    return Amount(math.nan if value is None else float(value), str(get("unit") or "-"), ends)
+
+
+def number(value: float, digits: int = 2) -> str:
+    """Significant digits without an exponent where that reads well; a true minus sign."""
+    if not math.isfinite(value):
+        return "–"
+    if value == 0.0:
+        return "0"
+    places = digits - 1 - math.floor(math.log10(abs(value)))
+    text = f"{value:.{digits - 1}e}" if abs(value) >= 1e6 or abs(value) < 1e-4 else f"{value:.{max(places, 0)}f}"
+    return text.replace("-", "−")
+
+
+def quantity(amount: Amount, unit: str = "", signed: bool = False) -> str:
+    """Value, doubt and unit, rounded to what the doubt leaves of it.
+
+    Args:
+        amount: what to write.
+        unit: as people write it, after a space.
+        signed: write a plus sign too.
+    """
+    value = amount.value if signed else abs(amount.value)
+    after = f" {unit}" if unit else ""
+    plus = "+" if signed and value > 0.0 else ""
+    if amount.interval is None or not math.isfinite(value):
+        return f"{plus}{number(value, 2)}{after}"
+    low, high = amount.interval
+    if not signed and amount.value < 0.0:
+        low, high = -high, -low
+    half = 0.5 * (high - low)
+    if half <= 0.0:
+        return f"{plus}{number(value, 3)}{after}"
+    places = max(1 - math.floor(math.log10(half)), 0) if half < 10.0 else 0
+    places = places - 1 if places > 0 and half * 10.0**places >= 30.0 else places
+    if abs(value - 0.5 * (low + high)) > _LOPSIDED * half:
+        return f"{plus}{_fixed(value, places)}{after} ({_fixed(low, places)} to {_fixed(high, places)})"
+    return f"{plus}{_fixed(value, places)} ± {_fixed(half, places)}{after}"
+
+
+def _fixed(value: float, places: int) -> str:
+    return f"{value:.{places}f}".replace("-", "−")
+
+
+def _towards(amount: Amount, words: tuple[str, str], factor: float, unit: str) -> str:
+    """Size and one of two directions, by the sign."""
+    return f"{quantity(amount.scaled(factor), unit)} {words[0] if amount.value >= 0.0 else words[1]}"
+
+
+def _factor(amount: Amount, words: tuple[str, str]) -> str:
+    """A factor as percent more or less."""
+    return f"{quantity(amount.scaled(100.0, -100.0), '%')} {words[0] if amount.value >= 1.0 else words[1]}"
+
+
+def _is_large(amount: Amount, neutral: float, least: float) -> bool:
+    return abs(amount.value - neutral) >= least
+
+
+def _pair(a: Amounts, names: tuple[str, str], parts: tuple[str, str], least: float, neutral: float = 0.0) -> str:
+    """Both parts of a sentence, or the one that is large enough to matter."""
+    large = [text for name, text in zip(names, parts, strict=True) if _is_large(a[name], neutral, least)]
+    return " and ".join(large or [parts[0]])
+
+
+def _compass(amount: Amount, flip: bool = False) -> str:
+    degrees = amount.scaled(DEGREES)
+    turns = 360.0 * math.floor((degrees.value + 180.0 * flip) / 360.0) - 180.0 * flip
+    return quantity(degrees.scaled(1.0, -turns), "degrees")
+
+
+def _slope(a: Amounts) -> str:
+    angle = quantity(a["angle"].scaled(DEGREES), "degrees")
+    towards = _compass(a["direction"], a["angle"].value < 0.0)
+    return f"the ground slopes {angle}, rising towards {towards} from the x axis"
+
+
+def _soil(a: Amounts) -> str:
+    strength = _factor(a["strength"], ("stronger", "weaker"))
+    stiffness = _factor(a["stiffness"], ("stiffer", "softer"))
+    return _pair(a, ("strength", "stiffness"), (strength, stiffness), 0.02, 1.0)
+
+
+def _soil_change(a: Amounts) -> str:
+    onset = a.get("onset")
+    since = f" from {quantity(onset, 's')} on" if onset is not None and abs(onset.value) < _UNBOUNDED else ""
+    return f"the soil is {_soil(a)} than the model's{since}"
+
+
+def _soil_patch(a: Amounts) -> str:
+    place = f"({number(a['centre_x'].value, 3)}, {number(a['centre_y'].value, 3)}) m"
+    return f"the soil is {_soil(a)} within {quantity(a['radius'], 'm')} of {place}"
+
+
+def _encoder_scale(a: Amounts) -> str:
+    parts = [
+        f"the {bank} encoder reads {quantity(a[bank].scaled(100.0, -100.0), '%')} "
+        f"too {'much' if a[bank].value >= 1.0 else 'little'}"
+        for bank in ("right", "left")
+    ]
+    return _pair(a, ("right", "left"), (parts[0], parts[1]), 0.002, 1.0)
+
+
+def _payload(a: Amounts) -> str:
+    change = "heavier" if a["mass"].value >= 0.0 else "lighter"
+    along = _towards(a["x"], ("forward", "back"), 1.0, "m")
+    across = _towards(a["y"], ("left", "right"), 1.0, "m")
+    middle = math.hypot(a["x"].value, a["y"].value) < 0.05
+    where = "above the centre" if middle else f"{along} and {across} of the centre"
+    return f"the robot is {quantity(a['mass'], 'kg')} {change}, {where}"
+
+
+def _centre_of_mass(a: Amounts) -> str:
+    along = _towards(a["x"], ("forward", "back"), 100.0, "cm")
+    across = _towards(a["y"], ("to the left", "to the right"), 100.0, "cm")
+    return f"the centre of mass lies {_pair(a, ('x', 'y'), (along, across), 0.005)} of where the model has it"
+
+
+def _accelerometer_bias(a: Amounts) -> str:
+    along, across = quantity(a["x"], "m/s²", signed=True), quantity(a["y"], "m/s²", signed=True)
+    parts = (f"{along} forward", f"{across} to the left")
+    return f"the accelerometer is off by {_pair(a, ('x', 'y'), parts, 0.01)}"
+
+
+def _accelerometer_sign(a: Amounts) -> str:
+    axes = [word for name, word in (("flip_x", "forward"), ("flip_y", "sideways")) if a[name].value >= 0.5]
+    return f"the accelerometer's {' and '.join(axes) or 'forward'} axis is reversed"
+
+
+def _lever_arm(a: Amounts) -> str:
+    along = _towards(a["x"], ("forward", "back"), 1.0, "m")
+    across = _towards(a["y"], ("to the left", "to the right"), 1.0, "m")
+    return f"the IMU sits {_pair(a, ('x', 'y'), (along, across), 0.03)} of where the model has it"
+
+
+def _tilt(a: Amounts) -> str:
+    roll = _towards(a["roll"], ("left side up", "right side up"), DEGREES, "degrees")
+    pitch = _towards(a["pitch"], ("nose down", "nose up"), DEGREES, "degrees")
+    return f"the IMU is tilted {_pair(a, ('roll', 'pitch'), (roll, pitch), 0.003)}"
+
+
+def _saturation(a: Amounts) -> str:
+    parts = []
+    if a["speed_limit"].value < 1e3:
+        parts.append(f"no faster than {quantity(a['speed_limit'], 'rad/s')}")
+    if a["acceleration_limit"].value < _UNBOUNDED:
+        parts.append(f"change by no more than {quantity(a['acceleration_limit'], 'rad/s²')}")
+    return f"the banks turn {' and '.join(parts)}" if parts else "the banks have a limit that was not reached"
+
+
+def _deadband(a: Amounts) -> str:
+    loss = " and larger ones lose as much" if a["loss"].value >= 0.5 else ""
+    return f"commands below {quantity(a['width'], 'rad/s')} move nothing{loss}"
+
+
+def _hold(a: Amounts) -> str:
+    sensors = [name for name in ("accelerometer", "gyro", "encoders", "pose") if name in a and a[name].value >= 0.5]
+    return f"readings are repeated for {quantity(a['duration'], 's')} ({', '.join(sensors) or 'some sensors'})"
+
+
+def _split(a: Amounts) -> str:
+    return f"the soil on the left is {_soil(a)} than on the right"
+
+
+def _radius(a: Amounts) -> str:
+    sides = ("right", "left") if a["difference"].value >= 0.0 else ("left", "right")
+    return f"the {sides[0]} wheels are {quantity(a['difference'].scaled(100.0), '%')} larger than the {sides[1]} ones"
+
+
+def _multipass(a: Amounts) -> str:
+    word = "stiffer" if a["stiffening"].value >= 0.0 else "softer"
+    return f"in the ruts of the front wheels the soil is {quantity(a['stiffening'].scaled(100.0), '%')} {word}"
+
+
+SENTENCES: Mapping[str, Callable[[Amounts], str]] = {
+    "accelerometer_bias": _accelerometer_bias,
+    "accelerometer_sign": _accelerometer_sign,
+    "centre_of_mass_offset": _centre_of_mass,
+    "command_deadband": _deadband,
+    "command_delay": lambda a: f"commands act {quantity(a['delay'], 's')} late",
+    "encoder_scale": _encoder_scale,
+    "gyro_bias": lambda a: (
+        f"the gyro is off by {quantity(a['bias'].scaled(DEGREES), 'degrees/s', signed=True)} (positive to the left)"
+    ),
+    "gyro_scale": lambda a: (
+        f"the gyro reads {quantity(a['scale'].scaled(100.0, -100.0), '%')} "
+        f"too {'much' if a['scale'].value >= 1.0 else 'little'}"
+    ),
+    "gyro_sign": lambda a: "the gyro's sign is reversed",
+    "imu_lever_arm": _lever_arm,
+    "imu_misalignment": lambda a: (
+        f"the IMU is turned {_towards(a['yaw'], ('to the left', 'to the right'), DEGREES, 'degrees')}"
+    ),
+    "imu_tilt": _tilt,
+    "lateral_bulldozing": lambda a: (
+        f"wheels that slide sideways push soil ({quantity(a['scale'])} times the theoretical pressure)"
+    ),
+    "motor_droop": lambda a: (
+        f"the motors slow down under load, by {quantity(a['droop'].scaled(1e3), 'mrad/s')} per N m of axle torque"
+    ),
+    "motor_lag": lambda a: (
+        f"the motors answer {quantity(a['lag'], 's')} {'more slowly' if a['lag'].value >= 0.0 else 'faster'}"
+    ),
+    "motor_saturation": _saturation,
+    "multipass": _multipass,
+    "payload": _payload,
+    "pose_latency": lambda a: f"poses come {quantity(a['latency'], 's')} late",
+    "sensor_hold": _hold,
+    "slip_sinkage": lambda a: (
+        f"wheels that slip sink deeper (the sinkage exponent grows by {quantity(a['growth'])} from slip 0 to 1)"
+    ),
+    "slope": _slope,
+    "soil_change": _soil_change,
+    "soil_patch": _soil_patch,
+    "soil_split": _split,
+    "towed_drag": lambda a: (
+        f"something pulls back with {quantity(a['force'], 'N')}, {quantity(a['hitch_distance'], 'm')} behind the centre"
+    ),
+    "viscous_drag": lambda a: f"something holds the robot back with {quantity(a['coefficient'], 'N')} per m/s",
+    "wheel_radius_mismatch": _radius,
+}
+"""One clause per effect of the library, from its amounts."""
+
+
+def describe(name: str, parameters: Amounts) -> str:
+    """An effect with its sizes as a clause: lower case, no full stop.
+
+    Effects of other packages, and those with parameters left out, are described by their title and all sizes given.
+
+    Args:
+        name: of the effect.
+        parameters: by field.
+    """
+    kind = effect_kinds().get(name)
+    complete = kind is not None and all(f in parameters for f in (*kind.size_names(), *kind.shape_names()))
+    if name in SENTENCES and (complete or _speaks_without_shapes(name, parameters)):
+        return SENTENCES[name](parameters)
+    units = {key: item.unit.replace("^2", "²").strip("-") for key, item in parameters.items()}
+    sizes = [f"{key.replace('_', ' ')} {quantity(item, units[key], signed=True)}" for key, item in parameters.items()]
+    return f"{title(name).lower()} ({', '.join(sizes)})" if sizes else title(name).lower()
+
+
+def _speaks_without_shapes(name: str, parameters: Amounts) -> bool:
+    try:
+        SENTENCES[name](parameters)
+    except KeyError:
+        return False
+    return True
+
+
+def title(name: str) -> str:
+    """An effect's title; the name itself, spelt out, for one that is not installed here."""
+    kind = effect_kinds().get(name)
+    return kind.title if kind is not None else name.replace("_", " ").capitalize()

@@ -1,0 +1,106 @@
+"""``ddagr evaluate``, ``freeze-scenarios`` and ``tune-controllers`` end to end on few episodes."""
+
+import json
+
+import pytest
+
+from ddagr_gym.cli import main
+from ddagr_gym.commands import evaluate
+from ddagr_gym.evaluation import gain_search
+from ddagr_gym.evaluation.claims import load_claims
+from ddagr_gym.evaluation.controllers import BOUNDS
+from ddagr_gym.evaluation.scenarios import set_hash
+
+
+def run_evaluation(folder, *extra):
+    return main(["evaluate", "--scenarios", "V", "--workers", "1", "--output", str(folder), *extra])
+
+
+def test_tables_summary_and_figure(tmp_path, capsys):
+    pytest.importorskip("pyarrow")
+    pytest.importorskip("matplotlib")
+    folder = tmp_path / "out"
+    assert run_evaluation(folder, "--controllers", "B1,true_path", "--episodes", "2") == 0
+    printed = capsys.readouterr().out
+    assert "true_path (upper bound)" in printed
+    summary = json.loads((folder / "summary.json").read_text())
+    assert set(summary) == {"B1", "true_path"}
+    assert summary["B1"]["V"]["episodes"] == 2
+    assert set(summary["B1"]["V"]["radius_error_median"]) == {"value", "interval"}
+    from pyarrow import parquet
+
+    table = parquet.read_table(folder / "episodes.parquet")
+    assert table.num_rows == 4
+    assert {"feasible", "radius_error", "estimator_radius", "arm"} <= set(table.column_names)
+    lines = (folder / "episodes.jsonl").read_text().splitlines()
+    assert len(lines) == 2 * (1 + len(BOUNDS))
+    assert (folder / "radius_error.png").stat().st_size > 10_000
+    assert not (folder / "claims.json").exists()  # two episodes decide no claim
+
+
+def test_a_second_run_drives_nothing_and_agrees(tmp_path, capsys):
+    folder = tmp_path / "out"
+    arguments = ("--controllers", "B1", "--episodes", "2")
+    assert run_evaluation(folder, *arguments) == 0
+    first, journal = (folder / "summary.json").read_text(), (folder / "episodes.jsonl").read_text()
+    assert run_evaluation(folder, *arguments) == 0
+    assert (folder / "summary.json").read_text() == first
+    assert (folder / "episodes.jsonl").read_text() == journal
+
+
+def test_claims_are_written_and_those_on_what_was_driven_are_printed(tmp_path, capsys):
+    claims = load_claims()
+    value = {"value": 0.96, "interval": [0.9, 0.99]}
+    evaluate._check_claims(tmp_path, {"B4": {"S2": {"success_rate": value}}})
+    printed = capsys.readouterr().out
+    assert "force balance success beyond the range" in printed
+    assert "not driven" not in printed
+    written = json.loads((tmp_path / "claims.json").read_text())
+    assert len(written) == sum(len(claim.sets) for claim in claims.claims)
+    assert [item["verdict"] for item in written if item["arm"] == "B4" and item["set_name"] == "S2"] == ["held"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--controllers", "B9"], "B4"),
+        (["--controllers", ","], "--controllers is empty"),
+        (["--scenarios", "S11"], "S1"),
+        (["--workers", "0"], "--workers 0"),
+        (["--episodes", "0"], "at least 1"),
+    ],
+)
+def test_bad_input_is_one_sentence(tmp_path, capsys, arguments, message):
+    assert main(["evaluate", "--output", str(tmp_path / "out"), *arguments]) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert "Traceback" not in error
+    assert not (tmp_path / "out").exists()
+
+
+def test_freezing_again_gives_the_shipped_set_and_replaces_nothing(tmp_path, capsys, monkeypatch):
+    from ddagr_gym.evaluation import scenarios
+
+    expected = set_hash("S0")
+    assert main(["freeze-scenarios", "S0", "--output", str(tmp_path)]) == 0
+    monkeypatch.setattr(scenarios, "scenario_folder", lambda: tmp_path)
+    assert set_hash("S0") == expected
+    before = (tmp_path / "S0.json.gz").read_bytes()
+    assert main(["freeze-scenarios", "S0", "--output", str(tmp_path)]) == 2
+    assert "exists" in capsys.readouterr().err
+    assert (tmp_path / "S0.json.gz").read_bytes() == before
+    assert main(["freeze-scenarios", "S9", "--output", str(tmp_path)]) == 2
+
+
+def test_tuning_writes_gains_and_record(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(gain_search, "STAGES", ((2, 1),))
+    monkeypatch.setattr(gain_search.GainSearch.__init__, "__kwdefaults__", {
+        **gain_search.GainSearch.__init__.__kwdefaults__, "stages": ((2, 1),)
+    })  # fmt: skip
+    assert main(["tune-controllers", "--controllers", "B2", "--output", str(tmp_path)]) == 0
+    record = json.loads((tmp_path / "gain_search.json").read_text())
+    assert record[0]["controller"] == "B2"
+    assert set(record[0]["best"]) == {"proportional", "integral", "derivative", "lead_factor"}
+    assert (tmp_path / "ladder_gains.yaml").is_file()
+    assert "B2" in capsys.readouterr().out
+    assert main(["tune-controllers", "--controllers", "B1", "--output", str(tmp_path)]) == 2

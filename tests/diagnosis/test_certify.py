@@ -1,0 +1,193 @@
+"""Certification sees nothing of what it judges, and says what a planted slope is worth."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ddagr_gym.diagnosis.certify import (
+    BY_RECORDING,
+    BY_TIME,
+    CHANNELS,
+    MOTION,
+    _resampled,
+    certify,
+    folds_of,
+    gain_share,
+    refitted_on,
+)
+from ddagr_gym.diagnosis.forecast import PAST, cut_forecasts, errors_at, past_elimination, start_states
+from ddagr_gym.diagnosis.problem import Problem
+from ddagr_gym.diagnosis.verdict import _check_fit
+from ddagr_gym.errors import InputError
+from ddagr_gym.presets import get_robot
+from ddagr_gym.replay.windows import WindowSet
+from tests.diagnosis.conftest import Sloping
+
+ROBOT = get_robot("ddagr")
+
+
+def test_the_planted_effect_predicts_unseen_drives(sloping: Sloping) -> None:
+    found = sloping.certificate
+    assert found["folds"] == BY_RECORDING
+    for channel, ratio in (("position", 0.3), ("specific_force_x", 0.1), ("yaw_rate", 0.3)):
+        errors = found["channels"][channel]["5"]
+        assert errors["corrected"]["value"] < ratio * errors["refitted"]["value"], channel
+        low, high = errors["corrected"]["interval"]
+        assert low <= errors["corrected"]["value"] <= high
+        assert errors["ceiling"]["value"] <= min(errors[m]["value"] for m in ("refitted", "corrected", "black_box"))
+    assert found["gain_share"]["5"]["value"] > 0.9
+    _check_fit(found)
+
+
+def test_a_horizon_that_no_drive_holds_is_left_out_and_said(sloping: Sloping) -> None:
+    assert set(sloping.certificate["channels"]["position"]) == {"1", "5"}
+    assert "30 s" in sloping.certificate["note"]
+
+
+def test_what_is_wrong_in_the_schema_is_refused(sloping: Sloping) -> None:
+    broken = {**sloping.certificate, "channels": {"speed": {"1": {"unit": "m/s"}}}}
+    with pytest.raises(InputError, match="speed after 1 s"):
+        _check_fit(broken)
+
+
+def test_sizes_do_not_see_the_recording_that_judges(sloping: Sloping) -> None:
+    """Readings of the judging recording are spoilt; the sizes fitted to the others stay what they are."""
+    problem = sloping.problem
+    fold = next(f for f in folds_of(problem)[1] if 0 in f.unseen)
+    windows = problem.blocked.windows
+    spoilt = windows.measured + np.where(windows.recording == 0, 5.0, 0.0)[:, None, None]
+    other = problem.on(replace(problem.blocked, windows=replace(windows, measured=spoilt)))
+    points = [refitted_on(p, sloping.chosen, fold) for p in (problem, other)]
+    assert points[0].effects == points[1].effects
+    assert np.array_equal(points[0].values, points[1].values)
+    biases = [k for k, p in enumerate(problem.nuisances.parameters) if p.recording == 0]
+    assert np.abs(points[0].values[biases]).max() < 1e-12
+
+
+def test_starts_do_not_see_what_follows(sloping: Sloping) -> None:
+    recordings = sloping.recordings
+    forecasts = cut_forecasts(sloping.problem, ROBOT, recordings, 5.0, 4.0)
+    assert forecasts is not None
+    rows = [int(start) for r, start in zip(forecasts.future.recording, forecasts.future.start, strict=True) if r == 0]
+    cut = rows[1] + 1
+    channels = {name: values.copy() for name, values in recordings[0].channels.items()}
+    for name in ("yaw_rate", "encoder_right", "pose_x", "pose_yaw", "specific_force_x"):
+        channels[name][cut:] += 1.0
+    changed = cut_forecasts(
+        sloping.problem, ROBOT, (replace(recordings[0], channels=channels), recordings[1]), 5.0, 4.0
+    )
+    assert changed is not None
+    # the noise of the readings is told from all of them: it is kept the same here
+    changed = replace(changed, past=changed.past.on(replace(changed.past.blocked, sigma=forecasts.past.blocked.sigma)))
+    point = sloping.chosen.point
+    states = [start_states(f, point, past_elimination(f, point)) for f in (forecasts, changed)]
+    assert np.allclose(states[0][1], states[1][1], rtol=0.0, atol=1e-9)
+    assert not np.allclose(states[0][2], states[1][2], rtol=0.0, atol=0.1)
+
+
+def test_starts_are_where_the_robot_was(sloping: Sloping) -> None:
+    """Speeds to a centimetre per second; the truth comes with the simulated drive."""
+    forecasts = cut_forecasts(sloping.problem, ROBOT, sloping.recordings, 5.0, 4.0)
+    assert forecasts is not None
+    point = sloping.chosen.point
+    states = start_states(forecasts, point, past_elimination(forecasts, point))
+    for k, name in ((3, "true_v_x"), (5, "true_yaw_rate")):
+        truth = [
+            sloping.recordings[r].extras[name][s]
+            for r, s in zip(forecasts.future.recording, forecasts.future.start, strict=True)
+        ]
+        assert np.abs(states[:, k] - truth).max() < 0.01, name
+
+
+def test_one_recording_is_judged_by_halves(problem_of: Callable[..., Problem], sloping: Sloping) -> None:
+    recording = sloping.recordings[0]
+    problem = problem_of(recording)
+    rule, folds = folds_of(problem)
+    assert rule == BY_TIME
+    forecasts = cut_forecasts(problem, ROBOT, (recording,), 5.0, 1.0)
+    assert forecasts is not None
+    windows = problem.blocked.windows
+    for fold in folds:
+        judged = forecasts.future.subset(fold.judges(forecasts))
+        assert judged.count
+        time = windows.time[fold.training]
+        before = time + windows.duration <= judged.time.min() - PAST
+        after = time >= (judged.time + judged.duration).max()
+        assert (before | after).all()
+        assert not (fold.judges(forecasts) & fold.trains(forecasts)).any()
+
+
+def test_halves_are_named_as_the_weaker_proof(problem_of: Callable[..., Problem], sloping: Sloping) -> None:
+    problem = problem_of(sloping.recordings[0])
+    first = problem.blocked.windows.count
+    part = replace(
+        sloping.nominal,
+        point=replace(sloping.nominal.point, states=sloping.nominal.point.states[:first], values=_own(sloping, problem)),
+        by_parameter=sloping.nominal.by_parameter[:first][..., _columns(sloping, problem)],
+        elimination=sloping.nominal.elimination.subset(np.arange(len(sloping.nominal.window_cost)) < first),
+        prediction=sloping.nominal.prediction[:first],
+        window_cost=sloping.nominal.window_cost[:first],
+    )
+    rng = np.random.default_rng(0)
+    found = certify(problem, part, part, ROBOT, sloping.recordings[:1], rng)
+    assert found["folds"] == BY_TIME
+    assert "one recording" in found["note"]
+    errors = found["channels"]["position"]["1"]
+    assert errors["corrected"] == errors["refitted"]
+
+
+def _columns(sloping: Sloping, problem: Problem) -> list[int]:
+    names = [p.name for p in sloping.problem.nuisances.parameters]
+    return [names.index(p.name) for p in problem.nuisances.parameters]
+
+
+def _own(sloping: Sloping, problem: Problem) -> np.ndarray:
+    return sloping.nominal.point.values[_columns(sloping, problem)]
+
+
+def _still(count: int = 2, seconds: float = 2.0, period: float = 0.1) -> WindowSet:
+    samples = round(seconds / period)
+    return WindowSet(
+        period, np.zeros(count, dtype=np.int64), np.zeros(count, dtype=np.int64), np.zeros(count),
+        np.zeros((count, samples, 2)), 0, np.zeros((count, samples, 8)), np.zeros((count, 8)),
+    )  # fmt: skip
+
+
+def test_errors_of_a_known_prediction() -> None:
+    windows = _still()
+    prediction = np.zeros_like(windows.measured)
+    prediction[..., CHANNELS.index("yaw_rate")] = 0.1
+    prediction[..., CHANNELS.index("pose_yaw")] = 2.0 * np.pi - 0.2
+    prediction[0, :, CHANNELS.index("pose_x")] = 0.3 * 0.1 * np.arange(20)  # 0.3 m/s
+    prediction[0, :, CHANNELS.index("pose_y")] = 4.0
+    errors = errors_at(windows, prediction, 2.0)
+    assert errors["yaw_rate"] == pytest.approx([0.1, 0.1])
+    assert errors["heading"] == pytest.approx([0.2, 0.2])
+    assert errors["pose_yaw"] == pytest.approx([-0.2, -0.2])
+    assert errors["speed"] == pytest.approx([0.3, 0.0])
+    # the last half second of poses is at 0.45 to 0.57 m, 0.51 m on average
+    assert errors["position"] == pytest.approx([np.hypot(0.51, 4.0), 0.0])
+
+
+def test_what_nothing_measures_has_no_error() -> None:
+    windows = _still()
+    windows.measured[..., 5:] = np.nan
+    windows.measured[0, ::2, CHANNELS.index("yaw_rate")] = np.nan
+    errors = errors_at(windows, np.zeros_like(windows.measured), 1.0)
+    assert np.isnan(errors["position"]).all() and np.isnan(errors["speed"]).all()
+    assert np.isnan(errors["heading"][0]) and errors["heading"][1] == 0.0
+
+
+def test_share_of_the_ceiling() -> None:
+    """Errors of 1 and 0.4 with a ceiling of 0.2 are three quarters of the way; without a ceiling there is no share."""
+    ones, clusters = np.ones(6), np.array([0, 0, 1, 1, 2, 2])
+    errors = {"refitted": {"yaw_rate": ones}, "corrected": {"yaw_rate": 0.4 * ones}, "flexible": {"yaw_rate": 0.2 * ones}}
+    table = _resampled(errors, clusters, np.random.default_rng(0))
+    share = gain_share(table, MOTION)
+    assert share is not None
+    assert share["value"] == pytest.approx(0.75)
+    assert share["interval"] == pytest.approx([0.75, 0.75])
+    nothing = {name: {"yaw_rate": ones} for name in ("refitted", "corrected", "black_box")}
+    assert gain_share(_resampled(nothing, clusters, np.random.default_rng(0)), MOTION) is None

@@ -1,0 +1,44 @@
+"""Names of arms, by stand-ins for trained policies."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from ddagr_gym.evaluation.arms import policy_arm, policy_version
+from ddagr_gym.policies import shipped
+
+
+@pytest.fixture
+def policy(monkeypatch, tmp_path):
+    """Every policy was trained with seed 3 and has this file."""
+    file = tmp_path / "policy.npz"
+    file.write_bytes(b"weights")
+    monkeypatch.setattr(shipped, "find_policy", lambda name: SimpleNamespace(training={"seed": 3}))
+    monkeypatch.setattr(shipped, "policy_file", lambda name: file)
+    return file
+
+
+@pytest.mark.parametrize(
+    ("name", "arm"),
+    [
+        ("ppo_ekf_seed_3", "ppo_ekf"),
+        ("ppo_ekf_3", "ppo_ekf"),
+        ("ppo_ekf-s3", "ppo_ekf"),
+        ("ppo_ekf", "ppo_ekf"),
+        ("ppo_ekf_13", "ppo_ekf_13"),
+        ("ppo_ekf_4", "ppo_ekf_4"),
+        ("runs/ppo_ekf_seed_3/policy.npz", "ppo_ekf"),
+        ("runs/ppo_raw_3.npz", "ppo_raw"),
+        ("ppo_ekf_seed_3@frozen", "ppo_ekf@frozen"),
+    ],
+)
+def test_seeds_of_a_training_are_one_arm(policy, name, arm):
+    assert policy_arm(name) == (arm, 3)
+
+
+def test_version_changes_with_file_and_estimate(policy):
+    first = policy_version("ppo_ekf")
+    assert policy_version("ppo_ekf@wrong") != first
+    assert policy_version("ppo_ekf") == first
+    policy.write_bytes(b"other weights")
+    assert policy_version("ppo_ekf") != first

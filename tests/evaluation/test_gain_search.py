@@ -1,0 +1,123 @@
+"""The search for gains, on few candidates and scenarios."""
+
+import json
+
+import numpy as np
+import pytest
+
+from ddagr_gym.config import load_config
+from ddagr_gym.errors import InputError
+from ddagr_gym.evaluation import gain_search
+from ddagr_gym.evaluation.controllers import LadderGains, gains_file, ladder_gains
+from ddagr_gym.evaluation.gain_search import (
+    SPACES,
+    STAGES,
+    VALIDATION_SET,
+    GainSearch,
+    check_names,
+    episodes_of,
+    objective,
+    write_gains,
+)
+
+FEW = ((4, 1), (2, 2))
+
+
+def test_objective_by_hand():
+    outcomes = [(0.01, True), (-0.02, True), (0.03, True), (None, False)]
+    # median of 1, 2, 3 and 100 percent is 2.5; order statistic at 95 percent is 100
+    assert objective(outcomes) == pytest.approx(0.025 + 0.25 * 1.0 + 0.25)
+    assert objective([(0.01, True)]) == pytest.approx(0.01 + 0.0025)
+    assert objective([(0.01, False)]) > objective([(0.9, True)]) - 1.0
+    assert objective([(7.0, True)]) == objective([(1.0, True)])
+
+
+def test_budget_is_counted():
+    assert episodes_of(STAGES) == 64 * 8 + 16 * 16 + 4 * 16
+    assert episodes_of(FEW) == 6
+
+
+def test_values_span_the_box_logarithmically():
+    space = SPACES["B4"]
+    low, high = space.values(np.zeros(4)), space.values(np.ones(4))
+    middle = space.values(np.full(4, 0.5))
+    for name, least, most in space.axes:
+        assert (low[name], high[name]) == (least, most)
+        assert middle[name] == pytest.approx((least * most) ** 0.5, rel=1e-3)
+
+
+@pytest.mark.parametrize("controller", SPACES)
+def test_every_space_changes_its_own_controller_only(controller):
+    before = ladder_gains()
+    after = SPACES[controller].apply(before, SPACES[controller].values(np.full(len(SPACES[controller].axes), 0.37)))
+    changed = {name for name in vars(before) if getattr(before, name) != getattr(after, name)}
+    expected = {"B2": "yaw_rate", "B3": "radial", "B4": "force_balance", "B5": "predictive"}.get(controller, controller)
+    assert changed - {"true_path_heading"} == {expected}
+    assert ("true_path_heading" in changed) == (controller == "true_path")
+
+
+def test_search_resumes_and_is_repeatable(tmp_path):
+    counted = []
+    first = GainSearch("B2", tmp_path / "a", stages=FEW, progress=counted.append).run()
+    assert sum(counted) == episodes_of(FEW)
+    journal = (tmp_path / "a").read_text().splitlines()
+    assert len(journal) == episodes_of(FEW)
+    (tmp_path / "b").write_text("\n".join(journal[:3]) + "\n" + journal[3][:10])
+    again = GainSearch("B2", tmp_path / "b", stages=FEW)
+    assert len(again._driven) == 3
+    assert again.run() == first
+    assert GainSearch("B2", tmp_path / "c", stages=FEW, seed=1).run()["finalists"] != first["finalists"]
+    assert first["objective"] == min(item["objective"] for item in first["finalists"])
+    assert first["best"] == first["finalists"][0]["values"]
+    assert len(first["finalists"]) == 2
+
+
+def test_search_finds_a_known_optimum(tmp_path, monkeypatch):
+    space = SPACES["B4"]
+    wanted = np.array([0.7, 0.3, 0.5, 0.6])
+
+    def drive(self, values, number):
+        point = [np.log(values[n] / low) / np.log(high / low) for n, low, high in space.axes]
+        outcome = (float(0.1 * np.linalg.norm(np.array(point) - wanted)), True)
+        self._driven[json.dumps(values), number] = outcome
+        return outcome
+
+    monkeypatch.setattr(GainSearch, "_drive", drive)
+    found = GainSearch("B4", tmp_path / "journal").run()
+    # 32 Sobol points alone come within 0.3 of the optimum
+    assert found["objective"] < 0.1 * 0.25 * 1.25
+    assert len(found["finalists"]) == STAGES[-1][0]
+
+
+def test_only_the_validation_set_is_read(tmp_path, monkeypatch):
+    asked = []
+    load = gain_search.load_scenarios
+    monkeypatch.setattr(gain_search, "load_scenarios", lambda name: asked.append(name) or load(name))
+    GainSearch("B3", tmp_path / "journal", stages=((2, 1),)).run()
+    assert asked == [VALIDATION_SET] == ["V"]
+
+
+def test_written_gains_read_back(tmp_path):
+    record = {"controller": "B5", "best": {"lateral": 33.0, "offset_rate": 0.07}}
+    written = write_gains([record], tmp_path / "gains.yaml")
+    assert load_config(tmp_path / "gains.yaml", LadderGains) == written
+    assert written.predictive.lateral == 33.0
+    assert written.yaw_rate == ladder_gains().yaw_rate
+
+
+def test_shipped_gains_are_those_of_the_record():
+    records = json.loads(gains_file().with_name("gain_search.json").read_text())
+    gains = ladder_gains()
+    assert {record["controller"] for record in records} == set(SPACES)
+    for record in records:
+        assert SPACES[record["controller"]].apply(gains, record["best"]) == gains
+        assert record["stages"] == [list(stage) for stage in STAGES]
+
+
+def test_unknown_names_are_one_sentence(tmp_path):
+    with pytest.raises(InputError, match="B5"):
+        check_names(["B1"])
+    with pytest.raises(InputError, match="no controller"):
+        check_names([])
+    with pytest.raises(InputError, match="controller with gains"):
+        GainSearch("B0", tmp_path / "journal")

@@ -1,0 +1,69 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ddagr_gym.errors import InputError
+from ddagr_gym.presets import get_robot
+from ddagr_gym.replay.prepare import prepare
+from ddagr_gym.replay.split import held_out, training
+
+
+def prepared(recordings, robot, **more):
+    return prepare(recordings, robot, np.random.default_rng(0), **more)
+
+
+def test_a_recording_of_another_robot_is_refused(make_recording):
+    with pytest.raises(InputError, match=r"recording of the robot 'ddagr': replay it with --robot ddagr, not husky"):
+        prepared([make_recording()], get_robot("husky"))
+
+
+def test_one_row_is_no_drive(make_recording, robot):
+    with pytest.raises(InputError, match="has 1 rows: a replay needs a drive"):
+        prepared([make_recording(seconds=0.05)], robot)
+
+
+def test_dead_channels_are_named(make_recording, robot):
+    recording = make_recording(encoder_right=np.arange(2000.0), encoder_left=np.arange(2000.0))
+    found = prepared([recording], robot)
+    assert found.dead == ("yaw_rate",)
+    assert any(note.startswith("yaw_rate never changes and was left out") for note in found.notes)
+
+
+def test_no_window_is_none_instead_of_an_error(make_recording, robot):
+    recording = make_recording(command_valid=np.zeros(2000, dtype=bool))
+    found = prepared([recording], robot)
+    assert found.windows(2.0, "commands") is None
+    assert found.windows(2.0, "encoders").count == 49
+
+
+def test_parts_and_numbers_of_windows(make_recording, robot):
+    found = prepared([make_recording()], robot)
+    seen, judged = (found.windows(1.0, "commands", part=part) for part in (training, held_out))
+    assert set(seen.start).isdisjoint(judged.start)
+    assert found.windows(1.0, "commands", most=7).count == 7
+
+
+def test_late_poses_are_moved_and_said_so(make_recording, robot):
+    rng = np.random.default_rng(0)
+    t = np.arange(0.0, 100.0, 0.05)
+    turning = np.repeat(rng.uniform(-1.0, 1.0, 20), 100)
+    heading = np.cumsum(turning) * 0.05
+    late = np.interp(t - 0.4, t, heading)
+    recording = make_recording(yaw_rate=turning, pose_yaw=late, pose_x=late, pose_y=late)
+    found = prepared([recording], robot)
+    assert found.noise[0].pose_lateness == pytest.approx(0.4, abs=0.05)
+    lateness = f"poses come {found.noise[0].pose_lateness:.2f} s behind the gyro"
+    assert any(lateness in note for note in found.notes)
+    moved = found.recordings[0]["pose_yaw"]
+    known = np.isfinite(moved)
+    np.testing.assert_allclose(moved[known][100:-100], heading[known][100:-100], atol=0.06)
+
+
+def test_opposed_signs_are_said(make_recording, robot):
+    rng = np.random.default_rng(0)
+    turning = np.repeat(rng.uniform(-1.0, 1.0, 20), 100)
+    heading = np.cumsum(turning) * 0.05
+    recording = make_recording(yaw_rate=-turning, pose_yaw=heading)
+    notes = prepared([recording], robot).notes
+    assert any("gyro and poses turn opposite ways" in note for note in notes)
