@@ -33,7 +33,6 @@ TRUTH = (
     "slip_outer",
     "slip_inner",
     "sinkage",
-    "true_distance_to_go",
 )
 """What the critic sees besides the policy's inputs; dimensionless, turned to the left."""
 
@@ -58,7 +57,6 @@ def true_entries(batch: TurnBatch) -> NDArray[np.float32]:
         np.where(side > 0.0, right, left),
         np.where(side > 0.0, left, right),
         10.0 * rows[:, layout.SINKAGE : layout.SINKAGE + 4].mean(axis=1),
-        np.pi - distance,
     ]
     return np.clip(np.stack(entries, axis=1), -_LARGEST, _LARGEST).astype(np.float32)
 
@@ -112,6 +110,4 @@ class AsymmetricPolicy(ActorCriticPolicy):
 
     def _build_mlp_extractor(self) -> None:
         known = self.features_dim
-        self.mlp_extractor = _SplitExtractor(
-            known - len(TRUTH), known, self.net_arch, self.activation_fn, self.device
-        )
+        self.mlp_extractor = _SplitExtractor(known - len(TRUTH), known, self.net_arch, self.activation_fn, self.device)

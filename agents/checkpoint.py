@@ -1,4 +1,4 @@
-"""Checkpoints from which a killed training goes on to the bit: model, optimiser, normalisation, environments, generators.
+"""Checkpoints from which a killed training goes on to the bit: model, normalisation, environments, generators.
 
 A checkpoint is a pickle that this program wrote into its own training folder; never load one from elsewhere. What is
 published are the files of :mod:`ddagr_gym.policies.archive`, which hold numbers only.
@@ -39,7 +39,7 @@ def snapshot(model: BaseAlgorithm, normalise: VecNormalize, extra: dict[str, Any
         "normalisation": {name: copy.deepcopy(getattr(normalise, name)) for name in _NORMALISATION},
         "view": view.state(),
         "environments": save_state(view.venv.env),
-        "generators": (random.getstate(), np.random.get_state(), torch.get_rng_state()),
+        "generators": (random.getstate(), np.random.get_state(), torch.get_rng_state()),  # noqa: NPY002
         "action_generator": copy.deepcopy(model.action_space.np_random.bit_generator.state),
         "replay_buffer": copy.deepcopy(getattr(model, "replay_buffer", None)),
         "extra": copy.deepcopy(extra),
@@ -64,7 +64,7 @@ def resume(model: BaseAlgorithm, normalise: VecNormalize, saved: dict[str, Any])
         model.replay_buffer = saved["replay_buffer"]  # type: ignore[attr-defined]
     python, numpy_state, torch_state = saved["generators"]
     random.setstate(python)
-    np.random.set_state(numpy_state)
+    np.random.set_state(numpy_state)  # noqa: NPY002
     torch.set_rng_state(torch_state)
     model.action_space.np_random.bit_generator.state = saved["action_generator"]
     extra: dict[str, Any] = copy.deepcopy(saved["extra"])

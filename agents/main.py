@@ -59,7 +59,9 @@ def train_one(algorithm: str, config: str, seed: int, output: Path, overrides: S
     """
     settings = load_settings(config, overrides)
     if settings.algorithm != algorithm:
-        raise InputError(f"{config!r} is a configuration of {settings.algorithm}: use `ddagr train {settings.algorithm}`.")
+        raise InputError(
+            f"{config!r} is a configuration of {settings.algorithm}: use `ddagr train {settings.algorithm}`."
+        )
     return train(ALGORITHMS[algorithm], settings, seed, training_folder(output, config, seed))
 
 

@@ -101,8 +101,8 @@ def card(name: str, settings: TrainingSettings, results: list[dict[str, Any]], s
         [
             f"# {name}: {settings.description}",
             "",
-            "A policy that turns a DDAGR robot from one strawberry row into the next on soft soil, trained in simulation"
-            " only. It has never driven a robot.",
+            "A policy that turns a DDAGR robot from one strawberry row into the next on soft soil, trained in "
+            "simulation only. It has never driven a robot.",
             "",
             "## Use",
             "",
@@ -121,8 +121,7 @@ def card(name: str, settings: TrainingSettings, results: list[dict[str, Any]], s
             "## What it sees and does",
             "",
             f"- Inputs ({len(design.inputs)}, mirrored so that every turn is to the left, dimensionless): "
-            f"{', '.join(design.frame_inputs)}"
-            + (f"; {design.frames} instants, {design.frame_interval} control steps apart." if design.frames > 1 else "."),
+            f"{', '.join(design.frame_inputs)}{_history(settings)}.",
             f"- Outputs: {_outputs(settings)}",
             f"- An output changes by at most {design.rate_limit:g} per control step of 0.08 s.",
             "- It never sees the true pose, speed or soil.",
@@ -154,6 +153,11 @@ def card(name: str, settings: TrainingSettings, results: list[dict[str, Any]], s
             "",
         ]
     )
+
+
+def _history(settings: TrainingSettings) -> str:
+    design = settings.design
+    return f"; {design.frames} instants, {design.frame_interval} control steps apart" if design.frames > 1 else ""
 
 
 def _outputs(settings: TrainingSettings) -> str:

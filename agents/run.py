@@ -70,11 +70,8 @@ class Training:
     checkpoint_seconds: float = 60.0
 
     def logger(self) -> Logger:
-        """TensorBoard under the folder where TensorBoard is installed; nothing on the terminal."""
-        from importlib.util import find_spec
-
-        formats = ["tensorboard"] if find_spec("tensorboard") else []
-        return configure(str(self.folder / "tensorboard"), formats)
+        """TensorBoard under the folder; nothing on the terminal."""
+        return configure(str(self.folder / "tensorboard"), ["tensorboard"])
 
     def run(self, model: BaseAlgorithm, normalise: VecNormalize) -> dict[str, Any]:
         """Train to the end, from the checkpoint where there is one.

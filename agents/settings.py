@@ -25,13 +25,15 @@ class TaskSettings(Validated):
         speed: reference speed [m/s].
         randomisation: what differs from episode to episode besides the soil.
         reward: weights of the terms.
+        effects: missing physics, name=size or the path of an effects file such as `ddagr diagnose` writes.
     """
 
     soil: str = "thesis_a1_range"
     radius: tuple[float, float] = (0.80, 0.80)
     speed: float = bounded("m/s", 0.0, 2.0, default=0.20, open_low=True)
-    randomisation: Randomisation = Randomisation()
-    reward: RewardWeights = RewardWeights()
+    randomisation: Randomisation = field(default_factory=Randomisation)
+    reward: RewardWeights = field(default_factory=RewardWeights)
+    effects: tuple[str, ...] = ()
 
     def environment(self, design: PolicyDesign) -> dict[str, Any]:
         """Keyword arguments of the environment."""
@@ -42,33 +44,9 @@ class TaskSettings(Validated):
             "speed": self.speed,
             "randomisation": self.randomisation,
             "reward": self.reward,
+            "effects": self.effects,
             "ekf_features": design.needs_filter,
         }
-
-
-@dataclass(frozen=True)
-class ImitationSettings(Validated):
-    """The head start that a teacher gives who sees the truth; see :mod:`agents.imitation`.
-
-    Attributes:
-        rounds: of driving and fitting; 0 for none.
-        steps: control steps per environment and round.
-        epochs: passes over all data so far, per round.
-        batch: samples per gradient step.
-        learning_rate: of Adam; falls linearly in each round.
-        exploration: standard deviation added to the outputs while driving [-].
-        cross_track: the teacher's curvature over 1/R* per distance over R* [-].
-        heading: the teacher's curvature over 1/R* per heading error [1/rad].
-    """
-
-    rounds: int = 0
-    steps: int = 250
-    epochs: int = 6
-    batch: int = 512
-    learning_rate: float = bounded("-", 0.0, 1.0, default=2e-3, open_low=True)
-    exploration: float = bounded("-", 0.0, 1.0, default=0.05)
-    cross_track: float = bounded("-", 0.0, 100.0, default=2.5)
-    heading: float = bounded("1/rad", 0.0, 100.0, default=2.5)
 
 
 @dataclass(frozen=True)
@@ -86,7 +64,6 @@ class PpoSettings(Validated):
         entropy: weight of the entropy bonus [-].
         initial_deviation: of the outputs [-].
         hidden: units of the two layers of policy and value.
-        critic_first: share of the training in which only the value learns [-].
     """
 
     rollout: int = 64
@@ -99,7 +76,6 @@ class PpoSettings(Validated):
     entropy: float = bounded("-", 0.0, 1.0, default=0.0)
     initial_deviation: float = bounded("-", 0.0, 2.0, default=0.2, open_low=True)
     hidden: tuple[int, ...] = (64, 64)
-    critic_first: float = bounded("-", 0.0, 1.0, default=0.0)
 
 
 @dataclass(frozen=True)
@@ -140,7 +116,6 @@ class TrainingSettings:
         validation_interval: control steps between drives of the validation set.
         design: what the policy sees and does.
         task: what it is trained on.
-        imitation: head start, of PPO only.
         ppo: of the algorithm.
         sac: of the algorithm.
     """
@@ -153,7 +128,6 @@ class TrainingSettings:
     validation_interval: int = 250_000
     design: PolicyDesign = field(default_factory=PolicyDesign)
     task: TaskSettings = field(default_factory=TaskSettings)
-    imitation: ImitationSettings = field(default_factory=ImitationSettings)
     ppo: PpoSettings = field(default_factory=PpoSettings)
     sac: SacSettings = field(default_factory=SacSettings)
 

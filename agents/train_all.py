@@ -1,6 +1,6 @@
 """Every published training, one after another, and what is published of them. Started again, it goes on.
 
-    ./ddagr train all --output runs --publish
+./ddagr train all --output runs --publish
 """
 
 from __future__ import annotations
@@ -59,4 +59,4 @@ def publish_arm(name: str, results: list[dict[str, Any]], output: Path, target: 
     from ddagr_gym.policies.shipped import policies_dir
 
     folder = policies_dir() if target is None else target
-    publish(name, load_settings(name), results, output, folder / name)
+    publish(Path(name).stem, load_settings(name), results, output, folder / Path(name).stem)

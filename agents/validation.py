@@ -10,7 +10,8 @@ import numpy as np
 from gymnasium.utils import seeding
 from numpy.typing import NDArray
 
-from ddagr_gym.control.row_turn import wheels_fit_furrow
+from ddagr_gym.control.circle import turn_window
+from ddagr_gym.control.row_turn import RowTurn, wheels_fit_furrow
 from ddagr_gym.envs import turn_kernel as kernel
 from ddagr_gym.envs.constants import EPISODE_STEPS
 from ddagr_gym.envs.settings import Episode, TurnSettings
@@ -30,11 +31,15 @@ class ValidationResult:
 
     Attributes:
         errors: (N,) e_R [-], infinite where the turn has no radius.
+        heading_errors: (N,) arc length over heading change against R* in the same window [-], likewise. It leaves out
+            the sideslip, which changes along a turn on uneven soil and which a robot without a receiver cannot see:
+            what is left is what control can do something about.
         successes: (N,) whether every wheel fits its furrow at the exit.
         returns: (N,) sum of rewards.
     """
 
     errors: Array
+    heading_errors: Array
     successes: NDArray[np.bool_]
     returns: Array
 
@@ -44,6 +49,7 @@ class ValidationResult:
         return {
             "radius_error_median": float(np.quantile(size, 0.5, method="higher")),
             "radius_error_p95": float(np.quantile(size, 0.95, method="higher")),
+            "heading_radius_error_median": float(np.quantile(np.abs(self.heading_errors), 0.5, method="higher")),
             "success_rate": float(self.successes.mean()),
             "mean_return": float(self.returns.mean()),
         }
@@ -81,12 +87,12 @@ def drive_all(
         if not driving.any():
             break
     judged = [_judge(np.concatenate(track), episode) for track, (_, episode) in zip(tracks, episodes, strict=True)]
-    errors, successes = zip(*judged, strict=True)
-    return ValidationResult(np.array(errors), np.array(successes, dtype=np.bool_), returns)
+    errors, heading_errors, successes = (np.array(values) for values in zip(*judged, strict=True))
+    return ValidationResult(errors, heading_errors, successes.astype(np.bool_), returns)
 
 
-def _judge(track: Array, episode: Episode) -> tuple[float, bool]:
-    """e_R and success of a track (T, 3) of true x, y, yaw at the sensor rate."""
+def _judge(track: Array, episode: Episode) -> tuple[float, float, bool]:
+    """e_R, the heading's radius error and success of a track (T, 3) of true x, y, yaw at the sensor rate."""
     turn, half_wheelbase = episode.turn, episode.robot.half_wheelbase
     t = np.arange(1.0, len(track) + 1.0) * episode.sensors.period
     x, y, yaw = track.T
@@ -94,4 +100,14 @@ def _judge(track: Array, episode: Episode) -> tuple[float, bool]:
     end = len(t) if leave is None else int(np.searchsorted(t, leave.time)) + 1
     radius = turn_radius_error(x[:end], y[:end], yaw[:end], turn.radius, turn.side)
     fits = leave is not None and wheels_fit_furrow(leave.lateral_error, leave.heading_error, half_wheelbase)
-    return (np.inf if radius.error is None else radius.error), fits
+    if radius.error is None:
+        return np.inf, np.inf, fits
+    return radius.error, _heading_radius(x[:end], y[:end], yaw[:end], turn) / turn.radius - 1.0, fits
+
+
+def _heading_radius(x: Array, y: Array, yaw: Array, turn: RowTurn) -> float:
+    """Arc length over heading change between 30 and 150 degrees [m]."""
+    window, _ = turn_window(yaw, turn.side)
+    assert window is not None
+    length = float(np.hypot(np.diff(x[window]), np.diff(y[window])).sum())
+    return length / (turn.sign * float(yaw[window][-1] - yaw[window][0]))

@@ -27,6 +27,7 @@ EXAMPLES = (
     "ddagr diagnose drives --robot ddagr --soil thesis_a1 --thresholds thresholds.json --output diagnosis",
 )
 
+PAGE = "index.html"
 _ENDINGS = (".csv", ".csv.gz", ".parquet", ".mcap", ".bag")
 _SHOWN = ("position", "pose_yaw", "heading", "yaw_rate", "speed", "specific_force_x", "specific_force_y")
 
@@ -190,6 +191,7 @@ def write_outcome(outcome: Outcome, folder: Path) -> None:
     save(diagnosis, folder / "diagnosis.json")
     outcome.evidence.save(folder / evidence.NAME)
     diagnosis_page.write_report(folder, as_mapping(diagnosis), outcome.evidence)
+    (folder / diagnosis_page.PAGE).rename(folder / PAGE)
 
 
 def outcome_text(diagnosis: Diagnosis) -> str:

@@ -26,9 +26,10 @@ EXAMPLES = (
 
 @dataclass(frozen=True)
 class Arguments:
-    """Estimate speeds and soil over a recording: figures in the thesis's order, a table, a summary.
+    """Estimate speeds and soil over a recording, with figures.
 
-    Figures show estimates with bands of two standard deviations, and the truth where the recording holds it.
+    Figures stand in the order of the thesis's chapter 6. They show estimates with bands of two standard deviations, and
+    the truth where the recording holds it.
 
     Attributes:
         run: recording, as `ddagr check` takes it; none with --thesis.

@@ -43,18 +43,19 @@ class Arguments:
 
 def run(arguments: Arguments) -> None:
     """Drive, summarise, print the tables."""
+    from ddagr_gym.control.row_turn import RowTurn
     from ddagr_gym.evaluation.campaign import run_campaign, wanted_episodes, with_bounds
-    from ddagr_gym.evaluation.controllers import controller_title
+    from ddagr_gym.evaluation.controllers import find_controller
     from ddagr_gym.evaluation.scenarios import scenario_names
     from ddagr_gym.evaluation.summary import summaries
 
     controllers = _names(arguments.controllers, "controllers")
     sets = _names(arguments.scenarios, "scenarios")
-    for name in controllers:
-        controller_title(name)
     for name in sets:
         if name not in scenario_names():
             raise unknown_name("scenario set", name, scenario_names())
+    for name in controllers:
+        find_controller(name, RowTurn())  # what cannot be made shall fail before anything is driven
     if arguments.workers < 1:
         raise InputError(f"--workers {arguments.workers}: give at least 1.")
     total = len(wanted_episodes(with_bounds(controllers), sets, arguments.episodes))

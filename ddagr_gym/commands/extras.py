@@ -18,6 +18,7 @@ EXTRA_OF_MODULE = {
     "sb3_contrib": "rl",
     "sklearn": "diagnosis",
     "stable_baselines3": "rl",
+    "tensorboard": "rl",
     "torch": "rl",
 }
 """Import name of an optional library -> extra in pyproject.toml."""

@@ -26,8 +26,8 @@ EXAMPLES = (
 class Arguments:
     """Say before any drive which effects it could show, how small, and which it could tell apart.
 
-    The nominal robot is simulated over the manoeuvres with the sensors' default noise; from its sensitivities follow the
-    least detectable size of each effect and the share of its trace that every other effect cannot imitate.
+    The nominal robot is simulated over the manoeuvres with the sensors' default noise; from its sensitivities follow
+    the least detectable size of each effect and the share of its trace that every other effect cannot imitate.
 
     Attributes:
         output: folder for isolability.json, isolability.txt and the figure.
@@ -96,7 +96,9 @@ def table_text(table: Isolability) -> str:
     rows = []
     for name in order:
         for item in (entry for entry in table.detectable if entry.effect == name):
-            rows.append((name, item.field, _size(item.size), item.unit, _multiples(item.multiples), _rivals(table, name)))
+            rows.append(
+                (name, item.field, _size(item.size), item.unit, _multiples(item.multiples), _rivals(table, name))
+            )
     header = ("effect", "size", "least detectable", "unit", "/ least meaningful", "not told from (share of its own)")
     head = (
         f"{table.robot} on {table.soil}: {', '.join(table.manoeuvres)} ({table.duration:.0f} s) with "

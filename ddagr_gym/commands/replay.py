@@ -182,6 +182,7 @@ def summary(report: ReplayReport) -> list[str]:
         texts.append(f"\n{', '.join(item.sources)}: {item.seconds:.0f} s; {item.split}")
         texts += [f"note: {note}" for note in item.notes]
         texts += [arm_text(arm) for arm in item.arms]
+        texts.append(f"replayed in {item.cpu_seconds:.1f} s of one core")
     return texts
 
 

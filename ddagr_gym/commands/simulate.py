@@ -40,7 +40,7 @@ class Arguments:
     manoeuvre: str = "table_6_2"
     soil: str = "thesis_a1"
     robot: str = "ddagr"
-    effect: Annotated[tuple[str, ...], tyro.conf.UseAppendAction] = ()
+    effect: Annotated[tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(aliases=("--effects",))] = ()
     output: Path | None = None
     figure: Path | None = None
     video: Path | None = None

@@ -2,7 +2,8 @@
 
 Every recording is forecast by models whose sizes and nuisances were fitted to the others; a single recording by its
 halves. The start of a forecast comes from the readings before it (:mod:`ddagr_gym.diagnosis.forecast`); biases of a
-recording that a fit has not seen stand at their prior, zero. *Which* effects are in the model was decided on all drives.
+recording that a fit has not seen stand at their prior, zero. *Which* effects are in the model was decided on all
+drives.
 
 Compared are the raw nominal simulator, the refitted one, the corrected one, a *black box* (a flexible residual model on
 top of the refitted one) and the *ceiling*: the best of these and of a flexible model on top of the corrected one, per
@@ -19,10 +20,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ddagr_gym.diagnosis.certificate import BY_RECORDING, BY_TIME, HORIZONS, Errors, certificate
 from ddagr_gym.diagnosis.forecast import (
-    MOTION,
     PAST,
-    UNITS,
     Forecasts,
     cut_forecasts,
     errors_at,
@@ -32,33 +32,18 @@ from ddagr_gym.diagnosis.forecast import (
 )
 from ddagr_gym.diagnosis.problem import Elimination, Point, Problem
 from ddagr_gym.diagnosis.refit import Fitted, fit
-from ddagr_gym.diagnosis.residual_model import Rollout, corrected, fit_residual_model
-from ddagr_gym.diagnosis.uncertainty import LEVEL
+from ddagr_gym.diagnosis.residual_model import ResidualModel, Rollout, corrected, fit_residual_model
 from ddagr_gym.parameters import Robot
 from ddagr_gym.recordings.schema import Recording
-from ddagr_gym.replay.windows import CHANNELS
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-Errors = dict[str, dict[str, Array]]
-
-HORIZONS = (1.0, 5.0, 30.0)
-"""[s], diagnosis.md, step 10."""
-
-MODELS = ("raw", "refitted", "corrected", "black_box", "ceiling")
 
 STRIDE = 2.0
 """Between the starts of short forecasts [s]; those of the longest are 5 s apart."""
 
 CLUSTER = 10.0
 """Time within which errors count as one when intervals are resampled [s], or the horizon where it is longer."""
-
-DRAWS = 500
-
-LEAST_EXPLAINABLE = 0.03
-"""Share of the refitted error that the ceiling must explain before a share of it means anything (ours)."""
-
-BY_RECORDING, BY_TIME = "by recording", "by time"
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,17 +159,19 @@ def certify(
     progress("certification: sizes from the other drives")
     arms = _arms(problem, nominal, chosen, folds)
     sets = _forecast_sets(problem, robot, recordings)
+    seed = int(rng.integers(2**31))
+    learnt: Learnt = {}
     found: dict[float, Errors] = {}
     clusters: dict[float, NDArray[np.int64]] = {}
     for forecasts, horizons in sets:
-        longest = f"{forecasts.future.duration:.3g} s"
-        progress(f"certification: forecasts of {longest}")
-        errors, kept = _errors(forecasts, arms, folds, horizons, sets[0][0], int(rng.integers(2**31)))
-        for horizon in horizons:
-            if kept.any():
-                found[horizon] = errors[horizon]
-                clusters[horizon] = _clusters(forecasts.subset(kept), horizon)
-    return _report(rule, found, clusters, rng)
+        progress(f"certification: forecasts of {forecasts.future.duration:.3g} s")
+        bases = _bases(forecasts, arms)
+        learnt = learnt or _learnt(forecasts, arms, folds, bases, seed)
+        errors, kept = _errors(forecasts, arms, folds, horizons, bases, learnt)
+        if kept.any():
+            found |= errors
+            clusters |= {horizon: _clusters(forecasts.subset(kept), horizon) for horizon in horizons}
+    return certificate(rule, found, clusters, rng)
 
 
 def _arms(problem: Problem, nominal: Fitted, chosen: Fitted, folds: Sequence[Fold]) -> list[Arm]:
@@ -211,31 +198,50 @@ def _forecast_sets(
     return served if long is None else [*served, (long, HORIZONS[2:])]
 
 
+Learnt = dict[tuple[str, int], ResidualModel]
+
+
+def _bases(forecasts: Forecasts, arms: Sequence[Arm]) -> dict[str, Elimination]:
+    """What the unknowns before the starts explain, by arm; the raw model's starts take that of the refitted one."""
+    found = {arm.name: past_elimination(forecasts, arm.points[0]) for arm in arms if arm.learnt}
+    return found | {"raw": found["refitted"]}
+
+
+def _learnt(
+    forecasts: Forecasts, arms: Sequence[Arm], folds: Sequence[Fold], bases: Mapping[str, Elimination], seed: int
+) -> Learnt:
+    """Flexible model by arm and fold, from the drives that the fold may see; absent where too little is known."""
+    made: Learnt = {}
+    for arm in (item for item in arms if item.learnt):
+        for number, (fold, point) in enumerate(zip(folds, arm.points, strict=True)):
+            shown = fold.trains(forecasts)
+            if shown.any():
+                model = fit_residual_model(_rolled(forecasts, point, bases[arm.name], shown), STRIDE, seed)
+                if model is not None:
+                    made[arm.name, number] = model
+    return made
+
+
 def _errors(
     forecasts: Forecasts,
     arms: Sequence[Arm],
     folds: Sequence[Fold],
     horizons: Sequence[float],
-    training: Forecasts,
-    seed: int,
+    bases: Mapping[str, Elimination],
+    learnt: Learnt,
 ) -> tuple[dict[float, Errors], Flags]:
     """Errors (K,) by horizon, model and quantity, and which of the forecasts (W,) were judged."""
     judged = np.any([fold.judges(forecasts) for fold in folds], axis=0)
-    parts: dict[float, dict[str, dict[str, Array]]] = {h: {} for h in horizons}
+    parts: dict[float, Errors] = {h: {} for h in horizons}
     for arm in arms:
-        own = past_elimination(forecasts, arm.points[0])
-        seen = own if training is forecasts or not arm.learnt else past_elimination(training, arm.points[0])
-        for fold, point in zip(folds, arm.points, strict=True):
+        for number, (fold, point) in enumerate(zip(folds, arm.points, strict=True)):
             chosen = fold.judges(forecasts)
             if not chosen.any():
                 continue
-            rollout = _rolled(forecasts, point, own, chosen)
+            rollout = _rolled(forecasts, point, bases[arm.name], chosen)
             made = {arm.name: rollout.readings}
             if arm.learnt:
-                shown = fold.trains(training)
-                model = None
-                if shown.any():
-                    model = fit_residual_model(_rolled(training, point, seen, shown), STRIDE, seed)
+                model = learnt.get((arm.name, number))
                 made[arm.learnt] = rollout.readings if model is None else corrected(model, rollout)
             for name, readings in made.items():
                 for horizon in horizons:
@@ -250,7 +256,7 @@ def _rolled(forecasts: Forecasts, point: Point, elimination: Elimination, chosen
     return Rollout(part.future, readings, record)
 
 
-def _put(errors: dict[str, dict[str, Array]], model: str, chosen: Flags, values: Mapping[str, Array]) -> None:
+def _put(errors: Errors, model: str, chosen: Flags, values: Mapping[str, Array]) -> None:
     for name, value in values.items():
         whole = errors.setdefault(model, {}).setdefault(name, np.full(len(chosen), np.nan))
         whole[chosen] = value
@@ -261,106 +267,3 @@ def _clusters(forecasts: Forecasts, horizon: float) -> NDArray[np.int64]:
     length = max(CLUSTER, horizon)
     keys = np.stack([forecasts.future.recording, np.floor(forecasts.future.time / length).astype(np.int64)], axis=1)
     return np.unique(keys, axis=0, return_inverse=True)[1].reshape(-1).astype(np.int64)
-
-
-def _report(
-    rule: str, found: Mapping[float, Errors], clusters: Mapping[float, NDArray[np.int64]], rng: np.random.Generator
-) -> dict[str, Any]:
-    channels: dict[str, dict[str, Any]] = {}
-    shares: dict[str, dict[str, Any]] = {"gain_share": {}, "gain_share_readings": {}}
-    for horizon, errors in found.items():
-        key = f"{horizon:g}"
-        table = _resampled(errors, clusters[horizon], rng)
-        for quantity in UNITS:
-            if quantity in table["refitted"]:
-                channels.setdefault(quantity, {})[key] = _entry(table, quantity, errors)
-        shares["gain_share"][key] = gain_share(table, MOTION)
-        shares["gain_share_readings"][key] = gain_share(table, CHANNELS)
-    return {
-        "folds": rule,
-        "note": _note(rule, found),
-        "horizons": list(HORIZONS),
-        "level": LEVEL,
-        "channels": channels,
-        **shares,
-    }
-
-
-def _note(rule: str, found: Mapping[float, Errors]) -> str:
-    parts = ["Which effects are in the model was decided on all drives; their sizes and the nominal model's were not."]
-    if rule == BY_TIME:
-        parts.append(
-            "There is one recording: its halves judge each other, so that its place, its sensors' biases and its day "
-            "are not new to the model that is judged."
-        )
-    missing = [f"{h:g} s" for h in HORIZONS if h not in found]
-    if missing:
-        parts.append(f"No drive is long enough for {' and '.join(missing)}.")
-    return " ".join(parts)
-
-
-Table = dict[str, dict[str, Array]]
-
-
-def _resampled(errors: Errors, clusters: NDArray[np.int64], rng: np.random.Generator) -> Table:
-    """Root mean squares (1 + DRAWS,) by model and quantity, the first of all windows, the others of drawn clusters.
-
-    The ceiling is the least of all but the raw one, in every draw.
-    """
-    count = int(clusters.max()) + 1
-    drawn = rng.integers(count, size=(DRAWS, count))
-    times = np.stack([np.bincount(row, minlength=count) for row in drawn]).astype(float)
-    times = np.concatenate([np.ones((1, count)), times]) if count > 1 else np.ones((1, count))
-    table: Table = {}
-    for model, by_quantity in errors.items():
-        table[model] = {}
-        for quantity, values in by_quantity.items():
-            known = np.isfinite(values)
-            if not known.any():
-                continue
-            squares = np.bincount(clusters[known], values[known] ** 2, minlength=count)
-            number = np.bincount(clusters[known], minlength=count)
-            with np.errstate(invalid="ignore", divide="ignore"):
-                table[model][quantity] = np.sqrt((times @ squares) / (times @ number))
-    table.setdefault("corrected", table["refitted"])
-    rivals = [table[name] for name in ("refitted", "corrected", "black_box", "flexible") if name in table]
-    table["ceiling"] = {q: np.min([rival[q] for rival in rivals], axis=0) for q in table["refitted"]}
-    return table
-
-
-def _entry(table: Table, quantity: str, errors: Errors) -> dict[str, Any]:
-    entry: dict[str, Any] = {name: _estimate(table[name][quantity]) for name in MODELS}
-    count = int(np.isfinite(errors["refitted"][quantity]).sum())
-    return entry | {"unit": UNITS[quantity], "count": count}
-
-
-def _estimate(values: Array) -> dict[str, Any]:
-    """The first value, and the interval of the others."""
-    rest = values[1:][np.isfinite(values[1:])]
-    if rest.size < DRAWS // 2:
-        return {"value": float(values[0]), "interval": None}
-    tail = 0.5 * (1.0 - LEVEL)
-    low, high = np.quantile(rest, [tail, 1.0 - tail])
-    return {"value": float(values[0]), "interval": [float(low), float(high)]}
-
-
-def gain_share(table: Table, quantities: Sequence[str]) -> dict[str, Any] | None:
-    """Share of what the ceiling gains over the refitted nominal model that the named effects gain.
-
-    Every quantity counts by its error over that of the refitted model. None where not even the ceiling gains
-    :data:`LEAST_EXPLAINABLE`.
-    """
-    names = [name for name in quantities if name in table["refitted"] and table["refitted"][name][0] > 0.0]
-    if not names:
-        return None
-    base = np.stack([table["refitted"][name] for name in names])
-
-    def gained(model: str) -> Array:
-        return np.asarray(1.0 - np.mean(np.stack([table[model][name] for name in names]) / base, axis=0))
-
-    reachable, reached = gained("ceiling"), gained("corrected")
-    if reachable[0] < LEAST_EXPLAINABLE:
-        return None
-    sound = reachable > 0.5 * LEAST_EXPLAINABLE
-    sound[0] = True
-    return _estimate(np.where(sound, reached / np.where(sound, reachable, 1.0), np.nan))

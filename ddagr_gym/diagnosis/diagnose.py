@@ -13,7 +13,7 @@ from ddagr_gym.diagnosis.held import Held, find_held, hold_effect, without_repea
 from ddagr_gym.diagnosis.inputs import data_source
 from ddagr_gym.diagnosis.misfit import roughest
 from ddagr_gym.diagnosis.problem import Problem
-from ddagr_gym.diagnosis.search import Found, Standing, search
+from ddagr_gym.diagnosis.search import MOST_EFFECTS, Found, Standing, search
 from ddagr_gym.diagnosis.setting import Setting, make_problem
 from ddagr_gym.diagnosis.thresholds import Thresholds
 from ddagr_gym.diagnosis.uncertainty import intervals, least_detectable, resampled_parameters
@@ -187,7 +187,11 @@ def _channel_shares(nominal: Standing, chosen: Standing) -> dict[str, float]:
 def _verdict(found: Found, names: Sequence[str], thresholds: Thresholds) -> tuple[tuple[str, ...], bool]:
     """Three values: named and complete, named but incomplete, none of these; or nothing at all."""
     _, left = roughest(found.chosen.misfit, dict(thresholds.misfit))
-    complete = left <= 1.0 and not any(thresholds.passes(g.name, g.gain, found.chosen) for g in found.chosen.gains)
+    # what passed the gate and was not added has failed in a joint refit, unless the search stopped at its limit
+    more = len(found.chosen.names) >= MOST_EFFECTS and any(
+        thresholds.passes(g.name, g.gain, found.chosen) for g in found.chosen.gains
+    )
+    complete = left <= 1.0 and not more
     if not names:
         return ((NONE,), True) if complete else ((UNKNOWN,), False)
     _, before = roughest(found.nominal.misfit, dict(thresholds.misfit))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,6 +9,7 @@ from ddagr_gym.diagnosis.localisation import piece_values
 from ddagr_gym.diagnosis.problem import Problem
 from ddagr_gym.diagnosis.refit import Fitted
 from ddagr_gym.diagnosis.score_process import (
+    as_it_stands,
     in_blocks,
     piece_length,
     pieces_of,
@@ -39,7 +38,8 @@ def gather_evidence(problem: Problem, found: Found, thresholds: Thresholds | Non
     pieces = piece_values(problem, chosen)
     shape = (windows.count, int(pieces_of(problem)[-1]) + 1)
     processes = score_processes(problem, chosen)
-    wrench = residual_wrench(problem, found.nominal.fitted, chosen, found.chosen.dispersion)
+    raw = as_it_stands(problem, found.nominal.fitted)
+    wrench = residual_wrench(problem, raw, chosen, found.chosen.dispersion)
     measured = _means(problem, np.nan_to_num(windows.measured))
     gains = {item.name: item.gain for item in found.nominal.gains}
     left = {item.name: item.gain for item in found.chosen.gains}
@@ -55,7 +55,7 @@ def gather_evidence(problem: Problem, found: Found, thresholds: Thresholds | Non
         windows.time,
         _means(problem, chosen.prediction)[..., 5:8],
         np.where(np.isfinite(problem.blocked.sigma), measured, np.nan),
-        _shown(problem, _raw(problem, found.nominal.fitted), measured),
+        _shown(problem, raw, measured),
         _shown(problem, found.nominal.fitted, measured),
         _shown(problem, chosen, measured),
         problem.blocked.sigma,
@@ -74,12 +74,6 @@ def gather_evidence(problem: Problem, found: Found, thresholds: Thresholds | Non
         wrench.after,
         wrench.deviation,
     )
-
-
-def _raw(problem: Problem, nominal: Fitted) -> Fitted:
-    """The nominal model as it stands, from the initial states that suit the refitted one."""
-    point = replace(nominal.point, values=np.zeros(len(problem.prior)))
-    return replace(nominal, point=point, prediction=problem.predict(point))
 
 
 def _means(problem: Problem, values: Array) -> Array:

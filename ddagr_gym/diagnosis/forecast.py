@@ -37,7 +37,16 @@ LAST = 0.5
 SPEED_TIME = 1.0
 """Time over which a speed is taken from poses [s]."""
 
-STATE_ENTRIES = (layout.X, layout.Y, layout.YAW, layout.V_X, layout.V_Y, layout.YAW_RATE, layout.OMEGA, layout.OMEGA + 1)
+STATE_ENTRIES = (
+    layout.X,
+    layout.Y,
+    layout.YAW,
+    layout.V_X,
+    layout.V_Y,
+    layout.YAW_RATE,
+    layout.OMEGA,
+    layout.OMEGA + 1,
+)
 """Entries of the simulator's row that are STATE of :mod:`ddagr_gym.replay.windows`."""
 
 UNITS = {name: SCHEMA[name].unit for name in CHANNELS} | {"position": "m", "speed": "m/s", "heading": "rad"}
@@ -192,7 +201,7 @@ def _mean(values: Array) -> Array:
 
 def _speed_error(windows: WindowSet, prediction: Array, stop: int) -> Array:
     """Distance between the last pose and the one a second before it, predicted less measured, over the time between."""
-    known = np.isfinite(windows.measured[:, :stop][..., _XY]).all(axis=-1)
+    known = np.asarray(np.isfinite(windows.measured[:, :stop][..., _XY]).all(axis=-1))
     back, reach = round(SPEED_TIME / windows.period), round(LAST / windows.period)
     error = np.full(windows.count, np.nan)
     for w in range(windows.count):

@@ -42,11 +42,12 @@ def first_guess(candidate: Candidate, multiples: Sequence[float]) -> Effect:
 def _whole(candidate: Candidate) -> Effect:
     """A categorical probe taken to its bound."""
     probe = candidate.probes[0]
+    moved = {}
     for name in probe.size_names():
         data = probe.parameter(name).metadata
         if getattr(probe, name) != data["neutral"]:
-            return probe.with_values(**{name: data["high"]})  # type: ignore[no-any-return]
-    return probe
+            moved[name] = data["high"]
+    return probe.with_values(**moved)  # type: ignore[no-any-return]
 
 
 def _slope(candidate: Candidate, multiples: Sequence[float]) -> Effect:

@@ -229,11 +229,13 @@ class _Direction:
 
 
 def _directions(name: str, terms: Terms, matrix: Array, gate: float) -> list[_Direction]:
-    """Probes of an effect's best-placed candidate, or all of an effect whose probes are limits or flips."""
+    """Probes of an effect's best-placed candidate; of limits and flips those that the table states."""
     own = [c for c in terms.candidates if c.name == name]
     found = [[_direction(c, k, matrix, gate) for k in range(len(c.columns))] for c in own]
     if own[0].whole is not None or not own[0].probes[0].differentiable:
-        return [item for group in found for item in group]
+        every = [item for group in found for item in group]
+        stated = _best_by_field([item.size for item in every])
+        return [item for item in every if item.size in stated]
     return min(found, key=lambda group: min(item.size.multiples for item in group))
 
 
@@ -299,10 +301,15 @@ def _pair(
         imitated = max(_imitated(direction, c, matrix) for c in rivals)
         share = min(max(1.0 - imitated / own, 0.0), 1.0)
         needed = math.sqrt(2.0 * APART / (share * own)) / direction.least if share > 1e-9 else math.inf
-        multiples = max(needed, direction.size.multiples)
+        multiples = max(needed, _shown(direction, directions))
         if share < worst[0] or (share == worst[0] and multiples > worst[1]):
             worst = (share, multiples)
     return worst if worst[1] > 0.0 else (1.0, min(d.size.multiples for d in directions))
+
+
+def _shown(direction: _Direction, directions: Sequence[_Direction]) -> float:
+    """Multiples that the table states for the field of a direction: those of its worst one."""
+    return max(d.size.multiples for d in directions if d.size.field == direction.size.field)
 
 
 def _imitated(direction: _Direction, rival: Candidate, matrix: Array) -> float:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ddagr_gym.diagnosis.misfit import LOCAL
 from ddagr_gym.diagnosis.problem import Problem
 from ddagr_gym.diagnosis.refit import Fitted
 from ddagr_gym.diagnosis.regimes import Pieces, RegimeShare, Unevenness, shares, uneven
@@ -15,6 +16,7 @@ from ddagr_gym.diagnosis.regimes_words import phrase_of, uneven_phrase
 from ddagr_gym.diagnosis.score_process import (
     ScoreProcess,
     Span,
+    as_it_stands,
     by_piece,
     in_blocks,
     piece_length,
@@ -109,7 +111,7 @@ class WrenchSummary:
     Attributes:
         component: F_x, F_y or M_z, body axes at the body origin.
         unit: of the numbers.
-        before: mean that the nominal model lacks.
+        before: mean that the nominal model lacks as it stands.
         after: the same of the corrected model.
         deviation: standard deviation of both.
         chi_before: root mean square over the standard deviation; about 1 where nothing is missing.
@@ -161,9 +163,7 @@ def locate(problem: Problem, found: Found) -> Localisation:
         process.name: _where(problem, process, effect, pieces, chosen.dispersion)
         for process, effect in zip(processes, chosen.fitted.point.effects, strict=True)
     }
-    before, after = (
-        in_blocks(problem, projected_residual(problem, model.fitted)) ** 2 for model in (nominal, chosen)
-    )
+    before, after = (in_blocks(problem, projected_residual(problem, model.fitted)) ** 2 for model in (nominal, chosen))
     return Localisation(
         channels,
         explained,
@@ -178,13 +178,14 @@ def locate(problem: Problem, found: Found) -> Localisation:
 
 def rough(misfit: Mapping[str, float]) -> list[str]:
     """Channels whose mean square stands so far above that of noise that it can be said where."""
-    return [name for name, value in misfit.items() if value > _ROUGH]
+    return [name for name, value in misfit.items() if name in CHANNELS and value > _ROUGH]
 
 
 def samples(problem: Problem) -> dict[str, float]:
-    """Block means of each channel."""
+    """Block means of each channel, and windows of each local variation."""
     count = problem.blocked.mask.reshape(problem.blocked.sigma.shape).sum(axis=(0, 1))
-    return {name: float(count[k]) for k, name in enumerate(CHANNELS) if count[k] > 0}
+    found = {name: float(count[k]) for k, name in enumerate(CHANNELS) if count[k] > 0}
+    return found | dict.fromkeys(LOCAL, float(problem.blocked.windows.count))
 
 
 def channel_shares(
@@ -215,7 +216,7 @@ def piece_values(problem: Problem, fitted: Fitted) -> Pieces:
     prediction, record = problem.model.predict_recorded(
         fitted.point.values, fitted.point.states, _RECORDED, fitted.point.effects
     )
-    _, blocks, length, _ = problem.blocked.weights.shape
+    length = problem.blocked.weights.shape[2]
     sample_piece = np.repeat(pieces, length)
     kept = len(sample_piece)
 
@@ -271,7 +272,7 @@ def _where(
     other = uneven(process.remainder.ravel(), process.information.ravel(), window, pieces, rng)
     places = _fitted_place(effect) or _standing_place(lying)
     covered = time_share(shown, windows.count, windows.duration)
-    phrase = phrase_of(lying, _fitted_place(effect))
+    phrase = phrase_of(lying, _fitted_place(effect), covered)
     if other is not None:
         phrase = f"{phrase}; {uneven_phrase(other)}"
     return Where(shown, covered, lying, places, other, phrase)
@@ -306,17 +307,16 @@ def _mismatch(problem: Problem, squares: Array, channels: Sequence[str], pieces:
 def _lying(weight: Array, pieces: Pieces) -> Where:
     """Where a weight of the pieces lies, without spans."""
     lying = shares(weight, pieces, np.random.default_rng(_SEED))
-    return Where((), 0.0, lying, _standing_place(lying), None, phrase_of(lying, ()))
+    return Where((), 0.0, lying, _standing_place(lying), None, phrase_of(lying))
 
 
 def _wrench(problem: Problem, found: Found) -> tuple[WrenchSummary, ...]:
-    wrench = residual_wrench(problem, found.nominal.fitted, found.chosen.fitted, found.chosen.dispersion)
+    raw = as_it_stands(problem, found.nominal.fitted)
+    wrench = residual_wrench(problem, raw, found.chosen.fitted, found.chosen.dispersion)
     summaries = []
     for k, (component, unit) in enumerate(COMPONENTS):
         precision = wrench.deviation[:, k] ** -2
         before, after = (float(v[:, k] @ precision / precision.sum()) for v in (wrench.before, wrench.after))
         chi = [float(np.sqrt(np.mean(v[:, k] ** 2 * precision))) for v in (wrench.before, wrench.after)]
-        summaries.append(
-            WrenchSummary(component, unit, before, after, float(precision.sum() ** -0.5), chi[0], chi[1])
-        )
+        summaries.append(WrenchSummary(component, unit, before, after, float(precision.sum() ** -0.5), chi[0], chi[1]))
     return tuple(summaries)

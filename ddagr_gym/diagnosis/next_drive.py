@@ -1,7 +1,7 @@
 """What to drive next: the manoeuvre of a bank in which the remaining rivals would differ most.
 
-Each rival is taken for the truth at its fitted size. What it would do to the readings of a manoeuvre is then explained as
-well as possible by another rival, whose size, with the windows' unknowns and the nominal parameters, is refitted
+Each rival is taken for the truth at its fitted size. What it would do to the readings of a manoeuvre is then explained
+as well as possible by another rival, whose size, with the windows' unknowns and the nominal parameters, is refitted
 linearly. Half the square of what is left over the noise is the gain by which the right name would lead; it is compared
 per minute of driving.
 """
@@ -19,14 +19,15 @@ from numpy.typing import NDArray
 from ddagr_gym.control.manoeuvres import MANOEUVRES, Manoeuvre
 from ddagr_gym.diagnosis.candidates import Candidate, candidates_of
 from ddagr_gym.diagnosis.isolability import APART
-from ddagr_gym.diagnosis.planned import SENSORS, Plan, free_of_nuisances, plan
+from ddagr_gym.diagnosis.planned import RATE, SENSORS, Plan, free_of_nuisances, plan
 from ddagr_gym.diagnosis.scores import drive_extent, probe_column
 from ddagr_gym.diagnosis.size_prior import TYPICAL_MULTIPLE
 from ddagr_gym.errors import InputError
-from ddagr_gym.parameters import Robot, Soil
+from ddagr_gym.parameters import Imu, Robot, Sensors, Soil
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.effects.registry import effect_kind
 from ddagr_gym.replay.windows import CHANNELS
+from ddagr_gym.simulator import simulate
 
 Array = NDArray[np.float64]
 
@@ -93,8 +94,9 @@ def next_drive(
 
     Returns:
         ``manoeuvre`` (name, "" where none of the bank helps), ``why`` (a sentence), ``separates`` (pairs of names that
-        it tells apart within MOST_MINUTES), ``power`` (least expected gain of a pair per minute of driving), ``minutes``
-        (until the worst pair is told apart; null where never), ``alternatives`` (further manoeuvres with the same).
+        it tells apart within MOST_MINUTES), ``power`` (least expected gain of a pair per minute of driving),
+        ``minutes`` (until the worst pair is told apart; None where never), ``alternatives`` (further manoeuvres with
+        the same).
 
     Raises:
         InputError: no rival, or the same one twice.
@@ -102,12 +104,10 @@ def next_drive(
     _check(rivals)
     manoeuvres = tuple(MANOEUVRES.values()) if bank is None else tuple(bank)
     planned = [_timeless(rival) for rival in rivals]
-    progress("simulating the bank of manoeuvres")
-    prepared = plan(robot, soil, manoeuvres, sensors, seed=seed)
     place = _place(planned)
-    if place is not None:
-        starts = [_towards(place, prepared, number) for number in range(len(manoeuvres))]
-        prepared = plan(robot, soil, manoeuvres, sensors, starts=starts, seed=seed)
+    starts = None if place is None else [_towards(place, robot, soil, item) for item in manoeuvres]
+    progress("simulating the bank of manoeuvres")
+    prepared = plan(robot, soil, manoeuvres, sensors, starts=starts, seed=seed)
     progress("simulating the rivals")
     columns = _columns(prepared, planned)
     found = [_separations(prepared, columns, number, len(planned)) for number in range(len(manoeuvres))]
@@ -138,12 +138,12 @@ def _place(rivals: Sequence[Effect]) -> tuple[float, float] | None:
     return None
 
 
-def _towards(place: tuple[float, float], prepared: Plan, number: int) -> tuple[float, float, float]:
+def _towards(place: tuple[float, float], robot: Robot, soil: Soil, manoeuvre: Manoeuvre) -> tuple[float, float, float]:
     """Start from which a manoeuvre passes over a place about half way."""
-    windows = prepared.problem.blocked.windows
-    path = prepared.fitted.prediction[windows.recording == number][..., 5:7].reshape(-1, 2)
-    middle = path[len(path) // 2]
-    return place[0] - float(middle[0]), place[1] - float(middle[1]), 0.0
+    suite = Sensors(Imu(sample_rate=RATE))
+    columns = simulate(robot, soil, manoeuvre.commands(RATE), sensors=suite)
+    middle = len(columns["t"]) // 2
+    return place[0] - float(columns["true_x"][middle]), place[1] - float(columns["true_y"][middle]), 0.0
 
 
 def _columns(prepared: Plan, rivals: Sequence[Effect]) -> _Columns:
@@ -151,7 +151,7 @@ def _columns(prepared: Plan, rivals: Sequence[Effect]) -> _Columns:
     problem, fitted = prepared.problem, prepared.fitted
     extent = drive_extent(problem, fitted.prediction)
     free = np.flatnonzero(problem.free)
-    columns = [problem_column for problem_column in np.moveaxis(fitted.by_parameter[..., free], 2, 0)]
+    columns = list(np.moveaxis(fitted.by_parameter[..., free], 2, 0))
     whole, probes = [], []
     for rival in rivals:
         whole.append(len(columns))
@@ -209,16 +209,10 @@ def _left_over(
     answer = np.linalg.solve(inside[:-1, :-1] + np.diag(ridge), inside[:-1, -1])
     rest = table[..., truth] - table[..., index[:-1]] @ answer
     rows = rest.shape[1] // len(CHANNELS) * len(CHANNELS)
-    energy = np.zeros(len(CHANNELS))
-    means = _means(rest, rows)
-    energy = (means**2).sum(axis=(0, 1))
+    # the rows of the priors lie below the block means
+    energy = (rest[:, :rows].reshape(rest.shape[0], -1, len(CHANNELS)) ** 2).sum(axis=(0, 1))
     whole = float(energy.sum())
     return _Separation(gain, tuple((energy / whole).tolist() if whole > 0.0 else energy.tolist()))
-
-
-def _means(rest: Array, rows: int) -> Array:
-    """(W, B, 8) of the rows that are block means; those of the priors lie below them."""
-    return rest[:, :rows].reshape(rest.shape[0], -1, len(CHANNELS))
 
 
 def _answer(
@@ -263,15 +257,20 @@ def _why(
     (a, b), worst = min(found.items(), key=lambda item: item[1].gain)
     channel = CHANNELS[int(np.argmax(worst.channels))]
     share = 100.0 * max(worst.channels)
-    time = f"{60.0 * needed:.0f} s" if needed < 2.0 else f"{needed:.0f} min"
     if b < 0:
         what = f"{rivals[a].name} stands out from what soil and robot may do"
     else:
         what = f"{rivals[a].name} leaves readings that {rivals[b].name} cannot imitate"
-    return (
-        f"{manoeuvre.description}: {what}, {share:.0f} % of it in {channel}; {time} of it leave the wrong answer a "
-        "weight of 5 %."
-    )
+    return f"{manoeuvre.description}: {what}, {share:.0f} % of it in {channel}; {_runs(manoeuvre, needed)}."
+
+
+def _runs(manoeuvre: Manoeuvre, needed: float) -> str:
+    """How often it has to be driven until the wrong name keeps a weight of 5 percent."""
+    if not math.isfinite(needed):
+        return "no number of runs is enough"
+    runs = math.ceil(60.0 * needed / manoeuvre.duration)
+    length = f"{manoeuvre.duration:.0f} s"
+    return f"one run of {length} is enough" if runs <= 1 else f"{runs} runs of {length} are needed"
 
 
 def _nothing(rivals: Sequence[Effect]) -> str:

@@ -1,6 +1,6 @@
 """All steps of a diagnosis in their order, each kept when it is finished.
 
-    windows -> search -> verdict -> certification -> localisation -> unnamed terms -> evidence
+windows -> search -> verdict -> certification -> localisation -> unnamed terms -> next drive -> evidence
 """
 
 from __future__ import annotations
@@ -19,18 +19,20 @@ from ddagr_gym.diagnosis.diagnose import Prepared, conclude, prepare
 from ddagr_gym.diagnosis.evidence import Evidence, gather_evidence
 from ddagr_gym.diagnosis.inputs import check_recordings, content_hash
 from ddagr_gym.diagnosis.localisation import locate
+from ddagr_gym.diagnosis.next_drive import next_drive, rivals_of_diagnosis, sensors_of_diagnosis
 from ddagr_gym.diagnosis.search import Found, search
 from ddagr_gym.diagnosis.setting import Setting
 from ddagr_gym.diagnosis.sources import source_digest
 from ddagr_gym.diagnosis.store import StepStore
 from ddagr_gym.diagnosis.thresholds import Thresholds
 from ddagr_gym.diagnosis.unnamed import unnamed_terms
-from ddagr_gym.diagnosis.verdict import UNKNOWN, Diagnosis
+from ddagr_gym.diagnosis.verdict import UNKNOWN, Diagnosis, as_mapping
+from ddagr_gym.errors import InputError
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.recordings.schema import Recording
 
-STEPS = ("search", "verdict", "certification", "localisation", "unnamed terms", "evidence")
+STEPS = ("search", "verdict", "certification", "localisation", "unnamed terms", "next drive", "evidence")
 """Names of the steps that are kept."""
 
 
@@ -119,12 +121,12 @@ def run(
     fit = step("certification", lambda: _certified(task, prepared, found, diagnosis, progress))
     where = step("localisation", lambda: asdict(locate(prepared.problem, found)))
     unnamed = step("unnamed terms", lambda: _unnamed(task, prepared, found, diagnosis))
+    following = step("next drive", lambda: _next_drive(task, diagnosis, progress))
     evidence = step("evidence", lambda: gather_evidence(prepared.problem, found, task.thresholds))
     findings = tuple(replace(f, where=where["findings"].get(f.name)) for f in diagnosis.findings)
     seconds = time.monotonic() - began
-    diagnosis = replace(
-        diagnosis, findings=findings, fit=fit, localisation=where, unnamed=unnamed, seconds=seconds
-    )
+    entries = {"fit": fit, "localisation": where, "unnamed": unnamed, "next_drive": following}
+    diagnosis = replace(diagnosis, findings=findings, seconds=seconds, **entries)
     return Outcome(diagnosis, effects, prepared, found, evidence)
 
 
@@ -134,6 +136,17 @@ def _unnamed(task: Task, prepared: Prepared, found: Found, diagnosis: Diagnosis)
         return None
     standing = found.nominal if diagnosis.verdict == (UNKNOWN,) else found.chosen
     return unnamed_terms(prepared.problem, standing, task.rng("unnamed terms")).as_mapping()
+
+
+def _next_drive(task: Task, diagnosis: Diagnosis, progress: Callable[[str], None]) -> Mapping[str, Any]:
+    """The drive that would tell what is left open apart; without one, why there is none."""
+    mapping = as_mapping(diagnosis)
+    sensors = sensors_of_diagnosis(mapping)
+    try:
+        rivals = rivals_of_diagnosis(mapping)
+        return next_drive(task.robot, task.soil, rivals, sensors=sensors, seed=task.seed, progress=progress)
+    except InputError as error:
+        return {"manoeuvre": "", "why": str(error), "separates": [], "power": 0.0, "minutes": None, "alternatives": []}
 
 
 def _certified(

@@ -17,6 +17,15 @@ Array = NDArray[np.float64]
 
 _DAMPING = (1.0, 0.5, 0.25, 0.1, 0.03)
 _LONGEST = 3.0  # standard deviations that a parameter moves in one step: beyond, the sensitivities are of no use
+_KEPT = frozenset(
+    {
+        ("payload", "x"), ("payload", "y"), ("payload", "height"), ("lateral_bulldozing", "density"),
+        ("soil_patch", "edge"), ("towed_drag", "hitch_distance"),
+    }
+)  # fmt: skip
+"""Shapes that a diagnosis leaves at their defaults: free, they let one effect stand for another (a payload that is not
+at the centre is a centre of mass offset too), and drives hardly show them."""
+
 _EFFECT_RENEWALS = 5  # effects are less linear than nuisances, and fewer
 _STATES = len(STATE_PRIOR)
 _NEVER = 1e5  # an onset at which an effect holds always, or never
@@ -84,6 +93,8 @@ def effect_parameters(effects: Sequence[Effect], fixed: frozenset[str] = frozens
         for name in (*effect.size_names(), *effect.shape_names()):
             data = effect.parameter(name).metadata
             at_neutral = not effect.differentiable and getattr(effect, name) == data["neutral"]
+            if (effect.name, name) in _KEPT:
+                continue
             if data["step"] == 0.0 or name in fixed or abs(getattr(effect, name)) > _NEVER or at_neutral:
                 continue
             of_size = data["neutral"] is not None and effect.differentiable

@@ -96,7 +96,8 @@ class RegimeShare:
     @property
     def stands_out(self) -> bool:
         """Whether it is worth a phrase."""
-        return self.p < LEVEL and self.excess >= LEAST_EXCESS
+        bounded = self.name == "place" or self.low is not None or self.high is not None
+        return bounded and self.p < LEVEL and self.excess >= LEAST_EXCESS
 
 
 def shifted(weight: Array, recording: Integers, rng: np.random.Generator, count: int) -> Array:
@@ -196,8 +197,10 @@ def _ends(values: Array, order: Integers, first: int, last: int, circular: bool)
     if circular:
         return float(ranked[first % count]), float(ranked[(last - 1) % count])
     near = _NEAR_END * count
-    low = None if first <= near else float(0.5 * (ranked[first - 1] + ranked[first]))
-    high = None if last >= count - near else float(0.5 * (ranked[last - 1] + ranked[last]))
+    open_low = first <= near or ranked[first] == ranked[0]
+    open_high = last >= count - near or ranked[last] == ranked[-1]
+    low = None if open_low else float(0.5 * (ranked[first - 1] + ranked[first]))
+    high = None if open_high else float(0.5 * (ranked[last - 1] + ranked[last]))
     return low, high
 
 

@@ -10,6 +10,13 @@ from ddagr_gym.diagnosis.regimes import RegimeShare, Unevenness
 from ddagr_gym.reporting.wording import number
 
 EVERYWHERE = "everywhere"
+NOWHERE_MORE = "no motion, place or time stands out"
+
+_MOST_OF_IT = 0.6
+"""Share of the driven time from which what shows in it is said to be everywhere (ours)."""
+
+_BACKWARDS = 0.02
+"""Speed at which a range ends that means driving backwards [m/s] (ours)."""
 
 _ONLY = 0.95
 """Share of the weight from which "only" is said instead of "mostly" (ours)."""
@@ -48,6 +55,8 @@ def range_in_words(name: str, low: float | None, high: float | None) -> str:
     if name == "heading" and low is not None and high is not None:
         ends = [f"{math.degrees(end):.0f}".replace("-", "−") for end in (low, high)]
         return f"while heading between {ends[0]} and {ends[1]} degrees"
+    if name == "speed" and low is None and high is not None and abs(high) < _BACKWARDS:
+        return "while driving backwards"
     words, unit = _RANGES[name]
     after = f" {unit}" if unit else ""
     if low is None and high is None:
@@ -59,18 +68,19 @@ def range_in_words(name: str, low: float | None, high: float | None) -> str:
     return f"{words} between {number(low)} and {number(high)}{after}"
 
 
-def phrase_of(lying: Sequence[RegimeShare], fitted: Sequence[Disc]) -> str:
+def phrase_of(lying: Sequence[RegimeShare], fitted: Sequence[Disc] = (), covered: float = 0.0) -> str:
     """What stands out, in words.
 
     Args:
         lying: how the weight lies over the regimes, what stands out first.
         fitted: place of an effect that is bound to one.
+        covered: share of the driven time in which it shows.
     """
     if fitted:
         place = fitted[0]
         return f"within {number(place.radius)} m of ({number(place.x)}, {number(place.y)}) m"
     if not lying or not lying[0].stands_out:
-        return EVERYWHERE
+        return EVERYWHERE if covered >= _MOST_OF_IT else NOWHERE_MORE
     first = lying[0]
     degree = "only" if first.weight_inside >= _ONLY else "mostly"
     if first.name == "place":

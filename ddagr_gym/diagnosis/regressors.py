@@ -172,8 +172,8 @@ def _channels() -> tuple[str, ...]:
 
 
 def _present(problem: Problem) -> set[str]:
-    known = np.isfinite(problem.blocked.sigma).any(axis=(0, 1))
-    return {name for name, some in zip(_channels(), known, strict=True) if some}
+    known = np.asarray(np.isfinite(problem.blocked.sigma).any(axis=(0, 1)))
+    return {name for name, some in zip(_channels(), known.tolist(), strict=True) if some}
 
 
 def _body(motion: Motion, problem: Problem) -> list[Signal]:

@@ -84,9 +84,7 @@ class Response:
 def course_of(problem: Problem, fitted: Fitted) -> Course:
     """Motion and torques that a fitted model predicts."""
     point = fitted.point
-    _, record = problem.model.predict_recorded(
-        point.values, point.states, (*_ENTRIES, *_TORQUES), point.effects
-    )
+    _, record = problem.model.predict_recorded(point.values, point.states, (*_ENTRIES, *_TORQUES), point.effects)
     torque = record[..., len(_ENTRIES) :]
     banks = np.stack([torque[..., 0] + torque[..., 2], torque[..., 1] + torque[..., 3]], axis=2)
     return Course(record[..., : len(_ENTRIES)], banks)

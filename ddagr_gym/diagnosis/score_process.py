@@ -8,7 +8,7 @@ effect is at work as fitted, and nothing where it is not; raw residuals change f
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -34,7 +34,7 @@ _PENALTY = 3.0
 """Of a change point, times the logarithm of the number of pieces (ours: above the 2 of Yao's criterion)."""
 
 _LEAST_INFORMATION = 0.05
-"""Information of a piece over the mean of all pieces, below which it cannot show an effect (ours)."""
+"""Squared size of an effect in a piece over the mean of all pieces, below which it does not act there (ours)."""
 
 _CLOSED_GAP = 1.0
 """Time between pieces up to which they belong to one stretch [s] (ours)."""
@@ -53,6 +53,7 @@ class ScoreProcess:
         information: (W, Q) squared size of the effect: the score's variance, and its mean as the effect was fitted.
         gain: (W, Q) fall of the cost by the effect.
         remainder: (W, Q) inner product of the residual beside the effect and the effect; sums to nearly nothing.
+        own: (W, Q) squared size of the effect before the nuisances' answer, which reaches pieces where it does nothing.
     """
 
     name: str
@@ -60,6 +61,7 @@ class ScoreProcess:
     information: Array
     gain: Array
     remainder: Array
+    own: Array
 
 
 @dataclass(frozen=True)
@@ -118,6 +120,12 @@ def projected_residual(problem: Problem, fitted: Fitted) -> Array:
     return np.asarray(fitted.elimination.project(raw)[..., 0])
 
 
+def as_it_stands(problem: Problem, nominal: Fitted) -> Fitted:
+    """The nominal model before any refit, from the initial states that suit the refitted one."""
+    point = replace(nominal.point, values=np.zeros(len(problem.prior)))
+    return replace(nominal, point=point, prediction=problem.predict(point))
+
+
 def in_blocks(problem: Problem, values: Array) -> Array:
     """(W, B, 8) of (W, M + S): without the rows of the priors."""
     return values[:, : problem.blocked.mask.shape[1]].reshape(problem.blocked.sigma.shape)
@@ -134,15 +142,15 @@ def score_processes(problem: Problem, fitted: Fitted) -> tuple[ScoreProcess, ...
         return ()
     pieces = pieces_of(problem)
     left = in_blocks(problem, projected_residual(problem, fitted))
-    answer = _nuisance_answer(problem, fitted)
+    without = _without_nuisances(problem, fitted)
     found = []
     for number, effect in enumerate(fitted.point.effects):
-        moved = in_blocks(problem, answer(_effect_column(problem, fitted, number)))
+        column = _effect_column(problem, fitted, number)
+        own = fitted.elimination.project(problem.padded(column[..., None]))[..., 0]
+        moved = in_blocks(problem, without(own))
         information = by_piece(moved**2, pieces)
         beside = by_piece(left * moved, pieces)
-        found.append(
-            ScoreProcess(effect.name, beside + information, information, beside + 0.5 * information, beside)
-        )
+        found.append(ScoreProcess(effect.name, beside + information, information, beside + 0.5 * information, beside))
     return tuple(found)
 
 
@@ -153,20 +161,17 @@ def _effect_column(problem: Problem, fitted: Fitted, number: int) -> Array:
     return np.nan_to_num(problem.blocked.means(fitted.prediction - problem.predict(without)))
 
 
-class _nuisance_answer:  # noqa: N801
-    """Takes from a column (W, M) what windows' unknowns and nuisances can explain of it, (W, M + S)."""
+def _without_nuisances(problem: Problem, fitted: Fitted) -> Callable[[Array], Array]:
+    """Function that takes from a column (W, M + S), projected already, what the nuisances explain of it."""
+    free = np.flatnonzero(problem.free)
+    columns = fitted.elimination.project(problem.padded(fitted.by_parameter[..., free]))
+    inside = np.einsum("wmp,wmq->pq", columns, columns, optimize=True) + np.diag(1.0 / problem.prior[free] ** 2)
 
-    def __init__(self, problem: Problem, fitted: Fitted) -> None:
-        free = np.flatnonzero(problem.free)
-        self._problem, self._elimination = problem, fitted.elimination
-        self._columns = fitted.elimination.project(problem.padded(fitted.by_parameter[..., free]))
-        inside = np.einsum("wmp,wmq->pq", self._columns, self._columns, optimize=True)
-        self._inside = inside + np.diag(1.0 / problem.prior[free] ** 2)
+    def without(own: Array) -> Array:
+        change = np.linalg.solve(inside, np.einsum("wmp,wm->p", columns, own))
+        return np.asarray(own - columns @ change)
 
-    def __call__(self, column: Array) -> Array:
-        own = self._elimination.project(self._problem.padded(column[..., None]))[..., 0]
-        change = np.linalg.solve(self._inside, np.einsum("wmp,wm->p", self._columns, own))
-        return np.asarray(own - self._columns @ change)
+    return without
 
 
 def change_points(signal: Array) -> list[int]:
@@ -206,7 +211,8 @@ def spans(
     """
     found: list[Span] = []
     total = max(float(process.gain.sum()), 1e-12)
-    least = _LEAST_INFORMATION * float(process.information.mean())
+    acts = process.own > _LEAST_INFORMATION * float(process.own.mean())
+    acts &= process.information > 1e-9
     count = process.score.shape[1]
     for number in np.unique(recording):
         rows = np.flatnonzero(recording == number)
@@ -215,7 +221,7 @@ def spans(
         last = np.arange(count) == count - 1
         end = np.where(np.tile(last, len(rows)), np.repeat(time[rows] + duration, count), start + piece)
         columns = np.stack([start, end, *(v[rows].ravel() for v in (process.score, process.information, process.gain))])
-        found += _shown(int(number), columns[:, columns[3] > least], total, dispersion)
+        found += _shown(int(number), columns[:, acts[rows].ravel()], total, dispersion)
     return tuple(found)
 
 

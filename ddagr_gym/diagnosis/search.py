@@ -20,7 +20,10 @@ from ddagr_gym.physics.effects import Effect
 Array = NDArray[np.float64]
 
 _TRIAL_STEPS = 3
-_HOPELESS = 0.05  # share of the best linear gain below which no joint refit is tried
+_HOPELESS = 0.4  # share of the best linear gain below which no joint refit is tried
+_LARGE = 100.0  # gain above which the linear scan may be far off: refits then begin from two points
+_HOPELESS_LARGE = 0.1  # the same share there
+_BENT = 4.0  # dispersion of the refitted nominal model above which the raw one is scanned too
 _CLOSE = 0.6  # share of the best joint gain above which a rival is fitted to the end
 
 MOST_EFFECTS = 3
@@ -105,19 +108,14 @@ def stand(problem: Problem, fitted: Fitted, progress: Callable[[str], None] = la
     return Standing(fitted, terms, found, scores(terms, found), held_out, dispersion, misfit)
 
 
-def _trial(problem: Problem, standing: Standing, effect: Effect, raw: Fitted) -> Fitted:
-    """A few steps with one further effect, from the standing model and from the raw nominal one; the better of both.
+def _trial(problem: Problem, standing: Standing, effect: Effect, start: Fitted) -> Fitted:
+    """A few steps with one further effect from a starting point, whose sensitivities of the nuisances serve.
 
-    A nominal refit bends soil and robot to make up for what is missing, so far that no step leads back. Sensitivities
-    of the nuisances are those of the two starting points.
+    Where something large is missing, a nominal refit bends soil and robot to make up for it, so far that no step leads
+    back: then the raw nominal model is a better start than the refitted one.
     """
-    effects = (*standing.fitted.point.effects, effect)
-    starts = ((standing.fitted.point, standing.fitted), (raw.point, raw))
-    trials = [
-        fit(problem, replace(point, effects=effects), iterations=_TRIAL_STEPS, renewals=2, reuse=reuse)
-        for point, reuse in starts
-    ]
-    return min(trials, key=lambda trial: trial.cost)
+    point = replace(start.point, effects=(*standing.fitted.point.effects, effect))
+    return fit(problem, point, iterations=_TRIAL_STEPS, renewals=2, reuse=start)
 
 
 def rivals_of(problem: Problem, standing: Standing, raw: Fitted, thresholds: Thresholds, most: int) -> list[Rival]:
@@ -130,18 +128,42 @@ def rivals_of(problem: Problem, standing: Standing, raw: Fitted, thresholds: Thr
         thresholds: of the gate.
         most: effects that are tried.
     """
-    passing = [gain for gain in standing.gains if thresholds.passes(gain.name, gain.gain, standing)]
-    ranked = sorted(passing, key=lambda item: -(item.gain - thresholds.of(item.name).gain))
-    ranked = [item for item in ranked[:most] if item.gain > _HOPELESS * ranked[0].gain]
+    ranked = _ranked(problem, standing, raw, thresholds)
+    large = bool(ranked) and ranked[0][0].gain > _LARGE
+    least = (_HOPELESS_LARGE if large else _HOPELESS) * ranked[0][0].gain if ranked else 0.0
     extent = drive_extent(problem, standing.fitted.prediction)
+    starts = [standing.fitted, raw] if large else [standing.fitted]
     tried = []
-    for gain in ranked:
-        effect = first_guess(standing.terms.candidates[gain.candidate], gain.multiples)
-        tried.append(_rival(standing, gain.name, _trial(problem, standing, effect, raw)))
+    for gain, terms in ranked[:most]:
+        if gain.gain > least:
+            effect = first_guess(terms.candidates[gain.candidate], gain.multiples)
+            trials = [_trial(problem, standing, effect, start) for start in starts]
+            best_start = min(range(len(trials)), key=lambda k: trials[k].cost)
+            # the start that serves the first rival serves the others
+            starts = [starts[best_start]]
+            tried.append(_rival(standing, gain.name, trials[best_start]))
     best = max((rival.gain for rival in tried), default=0.0)
     rivals = [_finish(problem, standing, rival) if rival.gain > _CLOSE * best else rival for rival in tried]
     kept = [rival for rival in rivals if rival.fitted.point.effects[-1].is_meaningful(extent)]
     return sorted(kept, key=lambda rival: implausibility(rival.fitted.point.effects[-1]) - rival.gain)
+
+
+def _ranked(problem: Problem, standing: Standing, raw: Fitted, thresholds: Thresholds) -> list[tuple[Gain, Terms]]:
+    """Effects that pass the gate with the scan that says so, best first.
+
+    Where the refitted nominal model is far off, soil and robot are bent so much that the truth may not show there: the
+    raw nominal model is scanned as well, and each effect has the larger of its gains.
+    """
+    scans = [standing]
+    if not standing.names and standing.dispersion > _BENT:
+        scans.append(stand(problem, raw))
+    best: dict[str, tuple[Gain, Terms]] = {}
+    for scan_ in scans:
+        for gain in scan_.gains:
+            better = gain.name not in best or gain.gain > best[gain.name][0].gain
+            if better and thresholds.passes(gain.name, gain.gain, scan_):
+                best[gain.name] = (gain, scan_.terms)
+    return sorted(best.values(), key=lambda item: thresholds.of(item[0].name).gain - item[0].gain)
 
 
 def _rival(standing: Standing, name: str, fitted: Fitted) -> Rival:

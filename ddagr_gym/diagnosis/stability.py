@@ -201,9 +201,7 @@ def _search(
     return Stable(columns[front[best]], alike, float(shares[best]))
 
 
-def _fronts(
-    gradient: Array, information: Array, member: NDArray[np.int64], plainness: Sequence[int]
-) -> list[int]:
+def _fronts(gradient: Array, information: Array, member: NDArray[np.int64], plainness: Sequence[int]) -> list[int]:
     """One column of each cluster: the plainest of those that explain nearly as much as the best."""
     gain = 0.5 * gradient**2 / np.diag(information)
     front = []

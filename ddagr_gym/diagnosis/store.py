@@ -76,7 +76,7 @@ def _save(folder: Path, name: str, value: Any) -> None:
     arrays: dict[int, tuple[str, NDArray[Any]]] = {}
     tree = encode(value, arrays)
     with atomic_path(folder / f"{name}.npz") as part, open(part, "wb") as stream:
-        np.savez(stream, **{key: array for key, array in arrays.values()})  # type: ignore[arg-type]
+        np.savez(stream, **dict(arrays.values()))  # type: ignore[arg-type]
     # the JSON marks the step as finished, and comes last
     with atomic_path(folder / f"{name}.json") as part:
         part.write_text(json.dumps(tree))
@@ -132,7 +132,7 @@ def _dataclass(name: str) -> type[Any]:
     module, _, qualified = name.partition(":")
     if module.split(".", 1)[0] != _PACKAGE:
         raise TypeError(f"{name} is no class of this package")
-    found = importlib.import_module(module)
+    found: Any = importlib.import_module(module)
     for part in qualified.split("."):
         found = getattr(found, part)
     if not (isinstance(found, type) and dataclasses.is_dataclass(found)):

@@ -176,7 +176,7 @@ def stretches(problem: Problem) -> NDArray[np.int64]:
     windows = problem.blocked.windows
     total = windows.count * windows.duration
     length = max(min(STRETCH, total / FEWEST_STRETCHES), total / MOST_STRETCHES, windows.duration)
-    key = windows.recording * 1_000_000 + np.floor(windows.time / length).astype(np.int64)
+    key = windows.recording * 1_000_000 + np.floor(windows.time / length + 1e-6).astype(np.int64)
     return np.unique(key, return_inverse=True)[1].astype(np.int64)
 
 
@@ -260,4 +260,3 @@ def _piece(term: UnnamedTerm) -> str:
     regressor = "" if term.regressor == "1" else f" {term.regressor}"
     low, high = term.interval
     return f"{term.coefficient:.3g} [{low:.3g}, {high:.3g}]{unit}{regressor}"
-

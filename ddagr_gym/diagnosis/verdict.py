@@ -139,7 +139,7 @@ def _finite(value: Any) -> Any:
     return value
 
 
-_Kinds = dict[str, type | tuple[type, ...]]
+_Kinds = Mapping[str, type | tuple[type, ...]]
 _NUMBER = (int, float)
 _MAYBE_MAPPING = (dict, type(None))
 _WORDS = {
@@ -179,11 +179,16 @@ _FINDING_TYPES: _Kinds = {
 }
 _ESTIMATE_TYPES: _Kinds = {"value": _NUMBER, "unit": str, "interval": (list, type(None))}
 _DATA_TYPES: _Kinds = {"source": str, "sha256": str, "rows": int, "seconds": _NUMBER}
-_FIT_TYPES: _Kinds = {"folds": str, "note": str, "horizons": list, "level": _NUMBER, "channels": dict, "gain_share": dict}
-_ERROR_TYPES: _Kinds = {name: dict for name in ("raw", "refitted", "corrected", "black_box", "ceiling")} | {
-    "unit": str,
-    "count": int,
+_FIT_TYPES: _Kinds = {
+    "folds": str,
+    "note": str,
+    "horizons": list,
+    "level": _NUMBER,
+    "channels": dict,
+    "gain_share": dict,
 }
+_MODELS = ("raw", "refitted", "corrected", "black_box", "ceiling")
+_ERROR_TYPES: _Kinds = {"unit": str, "count": int, **dict.fromkeys(_MODELS, dict)}
 
 
 def validate(mapping: Mapping[str, Any]) -> None:
@@ -225,7 +230,7 @@ def _check_fit(fit: Mapping[str, Any] | None) -> None:
         for horizon, entry in by_horizon.items():
             place = f"the fit of {channel} after {horizon} s"
             _check_types(place, entry, _ERROR_TYPES)
-            for model in ("raw", "refitted", "corrected", "black_box", "ceiling"):
+            for model in _MODELS:
                 _check_types(f"{place}, {model}", entry[model], {"value": _NUMBER, "interval": (list, type(None))})
 
 

@@ -65,7 +65,7 @@ class ResidualWrench:
     """Wrenches by window.
 
     Attributes:
-        before: (W, 3) F_x, F_y [N], M_z [N m] that the nominal model lacks.
+        before: (W, 3) F_x, F_y [N], M_z [N m] that the nominal model lacks as it stands.
         after: (W, 3) the same of the corrected model.
         deviation: (W, 3) standard deviations.
     """
@@ -80,7 +80,7 @@ def residual_wrench(problem: Problem, before: Fitted, after: Fitted, dispersion:
 
     Args:
         problem: what was fitted.
-        before: the nominal model.
+        before: the nominal model, as it stands or refitted.
         after: the corrected one.
         dispersion: variance of the standardised residuals.
     """

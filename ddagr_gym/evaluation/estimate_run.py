@@ -62,7 +62,7 @@ THESIS_RUNS = {
     "6.2": ThesisRun("table_6_2", 4.5, "thesis_a1", "thesis Table 6.2, simulated on Table A.1's soil"),
     "6.3": ThesisRun("table_6_3", 1.4, "lete_sand_wong", "thesis Table 6.3, simulated on dry sand"),
 }
-"""Section 6.1's run; section 6.2's, which was driven in a field of drier, looser sand (section 6.3) with slow motors."""
+"""Section 6.1's run; section 6.2's, driven in a field of drier, looser sand (section 6.3) with slow motors."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,9 +150,7 @@ def _thesis_filter(recording: Recording, robot: Robot) -> FilterRun:
             f"{recording.meta.source} has {len(recording.meta.spans)} spans: the thesis's filter knows one drive from "
             "rest; leave --filter out."
         )
-    columns = recording.columns() | dict(
-        zip(("command_right", "command_left"), recording.held_commands(), strict=True)
-    )
+    columns = recording.columns() | dict(zip(("command_right", "command_left"), recording.held_commands(), strict=True))
     return run_thesis_filter(ThesisModel(robot, sample_period=recording.period), columns)
 
 
@@ -251,10 +249,8 @@ def summary_of(estimated: EstimatedRun) -> dict[str, Any]:
         learned = estimates(model, estimated.run.states[-1], estimated.run.covariances[-1]).learned
         for name, share in zip(PARAMETERS, learned, strict=True):
             summary["parameters"][name]["learned"] = float(share)
-        noise = model.noise
-        summary["noise"] = {
-            name: getattr(noise, name) for name in ("accelerometer", "gyro", "encoder", "acceleration", "yaw_acceleration")
-        }
+        names = ("accelerometer", "gyro", "encoder", "acceleration", "yaw_acceleration")
+        summary["noise"] = {name: getattr(model.noise, name) for name in names}
     return summary
 
 

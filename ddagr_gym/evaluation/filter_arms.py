@@ -123,9 +123,7 @@ def _filter_known_soil(robot: Robot, sensors: Sensors, columns: Columns) -> Moti
         ("traction_limit_deviation", "traction_rate_deviation", "coupling_deviation", "resistance_deviation"),
         KNOWN_DEVIATION,
     )
-    prior = SoilPrior(
-        limit / model.wheel_load, rate, stiffness / (limit * rate), resistance / limit, **known
-    )
+    prior = SoilPrior(limit / model.wheel_load, rate, stiffness / (limit * rate), resistance / limit, **known)
     return _of_states(run_filter(replace(model, prior=prior, noise=replace(model.noise, soil=0.0)), columns))
 
 

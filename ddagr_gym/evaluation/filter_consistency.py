@@ -53,12 +53,19 @@ def matched_model(robot: Robot, sensors: Sensors, prior: str) -> FilterModel:
     model = FilterModel.of(robot, sensors, **still)
     if prior == "default_prior":
         return model
-    known = {name: KNOWN_SOIL for name in ("traction_limit_deviation", "traction_rate_deviation", "resistance_deviation")}
+    names = ("traction_limit_deviation", "traction_rate_deviation", "resistance_deviation")
+    known = dict.fromkeys(names, KNOWN_SOIL)
     return replace(model, prior=SoilPrior(**known))
 
 
 def row_turn_commands(side: str, radius: float, period: float) -> Array:
-    """(T, 2) right and left bank speeds [rad/s] of the ladder's constant speeds through a row turn [m], every period."""
+    """(T, 2) right and left bank speeds [rad/s]: the ladder's constant speeds through a row turn.
+
+    Args:
+        side: "left" or "right".
+        radius: of the turn [m].
+        period: between samples [s].
+    """
     turn = RowTurn(radius=radius, side=side)
     constants = nominal_constants(turn)
     lengths = (2.0 * turn.run_in, math.pi * turn.radius, 2.0 * turn.run_out)

@@ -82,7 +82,8 @@ def real_drive(path: Path, robot_name: str, seed: int) -> dict[str, Any]:
     ratios = []
     for fold in folds:
         for drive in ("commands", "encoders"):
-            baselines = fit_baselines(fold, robot, drive, fold.windows(FIT_WINDOW, drive, part=training, most=MOST_WINDOWS))
+            seen = fold.windows(FIT_WINDOW, drive, part=training, most=MOST_WINDOWS)
+            baselines = fit_baselines(fold, robot, drive, seen)
             ratios += [] if baselines.effective_track is None else [baselines.effective_track.track_ratio]
             for label, errors in _arms(fold, robot, set_up.model, run, drive, baselines).items():
                 found.setdefault(label, []).append(errors)

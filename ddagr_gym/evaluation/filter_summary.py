@@ -27,18 +27,21 @@ IN_RANGE = "thesis_a1_range"
 NOTES = (
     "Radius error: distance over heading change while the heading has changed by 30 to 150 degrees, against the true "
     "one. Errors of speed and slip from 1.6 s after the start on. Intervals: 95 %, bootstrap over drives.",
-    "Drives: row turns by bank speeds calibrated on the nominal soil; soil, its variation along the way, mass, inertia, "
-    "motor rate, dead time, gyro and accelerometer bias are drawn and not told to any arm.",
+    "Drives: row turns by bank speeds calibrated on the nominal soil; soil, its variation along the way, mass, "
+    "inertia, motor rate, dead time, gyro and accelerometer bias are drawn and not told to any arm.",
     "The prior's widths and the de-weighting of the filter's gains were chosen on thesis_a1_range and field soils, and "
     "in earlier work while weaker and stiffer soils were looked at too; the drives here have seeds of their own, but "
     "weaker and stiffer are not unseen kinds of soil for the filter.",
-    "encoders and closed_form average 0.2 s of readings. filter_known_soil knows the parameters that fit the drive's "
-    "true wheel forces best, to 2 %. thesis_filter has no bias states: accelerometer biases of 0.05 m/s^2 throw it off.",
+    "encoders and closed_form average 0.2 s of readings. filter_known_soil knows the parameters that fit the "
+    "drive's true wheel forces best, to 2 %. thesis_filter has no states for the biases that the sensors have here.",
     "NIS: a de-weighted gain leaves innovations that hang together, so a drive's NIS scatters more than the chi-square "
-    "value of as many samples; its band is therefore the range of 95 % of single matched drives, found by simulation.",
-    "NEES with the default prior: soils on which the force law's robot is stuck are drawn again. The prior spans a "
-    "factor of two either way, over which an extended Kalman filter's linearisation does not hold: means lie above the "
-    "band while most single drives are inside. With the soil known to 15 % the filter is consistent.",
+    "value of as many samples; its band is therefore the range of 95 % of single matched drives, found by simulation "
+    "with encoders that count. inside: the mean over drives lies in that band. cautious: it lies below the mean of "
+    "matched drives for certain, so that the filter is less sure than it could be.",
+    "NEES: means over independent matched drives, with the chi-square band of such a mean; median_drive is the median "
+    "over drives of a drive's own mean. The default prior spans a factor of two either way, over which the "
+    "linearisation of an extended Kalman filter is not exact; soils on which the force law's robot is stuck are drawn "
+    "again.",
     "Real drives: root mean square over windows, both halves of a recording judged by what was fitted to the other "
     "half; effective track and motor are fitted, the filter learns on the way from the first second on.",
 )
@@ -102,6 +105,7 @@ def _nis(rows: list[dict[str, Any]], bands: Mapping[str, Any], rng: np.random.Ge
             table[channel] = found | {
                 "band": list(band),
                 "inside": bool(band.contains(found["value"])),
+                "cautious": found["interval"][1] < bands[channel]["mean"],
                 "share_of_drives_inside": float(band.contains(values).mean()),
             }
     return table

@@ -51,8 +51,8 @@ class LawFit(NamedTuple):
 
 def grid_states(robot: Robot) -> Array:
     """The thesis's 2,500 points: slip -1..1, slip angle -60..60 degrees. Columns v_x, v_y, omega, yaw rate."""
-    slip, angle = np.meshgrid(np.linspace(-0.98, 0.98, 50), np.linspace(-np.pi / 3, np.pi / 3, 50))
-    slip, angle = slip.ravel(), angle.ravel()
+    slips, angles = np.meshgrid(np.linspace(-0.98, 0.98, 50), np.linspace(-np.pi / 3, np.pi / 3, 50))
+    slip, angle = np.ravel(slips), np.ravel(angles)
     rim = np.where(slip >= 0, _SPEED / (1 - np.maximum(slip, 0)), _SPEED * (1 + slip))
     zero = np.zeros(slip.size)
     return np.column_stack([zero + _SPEED, _SPEED * np.tan(angle), rim / robot.wheels[0].outer_radius, zero])
@@ -73,8 +73,9 @@ def turn_states(robot: Robot, rng: np.random.Generator, count: int = 400) -> Arr
 def true_forces(robot: Robot, soil: Soil, states: Array) -> Array:
     """F_x, F_y (N, 2) [N] at the static load; bogged wheels as NaN."""
     wheel, load = robot.wheels[0], robot.mass * STANDARD_GRAVITY / 4
-    sinkage, status = equilibrium_sinkage(wheel, soil, *states.T, load)
-    force = np.array(wheel_force(wheel, soil, *states.T, sinkage).force[:, :2])
+    v_x, v_y, omega, yaw_rate = states.T
+    sinkage, status = equilibrium_sinkage(wheel, soil, v_x, v_y, omega, yaw_rate, load)
+    force = np.array(wheel_force(wheel, soil, v_x, v_y, omega, yaw_rate, sinkage).force[:, :2])
     force[np.asarray(status) != 0] = np.nan
     return force
 

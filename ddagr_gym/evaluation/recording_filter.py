@@ -70,9 +70,7 @@ def set_up_filter(
         others: further fields of the model.
     """
     sigma = np.max([item.sigma[:5] for item in noise], axis=0)
-    readings = FilterNoise(
-        accelerometer=float(sigma[:2].max()), gyro=float(sigma[2]), encoder=float(sigma[3:].max())
-    )
+    readings = FilterNoise(accelerometer=float(sigma[:2].max()), gyro=float(sigma[2]), encoder=float(sigma[3:].max()))
     model = FilterModel(robot, noise=readings, sample_period=recordings[0].period, **others)
     candidates = [FilterSetUp(model, True, attitude)]
     candidates += [
@@ -83,9 +81,7 @@ def set_up_filter(
     shaken = [
         replace(
             best,
-            model=replace(
-                best.model, noise=replace(best.model.noise, acceleration=density, yaw_acceleration=density)
-            ),
+            model=replace(best.model, noise=replace(best.model.noise, acceleration=density, yaw_acceleration=density)),
         )
         for density in PROCESS_NOISE
     ]

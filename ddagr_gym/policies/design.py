@@ -69,12 +69,12 @@ class PolicyDesign(Validated):
         for name, value, most in (("frames", self.frames, 64), ("frame_interval", self.frame_interval, 100)):
             if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= most:
                 raise InputError(f"PolicyDesign.{name} is {value!r}: give a whole number from 1 to {most}.")
-        for name, value, allowed in (
+        for field, choice, allowed in (
             ("features", self.features, ("raw", "ekf")),
             ("action", self.action, ("correction", "absolute")),
         ):
-            if value not in allowed:
-                raise InputError(f"PolicyDesign.{name} is {value!r}: give {' or '.join(map(repr, allowed))}.")
+            if choice not in allowed:
+                raise InputError(f"PolicyDesign.{field} is {choice!r}: give {' or '.join(map(repr, allowed))}.")
 
     @property
     def needs_filter(self) -> bool:

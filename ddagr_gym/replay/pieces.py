@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from dataclasses import replace
 
 import numpy as np
@@ -27,17 +28,18 @@ def bridged(recording: Recording, longest: float = LONGEST_BRIDGE) -> Recording:
         longest: time between the last row of a segment and the first of the next [s].
     """
     segments = list(recording.meta.segments)
-    span_of = [next(k for k, (a, b) in enumerate(recording.meta.spans) if a <= s[0] < b) for s in segments]
+    starts = [a for a, _ in recording.meta.spans]
+    span_of = [bisect_right(starts, s[0]) - 1 for s in segments]
     rows: list[NDArray[np.float64]] = []
     times: list[FloatArray] = []
     joined: list[tuple[int, int]] = []
-    count = 0
+    count, period = 0, recording.period
     for k, (start, stop) in enumerate(segments):
         gap = recording.t[start] - recording.t[segments[k - 1][1] - 1] if k and span_of[k] == span_of[k - 1] else np.inf
-        missing = round(gap / recording.period) - 1 if gap <= longest + 0.5 * recording.period else 0
+        missing = round(gap / period) - 1 if gap <= longest + 0.5 * period else 0
         if missing > 0:
             rows.append(np.full(missing, np.nan))
-            times.append(recording.t[start] - recording.period * np.arange(missing, 0, -1.0))
+            times.append(recording.t[start] - period * np.arange(missing, 0, -1.0))
             count += missing
         first = joined.pop()[0] if missing > 0 else count
         rows.append(np.arange(start, stop, dtype=np.float64))

@@ -224,6 +224,7 @@ class RunReport:
         pose_jitter: left in it [s].
         notes: sentences on what was left out and why.
         arms: one per drive that the recordings hold.
+        cpu_seconds: processor time of all arms, with fits, baselines and intervals, without drawing.
     """
 
     sources: tuple[str, ...]
@@ -237,6 +238,7 @@ class RunReport:
     pose_jitter: tuple[float, ...]
     notes: tuple[str, ...]
     arms: tuple[ArmReport, ...]
+    cpu_seconds: float
 
 
 @dataclass(frozen=True)

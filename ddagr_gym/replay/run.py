@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -65,6 +66,7 @@ def replay_run(
     """
     if not SHORTEST_WINDOW <= settings.window <= LONGEST_WINDOW:
         raise InputError(f"the window is {settings.window:g} s: give {SHORTEST_WINDOW:g} to {LONGEST_WINDOW:g} s.")
+    before = time.process_time()
     prepared = prepare(recordings, robot, np.random.default_rng(settings.seed), settings.swapped)
     found: dict[str, ArmResult] = {}
     values: dict[str, float] = {}
@@ -80,11 +82,16 @@ def replay_run(
         )
     arms = tuple(found[d] for d in DRIVES if d in found)
     absent = tuple(f"no window of {settings.window:g} s has known {d}." for d in DRIVES if d not in found)
-    return RunResult(prepared, arms, _run_report(recordings, prepared, arms, absent))
+    cpu = time.process_time() - before
+    return RunResult(prepared, arms, _run_report(recordings, prepared, arms, absent, cpu))
 
 
 def _run_report(
-    recordings: Sequence[Recording], prepared: Prepared, arms: Sequence[ArmResult], absent: Sequence[str]
+    recordings: Sequence[Recording],
+    prepared: Prepared,
+    arms: Sequence[ArmResult],
+    absent: Sequence[str],
+    cpu: float,
 ) -> RunReport:
     return RunReport(
         tuple(r.meta.source for r in recordings),
@@ -98,6 +105,7 @@ def _run_report(
         tuple(item.pose_jitter for item in prepared.noise),
         (*prepared.notes, *absent),
         tuple(arm.report for arm in arms),
+        cpu,
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -251,7 +252,9 @@ def _window(
 
 def _guess(recording: Recording, row: int, drive: Array, wheel_radius: float, half_track: float) -> Array:
     """Initial state from the samples around the start; without encoders the banks turn as they are driven."""
-    value = {name: _near(recording, name, row) for name in CHANNELS}
+    starts = [a for a, _ in recording.meta.spans]
+    rows = _rows_near(row, recording.meta.spans[bisect_right(starts, row) - 1])
+    value = {name: _near(recording, name, row, rows) for name in CHANNELS}
     right, left = (
         value[name] if np.isfinite(value[name]) else drive[bank]
         for bank, name in enumerate(("encoder_right", "encoder_left"))
@@ -266,10 +269,15 @@ def _guess(recording: Recording, row: int, drive: Array, wheel_radius: float, ha
     return np.nan_to_num(state)
 
 
-def _near(recording: Recording, name: str, row: int, reach: int = 12) -> float:
-    """Channel at ``row``, interpolated between its samples within ``reach`` rows of the same span."""
-    span = next(s for s in recording.spans() if s.start <= row < s.stop)
-    rows = slice(max(span.start, row - reach), min(span.stop, row + reach + 1))
-    values, t = recording[name][rows], recording.t[rows]
+def _rows_near(row: int, span: tuple[int, int], reach: int = 12) -> slice:
+    """Rows of the span within ``reach`` of ``row``."""
+    return slice(max(span[0], row - reach), min(span[1], row + reach + 1))
+
+
+def _near(recording: Recording, name: str, row: int, rows: slice) -> float:
+    """Channel at ``row``, interpolated between its samples in ``rows``; NaN without any."""
+    if name not in recording.channels:
+        return np.nan
+    values, t = recording.channels[name][rows], recording.t[rows]
     known = np.isfinite(values)
     return float(np.interp(recording.t[row], t[known], values[known])) if known.any() else np.nan

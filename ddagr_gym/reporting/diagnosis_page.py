@@ -14,6 +14,7 @@ import numpy as np
 from ddagr_gym.errors import InputError
 from ddagr_gym.files import atomic_path, make_folder
 from ddagr_gym.reporting import diagnosis_figures as figures
+from ddagr_gym.reporting import diagnosis_maps as maps
 from ddagr_gym.reporting import diagnosis_tables as tables
 from ddagr_gym.reporting.evidence import Evidence
 from ddagr_gym.reporting.figures import house_style
@@ -36,6 +37,8 @@ class _Studio:
     def picture(self, figure: Any, name: str, alt: str, **more: Any) -> dict[str, Any]:
         """Data of an SVG with its text as paths, so that it looks the same everywhere."""
         self._progress(name)
+        figure.draw_without_rendering()
+        figure.set_layout_engine("none")
         stream = io.StringIO()
         figure.savefig(stream, format="svg", metadata={"Date": None})
         with atomic_path(self._folder / f"{name}.png") as path:
@@ -77,9 +80,7 @@ def _template() -> Any:
     try:
         from jinja2 import Environment, PackageLoader, StrictUndefined
     except ImportError:
-        raise InputError(
-            'reports need jinja2, which is not installed: run pip install "ddagr-gym[report]".'
-        ) from None
+        raise InputError('reports need jinja2, which is not installed: run pip install "ddagr-gym[report]".') from None
     loader = PackageLoader("ddagr_gym.reporting", "templates")
     environment = Environment(
         loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
@@ -127,17 +128,18 @@ def _seconds(evidence: Evidence) -> float:
 def _pictures(
     diagnosis: Mapping[str, Any], evidence: Evidence, findings: Iterable[Mapping[str, Any]], studio: _Studio
 ) -> dict[str, Any]:
-    maps = zip(figures.map_figures(evidence, list(findings)), figures.MODELS, strict=True)
-    force_before, force_after = figures.wrench_figures(evidence)
+    drawn = zip(maps.map_figures(evidence, list(findings)), figures.MODELS, strict=True)
+    force_before, force_after = maps.wrench_figures(evidence)
     rows = figures.best_stretch(evidence)
     return {
         "maps": [
             studio.picture(figure, f"map_{model}", f"Map of the drives, coloured by the mismatch of the {label} model")
-            for figure, (model, label, _) in maps
+            for figure, (model, label, _) in drawn
         ],
-        "misfit": studio.picture(
-            figures.misfit_figure(diagnosis["misfit"]), "misfit", "Residual over noise of each channel"
-        ),
+        "misfit": [
+            studio.picture(figures.lasting_figure(evidence), "lasting", "What lasts of each channel's residual"),
+            studio.picture(figures.misfit_figure(diagnosis["misfit"]), "misfit", "Residual over noise by channel"),
+        ],
         "stretch": _stretch(evidence, rows, diagnosis["recordings"]),
         "channels": [
             studio.picture(
@@ -150,9 +152,10 @@ def _pictures(
         "gains": studio.picture(
             figures.gain_figure(evidence, title), "gains", "Gain of each effect of the library, with its gate"
         ),
+        "unshown": len(evidence.effects) - len(figures.shown_effects(evidence)),
         "forces": [
-            studio.picture(force_before, "force_before", "Residual force over the ground before"),
-            studio.picture(force_after, "force_after", "Residual force over the ground after"),
+            studio.picture(force_before, "force_before", "Force that the simulator lacks, over the ground"),
+            studio.picture(force_after, "force_after", "Force that the corrected model lacks, over the ground"),
         ],
     }
 

@@ -7,12 +7,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ddagr_gym.reporting.diagnosis_figures import LABELS
-from ddagr_gym.reporting.wording import DEGREES, Amount, amounts, describe, number, quantity, title
+from ddagr_gym.reporting.wording import DEGREES, Amount, amounts, describe, in_sentence, number, quantity, title
 
 Entry = Mapping[str, Any]
 
 _MOST_SPANS = 8
-_ANGLES = {"rad": "degrees", "rad/s": "rad/s"}
 
 
 def tiles(diagnosis: Entry, seconds: float) -> list[dict[str, str]]:
@@ -83,7 +82,7 @@ def _evidence(finding: Entry) -> str:
     gate = finding.get("gate") or 0.0
     parts = [f"gain {number(finding['gain'], 3)}"]
     if gate > 0.0:
-        parts.append(f"{finding['gain'] / gate:.1f} times its gate of {number(gate, 3)}")
+        parts.append(f"{number(finding['gain'] / gate)} times its gate of {number(gate, 3)}")
     parts.append(f"{number(finding['held_out'], 3)} on left-out windows")
     parts.append(f"score {number(finding['score'], 2)}")
     if finding.get("calibrated_p") is not None:
@@ -106,18 +105,19 @@ def _spans(spans: Sequence[Entry], recordings: Sequence[str]) -> str:
 def _equivalents(name: str, weights: Mapping[str, float]) -> list[dict[str, Any]]:
     ordered = sorted((weights or {name: 1.0}).items(), key=lambda item: -item[1])
     return [
-        {"title": title(key), "percent": round(100.0 * weight), "own": key == name} for key, weight in ordered
+        {"name": key, "title": title(key), "percent": round(100.0 * weight), "own": key == name}
+        for key, weight in ordered
     ]
 
 
 def _equivalence_note(name: str, equivalents: Sequence[Entry]) -> str:
     if len(equivalents) > 1:
-        others = " or ".join(item["title"].lower() for item in equivalents if not item["own"])
+        others = " or ".join(in_sentence(item["name"]) for item in equivalents if not item["own"])
         return f"These recordings do not separate it from {others}: weights by resampling the windows."
     from ddagr_gym.physics.effects.registry import effect_kinds
 
     kind = effect_kinds().get(name)
-    rivals = ", ".join(title(other).lower() for other in (kind.confused_with if kind else ()))
+    rivals = ", ".join(in_sentence(other) for other in (kind.confused_with if kind else ()))
     usual = f" It is often confused with {rivals}; not here." if rivals else ""
     return f"Nothing else in the library explains these windows nearly as well.{usual}"
 
@@ -229,7 +229,7 @@ def next_drive(item: Entry | None) -> dict[str, Any] | None:
     return {
         "manoeuvre": str(item["manoeuvre"]).replace("_", " "),
         "why": item.get("why") or "",
-        "separates": [" from ".join(title(str(name)).lower() for name in pair) for pair in item.get("separates") or []],
+        "separates": [" from ".join(in_sentence(str(name)) for name in pair) for pair in item.get("separates") or []],
         "power": "" if power is None else percent(power),
         "alternatives": others,
     }
@@ -252,14 +252,17 @@ def detectable(table: Mapping[str, Mapping[str, float | None]]) -> list[dict[str
             shown = "none, however large"
             if value is not None and math.isfinite(value):
                 shown = size(Amount(value, unit))
-            rows.append({"title": title(name), "field": key.replace("_", " "), "size": shown})
+            field = "" if len(sizes) == 1 else f", {key.replace('_', ' ')}"
+            rows.append({"title": f"{title(name)}{field}", "size": shown})
     return rows
 
 
 def sources(diagnosis: Entry) -> list[tuple[str, str]]:
     """Recordings, gates and version behind the numbers."""
     thresholds = diagnosis["thresholds"]
-    rows = [("Recordings", ", ".join(diagnosis["recordings"]))]
+    data = diagnosis.get("data") or []
+    rows = [(str(item["source"]), f"{item['seconds']:.0f} s, SHA-256 {item['sha256']}") for item in data]
+    rows = rows or [("Recordings", ", ".join(diagnosis["recordings"]))]
     for label, key in (("Hash of the data", "data_hash"), ("Robot", "robot"), ("Soil", "soil"), ("Seed", "seed")):
         if diagnosis.get(key) is not None:
             rows.append((label, str(diagnosis[key])))

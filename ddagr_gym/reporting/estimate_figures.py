@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -119,7 +120,7 @@ def save_estimate_figures(
     with house_style():
         save(path_file, (6.0, 5.0), lambda figure: _path(figure.subplots(), view))
         for panel in view.panels:
-            save(panel.file, (7.2, 3.2), lambda figure, panel=panel: _alone(figure, view, panel))
+            save(panel.file, (7.2, 3.2), partial(_alone, view=view, panel=panel))
         save("innovations", (9.0, 8.0), lambda figure: _innovations(figure, view))
         save("overview", (13.0, 9.0), lambda figure: _overview(figure, view))
     return files
@@ -195,9 +196,7 @@ def _limit(axes: Any, panel: Panel) -> None:
     if not joined.size or panel.logarithmic:
         return
     low, high = float(joined.min()), float(joined.max())
-    ends = [
-        float(np.nanmedian(item)) for line in panel.lines for item in (line.low, line.high) if item is not None
-    ]
+    ends = [float(np.nanmedian(item)) for line in panel.lines for item in (line.low, line.high) if item is not None]
     low, high = min([low, *ends]), max([high, *ends])
     room = 0.15 * (high - low) or 0.1 * abs(high) or 1.0
     axes.set_ylim(low - room, high + room)
@@ -259,10 +258,12 @@ def _nis(axes: Any, view: EstimateView) -> None:
     pieces = np.array_split(np.arange(len(view.t)), 10)
     t = np.array([view.t[piece].mean() for piece in pieces])
     colours = (palette.BLUE, palette.SKY_BLUE, palette.INK, palette.ORANGE, palette.GREEN)
-    for name, values, colour in zip(view.channels, view.innovations.T, colours, strict=True):
+    for name, values, colour in zip(view.channels, view.innovations.T, colours, strict=False):
         parts = [values[piece][np.isfinite(values[piece])] for piece in pieces]
         nis = [float(np.mean(part**2)) if part.size else np.nan for part in parts]
-        axes.plot(t, np.minimum(nis, 2.0 * _HIGHEST_NIS), "-o", color=colour, ms=2.5, lw=1.0, label=name.replace("_", " "))
+        axes.plot(
+            t, np.minimum(nis, 2.0 * _HIGHEST_NIS), "-o", color=colour, ms=2.5, lw=1.0, label=name.replace("_", " ")
+        )
     axes.axhline(1.0, color=palette.GREY, lw=0.8)
     axes.set(title="NIS by tenth of the run", ylabel="[-]", xlabel="time [s]")
     axes.set_ylim(0.0, _HIGHEST_NIS)

@@ -10,6 +10,7 @@ import os
 import zipfile
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,7 +59,7 @@ class Evidence:
         score: (F, W, Q) see :mod:`ddagr_gym.diagnosis.score_process`.
         information: (F, W, Q) the same.
         gain: (F, W, Q) the same.
-        wrench_before: (W, 3) F_x, F_y [N], M_z [N m] that the nominal model lacks.
+        wrench_before: (W, 3) F_x, F_y [N], M_z [N m] that the nominal model lacks as it stands.
         wrench_after: (W, 3) the same of the chosen model.
         wrench_deviation: (W, 3) standard deviations.
     """
@@ -149,7 +150,8 @@ class Evidence:
         names = {item.name for item in fields(cls)}
         if version is None or int(version) != VERSION or set(body) != names:
             raise InputError(f"{os.fspath(path)} holds no evidence of version {VERSION}: {remedy}.")
-        return cls(**{name: _restored(value) for name, value in body.items()})
+        restored: dict[str, Any] = {name: _restored(value) for name, value in body.items()}
+        return cls(**restored)
 
 
 def _compact(name: str, values: NDArray[np.generic]) -> NDArray[np.generic]:

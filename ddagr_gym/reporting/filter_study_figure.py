@@ -93,7 +93,9 @@ def _aside(count: int) -> Any:
     return (np.arange(count) - 0.5 * (count - 1)) * 0.17
 
 
-def _errors(axes: Any, document: Document, sets: Mapping[str, tuple[str, str]], keys: Sequence[str], unit: float) -> None:
+def _errors(
+    axes: Any, document: Document, sets: Mapping[str, tuple[str, str]], keys: Sequence[str], unit: float
+) -> None:
     for shift, (name, (label, colour)) in zip(_aside(len(sets)), sets.items(), strict=True):
         for place, arm in enumerate(ARMS):
             item = document[arm][name]

@@ -89,8 +89,8 @@ def _draw_matrix(panel: Any, names: Sequence[str], shares: Mapping[str, Mapping[
     )
     from matplotlib.colors import LinearSegmentedColormap
 
-    colours = LinearSegmentedColormap.from_list("share", [palette.VERMILLION, palette.PALE_ORANGE, palette.PAPER])
-    colours.set_bad(palette.HAIRLINE)
+    plain = LinearSegmentedColormap.from_list("share", [palette.VERMILLION, palette.PALE_ORANGE, palette.PAPER])
+    colours = plain.with_extremes(bad=palette.HAIRLINE)
     image = panel.imshow(values, vmin=0.0, vmax=1.0, cmap=colours, aspect="auto", interpolation="nearest")
     for i, j in zip(*np.nonzero(values < _STATED), strict=True):
         panel.text(j, i, f"{values[i, j]:.2f}".lstrip("0") if values[i, j] >= 0.005 else "0",

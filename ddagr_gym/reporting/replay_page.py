@@ -71,7 +71,8 @@ def _names(run: RunReport) -> str:
 def _run(run: RunReport, number: int, figures: Figures) -> list[str]:
     lines = [
         f'<h2 id="run{number + 1}">{escape(_names(run))}</h2>',
-        f"<p>{run.seconds:.0f} s, {run.rows} rows. Split for fits: {escape(run.split)}.</p>",
+        f"<p>{run.seconds:.0f} s, {run.rows} rows, replayed in {run.cpu_seconds:.1f} s of one core. "
+        f"Split for fits: {escape(run.split)}.</p>",
         *_notes(run.notes),
     ]
     for arm in run.arms:

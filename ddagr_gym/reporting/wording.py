@@ -13,7 +13,7 @@ from typing import Any
 from ddagr_gym.physics.effects.registry import effect_kinds
 
 DEGREES = 180.0 / math.pi
-_LOPSIDED = 0.35
+_LOPSIDED = 0.5
 """Distance of a value from the middle of its interval, over the half width, beyond which the interval is written."""
 _UNBOUNDED = 1e5
 """Onsets and limits beyond it mean always, and none."""
@@ -50,8 +50,9 @@ def amounts(parameters: Mapping[str, Any]) -> dict[str, Amount]:
 def _amount(item: Any) -> Amount:
     get = item.get if isinstance(item, Mapping) else lambda key: getattr(item, key, None)
     value, interval = get("value"), get("interval")
-    known = interval is not None and len(interval) == 2 and all(end is not None for end in interval)
-    ends = (float(interval[0]), float(interval[1])) if known else None
+    ends = None
+    if interval is not None and all(end is not None for end in interval):
+        ends = (float(interval[0]), float(interval[1]))
     return Amount(math.nan if value is None else float(value), str(get("unit") or "-"), ends)
 
 
@@ -86,7 +87,7 @@ def quantity(amount: Amount, unit: str = "", signed: bool = False) -> str:
     if half <= 0.0:
         return f"{plus}{number(value, 3)}{after}"
     places = max(1 - math.floor(math.log10(half)), 0) if half < 10.0 else 0
-    places = places - 1 if places > 0 and half * 10.0**places >= 30.0 else places
+    places = places - 1 if places > 0 and half * 10.0**places >= 20.0 else places
     if abs(value - 0.5 * (low + high)) > _LOPSIDED * half:
         return f"{plus}{_fixed(value, places)}{after} ({_fixed(low, places)} to {_fixed(high, places)})"
     return f"{plus}{_fixed(value, places)} ± {_fixed(half, places)}{after}"
@@ -141,7 +142,7 @@ def _soil_change(a: Amounts) -> str:
 
 
 def _soil_patch(a: Amounts) -> str:
-    place = f"({number(a['centre_x'].value, 3)}, {number(a['centre_y'].value, 3)}) m"
+    place = f"({_fixed(a['centre_x'].value, 2)}, {_fixed(a['centre_y'].value, 2)}) m"
     return f"the soil is {_soil(a)} within {quantity(a['radius'], 'm')} of {place}"
 
 
@@ -290,7 +291,7 @@ def describe(name: str, parameters: Amounts) -> str:
         return SENTENCES[name](parameters)
     units = {key: item.unit.replace("^2", "²").strip("-") for key, item in parameters.items()}
     sizes = [f"{key.replace('_', ' ')} {quantity(item, units[key], signed=True)}" for key, item in parameters.items()]
-    return f"{title(name).lower()} ({', '.join(sizes)})" if sizes else title(name).lower()
+    return f"{in_sentence(name)} ({', '.join(sizes)})" if sizes else in_sentence(name)
 
 
 def _speaks_without_shapes(name: str, parameters: Amounts) -> bool:
@@ -305,3 +306,9 @@ def title(name: str) -> str:
     """An effect's title; the name itself, spelt out, for one that is not installed here."""
     kind = effect_kinds().get(name)
     return kind.title if kind is not None else name.replace("_", " ").capitalize()
+
+
+def in_sentence(name: str) -> str:
+    """An effect's title inside a sentence: in lower case but for abbreviations."""
+    words = title(name).split()
+    return " ".join(word if word.isupper() else word.lower() for word in words)

@@ -10,8 +10,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-torch = pytest.importorskip("torch", reason="the extra rl is not installed")
 pytest.importorskip("stable_baselines3", reason="the extra rl is not installed")
+
+import torch
 
 from agents import run as run_module
 from agents.asymmetric import TRUTH, WithTruth, true_entries
@@ -28,6 +29,7 @@ from ddagr_gym.envs.options import make_settings
 from ddagr_gym.errors import InputError
 from ddagr_gym.evaluation.metrics import turn_metrics
 from ddagr_gym.evaluation.runs import drive_turn
+from ddagr_gym.physics import layout
 from ddagr_gym.policies.archive import load_policy
 from ddagr_gym.policies.controller import PolicyController
 from ddagr_gym.policies.design import PolicyDesign
@@ -78,7 +80,7 @@ def test_a_killed_training_goes_on_to_the_bit(tmp_path, monkeypatch, settings):
         with pytest.raises(Killed):
             train_here(settings, tmp_path / "killed")
     torch.manual_seed(99)
-    np.random.seed(99)  # noqa: NPY002  SB3 shuffles with it
+    np.random.seed(99)  # noqa: NPY002
     again = train_here(settings, tmp_path / "killed")
     first, second = members(tmp_path / "whole"), members(tmp_path / "killed")
     assert first.keys() == second.keys()
@@ -162,8 +164,6 @@ def test_the_critics_truth_is_that_of_the_simulator():
     truth = dict(zip(TRUTH, true_entries(env.batch).T, strict=True))
     np.testing.assert_array_equal(seen[:, -len(TRUTH) :].T, list(truth.values()))
     row = env.batch.simulator.rows[0]
-    from ddagr_gym.physics import layout
-
     assert truth["true_speed"][0] == pytest.approx(row[layout.V_X] / 0.2, rel=1e-5)
     speed = np.hypot(row[layout.V_X], row[layout.V_Y])
     assert truth["true_curvature"][0] == pytest.approx(-0.8 * row[layout.YAW_RATE] / speed, rel=1e-5)

@@ -50,5 +50,6 @@ def test_bad_requests_are_one_sentence_and_leave_nothing(options, message, tmp_p
     folder = tmp_path / "out"
     assert main(["estimate", *options, "--output", str(folder)]) == 2
     printed = capsys.readouterr().err
-    assert message in printed and printed.count("\n") == 1
+    assert message in printed
+    assert printed.count("\n") == 1
     assert not folder.exists()

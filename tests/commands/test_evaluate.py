@@ -1,12 +1,13 @@
 """``ddagr evaluate``, ``freeze-scenarios`` and ``tune-controllers`` end to end on few episodes."""
 
 import json
+import sys
 
 import pytest
 
 from ddagr_gym.cli import main
 from ddagr_gym.commands import evaluate
-from ddagr_gym.evaluation import gain_search
+from ddagr_gym.evaluation import controllers, gain_search
 from ddagr_gym.evaluation.claims import load_claims
 from ddagr_gym.evaluation.controllers import BOUNDS
 from ddagr_gym.evaluation.scenarios import set_hash
@@ -75,6 +76,14 @@ def test_bad_input_is_one_sentence(tmp_path, capsys, arguments, message):
     error = capsys.readouterr().err
     assert message in error
     assert "Traceback" not in error
+    assert not (tmp_path / "out").exists()
+
+
+def test_without_casadi_nothing_is_driven(tmp_path, capsys, monkeypatch):
+    controllers._predictive.cache_clear()
+    monkeypatch.setitem(sys.modules, "casadi", None)
+    assert run_evaluation(tmp_path / "out", "--controllers", "B1,B5", "--episodes", "1") == 2
+    assert "ddagr-gym[mpc]" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
 
 

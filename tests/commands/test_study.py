@@ -25,7 +25,8 @@ def test_table_figure_and_progress(tmp_path, capsys, monkeypatch):
     plan.write_text(PLAN)
     assert main(["study", "filter", "--plan", str(plan), "--output", str(folder)]) == 0
     printed = capsys.readouterr()
-    assert "our filter" in printed.out and "No real drives" in printed.out
+    assert "our filter" in printed.out
+    assert "No real drives" in printed.out
     assert "100 %" in printed.err
     document = json.loads((folder / "filter.json").read_text())
     shown = document["filter"]["thesis_a1_range"]["radius_error_median"]["value"]
@@ -39,5 +40,6 @@ def test_a_bad_plan_is_one_sentence(tmp_path, capsys):
     plan.write_text(PLAN.replace("drives: 2", "drives: 0"))
     assert main(["study", "filter", "--plan", str(plan), "--output", str(tmp_path / "out")]) == 2
     message = capsys.readouterr().err
-    assert "drives is 0" in message and message.count("\n") == 1
+    assert "drives is 0" in message
+    assert message.count("\n") == 1
     assert not (tmp_path / "out").exists()

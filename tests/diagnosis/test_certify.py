@@ -6,23 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ddagr_gym.diagnosis.certify import (
-    BY_RECORDING,
-    BY_TIME,
-    CHANNELS,
-    MOTION,
-    _resampled,
-    certify,
-    folds_of,
-    gain_share,
-    refitted_on,
-)
-from ddagr_gym.diagnosis.forecast import PAST, cut_forecasts, errors_at, past_elimination, start_states
+from ddagr_gym.diagnosis.certificate import BY_RECORDING, BY_TIME, finished, gain_share, resampled
+from ddagr_gym.diagnosis.certify import certify, folds_of, refitted_on
+from ddagr_gym.diagnosis.forecast import MOTION, PAST, cut_forecasts, errors_at, past_elimination, start_states
 from ddagr_gym.diagnosis.problem import Problem
 from ddagr_gym.diagnosis.verdict import _check_fit
 from ddagr_gym.errors import InputError
 from ddagr_gym.presets import get_robot
-from ddagr_gym.replay.windows import WindowSet
+from ddagr_gym.replay.windows import CHANNELS, WindowSet
 from tests.diagnosis.conftest import Sloping
 
 ROBOT = get_robot("ddagr")
@@ -124,7 +115,9 @@ def test_halves_are_named_as_the_weaker_proof(problem_of: Callable[..., Problem]
     first = problem.blocked.windows.count
     part = replace(
         sloping.nominal,
-        point=replace(sloping.nominal.point, states=sloping.nominal.point.states[:first], values=_own(sloping, problem)),
+        point=replace(
+            sloping.nominal.point, states=sloping.nominal.point.states[:first], values=_own(sloping, problem)
+        ),
         by_parameter=sloping.nominal.by_parameter[:first][..., _columns(sloping, problem)],
         elimination=sloping.nominal.elimination.subset(np.arange(len(sloping.nominal.window_cost)) < first),
         prediction=sloping.nominal.prediction[:first],
@@ -176,18 +169,34 @@ def test_what_nothing_measures_has_no_error() -> None:
     windows.measured[..., 5:] = np.nan
     windows.measured[0, ::2, CHANNELS.index("yaw_rate")] = np.nan
     errors = errors_at(windows, np.zeros_like(windows.measured), 1.0)
-    assert np.isnan(errors["position"]).all() and np.isnan(errors["speed"]).all()
-    assert np.isnan(errors["heading"][0]) and errors["heading"][1] == 0.0
+    assert np.isnan([errors["position"], errors["speed"]]).all()
+    assert np.isnan(errors["heading"][0])
+    assert errors["heading"][1] == 0.0
 
 
 def test_share_of_the_ceiling() -> None:
     """Errors of 1 and 0.4 with a ceiling of 0.2 are three quarters of the way; without a ceiling there is no share."""
     ones, clusters = np.ones(6), np.array([0, 0, 1, 1, 2, 2])
-    errors = {"refitted": {"yaw_rate": ones}, "corrected": {"yaw_rate": 0.4 * ones}, "flexible": {"yaw_rate": 0.2 * ones}}
-    table = _resampled(errors, clusters, np.random.default_rng(0))
+    errors = {
+        "refitted": {"yaw_rate": ones},
+        "corrected": {"yaw_rate": 0.4 * ones},
+        "flexible": {"yaw_rate": 0.2 * ones},
+    }
+    table = resampled(errors, clusters, np.random.default_rng(0))
     share = gain_share(table, MOTION)
     assert share is not None
     assert share["value"] == pytest.approx(0.75)
     assert share["interval"] == pytest.approx([0.75, 0.75])
     nothing = {name: {"yaw_rate": ones} for name in ("refitted", "corrected", "black_box")}
-    assert gain_share(_resampled(nothing, clusters, np.random.default_rng(0)), MOTION) is None
+    assert gain_share(resampled(nothing, clusters, np.random.default_rng(0)), MOTION) is None
+
+
+def test_what_one_model_does_not_finish_counts_for_none() -> None:
+    """Dropping it for that model alone would make a model that breaks look good."""
+    errors = {
+        "refitted": {"speed": np.array([1.0, 2.0, np.nan])},
+        "corrected": {"speed": np.array([0.5, np.nan, np.nan])},
+    }
+    left, lost = finished(errors)
+    assert lost == 1
+    assert np.isfinite(left["refitted"]["speed"]).tolist() == [True, False, False]

@@ -9,6 +9,7 @@ import pytest
 
 import ddagr_gym.envs  # noqa: F401 (registers the environments)
 from ddagr_gym import cli
+from ddagr_gym.config import parse_config
 from ddagr_gym.diagnosis.forecast import cut_forecasts, errors_at, past_elimination, roll_out, start_states
 from ddagr_gym.diagnosis.problem import Point
 from ddagr_gym.physics.effects import load_effects
@@ -68,3 +69,13 @@ def test_the_simulator_takes_the_file(sloping: Sloping, effects_file: Path, tmp_
     assert cli.main([*words, str(plain)]) == 0
     ends = [np.genfromtxt(path, delimiter=",", names=True)[-1] for path in (output, plain)]
     assert abs(ends[0]["true_x"] - ends[1]["true_x"]) > 0.01
+
+
+def test_a_training_configuration_takes_the_file(sloping: Sloping, effects_file: Path) -> None:
+    from agents.settings import TaskSettings
+    from ddagr_gym.policies.design import PolicyDesign
+
+    task = parse_config(f"effects: [{effects_file}]", TaskSettings)
+    made = gymnasium.make("DDAGR-Turn-v0", **task.environment(PolicyDesign()))
+    assert made.unwrapped.settings.effects == sloping.chosen.point.effects
+    made.close()

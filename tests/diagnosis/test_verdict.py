@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from ddagr_gym.diagnosis.verdict import Diagnosis, Estimate, Finding, load, save
+from ddagr_gym.diagnosis.verdict import DataSource, Diagnosis, Estimate, Finding, load, save
 from ddagr_gym.errors import InputError
 
 FINDING = Finding("slope", {"angle": Estimate(0.05, "rad", (0.04, 0.06))}, 30.0, 8.0, 4.0, 20.0)
@@ -40,3 +40,31 @@ def test_another_schema_is_refused(tmp_path: Path) -> None:
     (tmp_path / "d.json").write_text(json.dumps(body))
     with pytest.raises(InputError, match="schema"):
         load(tmp_path / "d.json")
+
+
+def test_what_later_steps_add_is_kept(tmp_path: Path) -> None:
+    source = DataSource("a.csv", "0" * 64, 1200, 23.98)
+    finding = replace(FINDING, where={"phrase": "everywhere"}, calibrated_p=0.02)
+    full = replace(GOOD, findings=(finding,), data=(source,), next_drive={"manoeuvre": "arcs"}, unnamed={"terms": ()})
+    save(full, tmp_path / "d.json")
+    found = load(tmp_path / "d.json")
+    assert found["data"] == [{"source": "a.csv", "sha256": "0" * 64, "rows": 1200, "seconds": 23.98}]
+    assert found["findings"][0]["where"] == {"phrase": "everywhere"}
+    assert found["findings"][0]["calibrated_p"] == 0.02
+    assert found["next_drive"] == {"manoeuvre": "arcs"}
+    assert found["fit"] is None
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"fit": [1.0]}, "a mapping or null"),
+        ({"fit": {"folds": "by recording"}}, "'note'"),
+        ({"findings": (replace(FINDING, where="somewhere"),)}, "finding 'slope' has where"),
+        ({"findings": (replace(FINDING, parameters={"angle": {"value": 0.1}}),)}, "angle has no entry 'unit'"),
+        ({"data": (DataSource("a.csv", "0", "many", 1.0),)}, "data 1 has rows"),
+    ],
+)
+def test_wrong_entries_are_named(tmp_path: Path, change: dict, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        save(replace(GOOD, **change), tmp_path / "d.json")

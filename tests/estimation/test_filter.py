@@ -207,3 +207,15 @@ def test_survives_50_thousand_steps_of_abuse(law, robot_name):
 @pytest.mark.slow
 def test_survives_a_million_steps_of_abuse(robot):
     fuzz(FilterModel(robot, accelerometer_interval=3), 1_000_000, seed=2)
+
+
+def test_a_run_goes_on_from_a_state(model):
+    t = 0.008 * np.arange(1, 401)
+    columns = {"t": t, "command_right": np.full(400, 0.9), "command_left": np.full(400, 0.5), "yaw_rate": 0.1 * t}
+    whole = run_filter(model, columns)
+    later = {name: values[200:] for name, values in columns.items()}
+    resumed = run_filter(model, later, start=(whole.states[199], whole.covariances[199]))
+    np.testing.assert_allclose(resumed.states, whole.states[200:], rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(resumed.covariances, whole.covariances[200:], rtol=1e-9, atol=1e-15)
+    with pytest.raises(InputError, match="both given"):
+        run_filter(model, columns, motion=np.zeros(5), start=(whole.states[0], whole.covariances[0]))

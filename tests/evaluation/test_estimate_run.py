@@ -48,7 +48,8 @@ def test_the_thesis_s_first_run(first):
 
 def test_the_thesis_s_filter_is_worse_there(first, by_thesis):
     ours, theirs = summary_of(first), summary_of(by_thesis)
-    assert theirs["filter"] == "thesis" and theirs["force_law"] == "thesis"
+    assert theirs["filter"] == "thesis"
+    assert theirs["force_law"] == "thesis"
     assert theirs["errors"]["v_x_rmse"] > 2.0 * ours["errors"]["v_x_rmse"]
     assert len(theirs["parameters"]) == 3
     assert table_of(by_thesis)["a1"].shape == by_thesis.run.t.shape
@@ -67,7 +68,8 @@ def test_panels_are_in_the_thesis_s_order(first):
     view = estimate_view(first, "6.2")
     names = [panel.file for panel in view.panels]
     assert [name.split("_")[2] for name in names if name.startswith("figure")] == list("23456789")
-    assert path_file("6.2") == "figure_6_1_path" and path_file(None) == "path"
+    assert path_file("6.2") == "figure_6_1_path"
+    assert path_file(None) == "path"
     assert list(view.paths) == ["true", "estimated"]
     speed = next(panel for panel in view.panels if "longitudinal" in panel.file).lines[0]
     np.testing.assert_allclose(speed.high - speed.value, 2.0 * first.run.deviations[:, 0])

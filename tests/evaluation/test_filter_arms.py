@@ -79,7 +79,8 @@ def test_ours_beats_every_yardstick(robot, drive):
 def test_wheel_states_are_those_of_the_slip_ratios(robot, drive):
     rows = np.array([1000, 1500])
     states, forces = wheel_states(robot, drive, rows)
-    assert states.shape == (8, 4) and forces.shape == (8, 2)
+    assert states.shape == (8, 4)
+    assert forces.shape == (8, 2)
     radius = robot.wheels[0].outer_radius
     for wheel in range(4):
         for k, row in enumerate(rows):

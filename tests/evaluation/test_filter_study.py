@@ -75,7 +75,9 @@ def test_an_interrupted_study_goes_on(tmp_path, monkeypatch):
         file.write('["drive", "thesis_a1')  # what a kill leaves behind
     counted = []
     results = run_study(SMALL, journal, progress=counted.append)
-    assert len(results) == 13 and sum(counted) == 13 and counted[0] == 4
+    assert len(results) == 13
+    assert sum(counted) == 13
+    assert counted[0] == 4
     assert len(made) == 5 + 9
     assert results[Part(DRIVE, "thesis_a1_range", 2)] == {"number": 2}
 
@@ -98,6 +100,11 @@ def test_the_document_has_every_figure(document):
             assert low <= item[name]["value"] <= high
     assert set(document["filter"]["thesis_a1_range"]["nis"]) == set(document["aims"]["nis_inside_band"]["channels"])
     assert document["aims"]["radius_error_median"]["met"]
+    for channel, item in document["filter"]["thesis_a1_range"]["nis"].items():
+        matched = document["nis_of_matched_drives"]["soil_known_to_15_percent"][channel]
+        assert item["band"] == matched["band"]
+        assert item["inside"] == (item["band"][0] <= item["value"] <= item["band"][1])
+        assert item["cautious"] == (item["interval"][1] < matched["mean"])
     assert document["force_laws"]["thesis_a1_range"]["drives"]["coupled"]["peak_error_x"] < 0.3
     assert document["real_drives"] == {}
 

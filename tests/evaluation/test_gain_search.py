@@ -33,8 +33,8 @@ def test_objective_by_hand():
 
 
 def test_budget_is_counted():
-    assert episodes_of(STAGES) == 64 * 8 + 16 * 16 + 4 * 16
-    assert episodes_of(FEW) == 6
+    assert episodes_of(STAGES) == 64 * 8 + 16 * 16 + 4 * 16 + 40
+    assert episodes_of(FEW) == 4 + 2 + 2
 
 
 def test_values_span_the_box_logarithmically():
@@ -69,7 +69,9 @@ def test_search_resumes_and_is_repeatable(tmp_path):
     assert GainSearch("B2", tmp_path / "c", stages=FEW, seed=1).run()["finalists"] != first["finalists"]
     assert first["objective"] == min(item["objective"] for item in first["finalists"])
     assert first["best"] == first["finalists"][0]["values"]
-    assert len(first["finalists"]) == 2
+    assert len(first["finalists"]) == 3  # two, and the gains chosen by hand
+    by_hand = dict(zip((name for name, _, _ in SPACES["B2"].axes), SPACES["B2"].start, strict=True))
+    assert {"values": by_hand, "objective": first["objective_by_hand"]} in first["finalists"]
 
 
 def test_search_finds_a_known_optimum(tmp_path, monkeypatch):
@@ -77,7 +79,7 @@ def test_search_finds_a_known_optimum(tmp_path, monkeypatch):
     wanted = np.array([0.7, 0.3, 0.5, 0.6])
 
     def drive(self, values, number):
-        point = [np.log(values[n] / low) / np.log(high / low) for n, low, high in space.axes]
+        point = [np.log(max(values[n], 1e-9) / low) / np.log(high / low) for n, low, high in space.axes]
         outcome = (float(0.1 * np.linalg.norm(np.array(point) - wanted)), True)
         self._driven[json.dumps(values), number] = outcome
         return outcome
@@ -86,7 +88,19 @@ def test_search_finds_a_known_optimum(tmp_path, monkeypatch):
     found = GainSearch("B4", tmp_path / "journal").run()
     # 32 Sobol points alone come within 0.3 of the optimum
     assert found["objective"] < 0.1 * 0.25 * 1.25
-    assert len(found["finalists"]) == STAGES[-1][0]
+    assert len(found["finalists"]) == STAGES[-1][0] + 1
+
+
+def test_gains_chosen_by_hand_win_where_nothing_is_better(tmp_path, monkeypatch):
+    space = SPACES["B3"]
+    by_hand = dict(zip((name for name, _, _ in space.axes), space.start, strict=True))
+
+    def drive(self, values, number):
+        self._driven[json.dumps(values), number] = (0.01 if values == by_hand else 0.02, True)
+        return self._driven[json.dumps(values), number]
+
+    monkeypatch.setattr(GainSearch, "_drive", drive)
+    assert GainSearch("B3", tmp_path / "journal").run()["best"] == by_hand
 
 
 def test_only_the_validation_set_is_read(tmp_path, monkeypatch):

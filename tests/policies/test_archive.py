@@ -14,8 +14,10 @@ from ddagr_gym.errors import InputError
 from ddagr_gym.policies.archive import MAXIMUM_BYTES, MAXIMUM_UNPACKED, Policy, load_policy, save_policy
 from ddagr_gym.policies.design import PolicyDesign
 
+DESIGN = PolicyDesign()
 
-def make_policy(design=PolicyDesign(), units=8, seed=0, **others):
+
+def make_policy(design=DESIGN, units=8, seed=0, **others):
     rng = np.random.default_rng(seed)
     inputs = len(design.inputs)
     shapes = [(units, inputs), (units, units), (2, units)]
@@ -43,7 +45,9 @@ def stored(tmp_path):
         return file, {name: archive[name] for name in archive.files}
 
 
-@pytest.mark.parametrize("design", [PolicyDesign(), PolicyDesign(features="raw", frames=3), PolicyDesign(action="absolute")])
+@pytest.mark.parametrize(
+    "design", [PolicyDesign(), PolicyDesign(features="raw", frames=3), PolicyDesign(action="absolute")]
+)
 @pytest.mark.parametrize("squashed", [False, True])
 def test_what_was_saved_is_read_back(tmp_path, design, squashed):
     policy = make_policy(design, squashed=squashed, activation="relu", clip=5.0)
@@ -62,7 +66,9 @@ def test_outputs_are_those_of_the_formula():
     layer = np.clip((x - policy.mean) / policy.deviation, -10, 10)
     for weight, bias in zip(policy.weights[:2], policy.biases[:2], strict=True):
         layer = np.tanh(weight.astype(float) @ layer + bias)
-    np.testing.assert_allclose(policy(x[None])[0], policy.weights[2].astype(float) @ layer + policy.biases[2], rtol=1e-5)
+    np.testing.assert_allclose(
+        policy(x[None])[0], policy.weights[2].astype(float) @ layer + policy.biases[2], rtol=1e-5
+    )
 
 
 def test_missing_and_foreign_files(tmp_path):

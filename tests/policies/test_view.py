@@ -22,14 +22,17 @@ SCALE = dict(zip(NAMES, [scale for _, _, scale in (*OBSERVATION, *EKF_FEATURES)]
 START = {"side": 1.0, "target_radius": 0.8, "target_speed": 0.2, "heading_to_go": math.pi, "run_in_to_go": 0.5}
 
 
-def observation(design=PolicyDesign(), **values):
+DESIGN = PolicyDesign()
+
+
+def observation(design=DESIGN, **values):
     """One observation (1, entries) of SI values."""
     given = START | values
     full = np.array([given.get(name, 0.0) / SCALE[name] for name in NAMES], dtype=np.float32)
     return full[None, : design.observation_size]
 
 
-def view_of(design=PolicyDesign(), count=1):
+def view_of(design=DESIGN, count=1):
     return PolicyView(design, ddagr(), Sensors(), count)
 
 
@@ -122,7 +125,7 @@ def test_without_correction_the_feed_forward_is_the_force_balance():
     model = FilterModel.of(robot, Sensors())
     prior = model.soil_prior.logs(model.wheel_load)[0]
     seen = observation(run_in_to_go=0.0, heading_to_go=2.0, log_traction_limit=0.3, log_motion_resistance=-0.2)
-    expected = arc_bank_speeds(model, np.exp(prior + [0.3, 0.0, 0.0, -0.2]), 0.2, 1.25)
+    expected = arc_bank_speeds(model, np.exp(prior + np.array([0.3, 0.0, 0.0, -0.2])), 0.2, 1.25)
     view = view_of()
     view.observe(seen)
     np.testing.assert_allclose(view.act(np.zeros((1, 2)), seen)[0] * robot.maximum_wheel_speed, expected, rtol=1e-5)

@@ -43,7 +43,7 @@ def arm(horizons, notes=(), refit=None):
 
 
 def report(arms, source="a.csv"):
-    run = RunReport((source,), ("",), 100, 5.0, 0.05, "halves", {}, (0.0,), (0.0,), ("a <note>.",), tuple(arms))
+    run = RunReport((source,), ("",), 100, 5.0, 0.05, "halves", {}, (0.0,), (0.0,), ("a <note>.",), tuple(arms), 3.0)
     return ReplayReport(SCHEMA, SCHEMA_VERSION, "1", "ddagr", "clay", (), 2.0, False, 0, (run,))
 
 

@@ -1,8 +1,9 @@
 """An accelerometer axis mounted or logged with the other sign."""
 
 from dataclasses import dataclass
+from typing import Any
 
-from ddagr_gym.physics.effects.base import Effect, Vector, size
+from ddagr_gym.physics.effects.base import DriveExtent, Effect, Vector, size
 from ddagr_gym.physics.layout import POINT_READINGS, READING
 
 
@@ -33,3 +34,9 @@ class AccelerometerSign(Effect):
 
     flip_x: float = size("-", 0.0, 1.0, least=1.0, default=1.0, step=0.05)
     flip_y: float = size("-", 0.0, 1.0, least=1.0, default=0.0, step=0.05)
+
+    @classmethod
+    def probes(cls, extent: DriveExtent) -> tuple[Any, ...]:
+        """Each axis alone, and both: a sensor that is turned by half a turn or states the reaction."""
+        step = cls.parameter("flip_x").metadata["step"]
+        return (*super().probes(extent), cls(step, step))

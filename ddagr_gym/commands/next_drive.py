@@ -1,0 +1,86 @@
+"""``ddagr next-drive``: the manoeuvre that would settle what a diagnosis leaves open."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import tyro
+from tyro.conf import Positional
+
+from ddagr_gym.commands.output import format_table, write_text
+from ddagr_gym.errors import InputError
+
+EXAMPLES = (
+    "ddagr next-drive diagnosis",
+    "ddagr next-drive --rival slope=0.03 --rival accelerometer_bias=0.3 --robot ddagr --soil thesis_a1",
+)
+
+
+@dataclass(frozen=True)
+class Arguments:
+    """Name the manoeuvre in which the remaining explanations of a diagnosis would differ most.
+
+    Every rival is simulated at its fitted size over every built-in manoeuvre; the others imitate it as well as they
+    can, with soil and robot refitted. Manoeuvres are ranked by what is left per minute of driving.
+
+    Attributes:
+        diagnosis: folder or diagnosis.json of `ddagr diagnose`.
+        rival: effects to tell apart instead, name=size; may be repeated.
+        output: JSON file to write.
+        robot: nominal robot.
+        soil: nominal soil.
+        sensors: some of imu, encoders, pose; those of the diagnosis by default.
+        seed: of the sensor noise.
+    """
+
+    diagnosis: Positional[Path | None] = None
+    rival: Annotated[tuple[str, ...], tyro.conf.UseAppendAction] = ()
+    output: Path | None = None
+    robot: str = "ddagr"
+    soil: str = "thesis_a1"
+    sensors: tuple[str, ...] = ()
+    seed: int = 0
+
+
+def run(arguments: Arguments) -> None:
+    """Rank the manoeuvres and print the best."""
+    from ddagr_gym.diagnosis.next_drive import next_drive
+    from ddagr_gym.presets import get_robot, get_soil
+
+    if (arguments.diagnosis is None) == (not arguments.rival):
+        raise InputError("give either a diagnosis or some --rival name=size, not both.")
+    rivals, sensors = _rivals(arguments)
+    answer = next_drive(
+        get_robot(arguments.robot), get_soil(arguments.soil), rivals, sensors=sensors, seed=arguments.seed
+    )
+    if arguments.output is not None:
+        write_text(arguments.output, json.dumps(answer, indent=1, allow_nan=False) + "\n")
+    print(answer_text(answer))
+
+
+def _rivals(arguments: Arguments) -> tuple[list[Any], tuple[str, ...]]:
+    from ddagr_gym.diagnosis.next_drive import rivals_of_diagnosis, sensors_of_diagnosis
+    from ddagr_gym.diagnosis.planned import SENSORS
+    from ddagr_gym.diagnosis.verdict import load
+    from ddagr_gym.physics.effects.registry import parse_effect
+
+    if arguments.diagnosis is None:
+        return [parse_effect(text) for text in arguments.rival], arguments.sensors or tuple(SENSORS)
+    path = arguments.diagnosis
+    mapping = load(path / "diagnosis.json" if path.is_dir() else path)
+    return rivals_of_diagnosis(mapping), arguments.sensors or sensors_of_diagnosis(mapping)
+
+
+def answer_text(answer: dict[str, Any]) -> str:
+    """The answer in words, with the runners-up."""
+    if not answer["manoeuvre"]:
+        return str(answer["why"])
+    entries = [answer, *answer["alternatives"]]
+    rows = [(e["manoeuvre"], float(e["power"]), 60.0 * e["minutes"]) for e in entries]
+    table = format_table(("manoeuvre", "gain per minute", "seconds needed"), rows)
+    pairs = ", ".join(" from ".join(pair) for pair in answer["separates"])
+    tells = f"It tells {pairs}.\n" if pairs else ""
+    return f"Drive {answer['manoeuvre']}: {answer['why']}\n{tells}\n{table}"

@@ -1,0 +1,153 @@
+"""Errors of predictions as the entries of a certificate: root mean squares, intervals, and shares of the ceiling."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ddagr_gym.diagnosis.forecast import MOTION, UNITS
+from ddagr_gym.diagnosis.uncertainty import LEVEL
+from ddagr_gym.replay.windows import CHANNELS
+
+Array = NDArray[np.float64]
+Errors = dict[str, dict[str, Array]]
+"""(K,) by model and quantity."""
+
+HORIZONS = (1.0, 5.0, 30.0)
+"""[s], diagnosis.md, step 10."""
+
+MODELS = ("raw", "refitted", "corrected", "black_box", "ceiling")
+
+BY_RECORDING, BY_TIME = "by recording", "by time"
+
+DRAWS = 500
+
+LEAST_EXPLAINABLE = 0.03
+"""Share of the refitted error that the ceiling must explain before a share of it means anything (ours)."""
+
+
+def certificate(
+    rule: str, found: Mapping[float, Errors], clusters: Mapping[float, NDArray[np.int64]], rng: np.random.Generator
+) -> dict[str, Any]:
+    """Entries of ``fit`` in ``diagnosis.json``.
+
+    Args:
+        rule: BY_RECORDING or BY_TIME.
+        found: errors by horizon, model and quantity.
+        clusters: of the predictions, by horizon.
+        rng: of the resampling.
+    """
+    channels: dict[str, dict[str, Any]] = {}
+    shares: dict[str, dict[str, Any]] = {"gain_share": {}, "gain_share_readings": {}}
+    lost = 0
+    for horizon, every in found.items():
+        key = f"{horizon:g}"
+        errors, unfinished = finished(every)
+        lost += unfinished
+        table = resampled(errors, clusters[horizon], rng)
+        for quantity in UNITS:
+            if quantity in table["refitted"]:
+                channels.setdefault(quantity, {})[key] = _entry(table, quantity, errors)
+        shares["gain_share"][key] = gain_share(table, MOTION)
+        shares["gain_share_readings"][key] = gain_share(table, CHANNELS)
+    return {
+        "folds": rule,
+        "note": _note(rule, found, lost),
+        "horizons": list(HORIZONS),
+        "level": LEVEL,
+        "channels": channels,
+        **shares,
+    }
+
+
+def finished(errors: Errors) -> tuple[Errors, int]:
+    """Errors without the predictions that some model did not finish, and how many (at most of a quantity) these are."""
+    known = {q: [np.isfinite(by_quantity[q]) for by_quantity in errors.values()] for q in errors["refitted"]}
+    every = {q: np.all(flags, axis=0) for q, flags in known.items()}
+    lost = max(int((np.any(flags, axis=0) & ~every[q]).sum()) for q, flags in known.items())
+    return {m: {q: np.where(every[q], v, np.nan) for q, v in e.items()} for m, e in errors.items()}, lost
+
+
+def _note(rule: str, found: Mapping[float, Errors], lost: int) -> str:
+    parts = ["Which effects are in the model was decided on all drives; their sizes and the nominal model's were not."]
+    if rule == BY_TIME:
+        parts.append(
+            "There is one recording: its halves judge each other, so that its place, its sensors' biases and its day "
+            "are not new to the model that is judged."
+        )
+    missing = [f"{h:g} s" for h in HORIZONS if h not in found]
+    if missing:
+        parts.append(f"No drive is long enough for {' and '.join(missing)}.")
+    if lost:
+        parts.append(f"{lost} predictions that a model did not bring to an end are left out of all.")
+    return " ".join(parts)
+
+
+Table = dict[str, dict[str, Array]]
+
+
+def resampled(errors: Errors, clusters: NDArray[np.int64], rng: np.random.Generator) -> Table:
+    """Root mean squares (1 + DRAWS,) by model and quantity, the first of all windows, the others of drawn clusters.
+
+    The ceiling is the least of all but the raw one, in every draw.
+    """
+    count = int(clusters.max()) + 1
+    drawn = rng.integers(count, size=(DRAWS, count))
+    times = np.stack([np.bincount(row, minlength=count) for row in drawn]).astype(float)
+    times = np.concatenate([np.ones((1, count)), times]) if count > 1 else np.ones((1, count))
+    table: Table = {}
+    for model, by_quantity in errors.items():
+        table[model] = {}
+        for quantity, values in by_quantity.items():
+            known = np.isfinite(values)
+            if not known.any():
+                continue
+            squares = np.bincount(clusters[known], values[known] ** 2, minlength=count)
+            number = np.bincount(clusters[known], minlength=count)
+            with np.errstate(invalid="ignore", divide="ignore"):
+                table[model][quantity] = np.sqrt((times @ squares) / (times @ number))
+    table.setdefault("corrected", table["refitted"])
+    rivals = [table[name] for name in ("refitted", "corrected", "black_box", "flexible") if name in table]
+    table["ceiling"] = {q: np.min([rival[q] for rival in rivals], axis=0) for q in table["refitted"]}
+    return table
+
+
+def _entry(table: Table, quantity: str, errors: Errors) -> dict[str, Any]:
+    entry: dict[str, Any] = {name: _estimate(table[name][quantity]) for name in MODELS}
+    count = int(np.isfinite(errors["refitted"][quantity]).sum())
+    return entry | {"unit": UNITS[quantity], "count": count}
+
+
+def _estimate(values: Array) -> dict[str, Any]:
+    """The first value, and the interval of the others."""
+    rest = values[1:][np.isfinite(values[1:])]
+    if rest.size < DRAWS // 2:
+        return {"value": float(values[0]), "interval": None}
+    tail = 0.5 * (1.0 - LEVEL)
+    low, high = np.quantile(rest, [tail, 1.0 - tail])
+    return {"value": float(values[0]), "interval": [float(low), float(high)]}
+
+
+def gain_share(table: Table, quantities: Sequence[str]) -> dict[str, Any] | None:
+    """Share of what the ceiling gains over the refitted nominal model that the named effects gain.
+
+    Every quantity counts by its error over that of the refitted model. None where not even the ceiling gains
+    :data:`LEAST_EXPLAINABLE`.
+    """
+    names = [name for name in quantities if name in table["refitted"] and table["refitted"][name][0] > 0.0]
+    if not names:
+        return None
+    base = np.stack([table["refitted"][name] for name in names])
+
+    def gained(model: str) -> Array:
+        return np.asarray(1.0 - np.mean(np.stack([table[model][name] for name in names]) / base, axis=0))
+
+    reachable, reached = gained("ceiling"), gained("corrected")
+    if reachable[0] < LEAST_EXPLAINABLE:
+        return None
+    sound = reachable > 0.5 * LEAST_EXPLAINABLE
+    sound[0] = True
+    return _estimate(np.where(sound, reached / np.where(sound, reachable, 1.0), np.nan))

@@ -1,0 +1,176 @@
+"""`ddagr diagnose` from files to a folder: what it names, writes, refuses, and where it goes on after a stop."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ddagr_gym.cli import main
+from ddagr_gym.diagnosis import pipeline
+from ddagr_gym.diagnosis.store import part_folder
+from ddagr_gym.diagnosis.thresholds import Gate, Thresholds, save_thresholds
+from ddagr_gym.diagnosis.verdict import load
+from ddagr_gym.parameters import Imu, PoseReceiver, Sensors
+from ddagr_gym.physics.effects import load_effects
+from ddagr_gym.presets import get_robot, get_soil
+from ddagr_gym.recordings.schema import Recording
+from ddagr_gym.recordings.storage import save_parquet
+from ddagr_gym.replay.windows import CHANNELS
+from ddagr_gym.simulator import simulate
+
+RATE = 50.0
+STEPS = [(0.7, 0.7), (0.9, 0.4), (0.0, 0.0), (0.4, 0.9), (-0.5, 0.5), (1.0, 1.0)]
+
+
+@pytest.fixture(scope="session")
+def work(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with two drives of 24 s on ground that slopes, and thresholds that let only large gains pass."""
+    folder = tmp_path_factory.mktemp("diagnose")
+    robot = get_robot("ddagr")
+    (folder / "drives").mkdir()
+    for number, order in enumerate((1, -1)):
+        commands = np.concatenate([np.tile(step[::order], (200, 1)) for step in STEPS])
+        sensors = Sensors(Imu(sample_rate=RATE), pose=PoseReceiver(5.0))
+        slope = "slope=0.06,direction=0.8"
+        columns = simulate(robot, get_soil("thesis_a1"), commands, sensors=sensors, effects=slope, seed=number)
+        made = Recording.from_columns(columns, robot, source=f"run_{number + 1}")
+        save_parquet(made, folder / "drives" / f"run_{number + 1}.parquet")
+    gates = Thresholds({"slope": Gate(30.0, 0.0)}, dict.fromkeys(CHANNELS, 2.0), 20, "0" * 64)
+    save_thresholds(gates, folder / "thresholds.json")
+    return folder
+
+
+def words(work: Path, output: str = "found", *runs: str) -> list[str]:
+    names = [str(work / run) for run in runs or ("drives",)]
+    return ["diagnose", *names, "--thresholds", str(work / "thresholds.json"), "--output", str(work / output)]
+
+
+@pytest.fixture(scope="session")
+def found(work: Path) -> Path:
+    """The folder that the command writes for them."""
+    assert main(words(work)) == 0
+    return work / "found"
+
+
+@pytest.mark.slow
+def test_the_slope_is_named_and_certified(found: Path) -> None:
+    diagnosis = load(found / "diagnosis.json")
+    assert diagnosis["verdict"] == ["slope"]
+    estimate = diagnosis["findings"][0]["parameters"]["angle"]
+    assert estimate["value"] == pytest.approx(0.06, abs=0.005)
+    position = diagnosis["fit"]["channels"]["position"]["5"]
+    assert position["corrected"]["value"] < 0.5 * position["refitted"]["value"]
+    assert diagnosis["fit"]["gain_share"]["5"]["value"] > 0.7
+    assert [source["source"] for source in diagnosis["data"]] == ["run_1", "run_2"]
+    assert diagnosis["findings"][0]["where"]["phrase"]
+    assert diagnosis["next_drive"]["why"]
+
+
+@pytest.mark.slow
+def test_the_folder_is_complete(found: Path) -> None:
+    names = {path.relative_to(found).as_posix() for path in found.rglob("*") if path.is_file()}
+    assert {"index.html", "diagnosis.json", "effects.json", "effects.yaml", "evidence.npz"} <= names
+    assert any(name.endswith(".png") for name in names)
+    assert "Sloping ground" in (found / "index.html").read_text()
+    assert not part_folder(found).exists()
+
+
+@pytest.mark.slow
+def test_both_effects_files_hold_what_the_diagnosis_says(found: Path) -> None:
+    named = load(found / "diagnosis.json")["findings"][0]["parameters"]
+    for name in ("effects.json", "effects.yaml"):
+        (effect,) = load_effects(found / name)
+        assert effect.as_mapping()["parameters"] == {key: item["value"] for key, item in named.items()}
+
+
+@pytest.mark.slow
+def test_the_loop_closes(found: Path, work: Path) -> None:
+    """Replayed with the effects file, the drives' errors fall as the diagnosis certified."""
+    output = work / "replayed"
+    runs = [str(path) for path in sorted((work / "drives").iterdir())]
+    options = ["--soil", "thesis_a1", "--robot", "ddagr", "--output"]
+    effects = ["--effects", str(found / "effects.yaml")]
+    assert main(["replay", *runs, *options, str(output)]) == 0
+    assert main(["replay", *runs, *options, str(output) + "_with", *effects]) == 0
+    errors = [_replayed(Path(path)) for path in (str(output), str(output) + "_with")]
+    certified = load(found / "diagnosis.json")["fit"]["channels"]["position"]["5"]
+    assert errors[1] < 0.6 * errors[0]
+    assert errors[1] < 2.0 * certified["corrected"]["value"]
+
+
+def _replayed(folder: Path) -> float:
+    """Mean square root error of the position after 5 s, driven by commands, over the runs."""
+    report = json.loads((folder / "replay.json").read_text())
+    found = [
+        item["error"]["rms"]
+        for run in report["runs"]
+        for arm in run["arms"]
+        for item in arm["horizons"]
+        if arm["drive"] == "commands" and item["metric"] == "position" and item["horizon"] == 5.0
+        if item["error"]["rms"] is not None and item["model"] != "kinematic"
+    ]
+    return float(np.mean(found))
+
+
+@pytest.mark.slow
+def test_a_stopped_diagnosis_goes_on(
+    found: Path, work: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Stopped in the certification: nothing at the place of the output; the next start does not search again."""
+
+    def stopped(*arguments: object, **options: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(pipeline, "certify", stopped)
+        assert main(words(work, "stopped")) == 130
+    assert "goes on" in capsys.readouterr().err
+    assert not (work / "stopped").exists()
+
+    def searched(*arguments: object, **options: object) -> None:
+        raise AssertionError("the search was done again")
+
+    monkeypatch.setattr(pipeline, "search", searched)
+    assert main(words(work, "stopped")) == 0
+    again, before = (load(work / name / "diagnosis.json") for name in ("stopped", "found"))
+    assert {**again, "seconds": 0} == {**before, "seconds": 0}
+
+
+@pytest.mark.parametrize(
+    ("changes", "fragment"),
+    [
+        (["--map", "no_such_map"], "no_such_map"),
+        (["--robot", "husky"], "'ddagr'"),
+        (["--soil", "mud"], "mud"),
+        (["--threads", "0"], "--threads"),
+        (["--thresholds", "missing.json"], "ddagr null-bank"),
+    ],
+)
+def test_bad_options_are_one_sentence(
+    work: Path, changes: list[str], fragment: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    line = words(work, "refused")
+    if changes[0] == "--map":
+        shutil.copy(work / "thresholds.json", work / "table.csv")
+        line[1] = str(work / "table.csv")
+    assert main([*line, *changes]) == 2
+    error = capsys.readouterr().err
+    assert fragment in error
+    assert error.count("\n") == 1
+    assert not (work / "refused").exists()
+    assert not part_folder(work / "refused").exists()
+
+
+def test_a_folder_without_recordings_is_refused(work: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([*words(work)[:1], str(tmp_path), *words(work, "refused")[2:]]) == 2
+    assert "holds no recording" in capsys.readouterr().err
+
+
+def test_an_output_of_something_else_is_refused_at_once(work: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(words(work, "drives")) == 2
+    assert "no ddagr command wrote" in capsys.readouterr().err
+    assert len(list((work / "drives").iterdir())) == 2

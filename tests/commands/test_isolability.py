@@ -1,0 +1,69 @@
+"""``ddagr isolability``: files, text, figure."""
+
+import json
+
+import pytest
+
+from ddagr_gym.cli import main
+from ddagr_gym.commands.isolability import table_text
+from ddagr_gym.diagnosis.isolability import Detectable, Isolability
+from ddagr_gym.reporting.isolability_figure import isolability_figure
+
+
+@pytest.fixture
+def drive_csv(tmp_path):
+    path = tmp_path / "short.csv"
+    path.write_text("t,command_right,command_left\n0,0.8,0.8\n2,0.8,-0.8\n4,0.8,0.8\n")
+    return path
+
+
+def test_writes_table_json_and_figure(tmp_path, capsys, monkeypatch, drive_csv):
+    from ddagr_gym.physics.effects import registry
+
+    few = {name: registry.effect_kinds()[name] for name in ("slope", "gyro_scale", "imu_tilt")}
+    monkeypatch.setattr("ddagr_gym.diagnosis.scores.effect_kinds", lambda: few)
+    folder = tmp_path / "out"
+    arguments = ["isolability", "--manoeuvres", str(drive_csv), "--sensors", "imu", "encoders"]
+    assert main([*arguments, "--output", str(folder)]) == 0
+    mapping = json.loads((folder / "isolability.json").read_text())
+    assert mapping["schema"] == "ddagr-isolability/1"
+    assert set(mapping["effects"]) == {"slope", "gyro_scale", "imu_tilt"}
+    text = (folder / "isolability.txt").read_text()
+    assert "ddagr on thesis_a1: short (6 s) with imu, encoders; gates: chi-square" in text
+    assert text.strip() in capsys.readouterr().out
+    assert (folder / "isolability.png").stat().st_size > 10_000
+    # a second run does not overwrite unasked
+    assert main([*arguments, "--output", str(folder)]) == 2
+    assert "--overwrite" in capsys.readouterr().err
+
+
+def test_unknown_manoeuvre_is_one_sentence(tmp_path, capsys):
+    assert main(["isolability", "--manoeuvres", "strait", "--output", str(tmp_path / "out")]) == 2
+    assert "straight" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def table() -> Isolability:
+    inf = float("inf")
+    sizes = (
+        Detectable("slope", "angle", "rad", 0.0087, 0.002, 0.23),
+        Detectable("imu_tilt", "roll", "rad", 0.0087, 0.003, 0.34),
+        Detectable("gyro_scale", "scale", "-", 0.02, inf, inf),
+    )
+    share = ((float("nan"), 0.013, 1.0), (0.02, float("nan"), 1.0), (float("nan"), float("nan"), float("nan")))
+    apart = ((inf, 4.0, 0.23), (5.0, inf, 0.34), (inf, inf, inf))
+    names = ("slope", "imu_tilt", "gyro_scale")
+    return Isolability("ddagr", "a", ("straight",), 20.0, ("imu",), "chi-square", names, sizes, share, apart)
+
+
+def test_text_names_rivals_and_what_is_not_seen():
+    lines = table_text(table()).splitlines()
+    assert lines[4].split()[:3] == ["slope", "angle", "0.002"]
+    assert "imu_tilt (0.01)" in lines[4]
+    assert "not seen" in lines[6]
+
+
+def test_figure_shows_effects_that_cannot_be_seen(tmp_path):
+    png, svg = isolability_figure(table().as_mapping(), tmp_path / "figure.png")
+    assert png.stat().st_size > 10_000
+    assert svg.is_file()

@@ -1,0 +1,55 @@
+"""Recordings that cannot be diagnosed are refused with the reason before anything is computed."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ddagr_gym.diagnosis.inputs import check_recordings, content_hash, data_source
+from ddagr_gym.diagnosis.setting import Setting
+from ddagr_gym.errors import InputError
+from ddagr_gym.presets import get_robot
+from ddagr_gym.recordings.schema import Recording
+
+ROBOT = get_robot("ddagr")
+
+
+def made(seconds: float = 30.0, rate: float = 50.0, **channels: float | None) -> Recording:
+    """A drive with constant channels; None leaves one out."""
+    t = np.arange(int(seconds * rate)) / rate
+    values = {"command_right": 0.5, "command_left": 0.5, "yaw_rate": 0.1} | channels
+    columns = {name: np.full(len(t), value) for name, value in values.items() if value is not None}
+    return Recording.from_columns({"t": t, **columns}, ROBOT, source="drive.csv")
+
+
+def test_a_sound_drive_passes() -> None:
+    check_recordings([made()], ROBOT, Setting())
+
+
+@pytest.mark.parametrize(
+    ("recordings", "words"),
+    [
+        ([], "no recording"),
+        ([made(command_left=None)], "no commands"),
+        ([made(yaw_rate=None)], "neither yaw_rate nor encoders nor poses"),
+        ([made(seconds=10.0)], "too few"),
+        ([made(), made(rate=100.0)], "100 Hz"),
+        ([made(command_right=0.0, command_left=0.0)], "stand still 100 %"),
+        ([made(), made().with_meta(robot="husky")], "--robot husky"),
+    ],
+)
+def test_what_cannot_be_diagnosed_is_refused(recordings: list[Recording], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        check_recordings(recordings, ROBOT, Setting())
+
+
+def test_the_hash_knows_every_value(drive: Callable[..., Recording]) -> None:
+    recording = drive()
+    changed = {**recording.channels, "yaw_rate": recording["yaw_rate"].copy()}
+    changed["yaw_rate"][7] += 1e-9
+    assert content_hash(recording) == content_hash(drive())
+    assert content_hash(replace(recording, channels=changed)) != content_hash(recording)
+    source = data_source(recording)
+    assert source.sha256 == content_hash(recording)
+    assert source.seconds == pytest.approx(23.98)
