@@ -150,7 +150,8 @@ def score_processes(problem: Problem, fitted: Fitted) -> tuple[ScoreProcess, ...
         moved = in_blocks(problem, without(own))
         information = by_piece(moved**2, pieces)
         beside = by_piece(left * moved, pieces)
-        found.append(ScoreProcess(effect.name, beside + information, information, beside + 0.5 * information, beside))
+        gain, acts = beside + 0.5 * information, by_piece(in_blocks(problem, own) ** 2, pieces)
+        found.append(ScoreProcess(effect.name, beside + information, information, gain, beside, acts))
     return tuple(found)
 
 

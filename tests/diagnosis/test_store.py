@@ -1,16 +1,18 @@
 """Finished steps come back as they were, and nothing of another diagnosis does."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from ddagr_gym.diagnosis.refit import fit
-from ddagr_gym.diagnosis.search import Found, stand
+from ddagr_gym.diagnosis.scores import gains, scan
+from ddagr_gym.diagnosis.search import Found, Standing
 from ddagr_gym.diagnosis.store import StepStore
 from ddagr_gym.errors import InputError
 from ddagr_gym.physics.effects import load_effects
+from ddagr_gym.physics.effects.registry import effect_kind
 from tests.diagnosis.conftest import Sloping
 
 
@@ -19,16 +21,18 @@ def never() -> None:
 
 
 def test_a_search_comes_back_whole(sloping: Sloping, tmp_path: Path) -> None:
-    fitted = fit(sloping.problem, sloping.chosen.point, iterations=0)
-    found = Found((stand(sloping.problem, fitted),), ())
+    fitted, name = sloping.nominal, "slope"
+    terms = scan(sloping.problem, fitted, {name: effect_kind(name)})
+    standing = Standing(fitted, terms, tuple(gains(terms)), {name: 1.0}, {name: 2.0}, 1.0, {})
+    found = Found((standing, replace(standing, fitted=sloping.chosen)), ())
     assert StepStore(tmp_path / "part", "key").step("search", lambda: found) is found
     again = StepStore(tmp_path / "part", "key").step("search", never)
     chosen = again.chosen
-    assert chosen.fitted.point.effects == fitted.point.effects
+    assert chosen.fitted.point.effects == sloping.chosen.point.effects
     assert chosen.gains == found.chosen.gains
     assert chosen.terms.candidates[0].probes == found.chosen.terms.candidates[0].probes
     assert np.array_equal(chosen.terms.normals, found.chosen.terms.normals)
-    assert np.array_equal(chosen.fitted.elimination.basis, fitted.elimination.basis)
+    assert np.array_equal(again.nominal.fitted.elimination.basis, fitted.elimination.basis)
 
 
 @pytest.mark.parametrize(
