@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import json
+import math
 import shutil
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from agents.main import training_folder
 from agents.run import POLICY
@@ -26,6 +25,8 @@ AIMS = {"radius_error_median": 0.02, "radius_error_p95": 0.06, "success_rate": 0
 def rank(result: dict[str, Any]) -> float:
     """How far a training is from the aims on the validation set: the worst of its three ratios, 1 at the aims."""
     found = result["validation"]
+    if found["radius_error_p95"] is None or found["radius_error_median"] is None:
+        return math.inf
     return max(
         found["radius_error_median"] / AIMS["radius_error_median"],
         found["radius_error_p95"] / AIMS["radius_error_p95"],
@@ -69,9 +70,10 @@ def draw_course(settings: TrainingSettings, results: list[dict[str, Any]], path:
             for result in results:
                 course = result["course"]
                 steps = [entry["steps"] / 1e6 for entry in course] + [result["steps"] / 1e6]
-                values = [100.0 * entry[key] for entry in course] + [100.0 * result["validation"][key]]
-                # a policy that fails most turns has no finite percentile
-                axes.plot(steps, np.where(np.isfinite(values), values, np.nan), color=palette.BLUE, alpha=0.55)
+                # a policy that fails most turns has no percentile
+                values = [entry[key] for entry in [*course, result["validation"]]]
+                percent = [math.nan if value is None else 100.0 * value for value in values]
+                axes.plot(steps, percent, color=palette.BLUE, alpha=0.55)
             axes.axhline(100.0 * AIMS[key], color=palette.VERMILLION, linestyle=(0, (4, 2)), linewidth=1.0)
             axes.set(xlabel="million control steps", title=label)
             if key == "success_rate":
@@ -171,5 +173,5 @@ def _outputs(settings: TrainingSettings) -> str:
     )
 
 
-def _percent(value: float) -> str:
-    return f"{100 * value:.2f} %" if np.isfinite(value) else "no radius"
+def _percent(value: float | None) -> str:
+    return "no radius" if value is None else f"{100 * value:.2f} %"

@@ -157,7 +157,8 @@ class _Course(BaseCallback):
         entry = {"steps": self.model.num_timesteps, "cpu_seconds": round(self.seconds(), 1), **summary}
         self.history.append(entry)
         for name, value in summary.items():
-            self.logger.record(f"validation/{name}", value)
+            if value is not None:
+                self.logger.record(f"validation/{name}", value)
 
     def checkpoint(self) -> None:
         """Save, between rollouts only: a rollout begins with an empty buffer."""
@@ -190,6 +191,15 @@ def validation_episodes(count: int | None = None) -> Episodes:
     from ddagr_gym.evaluation.scenarios import load_scenarios
 
     return [(scenario.seed, scenario.episode) for scenario in load_scenarios("V")[:count]]
+
+
+def describe(found: dict[str, Any]) -> str:
+    """A validation's summary as a phrase."""
+    median, worst = (
+        "none" if found[f"radius_error_{name}"] is None else f"{100 * found[f'radius_error_{name}']:.2f} %"
+        for name in ("median", "p95")
+    )
+    return f"median |e_R| {median}, 95th percentile {worst}, success {100 * found['success_rate']:.0f} %"
 
 
 def one_thread() -> None:

@@ -11,7 +11,7 @@ from typing import Any
 
 from agents.main import ALGORITHMS, load_settings, training_folder
 from agents.publish import publish
-from agents.run import train
+from agents.run import describe, train
 
 PUBLISHED = (
     "ppo_ekf",
@@ -45,11 +45,7 @@ def train_seeds(name: str, output: Path) -> list[dict[str, Any]]:
     for seed in range(settings.seeds):
         result = train(ALGORITHMS[settings.algorithm], settings, seed, training_folder(output, name, seed))
         found = result["validation"]
-        print(
-            f"{name} seed {seed}: median {100 * found['radius_error_median']:.2f} %, 95th percentile "
-            f"{100 * found['radius_error_p95']:.2f} %, success {100 * found['success_rate']:.0f} %",
-            file=sys.stderr,
-        )
+        print(f"{Path(name).stem} seed {seed}: {describe(found)}", file=sys.stderr)
         results.append(result)
     return results
 

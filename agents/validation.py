@@ -43,16 +43,23 @@ class ValidationResult:
     successes: NDArray[np.bool_]
     returns: Array
 
-    def summary(self) -> dict[str, float]:
-        """Median and 95th percentile of |e_R|, share of successes, mean return; failures count as worst."""
-        size = np.abs(self.errors)
+    def summary(self) -> dict[str, float | None]:
+        """Median and 95th percentile of |e_R|, share of successes, mean return; failures count as worst.
+
+        None where so many turns have no radius that the value has none.
+        """
         return {
-            "radius_error_median": float(np.quantile(size, 0.5, method="higher")),
-            "radius_error_p95": float(np.quantile(size, 0.95, method="higher")),
-            "heading_radius_error_median": float(np.quantile(np.abs(self.heading_errors), 0.5, method="higher")),
+            "radius_error_median": _quantile(self.errors, 0.5),
+            "radius_error_p95": _quantile(self.errors, 0.95),
+            "heading_radius_error_median": _quantile(self.heading_errors, 0.5),
             "success_rate": float(self.successes.mean()),
             "mean_return": float(self.returns.mean()),
         }
+
+
+def _quantile(errors: Array, level: float) -> float | None:
+    value = float(np.quantile(np.abs(errors), level, method="higher"))
+    return value if np.isfinite(value) else None
 
 
 def drive_all(

@@ -28,7 +28,7 @@ from ddagr_gym.recordings.files import write_atomically
 
 HERE = Path(__file__).resolve().parent
 CHECKOUT = HERE.parents[1]
-ENTRIES = ("verdict", "complete", "findings", "sentence", "fit", "seconds", "version")
+ENTRIES = ("verdict", "complete", "findings", "sentence", "fit", "detectable", "misfit", "seconds", "version")
 """What an answer keeps of a diagnosis.json."""
 
 GROUND_OF_REAL_DRIVES = "firm_ground"

@@ -29,7 +29,7 @@ EXAMPLES = (
 
 PAGE = "index.html"
 _ENDINGS = (".csv", ".csv.gz", ".parquet", ".mcap", ".bag")
-_SHOWN = ("position", "pose_yaw", "heading", "yaw_rate", "speed", "specific_force_x", "specific_force_y")
+_SHOWN = ("position", "pose_yaw", "heading_by_gyro", "yaw_rate", "speed", "specific_force_x", "specific_force_y")
 
 
 @dataclass(frozen=True)

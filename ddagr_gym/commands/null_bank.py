@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -46,6 +46,7 @@ class Arguments:
         map: column map, for sources that are not imported yet.
         count: null drives; at least 20 for the level of 5 percent.
         seed: of the bank.
+        soil_uncertainty: as for `ddagr diagnose`.
         stride: seconds between the starts of windows; 2 uses all samples.
         processes: that work at the same time.
     """
@@ -59,6 +60,7 @@ class Arguments:
     piece: float = 60.0
     count: int = 60
     seed: int = 0
+    soil_uncertainty: float = 1.0
     stride: float = 2.0
     processes: int = 2
 
@@ -66,6 +68,7 @@ class Arguments:
 def run(arguments: Arguments) -> None:
     """Make what is missing of the bank, then write the thresholds."""
     from ddagr_gym.diagnosis.noise import recording_noise
+    from ddagr_gym.diagnosis.nuisance import NuisancePriors
     from ddagr_gym.diagnosis.null_bank import bank_hash, pieces_of, template_of
     from ddagr_gym.diagnosis.setting import Setting, wheel_radius
     from ddagr_gym.diagnosis.thresholds import NullRun, save_thresholds, thresholds_from
@@ -74,25 +77,21 @@ def run(arguments: Arguments) -> None:
 
     robot, soil = get_robot(arguments.robot), get_soil(arguments.soil)
     recordings = [load_recording(path, arguments.map or None, arguments.robot) for path in arguments.runs]
-    setting = Setting(stride=arguments.stride)
+    setting = Setting(stride=arguments.stride, priors=NuisancePriors().with_soil(arguments.soil_uncertainty))
+    template: Template | None = None
+    pieces: list[Recording] = []
     if arguments.ordinary:
         pieces = [piece for recording in recordings for piece in pieces_of(recording, arguments.piece)]
-        arguments = replace(arguments, count=len(pieces))
         template = template_of(pieces, (None,) * 8)
-    else:
-        pieces = []
-        template = template_of(recordings, recording_noise(recordings, wheel_radius(robot))) if recordings else None
-    bank = bank_hash(robot, soil, template, setting, arguments.count, arguments.seed)
+    elif recordings:
+        template = template_of(recordings, recording_noise(recordings, wheel_radius(robot)))
+    drives: list[Template | Recording | None] = [*pieces] or [template] * arguments.count
+    bank = bank_hash(robot, soil, template, setting, len(drives), arguments.seed)
     folder = arguments.output.with_suffix(".bank")
     folder.mkdir(parents=True, exist_ok=True)
-    missing = [n for n in range(arguments.count) if not _part(folder, bank, n).exists()]
-    if missing:
-        drives = [template] * arguments.count if not pieces else pieces
-        _make(
-            [(robot, soil, drives[n], setting, arguments.seed, n, _part(folder, bank, n)) for n in missing],
-            arguments.processes,
-        )
-    runs = [NullRun(**json.loads(_part(folder, bank, n).read_text())) for n in range(arguments.count)]
+    tasks = [(robot, soil, d, setting, arguments.seed, n, _part(folder, bank, n)) for n, d in enumerate(drives)]
+    _make([task for task in tasks if not task[-1].exists()], arguments.processes)
+    runs = [NullRun(**json.loads(task[-1].read_text())) for task in tasks]
     save_thresholds(thresholds_from(runs, bank), arguments.output)
     print(f"{arguments.output}: thresholds of {len(runs)} null drives, bank {bank[:12]}")
 
@@ -105,6 +104,8 @@ def _make(tasks: list[_Task], processes: int) -> None:
     """Run the missing nulls, in processes of their own."""
     import multiprocessing
 
+    if not tasks:
+        return
     with Progress(len(tasks), "null drives") as progress:
         if processes == 1:
             for task in tasks:

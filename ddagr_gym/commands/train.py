@@ -52,12 +52,8 @@ def run(arguments: Arguments) -> None:
     result = _agents("main").train_one(
         arguments.what, arguments.config, arguments.seed, arguments.output, arguments.set
     )
-    found = result["validation"]
-    print(
-        f"After {result['steps']} control steps, on the validation set: median |e_R| "
-        f"{100 * found['radius_error_median']:.2f} %, 95th percentile {100 * found['radius_error_p95']:.2f} %, success "
-        f"{100 * found['success_rate']:.0f} %."
-    )
+    described = _agents("run").describe(result["validation"])
+    print(f"After {result['steps']} control steps, on the validation set: {described}.")
     print(f"Policy, checkpoint and TensorBoard are in {arguments.output.resolve()}")
 
 

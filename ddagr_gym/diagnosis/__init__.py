@@ -1,6 +1,9 @@
 """Which physics a nominal simulator leaves out, from recordings: where, what, how big, how sure, what else.
 
     recordings -> held -> noise -> windows (setting, blocks) -> problem -> refit -> scores -> search -> verdict
+               -> certify (forecast, residual_model, certificate) -> localisation -> unnamed -> next_drive -> evidence
+
+*pipeline* runs these steps, *store* keeps what is finished, *inputs* says what recordings need to have.
 
 Method (measured reasons in the study that the project follows)
     *noise*       level, growth with speed and colour of each channel from the recordings alone.
@@ -14,13 +17,14 @@ Method (measured reasons in the study that the project follows)
                   cost), cluster-robust scores, gains on left-out windows and resampled gains without another one.
     *null_bank*   the same scan of drives from structurally different simulators; *thresholds* are its quantiles.
     *search*      forward and backward moves over joint refits, each through the gate.
+    *certify*     sizes fitted to the other recordings predict each one from states known at the start, 1, 5 and 30 s on;
+                  a flexible model of what is left says how much could have been explained.
 
 Why a refit has two starts: where something large is missing, the nominal refit bends soil and robot to make up for it,
 up to places from which no small step leads back; a joint refit from the raw nominal model finds the truth there.
 
 Limits so far
-    Certification on sealed drives, localisation, the sparse regression of unnamed terms and the next drive are not
-    built; ``complete`` and ``unknown`` rest on the misfit per channel against the null bank. A second-order motor loop
+    *Which* effects are named is decided on all recordings; only their sizes are certified on others. ``complete`` and ``unknown`` rest on the misfit per channel against the null bank. A second-order motor loop
     is named as a delay of commands. Mass hides behind soil strength in drives of this kind: see ``detectable``.
 
 Conventions: SI units, radians, channels and states in the order of :mod:`ddagr_gym.replay.windows`. Costs are half sums

@@ -49,10 +49,10 @@ STATE_ENTRIES = (
 )
 """Entries of the simulator's row that are STATE of :mod:`ddagr_gym.replay.windows`."""
 
-UNITS = {name: SCHEMA[name].unit for name in CHANNELS} | {"position": "m", "speed": "m/s", "heading": "rad"}
+UNITS = {name: SCHEMA[name].unit for name in CHANNELS} | {"position": "m", "speed": "m/s", "heading_by_gyro": "rad"}
 """What is compared at a horizon: every channel, the distance and the speed by the poses, the gyro's integral."""
 
-MOTION = ("position", "speed", "pose_yaw", "heading", "yaw_rate")
+MOTION = ("position", "speed", "pose_yaw", "heading_by_gyro", "yaw_rate")
 """Those that say where the robot is going."""
 
 _XY = [CHANNELS.index("pose_x"), CHANNELS.index("pose_y")]
@@ -189,7 +189,7 @@ def errors_at(windows: WindowSet, prediction: Array, horizon: float) -> dict[str
     found["speed"] = _speed_error(windows, prediction, stop)
     gyro = difference[..., _GYRO]
     enough = np.isfinite(gyro).mean(axis=1) >= _GYRO_SHARE
-    found["heading"] = np.where(enough, _mean(gyro) * stop * windows.period, np.nan)
+    found["heading_by_gyro"] = np.where(enough, _mean(gyro) * stop * windows.period, np.nan)
     return found
 
 

@@ -7,9 +7,11 @@ their relief tilts the robot. Both have normal priors and are projected out of e
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from ddagr_gym.errors import InputError
 from ddagr_gym.parameters import Robot
 from ddagr_gym.physics import layout
 from ddagr_gym.replay.parameters import (
@@ -56,6 +58,21 @@ class NuisancePriors:
     local_split: float = 0.03
     local_accelerometer: float = 0.02
     local_gyro: float = 3e-4
+
+    def with_soil(self, factor: float) -> NuisancePriors:
+        """The same with another uncertainty of the ground as a whole.
+
+        Args:
+            factor: on the deviations of strength, stiffness, shear modulus, friction and exponent; 1 for a field whose
+                soil was surveyed, about 4 for ground of which only a kind is known.
+
+        Raises:
+            InputError: not a positive number.
+        """
+        if not (math.isfinite(factor) and factor > 0.0):
+            raise InputError(f"the soil uncertainty is {factor:g}: give a factor above 0, 1 for a surveyed field.")
+        names = ("strength", "stiffness", "shear_modulus", "friction", "exponent")
+        return replace(self, **{name: factor * getattr(self, name) for name in names})
 
 
 @dataclass(frozen=True)

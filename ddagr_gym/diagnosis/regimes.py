@@ -36,6 +36,9 @@ LEVEL = 0.05
 LEAST_EXCESS = 0.3
 """Share of the weight beyond the share of the time from which a regime is worth naming (ours)."""
 
+LEAST_DIFFERENCE = 0.3
+"""Difference between the sizes of an effect in two regimes, over the fitted size, worth naming (ours)."""
+
 BINS = 6
 
 _NEAR_END = 0.05
@@ -281,6 +284,8 @@ def uneven(
     if best.p >= LEVEL or not information[inside].any() or not information[~inside].any():
         return None
     sizes = [1.0 + float(remainder[s].sum() / information[s].sum()) for s in (inside, ~inside)]
+    if abs(sizes[0] - sizes[1]) < LEAST_DIFFERENCE:
+        return None
     return Unevenness(best.name, best.unit, best.low, best.high, sizes[0], sizes[1], best.p)
 
 

@@ -178,7 +178,7 @@ def _without_nuisances(problem: Problem, fitted: Fitted) -> Callable[[Array], Ar
 def change_points(signal: Array) -> list[int]:
     """Ends of the stretches of (n,) between whose means a signal of unit variance jumps, the last one n.
 
-    PELT with squared errors (R. Killick, P. Fearnhead, I. Eckley, 2012).
+    PELT with squared errors (R. Killick, P. Fearnhead, I. Eckley, 2012; in C with a linear kernel).
 
     Raises:
         InputError: ruptures is not installed.
@@ -191,7 +191,7 @@ def change_points(signal: Array) -> list[int]:
         raise InputError(
             'change points need ruptures, which is not installed: run pip install "ddagr-gym[diagnosis]".'
         ) from None
-    search = ruptures.Pelt(model="l2", min_size=_SHORTEST, jump=1).fit(np.asarray(signal).reshape(-1, 1))
+    search = ruptures.KernelCPD(kernel="linear", min_size=_SHORTEST).fit(np.asarray(signal).reshape(-1, 1))
     return [int(end) for end in search.predict(pen=_PENALTY * np.log(len(signal)))]
 
 

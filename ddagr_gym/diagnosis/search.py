@@ -23,6 +23,7 @@ _TRIAL_STEPS = 3
 _HOPELESS = 0.4  # share of the best linear gain below which no joint refit is tried
 _LARGE = 100.0  # gain above which the linear scan may be far off: refits then begin from two points
 _HOPELESS_LARGE = 0.1  # the same share there
+_UNMISTAKABLE = 3.0  # gain over the gate above which an effect is named even below its least meaningful size
 _BENT = 4.0  # dispersion of the refitted nominal model above which the raw one is scanned too
 _CLOSE = 0.6  # share of the best joint gain above which a rival is fitted to the end
 
@@ -144,7 +145,12 @@ def rivals_of(problem: Problem, standing: Standing, raw: Fitted, thresholds: Thr
             tried.append(_rival(standing, gain.name, trials[best_start]))
     best = max((rival.gain for rival in tried), default=0.0)
     rivals = [_finish(problem, standing, rival) if rival.gain > _CLOSE * best else rival for rival in tried]
-    kept = [rival for rival in rivals if rival.fitted.point.effects[-1].is_meaningful(extent)]
+    kept = [
+        rival
+        for rival in rivals
+        if rival.fitted.point.effects[-1].is_meaningful(extent)
+        or rival.gain > _UNMISTAKABLE * thresholds.of(rival.name).gain
+    ]
     return sorted(kept, key=lambda rival: implausibility(rival.fitted.point.effects[-1]) - rival.gain)
 
 

@@ -134,7 +134,7 @@ def select(
     stable: float = STABLE,
     bound: float = FALSE_SELECTIONS,
 ) -> list[Stable]:
-    """Stable columns, one after the other.
+    """Stable columns, one after the other: of those that are stable the one that is worth most.
 
     Args:
         sums: by group; halves are drawn of the groups.
@@ -149,10 +149,13 @@ def select(
     found: list[Stable] = []
     while len(found) < most:
         taken = [item.column for item in found]
-        best = _search(sums, taken, plainness, rng, stable, bound)
-        if best is None or (worth is not None and worth([*taken, best.column]) - worth(taken) < least):
+        near = _search(sums, taken, plainness, rng, stable, bound)
+        if worth is not None:
+            rise = {item.column: worth([*taken, item.column]) - worth(taken) for item in near}
+            near = sorted((item for item in near if rise[item.column] >= least), key=lambda item: -rise[item.column])
+        if not near:
             break
-        found.append(best)
+        found.append(near[0])
     return found if worth is None else _settled(found, plainness, worth, least)
 
 
@@ -178,8 +181,8 @@ def _settled(
 
 def _search(
     sums: Sums, taken: list[int], plainness: Sequence[int], rng: np.random.Generator, stable: float, bound: float
-) -> Stable | None:
-    """The most stable cluster beside columns that were taken before."""
+) -> list[Stable]:
+    """Stable clusters beside columns that were taken before, the most stable first."""
     count = sums.normals.shape[1] - 1 - sums.nuisances
     rest = [k for k in range(count) if k not in taken]
     beside = sums.chosen(rest, taken)
@@ -187,18 +190,19 @@ def _search(
     total = np.diagonal(beside.normals.sum(axis=0))[1 + beside.nuisances :]
     live = np.flatnonzero(np.diag(information) > _LEAST_SHARE * np.maximum(total, 1e-12))
     if len(live) < 2:
-        return None
+        return []
     columns = [rest[k] for k in live]
     beside = sums.chosen(columns, taken)
     gradient, information, _ = beside.reduced()
     member = clusters(information)
     front = _fronts(gradient, information, member, [plainness[k] for k in columns])
     shares = _shares(sums.chosen([columns[k] for k in front], taken), rng, stable, bound)
-    best = int(np.argmax(shares))
-    if shares[best] < stable:
-        return None
-    alike = tuple(columns[k] for k in np.flatnonzero(member == member[front[best]]))
-    return Stable(columns[front[best]], alike, float(shares[best]))
+    found = []
+    for k in np.argsort(-shares, kind="stable"):
+        if shares[k] >= stable:
+            alike = tuple(columns[m] for m in np.flatnonzero(member == member[front[k]]))
+            found.append(Stable(columns[front[k]], alike, float(shares[k])))
+    return found
 
 
 def _fronts(gradient: Array, information: Array, member: NDArray[np.int64], plainness: Sequence[int]) -> list[int]:

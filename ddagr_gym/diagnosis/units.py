@@ -97,9 +97,15 @@ class Signal:
     def __mul__(self, other: Signal) -> Signal:
         return Signal(f"{self.name} {other.name}", self.values * other.values, self.unit * other.unit)
 
-    def named(self, name: str) -> Signal:
-        """The same under a shorter name."""
-        return Signal(name, self.values, self.unit)
+    def named(self, name: str, unit: Unit | None = None) -> Signal:
+        """The same under a shorter name, and in another unit of the same dimension.
+
+        Raises:
+            InputError: the unit has another dimension.
+        """
+        if unit is not None and unit.dimension != self.unit.dimension:
+            raise InputError(f"{name} has the unit {self.unit}: it cannot be given in {unit}.")
+        return Signal(name, self.values, self.unit if unit is None else unit)
 
     def squared(self) -> Signal:
         """Square that keeps the sign: |x| x."""

@@ -2,7 +2,8 @@
 
 A wrench held over a window changes speeds, slips and so the soil's reaction; its effect on all channels comes from one
 simulation per component, and the window's unknowns are projected out of it. In steady motion an accelerometer shows
-nothing of a drag: the soil balances it at another slip, which encoders and poses show.
+nothing of a drag: the soil balances it at another slip, which encoders and poses show. Small forces in straight steady
+motion hardly show at all (their deviations say so), and starts from rest are not linear in them.
 """
 
 from __future__ import annotations

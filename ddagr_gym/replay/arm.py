@@ -197,8 +197,8 @@ def _notes(
         yield f"no window of {settings.window:g} s lies in the part for fits: nothing was fitted."
     elif baselines.effective_track is None:
         yield (
-            "no effective track could be fitted: the robot did not turn, or turned against its drive, in the part for "
-            "fits; see ddagr check."
+            "no effective track could be fitted: in the part for fits the robot did not turn, or not as it was driven; "
+            "see ddagr check."
         )
     if judged is None:
         yield f"no window of {settings.window:g} s lies in the unseen part: its residuals are not judged."

@@ -137,9 +137,17 @@ def fit_baselines(prepared: Prepared, robot: Robot, drive_by: str, training: Win
             motor = fit_motor(training, motor.rate, motor.maximum_speed, sigma["encoder_right"])
     track = None
     if training is not None:
-        track = fit_track(training, radius, half_track, motor, sigma=sigma["yaw_rate"], robust=ROBUST)
+        track = fit_track(training, radius, half_track, motor, sigma=_turn_noise(prepared), robust=ROBUST)
     delay = 0.0 if track is None else track.delay
     return Baselines(KinematicModel(radius, half_track, 1.0, motor, delay), track, motor)
+
+
+def _turn_noise(prepared: Prepared) -> float:
+    """Standard deviation of the yaw rates that the track is fitted to [rad/s]: the gyro's, or between poses."""
+    if "yaw_rate" not in prepared.dead:
+        return float(prepared.sigma[CHANNELS.index("yaw_rate")])
+    rate = max(recording.rate("pose_yaw") for recording in prepared.recordings)
+    return float(np.sqrt(2.0) * prepared.sigma[CHANNELS.index("pose_yaw")] * rate) or np.inf
 
 
 def weights_of(prepared: Prepared, windows: WindowSet, imposed: bool) -> Array:

@@ -235,7 +235,7 @@ def _nothing(axes: Any, text: str) -> None:
 
 
 def _draw_growth(axes: Any, arm: ArmResult) -> None:
-    axes.set_title("Growth of the heading error, by the gyro", pad=5.0)
+    axes.set_title("Growth of the heading error", pad=5.0)
     judged = {h: r for h, r in arm.horizons.items() if any("heading" in e for e in r.errors.values())}
     if not judged:
         return _nothing(axes, "not judged: no unseen stretch, or no gyro")
@@ -243,7 +243,7 @@ def _draw_growth(axes: Any, arm: ArmResult) -> None:
     many = [horizon for horizon, result in judged.items() if len(result.clusters) >= LEAST_WINDOWS]
     longest = max(many or judged)
     result = judged[longest]
-    axes.set_title(f"Growth of the heading error, by the gyro ({len(result.clusters)} windows)", pad=5.0)
+    axes.set_title(f"Growth of the heading error ({len(result.clusters)} windows)", pad=5.0)
     for name, curve in result.growth.items():
         _, colour, line = MODEL_STYLES[name]
         times = result.period * np.arange(1, len(curve) + 1)

@@ -285,21 +285,12 @@ def describe(name: str, parameters: Amounts) -> str:
         name: of the effect.
         parameters: by field.
     """
-    kind = effect_kinds().get(name)
-    complete = kind is not None and all(f in parameters for f in (*kind.size_names(), *kind.shape_names()))
-    if name in SENTENCES and (complete or _speaks_without_shapes(name, parameters)):
+    try:
         return SENTENCES[name](parameters)
-    units = {key: item.unit.replace("^2", "²").strip("-") for key, item in parameters.items()}
+    except KeyError:
+        units = {key: item.unit.replace("^2", "²").strip("-") for key, item in parameters.items()}
     sizes = [f"{key.replace('_', ' ')} {quantity(item, units[key], signed=True)}" for key, item in parameters.items()]
     return f"{in_sentence(name)} ({', '.join(sizes)})" if sizes else in_sentence(name)
-
-
-def _speaks_without_shapes(name: str, parameters: Amounts) -> bool:
-    try:
-        SENTENCES[name](parameters)
-    except KeyError:
-        return False
-    return True
 
 
 def title(name: str) -> str:

@@ -43,7 +43,7 @@ def test_rank_is_one_at_the_aims_and_takes_the_worst():
     assert rank(result(0, *AIMS.values())) == pytest.approx(1.0)
     assert rank(result(0, 0.01, 0.12, 1.0)) == pytest.approx(2.0)
     assert rank(result(0, 0.01, 0.03, 0.90)) == pytest.approx(5.0)
-    assert rank(result(0, np.inf, np.inf, 1.0)) == np.inf
+    assert rank(result(0, 0.01, None, 1.0)) == np.inf
 
 
 def test_all_trainings_are_run_published_and_not_run_again(tmp_path, monkeypatch):
@@ -78,5 +78,5 @@ def test_a_policy_that_fails_every_turn_can_be_published(tmp_path):
     seed_folder = tmp_path / "runs" / "bad" / "seed_0"
     seed_folder.mkdir(parents=True)
     (seed_folder / "policy.npz").write_bytes(b"weights")
-    publish("bad", settings, [result(0, np.inf, np.inf, 0.0)], tmp_path / "runs", tmp_path / "bad")
+    publish("bad", settings, [result(0, None, None, 0.0)], tmp_path / "runs", tmp_path / "bad")
     assert "no radius" in (tmp_path / "bad" / "README.md").read_text()

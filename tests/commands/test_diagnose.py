@@ -19,6 +19,7 @@ from ddagr_gym.physics.effects import load_effects
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.recordings.storage import save_parquet
+from ddagr_gym.replay.report import NOMINAL
 from ddagr_gym.replay.windows import CHANNELS
 from ddagr_gym.simulator import simulate
 
@@ -111,7 +112,7 @@ def _replayed(folder: Path) -> float:
         for arm in run["arms"]
         for item in arm["horizons"]
         if arm["drive"] == "commands" and item["metric"] == "position" and item["horizon"] == 5.0
-        if item["error"]["rms"] is not None and item["model"] != "kinematic"
+        if item["model"] == NOMINAL and item["error"]["rms"] is not None
     ]
     return float(np.mean(found))
 

@@ -157,7 +157,7 @@ def test_errors_of_a_known_prediction() -> None:
     prediction[0, :, CHANNELS.index("pose_y")] = 4.0
     errors = errors_at(windows, prediction, 2.0)
     assert errors["yaw_rate"] == pytest.approx([0.1, 0.1])
-    assert errors["heading"] == pytest.approx([0.2, 0.2])
+    assert errors["heading_by_gyro"] == pytest.approx([0.2, 0.2])
     assert errors["pose_yaw"] == pytest.approx([-0.2, -0.2])
     assert errors["speed"] == pytest.approx([0.3, 0.0])
     # the last half second of poses is at 0.45 to 0.57 m, 0.51 m on average
@@ -170,8 +170,8 @@ def test_what_nothing_measures_has_no_error() -> None:
     windows.measured[0, ::2, CHANNELS.index("yaw_rate")] = np.nan
     errors = errors_at(windows, np.zeros_like(windows.measured), 1.0)
     assert np.isnan([errors["position"], errors["speed"]]).all()
-    assert np.isnan(errors["heading"][0])
-    assert errors["heading"][1] == 0.0
+    assert np.isnan(errors["heading_by_gyro"][0])
+    assert errors["heading_by_gyro"][1] == 0.0
 
 
 def test_share_of_the_ceiling() -> None:

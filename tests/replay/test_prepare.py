@@ -67,3 +67,20 @@ def test_opposed_signs_are_said(make_recording, robot):
     recording = make_recording(yaw_rate=-turning, pose_yaw=heading)
     notes = prepared([recording], robot).notes
     assert any("gyro and poses turn opposite ways" in note for note in notes)
+
+
+def test_the_track_is_fitted_to_poses_by_the_poses_noise_where_the_gyro_is_dead(make_recording, robot):
+    from ddagr_gym.replay.models import fit_baselines
+
+    rng = np.random.default_rng(0)
+    speeds = np.repeat(rng.uniform(0.5, 2.0, (20, 2)), 100, axis=0)
+    ratio, radius, half_track = 1.6, robot.wheels[0].outer_radius, robot.half_track
+    heading = np.cumsum(radius * (speeds[:, 0] - speeds[:, 1]) / (2.0 * half_track * ratio)) * 0.05
+    pose = np.where(np.arange(2000) % 5 == 0, heading + rng.normal(0.0, 0.005, 2000), np.nan)
+    recording = make_recording(
+        encoder_right=speeds[:, 0], encoder_left=speeds[:, 1], pose_yaw=pose, pose_x=0.0 * pose, pose_y=0.0 * pose
+    )
+    found = prepared([recording], robot)
+    assert "yaw_rate" in found.dead
+    seen = found.windows(2.0, "encoders", part=training)
+    assert fit_baselines(found, robot, "encoders", seen).effective_track.track_ratio == pytest.approx(ratio, rel=0.05)

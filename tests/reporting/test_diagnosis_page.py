@@ -1,0 +1,202 @@
+"""The page of a diagnosis: complete, escaped, self-contained, and at home on desks, phones and paper."""
+
+import base64
+import re
+
+import numpy as np
+import pytest
+
+from ddagr_gym.replay.windows import CHANNELS
+from ddagr_gym.reporting.diagnosis_page import PAGE, PICTURES, write_report
+from ddagr_gym.reporting.diagnosis_tables import detectable, fit_table, gate_note, regime_rows, tiles
+from ddagr_gym.reporting.evidence import Evidence
+
+from .browser import Browser, find_browser
+
+pytest.importorskip("matplotlib", reason="needs the extra report")
+pytest.importorskip("jinja2", reason="needs the extra report")
+
+HOSTILE = "<script>alert('$x_1$')</script>.csv"
+
+
+def evidence(windows=12, seed=0):
+    rng = np.random.default_rng(seed)
+    blocks, pieces, channels = 20, 4, len(CHANNELS)
+    time = 2.0 * (np.arange(windows) % (windows // 2))
+    turn = 0.2 * (time[:, None] + 0.1 * np.arange(blocks))
+    path = np.stack([2.0 * np.sin(turn), 1.0 - np.cos(turn), turn], axis=2)
+    measured = rng.normal(size=(windows, blocks, channels))
+    measured[:, ::2, 5:] = np.nan
+    sigma = np.where(np.isnan(measured), np.inf, 0.5)
+    regimes = rng.uniform(size=(3, windows, pieces))
+    regimes[2] = 1.0
+    return Evidence(
+        0.1, 0.5, np.repeat([0, 1], windows // 2), time, path, measured, measured - 1.0, measured - 0.8,
+        measured + 0.2 * rng.normal(size=measured.shape), sigma, ("slope", "payload"), np.array([80.0, 3.0]),
+        np.array([np.nan, 0.1]), np.array([9.0, 7.0]), ("speed", "heading", "slip"), regimes,
+        np.stack([path[:, 2::5, 0], path[:, 2::5, 1]], axis=2), ("slope",), rng.normal(2.0, size=(1, windows, pieces)),
+        np.ones((1, windows, pieces)), np.ones((1, windows, pieces)), rng.normal(size=(windows, 3)) + 9.0,
+        rng.normal(size=(windows, 3)), np.ones((windows, 3)),
+    )  # fmt: skip
+
+
+def where(**changes):
+    share = {
+        "name": "speed", "unit": "m/s", "edges": [0.0, 1.0], "time_share": [1.0], "weight_share": [1.0], "low": 0.5,
+        "high": None, "excess": 0.5, "weight_inside": 0.8, "time_inside": 0.3, "p": 0.01,
+    }  # fmt: skip
+    span = {"recording": 0, "start": 2.0, "end": 8.0, "share": 0.9, "size": 1.0, "deviation": 0.1}
+    found = {"spans": [span], "time_share": 0.5, "regimes": [share], "places": [], "uneven": None, "phrase": "uphill"}
+    return found | changes
+
+
+def diagnosis(**changes):
+    angle = {"value": 0.065, "unit": "rad", "interval": [0.06, 0.07]}
+    direction = {"value": 0.56, "unit": "rad", "interval": [0.5, 0.62]}
+    finding = {
+        "name": "slope", "parameters": {"angle": angle, "direction": direction}, "gain": 80.0, "gate": 9.0,
+        "score": 6.0, "held_out": 70.0, "channels": {}, "where": where(), "calibrated_p": 0.004,
+        "equivalence_set": {"slope": 0.8, "accelerometer_bias": 0.2},
+    }  # fmt: skip
+    misfit = dict.fromkeys(CHANNELS, 1.5)
+    return {
+        "schema": "ddagr-diagnosis/2", "verdict": ["slope"], "complete": True, "findings": [finding],
+        "sentence": "The ground slopes 3.7 ± 0.3 degrees.", "version": "0.1", "seconds": 61.0,
+        "misfit": {"nominal": misfit, "corrected": dict.fromkeys(CHANNELS, 0.9), "limit": dict.fromkeys(CHANNELS, 1.2)},
+        "detectable": {"slope": {"angle": 0.01}, "payload": {"mass": None}}, "nuisances": {"soil_strength": -0.1},
+        "recordings": [HOSTILE, "run_2.csv"], "thresholds": {"nulls": 120, "bank": "abc", "level": 0.05},
+    } | changes  # fmt: skip
+
+
+def later_entries():
+    error = {"value": 0.2, "interval": [0.1, 0.3]}
+    arms = {"raw": error, "refitted": error, "corrected": error, "ceiling": {"value": 0.1, "interval": None}}
+    wrench = {"component": "F_x", "unit": "N", "before": 9.0, "after": 0.1, "deviation": 1.0, "chi_before": 9.0}
+    return {
+        "fit": {
+            "folds": "by recording", "horizons": [1.0, 30.0], "gain_share": {"value": 0.91, "interval": [0.85, 0.95]},
+            "channels": {"yaw_rate": {"1.0": arms | {"unit": "rad/s"}, "30.0": {"raw": None, "unit": "rad/s"}}},
+        },
+        "localisation": {
+            "explained": 0.71, "mismatch": where(), "remaining": where(phrase="nothing above the noise", regimes=[]),
+            "wrench": [wrench | {"chi_after": 1.0}],
+        },
+        "unnamed": {
+            "equation": f"F_x = -12 v_x {HOSTILE}", "ceiling_share": 0.9, "where": "at speed",
+            "terms": [{"regressor": "v_x", "target": "F_x", "coefficient": -12.0, "unit": "N s/m",
+                       "interval": [-15.0, -9.0], "stability": 0.95}],
+        },
+        "next_drive": {
+            "manoeuvre": "square_both_ways", "why": "Gravity turns.", "separates": [["slope", "accelerometer_bias"]],
+            "power": 0.97, "alternatives": [{"manoeuvre": "spin"}],
+        },
+        "data": [{"source": HOSTILE, "sha256": "f" * 64, "rows": 600, "seconds": 12.0}],
+    }  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A report with every section."""
+    made = tmp_path_factory.mktemp("report")
+    write_report(made, diagnosis(**later_entries()), evidence())
+    return made
+
+
+@pytest.fixture(scope="module")
+def page(folder):
+    return (folder / PAGE).read_text()
+
+
+def test_the_answer_comes_first_and_every_section_is_there(page):
+    headings = re.findall(r"<h[12]>(.*?)</h[12]>", page)
+    assert headings[0] == "The ground slopes 3.7 ± 0.3 degrees."
+    assert len(headings) == len(set(headings)) == 13
+    for words in (
+        "slopes 3.7 ± 0.3 degrees, rising towards 32.1 ± 3.4 degrees", "uphill", "71 %", "square both ways",
+        "sloping ground from accelerometer bias", "0.57 degrees", "none, however large", "120 null drives", "f" * 64,
+        "p = 0.0040", "85 % to 95 %",
+    ):  # fmt: skip
+        assert words in page, words
+
+
+def test_names_from_recordings_are_escaped(page):
+    assert "<script" not in page
+    assert page.count("&lt;script&gt;alert(&#39;$x_1$&#39;)&lt;/script&gt;") >= 4
+
+
+def test_the_page_is_one_small_file_that_points_nowhere(page):
+    assert len(page.encode()) < 2_000_000
+    sources = re.findall(r'(?:src|href)="([^"]*)"', page)
+    assert sources
+    assert all(source.startswith("data:") for source in sources)
+    assert not re.search(r"https?://", page)
+
+
+def test_pictures_are_whole_and_named(folder, page):
+    images = re.findall(r'<img src="data:image/svg\+xml;base64,([^"]*)" alt="([^"]+)"', page)
+    assert len(images) == len(list((folder / PICTURES).glob("*.png"))) == 19
+    for data, _ in images:
+        assert base64.b64decode(data).rstrip().endswith(b"</svg>")
+    assert len({alt for _, alt in images}) == 19
+
+
+def test_later_steps_may_be_absent(tmp_path):
+    bare = diagnosis(findings=[], verdict=["none"], sentence="Nothing is missing.", detectable={}, nuisances={})
+    empty = evidence()
+    for name, value in (("findings", ()), ("score", np.zeros((0, 12, 4))), ("information", np.zeros((0, 12, 4)))):
+        object.__setattr__(empty, name, value)
+    object.__setattr__(empty, "gain", np.zeros((0, 12, 4)))
+    object.__setattr__(empty, "gates", np.full(2, np.nan))
+    write_report(tmp_path, bare, empty)
+    text = (tmp_path / PAGE).read_text()
+    for absent in ("What to drive next", "What has no name", "has not seen", "When it shows", "could have shown"):
+        assert absent not in text
+    assert "No regime stands out" in text
+
+
+def test_the_same_evidence_gives_the_same_page(tmp_path, page):
+    write_report(tmp_path, diagnosis(**later_entries()), evidence())
+    assert (tmp_path / PAGE).read_text() == page
+
+
+def test_tables_by_hand():
+    assert [row["size"] for row in detectable({"slope": {"angle": 0.0174533}, "no_such": {"x": 2.0}})] == [
+        "1.0 degrees",
+        "2.0",
+    ]
+    assert regime_rows({}, [{"name": "slope", "where": where()}]) == [
+        {"what": "Sloping ground", "where": "speed above 0.50 m/s", "share": "80 %", "time": "30 %", "p": "0.01"}
+    ]
+    assert "no null drives" in gate_note({"nulls": 0, "level": 0.05})
+    assert fit_table(later_entries()["fit"])["rows"][1] == ["yaw rate after 30 s [rad/s]", "–", "–", "–", "–"]
+    labels = [tile["label"] for tile in tiles(diagnosis(complete=False), 24.0)]
+    assert labels[0] == "incomplete: something is left"
+
+
+@pytest.fixture(scope="module")
+def browser():
+    program = find_browser()
+    if program is None:
+        pytest.skip("no Chromium is installed: the page is not opened")
+    with Browser(program) as running:
+        yield running
+
+
+@pytest.mark.parametrize(("width", "print_out"), [(1280, False), (390, False), (720, True)])
+def test_the_page_opens_without_errors_and_fits_the_view(browser, folder, width, print_out):
+    seen = browser.open(folder / PAGE, width, 900, print_out)
+    assert seen.problems == ()
+    assert [r for r in seen.requests if not r.startswith("data:")] == [(folder / PAGE).resolve().as_uri()]
+    assert seen.page_width <= seen.view_width
+    assert seen.broken_images == 0
+    assert HOSTILE in seen.text
+    assert len(seen.screenshot) > 50_000
+
+
+def test_the_browser_test_sees_errors_and_overflow(browser, tmp_path):
+    bad = tmp_path / "bad.html"
+    bad.write_text("<p style='width: 3000px'>wide</p><img src='absent.png'><script>throw Error('x')</script>")
+    seen = browser.open(bad, 390, 900)
+    assert seen.problems
+    assert seen.page_width > seen.view_width
+    assert seen.broken_images == 1
