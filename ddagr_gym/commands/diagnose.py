@@ -34,7 +34,7 @@ _SHOWN = ("position", "pose_yaw", "heading_by_gyro", "yaw_rate", "speed", "speci
 
 @dataclass(frozen=True)
 class Arguments:
-    """Find the physics that a nominal simulator leaves out: where, what, how big, how sure, what else.
+    """Find the physics that a nominal simulator leaves out: where, what, how big, how sure.
 
     Several recordings of one robot on one ground are diagnosed together; each is then predicted by a model whose sizes
     were fitted to the others. With a single one its halves judge each other, which is weaker: place, day and biases are
@@ -49,6 +49,8 @@ class Arguments:
         map: shipped map by name or the path of one's own YAML file, for sources that are not imported yet.
         thresholds: of `ddagr null-bank`, made with these or similar drives; those that ship with the package when it is
             left out.
+        soil_uncertainty: factor on how far the soil may be from the nominal one; larger where it is only guessed. The
+            thresholds must be of the same.
         stride: seconds between the starts of windows; 2 uses all samples.
         seed: of the resampling.
         threads: of the simulator.
@@ -63,6 +65,7 @@ class Arguments:
     soil: str = "thesis_a1"
     map: str = ""
     thresholds: Path | None = None
+    soil_uncertainty: float = 1.0
     stride: float = 2.0
     seed: int = 0
     threads: int = 2
@@ -95,6 +98,7 @@ def run(arguments: Arguments) -> int | None:
 
 
 def _task(arguments: Arguments) -> Task:
+    from ddagr_gym.diagnosis.nuisance import NuisancePriors
     from ddagr_gym.diagnosis.pipeline import Task
     from ddagr_gym.diagnosis.setting import Setting
     from ddagr_gym.presets import get_robot, get_soil
@@ -109,7 +113,8 @@ def _task(arguments: Arguments) -> Task:
     recordings: list[Recording] = [
         load_recording(path, arguments.map or None, arguments.robot, limits) for path in _sources(arguments.runs)
     ]
-    setting = Setting(stride=arguments.stride, threads=arguments.threads)
+    priors = NuisancePriors().with_soil(arguments.soil_uncertainty)
+    setting = Setting(stride=arguments.stride, priors=priors, threads=arguments.threads)
     return Task(robot, soil, tuple(recordings), _thresholds(arguments), setting, arguments.seed)
 
 

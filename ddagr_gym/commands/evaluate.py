@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from ddagr_gym.commands.output import atomic_path, format_table, make_folder, write_text
+from ddagr_gym.commands.output import format_table, make_folder, write_text
 from ddagr_gym.commands.progress import Progress
 from ddagr_gym.errors import InputError, unknown_name
 
@@ -15,6 +15,7 @@ EXAMPLES = (
     "ddagr evaluate --controllers B0,B1,B3 --scenarios S0 --output evaluation",
     "ddagr evaluate --controllers B1,B4,B5 --scenarios S0,V --workers 2 --output evaluation",
     "ddagr evaluate --controllers B4 --scenarios T --episodes 5 --output smoke_test",
+    "ddagr evaluate --replay B4:V:11 --output worst_turn",
 )
 
 
@@ -29,9 +30,10 @@ class Arguments:
     Attributes:
         controllers: names, separated by commas: B0 to B5, upper bounds, trained policies or their files.
         scenarios: names of frozen sets, separated by commas: S0 to S8, V for tuning, T for another soil law.
-        output: folder for episodes.parquet, summary.json, claims.json and the figure.
+        output: folder for report.html, episodes.parquet, summary.json, claims.json and the figure.
         workers: processes.
         episodes: only so many of each set; all by default. Claims are then not checked.
+        replay: instead of all that drive one scenario, controller:set:number, and write its figure, video and metrics.
     """
 
     controllers: str = "B0,B1,B2,B3,B4,true_curvature"
@@ -39,16 +41,21 @@ class Arguments:
     output: Path = Path("ddagr_evaluation")
     workers: int = 2
     episodes: int | None = None
+    replay: str = ""
 
 
 def run(arguments: Arguments) -> None:
-    """Drive, summarise, print the tables."""
+    """Drive, summarise, print the tables, write the page."""
+    from ddagr_gym.commands.evaluation_report import replay_scenario, write_files, write_report
     from ddagr_gym.control.row_turn import RowTurn
     from ddagr_gym.evaluation.campaign import run_campaign, wanted_episodes, with_bounds
     from ddagr_gym.evaluation.controllers import find_controller
     from ddagr_gym.evaluation.scenarios import scenario_names
     from ddagr_gym.evaluation.summary import summaries
 
+    if arguments.replay:
+        replay_scenario(arguments.replay, arguments.output)
+        return
     controllers = _names(arguments.controllers, "controllers")
     sets = _names(arguments.scenarios, "scenarios")
     for name in sets:
@@ -70,11 +77,11 @@ def run(arguments: Arguments) -> None:
             progress=progress.advance,
         )
     summary = summaries(rows)
-    _write(folder, rows, summary)
-    print(format_table(*_table(summary)))
-    if arguments.episodes is None:
-        _check_claims(folder, summary)
-    print(f"\nEpisodes, summary and figure are in {folder.resolve()}")
+    write_files(folder, rows, summary)
+    print(format_table(*results_table(summary)))
+    claims = _check_claims(folder, summary) if arguments.episodes is None else []
+    page = write_report(folder, rows, summary, claims, arguments.workers)
+    print(f"\nThe page is {page.resolve()}; episodes and summary are beside it.")
 
 
 def _names(text: str, option: str) -> list[str]:
@@ -84,31 +91,22 @@ def _names(text: str, option: str) -> list[str]:
     return list(dict.fromkeys(names))
 
 
-def _write(folder: Path, rows: list[dict[str, Any]], summary: dict[str, Any]) -> None:
-    import pyarrow as pa
-    from pyarrow import parquet
-
-    from ddagr_gym.reporting.evaluation_figures import radius_error_figure
-
-    with atomic_path(folder / "episodes.parquet") as temporary:
-        parquet.write_table(pa.Table.from_pylist(rows), temporary)
-    write_text(folder / "summary.json", json.dumps(summary, indent=1) + "\n")
-    radius_error_figure(rows, folder / "radius_error.png")
-
-
-def _check_claims(folder: Path, summary: dict[str, Any]) -> None:
-    """Write what became of every claim, and print those on something that was driven."""
+def _check_claims(folder: Path, summary: dict[str, Any]) -> list[dict[str, Any]]:
+    """Write what became of every claim, print those on something that was driven, and return all."""
     from ddagr_gym.evaluation.claims import check_claims, claims_table, load_claims
 
     checked = check_claims(load_claims(), summary)
-    write_text(folder / "claims.json", json.dumps([asdict(item) for item in checked], indent=1) + "\n")
+    written = [asdict(item) for item in checked]
+    write_text(folder / "claims.json", json.dumps(written, indent=1) + "\n")
     driven = [item for item in checked if item.verdict != "not driven"]
     if driven:
         print("\nClaims (configs/evaluation/claims.yaml)\n")
         print(format_table(*claims_table(driven)))
+    return written
 
 
-def _table(summary: dict[str, Any]) -> tuple[tuple[str, ...], list[tuple[object, ...]]]:
+def results_table(summary: dict[str, Any]) -> tuple[tuple[str, ...], list[tuple[object, ...]]]:
+    """Header and rows of the printed table, of :func:`ddagr_gym.evaluation.summary.summaries`."""
     header = ("controller", "set", "episodes", "|e_R| median", "95 % interval", "|e_R| 95th percentile", "success",
               "infeasible")  # fmt: skip
     rows: list[tuple[object, ...]] = []

@@ -24,7 +24,7 @@ EXAMPLES = (
 
 @dataclass(frozen=True)
 class Arguments:
-    """Say before any drive which effects it could show, how small, and which it could tell apart.
+    """Say which effects planned drives could show, how small, and which they could tell apart.
 
     The nominal robot is simulated over the manoeuvres with the sensors' default noise; from its sensitivities follow
     the least detectable size of each effect and the share of its trace that every other effect cannot imitate.
@@ -35,8 +35,8 @@ class Arguments:
         sensors: some of imu, encoders, pose.
         robot: nominal robot.
         soil: nominal soil.
-        thresholds: gates of `ddagr null-bank`; without them those of chance alone (chi-square, the smallest that any
-            sizes could be).
+        thresholds: gates of `ddagr null-bank`; without them those that normal noise alone asks for (chi-square); real
+            drives need larger sizes.
         seed: of the sensor noise.
         overwrite: replace an output folder that an earlier command wrote.
     """

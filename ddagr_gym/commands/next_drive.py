@@ -21,7 +21,7 @@ EXAMPLES = (
 
 @dataclass(frozen=True)
 class Arguments:
-    """Name the manoeuvre in which the remaining explanations of a diagnosis would differ most.
+    """Name the drive that would tell the remaining explanations of a diagnosis apart.
 
     Every rival is simulated at its fitted size over every built-in manoeuvre; the others imitate it as well as they
     can, with soil and robot refitted. Manoeuvres are ranked by what is left per minute of driving.

@@ -17,15 +17,16 @@ Method (measured reasons in the study that the project follows)
                   cost), cluster-robust scores, gains on left-out windows and resampled gains without another one.
     *null_bank*   the same scan of drives from structurally different simulators; *thresholds* are its quantiles.
     *search*      forward and backward moves over joint refits, each through the gate.
-    *certify*     sizes fitted to the other recordings predict each one from states known at the start, 1, 5 and 30 s on;
-                  a flexible model of what is left says how much could have been explained.
+    *certify*     sizes fitted to the other recordings predict each one from states known at the start, over 1, 5 and
+                  30 s; a flexible model of what is left says how much could have been explained.
 
 Why a refit has two starts: where something large is missing, the nominal refit bends soil and robot to make up for it,
 up to places from which no small step leads back; a joint refit from the raw nominal model finds the truth there.
 
 Limits so far
-    *Which* effects are named is decided on all recordings; only their sizes are certified on others. ``complete`` and ``unknown`` rest on the misfit per channel against the null bank. A second-order motor loop
-    is named as a delay of commands. Mass hides behind soil strength in drives of this kind: see ``detectable``.
+    *Which* effects are named is decided on all recordings; only their sizes are certified on others. ``complete``
+    and ``unknown`` rest on the misfit per channel against the null bank. A second-order motor loop is named as a delay
+    of commands. Mass hides behind soil strength in drives of this kind: see ``detectable``.
 
 Conventions: SI units, radians, channels and states in the order of :mod:`ddagr_gym.replay.windows`. Costs are half sums
 of squares in units of the noise; gains are divided by the dispersion of the model they start from.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from ddagr_gym.diagnosis.problem import Problem
@@ -47,3 +49,23 @@ def roughest(misfit: dict[str, float], limits: dict[str, float]) -> tuple[str, f
         return "", 0.0
     worst = max(ratios, key=lambda name: ratios[name])
     return worst, float(np.float64(ratios[worst]))
+
+
+_ORDINARY = 0.75
+"""Misfit over its limit that drives with nothing missing have (the null bank's median)."""
+
+
+def explained_share(
+    before: Mapping[str, float], after: Mapping[str, float], limits: Mapping[str, float]
+) -> float | None:
+    """Share of the misfit beyond the ordinary that a model takes away, over all channels; None where there is none.
+
+    Args:
+        before: misfit of the nominal model.
+        after: of the model.
+        limits: of the null bank.
+    """
+    known = [name for name in before if limits.get(name, 0.0) > 0.0]
+    first = sum(max(before[name] / limits[name] - _ORDINARY, 0.0) for name in known)
+    left = sum(max(after[name] / limits[name] - _ORDINARY, 0.0) for name in known)
+    return max(1.0 - left / first, 0.0) if first > 0.0 else None

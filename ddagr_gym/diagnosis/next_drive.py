@@ -293,12 +293,18 @@ def rivals_of_diagnosis(mapping: Mapping[str, Any]) -> list[Effect]:
         weights = {widest["name"]: 1.0, **widest["equivalence_set"]}
         names = sorted(weights, key=lambda name: (name != widest["name"], -weights[name]))[:MOST_RIVALS]
         fitted = {f["name"]: f for f in mapping["findings"]}
-        return [_at_size(name, fitted.get(name)) for name in names if name != "sensor_hold"]
+        return [_at_size(name, fitted.get(name)) for name in names if name in fitted or _has_typical_size(name)]
     return [_at_size(name, None) for name in _hidden(mapping["detectable"])]
 
 
 def _certainty(finding: Mapping[str, Any]) -> float:
     return float(finding["equivalence_set"].get(finding["name"], 1.0))
+
+
+def _has_typical_size(name: str) -> bool:
+    """Whether an effect that was not fitted can be given a size: limits and held readings cannot."""
+    kind = effect_kind(name)
+    return kind.categorical or kind.differentiable
 
 
 def _at_size(name: str, finding: Mapping[str, Any] | None) -> Effect:
@@ -309,8 +315,6 @@ def _at_size(name: str, finding: Mapping[str, Any] | None) -> Effect:
     data = kind.parameter(size).metadata
     if kind.categorical:
         return replace(kind.neutral(), **{size: data["high"]})
-    if not kind.differentiable:
-        raise InputError(f"{name} has no typical size: give one as {name}=SIZE.")
     direction = math.copysign(1.0, data["step"])
     value = data["neutral"] + direction * TYPICAL_MULTIPLE * data["least"]
     return kind.neutral().with_values(**{size: min(max(value, data["low"]), data["high"])})  # type: ignore[no-any-return]

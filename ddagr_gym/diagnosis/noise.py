@@ -30,7 +30,7 @@ _COARSE = 1.5
 """Quanta by which successive samples of a channel differ at most (rms) if its rounding is what limits it (ours)."""
 
 _STEADY = 0.8
-"""Time without a change of command after which a robot's motion counts as steady [s]: three time constants of a bank."""
+"""Time without a change of command after which a robot's motion counts as steady [s]: four time constants."""
 
 _STEADY_CHANGE = 0.02
 """Change of a bank's command that still counts as none [rad/s] (ours)."""

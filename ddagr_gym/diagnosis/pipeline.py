@@ -19,8 +19,10 @@ from ddagr_gym.diagnosis.diagnose import Prepared, conclude, prepare
 from ddagr_gym.diagnosis.evidence import Evidence, gather_evidence
 from ddagr_gym.diagnosis.inputs import check_recordings, content_hash
 from ddagr_gym.diagnosis.localisation import locate
+from ddagr_gym.diagnosis.misfit import explained_share
 from ddagr_gym.diagnosis.next_drive import next_drive, rivals_of_diagnosis, sensors_of_diagnosis
 from ddagr_gym.diagnosis.search import Found, search
+from ddagr_gym.diagnosis.sentences import headline
 from ddagr_gym.diagnosis.setting import Setting
 from ddagr_gym.diagnosis.sources import source_digest
 from ddagr_gym.diagnosis.store import StepStore
@@ -120,14 +122,24 @@ def run(
     diagnosis, effects = step("verdict", lambda: conclude(prepared, found, task.thresholds, task.rng("verdict")))
     fit = step("certification", lambda: _certified(task, prepared, found, diagnosis, progress))
     where = step("localisation", lambda: asdict(locate(prepared.problem, found)))
+    diagnosis = _doubted(diagnosis, found, where)
     unnamed = step("unnamed terms", lambda: _unnamed(task, prepared, found, diagnosis))
     following = step("next drive", lambda: _next_drive(task, diagnosis, progress))
     evidence = step("evidence", lambda: gather_evidence(prepared.problem, found, task.thresholds))
-    findings = tuple(replace(f, where=where["findings"].get(f.name)) for f in diagnosis.findings)
     seconds = time.monotonic() - began
     entries = {"fit": fit, "localisation": where, "unnamed": unnamed, "next_drive": following}
-    diagnosis = replace(diagnosis, findings=findings, seconds=seconds, **entries)
+    diagnosis = replace(diagnosis, seconds=seconds, **entries)
     return Outcome(diagnosis, effects, prepared, found, evidence)
+
+
+def _doubted(diagnosis: Diagnosis, found: Found, where: Mapping[str, Any]) -> Diagnosis:
+    """Findings with their places; a size that is not the same everywhere means that the name is not the whole truth."""
+    findings = tuple(replace(f, where=where["findings"].get(f.name)) for f in diagnosis.findings)
+    even = all(f.where is None or f.where.get("uneven") is None for f in findings)
+    complete = diagnosis.complete and even
+    share = explained_share(found.nominal.misfit, found.chosen.misfit, diagnosis.misfit["limit"]) if findings else None
+    sentence = headline(diagnosis.verdict, complete, findings, share)
+    return replace(diagnosis, findings=findings, complete=complete, sentence=sentence)
 
 
 def _unnamed(task: Task, prepared: Prepared, found: Found, diagnosis: Diagnosis) -> Mapping[str, Any] | None:

@@ -15,6 +15,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ddagr_gym.reporting.wording import REGIME_EXCESS, REGIME_LEVEL
+
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
@@ -29,12 +31,6 @@ REGIMES: Mapping[str, tuple[str, str]] = {
     "time": ("s", "of the recording"),
 }
 """Unit and meaning of the ordered regimes; places and recordings come beside them."""
-
-LEVEL = 0.05
-"""Of the test over all regimes."""
-
-LEAST_EXCESS = 0.3
-"""Share of the weight beyond the share of the time from which a regime is worth naming (ours)."""
 
 LEAST_DIFFERENCE = 0.3
 """Difference between the sizes of an effect in two regimes, over the fitted size, worth naming (ours)."""
@@ -100,7 +96,7 @@ class RegimeShare:
     def stands_out(self) -> bool:
         """Whether it is worth a phrase."""
         bounded = self.name == "place" or self.low is not None or self.high is not None
-        return bounded and self.p < LEVEL and self.excess >= LEAST_EXCESS
+        return bounded and self.p < REGIME_LEVEL and self.excess >= REGIME_EXCESS
 
 
 def shifted(weight: Array, recording: Integers, rng: np.random.Generator, count: int) -> Array:
@@ -281,7 +277,7 @@ def uneven(
     tested = _with_p(found)
     best = min(tested, key=lambda item: (item.p, -item.excess))
     inside = _inside(pieces.values[best.name], best)
-    if best.p >= LEVEL or not information[inside].any() or not information[~inside].any():
+    if best.p >= REGIME_LEVEL or not information[inside].any() or not information[~inside].any():
         return None
     sizes = [1.0 + float(remainder[s].sum() / information[s].sum()) for s in (inside, ~inside)]
     if abs(sizes[0] - sizes[1]) < LEAST_DIFFERENCE:

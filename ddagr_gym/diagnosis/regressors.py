@@ -182,7 +182,9 @@ def _body(motion: Motion, problem: Problem) -> list[Signal]:
     radius = Signal("R", np.array(_radius(problem)), METRE)
     track = Signal("W", np.array(problem.robot.half_track), METRE)
     slips = [
-        (radius * motion[f"w_{side}"] - v_x - Signal("1", np.array(sign), NUMBER) * track * r).named(f"slip_{side}", SPEED)
+        (radius * motion[f"w_{side}"] - v_x - Signal("1", np.array(sign), NUMBER) * track * r).named(
+            f"slip_{side}", SPEED
+        )
         for side, sign in (("right", 1.0), ("left", -1.0))
     ]
     return [

@@ -217,17 +217,27 @@ def search(
             break
         progress(f"joint refit with {tried[0].name}")
         best = _swapped(problem, tried[0].fitted, steps)
-        standing = stand(problem, fit(problem, best.point, iterations=4, renewals=1, first=best), progress)
+        standing = stand(problem, fit(problem, best.point, iterations=8, renewals=3, first=best), progress)
         standing = _without_idle(problem, standing, thresholds, progress)
         if set(standing.names) in [set(s.names) for s in standings]:
             break
         standings.append(standing)
         steps.append(tuple(tried))
+    if steps and not standings[-1].fitted.converged:
+        progress("last refit")
+        standings[-1] = _settled(problem, standings[-1])
     return Found(tuple(standings), steps[0] if steps else (), tuple(steps))
 
 
+def _settled(problem: Problem, standing: Standing) -> Standing:
+    """The same model fitted to the end; what the scan said of others stays."""
+    point, last = standing.fitted.point, standing.fitted
+    fitted = min(fit(problem, point, iterations=8, renewals=2, first=last), last, key=lambda trial: trial.cost)
+    return replace(standing, fitted=fitted, misfit=channel_misfit(problem, fitted))
+
+
 def _swapped(problem: Problem, fitted: Fitted, steps: Sequence[tuple[Rival, ...]]) -> Fitted:
-    """Swap move: the model with a close rival in place of an effect that an earlier step chose, where it fits better."""
+    """Swap move: the model with a close rival in place of an effect of an earlier step, where it fits better."""
     best = fitted
     for number, rivals in enumerate(steps):
         for rival in rivals[1:]:

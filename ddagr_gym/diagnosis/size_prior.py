@@ -42,8 +42,8 @@ _SPREAD = 0.7
 def implausibility(effect: Effect) -> float:
     """Half the square of how far a size is from a typical one, on a logarithmic scale; it settles ties only.
 
-    A biased and a tilted accelerometer leave the same traces: 0.1 m/s^2 is an ordinary bias and hardly a tilt, 0.5 m/s^2
-    an ordinary tilt and hardly a bias.
+    A biased and a tilted accelerometer leave the same traces: 0.1 m/s^2 is an ordinary bias and hardly a tilt, 0.5
+    m/s^2 an ordinary tilt and hardly a bias.
     """
     if effect.categorical or not effect.differentiable:
         return 0.0

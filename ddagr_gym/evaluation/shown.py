@@ -1,4 +1,4 @@
-"""Which episodes of a campaign a page shows, driven again: paths, the filter's estimate, the worst and a typical turn."""
+"""Which episodes of a campaign a page shows, driven again: paths, the filter's estimate, the worst, a typical turn."""
 
 from __future__ import annotations
 

@@ -31,8 +31,13 @@ FILTER_INPUTS = (
     "heading_error",
     "estimated_heading_to_go",
     "estimated_distance_to_go",
+    "sideslip",
+    "sideslip_deviation",
+    "course_cross_track_error",
+    "course_error",
 )
-"""Inputs of the arm with the filter: its features, and the pose that its speed and yaw rate integrate to."""
+"""Inputs of the arm with the filter: its features, the pose that its speed and yaw rate integrate to, and the same with
+the sideslip that :mod:`ddagr_gym.estimation.sideslip` adds."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +56,7 @@ class PolicyDesign(Validated):
         curvature_scale: correction of curvature at output 1, over 1/R* [-].
         speed_scale: correction of speed at output 1, over the reference speed [-].
         rate_limit: largest change of an output per control step [-].
-        lead_time: how long before the end of the turn the feed-forward straightens [s].
+        lead_time: how long before the start and the end of the turn the feed-forward bends and straightens [s].
         heading_gain: curvature of the feed-forward per heading error on straights [1/(m rad)].
     """
 
@@ -62,7 +67,7 @@ class PolicyDesign(Validated):
     curvature_scale: float = bounded("-", 0.0, 5.0, default=0.5, open_low=True)
     speed_scale: float = bounded("-", 0.0, 0.9, default=0.25)
     rate_limit: float = bounded("-", 0.0, 2.0, default=0.25, open_low=True)
-    lead_time: float = bounded("s", 0.0, 2.0, default=0.22)
+    lead_time: float = bounded("s", 0.0, 2.0, default=0.30)
     heading_gain: float = bounded("1/(m rad)", 0.0, 50.0, default=1.0)
 
     def _check(self) -> None:

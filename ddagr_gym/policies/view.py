@@ -7,14 +7,17 @@ knows the observation only: nothing true.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.control.observation import FEATURE_SCALES, OBSERVATION, SCALES
 from ddagr_gym.control.turn_controller import CONTROL_PERIOD
+from ddagr_gym.envs.constants import CONTROL_INTERVAL
 from ddagr_gym.estimation import FilterModel
 from ddagr_gym.estimation.force_balance import arc_bank_speed_rows
+from ddagr_gym.estimation.sideslip import SideslipFilter
 from ddagr_gym.parameters import Robot, Sensors
 from ddagr_gym.policies.design import PolicyDesign
 
@@ -26,6 +29,9 @@ INPUT_LIMIT = 10.0
 
 _LEAST_SPEED = 0.25
 """Share of the reference speed below which an estimated speed is not divided by [-] (ours)."""
+
+_TURNED = 0.05
+"""Heading change after which the sideslip may change [rad] (ours)."""
 
 _BASE = len(OBSERVATION)
 _FORCE_SCALE = 1.0  # [m/s^2]
@@ -52,20 +58,25 @@ class PolicyView:
         self._fresh = np.ones(count, dtype=np.bool_)
         self._outputs = np.zeros((count, 2))
         self._pose = np.zeros((count, 3))
+        self._course_position = np.zeros((count, 2))
+        self._sideslip = SideslipFilter(sensors.imu, CONTROL_INTERVAL, CONTROL_PERIOD, count)
         self._last_rate = np.zeros(count)
         self._integral = np.zeros(count)
         self._frames = np.zeros((count, depth, len(design.frame_inputs)))
 
-    MEMORY = ("_fresh", "_outputs", "_pose", "_last_rate", "_integral", "_frames")
+    def _memories(self) -> tuple[NDArray[Any], ...]:
+        filter_ = self._sideslip
+        own = (self._fresh, self._outputs, self._pose, self._course_position, self._last_rate, self._integral)
+        return (*own, self._frames, filter_.states, filter_.covariances, filter_.last_rates)
 
-    def memory(self) -> dict[str, NDArray[np.generic]]:
+    def memory(self) -> tuple[NDArray[Any], ...]:
         """Copies of everything that is remembered between steps; see :meth:`restore`."""
-        return {name: getattr(self, name).copy() for name in self.MEMORY}
+        return tuple(array.copy() for array in self._memories())
 
-    def restore(self, memory: dict[str, NDArray[np.generic]]) -> None:
+    def restore(self, memory: tuple[NDArray[Any], ...]) -> None:
         """Back to what :meth:`memory` gave."""
-        for name in self.MEMORY:
-            getattr(self, name)[...] = memory[name]
+        for array, saved in zip(self._memories(), memory, strict=True):
+            array[...] = saved
 
     def reset(self, chosen: NDArray[np.int64] | None = None) -> None:
         """Forget the episodes of ``chosen`` rows, all by default."""
@@ -100,6 +111,8 @@ class PolicyView:
         self._outputs[started] = 0.0
         self._pose[started] = 0.0
         self._pose[started, 0] = -seen[new, 11]
+        self._course_position[started] = self._pose[started, :2]
+        self._sideslip.reset(started)
         self._last_rate[started] = 0.0
         self._integral[started] = 0.0
 
@@ -125,9 +138,9 @@ class PolicyView:
 
     def _phases(self, seen: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Whether in the turn, and whether in the run-out, as the classical controllers decide it."""
-        entered = seen[:, 11] <= 0.0
-        lead = self.design.lead_time * seen[:, 9] / seen[:, 8]
-        to_turn = seen[:, 10] > lead
+        lead = self.design.lead_time * seen[:, 9]
+        entered = seen[:, 11] <= lead
+        to_turn = seen[:, 10] > lead / seen[:, 8]
         return entered & to_turn, entered & ~to_turn
 
     def _filtered(self, rows: NDArray[np.int64], seen: Array, features: Array) -> list[Array]:
@@ -137,8 +150,14 @@ class PolicyView:
         curvature = radius * rate / np.maximum(forward, _LEAST_SPEED * speed)
         error = np.where(turning, curvature - 1.0, curvature)
         self._integral[rows] += np.where(turning, error, 0.0) * CONTROL_PERIOD
-        self._dead_reckon(rows, forward, rate)
-        cross_track, heading_error, to_go = self._path_errors(rows, radius)
+        turning_body = np.abs(self._pose[rows, 2]) > _TURNED
+        side_speed = self._sideslip.update(rows, side * seen[:, 1], forward, rate, turning_body)
+        side_speed = np.where(self._fresh[rows], 0.0, side_speed)
+        self._dead_reckon(rows, forward, side_speed, rate)
+        heading = self._pose[rows, 2]
+        cross_track, heading_error, to_go = _path_errors(*self._pose[rows, :2].T / radius, heading)
+        slip_angle = side_speed / np.maximum(forward, _LEAST_SPEED * speed)
+        course = _path_errors(*self._course_position[rows].T / radius, heading + slip_angle)
         outer, inner = _outer_inner(side, features[:, 6], features[:, 7])
         return [
             forward / speed,
@@ -152,30 +171,26 @@ class PolicyView:
             # a hundredth of R* and half a degree are what matters
             10.0 * cross_track,
             10.0 * heading_error,
-            (math.pi - self._pose[rows, 2]) / math.pi,
+            (math.pi - heading) / math.pi,
             to_go,
+            10.0 * slip_angle,
+            100.0 * np.sqrt(self._sideslip.covariances[rows, 0, 0]),
+            10.0 * course[0],
+            10.0 * course[1],
         ]
 
-    def _dead_reckon(self, rows: NDArray[np.int64], forward: Array, rate: Array) -> None:
-        """Pose by the filter's speed and yaw rate, in coordinates in which the turn goes to the left."""
+    def _dead_reckon(self, rows: NDArray[np.int64], forward: Array, side_speed: Array, rate: Array) -> None:
+        """Pose by the filter's speed and yaw rate, and position with the sideslip, turn to the left."""
         moved = ~self._fresh[rows]
         turned = np.where(moved, 0.5 * (rate + self._last_rate[rows]) * CONTROL_PERIOD, 0.0)
         heading = self._pose[rows, 2] + 0.5 * turned
         step = np.where(moved, forward * CONTROL_PERIOD, 0.0)
-        self._pose[rows, 0] += step * np.cos(heading)
-        self._pose[rows, 1] += step * np.sin(heading)
+        aside = np.where(moved, side_speed * CONTROL_PERIOD, 0.0)
+        ahead = np.column_stack([step * np.cos(heading), step * np.sin(heading)])
+        self._pose[rows, :2] += ahead
         self._pose[rows, 2] += turned
+        self._course_position[rows] += ahead + np.column_stack([-aside * np.sin(heading), aside * np.cos(heading)])
         self._last_rate[rows] = rate
-
-    def _path_errors(self, rows: NDArray[np.int64], radius: Array) -> tuple[Array, Array, Array]:
-        """Distance to the left of the path and heading error of the dead-reckoned pose, turn left, all over R* or 1."""
-        x, y, heading = self._pose[rows, 0] / radius, self._pose[rows, 1] / radius, self._pose[rows, 2]
-        from_centre = y - 1.0
-        on_circle, leaving = x >= 0.0, from_centre > 0.0
-        angle = np.arctan2(np.abs(x), -from_centre)
-        distance = np.where(on_circle, angle, np.where(leaving, math.pi - x, x))
-        offset = np.where(on_circle, 1.0 - np.hypot(x, from_centre), np.where(leaving, 1.0 - from_centre, y))
-        return offset, heading - np.clip(distance, 0.0, math.pi), math.pi - distance
 
     def act(self, outputs: NDArray[np.floating], observations: NDArray[np.floating]) -> NDArray[np.float32]:
         """Actions of the environment (N, 2), right and left, for the policy's outputs (N, 2) in [-1, 1].
@@ -206,6 +221,16 @@ class PolicyView:
         parameters = np.exp(np.broadcast_to(self._prior + logs, (len(seen), 4)))
         corrected = speed * (1.0 + self.design.speed_scale * self._outputs[:, 1])
         return arc_bank_speed_rows(self._model, parameters, corrected, curvature)
+
+
+def _path_errors(x: Array, y: Array, heading: Array) -> tuple[Array, Array, Array]:
+    """Distance to the left of the path of R* = 1, heading error, and angle to go, for a turn to the left."""
+    from_centre = y - 1.0
+    on_circle, leaving = x >= 0.0, from_centre > 0.0
+    angle = np.arctan2(np.abs(x), -from_centre)
+    distance = np.where(on_circle, angle, np.where(leaving, math.pi - x, x))
+    offset = np.where(on_circle, 1.0 - np.hypot(x, from_centre), np.where(leaving, 1.0 - from_centre, y))
+    return offset, heading - np.clip(distance, 0.0, math.pi), math.pi - distance
 
 
 def _outer_inner(side: Array, right: Array, left: Array) -> tuple[Array, Array]:

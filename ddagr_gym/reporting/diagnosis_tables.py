@@ -7,7 +7,19 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ddagr_gym.reporting.diagnosis_figures import LABELS
-from ddagr_gym.reporting.wording import DEGREES, Amount, amounts, describe, in_sentence, number, quantity, title
+from ddagr_gym.reporting.wording import (
+    DEGREES,
+    REGIME_EXCESS,
+    REGIME_LEVEL,
+    Amount,
+    amounts,
+    describe,
+    in_sentence,
+    number,
+    quantity,
+    range_in_words,
+    title,
+)
 
 Entry = Mapping[str, Any]
 
@@ -130,7 +142,7 @@ def regime_rows(localisation: Entry, findings: Sequence[Entry]) -> list[dict[str
     rows = []
     for what, where in sources:
         for item in where.get("regimes") or []:
-            if item["p"] < 0.05 and item["excess"] >= 0.2:
+            if item["p"] < REGIME_LEVEL and item["excess"] >= REGIME_EXCESS:
                 inside = min(item["weight_inside"], 1.0)
                 rows.append(
                     {
@@ -145,15 +157,10 @@ def regime_rows(localisation: Entry, findings: Sequence[Entry]) -> list[dict[str
 
 
 def _range(item: Entry) -> str:
-    name, low, high = str(item["name"]).replace("_", " "), item.get("low"), item.get("high")
-    if name == "place":
+    if item["name"] == "place":
         x, y, radius = item["edges"]
-        return f"within {number(radius)} m of ({number(x)}, {number(y)}) m"
-    factor, unit = (DEGREES, "degrees") if item["unit"] == "rad" else (1.0, item["unit"].strip("-"))
-    ends = [None if end is None else number(factor * end) for end in (low, high)]
-    if ends[0] is None or ends[1] is None:
-        return f"{name} {'below' if ends[0] is None else 'above'} {ends[1] or ends[0] or 'all'} {unit}".strip()
-    return f"{name} from {ends[0]} to {ends[1]} {unit}".strip()
+        return f"within {number(radius)} m of ({x:.2f}, {y:.2f}) m"
+    return range_in_words(str(item["name"]), item.get("low"), item.get("high"))
 
 
 def gate_note(thresholds: Entry) -> str:

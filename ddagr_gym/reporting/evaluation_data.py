@@ -92,7 +92,7 @@ class Film:
         file: relative to the page.
         title: what it shows.
         command: that makes it again.
-        poster: PNG of one picture of it.
+        poster: JPEG of one picture of it.
     """
 
     file: PurePosixPath

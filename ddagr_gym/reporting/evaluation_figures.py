@@ -16,7 +16,8 @@ ROW_HEIGHT = 0.2
 """Of one arm in a figure [inch]."""
 
 BASELINE_COLOURS = {"B1": palette.BLUE, "B4": palette.ORANGE}
-_LEAST, _MOST = 0.002, 1.0
+_LEAST, _MOST, _FAILED = 0.1, 100.0, 170.0
+"""Ends of the axis of |e_R|, and where a failure stands [%]."""
 _QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 _SIGNED_LIMIT = 0.30
 _POINTS = 400
@@ -38,7 +39,7 @@ def arm_colours(evaluation: Evaluation) -> dict[str, str]:
 
 
 def radius_error_figure(evaluation: Evaluation, path: str | Path) -> tuple[Path, Path]:
-    """Every turn radius error on the judged set by arm, with median and 5 to 95 %; PNG and SVG, for a README.
+    """Every turn radius error on the judged set by arm, with median, quartiles and 5 to 95 %; PNG and SVG, for a README.
 
     Args:
         evaluation: what was driven.
@@ -57,7 +58,9 @@ def radius_error_figure(evaluation: Evaluation, path: str | Path) -> tuple[Path,
         for place, arm in enumerate(arms):
             _strip(axes, place, evaluation.rows_of(arm.name, evaluation.judged), colours[arm.name])
         count = next(item.driven for item in evaluation.sets if item.name == evaluation.judged)
-        axes.set_title(f"Turn radius error on the {count} scenarios of {evaluation.judged}: median, 5 to 95 %")
+        axes.set_title(
+            f"Turn radius error on the {count} scenarios of {evaluation.judged}: median, quartiles, 5 to 95 %"
+        )
         _arm_axis(axes, arms)
         _signed_axis(axes)
         axes.set_xlabel("turn radius error [%]; at the edge: beyond it, or no radius")
@@ -111,7 +114,7 @@ def _signed_axis(axes: Any) -> None:
     axes.set_xlim(-100.0 * _SIGNED_LIMIT, 100.0 * _SIGNED_LIMIT)
 
 
-def _panels(evaluation: Evaluation, width: float = 1.35) -> tuple[Any, list[Any], list[Arm]]:
+def _panels(evaluation: Evaluation, width: float = 1.1) -> tuple[Any, list[Any], list[Arm]]:
     """Figure with one panel a set and one row an arm."""
     from matplotlib.figure import Figure
 
@@ -143,10 +146,10 @@ def error_figure(evaluation: Evaluation) -> Any:
             _dot(panel, place - 0.13, found.get("radius_error_median"), colours[arm.name], True)
             _dot(panel, place + 0.13, found.get("radius_error_p95"), colours[arm.name], False)
         panel.set_xscale("log")
-        panel.set_xlim(100.0 * _LEAST, 130.0 * _MOST)
-        panel.set_xticks([1.0, 10.0, 100.0], ["1", "10", "fails"])
+        panel.set_xlim(_LEAST, 1.2 * _FAILED)
+        panel.set_xticks([1.0, 10.0, 100.0], ["1", "10", "100"])
         panel.tick_params(axis="x", which="minor", length=0)
-    figure.supxlabel("|turn radius error| [%]: filled the median, hollow the 95th percentile", fontsize=8)
+    figure.supxlabel("|turn radius error| [%]", fontsize=8)
     return figure
 
 
@@ -157,12 +160,13 @@ def _dot(panel: Any, place: float, metric: Mapping[str, Any] | None, colour: str
     if metric["interval"] is not None:
         panel.plot([_shown(end) for end in metric["interval"]], [place, place], color=colour, linewidth=1.5)
     face = colour if filled else "white"
-    panel.plot(value, place, "o", color=face, markeredgecolor=colour, markersize=3.6, mew=1.0)
+    mark = ">" if metric["value"] is None else "o"
+    panel.plot(value, place, mark, color=face, markeredgecolor=colour, markersize=3.6, mew=1.0)
 
 
 def _shown(share: float | None) -> float:
     """Percent, kept inside the panel."""
-    return 100.0 * (_MOST if share is None else float(np.clip(share, _LEAST, _MOST)))
+    return _FAILED if share is None else float(np.clip(100.0 * share, _LEAST, _MOST))
 
 
 def signed_figure(evaluation: Evaluation) -> Any:
@@ -174,9 +178,7 @@ def signed_figure(evaluation: Evaluation) -> Any:
             rows = evaluation.rows_of(arm.name, item.name)
             _quantile_bar(panel, place, rows, colours[arm.name], 100.0 * _SIGNED_LIMIT)
         _signed_axis(panel)
-    figure.supxlabel(
-        "turn radius error [%], positive is too wide: median, quartiles, 5 and 95 %; at the edge: beyond it", fontsize=8
-    )
+    figure.supxlabel("turn radius error [%]", fontsize=8)
     return figure
 
 

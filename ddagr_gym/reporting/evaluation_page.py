@@ -30,9 +30,7 @@ _DPI = 110
 """Of the points inside figures."""
 
 
-def write_page(
-    folder: Path, evaluation: Evaluation, robot: Robot, progress: Callable[[], None] = lambda: None
-) -> Path:
+def write_page(folder: Path, evaluation: Evaluation, robot: Robot, progress: Callable[[], None] = lambda: None) -> Path:
     """Write ``report.html`` and ``radius_error.png``.
 
     Args:
@@ -125,7 +123,7 @@ def _context(evaluation: Evaluation, robot: Robot, progress: Callable[[], None])
 
 
 def _film(film: Film) -> dict[str, str]:
-    poster = f"data:image/png;base64,{base64.b64encode(film.poster).decode()}" if film.poster else ""
+    poster = f"data:image/jpeg;base64,{base64.b64encode(film.poster).decode()}" if film.poster else ""
     return {"file": str(film.file), "title": film.title, "command": film.command, "poster": poster}
 
 

@@ -8,7 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from ddagr_gym.control.row_turn import FURROW_SLACK, PRACTICE_HEADING_TOLERANCE, PRACTICE_LATERAL_TOLERANCE, RowTurn
+from ddagr_gym.control.row_turn import (
+    FURROW_SLACK,
+    PRACTICE_HEADING_TOLERANCE,
+    PRACTICE_LATERAL_TOLERANCE,
+    RowTurn,
+    side_sign,
+)
 from ddagr_gym.parameters import Robot
 from ddagr_gym.reporting import palette
 from ddagr_gym.reporting.evaluation_data import Evaluation, ShownDrive, display_name
@@ -38,7 +44,7 @@ def _grid(count: int, panel: tuple[float, float], columns: int = _COLUMNS, top: 
 
 
 def exit_figure(evaluation: Evaluation, robot: Robot) -> Any:
-    """Lateral against heading error at the next row's start line, by arm, on the judged set.
+    """Lateral against heading error at the next row's start line, by arm, on the judged set; as if turned left.
 
     Args:
         evaluation: what was driven.
@@ -59,8 +65,8 @@ def exit_figure(evaluation: Evaluation, robot: Robot) -> Any:
         panel.set(xlim=(-1e3 * _LATERAL_LIMIT, 1e3 * _LATERAL_LIMIT), xticks=(-200, 0, 200), yticks=(-30, 0, 30))
         panel.set_ylim(-math.degrees(_HEADING_LIMIT), math.degrees(_HEADING_LIMIT))
         panel.tick_params(labelleft=True, labelbottom=True, length=2.0)
-    figure.supxlabel("lateral error [mm], to the left of the row positive", fontsize=8)
-    figure.supylabel("heading error [°]", fontsize=8)
+    figure.supxlabel("lateral error [mm], beyond the row positive", fontsize=8)
+    figure.supylabel("heading error [°], turned too far positive", fontsize=8)
     return figure
 
 
@@ -70,8 +76,11 @@ def _exits(panel: Any, rows: Sequence[Any]) -> None:
     every = reached[:: max(1, len(reached) // _POINTS)]
     for success, colour in ((True, palette.BLUE), (False, palette.VERMILLION)):
         mine = [row for row in every if bool(row["success"]) == success]
-        lateral = np.clip([row["exit_lateral_error"] for row in mine], -_LATERAL_LIMIT, _LATERAL_LIMIT)
-        heading = np.clip([row["exit_heading_error"] for row in mine], -_HEADING_LIMIT, _HEADING_LIMIT)
+        if not mine:
+            continue
+        side = np.array([side_sign(row["side"]) for row in mine])
+        lateral = -side * np.clip([row["exit_lateral_error"] for row in mine], -_LATERAL_LIMIT, _LATERAL_LIMIT)
+        heading = side * np.clip([row["exit_heading_error"] for row in mine], -_HEADING_LIMIT, _HEADING_LIMIT)
         panel.plot(
             1e3 * lateral, np.degrees(heading), "o", color=colour, markersize=2.2, alpha=0.6, mew=0, rasterized=True,
             clip_on=False,

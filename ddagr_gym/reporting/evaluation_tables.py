@@ -67,8 +67,13 @@ def with_span(metric: Mapping[str, Any] | None, digits: int = 1) -> dict[str, st
     if metric is None:
         return {"value": NONE, "span": ""}
     span = metric["interval"]
-    ends = "" if span is None else "–".join(FAILED if e is None else f"{100.0 * e:.{digits}f}" for e in span)
+    ends = "" if span is None else _span([FAILED if e is None else f"{100.0 * e:.{digits}f}" for e in span])
     return {"value": percent(metric["value"], digits), "span": ends}
+
+
+def _span(ends: Sequence[str]) -> str:
+    """Ends of an interval; a dash between them only where none is negative."""
+    return (" to " if any(end.startswith("-") for end in ends) else "–").join(ends)
 
 
 def sentence(evaluation: Evaluation) -> str:
@@ -158,7 +163,7 @@ def _size(metric: Mapping[str, Any] | None, factor: float) -> dict[str, str]:
         return {"value": NONE, "span": ""}
     ends = [FAILED if end is None else f"{factor * end:.3g}" for end in metric["interval"]]
     value = FAILED if metric["value"] is None else f"{factor * metric['value']:.3g}"
-    return {"value": value, "span": "–".join(ends)}
+    return {"value": value, "span": _span(ends)}
 
 
 def why_failed(row: Row) -> str:
@@ -301,20 +306,20 @@ def infeasible_rows(evaluation: Evaluation) -> list[dict[str, str]]:
 def infeasible_sentence(evaluation: Evaluation) -> str:
     """How many scenarios are left out, and how often one was made all the same."""
     total = sum(item.driven for item in evaluation.sets)
+    if not evaluation.infeasible:
+        return f"All {total} scenarios can be made: an upper bound that sees the true state makes each."
     made = [
         sum(evaluation.metrics(arm.name, item.name).get("infeasible_but_made", 0) for item in evaluation.sets)
         for arm in evaluation.arms
     ]
-    text = f"{len(evaluation.infeasible)} of {total} scenarios: no controller that sees the true state makes the turn"
-    return text + f"; an arm made up to {max(made, default=0)} of them all the same."
+    text = f"{len(evaluation.infeasible)} of {total} scenarios are left out: no upper bound, which sees the true state, makes them"
+    return text + f"; the arm that made most of them all the same made {max(made, default=0)}."
 
 
 def radius_note(evaluation: Evaluation) -> str:
     """How many radii are undefined or doubtful, over all arms and sets."""
     found = [evaluation.metrics(arm.name, item.name) for arm in evaluation.arms for item in evaluation.sets]
-    undefined, doubtful = (
-        sum(m.get(key, 0) for m in found) for key in ("undefined_radius", "inconsistent_radius")
-    )
+    undefined, doubtful = (sum(m.get(key, 0) for m in found) for key in ("undefined_radius", "inconsistent_radius"))
     return (
         f"Of {len(evaluation.rows)} episodes, {undefined} have no radius (they count as worst), and in {doubtful} the "
         "fitted radius and arc length over course change differ by more than 1 %."

@@ -303,3 +303,54 @@ def in_sentence(name: str) -> str:
     """An effect's title inside a sentence: in lower case but for abbreviations."""
     words = title(name).split()
     return " ".join(word if word.isupper() else word.lower() for word in words)
+
+
+EVERYWHERE = "everywhere"
+
+_BACKWARDS = 0.02
+"""Speed at which a range ends that means driving backwards [m/s] (ours)."""
+
+_STEADY = 0.01
+"""Change of commands below which they count as held [rad/s] (ours)."""
+
+REGIME_LEVEL = 0.05
+"""Of the test over all regimes, for one to be put in words."""
+
+REGIME_EXCESS = 0.25
+"""Share of something beyond the share of the time from which a regime is put in words (ours)."""
+
+_RANGES: dict[str, tuple[str, str]] = {
+    "speed": ("at speeds", "m/s"),
+    "slip": ("at slips", ""),
+    "turning": ("while turning at", "rad/s"),
+    "yaw_rate": ("at yaw rates", "rad/s (positive to the left)"),
+    "command": ("at commands", "rad/s"),
+    "command_change": ("while commands change by", "rad/s"),
+    "time": ("at times", "s"),
+}
+
+
+def range_in_words(name: str, low: float | None, high: float | None) -> str:
+    """A range of a regime, such as "at speeds above 0.6 m/s".
+
+    Args:
+        name: of the regime.
+        low: None where it is open.
+        high: the same.
+    """
+    if name == "heading" and low is not None and high is not None:
+        ends = [f"{math.degrees(end):.0f}".replace("-", "−") for end in (low, high)]
+        return f"while heading between {ends[0]} and {ends[1]} degrees"
+    if name == "speed" and low is None and high is not None and abs(high) < _BACKWARDS:
+        return "while driving backwards"
+    if name == "command_change" and low is None and high is not None and high < _STEADY:
+        return "while commands are held"
+    words, unit = _RANGES[name]
+    after = f" {unit}" if unit else ""
+    if low is None and high is None:
+        return EVERYWHERE
+    if low is None:
+        return f"{words} below {number(high or 0.0)}{after}"
+    if high is None:
+        return f"{words} above {number(low)}{after}"
+    return f"{words} between {number(low)} and {number(high)}{after}"

@@ -90,7 +90,10 @@ def test_both_effects_files_hold_what_the_diagnosis_says(found: Path) -> None:
 
 @pytest.mark.slow
 def test_the_loop_closes(found: Path, work: Path) -> None:
-    """Replayed with the effects file, the drives' errors fall as the diagnosis certified."""
+    """Replayed with the effects file, the drives' errors fall as the diagnosis certified.
+
+    A replay compares with the last pose alone, whose noise of 13 mm along each axis the certification averages.
+    """
     output = work / "replayed"
     runs = [str(path) for path in sorted((work / "drives").iterdir())]
     options = ["--soil", "thesis_a1", "--robot", "ddagr", "--output"]
@@ -100,11 +103,11 @@ def test_the_loop_closes(found: Path, work: Path) -> None:
     errors = [_replayed(Path(path)) for path in (str(output), str(output) + "_with")]
     certified = load(found / "diagnosis.json")["fit"]["channels"]["position"]["5"]
     assert errors[1] < 0.6 * errors[0]
-    assert errors[1] < 2.0 * certified["corrected"]["value"]
+    assert errors[1] < certified["corrected"]["value"] + 0.02
 
 
 def _replayed(folder: Path) -> float:
-    """Mean square root error of the position after 5 s, driven by commands, over the runs."""
+    """Root mean square error of the position after 5 s, driven by commands, mean over the runs [m]."""
     report = json.loads((folder / "replay.json").read_text())
     found = [
         item["error"]["rms"]

@@ -22,7 +22,7 @@ def quick_nulls(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     def null_run(robot, soil, template, kind, setting, seed, *more, **options):  # type: ignore[no-untyped-def]
         made.append(seed[-1])
         rng = np.random.default_rng(list(seed))
-        gains = {"slope": float(rng.exponential(3.0)), "payload": float(rng.exponential(1.0))}
+        gains = {"slope": float(rng.exponential(300.0)), "payload": float(rng.exponential(100.0))}
         misfit = {name: float(rng.uniform(0.9, 1.1)) for name in CHANNELS}
         return NullRun(kind, gains, dict.fromkeys(gains, 1.0), dict.fromkeys(gains, 0.5), misfit)
 

@@ -10,7 +10,7 @@ from ddagr_gym.diagnosis.localisation import channel_shares, locate, piece_value
 from ddagr_gym.diagnosis.misfit import channel_misfit
 from ddagr_gym.diagnosis.refit import fit
 from ddagr_gym.diagnosis.regimes import Pieces, shares, uneven
-from ddagr_gym.diagnosis.regimes_words import EVERYWHERE, NOWHERE_MORE, phrase_of, range_in_words, uneven_phrase
+from ddagr_gym.diagnosis.regimes_words import NOWHERE_MORE, phrase_of, uneven_phrase
 from ddagr_gym.diagnosis.score_process import (
     ScoreProcess,
     as_it_stands,
@@ -25,6 +25,7 @@ from ddagr_gym.diagnosis.scores import dispersion_of
 from ddagr_gym.diagnosis.search import Found, Standing
 from ddagr_gym.diagnosis.wrench import HeldWrench, residual_wrench
 from ddagr_gym.physics.effects.registry import parse_effect
+from ddagr_gym.reporting.wording import EVERYWHERE, range_in_words
 
 pytest.importorskip("ruptures", reason="needs the extra diagnosis")
 
@@ -249,6 +250,7 @@ def test_an_effect_of_two_sizes_is_uneven_and_one_of_one_size_is_not():
 def test_ranges_in_words():
     assert range_in_words("speed", 0.6, None) == "at speeds above 0.60 m/s"
     assert range_in_words("speed", None, -0.01) == "while driving backwards"
+    assert range_in_words("command_change", None, 0.0) == "while commands are held"
     assert range_in_words("slip", 0.1, 0.35) == "at slips between 0.10 and 0.35"
     assert range_in_words("heading", 3.0, -3.0) == "while heading between 172 and −172 degrees"
     assert range_in_words("command", None, None) == EVERYWHERE

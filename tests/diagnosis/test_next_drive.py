@@ -72,6 +72,9 @@ def test_rivals_and_sensors_of_a_diagnosis() -> None:
     # five times the least meaningful bias of 0.05 m/s^2
     assert abs(rivals[1].x) == pytest.approx(0.25)
     assert sensors_of_diagnosis(mapping) == ("imu", "encoders")
+    # a limit that was not fitted has no size to plan with
+    finding["equivalence_set"] = {"slope": 0.6, "motor_saturation": 0.4}
+    assert [rival.name for rival in rivals_of_diagnosis(mapping)] == ["slope"]
 
 
 def test_without_findings_what_could_hide_is_planned_for() -> None:

@@ -1,0 +1,48 @@
+"""The demonstration's evaluation: the ladder of controllers and the trained policies on a few frozen scenarios."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ddagr_gym.commands.demo import Section
+
+LADDER = ("B0", "B1", "B2", "B3", "B4")
+SET = "V"
+SCENARIOS = 8
+"""The first ones of the validation set: enough for a look, not for a result."""
+
+
+def evaluation_step(folder: Path, scenarios: int = SCENARIOS, workers: int = 2) -> Section:
+    """Drive controllers and policies over the same soils and noise; page, videos and files into ``folder/evaluation``.
+
+    Args:
+        folder: of the demonstration, which exists.
+        scenarios: how many of the set.
+        workers: processes.
+    """
+    from ddagr_gym.commands.demo import Section
+    from ddagr_gym.commands.evaluate import results_table
+    from ddagr_gym.commands.evaluation_report import write_files, write_report
+    from ddagr_gym.commands.output import format_table
+    from ddagr_gym.evaluation.campaign import run_campaign
+    from ddagr_gym.evaluation.summary import summaries
+    from ddagr_gym.policies.shipped import policy_names
+    from ddagr_gym.reporting.evaluation_page import PAGE, PICTURE
+
+    controllers = [*LADDER, *policy_names()]
+    print(f"Driving {len(controllers)} controllers over {scenarios} scenarios of set {SET} ...", flush=True)
+    target = folder / "evaluation"
+    target.mkdir()
+    rows = run_campaign(controllers, [SET], target / "episodes.jsonl", processes=workers, count=scenarios)
+    summary: dict[str, Any] = summaries(rows)
+    write_files(target, rows, summary)
+    write_report(target, rows, summary, workers=workers)
+    html = f"""<p>The first {scenarios} scenarios of set {SET}: a look, not a result. All of it:
+<code>ddagr evaluate --scenarios S1</code>.</p>
+<div class="wide"><a href="evaluation/{PAGE}"><img src="evaluation/{PICTURE}.png" alt="Turn radius error by controller">
+</a></div>
+<p>Everything about it, with paths, the filter's estimate and the worst turns: <a href="evaluation/{PAGE}">page</a>,
+<a href="evaluation/summary.json">summary</a>, <a href="evaluation/episodes.parquet">episodes</a>.</p>"""
+    return Section("Which controller turns closest", format_table(*results_table(summary)), html)

@@ -1,0 +1,238 @@
+"""What ``ddagr evaluate`` writes beside its tables: the page with its videos, and one scenario driven again."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path, PurePosixPath
+from typing import TYPE_CHECKING, Any
+
+from ddagr_gym.commands.output import atomic_path, format_table, make_folder, write_text
+from ddagr_gym.commands.progress import Progress
+
+if TYPE_CHECKING:
+    from ddagr_gym.evaluation.runs import TurnRun
+    from ddagr_gym.reporting.evaluation_data import Arm, Evaluation, Film, SetNote
+
+VIDEOS = "videos"
+
+_HASH_DIGITS = 16
+
+
+def write_report(
+    folder: Path,
+    rows: Sequence[Mapping[str, Any]],
+    summary: Mapping[str, Any],
+    claims: Sequence[Mapping[str, Any]] = (),
+    workers: int = 1,
+    films: bool = True,
+) -> Path:
+    """Drive what the page shows again, and write the page, its videos and the picture for a README.
+
+    Args:
+        folder: of the evaluation.
+        rows: of the campaign.
+        summary: of the rows.
+        claims: checked, as mappings; none where they were not decided.
+        workers: processes for the drives.
+        films: whether to make videos.
+
+    Returns:
+        The page.
+    """
+    from ddagr_gym.evaluation.shown import drive_shown, film_rows, overlaid_rows, tracked_rows
+    from ddagr_gym.presets import ddagr
+    from ddagr_gym.reporting.evaluation_page import FIGURES, write_page
+
+    plain = assemble(rows, summary, claims)
+    overlaid, tracked = overlaid_rows(plain), tracked_rows(plain)
+    filmed = film_rows(plain) if films else []
+    total = len(overlaid) + len(tracked) + len(filmed) + FIGURES
+    with Progress(total, "report") as progress:
+        shown = replace(
+            plain,
+            drives=drive_shown(overlaid, False, workers, progress.advance),
+            tracked=drive_shown(tracked, True, 1, progress.advance),
+            films=[_film(folder, number, *item, progress) for number, item in enumerate(filmed, 1)],
+        )
+        return write_page(folder, shown, ddagr(), progress.advance)
+
+
+def assemble(
+    rows: Sequence[Mapping[str, Any]], summary: Mapping[str, Any], claims: Sequence[Mapping[str, Any]]
+) -> Evaluation:
+    """Evidence of the page before anything is driven again."""
+    from ddagr_gym.evaluation.claims import load_claims
+    from ddagr_gym.evaluation.shown import infeasible_soils
+    from ddagr_gym.evaluation.summary import improvement
+    from ddagr_gym.reporting.evaluation_data import Evaluation
+
+    headline = load_claims().headline
+    arms, sets = _arms(rows, summary), _sets(rows)
+    evaluation = Evaluation(
+        rows=rows,
+        summary=summary,
+        arms=arms,
+        sets=sets,
+        headline=headline if headline in summary else "",
+        claims=claims,
+        infeasible=infeasible_soils(rows),
+        sources=_sources(arms, sets),
+        note=_left_out(sets),
+    )
+    if not evaluation.headline:
+        return evaluation
+    plain: Any = [dict(row) for row in rows]
+    found = {
+        arm.name: improvement(plain, arm.name, headline, evaluation.judged)
+        for arm in arms
+        if arm.learned and arm.name != headline
+    }
+    return replace(evaluation, over_headline={name: item for name, item in found.items() if item is not None})
+
+
+def _arms(rows: Sequence[Mapping[str, Any]], summary: Mapping[str, Any]) -> list[Arm]:
+    """Arms in the order of the summary, those that are never deployable last."""
+    from ddagr_gym.evaluation.controllers import controller_names, controller_title, controller_version, is_deployable
+    from ddagr_gym.reporting.evaluation_data import Arm, arm_name
+
+    member: dict[str, str] = {}
+    for row in rows:
+        member.setdefault(arm_name(row), row["controller"])
+    arms = []
+    for name in summary:
+        controller = member[name]
+        learned = controller not in controller_names()
+        version = controller_version(controller)[:_HASH_DIGITS] if learned else ""
+        arms.append(Arm(name, controller_title(controller), is_deployable(controller), learned, version))
+    return sorted(arms, key=lambda arm: not arm.deployable)
+
+
+def _sets(rows: Sequence[Mapping[str, Any]]) -> list[SetNote]:
+    from ddagr_gym.evaluation.scenario_sets import PLANS
+    from ddagr_gym.evaluation.scenarios import load_scenarios, set_hash
+    from ddagr_gym.reporting.evaluation_data import SetNote
+
+    driven: dict[str, set[int]] = {}
+    for row in rows:
+        driven.setdefault(row["set"], set()).add(row["number"])
+    return [
+        SetNote(name, PLANS[name].description, len(load_scenarios(name)), len(numbers), set_hash(name))
+        for name, numbers in driven.items()
+    ]
+
+
+def _left_out(sets: Sequence[SetNote]) -> str:
+    short = [item for item in sets if item.driven < item.scenarios]
+    if not short:
+        return ""
+    parts = ", ".join(f"{item.driven} of {item.scenarios} of {item.name}" for item in short)
+    return f"Only the first scenarios were driven ({parts}): this is a look, not a result."
+
+
+def _sources(arms: Sequence[Arm], sets: Sequence[SetNote]) -> list[tuple[str, str]]:
+    from ddagr_gym.evaluation.controllers import gains_file
+    from ddagr_gym.version import __version__
+
+    found = [("ddagr-gym", __version__), ("gains of the ladder", f"sha256 {_digest(gains_file())}")]
+    found += [(f"scenarios {item.name}", f"sha256 {item.sha256[:_HASH_DIGITS]}") for item in sets]
+    found += [(f"policy {arm.name}", f"sha256 {arm.version}") for arm in arms if arm.learned]
+    return [*found, ("every number", "summary.json, and every episode in episodes.parquet beside this page")]
+
+
+def _digest(path: Path) -> str:
+    import hashlib
+
+    return hashlib.sha256(path.read_bytes()).hexdigest()[:_HASH_DIGITS]
+
+
+def _film(folder: Path, number: int, title: str, row: Mapping[str, Any], progress: Progress) -> Film:
+    from ddagr_gym.evaluation.controllers import needs_filter
+    from ddagr_gym.evaluation.shown import replayed
+    from ddagr_gym.reporting.evaluation_data import Film, display_name
+    from ddagr_gym.reporting.evaluation_film import film_turn
+    from ddagr_gym.reporting.evaluation_tables import replay_command
+
+    _, run = replayed(row["controller"], row["set"], row["number"])
+    run = _with_estimate(run) if needs_filter(row["controller"]) else run
+    file = PurePosixPath(VIDEOS) / f"{number}_{_file_name(row)}.mp4"
+    make_folder(folder / VIDEOS)
+    turn, robot = run.episode.turn, run.episode.robot
+    poster = film_turn(run.columns, turn, robot, folder / file, display_name(str(row["controller"])))
+    progress.advance()
+    return Film(file, f"{title}: {row['set']} {row['number']}", replay_command(row), poster)
+
+
+def _file_name(row: Mapping[str, Any]) -> str:
+    """Letters, digits and underscores only, whatever a policy's path holds."""
+    name = Path(str(row["controller"]).removesuffix("/policy.npz")).name
+    plain = "".join(letter if letter.isalnum() else "_" for letter in name)
+    return f"{plain}_{row['set']}_{row['number']}"
+
+
+def _with_estimate(run: TurnRun) -> TurnRun:
+    """The run with the path that the filter believes in."""
+    from ddagr_gym.evaluation.shown import estimated_track
+
+    x, y, _ = estimated_track(run).T
+    return replace(run, columns=run.columns | {"estimated_x": x, "estimated_y": y})
+
+
+def replay_scenario(text: str, folder: Path) -> None:
+    """Drive one scenario of one controller again; figure, video, recording and metrics into the folder.
+
+    Args:
+        text: ``controller:set:number``.
+        folder: made where absent.
+
+    Raises:
+        InputError: the text names nothing.
+    """
+    import json
+
+    from ddagr_gym.commands.simulate import write_recording
+    from ddagr_gym.evaluation.controllers import needs_filter
+    from ddagr_gym.evaluation.shown import parse_replay, replayed
+    from ddagr_gym.reporting.evaluation_film import film_turn
+    from ddagr_gym.reporting.figures import turn_figure
+
+    controller, set_name, number = parse_replay(text)
+    row, run = replayed(controller, set_name, number)
+    make_folder(folder)
+    stem = _file_name(row)
+    seen = _with_estimate(run) if needs_filter(controller) else run
+    name, turn, robot = f"{set_name} {number}", run.episode.turn, run.episode.robot
+    turn_figure(seen.columns, turn, folder / f"{stem}.png", robot=robot, soil_name=f"soil {name}")
+    write_recording(folder / f"{stem}.parquet", run.columns, robot)
+    write_text(folder / f"{stem}.json", json.dumps(row, indent=1) + "\n")
+    film_turn(seen.columns, turn, robot, folder / f"{stem}.mp4", f"soil {name}")
+    print(format_table((f"{controller} on {name}", "value"), _replay_rows(row)))
+    print(f"\nFigure, video, recording and metrics are in {folder.resolve()}")
+
+
+def _replay_rows(row: Mapping[str, Any]) -> list[tuple[str, object]]:
+    from ddagr_gym.reporting.evaluation_tables import why_failed
+
+    def shown(key: str, factor: float, unit: str) -> str:
+        return "undefined" if row[key] is None else f"{factor * row[key]:+.1f} {unit}"
+
+    return [
+        ("turn radius error", shown("radius_error", 100.0, "%")),
+        ("lateral error at the next row", shown("exit_lateral_error", 1e3, "mm")),
+        ("heading error there", shown("exit_heading_error", 57.29578, "deg")),
+        ("every wheel fits its furrow", "yes" if row["success"] else f"no: {why_failed(row)}"),
+        ("headland depth", shown("headland_depth", 1.0, "m")),
+        ("duration", shown("duration", 1.0, "s")),
+    ]
+
+
+def write_files(folder: Path, rows: Sequence[Mapping[str, Any]], summary: Mapping[str, Any]) -> None:
+    """Write ``episodes.parquet`` and ``summary.json``."""
+    import json
+
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    with atomic_path(folder / "episodes.parquet") as temporary:
+        parquet.write_table(pa.Table.from_pylist([dict(row) for row in rows]), temporary)
+    write_text(folder / "summary.json", json.dumps(summary, indent=1) + "\n")
