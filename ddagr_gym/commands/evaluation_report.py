@@ -221,8 +221,8 @@ def _replay_rows(row: Mapping[str, Any]) -> list[tuple[str, object]]:
         ("lateral error at the next row", shown("exit_lateral_error", 1e3, "mm")),
         ("heading error there", shown("exit_heading_error", 57.29578, "deg")),
         ("every wheel fits its furrow", "yes" if row["success"] else f"no: {why_failed(row)}"),
-        ("headland depth", shown("headland_depth", 1.0, "m")),
-        ("duration", shown("duration", 1.0, "s")),
+        ("headland depth", f"{row['headland_depth']:.2f} m"),
+        ("duration", f"{row['duration']:.1f} s"),
     ]
 
 

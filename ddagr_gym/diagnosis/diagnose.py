@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -9,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ddagr_gym.diagnosis.equivalence import equivalence_weights
+from ddagr_gym.diagnosis.flipped import Flipped, find_flipped_gyro, with_gyro_turned
 from ddagr_gym.diagnosis.held import Held, find_held, hold_effect, without_repeats
 from ddagr_gym.diagnosis.inputs import data_source
 from ddagr_gym.diagnosis.misfit import LOCAL, explained_share, roughest
@@ -21,6 +23,7 @@ from ddagr_gym.diagnosis.uncertainty import intervals, least_detectable, resampl
 from ddagr_gym.diagnosis.verdict import NONE, UNKNOWN, Diagnosis, Estimate, Finding
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.physics.effects import Effect
+from ddagr_gym.physics.effects.gyro_sign import GyroSign
 from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.version import __version__
 
@@ -39,11 +42,13 @@ class Prepared:
     Attributes:
         recordings: with repeats as missing samples.
         held: sensors that repeat their readings.
+        flipped: evidence of a reversed gyro, whose sign is mended in the recordings.
         problem: their windows.
     """
 
     recordings: tuple[Recording, ...]
     held: tuple[Held, ...]
+    flipped: Flipped | None
     problem: Problem
 
 
@@ -58,7 +63,10 @@ def prepare(robot: Robot, soil: Soil, recordings: Sequence[Recording], setting: 
     """
     held = find_held(recordings)
     clean = tuple(without_repeats(recording, held) for recording in recordings) if held else tuple(recordings)
-    return Prepared(clean, tuple(held), make_problem(robot, soil, clean, setting))
+    flipped = find_flipped_gyro(clean)
+    if flipped is not None:
+        clean = tuple(with_gyro_turned(recording) for recording in clean)
+    return Prepared(clean, tuple(held), flipped, make_problem(robot, soil, clean, setting))
 
 
 def conclude(
@@ -76,9 +84,14 @@ def conclude(
         The diagnosis (its time is 0), and the effects that it names with their fitted sizes.
     """
     problem, held = prepared.problem, prepared.held
-    findings = [*_held_findings(held), *_findings(problem, found, thresholds, rng)]
+    findings = [
+        *_held_findings(held),
+        *_flipped_findings(prepared.flipped),
+        *_findings(problem, found, thresholds, rng),
+    ]
     verdict, complete = _verdict(found, [f.name for f in findings], thresholds)
-    effects = (*((hold_effect(held),) if held else ()), *found.chosen.fitted.point.effects)
+    from_values = (*((hold_effect(held),) if held else ()), *((GyroSign(1.0),) if prepared.flipped else ()))
+    effects = (*from_values, *found.chosen.fitted.point.effects)
     values = found.chosen.fitted.point.values
     diagnosis = Diagnosis(
         verdict,
@@ -122,6 +135,7 @@ def diagnose(
     """
     began = time.monotonic()
     prepared = prepare(robot, soil, recordings, Setting() if setting is None else setting)
+    thresholds = thresholds.for_windows(prepared.problem.blocked.windows.count)
     found = search(prepared.problem, thresholds, progress=progress)
     progress("doubt")
     diagnosis, effects = conclude(prepared, found, thresholds, rng)
@@ -139,6 +153,15 @@ def _held_findings(held: Sequence[Held]) -> list[Finding]:
     }
     repeats = sum(item.share * item.samples for item in held)
     return [Finding("sensor_hold", parameters, repeats, 0.0, repeats**0.5, repeats, {}, {"sensor_hold": 1.0})]
+
+
+def _flipped_findings(flipped: Flipped | None) -> list[Finding]:
+    """A reversed gyro needs no fit: the correlation is the evidence, as the gain of a line through the origin."""
+    if flipped is None:
+        return []
+    gain = -0.5 * flipped.samples * math.log1p(-min(flipped.correlation**2, 1.0 - 1e-12))
+    flip = {"flip": Estimate(1.0, "-")}
+    return [Finding("gyro_sign", flip, gain, 0.0, (2.0 * gain) ** 0.5, gain, {"yaw_rate": 1.0}, {"gyro_sign": 1.0})]
 
 
 def _findings(problem: Problem, found: Found, thresholds: Thresholds, rng: np.random.Generator) -> list[Finding]:

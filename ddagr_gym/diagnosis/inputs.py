@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ddagr_gym.diagnosis.setting import Setting
+from ddagr_gym.diagnosis.setting import Setting, window_duration
 from ddagr_gym.diagnosis.verdict import DataSource
 from ddagr_gym.errors import InputError
 from ddagr_gym.parameters import Robot
@@ -90,16 +90,17 @@ def _check_channels(recording: Recording) -> None:
 
 
 def _check_length(recordings: Sequence[Recording], setting: Setting) -> None:
+    duration = window_duration(recordings, setting)
     total = sum(
-        int((recording.t[s.stop - 1] - recording.t[s.start]) / setting.duration)
+        int((recording.t[s.stop - 1] - recording.t[s.start]) / duration)
         for recording in recordings
         for s in recording.segments()
     )
     if total < LEAST_WINDOWS:
         names = ", ".join(recording.meta.source for recording in recordings)
         raise InputError(
-            f"{names}: {total} windows of {setting.duration:g} s without a gap are too few: "
-            f"give drives of {LEAST_WINDOWS * setting.duration:g} s at least."
+            f"{names}: {total} windows of {duration:g} s without a gap are too few: "
+            f"give drives of {LEAST_WINDOWS * duration:g} s at least."
         )
 
 

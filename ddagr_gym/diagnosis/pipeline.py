@@ -113,6 +113,7 @@ def run(
     store = StepStore(None, "") if store is None else store
     check_recordings(task.recordings, task.robot, task.setting)
     prepared = prepare(task.robot, task.soil, task.recordings, task.setting)
+    task = replace(task, thresholds=task.thresholds.for_windows(prepared.problem.blocked.windows.count))
 
     def step(name: str, work: Callable[[], Any]) -> Any:
         began_step(name)

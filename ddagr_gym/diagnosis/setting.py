@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from ddagr_gym.diagnosis.blocks import BLOCK, block_windows, located
 from ddagr_gym.diagnosis.noise import ChannelNoise, recording_noise
 from ddagr_gym.diagnosis.nuisance import NuisancePriors, nuisances
@@ -12,6 +14,9 @@ from ddagr_gym.diagnosis.problem import Problem
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.replay.windows import cut_windows
+
+SHORTEST = 1.0
+"""Shortest windows that are cut to fit segments [s]: five time constants of a bank."""
 
 HISTORY = 0.6
 """Commands kept from before a window [s]: longer than the longest delay of the library."""
@@ -41,6 +46,13 @@ def wheel_radius(robot: Robot) -> float:
     return sum(wheel.outer_radius for wheel in robot.wheels) / len(robot.wheels)
 
 
+def window_duration(recordings: Sequence[Recording], setting: Setting) -> float:
+    """Length of windows [s]: as set, or what most segments have room for where logs were cut into short ones."""
+    lengths = [(s.stop - s.start - 1) * recording.period for recording in recordings for s in recording.segments()]
+    usual = float(np.median(lengths)) if lengths else 0.0
+    return min(setting.duration, usual) if usual >= SHORTEST else setting.duration
+
+
 def make_problem(
     robot: Robot,
     soil: Soil,
@@ -63,7 +75,7 @@ def make_problem(
     radius = wheel_radius(robot)
     windows = cut_windows(
         recordings,
-        setting.duration,
+        window_duration(recordings, setting),
         stride=setting.stride,
         wheel_radius=radius,
         half_track=robot.half_track,

@@ -39,7 +39,7 @@ def arm_colours(evaluation: Evaluation) -> dict[str, str]:
 
 
 def radius_error_figure(evaluation: Evaluation, path: str | Path) -> tuple[Path, Path]:
-    """Every turn radius error on the judged set by arm, with median, quartiles and 5 to 95 %; PNG and SVG, for a README.
+    """Every turn radius error on the judged set by arm, with quantiles; PNG and SVG, for a README.
 
     Args:
         evaluation: what was driven.

@@ -124,7 +124,8 @@ def path_figure(evaluation: Evaluation, robot: Robot) -> Any:
 def _field(panel: Any, turn: RowTurn, robot: Robot) -> None:
     """Beds, headland boundary and commanded path of a turn, as if to the left."""
     stage = turn_stage(turn, robot, "")
-    assert stage.beds is not None and stage.target_path is not None
+    assert stage.beds is not None
+    assert stage.target_path is not None
     for centre in stage.beds.centres:
         across = (centre - stage.beds.width / 2.0, centre + stage.beds.width / 2.0)
         outline = rounded_rectangle((stage.view.x_min - 1.0, stage.beds.end), across, 0.12)

@@ -312,8 +312,10 @@ def infeasible_sentence(evaluation: Evaluation) -> str:
         sum(evaluation.metrics(arm.name, item.name).get("infeasible_but_made", 0) for item in evaluation.sets)
         for arm in evaluation.arms
     ]
-    text = f"{len(evaluation.infeasible)} of {total} scenarios are left out: no upper bound, which sees the true state, makes them"
-    return text + f"; the arm that made most of them all the same made {max(made, default=0)}."
+    return (
+        f"{len(evaluation.infeasible)} of {total} scenarios are left out: no upper bound, which sees the true state, "
+        f"makes them; the arm that made most of them all the same made {max(made, default=0)}."
+    )
 
 
 def radius_note(evaluation: Evaluation) -> str:

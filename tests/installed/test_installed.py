@@ -68,6 +68,29 @@ def test_an_episode_runs():
     environment.close()
 
 
+def test_trained_policies_drive_without_torch():
+    from ddagr_gym.policies.controller import policy_controller
+    from ddagr_gym.policies.shipped import policies_dir, policy_names
+
+    assert policies_dir() == Path(ddagr_gym.__file__).resolve().parent / "data" / "policies"
+    assert "ppo_ekf" in policy_names()
+    environment = gymnasium.make("DDAGR-Turn-EKF-v0")
+    observation, _ = environment.reset(seed=1)
+    controller = policy_controller("ppo_ekf")
+    controller.reset()
+    for _ in range(40):
+        observation, *_ = environment.step(controller(observation))
+    assert observation[3] > 0.1  # the encoders: it drives
+    environment.close()
+
+
+def test_training_needs_a_checkout():
+    done = run("train", "ppo")
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert "clone" in done.stderr
+
+
 @pytest.mark.parametrize("make", ["make", "make_vec"])
 def test_the_id_with_its_module_needs_no_import(make):
     program = f"import gymnasium; gymnasium.{make}('ddagr_gym:DDAGR-Turn-v0').close()"

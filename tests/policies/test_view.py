@@ -12,6 +12,7 @@ from ddagr_gym.control.row_turn import RowTurn
 from ddagr_gym.errors import InputError
 from ddagr_gym.estimation import FilterModel
 from ddagr_gym.estimation.force_balance import arc_bank_speed_rows, arc_bank_speeds
+from ddagr_gym.estimation.sideslip import CENTRE_AHEAD
 from ddagr_gym.parameters import Sensors
 from ddagr_gym.policies.design import PolicyDesign
 from ddagr_gym.policies.view import PolicyView
@@ -103,11 +104,30 @@ def test_dead_reckoning_follows_the_commanded_path():
             ),
         )
         worst = {name: max(value, abs(seen[name]) / 10.0) for name, value in worst.items()}
-    # trapezoids cut the corners of the yaw rate: half a step of 16 mm at entry and exit
+    # trapezoids cut the corners of the yaw rate by half a step of 16 mm at entry and exit
     assert worst["cross_track_error"] * turn.radius < 0.005
     assert worst["heading_error"] < 0.5 * 0.25 * 0.08 + 1e-6
     assert seen["estimated_heading_to_go"] == pytest.approx(0.0, abs=0.01)
     assert seen["leaving"] == 1.0
+
+
+def test_sideslip_moves_the_course_and_not_the_heading():
+    design = PolicyDesign()
+    view = view_of(design)
+    view.observe(observation())
+    for _ in range(20):
+        view.observe(observation(estimated_v_x=0.2))
+    steady = {"run_in_to_go": 0.0, "estimated_v_x": 0.2, "estimated_yaw_rate": 0.25}
+    for _ in range(40):
+        without = named(design, view.observe(observation(heading_to_go=2.0, specific_force_y=0.05, **steady)))
+    # the body turns about a point ahead of its origin, which therefore slides outwards
+    assert without["sideslip"] == pytest.approx(-10.0 * CENTRE_AHEAD * 0.25 / 0.2, abs=0.3)
+    assert without["course_error"] < without["heading_error"]
+    for _ in range(20):  # pushed to the left at 5 mm/s^2
+        pushed = named(design, view.observe(observation(heading_to_go=2.0, specific_force_y=0.055, **steady)))
+    assert pushed["sideslip"] > without["sideslip"] + 0.05
+    assert pushed["sideslip_deviation"] > 0.0
+    assert pushed["course_cross_track_error"] < pushed["cross_track_error"]
 
 
 def test_cross_track_error_is_positive_to_the_left():
