@@ -23,7 +23,7 @@ HARD_GROUND = "firm_ground"
 
 @dataclass(frozen=True)
 class Arguments:
-    """Drive a row turn, replay a recording, and write a report folder: page, figures, video and CSV.
+    """Turn between rows, replay and diagnose drives, compare controllers: pages, figures, video.
 
     Attributes:
         output: folder to write; one that an earlier command wrote is replaced.
@@ -62,10 +62,18 @@ class Section:
 
 def run(arguments: Arguments) -> None:
     """Run the demonstration and print where its page lies."""
+    from ddagr_gym.commands.demo_diagnosis import diagnosis_step
+    from ddagr_gym.commands.demo_evaluation import evaluation_step
+
     start = time.monotonic()
     drive = _drive_to_replay(arguments)
     with output_folder(arguments.output, overwrite=True) as folder:
-        sections = [turn_step(arguments, folder), replay_step(drive, folder)]
+        sections = [
+            turn_step(arguments, folder),
+            replay_step(drive, folder),
+            diagnosis_step(folder, arguments.seed),
+            evaluation_step(folder),
+        ]
         write_text(folder / "index.html", _page(sections))
     for section in sections:
         print(f"\n{section.title}\n{section.text}")

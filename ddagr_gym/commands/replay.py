@@ -35,7 +35,7 @@ SAMPLE_SOIL = "sandy_loam_lll_15"
 
 @dataclass(frozen=True)
 class Arguments:
-    """Drive recordings again in the simulator: residuals, error growth, refit, kinematic baselines.
+    """Drive recordings again in the simulator: residuals, error growth, refit, baselines.
 
     The simulator is driven by the recorded commands and, as a second arm, by the recorded wheel speeds: in short
     windows with free initial states, and from the state at a start over 1, 5 and 30 s and over every whole stretch.

@@ -21,7 +21,7 @@ EXAMPLES = (
 
 @dataclass(frozen=True)
 class Arguments:
-    """Train a policy by reinforcement learning, or all published ones; an interrupted training goes on.
+    """Train a policy by reinforcement learning, or all published ones; resumes.
 
     Needs the checkout, where agents/ and configs/training/ are.
 
