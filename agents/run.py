@@ -43,7 +43,7 @@ _REWARD_CLIP = 10.0
 
 def make_environment(settings: TrainingSettings) -> VecNormalize:
     """Batch of turns as the policy sees it, inputs and rewards normalised."""
-    turns = TurnVecEnv(settings.environments, **settings.task.environment(settings.design))
+    turns = TurnVecEnv(settings.environments, staggered=True, **settings.task.environment(settings.design))
     view: Any = PolicyViewVecEnv(turns, settings.design)
     if settings.algorithm == "ppo":
         view = WithTruth(view)

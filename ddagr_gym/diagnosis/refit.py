@@ -181,18 +181,22 @@ def fit(
     )
     by_effect = effect_columns(problem, point, prediction, parameters)
     cost, _ = cost_of(problem, point, prediction, elimination)
-    converged, done = False, 0
+    converged, done, fresh = False, 0, known is None
     while done < iterations and not converged:
         done += 1
         before = cost
         point, prediction, cost = _step(
             problem, point, prediction, cost, elimination, by_parameter, by_effect, parameters
         )
-        converged = before - cost < tolerance * cost
+        small = before - cost < tolerance * cost
+        # a step that fails with sensitivities of another point says nothing about this one
+        converged = small and (fresh or reuse is not None)
         progress()
-        if done < renewals and not converged and reuse is None:
+        fresh = False
+        if reuse is None and not converged and (done < renewals or small):
             by_parameter, elimination = _sensitivities(problem, point, prediction)
             cost, _ = cost_of(problem, point, prediction, elimination)
+            fresh = True
         if parameters and done < max(renewals, _EFFECT_RENEWALS) and not converged:
             by_effect = effect_columns(problem, point, prediction, parameters)
     if reuse is None and done:

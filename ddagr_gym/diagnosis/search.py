@@ -144,7 +144,7 @@ def rivals_of(problem: Problem, standing: Standing, raw: Fitted, thresholds: Thr
             starts = [starts[best_start]]
             tried.append(_rival(standing, gain.name, trials[best_start]))
     best = max((rival.gain for rival in tried), default=0.0)
-    rivals = [_finish(problem, standing, rival) if rival.gain > _CLOSE * best else rival for rival in tried]
+    rivals = [_finish(problem, standing, rival, large) if rival.gain > _CLOSE * best else rival for rival in tried]
     kept = [
         rival
         for rival in rivals
@@ -176,9 +176,14 @@ def _rival(standing: Standing, name: str, fitted: Fitted) -> Rival:
     return Rival(name, fitted, (standing.fitted.cost - fitted.cost) / standing.dispersion)
 
 
-def _finish(problem: Problem, standing: Standing, rival: Rival) -> Rival:
-    fitted = fit(problem, rival.fitted.point, iterations=6, renewals=2, reuse=rival.fitted)
-    return _rival(standing, rival.name, min(fitted, rival.fitted, key=lambda trial: trial.cost))
+def _finish(problem: Problem, standing: Standing, rival: Rival, large: bool) -> Rival:
+    """A rival fitted to the end; one that explains much changes the nuisances' sensitivities, which are renewed."""
+    point, known = rival.fitted.point, rival.fitted
+    if large:
+        fitted = fit(problem, point, iterations=6, renewals=2, first=known)
+    else:
+        fitted = fit(problem, point, iterations=6, renewals=2, reuse=known)
+    return _rival(standing, rival.name, min(fitted, known, key=lambda trial: trial.cost))
 
 
 def begin(problem: Problem, progress: Callable[[str], None] = lambda text: None) -> tuple[Fitted, Standing]:

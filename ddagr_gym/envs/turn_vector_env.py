@@ -120,6 +120,10 @@ class TurnVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]):
         mask[chosen] = True
         return self._observations.copy(), _masked(info, mask)
 
+    def spread_time_limits(self) -> None:
+        """Let the running episodes end at times spread evenly up to the limit, the first ones soon."""
+        self._steps += np.arange(self.num_envs)[::-1] * self.max_episode_steps // self.num_envs
+
     def _chosen(self, options: dict[str, Any] | None) -> NDArray[np.int64]:
         mask = (options or {}).get("reset_mask")
         if mask is None:

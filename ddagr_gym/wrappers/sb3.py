@@ -17,9 +17,16 @@ class TurnVecEnv(VecEnv):
 
     Infos are empty but for environments that have just ended: ``terminal_observation``, ``TimeLimit.truncated``,
     ``is_success`` and the small info of the ending.
+
+    Args:
+        num_envs: N.
+        staggered: spread the time limits of the first episodes, so that later ones are at different parts of the turn;
+            otherwise every rollout of a learner would hold one part, and it would forget the others.
+        arguments: of :class:`TurnVectorEnv`.
     """
 
-    def __init__(self, num_envs: int, **arguments: Any) -> None:
+    def __init__(self, num_envs: int, staggered: bool = False, **arguments: Any) -> None:
+        self.staggered = staggered
         self.env = TurnVectorEnv(num_envs, autoreset_mode="SameStep", **arguments)
         super().__init__(num_envs, self.env.single_observation_space, self.env.single_action_space)
         self._actions = np.zeros((num_envs, 2), dtype=np.float32)
@@ -28,6 +35,8 @@ class TurnVecEnv(VecEnv):
         """Reset all environments; seeds come from :meth:`seed`."""
         seeds = self._seeds if any(seed is not None for seed in self._seeds) else None
         observations, _ = self.env.reset(seed=seeds)
+        if self.staggered:
+            self.env.spread_time_limits()
         self._reset_seeds()
         self._reset_options()
         self.reset_infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]

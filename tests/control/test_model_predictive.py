@@ -3,6 +3,7 @@
 import math
 import subprocess
 import sys
+import time
 
 import numpy as np
 import pytest
@@ -168,7 +169,18 @@ def test_casadi_is_imported_only_when_it_is_used():
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
-def test_beats_constants_in_time():
+def test_a_plan_takes_little_time():
+    controller, used = ModelPredictive(MODEL, PRIOR), []
+    for _ in range(40):
+        start = time.process_time()  # of this process: a busy machine shall not fail the test
+        controller(observation(encoder_right=1.2, encoder_left=0.3))
+        used.append(time.process_time() - start)
+    assert np.median(used) < 0.024  # [s] the aim; a third of the control period
+    assert len(controller.solve_times) == 40
+    assert min(controller.solve_times) > 0.0
+
+
+def test_beats_constants():
     errors = {}
     for name in ("B1", "B5"):
         settings, errors[name] = make_settings(ekf_features=name == "B5"), []
@@ -178,5 +190,4 @@ def test_beats_constants_in_time():
             errors[name].append(abs(turn_metrics(run.columns, run.episode.turn, run.episode.robot).turn.error))
             assert run.success or name == "B1"
     assert np.median(errors["B5"]) < np.median(errors["B1"])
-    assert np.median(controller.solve_times) < 0.024  # [s] the aim; a third of the control period
     assert controller.failed_solves == 0

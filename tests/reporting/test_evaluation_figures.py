@@ -20,7 +20,7 @@ def _style():
 
 
 def markers(axes, kind):
-    return [line.get_xydata()[0] for line in axes.lines if line.get_marker() == kind]
+    return [line.get_xydata()[0] for line in axes.lines if line.get_marker() == kind and len(line.get_xydata())]
 
 
 def test_medians_and_percentiles_stand_where_the_summary_says():
@@ -43,8 +43,7 @@ def test_signed_errors_keep_their_sign_and_stay_inside():
 
 def test_probabilities_of_both_baselines_stand_apart():
     figure = figures.improvement_figure(evaluation())
-    dots = {tuple(np.round(mark, 2)) for mark in markers(figure.axes[0], "o") if len(mark) == 2}
-    assert (0.0, 0.87) not in dots or (100.0, 0.87) in dots
+    dots = {tuple(np.round(mark, 2)) for mark in markers(figure.axes[0], "o")}
     assert (100.0, 0.87) in dots  # B4 is closer than B1 on each of the six
     assert not any(place == 1.13 for _, place in dots)  # and is not compared with itself
 
