@@ -96,15 +96,15 @@ def _arms(rows: Sequence[Mapping[str, Any]], summary: Mapping[str, Any]) -> list
     from ddagr_gym.evaluation.controllers import controller_names, controller_title, controller_version, is_deployable
     from ddagr_gym.reporting.evaluation_data import Arm, arm_name
 
-    member: dict[str, str] = {}
+    members: dict[str, dict[str, None]] = {}
     for row in rows:
-        member.setdefault(arm_name(row), row["controller"])
+        members.setdefault(arm_name(row), {})[row["controller"]] = None
     arms = []
     for name in summary:
-        controller = member[name]
-        learned = controller not in controller_names()
-        version = controller_version(controller)[:_HASH_DIGITS] if learned else ""
-        arms.append(Arm(name, controller_title(controller), is_deployable(controller), learned, version))
+        seeds = list(members[name])
+        learned = seeds[0] not in controller_names()
+        versions = tuple(controller_version(seed)[:_HASH_DIGITS] for seed in seeds) if learned else ()
+        arms.append(Arm(name, controller_title(seeds[0]), is_deployable(seeds[0]), learned, versions))
     return sorted(arms, key=lambda arm: not arm.deployable)
 
 
@@ -136,7 +136,7 @@ def _sources(arms: Sequence[Arm], sets: Sequence[SetNote]) -> list[tuple[str, st
 
     found = [("ddagr-gym", __version__), ("gains of the ladder", f"sha256 {_digest(gains_file())}")]
     found += [(f"scenarios {item.name}", f"sha256 {item.sha256[:_HASH_DIGITS]}") for item in sets]
-    found += [(f"policy {arm.name}", f"sha256 {arm.version}") for arm in arms if arm.learned]
+    found += [(f"policy {arm.name}", f"sha256 {', '.join(arm.versions)}") for arm in arms if arm.learned]
     return [*found, ("every number", "summary.json, and every episode in episodes.parquet beside this page")]
 
 
@@ -149,7 +149,7 @@ def _digest(path: Path) -> str:
 def _film(folder: Path, number: int, title: str, row: Mapping[str, Any], progress: Progress) -> Film:
     from ddagr_gym.evaluation.controllers import needs_filter
     from ddagr_gym.evaluation.shown import replayed
-    from ddagr_gym.reporting.evaluation_data import Film, display_name
+    from ddagr_gym.reporting.evaluation_data import Film, arm_name, display_name
     from ddagr_gym.reporting.evaluation_film import film_turn
     from ddagr_gym.reporting.evaluation_tables import replay_command
 
@@ -158,14 +158,16 @@ def _film(folder: Path, number: int, title: str, row: Mapping[str, Any], progres
     file = PurePosixPath(VIDEOS) / f"{number}_{_file_name(row)}.mp4"
     make_folder(folder / VIDEOS)
     turn, robot = run.episode.turn, run.episode.robot
-    poster = film_turn(run.columns, turn, robot, folder / file, display_name(str(row["controller"])))
+    poster = film_turn(run.columns, turn, robot, folder / file, display_name(arm_name(row)))
     progress.advance()
     return Film(file, f"{title}: {row['set']} {row['number']}", replay_command(row), poster)
 
 
 def _file_name(row: Mapping[str, Any]) -> str:
-    """Letters, digits and underscores only, whatever a policy's path holds."""
-    name = Path(str(row["controller"]).removesuffix("/policy.npz")).name
+    """Letters, digits and underscores only, whatever a policy's name holds; its training seed where that is not 0."""
+    from ddagr_gym.reporting.evaluation_data import arm_name, display_name
+
+    name = display_name(arm_name(row)) + (f"_{row['run']}" if row["run"] else "")
     plain = "".join(letter if letter.isalnum() else "_" for letter in name)
     return f"{plain}_{row['set']}_{row['number']}"
 

@@ -33,7 +33,9 @@ def first_guess(candidate: Candidate, multiples: Sequence[float]) -> Effect:
     for name in kind.shape_names():
         shapes = [getattr(p, name) for p in candidate.probes]
         if sum(weight) > 0.0:
-            values[name] = sum(w * s for w, s in zip(weight, shapes, strict=True)) / sum(weight)
+            mean = sum(w * s for w, s in zip(weight, shapes, strict=True)) / sum(weight)
+            # rounding must not lead out of the probes' range: an onset of "always" lies at its bound
+            values[name] = min(max(mean, min(shapes)), max(shapes))
         else:
             values[name] = shapes[0]
     return kind(**values)

@@ -26,6 +26,9 @@ from ddagr_gym.simulator import simulate
 
 Array = NDArray[np.float64]
 
+_VALID = 0.5
+"""Share of a piece in which the commands must be known."""
+
 _MARGIN = 3.0
 """Ground beyond the straight-line reach of a drive [m]."""
 
@@ -165,7 +168,8 @@ def scanned(robot: Robot, soil: Soil, recordings: Sequence[Recording], kind: str
 def pieces_of(recording: Recording, length: float) -> list[Recording]:
     """An ordinary drive cut into pieces of about ``length`` [s] at the joints of its segments, each a null run.
 
-    A drive of one long segment is cut inside it.
+    A drive of one long segment is cut inside it. Pieces whose commands are mostly not what the robot received are left
+    out.
     """
     ends = [end for _, end in recording.meta.segments]
     if len(ends) == 1:
@@ -176,7 +180,7 @@ def pieces_of(recording: Recording, length: float) -> list[Recording]:
         if (end - first) * recording.period >= length or end == ends[-1]:
             pieces.append(cut(recording, first, end))
             first = end
-    return pieces
+    return [piece for piece in pieces if np.mean(piece.command_valid) > _VALID]
 
 
 def cut(recording: Recording, first: int, last: int) -> Recording:

@@ -62,6 +62,7 @@ class RewardWeights(Validated):
     exit_error: float = bounded("-", 0.0, 1e3, default=5.0)
     success: float = bounded("-", 0.0, 1e3, default=10.0)
     failure: float = bounded("-", 0.0, 1e3, default=10.0)
+    steering: float = bounded("1/s", 0.0, 1e3, default=0.0)
 
 
 @dataclass(frozen=True)

@@ -95,6 +95,7 @@ class TurnBatch:
         self.tasks[indices, kernel.LAST_X] = state["x"]
         self.tasks[indices, kernel.LAST_Y] = state["y"]
         self.tasks[indices, kernel.LAST_YAW] = state["yaw"]
+        self.tasks[indices, kernel.COURSE] = state["yaw"]
         self.readings[indices] = 0.0
         self.terms[indices] = 0.0
         self.commands[indices] = 0.0

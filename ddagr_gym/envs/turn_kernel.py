@@ -10,6 +10,8 @@ Reward per step of length dt (every term is logged by name; weights in ``RewardW
     exit_error    - (|e_y| + L |sin e_psi|)/0.127 m, 10 at most, once at the next row's start line
     success       + 1 once, if that ratio is at most 1
     failure       - 1 once, if bogged or off the headland
+    steering      - |R* path curvature - wanted| dt while moving, 2 at most  [s]; wanted is side on the half circle,
+                  0 on the rows, less what leads back to the path: e/R* + 2 x course error (critically damped)
 
 Terms use the true state: they are for training, never for a deployed controller.
 """
@@ -50,6 +52,7 @@ TERMS = (
     "exit_error",
     "success",
     "failure",
+    "steering",
 )
 """Reward terms, in the order of the weights."""
 
@@ -73,8 +76,9 @@ TERMS = (
     ENDING,
     SUCCESS,
     TIME,
+    COURSE,
     TASK_SIZE,
-) = range(20)
+) = range(21)
 """Entries of an environment's task vector."""
 
 NO_ENDING, EXIT_REACHED, BOGGED_DOWN, LEFT_HEADLAND, TIME_OUT = range(5)
@@ -89,6 +93,7 @@ HEADLAND_DEPTH = 3.0
 HEADLAND_MARGIN = 1.5
 """Room beside the two rows [m] (ours)."""
 _LARGEST_EXIT_RATIO = 10.0
+_LEAST_WAY = 0.02  # [s], a quarter of a step: below it the direction of travel means little
 
 
 @kernel()
@@ -150,6 +155,32 @@ def _follow(task: Array, readings: Array, record: Array, period: float) -> None:
 
 
 @kernel()
+def _steering_error(task: Array, step_x: float, step_y: float, x: float, y: float) -> float:
+    """R* times the curvature of the driven path less the wanted one; 0 where the robot hardly moves.
+
+    The driven path's curvature is the change of course, that is the direction of travel, over the way.
+    """
+    radius, sign = task[RADIUS], task[SIGN]
+    way = math.hypot(step_x, step_y)
+    if way < _LEAST_WAY * task[SPEED]:
+        return 0.0
+    course = math.atan2(step_y, step_x)
+    change = course - task[COURSE]
+    change -= 2.0 * math.pi * math.ceil(change / (2.0 * math.pi) - 0.5)
+    task[COURSE] += change
+    turned = min(max((path_distance(task, x, y)[0] - task[RUN_IN]) / radius, 0.0), math.pi)
+    from_centre = sign * y - radius
+    if x >= 0.0:
+        inside = radius - math.hypot(x, from_centre)
+    else:
+        inside = radius - abs(from_centre)
+    # like the path, all for a turn to the left: positive error is to the left of the path
+    error = sign * task[COURSE] - turned
+    wanted = (1.0 if 0.0 < turned < math.pi else 0.0) - inside / radius - 2.0 * error
+    return sign * radius * change / way - wanted
+
+
+@kernel()
 def _ending(task: Array, row: Array, x: float, y: float) -> float:
     for i in range(4):
         if row[BOGGED + i] > 0.0:
@@ -201,6 +232,7 @@ def judge(
     period = row[SAMPLE_PERIOD]
     duration = period * readings.shape[0]
     was_exited = task[EXITED]
+    step_x, step_y = -task[LAST_X], -task[LAST_Y]
     _follow(task, readings, record, period)
     task[TIME] += duration
     x, y = task[LAST_X], task[LAST_Y]
@@ -227,6 +259,7 @@ def judge(
     task[ENDING] = _ending(task, row, x, y)
     if task[ENDING] == BOGGED_DOWN or task[ENDING] == LEFT_HEADLAND:
         terms[7] = -1.0
+    terms[8] = -min(abs(_steering_error(task, step_x + x, step_y + y, x, y)), 2.0) * duration
     total = 0.0
     for j in range(terms.shape[0]):
         total += weights[j] * terms[j]

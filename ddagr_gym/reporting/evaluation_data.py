@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import PurePosixPath
 from typing import Any
 
@@ -28,14 +29,14 @@ class Arm:
         title: what it is, in a phrase.
         deployable: whether it does without the true state.
         learned: whether it was trained.
-        version: what its weights or gains hash to; "" where it has none.
+        versions: what the files of its training seeds hash to; none where it was not trained.
     """
 
     name: str
     title: str
     deployable: bool = True
     learned: bool = False
-    version: str = ""
+    versions: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -145,12 +146,17 @@ class Evaluation:
         return self.summary.get(arm, {}).get(set_name, {})
 
     def rows_of(self, arm: str, set_name: str, feasible: bool = True) -> list[Row]:
-        """Episodes of an arm on a set."""
-        return [
-            row
-            for row in self.rows
-            if arm_name(row) == arm and row["set"] == set_name and (row["feasible"] or not feasible)
-        ]
+        """Episodes of an arm on a set, without infeasible scenarios unless they are asked for."""
+        mine = self._grouped.get((arm, set_name), [])
+        return [row for row in mine if row["feasible"]] if feasible else list(mine)
+
+    @cached_property
+    def _grouped(self) -> dict[tuple[str, str], list[Row]]:
+        """Episodes by arm and set: the figures ask for them often."""
+        groups: dict[tuple[str, str], list[Row]] = {}
+        for row in self.rows:
+            groups.setdefault((arm_name(row), row["set"]), []).append(row)
+        return groups
 
 
 def judged_set(names: Sequence[str]) -> str:

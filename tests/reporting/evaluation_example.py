@@ -68,7 +68,7 @@ def evaluation(**changes):
         "arms": [
             Arm("B1", f"constants {HOSTILE}"),
             Arm("B4", "force balance"),
-            Arm("ppo_ekf", "learned policy", learned=True, version="abc"),
+            Arm("ppo_ekf", "learned policy", learned=True, versions=("abc",)),
             Arm("true_path", "upper bound", deployable=False),
         ],
         "sets": [SetNote("S1", "in range", 6, 6, "0" * 64), SetNote("T", "another law", 3, 3, "1" * 64)],
