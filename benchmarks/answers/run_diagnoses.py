@@ -31,8 +31,11 @@ CHECKOUT = HERE.parents[1]
 ENTRIES = ("verdict", "complete", "findings", "sentence", "fit", "detectable", "misfit", "seconds", "version")
 """What an answer keeps of a diagnosis.json."""
 
-GROUND_OF_REAL_DRIVES = "firm_ground"
-"""Nominal soil where a file does not say what it was driven on."""
+UNKNOWN_GROUND = ("--soil", "firm_ground", "--soil-uncertainty", "4", "--stride", "4")
+"""Where a file does not say what it was driven on; every other window of drives of ten minutes is enough."""
+
+REAL_BANK = CHECKOUT / "ddagr_gym" / "data" / "null_bank_warthog.json"
+"""Thresholds from ordinary Warthog drives; no ordinary Husky drive is at hand, so they serve for it too."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +67,8 @@ def real_cases(folder: Path) -> Iterator[Case]:
     """Real drives, one a case; the robot is in the file's name."""
     for path in sorted((folder / "concealed").glob("*.csv.gz")) + sorted((folder / "open").glob("*.csv.gz")):
         robot = path.name.split("_", 1)[0]
-        yield Case(path.name.split(".", 1)[0], (str(path), "--robot", robot, "--soil", GROUND_OF_REAL_DRIVES))
+        options = ("--robot", robot, *UNKNOWN_GROUND, "--thresholds", str(REAL_BANK))
+        yield Case(path.name.split(".", 1)[0], (str(path), *options))
 
 
 def diagnose(case: Case, parts: Path, options: tuple[str, ...]) -> dict[str, Any]:
