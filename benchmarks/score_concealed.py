@@ -49,8 +49,8 @@ def share(hits: Sequence[bool]) -> dict[str, Any]:
     """Share of true values with its interval."""
     if not hits:
         return {"value": None, "interval": None, "count": 0}
-    low, high = wilson_interval(sum(hits), len(hits))
-    return {"value": sum(hits) / len(hits), "interval": [low, high], "count": len(hits)}
+    found = wilson_interval(sum(hits), len(hits))
+    return {"value": sum(hits) / len(hits), "interval": [found.low, found.high], "count": len(hits)}
 
 
 def mean(values: Sequence[float], seed: int = 0) -> dict[str, Any]:

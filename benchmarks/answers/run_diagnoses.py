@@ -4,6 +4,8 @@
     python benchmarks/answers/run_diagnoses.py recordings            every real drive -> recordings.json
     python benchmarks/answers/run_diagnoses.py DIR --output FILE     a set of the project's own generator
 
+Options after ``--`` go to every run; ``-- --names-only`` leaves out what follows the verdict and halves the time.
+
 Each case is one run of the command line in a process of its own. Finished cases are kept beside the answers until all
 are there, so that an interrupted script goes on; nothing is edited by hand. ``commit`` is the checkout's at the time.
 """

@@ -54,6 +54,7 @@ class Arguments:
         stride: seconds between the starts of windows; 2 uses all samples.
         seed: of the resampling.
         threads: of the simulator.
+        names_only: only name what is missing: no errors on unseen drives, no unnamed terms, no next drive, no page.
         overwrite: replace an output folder that an earlier command wrote.
         maximum_rows: refuse a recording with more rows or messages.
         maximum_bytes: refuse a recording that unpacks to more bytes.
@@ -69,6 +70,7 @@ class Arguments:
     stride: float = 2.0
     seed: int = 0
     threads: int = 2
+    names_only: bool = False
     overwrite: bool = False
     maximum_rows: int = 2_000_000
     maximum_bytes: int = 4 * 2**30
@@ -87,13 +89,13 @@ def run(arguments: Arguments) -> int | None:
     try:
         outcome = diagnosed(task, store)
         with output_folder(arguments.output, overwrite=arguments.overwrite) as folder:
-            write_outcome(outcome, folder)
+            write_outcome(outcome, folder, page=not arguments.names_only)
     except KeyboardInterrupt:
         print(f"ddagr: interrupted; the same command goes on from {parts}.", file=sys.stderr)
         return 130
     store.clear()
     print(outcome_text(outcome.diagnosis))
-    print(f"\npage, figures, diagnosis.json and effects.json: {arguments.output}")
+    print(f"\n{'' if arguments.names_only else 'page, figures, '}diagnosis.json and effects.json: {arguments.output}")
     return None
 
 
@@ -115,7 +117,7 @@ def _task(arguments: Arguments) -> Task:
     ]
     priors = NuisancePriors().with_soil(arguments.soil_uncertainty)
     setting = Setting(stride=arguments.stride, priors=priors, threads=arguments.threads)
-    return Task(robot, soil, tuple(recordings), _thresholds(arguments), setting, arguments.seed)
+    return Task(robot, soil, tuple(recordings), _thresholds(arguments), setting, arguments.seed, arguments.names_only)
 
 
 def _sources(runs: Sequence[Path]) -> list[Path]:
@@ -151,7 +153,7 @@ def diagnosed(task: Task, store: Any = None) -> Outcome:
     """
     from ddagr_gym.diagnosis import pipeline
 
-    with _steps(len(pipeline.STEPS), store) as began:
+    with _steps(len(pipeline.STEPS) - (len(pipeline.LATER) if task.names_only else 0), store) as began:
         return pipeline.run(task, store, began)
 
 
@@ -172,12 +174,13 @@ def _steps(count: int, store: Any) -> Iterator[Any]:
         progress.advance()
 
 
-def write_outcome(outcome: Outcome, folder: Path) -> None:
+def write_outcome(outcome: Outcome, folder: Path, page: bool = True) -> None:
     """Diagnosis, effects, evidence and page into a folder that exists.
 
     Args:
         outcome: of the pipeline.
         folder: to fill.
+        page: whether to write the page with its figures.
     """
     from ddagr_gym.diagnosis.pipeline import data_hash, effect_intervals
     from ddagr_gym.diagnosis.verdict import as_mapping, save
@@ -195,8 +198,9 @@ def write_outcome(outcome: Outcome, folder: Path) -> None:
         )
     save(diagnosis, folder / "diagnosis.json")
     outcome.evidence.save(folder / evidence.NAME)
-    diagnosis_page.write_report(folder, as_mapping(diagnosis), outcome.evidence)
-    (folder / diagnosis_page.PAGE).rename(folder / PAGE)
+    if page:
+        diagnosis_page.write_report(folder, as_mapping(diagnosis), outcome.evidence)
+        (folder / diagnosis_page.PAGE).rename(folder / PAGE)
 
 
 def outcome_text(diagnosis: Diagnosis) -> str:

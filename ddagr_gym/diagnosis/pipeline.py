@@ -37,6 +37,9 @@ from ddagr_gym.recordings.schema import Recording
 STEPS = ("search", "verdict", "certification", "localisation", "unnamed terms", "next drive", "evidence")
 """Names of the steps that are kept."""
 
+LATER = ("certification", "unnamed terms", "next drive")
+"""Those that ``names_only`` leaves out."""
+
 
 @dataclass(frozen=True, eq=False)
 class Task:
@@ -49,6 +52,7 @@ class Task:
         thresholds: of the null bank.
         setting: choices.
         seed: of everything random.
+        names_only: leave out certification, unnamed terms and the next drive.
     """
 
     robot: Robot
@@ -57,6 +61,7 @@ class Task:
     thresholds: Thresholds
     setting: Setting
     seed: int = 0
+    names_only: bool = False
 
     def key(self) -> str:
         """Hash of all that the results depend on; the number of threads is not among it."""
@@ -121,11 +126,15 @@ def run(
 
     found = step("search", lambda: search(prepared.problem, task.thresholds, progress=progress))
     diagnosis, effects = step("verdict", lambda: conclude(prepared, found, task.thresholds, task.rng("verdict")))
-    fit = step("certification", lambda: _certified(task, prepared, found, diagnosis, progress))
+    fit = (
+        None
+        if task.names_only
+        else step("certification", lambda: _certified(task, prepared, found, diagnosis, progress))
+    )
     where = step("localisation", lambda: asdict(locate(prepared.problem, found)))
     diagnosis = _doubted(diagnosis, found, where)
-    unnamed = step("unnamed terms", lambda: _unnamed(task, prepared, found, diagnosis))
-    following = step("next drive", lambda: _next_drive(task, diagnosis, progress))
+    unnamed = None if task.names_only else step("unnamed terms", lambda: _unnamed(task, prepared, found, diagnosis))
+    following = None if task.names_only else step("next drive", lambda: _next_drive(task, diagnosis, progress))
     evidence = step("evidence", lambda: gather_evidence(prepared.problem, found, task.thresholds))
     seconds = time.monotonic() - began
     entries = {"fit": fit, "localisation": where, "unnamed": unnamed, "next_drive": following}

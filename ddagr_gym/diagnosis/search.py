@@ -180,7 +180,7 @@ def _finish(problem: Problem, standing: Standing, rival: Rival, large: bool) -> 
     """A rival fitted to the end; one that explains much changes the nuisances' sensitivities, which are renewed."""
     point, known = rival.fitted.point, rival.fitted
     if large:
-        fitted = fit(problem, point, iterations=6, renewals=2, first=known)
+        fitted = fit(problem, point, iterations=6, renewals=1, first=known)
     else:
         fitted = fit(problem, point, iterations=6, renewals=2, reuse=known)
     return _rival(standing, rival.name, min(fitted, known, key=lambda trial: trial.cost))
@@ -197,7 +197,7 @@ def search(
     problem: Problem,
     thresholds: Thresholds,
     *,
-    rivals: int = 5,
+    rivals: int = 4,
     most: int = MOST_EFFECTS,
     progress: Callable[[str], None] = lambda text: None,
     begun: tuple[Fitted, Standing] | None = None,
@@ -222,7 +222,7 @@ def search(
             break
         progress(f"joint refit with {tried[0].name}")
         best = _swapped(problem, tried[0].fitted, steps)
-        standing = stand(problem, fit(problem, best.point, iterations=8, renewals=3, first=best), progress)
+        standing = stand(problem, fit(problem, best.point, iterations=8, renewals=2, first=best), progress)
         standing = _without_idle(problem, standing, thresholds, progress)
         if set(standing.names) in [set(s.names) for s in standings]:
             break

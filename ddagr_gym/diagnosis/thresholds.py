@@ -29,8 +29,8 @@ MARGIN = 2.0
 set), which shares no code with the bank, one in three stands above the bank's gates without it and one above twice."""
 
 LOCAL_MARGIN = 4.0
-"""The same on the misfit of the local variations: those nulls reach 2.4 times the bank's limits, effects that no library
-has 7 to 25 times."""
+"""The same on the misfit of the local variations: those nulls reach 2.4 times the bank's limits, effects that no
+library has 7 to 25 times."""
 
 MISFIT_MARGIN = 1.2
 """The same on the misfit of the channels, most of which is noise."""

@@ -220,11 +220,16 @@ def profile_figure(evaluation: Evaluation) -> Any:
     figure = Figure(figsize=(6.4, 3.3), layout="constrained")
     axes = figure.subplots()
     colours = arm_colours(evaluation)
+    used: set[str] = set()
     for arm in profile_arms(evaluation):
         profile = evaluation.metrics(arm.name, evaluation.judged).get("profile")
         if profile is not None:
             x, share, low, high = (100.0 * np.array(profile[k]) for k in ("thresholds", "share", "low", "high"))
-            line = "-" if arm.deployable else (0, (2.0, 1.5))
+            again = colours[arm.name] in used  # there are fewer colours than lines
+            used.add(colours[arm.name])
+            line = (0, (5.0, 1.2)) if again else "-"
+            if not arm.deployable:
+                line = (0, (1.5, 1.5))
             axes.plot(x, share, color=colours[arm.name], linestyle=line, label=display_name(arm.name))
             axes.fill_between(x, low, high, color=colours[arm.name], alpha=0.13, linewidth=0.0)
     axes.set(xlabel="|turn radius error| at most [%]", ylabel="share of turns [%]", xlim=(0.0, 20.0), ylim=(0.0, 101.0))
