@@ -120,8 +120,9 @@ def main() -> int:
     parser.add_argument("--output", type=Path, default=None)
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--only", nargs="*", default=None, help="names of cases")
-    parser.add_argument("options", nargs="*", help="further options of ddagr diagnose, after --")
-    arguments = parser.parse_args()
+    words = sys.argv[1:]
+    end = words.index("--") if "--" in words else len(words)
+    arguments, options = parser.parse_args(words[:end]), tuple(words[end + 1 :])
     if arguments.cases == "recordings":
         found = list(real_cases(Path(os.environ.get("DDAGR_RECORDINGS") or shared() / "recordings")))
     else:
@@ -133,7 +134,7 @@ def main() -> int:
     if not found:
         print(f"no cases for {arguments.cases}: set DDAGR_SHARED or name a folder of cases", file=sys.stderr)
         return 2
-    write_answers(found, output, arguments.processes, tuple(arguments.options))
+    write_answers(found, output, arguments.processes, options)
     return 0
 
 
