@@ -7,7 +7,8 @@
 
 Method (measured reasons in the study that the project follows)
     *noise*       level, growth with speed and colour of each channel from the recordings alone.
-    *held*        repeated readings, found in the values; repeats count as missing samples afterwards.
+    *held*        repeated readings, found in the values; repeats count as missing samples afterwards. *flipped*: a
+                  reversed gyro, found and mended in the same way, because first guesses come from its readings.
     *blocks*      windows of 2 s as means over 0.1 s. The error of the nominal speed loop adds to their noise.
     *nuisance*    what is uncertain about soil, robot, biases and clocks, as global parameters with priors, and how the
                   field differs from window to window, as local ones. Initial states and local parameters are eliminated
@@ -15,7 +16,11 @@ Method (measured reasons in the study that the project follows)
     *refit*       Gauss-Newton with priors and bounds; jointly with any effect that is assumed.
     *scores*      one simulation per probe of the library; from inner products per window follow gains (fall of the
                   cost), cluster-robust scores, gains on left-out windows and resampled gains without another one.
-    *null_bank*   the same scan of drives from structurally different simulators; *thresholds* are its quantiles.
+    *reread*      effects that act on readings only need no simulation of their own.
+    *null_bank*   the same scan of drives from structurally different simulators (over *standard_drives* or given ones),
+                  or of real drives that were ordinary; *thresholds* are its quantiles, with margins for strangers.
+    *misfit*      what is left by channel, and of what the local variations have to make up for.
+    *equivalence* rivals whose joint refits are nearly as good, weighted over resampled windows.
     *search*      forward and backward moves over joint refits, each through the gate.
     *certify*     sizes fitted to the other recordings predict each one from states known at the start, over 1, 5 and
                   30 s; a flexible model of what is left says how much could have been explained.
