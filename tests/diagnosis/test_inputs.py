@@ -53,3 +53,9 @@ def test_the_hash_knows_every_value(drive: Callable[..., Recording]) -> None:
     source = data_source(recording)
     assert source.sha256 == content_hash(recording)
     assert source.seconds == pytest.approx(23.98)
+
+
+def test_logs_cut_into_steps_of_one_window_pass() -> None:
+    drive = made(rate=20.0)
+    segments = tuple((k, k + 40) for k in range(0, 600, 40))
+    check_recordings([replace(drive, meta=replace(drive.meta, segments=segments))], ROBOT, Setting())
