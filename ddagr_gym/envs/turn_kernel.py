@@ -170,10 +170,7 @@ def _steering_error(task: Array, step_x: float, step_y: float, x: float, y: floa
     task[COURSE] += change
     turned = min(max((path_distance(task, x, y)[0] - task[RUN_IN]) / radius, 0.0), math.pi)
     from_centre = sign * y - radius
-    if x >= 0.0:
-        inside = radius - math.hypot(x, from_centre)
-    else:
-        inside = radius - abs(from_centre)
+    inside = radius - (math.hypot(x, from_centre) if x >= 0.0 else abs(from_centre))
     # like the path, all for a turn to the left: positive error is to the left of the path
     error = sign * task[COURSE] - turned
     wanted = (1.0 if 0.0 < turned < math.pi else 0.0) - inside / radius - 2.0 * error

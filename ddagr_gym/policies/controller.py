@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from ddagr_gym.errors import InputError, unknown_name
 from ddagr_gym.parameters import Robot, Sensors
 from ddagr_gym.policies.archive import Policy
-from ddagr_gym.policies.estimates import ESTIMATES
+from ddagr_gym.policies.estimates import ESTIMATES, OF_EVERY_POLICY
 from ddagr_gym.policies.shipped import SUFFIX, find_policy, policy_names
 from ddagr_gym.policies.view import PolicyView
 from ddagr_gym.presets import ddagr
@@ -25,7 +25,8 @@ class PolicyController:
         policy: what drives.
         robot: nominal robot.
         sensors: nominal sensors.
-        estimate: one of ``ESTIMATES``; all but "live" are for ablations and need ``info_level="full"``.
+        estimate: one of ``ESTIMATES``; all but "live" are for ablations, and those of the filter need
+            ``info_level="full"``.
     """
 
     def __init__(
@@ -33,12 +34,13 @@ class PolicyController:
     ) -> None:
         if estimate not in ESTIMATES:
             raise unknown_name("estimate", estimate, ESTIMATES)
-        if estimate != "live" and not policy.design.needs_filter:
+        if estimate not in OF_EVERY_POLICY and not policy.design.needs_filter:
             raise InputError(f"estimate {estimate!r}: this policy does not see the filter, give only its name.")
         nominal = ddagr() if robot is None else robot
         self.policy = policy
         self._view = PolicyView(policy.design, nominal, sensors)
         self._estimate = ESTIMATES[estimate][0](nominal, sensors)
+        self._silent = estimate == "feed_forward"
 
     def reset(self) -> None:
         """Forget the last episode."""
@@ -57,8 +59,9 @@ class PolicyController:
             needed = "DDAGR-Turn-EKF-v0" if self.policy.design.needs_filter else "DDAGR-Turn-v0"
             raise InputError(f"observation has shape {given.shape}: this policy needs {needed}, ({size},).")
         told = self._estimate(given, info)[None]
-        action: NDArray[np.float32] = self._view.act(self.policy(self._view.observe(told)), told)[0]
-        return action
+        inputs = self._view.observe(told)
+        outputs = np.zeros((1, 2), dtype=np.float32) if self._silent else self.policy(inputs)
+        return np.asarray(self._view.act(outputs, told)[0])
 
 
 def is_policy_name(name: str) -> bool:
@@ -77,7 +80,7 @@ def _split(name: str) -> tuple[str, str]:
 
 
 def policy_controller(name: str) -> PolicyController:
-    """Controller by name: ``ppo_ekf``, a path ending in ``.npz``, or either with ``@frozen``, ``@wrong``, ``@true``.
+    """Controller by name: ``ppo_ekf``, a path ending in ``.npz``, or either with an estimate, ``ppo_ekf@frozen``.
 
     Raises:
         InputError: unknown policy or estimate, with the closest names.

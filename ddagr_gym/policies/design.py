@@ -35,9 +35,12 @@ FILTER_INPUTS = (
     "sideslip_deviation",
     "course_cross_track_error",
     "course_error",
+    "reference_cross_track_error",
+    "reference_course_error",
+    "reference_to_go",
 )
-"""Inputs of the arm with the filter: its features, the pose that its speed and yaw rate integrate to, and the same with
-the sideslip that :mod:`ddagr_gym.estimation.sideslip` adds."""
+"""Inputs of the arm with the filter: its features, and dead reckoning with them, without and with sideslip, against the
+commanded path and against the reference of :mod:`ddagr_gym.policies.reckoning`."""
 
 
 @dataclass(frozen=True)
@@ -48,16 +51,19 @@ class PolicyDesign(Validated):
 
     Attributes:
         features: "raw" sees the sensors and the task, "ekf" the filter's features besides.
-        action: "correction": outputs are a correction of curvature and one of speed on the feed-forward, which is the
-            force balance at the filter's estimate ("ekf") or at its prior ("raw"); "absolute": outputs are the bank
-            speeds, outer and inner.
+        action: "correction": outputs are a correction of curvature and one of speed on the feed-forward; "absolute":
+            outputs are the bank speeds, outer and inner. The feed-forward is the force balance: with features "ekf" at
+            the filter's estimate, for a curvature that follows a dead-reckoned reference; with "raw" at the filter's
+            prior, for the commanded curvature.
         frames: how many past instants of the inputs are seen, the present one included.
         frame_interval: control steps between them.
         curvature_scale: correction of curvature at output 1, over 1/R* [-].
         speed_scale: correction of speed at output 1, over the reference speed [-].
         rate_limit: largest change of an output per control step [-].
         lead_time: how long before the start and the end of the turn the feed-forward bends and straightens [s].
-        heading_gain: curvature of the feed-forward per heading error on straights [1/(m rad)].
+        heading_gain: of "raw", curvature of the feed-forward per heading error on straights [1/(m rad)].
+        offset_gain: of "ekf", curvature over 1/R* per distance over R* from the reference [-].
+        course_gain: of "ekf", curvature over 1/R* per course error [1/rad].
     """
 
     features: Literal["raw", "ekf"] = "ekf"
@@ -67,8 +73,10 @@ class PolicyDesign(Validated):
     curvature_scale: float = bounded("-", 0.0, 5.0, default=0.5, open_low=True)
     speed_scale: float = bounded("-", 0.0, 0.9, default=0.25)
     rate_limit: float = bounded("-", 0.0, 2.0, default=0.25, open_low=True)
-    lead_time: float = bounded("s", 0.0, 2.0, default=0.30)
+    lead_time: float = bounded("s", 0.0, 2.0, default=0.36)
     heading_gain: float = bounded("1/(m rad)", 0.0, 50.0, default=1.0)
+    offset_gain: float = bounded("-", 0.0, 100.0, default=1.0)
+    course_gain: float = bounded("1/rad", 0.0, 100.0, default=4.0)
 
     def _check(self) -> None:
         for name, value, most in (("frames", self.frames, 64), ("frame_interval", self.frame_interval, 100)):

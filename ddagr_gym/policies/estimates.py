@@ -110,9 +110,13 @@ ESTIMATES: dict[str, tuple[Callable[[Robot, Sensors], Estimate], str]] = {
         lambda robot, sensors: HeldSoil(robot, sensors, wrong_prior()),
         "the soil held at deliberately wrong values",
     ),
+    "feed_forward": (lambda robot, sensors: LiveEstimate(), "its network silenced, only feed-forward and loop"),
     "true": (lambda robot, sensors: TrueMotion(), "the true speed, yaw rate and slip"),
 }
-"""By name: how it is made, and what it is in a phrase."""
+"""By name: how it is made, and what it is in a phrase. With "feed_forward" the policy's outputs are zero."""
+
+OF_EVERY_POLICY = ("live", "feed_forward")
+"""Those that do not need the filter's features."""
 
 
 def wrong_prior() -> SoilPrior:

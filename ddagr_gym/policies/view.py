@@ -14,12 +14,11 @@ from numpy.typing import NDArray
 
 from ddagr_gym.control.observation import FEATURE_SCALES, OBSERVATION, SCALES
 from ddagr_gym.control.turn_controller import CONTROL_PERIOD
-from ddagr_gym.envs.constants import CONTROL_INTERVAL
 from ddagr_gym.estimation import FilterModel
 from ddagr_gym.estimation.force_balance import arc_bank_speed_rows
-from ddagr_gym.estimation.sideslip import SideslipFilter
 from ddagr_gym.parameters import Robot, Sensors
 from ddagr_gym.policies.design import PolicyDesign
+from ddagr_gym.policies.reckoning import Reckoning
 
 Array = NDArray[np.float64]
 Inputs = NDArray[np.float32]
@@ -30,8 +29,8 @@ INPUT_LIMIT = 10.0
 _LEAST_SPEED = 0.25
 """Share of the reference speed below which an estimated speed is not divided by [-] (ours)."""
 
-_TURNED = 0.05
-"""Heading change after which the sideslip may change [rad] (ours)."""
+_LARGEST_STEERING = 0.8
+"""Curvature with which the loop steers back to the reference at most, over 1/R* [-] (ours)."""
 
 _BASE = len(OBSERVATION)
 _FORCE_SCALE = 1.0  # [m/s^2]
@@ -57,17 +56,12 @@ class PolicyView:
         depth = (design.frames - 1) * design.frame_interval + 1
         self._fresh = np.ones(count, dtype=np.bool_)
         self._outputs = np.zeros((count, 2))
-        self._pose = np.zeros((count, 3))
-        self._course_position = np.zeros((count, 2))
-        self._sideslip = SideslipFilter(sensors.imu, CONTROL_INTERVAL, CONTROL_PERIOD, count)
-        self._last_rate = np.zeros(count)
+        self._reckoning = Reckoning(sensors, count)
         self._integral = np.zeros(count)
         self._frames = np.zeros((count, depth, len(design.frame_inputs)))
 
     def _memories(self) -> tuple[NDArray[Any], ...]:
-        filter_ = self._sideslip
-        own = (self._fresh, self._outputs, self._pose, self._course_position, self._last_rate, self._integral)
-        return (*own, self._frames, filter_.states, filter_.covariances, filter_.last_rates)
+        return (self._fresh, self._outputs, self._integral, self._frames, *self._reckoning.memories())
 
     def memory(self) -> tuple[NDArray[Any], ...]:
         """Copies of everything that is remembered between steps; see :meth:`restore`."""
@@ -109,12 +103,8 @@ class PolicyView:
         new = self._fresh[rows]
         started = rows[new]
         self._outputs[started] = 0.0
-        self._pose[started] = 0.0
-        self._pose[started, 0] = -seen[new, 11]
-        self._course_position[started] = self._pose[started, :2]
-        self._sideslip.reset(started)
-        self._last_rate[started] = 0.0
         self._integral[started] = 0.0
+        self._reckoning.start(started, seen[new, 11])
 
     def _frame(self, rows: NDArray[np.int64], seen: Array, features: Array | None) -> Array:
         side, radius, speed = seen[:, 7], seen[:, 8], seen[:, 9]
@@ -150,14 +140,10 @@ class PolicyView:
         curvature = radius * rate / np.maximum(forward, _LEAST_SPEED * speed)
         error = np.where(turning, curvature - 1.0, curvature)
         self._integral[rows] += np.where(turning, error, 0.0) * CONTROL_PERIOD
-        turning_body = np.abs(self._pose[rows, 2]) > _TURNED
-        side_speed = self._sideslip.update(rows, side * seen[:, 1], forward, rate, turning_body)
-        side_speed = np.where(self._fresh[rows], 0.0, side_speed)
-        self._dead_reckon(rows, forward, side_speed, rate)
-        heading = self._pose[rows, 2]
-        cross_track, heading_error, to_go = _path_errors(*self._pose[rows, :2].T / radius, heading)
-        slip_angle = side_speed / np.maximum(forward, _LEAST_SPEED * speed)
-        course = _path_errors(*self._course_position[rows].T / radius, heading + slip_angle)
+        self._reckon(rows, seen, forward, rate)
+        heading = self._reckoning.poses[rows, 2]
+        by_heading, by_course = (self._reckoning.path_errors(rows, radius, sideslip) for sideslip in (False, True))
+        offset, course_error = self._reckoning.reference_errors(rows)
         outer, inner = _outer_inner(side, features[:, 6], features[:, 7])
         return [
             forward / speed,
@@ -169,28 +155,24 @@ class PolicyView:
             error,
             self._integral[rows],
             # a hundredth of R* and half a degree are what matters
-            10.0 * cross_track,
-            10.0 * heading_error,
+            10.0 * by_heading.offset / radius,
+            10.0 * by_heading.direction,
             (math.pi - heading) / math.pi,
-            to_go,
-            10.0 * slip_angle,
-            100.0 * np.sqrt(self._sideslip.covariances[rows, 0, 0]),
-            10.0 * course[0],
-            10.0 * course[1],
+            by_heading.to_go / radius,
+            10.0 * self._reckoning.slip_angles[rows],
+            100.0 * np.sqrt(self._reckoning.sideslip.covariances[rows, 0, 0]),
+            10.0 * by_course.offset / radius,
+            10.0 * by_course.direction,
+            10.0 * offset / radius,
+            10.0 * course_error,
+            (math.pi - self._reckoning.references[rows, 2]) / math.pi,
         ]
 
-    def _dead_reckon(self, rows: NDArray[np.int64], forward: Array, side_speed: Array, rate: Array) -> None:
-        """Pose by the filter's speed and yaw rate, and position with the sideslip, turn to the left."""
+    def _reckon(self, rows: NDArray[np.int64], seen: Array, forward: Array, rate: Array) -> None:
         moved = ~self._fresh[rows]
-        turned = np.where(moved, 0.5 * (rate + self._last_rate[rows]) * CONTROL_PERIOD, 0.0)
-        heading = self._pose[rows, 2] + 0.5 * turned
-        step = np.where(moved, forward * CONTROL_PERIOD, 0.0)
-        aside = np.where(moved, side_speed * CONTROL_PERIOD, 0.0)
-        ahead = np.column_stack([step * np.cos(heading), step * np.sin(heading)])
-        self._pose[rows, :2] += ahead
-        self._pose[rows, 2] += turned
-        self._course_position[rows] += ahead + np.column_stack([-aside * np.sin(heading), aside * np.cos(heading)])
-        self._last_rate[rows] = rate
+        radius, lateral = seen[:, 8], seen[:, 7] * seen[:, 1]
+        curvature = (1.0 + self.design.curvature_scale * self._outputs[rows, 0]) / radius
+        self._reckoning.advance(rows[moved], forward[moved], rate[moved], lateral[moved], curvature[moved])
 
     def act(self, outputs: NDArray[np.floating], observations: NDArray[np.floating]) -> NDArray[np.float32]:
         """Actions of the environment (N, 2), right and left, for the policy's outputs (N, 2) in [-1, 1].
@@ -213,24 +195,29 @@ class PolicyView:
     def _feed_forward(self, seen: Array, given: Array) -> Array:
         """Bank speeds (N, 2) right, left [rad/s] of the corrected arc at the estimated, or the nominal, soil."""
         side, radius, speed = seen[:, 7], seen[:, 8], seen[:, 9]
-        turning, leaving = self._phases(seen)
-        heading_hold = self.design.heading_gain * (seen[:, 10] - np.where(leaving, 0.0, math.pi))
-        curvature = np.where(turning, 1.0 / radius, heading_hold)
+        curvature = self._reference_loop(seen) if self.design.needs_filter else self._nominal(seen)
         curvature = side * (curvature + self.design.curvature_scale * self._outputs[:, 0] / radius)
         logs = given[:, _BASE + 2 : _BASE + 6] * FEATURE_SCALES[2:6] if self.design.needs_filter else 0.0
         parameters = np.exp(np.broadcast_to(self._prior + logs, (len(seen), 4)))
         corrected = speed * (1.0 + self.design.speed_scale * self._outputs[:, 1])
         return arc_bank_speed_rows(self._model, parameters, corrected, curvature)
 
+    def _nominal(self, seen: Array) -> Array:
+        """Commanded curvature, turn to the left, with heading hold by the gyro on straights [1/m]."""
+        turning, leaving = self._phases(seen)
+        heading_hold = self.design.heading_gain * (seen[:, 10] - np.where(leaving, 0.0, math.pi))
+        return np.where(turning, 1.0 / seen[:, 8], heading_hold)
 
-def _path_errors(x: Array, y: Array, heading: Array) -> tuple[Array, Array, Array]:
-    """Distance to the left of the path of R* = 1, heading error, and angle to go, for a turn to the left."""
-    from_centre = y - 1.0
-    on_circle, leaving = x >= 0.0, from_centre > 0.0
-    angle = np.arctan2(np.abs(x), -from_centre)
-    distance = np.where(on_circle, angle, np.where(leaving, math.pi - x, x))
-    offset = np.where(on_circle, 1.0 - np.hypot(x, from_centre), np.where(leaving, 1.0 - from_centre, y))
-    return offset, heading - np.clip(distance, 0.0, math.pi), math.pi - distance
+    def _reference_loop(self, seen: Array) -> Array:
+        """Curvature that follows the reference, bent and straightened ahead of time, turn to the left [1/m]."""
+        rows, radius = np.arange(self.count), seen[:, 8]
+        lead = self.design.lead_time * seen[:, 9]
+        entered = self._reckoning.distances + lead > 0.0
+        turning = entered & (self._reckoning.references[:, 2] + lead / radius < math.pi)
+        offset, course_error = self._reckoning.reference_errors(rows)
+        back = self.design.offset_gain * offset / radius + self.design.course_gain * course_error
+        back = np.clip(back, -_LARGEST_STEERING, _LARGEST_STEERING)
+        return (turning - back) / radius
 
 
 def _outer_inner(side: Array, right: Array, left: Array) -> tuple[Array, Array]:

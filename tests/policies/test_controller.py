@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import gymnasium
 import numpy as np
@@ -135,6 +136,17 @@ def test_a_controller_is_view_and_network_and_forgets(drive):
             np.testing.assert_array_equal(action, expected)
     np.testing.assert_array_equal(driven[0], driven[1])
     assert np.std(driven[0], axis=0).min() > 0.0
+
+
+def test_a_silenced_policy_is_the_feed_forward(drive):
+    for design in (PolicyDesign(), PolicyDesign(features="raw")):
+        size = design.observation_size
+        silenced = PolicyController(make_policy(design), estimate="feed_forward")
+        zero = replace(make_policy(design), weights=(np.zeros((2, len(design.inputs)), np.float32),))
+        other = PolicyController(zero)
+        for observation, info in drive[:60]:
+            np.testing.assert_array_equal(silenced(observation[:size], info), other(observation[:size], info))
+        assert silenced(drive[60][0][:size])[0] > 0.1
 
 
 def test_the_live_filter_learns_and_the_held_one_does_not(drive):
