@@ -35,7 +35,7 @@ def rank(result: dict[str, Any]) -> float:
 
 
 def publish(name: str, settings: TrainingSettings, results: list[dict[str, Any]], output: Path, folder: Path) -> None:
-    """Write ``folder``: policy.npz, settings.yaml, training.json, training.png, README.md.
+    """Write ``folder``: policy.npz, seeds/seed_<k>.npz, settings.yaml, training.json, training.png, README.md.
 
     Args:
         name: of the arm.
@@ -46,13 +46,21 @@ def publish(name: str, settings: TrainingSettings, results: list[dict[str, Any]]
     """
     make_folder(folder)
     selected = min(results, key=rank)
-    with atomic_path(folder / POLICY) as temporary:
-        shutil.copyfile(training_folder(output, name, selected["seed"]) / POLICY, temporary)
+    for result in results:
+        trained = training_folder(output, name, result["seed"]) / POLICY
+        _copy(trained, folder / "seeds" / f"seed_{result['seed']}.npz")
+        if result is selected:
+            _copy(trained, folder / POLICY)
     write_text(folder / "settings.yaml", dump_config(settings))
     record = {"arm": name, "digest": settings.digest(), "selected_seed": selected["seed"], "trainings": results}
     write_text(folder / "training.json", json.dumps(record, indent=1) + "\n")
     draw_course(settings, results, folder / "training.png")
     write_text(folder / "README.md", card(name, settings, results, selected))
+
+
+def _copy(source: Path, target: Path) -> None:
+    with atomic_path(target) as temporary:
+        shutil.copyfile(source, temporary)
 
 
 def draw_course(settings: TrainingSettings, results: list[dict[str, Any]], path: Path) -> None:
@@ -118,7 +126,8 @@ def card(name: str, settings: TrainingSettings, results: list[dict[str, Any]], s
             f'controller = policy_controller("{name}")  # (observation, info) -> action; reset() before each episode',
             "```",
             "",
-            "`policy.npz` holds weights, normalisation and a JSON description, no pickle; numpy runs it.",
+            "`policy.npz` holds weights, normalisation and a JSON description, no pickle; numpy runs it. The policies "
+            f"of all seeds are in `seeds/`, by name `{name}_seed_0` and so on.",
             "",
             "## What it sees and does",
             "",
@@ -166,10 +175,16 @@ def _outputs(settings: TrainingSettings) -> str:
     design = settings.design
     if design.action == "absolute":
         return "speeds of the outer and the inner bank, over the robot's maximum."
-    base = "the filter's estimate" if design.needs_filter else "the nominal soil (the filter's prior)"
+    base = (
+        "the filter's estimate, for a curvature that follows a dead-reckoned reference (gains "
+        f"{design.offset_gain:g} and {design.course_gain:g})"
+        if design.needs_filter
+        else "the nominal soil (the filter's prior)"
+    )
     return (
         f"corrections of curvature (up to {design.curvature_scale:g}/R*) and of speed (up to "
-        f"{100 * design.speed_scale:g} %) on the feed-forward, which is the force balance at {base}."
+        f"{100 * design.speed_scale:g} %) on the feed-forward, which is the force balance at {base}. "
+        "`@feed_forward` after the name drives without the network."
     )
 
 

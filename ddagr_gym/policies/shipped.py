@@ -20,9 +20,17 @@ def policies_dir() -> Path:
     return package / "data" / "policies"
 
 
+def policy_files() -> dict[str, Path]:
+    """Trained policies by name: the selected one of each arm, and every seed, as ``ppo_ekf_seed_3``."""
+    folder = policies_dir()
+    selected = {file.parent.name: file for file in sorted(folder.glob(f"*/policy{SUFFIX}"))}
+    seeds = {f"{file.parents[1].name}_{file.stem}": file for file in sorted(folder.glob(f"*/seeds/seed_*{SUFFIX}"))}
+    return selected | seeds
+
+
 def policy_names() -> tuple[str, ...]:
-    """Names of the trained policies: the folders that hold a ``policy.npz``."""
-    return tuple(sorted(file.parent.name for file in policies_dir().glob(f"*/policy{SUFFIX}")))
+    """Names of :func:`policy_files`."""
+    return tuple(policy_files())
 
 
 def policy_file(name: str) -> Path:
@@ -36,9 +44,10 @@ def policy_file(name: str) -> Path:
         if not path.is_file():
             raise InputError(f"{path}: no such policy file.")
         return path
-    if name not in policy_names():
-        raise unknown_name("policy", name, policy_names())
-    return policies_dir() / name / f"policy{SUFFIX}"
+    files = policy_files()
+    if name not in files:
+        raise unknown_name("policy", name, files)
+    return files[name]
 
 
 @lru_cache(maxsize=32)

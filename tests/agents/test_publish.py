@@ -55,9 +55,10 @@ def test_all_trainings_are_run_published_and_not_run_again(tmp_path, monkeypatch
     train_all_module.train_all(tmp_path / "runs", publish_to=tmp_path / "policies", write=True)
     folder = tmp_path / "policies" / "tiny"
     assert {file.name for file in folder.iterdir()} == {
-        "policy.npz", "settings.yaml", "training.json", "training.png", "README.md"
+        "policy.npz", "seeds", "settings.yaml", "training.json", "training.png", "README.md"
     }  # fmt: skip
-    assert sum(file.stat().st_size for file in folder.iterdir()) < 1_000_000
+    assert sum(file.stat().st_size for file in folder.rglob("*.*")) < 1_000_000
+    assert [load_policy(folder / "seeds" / f"seed_{k}.npz").training["seed"] for k in (0, 1)] == [0, 1]
     record = json.loads((folder / "training.json").read_text())
     assert [item["seed"] for item in record["trainings"]] == [0, 1]
     best = min(record["trainings"], key=rank)

@@ -85,6 +85,10 @@ def told(estimate, drive):
 
 def test_names(folder):
     assert shipped.policy_names() == ("ppo_bold", "ppo_ekf", "ppo_history", "ppo_raw")
+    save_policy(make_policy(PolicyDesign()), folder / "ppo_ekf" / "seeds" / "seed_3.npz")
+    assert shipped.policy_names()[-1] == "ppo_ekf_seed_3"
+    assert is_policy_name("ppo_ekf_seed_3@frozen")
+    assert policy_controller("ppo_ekf_seed_3").policy.design == PolicyDesign()
     assert policy_needs_filter("ppo_ekf@frozen")
     assert not policy_needs_filter("ppo_history")
     assert not is_deployable_policy("ppo_ekf@true")

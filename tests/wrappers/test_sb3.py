@@ -37,3 +37,12 @@ def test_ppo_learns_a_few_steps_on_it():
     model.learn(64)
     assert model.num_timesteps == 64
     assert bool((model.policy.action_net.weight != before).any())
+
+
+def test_staggered_episodes_end_apart_and_from_then_on_take_their_time():
+    env = TurnVecEnv(4, staggered=True, max_episode_steps=8)
+    env.seed(1)
+    env.reset()
+    ends = [np.flatnonzero(env.step(np.zeros((4, 2), np.float32))[2]).tolist() for _ in range(16)]
+    assert ends[:8] == [[], [0], [], [1], [], [2], [], [3]]
+    assert ends[8:] == ends[:8]
