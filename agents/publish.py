@@ -141,7 +141,7 @@ def card(name: str, settings: TrainingSettings, results: list[dict[str, Any]], s
             "",
             f"- {settings.algorithm.upper()} (Stable-Baselines3), {settings.steps} control steps in "
             f"{settings.environments} environments; all numbers in `settings.yaml`, digest `{settings.digest()[:12]}`.",
-            f"- Soils drawn from `{task.soil}`, R* {low:g} to {high:g} m, {task.speed:g} m/s.",
+            f"- Soils drawn from `{task.soil}`, R* {low:g} to {high:g} m, {task.speed[0]:g} to {task.speed[1]:g} m/s.",
             f"- Randomised per episode (standard deviations, SI or relative): {spread}.",
             f"- Reward weights (true state, training only): {reward}.",
             "",

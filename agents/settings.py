@@ -22,25 +22,24 @@ class TaskSettings(Validated):
     Attributes:
         soil: distribution that each episode draws from.
         radius: R*, lowest and highest [m].
-        speed: reference speed [m/s].
+        speed: reference speed, lowest and highest [m/s].
         randomisation: what differs from episode to episode besides the soil.
         reward: weights of the terms.
         effects: missing physics, name=size or the path of an effects file such as `ddagr diagnose` writes.
     """
 
     soil: str = "thesis_a1_range"
-    radius: tuple[float, float] = (0.80, 0.80)
-    speed: float = bounded("m/s", 0.0, 2.0, default=0.20, open_low=True)
+    radius: tuple[float, float] = (0.65, 1.20)
+    speed: tuple[float, float] = (0.16, 0.30)
     randomisation: Randomisation = field(default_factory=Randomisation)
     reward: RewardWeights = field(default_factory=RewardWeights)
     effects: tuple[str, ...] = ()
 
     def environment(self, design: PolicyDesign) -> dict[str, Any]:
         """Keyword arguments of the environment."""
-        low, high = self.radius
         return {
             "soil": self.soil,
-            "radius": low if low == high else (low, high),
+            "radius": self.radius,
             "speed": self.speed,
             "randomisation": self.randomisation,
             "reward": self.reward,

@@ -20,6 +20,8 @@ EXAMPLES = (
 HARD_GROUND = "firm_ground"
 """Nominal soil of a given recording, unless another is named: the refit moves it."""
 
+_SPEED = 0.20  # [m/s]
+
 
 @dataclass(frozen=True)
 class Arguments:
@@ -150,8 +152,8 @@ def _drive(arguments: Arguments) -> tuple[Any, str]:
     from ddagr_gym.evaluation.runs import drive_turn
     from ddagr_gym.presets import get_robot, get_soil
 
-    settings = make_settings(radius=arguments.radius, side=arguments.side)
-    turn = settings.turn(arguments.radius, arguments.side)
+    settings = make_settings(radius=arguments.radius, side=arguments.side, speed=_SPEED)
+    turn = settings.turn(arguments.radius, arguments.side, _SPEED)
     controller = calibrate_constant_speeds(get_robot("ddagr"), get_soil("thesis_a1"), turn)
     print("Driving a row turn on a soil drawn from the default range ...", flush=True)
     driven = drive_turn(controller, settings, arguments.seed)

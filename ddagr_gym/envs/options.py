@@ -45,7 +45,7 @@ def make_settings(
     side: str = "random",
     run_in: float = 0.5,
     run_out: float = 0.5,
-    speed: float = 0.20,
+    speed: float | tuple[float, float] = 0.20,
     sensors: Sensors = Sensors(),
     randomisation: bool | Randomisation = True,
     reward: RewardWeights = DEFAULT_REWARD,

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, fields, replace
 import numpy as np
 
 from ddagr_gym.control.row_turn import SIDES, RowTurn
-from ddagr_gym.errors import unknown_name
+from ddagr_gym.errors import InputError, unknown_name
 from ddagr_gym.parameters import Imu, Numerics, Robot, Sensors, Soil, Validated, bounded
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.soil_draws import SoilDistribution, draw_soil, get_distribution, soil_field
@@ -103,7 +103,7 @@ class TurnSettings(Validated):
         side: "left", "right" or "random".
         run_in: straight before the turn [m].
         run_out: straight after it [m].
-        speed: reference speed [m/s].
+        speed: reference speed [m/s], or (low, high) to draw from.
         sensors: nominal sensors.
         randomisation: what differs from episode to episode.
         reward: weights.
@@ -118,7 +118,7 @@ class TurnSettings(Validated):
     side: str = "random"
     run_in: float = bounded("m", 0.0, 5.0, default=0.5)
     run_out: float = bounded("m", 0.05, 5.0, default=0.5)
-    speed: float = bounded("m/s", 0.0, 2.0, default=0.20, open_low=True)
+    speed: float | tuple[float, float] = 0.20
     sensors: Sensors = Sensors()
     randomisation: Randomisation = Randomisation()
     reward: RewardWeights = RewardWeights()
@@ -129,12 +129,16 @@ class TurnSettings(Validated):
     def _check(self) -> None:
         if self.side != "random" and self.side not in SIDES:
             raise unknown_name("side", self.side, [*SIDES, "random"])
+        for name, value in (("radius", self.radius), ("speed", self.speed)):
+            if not isinstance(value, (int, float)) and (len(value) != 2 or value[0] > value[1]):
+                raise InputError(f"TurnSettings.{name} is {value!r}: give one number, or (low, high).")
         for radius in np.atleast_1d(np.asarray(self.radius, dtype=float)):
-            self.turn(float(radius), "left")
+            for speed in np.atleast_1d(np.asarray(self.speed, dtype=float)):
+                self.turn(float(radius), "left", float(speed))
 
-    def turn(self, radius: float, side: str) -> RowTurn:
-        """The commanded manoeuvre of a radius [m] and side."""
-        return RowTurn(radius=radius, side=side, run_in=self.run_in, run_out=self.run_out, speed=self.speed)
+    def turn(self, radius: float, side: str, speed: float) -> RowTurn:
+        """The commanded manoeuvre of a radius [m], side and reference speed [m/s]."""
+        return RowTurn(radius=radius, side=side, run_in=self.run_in, run_out=self.run_out, speed=speed)
 
     def draw(self, rng: np.random.Generator) -> Episode:
         """One episode; the same generator state gives the same episode."""
@@ -143,7 +147,8 @@ class TurnSettings(Validated):
         radius = self.radius if isinstance(self.radius, (int, float)) else float(rng.uniform(*self.radius))
         robot = self._draw_robot(rng)
         soil, rejected = (self.soil, 0) if isinstance(self.soil, Soil) else draw_soil(self.soil, rng, robot)
-        turn = self.turn(float(radius), side)
+        speed = self.speed if isinstance(self.speed, (int, float)) else float(rng.uniform(*self.speed))
+        turn = self.turn(float(radius), side, float(speed))
         return Episode(
             turn=turn,
             robot=robot,

@@ -9,9 +9,9 @@ from ddagr_gym.control.observation import EKF_FEATURES, OBSERVATION
 from ddagr_gym.errors import InputError
 from ddagr_gym.parameters import Validated, bounded
 
-TASK_INPUTS = ("turning", "leaving", "heading_to_go", "run_in_to_go")
+TASK_INPUTS = ("turning", "leaving", "heading_to_go", "run_in_to_go", "target_radius", "target_speed")
 SENSOR_INPUTS = ("specific_force_x", "specific_force_y", "yaw_rate", "encoder_outer", "encoder_inner")
-MEMORY_INPUTS = ("last_command_outer", "last_command_inner", "correction_0", "correction_1")
+MEMORY_INPUTS = ("last_command_outer", "last_command_inner", "correction_0", "correction_1", "response_time")
 FILTER_INPUTS = (
     "estimated_speed",
     "estimated_yaw_rate",
@@ -60,7 +60,8 @@ class PolicyDesign(Validated):
         curvature_scale: correction of curvature at output 1, over 1/R* [-].
         speed_scale: correction of speed at output 1, over the reference speed [-].
         rate_limit: largest change of an output per control step [-].
-        lead_time: how long before the start and the end of the turn the feed-forward bends and straightens [s].
+        lead_time: how long before the start and the end of the turn the feed-forward bends and straightens, beyond the
+            response time of the motors that commands and encoders of the run-in tell [s].
         heading_gain: of "raw", curvature of the feed-forward per heading error on straights [1/(m rad)].
         offset_gain: of "ekf", curvature over 1/R* per distance over R* from the reference [-].
         course_gain: of "ekf", curvature over 1/R* per course error [1/rad].
@@ -73,7 +74,7 @@ class PolicyDesign(Validated):
     curvature_scale: float = bounded("-", 0.0, 5.0, default=0.5, open_low=True)
     speed_scale: float = bounded("-", 0.0, 0.9, default=0.25)
     rate_limit: float = bounded("-", 0.0, 2.0, default=0.25, open_low=True)
-    lead_time: float = bounded("s", 0.0, 2.0, default=0.36)
+    lead_time: float = bounded("s", 0.0, 2.0, default=0.15)
     heading_gain: float = bounded("1/(m rad)", 0.0, 50.0, default=1.0)
     offset_gain: float = bounded("-", 0.0, 100.0, default=1.0)
     course_gain: float = bounded("1/rad", 0.0, 100.0, default=4.0)

@@ -29,11 +29,15 @@ INPUT_LIMIT = 10.0
 _LEAST_SPEED = 0.25
 """Share of the reference speed below which an estimated speed is not divided by [-] (ours)."""
 
+_LEAST_COMMAND = 0.1  # [rad/s]
+_LONGEST_RESPONSE = 1.5  # [s]
+
 _LARGEST_STEERING = 0.8
 """Curvature with which the loop steers back to the reference at most, over 1/R* [-] (ours)."""
 
 _BASE = len(OBSERVATION)
 _FORCE_SCALE = 1.0  # [m/s^2]
+_SPEED_SCALE = 0.25  # [m/s]
 
 
 class PolicyView:
@@ -58,10 +62,13 @@ class PolicyView:
         self._outputs = np.zeros((count, 2))
         self._reckoning = Reckoning(sensors, count)
         self._integral = np.zeros(count)
+        self._behind = np.zeros(count)
+        self._response = np.zeros(count)
         self._frames = np.zeros((count, depth, len(design.frame_inputs)))
 
     def _memories(self) -> tuple[NDArray[Any], ...]:
-        return (self._fresh, self._outputs, self._integral, self._frames, *self._reckoning.memories())
+        own = (self._fresh, self._outputs, self._integral, self._behind, self._response, self._frames)
+        return (*own, *self._reckoning.memories())
 
     def memory(self) -> tuple[NDArray[Any], ...]:
         """Copies of everything that is remembered between steps; see :meth:`restore`."""
@@ -90,6 +97,7 @@ class PolicyView:
         seen = given[:, :_BASE] * SCALES
         features = given[:, _BASE:] * FEATURE_SCALES if self.design.needs_filter else None
         self._start(rows, seen)
+        self._measure_response(rows, seen)
         frame = self._frame(rows, seen, features)
         self._frames[rows, 1:] = self._frames[rows, :-1]
         self._frames[rows, 0] = frame
@@ -103,8 +111,18 @@ class PolicyView:
         new = self._fresh[rows]
         started = rows[new]
         self._outputs[started] = 0.0
-        self._integral[started] = 0.0
+        for memory in (self._integral, self._behind, self._response):
+            memory[started] = 0.0
         self._reckoning.start(started, seen[new, 11])
+
+    def _measure_response(self, rows: NDArray[np.int64], seen: Array) -> None:
+        """Time by which the encoders are behind the commands, from the start from rest to the end of the run-in."""
+        command = self._limit * seen[:, 5:7].mean(axis=1)
+        straight = (seen[:, 11] > 0.0) & ~self._fresh[rows]
+        behind = np.where(straight, command - seen[:, 3:5].mean(axis=1), 0.0)
+        self._behind[rows] += CONTROL_PERIOD * behind
+        measured = self._behind[rows] / np.maximum(command, _LEAST_COMMAND)
+        self._response[rows] = np.where(straight, np.clip(measured, 0.0, _LONGEST_RESPONSE), self._response[rows])
 
     def _frame(self, rows: NDArray[np.int64], seen: Array, features: Array | None) -> Array:
         side, radius, speed = seen[:, 7], seen[:, 8], seen[:, 9]
@@ -116,19 +134,25 @@ class PolicyView:
             *(rim * bank for bank in _outer_inner(side, seen[:, 3], seen[:, 4])),
             *(rim * self._limit * bank for bank in _outer_inner(side, seen[:, 5], seen[:, 6])),
             *self._outputs[rows].T,
-            *self._task(seen),
+            self._response[rows],
+            *self._task(rows, seen),
         ]
         if features is not None:
             columns += self._filtered(rows, seen, features)
         return np.stack(columns, axis=1)
 
-    def _task(self, seen: Array) -> list[Array]:
-        turning, leaving = self._phases(seen)
-        return [turning.astype(float), leaving.astype(float), seen[:, 10] / math.pi, seen[:, 11] / seen[:, 8]]
+    def _task(self, rows: NDArray[np.int64], seen: Array) -> list[Array]:
+        turning, leaving = self._phases(rows, seen)
+        going = [seen[:, 10] / math.pi, seen[:, 11] / seen[:, 8]]
+        return [turning.astype(float), leaving.astype(float), *going, seen[:, 8], seen[:, 9] / _SPEED_SCALE]
 
-    def _phases(self, seen: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Whether in the turn, and whether in the run-out, as the classical controllers decide it."""
-        lead = self.design.lead_time * seen[:, 9]
+    def _lead(self, rows: NDArray[np.int64], seen: Array) -> Array:
+        """Way gone at the reference speed until a command has its effect [m]."""
+        return np.asarray((self._response[rows] + self.design.lead_time) * seen[:, 9])
+
+    def _phases(self, rows: NDArray[np.int64], seen: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Whether in the turn, and whether in the run-out, as commanded now: ahead of the robot."""
+        lead = self._lead(rows, seen)
         entered = seen[:, 11] <= lead
         to_turn = seen[:, 10] > lead / seen[:, 8]
         return entered & to_turn, entered & ~to_turn
@@ -136,7 +160,7 @@ class PolicyView:
     def _filtered(self, rows: NDArray[np.int64], seen: Array, features: Array) -> list[Array]:
         side, radius, speed = seen[:, 7], seen[:, 8], seen[:, 9]
         forward, rate = features[:, 0], side * features[:, 1]
-        turning, _ = self._phases(seen)
+        turning, _ = self._phases(rows, seen)
         curvature = radius * rate / np.maximum(forward, _LEAST_SPEED * speed)
         error = np.where(turning, curvature - 1.0, curvature)
         self._integral[rows] += np.where(turning, error, 0.0) * CONTROL_PERIOD
@@ -204,14 +228,14 @@ class PolicyView:
 
     def _nominal(self, seen: Array) -> Array:
         """Commanded curvature, turn to the left, with heading hold by the gyro on straights [1/m]."""
-        turning, leaving = self._phases(seen)
+        turning, leaving = self._phases(np.arange(self.count), seen)
         heading_hold = self.design.heading_gain * (seen[:, 10] - np.where(leaving, 0.0, math.pi))
         return np.where(turning, 1.0 / seen[:, 8], heading_hold)
 
     def _reference_loop(self, seen: Array) -> Array:
         """Curvature that follows the reference, bent and straightened ahead of time, turn to the left [1/m]."""
         rows, radius = np.arange(self.count), seen[:, 8]
-        lead = self.design.lead_time * seen[:, 9]
+        lead = self._lead(rows, seen)
         entered = self._reckoning.distances + lead > 0.0
         turning = entered & (self._reckoning.references[:, 2] + lead / radius < math.pi)
         offset, course_error = self._reckoning.reference_errors(rows)

@@ -231,6 +231,17 @@ def test_settings_reach_the_simulator():
     assert env.unwrapped.episode.turn.radius == 0.65
 
 
+def test_a_range_of_speeds_is_drawn_from():
+    env = make(speed=(0.16, 0.30))
+    speeds = []
+    for seed in range(12):
+        observation, _ = env.reset(seed=seed)
+        speeds.append(decode(observation).target_speed)
+        assert speeds[-1] == pytest.approx(env.unwrapped.episode.turn.speed, abs=1e-6)
+    assert 0.16 <= min(speeds) < 0.21
+    assert 0.25 < max(speeds) <= 0.30
+
+
 def test_radius_range_and_sides_are_drawn():
     env = make(radius=(0.65, 1.2))
     turns = []
@@ -253,6 +264,8 @@ def test_radius_range_and_sides_are_drawn():
         ({"info_level": "ful"}, "full"),
         ({"render_mode": "ansi"}, "render_mode"),
         ({"speed": 0.0}, "speed"),
+        ({"speed": (0.3, 0.2)}, "low, high"),
+        ({"radius": (0.7, 0.8, 0.9)}, "low, high"),
     ],
 )
 def test_bad_arguments_are_one_sentence(arguments, words):

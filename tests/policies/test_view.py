@@ -173,6 +173,41 @@ def test_outputs_are_rate_limited_and_clipped():
     np.testing.assert_allclose([a[1] for a in actions], [-0.25, -0.5, -0.75, -1.0, -1.0, -1.0])
 
 
+@pytest.mark.parametrize("delay_steps", [0, 2])
+def test_the_response_time_is_that_of_the_motors(delay_steps):
+    """A first-order lag of 0.3 s and a dead time, seen from the start from rest to the end of the run-in."""
+    design = PolicyDesign(features="raw")
+    view, speed, rate, sent = view_of(design), 0.0, 1.0 / 0.3, []
+    view.observe(observation(design))
+    for step in range(40):
+        command = 0.36
+        sent.append(2.0 * command)
+        target = sent[-1 - delay_steps] if len(sent) > delay_steps else 0.0
+        kept = math.exp(-rate * 0.08)
+        mean = target + (speed - target) * (1.0 - kept) / (rate * 0.08)
+        speed = target + (speed - target) * kept
+        values = {"encoder_right": mean, "encoder_left": mean, "last_action_right": command}
+        run_in = 0.5 if step < 35 else 0.0
+        inputs = view.observe(observation(design, **values, last_action_left=command, run_in_to_go=run_in))
+    expected = 0.3 + 0.08 * delay_steps
+    assert named(design, inputs)["response_time"] == pytest.approx(expected, abs=2e-3)
+    view.reset()
+    assert named(design, view.observe(observation(design)))["response_time"] == 0.0
+
+
+def test_slow_motors_are_commanded_earlier():
+    design = PolicyDesign(features="raw")
+    turning = {}
+    for name, encoder in (("fast", 0.7), ("slow", 0.1)):
+        view = view_of(design)
+        view.observe(observation(design))
+        values = {"encoder_right": encoder, "encoder_left": encoder, "last_action_right": 0.36}
+        for _ in range(5):
+            inputs = view.observe(observation(design, **values, last_action_left=0.36, run_in_to_go=0.06))
+        turning[name] = named(design, inputs)["turning"]
+    assert turning == {"fast": 0.0, "slow": 1.0}
+
+
 def test_history_holds_past_instants_and_starts_with_the_first():
     design = PolicyDesign(features="raw", frames=3, frame_interval=2)
     view, width = view_of(design), len(PolicyDesign(features="raw").inputs)
