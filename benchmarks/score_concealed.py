@@ -1,10 +1,14 @@
 """Score answers of ``benchmarks/answers/run_diagnoses.py`` against the labels of a set of the project's own generator.
 
-    python benchmarks/score_concealed.py --answers ANSWERS.json --labels LABELS.json --output RESULT.json
+    python -m benchmarks.score_concealed --answers ANSWERS.json --labels LABELS.json --commitments COMMITMENTS.json
+
+writes ``benchmarks/results/concealed.json`` and, beside it, a picture. With ``--commitments`` labels that are not the
+ones committed to before the run are refused.
 
 Every figure is ``{value, interval, count}``: shares with 95 % Wilson intervals, others with bootstrap intervals over
 cases. An effect counts as detectable where its true size is at least the least detectable one that the diagnosis of
-its own case states; categorical ones always. Every case that went wrong is listed.
+its own case states; one whose size means something else in the library, and a categorical one, always. A run that
+failed has named nothing: a false alarm on a null, a miss elsewhere. Every case that went wrong is listed.
 """
 
 from __future__ import annotations
@@ -13,36 +17,35 @@ import argparse
 import json
 import math
 import sys
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from benchmarks.concealed.commitments import commitment
+from benchmarks.concealed_figure import draw
+from benchmarks.concealed_truth import Case, covered, detectable, misses, sizes
+from ddagr_gym.errors import InputError
 from ddagr_gym.evaluation.statistics import wilson_interval
 from ddagr_gym.recordings.files import write_atomically
 
-SAME_PARAMETERS: dict[str, dict[str, str]] = {
-    "accelerometer_bias": {"x": "x", "y": "y"},
-    "centre_of_mass_offset": {"x": "x", "y": "y"},
-    "command_delay": {"delay": "delay"},
-    "encoder_scale": {"right": "right", "left": "left"},
-    "gyro_bias": {"bias": "bias"},
-    "gyro_scale": {"scale": "scale"},
-    "imu_lever_arm": {"x": "x", "y": "y"},
-    "imu_misalignment": {"yaw": "yaw"},
-    "motor_droop": {"droop": "droop"},
-    "motor_lag": {"lag": "added_time_constant"},
-    "payload": {"mass": "mass"},
-    "pose_latency": {"latency": "latency"},
-    "slope": {"angle": "angle"},
-    "towed_drag": {"force": "force"},
-    "viscous_drag": {"coefficient": "coefficient"},
-    "wheel_radius_mismatch": {"difference": "ratio"},
-}
-"""Parameters that mean the same in the library and in forms of the tag "same": library field, label field."""
+RESULT = Path(__file__).resolve().parent / "results" / "concealed.json"
 
-Case = tuple[str, Mapping[str, Any], Mapping[str, Any]]
+TARGETS: dict[str, tuple[float, float]] = {
+    "false_alarm_rate": (0.0, 0.05),
+    "top1": (0.8, 1.0),
+    "in_set": (0.9, 1.0),
+    "top1_doubles": (0.7, 1.0),
+    "in_set_doubles": (0.7, 1.0),
+    "confident_wrong": (0.0, 0.05),
+    "coverage": (0.8, 0.97),
+    "gain_share": (0.8, 1.0),
+}
+"""Least and largest value aimed at."""
+
+NULLS = ("null", "structural null")
 
 
 def share(hits: Sequence[bool]) -> dict[str, Any]:
@@ -75,9 +78,9 @@ def right(label: Mapping[str, Any], answer: Mapping[str, Any]) -> bool:
 
 
 def in_set(label: Mapping[str, Any], answer: Mapping[str, Any]) -> bool:
-    """Each of the label's effects stands in the equivalence set of some finding."""
+    """Each of the label's effects stands in the equivalence set of some finding, and the verdict names something."""
     sets = [set(finding["equivalence_set"]) for finding in answer["findings"]]
-    return all(any(name in found for found in sets) for name in label["verdict"])
+    return bool(names_of(answer)) and all(any(name in found for found in sets) for name in label["verdict"])
 
 
 def confident(answer: Mapping[str, Any]) -> bool:
@@ -85,55 +88,30 @@ def confident(answer: Mapping[str, Any]) -> bool:
     return bool(names_of(answer)) and bool(answer["complete"])
 
 
-def detectable(label: Mapping[str, Any], answer: Mapping[str, Any]) -> bool:
-    """Whether all effects of a case are at least as large as what the diagnosis says it can show."""
-    limits = answer.get("detectable") or {}
-    for effect in label["effects"]:
-        sizes = SAME_PARAMETERS.get(effect["name"], {})
-        known = limits.get(effect["name"], {})
-        reached = [
-            abs(
-                float(effect["parameters"][theirs])
-                - (1.0 if effect["name"] in ("encoder_scale", "gyro_scale") else 0.0)
-            )
-            >= known[ours]
-            for ours, theirs in sizes.items()
-            if known.get(ours) is not None and theirs in effect["parameters"]
-        ]
-        if reached and not any(reached):
-            return False
-    return True
-
-
-def covered(cases: Sequence[Case]) -> list[bool]:
-    """Whether the 90 % intervals of rightly named effects of the tag "same" hold the truth."""
-    hits = []
-    for _, label, answer in cases:
-        truth = {effect["name"]: effect for effect in label["effects"]}
-        for finding in answer["findings"]:
-            effect = truth.get(finding["name"])
-            if effect is None or effect["tag"] != "same":
-                continue
-            for ours, theirs in SAME_PARAMETERS.get(finding["name"], {}).items():
-                interval = finding["parameters"].get(ours, {}).get("interval")
-                if interval is not None:
-                    hits.append(interval[0] <= float(effect["parameters"][theirs]) <= interval[1])
-    return hits
-
-
 def gain_shares(cases: Sequence[Case], horizon: str = "5") -> list[float]:
-    """Certified share of the explainable error that the named effects explain, where something was named."""
+    """Certified share of the explainable error that the named effects explain, by case.
+
+    Of the motion where the ceiling gains anything there, else of the readings (what is wrong in a sensor moves no
+    robot). Cases without certification are left out; where nothing was named the share is what the certificate says,
+    nothing.
+    """
     found = []
     for _, _, answer in cases:
         fit = answer.get("fit") or {}
-        entry = (fit.get("gain_share") or {}).get(horizon)
-        if entry is not None and names_of(answer) and math.isfinite(entry["value"]):
-            found.append(float(entry["value"]))
+        entries = [(fit.get(name) or {}).get(horizon) for name in ("gain_share", "gain_share_readings")]
+        values = [float(entry["value"]) for entry in entries if entry is not None]
+        if values and math.isfinite(values[0]):
+            found.append(values[0])
     return found
 
 
 def score(labels: Mapping[str, Any], answers: Mapping[str, Any]) -> dict[str, Any]:
-    """All figures of a set."""
+    """All figures of a set, and the cases that went wrong.
+
+    Args:
+        labels: by case, as the generator writes them.
+        answers: by case; cases without an answer do not count.
+    """
     cases: list[Case] = [(name, labels[name], answers[name]) for name in sorted(answers)]
 
     def of(*kinds: str) -> list[Case]:
@@ -142,55 +120,136 @@ def score(labels: Mapping[str, Any], answers: Mapping[str, Any]) -> dict[str, An
     def over(chosen: Sequence[Case], test: Callable[[Any, Any], bool]) -> dict[str, Any]:
         return share([test(label, answer) for _, label, answer in chosen])
 
-    singles = of("single")
-    seen = [case for case in singles if detectable(case[1], case[2])]
-    outside = of("null", "structural null", "outside")
-    named = [case for case in cases if case[1]["kind"] in ("single", "double")]
+    seen = [case for case in of("single") if detectable(case[1], case[2])]
+    doubles = [case for case in of("double") if detectable(case[1], case[2])]
+    named = of("single", "double")
+    certified = [case for case in cases if case[2].get("fit")]
     return {
-        "false_alarm_rate": over(of("null", "structural null"), lambda _, a: a["verdict"] != ["none"]),
+        "false_alarm_rate": over(of(*NULLS), lambda _, a: a["verdict"] != ["none"]),
         "false_alarm_rate_structural": over(of("structural null"), lambda _, a: a["verdict"] != ["none"]),
+        "named_on_nulls": over(of(*NULLS), lambda _, a: bool(names_of(a))),
         "top1": over(seen, right),
         "in_set": over(seen, in_set),
-        "top1_all_singles": over(singles, right),
-        "top1_doubles": over(of("double"), right),
-        "in_set_doubles": over(of("double"), in_set),
+        "top1_all_singles": over(of("single"), right),
+        "in_set_all_singles": over(of("single"), in_set),
+        "top1_same_form": over([c for c in seen if c[1]["effects"][0]["tag"] == "same"], right),
+        "top1_other_form": over([c for c in seen if c[1]["effects"][0]["tag"] != "same"], right),
+        "top1_doubles": over(doubles, right),
+        "in_set_doubles": over(doubles, in_set),
+        "one_of_double": over(doubles, lambda label, a: bool(set(names_of(a)) & set(label["verdict"]))),
         "unknown_outside": over(of("outside"), lambda _, a: a["verdict"] == ["unknown"]),
         "flagged_outside": over(of("outside"), lambda _, a: not a["complete"]),
-        "confident_wrong": over(outside, lambda _, a: confident(a)),
+        "confident_wrong": over(of(*NULLS, "outside"), lambda _, a: confident(a)),
+        "confident_wrong_nulls": over(of(*NULLS), lambda _, a: confident(a)),
+        "confident_wrong_outside": over(of("outside"), lambda _, a: confident(a)),
         "coverage": share(covered(named)),
-        "gain_share": mean(gain_shares(named)),
+        "set_size": mean([float(len(f["equivalence_set"])) for _, _, a in named for f in a["findings"] if names_of(a)]),
+        "gain_share": mean(gain_shares([*seen, *doubles])),
+        "gain_share_rightly_named": mean(gain_shares([case for case in named if right(case[1], case[2])])),
         "seconds": mean([float(answer["seconds"]) for _, _, answer in cases]),
-        "failures": [
-            {
-                "case": name,
-                "kind": label["kind"],
-                "label": label["verdict"],
-                "forms": [effect["variant"] for effect in label["effects"]],
-                "structure": label["structure"],
-                "verdict": answer["verdict"],
-                "complete": answer["complete"],
-                "equivalence": [finding["equivalence_set"] for finding in answer["findings"]],
-            }
-            for name, label, answer in cases
-            if not right(label, answer)
-        ],
+        "seconds_full": mean([float(answer["seconds"]) for _, _, answer in certified]),
+        "failed_runs": over(cases, lambda _, a: "failure" in a),
+        "failures": [_failure(*case) for case in cases if not right(case[1], case[2])],
+        "interval_misses": misses(named),
     }
 
 
-def main() -> int:
+def _failure(name: str, label: Mapping[str, Any], answer: Mapping[str, Any]) -> dict[str, Any]:
+    """What is listed of a case that went wrong."""
+    return {
+        "case": name,
+        "kind": label["kind"],
+        "label": label["verdict"],
+        "forms": [f"{effect['name']}: {effect['variant']} ({effect['tag']})" for effect in label["effects"]],
+        "true_sizes": {effect["name"]: effect["parameters"] for effect in label["effects"]},
+        "detectable": detectable(label, answer),
+        "structure": label["structure"],
+        "verdict": answer["verdict"],
+        "complete": answer["complete"],
+        "found_sizes": sizes(answer),
+        "equivalence": [finding["equivalence_set"] for finding in answer["findings"]],
+        **({"failure": answer["failure"]} if "failure" in answer else {}),
+    }
+
+
+def against_targets(figures: Mapping[str, Any]) -> dict[str, Any]:
+    """Least and largest value aimed at, and whether the figure lies between them; None where there is none."""
+    found = {}
+    for name, (low, high) in TARGETS.items():
+        value = figures[name]["value"]
+        # half a count of rounding would turn a bound that is met exactly
+        met = None if value is None else low - 1e-9 <= value <= high + 1e-9
+        found[name] = {"least": low, "most": high, "met": met}
+    return found
+
+
+def check_commitments(opened: Mapping[str, Any], published: Mapping[str, Any]) -> None:
+    """Refuse labels that are not the ones committed to.
+
+    Args:
+        opened: labels file of a sealed set, with salts.
+        published: commitments from before the run.
+
+    Raises:
+        InputError: with the first case that differs.
+    """
+    for name in sorted(set(opened["cases"]) | set(published["cases"])):
+        entry = opened["cases"].get(name, {})
+        hashed = commitment(entry["salt"], entry["label"]) if {"salt", "label"} <= set(entry) else None
+        if hashed is None or hashed != published["cases"].get(name, {}).get("label"):
+            raise InputError(f"the label of {name} is not the one committed to: give the labels of that very set.")
+
+
+def about(opened: Mapping[str, Any], answers: Mapping[str, Any]) -> dict[str, Any]:
+    """What was scored: the set, and the versions and options of the runs."""
+    options = Counter(" ".join(answer.get("options", [])) or "all steps" for answer in answers.values())
+    return {
+        "set": opened.get("set"),
+        "generator": opened.get("generator"),
+        "cases": len(answers),
+        "unanswered": sorted(set(opened["cases"]) - set(answers)),
+        "commits": sorted({str(answer.get("commit")) for answer in answers.values()}),
+        "versions": sorted({str(answer.get("version")) for answer in answers.values()}),
+        "options": dict(options),
+    }
+
+
+def _printed(result: Mapping[str, Any]) -> None:
+    for name, entry in result.items():
+        if isinstance(entry, dict) and entry.get("value") is not None:
+            low, high = entry["interval"]
+            aim = result["targets"].get(name)
+            goal = (
+                "" if aim is None else f"  aim {aim['least']:g} to {aim['most']:g}: {'met' if aim['met'] else 'missed'}"
+            )
+            print(f"{name:28s} {entry['value']:8.3f}  [{low:.3f}, {high:.3f}]  {entry['count']:4d}{goal}")
+
+
+def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--answers", type=Path, required=True)
     parser.add_argument("--labels", type=Path, required=True)
-    parser.add_argument("--output", type=Path, required=True)
-    arguments = parser.parse_args()
-    entries = json.loads(arguments.labels.read_text())["cases"]
-    labels = {name: entry["label"] for name, entry in entries.items()}
-    result = score(labels, json.loads(arguments.answers.read_text()))
-    write_atomically(arguments.output, lambda to: to.write_text(json.dumps(result, indent=1) + "\n"))
-    for name, entry in result.items():
-        if isinstance(entry, dict) and entry["value"] is not None:
-            low, high = entry["interval"]
-            print(f"{name:28s} {entry['value']:.3f}  [{low:.3f}, {high:.3f}]  {entry['count']}")
+    parser.add_argument("--commitments", type=Path, help="of a sealed set, published before the run")
+    parser.add_argument("--output", type=Path, default=RESULT, help="JSON; the picture has the same name")
+    return parser
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """Command line; returns the exit code."""
+    arguments = _parser().parse_args(words)
+    opened, answers = (json.loads(path.read_text()) for path in (arguments.labels, arguments.answers))
+    try:
+        if arguments.commitments is not None:
+            check_commitments(opened, json.loads(arguments.commitments.read_text()))
+    except InputError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    labels = {name: entry["label"] for name, entry in opened["cases"].items()}
+    figures = score(labels, answers)
+    result = {**figures, "targets": against_targets(figures), "about": about(opened, answers)}
+    write_atomically(arguments.output, lambda to: to.write_text(json.dumps(result, indent=1, allow_nan=False) + "\n"))
+    draw(labels, answers, result, arguments.output.with_suffix(".png"))
+    _printed(result)
     return 0
 
 

@@ -5,14 +5,19 @@
     python benchmarks/answers/run_diagnoses.py DIR --output FILE     a set of the project's own generator
 
 Options after ``--`` go to every run; ``-- --names-only`` leaves out what follows the verdict and halves the time.
+``--full-every N`` runs one case in N to the end and names only in the others. Which ones, a hash of their names and
+of ``--full-seed`` says, so that no label has a part in it.
 
-Each case is one run of the command line in a process of its own. Finished cases are kept beside the answers until all
-are there, so that an interrupted script goes on; nothing is edited by hand. ``commit`` is the checkout's at the time.
+Each case is one run of the command line in a process of its own; the cores are shared among ``--processes`` of them.
+Finished cases are kept beside the answers until all are there, so that an interrupted script goes on, and a case that
+was run with other options is run again; nothing is edited by hand. A run that fails, or takes longer than
+``--time-limit``, is an answer that says so. ``commit`` is the checkout's at the time.
 """
 
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
 import os
 import shutil
@@ -21,7 +26,7 @@ import sys
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +44,13 @@ UNKNOWN_GROUND = ("--soil", "firm_ground", "--soil-uncertainty", "4", "--stride"
 REAL_BANK = CHECKOUT / "ddagr_gym" / "data" / "null_bank_warthog.json"
 """Thresholds from ordinary Warthog drives; no ordinary Husky drive is at hand, so they serve for it too."""
 
+INTERRUPTED = (130, -2, -15)
+"""Exit codes of a run that was told to stop; it is no answer."""
+
+
+class InterruptedRunError(Exception):
+    """A run was told to stop."""
+
 
 @dataclass(frozen=True)
 class Case:
@@ -47,10 +59,12 @@ class Case:
     Attributes:
         name: key of the answer.
         arguments: of ``ddagr diagnose``, without the output.
+        options: of this script and its user, kept with the answer.
     """
 
     name: str
     arguments: tuple[str, ...]
+    options: tuple[str, ...] = ()
 
 
 def shared() -> Path:
@@ -73,22 +87,65 @@ def real_cases(folder: Path) -> Iterator[Case]:
         yield Case(path.name.split(".", 1)[0], (str(path), *options))
 
 
-def diagnose(case: Case, parts: Path, options: tuple[str, ...]) -> dict[str, Any]:
-    """Answer of one case, from its part where it is finished already."""
+def chosen_for_all(name: str, every: int, seed: int) -> bool:
+    """Whether a case is one of those that are run to the end: one in ``every``, by a hash of its name.
+
+    Args:
+        name: of the case.
+        every: 1 chooses all.
+        seed: another one chooses others.
+    """
+    return int.from_bytes(hashlib.sha256(f"{seed} {name}".encode()).digest()[:8]) % every == 0
+
+
+def with_options(cases: list[Case], options: tuple[str, ...], every: int | None, seed: int) -> list[Case]:
+    """Cases with their options: those of the user, and ``--names-only`` where a case is not run to the end."""
+    found = []
+    for case in cases:
+        short = every is not None and not chosen_for_all(case.name, every, seed)
+        found.append(replace(case, options=(*options, "--names-only") if short else options))
+    return found
+
+
+def diagnose(case: Case, parts: Path, threads: int, limit: float) -> dict[str, Any]:
+    """Answer of one case, from its part where it is finished already.
+
+    Args:
+        case: what to run.
+        parts: folder of finished answers.
+        threads: of the run.
+        limit: after which it is stopped [s].
+
+    Raises:
+        InterruptedRunError: the run was told to stop.
+    """
     part = parts / f"{case.name}.json"
     if part.is_file():
-        return json.loads(part.read_text())  # type: ignore[no-any-return]
+        kept: dict[str, Any] = json.loads(part.read_text())
+        if kept.get("options") == list(case.options):
+            return kept
     output = parts / case.name
-    command = [sys.executable, "-m", "ddagr_gym", "diagnose", *case.arguments, *options]
+    command = [sys.executable, "-m", "ddagr_gym", "diagnose", *case.arguments, "--threads", str(threads), *case.options]
     began = time.monotonic()
-    done = subprocess.run(
-        [*command, "--output", str(output), "--overwrite"], capture_output=True, text=True, cwd=CHECKOUT, check=False
-    )
-    answer = _answer(output / "diagnosis.json", done) | {"commit": commit()}
+    done = _run([*command, "--output", str(output), "--overwrite"], limit)
+    if done.returncode in INTERRUPTED:
+        raise InterruptedRunError(case.name)
+    answer = _answer(output / "diagnosis.json", done) | {"options": list(case.options), "commit": commit()}
     answer.setdefault("seconds", time.monotonic() - began)
     write_atomically(part, lambda to: to.write_text(json.dumps(answer, indent=1) + "\n"))
     shutil.rmtree(output, ignore_errors=True)
     return answer
+
+
+def _run(command: list[str], limit: float) -> subprocess.CompletedProcess[str]:
+    """The command in one thread of linear algebra; one that takes too long ends with code 124."""
+    environment = os.environ | {"OMP_NUM_THREADS": "1"}
+    try:
+        return subprocess.run(
+            command, capture_output=True, text=True, cwd=CHECKOUT, env=environment, check=False, timeout=limit
+        )
+    except subprocess.TimeoutExpired:
+        return subprocess.CompletedProcess(command, 124, "", f"stopped after {limit:g} s")
 
 
 def _answer(path: Path, done: subprocess.CompletedProcess[str]) -> dict[str, Any]:
@@ -119,6 +176,9 @@ def main() -> int:
     parser.add_argument("cases", help="concealed, recordings, or a folder of cases")
     parser.add_argument("--output", type=Path, default=None)
     parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("--full-every", type=int, default=None, metavar="N", help="names only in all but one in N")
+    parser.add_argument("--full-seed", type=int, default=0, help="chooses the cases that are run to the end")
+    parser.add_argument("--time-limit", type=float, default=1800.0, help="of a case [s]")
     parser.add_argument("--only", nargs="*", default=None, help="names of cases")
     words = sys.argv[1:]
     end = words.index("--") if "--" in words else len(words)
@@ -130,25 +190,49 @@ def main() -> int:
         found = list(synthetic_cases(folder))
     if arguments.only is not None:
         found = [case for case in found if case.name in arguments.only]
+    for name in ("processes", "full_every"):
+        value = getattr(arguments, name)
+        if value is not None and value < 1:
+            parser.error(f"--{name.replace('_', '-')} must be at least 1")
     output = arguments.output or HERE / f"{Path(arguments.cases).name}.json"
     if not found:
         print(f"no cases for {arguments.cases}: set DDAGR_SHARED or name a folder of cases", file=sys.stderr)
         return 2
-    write_answers(found, output, arguments.processes, options)
+    found = with_options(found, options, arguments.full_every, arguments.full_seed)
+    try:
+        write_answers(found, output, arguments.processes, arguments.time_limit)
+    except (InterruptedRunError, KeyboardInterrupt):
+        print(f"interrupted; the same command goes on from {output.with_suffix('.parts')}", file=sys.stderr)
+        return 130
     return 0
 
 
-def write_answers(cases: list[Case], output: Path, processes: int, options: tuple[str, ...]) -> None:
-    """Answers of all cases into one file, in the cases' order."""
+def write_answers(cases: list[Case], output: Path, processes: int, limit: float) -> None:
+    """Answers of all cases into one file, in the cases' order.
+
+    Args:
+        cases: with their options.
+        output: file to write.
+        processes: runs at the same time.
+        limit: of one run [s].
+
+    Raises:
+        InterruptedRunError: a run was told to stop.
+    """
     parts = output.with_suffix(".parts")
     parts.mkdir(parents=True, exist_ok=True)
+    threads = max((os.cpu_count() or 1) // processes, 1)
     answers: dict[str, Any] = {}
-    with ThreadPoolExecutor(processes) as pool:
-        futures = {pool.submit(diagnose, case, parts, options): case.name for case in cases}
+    pool = ThreadPoolExecutor(processes)
+    try:
+        futures = {pool.submit(diagnose, case, parts, threads, limit): case.name for case in cases}
         for future in as_completed(futures):
             answers[futures[future]] = future.result()
             said = future.result()["verdict"] or future.result().get("failure")
             print(f"{len(answers)}/{len(cases)} {futures[future]}: {said}", flush=True)
+    finally:
+        # an interrupted script starts no further case
+        pool.shutdown(cancel_futures=True)
     ordered = {case.name: answers[case.name] for case in cases}
     write_atomically(output, lambda to: to.write_text(json.dumps(ordered, indent=1, allow_nan=False) + "\n"))
     shutil.rmtree(parts)

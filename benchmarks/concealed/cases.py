@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -138,6 +139,15 @@ def plan(set_name: str, seed: int) -> list[Case]:
         structure = structures[k % len(structures)] if kind == "structural null" else ""
         cases.append(_complete(Case(set_name, number, kind, effects, structure), seed))
     return cases
+
+
+def counts(set_name: str) -> dict[str, int]:
+    """Cases of each kind in a set; the same for every seed.
+
+    Args:
+        set_name: "development" or "sealed".
+    """
+    return dict(Counter(case.kind for case in plan(set_name, 0)))
 
 
 def _field_soil(rng: np.random.Generator, changes: dict[str, Any]) -> Soil:

@@ -1,8 +1,9 @@
 """Labels that are fixed before anyone sees them: salted hashes, their verification and their opening.
 
-``python -m benchmarks.concealed.commitments verify --data DIR --labels FILE [--replay N]``
-``python -m benchmarks.concealed.commitments reveal --data DIR --labels FILE``
+``python -m benchmarks.concealed.commitments verify --data DIR --labels FILE [--commitments FILE] [--replay N]``
+``python -m benchmarks.concealed.commitments reveal --data DIR --labels FILE [--commitments FILE]``
 
+Labels and recordings are held against ``DIR/commitments.json``, or against the copy that was published before the run.
 A label's commitment is SHA-256(salt || canonical JSON); the salt is an HMAC of the case's name under the seed, so that
 neither a label nor a salt can be guessed without the seed, and the seed itself is committed to in the same way.
 """
@@ -51,15 +52,16 @@ def committed(header: Mapping[str, Any], entries: Mapping[str, Mapping[str, Any]
     return {**_public(header), "seed_commitment": commitment(salt(seed, "seed"), seed), "cases": cases}
 
 
-def discrepancies(data: Path, labels_file: Path, replay: int = 0) -> list[str]:
+def discrepancies(data: Path, labels_file: Path, replay: int = 0, published_file: Path | None = None) -> list[str]:
     """Everything in which labels, recordings and commitments disagree; empty if all is in order.
 
     Args:
         data: folder of a sealed set, with ``commitments.json``.
         labels_file: labels with seed and salts.
         replay: cases that are generated anew from the seed and compared with label and recordings.
+        published_file: commitments that were published; those in the folder by default.
     """
-    published, opened = read_json(data / "commitments.json"), read_json(labels_file)
+    published, opened = read_json(published_file or data / "commitments.json"), read_json(labels_file)
     seed, faults = int(opened["seed"]), []
     if commitment(salt(seed, "seed"), seed) != published["seed_commitment"]:
         faults.append("the seed is not the one committed to")
@@ -87,9 +89,9 @@ def _replayed(published: Mapping[str, Any], opened: Mapping[str, Any], count: in
     return faults
 
 
-def reveal(data: Path, labels_file: Path) -> Path:
+def reveal(data: Path, labels_file: Path, published_file: Path | None = None) -> Path:
     """Copy verified labels to ``data/labels.json``; refuse when anything disagrees."""
-    faults = discrepancies(data, labels_file)
+    faults = discrepancies(data, labels_file, published_file=published_file)
     if faults:
         raise BenchmarkError(f"not revealed: {faults[0]} ({len(faults)} discrepancies); find their cause first.")
     opened, target = read_json(labels_file), data / "labels.json"
@@ -102,6 +104,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("action", choices=("verify", "reveal"))
     parser.add_argument("--data", type=Path, required=True, help="folder of the sealed set")
     parser.add_argument("--labels", type=Path, required=True, help="file with the labels")
+    parser.add_argument("--commitments", type=Path, help="published commitments; default: those in the folder")
     parser.add_argument("--replay", type=int, default=0, help="cases to generate anew and compare")
     return parser
 
@@ -111,9 +114,9 @@ def main(arguments: list[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     try:
         if options.action == "reveal":
-            print(f"revealed: {reveal(options.data, options.labels)}")
+            print(f"revealed: {reveal(options.data, options.labels, options.commitments)}")
             return 0
-        faults = discrepancies(options.data, options.labels, options.replay)
+        faults = discrepancies(options.data, options.labels, options.replay, options.commitments)
     except BenchmarkError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2

@@ -2,6 +2,7 @@
 
 ``python -m benchmarks.concealed.generate --set development --seed 1 --output DIR``
 ``python -m benchmarks.concealed.generate --set sealed --seed secret --output DIR --labels FILE``
+``python -m benchmarks.concealed.generate --set sealed --plan``
 
 The same seed gives the same bytes. A run that was interrupted goes on where it stopped. ``--seed secret`` draws a
 128-bit seed that is kept with the labels only.
@@ -22,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from .cases import SETS, Case, plan
+from .cases import SETS, Case, counts, plan
 from .commitments import committed, salt
 from .drive import SUBSTEPS, drive
 from .jit import FOLDER, source_digest
@@ -158,17 +159,32 @@ def _seed(text: str) -> int | None:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="benchmarks.concealed.generate", description=__doc__.split("\n\n")[0])
     parser.add_argument("--set", dest="set_name", choices=SETS, required=True)
-    parser.add_argument("--seed", type=_seed, required=True, help="whole number, or 'secret'")
-    parser.add_argument("--output", type=Path, required=True, help="folder for the cases")
+    parser.add_argument("--seed", type=_seed, default=-1, help="whole number, or 'secret'")
+    parser.add_argument("--output", type=Path, help="folder for the cases")
     parser.add_argument("--labels", type=Path, help="file for the labels; outside the folder for a sealed set")
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--limit", type=int, help="only the first cases, for a trial")
+    parser.add_argument("--plan", action="store_true", help="only say how many cases of each kind a set holds")
     return parser
+
+
+def plan_text(set_name: str) -> str:
+    """Cases of each kind, a line each, and their sum; nothing that a seed decides."""
+    found = counts(set_name)
+    return "\n".join(
+        f"{kind:15s} {count:4d}" for kind, count in [*sorted(found.items()), ("cases", sum(found.values()))]
+    )
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Command line; returns the exit code."""
-    options = _parser().parse_args(arguments)
+    parser = _parser()
+    options = parser.parse_args(arguments)
+    if options.plan:
+        print(plan_text(options.set_name))
+        return 0
+    if options.seed == -1 or options.output is None:
+        parser.error("give --seed and --output, or --plan")
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     try:
         labels = generate(

@@ -125,7 +125,7 @@ def _one(task: _Task) -> None:
     robot, soil, drives, setting, seed, number, path = task
     made: NullRun
     if isinstance(drives, Recording):
-        made = scanned(robot, soil, [drives], "real", setting)
+        made = scanned(robot, soil, [drives], f"real {Path(drives.meta.source).name}", setting)
     else:
         made = null_run(robot, soil, drives, KINDS[number % len(KINDS)], setting, (seed, number))
     with atomic_path(path) as part:

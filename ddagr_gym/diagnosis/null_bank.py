@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.diagnosis.noise import ChannelNoise
+from ddagr_gym.diagnosis.null_readings import PARTS
 from ddagr_gym.diagnosis.setting import Setting, make_problem
 from ddagr_gym.diagnosis.structural_nulls import KINDS, NullWorld, draw_world
 from ddagr_gym.diagnosis.thresholds import NullRun
@@ -93,30 +94,23 @@ def _drive(
 ) -> Recording:
     commands = template.commands[number]
     x, y, yaw = template.starts[number]
-    columns = simulate(
-        robot, soil, commands, sensors=ideal_sensors(template.period), effects=world.changes, field=world.field,
-        numerics=world.numerics, initial_state={"x": x, "y": y, "yaw": yaw},
+    parts = simulate(
+        robot, soil, world.reading.commands(commands), sensors=ideal_sensors(template.period / PARTS),
+        effects=world.changes, field=world.field, numerics=world.numerics,
+        initial_state={"x": x, "y": y, "yaw": yaw},
     )  # fmt: skip
-    speed = robot.wheels[0].outer_radius * 0.5 * (np.abs(columns["encoder_right"]) + np.abs(columns["encoder_left"]))
-    read = {"t": columns["t"], "command_right": commands[:, 0], "command_left": commands[:, 1]}
+    clean = {name: world.reading.read(name, parts[name]) for name in CHANNELS}
+    speed = robot.wheels[0].outer_radius * 0.5 * (np.abs(clean["encoder_right"]) + np.abs(clean["encoder_left"]))
+    read = {
+        "t": template.period * np.arange(1, len(commands) + 1),
+        "command_right": commands[:, 0],
+        "command_left": commands[:, 1],
+    }
     for k, name in enumerate(CHANNELS):
         found = template.noise[k]
-        clean = columns[name]
-        noisy = clean if found is None else _noisy(clean, found, speed, template.period, rng)
+        noisy = clean[name] if found is None else world.reading.noisy(name, clean[name], found, speed, rng)
         read[name] = np.where(template.present[number][:, k], noisy, np.nan)
     return Recording.from_columns(read, robot)
-
-
-def _noisy(clean: Array, noise: ChannelNoise, speed: Array, period: float, rng: np.random.Generator) -> Array:
-    """Coloured noise that grows with speed; a counter's speed is rounded in its angle instead."""
-    from scipy.signal import lfilter
-
-    if noise.quantum > 0.0:
-        counts = np.floor(np.cumsum(clean) / noise.quantum + rng.random())
-        return np.diff(counts, prepend=0.0) * noise.quantum
-    white = rng.standard_normal(len(clean) + 100)
-    coloured = lfilter([1.0], [1.0, -noise.correlation], white)[100:] * np.sqrt(1.0 - noise.correlation**2)
-    return clean + coloured * np.hypot(noise.sigma, noise.per_speed * speed) * max(noise.inflation, 1.0)
 
 
 def null_run(
@@ -148,7 +142,7 @@ def scanned(robot: Robot, soil: Soil, recordings: Sequence[Recording], kind: str
         robot: nominal.
         soil: nominal.
         recordings: null drives of one world, or pieces of real drives that are known to be ordinary.
-        kind: of KINDS, or "real".
+        kind: of KINDS, or the name of the real drive.
         setting: of the diagnosis.
     """
     from ddagr_gym.diagnosis.search import begin

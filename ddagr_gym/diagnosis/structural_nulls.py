@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ddagr_gym.diagnosis.null_readings import Reading, draw_reading
 from ddagr_gym.parameters import Numerics, Soil
 from ddagr_gym.physics.effects.base import Effect, Vector, size
 from ddagr_gym.physics.effects.soil_factors import scale_soil
@@ -28,6 +29,7 @@ from ddagr_gym.physics.layout import (
     SLIP_RATIO,
     SLOPE,
     WHEEL_V_X,
+    WHEEL_V_Y,
     X,
 )
 from ddagr_gym.physics.terrain import SoilField
@@ -45,10 +47,11 @@ def bend_pressure(row: Vector, parameters: Vector, memory: Vector) -> None:
 
 
 def bend_shear(row: Vector, parameters: Vector, memory: Vector) -> None:
-    """Strength by slip, as a shear law with a peak (negative) or one that hardens (positive) has it."""
+    """Strength by slip and by slip angle, as a law with a peak (negative) or one that hardens (positive) has it."""
     for i in range(4):
         slip = min(abs(row[SLIP_RATIO + i]), 1.0)
-        scale_soil(row, i, 1.0 + parameters[0] * (slip - 0.2), 1.0)
+        across = abs(row[WHEEL_V_Y + i]) / max(math.hypot(row[WHEEL_V_X + i], row[WHEEL_V_Y + i]), 0.02)
+        scale_soil(row, i, (1.0 + parameters[0] * (slip - 0.2)) * (1.0 + parameters[1] * (across - 0.3)), 1.0)
 
 
 def second_order_motors(row: Vector, parameters: Vector, memory: Vector) -> None:
@@ -64,9 +67,16 @@ def second_order_motors(row: Vector, parameters: Vector, memory: Vector) -> None
 
 
 def ripple_ground(row: Vector, parameters: Vector, memory: Vector) -> None:
-    """Relief by place: two crossed waves of gradient ``parameters[0]``, lengths and phases as given."""
-    row[SLOPE] += parameters[0] * math.sin(2.0 * math.pi * row[X] / parameters[1] + parameters[3])
-    row[SLOPE + 1] += parameters[0] * math.sin(2.0 * math.pi * row[X + 1] / parameters[2] + parameters[4])
+    """Relief by place: crossed waves of gradient ``parameters[0]``, each shorter than the one before by a golden ratio.
+
+    Gradients of equal size in every band are the coloured profile of fields, whose heights fall with the length.
+    """
+    for axis in range(2):
+        length, phase = parameters[1 + axis], parameters[3 + axis]
+        for k in range(int(parameters[5])):
+            turn = 2.0 * math.pi * row[X + axis] / length + (1.0 + 2.4 * k) * phase
+            row[SLOPE + axis] += parameters[0] * math.sin(turn)
+            length *= 0.618
 
 
 @dataclass(frozen=True)
@@ -87,17 +97,18 @@ class OtherPressureLaw(Effect):
 
 @dataclass(frozen=True)
 class OtherShearLaw(Effect):
-    """Shear strength that falls or rises with slip."""
+    """Shear strength that falls or rises with slip and slip angle."""
 
     name = "null_shear_law"
     title = "Another shear law"
     group = "ground"
-    equation = "c, tan(phi) -> (1 + gain (|slip| - 0.2)) c, tan(phi)"
+    equation = "c, tan(phi) -> (1 + gain (|slip| - 0.2)) (1 + across (|sin(slip angle)| - 0.3)) c, tan(phi)"
     source = "hump and hardening curves (Wong, Theory of Ground Vehicles, section 2.4.3)"
     signature = "none that a refit leaves"
     actions = ((POINT_SOIL, bend_shear),)
 
     gain: float = size("-", -1.0, 1.0, least=0.1)
+    across: float = size("-", -1.0, 1.0, least=0.1, default=0.0)
 
 
 @dataclass(frozen=True)
@@ -117,12 +128,12 @@ class SecondOrderMotors(Effect):
 
 @dataclass(frozen=True)
 class Relief(Effect):
-    """Small waves of the ground."""
+    """Small waves of the ground, one length or a spectrum."""
 
     name = "null_relief"
     title = "Relief"
     group = "ground"
-    equation = "gradient sin(2 pi x/length + phase) along both world axes"
+    equation = "sum over k of gradient sin(2 pi x/(0.618^k length) + phase_k) along both world axes"
     source = "ours"
     signature = "noise of the accelerometers with the pace of the drive"
     actions = ((POINT_LOADS, ripple_ground),)
@@ -132,9 +143,12 @@ class Relief(Effect):
     length_y: float = size("m", 0.1, 100.0, least=1.0, default=0.7, neutral=0.7)
     phase_x: float = size("rad", -10.0, 10.0, least=1.0, default=0.0)
     phase_y: float = size("rad", -10.0, 10.0, least=1.0, default=0.0)
+    waves: float = size("-", 1.0, 8.0, least=1.0, default=1.0, neutral=1.0)
 
 
-KINDS = ("plain", "pressure law", "shear law", "motor loop", "relief", "patchy", "all")
+KINDS = (
+    "plain", "pressure law", "shear law", "motor loop", "relief", "rough", "patchy", "readings", "noise", "all",
+)  # fmt: skip
 """Structural kinds, in the order in which a bank goes through them."""
 
 
@@ -147,12 +161,14 @@ class NullWorld:
         field: soil by place.
         changes: structural changes.
         numerics: of its integrator.
+        reading: how it is commanded and read.
     """
 
     kind: str
     field: SoilField
     changes: tuple[Effect, ...]
     numerics: Numerics
+    reading: Reading
 
 
 def draw_world(kind: str, soil: Soil, reach: float, rng: np.random.Generator) -> NullWorld:
@@ -164,20 +180,31 @@ def draw_world(kind: str, soil: Soil, reach: float, rng: np.random.Generator) ->
         reach: half the side of the area driven on [m].
         rng: source of randomness.
     """
+    spread = float(rng.uniform(0.05, 0.1)) if kind in ("all", "patchy") else float(rng.uniform(0.02, 0.04))
+    numerics = replace(Numerics(), maximum_step=float(rng.choice([0.004, 0.01])))
+    field = _field(_other(soil, rng), reach, spread, rng)
+    return NullWorld(kind, field, _changes(kind, rng), numerics, draw_reading(kind, rng))
+
+
+def _changes(kind: str, rng: np.random.Generator) -> tuple[Effect, ...]:
     every = kind == "all"
     changes: list[Effect] = []
     if every or kind == "pressure law":
         changes.append(OtherPressureLaw(float(rng.uniform(-0.4, 0.4)), float(rng.uniform(0.0, 0.08))))
     if every or kind == "shear law":
-        changes.append(OtherShearLaw(float(rng.uniform(-0.5, 0.5))))
+        changes.append(OtherShearLaw(float(rng.uniform(-0.5, 0.5)), float(rng.uniform(-0.3, 0.3))))
     if every or kind in ("motor loop", "plain"):
         changes.append(SecondOrderMotors(float(rng.uniform(0.01, 0.05))))
     if every or kind == "relief":
-        lengths, phases = rng.uniform(0.4, 1.5, 2), rng.uniform(-3.1, 3.1, 2)
-        changes.append(Relief(float(rng.uniform(0.003, 0.01)), *map(float, lengths), *map(float, phases)))
-    spread = float(rng.uniform(0.05, 0.08)) if every or kind == "patchy" else float(rng.uniform(0.02, 0.04))
-    numerics = replace(Numerics(), maximum_step=float(rng.choice([0.004, 0.01])))
-    return NullWorld(kind, _field(_other(soil, rng), reach, spread, rng), tuple(changes), numerics)
+        changes.append(_relief(rng.uniform(0.003, 0.01), rng.uniform(0.4, 1.5, 2), 1, rng))
+    if kind == "rough":
+        changes.append(_relief(rng.uniform(0.002, 0.006), rng.uniform(1.0, 4.0, 2), 6, rng))
+    return tuple(changes)
+
+
+def _relief(gradient: float, lengths: Array, waves: int, rng: np.random.Generator) -> Relief:
+    (x, y), (phase_x, phase_y) = map(float, lengths), map(float, rng.uniform(-3.1, 3.1, 2))
+    return Relief(float(gradient), length_x=x, length_y=y, phase_x=phase_x, phase_y=phase_y, waves=float(waves))
 
 
 def _other(soil: Soil, rng: np.random.Generator) -> Soil:
@@ -194,14 +221,14 @@ def _other(soil: Soil, rng: np.random.Generator) -> Soil:
     )
 
 
-def _field(soil: Soil, reach: float, spread: float, rng: np.random.Generator, spacing: float = 0.4) -> SoilField:
-    """Strength and stiffness as smooth random fields, correlated over 0.8 to 3 m."""
+def _field(soil: Soil, reach: float, spread: float, rng: np.random.Generator, spacing: float = 0.25) -> SoilField:
+    """Strength and stiffness as smooth random fields, correlated over 0.5 to 3 m."""
     from scipy.ndimage import gaussian_filter
 
     nodes = int(2.0 * reach / spacing) + 2
     values = np.broadcast_to(soil_vector(soil), (nodes, nodes, 9)).copy()
     for entries, times in (((0, 1), 1.0), ((3, 4), 1.5)):
-        smooth = gaussian_filter(rng.standard_normal((nodes, nodes)), rng.uniform(0.8, 3.0) / spacing)
+        smooth = gaussian_filter(rng.standard_normal((nodes, nodes)), rng.uniform(0.5, 3.0) / spacing)
         factor = np.exp(times * spread * smooth / smooth.std())
         values[..., list(entries)] *= factor[..., None]
     return SoilField((-reach, -reach), (spacing, spacing), values)

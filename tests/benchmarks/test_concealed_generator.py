@@ -76,6 +76,13 @@ def test_a_set_holds_what_the_protocol_says(set_name):
     assert 0.65 < with_receiver < 0.95
 
 
+def test_the_plan_is_printed_without_making_anything(capsys):
+    assert generate.main(["--set", "sealed", "--plan"]) == 0
+    printed = dict(line.rsplit(maxsplit=1) for line in capsys.readouterr().out.splitlines())
+    kinds = collections.Counter(case.kind for case in cases.plan("sealed", SEED))
+    assert {kind: int(count) for kind, count in printed.items()} == {**kinds, "cases": 124}
+
+
 def test_reserved_effects_and_pairs_stay_out_of_the_development_set():
     for seed in range(5):
         development, sealed_set = (cases.plan(name, seed) for name in cases.SETS)
@@ -246,6 +253,22 @@ def test_tampering_is_found(sealed_copy, what, capsys):
     assert commitments.main(["reveal", "--data", str(data), "--labels", str(labels)]) == 2
     assert not (data / "labels.json").exists()
     assert "not revealed" in capsys.readouterr().err
+
+
+def test_commitments_are_held_against_the_published_copy(sealed_copy, tmp_path, capsys):
+    """Commitments that were rewritten together with the labels agree with them, but not with what was published."""
+    data, labels = sealed_copy
+    published = Path(shutil.copy(data / "commitments.json", tmp_path / "published.json"))
+    opened, rewritten = json.loads(labels.read_text()), json.loads(published.read_text())
+    entry = opened["cases"]["case_002"]
+    entry["label"]["verdict"] = ["payload", "slope"]
+    rewritten["cases"]["case_002"]["label"] = commitments.commitment(entry["salt"], entry["label"])
+    labels.write_text(json.dumps(opened))
+    (data / "commitments.json").write_text(json.dumps(rewritten))
+    words = ["verify", "--data", str(data), "--labels", str(labels)]
+    assert commitments.main(words) == 0
+    assert commitments.main([*words, "--commitments", str(published)]) == 1
+    assert "case_002" in capsys.readouterr().out
 
 
 def test_reveal_publishes_the_labels(sealed_copy):

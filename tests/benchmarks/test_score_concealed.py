@@ -1,12 +1,15 @@
-"""Scores of answers against labels, and what the answering script keeps."""
+"""Scores of answers against labels: figures, failures, targets, picture."""
 
-import subprocess
+import json
+import math
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from benchmarks.answers.run_diagnoses import Case, _answer, synthetic_cases
-from benchmarks.score_concealed import score, share
+from benchmarks.concealed.commitments import commitment
+from benchmarks.concealed_figure import tabled
+from benchmarks.score_concealed import TARGETS, against_targets, main, score, share
 
 
 def label(kind: str, *names: str, **parameters: float) -> dict[str, Any]:
@@ -68,21 +71,136 @@ def test_effects_below_the_stated_limit_do_not_count_as_missed() -> None:
     assert score(labels, {"a": missed})["top1_all_singles"]["value"] == 0.0
 
 
-def test_a_failure_is_an_answer_too(tmp_path: Any) -> None:
-    done = subprocess.CompletedProcess([], 2, "", "progress\nddagr: the file is empty.\n")
-    found = _answer(tmp_path / "absent.json", done)
-    assert found["verdict"] == []
-    assert found["failure"] == {"exit_code": 2, "message": "ddagr: the file is empty."}
+def test_a_size_counts_as_detectable_by_its_distance_from_neutral() -> None:
+    """ln(strength) = 0.2 is a factor of 1.22 in the library, 0.22 from neutral."""
+    labels = {"a": label("single", "soil_change", ln_strength=0.2)}
+    distance = math.exp(0.2) - 1.0
+    for least, count in ((distance - 0.01, 1), (distance + 0.01, 0)):
+        missed = {**answer("none"), "detectable": {"soil_change": {"strength": least}}}
+        assert score(labels, {"a": missed})["top1"]["count"] == count
 
 
-def test_cases_are_folders_with_runs(tmp_path: Any) -> None:
-    (tmp_path / "case_02").mkdir()
-    (tmp_path / "case_02" / "run_1.csv.gz").touch()
-    (tmp_path / "notes").mkdir()
-    (case,) = synthetic_cases(tmp_path)
-    assert isinstance(case, Case)
-    assert case.name == "case_02"
-    assert case.arguments[0].endswith("run_1.csv.gz")
+def test_intervals_are_compared_in_the_library_s_terms() -> None:
+    """The generator states right over left, the library left over right."""
+    labels = {"a": label("single", "soil_split", ln_strength_ratio=0.3)}
+    found = answer("soil_split")
+    for interval, value in (((0.7, 0.8), 1.0), ((1.3, 1.4), 0.0)):
+        found["findings"][0]["parameters"] = {"strength": {"value": 0.75, "interval": interval}}
+        scored = score(labels, {"a": found})
+        assert scored["coverage"]["value"] == value
+        assert [entry["truth"] for entry in scored["interval_misses"]] == [math.exp(-0.3)] * (value == 0.0)
+
+
+def test_a_name_in_a_verdict_of_unknown_is_none() -> None:
+    labels = {"a": label("single", "command_delay", delay=0.1)}
+    doubtful = {**answer("command_delay", interval=(0.0, 1.0)), "verdict": ["unknown"], "complete": False}
+    found = score(labels, {"a": doubtful})
+    assert found["in_set"]["value"] == 0.0
+    assert found["coverage"]["count"] == 0
+
+
+def test_a_failed_run_is_a_false_alarm_or_a_miss_and_is_listed() -> None:
+    failure = {"exit_code": 2, "message": "the file is empty"}
+    failed = {"verdict": [], "complete": False, "findings": [], "seconds": 1.0, "failure": failure}
+    labels = {"a": label("null", "none"), "b": label("single", "command_delay", delay=0.1)}
+    found = score(labels, {"a": failed, "b": failed})
+    assert found["false_alarm_rate"]["value"] == 1.0
+    assert found["top1"]["value"] == 0.0
+    assert found["confident_wrong"]["value"] == 0.0
+    assert found["failed_runs"]["value"] == 1.0
+    assert [entry["failure"] for entry in found["failures"]] == [failure, failure]
+
+
+def test_gain_share_is_of_the_motion_else_of_the_readings_and_counts_what_was_missed() -> None:
+    def certified(motion: float | None, readings: float | None, *verdict: str) -> dict[str, Any]:
+        entries = {"gain_share": motion, "gain_share_readings": readings}
+        fit = {name: {"5": None if value is None else {"value": value}} for name, value in entries.items()}
+        return {**answer(*verdict), "fit": fit}
+
+    labels = {name: label("single", "command_delay", delay=0.1) for name in "abcde"} | {"n": label("null", "none")}
+    answers = {
+        "a": certified(1.0, 0.2, "command_delay"),
+        "b": certified(None, 0.5, "command_delay"),
+        "c": certified(0.0, 0.0, "unknown"),
+        "d": certified(None, None, "command_delay"),
+        "e": answer("command_delay"),
+        "n": certified(0.9, 0.9, "slope"),
+    }
+    found = score(labels, answers)
+    assert found["gain_share"]["value"] == pytest.approx(0.5)
+    assert found["gain_share"]["count"] == 3
+    assert found["gain_share_rightly_named"]["value"] == pytest.approx(0.75)
+
+
+def test_targets_are_bounds_on_both_sides() -> None:
+    figures: dict[str, Any] = {name: {"value": None} for name in TARGETS}
+    figures["coverage"] = {"value": 0.99}
+    figures["false_alarm_rate"] = {"value": 0.05}
+    met = {name: entry["met"] for name, entry in against_targets(figures).items()}
+    assert met["coverage"] is False
+    assert met["false_alarm_rate"] is True
+    assert met["top1"] is None
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> dict[str, Path]:
+    """Labels with salts, their commitments, answers."""
+    labels = {"case_001": label("null", "none"), "case_002": label("single", "command_delay", delay=0.1)}
+    opened = {"set": "sealed", "cases": {name: {"label": entry, "salt": "ab"} for name, entry in labels.items()}}
+    hashed = {name: {"label": commitment("ab", entry)} for name, entry in labels.items()}
+    contents = {
+        "labels": opened,
+        "commitments": {"cases": hashed},
+        "answers": {"case_001": answer("none"), "case_002": answer("slope")},
+    }
+    paths = {name: tmp_path / f"{name}.json" for name in contents}
+    for name, content in contents.items():
+        paths[name].write_text(json.dumps(content))
+    return paths | {"output": tmp_path / "result.json"}
+
+
+def test_command_line_writes_figures_and_picture(files: dict[str, Path], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([word for name, path in files.items() for word in (f"--{name}", str(path))]) == 0
+    found = json.loads(files["output"].read_text())
+    assert found["false_alarm_rate"]["value"] == 0.0
+    assert found["top1"]["value"] == 0.0
+    assert found["targets"]["top1"]["met"] is False
+    assert [entry["case"] for entry in found["failures"]] == ["case_002"]
+    assert files["output"].with_suffix(".png").read_bytes()[:4] == b"\x89PNG"
+    assert "missed" in capsys.readouterr().out
+
+
+def test_labels_that_were_changed_after_the_run_are_refused(
+    files: dict[str, Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    opened = json.loads(files["labels"].read_text())
+    opened["cases"]["case_002"]["label"]["verdict"] = ["slope"]
+    files["labels"].write_text(json.dumps(opened))
+    assert main([word for name, path in files.items() for word in (f"--{name}", str(path))]) == 2
+    assert "case_002" in capsys.readouterr().err
+    assert not files["output"].exists()
+
+
+def test_the_picture_s_table_counts_every_case_once_in_its_row() -> None:
+    labels = {
+        "a": label("null", "none"),
+        "b": label("single", "slope", angle=0.1),
+        "c": label("single", "slope", angle=0.1),
+        "d": label("double", "slope", "gyro_bias"),
+        "e": label("outside", "unknown"),
+    }
+    answers = {
+        "a": answer("unknown"), "b": answer("slope"), "c": answer("payload", "slope"), "d": answer("slope"),
+        "e": {"verdict": []},
+    }  # fmt: skip
+    rows = tabled(labels, answers)
+    assert {name: (count, dict(said)) for name, (count, said, _) in rows.items()} == {
+        "slope": (2, {"slope": 2, "payload": 1}),
+        "nothing (nulls)": (1, {"unknown": 1}),
+        "in no library": (1, {"failed": 1}),
+        "slope + gyro_bias": (1, {"slope": 1}),
+    }
+    assert next(iter(rows)) == "slope"
 
 
 def test_share_of_nothing_is_not_a_number() -> None:

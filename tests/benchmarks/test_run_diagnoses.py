@@ -1,0 +1,103 @@
+"""The answering script: which cases, which options, what is kept, going on after an interruption."""
+
+import json
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from benchmarks.answers import run_diagnoses
+from benchmarks.answers.run_diagnoses import (
+    Case,
+    InterruptedRunError,
+    _answer,
+    chosen_for_all,
+    diagnose,
+    synthetic_cases,
+    with_options,
+    write_answers,
+)
+
+CASES = [Case(f"case_{number:03d}", ()) for number in range(1, 125)]
+
+
+@pytest.fixture
+def runs(monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
+    """Commands that would have been run; each writes a diagnosis of nothing."""
+    commands: list[list[str]] = []
+
+    def run(command: list[str], limit: float) -> subprocess.CompletedProcess[str]:
+        commands.append(command)
+        folder = Path(command[command.index("--output") + 1])
+        folder.mkdir()
+        (folder / "diagnosis.json").write_text(json.dumps({"verdict": ["none"], "complete": True, "seconds": 3.0}))
+        return subprocess.CompletedProcess(command, 0, "", "")
+
+    monkeypatch.setattr(run_diagnoses, "_run", run)
+    return commands
+
+
+def test_a_failure_is_an_answer_too(tmp_path: Path) -> None:
+    done = subprocess.CompletedProcess([], 2, "", "progress\nddagr: the file is empty.\n")
+    found = _answer(tmp_path / "absent.json", done)
+    assert found["verdict"] == []
+    assert found["failure"] == {"exit_code": 2, "message": "ddagr: the file is empty."}
+
+
+def test_cases_are_folders_with_runs(tmp_path: Path) -> None:
+    (tmp_path / "case_02").mkdir()
+    (tmp_path / "case_02" / "run_1.csv.gz").touch()
+    (tmp_path / "notes").mkdir()
+    (case,) = synthetic_cases(tmp_path)
+    assert case.name == "case_02"
+    assert case.arguments[0].endswith("run_1.csv.gz")
+
+
+def test_a_share_of_the_cases_is_run_to_the_end_by_their_names_alone() -> None:
+    chosen = [case.name for case in CASES if chosen_for_all(case.name, 4, 0)]
+    # 31 expected, standard deviation of the binomial 4.8
+    assert 31 - 15 < len(chosen) < 31 + 15
+    assert chosen != [case.name for case in CASES if chosen_for_all(case.name, 4, 1)]
+    assert all(chosen_for_all(case.name, 1, 0) for case in CASES)
+    optioned = with_options(CASES, ("--seed", "2"), 4, 0)
+    assert [case.name for case in optioned if case.options == ("--seed", "2")] == chosen
+    assert {case.options for case in optioned} == {("--seed", "2"), ("--seed", "2", "--names-only")}
+    assert {case.options for case in with_options(CASES, (), None, 0)} == {()}
+
+
+def test_answers_keep_what_was_said_and_how(runs: list[list[str]], tmp_path: Path) -> None:
+    cases = [replace(case, options=("--names-only",)) for case in CASES[:2]]
+    write_answers(cases, tmp_path / "answers.json", 2, 10.0)
+    found = json.loads((tmp_path / "answers.json").read_text())
+    assert list(found) == ["case_001", "case_002"]
+    assert found["case_001"]["verdict"] == ["none"]
+    assert found["case_001"]["options"] == ["--names-only"]
+    assert found["case_001"]["seconds"] == 3.0
+    assert all("--names-only" in command and "--threads" in command for command in runs)
+    assert [path.name for path in tmp_path.iterdir()] == ["answers.json"]
+
+
+def test_finished_cases_are_not_run_again_unless_options_differ(runs: list[list[str]], tmp_path: Path) -> None:
+    for options in ((), (), ("--names-only",)):
+        diagnose(replace(CASES[0], options=options), tmp_path, 1, 10.0)
+    assert len(runs) == 2
+
+
+def test_an_interrupted_run_is_no_answer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(command: list[str], limit: float) -> subprocess.CompletedProcess[str]:
+        return subprocess.CompletedProcess(command, 130, "", "ddagr: interrupted")
+
+    monkeypatch.setattr(run_diagnoses, "_run", interrupted)
+    with pytest.raises(InterruptedRunError):
+        write_answers(CASES, tmp_path / "answers.json", 1, 10.0)
+    assert not (tmp_path / "answers.json").exists()
+    assert list((tmp_path / "answers.parts").iterdir()) == []
+
+
+def test_a_run_that_takes_too_long_is_stopped_and_is_an_answer(tmp_path: Path) -> None:
+    done = run_diagnoses._run(["sleep", "20"], 0.05)
+    assert done.returncode == 124
+    found: dict[str, Any] = _answer(tmp_path / "absent.json", done)
+    assert found["failure"] == {"exit_code": 124, "message": "stopped after 0.05 s"}
