@@ -9,6 +9,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from agents.main import training_folder
 from agents.run import POLICY
 from agents.settings import TrainingSettings
@@ -20,6 +22,10 @@ from ddagr_gym.reporting.figures import house_style
 
 AIMS = {"radius_error_median": 0.02, "radius_error_p95": 0.06, "success_rate": 0.98}
 """Of the project: median and 95th percentile of |e_R| at most, share of successes at least."""
+
+
+_MOST_FAILURES = 0.05
+"""Share of validation turns beyond which a model card warns (ours)."""
 
 
 def rank(result: dict[str, Any]) -> float:
@@ -84,15 +90,22 @@ def draw_course(settings: TrainingSettings, results: list[dict[str, Any]], path:
                 axes.plot(steps, percent, color=palette.BLUE, alpha=0.55)
             axes.axhline(100.0 * AIMS[key], color=palette.VERMILLION, linestyle=(0, (4, 2)), linewidth=1.0)
             axes.set(xlabel="million control steps", title=label)
-            if key == "success_rate":
-                axes.set_ylim(0.0, 103.0)
-            else:
-                axes.set_yscale("log")
-                axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
-                axes.yaxis.set_minor_formatter(lambda value, _: f"{value:g}" if str(value)[0] in "25" else "")
-        figure.suptitle(f"{settings.description} ({len(results)} seeds; dashed: aim)", x=0.01, ha="left", fontsize=8.5)
+            _scale(axes, 103.0 if key == "success_rate" else None)
+        seeds = f"{len(results)} seed{'s' if len(results) > 1 else ''}"
+        figure.suptitle(f"{settings.description} ({seeds}; dashed: aim)", x=0.01, ha="left", fontsize=8.5)
         with atomic_path(path) as temporary:
             figure.savefig(temporary, dpi=130.0, metadata={"Software": None})
+
+
+def _scale(axes: Any, top: float | None) -> None:
+    """From zero to ``top``, to the data where it is None, and logarithmic where these span more than a decade."""
+    found = np.concatenate([line.get_ydata() for line in axes.lines]).astype(float)
+    found = found[np.isfinite(found) & (found > 0.0)]
+    if top is None and found.max() > 10.0 * found.min():
+        axes.set_yscale("log")
+        axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    else:
+        axes.set_ylim(0.0, top)
 
 
 def card(name: str, settings: TrainingSettings, results: list[dict[str, Any]], selected: dict[str, Any]) -> str:
@@ -113,6 +126,7 @@ def card(name: str, settings: TrainingSettings, results: list[dict[str, Any]], s
             "",
             "A policy that turns a DDAGR robot from one strawberry row into the next on soft soil, trained in "
             "simulation only. It has never driven a robot.",
+            *_warning(selected),
             "",
             "## Use",
             "",
@@ -160,10 +174,22 @@ def card(name: str, settings: TrainingSettings, results: list[dict[str, Any]], s
             "## Limits",
             "",
             "Soils, masses and motors far from those of the training are outside its experience; so are other robots. "
-            "What it does there is in the evaluation report, not in this table.",
+            "What it does there, and how it compares with controllers that need no training, is in the README and in "
+            "`benchmarks/results/row_turns.json`, not in this table.",
             "",
         ]
     )
+
+
+def _warning(selected: dict[str, Any]) -> list[str]:
+    """A sentence on a policy that is no good, with the empty line before it."""
+    share = 1.0 - selected["validation"]["success_rate"]
+    if share <= _MOST_FAILURES:
+        return []
+    return [
+        "",
+        f"**Not for use:** it fails {100.0 * share:.0f} % of the validation turns and is kept as a record only.",
+    ]
 
 
 def _history(settings: TrainingSettings) -> str:
@@ -189,4 +215,6 @@ def _outputs(settings: TrainingSettings) -> str:
 
 
 def _percent(value: float | None) -> str:
-    return "no radius" if value is None else f"{100 * value:.2f} %"
+    if value is None:
+        return "no radius"
+    return f"{100 * value:.2f} %" if value < 2.0 else "more than 200 %"

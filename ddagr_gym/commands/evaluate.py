@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import fnmatch
 import json
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -28,7 +30,8 @@ class Arguments:
     say which scenarios are feasible, and are in the tables only where they are asked for.
 
     Attributes:
-        controllers: names, separated by commas: B0 to B5, upper bounds, trained policies or their files.
+        controllers: names, separated by commas: B0 to B5, upper bounds, trained policies or their files; a * stands for
+            any letters of the trained ones, so that ppo_ekf_seed_* are all training seeds, which are judged together.
         scenarios: names of frozen sets, separated by commas: S0 to S8, V for tuning, T for another soil law.
         output: folder for report.html, episodes.parquet, summary.json, claims.json and the figure.
         workers: processes.
@@ -56,7 +59,7 @@ def run(arguments: Arguments) -> None:
     if arguments.replay:
         replay_scenario(arguments.replay, arguments.output)
         return
-    controllers = _names(arguments.controllers, "controllers")
+    controllers = without_stars(_names(arguments.controllers, "controllers"))
     sets = _names(arguments.scenarios, "scenarios")
     for name in sets:
         if name not in scenario_names():
@@ -89,6 +92,23 @@ def _names(text: str, option: str) -> list[str]:
     if not names:
         raise InputError(f"--{option} is empty: give names separated by commas.")
     return list(dict.fromkeys(names))
+
+
+def without_stars(names: Sequence[str]) -> list[str]:
+    """Names with every pattern, such as ppo_ekf_seed_* or ppo_*@frozen, replaced by the policies that fit it."""
+    from ddagr_gym.policies.shipped import policy_names
+
+    found: dict[str, None] = {}
+    for name in names:
+        stem, sign, estimate = name.partition("@")
+        if "*" not in stem:
+            found[name] = None
+            continue
+        fitting = fnmatch.filter(policy_names(), stem)
+        if not fitting:
+            raise InputError(f"no trained policy fits {stem!r}: there are {', '.join(policy_names()) or 'none'}.")
+        found |= dict.fromkeys(policy + sign + estimate for policy in fitting)
+    return list(found)
 
 
 def _check_claims(folder: Path, summary: dict[str, Any]) -> list[dict[str, Any]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
@@ -64,7 +64,6 @@ def assemble(
     """Evidence of the page before anything is driven again."""
     from ddagr_gym.evaluation.claims import load_claims
     from ddagr_gym.evaluation.shown import infeasible_soils
-    from ddagr_gym.evaluation.summary import improvement
     from ddagr_gym.reporting.evaluation_data import Evaluation
 
     headline = load_claims().headline
@@ -80,15 +79,33 @@ def assemble(
         sources=_sources(arms, sets),
         note=_left_out(sets),
     )
-    if not evaluation.headline:
-        return evaluation
-    plain: Any = [dict(row) for row in rows]
-    found = {
-        arm.name: improvement(plain, arm.name, headline, evaluation.judged)
-        for arm in arms
-        if arm.learned and arm.name != headline
-    }
-    return replace(evaluation, over_headline={name: item for name, item in found.items() if item is not None})
+    return _with_headline(evaluation) if evaluation.headline else evaluation
+
+
+def _with_headline(evaluation: Evaluation) -> Evaluation:
+    """With the learned arms held against the headline; what is told something else against the same training seeds."""
+    from ddagr_gym.evaluation.summary import improvement, summarise
+
+    headline, judged = evaluation.headline, evaluation.judged
+    found, alone = {}, {}
+    for arm in (arm for arm in evaluation.arms if arm.learned and arm.name != headline):
+        mine, others = ([dict(row) for row in evaluation.rows_of(name, judged)] for name in (arm.name, headline))
+        if arm.name.partition("@")[0] == headline:
+            seeds = {row["run"] for row in mine}
+            same = [row for row in others if row["run"] in seeds]
+            if same and len(same) < len(others):
+                alone[_seeds_text(headline, seeds)] = summarise(same)
+            others = same
+        found[arm.name] = improvement([*mine, *others], arm.name, headline, judged)
+    return replace(
+        evaluation,
+        over_headline={name: item for name, item in found.items() if item is not None},
+        headline_alone=alone,
+    )
+
+
+def _seeds_text(headline: str, seeds: Collection[int]) -> str:
+    return f"{headline}, training seed{'s' if len(seeds) > 1 else ''} {', '.join(map(str, sorted(seeds)))} alone"
 
 
 def _arms(rows: Sequence[Mapping[str, Any]], summary: Mapping[str, Any]) -> list[Arm]:

@@ -23,20 +23,23 @@ from ddagr_gym.evaluation.controllers import (
     controller_arm,
     controller_version,
     drives_on,
+    find_batch,
     find_controller,
     needs_filter,
 )
 from ddagr_gym.evaluation.estimator_metrics import estimator_errors
 from ddagr_gym.evaluation.metrics import turn_metrics
 from ddagr_gym.evaluation.other_ground import ground_effects
-from ddagr_gym.evaluation.runs import TurnRun, drive_turn
+from ddagr_gym.evaluation.runs import TurnRun, drive_turn, drive_turns
 from ddagr_gym.evaluation.scenarios import Scenario, load_scenarios, set_hash
 from ddagr_gym.files import atomic_path
 from ddagr_gym.parameters import Sensors
 from ddagr_gym.presets import ddagr
 
-_CHUNK = 10
-"""Episodes per task of a worker: a resumed run loses at most this many."""
+_CHUNK = 50
+"""Episodes per task of a worker, driven side by side where the controller can: a stopped run loses at most a task."""
+_SLOW_CHUNK = 10
+"""Likewise of controllers that drive one turn at a time."""
 
 Key = tuple[str, str, int]
 """Controller, set and number of an episode."""
@@ -70,6 +73,16 @@ def drive_scenario(controller: str, scenario: Scenario) -> TurnRun:
     made = find_controller(controller, scenario.episode.turn)
     settings = scenario_settings(scenario, needs_filter(controller))
     return drive_turn(made, settings, scenario.seed, scenario.episode)
+
+
+def drive_scenarios(controller: str, scenarios: Sequence[Scenario]) -> list[TurnRun]:
+    """Scenarios of one set by one controller, side by side where it can; the runs are those of one by one."""
+    batch = find_batch(controller, len(scenarios))
+    if batch is None:
+        return [drive_scenario(controller, scenario) for scenario in scenarios]
+    settings = scenario_settings(scenarios[0], needs_filter(controller))
+    seeds, episodes = [scenario.seed for scenario in scenarios], [scenario.episode for scenario in scenarios]
+    return drive_turns(batch, settings, seeds, episodes)
 
 
 @lru_cache(maxsize=1)
@@ -123,14 +136,14 @@ def provenance(controller: str, set_name: str) -> str:
 
 
 def _work(task: Task) -> list[dict[str, Any]]:
-    scenarios = load_scenarios(task.set_name)
+    everything = load_scenarios(task.set_name)
+    scenarios = [everything[number] for number in task.numbers]
     made_of = provenance(task.controller, task.set_name)
-    rows = []
-    for number in task.numbers:
-        scenario = scenarios[number]
-        row = episode_row(task.controller, scenario, drive_scenario(task.controller, scenario))
-        rows.append(row | {"made_of": made_of})
-    return rows
+    runs = drive_scenarios(task.controller, scenarios)
+    return [
+        episode_row(task.controller, scenario, run) | {"made_of": made_of}
+        for scenario, run in zip(scenarios, runs, strict=True)
+    ]
 
 
 def with_bounds(controllers: Sequence[str]) -> list[str]:
@@ -163,11 +176,11 @@ def plan(controllers: Sequence[str], sets: Sequence[str], done: set[Key], count:
     for controller, set_name, number in wanted_episodes(controllers, sets, count):
         if (controller, set_name, number) not in done:
             groups.setdefault((controller, set_name), []).append(number)
-    return [
-        Task(controller, set_name, tuple(numbers[k : k + _CHUNK]))
-        for (controller, set_name), numbers in groups.items()
-        for k in range(0, len(numbers), _CHUNK)
-    ]
+    tasks = []
+    for (controller, set_name), numbers in groups.items():
+        size = _SLOW_CHUNK if find_batch(controller, 1) is None else _CHUNK
+        tasks += [Task(controller, set_name, tuple(numbers[k : k + size])) for k in range(0, len(numbers), size)]
+    return tasks
 
 
 def read_rows(journal: Path) -> list[dict[str, Any]]:

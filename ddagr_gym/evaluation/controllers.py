@@ -30,7 +30,7 @@ from ddagr_gym.estimation.force_balance import arc_bank_speeds
 from ddagr_gym.evaluation.arms import policy_arm, policy_version
 from ddagr_gym.evaluation.calibration import calibrate_constant_speeds
 from ddagr_gym.evaluation.other_ground import NOMINAL_LAW
-from ddagr_gym.evaluation.runs import Controller
+from ddagr_gym.evaluation.runs import BatchController, Controller
 from ddagr_gym.evaluation.true_ground import soil_of, steady_bank_speeds
 from ddagr_gym.parameters import Sensors, Validated, bounded
 from ddagr_gym.presets import ddagr, get_soil
@@ -258,3 +258,17 @@ def find_controller(name: str, turn: RowTurn, gains: LadderGains | None = None) 
     if name not in _LADDER:
         raise _unknown(name)
     return _LADDER[name][0](turn, ladder_gains() if gains is None else gains)
+
+
+def find_batch(name: str, count: int) -> BatchController | None:
+    """Trained policy that drives N turns side by side, or None where a controller drives one at a time.
+
+    Args:
+        name: of a controller.
+        count: N.
+    """
+    if not _policy(name):
+        return None
+    from ddagr_gym.policies.controller import policy_batch
+
+    return policy_batch(name, count)

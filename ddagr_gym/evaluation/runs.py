@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -28,6 +29,16 @@ class Controller(Protocol):
 
     def __call__(self, observation: ArrayLike, info: Any = None) -> NDArray[np.float32]:
         """Action (2,) for an observation; ``info`` is the environment's, for upper bounds only."""
+
+
+class BatchController(Protocol):
+    """What drives N turns side by side by their observations alone."""
+
+    def reset(self) -> None:
+        """Forget the last episodes."""
+
+    def __call__(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Actions (N, 2) for observations (N, entries)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,29 +69,74 @@ def drive_turn(controller: Controller, settings: TurnSettings, seed: int, episod
         seed: of the episode and the sensor noise.
         episode: repeat this one instead of drawing.
     """
-    batch = TurnBatch(settings, recorded=list(TRUTH.values()))
-    rng, _ = seeding.np_random(seed)
-    batch.reset([0], [rng], None if episode is None else {"episode": episode})
-    observations = batch.new_observations()
-    batch.observe_start([0], observations)
     controller.reset()
-    rewards, total = np.zeros(1), 0.0
-    readings, records, commands = [], [], []
+
+    def act(batch: TurnBatch, observations: NDArray[np.float32]) -> NDArray[np.float32]:
+        return controller(observations[0], single_info(batch_info(batch, "full")))[None]
+
+    return _drive(act, settings, [seed], [episode])[0]
+
+
+def drive_turns(
+    controller: BatchController, settings: TurnSettings, seeds: Sequence[int], episodes: Sequence[Episode]
+) -> list[TurnRun]:
+    """Drive N turns side by side, each to its end; each is to the bit what :func:`drive_turn` makes of it.
+
+    Args:
+        controller: drives all of them.
+        settings: of the environment.
+        seeds: of the sensor noise, N.
+        episodes: what is driven, N.
+    """
+    controller.reset()
+    return _drive(lambda batch, observations: controller(observations), settings, seeds, episodes)
+
+
+class _Log:
+    """What one robot did so far."""
+
+    def __init__(self) -> None:
+        self.parts: list[tuple[Array, Array, Array]] = []
+        self.total = 0.0
+        self.ending, self.success = kernel.NO_ENDING, False
+
+    def add(self, batch: TurnBatch, n: int, reward: float) -> None:
+        self.total += reward
+        command = np.repeat(batch.commands[n : n + 1], batch.readings.shape[1], axis=0)
+        self.parts.append((command, batch.readings[n].copy(), batch.record[n].copy()))
+        self.ending = int(batch.endings[n])
+        self.success = bool(batch.tasks[n, kernel.SUCCESS] > 0.0)
+
+    def run(self, episode: Episode) -> TurnRun:
+        columns = _columns(episode, *(np.concatenate(part) for part in zip(*self.parts, strict=True)))
+        return TurnRun(columns, episode, self.ending, self.success, self.total)
+
+
+def _drive(
+    act: Callable[[TurnBatch, NDArray[np.float32]], NDArray[np.float32]],
+    settings: TurnSettings,
+    seeds: Sequence[int],
+    episodes: Sequence[Episode | None],
+) -> list[TurnRun]:
+    count = len(seeds)
+    batch = TurnBatch(settings, count, recorded=list(TRUTH.values()))
+    rngs = [seeding.np_random(seed)[0] for seed in seeds]
+    for n, episode in enumerate(episodes):
+        batch.reset([n], rngs, None if episode is None else {"episode": episode})
+    observations = batch.new_observations()
+    batch.observe_start(range(count), observations)
+    rewards, driving = np.zeros(count), np.ones(count, dtype=np.bool_)
+    logs = [_Log() for _ in range(count)]
     for _ in range(EPISODE_STEPS):
-        info = single_info(batch_info(batch, "full"))
-        action = check_action(controller(observations[0], info), (2,))
-        batch.step(action[None], [rng], rewards, observations)
-        total += float(rewards[0])
-        readings.append(batch.readings[0].copy())
-        records.append(batch.record[0].copy())
-        commands.append(np.repeat(batch.commands, len(readings[-1]), axis=0))
-        if batch.endings[0] != kernel.NO_ENDING:
+        actions = np.where(driving[:, None], act(batch, observations), 0.0)
+        active = np.flatnonzero(driving)
+        batch.step(check_action(actions, (count, 2)), rngs, rewards, observations, active)
+        for row in active.tolist():
+            logs[row].add(batch, row, float(rewards[row]))
+            driving[row] = logs[row].ending == kernel.NO_ENDING
+        if not driving.any():
             break
-    driven = batch.episodes[0]
-    assert driven is not None
-    columns = _columns(driven, np.concatenate(commands), np.concatenate(readings), np.concatenate(records))
-    success = bool(batch.tasks[0, kernel.SUCCESS] > 0.0)
-    return TurnRun(columns, driven, int(batch.endings[0]), success, total)
+    return [log.run(episode) for log, episode in zip(logs, batch.episodes, strict=True) if episode is not None]
 
 
 def _columns(episode: Episode, commands: Array, readings: Array, records: Array) -> dict[str, Array]:

@@ -46,6 +46,7 @@ _LOST_WITH_THE_TURN = (
     "exit_lateral_error",
     "exit_heading_error",
     "fit_residual",
+    "radius_disagreement",
     "radial_error_rms",
     "radial_error_maximum",
 )

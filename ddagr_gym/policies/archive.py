@@ -106,10 +106,11 @@ class Policy:
     def __call__(self, inputs: NDArray[np.floating]) -> NDArray[np.float32]:
         """Outputs (N, 2) in single precision, as they were trained."""
         normal = np.clip((inputs - self.mean) / self.deviation, -self.clip, self.clip).astype(np.float32)
+        normal = normal[:, None]  # a product for each row: its bits do not depend on how many rows there are
         for weight, bias in zip(self.weights[:-1], self.biases[:-1], strict=True):
             normal = normal @ weight.T + bias
             normal = np.tanh(normal) if self.activation == "tanh" else np.maximum(normal, 0.0)
-        outputs: NDArray[np.float32] = normal @ self.weights[-1].T + self.biases[-1]
+        outputs: NDArray[np.float32] = (normal @ self.weights[-1].T + self.biases[-1])[:, 0]
         return np.tanh(outputs) if self.squashed else outputs
 
     def description(self) -> Description:

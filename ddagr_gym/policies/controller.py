@@ -64,6 +64,49 @@ class PolicyController:
         return np.asarray(self._view.act(outputs, told)[0])
 
 
+class PolicyBatch:
+    """Drives N turns side by side by a trained policy; each to the bit as :class:`PolicyController` does.
+
+    Args:
+        policy: what drives.
+        count: N.
+        silent: outputs of zero in place of the policy's, as the estimate "feed_forward".
+        robot: nominal robot.
+        sensors: nominal sensors.
+    """
+
+    def __init__(
+        self, policy: Policy, count: int, silent: bool = False, robot: Robot | None = None, sensors: Sensors = Sensors()
+    ) -> None:
+        self.policy = policy
+        self._silent = silent
+        self._view = PolicyView(policy.design, ddagr() if robot is None else robot, sensors, count)
+
+    def reset(self) -> None:
+        """Forget the last episodes."""
+        self._view.reset()
+
+    def __call__(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Actions (N, 2) for observations (N, entries)."""
+        inputs = self._view.observe(observations)
+        outputs = np.zeros((len(inputs), 2), dtype=np.float32) if self._silent else self.policy(inputs)
+        return self._view.act(outputs, observations)
+
+
+def policy_batch(name: str, count: int) -> PolicyBatch | None:
+    """N robots by a policy's name as :func:`policy_controller` takes it; None where its estimate wants the truth.
+
+    Raises:
+        InputError: unknown policy or estimate, with the closest names.
+    """
+    stem, estimate = _split(name)
+    if estimate not in ESTIMATES:
+        raise unknown_name("estimate", estimate, ESTIMATES)
+    if estimate not in OF_EVERY_POLICY:
+        return None
+    return PolicyBatch(find_policy(stem), count, silent=estimate == "feed_forward")
+
+
 def is_policy_name(name: str) -> bool:
     """Whether a controller's name means a policy: a trained one, or a path, with or without an estimate."""
     stem = name.rpartition(SEPARATOR)[0] if _has_estimate(name) else name

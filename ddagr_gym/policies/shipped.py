@@ -33,6 +33,11 @@ def policy_names() -> tuple[str, ...]:
     return tuple(policy_files())
 
 
+def selected_policies() -> tuple[str, ...]:
+    """Names of the selected policy of each arm, without the seeds'."""
+    return tuple(name for name, file in policy_files().items() if file.stem == "policy")
+
+
 def policy_file(name: str) -> Path:
     """File of a trained policy by name, or a path that ends in ``.npz``.
 

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import io
-import re
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -17,7 +14,7 @@ from ddagr_gym.reporting import diagnosis_figures as figures
 from ddagr_gym.reporting import diagnosis_maps as maps
 from ddagr_gym.reporting import diagnosis_tables as tables
 from ddagr_gym.reporting.evidence import Evidence
-from ddagr_gym.reporting.figures import house_style
+from ddagr_gym.reporting.figures import house_style, svg_data
 from ddagr_gym.reporting.wording import title
 
 PAGE = "report.html"
@@ -35,23 +32,14 @@ class _Studio:
         self._progress = progress
 
     def picture(self, figure: Any, name: str, alt: str, **more: Any) -> dict[str, Any]:
-        """Data of an SVG with its text as paths, so that it looks the same everywhere."""
+        """Data of an SVG for the page; the PNG is written."""
         self._progress(name)
-        figure.draw_without_rendering()
-        figure.set_layout_engine("none")
-        stream = io.StringIO()
-        figure.savefig(stream, format="svg", metadata={"Date": None})
+        data = svg_data(figure)
         with atomic_path(self._folder / f"{name}.png") as path:
             figure.savefig(path, format="png", dpi=160, facecolor="white", metadata={"Software": None})
         width, height = figure.get_size_inches()
-        data = base64.b64encode(_rounded(stream.getvalue()).encode()).decode()
         pixels = {"width": round(72 * width / _POINTS_PER_PIXEL), "height": round(72 * height / _POINTS_PER_PIXEL)}
-        return {"data": f"data:image/svg+xml;base64,{data}", "alt": alt, **pixels, **more}
-
-
-def _rounded(svg: str) -> str:
-    """An SVG whose paths and places have two decimals: a fiftieth of a pixel, and a third less to carry."""
-    return re.sub(r'(?<= )(?:d|x|y)="[^"]*"', lambda found: re.sub(r"(\.\d\d)\d+", r"\1", found[0]), svg)
+        return {"data": data, "alt": alt, **pixels, **more}
 
 
 def write_report(

@@ -113,7 +113,9 @@ class Evaluation:
         sets: that were driven.
         headline: arm that the claims name.
         claims: :class:`ddagr_gym.evaluation.claims.CheckedClaim` as mappings; empty where none was decided.
-        over_headline: probability of a smaller |e_R| than the headline's by learned arm, on the judged set.
+        over_headline: probability of a smaller |e_R| than the headline's by learned arm, on the judged set; ablations
+            of the headline are held against its same training seeds.
+        headline_alone: summary of the headline on the judged set by those seeds alone, by what to call it.
         drives: for pictures of paths.
         tracked: drives with the filter's estimate.
         films: videos.
@@ -129,6 +131,7 @@ class Evaluation:
     headline: str = ""
     claims: Sequence[Mapping[str, Any]] = ()
     over_headline: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    headline_alone: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     drives: Sequence[ShownDrive] = ()
     tracked: Sequence[ShownDrive] = ()
     films: Sequence[Film] = ()

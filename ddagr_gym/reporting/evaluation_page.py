@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import base64
-import io
-import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -16,7 +14,7 @@ from ddagr_gym.reporting import evaluation_figures as figures
 from ddagr_gym.reporting import evaluation_paths as paths
 from ddagr_gym.reporting import evaluation_tables as tables
 from ddagr_gym.reporting.evaluation_data import Evaluation, Film
-from ddagr_gym.reporting.figures import house_style
+from ddagr_gym.reporting.figures import house_style, svg_data
 
 PAGE = "report.html"
 PICTURE = "radius_error"
@@ -71,20 +69,10 @@ def _template() -> Any:
 
 
 def embedded(figure: Any, alt: str) -> dict[str, Any]:
-    """A figure as data of an SVG with its text as paths, so that it looks the same everywhere."""
-    figure.set_dpi(_DPI)
-    figure.draw_without_rendering()
-    figure.set_layout_engine("none")
-    stream = io.StringIO()
-    figure.savefig(stream, format="svg", dpi=_DPI, metadata={"Date": None})
+    """A figure as data of an SVG, with its size on the page."""
+    data = svg_data(figure, _DPI)
     width, height = (round(_PIXELS_PER_INCH * side) for side in figure.get_size_inches())
-    data = base64.b64encode(_rounded(stream.getvalue()).encode()).decode()
-    return {"data": f"data:image/svg+xml;base64,{data}", "alt": alt, "width": width, "height": height}
-
-
-def _rounded(svg: str) -> str:
-    """An SVG whose paths and places have two decimals: a fiftieth of a pixel, and a third less to carry."""
-    return re.sub(r'(?<= )(?:d|x|y)="[^"]*"', lambda found: re.sub(r"(\.\d\d)\d+", r"\1", found[0]), svg)
+    return {"data": data, "alt": alt, "width": width, "height": height}
 
 
 def _context(evaluation: Evaluation, robot: Robot, progress: Callable[[], None]) -> dict[str, Any]:

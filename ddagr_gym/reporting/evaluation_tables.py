@@ -256,20 +256,21 @@ def learned_rows(evaluation: Evaluation) -> list[dict[str, Any]]:
     rows = []
     for arm in (arm for arm in evaluation.arms if arm.learned):
         found = evaluation.metrics(arm.name, evaluation.judged)
-        if "radius_error_median" not in found:
-            continue
-        versus = evaluation.over_headline.get(arm.name)
-        cells = [with_span(found[key]) for key in ("radius_error_median", "radius_error_p95", "success_rate")]
-        rows.append(
-            {
-                "name": display_name(arm.name),
-                "headline": arm.name == evaluation.headline,
-                "title": arm.title,
-                "runs": found["runs"],
-                "cells": [*cells, with_span(versus, 0)],
-            }
-        )
+        headline = arm.name == evaluation.headline
+        if "radius_error_median" in found:
+            versus = evaluation.over_headline.get(arm.name)
+            rows.append(_learned_row(display_name(arm.name), headline, arm.title, found, versus))
+        if headline:
+            rows += [_learned_row(name, False, "", part, None) for name, part in evaluation.headline_alone.items()]
     return rows
+
+
+def _learned_row(
+    name: str, headline: bool, title: str, found: Mapping[str, Any], versus: Mapping[str, Any] | None
+) -> dict[str, Any]:
+    cells = [with_span(found[key]) for key in ("radius_error_median", "radius_error_p95", "success_rate")]
+    cells.append(with_span(versus, 0))
+    return {"name": name, "headline": headline, "title": title, "runs": found["runs"], "cells": cells}
 
 
 def transfer_rows(evaluation: Evaluation, here: str = "S1", there: str = "T") -> list[dict[str, Any]]:
@@ -319,10 +320,15 @@ def infeasible_sentence(evaluation: Evaluation) -> str:
 
 
 def radius_note(evaluation: Evaluation) -> str:
-    """How many radii are undefined or doubtful, over all arms and sets."""
+    """How many radii are undefined, and how far two ways of measuring one differ, over all arms and sets."""
     found = [evaluation.metrics(arm.name, item.name) for arm in evaluation.arms for item in evaluation.sets]
-    undefined, doubtful = (sum(m.get(key, 0) for m in found) for key in ("undefined_radius", "inconsistent_radius"))
+    undefined = sum(m.get("undefined_radius", 0) for m in found)
+    gaps = [row["radius_disagreement"] for row in evaluation.rows if row["radius_disagreement"] is not None]
+    text = f"Of {len(evaluation.rows)} episodes, {undefined} have no radius (they count as worst)."
+    if not gaps:
+        return text
+    median, high = (percent(float(np.quantile(gaps, level, method="inverted_cdf"))) for level in (0.5, 0.95))
     return (
-        f"Of {len(evaluation.rows)} episodes, {undefined} have no radius (they count as worst), and in {doubtful} the "
-        "fitted radius and arc length over course change differ by more than 1 %."
+        f"{text} On uneven soil a path is no exact circle: arc length over course change gives a radius that differs "
+        f"from the fitted one by {median} in half of the turns and by more than {high} in one of twenty."
     )

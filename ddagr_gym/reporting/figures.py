@@ -6,6 +6,9 @@ the same bytes.
 
 from __future__ import annotations
 
+import base64
+import io
+import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -104,6 +107,25 @@ def house_style() -> Iterator[None]:
         ) from None
     with style.context(["default", HOUSE_STYLE | {"axes.prop_cycle": cycler(color=COLOURS)}]):
         yield
+
+
+def svg_data(figure: Any, dpi: float | None = None) -> str:
+    """Data URL of a figure as SVG, its text as paths so that it looks the same everywhere; its layout is then fixed.
+
+    Paths and places have two decimals: a fiftieth of a pixel, and a third less to carry.
+
+    Args:
+        figure: of matplotlib, inside :func:`house_style`.
+        dpi: of what is drawn as points; the figure's own by default.
+    """
+    if dpi is not None:
+        figure.set_dpi(dpi)
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")
+    stream = io.StringIO()
+    figure.savefig(stream, format="svg", metadata={"Date": None}, **({} if dpi is None else {"dpi": dpi}))
+    svg = re.sub(r'(?<= )(?:d|x|y)="[^"]*"', lambda found: re.sub(r"(\.\d\d)\d+", r"\1", found[0]), stream.getvalue())
+    return f"data:image/svg+xml;base64,{base64.b64encode(svg.encode()).decode()}"
 
 
 def save_figure(figure: Any, path: str | Path) -> tuple[Path, Path]:

@@ -80,4 +80,16 @@ def test_a_policy_that_fails_every_turn_can_be_published(tmp_path):
     seed_folder.mkdir(parents=True)
     (seed_folder / "policy.npz").write_bytes(b"weights")
     publish("bad", settings, [result(0, None, None, 0.0)], tmp_path / "runs", tmp_path / "bad")
-    assert "no radius" in (tmp_path / "bad" / "README.md").read_text()
+    card = (tmp_path / "bad" / "README.md").read_text()
+    assert "no radius" in card
+    assert "fails 100 % of the validation turns" in card
+
+
+def test_only_what_fails_often_is_warned_of(tmp_path):
+    seed_folder = tmp_path / "runs" / "arm" / "seed_0"
+    seed_folder.mkdir(parents=True)
+    (seed_folder / "policy.npz").write_bytes(b"weights")
+    publish("arm", TINY, [result(0, 0.02, 122.0, 0.97)], tmp_path / "runs", tmp_path / "arm")
+    card = (tmp_path / "arm" / "README.md").read_text()
+    assert "Not for use" not in card
+    assert "| 0 (shipped) | 2.00 % | more than 200 % | 97.00 % |" in card

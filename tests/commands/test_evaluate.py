@@ -7,10 +7,12 @@ import pytest
 
 from ddagr_gym.cli import main
 from ddagr_gym.commands import evaluate
+from ddagr_gym.errors import InputError
 from ddagr_gym.evaluation import controllers, gain_search
 from ddagr_gym.evaluation.claims import load_claims
 from ddagr_gym.evaluation.controllers import BOUNDS
 from ddagr_gym.evaluation.scenarios import set_hash
+from ddagr_gym.policies import shipped
 
 
 def run_evaluation(folder, *extra):
@@ -59,6 +61,15 @@ def test_claims_are_written_and_those_on_what_was_driven_are_printed(tmp_path, c
     written = json.loads((tmp_path / "claims.json").read_text())
     assert len(written) == sum(len(claim.sets) for claim in claims.claims)
     assert [item["verdict"] for item in written if item["arm"] == "B4" and item["set_name"] == "S2"] == ["held"]
+
+
+def test_a_star_stands_for_trained_policies(monkeypatch):
+    names = ("ppo_ekf", "ppo_raw", "ppo_ekf_seed_0", "ppo_ekf_seed_1")
+    monkeypatch.setattr(shipped, "policy_names", lambda: names)
+    assert evaluate.without_stars(["B1", "ppo_ekf_seed_*", "ppo_ekf_seed_1"]) == ["B1", *names[2:]]
+    assert evaluate.without_stars(["ppo_ra*@feed_forward"]) == ["ppo_raw@feed_forward"]
+    with pytest.raises(InputError, match=r"no trained policy fits 'sac\*': there are ppo_ekf, ppo_raw"):
+        evaluate.without_stars(["sac*"])
 
 
 @pytest.mark.parametrize(

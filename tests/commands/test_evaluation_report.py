@@ -5,11 +5,12 @@ import json
 import pytest
 
 from ddagr_gym.cli import main
-from ddagr_gym.commands import demo_evaluation
+from ddagr_gym.commands import demo_evaluation, evaluation_report
 from ddagr_gym.commands.evaluation_report import assemble, write_report
 from ddagr_gym.evaluation.campaign import run_campaign
 from ddagr_gym.evaluation.summary import summaries
 from ddagr_gym.policies import shipped
+from ddagr_gym.reporting.evaluation_data import Arm
 
 pytest.importorskip("matplotlib", reason="needs the extra report")
 pytest.importorskip("jinja2", reason="needs the extra report")
@@ -32,6 +33,27 @@ def test_evidence_says_what_everything_was_made_of(rows):
     sources = dict(found.sources)
     assert set(sources) >= {"ddagr-gym", "gains of the ladder", "scenarios V"}
     assert len(sources["scenarios V"].removeprefix("sha256 ")) == 16
+
+
+def test_ablations_are_held_against_their_own_training_seed(rows, monkeypatch):
+    """A policy of two seeds, one close and one far off, and the first one frozen, in between."""
+
+    def copies(controller, arm, run, error):
+        mine = [row for row in rows if row["controller"] == "B1"]
+        return [row | {"controller": controller, "arm": arm, "run": run, "radius_error": error} for row in mine]
+
+    driven = copies("close", "ppo_ekf", 4, 0.01) + copies("far", "ppo_ekf", 5, 0.05)
+    driven += copies("frozen", "ppo_ekf@frozen", 4, 0.02) + copies("raw", "ppo_raw", 4, 0.02)
+    arms = [Arm(name, "", learned=True) for name in ("ppo_ekf", "ppo_ekf@frozen", "ppo_raw")]
+    monkeypatch.setattr(evaluation_report, "_arms", lambda rows, summary: arms)
+    found = assemble(driven, summaries(driven), [])
+    assert found.over_headline["ppo_ekf@frozen"]["value"] == 0.0
+    assert found.over_headline["ppo_raw"]["value"] == 0.5
+    (text, alone), *more = found.headline_alone.items()
+    assert not more
+    assert text == "ppo_ekf, training seed 4 alone"
+    assert alone["radius_error_median"]["value"] == 0.01
+    assert alone["episodes"] == 2
 
 
 def test_the_page_shows_paths_and_the_estimate(rows, tmp_path):
@@ -63,7 +85,7 @@ def test_a_scenario_that_is_not_there_is_one_sentence(tmp_path, capsys):
 @pytest.mark.slow
 def test_the_demonstration_ends_with_a_page(monkeypatch, tmp_path):
     pytest.importorskip("imageio_ffmpeg", reason="needs the extra render")
-    monkeypatch.setattr(shipped, "policy_names", lambda: ())
+    monkeypatch.setattr(shipped, "selected_policies", lambda: ())
     section = demo_evaluation.evaluation_step(tmp_path, scenarios=2, workers=1)
     assert all(name in section.text for name in demo_evaluation.LADDER)
     for link in ("evaluation/report.html", "evaluation/radius_error.png", "evaluation/summary.json"):

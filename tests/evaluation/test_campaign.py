@@ -8,11 +8,20 @@ import pytest
 from ddagr_gym.errors import InputError
 from ddagr_gym.evaluation import campaign
 from ddagr_gym.evaluation import scenarios as scenario_module
-from ddagr_gym.evaluation.campaign import drive_scenario, episode_row, plan, read_rows, run_campaign, wanted_episodes
+from ddagr_gym.evaluation.campaign import (
+    drive_scenario,
+    drive_scenarios,
+    episode_row,
+    plan,
+    read_rows,
+    run_campaign,
+    wanted_episodes,
+)
 from ddagr_gym.evaluation.controllers import (
     BOUNDS,
     controller_names,
     controller_title,
+    find_batch,
     find_controller,
     is_deployable,
     needs_filter,
@@ -183,6 +192,30 @@ def policy_path(tmp_path):
         training=record,
     )
     return save_policy(policy, tmp_path / "ppo_untrained_seed_7.npz")
+
+
+@pytest.mark.parametrize("estimate", ["", "@feed_forward"])
+def test_policies_drive_side_by_side_what_they_drive_alone(frozen, policy_path, estimate):
+    name, scenarios = f"{policy_path}{estimate}", load_scenarios("V")
+    together = drive_scenarios(name, scenarios)
+    assert len({len(run.columns["t"]) for run in together}) > 1  # they end at different times
+    for scenario, run in zip(scenarios, together, strict=True):
+        alone = drive_scenario(name, scenario)
+        assert run.episode == alone.episode
+        assert (run.ending, run.success, run.total_reward) == (alone.ending, alone.success, alone.total_reward)
+        assert run.columns.keys() == alone.columns.keys()
+        for column, values in alone.columns.items():
+            np.testing.assert_array_equal(run.columns[column], values)
+
+
+def test_what_wants_the_truth_drives_alone(frozen, policy_path):
+    assert find_batch(str(policy_path), 3) is not None
+    for name in ("B4", f"{policy_path}@true"):
+        assert find_batch(name, 3) is None
+    with pytest.raises(InputError, match="frozen"):
+        find_batch(f"{policy_path}@frozem", 3)
+    sizes = {task.controller: len(task.numbers) for task in plan([str(policy_path), "B4"], ["V"], set())}
+    assert sizes == {str(policy_path): 3, "B4": 3}
 
 
 def test_a_policy_is_driven_like_a_controller(frozen, tmp_path, policy_path):

@@ -17,8 +17,9 @@ def rows_of(controller, errors, success=True, run=0, set_name="V"):
         {
             "controller": f"{controller}_{run}" if run else controller, "arm": controller, "run": run,
             "set": set_name, "number": n, "feasible": True, "radius_error": e, "radius_consistent": True,
-            "success": success and e is not None, "within_practice": False, "headland_depth": 1.0, "duration": 18.0,
-            "slip_energy": None, "wheel_speed_variation": 0.1, "radial_error_rms": None if e is None else 0.01,
+            "success": success and e is not None, "within_practice": False, "radius_disagreement": 0.004,
+            "headland_depth": 1.0, "duration": 18.0, "slip_energy": None, "wheel_speed_variation": 0.1,
+            "radial_error_rms": None if e is None else 0.01,
             "radial_error_maximum": None if e is None else 0.02, "fit_residual": 0.001,
             "exit_lateral_error": None if e is None else -0.03 * (n + 1), "exit_heading_error": 0.1,
             "bank_stalls": int(n == 0), "robot_stalls": 0, "estimator_radius": -0.04, "estimator_speed_rms": 0.01,

@@ -87,6 +87,7 @@ def test_names(folder):
     assert shipped.policy_names() == ("ppo_bold", "ppo_ekf", "ppo_history", "ppo_raw")
     save_policy(make_policy(PolicyDesign()), folder / "ppo_ekf" / "seeds" / "seed_3.npz")
     assert shipped.policy_names()[-1] == "ppo_ekf_seed_3"
+    assert shipped.selected_policies() == ("ppo_bold", "ppo_ekf", "ppo_history", "ppo_raw")
     assert is_policy_name("ppo_ekf_seed_3@frozen")
     assert policy_controller("ppo_ekf_seed_3").policy.design == PolicyDesign()
     assert policy_needs_filter("ppo_ekf@frozen")

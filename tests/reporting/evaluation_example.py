@@ -28,8 +28,9 @@ def rows_of(controller, errors, set_name="S1", infeasible=()):
             "success": e is not None and abs(e) < 0.055, "within_practice": e is not None and abs(e) < 0.04,
             "exit_lateral_error": None if e is None else 1.6 * e, "exit_heading_error": None if e is None else e,
             "radial_error_rms": None if e is None else 0.01, "radial_error_maximum": None if e is None else 0.02,
-            "headland_depth": 1.4, "duration": 18.0, "slip_energy": 900.0, "wheel_speed_variation": 0.2,
-            "bank_stalls": 0, "robot_stalls": 0, "estimator_speed_rms": 0.004, "estimator_yaw_rate_rms": 4e-4,
+            "headland_depth": 1.4, "radius_disagreement": 0.004, "duration": 18.0,
+            "slip_energy": 900.0, "wheel_speed_variation": 0.2, "bank_stalls": 0, "robot_stalls": 0,
+            "estimator_speed_rms": 0.004, "estimator_yaw_rate_rms": 4e-4,
             "estimator_slip_rms": 0.05, "estimator_radius": -0.015, "estimator_prediction_1s": 0.006,
             "estimator_prediction_5s": 0.03, "estimator_dead_reckoning": 0.015, "estimator_innovation": 0.9,
         }

@@ -13,6 +13,7 @@ from ddagr_gym.reporting.evaluation_tables import (
     failure_rows,
     infeasible_sentence,
     learned_rows,
+    radius_note,
     replay_command,
     sentence,
     set_matrix,
@@ -95,6 +96,27 @@ def test_learned_arms_stand_beside_the_headline():
         {"value": "–", "span": ""},
         {"value": "50 %", "span": "10–90"},
     ]
+
+
+def test_the_headline_by_one_seed_stands_below_the_headline():
+    rows = rows_of("ppo_ekf", [0.01, 0.02])
+    alone = {"ppo_ekf, training seed 3 alone": summaries(rows)["ppo_ekf"]["S1"]}
+    arms = [Arm("ppo_ekf", "learned", learned=True)]
+    found = learned_rows(evaluation(rows=rows, summary=summaries(rows), arms=arms, headline_alone=alone))
+    assert [row["name"] for row in found] == ["ppo_ekf", "ppo_ekf, training seed 3 alone"]
+    assert [row["headline"] for row in found] == [True, False]
+    assert found[1]["cells"][0]["value"] == "1.0 %"  # the lower of two
+
+
+def test_the_radius_note_says_how_well_a_radius_is_defined():
+    gaps = [0.002, 0.004, 0.03]
+    rows = [row | {"radius_disagreement": gap} for row, gap in zip(rows_of("B1", [0.1, 0.2, 0.3]), gaps, strict=True)]
+    text = radius_note(evaluation(rows=rows, summary=summaries(rows), arms=[Arm("B1", "")], headline=""))
+    assert "Of 3 episodes, 0 have no radius" in text
+    assert "by 0.4 % in half of the turns" in text
+    assert "more than 3.0 % in one of twenty" in text
+    none = [row | {"radius_disagreement": None} for row in rows]
+    assert "exact circle" not in radius_note(evaluation(rows=none, arms=[Arm("B1", "")], headline=""))
 
 
 def test_sets_that_an_arm_did_not_drive_are_dashes():

@@ -1,3 +1,5 @@
+import base64
+import re
 import sys
 import xml.etree.ElementTree as ElementTree
 
@@ -7,7 +9,14 @@ import pytest
 from ddagr_gym.control.row_turn import RowTurn
 from ddagr_gym.errors import InputError
 from ddagr_gym.presets import get_robot
-from ddagr_gym.reporting.figures import TURN_FIGURE_COLUMNS, headland_times, house_style, save_figure, turn_figure
+from ddagr_gym.reporting.figures import (
+    TURN_FIGURE_COLUMNS,
+    headland_times,
+    house_style,
+    save_figure,
+    svg_data,
+    turn_figure,
+)
 
 matplotlib = pytest.importorskip("matplotlib", reason="needs the extra report")
 
@@ -94,3 +103,22 @@ def test_failed_save_leaves_no_file(tmp_path):
     with pytest.raises(RuntimeError, match="no memory"):
         save_figure(Broken(), tmp_path / "turn")
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("dpi", [None, 110])
+def test_a_figure_for_a_page_is_an_svg_with_rounded_paths(dpi):
+    from matplotlib.figure import Figure
+
+    with house_style():
+        figure = Figure(figsize=(2.0, 1.0), layout="constrained")
+        figure.subplots().plot([0.0, 1.0, 2.0], [0.123456789, 0.5, 0.3])
+        data = svg_data(figure, dpi)
+    kind, _, content = data.partition(",")
+    assert kind == "data:image/svg+xml;base64"
+    svg = base64.b64decode(content).decode()
+    root = ElementTree.fromstring(svg)
+    assert root.get("viewBox") == "0 0 144 72"  # points, whatever the dots
+    places = " ".join(re.findall(r' (?:d|x|y)="([^"]*)"', svg))
+    assert re.search(r"\.\d\d\b", places)
+    assert not re.search(r"\.\d\d\d", places)
+    assert "<text" not in svg

@@ -1,0 +1,148 @@
+"""The full evaluation of row turns: which controllers and policies drive which scenario sets, and what is kept of it.
+
+    python benchmarks/row_turns.py --output FOLDER [--workers 2]
+
+Drives :data:`PLAN` as ``ddagr evaluate`` does, with the same journal, page and files (about twenty minutes of one core;
+stopped and started again with the same folder, it goes on), then writes ``benchmarks/results/row_turns.json`` and the
+figure of the README, ``docs/radius_error.png``. The JSON file has the form of ``summary.json``, {controller: {set:
+{metric: {value, interval}}}}, and one entry more, ``_run``: command line, the checkout's commit, who drove what, hashes
+of scenarios and policies, and what became of the claims.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import subprocess
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+from ddagr_gym.commands.evaluate import without_stars
+from ddagr_gym.commands.evaluation_report import assemble, write_files, write_report
+from ddagr_gym.commands.output import make_folder, write_bytes, write_text
+from ddagr_gym.commands.progress import Progress
+from ddagr_gym.evaluation.campaign import run_campaign, wanted_episodes, with_bounds
+from ddagr_gym.evaluation.claims import check_claims, load_claims
+from ddagr_gym.evaluation.summary import summaries
+from ddagr_gym.reporting.evaluation_data import Evaluation
+from ddagr_gym.reporting.evaluation_figures import radius_error_figure
+
+CHECKOUT = Path(__file__).resolve().parents[1]
+RESULT = CHECKOUT / "benchmarks" / "results" / "row_turns.json"
+FIGURE = CHECKOUT / "docs" / "radius_error.png"
+
+SETS = ("S0", "S1", "S2", "S3", "S4", "S5", "S6", "S7", "S8", "T")
+PLAN: tuple[tuple[tuple[str, ...], tuple[str, ...]], ...] = (
+    (("B0", "B1", "B2", "B3", "B4", "ppo_ekf_seed_*", "true_curvature", "true_soil", "true_path"), SETS),
+    (("B5",), ("S0", "S1", "S7", "T")),  # half a second a turn
+    (("ppo_raw_seed_*", "ppo_history_seed_*", "ppo_ekf@feed_forward"), SETS),
+    (("ppo_ekf@frozen", "ppo_ekf@wrong", "ppo_ekf@true"), ("S1", "S4", "T")),
+    (("ppo_ekf_fixed_seed_*", "ppo_ekf_absolute_seed_*", "sac_ekf_seed_*"), ("S1", "T")),
+)
+"""Controllers and the sets that they drive; what the claims are about drives all of them."""
+
+ORDER = ("B0", "B1", "B2", "B3", "B4", "B5", "ppo_ekf", "ppo_history", "ppo_raw", "sac_ekf")
+"""Arms in the tables; others follow."""
+SHOWN = ("B0", "B1", "B2", "B3", "B4", "B5", "ppo_ekf", "ppo_history", "ppo_raw", "true_curvature", "true_path")
+"""Arms of the README's figure."""
+
+_DIGITS = 5
+
+
+def rounded(value: Any) -> Any:
+    """A summary with numbers of five significant digits."""
+    if isinstance(value, Mapping):
+        return {key: rounded(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [rounded(item) for item in value]
+    return float(f"{value:.{_DIGITS}g}") if isinstance(value, float) and math.isfinite(value) else value
+
+
+def commit() -> str:
+    """Commit of the checkout, with a mark where files differ from it."""
+
+    def git(*words: str) -> str:
+        return subprocess.run(["git", *words], capture_output=True, text=True, cwd=CHECKOUT, check=False).stdout.strip()
+
+    return git("rev-parse", "HEAD") + ("+changes" if git("status", "--porcelain", "--untracked-files=no") else "")
+
+
+def record(
+    summary: Mapping[str, Any], claims: Sequence[Mapping[str, Any]], evaluation: Evaluation, command: str, made_at: str
+) -> dict[str, Any]:
+    """What is kept: the summary, and what it was made of."""
+    run = {
+        "command": command,
+        "commit": made_at,
+        "plan": [{"controllers": list(controllers), "sets": list(sets)} for controllers, sets in PLAN],
+        "headline": evaluation.headline,
+        "sources": {name: value for name, value in evaluation.sources if "sha256" in value or name == "ddagr-gym"},
+        "claims": list(claims),
+        "infeasible": [item["scenario"] for item in evaluation.infeasible],
+        "over_headline": dict(evaluation.over_headline),
+    }
+    return {"_run": rounded(run), **rounded(summary)}
+
+
+def as_lines(content: Mapping[str, Any]) -> str:
+    """JSON with one line for every metric."""
+    parts = []
+    for name, sets in content.items():
+        if name == "_run":
+            parts.append(f" {json.dumps(name)}: {json.dumps(sets, indent=1)}".replace("\n", "\n "))
+            continue
+        inner = []
+        for set_name, metrics in sets.items():
+            lines = ",\n".join(f"   {json.dumps(key)}: {json.dumps(value)}" for key, value in metrics.items())
+            inner.append(f"  {json.dumps(set_name)}: {{\n{lines}\n  }}")
+        parts.append(f" {json.dumps(name)}: {{\n" + ",\n".join(inner) + "\n }")
+    return "{\n" + ",\n".join(parts) + "\n}\n"
+
+
+def drive(folder: Path, workers: int) -> list[dict[str, Any]]:
+    """Episodes of the plan, driven where the folder's journal does not hold them."""
+    plan = [(without_stars(controllers), sets) for controllers, sets in PLAN]
+    total = sum(len(wanted_episodes(with_bounds(controllers), sets)) for controllers, sets in plan)
+    rows = []
+    with Progress(total, "driving") as progress:
+        for controllers, sets in plan:
+            rows += run_campaign(
+                controllers, sets, folder / "episodes.jsonl", processes=workers, progress=progress.advance
+            )
+    places = {name: place for place, name in enumerate(ORDER)}
+    return sorted(rows, key=lambda row: (places.get(row["arm"], len(ORDER)), SETS.index(row["set"])))
+
+
+def keep(
+    folder: Path, rows: Sequence[Mapping[str, Any]], command: str, made_at: str, workers: int = 1,
+    result: Path = RESULT, figure: Path = FIGURE, films: bool = True,
+) -> None:  # fmt: skip
+    """Write an evaluation's files and page into its folder, and its record and figure into the checkout."""
+    summary = summaries([dict(row) for row in rows])
+    claims = [asdict(item) for item in check_claims(load_claims(), summary)]
+    write_files(folder, rows, summary)
+    write_text(folder / "claims.json", json.dumps(claims, indent=1) + "\n")
+    evaluation = assemble(rows, summary, claims)
+    write_text(result, as_lines(record(summary, claims, evaluation, command, made_at)))
+    shown = replace(evaluation, arms=[arm for arm in evaluation.arms if arm.name in SHOWN])
+    picture, _ = radius_error_figure(shown, folder / f"readme_{figure.name}")
+    write_bytes(figure, picture.read_bytes())
+    write_report(folder, rows, summary, claims, workers, films)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--output", type=Path, required=True, help="folder of the evaluation")
+    parser.add_argument("--workers", type=int, default=2, help="processes")
+    arguments = parser.parse_args()
+    made_at, folder = commit(), make_folder(arguments.output)
+    rows = drive(folder, arguments.workers)
+    keep(folder, rows, "python benchmarks/row_turns.py --output FOLDER", made_at, arguments.workers)
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
