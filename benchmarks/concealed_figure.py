@@ -40,7 +40,7 @@ def draw(labels: Mapping[str, Any], answers: Mapping[str, Any], result: Mapping[
     with house_style():
         from matplotlib.figure import Figure
 
-        figure = Figure(figsize=(14.5, 1.6 + 0.235 * len(rows)), layout="constrained")
+        figure = Figure(figsize=(14.5, max(1.6 + 0.235 * len(rows), 6.0)), layout="constrained")
         left, right = figure.subplots(1, 2, width_ratios=(3.1, 1.0))
         _confusion(left, rows)
         _targets(right, result)

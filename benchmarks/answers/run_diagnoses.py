@@ -11,7 +11,8 @@ of ``--full-seed`` says, so that no label has a part in it.
 Each case is one run of the command line in a process of its own; the cores are shared among ``--processes`` of them.
 Finished cases are kept beside the answers until all are there, so that an interrupted script goes on, and a case that
 was run with other options is run again; nothing is edited by hand. A run that fails, or takes longer than
-``--time-limit``, is an answer that says so. ``commit`` is the checkout's at the time.
+``--time-limit``, is an answer that says so. ``--collect`` runs nothing and writes the answers of the cases that an
+interrupted script has finished. ``commit`` is the checkout's at the time.
 """
 
 from __future__ import annotations
@@ -179,6 +180,7 @@ def main() -> int:
     parser.add_argument("--full-every", type=int, default=None, metavar="N", help="names only in all but one in N")
     parser.add_argument("--full-seed", type=int, default=0, help="chooses the cases that are run to the end")
     parser.add_argument("--time-limit", type=float, default=1800.0, help="of a case [s]")
+    parser.add_argument("--collect", action="store_true", help="write the answers that are finished, run nothing")
     parser.add_argument("--only", nargs="*", default=None, help="names of cases")
     words = sys.argv[1:]
     end = words.index("--") if "--" in words else len(words)
@@ -199,6 +201,9 @@ def main() -> int:
         print(f"no cases for {arguments.cases}: set DDAGR_SHARED or name a folder of cases", file=sys.stderr)
         return 2
     found = with_options(found, options, arguments.full_every, arguments.full_seed)
+    if arguments.collect:
+        print(f"{collect(found, output)} of {len(found)} cases are finished: {output}")
+        return 0
     try:
         write_answers(found, output, arguments.processes, arguments.time_limit)
     except (InterruptedRunError, KeyboardInterrupt):
@@ -236,6 +241,20 @@ def write_answers(cases: list[Case], output: Path, processes: int, limit: float)
     ordered = {case.name: answers[case.name] for case in cases}
     write_atomically(output, lambda to: to.write_text(json.dumps(ordered, indent=1, allow_nan=False) + "\n"))
     shutil.rmtree(parts)
+
+
+def collect(cases: list[Case], output: Path) -> int:
+    """Write the answers of finished cases and leave them where they are; how many there are.
+
+    Args:
+        cases: in the order of the answers.
+        output: file to write.
+    """
+    parts = output.with_suffix(".parts")
+    finished = {case.name: parts / f"{case.name}.json" for case in cases}
+    answers = {name: json.loads(part.read_text()) for name, part in finished.items() if part.is_file()}
+    write_atomically(output, lambda to: to.write_text(json.dumps(answers, indent=1, allow_nan=False) + "\n"))
+    return len(answers)
 
 
 if __name__ == "__main__":

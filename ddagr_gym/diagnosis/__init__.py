@@ -30,8 +30,9 @@ up to places from which no small step leads back; a joint refit from the raw nom
 
 Limits so far
     *Which* effects are named is decided on all recordings; only their sizes are certified on others. ``complete``
-    and ``unknown`` rest on the misfit per channel against the null bank. A second-order motor loop is named as a delay
-    of commands. Mass hides behind soil strength in drives of this kind: see ``detectable``.
+    and ``unknown`` rest on the misfit per channel against the null bank. Mass hides behind soil strength in drives of
+    this kind, and so does a drag along the speed: see ``detectable``. Which of two motor poles is the slower one is
+    open, so that the lag of a second pole is shared out with the nuisance ``motor_rate``.
 
 Conventions: SI units, radians, channels and states in the order of :mod:`ddagr_gym.replay.windows`. Costs are half sums
 of squares in units of the noise; gains are divided by the dispersion of the model they start from.

@@ -124,7 +124,7 @@ def run(
         began_step(name)
         return store.step(name, work)
 
-    found = step("search", lambda: search(prepared.problem, task.thresholds, progress=progress))
+    found = step("search", lambda: search(prepared.problem, task.thresholds, progress=progress, keep=store.step))
     diagnosis, effects = step("verdict", lambda: conclude(prepared, found, task.thresholds, task.rng("verdict")))
     fit = (
         None

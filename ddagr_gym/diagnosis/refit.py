@@ -15,7 +15,9 @@ from ddagr_gym.replay.refit import STATE_PRIOR
 
 Array = NDArray[np.float64]
 
-_DAMPING = (1.0, 0.5, 0.25, 0.1, 0.03)
+DAMPING = (1.0, 0.5, 0.25, 0.1, 0.03)
+"""Shares of a step that are tried until the cost falls."""
+
 _LONGEST = 3.0  # standard deviations that a parameter moves in one step: beyond, the sensitivities are of no use
 _KEPT = frozenset(
     {
@@ -237,7 +239,7 @@ def _step(
     change = bounded_step(information, gradient, np.maximum(low - here, -reach), np.minimum(high - here, reach))
     explained = elimination.explain(raw)
     states = explained[:, :_STATES, 0] - explained[:, :_STATES, 1:] @ change
-    for damping in _DAMPING:
+    for damping in DAMPING:
         values = point.values.copy()
         values[free] += damping * change[: len(free)]
         effects = moved(point.effects, parameters, here[len(free) :] + damping * change[len(free) :])

@@ -250,6 +250,24 @@ def gains(terms: Terms, weights: Array | None = None, dispersion: float = 1.0) -
     return sorted(best.values(), key=lambda item: -item.gain)
 
 
+def nuisance_answer(problem: Problem, fitted: Fitted, terms: Terms, gain: Gain) -> Array:
+    """(P,) change of all nuisances that goes with a candidate's multiples in the scan's linear model.
+
+    Args:
+        problem: what was fitted.
+        fitted: the model that was scanned.
+        terms: of that scan.
+        gain: of the candidate; a categorical or a limiting effect stands at its probe whatever its multiple.
+    """
+    candidate = terms.candidates[gain.candidate]
+    reduced = reduce(terms)
+    change = np.zeros(len(fitted.point.values))
+    if candidate.whole is None and candidate.probes[0].differentiable:
+        columns = 1 + np.array(candidate.columns)
+        change[_open(problem, fitted)] = reduced.nuisance[:, 0] - reduced.nuisance[:, columns] @ gain.multiples
+    return change
+
+
 def dispersion_of(problem: Problem, fitted: Fitted) -> float:
     """Mean square of the weighted residuals of the fit, at least 1."""
     unknowns = fitted.elimination.basis.shape[2] * problem.blocked.windows.count

@@ -4,20 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.diagnosis.hypotheses import first_guess
 from ddagr_gym.diagnosis.misfit import channel_misfit
-from ddagr_gym.diagnosis.problem import Problem
-from ddagr_gym.diagnosis.refit import Fitted, fit
-from ddagr_gym.diagnosis.scores import Gain, Terms, dispersion_of, drive_extent, gains, held_out_gains, scan, scores
+from ddagr_gym.diagnosis.problem import Point, Problem
+from ddagr_gym.diagnosis.refit import DAMPING, Fitted, cost_of, fit
+from ddagr_gym.diagnosis.scores import (
+    Gain,
+    Terms,
+    dispersion_of,
+    drive_extent,
+    gains,
+    held_out_gains,
+    nuisance_answer,
+    scan,
+    scores,
+)
 from ddagr_gym.diagnosis.size_prior import implausibility
 from ddagr_gym.diagnosis.thresholds import Thresholds
-from ddagr_gym.physics.effects import Effect
 
 Array = NDArray[np.float64]
+Result = TypeVar("Result")
 
 _TRIAL_STEPS = 3
 _HOPELESS = 0.4  # share of the best linear gain below which no joint refit is tried
@@ -109,14 +120,48 @@ def stand(problem: Problem, fitted: Fitted, progress: Callable[[str], None] = la
     return Standing(fitted, terms, found, scores(terms, found), held_out, dispersion, misfit)
 
 
-def _trial(problem: Problem, standing: Standing, effect: Effect, start: Fitted) -> Fitted:
+def _trial(problem: Problem, standing: Standing, gain: Gain, terms: Terms, start: Fitted) -> Fitted:
     """A few steps with one further effect from a starting point, whose sensitivities of the nuisances serve.
 
     Where something large is missing, a nominal refit bends soil and robot to make up for it, so far that no step leads
     back: then the raw nominal model is a better start than the refitted one.
     """
+    effect = first_guess(terms.candidates[gain.candidate], gain.multiples)
     point = replace(start.point, effects=(*standing.fitted.point.effects, effect))
-    return fit(problem, point, iterations=_TRIAL_STEPS, renewals=2, reuse=start)
+    fitted = fit(problem, point, iterations=_TRIAL_STEPS, renewals=2, reuse=start)
+    if fitted.cost < standing.fitted.cost or (terms is standing.terms) != (start is standing.fitted):
+        return fitted
+    # the guess was too far off: nothing at all would have been better
+    point = _damped_guess(problem, standing, gain, terms, start)
+    again = fit(problem, point, iterations=_TRIAL_STEPS, renewals=2, reuse=start)
+    return min(fitted, again, key=lambda trial: trial.cost)
+
+
+def _damped_guess(problem: Problem, standing: Standing, gain: Gain, terms: Terms, start: Fitted) -> Point:
+    """The scan's step, damped as any other: the effect as guessed, and what soil and robot give back for it.
+
+    A nominal refit has made up for what is missing. With the effect alone that counts twice, and where the guess lies
+    far out a fit may begin so badly that no few steps lead down.
+
+    Args:
+        problem: what to fit.
+        standing: the model before.
+        gain: of the effect.
+        terms: of the scan that says so, made at ``start``.
+        start: where to begin.
+    """
+    candidate = terms.candidates[gain.candidate]
+    answer = nuisance_answer(problem, start, terms, gain)
+    points, costs = [], []
+    for share in DAMPING:
+        effect = first_guess(candidate, [share * multiple for multiple in gain.multiples])
+        values = np.clip(start.point.values + share * answer, problem.low, problem.high)
+        point = replace(start.point, values=values, effects=(*standing.fitted.point.effects, effect))
+        points.append(point)
+        costs.append(cost_of(problem, point, problem.predict(point), start.elimination)[0])
+        if costs[-1] < start.cost:
+            break
+    return points[int(np.argmin(costs))]
 
 
 def rivals_of(problem: Problem, standing: Standing, raw: Fitted, thresholds: Thresholds, most: int) -> list[Rival]:
@@ -137,8 +182,7 @@ def rivals_of(problem: Problem, standing: Standing, raw: Fitted, thresholds: Thr
     tried = []
     for gain, terms in ranked[:most]:
         if gain.gain > least:
-            effect = first_guess(terms.candidates[gain.candidate], gain.multiples)
-            trials = [_trial(problem, standing, effect, start) for start in starts]
+            trials = [_trial(problem, standing, gain, terms, start) for start in starts]
             best_start = min(range(len(trials)), key=lambda k: trials[k].cost)
             # the start that serves the first rival serves the others
             starts = [starts[best_start]]
@@ -193,6 +237,17 @@ def begin(problem: Problem, progress: Callable[[str], None] = lambda text: None)
     return raw, stand(problem, fit(problem, raw.point, first=raw), progress)
 
 
+class Keep(Protocol):
+    """Where finished parts of a search go: :meth:`ddagr_gym.diagnosis.store.StepStore.step`, or nowhere."""
+
+    def __call__(self, name: str, work: Callable[[], Result]) -> Result:
+        """Result of a part: the kept one, or that of ``work``."""
+
+
+def _do(name: str, work: Callable[[], Result]) -> Result:
+    return work()
+
+
 def search(
     problem: Problem,
     thresholds: Thresholds,
@@ -201,6 +256,7 @@ def search(
     most: int = MOST_EFFECTS,
     progress: Callable[[str], None] = lambda text: None,
     begun: tuple[Fitted, Standing] | None = None,
+    keep: Keep = _do,
 ) -> Found:
     """Refit, scan, and add effects while one passes the gate.
 
@@ -211,27 +267,42 @@ def search(
         most: effects at the same time.
         progress: called with what is being done.
         begun: raw and refitted nominal model of an earlier :func:`begin`.
+        keep: of the nominal refit and of each step, so that a search that was stopped goes on behind the last one.
     """
-    raw, standing = begin(problem, progress) if begun is None else begun
+    raw, standing = keep("search nominal", lambda: begin(problem, progress)) if begun is None else begun
     standings: list[Standing] = [standing]
     steps: list[tuple[Rival, ...]] = []
-    while len(standing.names) < most:
-        tried = rivals_of(problem, standing, raw, thresholds, rivals)
-        tried = [rival for rival in tried if rival.gain > thresholds.of(rival.name).gain]
-        if not tried:
+    while len(standings[-1].names) < most:
+        number = f"search step {len(standings)}"
+        added = keep(number, lambda: _added(problem, standings[-1], raw, steps, thresholds, rivals, progress))
+        if added is None or set(added[0].names) in [set(s.names) for s in standings]:
             break
-        progress(f"joint refit with {tried[0].name}")
-        best = _swapped(problem, tried[0].fitted, steps)
-        standing = stand(problem, fit(problem, best.point, iterations=8, renewals=2, first=best), progress)
-        standing = _without_idle(problem, standing, thresholds, progress)
-        if set(standing.names) in [set(s.names) for s in standings]:
-            break
-        standings.append(standing)
-        steps.append(tuple(tried))
+        standings.append(added[0])
+        steps.append(added[1])
     if steps and not standings[-1].fitted.converged:
         progress("last refit")
         standings[-1] = _settled(problem, standings[-1])
     return Found(tuple(standings), steps[0] if steps else (), tuple(steps))
+
+
+def _added(
+    problem: Problem,
+    standing: Standing,
+    raw: Fitted,
+    steps: Sequence[tuple[Rival, ...]],
+    thresholds: Thresholds,
+    most: int,
+    progress: Callable[[str], None],
+) -> tuple[Standing, tuple[Rival, ...]] | None:
+    """The model with one further effect and the refits that it was chosen from; None where none passes the gate."""
+    tried = rivals_of(problem, standing, raw, thresholds, most)
+    tried = [rival for rival in tried if rival.gain > thresholds.of(rival.name).gain]
+    if not tried:
+        return None
+    progress(f"joint refit with {tried[0].name}")
+    best = _swapped(problem, tried[0].fitted, steps)
+    more = stand(problem, fit(problem, best.point, iterations=8, renewals=2, first=best), progress)
+    return _without_idle(problem, more, thresholds, progress), tuple(tried)
 
 
 def _settled(problem: Problem, standing: Standing) -> Standing:

@@ -202,6 +202,13 @@ def _saturation(a: Amounts) -> str:
     return f"the banks turn {' and '.join(parts)}" if parts else "the banks have a limit that was not reached"
 
 
+def _lag(a: Amounts) -> str:
+    slower = a["lag"].value >= 0.0
+    share = a["second_pole"].value if slower and "second_pole" in a else 0.0
+    pole = " (mostly by a second pole)" if share >= 0.5 else ""
+    return f"the motors answer {quantity(a['lag'], 's')} {'more slowly' if slower else 'faster'}{pole}"
+
+
 def _deadband(a: Amounts) -> str:
     loss = " and larger ones lose as much" if a["loss"].value >= 0.5 else ""
     return f"commands below {quantity(a['width'], 'rad/s')} move nothing{loss}"
@@ -252,9 +259,7 @@ SENTENCES: Mapping[str, Callable[[Amounts], str]] = {
     "motor_droop": lambda a: (
         f"the motors slow down under load, by {quantity(a['droop'].scaled(1e3), 'mrad/s')} per N m of axle torque"
     ),
-    "motor_lag": lambda a: (
-        f"the motors answer {quantity(a['lag'], 's')} {'more slowly' if a['lag'].value >= 0.0 else 'faster'}"
-    ),
+    "motor_lag": _lag,
     "motor_saturation": _saturation,
     "multipass": _multipass,
     "payload": _payload,

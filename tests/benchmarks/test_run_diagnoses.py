@@ -14,6 +14,7 @@ from benchmarks.answers.run_diagnoses import (
     InterruptedRunError,
     _answer,
     chosen_for_all,
+    collect,
     diagnose,
     synthetic_cases,
     with_options,
@@ -83,6 +84,17 @@ def test_finished_cases_are_not_run_again_unless_options_differ(runs: list[list[
     for options in ((), (), ("--names-only",)):
         diagnose(replace(CASES[0], options=options), tmp_path, 1, 10.0)
     assert len(runs) == 2
+
+
+def test_finished_cases_are_collected_and_kept(runs: list[list[str]], tmp_path: Path) -> None:
+    parts = tmp_path / "answers.parts"
+    parts.mkdir()
+    diagnose(CASES[1], parts, 1, 10.0)
+    assert collect(CASES[:3], tmp_path / "answers.json") == 1
+    assert list(json.loads((tmp_path / "answers.json").read_text())) == ["case_002"]
+    write_answers(CASES[:3], tmp_path / "answers.json", 1, 10.0)
+    assert len(runs) == 3
+    assert len(json.loads((tmp_path / "answers.json").read_text())) == 3
 
 
 def test_an_interrupted_run_is_no_answer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

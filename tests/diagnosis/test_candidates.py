@@ -33,6 +33,12 @@ def test_slope_is_guessed_from_two_components() -> None:
     assert guess.direction == pytest.approx(np.arctan2(-4.0, 3.0))
 
 
+def test_forms_of_a_motor_lag_are_tried_one_by_one() -> None:
+    """Free to split the lag by any sign, one candidate would fit any loop of second order that is as fast."""
+    found = candidates_of(effect_kinds()["motor_lag"], EXTENT, 0)
+    assert [(len(c.probes), c.probes[0].second_pole) for c in found] == [(1, 0.0), (1, 0.5), (1, 1.0)]
+
+
 def test_sign_is_guessed_as_reversed() -> None:
     candidate = candidates_of(effect_kinds()["gyro_sign"], EXTENT, 0)[0]
     assert first_guess(candidate, [1.0]).flip == 1.0

@@ -1,34 +1,68 @@
 """Motors that answer more slowly than the nominal first-order loop."""
 
+import math
 from dataclasses import dataclass
 
-from ddagr_gym.physics.effects.base import Effect, Vector, size
-from ddagr_gym.physics.layout import MOTOR_RATE, POINT_MOTORS
+from ddagr_gym.physics.effects.base import DriveExtent, Effect, Vector, shape, size
+from ddagr_gym.physics.layout import MOTOR_RATE, MOTOR_TARGET, OMEGA, POINT_MOTORS, SAMPLE_PERIOD
 
 _FASTEST = 0.05  # of the nominal time constant: a negative lag cannot make the loop faster than 20 times
+_STARTED = 2
+_PROBED = (0.0, 0.5, 1.0)
 
 
 def slow_motors(row: Vector, parameters: Vector, memory: Vector) -> None:
-    """Lengthen both time constants by ``parameters[0]``."""
+    """Split the lag ``parameters[0]`` between both loops' time constants and, by ``parameters[1]``, a filter before.
+
+    Over a sample the loop aims at the mean of the filter's answer to the held command, so that a filter shorter than
+    a sample still counts in proportion to its length.
+    """
+    second = parameters[1] * max(parameters[0], 0.0)
     for bank in range(2):
-        row[MOTOR_RATE + bank] /= max(1.0 + parameters[0] * row[MOTOR_RATE + bank], _FASTEST)
+        row[MOTOR_RATE + bank] /= max(1.0 + (parameters[0] - second) * row[MOTOR_RATE + bank], _FASTEST)
+        if memory[_STARTED] == 0.0:
+            # before the first sample the motors are taken to have settled
+            memory[bank] = row[OMEGA + bank]
+        if second > 0.0:
+            command = row[MOTOR_TARGET + bank]
+            decay = math.exp(-row[SAMPLE_PERIOD] / second)
+            behind = memory[bank] - command
+            row[MOTOR_TARGET + bank] = command + behind * (1.0 - decay) * second / row[SAMPLE_PERIOD]
+            memory[bank] = command + behind * decay
+    memory[_STARTED] = 1.0
 
 
 @dataclass(frozen=True)
 class MotorLag(Effect):
-    """Longer time constant of the bank speed loops.
+    """Later answer of the bank speed loops: a longer time constant, a second pole, or some of both.
 
     Attributes:
-        lag: added to 1/motor_rate; least: a quarter of the 0.22 s of the thesis's simulated motors.
+        lag: added to the time by which the speed trails a ramp of commands, which is 1/motor_rate of the nominal loop;
+            least: a quarter of the 0.22 s of the thesis's simulated motors.
+        second_pole: share of the lag that a second pole takes (a current loop, a filter of the commands); 0 leaves one
+            pole. A negative lag quickens the only one.
     """
 
     name = "motor_lag"
     title = "Motor lag"
     group = "commands and motors"
-    equation = "d omega/dt = (command - omega)/(1/motor_rate + lag)"
-    source = "thesis (4.11), whose k_omega is 4.5 1/s simulated and 1.4 1/s measured"
+    equation = (
+        "(1/motor_rate + (1 - second_pole) lag) d omega/dt = target - omega; second_pole lag d target/dt = command - "
+        "target"
+    )
+    source = (
+        "thesis (4.11), whose k_omega is 4.5 1/s simulated and 1.4 1/s measured; two lags in series as of armature and "
+        "rotor (Astrom and Murray, Feedback Systems)"
+    )
     signature = "bank speeds approach a new command late and round its corner; none at steady speed"
     confused_with = ("command_delay", "motor_saturation")
     actions = ((POINT_MOTORS, slow_motors),)
 
     lag: float = size("s", -0.05, 5.0, least=0.05)
+    second_pole: float = shape("-", 0.0, 1.0, default=0.0, step=0.1)
+
+    @classmethod
+    def probes(cls, extent: DriveExtent) -> tuple[Effect, ...]:
+        """A slower loop, a second pole, and half of each."""
+        step = cls.parameter("lag").metadata["step"]
+        return tuple(cls(step, share) for share in _PROBED)

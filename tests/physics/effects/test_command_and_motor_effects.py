@@ -62,6 +62,35 @@ def test_lag_lengthens_the_time_constant(drive, steps, lag):
     np.testing.assert_allclose(speed[70:180], 0.5 * (1 - np.exp(-time / (1 / RATE + lag))), rtol=1e-9)
 
 
+@pytest.mark.parametrize("share", [0.3, 1.0])
+def test_a_second_pole_answers_as_two_lags_in_series(drive, steps, share):
+    lag = 0.25
+    speed = drive([f"motor_lag={lag},second_pole={share}"], steps)["true_omega_left"]
+    loop, second = 1 / RATE + (1 - share) * lag, share * lag
+    time = PERIOD * np.arange(1, 111)
+    left = (loop * np.exp(-time / loop) - second * np.exp(-time / second)) / (loop - second)
+    # the loop aims at the mean of the filter over each sample: an error of (PERIOD/second)^2/12 at most
+    np.testing.assert_allclose(speed[70:180], 0.5 * (1 - left), atol=0.5 * (PERIOD / second) ** 2 / 12)
+
+
+@pytest.mark.parametrize("lag", [0.002, 0.3])
+@pytest.mark.parametrize("share", [0.5, 1.0])
+def test_behind_a_ramp_the_lag_is_the_same_however_it_is_split(drive, share, lag):
+    ramp = np.repeat(0.1 * PERIOD * np.arange(500)[:, None], 2, axis=1)
+    nominal, slower, split = (
+        drive(effects, ramp)["true_omega_right"][-1]
+        for effects in ((), [f"motor_lag={lag}"], [f"motor_lag={lag},second_pole={share}"])
+    )
+    assert nominal - slower == pytest.approx(0.1 * lag, rel=0.05)
+    assert nominal - split == pytest.approx(nominal - slower, rel=0.01)
+
+
+def test_a_steady_bank_does_not_notice_the_second_pole(drive):
+    state = {"v_x": 0.14, "omega_right": 0.5, "omega_left": 0.5}
+    columns = drive(["motor_lag=0.3,second_pole=1"], np.full((40, 2), 0.5), initial_state=state)
+    np.testing.assert_allclose(columns["true_omega_right"], 0.5, atol=1e-12)
+
+
 def test_negative_lag_cannot_reverse_time(act, turning_row):
     row = turning_row.copy()
     row[layout.MOTOR_RATE : layout.MOTOR_RATE + 2] = 50.0

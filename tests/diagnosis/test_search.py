@@ -1,0 +1,96 @@
+"""Where joint refits begin, and a search that goes on where it was stopped."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from ddagr_gym.diagnosis import search as module
+from ddagr_gym.diagnosis.refit import cost_of, fit
+from ddagr_gym.diagnosis.scores import Gain, gains, nuisance_answer, scan
+from ddagr_gym.diagnosis.search import Rival, Standing, search
+from ddagr_gym.diagnosis.store import StepStore
+from ddagr_gym.diagnosis.thresholds import Gate, Thresholds
+from ddagr_gym.physics.effects.registry import effect_kind, parse_effect
+from tests.diagnosis.conftest import Sloping
+
+THRESHOLDS = Thresholds({"slope": Gate(3.0, 0.0)}, {}, 20, "a test")
+
+
+@pytest.fixture(scope="module")
+def standing(sloping: Sloping) -> Standing:
+    """The nominal model on sloping ground and what the slope would gain."""
+    terms = scan(sloping.problem, sloping.nominal, {"slope": effect_kind("slope")})
+    return Standing(sloping.nominal, terms, tuple(gains(terms)), {}, {}, 1.0, {})
+
+
+def cost_at(sloping: Sloping, point: module.Point) -> float:
+    prediction = sloping.problem.predict(point)
+    return cost_of(sloping.problem, point, prediction, sloping.nominal.elimination)[0]
+
+
+def test_a_damped_guess_begins_with_the_answer_of_soil_and_robot(sloping: Sloping, standing: Standing) -> None:
+    """The scan promises a fall of the cost for the effect and the nuisances' answer together."""
+    gain = standing.gains[0]
+    answer = nuisance_answer(sloping.problem, sloping.nominal, standing.terms, gain)
+    assert (answer[sloping.problem.free] != 0.0).any()
+    assert (answer[~sloping.problem.free] == 0.0).all()
+    point = module._damped_guess(sloping.problem, standing, gain, standing.terms, sloping.nominal)
+    alone = replace(point, values=sloping.nominal.point.values)
+    assert cost_at(sloping, point) < cost_at(sloping, alone)
+    assert sloping.nominal.cost - cost_at(sloping, point) > 0.5 * gain.gain
+
+
+def test_a_guess_that_is_far_too_large_is_damped(sloping: Sloping, standing: Standing) -> None:
+    gain = standing.gains[0]
+    exaggerated = Gain(gain.candidate, gain.name, gain.gain, tuple(3.0 * m for m in gain.multiples))
+    point = module._damped_guess(sloping.problem, standing, exaggerated, standing.terms, sloping.nominal)
+    guessed = module._damped_guess(sloping.problem, standing, gain, standing.terms, sloping.nominal)
+    assert point.effects[0].angle < 2.0 * guessed.effects[0].angle
+    assert cost_at(sloping, point) < sloping.nominal.cost
+
+
+def test_a_search_goes_on_behind_its_last_step(
+    sloping: Sloping, standing: Standing, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    chosen = replace(standing, fitted=sloping.chosen)
+    done: list[str] = []
+    stop = [True]
+
+    def begin(problem: object, progress: object) -> tuple[object, Standing]:
+        done.append("nominal")
+        return sloping.nominal, standing
+
+    def added(problem: object, last: Standing, *rest: object) -> tuple[Standing, tuple[Rival, ...]] | None:
+        done.append(f"after {last.names}")
+        if not last.names:
+            return chosen, (Rival("slope", sloping.chosen, 9.0),)
+        if stop.pop():
+            raise KeyboardInterrupt
+        return None
+
+    monkeypatch.setattr(module, "begin", begin)
+    monkeypatch.setattr(module, "_added", added)
+    monkeypatch.setattr(module, "_settled", lambda problem, last: last)
+    with pytest.raises(KeyboardInterrupt):
+        search(sloping.problem, THRESHOLDS, keep=StepStore(tmp_path / "part", "key").step)
+    assert done == ["nominal", "after ()", "after ('slope',)"]
+    stop[:] = [False]
+    found = search(sloping.problem, THRESHOLDS, keep=StepStore(tmp_path / "part", "key").step)
+    assert done[3:] == ["after ('slope',)"]
+    assert found.chosen.names == ("slope",)
+    assert found.steps[0][0].fitted.point.effects == sloping.chosen.point.effects
+
+
+def test_loops_are_told_from_delays(drive, problem_of) -> None:
+    """Both are late by the same time; only one rounds the corner of a step."""
+    for truth, other in (("motor_lag=0.25,second_pole=1", "command_delay"), ("command_delay=0.2", "motor_lag")):
+        problem = problem_of(drive((truth,)))
+        raw = fit(problem, iterations=0)
+        right = parse_effect(truth)
+        wrong = {"command_delay": "command_delay=0.2", "motor_lag": "motor_lag=0.2,second_pole=0.9"}[other]
+        costs = [
+            fit(problem, replace(raw.point, effects=(effect,)), iterations=6, reuse=raw).cost
+            for effect in (right.with_values(**{right.size_names()[0]: 0.15}), parse_effect(wrong))
+        ]
+        assert costs[1] - costs[0] > 20.0, (truth, costs)
