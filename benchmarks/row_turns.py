@@ -5,8 +5,8 @@
 Drives :data:`PLAN` as ``ddagr evaluate`` does, with the same journal, page and files (about twenty minutes of one core;
 stopped and started again with the same folder, it goes on), then writes ``benchmarks/results/row_turns.json`` and the
 figure of the README, ``docs/radius_error.png``. The JSON file has the form of ``summary.json``, {controller: {set:
-{metric: {value, interval}}}}, and one entry more, ``_run``: command line, the checkout's commit, who drove what, hashes
-of scenarios and policies, and what became of the claims.
+{metric: {value, interval}}}}, and one entry more, ``_run``: command line, commits, who drove what, hashes of scenarios
+and policies, and what became of the claims.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from ddagr_gym.commands.output import make_folder, write_bytes, write_text
 from ddagr_gym.commands.progress import Progress
 from ddagr_gym.evaluation.campaign import run_campaign, wanted_episodes, with_bounds
 from ddagr_gym.evaluation.claims import check_claims, load_claims
+from ddagr_gym.evaluation.controllers import BOUNDS
 from ddagr_gym.evaluation.summary import summaries
 from ddagr_gym.reporting.evaluation_data import Evaluation
 from ddagr_gym.reporting.evaluation_figures import radius_error_figure
@@ -35,14 +36,18 @@ RESULT = CHECKOUT / "benchmarks" / "results" / "row_turns.json"
 FIGURE = CHECKOUT / "docs" / "radius_error.png"
 
 SETS = ("S0", "S1", "S2", "S3", "S4", "S5", "S6", "S7", "S8", "T")
+OTHERS = tuple(name for name in SETS if name not in ("S1", "T"))
 PLAN: tuple[tuple[tuple[str, ...], tuple[str, ...]], ...] = (
     (("B0", "B1", "B2", "B3", "B4", "ppo_ekf_seed_*", "true_curvature", "true_soil", "true_path"), SETS),
-    (("B5",), ("S0", "S1", "S7", "T")),  # half a second a turn
-    (("ppo_raw_seed_*", "ppo_history_seed_*", "ppo_ekf@feed_forward"), SETS),
-    (("ppo_ekf@frozen", "ppo_ekf@wrong", "ppo_ekf@true"), ("S1", "S4", "T")),
-    (("ppo_ekf_fixed_seed_*", "ppo_ekf_absolute_seed_*", "sac_ekf_seed_*"), ("S1", "T")),
+    (("ppo_raw_seed_*", "ppo_history_seed_*"), ("S1", "T")),
+    (("ppo_raw", "ppo_history"), OTHERS),
+    (("ppo_ekf@feed_forward", "ppo_ekf@frozen", "ppo_ekf@wrong", "ppo_ekf@true"), ("S1",)),
+    (("ppo_ekf_fixed_seed_*", "ppo_ekf_absolute_seed_*", "sac_ekf_seed_*"), ("S1",)),
+    (("B5",), ("S0", "S1", "T")),
 )
-"""Controllers and the sets that they drive; what the claims are about drives all of them."""
+"""Controllers and the sets that they drive. What the claims are about drives all of them with all of its seeds; to save
+time the other learned arms drive S1 and T with all of theirs and the rest with the selected one, ablations drive S1,
+and B5, which takes half a second of CPU a turn, S0, S1 and T."""
 
 ORDER = ("B0", "B1", "B2", "B3", "B4", "B5", "ppo_ekf", "ppo_history", "ppo_raw", "sac_ekf")
 """Arms in the tables; others follow."""
@@ -70,13 +75,26 @@ def commit() -> str:
     return git("rev-parse", "HEAD") + ("+changes" if git("status", "--porcelain", "--untracked-files=no") else "")
 
 
+def remembered_commits(folder: Path) -> list[str]:
+    """Commits at which the folder's episodes were driven, now that of this checkout as well."""
+    file = folder / "commits.json"
+    known: list[str] = json.loads(file.read_text()) if file.is_file() else []
+    known = list(dict.fromkeys([*known, commit()]))
+    write_text(file, json.dumps(known))
+    return known
+
+
 def record(
-    summary: Mapping[str, Any], claims: Sequence[Mapping[str, Any]], evaluation: Evaluation, command: str, made_at: str
+    summary: Mapping[str, Any],
+    claims: Sequence[Mapping[str, Any]],
+    evaluation: Evaluation,
+    command: str,
+    made_at: Sequence[str],
 ) -> dict[str, Any]:
     """What is kept: the summary, and what it was made of."""
     run = {
         "command": command,
-        "commit": made_at,
+        "commits": list(made_at),
         "plan": [{"controllers": list(controllers), "sets": list(sets)} for controllers, sets in PLAN],
         "headline": evaluation.headline,
         "sources": {name: value for name, value in evaluation.sources if "sha256" in value or name == "ddagr-gym"},
@@ -85,6 +103,29 @@ def record(
         "over_headline": dict(evaluation.over_headline),
     }
     return {"_run": rounded(run), **rounded(summary)}
+
+
+def readme_table(content: Mapping[str, Any], set_name: str = "S1") -> str:
+    """First table of the README: on one set, each shown arm with 95 % intervals, in Markdown."""
+    lines = [
+        "| controller | radius error, median | 95th percentile | success | closer than B1 | closer than B4 |",
+        "|---|---|---|---|---|---|",
+    ]
+    for name in (name for name in SHOWN if set_name in content.get(name, {})):
+        found = content[name][set_name]
+        label = f"{name} ({found['runs']} seeds)" if found["runs"] > 1 else name
+        label += " *(sees the truth)*" if name in BOUNDS else ""
+        cells = [_cell(found["radius_error_median"], 1), _cell(found["radius_error_p95"], 1)]
+        cells += [_cell(found.get(key), 0) for key in ("success_rate", "improvement_over_B1", "improvement_over_B4")]
+        lines.append(f"| {' | '.join([label, *cells])} |")
+    return "\n".join(lines)
+
+
+def _cell(metric: Mapping[str, Any] | None, digits: int) -> str:
+    if metric is None:
+        return ""
+    texts = ["-" if x is None else f"{100 * x:.{digits}f}" for x in (metric["value"], *metric["interval"])]
+    return f"{texts[0]} % ({texts[1]} to {texts[2]})"
 
 
 def as_lines(content: Mapping[str, Any]) -> str:
@@ -117,7 +158,7 @@ def drive(folder: Path, workers: int) -> list[dict[str, Any]]:
 
 
 def keep(
-    folder: Path, rows: Sequence[Mapping[str, Any]], command: str, made_at: str, workers: int = 1,
+    folder: Path, rows: Sequence[Mapping[str, Any]], command: str, made_at: Sequence[str], workers: int = 1,
     result: Path = RESULT, figure: Path = FIGURE, films: bool = True,
 ) -> None:  # fmt: skip
     """Write an evaluation's files and page into its folder, and its record and figure into the checkout."""
@@ -138,7 +179,8 @@ def main() -> int:
     parser.add_argument("--output", type=Path, required=True, help="folder of the evaluation")
     parser.add_argument("--workers", type=int, default=2, help="processes")
     arguments = parser.parse_args()
-    made_at, folder = commit(), make_folder(arguments.output)
+    folder = make_folder(arguments.output)
+    made_at = remembered_commits(folder)
     rows = drive(folder, arguments.workers)
     keep(folder, rows, "python benchmarks/row_turns.py --output FOLDER", made_at, arguments.workers)
     return 0

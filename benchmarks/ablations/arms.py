@@ -1,0 +1,124 @@
+"""Arms of the ablation that scan the library: as it is, nominal parameters fixed, no null bank, one long roll-out.
+
+All say what they say after the first scan, before any joint refit: the search of a diagnosis goes on from there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+
+from ddagr_gym.diagnosis.diagnose import Prepared
+from ddagr_gym.diagnosis.misfit import LOCAL, roughest
+from ddagr_gym.diagnosis.nuisance import NuisancePriors, Nuisances
+from ddagr_gym.diagnosis.problem import Problem
+from ddagr_gym.diagnosis.refit import Fitted, cost_of
+from ddagr_gym.diagnosis.search import Standing, stand
+from ddagr_gym.diagnosis.thresholds import Gate, Thresholds
+from ddagr_gym.parameters import Soil
+from ddagr_gym.physics.effects.registry import effect_kinds
+from ddagr_gym.replay.windows import CHANNELS
+
+_LOCKED = 1e-6
+"""Deviation that allows nothing, in any unit of a local variation; zero would divide by it."""
+
+_CERTAIN = 1e9
+"""Gain over a gate where none was needed."""
+
+_LEVEL = 0.05
+_DIRECTIONS = 3
+"""Degrees of freedom of the largest candidates: two sizes and the choice among places or moments."""
+
+
+@dataclass(frozen=True)
+class First:
+    """What a first scan says of a case.
+
+    Attributes:
+        name: effect that stands first, "" for none.
+        passes: whether it passes its gate.
+        ratio: its gain over its gate.
+        rough: largest misfit of a channel over its limit; 0 where the arm has no limits.
+    """
+
+    name: str
+    passes: bool
+    ratio: float
+    rough: float = 0.0
+
+    @property
+    def alarm(self) -> bool:
+        """Whether it says that something is missing, with or without a name."""
+        return self.passes or self.rough > 1.0
+
+    def as_mapping(self) -> dict[str, object]:
+        """For JSON."""
+        return asdict(self) | {"alarm": self.alarm}
+
+
+def from_values(prepared: Prepared) -> First | None:
+    """What the readings themselves show before any simulation, alike in all arms that scan; None for nothing."""
+    if prepared.held:
+        return First("sensor_hold", True, _CERTAIN)
+    return First("gyro_sign", True, _CERTAIN) if prepared.flipped is not None else None
+
+
+def first_of(scans: Sequence[Standing], thresholds: Thresholds) -> First:
+    """The effect that a search tries first: by how much its gain exceeds its gate, those that pass before the others.
+
+    Args:
+        scans: at one or two nominal models; each effect has the larger of its gains.
+        thresholds: of the gates and of the misfit of the first.
+    """
+    _, rough = roughest(scans[0].misfit, dict(thresholds.misfit))
+    found = [
+        (thresholds.passes(gain.name, gain.gain, scan), gain.gain - thresholds.of(gain.name).gain, gain)
+        for scan in scans
+        for gain in scan.gains
+    ]
+    passes, _, gain = max(found, key=lambda item: item[:2])
+    return First(gain.name, passes, gain.gain / thresholds.of(gain.name).gain, rough)
+
+
+def noise_thresholds(problem: Problem) -> Thresholds:
+    """Gates and limits that white noise alone would need: quantiles of chi-square, corrected for how many there are.
+
+    Args:
+        problem: whose means and windows are counted.
+    """
+    from scipy.stats import chi2
+
+    names = tuple(effect_kinds())
+    gate = Gate(0.5 * float(chi2.ppf(1.0 - _LEVEL / len(names), _DIRECTIONS)), 0.0)
+    means = problem.blocked.mask.reshape(problem.blocked.sigma.shape).sum(axis=(0, 1))
+    counts = dict(zip(CHANNELS, means.tolist(), strict=True)) | dict.fromkeys(LOCAL, problem.blocked.windows.count)
+    share = 1.0 - _LEVEL / len(counts)
+    limits = {name: float(chi2.ppf(share, count)) / count for name, count in counts.items() if count > 0}
+    return Thresholds(dict.fromkeys(names, gate), limits, 0, "chi-square")
+
+
+def without_nuisances(problem: Problem, soil: Soil) -> Problem:
+    """The problem with soil, robot, biases and local variations at their nominal values; only states are free.
+
+    Args:
+        problem: with its nuisances.
+        soil: nominal.
+    """
+    parameters = tuple(replace(parameter, prior=0.0) for parameter in problem.nuisances.parameters)
+    fixed = Nuisances(parameters, tuple((index, _LOCKED) for index, _ in problem.nuisances.local))
+    locked: Mapping[str, float] = dict.fromkeys(("local_accelerometer", "local_gyro"), _LOCKED)
+    return Problem(problem.robot, soil, problem.blocked, fixed, NuisancePriors(**locked))
+
+
+def nominal_standing(problem: Problem, raw: Fitted, soil: Soil) -> Standing:
+    """Scan at the raw nominal model with nothing but the windows' states eliminated.
+
+    Args:
+        problem: with its nuisances.
+        raw: its raw nominal model, not refitted.
+        soil: nominal.
+    """
+    fixed = without_nuisances(problem, soil)
+    elimination = fixed.eliminate(raw.point, raw.prediction, raw.by_parameter)
+    cost, shares = cost_of(fixed, raw.point, raw.prediction, elimination)
+    return stand(fixed, replace(raw, cost=cost, elimination=elimination, window_cost=shares))

@@ -1,0 +1,89 @@
+"""What every arm says of one case, with what it cost."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from benchmarks.ablations.arms import First, first_of, from_values, noise_thresholds, nominal_standing
+from benchmarks.ablations.sparse import sparse_first
+from ddagr_gym.diagnosis.diagnose import Prepared, prepare
+from ddagr_gym.diagnosis.refit import Fitted
+from ddagr_gym.diagnosis.search import _BENT, Standing, begin, stand
+from ddagr_gym.diagnosis.setting import Setting, make_problem, wheel_radius
+from ddagr_gym.diagnosis.thresholds import Thresholds
+from ddagr_gym.parameters import Robot, Soil
+from ddagr_gym.presets import get_robot, get_soil
+from ddagr_gym.recordings.load import load_recording
+
+ARMS = {
+    "as it is": "first scan of the diagnosis",
+    "nominal fixed": "raw nominal model, soil, robot and biases not refitted",
+    "no null bank": "gates and limits from white noise alone",
+    "one roll-out": "one window per drive, states free at its start only",
+    "SINDy": "sparse regression of the residual accelerations",
+}
+ROBOT, SOIL = "ddagr", "thesis_a1"
+
+_WHOLE_DRIVE = 1e6
+"""Longer than any drive [s]; windows are then as long as the drives."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Begun:
+    """The case as the diagnosis sees it before its search."""
+
+    prepared: Prepared
+    raw: Fitted
+    scans: tuple[Standing, ...]
+    thresholds: Thresholds
+
+
+def examine(folder: Path, thresholds: Thresholds) -> dict[str, dict[str, Any]]:
+    """First names of every arm for the drives of one case.
+
+    Args:
+        folder: of the case.
+        thresholds: of the null bank.
+
+    Returns:
+        By arm: name, passes, ratio, rough, alarm, and seconds of CPU that it needs beyond those of "as it is" where it
+        builds on its refit.
+    """
+    robot, soil = get_robot(ROBOT), get_soil(SOIL)
+    began = time.process_time()
+    begun = _begin(robot, soil, folder, thresholds)
+    values = from_values(begun.prepared)
+    problem = begun.prepared.problem
+    found = {"as it is": _timed(lambda: values or first_of(begun.scans, begun.thresholds), began)}
+    arms: dict[str, Callable[[], First]] = {
+        "nominal fixed": lambda: values or first_of((nominal_standing(problem, begun.raw, soil),), begun.thresholds),
+        "no null bank": lambda: values or first_of(begun.scans, noise_thresholds(problem)),
+        "one roll-out": lambda: values or _one_roll_out(robot, soil, begun),
+        "SINDy": lambda: sparse_first(problem, begun.scans[0].fitted, wheel_radius(robot)),
+    }
+    return found | {name: _timed(work, time.process_time()) for name, work in arms.items()}
+
+
+def _timed(work: Callable[[], First], began: float) -> dict[str, Any]:
+    first = work()
+    return first.as_mapping() | {"seconds": time.process_time() - began}
+
+
+def _begin(robot: Robot, soil: Soil, folder: Path, thresholds: Thresholds) -> _Begun:
+    recordings = [load_recording(path, "concealed", ROBOT) for path in sorted(folder.glob("run_*.csv.gz"))]
+    prepared = prepare(robot, soil, recordings, Setting())
+    problem = prepared.problem
+    raw, standing = begin(problem)
+    scans = (standing, stand(problem, raw)) if standing.dispersion > _BENT else (standing,)
+    return _Begun(prepared, raw, scans, thresholds.for_windows(problem.blocked.windows.count))
+
+
+def _one_roll_out(robot: Robot, soil: Soil, begun: _Begun) -> First:
+    """The same with windows as long as the drives."""
+    setting = Setting(duration=_WHOLE_DRIVE, stride=_WHOLE_DRIVE)
+    _, standing = begin(make_problem(robot, soil, begun.prepared.recordings, setting))
+    return first_of((standing,), begun.thresholds)
