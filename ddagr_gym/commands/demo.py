@@ -83,8 +83,7 @@ def run(arguments: Arguments) -> None:
 
 
 def turn_step(arguments: Arguments, folder: Path) -> Section:
-    """A row turn by constant speeds on a drawn soil; figure, video and CSV into the folder."""
-    print("Calibrating two constant bank speeds on the nominal soil ...", flush=True)
+    """A row turn by the default controller on a drawn soil; figure, video and CSV into the folder."""
     driven, summary = _drive(arguments)
     print("Writing the CSV, the figure and the video ...", flush=True)
     _write(folder, driven)
@@ -147,22 +146,23 @@ def replay_step(drive: DriveToReplay, folder: Path) -> Section:
 
 def _drive(arguments: Arguments) -> tuple[Any, str]:
     from ddagr_gym.envs.options import make_settings
-    from ddagr_gym.evaluation.calibration import calibrate_constant_speeds
+    from ddagr_gym.evaluation.controllers import DEFAULT, find_controller, needs_filter
     from ddagr_gym.evaluation.metrics import turn_metrics
     from ddagr_gym.evaluation.runs import drive_turn
-    from ddagr_gym.presets import get_robot, get_soil
 
-    settings = make_settings(radius=arguments.radius, side=arguments.side, speed=_SPEED)
+    settings = make_settings(
+        radius=arguments.radius, side=arguments.side, speed=_SPEED, ekf_features=needs_filter(DEFAULT)
+    )
     turn = settings.turn(arguments.radius, arguments.side, _SPEED)
-    controller = calibrate_constant_speeds(get_robot("ddagr"), get_soil("thesis_a1"), turn)
-    print("Driving a row turn on a soil drawn from the default range ...", flush=True)
-    driven = drive_turn(controller, settings, arguments.seed)
+    print(f"Driving a row turn by {DEFAULT} on a soil drawn from the default range ...", flush=True)
+    driven = drive_turn(find_controller(DEFAULT, turn), settings, arguments.seed)
     metrics = turn_metrics(driven.columns, driven.episode.turn, driven.episode.robot)
     return driven, _summary(driven, metrics)
 
 
 def _summary(driven: Any, metrics: Any) -> str:
     from ddagr_gym.commands.output import format_table
+    from ddagr_gym.evaluation.controllers import DEFAULT
 
     radius, exit_ = metrics.turn, metrics.exit
     turn = driven.episode.turn
@@ -172,7 +172,7 @@ def _summary(driven: Any, metrics: Any) -> str:
     if exit_ is not None:
         rows += [("lateral error at the next row", f"{1e3 * exit_.lateral_error:+.0f} mm")]
     rows += [("every wheel fits its furrow", "yes" if driven.success else "no")]
-    return format_table(("row turn by two constant speeds (B1)", "value"), rows)
+    return format_table((f"row turn by {DEFAULT}, the default controller", "value"), rows)
 
 
 def _write(folder: Path, driven: Any) -> None:

@@ -14,7 +14,8 @@ from ddagr_gym.commands.progress import Progress
 from ddagr_gym.errors import InputError, unknown_name
 
 EXAMPLES = (
-    "ddagr evaluate --controllers B0,B1,B3 --scenarios S0 --output evaluation",
+    "ddagr evaluate --controllers B1,B4,ppo_ekf --scenarios S0 --output evaluation",
+    "ddagr evaluate --controllers 'B4,ppo_ekf_seed_*' --scenarios S1 --output all_training_seeds",
     "ddagr evaluate --controllers B1,B4,B5 --scenarios S0,V --workers 2 --output evaluation",
     "ddagr evaluate --controllers B4 --scenarios T --episodes 5 --output smoke_test",
     "ddagr evaluate --replay B4:V:11 --output worst_turn",
@@ -39,7 +40,7 @@ class Arguments:
         replay: instead of all that drive one scenario, controller:set:number, and write its figure, video and metrics.
     """
 
-    controllers: str = "B0,B1,B2,B3,B4,true_curvature"
+    controllers: str = "B0,B1,B2,B3,B4,ppo_ekf"
     scenarios: str = "S0"
     output: Path = Path("ddagr_evaluation")
     workers: int = 2

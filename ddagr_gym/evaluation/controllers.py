@@ -156,6 +156,10 @@ def _make_true_path(turn: RowTurn, gains: LadderGains) -> Controller:
     return TruePath(ddagr(), loop.gains, gains.true_path_heading, ratio, lead)
 
 
+DEFAULT = "B4"
+"""Controller that is used where none is named: the headline policy if the claims hold that it is surely closer than
+the force balance on S1 and does not collapse on S4 to S8 (``benchmarks/results/row_turns.json``), else the latter."""
+
 EKF_CONTROLLERS = ("B4", "B5")
 """Controllers that need the filter's features in the observation."""
 

@@ -121,7 +121,11 @@ def _first_run(rows: Sequence[Row]) -> list[Row]:
 def main_arms(evaluation: Evaluation, most: int) -> list[str]:
     """Deployable arms by importance: headline, best, ladder, others; in the order of the tables."""
     best = best_arm(evaluation)
-    deployable = [arm for arm in evaluation.arms if arm.deployable and evaluation.rows_of(arm.name, evaluation.judged)]
+    deployable = [
+        arm
+        for arm in evaluation.arms
+        if arm.deployable and not arm.ablation and evaluation.rows_of(arm.name, evaluation.judged)
+    ]
     first = [arm for arm in deployable if arm.name in (evaluation.headline, best.name if best else "")]
     ladder = [arm for arm in deployable if not arm.learned and arm not in first]
     others = [arm for arm in deployable if arm.learned and arm not in first]

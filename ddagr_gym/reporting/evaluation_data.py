@@ -38,6 +38,11 @@ class Arm:
     learned: bool = False
     versions: tuple[str, ...] = ()
 
+    @property
+    def ablation(self) -> bool:
+        """Whether it is a policy that is told something else than it was trained with, to see what that changes."""
+        return "@" in self.name.rsplit("/", 1)[-1]
+
 
 @dataclass(frozen=True)
 class SetNote:
@@ -184,11 +189,13 @@ def badness(row: Row) -> tuple[bool, float]:
 
 
 def best_arm(evaluation: Evaluation) -> Arm | None:
-    """Deployable arm with the smallest median |e_R| on the judged set; None where no scenario there is feasible."""
+    """Deployable arm with the smallest median |e_R| on the judged set, ablations apart; None if nothing is feasible."""
     ranked = [
         (value, place, arm)
         for place, arm in enumerate(evaluation.arms)
-        if arm.deployable and (value := _median(evaluation.metrics(arm.name, evaluation.judged))) is not None
+        if arm.deployable
+        and not arm.ablation
+        and (value := _median(evaluation.metrics(arm.name, evaluation.judged))) is not None
     ]
     return min(ranked)[2] if ranked else None
 

@@ -100,13 +100,18 @@ def doubts(evaluation: Evaluation) -> str:
     if best is None:
         return ""
     found = evaluation.metrics(best.name, evaluation.judged)
-    parts = []
-    for baseline in BASELINES:
-        item = found.get(f"improvement_over_{baseline}")
+    compared = {name: found.get(f"improvement_over_{name}") for name in BASELINES}
+    parts, open_ones = [], []
+    for baseline, item in compared.items():
         if item is not None:
             text = with_span(item, 0)
             parts.append(f"closer than {baseline} in {text['value']} of scenarios ({text['span']})")
-    return f"Paired, it is {' and '.join(parts)}." if parts else ""
+            if item["interval"][0] <= 0.5 <= item["interval"][1]:
+                open_ones.append(baseline)
+    if not parts:
+        return ""
+    undecided = f" Whether it is better than {' or '.join(open_ones)} is open: 50 % lies inside." if open_ones else ""
+    return f"Paired, it is {' and '.join(parts)}.{undecided}"
 
 
 def answer_rows(evaluation: Evaluation, deployable: bool) -> list[dict[str, Any]]:
@@ -115,7 +120,7 @@ def answer_rows(evaluation: Evaluation, deployable: bool) -> list[dict[str, Any]
     rows = []
     for arm in evaluation.arms:
         found = evaluation.metrics(arm.name, evaluation.judged)
-        if arm.deployable != deployable or not found:
+        if arm.deployable != deployable or arm.ablation or not found:
             continue
         rows.append(
             {
@@ -323,12 +328,12 @@ def radius_note(evaluation: Evaluation) -> str:
     """How many radii are undefined, and how far two ways of measuring one differ, over all arms and sets."""
     found = [evaluation.metrics(arm.name, item.name) for arm in evaluation.arms for item in evaluation.sets]
     undefined = sum(m.get("undefined_radius", 0) for m in found)
-    gaps = [row["radius_disagreement"] for row in evaluation.rows if row["radius_disagreement"] is not None]
+    gaps = [row["radius_disagreement"] for row in evaluation.rows if row["success"] and row["radius_disagreement"]]
     text = f"Of {len(evaluation.rows)} episodes, {undefined} have no radius (they count as worst)."
     if not gaps:
         return text
     median, high = (percent(float(np.quantile(gaps, level, method="inverted_cdf"))) for level in (0.5, 0.95))
     return (
         f"{text} On uneven soil a path is no exact circle: arc length over course change gives a radius that differs "
-        f"from the fitted one by {median} in half of the turns and by more than {high} in one of twenty."
+        f"from the fitted one by {median} in half of the successful turns and by more than {high} in one of twenty."
     )

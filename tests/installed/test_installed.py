@@ -73,8 +73,7 @@ def test_trained_policies_drive_without_torch():
     from ddagr_gym.policies.shipped import policies_dir, policy_names
 
     assert policies_dir() == Path(ddagr_gym.__file__).resolve().parent / "data" / "policies"
-    if "ppo_ekf" not in policy_names():
-        pytest.skip("no trained policy is published in agents/policies yet")
+    assert "ppo_ekf" in policy_names()
     environment = gymnasium.make("DDAGR-Turn-EKF-v0")
     observation, _ = environment.reset(seed=1)
     controller = policy_controller("ppo_ekf")

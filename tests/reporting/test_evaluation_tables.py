@@ -10,6 +10,7 @@ from ddagr_gym.reporting.evaluation_tables import (
     answer_rows,
     claim_rows,
     claims_sentence,
+    doubts,
     failure_rows,
     infeasible_sentence,
     learned_rows,
@@ -40,6 +41,26 @@ def test_a_failure_makes_the_percentile_fail():
     assert row["cells"][1]["value"] == "failed"
     assert row["cells"][1]["span"].endswith("failed")
     assert row["cells"][3]["value"] == "50.0 %"  # 5, 4 and 3 % of six fit
+
+
+def test_an_ablation_is_no_answer():
+    rows = rows_of("ppo_ekf", [0.01, 0.02]) + rows_of("ppo_ekf@frozen", [0.001, 0.002])
+    arms = [Arm("ppo_ekf", "learned", learned=True), Arm("ppo_ekf@frozen", "learned", learned=True)]
+    found = evaluation(rows=rows, summary=summaries(rows), arms=arms)
+    assert sentence(found).startswith("ppo_ekf turns closest")
+    assert [row["name"] for row in answer_rows(found, True)] == ["ppo_ekf"]
+    assert [row["name"] for row in learned_rows(found)] == ["ppo_ekf", "ppo_ekf@frozen"]
+    assert not Arm("runs@home/policy.npz", "").ablation
+
+
+def test_an_interval_around_one_half_is_said_to_decide_nothing():
+    near = rows_of("ppo_ekf", [0.01, 0.04] * 20) + rows_of("B4", [0.03] * 40) + rows_of("B1", [0.2] * 40)
+    arms = [Arm("B1", ""), Arm("B4", ""), Arm("ppo_ekf", "", learned=True)]
+    text = doubts(evaluation(rows=near, summary=summaries(near), arms=arms))
+    assert text.startswith("Paired, it is closer than B1 in 100 % of scenarios")
+    assert text.endswith("Whether it is better than B4 is open: 50 % lies inside.")
+    clear = [row for row in near if row["arm"] != "B4"]
+    assert "open" not in doubts(evaluation(rows=clear, summary=summaries(clear), arms=[arms[0], arms[2]]))
 
 
 def test_negative_intervals_are_read_as_such():
@@ -109,13 +130,14 @@ def test_the_headline_by_one_seed_stands_below_the_headline():
 
 
 def test_the_radius_note_says_how_well_a_radius_is_defined():
-    gaps = [0.002, 0.004, 0.03]
-    rows = [row | {"radius_disagreement": gap} for row, gap in zip(rows_of("B1", [0.1, 0.2, 0.3]), gaps, strict=True)]
+    gaps = (0.002, 0.004, 0.03)
+    turns = rows_of("B1", [0.01, 0.02, 0.03])
+    rows = [row | {"radius_disagreement": gap} for row, gap in zip(turns, gaps, strict=True)]
     text = radius_note(evaluation(rows=rows, summary=summaries(rows), arms=[Arm("B1", "")], headline=""))
     assert "Of 3 episodes, 0 have no radius" in text
-    assert "by 0.4 % in half of the turns" in text
+    assert "by 0.4 % in half of the successful turns" in text
     assert "more than 3.0 % in one of twenty" in text
-    none = [row | {"radius_disagreement": None} for row in rows]
+    none = [row | {"success": False} for row in rows]
     assert "exact circle" not in radius_note(evaluation(rows=none, arms=[Arm("B1", "")], headline=""))
 
 
