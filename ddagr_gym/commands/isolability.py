@@ -35,8 +35,8 @@ class Arguments:
         sensors: some of imu, encoders, pose.
         robot: nominal robot.
         soil: nominal soil.
-        thresholds: gates of `ddagr null-bank`; without them those that normal noise alone asks for (chi-square); real
-            drives need larger sizes.
+        thresholds: gates of `ddagr null-bank`; by default those that ship for the robot, and where none do those that
+            normal noise alone asks for (chi-square): real drives need larger sizes then.
         seed: of the sensor noise.
         overwrite: replace an output folder that an earlier command wrote.
     """
@@ -62,7 +62,7 @@ def run(arguments: Arguments) -> None:
     check_output_folder(arguments.output, overwrite=arguments.overwrite)
     robot, soil = get_robot(arguments.robot), get_soil(arguments.soil)
     manoeuvres = [find_manoeuvre(name) for name in arguments.manoeuvres]
-    thresholds = _thresholds(arguments.thresholds)
+    thresholds = _thresholds(arguments.thresholds, arguments.robot)
     with Progress(len(effect_kinds()), "effects") as progress:
         table = isolability(
             robot,
@@ -84,10 +84,14 @@ def run(arguments: Arguments) -> None:
     print(f"\ntable, JSON and figure: {arguments.output}")
 
 
-def _thresholds(path: Path | None) -> Thresholds | None:
-    from ddagr_gym.diagnosis.thresholds import load_thresholds
+def _thresholds(path: Path | None, robot: str) -> Thresholds | None:
+    """Given gates, those that ship for a robot, or None where none do."""
+    from ddagr_gym.diagnosis import thresholds
 
-    return None if path is None else load_thresholds(path)
+    if path is not None:
+        return thresholds.load_thresholds(path)
+    shipped = Path(thresholds.__file__).resolve().parents[1] / "data" / f"null_bank_{robot}.json"
+    return thresholds.default_thresholds(robot) if shipped.is_file() else None
 
 
 def table_text(table: Isolability) -> str:

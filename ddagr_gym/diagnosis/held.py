@@ -88,6 +88,18 @@ def find_held(recordings: Sequence[Recording]) -> tuple[Held, ...]:
     return tuple(found)
 
 
+def repeated_rows(recording: Recording, names: Sequence[str]) -> tuple[NDArray[np.int64], Flags]:
+    """Rows (n,) with a reading of all channels, and whether each repeats the reading before.
+
+    A standing robot's encoders say zero all the time and mean it: zeros are no repeats.
+    """
+    values = np.stack([recording[name] for name in names], axis=1)
+    rows = np.flatnonzero(np.isfinite(values).all(axis=1))
+    same = np.zeros(len(rows), dtype=bool)
+    same[1:] = (values[rows[1:]] == values[rows[:-1]]).all(axis=1)
+    return rows, same & ~(values[rows] == 0.0).all(axis=1)
+
+
 def without_repeats(recording: Recording, held: Sequence[Held]) -> Recording:
     """Recording in which repeated readings of the held sensors are missing samples."""
     channels = dict(recording.channels)
@@ -95,12 +107,7 @@ def without_repeats(recording: Recording, held: Sequence[Held]) -> Recording:
         names = [name for name in SENSORS[item.sensor] if recording.has(name)]
         if not names:
             continue
-        values = np.stack([recording[name] for name in names], axis=1)
-        rows = np.flatnonzero(np.isfinite(values).all(axis=1))
-        same = np.zeros(len(rows), dtype=bool)
-        same[1:] = (values[rows[1:]] == values[rows[:-1]]).all(axis=1)
-        # a standing robot's encoders say zero all the time and mean it
-        same &= ~(values[rows] == 0.0).all(axis=1)
+        rows, same = repeated_rows(recording, names)
         for name in names:
             changed = channels[name].copy()
             changed[rows[same]] = np.nan

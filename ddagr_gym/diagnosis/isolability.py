@@ -179,7 +179,8 @@ def isolability(
     """
     planned = plan(robot, soil, manoeuvres, sensors, seed=seed, setting=setting)
     terms = scan(planned.problem, planned.fitted, kinds, progress)
-    gates = chance_gates(terms) if thresholds is None else thresholds
+    windows = planned.problem.blocked.windows.count
+    gates = chance_gates(terms) if thresholds is None else thresholds.for_windows(windows)
     matrix = information(terms)
     names = tuple(dict.fromkeys(c.name for c in terms.candidates))
     sizes = {name: _directions(name, terms, matrix, gates.of(name).gain) for name in names}
@@ -195,7 +196,7 @@ def isolability(
         tuple(m.name for m in manoeuvres),
         math.fsum(m.duration for m in manoeuvres),
         tuple(sensors),
-        gates.bank,
+        f"null bank {gates.bank} of {gates.nulls} drives" if gates.nulls else gates.bank,
         names,
         tuple(item for name in names for item in _best_by_field([d.size for d in sizes[name]])),
         tuple(map(tuple, share.tolist())),

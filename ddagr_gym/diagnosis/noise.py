@@ -35,6 +35,13 @@ _STEADY = 0.8
 _STEADY_CHANGE = 0.02
 """Change of a bank's command that still counts as none [rad/s] (ours)."""
 
+_NO_COUNTER = 1.7
+"""Standard deviation of means of ten over that of a differenced counter above which a channel is none: with rounding
+that is independent from sample to sample it is 3."""
+
+_STEPS = 6.0
+"""Quanta between two samples at steady speed beyond which the speed was not steady (ours)."""
+
 _FEWEST = 40
 """Differences that a level needs (ours)."""
 
@@ -119,10 +126,27 @@ def channel_noise(values: Sequence[Array], speeds: Sequence[Array], sparse: bool
         return ChannelNoise(float(np.sqrt(square)), 0.0, 0.0, 0.0) if np.isfinite(square) else None
     one, _ = _pairs(list(values), list(speeds), 1)
     if quantum > 0.0 and _central_square(one) < (_COARSE * quantum) ** 2:
-        # a differenced counter: the rounding of a position enters two successive samples with opposite signs
-        return ChannelNoise(float(quantum / np.sqrt(6.0)), 0.0, -0.5, quantum)
+        return _rounded(list(values), list(speeds), quantum)
     found = _coloured(list(values), list(speeds))
     return None if found is None else replace(found, quantum=quantum)
+
+
+def _rounded(values: list[Array], speeds: list[Array], quantum: float) -> ChannelNoise:
+    """Noise of a channel that its rounding limits: a differenced counter, or a reading rounded by itself.
+
+    The rounding of a counter's position enters two successive samples with opposite signs, so that means over several
+    are far better than samples; that of a reading, or a jitter of either, does not. Means of the data themselves tell.
+    """
+    counter = ChannelNoise(float(quantum / np.sqrt(6.0)), 0.0, -0.5, quantum)
+    if _inflation(counter, values, speeds, samples=10) < _NO_COUNTER:
+        return counter
+    (first, _), (second, _) = (_pairs(values, speeds, lag) for lag in (1, 2))
+    limit = _STEPS * quantum
+    squares = [float(np.mean(d[np.abs(d) < limit] ** 2)) for d in (first, second)]
+    # correlated over one sample at most: var(x[k+1] - x[k]) = 2 s^2 (1 - r), var(x[k+2] - x[k]) = 2 s^2
+    correlation = float(np.clip(1.0 - squares[0] / max(squares[1], 1e-12), -0.5, 0.5))
+    plain = ChannelNoise(float(np.sqrt(0.5 * squares[1])), 0.0, correlation, quantum)
+    return replace(plain, inflation=max(_inflation(plain, values, speeds), 1.0))
 
 
 def _coloured(values: list[Array], speeds: list[Array]) -> ChannelNoise | None:

@@ -22,6 +22,12 @@ PARTS = 4
 _SLOW = 0.98
 """Correlation of successive samples of the slow part of the noise [-]."""
 
+_COUNTER = -0.4
+"""Correlation of successive samples below which rounding is that of a differenced counter."""
+
+_JITTER = 0.4
+"""Of a speed that is rounded by itself, in quanta."""
+
 _MEANS = ("encoder_right", "encoder_left")
 _INERTIAL = ("specific_force_x", "specific_force_y", "yaw_rate")
 
@@ -37,6 +43,7 @@ class Reading:
         inertial_mean: whether the inertial unit gives means over a sample instead of values at its end.
         encoder_instant: whether encoders give the speed at the end of a sample instead of the mean.
         tails: degrees of freedom of Student's t distribution of the noise, above 2; 0 for normal noise.
+        rounded: whether encoders' speeds are rounded one by one instead of as differences of a counter.
         slow: share of the inertial noise's standard deviation that changes slowly.
     """
 
@@ -46,6 +53,7 @@ class Reading:
     inertial_mean: bool = False
     encoder_instant: bool = False
     tails: float = 0.0
+    rounded: bool = False
     slow: float = 0.0
 
     def commands(self, commands: Array) -> Array:
@@ -79,14 +87,17 @@ class Reading:
             speed: (n,) travel speed [m/s].
             rng: source of randomness.
         """
-        if noise.quantum > 0.0:
+        if self.rounded and noise.quantum > 0.0:
+            return np.round(clean / noise.quantum + _JITTER * rng.standard_normal(len(clean))) * noise.quantum
+        if noise.quantum > 0.0 and noise.correlation <= _COUNTER:
             counts = np.floor(np.cumsum(clean) / noise.quantum + rng.random())
             return np.diff(counts, prepend=0.0) * noise.quantum
         share = self.slow if name in _INERTIAL else 0.0
         shape = np.sqrt(1.0 - share**2) * _coloured(self._white(len(clean) + 100, rng), noise.correlation)
         if share > 0.0:
             shape = shape + share * _coloured(rng.standard_normal(len(clean) + 100), _SLOW)
-        return clean + shape * np.hypot(noise.sigma, noise.per_speed * speed) * max(noise.inflation, 1.0)
+        read = clean + shape * np.hypot(noise.sigma, noise.per_speed * speed) * max(noise.inflation, 1.0)
+        return np.round(read / noise.quantum) * noise.quantum if noise.quantum > 0.0 else read
 
     def _white(self, count: int, rng: np.random.Generator) -> Array:
         if self.tails <= 2.0:
@@ -117,5 +128,10 @@ def draw_reading(kind: str, rng: np.random.Generator) -> Reading:
             "encoder_instant": bool(rng.random() < 0.5),
         }
     if kind in ("noise", "all"):
-        options = {**options, "tails": float(rng.uniform(4.0, 8.0)), "slow": float(rng.uniform(0.1, 0.3))}
+        options = {
+            **options,
+            "tails": float(rng.uniform(4.0, 8.0)),
+            "rounded": bool(rng.random() < 0.5),
+            "slow": float(rng.uniform(0.1, 0.3)),
+        }
     return Reading(**options)  # type: ignore[arg-type]

@@ -17,10 +17,13 @@ import numpy as np
 from ddagr_gym.diagnosis.certify import certify
 from ddagr_gym.diagnosis.diagnose import Prepared, conclude, prepare
 from ddagr_gym.diagnosis.evidence import Evidence, gather_evidence
+from ddagr_gym.diagnosis.held_spans import held_where
 from ddagr_gym.diagnosis.inputs import check_recordings, content_hash
 from ddagr_gym.diagnosis.localisation import locate
 from ddagr_gym.diagnosis.misfit import explained_share
 from ddagr_gym.diagnosis.next_drive import next_drive, rivals_of_diagnosis, sensors_of_diagnosis
+from ddagr_gym.diagnosis.regimes import Unevenness
+from ddagr_gym.diagnosis.regimes_words import uneven_phrase
 from ddagr_gym.diagnosis.search import Found, search
 from ddagr_gym.diagnosis.sentences import headline
 from ddagr_gym.diagnosis.setting import Setting
@@ -33,6 +36,7 @@ from ddagr_gym.errors import InputError
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.recordings.schema import Recording
+from ddagr_gym.reporting.wording import in_sentence
 
 STEPS = ("search", "verdict", "certification", "localisation", "unnamed terms", "next drive", "evidence")
 """Names of the steps that are kept."""
@@ -132,7 +136,8 @@ def run(
         else step("certification", lambda: _certified(task, prepared, found, diagnosis, progress))
     )
     where = step("localisation", lambda: asdict(locate(prepared.problem, found)))
-    diagnosis = _doubted(diagnosis, found, where)
+    held = held_where(task.recordings, prepared.held)
+    diagnosis = _doubted(diagnosis, found, where, {} if held is None else {"sensor_hold": asdict(held)})
     unnamed = None if task.names_only else step("unnamed terms", lambda: _unnamed(task, prepared, found, diagnosis))
     following = None if task.names_only else step("next drive", lambda: _next_drive(task, diagnosis, progress))
     evidence = step("evidence", lambda: gather_evidence(prepared.problem, found, task.thresholds))
@@ -142,14 +147,18 @@ def run(
     return Outcome(diagnosis, effects, prepared, found, evidence)
 
 
-def _doubted(diagnosis: Diagnosis, found: Found, where: Mapping[str, Any]) -> Diagnosis:
+def _doubted(diagnosis: Diagnosis, found: Found, where: Mapping[str, Any], held: Mapping[str, Any]) -> Diagnosis:
     """Findings with their places; a size that is not the same everywhere means that the name is not the whole truth."""
-    findings = tuple(replace(f, where=where["findings"].get(f.name)) for f in diagnosis.findings)
-    even = all(f.where is None or f.where.get("uneven") is None for f in findings)
-    complete = diagnosis.complete and even
+    located = {**where["findings"], **held}
+    findings = tuple(replace(f, where=located.get(f.name)) for f in diagnosis.findings)
+    uneven = [
+        uneven_phrase(Unevenness(**f.where["uneven"]), f"the size of {in_sentence(f.name)}")
+        for f in findings
+        if f.where is not None and f.where.get("uneven") is not None
+    ]
     share = explained_share(found.nominal.misfit, found.chosen.misfit, diagnosis.misfit["limit"]) if findings else None
-    sentence = headline(diagnosis.verdict, complete, findings, share)
-    return replace(diagnosis, findings=findings, complete=complete, sentence=sentence)
+    sentence = headline(diagnosis.verdict, diagnosis.complete, findings, share, uneven)
+    return replace(diagnosis, findings=findings, complete=diagnosis.complete and not uneven, sentence=sentence)
 
 
 def _unnamed(task: Task, prepared: Prepared, found: Found, diagnosis: Diagnosis) -> Mapping[str, Any] | None:

@@ -52,8 +52,13 @@ def phrase_of(lying: Sequence[RegimeShare], fitted: Sequence[Disc] = (), covered
     return f"{degree} {where} ({inside} % of it in {100.0 * first.time_inside:.0f} % of the time)"
 
 
-def uneven_phrase(other: Unevenness) -> str:
-    """That a fitted effect is not of one size."""
+def uneven_phrase(other: Unevenness, whose: str = "its size") -> str:
+    """That a fitted effect is not of one size.
+
+    Args:
+        other: where it differs.
+        whose: subject of the sentence.
+    """
     where = range_in_words(other.name, other.low, other.high)
     inside, outside = number(other.size_inside), number(other.size_outside)
-    return f"its size is not the same everywhere: {inside} of the fitted one {where}, {outside} elsewhere"
+    return f"{whose} is not the same everywhere: {inside} of the fitted one {where}, {outside} elsewhere"

@@ -126,10 +126,13 @@ def _trial(problem: Problem, standing: Standing, gain: Gain, terms: Terms, start
     Where something large is missing, a nominal refit bends soil and robot to make up for it, so far that no step leads
     back: then the raw nominal model is a better start than the refitted one.
     """
-    effect = first_guess(terms.candidates[gain.candidate], gain.multiples)
+    candidate = terms.candidates[gain.candidate]
+    effect = first_guess(candidate, gain.multiples)
     point = replace(start.point, effects=(*standing.fitted.point.effects, effect))
     fitted = fit(problem, point, iterations=_TRIAL_STEPS, renewals=2, reuse=start)
-    if fitted.cost < standing.fitted.cost or (terms is standing.terms) != (start is standing.fitted):
+    scanned_here = (terms is standing.terms) == (start is standing.fitted)
+    has_sizes = candidate.whole is None and candidate.probes[0].differentiable
+    if fitted.cost < standing.fitted.cost or not (scanned_here and has_sizes):
         return fitted
     # the guess was too far off: nothing at all would have been better
     point = _damped_guess(problem, standing, gain, terms, start)

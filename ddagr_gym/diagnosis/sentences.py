@@ -9,7 +9,11 @@ from ddagr_gym.reporting.wording import amounts, describe
 
 
 def headline(
-    verdict: Sequence[str], complete: bool, findings: Sequence[Finding], misfit_share: float | None = None
+    verdict: Sequence[str],
+    complete: bool,
+    findings: Sequence[Finding],
+    misfit_share: float | None = None,
+    uneven: Sequence[str] = (),
 ) -> str:
     """What is missing, how big, how much of the mismatch that is, and whether more is left.
 
@@ -18,6 +22,7 @@ def headline(
         complete: whether nothing more is left than in drives with nothing missing.
         findings: one per name.
         misfit_share: share of the mismatch above the noise that the findings explain (0 to 1), None where unknown.
+        uneven: what is not of one size everywhere, in words.
     """
     if tuple(verdict) == (NONE,):
         return "Nothing is missing that these recordings can show."
@@ -26,7 +31,7 @@ def headline(
     found = _joined([describe(item.name, amounts(item.parameters)) for item in findings])
     share = "" if misfit_share is None else f"; {share_in_words(misfit_share)} of the mismatch"
     rest = "nothing else above what these data can show" if complete else "something more is left that has no name here"
-    return f"{found[:1].upper()}{found[1:]}{share}; {rest}."
+    return "; ".join([f"{found[:1].upper()}{found[1:]}{share}", *uneven, rest]) + "."
 
 
 def share_in_words(share: float) -> str:

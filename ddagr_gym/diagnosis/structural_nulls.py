@@ -194,7 +194,8 @@ def _changes(kind: str, rng: np.random.Generator) -> tuple[Effect, ...]:
     if every or kind == "shear law":
         changes.append(OtherShearLaw(float(rng.uniform(-0.5, 0.5)), float(rng.uniform(-0.3, 0.3))))
     if every or kind in ("motor loop", "plain"):
-        changes.append(SecondOrderMotors(float(rng.uniform(0.01, 0.05))))
+        # shorter than the least delay that counts as one
+        changes.append(SecondOrderMotors(float(rng.uniform(0.005, 0.02))))
     if every or kind == "relief":
         changes.append(_relief(rng.uniform(0.003, 0.01), rng.uniform(0.4, 1.5, 2), 1, rng))
     if kind == "rough":

@@ -24,13 +24,13 @@ from ddagr_gym.diagnosis.refit import effect_columns, effect_parameters
 from ddagr_gym.diagnosis.regressors import Motion, Term, library, motion_of
 from ddagr_gym.diagnosis.response import INPUTS, Response, course_of, linearise
 from ddagr_gym.diagnosis.search import Standing
-from ddagr_gym.diagnosis.stability import Stable, Sums, coefficients, held_out_share, resampled, select
+from ddagr_gym.diagnosis.stability import Stable, Sums, coefficients, held_out_share, intervals, select
 from ddagr_gym.replay.windows import CHANNELS
 
 Array = NDArray[np.float64]
 
 STRETCH = 6.0
-"""Length of the pieces of a recording that are drawn together [s] (ours: three windows)."""
+"""Length of the pieces of a recording that are drawn or left out together [s] (ours: three windows)."""
 
 FEWEST_STRETCHES, MOST_STRETCHES = 16, 40
 """Pieces at least and at most; shorter or longer recordings get shorter or longer pieces."""
@@ -53,7 +53,7 @@ class UnnamedTerm:
             [rad/s], or the name of a channel.
         coefficient: in unit.
         unit: of the target over that of the regressor.
-        interval: 90 %, resampled over stretches.
+        interval: 90 %, from fits that leave out one stretch at a time.
         stability: share of the halves of the data in which the term was taken.
         alternatives: terms that say nearly the same in these drives, "target ~ regressor".
     """
@@ -101,7 +101,7 @@ def unnamed_terms(problem: Problem, standing: Standing, rng: np.random.Generator
     Args:
         problem: windows and nominal model.
         standing: the model whose residual is to be explained, with the effects that it names.
-        rng: of the halves and the resampling.
+        rng: of the halves.
     """
     fitted = standing.fitted
     course = course_of(problem, fitted)
@@ -124,7 +124,7 @@ def unnamed_terms(problem: Problem, standing: Standing, rng: np.random.Generator
     share = held_out_share(sums, chosen, fold)
     ceiling = _ceiling(problem, sums, projected, motion, fold[group], fold)
     where = _where(problem, sums, projected, columns, motion, chosen)
-    written = _written(sums, terms, found, rng)
+    written = _written(sums, terms, found)
     return Unnamed(_equation(written), written, share, max(ceiling, share), where)
 
 
@@ -222,16 +222,13 @@ def _where(
     return regime_of(energy, motion, problem.blocked.windows.recording).words
 
 
-def _written(
-    sums: Sums, terms: Sequence[Term], found: Sequence[Stable], rng: np.random.Generator
-) -> tuple[UnnamedTerm, ...]:
+def _written(sums: Sums, terms: Sequence[Term], found: Sequence[Stable]) -> tuple[UnnamedTerm, ...]:
     """Terms with their coefficients and intervals."""
     if not found:
         return ()
     chosen = [item.column for item in found]
     values = coefficients(sums, chosen)
-    tails = [0.5 * (1.0 - _LEVEL), 0.5 * (1.0 + _LEVEL)]
-    low, high = np.quantile(resampled(sums, chosen, rng), tails, axis=0)
+    low, high = intervals(sums, chosen, _LEVEL)
     written = []
     for k, item in enumerate(found):
         term = terms[item.column]

@@ -37,6 +37,12 @@ _LINES: Mapping[str, Any] = {"raw": (0, (1, 1.4)), "nominal": DASHED, "corrected
 
 STRETCH = 20.0
 """Length of the stretch whose channels are drawn [s]."""
+MOST_POINTS = 2400
+"""Points of the drives in one picture: enough for the paths of three minutes, and longer ones stay small."""
+MOST_PATHS = 150
+"""Windows whose paths are drawn as lines, which cost 300 bytes each and more; those of longer drives as pixels."""
+MOST_BARS = 720
+"""Bars in one picture of a score, about one per point of its width."""
 BINS = 8
 _NARROWEST = 0.03
 _LEAST_GAIN = 0.5
@@ -61,6 +67,17 @@ def unit_of(channel: str) -> str:
 def present(evidence: Evidence) -> list[str]:
     """Channels with samples."""
     return [name for k, name in enumerate(CHANNELS) if np.isfinite(evidence.measured[..., k]).any()]
+
+
+def thinned(evidence: Evidence) -> Array:
+    """(W, b, 2) path of each window, of as many points as keep all within :data:`MOST_POINTS`, its ends at least.
+
+    The ends of a window are those of its neighbours, so that the path stays whole.
+    """
+    windows, blocks = evidence.path.shape[:2]
+    points = min(max(MOST_POINTS // windows, 2), blocks)
+    kept = np.unique(np.linspace(0, blocks - 1, points).round().astype(int))
+    return np.asarray(evidence.path[:, kept, :2])
 
 
 def best_stretch(evidence: Evidence, seconds: float = STRETCH) -> NDArray[np.int64]:
@@ -270,25 +287,43 @@ def score_figure(evidence: Evidence, number: int, finding: Mapping[str, Any]) ->
     recordings = np.unique(evidence.recording)
     figure = blank_figure(0.55 + 0.85 * len(recordings), 11.0)
     panels = figure.subplots(len(recordings), 1, squeeze=False)[:, 0]
-    spread = np.sqrt(np.maximum(evidence.information[number], 1e-12))
-    score = np.where(evidence.information[number] > 1e-6, evidence.score[number] / spread, 0.0)
-    limits = (min(float(score.min()), -2.5), max(float(score.max()), 2.5))
+    bars = [_bars(evidence, number, recording) for recording in recordings]
+    every = np.concatenate([values for _, _, values in bars])
+    limits = (min(float(every.min()), -2.5), max(float(every.max()), 2.5))
     spans = (finding.get("where") or {}).get("spans") or []
-    for axes, recording in zip(panels, recordings, strict=True):
-        rows = np.flatnonzero(evidence.recording == recording)
-        start = evidence.time[rows, None] + evidence.piece * np.arange(score.shape[1])
+    for axes, recording, (start, end, values) in zip(panels, recordings, bars, strict=True):
         axes.axhspan(-2.0, 2.0, color=palette.SHADE, linewidth=0.0)
         for span in spans:
             if span["recording"] == recording:
                 axes.axvspan(span["start"], span["end"], color=palette.PALE_ORANGE, alpha=0.35, linewidth=0.0)
-        for first, values in zip(start[:, 0], score[rows], strict=True):
-            edges = first + evidence.piece * np.arange(len(values) + 1)
-            edges[-1] = first + evidence.duration
-            axes.stairs(values, edges, fill=True, color=palette.INK, linewidth=0.0)
-        axes.set(ylim=limits, xlim=(float(start.min()), float(evidence.time[rows].max()) + evidence.duration))
+        none = np.zeros(len(values))
+        outline = np.stack([[start, start, end, end], [none, values, values, none]])
+        axes.fill(*outline.transpose(0, 2, 1).reshape(2, -1), color=palette.INK, linewidth=0.0)
+        axes.set(ylim=limits, xlim=(float(start.min()), float(end.max())))
         axes.set_ylabel(f"recording {recording + 1}")
     panels[-1].set_xlabel("time [s]")
     return figure
+
+
+def _bars(evidence: Evidence, number: int, recording: int) -> tuple[Array, Array, Array]:
+    """Start, end and standardised score (n,) of successive pieces of a recording; of a long drive of several at once.
+
+    Scores and their variances add up, so that a longer piece shows an effect as its parts do together.
+    """
+    rows = np.flatnonzero(evidence.recording == recording)
+    rows = rows[np.argsort(evidence.time[rows], kind="stable")]
+    pieces = evidence.score.shape[2]
+    start = evidence.time[rows, None] + evidence.piece * np.arange(pieces)
+    end = np.append(start[:, 1:], evidence.time[rows, None] + evidence.duration, axis=1)
+    together = -(-evidence.score[number].size // MOST_BARS)
+    first = np.arange(0, start.size, together)
+    score, information = (
+        np.add.reduceat(values[number, rows].ravel(), first) for values in (evidence.score, evidence.information)
+    )
+    last = np.append(first[1:], start.size) - 1
+    shown = information > 1e-6
+    standard = np.where(shown, score / np.sqrt(np.where(shown, information, 1.0)), 0.0)
+    return start.ravel()[first], end.ravel()[last], standard
 
 
 def horizon_figure(channels: Mapping[str, Mapping[str, Any]], channel: str) -> Figure:

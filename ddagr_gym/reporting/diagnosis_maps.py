@@ -9,10 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.reporting import palette
-from ddagr_gym.reporting.diagnosis_figures import BEFORE, MODELS, Figure, blank_figure
+from ddagr_gym.reporting.diagnosis_figures import BEFORE, MODELS, MOST_PATHS, Figure, blank_figure, thinned
 from ddagr_gym.reporting.evidence import Evidence
 
 Array = NDArray[np.float64]
+
+_PIXELS = 200
+"""Per inch, of what is drawn as pixels."""
 
 
 def map_figures(evidence: Evidence, findings: Sequence[Mapping[str, Any]] = ()) -> tuple[Figure, ...]:
@@ -33,15 +36,17 @@ def _map(evidence: Evidence, size: Array, top: float, title: str, findings: Sequ
     from matplotlib.collections import LineCollection
     from matplotlib.colors import LinearSegmentedColormap, Normalize
 
-    points = evidence.path[..., :2]
+    points = thinned(evidence)
     figure = blank_figure(3.9, 3.6)
+    figure.set_dpi(_PIXELS)
     axes = figure.subplots()
     _draw_places(axes, evidence, findings)
     colours = LinearSegmentedColormap.from_list("mismatch", ["#D3D8DC", "#EFC27A", BEFORE, "#6E1F00"])
     order = np.argsort(size, kind="stable")
     lines = LineCollection(
-        list(points[order]), cmap=colours, norm=Normalize(1.0, top), linewidths=2.4, capstyle="round"
-    )
+        list(points[order]), cmap=colours, norm=Normalize(1.0, top), linewidths=2.4, capstyle="round",
+        rasterized=len(points) > MOST_PATHS,
+    )  # fmt: skip
     lines.set_array(size[order])
     axes.add_collection(lines)
     axes.autoscale_view()
@@ -110,12 +115,13 @@ def _force_cells(evidence: Evidence, wrench: Array) -> Array:
 
 
 def _forces(evidence: Evidence, cells: Array, longest: float, title: str) -> Figure:
-    points = evidence.path[..., :2]
+    points = thinned(evidence)
     span = np.ptp(points.reshape(-1, 2), axis=0)
     figure = blank_figure(4.2)
+    figure.set_dpi(_PIXELS)
     axes = figure.subplots()
     for window in points:
-        axes.plot(*window.T, color=palette.PALE, linewidth=1.0)
+        axes.plot(*window.T, color=palette.PALE, linewidth=1.0, rasterized=len(points) > MOST_PATHS)
     x, y, force_x, force_y, clear = cells
     reach = 0.16 * max(float(span.max()), 0.5)
     steps = [f * 10.0**e for e in range(-3, 6) for f in (1.0, 2.0, 5.0)]

@@ -237,7 +237,7 @@ def next_drive(item: Entry | None) -> dict[str, Any] | None:
         "manoeuvre": str(item["manoeuvre"]).replace("_", " "),
         "why": item.get("why") or "",
         "separates": [" from ".join(in_sentence(str(name)) for name in pair) for pair in item.get("separates") or []],
-        "power": "" if power is None else percent(power),
+        "gain_rate": "" if power is None else number(power, 2),
         "alternatives": others,
     }
 

@@ -1,12 +1,14 @@
 """``ddagr isolability``: files, text, figure."""
 
 import json
+from dataclasses import replace
 
 import pytest
 
 from ddagr_gym.cli import main
-from ddagr_gym.commands.isolability import table_text
+from ddagr_gym.commands.isolability import _thresholds, table_text
 from ddagr_gym.diagnosis.isolability import Detectable, Isolability
+from ddagr_gym.diagnosis.thresholds import default_thresholds, save_thresholds
 from ddagr_gym.reporting.isolability_figure import isolability_figure
 
 
@@ -29,12 +31,22 @@ def test_writes_table_json_and_figure(tmp_path, capsys, monkeypatch, drive_csv):
     assert mapping["schema"] == "ddagr-isolability/1"
     assert set(mapping["effects"]) == {"slope", "gyro_scale", "imu_tilt"}
     text = (folder / "isolability.txt").read_text()
-    assert "ddagr on thesis_a1: short (6 s) with imu, encoders; gates: chi-square" in text
+    bank = default_thresholds("ddagr")
+    gates = f"null bank {bank.bank} of {bank.nulls} drives"
+    assert f"ddagr on thesis_a1: short (6 s) with imu, encoders; gates: {gates}" in text
     assert text.strip() in capsys.readouterr().out
     assert (folder / "isolability.png").stat().st_size > 10_000
     # a second run does not overwrite unasked
     assert main([*arguments, "--output", str(folder)]) == 2
     assert "--overwrite" in capsys.readouterr().err
+
+
+def test_gates_ship_with_the_robot_or_come_from_chance(tmp_path):
+    assert _thresholds(None, "ddagr") == default_thresholds("ddagr")
+    assert _thresholds(None, "a_robot_of_mine") is None
+    given = replace(default_thresholds("ddagr"), bank="given")
+    save_thresholds(given, tmp_path / "gates.json")
+    assert _thresholds(tmp_path / "gates.json", "ddagr") == given
 
 
 def test_unknown_manoeuvre_is_one_sentence(tmp_path, capsys):

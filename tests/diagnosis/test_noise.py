@@ -54,6 +54,28 @@ def test_counter_is_recognised_by_its_quantum() -> None:
     assert float(found.of_mean(5)) < 0.5 * found.sigma
 
 
+@pytest.mark.parametrize("kind", ["counter", "jittering counter", "rounded speed"])
+def test_means_of_rounded_speeds_are_as_good_as_they_are(kind: str) -> None:
+    """At steady speeds, where what is not the speed is noise."""
+    rng = np.random.default_rng(7)
+    quantum, steps, each = 0.0157, 60, 150
+    speed = np.repeat(rng.uniform(0.3, 1.2, steps), each)
+    angle = np.cumsum(speed)
+    if kind == "rounded speed":
+        read = np.round((speed + 0.5 * quantum * rng.standard_normal(len(speed))) / quantum) * quantum
+    else:
+        jitter = 0.4 * quantum * rng.standard_normal(len(speed)) if kind == "jittering counter" else 0.0
+        read = np.diff(np.floor((angle + jitter) / quantum), prepend=0.0) * quantum
+    found = channel_noise(list(read.reshape(steps, each)), list(np.zeros((steps, each))), sparse=False)
+    assert found is not None
+    assert found.quantum == pytest.approx(quantum, rel=1e-6)
+    error = (read - speed)[each:]
+    for samples in (5, 10):
+        measured = np.std(error.reshape(-1, samples).mean(axis=1))
+        assert float(found.of_mean(samples)) == pytest.approx(measured, rel=0.35)
+    assert (found.correlation == -0.5) == (kind == "counter")
+
+
 def test_sparse_poses() -> None:
     rng = np.random.default_rng(5)
     values = np.full(6000, np.nan)

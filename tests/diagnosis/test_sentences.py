@@ -5,6 +5,8 @@ from dataclasses import dataclass
 
 import pytest
 
+from ddagr_gym.diagnosis.regimes import Unevenness
+from ddagr_gym.diagnosis.regimes_words import uneven_phrase
 from ddagr_gym.diagnosis.sentences import headline, share_in_words
 from ddagr_gym.diagnosis.verdict import Estimate, Finding
 from ddagr_gym.physics.effects.registry import effect_kinds
@@ -27,6 +29,17 @@ def test_the_headline_says_what_how_big_and_what_is_left():
     assert sentence == (
         "The ground slopes 3.7 ± 0.3 degrees, rising towards 32 ± 4 degrees from the x axis; 71 % of the mismatch; "
         "nothing else above what these data can show."
+    )
+
+
+def test_the_headline_says_where_a_size_is_another_one():
+    uneven = uneven_phrase(
+        Unevenness("speed", "m/s", 0.5, None, 1.42, 0.8, 0.01), f"the size of {in_sentence('slope')}"
+    )
+    sentence = headline(("slope",), True, [finding("slope", **SLOPE)], 0.71, [uneven])
+    assert sentence.endswith(
+        "; 71 % of the mismatch; the size of sloping ground is not the same everywhere: 1.4 of the fitted one at "
+        "speeds above 0.50 m/s, 0.80 elsewhere; nothing else above what these data can show."
     )
 
 

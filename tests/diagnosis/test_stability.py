@@ -8,8 +8,8 @@ from ddagr_gym.diagnosis.stability import (
     clusters,
     coefficients,
     held_out_share,
+    intervals,
     lasso_takes,
-    resampled,
     select,
 )
 
@@ -43,10 +43,25 @@ def test_planted_columns_are_found_with_intervals_that_hold_them():
     found = select(sums, range(COLUMNS), rng)
     assert {3, 17} <= {item.column for item in found}
     assert all(item.share > 0.9 for item in found if item.column in (3, 17))
-    low, high = np.quantile(resampled(sums, [3, 17], rng), [0.005, 0.995], axis=0)
+    low, high = intervals(sums, [3, 17], 0.99)
     assert (low < [0.4, -0.25]).all()
     assert (high > [0.4, -0.25]).all()
     np.testing.assert_allclose(coefficients(sums, [3, 17]), [0.4, -0.25], atol=0.1)
+
+
+def test_intervals_keep_their_level_where_errors_hang_together_and_few_groups_tell():
+    """Each group has an error of its own along the column, and some groups show the column ten times as well."""
+    rng = np.random.default_rng(6)
+    runs, hits = 200, 0
+    for _ in range(runs):
+        acting = rng.gamma(1.0, 1.0, size=(16, 1, 1))
+        columns = acting * rng.standard_normal((16, 30, 1))
+        own = rng.standard_normal((16, 1)) * columns[..., 0] / acting[..., 0]
+        residual = columns[..., 0] + 0.6 * own + rng.standard_normal((16, 30))
+        low, high = intervals(sums_of(columns, residual), [0], 0.9)
+        hits += int(low[0] < 1.0 < high[0])
+    # the standard deviation of the share is 2 percent; 87 percent are covered, and 83 by resampled groups
+    assert 0.85 <= hits / runs <= 0.96
 
 
 def test_of_alike_columns_the_plainer_is_kept_and_the_other_named():

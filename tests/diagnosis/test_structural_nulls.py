@@ -102,3 +102,14 @@ def test_a_counter_is_rounded_in_its_angle():
                            np.random.default_rng(2))  # fmt: skip
     assert abs(read[1:].mean() - 0.4) < 1e-4
     assert set(np.round(read[1:] / quantum)) == {25.0, 26.0}
+
+
+def test_a_rounded_speed_is_rounded_one_by_one():
+    quantum, rng = 0.0157, np.random.default_rng(3)
+    read = Reading(rounded=True).noisy(
+        "encoder_left", np.full(4000, 0.4), ChannelNoise(0.0, 0.0, -0.5, quantum), np.zeros(4000), rng
+    )
+    counts = read / quantum
+    np.testing.assert_allclose(counts, np.round(counts), atol=1e-9)
+    assert abs(np.corrcoef(read[1:], read[:-1])[0, 1]) < 0.05
+    assert abs(read.mean() - 0.4) < 0.05 * quantum

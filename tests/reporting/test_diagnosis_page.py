@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from ddagr_gym.replay.windows import CHANNELS
-from ddagr_gym.reporting.diagnosis_figures import channel_figure
+from ddagr_gym.reporting.diagnosis_figures import MOST_BARS, MOST_POINTS, _bars, channel_figure, thinned
 from ddagr_gym.reporting.diagnosis_page import PAGE, PICTURES, _Studio, write_report
 from ddagr_gym.reporting.diagnosis_tables import detectable, fit_table, gate_note, regime_rows, tiles
 from ddagr_gym.reporting.evidence import Evidence
@@ -115,7 +115,8 @@ def test_the_answer_comes_first_and_every_section_is_there(page):
     assert len(headings) == len(set(headings)) == 13
     for words in (
         "slopes 3.7 ± 0.3 degrees, rising towards 32 ± 3 degrees", "uphill", "71 %", "square both ways",
-        "sloping ground from accelerometer bias", "0.57 degrees", "none, however large", "120 null drives", "f" * 64,
+        "sloping ground from accelerometer bias", "over the closest other explanation by 0.97",
+        "0.57 degrees", "none, however large", "120 null drives", "f" * 64,
         "p = 0.0040", "85 % to 95 %",
     ):  # fmt: skip
         assert words in page, words
@@ -132,6 +133,32 @@ def test_the_page_is_one_small_file_that_points_nowhere(page):
     assert sources
     assert all(source.startswith("data:") for source in sources)
     assert not re.search(r"https?://", page)
+
+
+def test_the_page_of_a_long_drive_stays_small(tmp_path):
+    """Half an hour of drive, at which the pictures of the paths alone were 3 MB."""
+    write_report(tmp_path, diagnosis(**later_entries()), evidence(windows=900))
+    assert len((tmp_path / PAGE).read_bytes()) < 2_000_000
+
+
+def test_paths_are_thinned_and_keep_the_ends_of_their_windows():
+    short, long, longest = (evidence(windows=count) for count in (100, 900, 5000))
+    assert thinned(short).shape == (100, 20, 2)
+    for drawn, whole in ((thinned(long), long), (thinned(longest), longest)):
+        np.testing.assert_array_equal(drawn[:, [0, -1]], whole.path[:, [0, -1], :2])
+    assert thinned(long).shape[0] * thinned(long).shape[1] <= MOST_POINTS
+    assert thinned(longest).shape[1] == 2
+
+
+def test_scores_of_a_long_drive_are_drawn_together():
+    made = evidence(windows=900)
+    start, end, standard = _bars(made, 0, 1)
+    together = -(-900 * 4 // MOST_BARS)
+    assert len(start) == 1800 // together <= MOST_BARS
+    np.testing.assert_allclose(end[:-1], start[1:])
+    expected = made.score[0, 450:].ravel()[:together].sum() / np.sqrt(together)
+    assert standard[0] == pytest.approx(expected)
+    assert len(_bars(evidence(windows=12), 0, 0)[0]) == 24
 
 
 def test_pictures_are_whole_and_named(folder, page):

@@ -1,0 +1,47 @@
+"""What localisation adds to the findings and to the sentence."""
+
+from dataclasses import asdict
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from ddagr_gym.diagnosis.localisation import Where
+from ddagr_gym.diagnosis.pipeline import _doubted
+from ddagr_gym.diagnosis.regimes import Unevenness
+from ddagr_gym.diagnosis.verdict import Diagnosis, Estimate, Finding, as_mapping, validate
+
+MISFIT = {"yaw_rate": 4.0}
+FOUND: Any = SimpleNamespace(nominal=SimpleNamespace(misfit=MISFIT), chosen=SimpleNamespace(misfit={"yaw_rate": 0.9}))
+
+
+def diagnosis(name: str, field: str, value: float, complete: bool = True) -> Diagnosis:
+    finding = Finding(name, {field: Estimate(value, "s")}, 50.0, 10.0, 5.0, 40.0, equivalence_set={name: 1.0})
+    limits = {"nominal": MISFIT, "corrected": {"yaw_rate": 0.9}, "limit": {"yaw_rate": 1.2}}
+    return Diagnosis((name,), complete, (finding,), "", limits, {}, {}, ("a.csv",), {}, 1.0, "0")
+
+
+def where(uneven: Unevenness | None = None) -> dict[str, Any]:
+    return asdict(Where((), 0.0, (), (), uneven, "everywhere"))
+
+
+@pytest.mark.parametrize("complete", [True, False])
+def test_a_size_that_is_not_the_same_everywhere_is_said_and_leaves_the_answer_incomplete(complete: bool) -> None:
+    located = {"findings": {"command_delay": where(Unevenness("speed", "m/s", 0.5, None, 1.5, 0.7, 0.01))}}
+    made = _doubted(diagnosis("command_delay", "delay", 0.1, complete), FOUND, located, {})
+    assert not made.complete
+    assert "the size of command delay is not the same everywhere: 1.5 of the fitted one" in made.sentence
+    assert made.sentence.endswith("above what these data can show." if complete else "that has no name here.")
+
+
+def test_an_even_size_changes_nothing() -> None:
+    made = _doubted(diagnosis("command_delay", "delay", 0.1), FOUND, {"findings": {"command_delay": where()}}, {})
+    assert made.complete
+    assert "everywhere" not in made.sentence
+
+
+def test_held_readings_keep_their_place() -> None:
+    """The model has no such effect, so that localisation says nothing about it."""
+    made = _doubted(diagnosis("sensor_hold", "duration", 0.2), FOUND, {"findings": {}}, {"sensor_hold": where()})
+    assert made.findings[0].where == where()
+    validate(as_mapping(made))
