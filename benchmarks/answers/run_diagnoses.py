@@ -39,8 +39,8 @@ CHECKOUT = HERE.parents[1]
 ENTRIES = ("verdict", "complete", "findings", "sentence", "fit", "detectable", "misfit", "seconds", "version")
 """What an answer keeps of a diagnosis.json."""
 
-UNKNOWN_GROUND = ("--soil", "firm_ground", "--soil-uncertainty", "4", "--stride", "4")
-"""Where a file does not say what it was driven on; every other window of drives of ten minutes is enough."""
+UNKNOWN_GROUND = ("--soil", "firm_ground", "--soil-uncertainty", "4", "--stride", "8")
+"""Where a file does not say what it was driven on; one window in four of drives of ten minutes is enough."""
 
 REAL_BANK = CHECKOUT / "ddagr_gym" / "data" / "null_bank_warthog.json"
 """Thresholds from ordinary Warthog drives; no ordinary Husky drive is at hand, so they serve for it too."""
