@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,8 @@ from ddagr_gym.parameters import Numerics, Robot, Soil
 from ddagr_gym.physics import layout
 from ddagr_gym.simulator import Simulator
 
+_NEARLY_AT_REST = 0.05  # [rad/s]
+_SHARES = tuple(round(1.0 - 0.02 * k, 2) for k in range(26))
 _SETTLING_SAMPLES = 500  # 4 s at 125 Hz: more than ten time constants of body and motors
 
 
@@ -63,22 +66,53 @@ def turning_speeds(robot: Robot, soil: Soil, speed: float, curvature: float) -> 
 
     spread = 1.4 * track * curvature  # effective over geometric track in a turn is 1.3 to 1.85
     guess = np.clip(speed / radius * np.array([1 + spread, 1 - spread]), -0.99 * limit, 0.99 * limit)
-    found = least_squares(mismatch, guess, bounds=(-limit, limit), diff_step=1e-3, xtol=1e-8, ftol=1e-12)
-    if np.abs(found.fun).max() > 2e-3:
-        raise InputError(
-            f"no bank speeds within {limit:g} rad/s turn robot {robot.name!r} at {speed:g} m/s and radius "
-            f"{1 / abs(curvature) if curvature else math.inf:g} m on this soil: choose a lower speed or a wider turn."
-        )
-    return float(found.x[0]), float(found.x[1])
+    for start in _starts(guess):
+        found = least_squares(mismatch, start, bounds=(-limit, limit), diff_step=1e-3, xtol=1e-8, ftol=1e-12)
+        if np.abs(found.fun).max() <= 2e-3:
+            return float(found.x[0]), float(found.x[1])
+    raise InputError(
+        f"no bank speeds within {limit:g} rad/s turn robot {robot.name!r} at {speed:g} m/s and radius "
+        f"{1 / abs(curvature) if curvature else math.inf:g} m on this soil: choose a lower speed or a wider turn."
+    )
+
+
+def _starts(guess: NDArray[np.float64]) -> Iterator[NDArray[np.float64]]:
+    """A guess, then others with the slower bank just before and after rest, where its force has a kink."""
+    yield guess
+    slower = int(np.argmin(np.abs(guess)))
+    for speed in (_NEARLY_AT_REST, -_NEARLY_AT_REST):
+        other = guess.copy()
+        other[slower] = speed
+        yield other
+
+
+def fastest_turning_speeds(
+    robot: Robot, soil: Soil, speed: float, curvature: float
+) -> tuple[float, tuple[float, float]]:
+    """Speed [m/s] and its :func:`turning_speeds`: ``speed``, or the fastest below it that the motors reach (ours).
+
+    Speeds are tried down to half of it, each 2 % of it below the one before.
+
+    Raises:
+        InputError: as :func:`turning_speeds`, for half of the speed.
+    """
+    for share in _SHARES[:-1]:
+        try:
+            return share * speed, turning_speeds(robot, soil, share * speed, curvature)
+        except InputError:
+            continue
+    return _SHARES[-1] * speed, turning_speeds(robot, soil, _SHARES[-1] * speed, curvature)
 
 
 def calibrate_constant_speeds(robot: Robot, soil: Soil, turn: RowTurn) -> ConstantSpeeds:
     """B1 for a turn: straight and turning bank speeds that are right on ``soil``, lead for the motors' lag.
 
+    A turn that is too fast for the motors is driven more slowly, at the commanded radius.
+
     Raises:
-        InputError: as :func:`turning_speeds`.
+        InputError: as :func:`turning_speeds`, for half of the speed.
     """
     straight, _ = turning_speeds(robot, soil, turn.speed, 0.0)
-    outer, inner = turning_speeds(robot, soil, turn.speed, 1.0 / turn.radius)
-    lead = turn.speed / turn.radius / robot.motor_rate
+    speed, (outer, inner) = fastest_turning_speeds(robot, soil, turn.speed, 1.0 / turn.radius)
+    lead = speed / turn.radius / robot.motor_rate
     return ConstantSpeeds(straight, outer, inner, lead, robot.maximum_wheel_speed)

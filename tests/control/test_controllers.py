@@ -110,6 +110,29 @@ def test_turning_speeds_make_the_turn():
     assert math.hypot(v_x, v_y) / rate == pytest.approx(0.8, rel=3e-3)
 
 
+def test_turning_speeds_are_found_on_either_side_of_rest():
+    """The inner bank of this turn nearly stands; from a start on the wrong side of that kink nothing is found."""
+    soil = get_soil("thesis_a1")
+    right, left = turning_speeds(ROBOT, soil, 0.199693, 1 / 0.696994)
+    assert abs(left) < 0.1
+    v_x, v_y, rate = steady_motion(ROBOT, soil, right, left)
+    assert math.hypot(v_x, v_y) == pytest.approx(0.199693, rel=3e-3)
+    assert math.hypot(v_x, v_y) / rate == pytest.approx(0.696994, rel=3e-3)
+
+
+def test_a_turn_too_fast_for_the_motors_is_driven_more_slowly_at_its_radius():
+    soil, turn = get_soil("thesis_a1"), RowTurn(radius=0.68, speed=0.25)
+    with pytest.raises(InputError, match="lower speed"):
+        turning_speeds(ROBOT, soil, turn.speed, 1 / turn.radius)
+    constants = calibrate_constant_speeds(ROBOT, soil, turn)
+    assert 0.95 * ROBOT.maximum_wheel_speed < constants.outer <= ROBOT.maximum_wheel_speed
+    v_x, v_y, rate = steady_motion(ROBOT, soil, constants.outer, constants.inner)
+    assert math.hypot(v_x, v_y) / rate == pytest.approx(0.68, rel=3e-3)
+    assert 0.9 * 0.25 < math.hypot(v_x, v_y) < 0.25
+    straight = steady_motion(ROBOT, soil, constants.straight, constants.straight)
+    assert math.hypot(*straight[:2]) == pytest.approx(0.25, rel=3e-3)
+
+
 def test_impossible_turn_is_one_sentence():
     with pytest.raises(InputError, match="lower speed"):
         turning_speeds(ROBOT, get_soil("thesis_a1"), 0.5, 1 / 0.5)
