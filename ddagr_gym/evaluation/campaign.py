@@ -77,12 +77,26 @@ def drive_scenario(controller: str, scenario: Scenario) -> TurnRun:
 
 def drive_scenarios(controller: str, scenarios: Sequence[Scenario]) -> list[TurnRun]:
     """Scenarios of one set by one controller, side by side where it can; the runs are those of one by one."""
-    batch = find_batch(controller, len(scenarios))
-    if batch is None:
+    if find_batch(controller, 1) is None:
         return [drive_scenario(controller, scenario) for scenario in scenarios]
-    settings = scenario_settings(scenarios[0], needs_filter(controller))
-    seeds, episodes = [scenario.seed for scenario in scenarios], [scenario.episode for scenario in scenarios]
-    return drive_turns(batch, settings, seeds, episodes)
+    runs: dict[int, TurnRun] = {}
+    for places in _places_by_grid(scenarios).values():
+        group = [scenarios[place] for place in places]
+        batch = find_batch(controller, len(group))
+        assert batch is not None
+        settings = scenario_settings(group[0], needs_filter(controller))
+        driven = drive_turns(batch, settings, [item.seed for item in group], [item.episode for item in group])
+        runs |= dict(zip(places, driven, strict=True))
+    return [runs[place] for place in range(len(scenarios))]
+
+
+def _places_by_grid(scenarios: Sequence[Scenario]) -> dict[Any, list[int]]:
+    """Places of scenarios whose soil grids have the same shape, as those of one batch must."""
+    groups: dict[Any, list[int]] = {}
+    for place, scenario in enumerate(scenarios):
+        field = scenario.episode.field
+        groups.setdefault(None if field is None else field.values.shape, []).append(place)
+    return groups
 
 
 @lru_cache(maxsize=1)
