@@ -208,6 +208,20 @@ def test_policies_drive_side_by_side_what_they_drive_alone(frozen, policy_path, 
             np.testing.assert_array_equal(run.columns[column], values)
 
 
+def test_grids_of_different_shapes_are_driven_side_by_side_too(tmp_path, monkeypatch, policy_path):
+    monkeypatch.setattr(scenario_module, "scenario_folder", lambda: tmp_path / "scenarios")
+    drawn = draw_set("S8")[:2]
+    save_scenarios("S8", "two", [drawn[0], drawn[1], drawn[0]])
+    scenarios = load_scenarios("S8")
+    assert len({scenario.episode.field.values.shape for scenario in scenarios}) == 2
+    runs = drive_scenarios(str(policy_path), scenarios)
+    for scenario, run in zip(scenarios, runs, strict=True):
+        assert run.episode == scenario.episode
+        np.testing.assert_array_equal(
+            run.columns["true_y"], drive_scenario(str(policy_path), scenario).columns["true_y"]
+        )
+
+
 def test_what_wants_the_truth_drives_alone(frozen, policy_path):
     assert find_batch(str(policy_path), 3) is not None
     for name in ("B4", f"{policy_path}@true"):
