@@ -28,7 +28,7 @@ from ddagr_gym.simulator import simulate
 Array = NDArray[np.float64]
 
 _VALID = 0.5
-"""Share of a piece in which the commands must be known."""
+"""Share of a piece's intended length in which the commands must be known."""
 
 _MARGIN = 3.0
 """Ground beyond the straight-line reach of a drive [m]."""
@@ -160,21 +160,22 @@ def scanned(robot: Robot, soil: Soil, recordings: Sequence[Recording], kind: str
 
 
 def pieces_of(recording: Recording, length: float) -> list[Recording]:
-    """An ordinary drive cut into pieces of about ``length`` [s] at the joints of its segments, each a null run.
+    """An ordinary drive cut into pieces with about ``length`` [s] of commands, each a null run.
 
-    A drive of one long segment is cut inside it. Pieces whose commands are mostly not what the robot received are left
-    out.
+    It is cut at the joints of its segments, a drive of one long segment inside it. Only time in which the commands are
+    what the robot received counts; a piece with less than half of it is left out.
     """
+    known = np.concatenate([[0.0], np.cumsum(recording.command_valid) * recording.period])
     ends = [end for _, end in recording.meta.segments]
     if len(ends) == 1:
-        rows = max(round(length / recording.period), 1)
-        ends = [*range(rows, ends[0], rows), ends[0]]
+        ends = [*np.searchsorted(known, np.arange(length, known[-1], length)).tolist(), ends[0]]
     pieces, first = [], recording.meta.segments[0][0]
     for end in ends:
-        if (end - first) * recording.period >= length or end == ends[-1]:
-            pieces.append(cut(recording, first, end))
+        if known[end] - known[first] >= length or end == ends[-1]:
+            if known[end] - known[first] > _VALID * length:
+                pieces.append(cut(recording, first, end))
             first = end
-    return [piece for piece in pieces if np.mean(piece.command_valid) > _VALID]
+    return pieces
 
 
 def cut(recording: Recording, first: int, last: int) -> Recording:

@@ -1,0 +1,42 @@
+"""Ordinary drives are cut into pieces with enough commands that the robot received."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ddagr_gym.diagnosis.null_bank import pieces_of
+from ddagr_gym.presets import get_robot
+from ddagr_gym.recordings.schema import Recording
+
+PERIOD = 0.05
+
+
+def drive(valid: np.ndarray, segments: list[tuple[int, int]] | None = None) -> Recording:
+    count = len(valid)
+    columns = {name: np.linspace(0.0, 1.0, count) for name in ("command_right", "command_left", "yaw_rate")}
+    columns["t"] = PERIOD * np.arange(1, count + 1)
+    return Recording.from_columns(columns, get_robot("warthog"), command_valid=valid, segments=segments)
+
+
+def seconds_of_commands(piece: Recording) -> float:
+    return float(piece.command_valid.sum()) * PERIOD
+
+
+def test_a_long_drive_is_cut_by_the_time_of_its_commands():
+    valid = np.arange(6000) % 100 < 40  # 120 of 300 s
+    pieces = pieces_of(drive(valid), 50.0)
+    assert [seconds_of_commands(piece) for piece in pieces] == pytest.approx([50.0, 50.0], abs=0.1)
+    pieces = pieces_of(drive(valid), 40.0)
+    assert [seconds_of_commands(piece) for piece in pieces] == pytest.approx([40.0, 40.0, 40.0], abs=0.1)
+
+
+def test_segments_stay_whole():
+    segments = [(k * 120, (k + 1) * 120) for k in range(20)]  # 6 s each
+    pieces = pieces_of(drive(np.ones(2400, dtype=bool), segments), 20.0)
+    assert [len(piece) for piece in pieces] == [480] * 5
+    assert all(len(piece.meta.segments) == 4 for piece in pieces)
+
+
+def test_a_drive_without_commands_gives_nothing():
+    assert pieces_of(drive(np.zeros(2000, dtype=bool)), 20.0) == []
