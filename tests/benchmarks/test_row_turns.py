@@ -15,7 +15,7 @@ from benchmarks import row_turns
 from ddagr_gym.commands.evaluate import without_stars
 from ddagr_gym.evaluation import scenarios as scenario_module
 from ddagr_gym.evaluation.claims import HEADLINE, check_claims, load_claims
-from ddagr_gym.evaluation.controllers import controller_arm, controller_version
+from ddagr_gym.evaluation.controllers import controller_arm, controller_version, drives_on
 from ddagr_gym.evaluation.scenario_sets import PLANS, draw_set
 from ddagr_gym.evaluation.scenarios import save_scenarios, set_hash
 from ddagr_gym.evaluation.summary import BASELINES, summaries
@@ -36,7 +36,8 @@ def planned():
         for name in without_stars(patterns):
             arm, run = controller_arm(name)
             for set_name in sets:
-                runs.setdefault((arm, set_name), set()).add(run)
+                if drives_on(name, PLANS[set_name].law):
+                    runs.setdefault((arm, set_name), set()).add(run)
     return runs
 
 
