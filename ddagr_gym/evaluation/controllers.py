@@ -157,8 +157,8 @@ def _make_true_path(turn: RowTurn, gains: LadderGains) -> Controller:
 
 
 DEFAULT = "B4"
-"""Controller that is used where none is named: the headline policy if the claims hold that it is surely closer than
-the force balance on S1 and does not collapse on S4 to S8 (``benchmarks/results/row_turns.json``), else the latter."""
+"""Controller that is used where none is named: the strong classical one. The headline policy is closer on S1, by less
+than was aimed at, but not with stressed sensors or on another soil law (``benchmarks/results/row_turns.json``)."""
 
 EKF_CONTROLLERS = ("B4", "B5")
 """Controllers that need the filter's features in the observation."""

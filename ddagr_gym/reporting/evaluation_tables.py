@@ -314,13 +314,17 @@ def infeasible_sentence(evaluation: Evaluation) -> str:
     total = sum(item.driven for item in evaluation.sets)
     if not evaluation.infeasible:
         return f"All {total} scenarios can be made: an upper bound that sees the true state makes each."
-    made = [
-        sum(evaluation.metrics(arm.name, item.name).get("infeasible_but_made", 0) for item in evaluation.sets)
-        for arm in evaluation.arms
-    ]
+    made = []
+    for arm in evaluation.arms:
+        found = [evaluation.metrics(arm.name, item.name) for item in evaluation.sets]
+        tried = sum(m.get("infeasible", 0) * m.get("runs", 0) for m in found)
+        if tried:
+            made.append((sum(m["infeasible_but_made"] for m in found if m) / tried, display_name(arm.name)))
+    share, name = max(made)
+    luckier = f"; {name} makes {percent(share, 0)} of those that it drove all the same" if share > 0.0 else ""
     return (
         f"{len(evaluation.infeasible)} of {total} scenarios are left out: no upper bound, which sees the true state, "
-        f"makes them; the arm that made most of them all the same made {max(made, default=0)}."
+        f"makes them{luckier}."
     )
 
 

@@ -158,6 +158,16 @@ def test_nothing_feasible_has_no_answer():
     assert infeasible_sentence(found).startswith("2 of 2 scenarios are left out")
 
 
+def test_it_is_said_how_often_a_scenario_without_a_bound_was_made():
+    rows = rows_of("B1", [0.1, 0.2], infeasible=(0, 1))
+    rows += [row | {"run": run} for run in (0, 1) for row in rows_of("ppo_ekf", [0.01, 0.2], infeasible=(0, 1))]
+    found = evaluation(
+        rows=rows, summary=summaries(rows), arms=[Arm("B1", ""), Arm("ppo_ekf", "", learned=True)],
+        sets=[SetNote("S1", "", 2, 2, "")], infeasible=[{"scenario": "S1 0"}, {"scenario": "S1 1"}],
+    )  # fmt: skip
+    assert infeasible_sentence(found).endswith("makes them; ppo_ekf makes 50 % of those that it drove all the same.")
+
+
 @pytest.mark.parametrize(("names", "judged"), [(("S0", "S1", "V"), "S1"), (("S0", "V"), "V"), (("S4", "T"), "S4")])
 def test_the_set_in_range_answers(names, judged):
     assert judged_set(names) == judged
