@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ddagr_gym.commands.output import output_folder, write_text
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from ddagr_gym.evaluation.runs import TurnRun
+
+    Array = NDArray[np.float64]
 
 EXAMPLES = (
     "ddagr demo",
@@ -84,13 +93,18 @@ def run(arguments: Arguments) -> None:
 
 def turn_step(arguments: Arguments, folder: Path) -> Section:
     """A row turn by the default controller on a drawn soil; figure, video and CSV into the folder."""
-    driven, summary = _drive(arguments)
+    from ddagr_gym.evaluation.shown import estimated_track
+
+    driven = _drive(arguments)
+    track = estimated_track(driven)
     print("Writing the CSV, the figure and the video ...", flush=True)
-    _write(folder, driven)
+    _write(folder, driven, track)
     html = """<video controls muted loop src="row_turn.mp4"></video>
 <div class="wide"><img src="row_turn.svg" alt="Path, speeds, yaw rate, slip and sinkage of the turn"></div>
+<p>Dotted: where the extended Kalman filter believes the robot to be. It knows the pose at the start, and from there on
+only accelerometer, gyro, encoders and the commands.</p>
 <p>Data: <a href="row_turn.csv">row_turn.csv</a> (sensor columns, and the truth as <code>true_...</code>).</p>"""
-    return Section("A row turn on soft soil", summary, html)
+    return Section("A row turn on soft soil", _summary(driven, track), html)
 
 
 @dataclass(frozen=True)
@@ -144,10 +158,9 @@ def replay_step(drive: DriveToReplay, folder: Path) -> Section:
     return Section("A recording driven again in the simulator", lead_text(report), html)
 
 
-def _drive(arguments: Arguments) -> tuple[Any, str]:
+def _drive(arguments: Arguments) -> TurnRun:
     from ddagr_gym.envs.options import make_settings
     from ddagr_gym.evaluation.controllers import DEFAULT, find_controller, needs_filter
-    from ddagr_gym.evaluation.metrics import turn_metrics
     from ddagr_gym.evaluation.runs import drive_turn
 
     settings = make_settings(
@@ -155,35 +168,48 @@ def _drive(arguments: Arguments) -> tuple[Any, str]:
     )
     turn = settings.turn(arguments.radius, arguments.side, _SPEED)
     print(f"Driving a row turn by {DEFAULT} on a soil drawn from the default range ...", flush=True)
-    driven = drive_turn(find_controller(DEFAULT, turn), settings, arguments.seed)
-    metrics = turn_metrics(driven.columns, driven.episode.turn, driven.episode.robot)
-    return driven, _summary(driven, metrics)
+    return drive_turn(find_controller(DEFAULT, turn), settings, arguments.seed)
 
 
-def _summary(driven: Any, metrics: Any) -> str:
+def _summary(driven: TurnRun, track: Array) -> str:
     from ddagr_gym.commands.output import format_table
     from ddagr_gym.evaluation.controllers import DEFAULT
+    from ddagr_gym.evaluation.metrics import turn_metrics
 
-    radius, exit_ = metrics.turn, metrics.exit
     turn = driven.episode.turn
+    metrics = turn_metrics(driven.columns, turn, driven.episode.robot)
+    radius, exit_ = metrics.turn, metrics.exit
     rows: list[tuple[str, str]] = [("commanded radius", f"{turn.radius:.3f} m to the {turn.side}")]
     if radius.error is not None:
         rows += [("driven radius", f"{radius.radius:.3f} m"), ("turn radius error", f"{100 * radius.error:+.1f} %")]
     if exit_ is not None:
         rows += [("lateral error at the next row", f"{1e3 * exit_.lateral_error:+.0f} mm")]
     rows += [("every wheel fits its furrow", "yes" if driven.success else "no")]
+    rows += _estimate_rows(driven, track)
     return format_table((f"row turn by {DEFAULT}, the default controller", "value"), rows)
 
 
-def _write(folder: Path, driven: Any) -> None:
+def _estimate_rows(driven: TurnRun, track: Array) -> list[tuple[str, str]]:
+    from ddagr_gym.evaluation.metrics import turn_radius_error
+
+    turn, columns = driven.episode.turn, driven.columns
+    x, y, yaw = track.T
+    radius = turn_radius_error(x, y, yaw, turn.radius, turn.side).radius
+    off = math.hypot(x[-1] - columns["true_x"][-1], y[-1] - columns["true_y"][-1])
+    rows = [] if radius is None else [("radius estimated by the Kalman filter", f"{radius:.3f} m")]
+    return [*rows, ("estimated path off at the end", f"{1e3 * off:.0f} mm")]
+
+
+def _write(folder: Path, driven: TurnRun, track: Array) -> None:
     from ddagr_gym.commands.simulate import write_recording
     from ddagr_gym.reporting.figures import turn_figure
     from ddagr_gym.reporting.render import SceneRenderer
     from ddagr_gym.reporting.scene import scenes, turn_stage
     from ddagr_gym.reporting.video import write_video
 
-    columns, episode = driven.columns, driven.episode
-    write_recording(folder / "row_turn.csv", columns, episode.robot)
+    episode = driven.episode
+    write_recording(folder / "row_turn.csv", driven.columns, episode.robot)
+    columns = driven.columns | {"estimated_x": track[:, 0], "estimated_y": track[:, 1]}
     turn_figure(columns, episode.turn, folder / "row_turn.png", robot=episode.robot, soil_name="a drawn soil")
     stage = turn_stage(episode.turn, episode.robot, "a drawn soil")
     renderer = SceneRenderer()

@@ -194,9 +194,9 @@ def _draw_path(axes: Any, data: Mapping[str, Array], turn: RowTurn, robot: Robot
     axes.plot(*target.T, color=palette.TARGET, linestyle=DASHED, label="commanded", linewidth=1.6)
     axes.plot(data["true_x"], data["true_y"], color=palette.TRUE, label="driven", linewidth=1.6)
     if "estimated_x" in data:
-        dots = (0, (0.1, 2.0))
+        dots = (0, (0.1, 2.6))
         axes.plot(data["estimated_x"], data["estimated_y"], color=palette.ESTIMATE, linestyle=dots, label="estimated",
-                  linewidth=1.6, dash_capstyle="round")  # fmt: skip
+                  linewidth=1.2, dash_capstyle="round")  # fmt: skip
     axes.set(xlim=(view.x_min, view.x_max), ylim=(view.y_min, view.y_max), xlabel="x [m]", ylabel="y [m]")
     axes.set_aspect("equal", anchor="NW")
     axes.grid(False)

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +9,11 @@ import pytest
 from ddagr_gym.cli import main
 from ddagr_gym.commands import demo
 from ddagr_gym.commands.demo import Arguments, Section
+from ddagr_gym.control.row_turn import RowTurn
+from ddagr_gym.envs.options import make_settings
+from ddagr_gym.evaluation.controllers import find_controller
+from ddagr_gym.evaluation.runs import drive_turn
+from ddagr_gym.evaluation.shown import estimated_track
 from ddagr_gym.parameters import Imu, PoseReceiver, Sensors
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.load import load_recording
@@ -76,6 +82,53 @@ def test_another_robot_starts_on_hard_ground(tmp_path):
     assert (drive.robot, drive.soil) == ("husky", "firm_ground")
 
 
+@pytest.fixture(scope="module")
+def driven():
+    """A left turn at the wheel speeds of a robot that rolls without slip: wide, and cheap to drive."""
+    settings = make_settings(radius=0.8, side="left", speed=0.2)
+    return drive_turn(find_controller("B0", settings.turn(0.8, "left", 0.2)), settings, 1)
+
+
+def test_the_estimate_is_judged_against_the_true_path(driven):
+    turn = RowTurn(radius=0.8, side="left")
+    distance = turn.distance_at(np.arange(0.0, turn.duration, 0.02))
+    x, y = turn.position(distance).T
+    episode = replace(driven.episode, turn=turn)
+    run = replace(driven, columns={"true_x": x, "true_y": y}, episode=episode)
+    # 1.25 times the true path about the world's origin, and moved so that it ends 30 and 40 mm off
+    track = 1.25 * np.column_stack([x, y])
+    track += [x[-1] - track[-1, 0] + 0.03, y[-1] - track[-1, 1] - 0.04]
+    rows = dict(demo._estimate_rows(run, np.column_stack([track, turn.heading(distance)])))
+    assert rows == {"radius estimated by the Kalman filter": "1.000 m", "estimated path off at the end": "50 mm"}
+    straight = np.column_stack([x, 0.0 * x, 0.0 * x])
+    assert list(dict(demo._estimate_rows(run, straight))) == ["estimated path off at the end"]
+
+
+def test_figure_and_film_of_the_turn_show_the_estimate(monkeypatch, driven, tmp_path):
+    class Renderer:
+        def draw(self, scene):
+            return scene
+
+        def close(self):
+            pass
+
+    seen, filmed = [], []
+    monkeypatch.setattr(demo, "_drive", lambda _: driven)
+    monkeypatch.setattr("ddagr_gym.reporting.render.SceneRenderer", Renderer)
+    monkeypatch.setattr("ddagr_gym.reporting.video.write_video", lambda path, frames: filmed.extend(frames))
+    monkeypatch.setattr("ddagr_gym.reporting.figures.turn_figure", lambda columns, *_, **__: seen.append(columns))
+    section = demo.turn_step(Arguments(), tmp_path)
+    track = estimated_track(driven)
+    np.testing.assert_array_equal(np.column_stack([seen[0]["estimated_x"], seen[0]["estimated_y"]]), track[:, :2])
+    np.testing.assert_array_equal(filmed[-1].estimated_track, track[:, :2])
+    true = np.array([driven.columns[f"true_{axis}"][-1] for axis in "xy"])
+    off = f"{1e3 * np.hypot(*(track[-1, :2] - true)):.0f} mm"
+    assert section.text.splitlines()[-1].split("  ")[0] == "estimated path off at the end"
+    assert section.text.endswith(off)
+    # the recording stays one: readings and truth
+    assert "estimated_x" not in (tmp_path / "row_turn.csv").read_text().splitlines()[0]
+
+
 @pytest.mark.slow
 def test_the_whole_demonstration(tmp_path, capsys):
     output = tmp_path / "out"
@@ -87,4 +140,6 @@ def test_the_whole_demonstration(tmp_path, capsys):
     # the factors of benchmarks/make_replay_demo.py
     assert refit["soil_strength"] == pytest.approx(np.log(0.8), abs=0.1)
     assert refit["motor_rate"] == pytest.approx(np.log(0.85), abs=0.02)
-    assert "every wheel fits its furrow" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "every wheel fits its furrow" in printed
+    assert "estimated path off at the end" in printed

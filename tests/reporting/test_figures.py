@@ -9,6 +9,7 @@ import pytest
 from ddagr_gym.control.row_turn import RowTurn
 from ddagr_gym.errors import InputError
 from ddagr_gym.presets import get_robot
+from ddagr_gym.reporting import figures, palette
 from ddagr_gym.reporting.figures import (
     TURN_FIGURE_COLUMNS,
     headland_times,
@@ -62,6 +63,24 @@ def test_nothing_global_changes(tmp_path):
         assert matplotlib.rcParams["axes.spines.top"] is False
         raise ZeroDivisionError
     assert dict(matplotlib.rcParams) == before
+
+
+@pytest.mark.parametrize("with_estimate", [False, True])
+def test_the_estimated_path_is_a_line_of_its_own_where_there_is_one(tmp_path, monkeypatch, with_estimate):
+    drawn = []
+    monkeypatch.setattr(figures, "save_figure", lambda figure, path: drawn.append(figure) or (path, path))
+    columns = columns_of(RowTurn())
+    if with_estimate:
+        columns |= {"estimated_x": columns["true_x"] + 0.02, "estimated_y": columns["true_y"]}
+    turn_figure(columns, RowTurn(), tmp_path / "turn", robot=ROBOT, soil_name="soil")
+    path = drawn[0].axes[0]
+    names = [text.get_text() for text in path.get_legend().get_texts()]
+    assert names == ["commanded", "driven", "estimated"][: 2 + with_estimate]
+    lines = {line.get_label(): line for line in path.lines}
+    assert ("estimated" in lines) is with_estimate
+    if with_estimate:
+        np.testing.assert_array_equal(lines["estimated"].get_xdata(), columns["true_x"] + 0.02)
+        assert lines["estimated"].get_color() == palette.ESTIMATE != lines["driven"].get_color()
 
 
 def test_headland_times():
