@@ -39,6 +39,12 @@ _NO_COUNTER = 1.7
 """Standard deviation of means of ten over that of a differenced counter above which a channel is none: with rounding
 that is independent from sample to sample it is 3."""
 
+_OPPOSITE = -0.25
+"""Correlation of successive samples below which they are a counter's, half of what rounding gives."""
+
+_JITTERING = 1.3
+"""Standard deviation of its samples over that of its rounding above which a counter jitters (ours)."""
+
 _STEPS = 6.0
 """Quanta between two samples at steady speed beyond which the speed was not steady (ours)."""
 
@@ -145,7 +151,11 @@ def _rounded(values: list[Array], speeds: list[Array], quantum: float) -> Channe
     squares = [float(np.mean(d[np.abs(d) < limit] ** 2)) for d in (first, second)]
     # correlated over one sample at most: var(x[k+1] - x[k]) = 2 s^2 (1 - r), var(x[k+2] - x[k]) = 2 s^2
     correlation = float(np.clip(1.0 - squares[0] / max(squares[1], 1e-12), -0.5, 0.5))
-    plain = ChannelNoise(float(np.sqrt(0.5 * squares[1])), 0.0, correlation, quantum)
+    sigma = float(np.sqrt(0.5 * squares[1]))
+    if correlation < _OPPOSITE:
+        # few steady samples scatter more than a counter's; a jittering counter far more
+        return counter if sigma < _JITTERING * counter.sigma else replace(counter, sigma=sigma)
+    plain = ChannelNoise(sigma, 0.0, correlation, quantum)
     return replace(plain, inflation=max(_inflation(plain, values, speeds), 1.0))
 
 

@@ -73,7 +73,7 @@ def test_means_of_rounded_speeds_are_as_good_as_they_are(kind: str) -> None:
     for samples in (5, 10):
         measured = np.std(error.reshape(-1, samples).mean(axis=1))
         assert float(found.of_mean(samples)) == pytest.approx(measured, rel=0.35)
-    assert (found.correlation == -0.5) == (kind == "counter")
+    assert (found.correlation == -0.5) == (kind != "rounded speed")
 
 
 def test_sparse_poses() -> None:
