@@ -153,7 +153,7 @@ def diagnosed(task: Task, store: Any = None) -> Outcome:
     """
     from ddagr_gym.diagnosis import pipeline
 
-    with _steps(len(pipeline.STEPS) - (len(pipeline.LATER) if task.names_only else 0), store) as began:
+    with _steps(len(task.steps), store) as began:
         return pipeline.run(task, store, began)
 
 

@@ -86,12 +86,9 @@ def run(arguments: Arguments) -> None:
 
 def _thresholds(path: Path | None, robot: str) -> Thresholds | None:
     """Given gates, those that ship for a robot, or None where none do."""
-    from ddagr_gym.diagnosis import thresholds
+    from ddagr_gym.diagnosis.thresholds import load_thresholds, shipped_thresholds
 
-    if path is not None:
-        return thresholds.load_thresholds(path)
-    shipped = Path(thresholds.__file__).resolve().parents[1] / "data" / f"null_bank_{robot}.json"
-    return thresholds.default_thresholds(robot) if shipped.is_file() else None
+    return shipped_thresholds(robot) if path is None else load_thresholds(path)
 
 
 def table_text(table: Isolability) -> str:

@@ -59,6 +59,26 @@ def side_sign(side: str) -> int:
     return SIDES[side]
 
 
+def project_left_turn(x: Array, y: Array, radius: Array | float, run_in: float = 0.0) -> tuple[Array, Array]:
+    """Nearest point of a turn to the left by sector: rows at x < 0, circle at x >= 0 (see :meth:`RowTurn.project`).
+
+    Args:
+        x, y: positions (...) [m].
+        radius: R* (...) [m].
+        run_in: distance at the end of the run-in [m].
+
+    Returns:
+        Distance along the path (...) [m], and offset (...) [m] to the left of the direction of travel.
+    """
+    from_centre = y - radius
+    on_circle = x >= 0.0
+    turning = run_in + radius * np.arctan2(np.abs(x), -from_centre)
+    leaving = run_in + math.pi * radius - x
+    distance = np.where(on_circle, turning, np.where(from_centre > 0.0, leaving, run_in + x))
+    # one expression for all three parts: the radius less the distance from the centre line
+    return distance, radius - np.where(on_circle, np.hypot(x, from_centre), np.abs(from_centre))
+
+
 @dataclass(frozen=True)
 class RowTurn(Validated):
     """The commanded manoeuvre. The defaults are the thesis's: 80 cm, and Table 6.2's straights of 5 s and 2.5 s.
@@ -160,17 +180,8 @@ class RowTurn(Validated):
             the direction of travel. Between the rows the nearer row counts.
         """
         x, y = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
-        from_centre = self.sign * y - self.radius
-        on_circle = x >= 0.0
-        outgoing = from_centre > 0.0
-        angle = np.arctan2(np.abs(x), -from_centre)
-        turning = self.run_in + self.radius * angle
-        entering = self.run_in + x
-        leaving = self.run_in + self.turn_length - x
-        distance = np.where(on_circle, turning, np.where(outgoing, leaving, entering))
-        # One expression for all three parts: the distance from the centre line less the radius, mirrored by side.
-        offset = np.where(on_circle, np.hypot(x, from_centre), np.abs(from_centre)) - self.radius
-        return distance, -self.sign * offset
+        distance, offset = project_left_turn(x, self.sign * y, self.radius, self.run_in)
+        return distance, self.sign * offset
 
     def cross_track_error(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Signed distance from the path (...) [m], positive to the left of the direction of travel."""

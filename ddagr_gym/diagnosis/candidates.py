@@ -31,6 +31,11 @@ class Candidate:
     scales: tuple[float, ...]
     whole: float | None = None
 
+    @property
+    def has_sizes(self) -> bool:
+        """Whether its multiples are sizes; a flip or a limit stands at its probe whatever its multiple."""
+        return self.whole is None and self.probes[0].differentiable
+
 
 def candidates_of(kind: type[Effect], extent: DriveExtent, first: int) -> list[Candidate]:
     """Candidates of one kind: up to two probes span it; more are grouped by their shapes (place, onset).

@@ -233,7 +233,7 @@ def _directions(name: str, terms: Terms, matrix: Array, gate: float) -> list[_Di
     """Probes of an effect's best-placed candidate; of limits and flips those that the table states."""
     own = [c for c in terms.candidates if c.name == name]
     found = [[_direction(c, k, matrix, gate) for k in range(len(c.columns))] for c in own]
-    if own[0].whole is not None or not own[0].probes[0].differentiable:
+    if not own[0].has_sizes:
         every = [item for group in found for item in group]
         stated = _best_by_field([item.size for item in every])
         return [item for item in every if item.size in stated]

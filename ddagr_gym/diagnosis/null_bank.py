@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ddagr_gym.diagnosis.noise import ChannelNoise
 from ddagr_gym.diagnosis.null_readings import PARTS
 from ddagr_gym.diagnosis.setting import Setting, make_problem
-from ddagr_gym.diagnosis.structural_nulls import KINDS, NullWorld, draw_world
+from ddagr_gym.diagnosis.structural_nulls import NullWorld, draw_world
 from ddagr_gym.diagnosis.thresholds import NullRun
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.recordings.schema import Recording
@@ -195,14 +195,6 @@ def cut(recording: Recording, first: int, last: int) -> Recording:
         meta=meta,
         extras={name: values[rows] for name, values in recording.extras.items()},
     )
-
-
-def null_runs(
-    robot: Robot, soil: Soil, template: Template | None, setting: Setting, count: int, seed: int
-) -> Iterator[NullRun]:
-    """``count`` null runs, going through KINDS; the same seed gives the same runs whatever their number."""
-    for number in range(count):
-        yield null_run(robot, soil, template, KINDS[number % len(KINDS)], setting, (seed, number))
 
 
 def bank_hash(robot: Robot, soil: Soil, template: Template | None, setting: Setting, count: int, seed: int) -> str:

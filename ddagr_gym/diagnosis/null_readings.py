@@ -64,16 +64,14 @@ class Reading:
             ends = np.arange(len(commands) + 1)
             before = np.concatenate([commands[:1], commands])
             parts = np.stack([np.interp(samples, ends, before[:, bank]) for bank in range(2)], axis=1)
-        late = self.command_late
-        return np.concatenate([np.repeat(parts[:1], late, axis=0), parts])[: len(parts)]
+        return _late(parts, self.command_late)
 
     def read(self, name: str, parts: Array) -> Array:
         """(n,) readings of a channel without noise from (PARTS * n,) values."""
         if name in _MEANS:
             return parts[PARTS - 1 :: PARTS] if self.encoder_instant else _means(parts)
         if name in _INERTIAL:
-            late = self.inertial_late
-            parts = np.concatenate([np.repeat(parts[:1], late), parts])[: len(parts)]
+            parts = _late(parts, self.inertial_late)
             return _means(parts) if self.inertial_mean else parts[PARTS - 1 :: PARTS]
         return parts[PARTS - 1 :: PARTS]
 
@@ -103,6 +101,11 @@ class Reading:
         if self.tails <= 2.0:
             return rng.standard_normal(count)
         return rng.standard_t(self.tails, count) * np.sqrt((self.tails - 2.0) / self.tails)
+
+
+def _late(parts: Array, count: int) -> Array:
+    """The same rows ``count`` later, the first one repeated before them."""
+    return np.concatenate([np.repeat(parts[:1], count, axis=0), parts])[: len(parts)]
 
 
 def _means(parts: Array) -> Array:

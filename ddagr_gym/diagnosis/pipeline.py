@@ -67,6 +67,11 @@ class Task:
     seed: int = 0
     names_only: bool = False
 
+    @property
+    def steps(self) -> tuple[str, ...]:
+        """Those of STEPS that are done."""
+        return tuple(name for name in STEPS if not (self.names_only and name in LATER))
+
     def key(self) -> str:
         """Hash of all that the results depend on; the number of threads is not among it."""
         digest = hashlib.sha256(source_digest().encode())
@@ -125,21 +130,19 @@ def run(
     task = replace(task, thresholds=task.thresholds.for_windows(prepared.problem.blocked.windows.count))
 
     def step(name: str, work: Callable[[], Any]) -> Any:
+        if name not in task.steps:
+            return None
         began_step(name)
         return store.step(name, work)
 
     found = step("search", lambda: search(prepared.problem, task.thresholds, progress=progress, keep=store.step))
     diagnosis, effects = step("verdict", lambda: conclude(prepared, found, task.thresholds, task.rng("verdict")))
-    fit = (
-        None
-        if task.names_only
-        else step("certification", lambda: _certified(task, prepared, found, diagnosis, progress))
-    )
+    fit = step("certification", lambda: _certified(task, prepared, found, diagnosis, progress))
     where = step("localisation", lambda: asdict(locate(prepared.problem, found)))
     held = held_where(task.recordings, prepared.held)
     diagnosis = _doubted(diagnosis, found, where, {} if held is None else {"sensor_hold": asdict(held)})
-    unnamed = None if task.names_only else step("unnamed terms", lambda: _unnamed(task, prepared, found, diagnosis))
-    following = None if task.names_only else step("next drive", lambda: _next_drive(task, diagnosis, progress))
+    unnamed = step("unnamed terms", lambda: _unnamed(task, prepared, found, diagnosis))
+    following = step("next drive", lambda: _next_drive(task, diagnosis, progress))
     evidence = step("evidence", lambda: gather_evidence(prepared.problem, found, task.thresholds))
     seconds = time.monotonic() - began
     entries = {"fit": fit, "localisation": where, "unnamed": unnamed, "next_drive": following}

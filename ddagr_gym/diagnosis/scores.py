@@ -260,9 +260,9 @@ def nuisance_answer(problem: Problem, fitted: Fitted, terms: Terms, gain: Gain) 
         gain: of the candidate; a categorical or a limiting effect stands at its probe whatever its multiple.
     """
     candidate = terms.candidates[gain.candidate]
-    reduced = reduce(terms)
     change = np.zeros(len(fitted.point.values))
-    if candidate.whole is None and candidate.probes[0].differentiable:
+    if candidate.has_sizes:
+        reduced = reduce(terms)
         columns = 1 + np.array(candidate.columns)
         change[_open(problem, fitted)] = reduced.nuisance[:, 0] - reduced.nuisance[:, columns] @ gain.multiples
     return change

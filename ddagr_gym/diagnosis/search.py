@@ -131,8 +131,7 @@ def _trial(problem: Problem, standing: Standing, gain: Gain, terms: Terms, start
     point = replace(start.point, effects=(*standing.fitted.point.effects, effect))
     fitted = fit(problem, point, iterations=_TRIAL_STEPS, renewals=2, reuse=start)
     scanned_here = (terms is standing.terms) == (start is standing.fitted)
-    has_sizes = candidate.whole is None and candidate.probes[0].differentiable
-    if fitted.cost < standing.fitted.cost or not (scanned_here and has_sizes):
+    if fitted.cost < standing.fitted.cost or not (scanned_here and candidate.has_sizes):
         return fitted
     # the guess was too far off: nothing at all would have been better
     point = _damped_guess(problem, standing, gain, terms, start)

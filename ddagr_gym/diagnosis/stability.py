@@ -280,7 +280,7 @@ def intervals(sums: Sums, columns: Sequence[int], level: float) -> tuple[Array, 
 
     groups = len(sums.normals)
     values = coefficients(sums, columns)
-    without = np.stack([coefficients(sums, columns, 1.0 - np.eye(groups)[k]) for k in range(groups)])
+    without = np.stack([coefficients(sums, columns, weights) for weights in 1.0 - np.eye(groups)])
     variance = (groups - 1) / groups * ((without - without.mean(axis=0)) ** 2).sum(axis=0)
     reach = float(student.ppf(0.5 + 0.5 * level, groups - 1)) * np.sqrt(variance)
     return values - reach, values + reach

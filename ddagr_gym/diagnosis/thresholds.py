@@ -215,16 +215,22 @@ def load_thresholds(path: Path) -> Thresholds:
     )
 
 
+def shipped_thresholds(robot: str) -> Thresholds | None:
+    """Thresholds that ship with the package for a robot, or None."""
+    path = Path(__file__).resolve().parents[1] / "data" / f"null_bank_{robot}.json"
+    return load_thresholds(path) if path.is_file() else None
+
+
 def default_thresholds(robot: str) -> Thresholds:
     """Thresholds that ship with the package for drives of three times 60 s.
 
     Raises:
         InputError: no bank ships for the robot.
     """
-    path = Path(__file__).resolve().parents[1] / "data" / f"null_bank_{robot}.json"
-    if not path.is_file():
+    found = shipped_thresholds(robot)
+    if found is None:
         raise InputError(
             f"no null bank ships for robot {robot!r}: make one with `ddagr null-bank RUN... --robot {robot}` and give "
             "it as --thresholds."
         )
-    return load_thresholds(path)
+    return found

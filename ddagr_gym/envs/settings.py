@@ -144,11 +144,10 @@ class TurnSettings(Validated):
         """One episode; the same generator state gives the same episode."""
         spread = self.randomisation
         side = ("left", "right")[int(rng.integers(2))] if self.side == "random" else self.side
-        radius = self.radius if isinstance(self.radius, (int, float)) else float(rng.uniform(*self.radius))
+        radius = _drawn(self.radius, rng)
         robot = self._draw_robot(rng)
         soil, rejected = (self.soil, 0) if isinstance(self.soil, Soil) else draw_soil(self.soil, rng, robot)
-        speed = self.speed if isinstance(self.speed, (int, float)) else float(rng.uniform(*self.speed))
-        turn = self.turn(float(radius), side, float(speed))
+        turn = self.turn(radius, side, _drawn(self.speed, rng))
         return Episode(
             turn=turn,
             robot=robot,
@@ -196,3 +195,8 @@ class TurnSettings(Validated):
         radius = float(np.max(self.radius))
         extent = (-turn.run_in - 0.5, radius + 1.0, -2.0 * radius - 0.8, 2.0 * radius + 0.8)
         return soil_field(soil, rng, spread.soil_variation, spread.correlation_length, extent)
+
+
+def _drawn(value: float | tuple[float, float], rng: np.random.Generator) -> float:
+    """A number as it is, or one drawn evenly from (low, high)."""
+    return float(value) if isinstance(value, (int, float)) else float(rng.uniform(*value))

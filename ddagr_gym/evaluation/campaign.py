@@ -77,15 +77,15 @@ def drive_scenario(controller: str, scenario: Scenario) -> TurnRun:
 
 def drive_scenarios(controller: str, scenarios: Sequence[Scenario]) -> list[TurnRun]:
     """Scenarios of one set by one controller, side by side where it can; the runs are those of one by one."""
-    if find_batch(controller, 1) is None:
-        return [drive_scenario(controller, scenario) for scenario in scenarios]
     runs: dict[int, TurnRun] = {}
     for places in _places_by_grid(scenarios).values():
         group = [scenarios[place] for place in places]
         batch = find_batch(controller, len(group))
-        assert batch is not None
-        settings = scenario_settings(group[0], needs_filter(controller))
-        driven = drive_turns(batch, settings, [item.seed for item in group], [item.episode for item in group])
+        if batch is None:
+            driven = [drive_scenario(controller, item) for item in group]
+        else:
+            settings = scenario_settings(group[0], needs_filter(controller))
+            driven = drive_turns(batch, settings, [item.seed for item in group], [item.episode for item in group])
         runs |= dict(zip(places, driven, strict=True))
     return [runs[place] for place in range(len(scenarios))]
 

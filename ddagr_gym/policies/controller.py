@@ -38,13 +38,12 @@ class PolicyController:
             raise InputError(f"estimate {estimate!r}: this policy does not see the filter, give only its name.")
         nominal = ddagr() if robot is None else robot
         self.policy = policy
-        self._view = PolicyView(policy.design, nominal, sensors)
+        self._alone = PolicyBatch(policy, 1, estimate == "feed_forward", nominal, sensors)
         self._estimate = ESTIMATES[estimate][0](nominal, sensors)
-        self._silent = estimate == "feed_forward"
 
     def reset(self) -> None:
         """Forget the last episode."""
-        self._view.reset()
+        self._alone.reset()
         self._estimate.reset()
 
     def __call__(self, observation: ArrayLike, info: Any = None) -> NDArray[np.float32]:
@@ -58,10 +57,7 @@ class PolicyController:
         if given.shape != (size,):
             needed = "DDAGR-Turn-EKF-v0" if self.policy.design.needs_filter else "DDAGR-Turn-v0"
             raise InputError(f"observation has shape {given.shape}: this policy needs {needed}, ({size},).")
-        told = self._estimate(given, info)[None]
-        inputs = self._view.observe(told)
-        outputs = np.zeros((1, 2), dtype=np.float32) if self._silent else self.policy(inputs)
-        return np.asarray(self._view.act(outputs, told)[0])
+        return np.asarray(self._alone(self._estimate(given, info)[None])[0])
 
 
 class PolicyBatch:

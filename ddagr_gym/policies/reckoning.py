@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ddagr_gym.control.row_turn import project_left_turn
 from ddagr_gym.control.turn_controller import CONTROL_PERIOD
 from ddagr_gym.envs.constants import CONTROL_INTERVAL
 from ddagr_gym.estimation.sideslip import SideslipFilter
@@ -129,12 +130,7 @@ class Reckoning:
 
 
 def path_errors(x: Array, y: Array, direction: Array, radius: Array) -> PathErrors:
-    """Errors of poses against the commanded path, by sector as :meth:`RowTurn.project`."""
-    from_centre = y - radius
-    on_circle, leaving = x >= 0.0, from_centre > 0.0
-    angle = np.arctan2(np.abs(x), -from_centre)
-    distance = np.where(on_circle, radius * angle, np.where(leaving, math.pi * radius - x, x))
-    off_circle = radius - np.hypot(x, from_centre)
-    offset = np.where(on_circle, off_circle, np.where(leaving, radius - from_centre, y))
+    """Errors of poses against the commanded path."""
+    distance, offset = project_left_turn(x, y, radius)
     error = direction - np.clip(distance / radius, 0.0, math.pi)
     return PathErrors(offset, error, math.pi * radius - distance)

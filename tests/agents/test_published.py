@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import pytest
 
@@ -20,6 +21,10 @@ from ddagr_gym.policies.shipped import policies_dir, selected_policies
 
 SEEDS_AT_LEAST = {"ppo_ekf": 10, "ppo_raw": 5, "ppo_history": 5}
 """Of control.md, "Protocol", and of what the arms are said to have."""
+
+
+ABSOLUTE_PATH = re.compile(r"(?<![\w.*/)])/[a-z]\w*/")
+"""A folder from the root of some machine; not of an address, a ratio or a path inside the repository."""
 
 
 def record_of(name):
@@ -57,7 +62,7 @@ def test_a_card_names_the_seed_and_no_place_on_a_machine(name):
     card = (policies_dir() / name / "README.md").read_text()
     assert f"| {record['selected_seed']} (shipped) |" in card
     for text in (card, (policies_dir() / name / "training.json").read_text()):
-        assert not any(place in text for place in ("/home/", "/tmp/", "/root/", "/work/"))
+        assert not ABSOLUTE_PATH.search(text)
     shipped = next(item for item in record["trainings"] if item["seed"] == record["selected_seed"])
     assert ("Not for use" in card) == (shipped["validation"]["success_rate"] < 0.95)
 
