@@ -14,7 +14,6 @@ from __future__ import annotations
 import argparse
 import json
 import math
-import subprocess
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -30,6 +29,7 @@ from ddagr_gym.evaluation.controllers import BOUNDS
 from ddagr_gym.evaluation.summary import summaries
 from ddagr_gym.reporting.evaluation_data import Evaluation
 from ddagr_gym.reporting.evaluation_figures import radius_error_figure
+from ddagr_gym.version import commit_of
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 RESULT = CHECKOUT / "benchmarks" / "results" / "row_turns.json"
@@ -66,20 +66,11 @@ def rounded(value: Any) -> Any:
     return float(f"{value:.{_DIGITS}g}") if isinstance(value, float) and math.isfinite(value) else value
 
 
-def commit() -> str:
-    """Commit of the checkout, with a mark where files differ from it."""
-
-    def git(*words: str) -> str:
-        return subprocess.run(["git", *words], capture_output=True, text=True, cwd=CHECKOUT, check=False).stdout.strip()
-
-    return git("rev-parse", "HEAD") + ("+changes" if git("status", "--porcelain", "--untracked-files=no") else "")
-
-
 def remembered_commits(folder: Path) -> list[str]:
     """Commits at which the folder's episodes were driven, now that of this checkout as well."""
     file = folder / "commits.json"
     known: list[str] = json.loads(file.read_text()) if file.is_file() else []
-    known = list(dict.fromkeys([*known, commit()]))
+    known = list(dict.fromkeys([*known, commit_of(CHECKOUT)]))
     write_text(file, json.dumps(known))
     return known
 

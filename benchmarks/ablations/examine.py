@@ -12,7 +12,7 @@ from benchmarks.ablations.arms import First, first_of, from_values, noise_thresh
 from benchmarks.ablations.sparse import sparse_first
 from ddagr_gym.diagnosis.diagnose import Prepared, prepare
 from ddagr_gym.diagnosis.refit import Fitted
-from ddagr_gym.diagnosis.search import _BENT, Standing, begin, stand
+from ddagr_gym.diagnosis.search import BENT, Standing, begin, stand
 from ddagr_gym.diagnosis.setting import Setting, make_problem, wheel_radius
 from ddagr_gym.diagnosis.thresholds import Thresholds
 from ddagr_gym.parameters import Robot, Soil
@@ -75,11 +75,11 @@ def _timed(work: Callable[[], First], began: float) -> dict[str, Any]:
 
 def _begin(robot: Robot, soil: Soil, folder: Path, thresholds: Thresholds) -> _Begun:
     recordings = [load_recording(path, "concealed", ROBOT) for path in sorted(folder.glob("run_*.csv.gz"))]
-    prepared = prepare(robot, soil, recordings, Setting())
+    prepared = prepare(robot, soil, recordings, Setting().with_windows(thresholds.duration))
     problem = prepared.problem
     raw, standing = begin(problem)
-    scans = (standing, stand(problem, raw)) if standing.dispersion > _BENT else (standing,)
-    return _Begun(prepared, raw, scans, thresholds.for_windows(problem.blocked.windows.count))
+    scans = (standing, stand(problem, raw)) if standing.dispersion > BENT else (standing,)
+    return _Begun(prepared, raw, scans, thresholds.for_length(problem.covered))
 
 
 def _one_roll_out(robot: Robot, soil: Soil, begun: _Begun) -> First:

@@ -31,8 +31,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from ddagr_gym import __version__
 from ddagr_gym.recordings.files import write_atomically
+from ddagr_gym.version import __version__, commit_of
 
 HERE = Path(__file__).resolve().parent
 CHECKOUT = HERE.parents[1]
@@ -131,7 +131,7 @@ def diagnose(case: Case, parts: Path, threads: int, limit: float) -> dict[str, A
     done = _run([*command, "--output", str(output), "--overwrite"], limit)
     if done.returncode in INTERRUPTED:
         raise InterruptedRunError(case.name)
-    answer = _answer(output / "diagnosis.json", done) | {"options": list(case.options), "commit": commit()}
+    answer = _answer(output / "diagnosis.json", done) | {"options": list(case.options), "commit": commit_of(CHECKOUT)}
     answer.setdefault("seconds", time.monotonic() - began)
     write_atomically(part, lambda to: to.write_text(json.dumps(answer, indent=1) + "\n"))
     shutil.rmtree(output, ignore_errors=True)
@@ -157,19 +157,6 @@ def _answer(path: Path, done: subprocess.CompletedProcess[str]) -> dict[str, Any
     lines = done.stderr.strip().splitlines()
     failure = {"exit_code": done.returncode, "message": lines[-1] if lines else ""}
     return {"verdict": [], "complete": False, "findings": [], "version": __version__, "failure": failure}
-
-
-def commit() -> str:
-    """Commit of the checkout, with a mark where files differ from it."""
-    head = subprocess.run(["git", "rev-parse", "HEAD"], capture_output=True, text=True, cwd=CHECKOUT, check=False)
-    changes = subprocess.run(
-        ["git", "status", "--porcelain", "--untracked-files=no"],
-        capture_output=True,
-        text=True,
-        cwd=CHECKOUT,
-        check=False,
-    )
-    return head.stdout.strip() + ("+changes" if changes.stdout.strip() else "")
 
 
 def main() -> int:

@@ -85,7 +85,8 @@ def diagnosis_step(folder: Path, seed: int = 1, thresholds: Thresholds | None = 
 
     print("Diagnosing two drives on ground of which the nominal simulator does not know that it slopes ...", flush=True)
     gates = default_thresholds(ROBOT) if thresholds is None else thresholds
-    outcome = diagnosed(Task(get_robot(ROBOT), get_soil(SOIL), drives(seed), gates, Setting(threads=2), seed))
+    setting = Setting(threads=2).with_windows(gates.duration)
+    outcome = diagnosed(Task(get_robot(ROBOT), get_soil(SOIL), drives(seed), gates, setting, seed))
     target = folder / "diagnosis"
     target.mkdir()
     write_outcome(outcome, target)

@@ -51,7 +51,8 @@ class Arguments:
             left out.
         soil_uncertainty: factor on how far the soil may be from the nominal one; larger where it is only guessed. The
             thresholds must be of the same.
-        stride: seconds between the starts of windows; 2 uses all samples.
+        window: length of the windows [s]; that of the thresholds when it is left out.
+        stride: seconds between the starts of windows; their length, which uses all samples, when it is left out.
         seed: of the resampling.
         threads: of the simulator.
         names_only: only name what is missing: no errors on unseen drives, no unnamed terms, no next drive, no page.
@@ -67,7 +68,8 @@ class Arguments:
     map: str = ""
     thresholds: Path | None = None
     soil_uncertainty: float = 1.0
-    stride: float = 2.0
+    window: float | None = None
+    stride: float | None = None
     seed: int = 0
     threads: int = 2
     names_only: bool = False
@@ -107,17 +109,20 @@ def _task(arguments: Arguments) -> Task:
     from ddagr_gym.recordings.files import Limits
     from ddagr_gym.recordings.load import load_recording
 
-    for name, least in (("threads", 1), ("stride", 0.1), ("seed", 0)):
-        if getattr(arguments, name) < least:
-            raise InputError(f"--{name} is {getattr(arguments, name)}: give at least {least}.")
+    for name, least in (("threads", 1), ("window", 1.0), ("stride", 0.1), ("seed", 0)):
+        given = getattr(arguments, name)
+        if given is not None and not given >= least:
+            raise InputError(f"--{name} is {given}: give at least {least}.")
     robot, soil = get_robot(arguments.robot), get_soil(arguments.soil)
     limits = Limits(arguments.maximum_rows, arguments.maximum_bytes)
     recordings: list[Recording] = [
         load_recording(path, arguments.map or None, arguments.robot, limits) for path in _sources(arguments.runs)
     ]
     priors = NuisancePriors().with_soil(arguments.soil_uncertainty)
-    setting = Setting(stride=arguments.stride, priors=priors, threads=arguments.threads)
-    return Task(robot, soil, tuple(recordings), _thresholds(arguments), setting, arguments.seed, arguments.names_only)
+    thresholds = _thresholds(arguments)
+    window = thresholds.duration if arguments.window is None else arguments.window
+    setting = Setting(priors=priors, threads=arguments.threads).with_windows(window, arguments.stride)
+    return Task(robot, soil, tuple(recordings), thresholds, setting, arguments.seed, arguments.names_only)
 
 
 def _sources(runs: Sequence[Path]) -> list[Path]:

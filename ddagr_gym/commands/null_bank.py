@@ -47,7 +47,8 @@ class Arguments:
         count: null drives; at least 20 for the level of 5 percent.
         seed: of the bank.
         soil_uncertainty: as for `ddagr diagnose`.
-        stride: seconds between the starts of windows; 2 uses all samples.
+        window: length of the windows [s]; diagnoses with these thresholds cut recordings in the same way.
+        stride: seconds between the starts of windows; their length, which uses all samples, when it is left out.
         processes: that work at the same time.
     """
 
@@ -61,7 +62,8 @@ class Arguments:
     count: int = 60
     seed: int = 0
     soil_uncertainty: float = 1.0
-    stride: float = 2.0
+    window: float = 6.0
+    stride: float | None = None
     processes: int = 2
 
 
@@ -77,7 +79,8 @@ def run(arguments: Arguments) -> None:
 
     robot, soil = get_robot(arguments.robot), get_soil(arguments.soil)
     recordings = [load_recording(path, arguments.map or None, arguments.robot) for path in arguments.runs]
-    setting = Setting(stride=arguments.stride, priors=NuisancePriors().with_soil(arguments.soil_uncertainty))
+    priors = NuisancePriors().with_soil(arguments.soil_uncertainty)
+    setting = Setting(arguments.window, arguments.stride or arguments.window, priors=priors)
     template: Template | None = None
     pieces: list[Recording] = []
     if arguments.ordinary:
@@ -92,7 +95,7 @@ def run(arguments: Arguments) -> None:
     tasks = [(robot, soil, d, setting, arguments.seed, n, _part(folder, bank, n)) for n, d in enumerate(drives)]
     _make([task for task in tasks if not task[-1].exists()], arguments.processes)
     runs = [NullRun(**json.loads(task[-1].read_text())) for task in tasks]
-    save_thresholds(thresholds_from(runs, bank), arguments.output)
+    save_thresholds(thresholds_from(runs, bank, duration=arguments.window), arguments.output)
     print(f"{arguments.output}: thresholds of {len(runs)} null drives, bank {bank[:12]}")
 
 

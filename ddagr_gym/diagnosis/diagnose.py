@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -15,11 +16,11 @@ from ddagr_gym.diagnosis.held import Held, find_held, hold_effect, without_repea
 from ddagr_gym.diagnosis.inputs import data_source
 from ddagr_gym.diagnosis.misfit import LOCAL, explained_share, roughest
 from ddagr_gym.diagnosis.problem import Problem
-from ddagr_gym.diagnosis.search import MOST_EFFECTS, Found, Standing, search
+from ddagr_gym.diagnosis.search import BENT, MOST_EFFECTS, Found, Keep, Standing, begin, do, search
 from ddagr_gym.diagnosis.sentences import headline
-from ddagr_gym.diagnosis.setting import Setting, make_problem
+from ddagr_gym.diagnosis.setting import SHORT, Setting, make_problem
 from ddagr_gym.diagnosis.thresholds import Thresholds
-from ddagr_gym.diagnosis.uncertainty import intervals, least_detectable, resampled_parameters
+from ddagr_gym.diagnosis.uncertainty import intervals, least_detectable, resampled_parameters, with_structure
 from ddagr_gym.diagnosis.verdict import NONE, UNKNOWN, Diagnosis, Estimate, Finding
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.physics.effects import Effect
@@ -67,6 +68,42 @@ def prepare(robot: Robot, soil: Soil, recordings: Sequence[Recording], setting: 
     if flipped is not None:
         clean = tuple(with_gyro_turned(recording) for recording in clean)
     return Prepared(clean, tuple(held), flipped, make_problem(robot, soil, clean, setting))
+
+
+def searched(
+    robot: Robot,
+    soil: Soil,
+    recordings: Sequence[Recording],
+    thresholds: Thresholds,
+    setting: Setting,
+    progress: Callable[[str], None] = lambda text: None,
+    keep: Keep = do,
+) -> tuple[Setting, Found]:
+    """Search on windows of the set length; on short ones where the refitted nominal model is far off.
+
+    What is large bends long predictions so much that no small step leads to it, and shows in short ones as well.
+
+    Args:
+        robot: nominal.
+        soil: nominal.
+        recordings: at least one, of one period.
+        thresholds: of the bank.
+        setting: choices.
+        progress: called with what is being done.
+        keep: see :func:`ddagr_gym.diagnosis.search.search`.
+
+    Returns:
+        The setting of the windows that were searched, for :func:`prepare`, and what was found.
+    """
+    problem = prepare(robot, soil, recordings, setting).problem
+    begun = keep("search nominal", partial(begin, problem, progress))
+    if begun[1].dispersion > BENT and setting.duration > SHORT:
+        progress("short windows")
+        setting = setting.with_windows(SHORT, SHORT * setting.stride / setting.duration)
+        problem = prepare(robot, soil, recordings, setting).problem
+        begun = keep("search nominal, short windows", partial(begin, problem, progress))
+    gates = thresholds.for_length(problem.covered)
+    return setting, search(problem, gates, begun=begun, progress=progress, keep=keep)
 
 
 def conclude(
@@ -134,9 +171,10 @@ def diagnose(
         The diagnosis, and the effects that it names with their fitted sizes.
     """
     began = time.monotonic()
-    prepared = prepare(robot, soil, recordings, Setting() if setting is None else setting)
-    thresholds = thresholds.for_windows(prepared.problem.blocked.windows.count)
-    found = search(prepared.problem, thresholds, progress=progress)
+    setting = Setting().with_windows(thresholds.duration) if setting is None else setting
+    setting, found = searched(robot, soil, recordings, thresholds, setting, progress)
+    prepared = prepare(robot, soil, recordings, setting)
+    thresholds = thresholds.for_length(prepared.problem.covered)
     progress("doubt")
     diagnosis, effects = conclude(prepared, found, thresholds, rng)
     return replace(diagnosis, seconds=time.monotonic() - began), effects
@@ -173,7 +211,11 @@ def _findings(problem: Problem, found: Found, thresholds: Thresholds, rng: np.ra
     bounds = intervals(draws)
     findings = []
     for number, effect in enumerate(chosen.fitted.point.effects):
-        spread = {p.field: b for p, b in zip(parameters, bounds, strict=True) if p.effect == number}
+        spread = {
+            p.field: with_structure(b, effect, p.field)
+            for p, b in zip(parameters, bounds, strict=True)
+            if p.effect == number
+        }
         before = _before(found, effect.name)
         gain = next(item for item in before.gains if item.name == effect.name)
         estimates = {

@@ -16,13 +16,18 @@ LEAST_WEIGHT = 0.05
 """Weight that a rival needs to stand in the equivalence set (ours, with the level)."""
 
 
+FORM = 0.08
+"""Share of its gain that an effect may lose because the library's form of it is not the robot's (ours)."""
+
+
 def equivalence_weights(
     rivals: Sequence[Rival], dispersion: float, rng: np.random.Generator, draws: int = 400
 ) -> dict[str, float]:
     """Weight of each rival as the better explanation, averaged over resamplings of the windows.
 
     In a resampling a joint refit has the weight exp(-cost/dispersion) over the sum of all: two that explain the same
-    share it equally even where one is always ahead by a little.
+    share it equally even where one is always ahead by a little. The library's form of an effect is not the robot's:
+    differences of cost count in units of :data:`FORM` of what the best explains, where that is more than 1.
 
     Args:
         rivals: joint refits of one step of the search, best first.
@@ -38,7 +43,8 @@ def equivalence_weights(
     unusual = np.array([implausibility(rival.fitted.point.effects[-1]) for rival in rivals])
     count = windows.shape[1]
     counts = rng.multinomial(count, np.full(count, 1.0 / count), size=draws).astype(float)
-    costs = (counts @ windows.T + priors) / dispersion + unusual
+    form = max(FORM * rivals[0].gain, 1.0)
+    costs = (counts @ windows.T + priors) / dispersion / form + unusual
     relative = np.exp(costs.min(axis=1, keepdims=True) - costs)
     weights = (relative / relative.sum(axis=1, keepdims=True)).mean(axis=0)
     kept = {

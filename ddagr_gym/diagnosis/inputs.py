@@ -7,15 +7,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ddagr_gym.diagnosis.setting import Setting, window_duration
+from ddagr_gym.diagnosis.setting import LEAST_WINDOWS, Setting, window_duration
 from ddagr_gym.diagnosis.verdict import DataSource
 from ddagr_gym.errors import InputError
 from ddagr_gym.parameters import Robot
 from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.replay.windows import PERIOD_TOLERANCE
-
-LEAST_WINDOWS = 8
-"""Windows below which neither noise nor a score has a meaning (ours: 16 s of driving)."""
 
 LEAST_SPEED = 0.02
 """Bank speed that counts as moving [rad/s] (ours: 5 mm/s at the rim of the thesis's robot)."""

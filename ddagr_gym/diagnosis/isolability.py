@@ -169,7 +169,7 @@ def isolability(
         sensors: see there.
         thresholds: of a null bank; gates for normal errors (:func:`chance_gates`) without them.
         kinds: effects by name, the library by default. Held readings are found in the values themselves, left out.
-        setting: of the diagnosis.
+        setting: of the diagnosis; windows as those of the thresholds by default.
         seed: see :func:`ddagr_gym.diagnosis.planned.plan`.
         soil_name: for the table.
         progress: called with the name of each effect when it is done.
@@ -177,10 +177,11 @@ def isolability(
     Raises:
         InputError: see :func:`ddagr_gym.diagnosis.planned.plan`.
     """
+    if setting is None and thresholds is not None:
+        setting = Setting().with_windows(thresholds.duration)
     planned = plan(robot, soil, manoeuvres, sensors, seed=seed, setting=setting)
     terms = scan(planned.problem, planned.fitted, kinds, progress)
-    windows = planned.problem.blocked.windows.count
-    gates = chance_gates(terms) if thresholds is None else thresholds.for_windows(windows)
+    gates = chance_gates(terms) if thresholds is None else thresholds.for_length(planned.problem.covered)
     matrix = information(terms)
     names = tuple(dict.fromkeys(c.name for c in terms.candidates))
     sizes = {name: _directions(name, terms, matrix, gates.of(name).gain) for name in names}

@@ -14,8 +14,12 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ddagr_gym.diagnosis.hypotheses import first_guess
 from ddagr_gym.diagnosis.noise import ChannelNoise
 from ddagr_gym.diagnosis.null_readings import PARTS
+from ddagr_gym.diagnosis.problem import Problem
+from ddagr_gym.diagnosis.scores import drive_extent
+from ddagr_gym.diagnosis.search import Standing, begin
 from ddagr_gym.diagnosis.setting import Setting, make_problem
 from ddagr_gym.diagnosis.structural_nulls import NullWorld, draw_world
 from ddagr_gym.diagnosis.thresholds import NullRun
@@ -145,8 +149,6 @@ def scanned(robot: Robot, soil: Soil, recordings: Sequence[Recording], kind: str
         kind: of KINDS, or the name of the real drive.
         setting: of the diagnosis.
     """
-    from ddagr_gym.diagnosis.search import begin
-
     problem = make_problem(robot, soil, recordings, setting)
     _, standing = begin(problem)
     return NullRun(
@@ -156,7 +158,16 @@ def scanned(robot: Robot, soil: Soil, recordings: Sequence[Recording], kind: str
         standing.held_out,
         standing.misfit,
         problem.blocked.windows.count,
+        _meaningless(problem, standing),
     )
+
+
+def _meaningless(problem: Problem, standing: Standing) -> tuple[str, ...]:
+    """Effects that the scan puts below their least meaningful size."""
+    extent = drive_extent(problem, standing.fitted.prediction)
+    candidates = standing.terms.candidates
+    guesses = (first_guess(candidates[gain.candidate], gain.multiples) for gain in standing.gains)
+    return tuple(effect.name for effect in guesses if not effect.is_meaningful(extent))
 
 
 def pieces_of(recording: Recording, length: float) -> list[Recording]:

@@ -10,12 +10,13 @@ import json
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ddagr_gym.diagnosis.certify import certify
-from ddagr_gym.diagnosis.diagnose import Prepared, conclude, prepare
+from ddagr_gym.diagnosis.diagnose import Prepared, conclude, prepare, searched
 from ddagr_gym.diagnosis.evidence import Evidence, gather_evidence
 from ddagr_gym.diagnosis.held_spans import held_where
 from ddagr_gym.diagnosis.inputs import check_recordings, content_hash
@@ -24,7 +25,7 @@ from ddagr_gym.diagnosis.misfit import explained_share
 from ddagr_gym.diagnosis.next_drive import next_drive, rivals_of_diagnosis, sensors_of_diagnosis
 from ddagr_gym.diagnosis.regimes import Unevenness
 from ddagr_gym.diagnosis.regimes_words import uneven_phrase
-from ddagr_gym.diagnosis.search import Found, search
+from ddagr_gym.diagnosis.search import Found
 from ddagr_gym.diagnosis.sentences import headline
 from ddagr_gym.diagnosis.setting import Setting
 from ddagr_gym.diagnosis.sources import source_digest
@@ -126,8 +127,6 @@ def run(
     began = time.monotonic()
     store = StepStore(None, "") if store is None else store
     check_recordings(task.recordings, task.robot, task.setting)
-    prepared = prepare(task.robot, task.soil, task.recordings, task.setting)
-    task = replace(task, thresholds=task.thresholds.for_windows(prepared.problem.blocked.windows.count))
 
     def step(name: str, work: Callable[[], Any]) -> Any:
         if name not in task.steps:
@@ -135,7 +134,11 @@ def run(
         began_step(name)
         return store.step(name, work)
 
-    found = step("search", lambda: search(prepared.problem, task.thresholds, progress=progress, keep=store.step))
+    nominal = (task.robot, task.soil, task.recordings)
+    work = partial(searched, *nominal, task.thresholds, task.setting, progress, store.step)
+    setting, found = step("search", work)
+    prepared = prepare(*nominal, setting)
+    task = replace(task, thresholds=task.thresholds.for_length(prepared.problem.covered))
     diagnosis, effects = step("verdict", lambda: conclude(prepared, found, task.thresholds, task.rng("verdict")))
     fit = step("certification", lambda: _certified(task, prepared, found, diagnosis, progress))
     where = step("localisation", lambda: asdict(locate(prepared.problem, found)))

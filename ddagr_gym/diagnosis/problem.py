@@ -136,6 +136,12 @@ class Problem:
         return self._setting[0]
 
     @property
+    def covered(self) -> float:
+        """Length of all windows together [s]."""
+        windows = self.blocked.windows
+        return windows.count * windows.duration
+
+    @property
     def free(self) -> Chosen:
         """(P,) global parameters that a fit moves."""
         return np.asarray(self.prior > 0.0)

@@ -165,7 +165,8 @@ def fit(
         start: first point with its effects.
         iterations: most steps; 0 only computes the sensitivities at the start.
         tolerance: relative gain of a step that ends the fit.
-        renewals: how often the nuisances' sensitivities are computed before they are kept; those of the result are new.
+        renewals: how often the nuisances' sensitivities are computed before they are kept; those of the result are new,
+            or from a step before where that step was too small to matter.
         reuse: fit whose nuisance sensitivities are kept, so that only those of the effects are simulated.
         first: fit at ``start`` whose nuisance sensitivities serve for the first step only.
         fixed: names of effect parameters to leave alone.
@@ -201,7 +202,7 @@ def fit(
             fresh = True
         if parameters and done < max(renewals, _EFFECT_RENEWALS) and not converged:
             by_effect = effect_columns(problem, point, prediction, parameters)
-    if reuse is None and done:
+    if reuse is None and done and not converged:
         by_parameter, elimination = _sensitivities(problem, point, prediction)
     cost, shares = cost_of(problem, point, prediction, elimination)
     return Fitted(point, prediction, cost, elimination, by_parameter, done, converged, shares)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Protocol, TypeVar
 
 import numpy as np
@@ -25,7 +26,7 @@ from ddagr_gym.diagnosis.scores import (
     scores,
 )
 from ddagr_gym.diagnosis.size_prior import implausibility
-from ddagr_gym.diagnosis.thresholds import Thresholds
+from ddagr_gym.diagnosis.thresholds import UNMISTAKABLE, Thresholds
 
 Array = NDArray[np.float64]
 Result = TypeVar("Result")
@@ -34,8 +35,13 @@ _TRIAL_STEPS = 3
 _HOPELESS = 0.4  # share of the best linear gain below which no joint refit is tried
 _LARGE = 100.0  # gain above which the linear scan may be far off: refits then begin from two points
 _HOPELESS_LARGE = 0.1  # the same share there
-_UNMISTAKABLE = 3.0  # gain over the gate above which an effect is named even below its least meaningful size
-_BENT = 4.0  # dispersion of the refitted nominal model above which the raw one is scanned too
+_FORM = 0.01
+"""Share of what the named effects explain that a further one must explain besides its gate (ours): the library's form
+of an effect is not the robot's, and what is left of it looks like other effects."""
+
+BENT = 4.0
+"""Dispersion of the refitted nominal model above which the raw one is scanned too, and windows are short."""
+
 _CLOSE = 0.6  # share of the best joint gain above which a rival is fitted to the end
 
 MOST_EFFECTS = 3
@@ -195,7 +201,7 @@ def rivals_of(problem: Problem, standing: Standing, raw: Fitted, thresholds: Thr
         rival
         for rival in rivals
         if rival.fitted.point.effects[-1].is_meaningful(extent)
-        or rival.gain > _UNMISTAKABLE * thresholds.of(rival.name).gain
+        or rival.gain > UNMISTAKABLE * thresholds.of(rival.name).gain
     ]
     return sorted(kept, key=lambda rival: implausibility(rival.fitted.point.effects[-1]) - rival.gain)
 
@@ -207,7 +213,7 @@ def _ranked(problem: Problem, standing: Standing, raw: Fitted, thresholds: Thres
     raw nominal model is scanned as well, and each effect has the larger of its gains.
     """
     scans = [standing]
-    if not standing.names and standing.dispersion > _BENT:
+    if not standing.names and standing.dispersion > BENT:
         scans.append(stand(problem, raw))
     best: dict[str, tuple[Gain, Terms]] = {}
     for scan_ in scans:
@@ -246,7 +252,8 @@ class Keep(Protocol):
         """Result of a part: the kept one, or that of ``work``."""
 
 
-def _do(name: str, work: Callable[[], Result]) -> Result:
+def do(name: str, work: Callable[[], Result]) -> Result:
+    """A :class:`Keep` that keeps nothing."""
     return work()
 
 
@@ -258,7 +265,7 @@ def search(
     most: int = MOST_EFFECTS,
     progress: Callable[[str], None] = lambda text: None,
     begun: tuple[Fitted, Standing] | None = None,
-    keep: Keep = _do,
+    keep: Keep = do,
 ) -> Found:
     """Refit, scan, and add effects while one passes the gate.
 
@@ -276,7 +283,8 @@ def search(
     steps: list[tuple[Rival, ...]] = []
     while len(standings[-1].names) < most:
         number = f"search step {len(standings)}"
-        added = keep(number, lambda: _added(problem, standings[-1], raw, steps, thresholds, rivals, progress))
+        gates = thresholds.raised(_FORM * _explained(standings))
+        added = keep(number, partial(_added, problem, standings[-1], raw, steps, gates, rivals, progress))
         if added is None or set(added[0].names) in [set(s.names) for s in standings]:
             break
         standings.append(added[0])
@@ -285,6 +293,11 @@ def search(
         progress("last refit")
         standings[-1] = _settled(problem, standings[-1])
     return Found(tuple(standings), steps[0] if steps else (), tuple(steps))
+
+
+def _explained(standings: Sequence[Standing]) -> float:
+    """Gain of the named effects together."""
+    return (standings[0].fitted.cost - standings[-1].fitted.cost) / standings[-1].dispersion
 
 
 def _added(

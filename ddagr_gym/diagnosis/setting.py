@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -17,6 +17,12 @@ from ddagr_gym.replay.windows import cut_windows
 
 SHORTEST = 1.0
 """Shortest windows that are cut to fit segments [s]: five time constants of a bank."""
+
+LEAST_WINDOWS = 8
+"""Windows below which neither noise nor a score has a meaning (ours)."""
+
+SHORT = 2.0
+"""Windows to which short recordings are cut at least, so that there are enough of them [s]."""
 
 HISTORY = 0.6
 """Commands kept from before a window [s]: longer than the longest delay of the library."""
@@ -40,6 +46,15 @@ class Setting:
     priors: NuisancePriors = field(default_factory=NuisancePriors)
     threads: int = 1
 
+    def with_windows(self, duration: float, stride: float | None = None) -> Setting:
+        """The same with windows of another length.
+
+        Args:
+            duration: of a window [s].
+            stride: between their starts [s]; by default their length, which uses all samples once.
+        """
+        return replace(self, duration=duration, stride=duration if stride is None else stride)
+
 
 def wheel_radius(robot: Robot) -> float:
     """Mean hub to tread [m]."""
@@ -47,10 +62,11 @@ def wheel_radius(robot: Robot) -> float:
 
 
 def window_duration(recordings: Sequence[Recording], setting: Setting) -> float:
-    """Length of windows [s]: as set, or what most segments have room for where logs were cut into short ones."""
+    """Length of windows [s]: as set, or shorter where short recordings or segments have no room for enough of them."""
     lengths = [(s.stop - s.start - 1) * recording.period for recording in recordings for s in recording.segments()]
+    wanted = min(setting.duration, max(sum(lengths) / LEAST_WINDOWS, SHORT))
     usual = float(np.median(lengths)) if lengths else 0.0
-    return min(setting.duration, usual) if usual >= SHORTEST else setting.duration
+    return min(wanted, usual) if usual >= SHORTEST else wanted
 
 
 def make_problem(
@@ -73,10 +89,11 @@ def make_problem(
         InputError: see :func:`ddagr_gym.replay.windows.cut_windows`.
     """
     radius = wheel_radius(robot)
+    duration = window_duration(recordings, setting)
     windows = cut_windows(
         recordings,
-        window_duration(recordings, setting),
-        stride=setting.stride,
+        duration,
+        stride=setting.stride * min(duration / setting.duration, 1.0),
         wheel_radius=radius,
         half_track=robot.half_track,
         history=HISTORY,

@@ -24,10 +24,24 @@ NOISE_GAIN = 8.0
 """Gain that noise alone reaches in the largest of 28 effects: half the 99.8 percent quantile of chi-square with two to
 three degrees of freedom is 6.3 to 7.4."""
 
-MARGIN = 2.7
-"""Factor on all gates for structures that no bank has, midway (in logarithms) between what nulls and single effects of
-the project's own blind generator reach (development set; it shares no code with the bank): the highest of 40 nulls
-stands 2.3 times over the bank's own gates (the next 1.5), the least of the effects that show at all 3.2 times."""
+MARGIN = 1.5
+"""Factor on the gates of effects on commands, motors and sensors for structures that no bank has: what 40 nulls of the
+project's own blind generator (which shares no code with the bank) reach with a size that matters stays below the bank's
+own gates, the least of the single effects that show stands 3.3 times over them."""
+
+GROUND_MARGIN = 3.5
+"""The same for effects that act through wheels and soil, which another soil law imitates: there those nulls reach
+2.9 times the bank's own gates (patches, ruts), the next of the effects that show 7.8 times."""
+
+THROUGH_GROUND = ("robot", "ground")
+"""Groups of effects with that margin."""
+
+CLEAR = 2.0
+"""Gain over the gate above which an effect is named even if it says nothing about windows that were left out: a patch
+that a drive crosses once is in none of them."""
+
+UNMISTAKABLE = 3.0
+"""Gain over the gate above which an effect is named even below its least meaningful size."""
 
 LOCAL_MARGIN = 4.0
 """The same on the misfit of the local variations: those nulls reach 1.9 times the bank's limits, effects that no
@@ -35,6 +49,9 @@ library has and that show there 8 to 200 times."""
 
 MISFIT_MARGIN = 1.7
 """The same on the misfit of the channels: 0.74 times and, where it shows there, 3.9 to 36 times."""
+
+SHORT_WINDOW = 2.0
+"""Windows of banks that do not say how long theirs are [s]."""
 
 VERSION = 1
 
@@ -71,6 +88,7 @@ class Thresholds:
         level: of false alarms over the whole library.
         maxima: of each null run, the largest gain over its gate, in increasing order.
         windows: of a null run, their median; 0 where unknown.
+        duration: of these windows [s]; diagnoses with the thresholds cut recordings in the same way.
     """
 
     gates: Mapping[str, Gate]
@@ -80,18 +98,30 @@ class Thresholds:
     level: float = LEVEL
     maxima: tuple[float, ...] = ()
     windows: float = 0.0
+    duration: float = SHORT_WINDOW
 
-    def for_windows(self, count: int) -> Thresholds:
+    def for_length(self, seconds: float) -> Thresholds:
         """The same for recordings of another length.
 
-        What a null run reaches beyond noise comes from the structure of the simulator and grows with the number of
-        windows; shorter recordings keep the gates of the bank.
+        What a null run reaches beyond noise comes from the structure of the simulator and grows with the time that the
+        windows cover; what noise reaches does not.
+
+        Args:
+            seconds: that all windows cover together.
         """
-        if self.windows <= 0.0 or count <= self.windows:
+        covered = self.windows * self.duration
+        if covered <= 0.0:
             return self
-        share = count / self.windows
-        gates = {name: Gate(gate.gain * share, gate.held_out * share) for name, gate in self.gates.items()}
-        return replace(self, gates=gates, windows=float(count))
+        share = seconds / covered
+        gates = {
+            name: Gate(NOISE_GAIN + max(gate.gain - NOISE_GAIN, 0.0) * share, gate.held_out * share)
+            for name, gate in self.gates.items()
+        }
+        return replace(self, gates=gates, windows=seconds / self.duration)
+
+    def raised(self, by: float) -> Thresholds:
+        """The same with gates that lie higher by a gain."""
+        return replace(self, gates={name: replace(gate, gain=gate.gain + by) for name, gate in self.gates.items()})
 
     def p_value(self, name: str, gain: float) -> float | None:
         """Share of null runs in which some effect stands as high over its gate, the run at hand counted with them.
@@ -118,6 +148,8 @@ class Thresholds:
         speed limit of gain 1866, 3 for the best of the nulls).
         """
         gate = self.of(name)
+        if gain > CLEAR * gate.gain:
+            return True
         return gain > gate.gain and scan.held_out.get(name, 0.0) > gate.held_out
 
 
@@ -132,6 +164,7 @@ class NullRun:
         held_out: by effect.
         misfit: mean square of the residuals by channel.
         windows: of the run.
+        meaningless: effects that would be of less than their least meaningful size.
     """
 
     kind: str
@@ -140,14 +173,28 @@ class NullRun:
     held_out: dict[str, float]
     misfit: dict[str, float]
     windows: int = 0
+    meaningless: tuple[str, ...] = ()
+
+    def evidence(self, name: str) -> float:
+        """Gain of an effect that counts against its gate: below its least meaningful size only a multiple passes."""
+        gain = max(self.gains.get(name, 0.0), 0.0)
+        return gain / UNMISTAKABLE if name in self.meaningless else gain
 
 
-def thresholds_from(runs: Sequence[NullRun], bank: str, level: float = LEVEL) -> Thresholds:
+def thresholds_from(
+    runs: Sequence[NullRun], bank: str, level: float = LEVEL, duration: float = SHORT_WINDOW
+) -> Thresholds:
     """Gates such that the share ``level`` of null runs passes any of them, and strangers' nulls hardly more.
 
     Gains of an effect are divided by their upper quantile over the runs, or by what noise alone reaches; the quantile
     of the largest of these ratios over all effects then widens all gates alike (a max-statistic correction for the size
     of the library), and so does the margin for simulators that nobody thought of.
+
+    Args:
+        runs: at least one over the level.
+        bank: hash of what they depend on.
+        level: of false alarms over the whole library.
+        duration: of the windows [s].
 
     Raises:
         InputError: too few runs for the level.
@@ -155,17 +202,26 @@ def thresholds_from(runs: Sequence[NullRun], bank: str, level: float = LEVEL) ->
     if len(runs) < 1.0 / level:
         raise InputError(f"{len(runs)} null runs cannot give a level of {level:g}: make at least {int(1 / level)}.")
     names = sorted({name for run in runs for name in run.gains})
-    table = np.array([[max(run.gains.get(name, 0.0), 0.0) for name in names] for run in runs])
+    table = np.array([[run.evidence(name) for name in names] for run in runs])
     scale = np.maximum(np.quantile(table, 1.0 - level, axis=0), NOISE_GAIN)
-    widening = MARGIN * max(float(np.quantile((table / scale).max(axis=1), 1.0 - level)), 1.0)
+    widest = max(float(np.quantile((table / scale).max(axis=1), 1.0 - level)), 1.0)
+    widening = widest * np.array([_margin(name) for name in names])
     held = np.array([[run.held_out.get(name, 0.0) for name in names] for run in runs])
     # the gain carries the level; the gain on left-out windows refuses what few of them carry, at the nulls' median
-    gates = {
-        name: Gate(float(widening * scale[k]), float(max(np.median(held[:, k]), 0.0))) for k, name in enumerate(names)
-    }
+    least = np.maximum(np.median(held, axis=0), 0.0)
+    gates = {name: Gate(float(widening[k] * scale[k]), float(least[k])) for k, name in enumerate(names)}
     maxima = np.sort((table / (widening * scale)).max(axis=1))
     windows = float(np.median([run.windows for run in runs]))
-    return Thresholds(gates, _misfit_limits(runs, level), len(runs), bank, level, tuple(maxima.tolist()), windows)
+    limits = _misfit_limits(runs, level)
+    return Thresholds(gates, limits, len(runs), bank, level, tuple(maxima.tolist()), windows, duration)
+
+
+def _margin(name: str) -> float:
+    """Margin of an effect; one that is not in the library has the wider."""
+    from ddagr_gym.physics.effects.registry import effect_kinds
+
+    kind = effect_kinds().get(name)
+    return GROUND_MARGIN if kind is None or kind.group in THROUGH_GROUND else MARGIN
 
 
 def _misfit_limits(runs: Sequence[NullRun], level: float) -> dict[str, float]:
@@ -212,6 +268,7 @@ def load_thresholds(path: Path) -> Thresholds:
         float(body["level"]),
         maxima,
         float(body.get("windows", 0.0)),
+        float(body.get("duration", SHORT_WINDOW)),
     )
 
 

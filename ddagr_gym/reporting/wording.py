@@ -15,6 +15,12 @@ from ddagr_gym.physics.effects.registry import effect_kinds
 DEGREES = 180.0 / math.pi
 _LOPSIDED = 0.5
 """Distance of a value from the middle of its interval, over the half width, beyond which the interval is written."""
+_UNEVEN_BANKS = 0.3
+"""Share by which the banks' delays differ from their mean before both are told (ours)."""
+
+_ASIDE = 0.05
+"""Distance of a hitch from the middle that is told [m] (ours)."""
+
 _UNBOUNDED = 1e5
 """Onsets and limits beyond it mean always, and none."""
 
@@ -223,6 +229,23 @@ def _split(a: Amounts) -> str:
     return f"the soil on the left is {_soil(a)} than on the right"
 
 
+def _delay(a: Amounts) -> str:
+    text = f"commands act {quantity(a['delay'], 's')} late"
+    uneven = a["imbalance"].value if "imbalance" in a else 0.0
+    if abs(uneven) < _UNEVEN_BANKS:
+        return text
+    right, left = (a["delay"].value * (1.0 + sign * uneven) for sign in (1.0, -1.0))
+    return f"{text} on average, by {right:.2g} s on the right and {left:.2g} s on the left"
+
+
+def _towed_drag(a: Amounts) -> str:
+    place = f"{quantity(a['hitch_distance'], 'm')} behind the centre"
+    side = a["hitch_side"].value if "hitch_side" in a else 0.0
+    if abs(side) >= _ASIDE:
+        place += f" and {abs(side):.2g} m to the {'left' if side > 0.0 else 'right'}"
+    return f"something pulls back with {quantity(a['force'], 'N')}, {place}"
+
+
 def _radius(a: Amounts) -> str:
     sides = ("right", "left") if a["difference"].value >= 0.0 else ("left", "right")
     return f"the {sides[0]} wheels are {quantity(a['difference'].scaled(100.0), '%')} larger than the {sides[1]} ones"
@@ -238,7 +261,7 @@ SENTENCES: Mapping[str, Callable[[Amounts], str]] = {
     "accelerometer_sign": _accelerometer_sign,
     "centre_of_mass_offset": _centre_of_mass,
     "command_deadband": _deadband,
-    "command_delay": lambda a: f"commands act {quantity(a['delay'], 's')} late",
+    "command_delay": _delay,
     "encoder_scale": _encoder_scale,
     "gyro_bias": lambda a: (
         f"the gyro is off by {quantity(a['bias'].scaled(DEGREES), 'degrees/s', signed=True)} (positive to the left)"
@@ -272,9 +295,7 @@ SENTENCES: Mapping[str, Callable[[Amounts], str]] = {
     "soil_change": _soil_change,
     "soil_patch": _soil_patch,
     "soil_split": _split,
-    "towed_drag": lambda a: (
-        f"something pulls back with {quantity(a['force'], 'N')}, {quantity(a['hitch_distance'], 'm')} behind the centre"
-    ),
+    "towed_drag": _towed_drag,
     "viscous_drag": lambda a: f"something holds the robot back with {quantity(a['coefficient'], 'N')} per m/s",
     "wheel_radius_mismatch": _radius,
 }

@@ -88,7 +88,8 @@ def test_an_evaluation_is_driven_kept_and_not_driven_again(tmp_path, monkeypatch
 
 
 def test_every_commit_is_remembered_once(tmp_path, monkeypatch):
-    monkeypatch.setattr(row_turns, "commit", iter(["first", "second", "first"]).__next__)
+    commits = iter(["first", "second", "first"])
+    monkeypatch.setattr(row_turns, "commit_of", lambda checkout: next(commits))
     found = [row_turns.remembered_commits(tmp_path) for _ in range(3)]
     assert found == [["first"], ["first", "second"], ["first", "second"]]
 

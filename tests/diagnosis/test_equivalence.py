@@ -6,16 +6,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ddagr_gym.diagnosis.equivalence import equivalence_weights
+from ddagr_gym.diagnosis.equivalence import FORM, equivalence_weights
 from ddagr_gym.diagnosis.search import Rival
 from ddagr_gym.physics.effects import load_effects
 
 
-def rival(effect: str, window_cost: np.ndarray, prior: float = 0.0) -> Rival:
+def rival(effect: str, window_cost: np.ndarray, prior: float = 0.0, gain: float = 0.0) -> Rival:
     found = load_effects(effect)
     point = SimpleNamespace(effects=found)
     fitted: Any = SimpleNamespace(window_cost=window_cost, cost=float(window_cost.sum()) + prior, point=point)
-    return Rival(found[0].name, fitted, 0.0)
+    return Rival(found[0].name, fitted, gain)
 
 
 def weights(*rivals: Rival, dispersion: float = 1.0) -> dict[str, float]:
@@ -25,10 +25,10 @@ def weights(*rivals: Rival, dispersion: float = 1.0) -> dict[str, float]:
 def test_equal_costs_share_equally_and_clear_ones_do_not() -> None:
     cost = np.full(30, 10.0)
     # both five times the least meaningful size: equally plausible
-    same = weights(rival("gyro_scale=1.1", cost), rival("imu_misalignment=0.1745", cost))
+    same = weights(rival("gyro_scale=1.05", cost), rival("imu_misalignment=0.1745", cost))
     assert sum(same.values()) == pytest.approx(1.0)
     assert same["gyro_scale"] == pytest.approx(0.5, abs=0.2)
-    clear = weights(rival("gyro_scale=1.1", cost), rival("imu_misalignment=0.1745", cost + 1.0))
+    clear = weights(rival("gyro_scale=1.05", cost), rival("imu_misalignment=0.1745", cost + 1.0))
     assert clear == {"gyro_scale": 1.0}
 
 
@@ -36,7 +36,7 @@ def test_one_window_in_favour_keeps_a_rival_alive() -> None:
     cost = np.full(30, 10.0)
     other = cost.copy()
     other[:1] += 6.0  # in a third of the resamplings this window is missing
-    found = weights(rival("gyro_scale=1.1", cost), rival("imu_misalignment=0.1745", other))
+    found = weights(rival("gyro_scale=1.05", cost), rival("imu_misalignment=0.1745", other))
     assert 0.1 < found["imu_misalignment"] < 0.4
 
 
@@ -46,3 +46,12 @@ def test_size_settles_ties() -> None:
     large = weights(rival("accelerometer_bias=0.9", cost), rival("imu_tilt=0,pitch=0.0917", cost))
     assert small["accelerometer_bias"] > 0.6
     assert large["imu_tilt"] > 0.6
+
+
+def test_what_a_form_may_cost_keeps_a_rival_of_a_strong_effect() -> None:
+    cost, worse = np.full(30, 10.0), np.full(30, 11.0)
+    weak = weights(rival("gyro_scale=1.05", cost, gain=60.0), rival("imu_misalignment=0.1745", worse))
+    strong = weights(rival("gyro_scale=1.05", cost, gain=30.0 / FORM), rival("imu_misalignment=0.1745", worse))
+    assert weak == {"gyro_scale": 1.0}
+    # the difference of 30 is what the form may cost
+    assert strong["imu_misalignment"] == pytest.approx(1.0 / (1.0 + np.e), abs=0.05)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from ddagr_gym.diagnosis.inputs import check_recordings, content_hash, data_source
-from ddagr_gym.diagnosis.setting import Setting
+from ddagr_gym.diagnosis.setting import Setting, window_duration
 from ddagr_gym.errors import InputError
 from ddagr_gym.presets import get_robot
 from ddagr_gym.recordings.schema import Recording
@@ -59,3 +59,9 @@ def test_logs_cut_into_steps_of_one_window_pass() -> None:
     drive = made(rate=20.0)
     segments = tuple((k, k + 40) for k in range(0, 600, 40))
     check_recordings([replace(drive, meta=replace(drive.meta, segments=segments))], ROBOT, Setting())
+
+
+@pytest.mark.parametrize(("seconds", "duration"), [(24.0, 3.0), (60.0, 6.0), (10.0, 2.0)])
+def test_short_recordings_get_shorter_windows(seconds: float, duration: float) -> None:
+    recording = made(rate=50.0, seconds=seconds)
+    assert window_duration([recording], Setting().with_windows(6.0)) == pytest.approx(duration, rel=0.01)

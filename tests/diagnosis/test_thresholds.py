@@ -2,16 +2,21 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from ddagr_gym.diagnosis.misfit import LOCAL
 from ddagr_gym.diagnosis.thresholds import (
+    GROUND_MARGIN,
     MARGIN,
     MISFIT_MARGIN,
     NOISE_GAIN,
+    UNMISTAKABLE,
+    Gate,
     NullRun,
+    Thresholds,
     default_thresholds,
     load_thresholds,
     save_thresholds,
@@ -36,11 +41,28 @@ def null_runs(count: int, seed: int) -> list[NullRun]:
 def test_false_alarms_over_the_library_are_at_the_level() -> None:
     thresholds = thresholds_from(null_runs(2000, 1), "x", level=0.05)
     fresh = null_runs(2000, 2)
-    alarms = np.mean([any(run.gains[n] * MARGIN > thresholds.of(n).gain for n in NAMES) for run in fresh])
+    margins = dict(zip(NAMES, (GROUND_MARGIN, GROUND_MARGIN, MARGIN, MARGIN), strict=True))
+    alarms = np.mean([any(run.gains[n] * margins[n] > thresholds.of(n).gain for n in NAMES) for run in fresh])
     assert alarms == pytest.approx(0.05, abs=0.02)
-    assert thresholds.of("slope").gain >= MARGIN * NOISE_GAIN
+    assert thresholds.of("slope").gain >= GROUND_MARGIN * NOISE_GAIN
+    assert thresholds.of("gyro_bias").gain == pytest.approx(
+        thresholds.of("slope").gain * MARGIN / GROUND_MARGIN, rel=0.2
+    )
     assert thresholds.of("payload").gain > 1.5 * thresholds.of("slope").gain
     assert 1.15 < thresholds.misfit["yaw_rate"] / MISFIT_MARGIN < 1.25
+
+
+def test_gains_of_sizes_that_do_not_matter_count_less() -> None:
+    runs = [replace(run, gains=run.gains | {"payload": 100.0}) for run in null_runs(40, 1)]
+    strict = thresholds_from(runs, "x")
+    small = thresholds_from([replace(run, meaningless=("payload",)) for run in runs], "x")
+    assert strict.of("payload").gain == pytest.approx(UNMISTAKABLE * small.of("payload").gain, rel=1e-6)
+
+
+def test_further_effects_have_raised_gates() -> None:
+    thresholds = thresholds_from(null_runs(40, 1), "x")
+    assert thresholds.raised(12.0).of("slope").gain == pytest.approx(12.0 + thresholds.of("slope").gain)
+    assert thresholds.raised(12.0).of("slope").held_out == thresholds.of("slope").held_out
 
 
 def test_p_value_counts_null_runs_that_stand_as_high() -> None:
@@ -51,13 +73,22 @@ def test_p_value_counts_null_runs_that_stand_as_high() -> None:
     assert middle == pytest.approx(0.5, abs=0.03)
 
 
-def test_gates_grow_with_longer_recordings_only() -> None:
+def test_what_structure_adds_to_the_gates_goes_with_the_length() -> None:
     runs = [replace(run, windows=30) for run in null_runs(40, 1)]
-    thresholds = thresholds_from(runs, "x")
-    assert thresholds.for_windows(20) == thresholds
-    longer = thresholds.for_windows(90)
-    assert longer.of("slope").gain == pytest.approx(3.0 * thresholds.of("slope").gain)
-    assert longer.misfit == thresholds.misfit
+    thresholds = thresholds_from(runs, "x", duration=4.0)
+    assert thresholds.for_length(120.0).gates == thresholds.gates
+    for seconds in (40.0, 360.0):
+        other = thresholds.for_length(seconds)
+        beyond = thresholds.of("slope").gain - NOISE_GAIN
+        assert other.of("slope").gain == pytest.approx(NOISE_GAIN + seconds / 120.0 * beyond)
+        assert other.misfit == thresholds.misfit
+
+
+def test_what_few_windows_carry_must_be_clear() -> None:
+    thresholds = Thresholds({"slope": Gate(10.0, 0.0)}, {}, 20, "x")
+    few, many = SimpleNamespace(held_out={"slope": -5.0}), SimpleNamespace(held_out={"slope": 5.0})
+    assert [thresholds.passes("slope", gain, few) for gain in (9.0, 11.0, 21.0)] == [False, False, True]
+    assert [thresholds.passes("slope", gain, many) for gain in (9.0, 11.0, 21.0)] == [False, True, True]
 
 
 def test_a_bank_ships_for_the_thesis_robot() -> None:

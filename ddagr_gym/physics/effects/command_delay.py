@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from ddagr_gym.physics.effects.base import Effect, Vector, size
+from ddagr_gym.physics.effects.base import DriveExtent, Effect, Vector, shape, size
 from ddagr_gym.physics.effects.history import fill_node, push, recall, ring_is_empty, ring_stride
 from ddagr_gym.physics.layout import COMMAND, OMEGA, POINT_COMMANDS, SAMPLE_PERIOD
 
@@ -11,7 +11,7 @@ _NODES = 64  # every sample at 125 Hz and below
 
 
 def delay_command(row: Vector, parameters: Vector, memory: Vector) -> None:
-    """Commands of ``parameters[0]`` seconds ago."""
+    """Commands of ``parameters[0]`` seconds ago, ``parameters[1]`` of it more on the right and less on the left."""
     period = row[SAMPLE_PERIOD]
     stride = ring_stride(_LONGEST, period, _NODES)
     if ring_is_empty(memory, 2, _NODES):
@@ -21,7 +21,9 @@ def delay_command(row: Vector, parameters: Vector, memory: Vector) -> None:
                 fill_node(memory, 2, _NODES, k, stride, bank, row[OMEGA + bank])
     push(memory, 2, _NODES, stride, row[COMMAND : COMMAND + 2])
     for bank in range(2):
-        row[COMMAND + bank] = recall(memory, 2, _NODES, stride, bank, parameters[0] / period, row[COMMAND + bank])
+        share = 1.0 + parameters[1] if bank == 0 else 1.0 - parameters[1]
+        delay = min(parameters[0] * share, _LONGEST)
+        row[COMMAND + bank] = recall(memory, 2, _NODES, stride, bank, delay / period, row[COMMAND + bank])
 
 
 @dataclass(frozen=True)
@@ -29,16 +31,25 @@ class CommandDelay(Effect):
     """The motors receive the command of some time ago, interpolated between samples.
 
     Attributes:
-        delay: least: half a period of a usual 25 Hz control loop.
+        delay: mean of the banks; least: half a period of a usual 25 Hz control loop.
+        imbalance: share of the mean by which the right bank's is longer and the left one's shorter: 1 where only the
+            right motor controller is late, -1 where only the left one is.
     """
 
     name = "command_delay"
     title = "Command delay"
     group = "commands and motors"
-    equation = "command(t) -> command(t - delay)"
+    equation = "command(t) -> command(t - delay (1 +- imbalance)), + on the right"
     source = "dead time, as of a transport lag (Astrom and Murray, Feedback Systems)"
     signature = "bank speeds follow commands late by a constant time, then at the usual rate"
     confused_with = ("motor_lag", "sensor_hold")
     actions = ((POINT_COMMANDS, delay_command),)
 
     delay: float = size("s", 0.0, _LONGEST, least=0.02, step=0.008)
+    imbalance: float = shape("-", -1.0, 1.0, default=0.0, step=0.05)
+
+    @classmethod
+    def probes(cls, extent: DriveExtent) -> tuple[Effect, ...]:
+        """A short delay of both banks, of the right one and of the left one."""
+        step = cls.parameter("delay").metadata["step"]
+        return tuple(cls(step, imbalance) for imbalance in (0.0, 1.0, -1.0))

@@ -16,7 +16,7 @@ class GyroScale(Effect):
     """Factor on the yaw rate that is read; its reversal is gyro_sign.
 
     Attributes:
-        scale: least: 2 percent, 3.6 degrees per half turn.
+        scale: least: 1 percent, 1.8 degrees per half turn, as much as a row turn's radius should be known to.
     """
 
     name = "gyro_scale"
@@ -28,4 +28,4 @@ class GyroScale(Effect):
     confused_with = ("encoder_scale", "gyro_sign", "lateral_bulldozing")
     actions = ((POINT_READINGS, scale_gyro),)
 
-    scale: float = size("-", 0.1, 10.0, least=0.02, neutral=1.0)
+    scale: float = size("-", 0.1, 10.0, least=0.01, neutral=1.0)

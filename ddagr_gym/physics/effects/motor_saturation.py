@@ -11,6 +11,11 @@ _HIGHEST_SPEED_LIMIT = 20.0  # [rad/s] that any of the preset robots would meet
 _HIGHEST_ACCELERATION_LIMIT = 200.0  # [rad/s^2], the same
 _BINDING = 0.95  # of what the drive reaches: limits above it cost less than 5 percent
 _PROBED = (0.9, 0.6)
+_PROBED_ACCELERATION = (
+    0.9,
+    0.6,
+    0.3,
+)  # the greatest is that of a lag's first instant
 
 
 def limit_motors(row: Vector, parameters: Vector, memory: Vector) -> None:
@@ -71,5 +76,5 @@ class MotorSaturation(Effect):
     def probes(cls, extent: DriveExtent) -> tuple[Effect, ...]:
         """Limits somewhat and well below what the drive reaches, one at a time."""
         slow = [cls(max(share * extent.wheel_speed, 0.01)) for share in _PROBED]
-        limits = [max(share * extent.wheel_acceleration, 0.01) for share in _PROBED]
+        limits = [max(share * extent.wheel_acceleration, 0.01) for share in _PROBED_ACCELERATION]
         return (*slow, *(cls(_NO_SPEED_LIMIT, limit) for limit in limits))

@@ -10,14 +10,15 @@ _SMOOTHING_SPEED = 0.01  # [m/s], ours: the sign of the velocity, made different
 
 
 def drag_behind(row: Vector, parameters: Vector, memory: Vector) -> None:
-    """Force ``parameters[0]`` against the velocity of a hitch ``parameters[1]`` behind the origin."""
+    """Force ``parameters[0]`` against the velocity of a hitch ``parameters[1]`` behind, ``[2]`` left of the origin."""
+    v_x = row[V_X] - row[YAW_RATE] * parameters[2]
     v_y = row[V_Y] - row[YAW_RATE] * parameters[1]
-    speed = math.sqrt(row[V_X] * row[V_X] + v_y * v_y + _SMOOTHING_SPEED * _SMOOTHING_SPEED)
-    force_x = -parameters[0] * row[V_X] / speed
+    speed = math.sqrt(v_x * v_x + v_y * v_y + _SMOOTHING_SPEED * _SMOOTHING_SPEED)
+    force_x = -parameters[0] * v_x / speed
     force_y = -parameters[0] * v_y / speed
     row[BODY_FORCE] += force_x
     row[BODY_FORCE + 1] += force_y
-    row[BODY_FORCE + 2] -= parameters[1] * force_y
+    row[BODY_FORCE + 2] -= parameters[1] * force_y + parameters[2] * force_x
 
 
 @dataclass(frozen=True)
@@ -27,12 +28,13 @@ class TowedDrag(Effect):
     Attributes:
         force: least: 10 N, a tenth of the rolling resistance of a 170 kg robot on soil.
         hitch_distance: behind the body origin.
+        hitch_side: to the left of it; a hitch that is not in the middle pulls the robot to its side.
     """
 
     name = "towed_drag"
     title = "Towed drag"
     group = "robot"
-    equation = "F = -force v_h/|v_h| at the hitch, v_h = (v_x, v_y - hitch_distance yaw_rate)"
+    equation = "F = -force v_h/|v_h| at the hitch, v_h = (v_x - hitch_side yaw_rate, v_y - hitch_distance yaw_rate)"
     source = "Coulomb friction of a towed sledge"
     signature = "slower at every speed and heading; steadies yaw through the hitch"
     confused_with = ("lateral_bulldozing", "slip_sinkage", "slope", "soil_change", "viscous_drag")
@@ -40,6 +42,7 @@ class TowedDrag(Effect):
 
     force: float = size("N", 0.0, 2000.0, least=10.0, step=5.0)
     hitch_distance: float = shape("m", 0.0, 5.0, default=0.5, step=0.1)
+    hitch_side: float = shape("m", -2.0, 2.0, default=0.0, step=0.05)
 
     @classmethod
     def probes(cls, extent: DriveExtent) -> tuple[Effect, ...]:

@@ -30,6 +30,13 @@ def test_delay_of_whole_samples_shifts_the_bank_speeds(drive, steps, samples):
     np.testing.assert_array_equal(late[:samples], 0.0)
 
 
+@pytest.mark.parametrize(("imbalance", "samples"), [(1.0, (10, 0)), (-1.0, (0, 10)), (0.2, (6, 4))])
+def test_banks_may_be_late_by_different_times(drive, steps, imbalance, samples):
+    prompt, late = drive((), steps), drive([f"command_delay={5 * PERIOD},imbalance={imbalance}"], steps)
+    for name, shift in zip(("encoder_right", "encoder_left"), samples, strict=True):
+        np.testing.assert_allclose(late[name][shift:], prompt[name][: len(steps) - shift], atol=1e-12)
+
+
 @pytest.mark.parametrize("sample_rate", [50.0, 125.0, 400.0, 1000.0])
 @pytest.mark.parametrize("delay", [0.013, 0.2, 0.49])
 def test_delay_of_a_ramp_is_exact_at_every_rate(act, turning_row, sample_rate, delay):

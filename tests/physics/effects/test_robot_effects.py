@@ -119,9 +119,28 @@ def test_hitch_behind_the_robot_steadies_yaw(drive):
     assert rates[0] > rates[1] > rates[2] > 0
 
 
-@given(v_x=FINITE, v_y=FINITE, yaw_rate=FINITE, hitch=st.floats(0.0, 5.0), size=st.floats(0.0, 2000.0))
-def test_drags_take_power(v_x, v_y, yaw_rate, hitch, size):
-    for effect in (parse_effect(f"towed_drag={size},hitch_distance={hitch}"), parse_effect(f"viscous_drag={size}")):
+def test_hitch_aside_pulls_the_robot_to_its_side(drive, straight):
+    commands, state = straight(0.7, 400)
+    left, middle, right = (
+        drive([f"towed_drag=80,hitch_side={side}"], commands, initial_state=state)["true_yaw"][-1]
+        for side in (0.3, 0.0, -0.3)
+    )
+    assert left > 0.01
+    assert right == pytest.approx(-left, rel=1e-6)
+    assert middle == pytest.approx(0.0, abs=1e-9)
+
+
+@given(
+    v_x=FINITE,
+    v_y=FINITE,
+    yaw_rate=FINITE,
+    hitch=st.floats(0.0, 5.0),
+    side=st.floats(-2.0, 2.0),
+    size=st.floats(0.0, 2000.0),
+)
+def test_drags_take_power(v_x, v_y, yaw_rate, hitch, side, size):
+    towed = parse_effect(f"towed_drag={size},hitch_distance={hitch},hitch_side={side}")
+    for effect in (towed, parse_effect(f"viscous_drag={size}")):
         row = np.zeros(layout.SIZE)
         row[layout.V_X], row[layout.V_Y], row[layout.YAW_RATE] = v_x, v_y, yaw_rate
         effect.actions[0][1](row, effect.vector(), np.zeros(layout.EFFECT_MEMORY))
