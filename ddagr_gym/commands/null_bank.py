@@ -11,6 +11,7 @@ from tyro.conf import Positional
 
 from ddagr_gym.commands.output import atomic_path
 from ddagr_gym.commands.progress import Progress
+from ddagr_gym.errors import InputError
 
 if TYPE_CHECKING:
     from ddagr_gym.diagnosis.null_bank import Template
@@ -72,11 +73,13 @@ def run(arguments: Arguments) -> None:
     from ddagr_gym.diagnosis.noise import recording_noise
     from ddagr_gym.diagnosis.nuisance import NuisancePriors
     from ddagr_gym.diagnosis.null_bank import bank_hash, pieces_of, template_of
-    from ddagr_gym.diagnosis.setting import Setting, wheel_radius
+    from ddagr_gym.diagnosis.setting import SHORTEST, Setting, wheel_radius
     from ddagr_gym.diagnosis.thresholds import NullRun, save_thresholds, thresholds_from
     from ddagr_gym.presets import get_robot, get_soil
     from ddagr_gym.recordings.load import load_recording
 
+    if not arguments.window >= SHORTEST:
+        raise InputError(f"--window is {arguments.window:g}: give at least {SHORTEST:g} s.")
     robot, soil = get_robot(arguments.robot), get_soil(arguments.soil)
     recordings = [load_recording(path, arguments.map or None, arguments.robot) for path in arguments.runs]
     priors = NuisancePriors().with_soil(arguments.soil_uncertainty)

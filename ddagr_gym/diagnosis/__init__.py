@@ -35,7 +35,9 @@ Limits so far
     *Which* effects are named is decided on all recordings; only their sizes are certified on others. ``complete``
     and ``unknown`` rest on the misfit per channel against the null bank. Mass hides behind soil strength in drives of
     this kind, and so does a drag along the speed: see ``detectable``. Which of two motor poles is the slower one is
-    open, so that the lag of a second pole is shared out with the nuisance ``motor_rate``.
+    open, so that the lag of a second pole is shared out with the nuisance ``motor_rate``. Without poses every
+    recording has a heading and a place of its own: a slope or a patch that several of them share is then seen as if
+    they had begun alike (a slope may come with an accelerometer bias that is not there).
 
 Conventions: SI units, radians, channels and states in the order of :mod:`ddagr_gym.replay.windows`. Costs are half sums
 of squares in units of the noise; gains are divided by the dispersion of the model they start from.

@@ -26,7 +26,7 @@ class Estimate:
     Attributes:
         value: in unit.
         unit: SI.
-        interval: 90 %, resampled over windows; None where the parameter was not fitted.
+        interval: 90 %, resampled over windows and widened by the forms of simulators; None where it was not fitted.
     """
 
     value: float

@@ -60,3 +60,14 @@ def test_too_few_drives_for_the_level(
     assert main(words(tmp_path, count=5)) == 2
     assert "20" in capsys.readouterr().err
     assert not (tmp_path / "thresholds.json").exists()
+
+
+def test_windows_shorter_than_a_robot_answers_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([*words(tmp_path), "--window", "0.5"]) == 2
+    assert "--window is 0.5" in capsys.readouterr().err
+    assert not (tmp_path / "thresholds.bank").exists()
+
+
+def test_thresholds_know_their_windows(quick_nulls: list[int], tmp_path: Path) -> None:
+    assert main([*words(tmp_path), "--window", "4"]) == 0
+    assert load_thresholds(tmp_path / "thresholds.json").duration == 4.0
