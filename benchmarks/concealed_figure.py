@@ -114,5 +114,5 @@ def _targets(panel: Any, result: Mapping[str, Any]) -> None:
     panel.set_xlim(-0.02, 1.02)
     panel.set_ylim(len(shown) - 0.4, -0.7)
     panel.set_yticks([])
-    panel.set_xlabel("share, with its 95 % interval; blue is where it should lie")
+    panel.set_xlabel("share with 95 % interval; blue: the aim")
     panel.set_title("Against the targets")

@@ -217,7 +217,7 @@ def _findings(problem: Problem, found: Found, thresholds: Thresholds, rng: np.ra
             if p.effect == number
         }
         before = _before(found, effect.name)
-        gain = next(item for item in before.gains if item.name == effect.name)
+        gain = _gain(found, effect.name)
         estimates = {
             name: Estimate(float(getattr(effect, name)), str(effect.parameter(name).metadata["unit"]), spread.get(name))
             for name in (*effect.size_names(), *effect.shape_names())
@@ -226,13 +226,13 @@ def _findings(problem: Problem, found: Found, thresholds: Thresholds, rng: np.ra
             Finding(
                 effect.name,
                 estimates,
-                gain.gain,
+                gain,
                 thresholds.of(effect.name).gain,
                 before.scores[effect.name],
                 before.held_out.get(effect.name, 0.0),
                 _channel_shares(found.nominal, chosen),
                 _equivalents(found, effect.name, rng),
-                calibrated_p=thresholds.p_value(effect.name, gain.gain),
+                calibrated_p=thresholds.p_value(effect.name, gain),
             )
         )
     return findings
@@ -241,6 +241,12 @@ def _findings(problem: Problem, found: Found, thresholds: Thresholds, rng: np.ra
 def _before(found: Found, name: str) -> Standing:
     """The last model of the search that lacks an effect."""
     return next(s for s in reversed(found.standings) if name not in s.names)
+
+
+def _gain(found: Found, name: str) -> float:
+    """Evidence of an effect: what the scan says, or the joint refit that added it where that says more."""
+    linear = next(item.gain for item in _before(found, name).gains if item.name == name)
+    return max([linear, *(rival.gain for step in found.steps for rival in step if rival.name == name)])
 
 
 def _equivalents(found: Found, name: str, rng: np.random.Generator) -> dict[str, float]:

@@ -4,9 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 from ddagr_gym.diagnosis.candidates import Candidate
+from ddagr_gym.diagnosis.problem import Point, Problem
 from ddagr_gym.physics.effects import Effect
+from ddagr_gym.physics.effects.motor_lag import MotorLag
+
+PULLED = 4.0
+"""Standard deviations from the nominal value beyond which a refitted nuisance stands for something missing (ours)."""
 
 
 def first_guess(candidate: Candidate, multiples: Sequence[float]) -> Effect:
@@ -64,3 +70,30 @@ def _slope(candidate: Candidate, multiples: Sequence[float]) -> Effect:
     return candidate.probes[0].with_values(  # type: ignore[no-any-return]
         angle=min(math.hypot(x, y), high), direction=math.atan2(y, x)
     )
+
+
+def slower_loop(problem: Problem, point: Point) -> Point | None:
+    """The same predictions with a slow speed loop told as motor_lag, where its nuisance stands far from what is known.
+
+    Refitted rate and lag are one time constant, 1/rate + lag. The scan, which is linear, does not find the way from one
+    to the other: it is curved, and long where the loop is slow. Null drives leave the rate within a tenth of its
+    standard deviation.
+
+    Args:
+        problem: with the nuisances.
+        point: fitted.
+
+    Returns:
+        None where the rate is near the nominal one or fast, or motor_lag is assumed.
+    """
+    names = [parameter.name for parameter in problem.nuisances.parameters]
+    if "motor_rate" not in names or "motor_lag" in [effect.name for effect in point.effects]:
+        return None
+    place = names.index("motor_rate")
+    value = float(point.values[place])
+    if value > -PULLED * float(problem.prior[place]):
+        return None
+    values = point.values.copy()
+    values[place] = 0.0
+    lag = MotorLag(math.expm1(-value) / problem.robot.motor_rate)
+    return replace(point, values=values, effects=(*point.effects, lag))

@@ -24,7 +24,7 @@ from ddagr_gym.control.manoeuvres import Manoeuvre
 from ddagr_gym.diagnosis.candidates import Candidate
 from ddagr_gym.diagnosis.planned import information, plan
 from ddagr_gym.diagnosis.scores import Terms, scan
-from ddagr_gym.diagnosis.setting import Setting
+from ddagr_gym.diagnosis.setting import SHORT, Setting
 from ddagr_gym.diagnosis.size_prior import TYPICAL_MULTIPLE
 from ddagr_gym.diagnosis.thresholds import LEVEL, Gate, Thresholds
 from ddagr_gym.parameters import Robot, Soil
@@ -169,7 +169,7 @@ def isolability(
         sensors: see there.
         thresholds: of a null bank; gates for normal errors (:func:`chance_gates`) without them.
         kinds: effects by name, the library by default. Held readings are found in the values themselves, left out.
-        setting: of the diagnosis; windows as those of the thresholds by default.
+        setting: of the diagnosis; windows as those of the thresholds, shorter where a manoeuvre is short, by default.
         seed: see :func:`ddagr_gym.diagnosis.planned.plan`.
         soil_name: for the table.
         progress: called with the name of each effect when it is done.
@@ -177,8 +177,10 @@ def isolability(
     Raises:
         InputError: see :func:`ddagr_gym.diagnosis.planned.plan`.
     """
-    if setting is None and thresholds is not None:
-        setting = Setting().with_windows(thresholds.duration)
+    if setting is None and thresholds is not None and manoeuvres:
+        # a drive must have room for two windows, as short ones in a diagnosis do
+        room = 0.5 * min(manoeuvre.duration for manoeuvre in manoeuvres)
+        setting = Setting().with_windows(min(thresholds.duration, max(room, SHORT)))
     planned = plan(robot, soil, manoeuvres, sensors, seed=seed, setting=setting)
     terms = scan(planned.problem, planned.fitted, kinds, progress)
     gates = chance_gates(terms) if thresholds is None else thresholds.for_length(planned.problem.covered)

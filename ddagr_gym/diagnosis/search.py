@@ -10,7 +10,7 @@ from typing import Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.diagnosis.hypotheses import first_guess
+from ddagr_gym.diagnosis.hypotheses import first_guess, slower_loop
 from ddagr_gym.diagnosis.misfit import channel_misfit
 from ddagr_gym.diagnosis.problem import Point, Problem
 from ddagr_gym.diagnosis.refit import DAMPING, Fitted, cost_of, fit
@@ -195,6 +195,7 @@ def rivals_of(problem: Problem, standing: Standing, raw: Fitted, thresholds: Thr
             # the start that serves the first rival serves the others
             starts = [starts[best_start]]
             tried.append(_rival(standing, gain.name, trials[best_start]))
+    tried = _with_slower_loop(problem, standing, tried)
     best = max((rival.gain for rival in tried), default=0.0)
     rivals = [_finish(problem, standing, rival, large) if rival.gain > _CLOSE * best else rival for rival in tried]
     kept = [
@@ -204,6 +205,17 @@ def rivals_of(problem: Problem, standing: Standing, raw: Fitted, thresholds: Thr
         or rival.gain > UNMISTAKABLE * thresholds.of(rival.name).gain
     ]
     return sorted(kept, key=lambda rival: implausibility(rival.fitted.point.effects[-1]) - rival.gain)
+
+
+def _with_slower_loop(problem: Problem, standing: Standing, tried: list[Rival]) -> list[Rival]:
+    """Rivals and, where the refitted speed loop is far from the nominal one, motor_lag in its stead."""
+    point = slower_loop(problem, standing.fitted.point)
+    if point is None:
+        return tried
+    fitted = fit(problem, point, iterations=_TRIAL_STEPS, renewals=2, reuse=standing.fitted)
+    slower = _rival(standing, "motor_lag", fitted)
+    others = [rival for rival in tried if rival.name != slower.name]
+    return [*others, max([slower, *(rival for rival in tried if rival.name == slower.name)], key=lambda r: r.gain)]
 
 
 def _ranked(problem: Problem, standing: Standing, raw: Fitted, thresholds: Thresholds) -> list[tuple[Gain, Terms]]:

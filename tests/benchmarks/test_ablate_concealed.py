@@ -98,7 +98,7 @@ def test_the_first_effect_is_the_one_furthest_over_its_gate_and_passing_ones_com
     first = first_of([scan({"a": 30.0, "b": 60.0}, {"a": 5.0, "b": 5.0})], thresholds)
     assert first == First("a", True, 3.0, 1.5)
     # most of what "a" gains is lost on left-out windows: "b" stands first
-    assert first_of([scan({"a": 30.0, "b": 51.0}, {"a": 0.0, "b": 5.0})], thresholds).name == "b"
+    assert first_of([scan({"a": 15.0, "b": 51.0}, {"a": 0.0, "b": 5.0})], thresholds).name == "b"
     # at a second nominal model "b" gains more
     scans = [scan({"a": 30.0, "b": 60.0}, {"a": 5.0, "b": 5.0}), scan({"b": 90.0}, {"b": 9.0})]
     assert first_of(scans, thresholds).name == "b"
