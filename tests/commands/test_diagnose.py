@@ -138,7 +138,7 @@ def test_a_stopped_diagnosis_goes_on(
     def searched(*arguments: object, **options: object) -> None:
         raise AssertionError("the search was done again")
 
-    monkeypatch.setattr(pipeline, "search", searched)
+    monkeypatch.setattr(pipeline, "searched", searched)
     assert main(words(work, "stopped")) == 0
     again, before = (load(work / name / "diagnosis.json") for name in ("stopped", "found"))
     assert {**again, "seconds": 0} == {**before, "seconds": 0}
