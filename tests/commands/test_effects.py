@@ -30,7 +30,7 @@ def test_table_says_where_a_size_begins_to_matter(capsys):
     for line in printed(capsys).splitlines()[2:-2]:
         name = next(name for name in effect_kinds() if f"  {name} " in line)
         numbers[name] = line.split("]")[1].split()[:4]
-    assert numbers["gyro_scale"] == ["1", "0.1", "10", "1.02"]
+    assert numbers["gyro_scale"] == ["1", "0.1", "10", "1.01"]
     assert numbers["slope"] == ["0", "-0.6", "0.6", "0.0087"]
     assert numbers["motor_saturation"] == ["1000", "0.01", "1000", "20"]
 
