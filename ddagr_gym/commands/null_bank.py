@@ -78,12 +78,14 @@ def run(arguments: Arguments) -> None:
     from ddagr_gym.presets import get_robot, get_soil
     from ddagr_gym.recordings.load import load_recording
 
-    if not arguments.window >= SHORTEST:
-        raise InputError(f"--window is {arguments.window:g}: give at least {SHORTEST:g} s.")
+    for name, least in (("window", SHORTEST), ("stride", 0.1)):
+        given = getattr(arguments, name)
+        if given is not None and not given >= least:
+            raise InputError(f"--{name} is {given:g}: give at least {least:g} s.")
     robot, soil = get_robot(arguments.robot), get_soil(arguments.soil)
     recordings = [load_recording(path, arguments.map or None, arguments.robot) for path in arguments.runs]
     priors = NuisancePriors().with_soil(arguments.soil_uncertainty)
-    setting = Setting(arguments.window, arguments.stride or arguments.window, priors=priors)
+    setting = Setting(priors=priors).with_windows(arguments.window, arguments.stride)
     template: Template | None = None
     pieces: list[Recording] = []
     if arguments.ordinary:

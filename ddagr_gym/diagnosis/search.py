@@ -214,8 +214,8 @@ def _with_slower_loop(problem: Problem, standing: Standing, tried: list[Rival]) 
         return tried
     fitted = fit(problem, point, iterations=_TRIAL_STEPS, renewals=2, reuse=standing.fitted)
     slower = _rival(standing, "motor_lag", fitted)
-    others = [rival for rival in tried if rival.name != slower.name]
-    return [*others, max([slower, *(rival for rival in tried if rival.name == slower.name)], key=lambda r: r.gain)]
+    better = [rival for rival in tried if rival.name == slower.name and rival.gain >= slower.gain]
+    return tried if better else [*(rival for rival in tried if rival.name != slower.name), slower]
 
 
 def _ranked(problem: Problem, standing: Standing, raw: Fitted, thresholds: Thresholds) -> list[tuple[Gain, Terms]]:

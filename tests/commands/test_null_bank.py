@@ -62,9 +62,12 @@ def test_too_few_drives_for_the_level(
     assert not (tmp_path / "thresholds.json").exists()
 
 
-def test_windows_shorter_than_a_robot_answers_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main([*words(tmp_path), "--window", "0.5"]) == 2
-    assert "--window is 0.5" in capsys.readouterr().err
+@pytest.mark.parametrize("option", ["--window", "--stride"])
+def test_windows_and_strides_that_are_too_short_are_refused(
+    option: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([*words(tmp_path), option, "0.05"]) == 2
+    assert f"{option} is 0.05" in capsys.readouterr().err
     assert not (tmp_path / "thresholds.bank").exists()
 
 
