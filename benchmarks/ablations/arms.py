@@ -13,7 +13,7 @@ from ddagr_gym.diagnosis.misfit import LOCAL, roughest
 from ddagr_gym.diagnosis.nuisance import NuisancePriors, Nuisances
 from ddagr_gym.diagnosis.problem import Problem
 from ddagr_gym.diagnosis.refit import Fitted, cost_of
-from ddagr_gym.diagnosis.search import Standing, stand
+from ddagr_gym.diagnosis.standing import Standing, stand
 from ddagr_gym.diagnosis.thresholds import Gate, Thresholds
 from ddagr_gym.parameters import Soil
 from ddagr_gym.physics.effects.registry import effect_kinds

@@ -12,8 +12,9 @@ from benchmarks.ablations.arms import First, first_of, from_values, noise_thresh
 from benchmarks.ablations.sparse import sparse_first
 from ddagr_gym.diagnosis.diagnose import Prepared, prepare
 from ddagr_gym.diagnosis.refit import Fitted
-from ddagr_gym.diagnosis.search import BENT, Standing, begin, stand
+from ddagr_gym.diagnosis.search import BENT, begin
 from ddagr_gym.diagnosis.setting import Setting, make_problem, wheel_radius
+from ddagr_gym.diagnosis.standing import Standing, stand
 from ddagr_gym.diagnosis.thresholds import Thresholds
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.presets import get_robot, get_soil

@@ -13,6 +13,7 @@ Method (measured reasons in the study that the project follows)
     *nuisance*    what is uncertain about soil, robot, biases and clocks, as global parameters with priors, and how the
                   field differs from window to window, as local ones. Initial states and local parameters are eliminated
                   from every sensitivity by a QR factorisation per window.
+    *origins*     recordings without poses have a place and a heading of their own; dead reckoning ties their windows.
     *refit*       Gauss-Newton with priors and bounds; jointly with any effect that is assumed.
     *scores*      one simulation per probe of the library; from inner products per window follow gains (fall of the
                   cost), cluster-robust scores, gains on left-out windows and resampled gains without another one.
@@ -24,7 +25,8 @@ Method (measured reasons in the study that the project follows)
                   more; in 12 s the structure of the simulator shows as much as what is missing.
     *misfit*      what is left by channel, and of what the local variations have to make up for.
     *equivalence* rivals whose joint refits are nearly as good, weighted over resampled windows.
-    *search*      forward and backward moves over joint refits, each through the gate.
+    *search*      forward and backward moves over joint refits, each through the gate; *hypotheses* says where they
+                  begin, *retold* adds rivals that no scan finds, *standing* is what a search holds.
     *certify*     sizes fitted to the other recordings predict each one from states known at the start, over 1, 5 and
                   30 s; a flexible model of what is left says how much could have been explained.
 
@@ -35,9 +37,9 @@ Limits so far
     *Which* effects are named is decided on all recordings; only their sizes are certified on others. ``complete``
     and ``unknown`` rest on the misfit per channel against the null bank. Mass hides behind soil strength in drives of
     this kind, and so does a drag along the speed: see ``detectable``. Which of two motor poles is the slower one is
-    open, so that the lag of a second pole is shared out with the nuisance ``motor_rate``. Without poses every
-    recording has a heading and a place of its own: a slope or a patch that several of them share is then seen as if
-    they had begun alike (a slope may come with an accelerometer bias that is not there).
+    open, so that the lag of a second pole is shared out with the nuisance ``motor_rate``. Without poses the headings
+    of several recordings are found where a slope shows them; a patch that they share is looked for as if they had
+    begun at one place.
 
 Conventions: SI units, radians, channels and states in the order of :mod:`ddagr_gym.replay.windows`. Costs are half sums
 of squares in units of the noise; gains are divided by the dispersion of the model they start from.

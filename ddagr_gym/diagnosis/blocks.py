@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.diagnosis.noise import ChannelNoise
+from ddagr_gym.diagnosis.origins import POSE
 from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.replay.windows import CHANNELS, STATE, WindowSet
 
@@ -127,7 +128,7 @@ def located(windows: WindowSet, recordings: Sequence[Recording], wheel_radius: f
     """
     initial = windows.initial.copy()
     for number, recording in enumerate(recordings):
-        if recording.has("pose_x", "pose_y", "pose_yaw"):
+        if recording.has(*POSE):
             continue
         step = recording.period
         yaw = np.cumsum(np.nan_to_num(recording["yaw_rate"])) * step

@@ -16,9 +16,10 @@ from ddagr_gym.diagnosis.held import Held, find_held, hold_effect, without_repea
 from ddagr_gym.diagnosis.inputs import data_source
 from ddagr_gym.diagnosis.misfit import LOCAL, explained_share, roughest
 from ddagr_gym.diagnosis.problem import Problem
-from ddagr_gym.diagnosis.search import BENT, MOST_EFFECTS, Found, Keep, Standing, begin, do, search
+from ddagr_gym.diagnosis.search import BENT, MOST_EFFECTS, Found, Keep, begin, do, search
 from ddagr_gym.diagnosis.sentences import headline
 from ddagr_gym.diagnosis.setting import SHORT, Setting, make_problem
+from ddagr_gym.diagnosis.standing import Standing
 from ddagr_gym.diagnosis.thresholds import Thresholds
 from ddagr_gym.diagnosis.uncertainty import intervals, least_detectable, resampled_parameters, with_structure
 from ddagr_gym.diagnosis.verdict import NONE, UNKNOWN, Diagnosis, Estimate, Finding

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.diagnosis.search import Rival
 from ddagr_gym.diagnosis.size_prior import implausibility
+from ddagr_gym.diagnosis.standing import Rival
 
 Array = NDArray[np.float64]
 

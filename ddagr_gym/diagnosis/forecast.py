@@ -121,7 +121,7 @@ def cut_forecasts(
 def past_elimination(forecasts: Forecasts, point: Point) -> Elimination:
     """Basis of what the unknowns before each start explain; ``point`` gives the model, its states do not count."""
     past = forecasts.past
-    point = replace(point, states=past.blocked.windows.initial.copy())
+    point = replace(point, states=past.starts(point.values))
     base = past.predict(point)
     columns = np.zeros((*past.blocked.mask.shape, len(past.prior)))
     for index, _ in past.nuisances.local:
@@ -142,7 +142,7 @@ def start_states(forecasts: Forecasts, point: Point, elimination: Elimination, s
         steps: of Gauss-Newton; one that does not lower a window's cost is not taken.
     """
     past = forecasts.past
-    here = replace(point, states=past.blocked.windows.initial.copy())
+    here = replace(point, states=past.starts(point.values))
     readings, record = past.model.predict_recorded(here.values, here.states, STATE_ENTRIES, here.effects)
     residual = past.residual(here, readings)[..., None]
     cost, ends = _window_cost(elimination, residual), record[:, -1]

@@ -6,10 +6,19 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ddagr_gym.diagnosis.candidates import Candidate
+from ddagr_gym.diagnosis.origins import YAW
 from ddagr_gym.diagnosis.problem import Point, Problem
+from ddagr_gym.diagnosis.scores import Gain, Terms, best_multiples, reduce
+from ddagr_gym.frames import wrap_angle
 from ddagr_gym.physics.effects import Effect
+from ddagr_gym.physics.effects.encoder_scale import EncoderScale
 from ddagr_gym.physics.effects.motor_lag import MotorLag
+from ddagr_gym.physics.effects.slope import Slope
+from ddagr_gym.physics.effects.wheel_radius_mismatch import WheelRadiusMismatch
 
 PULLED = 4.0
 """Standard deviations from the nominal value beyond which a refitted nuisance stands for something missing (ours)."""
@@ -58,7 +67,7 @@ def _whole(candidate: Candidate) -> Effect:
     return probe.with_values(**moved)  # type: ignore[no-any-return]
 
 
-def _slope(candidate: Candidate, multiples: Sequence[float]) -> Effect:
+def _slope(candidate: Candidate, multiples: Sequence[float]) -> Slope:
     """The two components of the gradient as an angle and a direction."""
     parts = [
         (m * p.as_mapping()["parameters"]["angle"], p.as_mapping()["parameters"]["direction"])
@@ -70,6 +79,60 @@ def _slope(candidate: Candidate, multiples: Sequence[float]) -> Effect:
     return candidate.probes[0].with_values(  # type: ignore[no-any-return]
         angle=min(math.hypot(x, y), high), direction=math.atan2(y, x)
     )
+
+
+def with_headings(problem: Problem, terms: Terms, gain: Gain, point: Point, share: float = 1.0) -> Point:
+    """A point with a slope as its last effect, where recordings without poses are turned so that their slopes agree.
+
+    Each of them shows the slope towards a direction of its own frame, and no small step turns frames that differ by
+    more than a right angle.
+
+    Args:
+        problem: with the nuisances.
+        terms: of the scan that found the slope.
+        gain: of the slope.
+        point: with the slope as the scan guesses it for one frame.
+        share: of the slope that the scan says.
+    """
+    parameters = enumerate(problem.nuisances.parameters)
+    shown = set(terms.recording.tolist())
+    turned = {p.recording: k for k, p in parameters if p.origin == YAW and p.recording in shown}
+    placed = ~np.isin(terms.recording, np.array(list(turned), dtype=np.int64))
+    if point.effects[-1].name != Slope.name or not turned or not placed.any():
+        return point
+    candidate = terms.candidates[gain.candidate]
+    own = {number: _slope_of(terms, candidate, terms.recording == number) for number in turned}
+    common = _slope_of(terms, candidate, placed)
+    values = point.values.copy()
+    for number, slope in own.items():
+        values[turned[number]] += wrap_angle(common.direction - slope.direction)
+    angle = share * float(np.mean([slope.angle for slope in (common, *own.values())]))
+    slope = common.with_values(angle=angle)
+    return problem.moved(replace(point, effects=(*point.effects[:-1], slope)), values)
+
+
+def _slope_of(terms: Terms, candidate: Candidate, chosen: NDArray[np.bool_]) -> Slope:
+    """Slope that some of the windows show."""
+    _, multiples = best_multiples(reduce(terms, chosen.astype(float)), candidate)
+    return _slope(candidate, multiples.tolist())
+
+
+def looped_encoders(point: Point) -> Point | None:
+    """Uneven wheel radii told as encoders of the wrong scale which the speed loop believes.
+
+    No reading tells one from the other, except that both encoders may be wrong by the same share as well.
+
+    Args:
+        point: with the effect to translate as its last one.
+
+    Returns:
+        None where the last effect is another.
+    """
+    radii = point.effects[-1]
+    if not isinstance(radii, WheelRadiusMismatch) or EncoderScale.name in [e.name for e in point.effects]:
+        return None
+    half = 0.5 * radii.difference
+    return replace(point, effects=(*point.effects[:-1], EncoderScale(1.0 - half, 1.0 + half, 1.0)))
 
 
 def slower_loop(problem: Problem, point: Point) -> Point | None:

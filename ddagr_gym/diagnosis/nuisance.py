@@ -17,6 +17,7 @@ from ddagr_gym.physics import layout
 from ddagr_gym.replay.parameters import (
     ModelParameter,
     command_shift,
+    origin_parameters,
     robot_parameters,
     sensor_parameters,
     soil_parameters,
@@ -88,6 +89,9 @@ class Nuisances:
     local: tuple[tuple[int, float], ...]
 
 
+UNKNOWN_PLACE = 10.0
+"""Standard deviation of where a recording without poses begins [m] (ours: a field's corner)."""
+
 _SOIL_STEP = 0.05
 """Of finite differences: the simulator's adaptive steps leave 0.5 units of noise per prediction, and forces are nearly
 linear in the logarithms over 5 percent."""
@@ -113,7 +117,13 @@ def _structural(priors: NuisancePriors) -> tuple[ModelParameter, ...]:
     )
 
 
-def nuisances(robot: Robot, recordings: int, period: float, priors: NuisancePriors = NuisancePriors()) -> Nuisances:
+def nuisances(
+    robot: Robot,
+    recordings: int,
+    period: float,
+    priors: NuisancePriors = NuisancePriors(),
+    unplaced: Sequence[int] = (),
+) -> Nuisances:
     """Global and local parameters for some recordings of a robot.
 
     Args:
@@ -121,6 +131,7 @@ def nuisances(robot: Robot, recordings: int, period: float, priors: NuisancePrio
         recordings: how many.
         period: between samples [s].
         priors: standard deviations of the others.
+        unplaced: recordings whose place and heading in the world nobody knows.
     """
     deviations = {
         "soil_strength": priors.strength,
@@ -135,6 +146,7 @@ def nuisances(robot: Robot, recordings: int, period: float, priors: NuisancePrio
         *robot_parameters(robot),
         command_shift(period),
         *sensor_parameters(recordings, priors.gyro_bias, priors.accelerometer_bias),
+        *origin_parameters(unplaced, UNKNOWN_PLACE, math.pi),
     )
     names = [p.name for p in parameters]
     local = (

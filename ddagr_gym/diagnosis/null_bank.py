@@ -19,8 +19,9 @@ from ddagr_gym.diagnosis.noise import ChannelNoise
 from ddagr_gym.diagnosis.null_readings import PARTS
 from ddagr_gym.diagnosis.problem import Problem
 from ddagr_gym.diagnosis.scores import drive_extent
-from ddagr_gym.diagnosis.search import Standing, begin
+from ddagr_gym.diagnosis.search import begin
 from ddagr_gym.diagnosis.setting import Setting, make_problem
+from ddagr_gym.diagnosis.standing import Standing
 from ddagr_gym.diagnosis.structural_nulls import NullWorld, draw_world
 from ddagr_gym.diagnosis.thresholds import NullRun
 from ddagr_gym.parameters import Robot, Soil

@@ -22,7 +22,7 @@ _LONGEST = 3.0  # standard deviations that a parameter moves in one step: beyond
 _KEPT = frozenset(
     {
         ("payload", "x"), ("payload", "y"), ("payload", "height"), ("lateral_bulldozing", "density"),
-        ("soil_patch", "edge"), ("towed_drag", "hitch_distance"),
+        ("soil_patch", "edge"), ("towed_drag", "hitch_distance"), ("encoder_scale", "loop"),
     }
 )  # fmt: skip
 """Shapes that a diagnosis leaves at their defaults: free, they let one effect stand for another (a payload that is not
@@ -176,12 +176,13 @@ def fit(
     parameters = effect_parameters(point.effects, fixed)
     prediction = problem.predict(point)
     if not np.isfinite(prediction).all():
-        point = replace(point, states=problem.blocked.windows.initial.copy())
+        point = replace(point, states=problem.starts(point.values))
         prediction = problem.predict(point)
     known = reuse or first
     by_parameter, elimination = (
         (known.by_parameter, known.elimination) if known else _sensitivities(problem, point, prediction)
     )
+    by_parameter = problem.with_origins(point, prediction, by_parameter)
     by_effect = effect_columns(problem, point, prediction, parameters)
     cost, _ = cost_of(problem, point, prediction, elimination)
     converged, done, fresh = False, 0, known is None
@@ -202,6 +203,7 @@ def fit(
             fresh = True
         if parameters and done < max(renewals, _EFFECT_RENEWALS) and not converged:
             by_effect = effect_columns(problem, point, prediction, parameters)
+            by_parameter = problem.with_origins(point, prediction, by_parameter)
     if reuse is None and done and not converged:
         by_parameter, elimination = _sensitivities(problem, point, prediction)
     cost, shares = cost_of(problem, point, prediction, elimination)
@@ -244,7 +246,8 @@ def _step(
         values = point.values.copy()
         values[free] += damping * change[: len(free)]
         effects = moved(point.effects, parameters, here[len(free) :] + damping * change[len(free) :])
-        trials = [Point(values, point.states + share * states, effects) for share in (damping, 0.0)]
+        start = problem.moved(replace(point, effects=effects), values)
+        trials = [replace(start, states=start.states + share * states) for share in (damping, 0.0)]
         tried, predicted, after = _best_by_window(problem, trials, elimination)
         if after < cost:
             return tried, predicted, after

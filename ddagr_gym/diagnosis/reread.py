@@ -19,8 +19,8 @@ Array = NDArray[np.float64]
 
 
 def acts_on_readings_only(effect: Effect) -> bool:
-    """Whether every action of an effect is on readings."""
-    return all(point == layout.POINT_READINGS for point, _ in effect.actions)
+    """Whether all that an effect does is done to readings."""
+    return all(point == layout.POINT_READINGS for point, _ in effect.acting)
 
 
 @dataclass(frozen=True, eq=False)

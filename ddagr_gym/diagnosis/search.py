@@ -10,28 +10,19 @@ from typing import Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.diagnosis.hypotheses import first_guess, slower_loop
+from ddagr_gym.diagnosis.hypotheses import first_guess, with_headings
 from ddagr_gym.diagnosis.misfit import channel_misfit
 from ddagr_gym.diagnosis.problem import Point, Problem
 from ddagr_gym.diagnosis.refit import DAMPING, Fitted, cost_of, fit
-from ddagr_gym.diagnosis.scores import (
-    Gain,
-    Terms,
-    dispersion_of,
-    drive_extent,
-    gains,
-    held_out_gains,
-    nuisance_answer,
-    scan,
-    scores,
-)
+from ddagr_gym.diagnosis.retold import TRIAL_STEPS, with_looped_encoders, with_slower_loop
+from ddagr_gym.diagnosis.scores import Gain, Terms, dispersion_of, drive_extent, gains, nuisance_answer
 from ddagr_gym.diagnosis.size_prior import implausibility
+from ddagr_gym.diagnosis.standing import Rival, Standing, rival_of, stand
 from ddagr_gym.diagnosis.thresholds import UNMISTAKABLE, Thresholds
 
 Array = NDArray[np.float64]
 Result = TypeVar("Result")
 
-_TRIAL_STEPS = 3
 _HOPELESS = 0.4  # share of the best linear gain below which no joint refit is tried
 _LARGE = 100.0  # gain above which the linear scan may be far off: refits then begin from two points
 _HOPELESS_LARGE = 0.1  # the same share there
@@ -46,49 +37,6 @@ _CLOSE = 0.6  # share of the best joint gain above which a rival is fitted to th
 
 MOST_EFFECTS = 3
 """Simultaneous effects that a search goes up to (diagnosis.md, step 6)."""
-
-
-@dataclass(frozen=True, eq=False)
-class Standing:
-    """A model and what the scan at it says about every effect that it lacks.
-
-    Attributes:
-        fitted: the model.
-        terms: of the scan.
-        gains: of absent effects over the dispersion, largest first.
-        scores: cluster-robust, by name.
-        held_out: gains on left-out windows over the dispersion, by name.
-        dispersion: mean square of the weighted residuals of this model, at least 1.
-        misfit: mean square of the residuals by channel.
-    """
-
-    fitted: Fitted
-    terms: Terms
-    gains: tuple[Gain, ...]
-    scores: dict[str, float]
-    held_out: dict[str, float]
-    dispersion: float
-    misfit: dict[str, float]
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Assumed effects."""
-        return tuple(effect.name for effect in self.fitted.point.effects)
-
-
-@dataclass(frozen=True, eq=False)
-class Rival:
-    """A joint refit with one further effect.
-
-    Attributes:
-        name: of the effect.
-        fitted: the refit.
-        gain: fall of the cost against the model before, over the dispersion.
-    """
-
-    name: str
-    fitted: Fitted
-    gain: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,16 +64,6 @@ class Found:
         return self.standings[-1]
 
 
-def stand(problem: Problem, fitted: Fitted, progress: Callable[[str], None] = lambda text: None) -> Standing:
-    """Scan the library at a fitted model."""
-    terms = scan(problem, fitted, progress=progress)
-    dispersion = dispersion_of(problem, fitted)
-    found = tuple(gains(terms, dispersion=dispersion))
-    held_out = held_out_gains(terms, dispersion)
-    misfit = channel_misfit(problem, fitted)
-    return Standing(fitted, terms, found, scores(terms, found), held_out, dispersion, misfit)
-
-
 def _trial(problem: Problem, standing: Standing, gain: Gain, terms: Terms, start: Fitted) -> Fitted:
     """A few steps with one further effect from a starting point, whose sensitivities of the nuisances serve.
 
@@ -135,13 +73,14 @@ def _trial(problem: Problem, standing: Standing, gain: Gain, terms: Terms, start
     candidate = terms.candidates[gain.candidate]
     effect = first_guess(candidate, gain.multiples)
     point = replace(start.point, effects=(*standing.fitted.point.effects, effect))
-    fitted = fit(problem, point, iterations=_TRIAL_STEPS, renewals=2, reuse=start)
+    point = with_headings(problem, terms, gain, point)
+    fitted = fit(problem, point, iterations=TRIAL_STEPS, renewals=2, reuse=start)
     scanned_here = (terms is standing.terms) == (start is standing.fitted)
     if fitted.cost < standing.fitted.cost or not (scanned_here and candidate.has_sizes):
         return fitted
     # the guess was too far off: nothing at all would have been better
     point = _damped_guess(problem, standing, gain, terms, start)
-    again = fit(problem, point, iterations=_TRIAL_STEPS, renewals=2, reuse=start)
+    again = fit(problem, point, iterations=TRIAL_STEPS, renewals=2, reuse=start)
     return min(fitted, again, key=lambda trial: trial.cost)
 
 
@@ -165,6 +104,7 @@ def _damped_guess(problem: Problem, standing: Standing, gain: Gain, terms: Terms
         effect = first_guess(candidate, [share * multiple for multiple in gain.multiples])
         values = np.clip(start.point.values + share * answer, problem.low, problem.high)
         point = replace(start.point, values=values, effects=(*standing.fitted.point.effects, effect))
+        point = with_headings(problem, terms, gain, point, share)
         points.append(point)
         costs.append(cost_of(problem, point, problem.predict(point), start.elimination)[0])
         if costs[-1] < start.cost:
@@ -194,10 +134,11 @@ def rivals_of(problem: Problem, standing: Standing, raw: Fitted, thresholds: Thr
             best_start = min(range(len(trials)), key=lambda k: trials[k].cost)
             # the start that serves the first rival serves the others
             starts = [starts[best_start]]
-            tried.append(_rival(standing, gain.name, trials[best_start]))
-    tried = _with_slower_loop(problem, standing, tried)
+            tried.append(rival_of(standing, gain.name, trials[best_start]))
+    tried = with_slower_loop(problem, standing, tried)
     best = max((rival.gain for rival in tried), default=0.0)
     rivals = [_finish(problem, standing, rival, large) if rival.gain > _CLOSE * best else rival for rival in tried]
+    rivals = with_looped_encoders(problem, standing, rivals)
     kept = [
         rival
         for rival in rivals
@@ -205,17 +146,6 @@ def rivals_of(problem: Problem, standing: Standing, raw: Fitted, thresholds: Thr
         or rival.gain > UNMISTAKABLE * thresholds.of(rival.name).gain
     ]
     return sorted(kept, key=lambda rival: implausibility(rival.fitted.point.effects[-1]) - rival.gain)
-
-
-def _with_slower_loop(problem: Problem, standing: Standing, tried: list[Rival]) -> list[Rival]:
-    """Rivals and, where the refitted speed loop is far from the nominal one, motor_lag in its stead."""
-    point = slower_loop(problem, standing.fitted.point)
-    if point is None:
-        return tried
-    fitted = fit(problem, point, iterations=_TRIAL_STEPS, renewals=2, reuse=standing.fitted)
-    slower = _rival(standing, "motor_lag", fitted)
-    better = [rival for rival in tried if rival.name == slower.name and rival.gain >= slower.gain]
-    return tried if better else [*(rival for rival in tried if rival.name != slower.name), slower]
 
 
 def _ranked(problem: Problem, standing: Standing, raw: Fitted, thresholds: Thresholds) -> list[tuple[Gain, Terms]]:
@@ -236,10 +166,6 @@ def _ranked(problem: Problem, standing: Standing, raw: Fitted, thresholds: Thres
     return sorted(best.values(), key=lambda item: thresholds.of(item[0].name).gain - item[0].gain)
 
 
-def _rival(standing: Standing, name: str, fitted: Fitted) -> Rival:
-    return Rival(name, fitted, (standing.fitted.cost - fitted.cost) / standing.dispersion)
-
-
 def _finish(problem: Problem, standing: Standing, rival: Rival, large: bool) -> Rival:
     """A rival fitted to the end; one that explains much changes the nuisances' sensitivities, which are renewed."""
     point, known = rival.fitted.point, rival.fitted
@@ -247,7 +173,7 @@ def _finish(problem: Problem, standing: Standing, rival: Rival, large: bool) -> 
         fitted = fit(problem, point, iterations=6, renewals=1, first=known)
     else:
         fitted = fit(problem, point, iterations=6, renewals=2, reuse=known)
-    return _rival(standing, rival.name, min(fitted, known, key=lambda trial: trial.cost))
+    return rival_of(standing, rival.name, min(fitted, known, key=lambda trial: trial.cost))
 
 
 def begin(problem: Problem, progress: Callable[[str], None] = lambda text: None) -> tuple[Fitted, Standing]:
@@ -345,13 +271,19 @@ def _swapped(problem: Problem, fitted: Fitted, steps: Sequence[tuple[Rival, ...]
     for number, rivals in enumerate(steps):
         for rival in rivals[1:]:
             names = {effect.name for effect in best.point.effects}
-            if rival.gain < _CLOSE * rivals[0].gain or rival.name in names:
+            if rival.gain < _CLOSE * rivals[0].gain or rival.name in names or rival.retold:
                 continue
             effects = list(best.point.effects)
             effects[number] = rival.fitted.point.effects[number]
             tried = fit(problem, replace(best.point, effects=tuple(effects)), iterations=4, reuse=fitted)
-            best = min(best, tried, key=lambda trial: trial.cost)
+            best = min(best, tried, key=partial(_with_sizes, problem))
     return best
+
+
+def _with_sizes(problem: Problem, fitted: Fitted) -> float:
+    """Cost and how unusual the effects' sizes are, which settles ties."""
+    unusual = sum(implausibility(effect) for effect in fitted.point.effects)
+    return fitted.cost + dispersion_of(problem, fitted) * unusual
 
 
 def _without_idle(

@@ -10,6 +10,7 @@ import numpy as np
 from ddagr_gym.diagnosis.blocks import BLOCK, block_windows, located
 from ddagr_gym.diagnosis.noise import ChannelNoise, recording_noise
 from ddagr_gym.diagnosis.nuisance import NuisancePriors, nuisances
+from ddagr_gym.diagnosis.origins import without_poses
 from ddagr_gym.diagnosis.problem import Problem
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.recordings.schema import Recording
@@ -100,5 +101,8 @@ def make_problem(
     )
     found = recording_noise(recordings, radius) if noise is None else noise
     blocked = block_windows(located(windows, recordings, radius), found, radius, setting.block)
-    uncertain = nuisances(robot, len(recordings), windows.period, setting.priors)
+    reckoned = without_poses(recordings)
+    # where none has poses the first one's start is the world's origin
+    unplaced = reckoned[1:] if len(reckoned) == len(recordings) else reckoned
+    uncertain = nuisances(robot, len(recordings), windows.period, setting.priors, unplaced)
     return Problem(robot, soil, blocked, uncertain, setting.priors, threads=setting.threads)

@@ -23,8 +23,8 @@ from ddagr_gym.diagnosis.problem import Problem
 from ddagr_gym.diagnosis.refit import effect_columns, effect_parameters
 from ddagr_gym.diagnosis.regressors import Motion, Term, library, motion_of
 from ddagr_gym.diagnosis.response import INPUTS, Response, course_of, linearise
-from ddagr_gym.diagnosis.search import Standing
 from ddagr_gym.diagnosis.stability import Stable, Sums, coefficients, held_out_share, intervals, select
+from ddagr_gym.diagnosis.standing import Standing
 from ddagr_gym.replay.windows import CHANNELS
 
 Array = NDArray[np.float64]

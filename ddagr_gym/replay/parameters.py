@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.physics import layout
+from ddagr_gym.replay.windows import STATE
 
 Array = NDArray[np.float64]
 
@@ -30,6 +31,7 @@ class ModelParameter:
         high: bound.
         recording: only windows of this recording, or None for all.
         shift: the value is a delay of the commands [s] instead of a row entry.
+        origin: the value moves this entry of STATE (x, y or yaw) at the start of the recording instead of a row entry.
     """
 
     name: str
@@ -42,10 +44,11 @@ class ModelParameter:
     high: float
     recording: int | None = None
     shift: bool = False
+    origin: int | None = None
 
     def apply(self, rows: Array, value: float, recording: NDArray[np.int64]) -> None:
         """Change the rows (W, SIZE) of the windows it concerns, in place."""
-        if self.shift or value == 0.0:
+        if not self.entries or value == 0.0:
             return
         chosen = np.ones(len(rows), dtype=bool) if self.recording is None else recording == self.recording
         index = np.ix_(chosen, np.array(self.entries))
@@ -135,6 +138,18 @@ def sensor_parameters(recordings: int, gyro_bias: float, accelerometer_bias: flo
             for k, axis in enumerate("xy")
         ]  # fmt: skip
     return tuple(made)
+
+
+def origin_parameters(recordings: Sequence[int], place: float, heading: float) -> tuple[ModelParameter, ...]:
+    """Where recordings without poses begin in the world; standard deviations of place [m] and heading [rad]."""
+    kinds = (("x", "m", place, 0.05), ("y", "m", place, 0.05), ("yaw", "rad", heading, 0.02))
+    return tuple(
+        ModelParameter(
+            f"origin_{name}_{number + 1}", unit, (), False, deviation, step, -1e3, 1e3, number, origin=STATE.index(name)
+        )
+        for number in recordings
+        for name, unit, deviation, step in kinds
+    )
 
 
 def command_shift(period: float) -> ModelParameter:

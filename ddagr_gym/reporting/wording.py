@@ -158,7 +158,13 @@ def _encoder_scale(a: Amounts) -> str:
         f"too {'much' if a[bank].value >= 1.0 else 'little'}"
         for bank in ("right", "left")
     ]
-    return _pair(a, ("right", "left"), (parts[0], parts[1]), 0.002, 1.0)
+    looped = ", and the speed loop believes it" if "loop" in a and a["loop"].value > 0.5 else ""
+    return _pair(a, ("right", "left"), (parts[0], parts[1]), 0.002, 1.0) + looped
+
+
+def _droop(a: Amounts) -> str:
+    of = "of both banks" if "shared" in a and a["shared"].value > 0.25 else "of axle torque"
+    return f"the motors slow down under load, by {quantity(a['droop'].scaled(1e3), 'mrad/s')} per N m {of}"
 
 
 def _payload(a: Amounts) -> str:
@@ -279,9 +285,7 @@ SENTENCES: Mapping[str, Callable[[Amounts], str]] = {
     "lateral_bulldozing": lambda a: (
         f"wheels that slide sideways push soil ({quantity(a['scale'])} times the theoretical pressure)"
     ),
-    "motor_droop": lambda a: (
-        f"the motors slow down under load, by {quantity(a['droop'].scaled(1e3), 'mrad/s')} per N m of axle torque"
-    ),
+    "motor_droop": _droop,
     "motor_lag": _lag,
     "motor_saturation": _saturation,
     "multipass": _multipass,

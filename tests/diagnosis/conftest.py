@@ -29,12 +29,17 @@ def commands(seconds: float) -> np.ndarray:
 
 @pytest.fixture(scope="session")
 def drive() -> Callable[..., Recording]:
-    """Function (effects, seconds, seed) -> recording of the thesis's robot and soil with all sensors and noise."""
+    """Function (effects, seconds, seed, yaw, poses) -> recording of the thesis's robot and soil with noise."""
 
-    def make(effects: tuple[str, ...] = (), seconds: float = 24.0, seed: int = 1) -> Recording:
+    def make(
+        effects: tuple[str, ...] = (), seconds: float = 24.0, seed: int = 1, yaw: float = 0.0, poses: bool = True
+    ) -> Recording:
         robot = get_robot("ddagr")
-        sensors = Sensors(Imu(sample_rate=RATE), WheelEncoder(), PoseReceiver(5.0))
-        columns = simulate(robot, get_soil("thesis_a1"), commands(seconds), sensors=sensors, effects=effects, seed=seed)
+        sensors = Sensors(Imu(sample_rate=RATE), WheelEncoder(), PoseReceiver(5.0 if poses else 0.0))
+        columns = simulate(
+            robot, get_soil("thesis_a1"), commands(seconds), sensors=sensors, effects=effects, seed=seed,
+            initial_state={"yaw": yaw},
+        )  # fmt: skip
         return Recording.from_columns(columns, robot)
 
     return make

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from ddagr_gym.diagnosis.equivalence import FORM, equivalence_weights
-from ddagr_gym.diagnosis.search import Rival
+from ddagr_gym.diagnosis.standing import Rival
 from ddagr_gym.physics.effects import load_effects
 
 

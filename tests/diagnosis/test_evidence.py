@@ -9,7 +9,8 @@ from ddagr_gym.diagnosis.evidence import Evidence, gather_evidence
 from ddagr_gym.diagnosis.misfit import channel_misfit
 from ddagr_gym.diagnosis.refit import fit
 from ddagr_gym.diagnosis.scores import Gain, dispersion_of
-from ddagr_gym.diagnosis.search import Found, Standing
+from ddagr_gym.diagnosis.search import Found
+from ddagr_gym.diagnosis.standing import Standing
 from ddagr_gym.diagnosis.thresholds import Gate, Thresholds
 from ddagr_gym.errors import InputError
 from ddagr_gym.physics.effects.registry import parse_effect

@@ -22,7 +22,8 @@ from ddagr_gym.diagnosis.score_process import (
     time_share,
 )
 from ddagr_gym.diagnosis.scores import dispersion_of
-from ddagr_gym.diagnosis.search import Found, Standing
+from ddagr_gym.diagnosis.search import Found
+from ddagr_gym.diagnosis.standing import Standing
 from ddagr_gym.diagnosis.wrench import HeldWrench, residual_wrench
 from ddagr_gym.physics.effects.registry import parse_effect
 from ddagr_gym.reporting.wording import EVERYWHERE, range_in_words

@@ -32,3 +32,9 @@ def test_columns_agree_to_the_bit(drive: Callable[..., Recording], problem_of: C
 @pytest.mark.parametrize("name", ["slope", "motor_lag", "payload", "command_delay", "wheel_radius_mismatch"])
 def test_effects_on_the_robot_need_their_own(name: str) -> None:
     assert not acts_on_readings_only(effect_kinds()[name].neutral())
+
+
+def test_encoders_in_the_speed_loop_move_the_robot() -> None:
+    kind = effect_kinds()["encoder_scale"]
+    assert acts_on_readings_only(kind.neutral())
+    assert not acts_on_readings_only(kind.neutral(loop=1.0))

@@ -8,7 +8,8 @@ import pytest
 from ddagr_gym.diagnosis import search as module
 from ddagr_gym.diagnosis.refit import cost_of, fit
 from ddagr_gym.diagnosis.scores import Gain, gains, nuisance_answer, scan
-from ddagr_gym.diagnosis.search import Rival, Standing, search
+from ddagr_gym.diagnosis.search import search
+from ddagr_gym.diagnosis.standing import Rival, Standing
 from ddagr_gym.diagnosis.store import StepStore
 from ddagr_gym.diagnosis.thresholds import Gate, Thresholds
 from ddagr_gym.physics.effects.registry import effect_kind, parse_effect

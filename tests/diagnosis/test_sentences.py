@@ -83,6 +83,8 @@ def test_every_effect_has_a_clause_with_its_main_size(name):
         (text("slope", angle=(-0.02, "rad"), direction=(0.0, "rad")), "1.1 degrees, rising towards 180 degrees"),
         (text("slope", angle=(0.02, "rad"), direction=(-1.5708, "rad")), "towards 270 degrees"),
         (text("encoder_scale", right=(0.97, "-"), left=(1.0, "-")), "the right encoder reads 3.0 % too little"),
+        (text("encoder_scale", right=(0.97, "-"), left=(1.0, "-"), loop=(1.0, "-")), "and the speed loop believes it"),
+        (text("motor_droop", droop=(0.002, "rad/(s N m)"), shared=(0.4, "-")), "2.0 mrad/s per N m of both banks"),
         (text("wheel_radius_mismatch", difference=(-0.02, "-")), "the left wheels are 2.0 % larger than the right"),
         (text("gyro_bias", bias=(-0.01, "rad/s", (-0.011, -0.009))), "off by −0.57 ± 0.06 degrees/s"),
         (text("imu_tilt", roll=(0.0, "rad"), pitch=(-0.035, "rad")), "tilted 2.0 degrees nose up"),
@@ -99,6 +101,10 @@ def test_every_effect_has_a_clause_with_its_main_size(name):
 )  # fmt: skip
 def test_directions_signs_and_factors_in_words(clause, words):
     assert words in clause
+
+
+def test_encoders_outside_the_speed_loop_are_believed_by_nobody():
+    assert "believes" not in text("encoder_scale", right=(0.97, "-"), left=(1.0, "-"), loop=(0.0, "-"))
 
 
 def test_effects_of_other_packages_are_described_by_title_and_sizes(monkeypatch):

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from ddagr_gym.diagnosis.scores import gains, scan
-from ddagr_gym.diagnosis.search import Found, Standing
+from ddagr_gym.diagnosis.search import Found
+from ddagr_gym.diagnosis.standing import Standing
 from ddagr_gym.diagnosis.store import StepStore
 from ddagr_gym.errors import InputError
 from ddagr_gym.physics.effects import load_effects

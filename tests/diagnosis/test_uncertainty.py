@@ -1,17 +1,43 @@
 """Intervals are as wide as resampling and the forms of simulators say, and stay within what exists."""
 
+import math
+from collections.abc import Mapping
+
+import numpy as np
 import pytest
 
-from ddagr_gym.diagnosis.uncertainty import STRUCTURE, STRUCTURE_OF_LIMIT, with_structure
-from ddagr_gym.physics.effects import parse_effect
+from ddagr_gym.diagnosis.candidates import Candidate, candidates_of
+from ddagr_gym.diagnosis.scores import Terms
+from ddagr_gym.diagnosis.thresholds import Gate, Thresholds
+from ddagr_gym.diagnosis.uncertainty import FORM, STRUCTURE, STRUCTURE_OF_LIMIT, least_detectable, with_structure
+from ddagr_gym.physics.effects import effect_kind, parse_effect
+from ddagr_gym.physics.effects.base import DriveExtent
+
+EXTENT = DriveExtent(60.0, (0.0, 8.0), (0.0, 6.0), 1.2, 3.0)
+GATE, DISPERSION = 2.0, 4.0
 
 
-def test_intervals_have_a_width_however_many_windows_there_are() -> None:
-    delay = parse_effect("command_delay=0.2")
-    low, high = with_structure((0.2, 0.2), delay, "delay")
-    assert (high - low) / 2.0 == pytest.approx(STRUCTURE * 0.02)
-    low, high = with_structure((0.1, 0.3), delay, "delay")
-    assert (low, high) == (pytest.approx(0.1, abs=1e-3), pytest.approx(0.3, abs=1e-3))
+@pytest.mark.parametrize(
+    ("text", "field", "value", "away", "least"),
+    [
+        ("command_delay=0.2", "delay", 0.2, 0.2, 0.02),
+        ("command_delay=0.001", "delay", 0.25, 0.001, 0.02),
+        ("gyro_scale=1.08", "scale", 1.08, 0.08, 0.01),
+    ],
+)
+def test_intervals_have_a_width_however_many_windows_there_are(
+    text: str, field: str, value: float, away: float, least: float
+) -> None:
+    """A share of the least meaningful size and one of the distance from neutral, which is not always zero."""
+    low, high = with_structure((value, value), parse_effect(text), field)
+    assert (high - low) / 2.0 == pytest.approx(math.hypot(STRUCTURE * least, FORM * away))
+    assert (low + high) / 2.0 == pytest.approx(value)
+
+
+def test_what_resampling_says_adds_in_quadrature() -> None:
+    low, high = with_structure((0.1, 0.3), parse_effect("command_delay=0.2"), "delay")
+    alone = with_structure((0.2, 0.2), parse_effect("command_delay=0.2"), "delay")
+    assert (high - low) / 2.0 == pytest.approx(math.hypot(0.1, (alone[1] - alone[0]) / 2.0))
 
 
 def test_a_limit_is_uncertain_by_a_share_of_itself() -> None:
@@ -24,3 +50,63 @@ def test_shapes_keep_their_intervals_and_bounds_hold() -> None:
         (0.2, 0.4)
     )
     assert with_structure((0.0, 0.001), parse_effect("command_delay=0.0005"), "delay")[0] == 0.0
+
+
+def least_of(
+    candidates: list[Candidate], information: Mapping[int, float], explained: Mapping[int, float] | None = None
+) -> dict[str, float]:
+    """Least detectable sizes of one effect, whose probes have this information, one nuisance explaining some of it."""
+    count = sum(len(candidate.columns) for candidate in candidates)
+    normals = np.zeros((1, 2 + count, 2 + count))
+    normals[0, 1, 1] = 1.0
+    for column, value in information.items():
+        normals[0, 2 + column, 2 + column] = value
+    for column, value in (explained or {}).items():
+        normals[0, 1, 2 + column] = normals[0, 2 + column, 1] = math.sqrt(value)
+    none = np.zeros(1, dtype=np.int64)
+    terms = Terms(normals, 1, np.zeros(1), np.zeros(1), tuple(candidates), none, np.zeros(1))
+    name = candidates[0].name
+    return least_detectable(terms, Thresholds({name: Gate(GATE, 0.0)}, {}, 20, "a test"), DISPERSION)[name]
+
+
+def reaching(step: float, information: float) -> float:
+    """Size whose expected gain over the dispersion is the gate."""
+    return step * math.sqrt(2.0 * GATE * DISPERSION / information)
+
+
+def test_a_change_that_may_begin_at_any_time_counts_from_the_beginning_on() -> None:
+    kind = effect_kind("soil_change")
+    candidates = candidates_of(kind, EXTENT, 0)
+    onsets = [candidate.probes[0].as_mapping()["parameters"]["onset"] for candidate in candidates]
+    whole = onsets.index(kind.parameter("onset").default)
+    assert len(onsets) > 1
+    information = {column: 1e4 for candidate in candidates for column in candidate.columns}
+    strength, stiffness = candidates[whole].columns
+    least = least_of(candidates, information | {strength: 400.0, stiffness: 100.0})
+    steps = [kind.parameter(name).metadata["step"] for name in ("strength", "stiffness")]
+    assert least == pytest.approx({"strength": reaching(steps[0], 400.0), "stiffness": reaching(steps[1], 100.0)})
+
+
+def test_of_places_the_median_counts_of_those_that_were_driven_over() -> None:
+    kind = effect_kind("soil_patch")
+    candidates = candidates_of(kind, EXTENT, 0)
+    driven = candidates[2:5]
+    information = {c.columns[0]: value for c, value in zip(driven, (100.0, 400.0, 1e6), strict=True)}
+    least = least_of(candidates, information)
+    assert least["strength"] == pytest.approx(reaching(kind.parameter("strength").metadata["step"], 400.0))
+    assert least["stiffness"] == np.inf
+
+
+def test_of_two_directions_the_one_that_shows_worst_counts() -> None:
+    kind = effect_kind("slope")
+    step = kind.parameter("angle").metadata["step"]
+    for information in ({0: 100.0, 1: 900.0}, {0: 900.0, 1: 100.0}):
+        least = least_of(candidates_of(kind, EXTENT, 0), information)
+        assert least == {"angle": pytest.approx(reaching(step, 100.0))}
+
+
+def test_what_a_nuisance_explains_detects_nothing() -> None:
+    kind = effect_kind("payload")
+    step = kind.parameter("mass").metadata["step"]
+    least = least_of(candidates_of(kind, EXTENT, 0), {0: 100.0}, {0: 75.0})
+    assert least == {"mass": pytest.approx(reaching(step, 25.0))}

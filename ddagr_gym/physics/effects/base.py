@@ -155,6 +155,11 @@ class Effect(Validated):
         """Whether it changes nothing."""
         return all(getattr(self, name) == self.parameter(name).metadata["neutral"] for name in self.size_names())
 
+    @property
+    def acting(self) -> tuple[tuple[int, Action], ...]:
+        """The actions that a simulation calls; fewer where a shape switches some off."""
+        return self.actions
+
     def is_meaningful(self, extent: DriveExtent) -> bool:
         """Whether any size is at least its least meaningful distance from neutral."""
         limits = {name: self.parameter(name).metadata for name in self.size_names()}
@@ -178,7 +183,7 @@ def action_address(action: Action) -> int:
 
 def effect_table(effects: tuple[Effect, ...]) -> tuple[NDArray[np.int64], NDArray[np.int64], Vector]:
     """Points, addresses and parameters of all actions of ``effects``, as the simulator's kernel reads them."""
-    rows = [(point, action_address(action), effect.vector()) for effect in effects for point, action in effect.actions]
+    rows = [(point, action_address(action), effect.vector()) for effect in effects for point, action in effect.acting]
     points = np.array([row[0] for row in rows], dtype=np.int64)
     addresses = np.array([row[1] for row in rows], dtype=np.int64)
     parameters = np.array([row[2] for row in rows], dtype=np.float64).reshape(-1, EFFECT_PARAMETERS)

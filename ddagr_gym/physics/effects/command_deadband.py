@@ -3,22 +3,32 @@
 import math
 from dataclasses import dataclass
 
-from ddagr_gym.physics.effects.base import Effect, Vector, shape, size
-from ddagr_gym.physics.layout import COMMAND, POINT_COMMANDS
+from ddagr_gym.physics.effects.base import DriveExtent, Effect, Vector, shape, size
+from ddagr_gym.physics.layout import COMMAND, OMEGA, POINT_COMMANDS
 
+_STARTED = 2
+_USUAL = 0.12  # share of the fastest command that a threshold for small ones is tried at, ours
 _EDGE = 0.1  # share of the band over which a command that passes whole sets in, ours
 
 
 def lose_small_commands(row: Vector, parameters: Vector, memory: Vector) -> None:
-    """Dead zone of half width ``parameters[0]``; ``parameters[1]`` of it is lost beyond as well."""
+    """Dead zone of half width ``parameters[0]``; ``parameters[1]`` of it is lost beyond as well.
+
+    A bank that moves stops below the share ``parameters[2]`` of the width; ``memory[:2]`` says which bank moves.
+    """
     width = parameters[0]
     if width <= 0.0:
         return
     for bank in range(2):
         command = row[COMMAND + bank]
-        inside = min(max((abs(command) / width - 1.0 + _EDGE) / _EDGE, 0.0), 1.0)
+        if memory[_STARTED] == 0.0:
+            memory[bank] = 1.0 if abs(row[OMEGA + bank]) > 0.5 * parameters[2] * width else 0.0
+        edge = width * (parameters[2] if memory[bank] > 0.0 else 1.0)
+        inside = min(max((abs(command) / edge - 1.0 + _EDGE) / _EDGE, 0.0), 1.0)
         passing = inside * inside * (3.0 - 2.0 * inside)
+        memory[bank] = 1.0 if abs(command) > edge else 0.0
         row[COMMAND + bank] = math.copysign(passing * max(abs(command) - parameters[1] * width, 0.0), command)
+    memory[_STARTED] = 1.0
 
 
 @dataclass(frozen=True)
@@ -28,12 +38,13 @@ class CommandDeadband(Effect):
     Attributes:
         width: half width of the dead zone; least: 3 percent of the 0.7 rad/s of a row turn.
         loss: share of the width that commands beyond it lose: 1 for friction, 0 for a driver's threshold.
+        release: share of the width below which a bank that moves stops; less than 1 where breaking loose takes more.
     """
 
     name = "command_deadband"
     title = "Command deadband"
     group = "commands and motors"
-    equation = "command -> 0 where |command| < width, else command - loss width sgn(command)"
+    equation = "command -> 0 where |command| < width (moving: release width), else command - loss width sgn(command)"
     source = "dead zone (Tao and Kokotovic, IEEE Trans. Automatic Control 39 (1994) 59)"
     signature = "encoders miss a constant amount of every command, all of a small one"
     confused_with = ("motor_droop",)
@@ -41,3 +52,10 @@ class CommandDeadband(Effect):
 
     width: float = size("rad/s", 0.0, 1.0, least=0.02)
     loss: float = shape("-", 0.0, 1.0, default=1.0, step=-0.05)
+    release: float = shape("-", 0.1, 1.0, default=1.0, step=-0.1)
+
+    @classmethod
+    def probes(cls, extent: DriveExtent) -> tuple[Effect, ...]:
+        """A narrow dead zone, and thresholds that show where commands come near them, without and with sticking."""
+        wide = _USUAL * extent.wheel_speed
+        return (cls(cls.parameter("width").metadata["step"]), cls(wide, 0.0), cls(wide, 0.0, 0.5))

@@ -87,5 +87,5 @@ class LateralBulldozing(Effect):
     confused_with = ("gyro_scale", "soil_change", "towed_drag")
     actions = ((POINT_WHEEL_FORCES, push_soil_aside),)
 
-    scale: float = size("-", 0.0, 10.0, least=0.25)
+    scale: float = size("-", 0.0, 10.0, least=0.25, step=0.25)
     density: float = shape("kg/m^3", 200.0, 2500.0, default=1500.0, step=100.0)

@@ -3,23 +3,31 @@
 import math
 from dataclasses import dataclass
 
-from ddagr_gym.physics.effects.base import Effect, Vector, size
-from ddagr_gym.physics.layout import AXLE_TORQUE, MOTOR_TARGET, POINT_MOTORS, SAMPLE_PERIOD
+from ddagr_gym.physics.effects.base import DriveExtent, Effect, Vector, shape, size
+from ddagr_gym.physics.layout import AXLE_TORQUE, MOTOR_TARGET, OMEGA, POINT_MOTORS, SAMPLE_PERIOD
 
 _FOLLOWING = 0.1  # [s] of rotor and gear, ours: without it the torque of a wheel at rest, where only friction is left
 # to set it, and the speed drive each other to and fro from sample to sample
+_SLOW = 0.02  # [rad/s] bank speeds about which "alike" changes its sign
 _STARTED = 2
 
 
 def droop_speed(row: Vector, parameters: Vector, memory: Vector) -> None:
-    """Shift each bank's speed by its axle torque, smoothed in ``memory[:2]``; negative torque brakes a driven wheel."""
+    """Shift each bank's speed by its axle torque, smoothed in ``memory[:2]``; negative torque brakes a driven wheel.
+
+    The share ``parameters[1]`` follows the torque of the other bank, with its sign where the banks turn alike.
+    """
     share = 1.0 - math.exp(-row[SAMPLE_PERIOD] / _FOLLOWING)
     for bank in range(2):
         torque = row[AXLE_TORQUE + bank] + row[AXLE_TORQUE + 2 + bank]
         if memory[_STARTED] == 0.0:
             memory[bank] = torque
         memory[bank] += share * (torque - memory[bank])
-        row[MOTOR_TARGET + bank] += parameters[0] * memory[bank]
+    both = row[OMEGA] * row[OMEGA + 1]
+    alike = both / (abs(both) + _SLOW * _SLOW)
+    for bank in range(2):
+        load = (1.0 - parameters[1]) * memory[bank] + parameters[1] * alike * memory[1 - bank]
+        row[MOTOR_TARGET + bank] += parameters[0] * load
     memory[_STARTED] = 1.0
 
 
@@ -27,16 +35,21 @@ def droop_speed(row: Vector, parameters: Vector, memory: Vector) -> None:
 class MotorDroop(Effect):
     """Bank speed that falls in proportion to the bank's axle torque, as with a speed loop without integral action.
 
-    A bank that the soil drives (downhill, or braked in a turn) runs faster than its command.
+    A bank that the soil drives (downhill, or braked in a turn) runs faster than its command. Where both motors hang on
+    one weak battery, the load of either slows both.
 
     Attributes:
         droop: speed lost per torque; least: 2 percent of 0.7 rad/s under 25 N m.
+        shared: share of the torque that is the other bank's: 0 for a weak speed loop, 0.5 for a weak battery.
     """
 
     name = "motor_droop"
     title = "Motor droop"
     group = "commands and motors"
-    equation = "omega_target = command + droop (T_front + T_rear), the soil's torques (braking < 0) over 0.1 s"
+    equation = (
+        "omega_target = command + droop ((1 - shared) T + shared T_other), T = T_front + T_rear by the soil "
+        "(braking < 0) over 0.1 s, T_other turned to the bank's sense"
+    )
     source = (
         "speed-torque line of a direct-current motor (Krause et al., Analysis of Electric Machinery); 0.1 s is ours"
     )
@@ -45,3 +58,10 @@ class MotorDroop(Effect):
     actions = ((POINT_MOTORS, droop_speed),)
 
     droop: float = size("rad/(s N m)", 0.0, 0.02, least=5e-4)
+    shared: float = shape("-", 0.0, 0.5, default=0.0, step=0.1)
+
+    @classmethod
+    def probes(cls, extent: DriveExtent) -> tuple[Effect, ...]:
+        """A droop by the bank's own torque, and one by that of both."""
+        step = cls.parameter("droop").metadata["step"]
+        return (cls(step), cls(step, 0.5))

@@ -48,4 +48,4 @@ class Multipass(Effect):
     confused_with = ("centre_of_mass_offset", "slip_sinkage", "soil_change")
     actions = ((POINT_SOIL, stiffen_ruts),)
 
-    stiffening: float = size("-", -0.5, 5.0, least=0.2)
+    stiffening: float = size("-", -0.5, 5.0, least=0.2, step=0.2)

@@ -41,7 +41,7 @@ class Payload(Effect):
     confused_with = ("centre_of_mass_offset", "soil_change")
     actions = ((POINT_LOADS, add_load),)
 
-    mass: float = size("kg", -30.0, 500.0, least=8.0)
+    mass: float = size("kg", -30.0, 500.0, least=8.0, step=8.0)
     x: float = shape("m", -1.0, 1.0, default=0.0, step=0.05)
     y: float = shape("m", -1.0, 1.0, default=0.0, step=0.05)
     height: float = shape("m", 0.0, 3.0, default=0.6, step=0.1)

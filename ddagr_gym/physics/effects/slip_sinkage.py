@@ -57,4 +57,4 @@ class SlipSinkage(Effect):
     confused_with = ("multipass", "soil_change", "towed_drag", "viscous_drag")
     actions = ((POINT_SOIL, dig_in),)
 
-    growth: float = size("-", 0.0, 1.5, least=0.1)
+    growth: float = size("-", 0.0, 1.5, least=0.1, step=0.1)

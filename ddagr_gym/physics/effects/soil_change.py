@@ -53,8 +53,8 @@ class SoilChange(Effect):
     )
     actions = ((POINT_SOIL, change_soil),)
 
-    strength: float = size("-", LOWEST_FACTOR, HIGHEST_FACTOR, least=0.1, neutral=1.0)
-    stiffness: float = size("-", LOWEST_FACTOR, HIGHEST_FACTOR, least=0.2, default=1.0, neutral=1.0)
+    strength: float = size("-", LOWEST_FACTOR, HIGHEST_FACTOR, least=0.1, neutral=1.0, step=0.1)
+    stiffness: float = size("-", LOWEST_FACTOR, HIGHEST_FACTOR, least=0.2, default=1.0, neutral=1.0, step=0.2)
     onset: float = shape("s", _ALWAYS, 1e6, default=_ALWAYS, step=0.25)
 
     @classmethod

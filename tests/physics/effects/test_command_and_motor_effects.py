@@ -132,6 +132,36 @@ def test_droop_comes_to_rest(drive):
     assert np.abs(columns["specific_force_x"][-50:]).max() < 0.02
 
 
+def droop(act, turning_row, text, omega, torques):
+    """Shift of both motors' targets under axle torques of the banks (right, left)."""
+    row = turning_row.copy()
+    row[layout.OMEGA : layout.OMEGA + 2] = omega
+    row[layout.AXLE_TORQUE : layout.AXLE_TORQUE + 4] = np.tile(0.5 * np.array(torques), 2)
+    changed = act(parse_effect(text), row)
+    return (changed - row)[layout.MOTOR_TARGET : layout.MOTOR_TARGET + 2]
+
+
+def test_a_shared_battery_slows_both_banks_alike(act, turning_row):
+    both = "motor_droop=0.002,shared=0.5"
+    np.testing.assert_allclose(droop(act, turning_row, both, (0.8, 0.8), (-30.0, -10.0)), -0.04, rtol=2e-3)
+    # on the spot both lose speed as well, each in its own sense
+    np.testing.assert_allclose(droop(act, turning_row, both, (0.8, -0.8), (-30.0, 10.0)), (-0.04, 0.04), rtol=2e-3)
+
+
+@pytest.mark.parametrize("omega", [(0.8, 0.4), (0.8, -0.4), (0.0, 0.0)])
+def test_a_droop_that_is_not_shared_follows_the_banks_own_torque(act, turning_row, omega):
+    shift = droop(act, turning_row, "motor_droop=0.002", omega, (-30.0, 10.0))
+    np.testing.assert_allclose(shift, (-0.06, 0.02), atol=1e-15)
+
+
+def test_a_weak_battery_lets_the_outer_bank_slow_the_inner_one(drive):
+    commands = np.tile((0.9, 0.5), (700, 1))
+    own, shared = (drive([f"motor_droop=0.002,shared={share}"], commands) for share in (0.0, 0.5))
+    lost = [0.9 - shared["true_omega_right"][-1], 0.5 - shared["true_omega_left"][-1]]
+    assert lost[0] == pytest.approx(lost[1], rel=0.01)
+    assert lost[1] > 0.5 - own["true_omega_left"][-1] + 5e-3
+
+
 def test_speed_limit_clips_and_leaves_slower_commands_alone(drive, steps):
     free = drive((), steps)
     limited = drive(["motor_saturation=0.6"], steps)

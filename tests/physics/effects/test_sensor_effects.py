@@ -63,6 +63,25 @@ def test_sensor_effects_do_not_move_the_robot(drive, turns):
             np.testing.assert_array_equal(wrong[name], plain[name])
 
 
+def test_encoders_in_the_speed_loop_agree_with_the_command_and_the_wheels_do_not(drive):
+    commands = np.tile((0.7, 0.5), (400, 1))
+    plain, looped = drive((), commands), drive(["encoder_scale=1.05,left=0.9,loop=1"], commands)
+    for side, scale in (("right", 1.05), ("left", 0.9)):
+        np.testing.assert_allclose(looped[f"encoder_{side}"][-50:], plain[f"encoder_{side}"][-50:], atol=1e-6)
+        wanted = commands[-50:, ("right", "left").index(side)] / scale
+        np.testing.assert_allclose(looped[f"true_omega_{side}"][-50:], wanted, atol=1e-5)
+
+
+def test_a_loop_with_encoders_of_its_own_moves_as_before(drive, turns):
+    separate = parse_effect("encoder_scale=1.05,left=0.9,loop=0")
+    assert [point for point, _ in separate.acting] == [layout.POINT_READINGS]
+    assert len(parse_effect("encoder_scale=1.05,left=0.9,loop=1").acting) == 2
+    plain, wrong = drive((), turns), drive([separate], turns)
+    for name in plain:
+        if name.startswith("true_"):
+            np.testing.assert_array_equal(wrong[name], plain[name])
+
+
 def test_noise_and_steps_of_the_sensor_stay_as_they_are(drive, turns):
     sensors = Sensors(imu=Imu())
     columns = drive(["accelerometer_bias=0.5"], turns, sensors=sensors, seed=3)
