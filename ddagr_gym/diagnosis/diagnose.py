@@ -137,7 +137,7 @@ def conclude(
         tuple(findings),
         headline(verdict, complete, findings),
         {"nominal": found.nominal.misfit, "corrected": found.chosen.misfit, "limit": dict(thresholds.misfit)},
-        least_detectable(found.nominal.terms, thresholds, found.nominal.dispersion),  # type: ignore[arg-type]
+        _detectable(found, thresholds),
         {p.name: float(v) for p, v in zip(problem.nuisances.parameters, values, strict=True) if p.prior > 0.0},
         tuple(recording.meta.source for recording in prepared.recordings),
         {"nulls": thresholds.nulls, "bank": thresholds.bank, "level": thresholds.level},
@@ -237,6 +237,12 @@ def _findings(problem: Problem, found: Found, thresholds: Thresholds, rng: np.ra
             )
         )
     return findings
+
+
+def _detectable(found: Found, thresholds: Thresholds) -> dict[str, dict[str, float]]:
+    """Least detectable sizes: of named effects before any was named, of the others beside those that were."""
+    by_model = [least_detectable(s.terms, thresholds, s.dispersion) for s in (found.nominal, found.chosen)]
+    return {**by_model[0], **by_model[1]}
 
 
 def _before(found: Found, name: str) -> Standing:
