@@ -10,6 +10,7 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ddagr_gym.commands.demo_section import Section
 from ddagr_gym.commands.output import output_folder, write_text
 
 if TYPE_CHECKING:
@@ -54,21 +55,6 @@ class Arguments:
     recording: Path | None = None
     robot: str = ""
     soil: str = ""
-
-
-@dataclass(frozen=True)
-class Section:
-    """What one step shows.
-
-    Attributes:
-        title: of the section.
-        text: table, printed and on the page.
-        html: figures and links below it, relative to the page.
-    """
-
-    title: str
-    text: str
-    html: str
 
 
 def run(arguments: Arguments) -> None:

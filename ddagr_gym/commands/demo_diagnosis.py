@@ -6,11 +6,12 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ddagr_gym.commands.demo_section import Section
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from ddagr_gym.commands.demo import Section
     from ddagr_gym.diagnosis.thresholds import Thresholds
     from ddagr_gym.recordings.schema import Recording
 
@@ -76,7 +77,6 @@ def diagnosis_step(folder: Path, seed: int = 1, thresholds: Thresholds | None = 
         seed: of the drives.
         thresholds: of the gate; those that ship with the package by default.
     """
-    from ddagr_gym.commands.demo import Section
     from ddagr_gym.commands.diagnose import PAGE, diagnosed, outcome_text, write_outcome
     from ddagr_gym.diagnosis.pipeline import Task
     from ddagr_gym.diagnosis.setting import Setting

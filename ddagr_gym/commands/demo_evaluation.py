@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from ddagr_gym.commands.demo import Section
+from ddagr_gym.commands.demo_section import Section
 
 LADDER = ("B0", "B1", "B2", "B3", "B4")
 POLICIES = ("ppo_ekf", "ppo_history", "ppo_raw")
@@ -24,7 +23,6 @@ def evaluation_step(folder: Path, scenarios: int = SCENARIOS, workers: int = 2) 
         scenarios: how many of the set.
         workers: processes.
     """
-    from ddagr_gym.commands.demo import Section
     from ddagr_gym.commands.evaluate import results_table
     from ddagr_gym.commands.evaluation_report import write_files, write_report
     from ddagr_gym.commands.output import format_table
