@@ -13,7 +13,7 @@ Method (measured reasons in the study that the project follows)
     *nuisance*    what is uncertain about soil, robot, biases and clocks, as global parameters with priors, and how the
                   field differs from window to window, as local ones. Initial states and local parameters are eliminated
                   from every sensitivity by a QR factorisation per window.
-    *origins*     recordings without poses have a place and a heading of their own; dead reckoning ties their windows.
+    *headings*    recordings without poses have a heading of their own; dead reckoning ties their windows.
     *refit*       Gauss-Newton with priors and bounds; jointly with any effect that is assumed.
     *scores*      one simulation per probe of the library; from inner products per window follow gains (fall of the
                   cost), cluster-robust scores, gains on left-out windows and resampled gains without another one.

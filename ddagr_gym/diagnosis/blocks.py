@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ddagr_gym.diagnosis.headings import POSE
 from ddagr_gym.diagnosis.noise import ChannelNoise
-from ddagr_gym.diagnosis.origins import POSE
 from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.replay.windows import CHANNELS, STATE, WindowSet
 

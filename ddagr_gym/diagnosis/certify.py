@@ -2,8 +2,8 @@
 
 Every recording is forecast by models whose sizes and nuisances were fitted to the others; a single recording by its
 halves. The start of a forecast comes from the readings before it (:mod:`ddagr_gym.diagnosis.forecast`); biases of a
-recording that a fit has not seen stand at their prior, zero; where one without poses began comes from the fit to all.
-*Which* effects are in the model was decided on all drives.
+recording that a fit has not seen stand at their prior, zero; the heading of one without poses is that of the fit to
+all. *Which* effects are in the model was decided on all drives.
 
 Compared are the raw nominal simulator, the refitted one, the corrected one, a *black box* (a flexible residual model on
 top of the refitted one) and the *ceiling*: the best of these and of a flexible model on top of the corrected one, per
@@ -107,8 +107,8 @@ def refitted_on(problem: Problem, fitted: Fitted, fold: Fold, iterations: int = 
     chosen = fold.training
     values = fitted.point.values.copy()
     for k, parameter in enumerate(problem.nuisances.parameters):
-        # where a drive began is a state and no size: it comes from the fit to all drives
-        if parameter.recording in fold.unseen and parameter.origin is None:
+        # how a drive began is a state and no size: it comes from the fit to all drives
+        if parameter.recording in fold.unseen and not parameter.heading:
             values[k] = 0.0
     start = Point(values, fitted.point.states[chosen], fitted.point.effects)
     reuse = replace(

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.diagnosis.candidates import Candidate
-from ddagr_gym.diagnosis.origins import YAW
 from ddagr_gym.diagnosis.problem import Point, Problem
 from ddagr_gym.diagnosis.scores import Gain, Terms, best_multiples, reduce
 from ddagr_gym.frames import wrap_angle
@@ -96,7 +95,7 @@ def with_headings(problem: Problem, terms: Terms, gain: Gain, point: Point, shar
     """
     parameters = enumerate(problem.nuisances.parameters)
     shown = set(terms.recording.tolist())
-    turned = {p.recording: k for k, p in parameters if p.origin == YAW and p.recording in shown}
+    turned = {p.recording: k for k, p in parameters if p.heading and p.recording in shown}
     placed = ~np.isin(terms.recording, np.array(list(turned), dtype=np.int64))
     if point.effects[-1].name != Slope.name or not turned or not placed.any():
         return point

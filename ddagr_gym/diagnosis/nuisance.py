@@ -17,7 +17,7 @@ from ddagr_gym.physics import layout
 from ddagr_gym.replay.parameters import (
     ModelParameter,
     command_shift,
-    origin_parameters,
+    heading_parameters,
     robot_parameters,
     sensor_parameters,
     soil_parameters,
@@ -89,9 +89,6 @@ class Nuisances:
     local: tuple[tuple[int, float], ...]
 
 
-UNKNOWN_PLACE = 10.0
-"""Standard deviation of where a recording without poses begins [m] (ours: a field's corner)."""
-
 _SOIL_STEP = 0.05
 """Of finite differences: the simulator's adaptive steps leave 0.5 units of noise per prediction, and forces are nearly
 linear in the logarithms over 5 percent."""
@@ -131,7 +128,7 @@ def nuisances(
         recordings: how many.
         period: between samples [s].
         priors: standard deviations of the others.
-        unplaced: recordings whose place and heading in the world nobody knows.
+        unplaced: recordings whose heading in the world nobody knows.
     """
     deviations = {
         "soil_strength": priors.strength,
@@ -146,7 +143,7 @@ def nuisances(
         *robot_parameters(robot),
         command_shift(period),
         *sensor_parameters(recordings, priors.gyro_bias, priors.accelerometer_bias),
-        *origin_parameters(unplaced, UNKNOWN_PLACE, math.pi),
+        *heading_parameters(unplaced, math.pi),
     )
     names = [p.name for p in parameters]
     local = (

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.diagnosis.blocks import BlockedWindows
+from ddagr_gym.diagnosis.headings import headings_matter, turned_starts
 from ddagr_gym.diagnosis.nuisance import NuisancePriors, Nuisances
-from ddagr_gym.diagnosis.origins import matter, moved_starts
 from ddagr_gym.parameters import Numerics, Robot, Soil
 from ddagr_gym.physics import layout
 from ddagr_gym.physics.effects import Effect
@@ -152,11 +152,11 @@ class Problem:
         return Point(np.zeros(len(self.prior)), self.blocked.windows.initial.copy(), tuple(effects))
 
     def starts(self, values: Array) -> Array:
-        """(W, 8) first guess of the states, which goes with the origins of recordings without poses."""
-        return moved_starts(self.blocked.windows, self.nuisances.parameters, values)
+        """(W, 8) first guess of the states, turned with the headings of recordings without poses."""
+        return turned_starts(self.blocked.windows, self.nuisances.parameters, values)
 
     def moved(self, point: Point, values: Array) -> Point:
-        """A point at other values; states go with the origins."""
+        """A point at other values; states turn with the headings."""
         return replace(point, values=values, states=point.states + self.starts(values) - self.starts(point.values))
 
     def predict(self, point: Point) -> Array:
@@ -184,7 +184,7 @@ class Problem:
         """Weighted sensitivity to every nuisance parameter, (W, M, P)."""
         columns = []
         for k, parameter in enumerate(self.nuisances.parameters):
-            if parameter.origin is not None:
+            if parameter.heading:
                 columns.append(np.zeros(self.blocked.mask.shape))
                 continue
             channel = _BIAS_CHANNEL.get(parameter.entries[0]) if len(parameter.entries) == 1 else None
@@ -196,25 +196,24 @@ class Problem:
             moved[k] += step
             columns.append(self.blocked.means(self.predict(replace(point, values=moved)) - base) / step)
             progress()
-        return self.with_origins(point, base, np.stack(columns, axis=2))
+        return self.with_headings(point, base, np.stack(columns, axis=2))
 
-    def with_origins(self, point: Point, base: Array, by_parameter: Array) -> Array:
-        """Sensitivities (W, M, P) with those to the origins as they are with the effects of a point.
+    def with_headings(self, point: Point, base: Array, by_parameter: Array) -> Array:
+        """Sensitivities (W, M, P) with those to the headings as they are with the effects of a point.
 
-        One simulation serves an entry of all origins: every window belongs to one recording.
+        One simulation serves all headings: every window belongs to one recording.
         """
-        parameters = self.nuisances.parameters
-        found = by_parameter
-        entries = {p.origin for p in parameters if p.origin is not None}
-        for origin in sorted(entry for entry in entries if matter(entry, point.effects)):
-            own = [k for k, p in enumerate(parameters) if p.origin == origin]
-            values = point.values.copy()
-            values[own] += parameters[own[0]].step
-            change = self.blocked.means(self.predict(replace(self.moved(point, values), values=point.values)) - base)
-            found = found.copy() if found is by_parameter else found
-            for k in own:
-                chosen = self.blocked.windows.recording == parameters[k].recording
-                found[..., k] = np.where(chosen[:, None], change / parameters[k].step, 0.0)
+        own = [k for k, parameter in enumerate(self.nuisances.parameters) if parameter.heading]
+        if not own or not headings_matter(point.effects):
+            return by_parameter
+        step = self.nuisances.parameters[own[0]].step
+        values = point.values.copy()
+        values[own] += step
+        change = self.blocked.means(self.predict(self.moved(point, values)) - base) / step
+        found = by_parameter.copy()
+        for k in own:
+            chosen = self.blocked.windows.recording == self.nuisances.parameters[k].recording
+            found[..., k] = np.where(chosen[:, None], change, 0.0)
         return found
 
     def _bias_column(self, channel: int, recording: int | None) -> Array:

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ddagr_gym.diagnosis.blocks import BLOCK, block_windows, located
+from ddagr_gym.diagnosis.headings import without_poses
 from ddagr_gym.diagnosis.noise import ChannelNoise, recording_noise
 from ddagr_gym.diagnosis.nuisance import NuisancePriors, nuisances
-from ddagr_gym.diagnosis.origins import without_poses
 from ddagr_gym.diagnosis.problem import Problem
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.recordings.schema import Recording
@@ -102,7 +102,7 @@ def make_problem(
     found = recording_noise(recordings, radius) if noise is None else noise
     blocked = block_windows(located(windows, recordings, radius), found, radius, setting.block)
     reckoned = without_poses(recordings)
-    # where none has poses the first one's start is the world's origin
+    # where none has poses the first one begins along the world's x axis
     unplaced = reckoned[1:] if len(reckoned) == len(recordings) else reckoned
     uncertain = nuisances(robot, len(recordings), windows.period, setting.priors, unplaced)
     return Problem(robot, soil, blocked, uncertain, setting.priors, threads=setting.threads)

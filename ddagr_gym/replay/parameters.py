@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.physics import layout
-from ddagr_gym.replay.windows import STATE
 
 Array = NDArray[np.float64]
 
@@ -31,7 +30,7 @@ class ModelParameter:
         high: bound.
         recording: only windows of this recording, or None for all.
         shift: the value is a delay of the commands [s] instead of a row entry.
-        origin: the value moves this entry of STATE (x, y or yaw) at the start of the recording instead of a row entry.
+        heading: the value turns the recording's starts [rad] instead of changing a row entry.
     """
 
     name: str
@@ -44,7 +43,7 @@ class ModelParameter:
     high: float
     recording: int | None = None
     shift: bool = False
-    origin: int | None = None
+    heading: bool = False
 
     def apply(self, rows: Array, value: float, recording: NDArray[np.int64]) -> None:
         """Change the rows (W, SIZE) of the windows it concerns, in place."""
@@ -140,15 +139,11 @@ def sensor_parameters(recordings: int, gyro_bias: float, accelerometer_bias: flo
     return tuple(made)
 
 
-def origin_parameters(recordings: Sequence[int], place: float, heading: float) -> tuple[ModelParameter, ...]:
-    """Where recordings without poses begin in the world; standard deviations of place [m] and heading [rad]."""
-    kinds = (("x", "m", place, 0.05), ("y", "m", place, 0.05), ("yaw", "rad", heading, 0.02))
+def heading_parameters(recordings: Sequence[int], deviation: float) -> tuple[ModelParameter, ...]:
+    """Headings at which recordings without poses begin, with their standard deviation [rad]."""
     return tuple(
-        ModelParameter(
-            f"origin_{name}_{number + 1}", unit, (), False, deviation, step, -1e3, 1e3, number, origin=STATE.index(name)
-        )
+        ModelParameter(f"heading_{number + 1}", "rad", (), False, deviation, 0.02, -1e3, 1e3, number, heading=True)
         for number in recordings
-        for name, unit, deviation, step in kinds
     )
 
 

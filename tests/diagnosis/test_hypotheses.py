@@ -126,27 +126,27 @@ def turned(
     return Turned(problem, raw, terms, gain, replace(raw.point, effects=effects), 2.5 if poses else 2.2)
 
 
-def origin_yaw(turned: Turned, point: Point) -> float:
+def heading(turned: Turned, point: Point) -> float:
     names = [parameter.name for parameter in turned.problem.nuisances.parameters]
-    return float(point.values[names.index("origin_yaw_2")])
+    return float(point.values[names.index("heading_2")])
 
 
 def test_a_recording_without_poses_is_turned_until_its_slope_agrees(turned: Turned) -> None:
     point = with_headings(turned.problem, turned.terms, turned.gain, turned.guess)
-    assert origin_yaw(turned, point) == pytest.approx(turned.away, abs=0.2)
+    assert heading(turned, point) == pytest.approx(turned.away, abs=0.2)
     assert point.effects[-1].angle == pytest.approx(0.06, abs=0.01)
     assert point.effects[-1].angle > 1.5 * turned.guess.effects[-1].angle
     # the windows of the recording turn with it, those of the other stay
     change = (point.states - turned.guess.states)[:, 2]
     second = turned.problem.blocked.windows.recording == 1
-    np.testing.assert_allclose(change[second], origin_yaw(turned, point))
+    np.testing.assert_allclose(change[second], heading(turned, point))
     assert not change[~second].any()
 
 
 def test_a_fit_does_not_forget_the_heading_that_a_slope_shows(turned: Turned) -> None:
     point = with_headings(turned.problem, turned.terms, turned.gain, turned.guess)
     fitted = fit(turned.problem, point, iterations=3, renewals=2).point
-    assert origin_yaw(turned, fitted) == pytest.approx(turned.away, abs=0.2)
+    assert heading(turned, fitted) == pytest.approx(turned.away, abs=0.2)
     off = (turned.problem.starts(fitted.values) - fitted.states)[:, 2]
     assert np.abs(off).max() < 0.2
 

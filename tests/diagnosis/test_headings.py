@@ -1,4 +1,4 @@
-"""Recordings without poses have an origin each, which moves the first guess of their windows and nothing else."""
+"""Recordings without poses have a heading each, which turns the first guess of their windows and nothing else."""
 
 import math
 from collections.abc import Callable
@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ddagr_gym.diagnosis.origins import YAW, matter, moved_starts, without_poses
+from ddagr_gym.diagnosis.headings import headings_matter, turned_starts, without_poses
 from ddagr_gym.diagnosis.problem import Problem
 from ddagr_gym.physics.effects import load_effects
 from ddagr_gym.recordings.schema import Recording
-from ddagr_gym.replay.parameters import command_shift, origin_parameters
+from ddagr_gym.replay.parameters import command_shift, heading_parameters
 from ddagr_gym.replay.windows import STATE, WindowSet
 
 POSE = [STATE.index(name) for name in ("x", "y", "yaw")]
-PARAMETERS = (command_shift(0.02), *origin_parameters((1, 2), 10.0, math.pi))
+PARAMETERS = (command_shift(0.02), *heading_parameters((1, 2), math.pi))
 NAMES = [parameter.name for parameter in PARAMETERS]
 
 
@@ -37,8 +37,8 @@ def unfollowed(drive: Callable[..., Recording], problem_of: Callable[..., Proble
     return problem_of(*(drive(seconds=8.0, seed=seed, poses=False) for seed in (1, 2)))
 
 
-def origins(problem: Problem) -> list[str]:
-    return [p.name for p in problem.nuisances.parameters if p.origin is not None]
+def headings(problem: Problem) -> list[str]:
+    return [p.name for p in problem.nuisances.parameters if p.heading]
 
 
 def test_a_receiver_that_says_nothing_is_none(drive: Callable[..., Recording]) -> None:
@@ -47,46 +47,45 @@ def test_a_receiver_that_says_nothing_is_none(drive: Callable[..., Recording]) -
     assert without_poses((followed, silent, followed, headless)) == (1, 3)
 
 
-def test_a_recording_turns_about_its_own_origin_and_then_moves() -> None:
+def test_a_recording_turns_about_its_own_start() -> None:
     before = windows()
-    after = moved_starts(before, PARAMETERS, values(origin_x_2=3.0, origin_y_2=-1.0, origin_yaw_2=math.pi / 2.0))
+    after = turned_starts(before, PARAMETERS, values(heading_2=math.pi / 2.0))
     others = before.recording != 1
     np.testing.assert_array_equal(after[others], before.initial[others])
     x, y, yaw = before.initial[~others][:, POSE].T
-    np.testing.assert_allclose(after[~others][:, POSE], np.stack([3.0 - y, x - 1.0, yaw + math.pi / 2.0], axis=1))
+    np.testing.assert_allclose(after[~others][:, POSE], np.stack([-y, x, yaw + math.pi / 2.0], axis=1), atol=1e-12)
     np.testing.assert_array_equal(after[:, 3:], before.initial[:, 3:])
 
 
 def test_where_nothing_has_poses_the_first_drive_is_the_world(unfollowed: Problem) -> None:
-    assert origins(unfollowed) == ["origin_x_2", "origin_y_2", "origin_yaw_2"]
+    assert headings(unfollowed) == ["heading_2"]
 
 
 def test_where_one_drive_has_poses_it_is_the_world(
     drive: Callable[..., Recording], problem_of: Callable[..., Problem]
 ) -> None:
     silent = drive(seconds=8.0, poses=False)
-    assert origins(problem_of(drive(seconds=8.0))) == []
+    assert headings(problem_of(drive(seconds=8.0))) == []
     mixed = problem_of(silent, drive(seconds=8.0), silent)
-    assert origins(mixed) == [f"origin_{name}_{number}" for number in (1, 3) for name in ("x", "y", "yaw")]
+    assert headings(mixed) == ["heading_1", "heading_3"]
 
 
-def test_a_heading_matters_beside_ground_and_a_place_beside_patches() -> None:
-    assert not matter(YAW, load_effects("gyro_scale=1.1"))
-    assert matter(YAW, load_effects("slope=0.1"))
-    assert not matter(STATE.index("x"), load_effects("slope=0.1"))
-    assert matter(STATE.index("x"), load_effects("soil_patch=0.5"))
+def test_a_heading_matters_where_the_ground_has_a_direction() -> None:
+    assert not headings_matter(load_effects("gyro_scale=1.1"))
+    assert headings_matter(load_effects("slope=0.1"))
+    assert not headings_matter(load_effects("soil_patch=0.5"))
 
 
-def test_sensitivities_to_an_origin_are_those_of_its_own_windows_on_this_ground(unfollowed: Problem) -> None:
+def test_sensitivities_to_a_heading_are_those_of_its_own_windows_on_this_ground(unfollowed: Problem) -> None:
     names = [parameter.name for parameter in unfollowed.nuisances.parameters]
-    place = names.index("origin_yaw_2")
+    place = names.index("heading_2")
     flat = unfollowed.start()
     base = unfollowed.predict(flat)
     blank = np.zeros((*unfollowed.blocked.mask.shape, len(names)))
-    assert unfollowed.with_origins(flat, base, blank) is blank
+    assert unfollowed.with_headings(flat, base, blank) is blank
     sloping = replace(flat, effects=load_effects("slope=0.1"))
     base = unfollowed.predict(sloping)
-    columns = unfollowed.with_origins(sloping, base, blank)
+    columns = unfollowed.with_headings(sloping, base, blank)
     assert not blank.any()
     own = unfollowed.blocked.windows.recording == 1
     assert not columns[~own].any()

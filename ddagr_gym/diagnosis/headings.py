@@ -1,0 +1,54 @@
+"""Recordings without poses begin with a heading each, which only what is fixed in the world can show.
+
+Dead reckoning ties the windows of such a recording to each other. A slope is then seen in one frame after the other,
+whose headings are nuisances; taken as begun alike they would not agree, and a bias would have to make up for it. Places
+are another matter: a patch is looked for as if the recordings had begun at one place and alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ddagr_gym.physics.effects import Effect
+from ddagr_gym.physics.effects.base import GROUPS
+from ddagr_gym.recordings.schema import Recording
+from ddagr_gym.replay.parameters import ModelParameter
+from ddagr_gym.replay.windows import STATE, WindowSet
+
+Array = NDArray[np.float64]
+
+POSE = ("pose_x", "pose_y", "pose_yaw")
+_X, _Y, _YAW = (STATE.index(name) for name in ("x", "y", "yaw"))
+_GROUND = GROUPS[2]
+
+
+def without_poses(recordings: Sequence[Recording]) -> tuple[int, ...]:
+    """Numbers of the recordings that no receiver has followed."""
+    return tuple(number for number, recording in enumerate(recordings) if not recording.has(*POSE))
+
+
+def headings_matter(effects: Sequence[Effect]) -> bool:
+    """Whether readings depend on headings: with what the ground does everywhere in one direction of the world."""
+    return any(effect.group == _GROUND and "centre_x" not in effect.shape_names() for effect in effects)
+
+
+def turned_starts(windows: WindowSet, parameters: Sequence[ModelParameter], values: Array) -> Array:
+    """(W, 8) first guess of STATE where the recordings' headings have their values.
+
+    Args:
+        windows: whose first guess holds for headings of 0; recordings without poses begin at the origin.
+        parameters: (P,) of the model.
+        values: (P,) of them.
+    """
+    initial = windows.initial.copy()
+    for parameter, yaw in zip(parameters, values, strict=True):
+        if parameter.heading:
+            chosen = windows.recording == parameter.recording
+            before = windows.initial[chosen]
+            initial[chosen, _X] = np.cos(yaw) * before[:, _X] - np.sin(yaw) * before[:, _Y]
+            initial[chosen, _Y] = np.sin(yaw) * before[:, _X] + np.cos(yaw) * before[:, _Y]
+            initial[chosen, _YAW] = yaw + before[:, _YAW]
+    return initial
