@@ -16,10 +16,11 @@ from ddagr_gym.diagnosis.held import Held, find_held, hold_effect, without_repea
 from ddagr_gym.diagnosis.inputs import data_source
 from ddagr_gym.diagnosis.misfit import LOCAL, explained_share, roughest
 from ddagr_gym.diagnosis.problem import Problem
-from ddagr_gym.diagnosis.search import BENT, MOST_EFFECTS, Found, Keep, begin, do, search
+from ddagr_gym.diagnosis.scores import dispersion_of
+from ddagr_gym.diagnosis.search import BENT, MOST_EFFECTS, Found, Keep, do, refit_nominal, search
 from ddagr_gym.diagnosis.sentences import headline
 from ddagr_gym.diagnosis.setting import SHORT, Setting, make_problem
-from ddagr_gym.diagnosis.standing import Standing
+from ddagr_gym.diagnosis.standing import Standing, stand
 from ddagr_gym.diagnosis.thresholds import Thresholds
 from ddagr_gym.diagnosis.uncertainty import intervals, least_detectable, resampled_parameters, with_structure
 from ddagr_gym.diagnosis.verdict import NONE, UNKNOWN, Diagnosis, Estimate, Finding
@@ -97,12 +98,13 @@ def searched(
         The setting of the windows that were searched, for :func:`prepare`, and what was found.
     """
     problem = prepare(robot, soil, recordings, setting).problem
-    begun = keep("search nominal", partial(begin, problem, progress))
-    if begun[1].dispersion > BENT and setting.duration > SHORT:
+    raw, refitted = keep("search refit", partial(refit_nominal, problem, progress))
+    if dispersion_of(problem, refitted) > BENT and setting.duration > SHORT:
         progress("short windows")
         setting = setting.with_windows(SHORT, SHORT * setting.stride / setting.duration)
         problem = prepare(robot, soil, recordings, setting).problem
-        begun = keep("search nominal, short windows", partial(begin, problem, progress))
+        raw, refitted = keep("search refit, short windows", partial(refit_nominal, problem, progress))
+    begun = raw, keep("search nominal", partial(stand, problem, refitted, progress))
     gates = thresholds.for_length(problem.covered)
     return setting, search(problem, gates, begun=begun, progress=progress, keep=keep)
 

@@ -182,8 +182,10 @@ def _ordered(name: str, every: Array, values: Array, usual: Array) -> tuple[Regi
 
 
 def _better_end(weight: Array, first: int, last: int) -> tuple[int, int]:
-    """Of two ranges at the ends of sorted weights, the one with the larger excess."""
+    """Of two ranges at the ends of sorted weights, the one with the larger excess; never an empty one."""
     count = len(weight)
+    if first == count or last == 0:
+        return (0, last or count) if first == count else (first, count)
     low = float(weight[:last].sum()) - last / count
     high = float(weight[first:].sum()) - (count - first) / count
     return (0, last) if low > high else (first, count)

@@ -176,11 +176,17 @@ def _finish(problem: Problem, standing: Standing, rival: Rival, large: bool) -> 
     return rival_of(standing, rival.name, min(fitted, known, key=lambda trial: trial.cost))
 
 
-def begin(problem: Problem, progress: Callable[[str], None] = lambda text: None) -> tuple[Fitted, Standing]:
-    """The raw nominal model with its sensitivities, and the refitted one with its scan."""
+def refit_nominal(problem: Problem, progress: Callable[[str], None] = lambda text: None) -> tuple[Fitted, Fitted]:
+    """The raw nominal model with its sensitivities, and the refitted one."""
     progress("nominal refit")
     raw = fit(problem, iterations=0)
-    return raw, stand(problem, fit(problem, raw.point, first=raw), progress)
+    return raw, fit(problem, raw.point, first=raw)
+
+
+def begin(problem: Problem, progress: Callable[[str], None] = lambda text: None) -> tuple[Fitted, Standing]:
+    """The raw nominal model with its sensitivities, and the refitted one with its scan."""
+    raw, refitted = refit_nominal(problem, progress)
+    return raw, stand(problem, refitted, progress)
 
 
 class Keep(Protocol):
