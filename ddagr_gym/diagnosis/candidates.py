@@ -32,6 +32,11 @@ class Candidate:
     whole: float | None = None
 
     @property
+    def is_direction(self) -> bool:
+        """Whether its probes point along the axes of the world."""
+        return len(self.probes) > 1 and "direction" in self.probes[0].shape_names()
+
+    @property
     def has_sizes(self) -> bool:
         """Whether its multiples are sizes; a flip or a limit stands at its probe whatever its multiple."""
         return self.whole is None and self.probes[0].differentiable

@@ -118,7 +118,8 @@ def refitted_on(problem: Problem, fitted: Fitted, fold: Fold, iterations: int = 
         elimination=fitted.elimination.subset(chosen),
         window_cost=fitted.window_cost[chosen],
     )
-    return fit(problem.subset(chosen), start, iterations=iterations, renewals=1, reuse=reuse).point
+    part = problem.subset(chosen).with_held_headings()
+    return fit(part, start, iterations=iterations, renewals=1, reuse=reuse).point
 
 
 @dataclass(frozen=True, eq=False)

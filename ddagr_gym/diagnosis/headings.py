@@ -2,7 +2,7 @@
 
 Dead reckoning ties the windows of such a recording to each other. A slope is then seen in one frame after the other,
 whose headings are nuisances; taken as begun alike they would not agree, and a bias would have to make up for it. Places
-are another matter: a patch is looked for as if the recordings had begun at one place and alike.
+are another matter: a patch is looked for as if the recordings had begun at one place.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.physics.effects import Effect
-from ddagr_gym.physics.effects.base import GROUPS
 from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.replay.parameters import ModelParameter
 from ddagr_gym.replay.windows import STATE, WindowSet
@@ -22,7 +21,6 @@ Array = NDArray[np.float64]
 
 POSE = ("pose_x", "pose_y", "pose_yaw")
 _X, _Y, _YAW = (STATE.index(name) for name in ("x", "y", "yaw"))
-_GROUND = GROUPS[2]
 
 
 def without_poses(recordings: Sequence[Recording]) -> tuple[int, ...]:
@@ -31,8 +29,8 @@ def without_poses(recordings: Sequence[Recording]) -> tuple[int, ...]:
 
 
 def headings_matter(effects: Sequence[Effect]) -> bool:
-    """Whether readings depend on headings: with what the ground does everywhere in one direction of the world."""
-    return any(effect.group == _GROUND and "centre_x" not in effect.shape_names() for effect in effects)
+    """Whether readings depend on headings: beside effects that have a ``direction`` in the world."""
+    return any("direction" in effect.shape_names() for effect in effects)
 
 
 def turned_starts(windows: WindowSet, parameters: Sequence[ModelParameter], values: Array) -> Array:

@@ -80,7 +80,7 @@ def _slope(candidate: Candidate, multiples: Sequence[float]) -> Slope:
     )
 
 
-def with_headings(problem: Problem, terms: Terms, gain: Gain, point: Point, share: float = 1.0) -> Point:
+def turned_to_agree(problem: Problem, terms: Terms, gain: Gain, point: Point, share: float = 1.0) -> Point:
     """A point with a slope as its last effect, where recordings without poses are turned so that their slopes agree.
 
     Each of them shows the slope towards a direction of its own frame, and no small step turns frames that differ by
@@ -96,7 +96,7 @@ def with_headings(problem: Problem, terms: Terms, gain: Gain, point: Point, shar
     parameters = enumerate(problem.nuisances.parameters)
     shown = set(terms.recording.tolist())
     turned = {p.recording: k for k, p in parameters if p.heading and p.recording in shown}
-    placed = ~np.isin(terms.recording, np.array(list(turned), dtype=np.int64))
+    placed = ~np.isin(terms.recording, np.array(terms.turned, dtype=np.int64))
     if point.effects[-1].name != Slope.name or not turned or not placed.any():
         return point
     candidate = terms.candidates[gain.candidate]

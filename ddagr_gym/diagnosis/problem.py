@@ -111,6 +111,7 @@ class Problem:
         windows = blocked.windows
         self.model = self.model_of(windows)
         self.prior = np.array([p.prior for p in nuisances.parameters])
+        self._headings = [k for k, parameter in enumerate(nuisances.parameters) if parameter.heading]
         self.low = np.array([p.low for p in nuisances.parameters])
         self.high = np.array([p.high for p in nuisances.parameters])
 
@@ -120,6 +121,12 @@ class Problem:
         return Problem(
             robot, soil, self.blocked.subset(chosen), self.nuisances, self.priors, threads=threads, numerics=numerics
         )
+
+    def with_held_headings(self) -> Problem:
+        """The same problem whose headings stay where they are."""
+        held = self.on(self.blocked)
+        held.prior[self._headings] = 0.0
+        return held
 
     def on(self, blocked: BlockedWindows) -> Problem:
         """The same problem on other windows of the same recordings."""
@@ -196,21 +203,24 @@ class Problem:
             moved[k] += step
             columns.append(self.blocked.means(self.predict(replace(point, values=moved)) - base) / step)
             progress()
-        return self.with_headings(point, base, np.stack(columns, axis=2))
+        return self.heading_columns(point, base, np.stack(columns, axis=2))
 
-    def with_headings(self, point: Point, base: Array, by_parameter: Array) -> Array:
+    def heading_columns(self, point: Point, base: Array, by_parameter: Array) -> Array:
         """Sensitivities (W, M, P) with those to the headings as they are with the effects of a point.
 
         One simulation serves all headings: every window belongs to one recording.
         """
-        own = [k for k, parameter in enumerate(self.nuisances.parameters) if parameter.heading]
-        if not own or not headings_matter(point.effects):
+        own = self._headings
+        if not own:
             return by_parameter
+        found = by_parameter.copy()
+        found[..., own] = 0.0
+        if not headings_matter(point.effects):
+            return found
         step = self.nuisances.parameters[own[0]].step
         values = point.values.copy()
         values[own] += step
         change = self.blocked.means(self.predict(self.moved(point, values)) - base) / step
-        found = by_parameter.copy()
         for k in own:
             chosen = self.blocked.windows.recording == self.nuisances.parameters[k].recording
             found[..., k] = np.where(chosen[:, None], change, 0.0)

@@ -42,6 +42,7 @@ class Terms:
         candidates: what the probes are of.
         recording: (W,) of each window.
         time: (W,) of each window [s].
+        turned: recordings whose headings are unknown.
     """
 
     normals: Array
@@ -51,6 +52,14 @@ class Terms:
     candidates: tuple[Candidate, ...]
     recording: NDArray[np.int64]
     time: Array
+    turned: tuple[int, ...] = ()
+
+    @property
+    def frames(self) -> list[Array]:
+        """(W,) windows, as weights, of each part whose directions in the world are known to each other."""
+        own = [self.recording == number for number in self.turned]
+        rest = ~np.isin(self.recording, np.array(self.turned, dtype=np.int64))
+        return [chosen.astype(float) for chosen in (rest, *own) if chosen.any()]
 
 
 @dataclass(frozen=True)
@@ -165,6 +174,7 @@ def scan(
         tuple(candidates),
         windows.recording,
         windows.time,
+        tuple(p.recording for p in problem.nuisances.parameters if p.heading and p.recording is not None),
     )
 
 
@@ -245,9 +255,21 @@ def gains(terms: Terms, weights: Array | None = None, dispersion: float = 1.0) -
     best: dict[str, Gain] = {}
     for k, candidate in enumerate(terms.candidates):
         gain, theta = best_multiples(reduced, candidate, dispersion)
+        if candidate.is_direction and terms.turned:
+            gain = max(gain, _gain_by_frame(terms, candidate, weights, dispersion))
         if candidate.name not in best or gain > best[candidate.name].gain:
             best[candidate.name] = Gain(k, candidate.name, gain, tuple(theta.tolist()))
     return sorted(best.values(), key=lambda item: -item.gain)
+
+
+def _gain_by_frame(terms: Terms, candidate: Candidate, weights: Array | None, dispersion: float) -> float:
+    """Gain of a direction that every frame may see turned, less what a heading explains by chance in each further one.
+
+    Drives out and back show the same slope with opposite signs: seen as begun alike they would say nothing together.
+    """
+    frames = [frame if weights is None else frame * weights for frame in terms.frames]
+    found = [best_multiples(reduce(terms, frame), candidate, dispersion)[0] for frame in frames if frame.any()]
+    return sum(found) - 0.5 * (len(found) - 1)
 
 
 def nuisance_answer(problem: Problem, fitted: Fitted, terms: Terms, gain: Gain) -> Array:

@@ -10,7 +10,7 @@ from typing import Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.diagnosis.hypotheses import first_guess, with_headings
+from ddagr_gym.diagnosis.hypotheses import first_guess, turned_to_agree
 from ddagr_gym.diagnosis.misfit import channel_misfit
 from ddagr_gym.diagnosis.problem import Point, Problem
 from ddagr_gym.diagnosis.refit import DAMPING, Fitted, cost_of, fit
@@ -73,7 +73,7 @@ def _trial(problem: Problem, standing: Standing, gain: Gain, terms: Terms, start
     candidate = terms.candidates[gain.candidate]
     effect = first_guess(candidate, gain.multiples)
     point = replace(start.point, effects=(*standing.fitted.point.effects, effect))
-    point = with_headings(problem, terms, gain, point)
+    point = turned_to_agree(problem, terms, gain, point)
     fitted = fit(problem, point, iterations=TRIAL_STEPS, renewals=2, reuse=start)
     scanned_here = (terms is standing.terms) == (start is standing.fitted)
     if fitted.cost < standing.fitted.cost or not (scanned_here and candidate.has_sizes):
@@ -104,7 +104,7 @@ def _damped_guess(problem: Problem, standing: Standing, gain: Gain, terms: Terms
         effect = first_guess(candidate, [share * multiple for multiple in gain.multiples])
         values = np.clip(start.point.values + share * answer, problem.low, problem.high)
         point = replace(start.point, values=values, effects=(*standing.fitted.point.effects, effect))
-        point = with_headings(problem, terms, gain, point, share)
+        point = turned_to_agree(problem, terms, gain, point, share)
         points.append(point)
         costs.append(cost_of(problem, point, problem.predict(point), start.elimination)[0])
         if costs[-1] < start.cost:

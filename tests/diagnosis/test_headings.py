@@ -82,10 +82,12 @@ def test_sensitivities_to_a_heading_are_those_of_its_own_windows_on_this_ground(
     flat = unfollowed.start()
     base = unfollowed.predict(flat)
     blank = np.zeros((*unfollowed.blocked.mask.shape, len(names)))
-    assert unfollowed.with_headings(flat, base, blank) is blank
+    of_a_slope = np.ones_like(blank)
+    assert not unfollowed.heading_columns(flat, base, of_a_slope)[..., place].any()
+    assert np.delete(unfollowed.heading_columns(flat, base, of_a_slope), place, axis=2).all()
     sloping = replace(flat, effects=load_effects("slope=0.1"))
     base = unfollowed.predict(sloping)
-    columns = unfollowed.with_headings(sloping, base, blank)
+    columns = unfollowed.heading_columns(sloping, base, blank)
     assert not blank.any()
     own = unfollowed.blocked.windows.recording == 1
     assert not columns[~own].any()

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from ddagr_gym.diagnosis.candidates import candidates_of
-from ddagr_gym.diagnosis.hypotheses import first_guess, looped_encoders, slower_loop, with_headings
+from ddagr_gym.diagnosis.certify import _recording_fold, refitted_on
+from ddagr_gym.diagnosis.hypotheses import first_guess, looped_encoders, slower_loop, turned_to_agree
 from ddagr_gym.diagnosis.problem import Point, Problem
 from ddagr_gym.diagnosis.refit import Fitted, fit
 from ddagr_gym.diagnosis.scores import Gain, Terms, gains, scan
@@ -132,7 +133,7 @@ def heading(turned: Turned, point: Point) -> float:
 
 
 def test_a_recording_without_poses_is_turned_until_its_slope_agrees(turned: Turned) -> None:
-    point = with_headings(turned.problem, turned.terms, turned.gain, turned.guess)
+    point = turned_to_agree(turned.problem, turned.terms, turned.gain, turned.guess)
     assert heading(turned, point) == pytest.approx(turned.away, abs=0.2)
     assert point.effects[-1].angle == pytest.approx(0.06, abs=0.01)
     assert point.effects[-1].angle > 1.5 * turned.guess.effects[-1].angle
@@ -144,7 +145,7 @@ def test_a_recording_without_poses_is_turned_until_its_slope_agrees(turned: Turn
 
 
 def test_a_fit_does_not_forget_the_heading_that_a_slope_shows(turned: Turned) -> None:
-    point = with_headings(turned.problem, turned.terms, turned.gain, turned.guess)
+    point = turned_to_agree(turned.problem, turned.terms, turned.gain, turned.guess)
     fitted = fit(turned.problem, point, iterations=3, renewals=2).point
     assert heading(turned, fitted) == pytest.approx(turned.away, abs=0.2)
     off = (turned.problem.starts(fitted.values) - fitted.states)[:, 2]
@@ -155,6 +156,32 @@ def test_other_effects_and_drives_with_poses_keep_their_headings(
     turned: Turned, drive: Callable[..., Recording], problem_of: Callable[..., Problem]
 ) -> None:
     other = replace(turned.guess, effects=load_effects("motor_lag=0.1"))
-    assert with_headings(turned.problem, turned.terms, turned.gain, other) is other
+    assert turned_to_agree(turned.problem, turned.terms, turned.gain, other) is other
     followed: Any = SimpleNamespace(nuisances=problem_of(drive(), drive(seed=2)).nuisances)
-    assert with_headings(followed, turned.terms, turned.gain, turned.guess) is turned.guess
+    assert turned_to_agree(followed, turned.terms, turned.gain, turned.guess) is turned.guess
+
+
+def test_drives_out_and_back_show_the_slope_that_one_frame_would_hide(
+    drive: Callable[..., Recording], problem_of: Callable[..., Problem]
+) -> None:
+    slope = ("slope=0.06,direction=0.8",)
+    there, back = (drive(slope, seed=seed, yaw=yaw, poses=False) for seed, yaw in ((1, 0.0), (2, math.pi)))
+    problem = problem_of(there, back)
+    kinds = {"slope": effect_kind("slope")}
+    terms = scan(problem, fit(problem, iterations=0), kinds)
+    alone = scan(problem_of(there), fit(problem_of(there), iterations=0), kinds)
+    assert gains(replace(terms, turned=()))[0].gain < 0.2 * gains(alone)[0].gain
+    assert gains(terms)[0].gain > gains(alone)[0].gain
+    point = turned_to_agree(problem, terms, gains(terms)[0], replace(problem.start(), effects=load_effects(*slope)))
+    names = [parameter.name for parameter in problem.nuisances.parameters]
+    assert abs(math.remainder(point.values[names.index("heading_2")] - math.pi, 2.0 * math.pi)) < 0.2
+    assert point.effects[0].angle == pytest.approx(0.06, rel=0.4)
+
+
+def test_sizes_for_an_unseen_drive_leave_its_heading_as_the_fit_to_all_drives_has_it(turned: Turned) -> None:
+    point = turned_to_agree(turned.problem, turned.terms, turned.gain, turned.guess)
+    fitted = fit(turned.problem, point, iterations=1)
+    for unseen in (0, 1):
+        found = refitted_on(turned.problem, fitted, _recording_fold(turned.problem, unseen))
+        assert heading(turned, found) == heading(turned, fitted.point)
+        assert found.effects[0].direction != fitted.point.effects[0].direction
