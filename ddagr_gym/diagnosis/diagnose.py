@@ -217,7 +217,8 @@ def _findings(problem: Problem, found: Found, thresholds: Thresholds, rng: np.ra
         spread = {
             p.field: with_structure(b, effect, p.field)
             for p, b in zip(parameters, bounds, strict=True)
-            if p.effect == number
+            # a shape that no resampling moves is not known: nothing shows it
+            if p.effect == number and (b[0] < b[1] or p.field in effect.size_names())
         }
         before = _before(found, effect.name)
         gain = _gain(found, effect.name)

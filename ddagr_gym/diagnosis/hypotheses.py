@@ -16,7 +16,6 @@ from ddagr_gym.frames import wrap_angle
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.effects.encoder_scale import EncoderScale
 from ddagr_gym.physics.effects.motor_lag import MotorLag
-from ddagr_gym.physics.effects.slope import Slope
 from ddagr_gym.physics.effects.wheel_radius_mismatch import WheelRadiusMismatch
 
 PULLED = 4.0
@@ -36,8 +35,8 @@ def first_guess(candidate: Candidate, multiples: Sequence[float]) -> Effect:
     kind = type(candidate.probes[0])
     if candidate.whole is not None or not kind.differentiable:
         return candidate.probes[0] if candidate.whole is None else _whole(candidate)
-    if kind.name == "slope":
-        return _slope(candidate, multiples)
+    if candidate.is_direction:
+        return _directed(candidate, multiples)
     values: dict[str, float] = {}
     for name in kind.size_names():
         data = kind.parameter(name).metadata
@@ -66,54 +65,57 @@ def _whole(candidate: Candidate) -> Effect:
     return probe.with_values(**moved)  # type: ignore[no-any-return]
 
 
-def _slope(candidate: Candidate, multiples: Sequence[float]) -> Slope:
-    """The two components of the gradient as an angle and a direction."""
+def _directed(candidate: Candidate, multiples: Sequence[float]) -> Effect:
+    """Components along the axes of the world as a size and a direction."""
+    probe = candidate.probes[0]
+    size = probe.size_names()[0]
     parts = [
-        (m * p.as_mapping()["parameters"]["angle"], p.as_mapping()["parameters"]["direction"])
+        (m * getattr(p, size), p.as_mapping()["parameters"]["direction"])
         for m, p in zip(multiples, candidate.probes, strict=True)
     ]
-    x = sum(angle * math.cos(direction) for angle, direction in parts)
-    y = sum(angle * math.sin(direction) for angle, direction in parts)
-    high = candidate.probes[0].parameter("angle").metadata["high"]
-    return candidate.probes[0].with_values(  # type: ignore[no-any-return]
-        angle=min(math.hypot(x, y), high), direction=math.atan2(y, x)
-    )
+    x = sum(length * math.cos(direction) for length, direction in parts)
+    y = sum(length * math.sin(direction) for length, direction in parts)
+    length = min(math.hypot(x, y), probe.parameter(size).metadata["high"])
+    return probe.with_values(**{size: length, "direction": math.atan2(y, x)})  # type: ignore[no-any-return]
 
 
 def turned_to_agree(problem: Problem, terms: Terms, gain: Gain, point: Point, share: float = 1.0) -> Point:
-    """A point with a slope as its last effect, where recordings without poses are turned so that their slopes agree.
+    """A point where recordings without poses are turned so that the direction of its last effect, a slope, agrees.
 
     Each of them shows the slope towards a direction of its own frame, and no small step turns frames that differ by
     more than a right angle.
 
     Args:
         problem: with the nuisances.
-        terms: of the scan that found the slope.
-        gain: of the slope.
-        point: with the slope as the scan guesses it for one frame.
-        share: of the slope that the scan says.
+        terms: of the scan that found the effect.
+        gain: of the effect.
+        point: with the effect as the scan guesses it for one frame; one without a direction stays as it is.
+        share: of the size that the scan says.
     """
     parameters = enumerate(problem.nuisances.parameters)
     shown = set(terms.recording.tolist())
     turned = {p.recording: k for k, p in parameters if p.heading and p.recording in shown}
     placed = ~np.isin(terms.recording, np.array(terms.turned, dtype=np.int64))
-    if point.effects[-1].name != Slope.name or not turned or not placed.any():
-        return point
     candidate = terms.candidates[gain.candidate]
-    own = {number: _slope_of(terms, candidate, terms.recording == number) for number in turned}
-    common = _slope_of(terms, candidate, placed)
+    directed = candidate.is_direction and candidate.name == point.effects[-1].name
+    if not directed or not turned or not placed.any():
+        return point
+    own = {number: _shown_by(terms, candidate, terms.recording == number) for number in turned}
+    length, direction = _shown_by(terms, candidate, placed)
     values = point.values.copy()
-    for number, slope in own.items():
-        values[turned[number]] += wrap_angle(common.direction - slope.direction)
-    angle = share * float(np.mean([slope.angle for slope in (common, *own.values())]))
-    slope = common.with_values(angle=angle)
-    return problem.moved(replace(point, effects=(*point.effects[:-1], slope)), values)
+    for number, (_, seen) in own.items():
+        values[turned[number]] += wrap_angle(direction - seen)
+    mean = float(np.mean([length, *(size for size, _ in own.values())]))
+    last = point.effects[-1]
+    last = last.with_values(**{last.size_names()[0]: share * mean, "direction": direction})
+    return problem.moved(replace(point, effects=(*point.effects[:-1], last)), values)
 
 
-def _slope_of(terms: Terms, candidate: Candidate, chosen: NDArray[np.bool_]) -> Slope:
-    """Slope that some of the windows show."""
+def _shown_by(terms: Terms, candidate: Candidate, chosen: NDArray[np.bool_]) -> tuple[float, float]:
+    """Size and direction that some of the windows show."""
     _, multiples = best_multiples(reduce(terms, chosen.astype(float)), candidate)
-    return _slope(candidate, multiples.tolist())
+    parameters = _directed(candidate, multiples.tolist()).as_mapping()["parameters"]
+    return parameters[candidate.probes[0].size_names()[0]], parameters["direction"]
 
 
 def looped_encoders(point: Point) -> Point | None:
@@ -130,8 +132,13 @@ def looped_encoders(point: Point) -> Point | None:
     radii = point.effects[-1]
     if not isinstance(radii, WheelRadiusMismatch) or EncoderScale.name in [e.name for e in point.effects]:
         return None
+    return replace(point, effects=(*point.effects[:-1], looped(radii)))
+
+
+def looped(radii: WheelRadiusMismatch) -> EncoderScale:
+    """Encoders that make a speed loop turn the wheels as unevenly as these radii let them roll."""
     half = 0.5 * radii.difference
-    return replace(point, effects=(*point.effects[:-1], EncoderScale(1.0 - half, 1.0 + half, 1.0)))
+    return EncoderScale(1.0 - half, 1.0 + half, 1.0)
 
 
 def slower_loop(problem: Problem, point: Point) -> Point | None:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from ddagr_gym.control.manoeuvres import MANOEUVRES, Manoeuvre
 from ddagr_gym.diagnosis.candidates import Candidate, candidates_of
+from ddagr_gym.diagnosis.hypotheses import looped
 from ddagr_gym.diagnosis.isolability import APART
 from ddagr_gym.diagnosis.planned import RATE, SENSORS, Plan, free_of_nuisances, plan
 from ddagr_gym.diagnosis.scores import drive_extent, probe_column
@@ -25,7 +26,9 @@ from ddagr_gym.diagnosis.size_prior import TYPICAL_MULTIPLE
 from ddagr_gym.errors import InputError
 from ddagr_gym.parameters import Imu, Robot, Sensors, Soil
 from ddagr_gym.physics.effects import Effect
+from ddagr_gym.physics.effects.encoder_scale import EncoderScale
 from ddagr_gym.physics.effects.registry import effect_kind
+from ddagr_gym.physics.effects.wheel_radius_mismatch import WheelRadiusMismatch
 from ddagr_gym.replay.windows import CHANNELS
 from ddagr_gym.simulator import simulate
 
@@ -293,8 +296,17 @@ def rivals_of_diagnosis(mapping: Mapping[str, Any]) -> list[Effect]:
         weights = {widest["name"]: 1.0, **widest["equivalence_set"]}
         names = sorted(weights, key=lambda name: (name != widest["name"], -weights[name]))[:MOST_RIVALS]
         fitted = {f["name"]: f for f in mapping["findings"]}
-        return [_at_size(name, fitted.get(name)) for name in names if name in fitted or _has_typical_size(name)]
+        known = {name: _at_size(name, fitted[name]) for name in names if name in fitted}
+        return [known.get(name) or _retold(name, known) for name in names if name in known or _has_typical_size(name)]
     return [_at_size(name, None) for name in _hidden(mapping["detectable"])]
+
+
+def _retold(name: str, known: Mapping[str, Effect]) -> Effect:
+    """A rival that was not kept: in the words of a fitted effect where it tells the same, else at a typical size."""
+    radii = known.get(WheelRadiusMismatch.name)
+    if name == EncoderScale.name and isinstance(radii, WheelRadiusMismatch):
+        return looped(radii)
+    return _at_size(name, None)
 
 
 def _certainty(finding: Mapping[str, Any]) -> float:

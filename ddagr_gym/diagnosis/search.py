@@ -222,7 +222,7 @@ def search(
         begun: raw and refitted nominal model of an earlier :func:`begin`.
         keep: of the nominal refit and of each step, so that a search that was stopped goes on behind the last one.
     """
-    raw, standing = keep("search nominal", lambda: begin(problem, progress)) if begun is None else begun
+    raw, standing = keep("search begin", lambda: begin(problem, progress)) if begun is None else begun
     standings: list[Standing] = [standing]
     steps: list[tuple[Rival, ...]] = []
     while len(standings[-1].names) < most:

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.diagnosis.candidates import Candidate
 from ddagr_gym.diagnosis.problem import Problem
 from ddagr_gym.diagnosis.refit import EffectParameter, Fitted, bounded_step, effect_columns, effect_parameters, read
 from ddagr_gym.diagnosis.scores import Terms, reduce
@@ -100,37 +99,34 @@ def least_detectable(terms: Terms, thresholds: Thresholds, dispersion: float) ->
     none. Of an effect that may act at any time or in any way, the usual one counts, which is its default (a change of
     soil from the beginning on); of one that has a place, the median over the places that the drives touch.
     """
-    reduced = reduce(terms)
+    information = np.diag(reduce(terms).information)
     found: dict[str, dict[str, list[tuple[bool, float]]]] = {}
     for candidate in terms.candidates:
         if not candidate.has_sizes:
             continue
         gate = thresholds.of(candidate.name).gain * dispersion
-        usual = any(_is_usual(probe) for probe in candidate.probes)
-        for name, size in _worst_by_field(candidate, np.diag(reduced.information), gate).items():
-            found.setdefault(candidate.name, {}).setdefault(name, []).append((usual, size))
+        sizes = [
+            _needed(probe, information[k], gate) for k, probe in zip(candidate.columns, candidate.probes, strict=True)
+        ]
+        if candidate.is_direction:
+            # any direction is as usual as another: the one that shows worst counts
+            sizes = [max(sizes, key=lambda item: item[2])]
+        for usual, name, size in sizes:
+            found.setdefault(candidate.name, {}).setdefault(name, []).append((usual or candidate.is_direction, size))
     return {
         effect: {name: float(np.median(_that_count(effect, name, sizes))) for name, sizes in fields.items()}
         for effect, fields in found.items()
     }
 
 
-def _is_usual(probe: Effect) -> bool:
-    """Whether its shapes are the default ones."""
-    return all(getattr(probe, name) == probe.parameter(name).default for name in probe.shape_names())
-
-
-def _worst_by_field(candidate: Candidate, information: Array, gate: float) -> dict[str, float]:
-    """Least detectable size of each field; where two probes move it, in the direction that shows worst."""
-    found: dict[str, float] = {}
-    for column, probe in zip(candidate.columns, candidate.probes, strict=True):
-        for name in probe.size_names():
-            away = abs(getattr(probe, name) - probe.parameter(name).metadata["neutral"])
-            if away > 0.0:
-                left = float(information[column])
-                size = away * float(np.sqrt(2.0 * gate / left)) if left > 0.0 else np.inf
-                found[name] = max(found.get(name, 0.0), size)
-    return found
+def _needed(probe: Effect, information: float, gate: float) -> tuple[bool, str, float]:
+    """Whether a probe has the default shapes, the field that it moves, and the size of it that reaches a gate."""
+    usual = all(getattr(probe, name) == probe.parameter(name).default for name in probe.shape_names())
+    for name in probe.size_names():
+        away = abs(getattr(probe, name) - probe.parameter(name).metadata["neutral"])
+        if away > 0.0:
+            return usual, name, away * float(np.sqrt(2.0 * gate / information)) if information > 0.0 else np.inf
+    raise ValueError(f"the probe {probe!r} is neutral")
 
 
 def _that_count(effect: str, field: str, sizes: Sequence[tuple[bool, float]]) -> list[float]:

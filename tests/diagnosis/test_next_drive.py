@@ -77,6 +77,16 @@ def test_rivals_and_sensors_of_a_diagnosis() -> None:
     assert [rival.name for rival in rivals_of_diagnosis(mapping)] == ["slope"]
 
 
+def test_encoders_that_stand_beside_uneven_radii_are_those_that_the_speed_loop_believes() -> None:
+    finding = {
+        "name": "wheel_radius_mismatch",
+        "parameters": {"difference": {"value": 0.04, "unit": "-"}},
+        "equivalence_set": {"wheel_radius_mismatch": 0.5, "encoder_scale": 0.5},
+    }
+    rivals = rivals_of_diagnosis({"findings": [finding], "detectable": {}, "misfit": {"nominal": {}}})
+    assert rivals[1].as_mapping()["parameters"] == {"right": 0.98, "left": 1.02, "loop": 1.0}
+
+
 def test_without_findings_what_could_hide_is_planned_for() -> None:
     detectable = {"slope": {"angle": 0.002}, "payload": {"mass": 40.0}, "gyro_sign": {}, "gyro_scale": {"scale": None}}
     mapping = {"findings": [], "detectable": detectable, "misfit": {"nominal": {}}}

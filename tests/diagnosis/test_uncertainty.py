@@ -105,6 +105,13 @@ def test_of_two_directions_the_one_that_shows_worst_counts() -> None:
         assert least == {"angle": pytest.approx(reaching(step, 100.0))}
 
 
+def test_of_two_ways_to_act_the_usual_one_counts() -> None:
+    kind = effect_kind("motor_droop")
+    step = kind.parameter("droop").metadata["step"]
+    least = least_of(candidates_of(kind, EXTENT, 0), {0: 900.0, 1: 100.0})
+    assert least == {"droop": pytest.approx(reaching(step, 900.0))}
+
+
 def test_what_a_nuisance_explains_detects_nothing() -> None:
     kind = effect_kind("payload")
     step = kind.parameter("mass").metadata["step"]

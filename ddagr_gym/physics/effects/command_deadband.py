@@ -14,7 +14,7 @@ _EDGE = 0.1  # share of the band over which a command that passes whole sets in,
 def lose_small_commands(row: Vector, parameters: Vector, memory: Vector) -> None:
     """Dead zone of half width ``parameters[0]``; ``parameters[1]`` of it is lost beyond as well.
 
-    A bank that moves stops below the share ``parameters[2]`` of the width; ``memory[:2]`` says which bank moves.
+    A bank that moves stops below the share ``parameters[2]`` of the width; ``memory[:2]`` says which way each moves.
     """
     width = parameters[0]
     if width <= 0.0:
@@ -22,11 +22,12 @@ def lose_small_commands(row: Vector, parameters: Vector, memory: Vector) -> None
     for bank in range(2):
         command = row[COMMAND + bank]
         if memory[_STARTED] == 0.0:
-            memory[bank] = 1.0 if abs(row[OMEGA + bank]) > 0.5 * parameters[2] * width else 0.0
-        edge = width * (parameters[2] if memory[bank] > 0.0 else 1.0)
+            speed = row[OMEGA + bank]
+            memory[bank] = math.copysign(1.0, speed) if abs(speed) > 0.5 * parameters[2] * width else 0.0
+        edge = width * (parameters[2] if memory[bank] * command > 0.0 else 1.0)
         inside = min(max((abs(command) / edge - 1.0 + _EDGE) / _EDGE, 0.0), 1.0)
         passing = inside * inside * (3.0 - 2.0 * inside)
-        memory[bank] = 1.0 if abs(command) > edge else 0.0
+        memory[bank] = math.copysign(1.0, command) if abs(command) > edge else 0.0
         row[COMMAND + bank] = math.copysign(passing * max(abs(command) - parameters[1] * width, 0.0), command)
     memory[_STARTED] = 1.0
 
@@ -39,6 +40,7 @@ class CommandDeadband(Effect):
         width: half width of the dead zone; least: 3 percent of the 0.7 rad/s of a row turn.
         loss: share of the width that commands beyond it lose: 1 for friction, 0 for a driver's threshold.
         release: share of the width below which a bank that moves stops; less than 1 where breaking loose takes more.
+            It shows with a loss below 1 only: else nothing is left of commands below the width.
     """
 
     name = "command_deadband"

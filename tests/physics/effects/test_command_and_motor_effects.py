@@ -219,3 +219,25 @@ def test_rates_of_the_motor_effects_do_not_depend_on_the_sample_rate(drive, step
     fine = drive(effects, steps)["true_omega_right"][1::2]
     coarse = drive(effects, steps[::2], sensors=slow)["true_omega_right"]
     np.testing.assert_allclose(coarse, fine, atol=6e-3)
+
+
+def test_a_bank_that_moves_stops_later_than_it_starts_and_sticks_again_before_it_reverses(turning_row):
+    effect = parse_effect("command_deadband=0.1,loss=0,release=0.5")
+    row, memory = turning_row.copy(), np.zeros(layout.EFFECT_MEMORY)
+    row[layout.OMEGA : layout.OMEGA + 2] = 0.0
+    passed = []
+    for command in (0.08, 0.12, 0.08, 0.03, 0.08, 0.2, -0.08, -0.2, -0.08):
+        row[layout.COMMAND : layout.COMMAND + 2] = command, 0.5
+        effect.actions[0][1](row, effect.vector(), memory)
+        passed.append(row[layout.COMMAND])
+        assert row[layout.COMMAND + 1] == 0.5
+    assert passed == [0.0, 0.12, 0.08, 0.0, 0.0, 0.2, 0.0, -0.2, -0.08]
+
+
+def test_a_drive_that_begins_in_motion_is_not_stuck(turning_row):
+    effect = parse_effect("command_deadband=0.1,loss=0,release=0.5")
+    row = turning_row.copy()
+    row[layout.OMEGA : layout.OMEGA + 2] = 0.08, -0.08
+    row[layout.COMMAND : layout.COMMAND + 2] = 0.08, 0.08
+    effect.actions[0][1](row, effect.vector(), np.zeros(layout.EFFECT_MEMORY))
+    assert tuple(row[layout.COMMAND : layout.COMMAND + 2]) == (0.08, 0.0)
