@@ -35,7 +35,7 @@ _TOO_MUCH = 10.0
 leaves up to seven times the limit, one that no library has and that borrows a name fifteen (development set)."""
 
 _MUCH = 1.5
-"""The same of any misfit where the names explain less than half of it."""
+"""The same where the names explain less than half of the channels' misfit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,14 +124,13 @@ def conclude(
         The diagnosis (its time is 0), and the effects that it names with their fitted sizes.
     """
     problem, held = prepared.problem, prepared.held
-    findings = [
-        *_held_findings(held),
-        *_flipped_findings(prepared.flipped),
-        *_findings(problem, found, thresholds, rng),
-    ]
-    verdict, complete = _verdict(found, [f.name for f in findings], thresholds)
+    seen = [*_held_findings(held), *_flipped_findings(prepared.flipped)]
+    verdict, complete = _verdict(found, [f.name for f in seen], thresholds)
+    findings = [*seen, *_findings(problem, found, thresholds, rng)]
+    if verdict != (UNKNOWN,):
+        findings = [finding for finding in findings if finding.name in verdict]
     from_values = (*((hold_effect(held),) if held else ()), *((GyroSign(1.0),) if prepared.flipped else ()))
-    effects = (*from_values, *found.chosen.fitted.point.effects)
+    effects = tuple(e for e in (*from_values, *found.chosen.fitted.point.effects) if e.name in verdict)
     values = found.chosen.fitted.point.values
     diagnosis = Diagnosis(
         verdict,
@@ -147,7 +146,7 @@ def conclude(
         __version__,
         data=tuple(data_source(recording) for recording in prepared.recordings),
     )
-    return diagnosis, effects if verdict != (UNKNOWN,) else ()
+    return diagnosis, effects
 
 
 def diagnose(
@@ -276,19 +275,23 @@ def _channel_shares(nominal: Standing, chosen: Standing) -> dict[str, float]:
     return {name: fall / total for name, fall in falls.items() if total > 0.0 and fall > 0.01 * total}
 
 
-def _verdict(found: Found, names: Sequence[str], thresholds: Thresholds) -> tuple[tuple[str, ...], bool]:
-    """Three values: named and complete, named but incomplete, none of these; or nothing at all."""
+def _verdict(found: Found, seen: Sequence[str], thresholds: Thresholds) -> tuple[tuple[str, ...], bool]:
+    """Three values: named and complete, named but incomplete, none of these; or nothing at all.
+
+    What was seen in the values themselves (repeats, a reversed gyro) stays named whatever else is left.
+    """
     _, left = roughest(found.chosen.misfit, dict(thresholds.misfit))
     # what passed the gate and was not added has failed in a joint refit, unless the search stopped at its limit
     more = len(found.chosen.names) >= MOST_EFFECTS and any(
         thresholds.passes(g.name, g.gain, found.chosen) for g in found.chosen.gains
     )
     complete = left <= 1.0 and not more
+    names = (*seen, *found.chosen.names)
     if not names:
         return ((NONE,), True) if complete else ((UNKNOWN,), False)
     channels = {name: value for name, value in found.chosen.misfit.items() if name not in LOCAL}
     _, in_channels = roughest(channels, dict(thresholds.misfit))
     explained = explained_share({name: found.nominal.misfit[name] for name in channels}, channels, thresholds.misfit)
-    if in_channels > _TOO_MUCH or (left > _MUCH and explained is not None and explained < 0.5):
-        return (UNKNOWN,), False
-    return tuple(names), complete
+    if in_channels > _TOO_MUCH or (in_channels > _MUCH and explained is not None and explained < 0.5):
+        return tuple(seen) or (UNKNOWN,), False
+    return names, complete

@@ -1,0 +1,46 @@
+"""Named, named but incomplete, or none of these: what is left over decides, and what was seen in the values stays."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from ddagr_gym.diagnosis.diagnose import _verdict
+from ddagr_gym.diagnosis.thresholds import Thresholds
+
+THRESHOLDS = Thresholds({}, {"encoder_left": 1.0, "yaw_rate": 1.0, "local_strength": 1.0}, 20, "a test")
+
+
+def standing(*names: str, **misfit: float) -> Any:
+    return SimpleNamespace(names=names, gains=(), misfit={"encoder_left": 0.5, "yaw_rate": 0.5} | misfit)
+
+
+def found(nominal: Any, chosen: Any) -> Any:
+    return SimpleNamespace(nominal=nominal, chosen=chosen)
+
+
+@pytest.mark.parametrize(
+    ("before", "left", "verdict", "complete"),
+    [
+        (8.0, {}, ("slope",), True),
+        (8.0, {"encoder_left": 1.2}, ("slope",), False),
+        (8.0, {"encoder_left": 6.0}, ("unknown",), False),
+        (80.0, {"encoder_left": 11.0}, ("unknown",), False),
+        (80.0, {"encoder_left": 9.0}, ("slope",), False),
+        # the share explained is one of the channels: what local variations make up for leaves the name incomplete
+        (0.9, {"encoder_left": 0.9, "local_strength": 1.7}, ("slope",), False),
+    ],
+)
+def test_what_is_left_in_the_channels_takes_a_name_away(
+    before: float, left: dict[str, float], verdict: tuple[str, ...], complete: bool
+) -> None:
+    search = found(standing(encoder_left=before), standing("slope", **left))
+    assert _verdict(search, (), THRESHOLDS) == (verdict, complete)
+
+
+def test_repeats_stay_named_whatever_is_left() -> None:
+    search = found(standing(encoder_left=8.0), standing("slope", encoder_left=7.9))
+    assert _verdict(search, (), THRESHOLDS) == (("unknown",), False)
+    assert _verdict(search, ("sensor_hold",), THRESHOLDS) == (("sensor_hold",), False)
+    alone = standing(encoder_left=0.5)
+    assert _verdict(found(alone, alone), ("sensor_hold",), THRESHOLDS) == (("sensor_hold",), True)
