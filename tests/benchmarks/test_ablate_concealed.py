@@ -122,7 +122,7 @@ def test_without_nuisances_nothing_but_states_is_eliminated() -> None:
     explained = standing.fitted.cost - refitted.cost
     assert explained > 10.0
     gain = next(gain.gain for gain in standing.gains if gain.name == "soil_change")
-    # a patch as large as the drive says the same
+    # a drag says the same of so short a drive
     assert gain > 0.99 * standing.gains[0].gain
     # one effect moves less than the refit does, from the same point
     assert 0.5 * explained < gain * standing.dispersion < explained
