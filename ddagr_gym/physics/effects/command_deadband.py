@@ -59,5 +59,5 @@ class CommandDeadband(Effect):
     @classmethod
     def probes(cls, extent: DriveExtent) -> tuple[Effect, ...]:
         """A narrow dead zone, and thresholds that show where commands come near them, without and with sticking."""
-        wide = _USUAL * extent.wheel_speed
+        wide = min(_USUAL * extent.wheel_speed, 0.5 * cls.parameter("width").metadata["high"])
         return (cls(cls.parameter("width").metadata["step"]), cls(wide, 0.0), cls(wide, 0.0, 0.5))

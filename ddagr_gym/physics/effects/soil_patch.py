@@ -61,6 +61,8 @@ class SoilPatch(Effect):
         stiffness = 1.0 + cls.parameter("stiffness").metadata["step"]
         spans = (extent.x[1] - extent.x[0], extent.y[1] - extent.y[0])
         width = max(max(spans) / _CELLS, _SMALLEST_CELL)
+        radius = min(0.6 * width, cls.parameter("radius").metadata["high"])
+        edge = min(0.2 * width, cls.parameter("edge").metadata["high"])
         columns, lines = (max(math.ceil(span / width - 1e-9), 1) for span in spans)
         found = []
         for i in range(columns):
@@ -68,5 +70,5 @@ class SoilPatch(Effect):
                 x = extent.x[0] + (i + 0.5) / columns * spans[0]
                 y = extent.y[0] + (j + 0.5) / lines * spans[1]
                 for inside in ((strength, 1.0), (1.0, stiffness)):
-                    found.append(cls(inside[0], inside[1], x, y, 0.6 * width, 0.2 * width))
+                    found.append(cls(inside[0], inside[1], x, y, radius, edge))
         return tuple(found)

@@ -307,3 +307,10 @@ def test_compiled_actions_come_from_the_disk_the_second_time():
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     hits, count = map(int, done.stdout.split())
     assert hits == count >= len(KINDS)
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_probes_exist_for_the_fastest_and_the_slowest_drives(name):
+    for speed in (1e-3, 0.3, 40.0):
+        extent = DriveExtent(600.0, (-500.0, 500.0), (-500.0, 500.0), speed, 10.0 * speed)
+        assert not any(probe.is_neutral for probe in KINDS[name].probes(extent))
