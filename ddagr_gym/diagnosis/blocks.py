@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.diagnosis.headings import POSE
 from ddagr_gym.diagnosis.noise import ChannelNoise
 from ddagr_gym.recordings.schema import Recording
+from ddagr_gym.replay.pieces import POSE_CHANNELS
 from ddagr_gym.replay.windows import CHANNELS, STATE, WindowSet
 
 Array = NDArray[np.float64]
@@ -128,7 +128,7 @@ def located(windows: WindowSet, recordings: Sequence[Recording], wheel_radius: f
     """
     initial = windows.initial.copy()
     for number, recording in enumerate(recordings):
-        if recording.has(*POSE):
+        if recording.has(*POSE_CHANNELS):
             continue
         step = recording.period
         yaw = np.cumsum(np.nan_to_num(recording["yaw_rate"])) * step

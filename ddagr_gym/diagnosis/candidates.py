@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -77,6 +79,20 @@ def candidates_of(kind: type[Effect], extent: DriveExtent, first: int) -> list[C
         )
         for group in groups
     ]
+
+
+def moved_field(probe: Effect) -> tuple[str, Mapping[str, Any], float]:
+    """Field that a probe moves from neutral, its metadata, and by how much.
+
+    Raises:
+        ValueError: it moves none.
+    """
+    for name in probe.size_names():
+        data = probe.parameter(name).metadata
+        away = float(getattr(probe, name) - data["neutral"])
+        if away != 0.0:
+            return name, data, away
+    raise ValueError(f"the probe {probe!r} is neutral")
 
 
 def _one_sided(probe: Effect) -> bool:

@@ -15,17 +15,17 @@ from numpy.typing import NDArray
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.replay.parameters import ModelParameter
+from ddagr_gym.replay.pieces import POSE_CHANNELS
 from ddagr_gym.replay.windows import STATE, WindowSet
 
 Array = NDArray[np.float64]
 
-POSE = ("pose_x", "pose_y", "pose_yaw")
 _X, _Y, _YAW = (STATE.index(name) for name in ("x", "y", "yaw"))
 
 
 def without_poses(recordings: Sequence[Recording]) -> tuple[int, ...]:
     """Numbers of the recordings that no receiver has followed."""
-    return tuple(number for number, recording in enumerate(recordings) if not recording.has(*POSE))
+    return tuple(number for number, recording in enumerate(recordings) if not recording.has(*POSE_CHANNELS))
 
 
 def headings_matter(effects: Sequence[Effect]) -> bool:

@@ -95,13 +95,12 @@ def turned_to_agree(problem: Problem, terms: Terms, gain: Gain, point: Point, sh
     parameters = enumerate(problem.nuisances.parameters)
     shown = set(terms.recording.tolist())
     turned = {p.recording: k for k, p in parameters if p.heading and p.recording in shown}
-    placed = ~np.isin(terms.recording, np.array(terms.turned, dtype=np.int64))
     candidate = terms.candidates[gain.candidate]
     directed = candidate.is_direction and candidate.name == point.effects[-1].name
-    if not directed or not turned or not placed.any():
+    if not directed or not turned or not terms.placed.any():
         return point
     own = {number: _shown_by(terms, candidate, terms.recording == number) for number in turned}
-    length, direction = _shown_by(terms, candidate, placed)
+    length, direction = _shown_by(terms, candidate, terms.placed)
     values = point.values.copy()
     for number, (_, seen) in own.items():
         values[turned[number]] += wrap_angle(direction - seen)

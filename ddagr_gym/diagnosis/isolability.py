@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.control.manoeuvres import Manoeuvre
-from ddagr_gym.diagnosis.candidates import Candidate
+from ddagr_gym.diagnosis.candidates import Candidate, moved_field
 from ddagr_gym.diagnosis.planned import information, plan
 from ddagr_gym.diagnosis.scores import Terms, scan
 from ddagr_gym.diagnosis.setting import SHORT, Setting
@@ -245,7 +245,7 @@ def _directions(name: str, terms: Terms, matrix: Array, gate: float) -> list[_Di
 
 def _direction(candidate: Candidate, k: int, matrix: Array, gate: float) -> _Direction:
     probe, column = candidate.probes[k], candidate.columns[k]
-    name, data, away = _moved(probe)
+    name, data, away = moved_field(probe)
     if candidate.whole is not None:
         least, distance = candidate.whole, abs(candidate.whole * away)
     elif probe.differentiable:
@@ -261,16 +261,6 @@ def _direction(candidate: Candidate, k: int, matrix: Array, gate: float) -> _Dir
     return _Direction(
         candidate, column, least, Detectable(candidate.name, name, str(data["unit"]), distance, size, multiples)
     )
-
-
-def _moved(probe: Effect) -> tuple[str, Mapping[str, Any], float]:
-    """Field that a probe moves from neutral, its data, and by how much."""
-    for name in probe.size_names():
-        data = probe.parameter(name).metadata
-        away = float(getattr(probe, name) - data["neutral"])
-        if away != 0.0:
-            return name, data, away
-    raise ValueError(f"the probe {probe!r} is neutral")
 
 
 def _best_by_field(sizes: Sequence[Detectable]) -> list[Detectable]:

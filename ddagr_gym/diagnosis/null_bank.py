@@ -27,6 +27,7 @@ from ddagr_gym.diagnosis.thresholds import NullRun
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.replay.model import ideal_sensors
+from ddagr_gym.replay.pieces import POSE_CHANNELS
 from ddagr_gym.replay.windows import CHANNELS
 from ddagr_gym.simulator import simulate
 
@@ -69,7 +70,7 @@ def template_of(recordings: Sequence[Recording], noise: Sequence[ChannelNoise | 
 
 def _start(recording: Recording) -> tuple[float, float, float]:
     found = []
-    for name in ("pose_x", "pose_y", "pose_yaw"):
+    for name in POSE_CHANNELS:
         known = recording[name][np.isfinite(recording[name])]
         found.append(float(known[0]) if known.size else 0.0)
     return found[0], found[1], found[2]

@@ -117,10 +117,7 @@ class Problem:
 
     def subset(self, chosen: NDArray[np.int64] | Chosen) -> Problem:
         """The same problem on some of the windows."""
-        robot, soil, threads, numerics = self._setting
-        return Problem(
-            robot, soil, self.blocked.subset(chosen), self.nuisances, self.priors, threads=threads, numerics=numerics
-        )
+        return self.on(self.blocked.subset(chosen))
 
     def with_held_headings(self) -> Problem:
         """The same problem whose headings stay where they are."""

@@ -179,10 +179,11 @@ def fit(
         point = replace(point, states=problem.starts(point.values))
         prediction = problem.predict(point)
     known = reuse or first
-    by_parameter, elimination = (
-        (known.by_parameter, known.elimination) if known else _sensitivities(problem, point, prediction)
-    )
-    by_parameter = problem.heading_columns(point, prediction, by_parameter)
+    if known:
+        by_parameter = problem.heading_columns(point, prediction, known.by_parameter)
+        elimination = known.elimination
+    else:
+        by_parameter, elimination = _sensitivities(problem, point, prediction)
     by_effect = effect_columns(problem, point, prediction, parameters)
     cost, _ = cost_of(problem, point, prediction, elimination)
     converged, done, fresh = False, 0, known is None
@@ -203,7 +204,8 @@ def fit(
             fresh = True
         if parameters and done < max(renewals, _EFFECT_RENEWALS) and not converged:
             by_effect = effect_columns(problem, point, prediction, parameters)
-            by_parameter = problem.heading_columns(point, prediction, by_parameter)
+            if not fresh:
+                by_parameter = problem.heading_columns(point, prediction, by_parameter)
     if reuse is None and done and not converged:
         by_parameter, elimination = _sensitivities(problem, point, prediction)
     cost, shares = cost_of(problem, point, prediction, elimination)

@@ -22,9 +22,7 @@ def with_slower_loop(problem: Problem, standing: Standing, tried: list[Rival]) -
     if point is None:
         return tried
     fitted = fit(problem, point, iterations=TRIAL_STEPS, renewals=2, reuse=standing.fitted)
-    slower = rival_of(standing, "motor_lag", fitted)
-    better = [rival for rival in tried if rival.name == slower.name and rival.gain >= slower.gain]
-    return tried if better else [*(rival for rival in tried if rival.name != slower.name), slower]
+    return _beside(tried, rival_of(standing, "motor_lag", fitted))
 
 
 def with_looped_encoders(problem: Problem, standing: Standing, tried: list[Rival]) -> list[Rival]:
@@ -36,5 +34,10 @@ def with_looped_encoders(problem: Problem, standing: Standing, tried: list[Rival
     looped = rival_of(standing, "encoder_scale", fit(problem, point, iterations=TRIAL_STEPS, reuse=radii.fitted))
     if looped.gain - radii.gain < _SECOND_SIZE * radii.gain:
         looped = replace(looped, gain=min(looped.gain, radii.gain) * (1.0 - _SECOND_SIZE), retold=True)
-    better = [rival for rival in tried if rival.name == looped.name and rival.gain >= looped.gain]
-    return tried if better else [*(rival for rival in tried if rival.name != looped.name), looped]
+    return _beside(tried, looped)
+
+
+def _beside(tried: list[Rival], further: Rival) -> list[Rival]:
+    """Rivals with a further one, which takes the place of one of its name unless that one explains as much."""
+    better = any(rival.name == further.name and rival.gain >= further.gain for rival in tried)
+    return tried if better else [*(rival for rival in tried if rival.name != further.name), further]

@@ -55,11 +55,15 @@ class Terms:
     turned: tuple[int, ...] = ()
 
     @property
+    def placed(self) -> NDArray[np.bool_]:
+        """(W,) windows whose headings in the world are known."""
+        return ~np.isin(self.recording, np.array(self.turned, dtype=np.int64))
+
+    @property
     def frames(self) -> list[Array]:
         """(W,) windows, as weights, of each part whose directions in the world are known to each other."""
         own = [self.recording == number for number in self.turned]
-        rest = ~np.isin(self.recording, np.array(self.turned, dtype=np.int64))
-        return [chosen.astype(float) for chosen in (rest, *own) if chosen.any()]
+        return [chosen.astype(float) for chosen in (self.placed, *own) if chosen.any()]
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ddagr_gym.diagnosis.candidates import moved_field
 from ddagr_gym.diagnosis.problem import Problem
 from ddagr_gym.diagnosis.refit import EffectParameter, Fitted, bounded_step, effect_columns, effect_parameters, read
 from ddagr_gym.diagnosis.scores import Terms, reduce
@@ -122,11 +123,8 @@ def least_detectable(terms: Terms, thresholds: Thresholds, dispersion: float) ->
 def _needed(probe: Effect, information: float, gate: float) -> tuple[bool, str, float]:
     """Whether a probe has the default shapes, the field that it moves, and the size of it that reaches a gate."""
     usual = all(getattr(probe, name) == probe.parameter(name).default for name in probe.shape_names())
-    for name in probe.size_names():
-        away = abs(getattr(probe, name) - probe.parameter(name).metadata["neutral"])
-        if away > 0.0:
-            return usual, name, away * float(np.sqrt(2.0 * gate / information)) if information > 0.0 else np.inf
-    raise ValueError(f"the probe {probe!r} is neutral")
+    name, _, away = moved_field(probe)
+    return usual, name, abs(away) * float(np.sqrt(2.0 * gate / information)) if information > 0.0 else np.inf
 
 
 def _that_count(effect: str, field: str, sizes: Sequence[tuple[bool, float]]) -> list[float]:
