@@ -28,6 +28,8 @@ DRAWS = 500
 LEAST_EXPLAINABLE = 0.03
 """Share of the refitted error that the ceiling must explain before a share of it means anything (ours)."""
 
+SHARES = ("gain_share", "gain_share_readings")
+
 
 def certificate(
     rule: str, found: Mapping[float, Errors], clusters: Mapping[float, NDArray[np.int64]], rng: np.random.Generator
@@ -41,7 +43,7 @@ def certificate(
         rng: of the resampling.
     """
     channels: dict[str, dict[str, Any]] = {}
-    shares: dict[str, dict[str, Any]] = {"gain_share": {}, "gain_share_readings": {}}
+    shares: dict[str, dict[str, Any]] = {name: {} for name in ("gain", "gain_readings", *SHARES)}
     lost = 0
     for horizon, every in found.items():
         key = f"{horizon:g}"
@@ -51,8 +53,10 @@ def certificate(
         for quantity in UNITS:
             if quantity in table["refitted"]:
                 channels.setdefault(quantity, {})[key] = _entry(table, quantity, errors)
-        shares["gain_share"][key] = gain_share(table, MOTION)
-        shares["gain_share_readings"][key] = gain_share(table, CHANNELS)
+        for quantities, ending in ((MOTION, ""), (CHANNELS, "_readings")):
+            gained = gains(table, quantities)
+            shares[f"gain{ending}"][key] = {model: _estimate(values) for model, values in gained.items()} or None
+            shares[f"gain_share{ending}"][key] = gain_share(gained)
     return {
         "folds": rule,
         "note": _note(rule, found, lost),
@@ -92,7 +96,7 @@ Table = dict[str, dict[str, Array]]
 def resampled(errors: Errors, clusters: NDArray[np.int64], rng: np.random.Generator) -> Table:
     """Root mean squares (1 + DRAWS,) by model and quantity, the first of all windows, the others of drawn clusters.
 
-    The ceiling is the least of all but the raw one, in every draw.
+    The ceiling is the one of all but the raw one that is best over all windows, for each quantity.
     """
     count = int(clusters.max()) + 1
     drawn = rng.integers(count, size=(DRAWS, count))
@@ -111,7 +115,7 @@ def resampled(errors: Errors, clusters: NDArray[np.int64], rng: np.random.Genera
                 table[model][quantity] = np.sqrt((times @ squares) / (times @ number))
     table.setdefault("corrected", table["refitted"])
     rivals = [table[name] for name in ("refitted", "corrected", "black_box", "flexible") if name in table]
-    table["ceiling"] = {q: np.min([rival[q] for rival in rivals], axis=0) for q in table["refitted"]}
+    table["ceiling"] = {q: min((rival[q] for rival in rivals), key=lambda row: row[0]) for q in table["refitted"]}
     return table
 
 
@@ -131,23 +135,59 @@ def _estimate(values: Array) -> dict[str, Any]:
     return {"value": float(values[0]), "interval": [float(low), float(high)]}
 
 
-def gain_share(table: Table, quantities: Sequence[str]) -> dict[str, Any] | None:
-    """Share of what the ceiling gains over the refitted nominal model that the named effects gain.
+def gains(table: Table, quantities: Sequence[str]) -> dict[str, Array]:
+    """(1 + DRAWS,) share of the refitted model's error that a model saves, by model, as a mean over quantities.
 
-    Every quantity counts by its error over that of the refitted model. None where not even the ceiling gains
-    :data:`LEAST_EXPLAINABLE`.
+    Every quantity counts by its error over that of the refitted model. Empty where none of them was measured.
     """
     names = [name for name in quantities if name in table["refitted"] and table["refitted"][name][0] > 0.0]
     if not names:
-        return None
+        return {}
     base = np.stack([table["refitted"][name] for name in names])
 
-    def gained(model: str) -> Array:
+    def saved(model: str) -> Array:
         return np.asarray(1.0 - np.mean(np.stack([table[model][name] for name in names]) / base, axis=0))
 
-    reachable, reached = gained("ceiling"), gained("corrected")
-    if reachable[0] < LEAST_EXPLAINABLE:
+    return {model: saved(model) for model in ("corrected", "black_box", "ceiling") if model in table}
+
+
+def gain_share(gained: Mapping[str, Array]) -> dict[str, Any] | None:
+    """Share of what the ceiling gains over the refitted nominal model that the named effects gain.
+
+    None where not even the ceiling gains :data:`LEAST_EXPLAINABLE`, or where the interval of its gain holds nothing:
+    a share of what may be nothing is no number.
+
+    Args:
+        gained: of :func:`gains`.
+    """
+    if not gained or gained["ceiling"][0] < LEAST_EXPLAINABLE:
         return None
-    sound = reachable > 0.5 * LEAST_EXPLAINABLE
-    sound[0] = True
-    return _estimate(np.where(sound, reached / np.where(sound, reachable, 1.0), np.nan))
+    ceiling = _estimate(gained["ceiling"])["interval"]
+    if ceiling is not None and ceiling[0] <= 0.0:
+        return None
+    sound = gained["ceiling"] > 0.5 * LEAST_EXPLAINABLE
+    return _estimate(np.where(sound, gained["corrected"] / np.where(sound, gained["ceiling"], 1.0), np.nan))
+
+
+def worse_on_unseen(fit: Mapping[str, Any] | None) -> dict[str, Any] | None:
+    """The horizon and gain at which the corrected model certainly predicts drives worse than the refitted nominal one.
+
+    None where nothing was certified, nowhere, or where it certainly predicts better elsewhere: a name that helps with
+    one quantity at one horizon is not refuted by another.
+
+    Args:
+        fit: of a certificate.
+    """
+    entries = [
+        (float(horizon), models["corrected"])
+        for name in ("gain", "gain_readings")
+        for horizon, models in ((fit or {}).get(name) or {}).items()
+        if models is not None and models["corrected"]["interval"] is not None
+    ]
+    if any(entry["interval"][0] > 0.0 for _, entry in entries):
+        return None
+    worse = [(horizon, entry) for horizon, entry in entries if entry["interval"][1] < 0.0]
+    if not worse:
+        return None
+    horizon, entry = min(worse, key=lambda item: item[1]["value"])
+    return {"horizon": horizon, **entry}

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from ddagr_gym.diagnosis.certificate import worse_on_unseen
 from ddagr_gym.diagnosis.certify import certify
 from ddagr_gym.diagnosis.diagnose import Prepared, conclude, prepare, searched
 from ddagr_gym.diagnosis.evidence import Evidence, gather_evidence
@@ -26,7 +27,7 @@ from ddagr_gym.diagnosis.next_drive import next_drive, rivals_of_diagnosis, sens
 from ddagr_gym.diagnosis.regimes import Unevenness
 from ddagr_gym.diagnosis.regimes_words import uneven_phrase
 from ddagr_gym.diagnosis.search import Found
-from ddagr_gym.diagnosis.sentences import headline
+from ddagr_gym.diagnosis.sentences import headline, worse_in_words
 from ddagr_gym.diagnosis.setting import Setting
 from ddagr_gym.diagnosis.sources import source_digest
 from ddagr_gym.diagnosis.store import StepStore
@@ -143,7 +144,7 @@ def run(
     fit = step("certification", lambda: _certified(task, prepared, found, diagnosis, progress))
     where = step("localisation", lambda: asdict(locate(prepared.problem, found)))
     held = held_where(task.recordings, prepared.held)
-    diagnosis = _doubted(diagnosis, found, where, {} if held is None else {"sensor_hold": asdict(held)})
+    diagnosis = _doubted(diagnosis, found, where, {} if held is None else {"sensor_hold": asdict(held)}, fit)
     unnamed = step("unnamed terms", lambda: _unnamed(task, prepared, found, diagnosis))
     following = step("next drive", lambda: _next_drive(task, diagnosis, progress))
     evidence = step("evidence", lambda: gather_evidence(prepared.problem, found, task.thresholds))
@@ -153,18 +154,29 @@ def run(
     return Outcome(diagnosis, effects, prepared, found, evidence)
 
 
-def _doubted(diagnosis: Diagnosis, found: Found, where: Mapping[str, Any], held: Mapping[str, Any]) -> Diagnosis:
-    """Findings with their places; a size that is not the same everywhere means that the name is not the whole truth."""
+def _doubted(
+    diagnosis: Diagnosis,
+    found: Found,
+    where: Mapping[str, Any],
+    held: Mapping[str, Any],
+    fit: Mapping[str, Any] | None = None,
+) -> Diagnosis:
+    """Findings with their places; the verdict is not the whole truth where a size is not the same everywhere, or where
+    drives that nothing was fitted to are certainly predicted worse with it.
+    """
     located = {**where["findings"], **held}
     findings = tuple(replace(f, where=located.get(f.name)) for f in diagnosis.findings)
-    uneven = [
+    doubts = [
         uneven_phrase(Unevenness(**f.where["uneven"]), f"the size of {in_sentence(f.name)}")
         for f in findings
         if f.where is not None and f.where.get("uneven") is not None
     ]
+    worse = worse_on_unseen(fit) if findings else None
+    if worse is not None:
+        doubts.append(worse_in_words(**worse))
     share = explained_share(found.nominal.misfit, found.chosen.misfit, diagnosis.misfit["limit"]) if findings else None
-    sentence = headline(diagnosis.verdict, diagnosis.complete, findings, share, uneven)
-    return replace(diagnosis, findings=findings, complete=diagnosis.complete and not uneven, sentence=sentence)
+    sentence = headline(diagnosis.verdict, diagnosis.complete, findings, share, doubts)
+    return replace(diagnosis, findings=findings, complete=diagnosis.complete and not doubts, sentence=sentence)
 
 
 def _unnamed(task: Task, prepared: Prepared, found: Found, diagnosis: Diagnosis) -> Mapping[str, Any] | None:

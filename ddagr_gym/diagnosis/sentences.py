@@ -13,7 +13,7 @@ def headline(
     complete: bool,
     findings: Sequence[Finding],
     misfit_share: float | None = None,
-    uneven: Sequence[str] = (),
+    doubts: Sequence[str] = (),
 ) -> str:
     """What is missing, how big, how much of the mismatch that is, and whether more is left.
 
@@ -22,7 +22,7 @@ def headline(
         complete: whether nothing more is left than in drives with nothing missing.
         findings: one per name.
         misfit_share: share of the mismatch above the noise that the findings explain (0 to 1), None where unknown.
-        uneven: what is not of one size everywhere, in words.
+        doubts: what speaks against it or is not of one size everywhere, in words.
     """
     if tuple(verdict) == (NONE,):
         return "Nothing is missing that these recordings can show."
@@ -31,7 +31,7 @@ def headline(
     found = _joined([describe(item.name, amounts(item.parameters)) for item in findings])
     share = "" if misfit_share is None else f"; {share_in_words(misfit_share)} of the mismatch"
     rest = "nothing else above what these data can show" if complete else "something more is left that has no name here"
-    return "; ".join([f"{found[:1].upper()}{found[1:]}{share}", *uneven, rest]) + "."
+    return "; ".join([f"{found[:1].upper()}{found[1:]}{share}", *doubts, rest]) + "."
 
 
 def share_in_words(share: float) -> str:
@@ -40,6 +40,21 @@ def share_in_words(share: float) -> str:
     if percent < 1.0:
         return "less than 1 %"
     return "all" if percent >= 99.5 else f"{percent:.0f} %"
+
+
+def worse_in_words(horizon: float, value: float, interval: Sequence[float]) -> str:
+    """That drives which nothing was fitted to are predicted worse.
+
+    Args:
+        horizon: of the predictions [s].
+        value: change of their error over that of the nominal model, negative.
+        interval: of it.
+    """
+    span = f"{-100.0 * interval[1]:.0f} to {-100.0 * interval[0]:.0f} %"
+    return (
+        f"drives that it was not fitted to are predicted worse with it, by {-100.0 * value:.0f} % ({span}) after "
+        f"{horizon:g} s, which makes the name doubtful"
+    )
 
 
 def _joined(parts: Sequence[str]) -> str:

@@ -25,6 +25,8 @@ Entry = Mapping[str, Any]
 
 _MOST_SPANS = 8
 
+_MIDDLE = 5.0  # [s] the horizon that stands for all
+
 
 def tiles(diagnosis: Entry, seconds: float) -> list[dict[str, str]]:
     """The few numbers under the headline.
@@ -36,7 +38,7 @@ def tiles(diagnosis: Entry, seconds: float) -> list[dict[str, str]]:
     verdict = ", ".join(title(name) if name not in ("none", "unknown") else name for name in diagnosis["verdict"])
     status = "complete: nothing else shows" if diagnosis["complete"] else "incomplete: something is left"
     explained = (diagnosis.get("localisation") or {}).get("explained")
-    gain = ((diagnosis.get("fit") or {}).get("gain_share") or {}).get("value")
+    shares = _gain_shares(diagnosis.get("fit") or {})
     found = [
         {"value": verdict, "label": status},
         {"value": f"{seconds:.0f} s", "label": f"of drive in {len(diagnosis['recordings'])} recordings"},
@@ -44,8 +46,10 @@ def tiles(diagnosis: Entry, seconds: float) -> list[dict[str, str]]:
     ]
     if explained is not None and diagnosis.get("findings"):
         found.insert(1, {"value": percent(explained), "label": "of the mismatch above the noise explained"})
-    if gain is not None:
-        found.insert(2, {"value": percent(gain), "label": "of what is explicable on unseen drives"})
+    if shares:
+        horizon, share = shares[0]
+        label = f"of what is explicable on unseen drives, {horizon:g} s ahead"
+        found.insert(2, {"value": percent(share["value"]), "label": label})
     return found
 
 
@@ -194,11 +198,23 @@ def fit_table(fit: Entry) -> dict[str, Any]:
             name = LABELS.get(channel, str(channel).replace("_", " "))
             cells = [_error(arms.get(arm)) for arm in ("raw", "refitted", "corrected", "ceiling")]
             rows.append([f"{name} after {float(horizon):g} s [{unit}]", *cells])
-    gain = fit.get("gain_share") or {}
-    interval = gain.get("interval")
+    gain = ", ".join(_share_text(*item) for item in sorted(_gain_shares(fit)))
+    return {"rows": rows, "folds": fit.get("folds") or "by recording", "gain": gain}
+
+
+def _gain_shares(fit: Entry) -> list[tuple[float, Entry]]:
+    """Horizon [s] and share where there is one, the middle horizon first: of the motion, else of the readings."""
+    for name in ("gain_share", "gain_share_readings"):
+        shares = [(float(h), share) for h, share in (fit.get(name) or {}).items() if share is not None]
+        if shares:
+            return sorted(shares, key=lambda item: abs(math.log(item[0] / _MIDDLE)))
+    return []
+
+
+def _share_text(horizon: float, share: Entry) -> str:
+    interval = share.get("interval")
     span = f" ({percent(interval[0])} to {percent(interval[1])})" if interval else ""
-    share = "" if gain.get("value") is None else f"{percent(gain['value'])}{span}"
-    return {"rows": rows, "folds": fit.get("folds") or "by recording", "gain": share}
+    return f"{percent(share['value'])}{span} after {horizon:g} s"
 
 
 def _error(item: Entry | None) -> str:

@@ -2,11 +2,20 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from ddagr_gym.diagnosis.certificate import BY_RECORDING, BY_TIME, finished, gain_share, resampled
+from ddagr_gym.diagnosis.certificate import (
+    BY_RECORDING,
+    BY_TIME,
+    finished,
+    gain_share,
+    gains,
+    resampled,
+    worse_on_unseen,
+)
 from ddagr_gym.diagnosis.certify import certify, folds_of, refitted_on
 from ddagr_gym.diagnosis.forecast import MOTION, PAST, cut_forecasts, errors_at, past_elimination, start_states
 from ddagr_gym.diagnosis.problem import Problem
@@ -183,12 +192,36 @@ def test_share_of_the_ceiling() -> None:
         "flexible": {"yaw_rate": 0.2 * ones},
     }
     table = resampled(errors, clusters, np.random.default_rng(0))
-    share = gain_share(table, MOTION)
+    share = gain_share(gains(table, MOTION))
     assert share is not None
     assert share["value"] == pytest.approx(0.75)
     assert share["interval"] == pytest.approx([0.75, 0.75])
     nothing = {name: {"yaw_rate": ones} for name in ("refitted", "corrected", "black_box")}
-    assert gain_share(resampled(nothing, clusters, np.random.default_rng(0)), MOTION) is None
+    assert gain_share(gains(resampled(nothing, clusters, np.random.default_rng(0)), MOTION)) is None
+
+
+def test_a_share_of_a_gain_that_may_be_nothing_is_no_number() -> None:
+    """The ceiling is better by 10 % over all, but by its luck in one stretch of six."""
+    ones, clusters = np.ones(12), np.repeat(np.arange(6), 2)
+    lucky = np.where(clusters == 0, 0.1, 1.01)
+    errors = {"refitted": {"yaw_rate": ones}, "corrected": {"yaw_rate": ones}, "flexible": {"yaw_rate": lucky}}
+    gained = gains(resampled(errors, clusters, np.random.default_rng(0)), MOTION)
+    assert gained["ceiling"][0] > 0.05
+    assert gain_share(gained) is None
+
+
+def _gain(*intervals: tuple[float, float]) -> dict[str, Any]:
+    entries = [{"value": sum(interval) / 2.0, "interval": list(interval)} for interval in intervals]
+    return {f"{5.0 * k:g}": {"corrected": entry} for k, entry in enumerate(entries, 1)}
+
+
+def test_a_model_that_predicts_unseen_drives_worse_is_found() -> None:
+    fit = {"gain": {"1": None}, "gain_readings": _gain((-0.1, 0.2), (-0.4, -0.2))}
+    assert worse_on_unseen(fit) == {"horizon": 10.0, "value": pytest.approx(-0.3), "interval": [-0.4, -0.2]}
+    assert worse_on_unseen({"gain": _gain((0.1, 0.2)), "gain_readings": _gain((-0.4, -0.2))}) is None
+    assert worse_on_unseen({"gain": _gain((-0.1, 0.2))}) is None
+    assert worse_on_unseen({}) is None
+    assert worse_on_unseen(None) is None
 
 
 def test_what_one_model_does_not_finish_counts_for_none() -> None:

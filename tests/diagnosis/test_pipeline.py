@@ -45,3 +45,16 @@ def test_held_readings_keep_their_place() -> None:
     made = _doubted(diagnosis("sensor_hold", "duration", 0.2), FOUND, {"findings": {}}, {"sensor_hold": where()})
     assert made.findings[0].where == where()
     validate(as_mapping(made))
+
+
+def test_drives_predicted_worse_make_a_name_doubtful() -> None:
+    """Only where the fall of the error is certain."""
+
+    def made(interval: list[float]) -> Diagnosis:
+        fit = {"gain": {"30": {"corrected": {"value": -0.3, "interval": interval}}}}
+        return _doubted(diagnosis("command_delay", "delay", 0.1), FOUND, {"findings": {}}, {}, fit)
+
+    assert not made([-0.4, -0.2]).complete
+    assert "predicted worse with it, by 30 % (20 to 40 %) after 30 s" in made([-0.4, -0.2]).sentence
+    assert made([-0.4, 0.1]).complete
+    assert "worse" not in made([-0.4, 0.1]).sentence

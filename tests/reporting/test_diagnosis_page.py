@@ -76,7 +76,9 @@ def later_entries():
     wrench = {"component": "F_x", "unit": "N", "before": 9.0, "after": 0.1, "deviation": 1.0, "chi_before": 9.0}
     return {
         "fit": {
-            "folds": "by recording", "horizons": [1.0, 30.0], "gain_share": {"value": 0.91, "interval": [0.85, 0.95]},
+            "folds": "by recording", "horizons": [1.0, 30.0], "gain_share": {
+                "1": None, "30": {"value": 0.91, "interval": [0.85, 0.95]},
+            },
             "channels": {"yaw_rate": {"1.0": arms | {"unit": "rad/s"}, "30.0": {"raw": None, "unit": "rad/s"}}},
         },
         "localisation": {
@@ -107,6 +109,11 @@ def folder(tmp_path_factory):
 @pytest.fixture(scope="module")
 def page(folder):
     return (folder / PAGE).read_text()
+
+
+def test_the_share_of_what_is_explicable_is_said_with_its_horizon(page):
+    assert "91 % (85 % to 95 %) after 30 s" in page
+    assert "of what is explicable on unseen drives, 30 s ahead" in page
 
 
 def test_the_answer_comes_first_and_every_section_is_there(page):
