@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Protocol
@@ -123,9 +123,11 @@ class Thresholds:
         }
         return replace(self, gates=gates, windows=seconds / self.duration)
 
-    def raised(self, by: float) -> Thresholds:
-        """The same with gates that lie higher by a gain."""
-        return replace(self, gates={name: replace(gate, gain=gate.gain + by) for name, gate in self.gates.items()})
+    def raised(self, by: float, names: Collection[str] | None = None) -> Thresholds:
+        """The same with gates that lie higher by a gain: all of them, or those of some effects."""
+        chosen = self.gates if names is None else names
+        gates = {n: replace(g, gain=g.gain + by) if n in chosen else g for n, g in self.gates.items()}
+        return replace(self, gates=gates)
 
     def p_value(self, name: str, gain: float) -> float | None:
         """Share of null runs in which some effect stands as high over its gate, the run at hand counted with them.

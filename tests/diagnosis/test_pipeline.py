@@ -58,3 +58,13 @@ def test_drives_predicted_worse_make_a_name_doubtful() -> None:
     assert "predicted worse with it, by 30 % (20 to 40 %) after 30 s" in made([-0.4, -0.2]).sentence
     assert made([-0.4, 0.1]).complete
     assert "worse" not in made([-0.4, 0.1]).sentence
+
+
+def test_findings_that_leave_much_of_the_mismatch_are_not_complete() -> None:
+    left: Any = SimpleNamespace(
+        nominal=SimpleNamespace(misfit=MISFIT), chosen=SimpleNamespace(misfit={"yaw_rate": 3.0})
+    )
+    made = _doubted(diagnosis("command_delay", "delay", 0.1), left, {"findings": {}}, {})
+    assert not made.complete
+    assert made.sentence.endswith("% of the mismatch; something more is left that has no name here.")
+    assert _doubted(diagnosis("command_delay", "delay", 0.1), FOUND, {"findings": {}}, {}).complete

@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -95,3 +97,17 @@ def test_loops_are_told_from_delays(drive, problem_of) -> None:
             for effect in (right.with_values(**{right.size_names()[0]: 0.15}), parse_effect(wrong))
         ]
         assert costs[1] - costs[0] > 20.0, (truth, costs)
+
+
+def test_what_is_confused_with_a_named_effect_has_to_explain_more() -> None:
+    """A patch of another form than the library's leaves something that looks like a soil that changes."""
+
+    def standing(cost: float, *effects: str) -> Any:
+        point = SimpleNamespace(effects=tuple(parse_effect(text) for text in effects))
+        return SimpleNamespace(fitted=SimpleNamespace(cost=cost, point=point), dispersion=1.0)
+
+    gates = Thresholds({"soil_change": Gate(40.0, 0.0), "gyro_scale": Gate(20.0, 0.0)}, {}, 20, "x")
+    found = module._gates(gates, [standing(2000.0), standing(1000.0, "soil_patch=0.5")])
+    assert found.of("soil_change").gain == pytest.approx(40.0 + 0.1 * 1000.0)
+    assert found.of("gyro_scale").gain == pytest.approx(20.0 + 0.01 * 1000.0)
+    assert module._gates(gates, [standing(2000.0)]) == gates

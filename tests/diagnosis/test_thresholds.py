@@ -63,6 +63,9 @@ def test_further_effects_have_raised_gates() -> None:
     thresholds = thresholds_from(null_runs(40, 1), "x")
     assert thresholds.raised(12.0).of("slope").gain == pytest.approx(12.0 + thresholds.of("slope").gain)
     assert thresholds.raised(12.0).of("slope").held_out == thresholds.of("slope").held_out
+    some = thresholds.raised(12.0, {"slope"})
+    assert some.of("slope") == thresholds.raised(12.0).of("slope")
+    assert some.of("payload") == thresholds.of("payload")
 
 
 def test_p_value_counts_null_runs_that_stand_as_high() -> None:
