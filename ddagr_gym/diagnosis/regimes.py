@@ -181,6 +181,12 @@ def _ordered(name: str, every: Array, values: Array, usual: Array) -> tuple[Regi
     return share, statistic
 
 
+def _trend(every: Array, values: Array) -> Array:
+    """(P,) size of the trend of weights (P, n) with the ranks of values (n,)."""
+    rank = np.argsort(np.argsort(values, kind="stable"), kind="stable") - 0.5 * (len(values) - 1)
+    return np.asarray(np.abs(every @ rank) / len(values))
+
+
 def _better_end(weight: Array, first: int, last: int) -> tuple[int, int]:
     """Of two ranges at the ends of sorted weights, the one with the larger excess; never an empty one."""
     count = len(weight)
@@ -249,10 +255,11 @@ class Unevenness:
 def uneven(
     remainder: Array, information: Array, window: Integers, pieces: Pieces, rng: np.random.Generator
 ) -> Unevenness | None:
-    """The regime in which a fitted effect's size departs most, if that is no chance: a score test of its constancy.
+    """The regime by which a fitted effect's size differs most, if that is no chance: a score test of its constancy.
 
     Ordered by a regime, the running sum of what is left along the effect wanders off where its size is not the same
-    (A. Zeileis, K. Hornik, 2007, generalised M-fluctuation tests); signs drawn by window give the null distribution.
+    (A. Zeileis, K. Hornik, 2007, generalised M-fluctuation tests), and its trend is steep where the size drifts, which
+    few windows show more clearly; signs drawn by window give the null distribution.
 
     Args:
         remainder: (n,) inner product of the residual beside the effect and the effect.
@@ -269,22 +276,30 @@ def uneven(
     every = np.concatenate([remainder[None], signs * remainder])
     every = every - every.sum(axis=1, keepdims=True) * information / whole
     every /= max(float(np.sqrt((np.bincount(group, remainder) ** 2).sum())), 1e-12)
-    found = [
-        _ordered(name, every, values, np.zeros(len(values)))
-        for name, values in pieces.values.items()
-        if np.isfinite(values).all() and np.ptp(values) > 0.0
-    ]
+    known = {n: v for n, v in pieces.values.items() if np.isfinite(v).all() and np.ptp(v) > 0.0}
+    found = [_ordered(name, every, values, np.zeros(len(values))) for name, values in known.items()]
+    found += [(share, _trend(every, known[share.name])) for share, _ in found if share.name != "heading"]
     if not found:
         return None
-    tested = _with_p(found)
-    best = min(tested, key=lambda item: (item.p, -item.excess))
-    inside = _inside(pieces.values[best.name], best)
-    if best.p >= REGIME_LEVEL or not information[inside].any() or not information[~inside].any():
-        return None
-    sizes = [1.0 + float(remainder[s].sum() / information[s].sum()) for s in (inside, ~inside)]
-    if abs(sizes[0] - sizes[1]) < LEAST_DIFFERENCE:
-        return None
-    return Unevenness(best.name, best.unit, best.low, best.high, sizes[0], sizes[1], best.p)
+    clear = [share for share in _with_p(found) if share.p < REGIME_LEVEL]
+    split = [_split(share, remainder, information, _inside(pieces.values[share.name], share)) for share in clear]
+    wide = [(explained, item) for explained, item in split if item is not None]
+    return max(wide, key=lambda pair: pair[0])[1] if wide else None
+
+
+def _split(
+    share: RegimeShare, remainder: Array, information: Array, inside: NDArray[np.bool_]
+) -> tuple[float, Unevenness | None]:
+    """Fall of the squares by a size of its own in a range, and the sizes; none where they differ by little."""
+    within, beyond = float(information[inside].sum()), float(information[~inside].sum())
+    if within <= 0.0 or beyond <= 0.0:
+        return 0.0, None
+    sizes = 1.0 + float(remainder[inside].sum()) / within, 1.0 + float(remainder[~inside].sum()) / beyond
+    difference = sizes[0] - sizes[1]
+    explained = difference**2 * within * beyond / (within + beyond)
+    if abs(difference) < LEAST_DIFFERENCE:
+        return explained, None
+    return explained, Unevenness(share.name, share.unit, share.low, share.high, *sizes, share.p)
 
 
 def _inside(values: Array, share: RegimeShare) -> NDArray[np.bool_]:
