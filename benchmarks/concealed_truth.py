@@ -11,6 +11,9 @@ from ddagr_gym.physics.effects.registry import effect_kind
 Case = tuple[str, Mapping[str, Any], Mapping[str, Any]]
 """Name, label, answer."""
 
+Sizes = Mapping[str, Mapping[str, float]]
+"""Of effects, by name and field."""
+
 Truth = tuple[str, Callable[[float], float]]
 
 
@@ -70,25 +73,31 @@ def true_sizes(effect: Mapping[str, Any]) -> dict[str, float]:
     return {ours: convert(float(known[theirs])) for ours, (theirs, convert) in fields.items() if theirs in known}
 
 
-def detectable(label: Mapping[str, Any], answer: Mapping[str, Any]) -> bool:
+def detectable(label: Mapping[str, Any], answer: Mapping[str, Any], equivalents: Sizes | None = None) -> bool:
     """Whether all effects of a case are at least as large as what the diagnosis says it can show.
 
     Args:
         label: of the case.
         answer: with the least detectable distances from neutral, by effect and field.
+        equivalents: sizes in the library's terms of effects whose own mean something else, by name.
     """
     limits = answer.get("detectable") or {}
-    return all(_is_detectable(effect, limits.get(effect["name"], {})) for effect in label["effects"])
+    known = equivalents or {}
+    return all(
+        _is_detectable(effect["name"], true_sizes(effect) or known.get(effect["name"], {}), limits)
+        for effect in label["effects"]
+    )
 
 
-def _is_detectable(effect: Mapping[str, Any], limits: Mapping[str, float | None]) -> bool:
-    kind = effect["name"]
-    reached = [
+def _is_detectable(kind: str, sizes: Mapping[str, float], limits: Mapping[str, Mapping[str, float | None]]) -> bool:
+    """An effect without sizes, or of which the diagnosis says nothing, counts; one that it cannot show does not."""
+    if not sizes or kind not in limits:
+        return True
+    return any(
         abs(value - float(effect_kind(kind).parameter(field).metadata["neutral"])) >= float(least)
-        for field, value in true_sizes(effect).items()
-        if (least := limits.get(field)) is not None
-    ]
-    return any(reached) or not reached
+        for field, value in sizes.items()
+        if (least := limits[kind].get(field)) is not None
+    )
 
 
 def _stated(cases: Sequence[Case]) -> Iterator[tuple[str, str, str, float, Sequence[float]]]:

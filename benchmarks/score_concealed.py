@@ -7,7 +7,8 @@ ones committed to before the run are refused.
 
 Every figure is ``{value, interval, count}``: shares with 95 % Wilson intervals, others with bootstrap intervals over
 cases. An effect counts as detectable where its true size is at least the least detectable one that the diagnosis of
-its own case states; one whose size means something else in the library, and a categorical one, always. A run that
+its own case states; a categorical one always. For one whose size means something else in the library the size in the
+library's terms counts, which :mod:`benchmarks.concealed_equivalents` measures (``--equivalents``). A run that
 failed has named nothing: a false alarm on a null, a miss elsewhere. Every case that went wrong is listed.
 """
 
@@ -26,7 +27,7 @@ import numpy as np
 
 from benchmarks.concealed.commitments import commitment
 from benchmarks.concealed_figure import draw
-from benchmarks.concealed_truth import Case, covered, detectable, misses, sizes
+from benchmarks.concealed_truth import Case, Sizes, covered, detectable, misses, sizes
 from ddagr_gym.errors import InputError
 from ddagr_gym.evaluation.statistics import wilson_interval
 from ddagr_gym.recordings.files import write_atomically
@@ -105,12 +106,15 @@ def gain_shares(cases: Sequence[Case], horizon: str = "5") -> list[float]:
     return found
 
 
-def score(labels: Mapping[str, Any], answers: Mapping[str, Any]) -> dict[str, Any]:
+def score(
+    labels: Mapping[str, Any], answers: Mapping[str, Any], equivalents: Mapping[str, Sizes] | None = None
+) -> dict[str, Any]:
     """All figures of a set, and the cases that went wrong.
 
     Args:
         labels: by case, as the generator writes them.
         answers: by case; cases without an answer do not count.
+        equivalents: by case, sizes in the library's terms of effects whose own mean something else.
     """
     cases: list[Case] = [(name, labels[name], answers[name]) for name in sorted(answers)]
 
@@ -120,8 +124,9 @@ def score(labels: Mapping[str, Any], answers: Mapping[str, Any]) -> dict[str, An
     def over(chosen: Sequence[Case], test: Callable[[Any, Any], bool]) -> dict[str, Any]:
         return share([test(label, answer) for _, label, answer in chosen])
 
-    seen = [case for case in of("single") if detectable(case[1], case[2])]
-    doubles = [case for case in of("double") if detectable(case[1], case[2])]
+    visible = {name for name, label, answer in cases if detectable(label, answer, (equivalents or {}).get(name))}
+    seen = [case for case in of("single") if case[0] in visible]
+    doubles = [case for case in of("double") if case[0] in visible]
     named = of("single", "double")
     certified = [case for case in cases if case[2].get("fit")]
     return {
@@ -149,20 +154,21 @@ def score(labels: Mapping[str, Any], answers: Mapping[str, Any]) -> dict[str, An
         "seconds": mean([float(answer["seconds"]) for _, _, answer in cases]),
         "seconds_full": mean([float(answer["seconds"]) for _, _, answer in certified]),
         "failed_runs": over(cases, lambda _, a: "failure" in a),
-        "failures": [_failure(*case) for case in cases if not right(case[1], case[2])],
+        "failures": [_failure(case, case[0] in visible) for case in cases if not right(case[1], case[2])],
         "interval_misses": misses(named),
     }
 
 
-def _failure(name: str, label: Mapping[str, Any], answer: Mapping[str, Any]) -> dict[str, Any]:
+def _failure(case: Case, visible: bool) -> dict[str, Any]:
     """What is listed of a case that went wrong."""
+    name, label, answer = case
     return {
         "case": name,
         "kind": label["kind"],
         "label": label["verdict"],
         "forms": [f"{effect['name']}: {effect['variant']} ({effect['tag']})" for effect in label["effects"]],
         "true_sizes": {effect["name"]: effect["parameters"] for effect in label["effects"]},
-        "detectable": detectable(label, answer),
+        "detectable": visible,
         "structure": label["structure"],
         "verdict": answer["verdict"],
         "complete": answer["complete"],
@@ -200,6 +206,22 @@ def check_commitments(opened: Mapping[str, Any], published: Mapping[str, Any]) -
             raise InputError(f"the label of {name} is not the one committed to: give the labels of that very set.")
 
 
+def equivalents_of(path: Path, opened: Mapping[str, Any]) -> Mapping[str, Sizes]:
+    """Sizes in the library's terms by case.
+
+    Args:
+        path: of :mod:`benchmarks.concealed_equivalents`.
+        opened: labels file.
+
+    Raises:
+        InputError: they are of another set.
+    """
+    found = json.loads(path.read_text())
+    if any(found.get(field) != opened.get(field) for field in ("set", "generator", "seed")):
+        raise InputError(f"{path} holds equivalent sizes of another set: make them for the labels that are given.")
+    return dict(found["cases"])
+
+
 def about(opened: Mapping[str, Any], answers: Mapping[str, Any]) -> dict[str, Any]:
     """What was scored: the set, and the versions and options of the runs."""
     options = Counter(" ".join(answer.get("options", [])) or "all steps" for answer in answers.values())
@@ -230,6 +252,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--answers", type=Path, required=True)
     parser.add_argument("--labels", type=Path, required=True)
     parser.add_argument("--commitments", type=Path, help="of a sealed set, published before the run")
+    parser.add_argument("--equivalents", type=Path, help="sizes in the library's terms, of the same set")
     parser.add_argument("--output", type=Path, default=RESULT, help="JSON; the picture has the same name")
     return parser
 
@@ -241,12 +264,14 @@ def main(words: Sequence[str] | None = None) -> int:
     try:
         if arguments.commitments is not None:
             check_commitments(opened, json.loads(arguments.commitments.read_text()))
+        equivalents = None if arguments.equivalents is None else equivalents_of(arguments.equivalents, opened)
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
     labels = {name: entry["label"] for name, entry in opened["cases"].items()}
-    figures = score(labels, answers)
-    result = {**figures, "targets": against_targets(figures), "about": about(opened, answers)}
+    figures = score(labels, answers, equivalents)
+    described = {**about(opened, answers), "equivalent_sizes": equivalents}
+    result = {**figures, "targets": against_targets(figures), "about": described}
     write_atomically(arguments.output, lambda to: to.write_text(json.dumps(result, indent=1, allow_nan=False) + "\n"))
     draw(labels, answers, result, arguments.output.with_suffix(".png"))
     _printed(result)

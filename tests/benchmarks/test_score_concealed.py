@@ -9,7 +9,8 @@ import pytest
 
 from benchmarks.concealed.commitments import commitment
 from benchmarks.concealed_figure import tabled
-from benchmarks.score_concealed import TARGETS, against_targets, main, score, share
+from benchmarks.score_concealed import TARGETS, against_targets, equivalents_of, main, score, share
+from ddagr_gym.errors import InputError
 
 
 def label(kind: str, *names: str, **parameters: float) -> dict[str, Any]:
@@ -78,6 +79,32 @@ def test_a_size_counts_as_detectable_by_its_distance_from_neutral() -> None:
     for least, count in ((distance - 0.01, 1), (distance + 0.01, 0)):
         missed = {**answer("none"), "detectable": {"soil_change": {"strength": least}}}
         assert score(labels, {"a": missed})["top1"]["count"] == count
+
+
+def test_what_can_be_shown_at_no_size_does_not_count_as_missed() -> None:
+    labels = {"a": label("single", "payload", mass=400.0)}
+    missed = {**answer("none"), "detectable": {"payload": {"mass": None}}}
+    assert score(labels, {"a": missed})["top1"]["count"] == 0
+    assert score(labels, {"a": missed | {"detectable": {}}})["top1"]["count"] == 1
+
+
+def test_sizes_of_another_meaning_count_by_their_equivalents() -> None:
+    """The generator's gain of 3.7 means another law than the library's growth."""
+    labels = {"a": label("single", "slip_sinkage", gain=3.7)}
+    missed = {**answer("none"), "detectable": {"slip_sinkage": {"growth": 0.3}}}
+    assert score(labels, {"a": missed})["top1"]["count"] == 1
+    for growth, count in ((0.31, 1), (0.29, 0)):
+        equivalents = {"a": {"slip_sinkage": {"growth": growth}}}
+        assert score(labels, {"a": missed}, equivalents)["top1"]["count"] == count
+
+
+def test_equivalent_sizes_of_another_set_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "equivalents.json"
+    opened = {"set": "sealed", "generator": "f", "seed": 1, "cases": {}}
+    path.write_text(json.dumps(opened))
+    assert equivalents_of(path, opened) == {}
+    with pytest.raises(InputError, match="of another set"):
+        equivalents_of(path, opened | {"seed": 2})
 
 
 def test_intervals_are_compared_in_the_library_s_terms() -> None:
