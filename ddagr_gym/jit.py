@@ -17,6 +17,7 @@ import numba
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
+from numba.core.caching import IndexDataCacheFile
 from numba.core.ccallback import CFunc
 from numba.extending import intrinsic
 from numba.np.arrayobj import populate_array
@@ -61,12 +62,41 @@ def callback_stamp(function: Callable[..., Any]) -> str | None:
     return _folder_stamp(file.parent) if file.is_file() else None
 
 
+class _CacheFile(IndexDataCacheFile):  # type: ignore[misc]
+    """Machine code on disk, a file for each state of the sources and each signature.
+
+    numba's own index is written before the file that it points to: of two processes that compile at the same time
+    after an edit or an upgrade, one may read the new index and run the old code.
+    """
+
+    def save(self, key: Any, data: Any) -> None:
+        """Keep what was compiled for a signature."""
+        self._save_data(self._name(key), data)
+
+    def load(self, key: Any) -> Any:
+        """What was compiled for a signature, None where nothing was."""
+        try:
+            return self._load_data(self._name(key))
+        except OSError:
+            return None
+
+    def _name(self, key: Any) -> str:
+        state = repr((self._version, self._source_stamp, key))
+        return f"{self._index_name.removesuffix('.nbi')}.{hashlib.sha256(state.encode()).hexdigest()[:16]}.nbc"
+
+
+def _keep_apart(cache: Any, stamp: str) -> None:
+    """Let a numba cache know the sources of all that its function may contain."""
+    numbered = getattr(cache, "_cache_file", None)
+    if numbered is not None:
+        name = numbered._index_name.removesuffix(".nbi")
+        cache._cache_file = _CacheFile(numbered._cache_path, name, (numbered._source_stamp, stamp))
+
+
 def _stamp(compiled: Any, module: str) -> None:
     parts = module.split(".")
     folder = parts[1] if parts[0] == _PACKAGE.name and len(parts) > 2 else ""
-    cache_file = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
-    if cache_file is not None:
-        cache_file._source_stamp = (cache_file._source_stamp, kernel_stamp(folder))
+    _keep_apart(getattr(compiled, "_cache", None), kernel_stamp(folder))
 
 
 def kernel(*, inline: bool = False, fused: bool = True, cached: bool = True) -> Callable[[Callable[..., Any]], Any]:
@@ -109,8 +139,7 @@ def compile_callback(function: Callable[..., None], signature: Any, stamp: str |
     callback: Any = CFunc(function, numba.core.sigutils.normalize_signature(signature), locals={}, options={})
     if stamp is not None:
         callback.enable_caching()
-        cache_file = callback._cache._cache_file
-        cache_file._source_stamp = (cache_file._source_stamp, stamp)
+        _keep_apart(callback._cache, stamp)
     callback.compile()
     _KEEP_ALIVE.append(callback)
     return int(callback.address)

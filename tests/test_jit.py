@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from numba.core.errors import NumbaError
 
+from ddagr_gym import jit
 from ddagr_gym.jit import kernel, stack_array
 
 
@@ -62,3 +63,20 @@ def test_unfused_function_gives_plain_arithmetic():
 
     a, b = 1.0 + 2.0**-30, 1.0 - 2.0**-30
     assert around(a, b, -1.0) == a * b - 1.0
+
+
+def test_code_of_other_sources_or_signatures_is_never_taken(tmp_path):
+    """numba's index would name the file of the old code before the new one is there."""
+    old, new = (jit._CacheFile(str(tmp_path), "kernel-1.py311", stamp) for stamp in ("old", "new"))
+    old.save(("float64",), "old code")
+    assert new.load(("float64",)) is None
+    new.save(("float64",), "new code")
+    new.save(("int64",), "of integers")
+    assert [new.load((kind,)) for kind in ("float64", "int64", "bool")] == ["new code", "of integers", None]
+    assert old.load(("float64",)) == "old code"
+
+
+def test_every_cached_kernel_keeps_its_code_apart():
+    from ddagr_gym.simulator_kernel import advance_rows
+
+    assert isinstance(advance_rows._cache._cache_file, jit._CacheFile)

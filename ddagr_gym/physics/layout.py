@@ -75,6 +75,7 @@ EXTRA_FORCE_Y = _block(4)
 EXTRA_YAW_MOMENT = _block(4)
 EXTRA_AXLE_TORQUE = _block(4)
 BODY_FORCE = _block(3)  # added by body force effects: F_x, F_y at the body origin, M_z
+TOWED = _block(2)  # where a load on a rope lies, world [m]: left by a load effect to the body force effect
 
 # Results
 ACCELERATION = _block(3)  # d/dt of V_X, V_Y, YAW_RATE

@@ -164,6 +164,8 @@ def _encoder_scale(a: Amounts) -> str:
 
 def _droop(a: Amounts) -> str:
     of = "of both banks" if "shared" in a and a["shared"].value > 0.25 else "of axle torque"
+    if "power" in a and a["power"].value > 0.5:
+        of = "of both banks at 0.7 rad/s, in proportion to power and speed as with a weak battery"
     return f"the motors slow down under load, by {quantity(a['droop'].scaled(1e3), 'mrad/s')} per N m {of}"
 
 
@@ -218,7 +220,8 @@ def _lag(a: Amounts) -> str:
     slower = a["lag"].value >= 0.0
     share = a["second_pole"].value if slower and "second_pole" in a else 0.0
     pole = " (mostly by a second pole)" if share >= 0.5 else ""
-    return f"the motors answer {quantity(a['lag'], 's')} {'more slowly' if slower else 'faster'}{pole}"
+    rising = ", mostly while they speed up" if "slowing" in a and a["slowing"].value < 0.5 else ""
+    return f"the motors answer {quantity(a['lag'], 's')} {'more slowly' if slower else 'faster'}{pole}{rising}"
 
 
 def _deadband(a: Amounts) -> str:
@@ -249,7 +252,9 @@ def _towed_drag(a: Amounts) -> str:
     side = a["hitch_side"].value if "hitch_side" in a else 0.0
     if abs(side) >= _ASIDE:
         place += f" and {abs(side):.2g} m to the {'left' if side > 0.0 else 'right'}"
-    return f"something pulls back with {quantity(a['force'], 'N')}, {place}"
+    rope = a["rope"].value if "rope" in a else 0.0
+    load = f", on a rope of {rope:.1g} m" if rope >= _ASIDE else ""
+    return f"something pulls back with {quantity(a['force'], 'N')}, {place}{load}"
 
 
 def _radius(a: Amounts) -> str:

@@ -9,13 +9,15 @@ from ddagr_gym.physics.layout import AXLE_TORQUE, MOTOR_TARGET, OMEGA, POINT_MOT
 _FOLLOWING = 0.1  # [s] of rotor and gear, ours: without it the torque of a wheel at rest, where only friction is left
 # to set it, and the speed drive each other to and fro from sample to sample
 _SLOW = 0.02  # [rad/s] bank speeds about which "alike" changes its sign
+_USUAL = 0.7  # [rad/s] of the thesis's row turns, at which power counts as torque
 _STARTED = 2
 
 
 def droop_speed(row: Vector, parameters: Vector, memory: Vector) -> None:
     """Shift each bank's speed by its axle torque, smoothed in ``memory[:2]``; negative torque brakes a driven wheel.
 
-    The share ``parameters[1]`` follows the torque of the other bank, with its sign where the banks turn alike.
+    The share ``parameters[1]`` follows the torque of the other bank, with its sign where the banks turn alike, and the
+    share ``parameters[2]`` takes the power of both in place of torque, and a part of the speed in place of an amount.
     """
     share = 1.0 - math.exp(-row[SAMPLE_PERIOD] / _FOLLOWING)
     for bank in range(2):
@@ -25,8 +27,10 @@ def droop_speed(row: Vector, parameters: Vector, memory: Vector) -> None:
         memory[bank] += share * (torque - memory[bank])
     both = row[OMEGA] * row[OMEGA + 1]
     alike = both / (abs(both) + _SLOW * _SLOW)
+    drawn = (memory[0] * row[OMEGA] + memory[1] * row[OMEGA + 1]) / (_USUAL * _USUAL)
     for bank in range(2):
         load = (1.0 - parameters[1]) * memory[bank] + parameters[1] * alike * memory[1 - bank]
+        load += parameters[2] * (drawn * row[MOTOR_TARGET + bank] - load)
         row[MOTOR_TARGET + bank] += parameters[0] * load
     memory[_STARTED] = 1.0
 
@@ -36,11 +40,14 @@ class MotorDroop(Effect):
     """Bank speed that falls in proportion to the bank's axle torque, as with a speed loop without integral action.
 
     A bank that the soil drives (downhill, or braked in a turn) runs faster than its command. Where both motors hang on
-    one weak battery, the load of either slows both.
+    one weak battery, the load of either slows both; its voltage falls with the power that they draw, and every speed
+    with the voltage in proportion.
 
     Attributes:
         droop: speed lost per torque; least: 2 percent of 0.7 rad/s under 25 N m.
         shared: share of the torque that is the other bank's: 0 for a weak speed loop, 0.5 for a weak battery.
+        power: 0 where torque takes an amount of speed, 1 where the power of both banks takes a share of it, as from a
+            weak battery; the droop is then that by the torque of both together at 0.7 rad/s.
     """
 
     name = "motor_droop"
@@ -48,10 +55,12 @@ class MotorDroop(Effect):
     group = "commands and motors"
     equation = (
         "omega_target = command + droop ((1 - shared) T + shared T_other), T = T_front + T_rear by the soil "
-        "(braking < 0) over 0.1 s, T_other turned to the bank's sense"
+        "(braking < 0) over 0.1 s, T_other turned to the bank's sense; with power 1 command (1 + droop (T_right "
+        "omega_right + T_left omega_left)/(0.7 rad/s)^2)"
     )
     source = (
-        "speed-torque line of a direct-current motor (Krause et al., Analysis of Electric Machinery); 0.1 s is ours"
+        "speed by torque and voltage of a direct-current motor (Krause et al., Analysis of Electric Machinery); 0.1 s "
+        "is ours"
     )
     signature = "encoders settle below the command, more in turns and soft places; a locked bank creeps"
     confused_with = ("command_deadband", "encoder_scale", "motor_saturation")
@@ -59,9 +68,10 @@ class MotorDroop(Effect):
 
     droop: float = size("rad/(s N m)", 0.0, 0.02, least=5e-4)
     shared: float = shape("-", 0.0, 0.5, default=0.0, step=0.1)
+    power: float = shape("-", 0.0, 1.0, default=0.0, step=0.1)
 
     @classmethod
     def probes(cls, extent: DriveExtent) -> tuple[Effect, ...]:
-        """A droop by the bank's own torque, and one by that of both."""
+        """A droop by the bank's own torque, and one by the power of both."""
         step = cls.parameter("droop").metadata["step"]
-        return (cls(step), cls(step, 0.5))
+        return (cls(step), cls(step, 0.5, 1.0))

@@ -105,6 +105,28 @@ def test_negative_lag_cannot_reverse_time(act, turning_row):
     np.testing.assert_allclose(rates, 1000.0)
 
 
+@pytest.mark.parametrize(("slowing", "falling"), [(0.0, 0.0), (0.5, 0.15), (1.0, 0.3)])
+def test_a_lag_of_speeding_up_leaves_the_slowing_down(drive, slowing, falling):
+    commands = np.repeat([0.6, -0.2], 250)[:, None].repeat(2, axis=1)
+    speed = drive([f"motor_lag=0.3,slowing={slowing}"], commands)["true_omega_right"]
+    time = PERIOD * np.arange(1, 51)
+    rising, settled = 1 / RATE + 0.3, speed[249]
+    # between the two it changes over smoothly: 0.02 rad/s either side of the target
+    np.testing.assert_allclose(speed[:50], 0.6 * (1 - np.exp(-time / rising)), rtol=4e-3)
+    expected = -0.2 + (settled + 0.2) * np.exp(-time / (1 / RATE + falling))
+    moving = expected > 0.1
+    assert moving.sum() > 10
+    np.testing.assert_allclose(speed[250:300][moving], expected[moving], atol=4e-3)
+
+
+def test_a_bank_that_reverses_speeds_up_once_it_is_past_rest(drive):
+    commands = np.repeat([0.6, -0.6], 250)[:, None].repeat(2, axis=1)
+    speed = drive(["motor_lag=0.3,slowing=0"], commands)["true_omega_right"]
+    late = speed[320:380] + 0.6
+    rate = -np.log(late[1:] / late[:-1]) / PERIOD
+    np.testing.assert_allclose(rate, 1 / (1 / RATE + 0.3), rtol=0.03)
+
+
 def torque(columns, bank):
     return columns[f"true_axle_torque_{1 + bank}"] + columns[f"true_axle_torque_{3 + bank}"]
 
@@ -152,6 +174,35 @@ def test_a_shared_battery_slows_both_banks_alike(act, turning_row):
 def test_a_droop_that_is_not_shared_follows_the_banks_own_torque(act, turning_row, omega):
     shift = droop(act, turning_row, "motor_droop=0.002", omega, (-30.0, 10.0))
     np.testing.assert_allclose(shift, (-0.06, 0.02), atol=1e-15)
+
+
+def test_power_takes_a_share_of_the_speed(act, turning_row):
+    sag = "motor_droop=0.002,shared=0.5,power=1"
+    row = turning_row.copy()
+    command = row[layout.MOTOR_TARGET : layout.MOTOR_TARGET + 2]
+    drawn = -30.0 * 0.8 + -10.0 * 0.4
+    shift = droop(act, turning_row, sag, (0.8, 0.4), (-30.0, -10.0))
+    np.testing.assert_allclose(shift, 0.002 * drawn / 0.7 * command / 0.7, rtol=1e-12)
+    # on the spot both banks draw as well
+    spot = droop(act, turning_row, sag, (0.8, -0.4), (-30.0, 10.0))
+    np.testing.assert_allclose(spot, shift, rtol=1e-12)
+    assert np.abs(shift).min() > 1e-3
+
+
+def test_at_the_usual_speed_power_takes_what_the_torque_of_both_does(drive):
+    commands = np.full((700, 2), 0.7)
+    lost = [
+        0.7 - drive([f"motor_droop=0.0005,shared={share},power={power}"], commands)["true_omega_right"][-1]
+        for share, power in ((0.0, 0.0), (0.5, 0.0), (0.0, 1.0), (0.5, 1.0))
+    ]
+    assert lost[0] > 3e-3
+    np.testing.assert_allclose(lost, lost[0] * np.array([1.0, 1.0, 2.0, 2.0]), rtol=0.04)
+
+
+def test_a_weak_battery_takes_nothing_from_a_locked_bank(drive):
+    columns = drive(["motor_droop=0.002,shared=0.5,power=1"], np.tile((0.7, 0.0), (300, 1)))
+    np.testing.assert_allclose(columns["true_omega_left"], 0.0, atol=1e-12)
+    assert columns["true_omega_right"][-1] < 0.69
 
 
 def test_a_weak_battery_lets_the_outer_bank_slow_the_inner_one(drive):

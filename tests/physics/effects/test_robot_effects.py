@@ -103,7 +103,9 @@ def test_radius_mismatch_gives_the_stated_radii(act, turning_row):
     np.testing.assert_allclose(radius, nominal * np.array([1.05, 0.95, 1.05, 0.95]))
 
 
-@pytest.mark.parametrize(("effect", "force"), [("towed_drag=60", 60.0), ("viscous_drag=300", None)])
+@pytest.mark.parametrize(
+    ("effect", "force"), [("towed_drag=60", 60.0), ("towed_drag=60,rope=0.8", 60.0), ("viscous_drag=300", None)]
+)
 def test_wheels_pull_the_drag_in_steady_travel(drive, straight, effect, force):
     commands, state = straight(0.7, 800)
     columns = drive([effect], commands, initial_state=state)
@@ -128,6 +130,89 @@ def test_hitch_aside_pulls_the_robot_to_its_side(drive, straight):
     assert left > 0.005
     assert right == pytest.approx(-left, rel=1e-6)
     assert middle == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_rope_of_no_length_is_none(drive):
+    commands = np.concatenate([np.tile((0.8, 0.3), (900, 1)), np.tile((0.3, 0.8), (900, 1))])
+    none, short, long = (drive([f"towed_drag=80,rope={rope}"], commands)["true_yaw"] for rope in (0.0, 0.01, 1.0))
+    assert np.abs(long - none).max() > 0.01
+    assert np.abs(short - none).max() < 0.1 * np.abs(long - none).max()
+
+
+def circled(effect, way):
+    """Row after a way [m] on a left circle of radius 2 m, with the force of the effect."""
+    row, memory = np.zeros(layout.SIZE), np.zeros(layout.EFFECT_MEMORY)
+    (_, pull), (_, lead) = effect.actions
+    row[layout.V_X] = 0.2
+    lead(row, effect.vector(), memory)
+    row[layout.YAW_RATE] = 0.1
+    for yaw in np.linspace(0.0, way / 2.0, 2000):
+        row[layout.YAW] = yaw
+        row[layout.X], row[layout.Y] = 2.0 * np.sin(yaw), 2.0 * (1.0 - np.cos(yaw))
+        lead(row, effect.vector(), memory)
+    pull(row, effect.vector(), memory)
+    return row, memory
+
+
+def test_a_load_on_a_rope_follows_on_its_own_circle():
+    """The tractrix of a circle ends on the concentric one that the rope touches."""
+    effect = parse_effect("towed_drag=80,hitch_distance=0.6,rope=1")
+    row, memory = circled(effect, 12.0)
+    hitch = np.hypot(2.0, 0.6)
+    assert np.hypot(memory[0], memory[1] - 2.0) == pytest.approx(np.sqrt(hitch**2 - 1.0), rel=1e-3)
+    force = row[layout.BODY_FORCE : layout.BODY_FORCE + 3]
+    # from the tangent at the hitch, which points outwards by atan(0.6/2), inwards by asin(rope/radius)
+    angle = np.arcsin(1.0 / hitch) + np.arctan2(0.6, 2.0)
+    np.testing.assert_allclose(force[:2], 80.0 * np.array([-np.cos(angle), np.sin(angle)]), rtol=5e-3)
+    assert force[2] == pytest.approx(-0.6 * force[1])
+
+
+def test_a_rope_turns_over_its_own_length():
+    effect = parse_effect("towed_drag=80,hitch_distance=0,rope=1")
+    angles = []
+    for way in (0.01, 1.0, 12.0):
+        force = circled(effect, way)[0][layout.BODY_FORCE : layout.BODY_FORCE + 2]
+        angles.append(np.arctan2(force[1], -force[0]))
+    assert angles[0] < 0.01
+    assert 0.5 * angles[2] < angles[1] < 0.85 * angles[2]
+
+
+def test_a_drive_begins_with_the_load_where_a_steady_turn_has_it():
+    effect = parse_effect("towed_drag=80,hitch_distance=0,rope=0.5")
+    row, memory = np.zeros(layout.SIZE), np.zeros(layout.EFFECT_MEMORY)
+    row[layout.V_X], row[layout.YAW_RATE] = 0.2, 0.1
+    effect.actions[1][1](row, effect.vector(), memory)
+    assert np.hypot(*memory[:2]) == pytest.approx(0.5)
+    # arctangent for arcsine: 3 percent at a quarter of the radius
+    assert np.arctan2(memory[1], -memory[0]) == pytest.approx(np.arcsin(0.25), rel=0.04)
+
+
+def test_a_rope_goes_slack_when_the_robot_backs(drive, straight):
+    forward, state = straight(0.7, 300)
+    commands = np.concatenate([forward, np.full((400, 2), -0.7), np.full((700, 2), 0.7)])
+    columns = drive(["towed_drag=80,rope=1"], commands, initial_state=state)
+    plain = drive([], commands, initial_state=state)
+    held = columns["true_v_x"] - plain["true_v_x"]
+    assert held[250] < -1e-3
+    np.testing.assert_allclose(held[650:690], 0.0, atol=1e-5)
+    # it pulls again where it was slackened
+    np.testing.assert_allclose(held[850:900], 0.0, atol=1e-5)
+    assert held[-1] == pytest.approx(held[250], rel=0.02)
+
+
+@given(v_x=FINITE, v_y=FINITE, yaw_rate=FINITE, load=st.tuples(*2 * [st.floats(-3.0, 3.0)]), rope=st.floats(0.01, 5.0))
+def test_a_rope_takes_power(v_x, v_y, yaw_rate, load, rope):
+    effect = parse_effect(f"towed_drag=100,hitch_side=0.3,rope={rope}")
+    (_, pull), (_, lead) = effect.actions
+    row, memory = np.zeros(layout.SIZE), np.zeros(layout.EFFECT_MEMORY)
+    row[layout.V_X], row[layout.V_Y], row[layout.YAW_RATE] = v_x, v_y, yaw_rate
+    memory[:3] = *load, 1.0
+    lead(row, effect.vector(), memory)
+    pull(row, effect.vector(), memory)
+    force = row[layout.BODY_FORCE : layout.BODY_FORCE + 3]
+    assert np.hypot(*force[:2]) <= 100.0 * (1.0 + 1e-12)
+    assert force @ (v_x, v_y, yaw_rate) <= 1e-9
+    assert np.hypot(memory[0] + 0.5, memory[1] - 0.3) <= rope * (1.0 + 1e-12) + 1e-12
 
 
 @given(
