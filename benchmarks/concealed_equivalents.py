@@ -5,9 +5,9 @@
 writes ``benchmarks/results/concealed_equivalents.json``: by case and effect the sizes at which the library's form best
 does what the generator's form did, with soil, robot and biases held at what they are without it. The latter are fitted
 to a *twin*: the same case made again from its seed without the effect, everything random the same; what the library's
-form would do for the twin is taken off. Nothing that a
-diagnosis said has a part in it; with ``--equivalents`` the scoring asks whether such a size is one that the diagnosis
-says it can show. Every case is made again as well and must give the recordings that are there.
+form would do for the twin is taken off. Nothing that a diagnosis said has a part in it; with ``--equivalents`` the
+scoring asks whether such a size is one that the diagnosis says it can show. Every case is made again as well and must
+give the recordings that are there.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
+from benchmarks.ablations.examine import ROBOT, SOIL, read_runs
 from benchmarks.concealed.cases import Case, plan
 from benchmarks.concealed.change import Form
 from benchmarks.concealed.generate import warm_up
@@ -41,11 +42,9 @@ from ddagr_gym.physics.effects.base import Effect
 from ddagr_gym.physics.effects.registry import effect_kind
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.files import write_atomically
-from ddagr_gym.recordings.load import load_recording
 from ddagr_gym.recordings.schema import Recording
 
 RESULT = Path(__file__).resolve().parent / "results" / "concealed_equivalents.json"
-ROBOT, SOIL = "ddagr", "thesis_a1"
 ITERATIONS = 12
 
 
@@ -86,15 +85,15 @@ def drives(case: Case, seed: int, folder: Path | None = None) -> list[Recording]
         InputError: they do not.
     """
     logs, _ = simulate_case(case, seed)
-    for run, log in logs.items() if folder else ():
-        if folder and digest(csv_bytes(log)) != recording_digest(folder / f"{run}.csv.gz"):
+    for run, log in logs.items():
+        if folder is not None and digest(csv_bytes(log)) != recording_digest(folder / f"{run}.csv.gz"):
             raise InputError(
                 f"{folder.name}/{run} is not what its seed gives here: use the checkout, versions and kind of machine "
                 "that made the set."
             )
     with tempfile.TemporaryDirectory() as made:
         write_case(Path(made) / "case", logs)
-        return [load_recording(path, "concealed", ROBOT) for path in sorted(Path(made, "case").glob("run_*.csv.gz"))]
+        return read_runs(Path(made) / "case")
 
 
 def equivalent(case: Sequence[Recording], twin: Sequence[Recording], first: Effect) -> dict[str, float]:
@@ -137,8 +136,7 @@ def equivalents_of(name: str, folder: Path, opened: Mapping[str, Any]) -> dict[s
         if needs_equivalent(effect):
             kind = effect_kind(effect["name"])
             sizes = {n: kind.parameter(n).metadata for n in kind.size_names()}
-            first = kind.neutral()
-            first = replace(first, **{n: data["neutral"] + data["least"] for n, data in sizes.items()})
+            first = replace(kind.neutral(), **{n: data["neutral"] + data["least"] for n, data in sizes.items()})
             found[effect["name"]] = equivalent(made, drives(without(case, k), seed), first)
     return found
 

@@ -206,7 +206,7 @@ def check_commitments(opened: Mapping[str, Any], published: Mapping[str, Any]) -
             raise InputError(f"the label of {name} is not the one committed to: give the labels of that very set.")
 
 
-def equivalents_of(path: Path, opened: Mapping[str, Any]) -> Mapping[str, Sizes]:
+def read_equivalents(path: Path, opened: Mapping[str, Any]) -> Mapping[str, Sizes]:
     """Sizes in the library's terms by case.
 
     Args:
@@ -264,7 +264,7 @@ def main(words: Sequence[str] | None = None) -> int:
     try:
         if arguments.commitments is not None:
             check_commitments(opened, json.loads(arguments.commitments.read_text()))
-        equivalents = None if arguments.equivalents is None else equivalents_of(arguments.equivalents, opened)
+        equivalents = None if arguments.equivalents is None else read_equivalents(arguments.equivalents, opened)
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2

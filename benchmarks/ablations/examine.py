@@ -19,6 +19,7 @@ from ddagr_gym.diagnosis.thresholds import Thresholds
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.load import load_recording
+from ddagr_gym.recordings.schema import Recording
 
 ARMS = {
     "as it is": "first scan of the diagnosis",
@@ -31,6 +32,11 @@ ROBOT, SOIL = "ddagr", "thesis_a1"
 
 _WHOLE_DRIVE = 1e6
 """Longer than any drive [s]; windows are then as long as the drives."""
+
+
+def read_runs(folder: Path) -> list[Recording]:
+    """Recordings of a case's drives, in their order."""
+    return [load_recording(path, "concealed", ROBOT) for path in sorted(folder.glob("run_*.csv.gz"))]
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +81,7 @@ def _timed(work: Callable[[], First], began: float) -> dict[str, Any]:
 
 
 def _begin(robot: Robot, soil: Soil, folder: Path, thresholds: Thresholds) -> _Begun:
-    recordings = [load_recording(path, "concealed", ROBOT) for path in sorted(folder.glob("run_*.csv.gz"))]
+    recordings = read_runs(folder)
     prepared = prepare(robot, soil, recordings, Setting().with_windows(thresholds.duration))
     problem = prepared.problem
     raw, standing = begin(problem)

@@ -28,8 +28,6 @@ DRAWS = 500
 LEAST_EXPLAINABLE = 0.03
 """Share of the refitted error that the ceiling must explain before a share of it means anything (ours)."""
 
-SHARES = ("gain_share", "gain_share_readings")
-
 
 def certificate(
     rule: str, found: Mapping[float, Errors], clusters: Mapping[float, NDArray[np.int64]], rng: np.random.Generator
@@ -43,7 +41,9 @@ def certificate(
         rng: of the resampling.
     """
     channels: dict[str, dict[str, Any]] = {}
-    shares: dict[str, dict[str, Any]] = {name: {} for name in ("gain", "gain_readings", *SHARES)}
+    shares: dict[str, dict[str, Any]] = {
+        name: {} for name in ("gain", "gain_readings", "gain_share", "gain_share_readings")
+    }
     lost = 0
     for horizon, every in found.items():
         key = f"{horizon:g}"

@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks.concealed.commitments import commitment
 from benchmarks.concealed_figure import tabled
-from benchmarks.score_concealed import TARGETS, against_targets, equivalents_of, main, score, share
+from benchmarks.score_concealed import TARGETS, against_targets, main, read_equivalents, score, share
 from ddagr_gym.errors import InputError
 
 
@@ -102,9 +102,9 @@ def test_equivalent_sizes_of_another_set_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "equivalents.json"
     opened = {"set": "sealed", "generator": "f", "seed": 1, "cases": {}}
     path.write_text(json.dumps(opened))
-    assert equivalents_of(path, opened) == {}
+    assert read_equivalents(path, opened) == {}
     with pytest.raises(InputError, match="of another set"):
-        equivalents_of(path, opened | {"seed": 2})
+        read_equivalents(path, opened | {"seed": 2})
 
 
 def test_intervals_are_compared_in_the_library_s_terms() -> None:
