@@ -93,6 +93,9 @@ def _is_detectable(kind: str, sizes: Mapping[str, float], limits: Mapping[str, M
     """An effect without sizes, or of which the diagnosis says nothing, counts; one that it cannot show does not."""
     if not sizes or kind not in limits:
         return True
+    if not effect_kind(kind).differentiable:
+        # the diagnosis says which limits show, as they are
+        return any(value <= float(least) for field, value in sizes.items() if (least := limits[kind].get(field)))
     return any(
         abs(value - float(effect_kind(kind).parameter(field).metadata["neutral"])) >= float(least)
         for field, value in sizes.items()

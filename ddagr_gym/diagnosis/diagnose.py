@@ -10,7 +10,7 @@ from functools import partial
 
 import numpy as np
 
-from ddagr_gym.diagnosis.equivalence import equivalence_weights
+from ddagr_gym.diagnosis.equivalence import equivalents
 from ddagr_gym.diagnosis.flipped import Flipped, find_flipped_gyro, with_gyro_turned
 from ddagr_gym.diagnosis.held import Held, find_held, hold_effect, without_repeats
 from ddagr_gym.diagnosis.inputs import data_source
@@ -234,7 +234,7 @@ def _findings(problem: Problem, found: Found, thresholds: Thresholds, rng: np.ra
                 before.scores[effect.name],
                 before.held_out.get(effect.name, 0.0),
                 _channel_shares(found.nominal, chosen),
-                _equivalents(found, effect.name, rng),
+                equivalents(found, effect.name, rng),
                 calibrated_p=thresholds.p_value(effect.name, gain),
             )
         )
@@ -256,16 +256,6 @@ def _gain(found: Found, name: str) -> float:
     """Evidence of an effect: what the scan says, or the joint refit that added it where that says more."""
     linear = next(item.gain for item in _before(found, name).gains if item.name == name)
     return max([linear, *(rival.gain for step in found.steps for rival in step if rival.name == name)])
-
-
-def _equivalents(found: Found, name: str, rng: np.random.Generator) -> dict[str, float]:
-    """Names that explain nearly as much as the one that was chosen, with their weights."""
-    for step, before in zip(found.steps, found.standings, strict=False):
-        if name in [rival.name for rival in step]:
-            # an effect that the final model has besides this one is no rival of it
-            rivals = [rival for rival in step if rival.name == name or rival.name not in found.chosen.names]
-            return equivalence_weights(sorted(rivals, key=lambda rival: rival.name != name), before.dispersion, rng)
-    return {name: 1.0}
 
 
 def _channel_shares(nominal: Standing, chosen: Standing) -> dict[str, float]:

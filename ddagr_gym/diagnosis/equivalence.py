@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ddagr_gym.diagnosis.search import Found
 from ddagr_gym.diagnosis.size_prior import implausibility
 from ddagr_gym.diagnosis.standing import Rival
 
@@ -54,3 +55,26 @@ def equivalence_weights(
     }
     total = sum(kept.values())
     return {name: weight / total for name, weight in kept.items()} if total > 0.0 else {rivals[0].name: 1.0}
+
+
+def equivalents(found: Found, name: str, rng: np.random.Generator) -> dict[str, float]:
+    """Names that explain nearly as much as one that was chosen, with their weights.
+
+    The step that chose it counts: in an earlier one it may have stood beside an effect that became idle when it was
+    added. An effect that the final model has besides it is no rival of it.
+
+    Args:
+        found: by the search.
+        name: of an effect of the chosen model.
+        rng: of the resampling.
+    """
+    tried = [
+        (step, before)
+        for step, before in zip(found.steps, found.standings, strict=False)
+        if name in [rival.name for rival in step]
+    ]
+    if not tried:
+        return {name: 1.0}
+    step, before = next((item for item in tried if item[0][0].name == name), tried[0])
+    rivals = [rival for rival in step if rival.name == name or rival.name not in found.chosen.names]
+    return equivalence_weights(sorted(rivals, key=lambda rival: rival.name != name), before.dispersion, rng)

@@ -3,7 +3,8 @@
 From the sensitivities of planned drives (:mod:`ddagr_gym.diagnosis.planned`) with windows' unknowns and nominal
 parameters projected out follow, to first order in the sizes,
 
-- the least detectable size: the one whose expected gain, half its squared sensitivity, reaches the gate;
+- the least detectable size: the one that passes the gate nine times in ten; its expected gain is half its squared
+  sensitivity;
 - isolability of one effect against another: the share of its sensitivity that the other cannot imitate at any likely
   size of its own (prior of :mod:`ddagr_gym.diagnosis.size_prior`), in the worst of its detectable sizes;
 - the size from which the two are told apart: where the expected gains differ by ln 19, so that the wrong name keeps a
@@ -186,13 +187,13 @@ def isolability(
     gates = chance_gates(terms) if thresholds is None else thresholds.for_length(planned.problem.covered)
     matrix = information(terms)
     names = tuple(dict.fromkeys(c.name for c in terms.candidates))
-    sizes = {name: _directions(name, terms, matrix, gates.of(name).gain) for name in names}
+    sizes = {name: _directions(name, terms, matrix, gates.of(name).detectable) for name in names}
     share = np.full((len(names), len(names)), np.nan)
     apart = np.full((len(names), len(names)), np.nan)
     for i, row in enumerate(names):
         for j, column in enumerate(names):
             if i != j:
-                share[i, j], apart[i, j] = _pair(sizes[row], column, terms, matrix, gates.of(row).gain)
+                share[i, j], apart[i, j] = _pair(sizes[row], column, terms, matrix, gates.of(row).detectable)
     return Isolability(
         robot.name,
         soil_name,

@@ -54,6 +54,9 @@ library has and that show there 8 to 200 times."""
 MISFIT_MARGIN = 1.7
 """The same on the misfit of the channels: 0.74 times and, where it shows there, 3.9 to 36 times."""
 
+POWER = 1.2816
+"""Standard deviations by which a score has to lie above its gate to pass nine times in ten."""
+
 SHORT_WINDOW = 2.0
 """Windows of banks that do not say how long theirs are [s]."""
 
@@ -78,6 +81,15 @@ class Gate:
 
     gain: float
     held_out: float
+
+    @property
+    def detectable(self) -> float:
+        """Expected gain of a size that passes nine times in ten.
+
+        A gain is half the square of a score with variance 1: a size whose expected gain just reaches the gate is missed
+        every other time.
+        """
+        return 0.5 * (math.sqrt(2.0 * self.gain) + POWER) ** 2
 
 
 @dataclass(frozen=True)

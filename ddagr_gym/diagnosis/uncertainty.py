@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.diagnosis.candidates import moved_field
+from ddagr_gym.diagnosis.candidates import Candidate, moved_field
 from ddagr_gym.diagnosis.problem import Problem
 from ddagr_gym.diagnosis.refit import EffectParameter, Fitted, bounded_step, effect_columns, effect_parameters, read
 from ddagr_gym.diagnosis.scores import Terms, reduce
@@ -94,18 +94,22 @@ def with_structure(interval: tuple[float, float], effect: Effect, field: str) ->
 
 
 def least_detectable(terms: Terms, thresholds: Thresholds, dispersion: float) -> Mapping[str, dict[str, float]]:
-    """Distance of each size from neutral whose expected gain reaches the gate, by effect and field.
+    """Distance of each size from neutral that passes the gate nine times in ten, by effect and field.
 
     The gain of a size s is s^2 I / 2 with the information I that is left beside the nuisances; infinite where there is
     none. Of an effect that may act at any time or in any way, the usual one counts, which is its default (a change of
-    soil from the beginning on); of one that has a place, the median over the places that the drives touch.
+    soil from the beginning on); of one that has a place, the median over the places that the drives touch. Of a limit
+    stands the mildest of the tried ones that shows, as it is, and of a reversed sign 1.
     """
     information = np.diag(reduce(terms).information)
     found: dict[str, dict[str, list[tuple[bool, float]]]] = {}
+    whole: dict[str, dict[str, list[float]]] = {}
     for candidate in terms.candidates:
+        gate = thresholds.of(candidate.name).detectable * dispersion
         if not candidate.has_sizes:
+            name, shown = _shown_whole(candidate, information[candidate.columns[0]], gate)
+            whole.setdefault(candidate.name, {}).setdefault(name, []).extend(shown)
             continue
-        gate = thresholds.of(candidate.name).gain * dispersion
         sizes = [
             _needed(probe, information[k], gate) for k, probe in zip(candidate.columns, candidate.probes, strict=True)
         ]
@@ -117,7 +121,18 @@ def least_detectable(terms: Terms, thresholds: Thresholds, dispersion: float) ->
     return {
         effect: {name: float(np.median(_that_count(effect, name, sizes))) for name, sizes in fields.items()}
         for effect, fields in found.items()
+    } | {
+        effect: {name: max(shown, default=np.inf) for name, shown in fields.items()} for effect, fields in whole.items()
     }
+
+
+def _shown_whole(candidate: Candidate, information: float, gate: float) -> tuple[str, list[float]]:
+    """The field of a limit or a reversed sign, which is there or not, and its value where its gain reaches a gate."""
+    probe = candidate.probes[0]
+    name, _, away = moved_field(probe)
+    multiple = 1.0 if candidate.whole is None else candidate.whole
+    value = float(getattr(probe, name)) if candidate.whole is None else abs(multiple * away)
+    return name, [value] if 0.5 * multiple**2 * information >= gate else []
 
 
 def _needed(probe: Effect, information: float, gate: float) -> tuple[bool, str, float]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ddagr_gym.reporting.diagnosis_figures import LABELS
 from ddagr_gym.reporting.wording import (
@@ -20,6 +20,9 @@ from ddagr_gym.reporting.wording import (
     range_in_words,
     title,
 )
+
+if TYPE_CHECKING:
+    from ddagr_gym.physics.effects import Effect
 
 Entry = Mapping[str, Any]
 
@@ -272,12 +275,18 @@ def detectable(table: Mapping[str, Mapping[str, float | None]]) -> list[dict[str
         kind = effect_kinds().get(name)
         for key, value in sizes.items():
             unit = str(kind.parameter(key).metadata["unit"]) if kind and key in kind.size_names() else "-"
-            shown = "none, however large"
-            if value is not None and math.isfinite(value):
-                shown = size(Amount(value, unit))
+            amount = Amount(value, unit) if value is not None and math.isfinite(value) else None
             field = "" if len(sizes) == 1 else f", {key.replace('_', ' ')}"
-            rows.append({"title": f"{title(name)}{field}", "size": shown})
+            rows.append({"title": f"{title(name)}{field}", "size": _detectable_size(kind, amount)})
     return rows
+
+
+def _detectable_size(kind: type[Effect] | None, amount: Amount | None) -> str:
+    if kind is not None and kind.categorical:
+        return "does not show" if amount is None else "shows"
+    if kind is not None and not kind.differentiable:
+        return "no limit that was tried" if amount is None else f"limits up to {size(amount)}"
+    return "none, however large" if amount is None else size(amount)
 
 
 def sources(diagnosis: Entry) -> list[tuple[str, str]]:

@@ -88,6 +88,13 @@ def test_what_can_be_shown_at_no_size_does_not_count_as_missed() -> None:
     assert score(labels, {"a": missed | {"detectable": {}}})["top1"]["count"] == 1
 
 
+def test_a_limit_counts_where_it_is_as_low_as_one_that_shows() -> None:
+    labels = {"a": label("single", "motor_saturation", speed_limit=0.9)}
+    for shows, count in ((1.0, 1), (0.8, 0), (None, 0)):
+        missed = {**answer("none"), "detectable": {"motor_saturation": {"speed_limit": shows}}}
+        assert score(labels, {"a": missed})["top1"]["count"] == count
+
+
 def test_sizes_of_another_meaning_count_by_their_equivalents() -> None:
     """The generator's gain of 3.7 means another law than the library's growth."""
     labels = {"a": label("single", "slip_sinkage", gain=3.7)}

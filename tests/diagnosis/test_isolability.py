@@ -65,12 +65,13 @@ def test_limits_are_given_as_values_that_would_show(turn) -> None:
     assert speed.multiples < 1.0
 
 
-def test_sizes_scale_with_the_root_of_the_gate(straight) -> None:
+def test_sizes_scale_with_the_score_that_passes_the_gate(straight) -> None:
     gates = {name: Gate(40.0, 0.0) for name in FEW}
     wide = table([STRAIGHT], thresholds=Thresholds(gates, {}, 0, "by hand"))
     chance = chance_gate(straight)
     assert wide.of("accelerometer_bias").size == pytest.approx(
-        straight.of("accelerometer_bias").size * math.sqrt(40.0 / chance), rel=1e-6
+        straight.of("accelerometer_bias").size * (math.sqrt(80.0) + 1.2816) / (math.sqrt(2.0 * chance) + 1.2816),
+        rel=1e-6,
     )
     assert wide.gates == "by hand"
 

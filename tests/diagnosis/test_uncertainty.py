@@ -6,7 +6,7 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from ddagr_gym.diagnosis.candidates import Candidate, candidates_of
+from ddagr_gym.diagnosis.candidates import Candidate, candidates_of, moved_field
 from ddagr_gym.diagnosis.scores import Terms
 from ddagr_gym.diagnosis.thresholds import Gate, Thresholds
 from ddagr_gym.diagnosis.uncertainty import FORM, STRUCTURE, STRUCTURE_OF_LIMIT, least_detectable, with_structure
@@ -70,8 +70,8 @@ def least_of(
 
 
 def reaching(step: float, information: float) -> float:
-    """Size whose expected gain over the dispersion is the gate."""
-    return step * math.sqrt(2.0 * GATE * DISPERSION / information)
+    """Size whose score over the root of the dispersion stands 1.28 above what passes the gate."""
+    return step * math.sqrt(DISPERSION / information) * (math.sqrt(2.0 * GATE) + 1.2816)
 
 
 def test_a_change_that_may_begin_at_any_time_counts_from_the_beginning_on() -> None:
@@ -117,3 +117,27 @@ def test_what_a_nuisance_explains_detects_nothing() -> None:
     step = kind.parameter("mass").metadata["step"]
     least = least_of(candidates_of(kind, EXTENT, 0), {0: 100.0}, {0: 75.0})
     assert least == {"mass": pytest.approx(reaching(step, 25.0))}
+
+
+def test_of_limits_the_mildest_that_shows_stands_as_it_is() -> None:
+    kind = effect_kind("motor_saturation")
+    candidates = candidates_of(kind, EXTENT, 0)
+    enough = 2.0 * DISPERSION * (math.sqrt(2.0 * GATE) + 1.2816) ** 2 / 2.0
+    names = [moved_field(candidate.probes[0])[0] for candidate in candidates]
+    speeds = [k for k, name in enumerate(names) if name == "speed_limit"]
+    values = sorted(candidates[k].probes[0].speed_limit for k in speeds)
+    all_of_them = {candidate.columns[0]: 1.01 * enough for candidate in candidates}
+    assert least_of(candidates, all_of_them)["speed_limit"] == pytest.approx(values[-1])
+    mildest = next(k for k in speeds if candidates[k].probes[0].as_mapping()["parameters"]["speed_limit"] == values[-1])
+    assert least_of(candidates, all_of_them | {mildest: 0.99 * enough})["speed_limit"] == pytest.approx(values[-2])
+    nothing = least_of(candidates, dict.fromkeys(all_of_them, 0.99 * enough))
+    assert nothing == {"speed_limit": np.inf, "acceleration_limit": np.inf}
+
+
+def test_a_reversed_sign_shows_or_does_not() -> None:
+    candidates = candidates_of(effect_kind("gyro_sign"), EXTENT, 0)
+    whole = candidates[0].whole
+    assert whole is not None
+    enough = DISPERSION * (math.sqrt(2.0 * GATE) + 1.2816) ** 2 / whole**2
+    assert least_of(candidates, {0: 1.01 * enough}) == {"flip": pytest.approx(1.0)}
+    assert least_of(candidates, {0: 0.99 * enough}) == {"flip": np.inf}

@@ -215,6 +215,12 @@ def test_tables_by_hand():
     assert labels[0] == "incomplete: something is left"
 
 
+def test_limits_and_signs_are_said_in_their_own_words() -> None:
+    table = {"motor_saturation": {"speed_limit": 0.9, "acceleration_limit": None}, "gyro_sign": {"flip": 1.0}}
+    rows = {row["title"]: row["size"] for row in detectable(table)}
+    assert list(rows.values()) == ["limits up to 0.90 rad/s", "no limit that was tried", "shows"]
+
+
 @pytest.fixture(scope="module")
 def browser():
     program = find_browser()
