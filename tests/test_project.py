@@ -11,7 +11,9 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 from ddagr_gym import commands
-from ddagr_gym.commands.extras import EXTRA_OF_MODULE, missing_extra
+from ddagr_gym.commands import extras
+from ddagr_gym.commands.extras import EXTRA_OF_MODULE, missing_extra, need
+from ddagr_gym.errors import InputError
 
 # Libraries whose import name is not their distribution's name.
 MODULE_OF = {
@@ -82,6 +84,13 @@ def test_missing_package_sentence():
     assert "ddagr-gym[io]" in str(error)
     assert missing_extra(ModuleNotFoundError(name="ddagr_gym.x")) is None
     assert missing_extra(ModuleNotFoundError()) is None
+
+
+def test_what_long_work_needs_at_its_end_is_asked_for_before(monkeypatch: pytest.MonkeyPatch) -> None:
+    need("numpy", "scipy")
+    monkeypatch.setattr(extras, "find_spec", lambda name: None if name == "sklearn" else object())
+    with pytest.raises(InputError, match=r"'sklearn', which is not installed.*ddagr-gym\[diagnosis\]"):
+        need("ruptures", "sklearn")
 
 
 def test_script_asks_for_extras_that_exist(project, repository):

@@ -12,11 +12,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import tyro
 from tyro.conf import Positional
 
+from ddagr_gym.commands.extras import need
 from ddagr_gym.commands.output import check_output_folder, format_table, output_folder
 from ddagr_gym.commands.progress import Progress
 from ddagr_gym.errors import InputError
 
 if TYPE_CHECKING:
+    from ddagr_gym.diagnosis.data_checks import DataDoubt
     from ddagr_gym.diagnosis.pipeline import Outcome, Task
     from ddagr_gym.diagnosis.thresholds import Thresholds
     from ddagr_gym.diagnosis.verdict import Diagnosis
@@ -84,6 +86,7 @@ def run(arguments: Arguments) -> int | None:
     from ddagr_gym.diagnosis.store import StepStore, part_folder
 
     check_output_folder(arguments.output, overwrite=arguments.overwrite)
+    need("ruptures", *(() if arguments.names_only else ("sklearn", "jinja2", "matplotlib")))
     task = _task(arguments)
     check_recordings(task.recordings, task.robot, task.setting)
     parts = part_folder(arguments.output.expanduser().resolve())
@@ -122,7 +125,9 @@ def _task(arguments: Arguments) -> Task:
     thresholds = _thresholds(arguments)
     window = thresholds.duration if arguments.window is None else arguments.window
     setting = Setting(priors=priors, threads=arguments.threads).with_windows(window, arguments.stride)
-    return Task(robot, soil, tuple(recordings), thresholds, setting, arguments.seed, arguments.names_only)
+    return Task(
+        robot, soil, tuple(recordings), thresholds, setting, arguments.seed, arguments.names_only, arguments.soil
+    )
 
 
 def _sources(runs: Sequence[Path]) -> list[Path]:
@@ -144,9 +149,13 @@ def _sources(runs: Sequence[Path]) -> list[Path]:
 def _thresholds(arguments: Arguments) -> Thresholds:
     from ddagr_gym.diagnosis.thresholds import default_thresholds, load_thresholds
 
-    if arguments.thresholds is None:
-        return default_thresholds(arguments.robot)
-    return load_thresholds(arguments.thresholds)
+    path, robot = arguments.thresholds, arguments.robot
+    thresholds = default_thresholds(robot) if path is None else load_thresholds(path)
+    if thresholds.origin is not None:
+        warning = thresholds.origin.mismatch(robot, arguments.soil, arguments.soil_uncertainty)
+        if warning:
+            print(f"ddagr: warning: {warning}", file=sys.stderr)
+    return thresholds
 
 
 def diagnosed(task: Task, store: Any = None) -> Outcome:
@@ -211,12 +220,22 @@ def write_outcome(outcome: Outcome, folder: Path, page: bool = True) -> None:
 def outcome_text(diagnosis: Diagnosis) -> str:
     """Answer, findings and errors at the horizons, as tables."""
     parts = [diagnosis.sentence]
+    if diagnosis.checks:
+        lines = [
+            f"  {' '.join(filter(None, (item.recording, item.channel)))}: {item.sentence}" for item in diagnosis.checks
+        ]
+        parts.append("\n".join(["The recordings themselves are suspicious (`ddagr check` says more):", *lines]))
     if diagnosis.findings:
         head = ("effect", "size", "90 % interval", "unit", "gain", "gate", "could also be")
         parts.append(format_table(head, [row for finding in diagnosis.findings for row in _finding_rows(finding)]))
     if diagnosis.fit is not None:
         parts += _fit_texts(diagnosis.fit)
     return "\n\n".join(parts)
+
+
+def _doubt_line(doubt: DataDoubt) -> str:
+    place = " ".join(filter(None, (doubt.recording, doubt.channel)))
+    return f"  {place}: {doubt.sentence}" if place else f"  {doubt.sentence}"
 
 
 def _finding_rows(finding: Any) -> Iterator[tuple[str, ...]]:

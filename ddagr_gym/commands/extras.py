@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
+
 from ddagr_gym.errors import InputError
 
 EXTRA_OF_MODULE = {
@@ -27,10 +29,22 @@ EXTRA_OF_MODULE = {
 def missing_extra(error: ModuleNotFoundError) -> InputError | None:
     """The sentence for an optional library that is not installed; None when the module is not an optional one."""
     module = (error.name or "").split(".", 1)[0]
-    extra = EXTRA_OF_MODULE.get(module)
-    if extra is None:
-        return None
+    return _sentence(module) if module in EXTRA_OF_MODULE else None
+
+
+def need(*modules: str) -> None:
+    """Ask for optional libraries before long work that uses them at its end.
+
+    Raises:
+        InputError: one of them is not installed.
+    """
+    for module in modules:
+        if find_spec(module) is None:
+            raise _sentence(module)
+
+
+def _sentence(module: str) -> InputError:
     return InputError(
         f"this needs the package {module!r}, which is not installed: "
-        f"run pip install -c constraints.txt 'ddagr-gym[{extra}]', or start through ./ddagr."
+        f"run pip install -c constraints.txt 'ddagr-gym[{EXTRA_OF_MODULE[module]}]', or start through ./ddagr."
     )

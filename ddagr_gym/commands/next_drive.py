@@ -19,6 +19,9 @@ EXAMPLES = (
 )
 
 
+ROBOT, SOIL = "ddagr", "thesis_a1"
+
+
 @dataclass(frozen=True)
 class Arguments:
     """Name the drive that would tell the remaining explanations of a diagnosis apart.
@@ -30,8 +33,8 @@ class Arguments:
         diagnosis: folder or diagnosis.json of `ddagr diagnose`.
         rival: effects to tell apart instead, name=size; may be repeated.
         output: JSON file to write.
-        robot: nominal robot.
-        soil: nominal soil.
+        robot: nominal robot; that of the diagnosis by default, ddagr without one.
+        soil: nominal soil; that of the diagnosis by default, thesis_a1 without one.
         sensors: some of imu, encoders, pose; those of the diagnosis by default.
         seed: of the sensor noise.
     """
@@ -39,8 +42,8 @@ class Arguments:
     diagnosis: Positional[Path | None] = None
     rival: Annotated[tuple[str, ...], tyro.conf.UseAppendAction] = ()
     output: Path | None = None
-    robot: str = "ddagr"
-    soil: str = "thesis_a1"
+    robot: str | None = None
+    soil: str | None = None
     sensors: tuple[str, ...] = ()
     seed: int = 0
 
@@ -52,26 +55,36 @@ def run(arguments: Arguments) -> None:
 
     if (arguments.diagnosis is None) == (not arguments.rival):
         raise InputError("give either a diagnosis or some --rival name=size, not both.")
-    rivals, sensors = _rivals(arguments)
-    answer = next_drive(
-        get_robot(arguments.robot), get_soil(arguments.soil), rivals, sensors=sensors, seed=arguments.seed
-    )
+    case = _case(arguments)
+    robot, soil = get_robot(arguments.robot or case.robot), get_soil(arguments.soil or case.soil)
+    answer = next_drive(robot, soil, case.rivals, sensors=arguments.sensors or case.sensors, seed=arguments.seed)
     if arguments.output is not None:
         write_text(arguments.output, json.dumps(answer, indent=1, allow_nan=False) + "\n")
     print(answer_text(answer))
 
 
-def _rivals(arguments: Arguments) -> tuple[list[Any], tuple[str, ...]]:
+@dataclass(frozen=True)
+class _Case:
+    """What is to be told apart, with which sensors, for which robot on which soil."""
+
+    rivals: list[Any]
+    sensors: tuple[str, ...]
+    robot: str
+    soil: str
+
+
+def _case(arguments: Arguments) -> _Case:
     from ddagr_gym.diagnosis.next_drive import rivals_of_diagnosis, sensors_of_diagnosis
     from ddagr_gym.diagnosis.planned import SENSORS
     from ddagr_gym.diagnosis.verdict import load
     from ddagr_gym.physics.effects.registry import parse_effect
 
     if arguments.diagnosis is None:
-        return [parse_effect(text) for text in arguments.rival], arguments.sensors or tuple(SENSORS)
+        return _Case([parse_effect(text) for text in arguments.rival], tuple(SENSORS), ROBOT, SOIL)
     path = arguments.diagnosis
     mapping = load(path / "diagnosis.json" if path.is_dir() else path)
-    return rivals_of_diagnosis(mapping), arguments.sensors or sensors_of_diagnosis(mapping)
+    named = mapping["robot"] or ROBOT, mapping["soil"] or SOIL
+    return _Case(rivals_of_diagnosis(mapping), sensors_of_diagnosis(mapping), *named)
 
 
 def answer_text(answer: dict[str, Any]) -> str:

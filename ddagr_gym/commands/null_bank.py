@@ -16,11 +16,12 @@ from ddagr_gym.errors import InputError
 if TYPE_CHECKING:
     from ddagr_gym.diagnosis.null_bank import Template
     from ddagr_gym.diagnosis.setting import Setting
-    from ddagr_gym.diagnosis.thresholds import NullRun
+    from ddagr_gym.diagnosis.thresholds import NullKind, NullRun, Origin
     from ddagr_gym.parameters import Robot, Soil
     from ddagr_gym.recordings.schema import Recording
 
-    _Task = tuple[Robot, Soil, Template | Recording | None, Setting, int, int, Path]
+    _Centre = tuple[Robot, Soil] | None
+    _Task = tuple[Robot, Soil, Template | Recording | None, Setting, int, int, Path, _Centre]
 
 EXAMPLES = (
     "ddagr null-bank --robot ddagr --soil thesis_a1 --output thresholds.json",
@@ -34,7 +35,8 @@ class Arguments:
 
     Each null drive follows the commands of the given recordings in a simulator of another structure (soil law, speed
     loop, relief, soil that varies from place to place) with the recordings' noise, and goes through the same refit and
-    scan as real drives. An interrupted bank goes on where it stopped.
+    scan as real drives. Soils are drawn about the nominal one, or about robot and soil as fitted to the recordings (a
+    bootstrap of the fitted nominal simulator). An interrupted bank goes on where it stopped.
 
     Attributes:
         runs: recordings of one robot, as `ddagr diagnose` takes them; without any, three drives of 60 s are drawn.
@@ -70,6 +72,7 @@ class Arguments:
 
 def run(arguments: Arguments) -> None:
     """Make what is missing of the bank, then write the thresholds."""
+    from ddagr_gym.diagnosis.fitted_nominal import fitted_nominal
     from ddagr_gym.diagnosis.noise import recording_noise
     from ddagr_gym.diagnosis.nuisance import NuisancePriors
     from ddagr_gym.diagnosis.null_bank import bank_hash, pieces_of, template_of
@@ -82,26 +85,39 @@ def run(arguments: Arguments) -> None:
         given = getattr(arguments, name)
         if given is not None and not given >= least:
             raise InputError(f"--{name} is {given:g}: give at least {least:g} s.")
+    if arguments.ordinary and not arguments.runs:
+        raise InputError("--ordinary takes recordings for null drives and none is given: name some, or leave it out.")
     robot, soil = get_robot(arguments.robot), get_soil(arguments.soil)
     recordings = [load_recording(path, arguments.map or None, arguments.robot) for path in arguments.runs]
     priors = NuisancePriors().with_soil(arguments.soil_uncertainty)
     setting = Setting(priors=priors).with_windows(arguments.window, arguments.stride)
     template: Template | None = None
+    centre: _Centre = None
     pieces: list[Recording] = []
     if arguments.ordinary:
         pieces = [piece for recording in recordings for piece in pieces_of(recording, arguments.piece)]
         template = template_of(pieces, (None,) * 8)
     elif recordings:
         template = template_of(recordings, recording_noise(recordings, wheel_radius(robot)))
+        centre = fitted_nominal(robot, soil, recordings, setting)
     drives: list[Template | Recording | None] = [*pieces] or [template] * arguments.count
-    bank = bank_hash(robot, soil, template, setting, len(drives), arguments.seed)
+    bank = bank_hash(robot, soil, template, setting, len(drives), arguments.seed, centre)
     folder = arguments.output.with_suffix(".bank")
     folder.mkdir(parents=True, exist_ok=True)
-    tasks = [(robot, soil, d, setting, arguments.seed, n, _part(folder, bank, n)) for n, d in enumerate(drives)]
-    _make([task for task in tasks if not task[-1].exists()], arguments.processes)
-    runs = [NullRun(**json.loads(task[-1].read_text())) for task in tasks]
-    save_thresholds(thresholds_from(runs, bank, duration=arguments.window), arguments.output)
+    paths = [_part(folder, bank, number) for number in range(len(drives))]
+    tasks = [(robot, soil, d, setting, arguments.seed, n, paths[n], centre) for n, d in enumerate(drives)]
+    _make([task for task in tasks if not paths[task[5]].exists()], arguments.processes)
+    runs = [NullRun(**json.loads(path.read_text())) for path in paths]
+    found = thresholds_from(runs, bank, duration=arguments.window, origin=_origin(arguments))
+    save_thresholds(found, arguments.output)
     print(f"{arguments.output}: thresholds of {len(runs)} null drives, bank {bank[:12]}")
+
+
+def _origin(arguments: Arguments) -> Origin:
+    from ddagr_gym.diagnosis.thresholds import Origin
+
+    kind: NullKind = "ordinary" if arguments.ordinary else "simulated"
+    return Origin(arguments.robot, arguments.soil, arguments.soil_uncertainty, arguments.seed, kind)
 
 
 def _part(folder: Path, bank: str, number: int) -> Path:
@@ -130,11 +146,11 @@ def _one(task: _Task) -> None:
     from ddagr_gym.diagnosis.structural_nulls import KINDS
     from ddagr_gym.recordings.schema import Recording
 
-    robot, soil, drives, setting, seed, number, path = task
+    robot, soil, drives, setting, seed, number, path, centre = task
     made: NullRun
     if isinstance(drives, Recording):
         made = scanned(robot, soil, [drives], f"real {Path(drives.meta.source).name}", setting)
     else:
-        made = null_run(robot, soil, drives, KINDS[number % len(KINDS)], setting, (seed, number))
+        made = null_run(robot, soil, drives, KINDS[number % len(KINDS)], setting, (seed, number), centre)
     with atomic_path(path) as part:
         part.write_text(json.dumps(asdict(made)))

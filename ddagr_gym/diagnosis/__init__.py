@@ -1,11 +1,13 @@
 """Which physics a nominal simulator leaves out, from recordings: where, what, how big, how sure, what else.
 
-    recordings -> held -> noise -> windows (setting, blocks) -> problem -> refit -> scores -> search -> verdict
-               -> certify (forecast, residual_model, certificate) -> localisation -> unnamed -> next_drive -> evidence
+    recordings -> data_checks -> held -> noise -> windows (setting, blocks) -> problem -> refit -> scores -> search
+               -> verdict -> certify (forecast, residual_model, certificate) -> localisation -> unnamed -> next_drive
+               -> evidence
 
 *pipeline* runs these steps, *store* keeps what is finished, *inputs* says what recordings need to have.
 
 Method (measured reasons in the study that the project follows)
+    *data_checks* clocks, signs, units and dead channels, as `ddagr check` judges them, before any physics.
     *noise*       level, growth with speed and colour of each channel from the recordings alone.
     *held*        repeated readings, found in the values; repeats count as missing samples afterwards. *flipped*: a
                   reversed gyro, found and mended in the same way, because first guesses come from its readings.
@@ -20,6 +22,8 @@ Method (measured reasons in the study that the project follows)
     *reread*      effects that act on readings only need no simulation of their own.
     *null_bank*   the same scan of drives from structurally different simulators (over *standard_drives* or given ones),
                   or of real drives that were ordinary; *thresholds* are its quantiles, with margins for strangers.
+                  Worlds are drawn about the nominal robot and soil, or, for a bank of given recordings, about those
+                  fitted to them (*fitted_nominal*, a parametric bootstrap).
                   They know how long its windows were, and a diagnosis cuts recordings in the same way: 6 s for the
                   DDAGR, in which side forces and drags show two to four times as much as in 2 s and null drives hardly
                   more; in 12 s the structure of the simulator shows as much as what is missing.

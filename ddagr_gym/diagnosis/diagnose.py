@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -141,7 +142,7 @@ def conclude(
         _detectable(found, thresholds),
         {p.name: float(v) for p, v in zip(problem.nuisances.parameters, values, strict=True) if p.prior > 0.0},
         tuple(recording.meta.source for recording in prepared.recordings),
-        {"nulls": thresholds.nulls, "bank": thresholds.bank, "level": thresholds.level},
+        _thresholds(thresholds),
         0.0,
         __version__,
         data=tuple(data_source(recording) for recording in prepared.recordings),
@@ -239,6 +240,13 @@ def _findings(problem: Problem, found: Found, thresholds: Thresholds, rng: np.ra
             )
         )
     return findings
+
+
+def _thresholds(thresholds: Thresholds) -> dict[str, Any]:
+    """Where the gates come from, and all of them."""
+    kind = {} if thresholds.origin is None else {"kind": thresholds.origin.kind}
+    gates = {name: gate.gain for name, gate in thresholds.gates.items()}
+    return {"nulls": thresholds.nulls, "bank": thresholds.bank, "level": thresholds.level, **kind, "gates": gates}
 
 
 def _detectable(found: Found, thresholds: Thresholds) -> dict[str, dict[str, float]]:

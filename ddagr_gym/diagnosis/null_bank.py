@@ -120,7 +120,13 @@ def _drive(
 
 
 def null_run(
-    robot: Robot, soil: Soil, template: Template | None, kind: str, setting: Setting, seed: Sequence[int]
+    robot: Robot,
+    soil: Soil,
+    template: Template | None,
+    kind: str,
+    setting: Setting,
+    seed: Sequence[int],
+    centre: tuple[Robot, Soil] | None = None,
 ) -> NullRun:
     """Refit and scan of one null world.
 
@@ -132,13 +138,16 @@ def null_run(
         kind: of KINDS.
         setting: of the diagnosis.
         seed: of this run alone.
+        centre: robot and soil about which worlds are drawn: the nominal ones by default, those fitted to the recordings
+            for a bootstrap of the fitted nominal simulator.
     """
     rng = np.random.default_rng(list(seed))
     if template is None:
         from ddagr_gym.diagnosis.standard_drives import standard_template
 
         template = standard_template(robot, rng)
-    return scanned(robot, soil, null_recordings(robot, soil, template, kind, rng), kind, setting)
+    drives = null_recordings(*((robot, soil) if centre is None else centre), template, kind, rng)
+    return scanned(robot, soil, drives, kind, setting)
 
 
 def scanned(robot: Robot, soil: Soil, recordings: Sequence[Recording], kind: str, setting: Setting) -> NullRun:
@@ -210,7 +219,15 @@ def cut(recording: Recording, first: int, last: int) -> Recording:
     )
 
 
-def bank_hash(robot: Robot, soil: Soil, template: Template | None, setting: Setting, count: int, seed: int) -> str:
+def bank_hash(
+    robot: Robot,
+    soil: Soil,
+    template: Template | None,
+    setting: Setting,
+    count: int,
+    seed: int,
+    centre: tuple[Robot, Soil] | None = None,
+) -> str:
     """Hash of everything that a bank depends on, the sources of the diagnosis and the simulator included."""
     from ddagr_gym.diagnosis.sources import source_digest
 
@@ -219,6 +236,7 @@ def bank_hash(robot: Robot, soil: Soil, template: Template | None, setting: Sett
     period = template.period if template else 0.0
     text = json.dumps([repr(robot), repr(soil), repr(setting), noise, period, count, seed], sort_keys=True)
     digest.update(text.encode())
+    digest.update(b"" if centre is None else repr(centre).encode())
     for commands in template.commands if template else ():
         digest.update(np.ascontiguousarray(commands).tobytes())
     return digest.hexdigest()

@@ -1,6 +1,6 @@
 """All steps of a diagnosis in their order, each kept when it is finished.
 
-windows -> search -> verdict -> certification -> localisation -> unnamed terms -> next drive -> evidence
+checks of the data -> search -> verdict -> certification -> localisation -> unnamed terms -> next drive -> evidence
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import numpy as np
 
 from ddagr_gym.diagnosis.certificate import worse_on_unseen
 from ddagr_gym.diagnosis.certify import certify
+from ddagr_gym.diagnosis.data_checks import DataDoubt, data_doubts, dead_channels
 from ddagr_gym.diagnosis.diagnose import Prepared, conclude, prepare, searched
 from ddagr_gym.diagnosis.evidence import Evidence, gather_evidence
 from ddagr_gym.diagnosis.held_spans import held_where
@@ -27,20 +28,20 @@ from ddagr_gym.diagnosis.next_drive import next_drive, rivals_of_diagnosis, sens
 from ddagr_gym.diagnosis.regimes import Unevenness
 from ddagr_gym.diagnosis.regimes_words import uneven_phrase
 from ddagr_gym.diagnosis.search import Found
-from ddagr_gym.diagnosis.sentences import headline, worse_in_words
+from ddagr_gym.diagnosis.sentences import dead_in_words, headline, worse_in_words
 from ddagr_gym.diagnosis.setting import Setting
 from ddagr_gym.diagnosis.sources import source_digest
 from ddagr_gym.diagnosis.store import StepStore
 from ddagr_gym.diagnosis.thresholds import Thresholds
 from ddagr_gym.diagnosis.unnamed import unnamed_terms
-from ddagr_gym.diagnosis.verdict import UNKNOWN, Diagnosis, as_mapping
+from ddagr_gym.diagnosis.verdict import NONE, UNKNOWN, Diagnosis, as_mapping
 from ddagr_gym.errors import InputError
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.reporting.wording import in_sentence
 
-STEPS = ("search", "verdict", "certification", "localisation", "unnamed terms", "next drive", "evidence")
+STEPS = ("checks", "search", "verdict", "certification", "localisation", "unnamed terms", "next drive", "evidence")
 """Names of the steps that are kept."""
 
 LATER = ("certification", "unnamed terms", "next drive")
@@ -64,6 +65,7 @@ class Task:
         setting: choices.
         seed: of everything random.
         names_only: leave out certification, unnamed terms and the next drive.
+        soil_name: of the nominal soil, for the report.
     """
 
     robot: Robot
@@ -73,6 +75,7 @@ class Task:
     setting: Setting
     seed: int = 0
     names_only: bool = False
+    soil_name: str = ""
 
     @property
     def steps(self) -> tuple[str, ...]:
@@ -140,6 +143,7 @@ def run(
         began_step(name)
         return store.step(name, work)
 
+    checks = step("checks", lambda: data_doubts(task.recordings, task.rng("checks")))
     nominal = (task.robot, task.soil, task.recordings)
     work = partial(searched, *nominal, task.thresholds, task.setting, progress, store.step)
     setting, found = step("search", work)
@@ -149,14 +153,27 @@ def run(
     fit = step("certification", lambda: _certified(task, prepared, found, diagnosis, progress))
     where = step("localisation", lambda: asdict(locate(prepared.problem, found)))
     held = held_where(task.recordings, prepared.held)
-    diagnosis = _doubted(diagnosis, found, where, {} if held is None else {"sensor_hold": asdict(held)}, fit)
+    diagnosis = _doubted(diagnosis, found, where, {} if held is None else {"sensor_hold": asdict(held)}, fit, checks)
     unnamed = step("unnamed terms", lambda: _unnamed(task, prepared, found, diagnosis))
     following = step("next drive", lambda: _next_drive(task, diagnosis, progress))
     evidence = step("evidence", lambda: gather_evidence(prepared.problem, found, task.thresholds))
     seconds = time.monotonic() - began
-    entries = {"fit": fit, "localisation": where, "unnamed": unnamed, "next_drive": following}
-    diagnosis = replace(diagnosis, seconds=seconds, **entries)
+    entries = {"fit": fit, "localisation": where, "unnamed": unnamed, "next_drive": following, "checks": checks}
+    diagnosis = replace(
+        diagnosis,
+        robot=task.robot.name,
+        soil=task.soil_name,
+        options=_options(task, setting),
+        seconds=seconds,
+        **entries,
+    )
     return Outcome(diagnosis, effects, prepared, found, evidence)
+
+
+def _options(task: Task, setting: Setting) -> dict[str, Any]:
+    """Choices that the answer depends on besides data, robot, soil and thresholds; windows as they were searched."""
+    windows = {"window": setting.duration, "stride": setting.stride, "block": setting.block}
+    return {**windows, "priors": asdict(setting.priors), "seed": task.seed, "names_only": task.names_only}
 
 
 def _doubted(
@@ -165,11 +182,12 @@ def _doubted(
     where: Mapping[str, Any],
     held: Mapping[str, Any],
     fit: Mapping[str, Any] | None = None,
+    checks: Sequence[DataDoubt] = (),
 ) -> Diagnosis:
     """Findings with their places, and what speaks against them.
 
-    The verdict is not the whole truth where a size is not the same everywhere, where much of the mismatch is left, or
-    where drives that nothing was fitted to are certainly predicted worse with it.
+    The verdict is not the whole truth where a size is not the same everywhere, where much of the mismatch is left,
+    where drives that nothing was fitted to are certainly predicted worse with it, or where a channel is dead.
     """
     located = {**where["findings"], **held}
     findings = tuple(replace(f, where=located.get(f.name)) for f in diagnosis.findings)
@@ -181,6 +199,9 @@ def _doubted(
     worse = worse_on_unseen(fit) if findings else None
     if worse is not None:
         doubts.append(worse_in_words(**worse))
+    dead = dead_channels(checks)
+    silent = [dead_in_words(dead)] if dead else []
+    doubts = silent if diagnosis.verdict in ((NONE,), (UNKNOWN,)) else [*doubts, *silent]
     share = explained_share(found.nominal.misfit, found.chosen.misfit, diagnosis.misfit["limit"]) if findings else None
     whole = diagnosis.complete and (share is None or share >= WHOLE)
     sentence = headline(diagnosis.verdict, whole, findings, share, doubts)

@@ -25,9 +25,9 @@ def headline(
         doubts: what speaks against it or is not of one size everywhere, in words.
     """
     if tuple(verdict) == (NONE,):
-        return "Nothing is missing that these recordings can show."
+        return "; ".join(["Nothing is missing that these recordings can show", *doubts]) + "."
     if tuple(verdict) == (UNKNOWN,):
-        return "Something is missing that no effect of the library explains."
+        return "; ".join(["Something is missing that no effect of the library explains", *doubts]) + "."
     found = _joined([describe(item.name, amounts(item.parameters)) for item in findings])
     share = "" if misfit_share is None else f"; {share_in_words(misfit_share)} of the mismatch"
     rest = "nothing else above what these data can show" if complete else "something more is left that has no name here"
@@ -55,6 +55,17 @@ def worse_in_words(horizon: float, value: float, interval: Sequence[float]) -> s
         f"drives that it was not fitted to are predicted worse with it, by {-100.0 * value:.0f} % ({span}) after "
         f"{horizon:g} s, which makes the name doubtful"
     )
+
+
+def dead_in_words(channels: Sequence[str]) -> str:
+    """That channels never change and so say nothing.
+
+    Args:
+        channels: at least one, by name.
+    """
+    names = " and ".join(", ".join(name.replace("_", " ") for name in channels).rsplit(", ", 1))
+    verb, pronoun = ("never change", "they say") if len(channels) > 1 else ("never changes", "it says")
+    return f"{names} {verb} while the robot drives, so that {pronoun} nothing"
 
 
 def _joined(parts: Sequence[str]) -> str:

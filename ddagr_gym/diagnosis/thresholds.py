@@ -11,7 +11,8 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Protocol
+from types import UnionType
+from typing import Literal, Protocol, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,6 +63,9 @@ SHORT_WINDOW = 2.0
 
 VERSION = 1
 
+NullKind = Literal["simulated", "ordinary"]
+"""What null drives are: simulated ones, or pieces of real drives in which nothing is wrong."""
+
 
 class Scores(Protocol):
     """What a scan says by effect."""
@@ -93,6 +97,47 @@ class Gate:
 
 
 @dataclass(frozen=True)
+class Origin:
+    """What a bank was made for, and of what.
+
+    Attributes:
+        robot: name of the nominal one.
+        soil: name of the nominal one.
+        soil_uncertainty: factor on how far the soil may be from the nominal one.
+        seed: of the bank.
+        kind: of its drives.
+    """
+
+    robot: str
+    soil: str
+    soil_uncertainty: float
+    seed: int
+    kind: NullKind
+
+    def mismatch(self, robot: str, soil: str, soil_uncertainty: float) -> str:
+        """Warning that a run is of something else, with the remedy; empty where it is not.
+
+        Args:
+            robot: of the run.
+            soil: of the run.
+            soil_uncertainty: of the run.
+        """
+        pairs = (
+            ("robot", self.robot, robot),
+            ("soil", self.soil, soil),
+            ("soil uncertainty", f"{self.soil_uncertainty:g}", f"{soil_uncertainty:g}"),
+        )
+        others = [f"{name} {own} instead of {given}" for name, own, given in pairs if own != given]
+        if not others:
+            return ""
+        options = f"--robot {robot} --soil {soil} --soil-uncertainty {soil_uncertainty:g}"
+        return (
+            f"the thresholds were made for {', '.join(others)}: make others with `ddagr null-bank RUN... {options}` "
+            "and give them as --thresholds."
+        )
+
+
+@dataclass(frozen=True)
 class Thresholds:
     """Gates by effect, and where they come from.
 
@@ -105,6 +150,7 @@ class Thresholds:
         maxima: of each null run, the largest gain over its gate, in increasing order.
         windows: of a null run, their median; 0 where unknown.
         duration: of these windows [s]; diagnoses with the thresholds cut recordings in the same way.
+        origin: of the bank; None where unknown.
     """
 
     gates: Mapping[str, Gate]
@@ -115,6 +161,7 @@ class Thresholds:
     maxima: tuple[float, ...] = ()
     windows: float = 0.0
     duration: float = SHORT_WINDOW
+    origin: Origin | None = None
 
     def for_length(self, seconds: float) -> Thresholds:
         """The same for recordings of another length.
@@ -200,7 +247,11 @@ class NullRun:
 
 
 def thresholds_from(
-    runs: Sequence[NullRun], bank: str, level: float = LEVEL, duration: float = SHORT_WINDOW
+    runs: Sequence[NullRun],
+    bank: str,
+    level: float = LEVEL,
+    duration: float = SHORT_WINDOW,
+    origin: Origin | None = None,
 ) -> Thresholds:
     """Gates such that the share ``level`` of null runs passes any of them, and strangers' nulls hardly more.
 
@@ -213,6 +264,7 @@ def thresholds_from(
         bank: hash of what they depend on.
         level: of false alarms over the whole library.
         duration: of the windows [s].
+        origin: of the bank.
 
     Raises:
         InputError: too few runs for the level.
@@ -231,7 +283,7 @@ def thresholds_from(
     maxima = np.sort((table / (widening * scale)).max(axis=1))
     windows = float(np.median([run.windows for run in runs]))
     limits = _misfit_limits(runs, level)
-    return Thresholds(gates, limits, len(runs), bank, level, tuple(maxima.tolist()), windows, duration)
+    return Thresholds(gates, limits, len(runs), bank, level, tuple(maxima.tolist()), windows, duration, origin)
 
 
 def _upper_mean(table: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -273,7 +325,7 @@ def load_thresholds(path: Path) -> Thresholds:
     """Read thresholds.
 
     Raises:
-        InputError: a file that is missing, no JSON, or of another version.
+        InputError: a file that is missing, no JSON, of another version, or with an origin that makes no sense.
     """
     try:
         body = json.loads(path.read_text())
@@ -293,7 +345,33 @@ def load_thresholds(path: Path) -> Thresholds:
         maxima,
         float(body.get("windows", 0.0)),
         float(body.get("duration", SHORT_WINDOW)),
+        _origin(body.get("origin"), path),
     )
+
+
+def _origin(entry: object, path: Path) -> Origin | None:
+    """Origin as it stands in a file; older ones have none."""
+    if entry is None:
+        return None
+    types: dict[str, type | UnionType] = {
+        "robot": str,
+        "soil": str,
+        "soil_uncertainty": int | float,
+        "seed": int,
+        "kind": str,
+    }
+    kinds = get_args(NullKind)
+    if (
+        not isinstance(entry, dict)
+        or entry.keys() != types.keys()
+        or not all(isinstance(entry[name], type_) for name, type_ in types.items())
+        or entry["kind"] not in kinds
+    ):
+        raise InputError(
+            f"the origin in {path} is not robot, soil, soil_uncertainty, seed and kind ({' or '.join(kinds)}): make "
+            "the file with `ddagr null-bank`."
+        )
+    return Origin(**entry)
 
 
 def shipped_thresholds(robot: str) -> Thresholds | None:

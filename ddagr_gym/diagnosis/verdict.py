@@ -10,10 +10,9 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from ddagr_gym.diagnosis.data_checks import DataDoubt
+from ddagr_gym.diagnosis.schema import SCHEMA, check_form
 from ddagr_gym.errors import InputError
-
-SCHEMA = "ddagr-diagnosis/2"
-"""Name and version of the JSON form: raised whenever an entry is renamed, removed or changes its meaning."""
 
 NONE = "none"
 UNKNOWN = "unknown"
@@ -93,7 +92,7 @@ class Diagnosis:
         detectable: least detectable distance from neutral by effect and field (None: none, however large).
         nuisances: refitted nominal parameters by name.
         recordings: names of the sources.
-        thresholds: where the gates come from: nulls, bank hash, level.
+        thresholds: nulls, hash and kind of the bank, level, and the gate of every effect.
         seconds: of the run.
         version: of the package.
         fit: errors of the models on drives that they were not fitted to (:mod:`ddagr_gym.diagnosis.certify`).
@@ -101,6 +100,10 @@ class Diagnosis:
         unnamed: terms without a name, with their equations, where the verdict is incomplete or unknown.
         next_drive: the drive that would tell the remaining rivals apart best.
         data: the recordings, with hashes.
+        robot: name of the nominal robot.
+        soil: name of the nominal soil.
+        options: windows, priors and seed, so that the same can be run again.
+        checks: what the recordings say is wrong with themselves (:mod:`ddagr_gym.diagnosis.data_checks`).
         schema: of this file.
     """
 
@@ -120,6 +123,10 @@ class Diagnosis:
     unnamed: Mapping[str, Any] | None = None
     next_drive: Mapping[str, Any] | None = None
     data: tuple[DataSource, ...] = ()
+    robot: str = ""
+    soil: str = ""
+    options: Mapping[str, Any] = field(default_factory=dict)
+    checks: tuple[DataDoubt, ...] = ()
     schema: str = SCHEMA
 
 
@@ -139,58 +146,6 @@ def _finite(value: Any) -> Any:
     return value
 
 
-_Kinds = Mapping[str, type | tuple[type, ...]]
-_NUMBER = (int, float)
-_MAYBE_MAPPING = (dict, type(None))
-_WORDS = {
-    str: "a text", bool: "true or false", int: "a whole number", float: "a number", list: "a list",
-    dict: "a mapping", type(None): "null",
-}  # fmt: skip
-_TYPES: _Kinds = {
-    "schema": str,
-    "verdict": list,
-    "complete": bool,
-    "findings": list,
-    "sentence": str,
-    "misfit": dict,
-    "detectable": dict,
-    "nuisances": dict,
-    "recordings": list,
-    "thresholds": dict,
-    "seconds": _NUMBER,
-    "version": str,
-    "fit": _MAYBE_MAPPING,
-    "localisation": _MAYBE_MAPPING,
-    "unnamed": _MAYBE_MAPPING,
-    "next_drive": _MAYBE_MAPPING,
-    "data": list,
-}
-_FINDING_TYPES: _Kinds = {
-    "name": str,
-    "parameters": dict,
-    "gain": _NUMBER,
-    "gate": _NUMBER,
-    "score": _NUMBER,
-    "held_out": _NUMBER,
-    "channels": dict,
-    "equivalence_set": dict,
-    "where": _MAYBE_MAPPING,
-    "calibrated_p": (*_NUMBER, type(None)),
-}
-_ESTIMATE_TYPES: _Kinds = {"value": _NUMBER, "unit": str, "interval": (list, type(None))}
-_DATA_TYPES: _Kinds = {"source": str, "sha256": str, "rows": int, "seconds": _NUMBER}
-_FIT_TYPES: _Kinds = {
-    "folds": str,
-    "note": str,
-    "horizons": list,
-    "level": _NUMBER,
-    "channels": dict,
-    "gain_share": dict,
-}
-_MODELS = ("raw", "refitted", "corrected", "black_box", "ceiling")
-_ERROR_TYPES: _Kinds = {"unit": str, "count": int, **dict.fromkeys(_MODELS, dict)}
-
-
 def validate(mapping: Mapping[str, Any]) -> None:
     """Check a mapping against the schema.
 
@@ -201,46 +156,16 @@ def validate(mapping: Mapping[str, Any]) -> None:
 
     if mapping.get("schema") != SCHEMA:
         raise InputError(f"the diagnosis has schema {mapping.get('schema')!r}: this version reads {SCHEMA!r}.")
-    _check_types("the diagnosis", mapping, _TYPES)
+    check_form(mapping)
     known = {NONE, UNKNOWN, *effect_kinds()}
     wrong = [name for name in mapping["verdict"] if name not in known]
     if wrong or not mapping["verdict"]:
         raise InputError(
             f"the diagnosis has the verdict {mapping['verdict']!r}: give names of effects, none or unknown."
         )
-    for finding in mapping["findings"]:
-        place = f"finding {finding.get('name')!r}"
-        _check_types(place, finding, _FINDING_TYPES)
-        for name, estimate in finding["parameters"].items():
-            _check_types(f"{place}, {name}", estimate, _ESTIMATE_TYPES)
-    for number, source in enumerate(mapping["data"]):
-        _check_types(f"data {number + 1}", source, _DATA_TYPES)
-    _check_fit(mapping["fit"])
     named = [finding["name"] for finding in mapping["findings"]]
     if mapping["verdict"] not in ([NONE], [UNKNOWN]) and sorted(named) != sorted(mapping["verdict"]):
         raise InputError(f"the diagnosis names {mapping['verdict']!r} and has findings on {named!r}: make them agree.")
-
-
-def _check_fit(fit: Mapping[str, Any] | None) -> None:
-    """Errors at horizons; InputError for what is missing or of a wrong type."""
-    if fit is None:
-        return
-    _check_types("the fit", fit, _FIT_TYPES)
-    for channel, by_horizon in fit["channels"].items():
-        for horizon, entry in by_horizon.items():
-            place = f"the fit of {channel} after {horizon} s"
-            _check_types(place, entry, _ERROR_TYPES)
-            for model in _MODELS:
-                _check_types(f"{place}, {model}", entry[model], {"value": _NUMBER, "interval": (list, type(None))})
-
-
-def _check_types(place: str, mapping: Mapping[str, Any], kinds: _Kinds) -> None:
-    for key, kind in kinds.items():
-        if key not in mapping:
-            raise InputError(f"{place} has no entry {key!r}: make it again with `ddagr diagnose`.")
-        if not isinstance(mapping[key], kind):
-            words = " or ".join(_WORDS[k] for k in (kind if isinstance(kind, tuple) else (kind,)))
-            raise InputError(f"{place} has {key} = {mapping[key]!r}: give {words}.")
 
 
 def save(diagnosis: Diagnosis, path: Path) -> None:

@@ -30,6 +30,16 @@ _MOST_SPANS = 8
 
 _MIDDLE = 5.0  # [s] the horizon that stands for all
 
+_JUDGED = {
+    "by recording": "Errors on each recording, by models whose sizes were fitted to the others",
+    "by time": "Errors on each half of the one recording, by models whose sizes were fitted to the other half",
+}
+
+_NULLS = {
+    "simulated": "simulated drives with nothing missing, made by structurally different simulators,",
+    "ordinary": "pieces of real drives that are taken to be ordinary,",
+}
+
 
 def tiles(diagnosis: Entry, seconds: float) -> list[dict[str, str]]:
     """The few numbers under the headline.
@@ -51,7 +61,7 @@ def tiles(diagnosis: Entry, seconds: float) -> list[dict[str, str]]:
         found.insert(1, {"value": percent(explained), "label": "of the mismatch above the noise explained"})
     if shares:
         horizon, share = shares[0]
-        label = f"of what is explicable on unseen drives, {horizon:g} s ahead"
+        label = f"of what is explicable where no size was fitted, {horizon:g} s ahead"
         found.insert(2, {"value": percent(share["value"]), "label": label})
     return found
 
@@ -59,6 +69,16 @@ def tiles(diagnosis: Entry, seconds: float) -> list[dict[str, str]]:
 def percent(share: float) -> str:
     """A share in percent."""
     return f"{100.0 * share:.0f} %"
+
+
+def checks(items: Sequence[Entry] | None) -> list[dict[str, str]]:
+    """What is wrong with the data themselves: where, and in words."""
+    found = []
+    for item in items or []:
+        recording = str(item.get("recording") or "Several recordings together")
+        place = f"{recording}, {item['channel']}" if item.get("channel") else recording
+        found.append({"place": place, "sentence": str(item["sentence"])})
+    return found
 
 
 def phrase(where: Entry | None) -> str:
@@ -175,10 +195,8 @@ def gate_note(thresholds: Entry) -> str:
     nulls, level = thresholds.get("nulls") or 0, thresholds.get("level")
     if not nulls or level is None:
         return "no null drives stand behind it here."
-    return (
-        f"of {nulls} simulated drives with nothing missing, made by structurally different simulators, "
-        f"{percent(level)} pass any gate."
-    )
+    drives = _NULLS.get(str(thresholds.get("kind")), "null drives")
+    return f"set by {nulls} {drives} at a level of {percent(level)} false alarms over the whole library."
 
 
 def wrench_rows(localisation: Entry) -> list[list[str]]:
@@ -202,7 +220,9 @@ def fit_table(fit: Entry) -> dict[str, Any]:
             cells = [_error(arms.get(arm)) for arm in ("raw", "refitted", "corrected", "ceiling")]
             rows.append([f"{name} after {float(horizon):g} s [{unit}]", *cells])
     gain = ", ".join(_share_text(*item) for item in sorted(_gain_shares(fit)))
-    return {"rows": rows, "folds": fit.get("folds") or "by recording", "gain": gain}
+    judged = _JUDGED.get(str(fit.get("folds")), "Errors where the models' sizes were not fitted")
+    note = fit.get("note") or "Which effects are in the model was decided on all recordings."
+    return {"rows": rows, "judged": judged, "note": str(note), "gain": gain}
 
 
 def _gain_shares(fit: Entry) -> list[tuple[float, Entry]]:
@@ -228,22 +248,24 @@ def _error(item: Entry | None) -> str:
 
 
 def unnamed(item: Entry | None) -> dict[str, Any] | None:
-    """The unnamed term as text."""
-    if not item or not item.get("equation"):
+    """What has no name as text; its equation is "" where none was stable."""
+    if not item:
         return None
-    rows = []
-    for term in item.get("terms") or []:
-        interval = term.get("interval")
-        span = "–" if not interval else f"{number(interval[0])} to {number(interval[1])}"
-        stability = "–" if term.get("stability") is None else percent(term["stability"])
-        rows.append([term["regressor"], term["target"], number(term["coefficient"], 3), span, term["unit"], stability])
-    share = item.get("ceiling_share")
+    equation, place, share = item.get("equation") or "", item.get("where") or "", item.get("ceiling_share")
+    acts = "Where it acts most" if equation else "Where most is left"
     return {
-        "equation": item["equation"],
-        "where": item.get("where") or "",
-        "rows": rows,
+        "equation": equation,
+        "where": f"{acts}: {place}." if place else "",
+        "rows": [_term_row(term) for term in item.get("terms") or []],
         "ceiling": "" if share is None else percent(share),
     }
+
+
+def _term_row(term: Entry) -> list[str]:
+    interval = term.get("interval")
+    span = "–" if not interval else f"{number(interval[0])} to {number(interval[1])}"
+    stability = "–" if term.get("stability") is None else percent(term["stability"])
+    return [term["regressor"], term["target"], number(term["coefficient"], 3), span, term["unit"], stability]
 
 
 def next_drive(item: Entry | None) -> dict[str, Any] | None:
@@ -266,8 +288,20 @@ def _alternative(other: Any) -> str:
     return str(name).replace("_", " ")
 
 
-def detectable(table: Mapping[str, Mapping[str, float | None]]) -> list[dict[str, str]]:
-    """Least sizes by effect and field."""
+def shown_gates(diagnosis: Entry) -> Mapping[str, float]:
+    """Gates by effect where no finding shows its own; empty elsewhere."""
+    return {} if diagnosis.get("findings") else diagnosis["thresholds"].get("gates") or {}
+
+
+def detectable(
+    table: Mapping[str, Mapping[str, float | None]], gates: Mapping[str, float] | None = None
+) -> list[dict[str, str]]:
+    """Least sizes by effect and field, beside the effect's gate.
+
+    Args:
+        table: entry ``detectable`` of ``diagnosis.json``.
+        gates: gains by effect; "–" stands for one that is not among them.
+    """
     from ddagr_gym.physics.effects.registry import effect_kinds
 
     rows = []
@@ -277,7 +311,8 @@ def detectable(table: Mapping[str, Mapping[str, float | None]]) -> list[dict[str
             unit = str(kind.parameter(key).metadata["unit"]) if kind and key in kind.size_names() else "-"
             amount = Amount(value, unit) if value is not None and math.isfinite(value) else None
             field = "" if len(sizes) == 1 else f", {key.replace('_', ' ')}"
-            rows.append({"title": f"{title(name)}{field}", "size": _detectable_size(kind, amount)})
+            gate = number((gates or {}).get(name, math.nan), 3)
+            rows.append({"title": f"{title(name)}{field}", "size": _detectable_size(kind, amount), "gate": gate})
     return rows
 
 
@@ -296,7 +331,7 @@ def sources(diagnosis: Entry) -> list[tuple[str, str]]:
     rows = [(str(item["source"]), f"{item['seconds']:.0f} s, SHA-256 {item['sha256']}") for item in data]
     rows = rows or [("Recordings", ", ".join(diagnosis["recordings"]))]
     for label, key in (("Hash of the data", "data_hash"), ("Robot", "robot"), ("Soil", "soil"), ("Seed", "seed")):
-        if diagnosis.get(key) is not None:
+        if diagnosis.get(key) not in (None, ""):
             rows.append((label, str(diagnosis[key])))
     rows += [
         ("Gates", f"{thresholds.get('nulls', 0)} null drives, level {thresholds.get('level', '–')}"),

@@ -7,6 +7,8 @@ import pytest
 from ddagr_gym.cli import main
 from ddagr_gym.commands.next_drive import answer_text
 from ddagr_gym.control.manoeuvres import MANOEUVRES
+from ddagr_gym.diagnosis.verdict import Diagnosis, Estimate, Finding, save
+from ddagr_gym.presets import get_soil
 
 
 @pytest.fixture
@@ -44,3 +46,32 @@ def test_bad_input_is_one_sentence(capsys, arguments, words):
 def test_an_answer_of_nothing_is_its_sentence():
     nothing = {"manoeuvre": "", "why": "No manoeuvre helps.", "alternatives": []}
     assert answer_text(nothing) == "No manoeuvre helps."
+
+
+def test_a_diagnosis_knows_its_robot_and_soil(tmp_path, monkeypatch, capsys):
+    """Planned for another robot unless it is asked for."""
+    planned = []
+
+    def plan(robot, soil, rivals, **rest):
+        planned.append((robot.name, soil, [rival.name for rival in rivals]))
+        return {"manoeuvre": "", "why": "No manoeuvre helps.", "alternatives": []}
+
+    monkeypatch.setattr("ddagr_gym.diagnosis.next_drive.next_drive", plan)
+    finding = Finding(
+        "slope", {"angle": Estimate(0.02, "rad"), "direction": Estimate(0.3, "rad")}, 30.0, 8.0, 4.0, 20.0,
+        equivalence_set={"slope": 0.6, "accelerometer_bias": 0.4},
+    )  # fmt: skip
+    bank = {"nulls": 60, "bank": "f", "level": 0.05, "gates": {}}
+    found = Diagnosis(
+        ("slope",), True, (finding,), "It slopes.", {"nominal": {"yaw_rate": 2.0}}, {}, {}, ("a.csv",), bank, 1.0, "0",
+        robot="warthog", soil="firm_ground",
+    )  # fmt: skip
+    save(found, tmp_path / "diagnosis.json")
+    assert main(["next-drive", str(tmp_path)]) == 0
+    assert main(["next-drive", str(tmp_path), "--robot", "husky", "--soil", "thesis_a1"]) == 0
+    rivals = ["slope", "accelerometer_bias"]
+    assert planned == [
+        ("warthog", get_soil("firm_ground"), rivals),
+        ("husky", get_soil("thesis_a1"), rivals),
+    ]
+    assert "No manoeuvre helps." in capsys.readouterr().out

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from ddagr_gym.cli import main
+from ddagr_gym.commands.diagnose import Arguments, _thresholds
 from ddagr_gym.diagnosis import null_bank
-from ddagr_gym.diagnosis.thresholds import NullRun, load_thresholds
+from ddagr_gym.diagnosis.thresholds import NullRun, Origin, load_thresholds
+from ddagr_gym.presets import get_robot, get_soil
+from ddagr_gym.recordings.schema import Recording
+from ddagr_gym.recordings.storage import save_parquet
 from ddagr_gym.replay.windows import CHANNELS
 
 
@@ -21,13 +26,21 @@ def quick_nulls(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
     def null_run(robot, soil, template, kind, setting, seed, *more, **options):  # type: ignore[no-untyped-def]
         made.append(seed[-1])
-        rng = np.random.default_rng(list(seed))
-        gains = {"slope": float(rng.exponential(300.0)), "payload": float(rng.exponential(100.0))}
-        misfit = {name: float(rng.uniform(0.9, 1.1)) for name in CHANNELS}
-        return NullRun(kind, gains, dict.fromkeys(gains, 1.0), dict.fromkeys(gains, 0.5), misfit)
+        return drawn(kind, list(seed))
+
+    def scanned(robot, soil, recordings, kind, setting):  # type: ignore[no-untyped-def]
+        return drawn(kind, [len(recordings)])
 
     monkeypatch.setattr(null_bank, "null_run", null_run)
+    monkeypatch.setattr(null_bank, "scanned", scanned)
     return made
+
+
+def drawn(kind: str, seed: list[int]) -> NullRun:
+    rng = np.random.default_rng(seed)
+    gains = {"slope": float(rng.exponential(300.0)), "payload": float(rng.exponential(100.0))}
+    misfit = {name: float(rng.uniform(0.9, 1.1)) for name in CHANNELS}
+    return NullRun(kind, gains, dict.fromkeys(gains, 1.0), dict.fromkeys(gains, 0.5), misfit)
 
 
 def words(folder: Path, count: int = 20) -> list[str]:
@@ -74,3 +87,80 @@ def test_windows_and_strides_that_are_too_short_are_refused(
 def test_thresholds_know_their_windows(quick_nulls: list[int], tmp_path: Path) -> None:
     assert main([*words(tmp_path), "--window", "4"]) == 0
     assert load_thresholds(tmp_path / "thresholds.json").duration == 4.0
+
+
+def test_thresholds_know_their_origin(quick_nulls: list[int], tmp_path: Path) -> None:
+    options = ["--robot", "husky", "--soil", "firm_ground", "--soil-uncertainty", "2.5", "--seed", "7"]
+    assert main([*words(tmp_path), *options]) == 0
+    origin = load_thresholds(tmp_path / "thresholds.json").origin
+    assert origin == Origin("husky", "firm_ground", 2.5, 7, "simulated")
+
+
+def test_thresholds_of_ordinary_drives_say_so(quick_nulls: list[int], tmp_path: Path) -> None:
+    count = 6000  # 60 s
+    columns = {name: np.linspace(0.0, 1.0, count) for name in ("command_right", "command_left", "yaw_rate")}
+    columns["t"] = 0.01 * np.arange(1, count + 1)
+    save_parquet(Recording.from_columns(columns, get_robot("ddagr")), tmp_path / "run.parquet")
+    ordinary = [str(tmp_path / "run.parquet"), "--ordinary", "--piece", "1"]
+    assert main([*words(tmp_path), *ordinary]) == 0
+    assert quick_nulls == []
+    assert load_thresholds(tmp_path / "thresholds.json").origin == Origin("ddagr", "thesis_a1", 1.0, 0, "ordinary")
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({}, ""),
+        ({"robot": "husky"}, "robot ddagr instead of husky"),
+        ({"soil": "firm_ground"}, "soil thesis_a1 instead of firm_ground"),
+        ({"soil_uncertainty": 4.0}, "soil uncertainty 1 instead of 4"),
+    ],
+)
+def test_a_diagnosis_of_something_else_is_warned(
+    changes: dict[str, Any], said: str, quick_nulls: list[int], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(words(tmp_path)) == 0
+    path = tmp_path / "thresholds.json"
+    capsys.readouterr()
+    given = _thresholds(Arguments((), tmp_path / "found", thresholds=path, **changes))
+    assert given == load_thresholds(path)
+    error = capsys.readouterr().err
+    assert said in error
+    assert error.count("\n") == bool(said)
+    assert error.startswith("ddagr: warning: " if said else "")
+
+
+def test_a_diagnosis_with_the_shipped_thresholds_is_warned_too(capsys: pytest.CaptureFixture[str]) -> None:
+    _thresholds(Arguments((), Path("found"), robot="warthog"))
+    assert "soil firm_ground instead of thesis_a1, soil uncertainty 4 instead of 1" in capsys.readouterr().err
+    _thresholds(Arguments((), Path("found"), robot="warthog", soil="firm_ground", soil_uncertainty=4.0))
+    _thresholds(Arguments((), Path("found")))
+    assert capsys.readouterr().err == ""
+
+
+def test_ordinary_drives_are_asked_for(tmp_path, capsys):
+    assert main(["null-bank", "--ordinary", "--output", str(tmp_path / "thresholds.json")]) == 2
+    assert "--ordinary takes recordings" in capsys.readouterr().err
+    assert not any(tmp_path.iterdir())
+
+
+def test_banks_of_given_drives_are_drawn_about_the_nominal_model_that_fits_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    about: list[Any] = []
+    centre = (get_robot("ddagr"), get_soil("firm_ground"))
+
+    def null_run(robot, soil, template, kind, setting, seed, middle):  # type: ignore[no-untyped-def]
+        about.append(middle)
+        return drawn(kind, list(seed))
+
+    monkeypatch.setattr(null_bank, "null_run", null_run)
+    monkeypatch.setattr("ddagr_gym.diagnosis.fitted_nominal.fitted_nominal", lambda *given: centre)
+    columns = {name: np.linspace(0.0, 1.0, 3000) for name in ("command_right", "command_left", "yaw_rate")}
+    columns["t"] = 0.01 * np.arange(1, 3001)
+    save_parquet(Recording.from_columns(columns, get_robot("ddagr")), tmp_path / "run.parquet")
+    assert main([*words(tmp_path), str(tmp_path / "run.parquet")]) == 0
+    assert about == [centre] * 20
+    about.clear()
+    assert main(words(tmp_path)) == 0
+    assert about == [None] * 20

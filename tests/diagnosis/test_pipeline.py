@@ -12,13 +12,14 @@ from ddagr_gym.diagnosis.regimes import Unevenness
 from ddagr_gym.diagnosis.verdict import Diagnosis, Estimate, Finding, as_mapping, validate
 
 MISFIT = {"yaw_rate": 4.0}
+BANK = {"nulls": 60, "bank": "f", "level": 0.05, "gates": {}}
 FOUND: Any = SimpleNamespace(nominal=SimpleNamespace(misfit=MISFIT), chosen=SimpleNamespace(misfit={"yaw_rate": 0.9}))
 
 
 def diagnosis(name: str, field: str, value: float, complete: bool = True) -> Diagnosis:
     finding = Finding(name, {field: Estimate(value, "s")}, 50.0, 10.0, 5.0, 40.0, equivalence_set={name: 1.0})
     limits = {"nominal": MISFIT, "corrected": {"yaw_rate": 0.9}, "limit": {"yaw_rate": 1.2}}
-    return Diagnosis((name,), complete, (finding,), "", limits, {}, {}, ("a.csv",), {}, 1.0, "0")
+    return Diagnosis((name,), complete, (finding,), "", limits, {}, {}, ("a.csv",), BANK, 1.0, "0")
 
 
 def where(uneven: Unevenness | None = None) -> dict[str, Any]:

@@ -1,5 +1,6 @@
 """Thresholds let the stated share of null runs pass, over the whole library."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -16,10 +17,12 @@ from ddagr_gym.diagnosis.thresholds import (
     UNMISTAKABLE,
     Gate,
     NullRun,
+    Origin,
     Thresholds,
     default_thresholds,
     load_thresholds,
     save_thresholds,
+    shipped_thresholds,
     thresholds_from,
 )
 from ddagr_gym.errors import InputError
@@ -115,3 +118,81 @@ def test_file_returns_what_was_saved(tmp_path: Path) -> None:
     (tmp_path / "bad.json").write_text("{}")
     with pytest.raises(InputError, match="null-bank"):
         load_thresholds(tmp_path / "bad.json")
+
+
+ORIGIN = Origin("warthog", "firm_ground", 4.0, 3, "ordinary")
+
+
+def test_file_returns_the_origin(tmp_path: Path) -> None:
+    thresholds = thresholds_from(null_runs(40, 1), "abc", origin=ORIGIN)
+    save_thresholds(thresholds, tmp_path / "t.json")
+    assert load_thresholds(tmp_path / "t.json").origin == ORIGIN
+    assert thresholds.raised(1.0).for_length(60.0).origin == ORIGIN
+
+
+def with_origin(path: Path, entry: object) -> Path:
+    """File of thresholds with an entry in place of its origin."""
+    save_thresholds(thresholds_from(null_runs(40, 1), "abc", origin=ORIGIN), path)
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"origin": entry}))
+    return path
+
+
+def test_file_without_an_origin_loads(tmp_path: Path) -> None:
+    path = with_origin(tmp_path / "t.json", None)
+    assert load_thresholds(path).origin is None
+    body = json.loads(path.read_text())
+    del body["origin"]
+    path.write_text(json.dumps(body))
+    assert load_thresholds(path).origin is None
+
+
+GOOD = {"robot": "warthog", "soil": "firm_ground", "soil_uncertainty": 4, "seed": 3, "kind": "ordinary"}
+
+
+@pytest.mark.parametrize(
+    "entry",
+    [
+        "warthog",
+        [],
+        {},
+        {"robot": "warthog"},
+        GOOD | {"more": 1},
+        GOOD | {"robot": None},
+        GOOD | {"seed": "3"},
+        GOOD | {"soil_uncertainty": "4"},
+        GOOD | {"kind": "drawn"},
+    ],
+)
+def test_malformed_origin_is_refused(tmp_path: Path, entry: object) -> None:
+    assert load_thresholds(with_origin(tmp_path / "good.json", GOOD)).origin == ORIGIN
+    with pytest.raises(InputError, match=r"origin in .*bad\.json .*null-bank"):
+        load_thresholds(with_origin(tmp_path / "bad.json", entry))
+
+
+@pytest.mark.parametrize(
+    ("run", "said"),
+    [
+        (("husky", "firm_ground", 4.0), "robot warthog instead of husky"),
+        (("warthog", "thesis_a1", 4.0), "soil firm_ground instead of thesis_a1"),
+        (("warthog", "firm_ground", 1.0), "soil uncertainty 4 instead of 1"),
+        (("husky", "firm_ground", 1.5), "robot warthog instead of husky, soil uncertainty 4 instead of 1.5"),
+    ],
+)
+def test_mismatch_says_both_values_and_the_remedy(run: tuple[str, str, float], said: str) -> None:
+    warning = ORIGIN.mismatch(*run)
+    assert f" made for {said}: " in warning
+    robot, soil, soil_uncertainty = run
+    remedy = f"ddagr null-bank RUN... --robot {robot} --soil {soil} --soil-uncertainty {soil_uncertainty:g}`"
+    assert remedy in warning
+
+
+def test_match_says_nothing() -> None:
+    assert ORIGIN.mismatch("warthog", "firm_ground", 4) == ""
+
+
+def test_shipped_banks_say_what_they_were_made_for() -> None:
+    found = [thresholds.origin for robot in ("ddagr", "warthog") if (thresholds := shipped_thresholds(robot))]
+    assert found == [
+        Origin("ddagr", "thesis_a1", 1.0, 0, "simulated"),
+        Origin("warthog", "firm_ground", 4.0, 0, "ordinary"),
+    ]

@@ -6,14 +6,19 @@ from pathlib import Path
 
 import pytest
 
+from ddagr_gym.diagnosis.data_checks import DataDoubt
 from ddagr_gym.diagnosis.verdict import DataSource, Diagnosis, Estimate, Finding, load, save
 from ddagr_gym.errors import InputError
 
 FINDING = Finding("slope", {"angle": Estimate(0.05, "rad", (0.04, 0.06))}, 30.0, 8.0, 4.0, 20.0)
 GOOD = Diagnosis(
     ("slope",), True, (FINDING,), "Missing.", {"nominal": {"yaw_rate": 2.0}}, {"slope": {"angle": float("inf")}},
-    {"mass": 0.0}, ("a.csv",), {"nulls": 60}, 1.0, "0",
+    {"mass": 0.0}, ("a.csv",), {"nulls": 60, "bank": "f", "level": 0.05, "gates": {"slope": 8.0}}, 1.0, "0",
 )  # fmt: skip
+
+WHERE = {"spans": [], "time_share": 1.0, "regimes": [], "places": [], "uneven": None, "phrase": "everywhere"}
+NEXT = {"manoeuvre": "arcs", "why": "It turns.", "separates": [], "power": 0.1, "minutes": None, "alternatives": []}
+UNNAMED = {"equation": "", "terms": [], "equation_share": 0.0, "ceiling_share": 0.2, "where": "everywhere"}
 
 
 def test_saved_and_loaded(tmp_path: Path) -> None:
@@ -44,14 +49,20 @@ def test_another_schema_is_refused(tmp_path: Path) -> None:
 
 def test_what_later_steps_add_is_kept(tmp_path: Path) -> None:
     source = DataSource("a.csv", "0" * 64, 1200, 23.98)
-    finding = replace(FINDING, where={"phrase": "everywhere"}, calibrated_p=0.02)
-    full = replace(GOOD, findings=(finding,), data=(source,), next_drive={"manoeuvre": "arcs"}, unnamed={"terms": ()})
+    finding = replace(FINDING, where=WHERE, calibrated_p=0.02)
+    doubt = DataDoubt("a.csv", "yaw_rate", "stuck", "It never changes.", ("sensor_hold",))
+    full = replace(
+        GOOD, findings=(finding,), data=(source,), next_drive=NEXT, unnamed=UNNAMED, robot="warthog", soil="sandy_loam",
+        checks=(doubt,), options={"seed": 3},
+    )  # fmt: skip
     save(full, tmp_path / "d.json")
     found = load(tmp_path / "d.json")
     assert found["data"] == [{"source": "a.csv", "sha256": "0" * 64, "rows": 1200, "seconds": 23.98}]
-    assert found["findings"][0]["where"] == {"phrase": "everywhere"}
+    assert found["findings"][0]["where"] == WHERE
     assert found["findings"][0]["calibrated_p"] == 0.02
-    assert found["next_drive"] == {"manoeuvre": "arcs"}
+    assert found["next_drive"] == NEXT
+    assert (found["robot"], found["soil"], found["options"]) == ("warthog", "sandy_loam", {"seed": 3})
+    assert found["checks"][0]["suspects"] == ["sensor_hold"]
     assert found["fit"] is None
 
 
@@ -63,6 +74,12 @@ def test_what_later_steps_add_is_kept(tmp_path: Path) -> None:
         ({"findings": (replace(FINDING, where="somewhere"),)}, "finding 'slope' has where"),
         ({"findings": (replace(FINDING, parameters={"angle": {"value": 0.1}}),)}, "angle has no entry 'unit'"),
         ({"data": (DataSource("a.csv", "0", "many", 1.0),)}, "data 1 has rows"),
+        ({"next_drive": {"manoeuvre": "arcs"}}, "next_drive has no entry 'why'"),
+        ({"unnamed": UNNAMED | {"terms": [{"regressor": "v"}]}}, "unnamed, terms, item 1 has no entry 'target'"),
+        ({"detectable": {"slope": {"angle": "small"}}}, "detectable, slope has angle = 'small'"),
+        ({"detectable": {"slope": {"angle": True}}}, "angle = True: give a number or null"),
+        ({"thresholds": {"nulls": 60}}, "thresholds has no entry 'bank'"),
+        ({"localisation": {"channels": {}}}, "localisation has no entry 'explained'"),
     ],
 )
 def test_wrong_entries_are_named(tmp_path: Path, change: dict, words: str) -> None:

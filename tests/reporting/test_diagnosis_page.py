@@ -6,10 +6,21 @@ import re
 import numpy as np
 import pytest
 
+from ddagr_gym.physics.effects.registry import effect_kinds
 from ddagr_gym.replay.windows import CHANNELS
 from ddagr_gym.reporting.diagnosis_figures import MOST_BARS, MOST_POINTS, _bars, channel_figure, thinned
 from ddagr_gym.reporting.diagnosis_page import PAGE, PICTURES, _Studio, write_report
-from ddagr_gym.reporting.diagnosis_tables import detectable, fit_table, gate_note, regime_rows, tiles
+from ddagr_gym.reporting.diagnosis_tables import (
+    checks,
+    detectable,
+    fit_table,
+    gate_note,
+    regime_rows,
+    shown_gates,
+    sources,
+    tiles,
+    unnamed,
+)
 from ddagr_gym.reporting.evidence import Evidence
 from ddagr_gym.reporting.figures import house_style
 
@@ -76,7 +87,8 @@ def later_entries():
     wrench = {"component": "F_x", "unit": "N", "before": 9.0, "after": 0.1, "deviation": 1.0, "chi_before": 9.0}
     return {
         "fit": {
-            "folds": "by recording", "horizons": [1.0, 30.0], "gain_share": {
+            "folds": "by recording", "note": f"Decided on all drives of {HOSTILE}.", "horizons": [1.0, 30.0],
+            "gain_share": {
                 "1": None, "30": {"value": 0.91, "interval": [0.85, 0.95]},
             },
             "channels": {"yaw_rate": {"1.0": arms | {"unit": "rad/s"}, "30.0": {"raw": None, "unit": "rad/s"}}},
@@ -94,6 +106,7 @@ def later_entries():
             "manoeuvre": "square_both_ways", "why": "Gravity turns.", "separates": [["slope", "accelerometer_bias"]],
             "power": 0.97, "alternatives": [{"manoeuvre": "spin"}],
         },
+        "checks": [{"recording": "run_2.csv", "channel": HOSTILE, "finding": "stuck", "sentence": "It never changes."}],
         "data": [{"source": HOSTILE, "sha256": "f" * 64, "rows": 600, "seconds": 12.0}],
     }  # fmt: skip
 
@@ -113,13 +126,14 @@ def page(folder):
 
 def test_the_share_of_what_is_explicable_is_said_with_its_horizon(page):
     assert "91 % (85 % to 95 %) after 30 s" in page
-    assert "of what is explicable on unseen drives, 30 s ahead" in page
+    assert "of what is explicable where no size was fitted, 30 s ahead" in page
 
 
 def test_the_answer_comes_first_and_every_section_is_there(page):
     headings = re.findall(r"<h[12]>(.*?)</h[12]>", page)
     assert headings[0] == "The ground slopes 3.7 ± 0.3 degrees."
-    assert len(headings) == len(set(headings)) == 13
+    assert headings[1] == "The recordings themselves"
+    assert len(headings) == len(set(headings)) == 14
     for words in (
         "slopes 3.7 ± 0.3 degrees, rising towards 32 ± 3 degrees", "uphill", "71 %", "square both ways",
         "sloping ground from accelerometer bias", "over the closest other explanation by 0.97",
@@ -186,7 +200,10 @@ def test_later_steps_may_be_absent(tmp_path):
     object.__setattr__(empty, "gates", np.full(2, np.nan))
     write_report(tmp_path, bare, empty)
     text = (tmp_path / PAGE).read_text()
-    for absent in ("What to drive next", "What has no name", "has not seen", "When it shows", "could have shown"):
+    for absent in (
+        "What to drive next", "What has no name", "not fitted to", "When it shows", "could have shown",
+        "recordings themselves",
+    ):  # fmt: skip
         assert absent not in text
     assert "No regime stands out" in text
 
@@ -199,6 +216,95 @@ def test_the_same_evidence_gives_the_same_picture(tmp_path):
         ]
     assert twice[0] == twice[1]
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+
+
+def test_the_note_on_the_fit_stands_above_its_errors(page):
+    section = page[page.index("How well it predicts what its sizes were not fitted to") :]
+    words = (
+        "on each recording, by models whose sizes were fitted to the others",
+        "Decided on all drives of &lt;script",
+    )
+    assert section.index(words[0]) < section.index(words[1]) < section.index("yaw rate after 30 s")
+    assert not re.search("has not seen|held out from|unseen drives", page)
+
+
+def test_what_judges_the_fit_is_said_as_it_was():
+    fit = later_entries()["fit"]
+    halves = fit_table(fit | {"folds": "by time", "note": "One recording."})
+    assert "each half of the one recording" in halves["judged"]
+    assert halves["note"] == "One recording."
+    plain = fit_table({"channels": {}})
+    assert "recording" not in plain["judged"]
+    assert "decided on all recordings" in plain["note"]
+
+
+def test_what_is_wrong_with_the_data_comes_before_everything_but_the_answer(page):
+    start = page.index("The recordings themselves")
+    assert page.index('class="tiles"') < start < page.index('id="findings"')
+    assert "<b>run_2.csv, &lt;script&gt;alert(" in page[start:]
+    assert ":</b> It never changes.</p>" in page[start:]
+
+
+def test_doubts_about_the_data_name_their_place():
+    doubts = [
+        {"recording": "a.csv", "channel": "", "finding": "schema", "sentence": "Its clock has gaps."},
+        {"recording": "", "channel": "gyro", "finding": "rotation_rate", "sentence": "Over 2 runs it is 1.1."},
+    ]
+    assert [item["place"] for item in checks(doubts)] == ["a.csv", "Several recordings together, gyro"]
+    assert checks(None) == checks([]) == []
+
+
+def test_what_is_known_is_said_without_an_equation(tmp_path):
+    known = {"equation": "", "terms": [], "ceiling_share": 0.42, "where": "turning left: 80 % of it"}
+    write_report(tmp_path, diagnosis(unnamed=known), evidence())
+    text = (tmp_path / PAGE).read_text()
+    section = text[text.index("What has no name") :]
+    for words in (
+        "No equation for what remains was stable. A flexible model removes 42 % of the squared residual",
+        "Where most is left: turning left: 80 % of it.",
+    ):
+        assert words in section
+    assert "<pre>" not in section
+    assert unnamed(None) is None
+
+
+def test_an_equation_is_not_called_unstable(page):
+    assert "<pre>F_x = -12 v_x" in page
+    assert "Where it acts most: at speed." in page
+    assert "was stable" not in page
+
+
+def test_gates_are_traced_to_the_drives_behind_them():
+    known = {"nulls": 60, "level": 0.05}
+    assert gate_note(known).startswith("set by 60 null drives at a level of 5 %")
+    assert "60 simulated drives with nothing missing" in gate_note(known | {"kind": "simulated"})
+    ordinary = gate_note(known | {"kind": "ordinary"})
+    assert "60 pieces of real drives that are taken to be ordinary" in ordinary
+    assert "simulat" not in ordinary
+
+
+def without_findings(table, gates):
+    """A diagnosis that names nothing, with gates."""
+    thresholds = {"nulls": 60, "bank": "abc", "level": 0.05, "gates": gates}
+    return diagnosis(findings=[], verdict=["none"], detectable=table, thresholds=thresholds)
+
+
+def test_gates_stand_beside_the_least_sizes_where_nothing_was_found(tmp_path):
+    table = {"slope": {"angle": 0.01}, "payload": {"mass": None}}
+    bare = without_findings(table, {"slope": 12.34})
+    write_report(tmp_path, bare, evidence())
+    text = (tmp_path / PAGE).read_text()
+    assert "<th>least size</th><th>gate</th>" in text
+    assert "<td>0.57 degrees</td><td>12.3</td>" in text
+    assert "<td>none, however large</td><td>–</td>" in text
+    assert shown_gates(bare | {"findings": diagnosis()["findings"]}) == {}
+
+
+def test_only_known_names_of_robot_and_soil_are_listed():
+    rows = dict(sources(diagnosis(robot="warthog", soil="", seed=0)))
+    assert rows["Robot"] == "warthog"
+    assert rows["Seed"] == "0"
+    assert "Soil" not in rows
 
 
 def test_tables_by_hand():
@@ -235,10 +341,21 @@ def test_the_page_opens_without_errors_and_fits_the_view(browser, folder, width,
     seen = browser.open(folder / PAGE, width, 900, print_out)
     assert seen.problems == ()
     assert [r for r in seen.requests if not r.startswith("data:")] == [(folder / PAGE).resolve().as_uri()]
-    assert seen.page_width <= seen.view_width
+    # a phone's view widens with its page
+    assert seen.page_width <= width
     assert seen.broken_images == 0
     assert HOSTILE in seen.text
     assert len(seen.screenshot) > 50_000
+
+
+def test_the_gates_of_the_whole_library_fit_a_phone(browser, tmp_path):
+    table = {name: dict.fromkeys(kind.size_names(), None) for name, kind in effect_kinds().items()}
+    write_report(tmp_path, without_findings(table, dict.fromkeys(table, 123.4)), evidence())
+    text = (tmp_path / PAGE).read_text().replace("overflow-x: auto", "overflow-x: visible")
+    head, rows = text[: text.index("<body>")], text[text.index("What these drives could have shown") :]
+    alone = tmp_path / "alone.html"
+    alone.write_text(f"{head}<body><h2>{rows}")
+    assert browser.open(alone, 390, 900).page_width <= 390
 
 
 def test_the_browser_test_sees_errors_and_overflow(browser, tmp_path):

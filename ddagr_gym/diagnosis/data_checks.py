@@ -1,0 +1,63 @@
+"""Step 0: what the recordings say is wrong with themselves, before any physics is looked for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ddagr_gym.recordings.checks.across import across_runs
+from ddagr_gym.recordings.checks.findings import Finding, Status
+from ddagr_gym.recordings.checks.run import check_recording
+from ddagr_gym.recordings.schema import Recording
+from ddagr_gym.replay.windows import CHANNELS
+
+STUCK = "stuck"
+"""Family of checks on channels that never change."""
+
+
+@dataclass(frozen=True)
+class DataDoubt:
+    """Something suspicious about a recording's clocks, signs, units or channels.
+
+    Attributes:
+        recording: its name; "" for what several say together.
+        channel: of the recording, or "a to b" for a pair; "" where it is about all.
+        finding: family of checks (`ddagr check`).
+        sentence: what it is and what to do.
+        suspects: effects that would explain it.
+    """
+
+    recording: str
+    channel: str
+    finding: str
+    sentence: str
+    suspects: tuple[str, ...] = ()
+
+
+def data_doubts(recordings: Sequence[Recording], rng: np.random.Generator) -> tuple[DataDoubt, ...]:
+    """All that `ddagr check` finds suspicious.
+
+    Args:
+        recordings: at least one, of one robot.
+        rng: for the resampled intervals of the checks.
+    """
+    reports = [check_recording(recording, rng) for recording in recordings]
+    found = []
+    for report in reports:
+        found += [DataDoubt(report.source, "", "schema", sentence) for sentence in report.sentences]
+        found += [_doubt(report.source, finding) for finding in report.suspicious]
+    together = across_runs(recordings, reports)
+    return (*found, *(_doubt("", finding) for finding in together if finding.status is Status.SUSPICIOUS))
+
+
+def _doubt(recording: str, finding: Finding) -> DataDoubt:
+    sentence = f"{finding.meaning} {finding.remedy}".strip()
+    return DataDoubt(recording, finding.channel, finding.check, sentence, finding.suspects)
+
+
+def dead_channels(doubts: Sequence[DataDoubt]) -> tuple[str, ...]:
+    """Channels which a diagnosis would compare and which never change while the robot drives."""
+    stuck = {doubt.channel for doubt in doubts if doubt.finding == STUCK}
+    return tuple(name for name in CHANNELS if name in stuck)
