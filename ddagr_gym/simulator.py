@@ -54,6 +54,9 @@ for _name, _first in (
 
 Soils = Soil | Sequence[Soil]
 
+_PARTS_PER_THREAD = 6
+_LONG = 100  # samples from which handing out parts costs less than waiting for the slower thread
+
 
 def _soils(soil: Soils) -> Array:
     per_wheel = [soil] * 4 if isinstance(soil, Soil) else list(soil)
@@ -170,9 +173,9 @@ class Simulator:
             contact_rule(numerics.contact_nodes),
             contact_rule(numerics.jacobian_contact_nodes),
         )
-        self._chunks = np.linspace(0, count, min(threads, count) + 1).astype(int)
-        parts = len(self._chunks) - 1
-        self._pool = ThreadPoolExecutor(parts) if parts > 1 else None
+        threads = min(threads, count)
+        self._threads = threads
+        self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
 
     def _set_fields(self, fields: Sequence[SoilField]) -> None:
         if len({field.values.shape for field in fields}) > 1:
@@ -257,16 +260,26 @@ class Simulator:
             record: (N, samples, K), written.
         """
 
+        chunks = self._chunks(noise.shape[1])
+
         def run(part: int) -> None:
             advance_rows(
-                self.rows, self._chunks[part], self._chunks[part + 1], commands, noise, *self._ground(),
+                self.rows, chunks[part], chunks[part + 1], commands, noise, *self._ground(),
                 *self._effects(), self._options, *self._rules, readings, recorded, record,
             )  # fmt: skip
 
         if self._pool is None:
             run(0)
         else:
-            list(self._pool.map(run, range(len(self._chunks) - 1)))
+            list(self._pool.map(run, range(len(chunks) - 1)))
+
+    def _chunks(self, samples: int) -> NDArray[np.int64]:
+        """Ends of the parts that threads take: one each for a short stretch, several for a long one.
+
+        Some drives cost twice as much as others, and whoever is done takes the next part.
+        """
+        each = _PARTS_PER_THREAD if samples >= _LONG and self._threads > 1 else 1
+        return np.linspace(0, self.count, min(each * self._threads, self.count) + 1).astype(np.int64)
 
     def step(
         self, commands: ArrayLike, noise: ArrayLike | None = None, *, recorded: Sequence[int] = (), samples: int = 1

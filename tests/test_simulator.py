@@ -138,6 +138,19 @@ def test_single_batch_and_threads_give_the_same_bits():
         np.testing.assert_array_equal(record[0], results[0][1][i])
 
 
+def test_threads_share_long_stretches_by_who_is_free_and_give_the_same_bits():
+    count, samples = 9, 150
+    soils = [get_soil("thesis_a1")] * count
+    rng = np.random.default_rng(3)
+    commands = np.repeat(rng.uniform(-1.0, 1.0, (count, samples // 50, 2)), 50, axis=1)
+    noise = rng.standard_normal((count, samples, layout.NOISE_CHANNELS))
+    one, two = (_batch(count, soils, threads=threads).step(commands, noise)[0] for threads in (1, 2))
+    assert np.array_equal(one, two, equal_nan=True)
+    simulator = Simulator(count, threads=2)
+    assert len(simulator._chunks(10)) == 3
+    assert len(simulator._chunks(samples)) == count + 1
+
+
 def test_saved_rows_continue_to_the_same_bits_also_in_another_simulator():
     soils, commands, noise = _drives(3)
     first = _batch(3, soils)

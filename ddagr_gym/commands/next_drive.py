@@ -37,6 +37,7 @@ class Arguments:
         soil: nominal soil; that of the diagnosis by default, thesis_a1 without one.
         sensors: some of imu, encoders, pose; those of the diagnosis by default.
         seed: of the sensor noise.
+        threads: of the simulator.
     """
 
     diagnosis: Positional[Path | None] = None
@@ -46,6 +47,7 @@ class Arguments:
     soil: str | None = None
     sensors: tuple[str, ...] = ()
     seed: int = 0
+    threads: int = 2
 
 
 def run(arguments: Arguments) -> None:
@@ -53,11 +55,14 @@ def run(arguments: Arguments) -> None:
     from ddagr_gym.diagnosis.next_drive import next_drive
     from ddagr_gym.presets import get_robot, get_soil
 
+    if arguments.threads < 1:
+        raise InputError(f"--threads is {arguments.threads}: give at least 1.")
     if (arguments.diagnosis is None) == (not arguments.rival):
         raise InputError("give either a diagnosis or some --rival name=size, not both.")
     case = _case(arguments)
     robot, soil = get_robot(arguments.robot or case.robot), get_soil(arguments.soil or case.soil)
-    answer = next_drive(robot, soil, case.rivals, sensors=arguments.sensors or case.sensors, seed=arguments.seed)
+    sensors, seed, threads = arguments.sensors or case.sensors, arguments.seed, arguments.threads
+    answer = next_drive(robot, soil, case.rivals, sensors=sensors, seed=seed, threads=threads)
     if arguments.output is not None:
         write_text(arguments.output, json.dumps(answer, indent=1, allow_nan=False) + "\n")
     print(answer_text(answer))

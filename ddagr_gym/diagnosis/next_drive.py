@@ -22,6 +22,7 @@ from ddagr_gym.diagnosis.hypotheses import looped
 from ddagr_gym.diagnosis.isolability import APART
 from ddagr_gym.diagnosis.planned import RATE, SENSORS, Plan, free_of_nuisances, plan
 from ddagr_gym.diagnosis.scores import drive_extent, probe_column
+from ddagr_gym.diagnosis.setting import Setting
 from ddagr_gym.diagnosis.size_prior import TYPICAL_MULTIPLE
 from ddagr_gym.errors import InputError
 from ddagr_gym.parameters import Imu, Robot, Sensors, Soil
@@ -82,6 +83,7 @@ def next_drive(
     sensors: Sequence[str] = tuple(SENSORS),
     bank: Sequence[Manoeuvre] | None = None,
     seed: int = 0,
+    threads: int = 1,
     progress: Callable[[str], None] = lambda text: None,
 ) -> dict[str, Any]:
     """Rank manoeuvres by how well they would tell rivals apart.
@@ -93,6 +95,7 @@ def next_drive(
         sensors: names of :data:`ddagr_gym.diagnosis.planned.SENSORS`.
         bank: manoeuvres; all built-in ones by default.
         seed: of the noise whose level is estimated.
+        threads: of the simulator.
         progress: called with what is being done.
 
     Returns:
@@ -110,7 +113,7 @@ def next_drive(
     place = _place(planned)
     starts = None if place is None else [_towards(place, robot, soil, item) for item in manoeuvres]
     progress("simulating the bank of manoeuvres")
-    prepared = plan(robot, soil, manoeuvres, sensors, starts=starts, seed=seed)
+    prepared = plan(robot, soil, manoeuvres, sensors, starts=starts, seed=seed, setting=Setting(threads=threads))
     progress("simulating the rivals")
     columns = _columns(prepared, planned)
     found = [_separations(prepared, columns, number, len(planned)) for number in range(len(manoeuvres))]

@@ -222,7 +222,15 @@ def _next_drive(task: Task, diagnosis: Diagnosis, progress: Callable[[str], None
     sensors = sensors_of_diagnosis(mapping)
     try:
         rivals = rivals_of_diagnosis(mapping)
-        return next_drive(task.robot, task.soil, rivals, sensors=sensors, seed=task.seed, progress=progress)
+        return next_drive(
+            task.robot,
+            task.soil,
+            rivals,
+            sensors=sensors,
+            seed=task.seed,
+            threads=task.setting.threads,
+            progress=progress,
+        )
     except InputError as error:
         return {"manoeuvre": "", "why": str(error), "separates": [], "power": 0.0, "minutes": None, "alternatives": []}
 
