@@ -221,9 +221,7 @@ def outcome_text(diagnosis: Diagnosis) -> str:
     """Answer, findings and errors at the horizons, as tables."""
     parts = [diagnosis.sentence]
     if diagnosis.checks:
-        lines = [
-            f"  {' '.join(filter(None, (item.recording, item.channel)))}: {item.sentence}" for item in diagnosis.checks
-        ]
+        lines = [_doubt_line(doubt) for doubt in diagnosis.checks]
         parts.append("\n".join(["The recordings themselves are suspicious (`ddagr check` says more):", *lines]))
     if diagnosis.findings:
         head = ("effect", "size", "90 % interval", "unit", "gain", "gate", "could also be")

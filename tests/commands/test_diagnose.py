@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 
 from ddagr_gym.cli import main
+from ddagr_gym.commands.diagnose import outcome_text
 from ddagr_gym.diagnosis import pipeline
+from ddagr_gym.diagnosis.data_checks import DataDoubt
 from ddagr_gym.diagnosis.store import part_folder
 from ddagr_gym.diagnosis.thresholds import Gate, Thresholds, save_thresholds
-from ddagr_gym.diagnosis.verdict import load
+from ddagr_gym.diagnosis.verdict import Diagnosis, load
 from ddagr_gym.parameters import Imu, PoseReceiver, Sensors
 from ddagr_gym.physics.effects import load_effects
 from ddagr_gym.presets import get_robot, get_soil
@@ -178,3 +180,15 @@ def test_an_output_of_something_else_is_refused_at_once(work: Path, capsys: pyte
     assert main(words(work, "drives")) == 2
     assert "no ddagr command wrote" in capsys.readouterr().err
     assert len(list((work / "drives").iterdir())) == 2
+
+
+def test_what_is_wrong_with_the_recordings_is_printed_first() -> None:
+    doubts = (
+        DataDoubt("run_1.csv", "yaw_rate", "stuck", "It never changes."),
+        DataDoubt("", "", "schema", "Times go back."),
+    )
+    answer = Diagnosis(("none",), False, (), "Nothing is missing.", {}, {}, {}, (), {}, 1.0, "0", checks=doubts)
+    lines = outcome_text(answer).splitlines()
+    assert lines[0] == "Nothing is missing."
+    assert lines[2].startswith("The recordings themselves are suspicious")
+    assert lines[3:] == ["  run_1.csv yaw_rate: It never changes.", "  Times go back."]
