@@ -113,16 +113,27 @@ def _check(place: str, value: Any, form: Any) -> None:
     for key, inner in form.items():
         if key not in value:
             raise InputError(f"{place} has no entry {key!r}: make it again with `ddagr diagnose`.")
-        _check_entry(place, key, value[key], inner)
+        check_entry(place, key, value[key], inner)
 
 
-def _check_entry(place: str, key: str, value: Any, form: Any) -> None:
+def check_entry(place: str, key: str, value: Any, form: Any) -> None:
+    """One entry against its form.
+
+    Args:
+        place: where it is, for the sentence.
+        key: of the entry.
+        value: of the entry.
+        form: that it should have, of :data:`FORM`.
+
+    Raises:
+        InputError: it has another.
+    """
     kinds = _kinds(form)
     if (isinstance(value, bool) and bool not in kinds) or not isinstance(value, kinds):
         words = " or ".join(_WORDS[kind] for kind in kinds if not (kind is int and float in kinds))
         raise InputError(f"{place} has {key} = {value!r}: give {words}.")
     for name, inner, inner_form in _inside(value, form):
-        _check_entry(f"{place}, {key}", name, inner, inner_form)
+        check_entry(f"{place}, {key}", name, inner, inner_form)
     required = form.of if isinstance(form, Maybe) else form
     if value is not None and isinstance(required, dict):
         _check(f"{place}, {key}", value, required)

@@ -19,7 +19,7 @@ from ddagr_gym.diagnosis.certificate import (
 from ddagr_gym.diagnosis.certify import certify, folds_of, refitted_on
 from ddagr_gym.diagnosis.forecast import MOTION, PAST, cut_forecasts, errors_at, past_elimination, start_states
 from ddagr_gym.diagnosis.problem import Problem
-from ddagr_gym.diagnosis.verdict import _check_fit
+from ddagr_gym.diagnosis.schema import FORM, check_entry
 from ddagr_gym.errors import InputError
 from ddagr_gym.presets import get_robot
 from ddagr_gym.replay.windows import CHANNELS, WindowSet
@@ -38,7 +38,7 @@ def test_the_planted_effect_predicts_unseen_drives(sloping: Sloping) -> None:
         assert low <= errors["corrected"]["value"] <= high
         assert errors["ceiling"]["value"] <= min(errors[m]["value"] for m in ("refitted", "corrected", "black_box"))
     assert found["gain_share"]["5"]["value"] > 0.9
-    _check_fit(found)
+    check_entry("the diagnosis", "fit", found, FORM["fit"])
 
 
 def test_a_horizon_that_no_drive_holds_is_left_out_and_said(sloping: Sloping) -> None:
@@ -48,8 +48,8 @@ def test_a_horizon_that_no_drive_holds_is_left_out_and_said(sloping: Sloping) ->
 
 def test_what_is_wrong_in_the_schema_is_refused(sloping: Sloping) -> None:
     broken = {**sloping.certificate, "channels": {"speed": {"1": {"unit": "m/s"}}}}
-    with pytest.raises(InputError, match="speed after 1 s"):
-        _check_fit(broken)
+    with pytest.raises(InputError, match=r"fit, channels, speed, 1 has no entry .count."):
+        check_entry("the diagnosis", "fit", broken, FORM["fit"])
 
 
 def test_sizes_do_not_see_the_recording_that_judges(sloping: Sloping) -> None:

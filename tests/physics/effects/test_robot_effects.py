@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ddagr_gym.parameters import STANDARD_GRAVITY
+from ddagr_gym.parameters import STANDARD_GRAVITY, Numerics
 from ddagr_gym.physics import layout
 from ddagr_gym.physics.effects import parse_effect
 from ddagr_gym.presets import get_robot
@@ -84,13 +84,14 @@ def test_offset_to_the_left_drags_the_robot_left(drive, straight):
 
 
 def test_radius_mismatch_turns_with_the_same_curvature_at_every_speed(drive, straight):
+    """With forces that are never extrapolated: that leaves some 5e-5 rad/s, a thirtieth of the slower yaw rate."""
     curvatures = []
     for speed in (0.4, 1.2):
         commands, state = straight(speed, 500)
-        columns = drive(["wheel_radius_mismatch=0.02"], commands, initial_state=state)
+        columns = drive(["wheel_radius_mismatch=0.02"], commands, initial_state=state, numerics=Numerics.smooth())
         np.testing.assert_allclose(columns["encoder_right"], columns["encoder_left"], atol=1e-12)
         curvatures.append(columns["yaw_rate"][-1] / columns["true_v_x"][-1])
-    assert curvatures[0] == pytest.approx(curvatures[1], rel=0.01)
+    assert curvatures[0] == pytest.approx(curvatures[1], rel=1e-3)
     # no faster than without side slip, and no slower than the widest effective track of fielded robots allows
     kinematic = 0.02 / (2 * get_robot("ddagr").half_track)
     assert 0.4 * kinematic < curvatures[0] < kinematic
