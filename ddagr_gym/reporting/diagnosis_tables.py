@@ -49,7 +49,8 @@ def tiles(diagnosis: Entry, seconds: float) -> list[dict[str, str]]:
         seconds: of drive.
     """
     verdict = ", ".join(title(name) if name not in ("none", "unknown") else name for name in diagnosis["verdict"])
-    status = "complete: nothing else shows" if diagnosis["complete"] else "incomplete: something is left"
+    left = "something is left" if diagnosis["verdict"] != ["none"] else "not every channel speaks"
+    status = "complete: nothing else shows" if diagnosis["complete"] else f"incomplete: {left}"
     explained = (diagnosis.get("localisation") or {}).get("explained")
     shares = _gain_shares(diagnosis.get("fit") or {})
     found = [

@@ -254,6 +254,21 @@ def test_doubts_about_the_data_name_their_place():
     assert checks(None) == checks([]) == []
 
 
+def test_many_doubts_are_folded_and_none_is_lost(tmp_path):
+    doubts = [
+        {"recording": "a.csv", "channel": f"c{number}", "finding": "wait", "sentence": "It waits.", "suspects": []}
+        for number in range(9)
+    ]
+    bare = diagnosis(findings=[], verdict=["none"], complete=False, checks=doubts)
+    write_report(tmp_path, bare, evidence())
+    text = (tmp_path / PAGE).read_text()
+    folded = text[text.index("<summary>3 more</summary>") :]
+    assert all(f"<b>a.csv, c{number}:</b>" in text for number in range(9))
+    assert "<b>a.csv, c6:</b>" in folded
+    assert "<b>a.csv, c5:</b>" not in folded
+    assert tiles(bare, 60.0)[0]["label"] == "incomplete: not every channel speaks"
+
+
 def test_what_is_known_is_said_without_an_equation(tmp_path):
     known = {"equation": "", "terms": [], "ceiling_share": 0.42, "where": "turning left: 80 % of it"}
     write_report(tmp_path, diagnosis(unnamed=known), evidence())
