@@ -75,7 +75,7 @@ class Elimination:
             np.linalg.solve(self.upper, np.matmul(self.basis.transpose(0, 2, 1), columns)), dtype=np.float64
         )
 
-    def subset(self, chosen: Chosen) -> Elimination:
+    def subset(self, chosen: NDArray[np.int64] | Chosen) -> Elimination:
         """Only the chosen windows."""
         return Elimination(self.basis[chosen], self.upper[chosen])
 

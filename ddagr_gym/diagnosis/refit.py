@@ -191,7 +191,7 @@ def fit(
         done += 1
         before = cost
         point, prediction, cost = _step(
-            problem, point, prediction, cost, elimination, by_parameter, by_effect, parameters
+            problem, point, prediction, cost, elimination, by_parameter, by_effect, parameters, tolerance * cost
         )
         small = before - cost < tolerance * cost
         # a step that fails with sensitivities of another point says nothing about this one
@@ -226,8 +226,12 @@ def _step(
     by_parameter: Array,
     by_effect: Array,
     parameters: Sequence[EffectParameter],
+    least: float,
 ) -> tuple[Point, Array, float]:
-    """One damped Gauss-Newton step; the point itself where none lowers the cost."""
+    """One damped Gauss-Newton step; the point itself where none lowers the cost.
+
+    Shares of it that promise less than ``least`` are not tried.
+    """
     free = np.flatnonzero(problem.free)
     sensitivities = np.concatenate([by_parameter[..., free], by_effect], axis=2)
     raw = np.concatenate([problem.residual(point, prediction)[..., None], problem.padded(sensitivities)], axis=2)
@@ -244,32 +248,49 @@ def _step(
     change = bounded_step(information, gradient, np.maximum(low - here, -reach), np.minimum(high - here, reach))
     explained = elimination.explain(raw)
     states = explained[:, :_STATES, 0] - explained[:, :_STATES, 1:] @ change
+    shares = 0.5 * (right**2).sum(axis=1)
     for damping in DAMPING:
+        if damping < 1.0 and damping * float(gradient @ change) < least:
+            break
         values = point.values.copy()
         values[free] += damping * change[: len(free)]
         effects = moved(point.effects, parameters, here[len(free) :] + damping * change[len(free) :])
         start = problem.moved(replace(point, effects=effects), values)
-        trials = [replace(start, states=start.states + share * states) for share in (damping, 0.0)]
-        tried, predicted, after = _best_by_window(problem, trials, elimination)
+        stepped = replace(start, states=start.states + damping * states)
+        tried, predicted, after = _best_by_window(problem, stepped, start, elimination, shares)
         if after < cost:
             return tried, predicted, after
     return point, prediction, cost
 
 
-def _best_by_window(problem: Problem, trials: Sequence[Point], elimination: Elimination) -> tuple[Point, Array, float]:
-    """Of points that differ in their initial states, the best state of each window.
+def _best_by_window(
+    problem: Problem, trial: Point, other: Point, elimination: Elimination, before: Array
+) -> tuple[Point, Array, float]:
+    """A trial with the initial states of another one in the windows that it would make worse, where those are better.
 
     Windows share nothing but the parameters; one near rest whose linear step fails must not stop all others.
+
+    Args:
+        problem: what to fit.
+        trial: with the linear step of the states.
+        other: the same with other states.
+        elimination: of the windows' unknowns.
+        before: (W,) costs of the windows before the step.
     """
-    predictions = [problem.predict(trial) for trial in trials]
-    costs = [cost_of(problem, trial, y, elimination)[1] for trial, y in zip(trials, predictions, strict=True)]
-    shares = np.nan_to_num(np.stack(costs), nan=np.inf)
-    best = np.argmin(shares, axis=0)
-    rows = np.arange(len(best))
-    states = np.stack([trial.states for trial in trials])[best, rows]
-    prior = _prior_cost(problem, trials[0])
-    total = float(shares[best, rows].sum()) + prior
-    return replace(trials[0], states=states), np.stack(predictions)[best, rows], total
+    prediction = problem.predict(trial)
+    costs = cost_of(problem, trial, prediction, elimination)[1]
+    states = trial.states.copy()
+    doubtful = np.flatnonzero(~(costs <= before))
+    if doubtful.size:
+        part = problem.subset(doubtful)
+        again = replace(other, states=other.states[doubtful])
+        predicted = part.predict(again)
+        others = cost_of(part, again, predicted, elimination.subset(doubtful))[1]
+        better = np.nan_to_num(others, nan=np.inf) < np.nan_to_num(costs[doubtful], nan=np.inf)
+        rows = doubtful[better]
+        states[rows], prediction[rows], costs[rows] = again.states[better], predicted[better], others[better]
+    total = float(costs.sum()) + _prior_cost(problem, trial)
+    return replace(trial, states=states), prediction, total if np.isfinite(total) else np.inf
 
 
 def bounded_step(information: Array, gradient: Array, low: Array, high: Array) -> Array:
