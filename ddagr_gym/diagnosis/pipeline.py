@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from ddagr_gym.diagnosis.bounds import pushed_to_bounds
 from ddagr_gym.diagnosis.certificate import worse_on_unseen
 from ddagr_gym.diagnosis.certify import certify
 from ddagr_gym.diagnosis.data_checks import DataDoubt, data_doubts, dead_channels
@@ -28,7 +29,7 @@ from ddagr_gym.diagnosis.next_drive import next_drive, rivals_of_diagnosis, sens
 from ddagr_gym.diagnosis.regimes import Unevenness
 from ddagr_gym.diagnosis.regimes_words import uneven_phrase
 from ddagr_gym.diagnosis.search import Found
-from ddagr_gym.diagnosis.sentences import dead_in_words, headline, worse_in_words
+from ddagr_gym.diagnosis.sentences import dead_in_words, headline, pushed_in_words, worse_in_words
 from ddagr_gym.diagnosis.setting import Setting
 from ddagr_gym.diagnosis.sources import source_digest
 from ddagr_gym.diagnosis.store import StepStore
@@ -186,8 +187,9 @@ def _doubted(
 ) -> Diagnosis:
     """Findings with their places, and what speaks against them.
 
-    The verdict is not the whole truth where a size is not the same everywhere, where much of the mismatch is left,
-    where drives that nothing was fitted to are certainly predicted worse with it, or where a channel is dead.
+    The verdict is not the whole truth where a size is not the same everywhere or at the bound of what exists, where
+    much of the mismatch is left, where drives that nothing was fitted to are certainly predicted worse with it, or
+    where a channel is dead.
     """
     located = {**where["findings"], **held}
     findings = tuple(replace(f, where=located.get(f.name)) for f in diagnosis.findings)
@@ -196,6 +198,7 @@ def _doubted(
         for f in findings
         if f.where is not None and f.where.get("uneven") is not None
     ]
+    doubts += [pushed_in_words(**vars(pushed)) for pushed in pushed_to_bounds(findings)]
     worse = worse_on_unseen(fit) if findings else None
     if worse is not None:
         doubts.append(worse_in_words(**worse))

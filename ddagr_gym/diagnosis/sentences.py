@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ddagr_gym.diagnosis.verdict import NONE, UNKNOWN, Finding
-from ddagr_gym.reporting.wording import amounts, describe
+from ddagr_gym.reporting.wording import amounts, describe, in_sentence
 
 
 def headline(
@@ -54,6 +54,22 @@ def worse_in_words(horizon: float, value: float, interval: Sequence[float]) -> s
     return (
         f"drives that it was not fitted to are predicted worse with it, by {-100.0 * value:.0f} % ({span}) after "
         f"{horizon:g} s, which makes the name doubtful"
+    )
+
+
+def pushed_in_words(name: str, field: str, bound: float, unit: str) -> str:
+    """That a size is at the bound of what exists.
+
+    Args:
+        name: of the effect.
+        field: the size.
+        bound: in unit.
+        unit: SI.
+    """
+    amount = f"{bound:g}" if unit == "-" else f"{bound:g} {unit}"
+    return (
+        f"the {field.replace('_', ' ')} of {in_sentence(name)} reaches {amount}, the bound of what exists, which makes "
+        "its form doubtful"
     )
 
 

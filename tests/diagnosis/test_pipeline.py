@@ -1,6 +1,6 @@
 """What localisation adds to the findings and to the sentence."""
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -69,3 +69,25 @@ def test_findings_that_leave_much_of_the_mismatch_are_not_complete() -> None:
     assert not made.complete
     assert made.sentence.endswith("% of the mismatch; something more is left that has no name here.")
     assert _doubted(diagnosis("command_delay", "delay", 0.1), FOUND, {"findings": {}}, {}).complete
+
+
+@pytest.mark.parametrize(
+    ("name", "field", "value", "interval", "words"),
+    [
+        ("soil_patch", "stiffness", 0.137, (0.1, 0.24), "the stiffness of soil patch reaches 0.1, the bound"),
+        ("soil_patch", "stiffness", 0.137, (0.11, 0.24), ""),
+        ("soil_patch", "stiffness", 1.7, (0.1, 4.0), ""),
+        ("pose_latency", "latency", 0.9, (0.8, 1.0), "the latency of late pose reaches 1 s, the bound"),
+        ("motor_saturation", "speed_limit", 0.9, (0.85, 1000.0), ""),
+    ],
+)
+def test_a_size_at_its_bound_makes_its_form_doubtful(
+    name: str, field: str, value: float, interval: tuple[float, float], words: str
+) -> None:
+    """On its own side of neutral only; a limit out of reach is what has no effect."""
+    answer = diagnosis(name, field, value)
+    estimate = replace(answer.findings[0].parameters[field], value=value, unit="s" if name == "pose_latency" else "-")
+    finding = replace(answer.findings[0], parameters={field: replace(estimate, interval=interval)})
+    made = _doubted(replace(answer, findings=(finding,)), FOUND, {"findings": {}}, {})
+    assert made.complete == (not words)
+    assert words in made.sentence
