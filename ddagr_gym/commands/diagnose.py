@@ -147,15 +147,11 @@ def _sources(runs: Sequence[Path]) -> list[Path]:
 
 
 def _thresholds(arguments: Arguments) -> Thresholds:
-    from ddagr_gym.diagnosis.thresholds import default_thresholds, load_thresholds
+    from ddagr_gym.commands.gates import gates_for
+    from ddagr_gym.diagnosis.thresholds import default_thresholds
 
-    path, robot = arguments.thresholds, arguments.robot
-    thresholds = default_thresholds(robot) if path is None else load_thresholds(path)
-    if thresholds.origin is not None:
-        warning = thresholds.origin.mismatch(robot, arguments.soil, arguments.soil_uncertainty)
-        if warning:
-            print(f"ddagr: warning: {warning}", file=sys.stderr)
-    return thresholds
+    found = gates_for(arguments.thresholds, arguments.robot, arguments.soil, arguments.soil_uncertainty)
+    return default_thresholds(arguments.robot) if found is None else found
 
 
 def diagnosed(task: Task, store: Any = None) -> Outcome:

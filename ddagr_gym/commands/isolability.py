@@ -13,7 +13,6 @@ from ddagr_gym.commands.progress import Progress
 
 if TYPE_CHECKING:
     from ddagr_gym.diagnosis.isolability import Isolability
-    from ddagr_gym.diagnosis.thresholds import Thresholds
 
 EXAMPLES = (
     "ddagr isolability --manoeuvres straight two_headings --output isolability",
@@ -53,6 +52,7 @@ class Arguments:
 
 def run(arguments: Arguments) -> None:
     """Make the table, write it, print it."""
+    from ddagr_gym.commands.gates import gates_for
     from ddagr_gym.control.manoeuvres import find_manoeuvre
     from ddagr_gym.diagnosis.isolability import isolability
     from ddagr_gym.physics.effects.registry import effect_kinds
@@ -62,7 +62,7 @@ def run(arguments: Arguments) -> None:
     check_output_folder(arguments.output, overwrite=arguments.overwrite)
     robot, soil = get_robot(arguments.robot), get_soil(arguments.soil)
     manoeuvres = [find_manoeuvre(name) for name in arguments.manoeuvres]
-    thresholds = _thresholds(arguments.thresholds, arguments.robot)
+    thresholds = gates_for(arguments.thresholds, arguments.robot, arguments.soil)
     with Progress(len(effect_kinds()), "effects") as progress:
         table = isolability(
             robot,
@@ -82,13 +82,6 @@ def run(arguments: Arguments) -> None:
         isolability_figure(mapping, folder / "isolability.png")
     print(text)
     print(f"\ntable, JSON and figure: {arguments.output}")
-
-
-def _thresholds(path: Path | None, robot: str) -> Thresholds | None:
-    """Given gates, those that ship for a robot, or None where none do."""
-    from ddagr_gym.diagnosis.thresholds import load_thresholds, shipped_thresholds
-
-    return shipped_thresholds(robot) if path is None else load_thresholds(path)
 
 
 def table_text(table: Isolability) -> str:

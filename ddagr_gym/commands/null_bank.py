@@ -14,7 +14,7 @@ from ddagr_gym.commands.progress import Progress
 from ddagr_gym.errors import InputError
 
 if TYPE_CHECKING:
-    from ddagr_gym.diagnosis.null_bank import Template
+    from ddagr_gym.diagnosis.null_drives import Template
     from ddagr_gym.diagnosis.setting import Setting
     from ddagr_gym.diagnosis.thresholds import NullKind, NullRun, Origin
     from ddagr_gym.parameters import Robot, Soil
@@ -75,7 +75,8 @@ def run(arguments: Arguments) -> None:
     from ddagr_gym.diagnosis.fitted_nominal import fitted_nominal
     from ddagr_gym.diagnosis.noise import recording_noise
     from ddagr_gym.diagnosis.nuisance import NuisancePriors
-    from ddagr_gym.diagnosis.null_bank import bank_hash, pieces_of, template_of
+    from ddagr_gym.diagnosis.null_bank import bank_hash, pieces_of
+    from ddagr_gym.diagnosis.null_drives import template_of
     from ddagr_gym.diagnosis.setting import SHORTEST, Setting, wheel_radius
     from ddagr_gym.diagnosis.thresholds import NullRun, save_thresholds, thresholds_from
     from ddagr_gym.presets import get_robot, get_soil

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.diagnosis.noise import ChannelNoise
-from ddagr_gym.diagnosis.null_bank import Template
+from ddagr_gym.diagnosis.null_drives import Template
 from ddagr_gym.parameters import Robot
 
 Array = NDArray[np.float64]

@@ -6,7 +6,8 @@ from dataclasses import replace
 import pytest
 
 from ddagr_gym.cli import main
-from ddagr_gym.commands.isolability import _thresholds, table_text
+from ddagr_gym.commands.gates import gates_for
+from ddagr_gym.commands.isolability import table_text
 from ddagr_gym.diagnosis.isolability import Detectable, Isolability
 from ddagr_gym.diagnosis.thresholds import default_thresholds, save_thresholds
 from ddagr_gym.reporting.isolability_figure import isolability_figure
@@ -42,11 +43,18 @@ def test_writes_table_json_and_figure(tmp_path, capsys, monkeypatch, drive_csv):
 
 
 def test_gates_ship_with_the_robot_or_come_from_chance(tmp_path):
-    assert _thresholds(None, "ddagr") == default_thresholds("ddagr")
-    assert _thresholds(None, "a_robot_of_mine") is None
+    assert gates_for(None, "ddagr", "thesis_a1") == default_thresholds("ddagr")
+    assert gates_for(None, "a_robot_of_mine", "thesis_a1") is None
     given = replace(default_thresholds("ddagr"), bank="given")
     save_thresholds(given, tmp_path / "gates.json")
-    assert _thresholds(tmp_path / "gates.json", "ddagr") == given
+    assert gates_for(tmp_path / "gates.json", "ddagr", "thesis_a1") == given
+
+
+def test_gates_of_another_soil_are_warned_of(capsys):
+    gates_for(None, "ddagr", "thesis_a1")
+    assert capsys.readouterr().err == ""
+    gates_for(None, "ddagr", "loose_sand")
+    assert "the thresholds were made for soil thesis_a1 instead of loose_sand" in capsys.readouterr().err
 
 
 def test_unknown_manoeuvre_is_one_sentence(tmp_path, capsys):

@@ -8,7 +8,8 @@ import pytest
 from ddagr_gym.diagnosis import fitted_nominal as module
 from ddagr_gym.diagnosis.fitted_nominal import fitted_nominal, with_values
 from ddagr_gym.diagnosis.nuisance import nuisances
-from ddagr_gym.diagnosis.null_bank import bank_hash, null_recordings, template_of
+from ddagr_gym.diagnosis.null_bank import bank_hash
+from ddagr_gym.diagnosis.null_drives import null_recordings, template_of
 from ddagr_gym.diagnosis.setting import Setting
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.schema import Recording

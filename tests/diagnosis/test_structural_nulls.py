@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ddagr_gym.diagnosis.noise import ChannelNoise
-from ddagr_gym.diagnosis.null_bank import Template, null_recordings
+from ddagr_gym.diagnosis.null_drives import Template, null_recordings
 from ddagr_gym.diagnosis.null_readings import PARTS, Reading
 from ddagr_gym.diagnosis.structural_nulls import KINDS, draw_world
 from ddagr_gym.presets import get_robot, get_soil
