@@ -14,12 +14,15 @@ from ddagr_gym.reporting.figures import house_style
 
 WORDS = {
     "false_alarm_rate": "nulls not called none",
+    "power": "any alarm, detectable singles",
     "top1": "right name, detectable singles",
     "in_set": "right name in the set, singles",
+    "in_set_per_size": "the same over the set's size",
     "top1_doubles": "both names, doubles",
     "in_set_doubles": "both names in sets, doubles",
     "confident_wrong": "sure of a wrong name, nulls and outside",
     "coverage": "truth inside the 90 % interval",
+    "size_error": "median error of the size",
     "gain_share": "share of the explainable error explained",
 }
 _NOTHING, _OUTSIDE, _FAILED = "none", "unknown", "failed"
@@ -101,18 +104,19 @@ def _square(x: int, y: int, **style: Any) -> Any:
 def _targets(panel: Any, result: Mapping[str, Any]) -> None:
     shown = [name for name in WORDS if result[name]["value"] is not None]
     for y, name in enumerate(shown):
-        entry, aim = result[name], result["targets"][name]
+        entry, aim = result[name], result["targets"].get(name)
         low, high = entry["interval"]
-        colour = palette.GREEN if aim["met"] else palette.VERMILLION
-        panel.barh(
-            y, aim["most"] - aim["least"], left=aim["least"], height=0.3, color=palette.SKY_BLUE, alpha=0.3, lw=0
-        )
+        colour = palette.INK
+        if aim is not None:
+            colour = palette.GREEN if aim["met"] else palette.VERMILLION
+            width = aim["most"] - aim["least"]
+            panel.barh(y, width, left=aim["least"], height=0.3, color=palette.SKY_BLUE, alpha=0.3, lw=0)
         panel.plot([low, high], [y, y], color=colour, lw=1.6)
         panel.plot(entry["value"], y, "o", color=colour, ms=5.0)
-        text = f"{WORDS[name]}: {100.0 * entry['value']:.0f} % of {entry['count']}"
+        text = f"{WORDS[name]} ({entry['count']}): {100.0 * entry['value']:.0f} %"
         panel.text(0.0, y - 0.24, text, va="bottom", fontsize=7.5)
     panel.set_xlim(-0.02, 1.02)
     panel.set_ylim(len(shown) - 0.4, -0.7)
     panel.set_yticks([])
-    panel.set_xlabel("share with 95 % interval; blue: the aim")
+    panel.set_xlabel("share, 95 % interval; blue: the aim")
     panel.set_title("Against the targets")

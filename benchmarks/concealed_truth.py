@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from ddagr_gym.physics.effects.registry import effect_kind
 
@@ -103,31 +103,91 @@ def _is_detectable(kind: str, sizes: Mapping[str, float], limits: Mapping[str, M
     )
 
 
-def _stated(cases: Sequence[Case]) -> Iterator[tuple[str, str, str, float, Sequence[float]]]:
-    """Case, effect, field, truth and interval of every size of a rightly named effect of the tag "same"."""
+class Stated(NamedTuple):
+    """A stated size beside the true one, both in the library's terms and the unit of its field.
+
+    Attributes:
+        case: name.
+        effect: name.
+        field: of the effect.
+        truth: true size.
+        value: stated size.
+        interval: stated with it.
+    """
+
+    case: str
+    effect: str
+    field: str
+    truth: float
+    value: float
+    interval: Sequence[float]
+
+
+def _stated(cases: Sequence[Case]) -> Iterator[Stated]:
+    """Every size with an interval of a rightly named effect of the tag "same"."""
     for case, label, answer in cases:
         truth = {effect["name"]: effect for effect in label["effects"] if effect["tag"] == "same"}
         for finding in answer["findings"]:
             if finding["name"] not in truth or finding["name"] not in answer["verdict"]:
                 continue
-            for field, value in true_sizes(truth[finding["name"]]).items():
-                interval = finding["parameters"].get(field, {}).get("interval")
-                if interval is not None:
-                    yield case, finding["name"], field, value, interval
+            for field, size in true_sizes(truth[finding["name"]]).items():
+                estimate = finding["parameters"].get(field, {})
+                if estimate.get("interval") is not None:
+                    yield Stated(case, finding["name"], field, size, float(estimate["value"]), estimate["interval"])
 
 
 def covered(cases: Sequence[Case]) -> list[bool]:
     """Whether each stated interval holds the truth, where the effect was rightly named and has the library's form."""
-    return [interval[0] <= value <= interval[1] for *_, value, interval in _stated(cases)]
+    return [_holds(stated) for stated in _stated(cases)]
+
+
+def _holds(stated: Stated) -> bool:
+    return stated.interval[0] <= stated.truth <= stated.interval[1]
 
 
 def misses(cases: Sequence[Case]) -> list[dict[str, Any]]:
     """The intervals that do not hold the truth."""
     return [
-        {"case": case, "effect": effect, "parameter": field, "truth": value, "interval": list(interval)}
-        for case, effect, field, value, interval in _stated(cases)
-        if not interval[0] <= value <= interval[1]
+        {"case": s.case, "effect": s.effect, "parameter": s.field, "truth": s.truth, "interval": list(s.interval)}
+        for s in _stated(cases)
+        if not _holds(s)
     ]
+
+
+def size_errors(cases: Sequence[Case]) -> list[float]:
+    """Relative error of the size of every rightly named effect that has the library's form [-].
+
+    |found - true| / max(|true - neutral|, least), from neutral because a gain of 1 or a factor of 1 is no effect; least
+    is the library's least meaningful distance, so that a small error of next to nothing is not called large. Several
+    sizes of an effect (x and y, roll and pitch, strength and stiffness) are one vector in units of their least
+    distances, and count once: a component near zero has no relative error of its own. An angle's size is the angle
+    itself (all are far below a turn; directions are no sizes). A limit is compared with the true limit, since neutral
+    is no limit at all. Sizes without an interval were not fitted and do not count, as in :func:`covered`.
+
+    Args:
+        cases: singles and doubles.
+    """
+    by_effect: dict[tuple[str, str], list[Stated]] = {}
+    for stated in _stated(cases):
+        by_effect.setdefault((stated.case, stated.effect), []).append(stated)
+    return [_relative_error(sizes) for sizes in by_effect.values()]
+
+
+def _relative_error(sizes: Sequence[Stated]) -> float:
+    """Length of the error over that of the true vector, in units of the least meaningful distances."""
+    scales = [_neutral_and_least(stated) for stated in sizes]
+    off = math.hypot(*((s.value - s.truth) / least for s, (_, least) in zip(sizes, scales, strict=True)))
+    true = math.hypot(*((s.truth - neutral) / least for s, (neutral, least) in zip(sizes, scales, strict=True)))
+    return off / max(true, 1.0)
+
+
+def _neutral_and_least(stated: Stated) -> tuple[float, float]:
+    """Where a size is counted from, and its unit; a limit from 0 in units of the true one."""
+    kind = effect_kind(stated.effect)
+    if not kind.differentiable:
+        return 0.0, abs(stated.truth)
+    data = kind.parameter(stated.field).metadata
+    return float(data["neutral"]), float(data["least"])
 
 
 def sizes(answer: Mapping[str, Any]) -> dict[str, dict[str, Any]]:

@@ -6,10 +6,12 @@ writes ``benchmarks/results/concealed.json`` and, beside it, a picture. With ``-
 ones committed to before the run are refused.
 
 Every figure is ``{value, interval, count}``: shares with 95 % Wilson intervals, others with bootstrap intervals over
-cases. An effect counts as detectable where its true size is at least the least detectable one that the diagnosis of
-its own case states; a categorical one always. For one whose size means something else in the library the size in the
-library's terms counts, which :mod:`benchmarks.concealed_equivalents` measures (``--equivalents``). A run that
-failed has named nothing: a false alarm on a null, a miss elsewhere. Every case that went wrong is listed.
+cases. ``power`` is the share of detectable singles that raise an alarm of any name at the gates' own level, 5 % false
+alarms over the whole library; ``false_alarm_rate`` is what the nulls show of that level. An effect counts as detectable
+where its true size is at least the least detectable one that the diagnosis of its own case states; a categorical one
+always. For one whose size means something else in the library the size in the library's terms counts, which
+:mod:`benchmarks.concealed_equivalents` measures (``--equivalents``). A run that failed has named nothing: a false alarm
+on a null, a miss elsewhere. Every case that went wrong is listed.
 """
 
 from __future__ import annotations
@@ -27,7 +29,7 @@ import numpy as np
 
 from benchmarks.concealed.commitments import commitment
 from benchmarks.concealed_figure import draw
-from benchmarks.concealed_truth import Case, Sizes, covered, detectable, misses, sizes
+from benchmarks.concealed_truth import Case, Sizes, covered, detectable, misses, size_errors, sizes
 from ddagr_gym.errors import InputError
 from ddagr_gym.evaluation.statistics import wilson_interval
 from ddagr_gym.recordings.files import write_atomically
@@ -59,13 +61,22 @@ def share(hits: Sequence[bool]) -> dict[str, Any]:
 
 def mean(values: Sequence[float], seed: int = 0) -> dict[str, Any]:
     """Mean with a bootstrap interval."""
+    return _bootstrapped(values, np.mean, seed)
+
+
+def median(values: Sequence[float], seed: int = 0) -> dict[str, Any]:
+    """Median with a bootstrap interval."""
+    return _bootstrapped(values, np.median, seed)
+
+
+def _bootstrapped(values: Sequence[float], statistic: Callable[..., Any], seed: int) -> dict[str, Any]:
     if not values:
         return {"value": None, "interval": None, "count": 0}
     rng = np.random.default_rng(seed)
     found = np.asarray(values)
-    draws = rng.choice(found, (2000, len(found))).mean(axis=1)
+    draws = statistic(rng.choice(found, (2000, len(found))), axis=1)
     low, high = np.quantile(draws, [0.025, 0.975])
-    return {"value": float(found.mean()), "interval": [float(low), float(high)], "count": len(found)}
+    return {"value": float(statistic(found)), "interval": [float(low), float(high)], "count": len(found)}
 
 
 def names_of(answer: Mapping[str, Any]) -> list[str]:
@@ -82,6 +93,26 @@ def in_set(label: Mapping[str, Any], answer: Mapping[str, Any]) -> bool:
     """Each of the label's effects stands in the equivalence set of some finding, and the verdict names something."""
     sets = [set(finding["equivalence_set"]) for finding in answer["findings"]]
     return bool(names_of(answer)) and all(any(name in found for found in sets) for name in label["verdict"])
+
+
+def set_share(label: Mapping[str, Any], answer: Mapping[str, Any]) -> float:
+    """Right name in the equivalence set, over the set's size: 1 for the right name alone, 0 where it is missing.
+
+    Where a single effect has several findings their sets count as one: more names, whether within one set or in
+    several, say less.
+
+    Args:
+        label: of a single.
+        answer: to it.
+    """
+    if not in_set(label, answer):
+        return 0.0
+    return 1.0 / len({name for finding in answer["findings"] for name in finding["equivalence_set"]})
+
+
+def alarm(answer: Mapping[str, Any]) -> bool:
+    """Says that something is missing, with or without a name; a run that failed says nothing."""
+    return bool(answer["verdict"]) and answer["verdict"] != ["none"]
 
 
 def confident(answer: Mapping[str, Any]) -> bool:
@@ -135,6 +166,9 @@ def score(
         "named_on_nulls": over(of(*NULLS), lambda _, a: bool(names_of(a))),
         "top1": over(seen, right),
         "in_set": over(seen, in_set),
+        "in_set_per_size": mean([set_share(label, answer) for _, label, answer in seen]),
+        "power": over(seen, lambda _, a: alarm(a)),
+        "power_all_singles": over(of("single"), lambda _, a: alarm(a)),
         "top1_all_singles": over(of("single"), right),
         "in_set_all_singles": over(of("single"), in_set),
         "top1_same_form": over([c for c in seen if c[1]["effects"][0]["tag"] == "same"], right),
@@ -148,6 +182,7 @@ def score(
         "confident_wrong_nulls": over(of(*NULLS), lambda _, a: confident(a)),
         "confident_wrong_outside": over(of("outside"), lambda _, a: confident(a)),
         "coverage": share(covered(named)),
+        "size_error": median(size_errors(named)),
         "set_size": mean([float(len(f["equivalence_set"])) for _, _, a in named for f in a["findings"] if names_of(a)]),
         "gain_share": mean(gain_shares([*seen, *doubles])),
         "gain_share_rightly_named": mean(gain_shares([case for case in named if right(case[1], case[2])])),

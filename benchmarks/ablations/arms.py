@@ -1,13 +1,15 @@
-"""Arms of the ablation that scan the library: as it is, nominal parameters fixed, no null bank, one long roll-out.
+"""Arms of the ablation that scan the library: as it is, nominal fixed, no null bank, BIC forward, one long roll-out.
 
 All say what they say after the first scan, before any joint refit: the search of a diagnosis goes on from there.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 
+from ddagr_gym.diagnosis.candidates import Candidate
 from ddagr_gym.diagnosis.diagnose import Prepared
 from ddagr_gym.diagnosis.misfit import LOCAL, roughest
 from ddagr_gym.diagnosis.nuisance import NuisancePriors, Nuisances
@@ -95,6 +97,42 @@ def noise_thresholds(problem: Problem) -> Thresholds:
     share = 1.0 - _LEVEL / len(counts)
     limits = {name: float(chi2.ppf(share, count)) / count for name, count in counts.items() if count > 0}
     return Thresholds(dict.fromkeys(names, gate), limits, 0, "chi-square")
+
+
+def bic_thresholds(problem: Problem, candidates: Sequence[Candidate]) -> Thresholds:
+    """Gates of the Bayesian information criterion (G. Schwarz, Ann. Statist. 6 (1978) 461), and no limits of misfit.
+
+    The criterion, twice the cost over the dispersion plus ln(readings) per parameter, falls where the gain exceeds half
+    of the latter. Left-out windows are not asked. Forward selection takes the effect by which it falls most, which
+    :func:`first_of` puts first.
+
+    Args:
+        problem: whose readings are counted: the block means of the windows, which use every sample once.
+        candidates: of the scan.
+    """
+    each = 0.5 * math.log(max(float(problem.blocked.mask.sum()), 1.0))
+    gates = {name: Gate(each * count, -math.inf) for name, count in parameter_counts(candidates).items()}
+    return Thresholds(gates, {}, 0, "BIC")
+
+
+def parameter_counts(candidates: Sequence[Candidate]) -> dict[str, int]:
+    """Parameters that a scan fits, by effect: multiples fitted together, and shapes in which the candidates differ.
+
+    A direction is two multiples; a flip or a limit is one; a patch has a place besides its sizes.
+
+    Args:
+        candidates: of the scan.
+    """
+    by_name: dict[str, list[Candidate]] = {}
+    for candidate in candidates:
+        by_name.setdefault(candidate.name, []).append(candidate)
+    return {name: max(len(c.columns) for c in found) + _shapes_tried(found) for name, found in by_name.items()}
+
+
+def _shapes_tried(candidates: Sequence[Candidate]) -> int:
+    """Number of shapes of which the first probes of an effect's candidates try several values."""
+    probes = [candidate.probes[0] for candidate in candidates]
+    return sum(len({getattr(probe, name) for probe in probes}) > 1 for name in probes[0].shape_names())
 
 
 def without_nuisances(problem: Problem, soil: Soil) -> Problem:

@@ -8,7 +8,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from benchmarks.ablations.arms import First, first_of, from_values, noise_thresholds, nominal_standing
+from benchmarks.ablations.arms import (
+    First,
+    bic_thresholds,
+    first_of,
+    from_values,
+    noise_thresholds,
+    nominal_standing,
+)
 from benchmarks.ablations.sparse import sparse_first
 from ddagr_gym.diagnosis.diagnose import Prepared, prepare
 from ddagr_gym.diagnosis.refit import Fitted
@@ -25,6 +32,7 @@ ARMS = {
     "as it is": "first scan of the diagnosis",
     "nominal fixed": "raw nominal model, soil, robot and biases not refitted",
     "no null bank": "gates and limits from white noise alone",
+    "BIC forward": "gates by the Bayesian information criterion",
     "one roll-out": "one window per drive, states free at its start only",
     "SINDy": "sparse regression of the residual accelerations",
 }
@@ -64,11 +72,12 @@ def examine(folder: Path, thresholds: Thresholds) -> dict[str, dict[str, Any]]:
     began = time.process_time()
     begun = _begin(robot, soil, folder, thresholds)
     values = from_values(begun.prepared)
-    problem = begun.prepared.problem
+    problem, candidates = begun.prepared.problem, begun.scans[0].terms.candidates
     found = {"as it is": _timed(lambda: values or first_of(begun.scans, begun.thresholds), began)}
     arms: dict[str, Callable[[], First]] = {
         "nominal fixed": lambda: values or first_of((nominal_standing(problem, begun.raw, soil),), begun.thresholds),
         "no null bank": lambda: values or first_of(begun.scans, noise_thresholds(problem)),
+        "BIC forward": lambda: values or first_of(begun.scans, bic_thresholds(problem, candidates)),
         "one roll-out": lambda: values or _one_roll_out(robot, soil, begun),
         "SINDy": lambda: sparse_first(problem, begun.scans[0].fitted, wheel_radius(robot)),
     }

@@ -12,7 +12,15 @@ import pytest
 
 from benchmarks import ablate_concealed
 from benchmarks.ablate_concealed import Work, chosen, figures, main
-from benchmarks.ablations.arms import First, first_of, from_values, noise_thresholds, nominal_standing
+from benchmarks.ablations.arms import (
+    First,
+    bic_thresholds,
+    first_of,
+    from_values,
+    noise_thresholds,
+    nominal_standing,
+    parameter_counts,
+)
 from benchmarks.ablations.examine import ARMS, examine
 from benchmarks.ablations.sparse import MEANING, sparse_equation, thresholded
 from benchmarks.concealed import manoeuvres
@@ -21,14 +29,17 @@ from benchmarks.concealed.catalogue import LIBRARY_FORMS
 from benchmarks.concealed.simulate import simulate_case
 from benchmarks.concealed.sizes import LEAST_MEANINGFUL
 from benchmarks.concealed.storage import write_case
+from ddagr_gym.diagnosis.candidates import candidates_of
 from ddagr_gym.diagnosis.problem import Problem
 from ddagr_gym.diagnosis.refit import fit
 from ddagr_gym.diagnosis.scores import Gain
 from ddagr_gym.diagnosis.setting import Setting, make_problem
+from ddagr_gym.diagnosis.standing import stand
 from ddagr_gym.diagnosis.thresholds import Gate, Thresholds, default_thresholds
 from ddagr_gym.errors import InputError
 from ddagr_gym.parameters import Imu, PoseReceiver, Sensors, WheelEncoder
-from ddagr_gym.physics.effects.registry import effect_kinds
+from ddagr_gym.physics.effects.base import DriveExtent
+from ddagr_gym.physics.effects.registry import effect_kind, effect_kinds
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.simulator import simulate
@@ -138,6 +149,50 @@ def test_noise_limits_hold_on_a_drive_of_the_same_simulator() -> None:
     assert above * len(effect_kinds()) == pytest.approx(0.05, rel=1e-6)
 
 
+def scanned(*names: str) -> list[Any]:
+    """Candidates of effects on drives of 3 min over 10 m by 6 m."""
+    extent = DriveExtent(180.0, (-5.0, 5.0), (-3.0, 3.0), 1.2, 1.0)
+    return [candidate for name in names for candidate in candidates_of(effect_kind(name), extent, 0)]
+
+
+def test_parameters_are_what_a_scan_fits_and_chooses() -> None:
+    """Sizes, a direction as two multiples, places and moments that are tried; a flip or a limit is one choice."""
+    expected = {
+        "gyro_bias": 1, "gyro_sign": 1, "accelerometer_sign": 1, "motor_saturation": 1, "slope": 2, "imu_tilt": 2,
+        "soil_change": 3, "soil_patch": 4,
+    }  # fmt: skip
+    assert parameter_counts(scanned(*expected)) == expected
+
+
+def test_an_effect_passes_the_criterion_where_it_falls_whatever_left_out_windows_say() -> None:
+    """BIC = 2 cost/dispersion + parameters ln(readings): smaller with the effect from half of the latter on."""
+    mask = np.ones((5, 80))
+    mask[:, 60:] = 0.0
+    problem: Any = SimpleNamespace(blocked=SimpleNamespace(mask=mask))
+    thresholds = bic_thresholds(problem, scanned("gyro_bias", "slope"))
+    limit = 0.5 * math.log(300.0)
+    lost = SimpleNamespace(held_out={"gyro_bias": -50.0, "slope": -50.0})
+    for name, count in (("gyro_bias", 1), ("slope", 2)):
+        assert thresholds.passes(name, 1.001 * count * limit, lost)
+        assert not thresholds.passes(name, 0.999 * count * limit, lost)
+    # by how much the criterion falls decides, not by what factor over the gate
+    listed = (Gain(0, "gyro_bias", 3.0 * limit, ()), Gain(1, "slope", 4.5 * limit, ()))
+    scan: Any = SimpleNamespace(gains=listed, held_out=lost.held_out, misfit={"yaw_rate": 99.0})
+    first = first_of([scan], thresholds)
+    assert (first.name, first.passes, first.rough) == ("slope", True, 0.0)
+    assert first.ratio == pytest.approx(2.25)
+
+
+def test_the_criterion_names_what_is_there_on_a_drive_of_the_same_simulator() -> None:
+    problem = problem_of("gyro_bias=0.02")
+    standing = stand(problem, fit(problem, iterations=0))
+    thresholds = bic_thresholds(problem, standing.terms.candidates)
+    first = first_of([standing], thresholds)
+    assert first.name == "gyro_bias"
+    assert first.alarm
+    assert set(thresholds.gates) == {gain.name for gain in standing.gains}
+
+
 def test_sparse_regression_finds_the_terms_that_are_there() -> None:
     rng = np.random.default_rng(0)
     x = rng.standard_normal((900, 4))
@@ -207,6 +262,7 @@ def test_every_arm_examines_a_case_of_the_generator(tmp_path: Path, monkeypatch:
     assert found["as it is"]["name"] == found["nominal fixed"]["name"] == "gyro_bias"
     assert found["as it is"]["passes"]
     assert found["no null bank"]["name"] == "gyro_bias"
+    assert found["BIC forward"]["name"] == "gyro_bias"
     # the same gain over a lower gate
     assert found["no null bank"]["ratio"] > found["as it is"]["ratio"]
     # no equation of accelerations has a term for it

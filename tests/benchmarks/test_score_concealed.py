@@ -9,7 +9,17 @@ import pytest
 
 from benchmarks.concealed.commitments import commitment
 from benchmarks.concealed_figure import tabled
-from benchmarks.score_concealed import TARGETS, against_targets, main, read_equivalents, score, share
+from benchmarks.concealed_truth import size_errors
+from benchmarks.score_concealed import (
+    TARGETS,
+    against_targets,
+    main,
+    mean,
+    median,
+    read_equivalents,
+    score,
+    share,
+)
 from ddagr_gym.errors import InputError
 
 
@@ -125,6 +135,116 @@ def test_intervals_are_compared_in_the_library_s_terms() -> None:
         assert [entry["truth"] for entry in scored["interval_misses"]] == [math.exp(-0.3)] * (value == 0.0)
 
 
+def sized(name: str, **values: float | None) -> dict[str, Any]:
+    """Answer that names one effect and states its sizes; those that are None stay neutral and state no interval."""
+    entries = {
+        field: {"value": 1e3, "interval": None} if value is None else {"value": value, "interval": [0.0, 1.0]}
+        for field, value in values.items()
+    }
+    return {**answer(name), "findings": [{"name": name, "equivalence_set": {name: 1.0}, "parameters": entries}]}
+
+
+@pytest.mark.parametrize(
+    ("name", "truth", "stated", "error"),
+    [
+        ("command_delay", {"delay": 0.1}, {"delay": 0.08}, 0.2),
+        # least meaningful: 0.02 s
+        ("command_delay", {"delay": 0.01}, {"delay": 0.02}, 0.5),
+        # a gain of 1.04 is 0.04 from no effect
+        ("gyro_scale", {"scale": 1.04}, {"scale": 1.03}, 0.25),
+        # found the wrong way round
+        ("gyro_bias", {"bias": 0.004}, {"bias": -0.004}, 2.0),
+        # y alone has no relative error
+        ("imu_lever_arm", {"x": 0.5, "y": 0.0}, {"x": 0.5, "y": 0.25}, 0.5),
+        ("imu_lever_arm", {"x": 0.3, "y": 0.4}, {"x": 0.0, "y": 0.0}, 1.0),
+        # a limit is 8 % too high, however far from none
+        ("motor_saturation", {"speed_limit": 0.5}, {"speed_limit": 0.54, "acceleration_limit": None}, 0.08),
+        # the generator states right over left, the library left over right; least: 0.2
+        ("soil_split", {"ln_strength_ratio": math.log(2.0)}, {"strength": 0.75}, 0.5),
+        # in units of the least, 0.1 and 0.2: true (3, 4), error (0, 2)
+        (
+            "soil_change",
+            {"ln_strength": math.log(1.3), "ln_stiffness": math.log(1.8)},
+            {"strength": 1.3, "stiffness": 2.2},
+            0.4,
+        ),
+    ],
+)
+def test_the_error_of_a_size_is_relative_to_its_distance_from_neutral(
+    name: str, truth: dict[str, float], stated: dict[str, float | None], error: float
+) -> None:
+    case = ("a", label("single", name, **truth), sized(name, **stated))
+    assert size_errors([case]) == [pytest.approx(error)]
+
+
+def test_sizes_of_wrong_names_other_forms_and_unfitted_ones_have_no_error() -> None:
+    delayed = label("single", "command_delay", delay=0.1)
+    other = {**delayed, "effects": [{**delayed["effects"][0], "tag": "variant"}]}
+    assert size_errors([("a", delayed, sized("motor_lag", lag=0.1))]) == []
+    assert size_errors([("a", delayed, sized("command_delay", delay=None))]) == []
+    assert size_errors([("a", delayed, {**sized("command_delay", delay=0.1), "verdict": ["unknown"]})]) == []
+    assert size_errors([("a", other, sized("command_delay", delay=0.1))]) == []
+
+
+def test_the_size_error_of_a_set_is_the_median_over_effects() -> None:
+    delays = {"a": 0.11, "b": 0.12, "c": 0.2, "d": 0.09}
+    labels = {name: label("single", "command_delay", delay=0.1) for name in delays}
+    labels["e"] = label("null", "none")
+    answers = {name: sized("command_delay", delay=value) for name, value in delays.items()} | {"e": answer("none")}
+    found = score(labels, answers)["size_error"]
+    assert found["value"] == pytest.approx(0.15)
+    assert found["count"] == 4
+    assert found["interval"] == pytest.approx([0.1, 1.0])
+
+
+def test_the_right_name_counts_by_how_many_names_stand_beside_it() -> None:
+    labels = {name: label("single", "command_delay", delay=0.1) for name in "abcdef"} | {"n": label("null", "none")}
+    answers = {
+        "a": answer("command_delay"),
+        "b": answer("motor_lag", command_delay=0.4),
+        "c": answer("motor_lag", slope=0.2, payload=0.1),
+        "d": answer("none"),
+        # its own name beside another finding
+        "e": answer("command_delay", "slope"),
+        # doubted: nothing is named
+        "f": {**answer("command_delay"), "verdict": ["unknown"]},
+        "n": answer("slope"),
+    }
+    found = score(labels, answers)
+    assert found["in_set"]["value"] == pytest.approx(3.0 / 6.0)
+    assert found["in_set_per_size"]["value"] == pytest.approx((1.0 + 0.5 + 0.5) / 6.0)
+    assert found["in_set_per_size"]["count"] == 6
+
+
+def test_power_counts_alarms_of_any_name_on_detectable_singles() -> None:
+    labels = {name: label("single", "command_delay", delay=0.1) for name in "abcdef"}
+    labels |= {"n": label("null", "none"), "o": label("outside", "unknown")}
+    answers = {
+        "a": answer("command_delay"),
+        "b": answer("payload"),
+        "c": answer("unknown", complete=False),
+        "d": answer("none"),
+        # a run that failed raised no alarm
+        "e": {**answer(), "failure": {"exit_code": 2}},
+        "f": {**answer("none"), "detectable": {"command_delay": {"delay": 0.2}}},
+        "n": answer("slope"),
+        "o": answer("unknown"),
+    }
+    found = score(labels, answers)
+    assert found["power"] == share([True, True, True, False, False])
+    assert found["power_all_singles"]["value"] == pytest.approx(3.0 / 6.0)
+
+
+def test_intervals_of_medians_and_means_are_of_the_values_resampled() -> None:
+    values = [0.0] * 30 + [1.0] * 10
+    assert median(values) == {"value": 0.0, "interval": [0.0, 0.0], "count": 40}
+    found = mean(values)
+    # standard error of a share: sqrt(0.25 * 0.75/40) = 0.068
+    assert found["value"] == 0.25
+    assert found["interval"] == pytest.approx([0.25 - 1.96 * 0.068, 0.25 + 1.96 * 0.068], abs=0.03)
+    assert median([]) == mean([]) == {"value": None, "interval": None, "count": 0}
+
+
 def test_a_name_in_a_verdict_of_unknown_is_none() -> None:
     labels = {"a": label("single", "command_delay", delay=0.1)}
     doubtful = {**answer("command_delay", interval=(0.0, 1.0)), "verdict": ["unknown"], "complete": False}
@@ -199,9 +319,14 @@ def test_command_line_writes_figures_and_picture(files: dict[str, Path], capsys:
     assert found["false_alarm_rate"]["value"] == 0.0
     assert found["top1"]["value"] == 0.0
     assert found["targets"]["top1"]["met"] is False
+    assert found["power"]["value"] == 1.0
+    assert found["in_set_per_size"]["value"] == 0.0
     assert [entry["case"] for entry in found["failures"]] == ["case_002"]
     assert files["output"].with_suffix(".png").read_bytes()[:4] == b"\x89PNG"
-    assert "missed" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "missed" in printed
+    assert "power " in printed
+    assert "in_set_per_size" in printed
 
 
 def test_labels_that_were_changed_after_the_run_are_refused(
