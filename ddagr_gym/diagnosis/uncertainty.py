@@ -97,9 +97,10 @@ def least_detectable(terms: Terms, thresholds: Thresholds, dispersion: float) ->
     """Distance of each size from neutral that passes the gate nine times in ten, by effect and field.
 
     The gain of a size s is s^2 I / 2 with the information I that is left beside the nuisances; infinite where there is
-    none. Of an effect that may act at any time or in any way, the usual one counts, which is its default (a change of
-    soil from the beginning on); of one that has a place, the median over the places that the drives touch. Of a limit
-    stands the mildest of the tried ones that shows, as it is, and of a reversed sign 1.
+    none, or where the size lies beyond the bound of what exists. Of an effect that may act at any time or in any way,
+    the usual one counts, which is its default (a change of soil from the beginning on); of one that has a place, the
+    median over the places that the drives touch. Of a limit stands the mildest of the tried ones that shows, as it is,
+    and of a reversed sign 1.
     """
     information = np.diag(reduce(terms).information)
     found: dict[str, dict[str, list[tuple[bool, float]]]] = {}
@@ -143,8 +144,8 @@ def _needed(probe: Effect, information: float, gate: float) -> tuple[bool, str, 
 
 
 def _that_count(effect: str, field: str, sizes: Sequence[tuple[bool, float]]) -> list[float]:
-    """Those of the usual shape, or where none is usual those that the effect can have at all."""
-    usual = [size for is_usual, size in sizes if is_usual]
+    """Those of the usual shape, or where none is usual all; what the effect can never have is infinite, or left out."""
     data = effect_kind(effect).parameter(field).metadata
     reach = max(data["high"] - data["neutral"], data["neutral"] - data["low"])
+    usual = [size if size <= reach else np.inf for is_usual, size in sizes if is_usual]
     return usual or [size for _, size in sizes if size <= reach] or [np.inf]

@@ -112,6 +112,17 @@ def test_of_two_ways_to_act_the_usual_one_counts() -> None:
     assert least == {"droop": pytest.approx(reaching(step, 900.0))}
 
 
+def test_a_size_that_cannot_exist_is_not_detectable() -> None:
+    """A pose that is up to 1 s late: what would take 1.1 s shows at no size."""
+    kind = effect_kind("pose_latency")
+    data = kind.parameter("latency").metadata
+    candidates = candidates_of(kind, EXTENT, 0)
+    for size in (0.9, 1.1):
+        information = (reaching(data["step"], 1.0) / (size * data["high"])) ** 2
+        expected = size * data["high"] if size < 1.0 else np.inf
+        assert least_of(candidates, {0: information}) == {"latency": pytest.approx(expected)}
+
+
 def test_what_a_nuisance_explains_detects_nothing() -> None:
     kind = effect_kind("payload")
     step = kind.parameter("mass").metadata["step"]
