@@ -84,12 +84,12 @@ def detectable(label: Mapping[str, Any], answer: Mapping[str, Any], equivalents:
     limits = answer.get("detectable") or {}
     known = equivalents or {}
     return all(
-        _is_detectable(effect["name"], true_sizes(effect) or known.get(effect["name"], {}), limits)
+        is_detectable(effect["name"], true_sizes(effect) or known.get(effect["name"], {}), limits)
         for effect in label["effects"]
     )
 
 
-def _is_detectable(kind: str, sizes: Mapping[str, float], limits: Mapping[str, Mapping[str, float | None]]) -> bool:
+def is_detectable(kind: str, sizes: Mapping[str, float], limits: Mapping[str, Mapping[str, float | None]]) -> bool:
     """An effect without sizes, or of which the diagnosis says nothing, counts; one that it cannot show does not."""
     if not sizes or kind not in limits:
         return True

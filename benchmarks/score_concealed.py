@@ -271,15 +271,20 @@ def about(opened: Mapping[str, Any], answers: Mapping[str, Any]) -> dict[str, An
     }
 
 
+def figure_line(name: str, entry: Mapping[str, Any]) -> str:
+    """Name, value, interval and count of a figure."""
+    low, high = entry["interval"]
+    return f"{name:28s} {entry['value']:8.3f}  [{low:.3f}, {high:.3f}]  {entry['count']:4d}"
+
+
 def _printed(result: Mapping[str, Any]) -> None:
     for name, entry in result.items():
         if isinstance(entry, dict) and entry.get("value") is not None:
-            low, high = entry["interval"]
             aim = result["targets"].get(name)
             goal = (
                 "" if aim is None else f"  aim {aim['least']:g} to {aim['most']:g}: {'met' if aim['met'] else 'missed'}"
             )
-            print(f"{name:28s} {entry['value']:8.3f}  [{low:.3f}, {high:.3f}]  {entry['count']:4d}{goal}")
+            print(f"{figure_line(name, entry)}{goal}")
 
 
 def _parser() -> argparse.ArgumentParser:

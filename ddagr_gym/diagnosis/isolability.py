@@ -256,8 +256,7 @@ def _direction(candidate: Candidate, k: int, matrix: Array, gate: float) -> _Dir
     gain = 0.5 * least**2 * max(float(matrix[column, column]), 0.0)
     multiples = math.sqrt(gate / gain) if gain > 1e-12 else math.inf
     if probe.differentiable and candidate.whole is None:
-        reach = max(data["high"] - data["neutral"], data["neutral"] - data["low"])
-        size = distance * multiples if distance * multiples <= reach else math.inf
+        size = distance * multiples if distance * multiples <= probe.reach(name) else math.inf
     else:  # a limit or a flip is there or not
         size = distance if multiples <= 1.0 else math.inf
     return _Direction(

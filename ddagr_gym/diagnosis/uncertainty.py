@@ -145,7 +145,6 @@ def _needed(probe: Effect, information: float, gate: float) -> tuple[bool, str, 
 
 def _that_count(effect: str, field: str, sizes: Sequence[tuple[bool, float]]) -> list[float]:
     """Those of the usual shape, or where none is usual all; what the effect can never have is infinite, or left out."""
-    data = effect_kind(effect).parameter(field).metadata
-    reach = max(data["high"] - data["neutral"], data["neutral"] - data["low"])
+    reach = effect_kind(effect).reach(field)
     usual = [size if size <= reach else np.inf for is_usual, size in sizes if is_usual]
     return usual or [size for _, size in sizes if size <= reach] or [np.inf]

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from benchmarks import altered_drives
-from benchmarks.altered_drives import (
+from benchmarks.altered_changes import (
     CHANGES,
     CONTINUOUS,
     CONTROL,
@@ -21,27 +21,20 @@ from benchmarks.altered_drives import (
     IN_STEPS,
     LATE_POSES,
     LATE_SENSORS,
-    RESULT,
     SCALE,
     TILTED,
     TURNED,
     Change,
     Layout,
     Table,
-    covered,
-    detectable,
-    draw,
-    figures,
     layout_of,
-    main,
     numbers,
-    outcome,
     packed,
     read_table,
     rows_before,
-    scored,
-    with_own,
 )
+from benchmarks.altered_drives import RESULT, covered, detectable, figures, main, scored, with_own
+from benchmarks.altered_figure import draw, outcome
 from benchmarks.answers import run_diagnoses
 from ddagr_gym.physics import layout
 from ddagr_gym.physics.effects.registry import effect_kind

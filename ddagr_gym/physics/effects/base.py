@@ -122,6 +122,12 @@ class Effect(Validated):
         return {item.name: item for item in fields(cls)}[name]
 
     @classmethod
+    def reach(cls, name: str) -> float:
+        """Largest distance of a size from neutral that exists, in its unit."""
+        data = cls.parameter(name).metadata
+        return float(max(data["high"] - data["neutral"], data["neutral"] - data["low"]))
+
+    @classmethod
     def description(cls) -> str:
         """The class's docstring without its list of attributes."""
         return inspect.cleandoc(cls.__doc__ or "").partition("\n\nAttributes:")[0]
