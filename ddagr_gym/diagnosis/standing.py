@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from ddagr_gym.diagnosis.misfit import channel_misfit
 from ddagr_gym.diagnosis.problem import Problem
 from ddagr_gym.diagnosis.refit import Fitted
 from ddagr_gym.diagnosis.scores import Gain, Terms, dispersion_of, gains, held_out_gains, scan, scores
+from ddagr_gym.diagnosis.size_prior import implausibility
+
+TIE = 0.01
+"""Share of a gain by which rivals may differ because no effect has exactly the library's form (ours: the share by which
+the gates of further effects rise, so that what the likelier of two leaves behind is no effect of its own)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +69,25 @@ def stand(problem: Problem, fitted: Fitted, progress: Callable[[str], None] = la
     held_out = held_out_gains(terms, dispersion)
     misfit = channel_misfit(problem, fitted)
     return Standing(fitted, terms, found, scores(terms, found), held_out, dispersion, misfit)
+
+
+def likeliest_first(rivals: Sequence[Rival]) -> list[Rival]:
+    """Rivals by what they gain; where gains tie, by how usual the sizes are.
+
+    Args:
+        rivals: of one step of a search.
+    """
+    unit = tie_unit(max((rival.gain for rival in rivals), default=0.0))
+    return sorted(rivals, key=lambda rival: implausibility(rival.fitted.point.effects[-1]) - rival.gain / unit)
+
+
+def tie_unit(explained: float) -> float:
+    """Difference of gains that is worth one unit of how usual a size is, as in the weights of the equivalence set.
+
+    Args:
+        explained: gain of the model.
+    """
+    return max(TIE * explained, 1.0)
 
 
 def rival_of(standing: Standing, name: str, fitted: Fitted) -> Rival:

@@ -84,7 +84,7 @@ def sloping(drive: Callable[..., Recording], problem_of: Callable[..., Problem])
     problem = problem_of(*recordings)
     nominal = fit(problem, iterations=2, renewals=1)
     start = replace(nominal.point, effects=load_effects("slope=0.05,direction=0.7"))
-    chosen = fit(problem, start, iterations=6, renewals=2, first=nominal)
+    chosen = fit(problem, start, iterations=15, renewals=5, first=nominal)
     rng = np.random.default_rng(0)
     return Sloping(
         recordings, problem, nominal, chosen, certify(problem, nominal, chosen, get_robot("ddagr"), recordings, rng)

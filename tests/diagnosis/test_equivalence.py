@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from ddagr_gym.diagnosis.equivalence import FORM, equivalence_weights, equivalents
-from ddagr_gym.diagnosis.standing import Rival
+from ddagr_gym.diagnosis.standing import TIE, Rival, likeliest_first
 from ddagr_gym.physics.effects import load_effects
 
 
@@ -76,3 +76,24 @@ def test_an_effect_swapped_in_keeps_the_rivals_of_its_step() -> None:
     found: Any = SimpleNamespace(steps=((tilt, bias),), standings=standings, chosen=standings[-1])
     assert set(equivalents(found, "accelerometer_bias", np.random.default_rng(1))) == {"imu_tilt", "accelerometer_bias"}
     assert equivalents(found, "slope", np.random.default_rng(1)) == {"slope": 1.0}
+
+
+BIAS, TILT = "accelerometer_bias=0.1", "imu_tilt=0,pitch=0.0102"
+"""The same reading; the bias has the more usual size."""
+
+
+@pytest.mark.parametrize(
+    ("behind", "first"), [(0.0, "accelerometer_bias"), (0.5, "accelerometer_bias"), (2.0, "imu_tilt")]
+)
+def test_of_two_that_fit_alike_the_one_of_usual_size_is_named(behind: float, first: str) -> None:
+    """What decides is the gain that the likelier one lacks, in units of a hundredth of the best one's."""
+    gain, cost = 500.0, np.full(30, 10.0)
+    named = likeliest_first([rival(TILT, cost, gain=gain), rival(BIAS, cost, gain=gain * (1.0 - behind * TIE))])
+    assert named[0].name == first
+
+
+def test_a_weak_gain_ties_within_one() -> None:
+    cost = np.full(30, 10.0)
+    assert likeliest_first([rival(TILT, cost, gain=30.0), rival(BIAS, cost, gain=29.7)])[0].name == "accelerometer_bias"
+    assert likeliest_first([rival(TILT, cost, gain=30.0), rival(BIAS, cost, gain=27.0)])[0].name == "imu_tilt"
+    assert likeliest_first([]) == []
