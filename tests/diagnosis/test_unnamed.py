@@ -26,7 +26,8 @@ def nominal(drive, problem_of):
 
 @pytest.fixture(scope="module")
 def pushed(drive, problem_of):
-    problem = problem_of(drive((HeldWrench(0.0, PUSH, 0.0),)))
+    push = (HeldWrench(0.0, PUSH, 0.0),)
+    problem = problem_of(drive(push, seed=5), drive(push, seed=6, yaw=2.0))
     return problem, fit(problem, iterations=2)
 
 
