@@ -2,6 +2,11 @@
 
 numba's on-disk cache notices edits of a function's own file only, not of the kernels it calls. Every kernel here
 is therefore cached under a stamp over all kernel sources of the package: edit one and all recompile.
+
+A compiled kernel holds copies of the kernels that it calls, optimised in their place. numba shares such copies: of two
+with one name a process runs the one that it met first. A process that compiles meets the kernel alone before its copy
+in a larger one, a process that loads what was compiled does not, and with fused multiply-adds their last bits differ.
+Here every kernel keeps its own copies, so that the same seed gives the same bits in the first process as in all others.
 """
 
 from __future__ import annotations
@@ -15,10 +20,13 @@ from typing import Any
 
 import numba
 from llvmlite import ir
+from llvmlite.binding import Linkage
 from numba import types
 from numba.core import cgutils
 from numba.core.caching import IndexDataCacheFile
 from numba.core.ccallback import CFunc
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler
 from numba.extending import intrinsic
 from numba.np.arrayobj import populate_array
 
@@ -99,6 +107,31 @@ def _stamp(compiled: Any, module: str) -> None:
     _keep_apart(getattr(compiled, "_cache", None), kernel_stamp(folder))
 
 
+class _OwnCopies(JITCodeLibrary):  # type: ignore[misc]
+    """Machine code of a kernel that runs its own copies of what it calls; other kernels still inline from it."""
+
+    def _finalize_final_module(self) -> None:
+        self._shared_module = self._final_module.clone()
+        for function in self._shared_module.functions:
+            if not function.is_declaration and function.linkage == Linkage.external:
+                function.linkage = Linkage.linkonce_odr
+        for function in self._final_module.functions:
+            if not function.is_declaration and function.linkage == Linkage.linkonce_odr:
+                function.linkage = Linkage.internal
+        super()._finalize_final_module()
+
+
+class _Compiler(Compiler):  # type: ignore[misc]
+    """numba's, into :class:`_OwnCopies`."""
+
+    def compile_extra(self, func: Callable[..., Any]) -> Any:
+        """Compile a function for given types."""
+        library = _OwnCopies(self.state.targetctx.codegen(), func.__qualname__)
+        library.enable_object_caching()
+        self.state.library = library
+        return super().compile_extra(func)
+
+
 def kernel(*, inline: bool = False, fused: bool = True, cached: bool = True) -> Callable[[Callable[..., Any]], Any]:
     """Decorator: nopython, no GIL, no divide checks, fused multiply-add, cached.
 
@@ -113,9 +146,8 @@ def kernel(*, inline: bool = False, fused: bool = True, cached: bool = True) -> 
     fastmath = {"contract"} if fused else False
 
     def decorate(function: Callable[..., Any]) -> Any:
-        compiled = numba.njit(fastmath=fastmath, error_model="numpy", nogil=True, cache=cached, forceinline=inline)(
-            function
-        )
+        options = {"fastmath": fastmath, "error_model": "numpy", "nogil": True, "cache": cached, "forceinline": inline}
+        compiled = numba.njit(pipeline_class=_Compiler, **options)(function)
         if cached:
             _stamp(compiled, function.__module__)
         return compiled
