@@ -17,7 +17,7 @@ from ddagr_gym.diagnosis.refit import DAMPING, Fitted, cost_of, fit
 from ddagr_gym.diagnosis.retold import TRIAL_STEPS, with_looped_encoders, with_slower_loop
 from ddagr_gym.diagnosis.scores import Gain, Terms, dispersion_of, drive_extent, gains, nuisance_answer
 from ddagr_gym.diagnosis.size_prior import implausibility
-from ddagr_gym.diagnosis.standing import TIE, Rival, Standing, likeliest_first, rival_of, stand, tie_unit
+from ddagr_gym.diagnosis.standing import TIE, Rival, Standing, likeliest_first, rival_of, stand
 from ddagr_gym.diagnosis.thresholds import UNMISTAKABLE, Thresholds
 
 Array = NDArray[np.float64]
@@ -286,7 +286,6 @@ def _swapped(problem: Problem, fitted: Fitted, steps: Sequence[tuple[Rival, ...]
     """Swap move: the model with a close rival in place of an effect of an earlier step, where it fits better."""
     best = fitted
     for number, rivals in enumerate(steps):
-        unit = tie_unit(rivals[0].gain)
         for rival in rivals[1:]:
             names = {effect.name for effect in best.point.effects}
             if rival.gain < _CLOSE * rivals[0].gain or rival.name in names or rival.retold:
@@ -294,14 +293,27 @@ def _swapped(problem: Problem, fitted: Fitted, steps: Sequence[tuple[Rival, ...]
             effects = list(best.point.effects)
             effects[number] = rival.fitted.point.effects[number]
             tried = fit(problem, replace(best.point, effects=tuple(effects)), iterations=4, reuse=fitted)
-            best = min(best, tried, key=partial(_with_sizes, problem, unit))
+            best = _likelier(problem, best, tried, TIE * rivals[0].gain)
     return best
 
 
-def _with_sizes(problem: Problem, unit: float, fitted: Fitted) -> float:
-    """Cost and how unusual the effects' sizes are, which settles ties."""
-    unusual = sum(implausibility(effect) for effect in fitted.point.effects)
-    return fitted.cost + dispersion_of(problem, fitted) * unit * unusual
+def _likelier(problem: Problem, fitted: Fitted, tried: Fitted, tie: float) -> Fitted:
+    """The fit with less cost and more usual sizes; costs that differ by no more than a tie count as the same.
+
+    Args:
+        problem: what was fitted.
+        fitted: stays where nothing speaks for the other.
+        tried: the other.
+        tie: difference of gains.
+    """
+    dispersion = dispersion_of(problem, fitted)
+    tied = abs(tried.cost - fitted.cost) <= tie * dispersion
+    ahead = 0.0 if tied else (fitted.cost - tried.cost) / dispersion
+    return tried if ahead > _unusual(tried) - _unusual(fitted) else fitted
+
+
+def _unusual(fitted: Fitted) -> float:
+    return sum(implausibility(effect) for effect in fitted.point.effects)
 
 
 def _without_idle(

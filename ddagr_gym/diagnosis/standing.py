@@ -12,8 +12,8 @@ from ddagr_gym.diagnosis.scores import Gain, Terms, dispersion_of, gains, held_o
 from ddagr_gym.diagnosis.size_prior import implausibility
 
 TIE = 0.01
-"""Share of a gain by which rivals may differ because no effect has exactly the library's form (ours: the share by which
-the gates of further effects rise, so that what the likelier of two leaves behind is no effect of its own)."""
+"""Share of the best gain within which gains are the same, for no effect has exactly the library's form (ours: the share
+by which the gates of further effects rise, so that what the likelier of two leaves behind is no effect of its own)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,22 +72,18 @@ def stand(problem: Problem, fitted: Fitted, progress: Callable[[str], None] = la
 
 
 def likeliest_first(rivals: Sequence[Rival]) -> list[Rival]:
-    """Rivals by what they gain; where gains tie, by how usual the sizes are.
+    """Rivals by what they gain and how usual their sizes are; gains within :data:`TIE` of the best count as the same.
 
     Args:
         rivals: of one step of a search.
     """
-    unit = tie_unit(max((rival.gain for rival in rivals), default=0.0))
-    return sorted(rivals, key=lambda rival: implausibility(rival.fitted.point.effects[-1]) - rival.gain / unit)
+    best = max((rival.gain for rival in rivals), default=0.0)
 
+    def unlikeliness(rival: Rival) -> float:
+        gain = best if rival.gain >= (1.0 - TIE) * best else rival.gain
+        return implausibility(rival.fitted.point.effects[-1]) - gain
 
-def tie_unit(explained: float) -> float:
-    """Difference of gains that is worth one unit of how usual a size is, as in the weights of the equivalence set.
-
-    Args:
-        explained: gain of the model.
-    """
-    return max(TIE * explained, 1.0)
+    return sorted(rivals, key=unlikeliness)
 
 
 def rival_of(standing: Standing, name: str, fitted: Fitted) -> Rival:
