@@ -17,7 +17,7 @@ from ddagr_gym.diagnosis.refit import DAMPING, Fitted, cost_of, fit
 from ddagr_gym.diagnosis.retold import TRIAL_STEPS, with_looped_encoders, with_slower_loop
 from ddagr_gym.diagnosis.scores import Gain, Terms, dispersion_of, drive_extent, gains, nuisance_answer
 from ddagr_gym.diagnosis.size_prior import implausibility
-from ddagr_gym.diagnosis.standing import TIE, Rival, Standing, likeliest_first, rival_of, stand
+from ddagr_gym.diagnosis.standing import Rival, Standing, rival_of, stand
 from ddagr_gym.diagnosis.thresholds import UNMISTAKABLE, Thresholds
 
 Array = NDArray[np.float64]
@@ -26,7 +26,7 @@ Result = TypeVar("Result")
 _HOPELESS = 0.4  # share of the best linear gain below which no joint refit is tried
 _LARGE = 100.0  # gain above which the linear scan may be far off: refits then begin from two points
 _HOPELESS_LARGE = 0.1  # the same share there
-_FORM = TIE
+_FORM = 0.01
 """Share of what the named effects explain that a further one must explain besides its gate (ours): the library's form
 of an effect is not the robot's, and what is left of it looks like other effects."""
 
@@ -149,7 +149,7 @@ def rivals_of(problem: Problem, standing: Standing, raw: Fitted, thresholds: Thr
         if rival.fitted.point.effects[-1].is_meaningful(extent)
         or rival.gain > UNMISTAKABLE * thresholds.of(rival.name).gain
     ]
-    return likeliest_first(kept)
+    return sorted(kept, key=lambda rival: implausibility(rival.fitted.point.effects[-1]) - rival.gain)
 
 
 def _ranked(problem: Problem, standing: Standing, raw: Fitted, thresholds: Thresholds) -> list[tuple[Gain, Terms]]:
@@ -293,27 +293,14 @@ def _swapped(problem: Problem, fitted: Fitted, steps: Sequence[tuple[Rival, ...]
             effects = list(best.point.effects)
             effects[number] = rival.fitted.point.effects[number]
             tried = fit(problem, replace(best.point, effects=tuple(effects)), iterations=4, reuse=fitted)
-            best = _likelier(problem, best, tried, TIE * rivals[0].gain)
+            best = min(best, tried, key=partial(_with_sizes, problem))
     return best
 
 
-def _likelier(problem: Problem, fitted: Fitted, tried: Fitted, tie: float) -> Fitted:
-    """The fit with less cost and more usual sizes; costs that differ by no more than a tie count as the same.
-
-    Args:
-        problem: what was fitted.
-        fitted: stays where nothing speaks for the other.
-        tried: the other.
-        tie: difference of gains.
-    """
-    dispersion = dispersion_of(problem, fitted)
-    tied = abs(tried.cost - fitted.cost) <= tie * dispersion
-    ahead = 0.0 if tied else (fitted.cost - tried.cost) / dispersion
-    return tried if ahead > _unusual(tried) - _unusual(fitted) else fitted
-
-
-def _unusual(fitted: Fitted) -> float:
-    return sum(implausibility(effect) for effect in fitted.point.effects)
+def _with_sizes(problem: Problem, fitted: Fitted) -> float:
+    """Cost and how unusual the effects' sizes are, which settles ties."""
+    unusual = sum(implausibility(effect) for effect in fitted.point.effects)
+    return fitted.cost + dispersion_of(problem, fitted) * unusual
 
 
 def _without_idle(

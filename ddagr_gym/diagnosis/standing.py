@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from ddagr_gym.diagnosis.misfit import channel_misfit
 from ddagr_gym.diagnosis.problem import Problem
 from ddagr_gym.diagnosis.refit import Fitted
 from ddagr_gym.diagnosis.scores import Gain, Terms, dispersion_of, gains, held_out_gains, scan, scores
-from ddagr_gym.diagnosis.size_prior import implausibility
-
-TIE = 0.01
-"""Share of the best gain within which gains are the same, for no effect has exactly the library's form (ours: the share
-by which the gates of further effects rise, so that what the likelier of two leaves behind is no effect of its own)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,21 +64,6 @@ def stand(problem: Problem, fitted: Fitted, progress: Callable[[str], None] = la
     held_out = held_out_gains(terms, dispersion)
     misfit = channel_misfit(problem, fitted)
     return Standing(fitted, terms, found, scores(terms, found), held_out, dispersion, misfit)
-
-
-def likeliest_first(rivals: Sequence[Rival]) -> list[Rival]:
-    """Rivals by what they gain and how usual their sizes are; gains within :data:`TIE` of the best count as the same.
-
-    Args:
-        rivals: of one step of a search.
-    """
-    best = max((rival.gain for rival in rivals), default=0.0)
-
-    def unlikeliness(rival: Rival) -> float:
-        gain = best if rival.gain >= (1.0 - TIE) * best else rival.gain
-        return implausibility(rival.fitted.point.effects[-1]) - gain
-
-    return sorted(rivals, key=unlikeliness)
 
 
 def rival_of(standing: Standing, name: str, fitted: Fitted) -> Rival:

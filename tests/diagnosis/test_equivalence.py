@@ -6,9 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ddagr_gym.diagnosis import search
 from ddagr_gym.diagnosis.equivalence import FORM, equivalence_weights, equivalents
-from ddagr_gym.diagnosis.standing import TIE, Rival, likeliest_first
+from ddagr_gym.diagnosis.standing import Rival
 from ddagr_gym.physics.effects import load_effects
 
 
@@ -77,36 +76,3 @@ def test_an_effect_swapped_in_keeps_the_rivals_of_its_step() -> None:
     found: Any = SimpleNamespace(steps=((tilt, bias),), standings=standings, chosen=standings[-1])
     assert set(equivalents(found, "accelerometer_bias", np.random.default_rng(1))) == {"imu_tilt", "accelerometer_bias"}
     assert equivalents(found, "slope", np.random.default_rng(1)) == {"slope": 1.0}
-
-
-BIAS, TILT = "accelerometer_bias=0.1", "imu_tilt=0,pitch=0.0102"
-"""The same reading; the bias has the more usual size."""
-
-
-@pytest.mark.parametrize(
-    ("behind", "first"), [(0.0, "accelerometer_bias"), (0.9, "accelerometer_bias"), (1.1, "imu_tilt")]
-)
-def test_of_two_that_fit_alike_the_one_of_usual_size_is_named(behind: float, first: str) -> None:
-    """Alike is a hundredth of the best gain, which is much more than usual sizes may make up for otherwise."""
-    gain, cost = 5000.0, np.full(30, 10.0)
-    named = likeliest_first([rival(TILT, cost, gain=gain), rival(BIAS, cost, gain=gain * (1.0 - behind * TIE))])
-    assert named[0].name == first
-
-
-def test_a_weak_gain_ties_within_what_usual_sizes_make_up_for() -> None:
-    cost = np.full(30, 10.0)
-    assert likeliest_first([rival(TILT, cost, gain=30.0), rival(BIAS, cost, gain=29.5)])[0].name == "accelerometer_bias"
-    assert likeliest_first([rival(TILT, cost, gain=30.0), rival(BIAS, cost, gain=27.0)])[0].name == "imu_tilt"
-    assert likeliest_first([]) == []
-
-
-@pytest.mark.parametrize(("ahead", "first"), [(4.0, "accelerometer_bias"), (6.0, "imu_tilt")])
-def test_a_swap_keeps_the_usual_size_of_two_that_fit_alike(
-    monkeypatch: pytest.MonkeyPatch, ahead: float, first: str
-) -> None:
-    monkeypatch.setattr(search, "dispersion_of", lambda problem, fitted: 2.0)
-    cost = np.full(30, 10.0)
-    problem: Any = None
-    bias, tilt = rival(BIAS, cost).fitted, rival(TILT, cost, prior=-2.0 * ahead).fitted
-    assert search._likelier(problem, bias, tilt, 5.0).point.effects[0].name == first
-    assert search._likelier(problem, tilt, bias, 5.0).point.effects[0].name == first
