@@ -124,12 +124,10 @@ class _OwnCopies(JITCodeLibrary):  # type: ignore[misc]
 class _Compiler(Compiler):  # type: ignore[misc]
     """numba's, into :class:`_OwnCopies`."""
 
-    def compile_extra(self, func: Callable[..., Any]) -> Any:
-        """Compile a function for given types."""
-        library = _OwnCopies(self.state.targetctx.codegen(), func.__qualname__)
-        library.enable_object_caching()
-        self.state.library = library
-        return super().compile_extra(func)
+    def __init__(self, typing: Any, target: Any, _: None, *rest: Any) -> None:
+        own = _OwnCopies(target.codegen(), "kernel")
+        own.enable_object_caching()
+        super().__init__(typing, target, own, *rest)
 
 
 def kernel(*, inline: bool = False, fused: bool = True, cached: bool = True) -> Callable[[Callable[..., Any]], Any]:

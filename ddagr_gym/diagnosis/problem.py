@@ -37,7 +37,7 @@ def fit_numerics() -> Numerics:
     """Smooth predictions at steps of 20 ms, divided where the integrator's own error estimate asks for it.
 
     Accelerations of starts, arcs, stops and spins are within 0.5 mm/s^2 (r.m.s.) of converged ones. Dividing at
-    launches instead (``Numerics.smooth()``) costs 1.2 to 1.5 times as much and errs by 2.3 mm/s^2.
+    launches instead (``Numerics.smooth()``) costs up to 1.5 times as much and errs by 2.3 mm/s^2.
     """
     return replace(Numerics.smooth(), maximum_step=0.02, accepted_error=1e-4, launch_change=1e9, contact_nodes=5)
 

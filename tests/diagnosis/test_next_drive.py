@@ -55,7 +55,8 @@ def test_a_place_is_driven_over() -> None:
     far = drive("soil_patch=2.5,centre_x=30.0,centre_y=-20.0", bank=(STRAIGHT,))
     near = drive("soil_patch=2.5,centre_x=1.0,centre_y=0.0", bank=(STRAIGHT,))
     assert far["power"] == pytest.approx(near["power"], rel=0.1)
-    assert far["power"] > 0.05
+    # 0.0812 with steps of 5 ms and nine contact nodes; steps divided at launches read 1.2 out of their own noise
+    assert far["power"] == pytest.approx(0.0812, rel=0.3)
 
 
 def test_rivals_and_sensors_of_a_diagnosis() -> None:
