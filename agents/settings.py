@@ -11,6 +11,7 @@ from ddagr_gym.envs.settings import Randomisation, RewardWeights
 from ddagr_gym.errors import InputError
 from ddagr_gym.estimation import FilterModel
 from ddagr_gym.parameters import Sensors, Validated, bounded
+from ddagr_gym.physics.effects import load_effects
 from ddagr_gym.policies.design import PolicyDesign
 from ddagr_gym.presets import ddagr
 
@@ -142,4 +143,7 @@ class TrainingSettings:
             del content[name]
         # the policy is fitted to this filter: with another one it has to be trained anew
         content["filter"] = asdict(FilterModel.of(ddagr(), Sensors()))
+        if self.task.effects:
+            # what a file of effects says counts, not its path
+            content["effects"] = [effect.as_mapping() for effect in load_effects(self.task.effects)]
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()

@@ -95,7 +95,7 @@ def examined(work: Work) -> str:
     """Examine a case unless that is done; returns its name."""
     from benchmarks.ablations.examine import ROBOT, examine
     from ddagr_gym.diagnosis.sources import source_digest
-    from ddagr_gym.diagnosis.thresholds import default_thresholds, load_thresholds
+    from ddagr_gym.diagnosis.threshold_files import default_thresholds, load_thresholds
 
     thresholds = default_thresholds(ROBOT) if work.thresholds is None else load_thresholds(work.thresholds)
     key = f"{source_digest()} {thresholds.bank}"

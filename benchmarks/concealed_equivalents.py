@@ -36,7 +36,7 @@ from ddagr_gym.diagnosis.problem import Point
 from ddagr_gym.diagnosis.refit import fit
 from ddagr_gym.diagnosis.search import refit_nominal
 from ddagr_gym.diagnosis.setting import Setting, make_problem
-from ddagr_gym.diagnosis.thresholds import default_thresholds
+from ddagr_gym.diagnosis.threshold_files import default_thresholds
 from ddagr_gym.errors import InputError
 from ddagr_gym.physics.effects.base import Effect
 from ddagr_gym.physics.effects.registry import effect_kind

@@ -25,7 +25,8 @@ from ddagr_gym.diagnosis.pipeline import Task, run
 from ddagr_gym.diagnosis.scores import scan
 from ddagr_gym.diagnosis.search import refit_nominal
 from ddagr_gym.diagnosis.setting import Setting
-from ddagr_gym.diagnosis.thresholds import Thresholds, default_thresholds
+from ddagr_gym.diagnosis.threshold_files import default_thresholds
+from ddagr_gym.diagnosis.thresholds import Thresholds
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.files import write_atomically
 from ddagr_gym.reporting.figures import house_style, save_figure

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import shlex
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -86,6 +87,35 @@ def test_help_of_a_command_has_examples_that_parse(name, capsys):
         words = example.split()
         assert words[:2] == ["ddagr", name]
         assert isinstance(cli._parse(command, words[2:]), command.arguments)
+
+
+README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+
+
+def readme_lines() -> list[str]:
+    """Command lines of README.md: those of its code blocks, then those inside its sentences."""
+    blocks = re.findall(r"^```.*?\n(.*?)^```", README, flags=re.MULTILINE | re.DOTALL)
+    text = re.sub(r"^```.*?^```", "", README, flags=re.MULTILINE | re.DOTALL)
+    lines = [line for block in blocks for line in block.splitlines() if line.startswith("./ddagr")]
+    return lines + [" ".join(code.split()) for code in re.findall(r"`(\./ddagr\b[^`]*)`", text)]
+
+
+def test_readme_shows_command_lines():
+    named = {words[1] for line in readme_lines() if len(words := line.split()) > 1}
+    assert {"demo", "diagnose", "isolability", "next-drive", "evaluate"} <= named
+
+
+@pytest.mark.parametrize("line", readme_lines())
+def test_command_lines_of_the_readme_parse(line):
+    program, *words = shlex.split(line, comments=True)
+    assert program == "./ddagr"
+    if not words or words[0].startswith("-"):
+        pytest.skip("names no command")
+    command = commands.load(words[0])
+    if len(words) == 1 and f"`{line}`" in README:
+        pytest.skip("a sentence names the command without its arguments")
+    given = ["path" if re.fullmatch(r"[A-Z]{2,}(\.\.\.)?", word) else word for word in words[1:]]
+    assert isinstance(cli._parse(command, given), command.arguments)
 
 
 def test_unknown_command_names_the_closest(capsys):

@@ -25,7 +25,7 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -36,7 +36,9 @@ from ddagr_gym.version import __version__, commit_of
 
 HERE = Path(__file__).resolve().parent
 CHECKOUT = HERE.parents[1]
-ENTRIES = ("verdict", "complete", "findings", "sentence", "fit", "detectable", "misfit", "seconds", "version")
+ENTRIES = (
+    "verdict", "complete", "findings", "rejected", "sentence", "fit", "detectable", "misfit", "seconds", "version",
+)  # fmt: skip
 """What an answer keeps of a diagnosis.json."""
 
 UNKNOWN_GROUND = ("--soil", "firm_ground", "--soil-uncertainty", "4", "--stride", "8")
@@ -44,6 +46,8 @@ UNKNOWN_GROUND = ("--soil", "firm_ground", "--soil-uncertainty", "4", "--stride"
 
 REAL_BANK = CHECKOUT / "ddagr_gym" / "data" / "null_bank_warthog.json"
 """Thresholds from ordinary Warthog drives; no ordinary Husky drive is at hand, so they serve for it too."""
+
+_RECORDING = ".csv.gz"
 
 INTERRUPTED = (130, -2, -15)
 """Exit codes of a run that was told to stop; it is no answer."""
@@ -131,11 +135,17 @@ def diagnose(case: Case, parts: Path, threads: int, limit: float) -> dict[str, A
     done = _run([*command, "--output", str(output), "--overwrite"], limit)
     if done.returncode in INTERRUPTED:
         raise InterruptedRunError(case.name)
-    answer = _answer(output / "diagnosis.json", done) | {"options": list(case.options), "commit": commit_of(CHECKOUT)}
+    told = {"arguments": shown(case.arguments), "options": list(case.options), "commit": commit_of(CHECKOUT)}
+    answer = _answer(output / "diagnosis.json", done) | told
     answer.setdefault("seconds", time.monotonic() - began)
     write_atomically(part, lambda to: to.write_text(json.dumps(answer, indent=1) + "\n"))
     shutil.rmtree(output, ignore_errors=True)
     return answer
+
+
+def shown(arguments: Sequence[str]) -> list[str]:
+    """Arguments of a run as they are kept with its answer: recordings by name, files of the checkout from there."""
+    return [Path(word).name if word.endswith(_RECORDING) else word.removeprefix(f"{CHECKOUT}/") for word in arguments]
 
 
 def _run(command: list[str], limit: float) -> subprocess.CompletedProcess[str]:

@@ -80,7 +80,7 @@ def diagnosis_step(folder: Path, seed: int = 1, thresholds: Thresholds | None = 
     from ddagr_gym.commands.diagnose import PAGE, diagnosed, outcome_text, write_outcome
     from ddagr_gym.diagnosis.pipeline import Task
     from ddagr_gym.diagnosis.setting import Setting
-    from ddagr_gym.diagnosis.thresholds import default_thresholds
+    from ddagr_gym.diagnosis.threshold_files import default_thresholds
     from ddagr_gym.presets import get_robot, get_soil
 
     print("Diagnosing two drives on ground of which the nominal simulator does not know that it slopes ...", flush=True)

@@ -148,7 +148,7 @@ def _sources(runs: Sequence[Path]) -> list[Path]:
 
 def _thresholds(arguments: Arguments) -> Thresholds:
     from ddagr_gym.commands.gates import gates_for
-    from ddagr_gym.diagnosis.thresholds import default_thresholds
+    from ddagr_gym.diagnosis.threshold_files import default_thresholds
 
     found = gates_for(arguments.thresholds, arguments.robot, arguments.soil, arguments.soil_uncertainty)
     return default_thresholds(arguments.robot) if found is None else found
@@ -222,6 +222,9 @@ def outcome_text(diagnosis: Diagnosis) -> str:
     if diagnosis.findings:
         head = ("effect", "size", "90 % interval", "unit", "gain", "gate", "could also be")
         parts.append(format_table(head, [row for finding in diagnosis.findings for row in _finding_rows(finding)]))
+    if diagnosis.rejected:
+        nearest = ", ".join(f"{item.name} (gain {item.gain:.1f})" for item in diagnosis.rejected)
+        parts.append(f"What comes nearest leaves too much to be named: {nearest}.")
     if diagnosis.fit is not None:
         parts += _fit_texts(diagnosis.fit)
     return "\n\n".join(parts)

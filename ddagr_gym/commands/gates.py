@@ -22,7 +22,7 @@ def gates_for(path: Path | None, robot: str, soil: str, soil_uncertainty: float 
     Raises:
         InputError: the file cannot be read.
     """
-    from ddagr_gym.diagnosis.thresholds import load_thresholds, shipped_thresholds
+    from ddagr_gym.diagnosis.threshold_files import load_thresholds, shipped_thresholds
 
     thresholds = shipped_thresholds(robot) if path is None else load_thresholds(path)
     if thresholds is not None and thresholds.origin is not None:

@@ -10,14 +10,15 @@ from typing import TYPE_CHECKING
 
 from ddagr_gym.commands.output import check_output_folder, format_table, output_folder, write_text
 from ddagr_gym.commands.progress import Progress
+from ddagr_gym.errors import InputError
 
 if TYPE_CHECKING:
     from ddagr_gym.diagnosis.isolability import Isolability
 
 EXAMPLES = (
     "ddagr isolability --manoeuvres straight two_headings --output isolability",
-    "ddagr isolability --robot warthog --soil firm_ground --manoeuvres stops arcs spin --sensors imu encoders "
-    "--output isolability",
+    "ddagr isolability --robot warthog --soil firm_ground --soil-uncertainty 4 --manoeuvres stops arcs spin "
+    "--sensors imu encoders",
 )
 
 
@@ -29,40 +30,46 @@ class Arguments:
     the least detectable size of each effect and the share of its trace that every other effect cannot imitate.
 
     Attributes:
-        output: folder for isolability.json, isolability.txt and the figure.
+        output: folder for isolability.json, isolability.txt and the figure; the table is only printed without one.
         manoeuvres: names of built-in drives, or CSV files of commands.
         sensors: some of imu, encoders, pose.
         robot: nominal robot.
         soil: nominal soil.
+        soil_uncertainty: as for `ddagr diagnose`.
         thresholds: gates of `ddagr null-bank`; by default those that ship for the robot, and where none do those that
             normal noise alone asks for (chi-square): real drives need larger sizes then.
         seed: of the sensor noise.
         overwrite: replace an output folder that an earlier command wrote.
     """
 
-    output: Path
+    output: Path | None = None
     manoeuvres: tuple[str, ...] = ("stops", "arcs", "spin", "s_weave")
     sensors: tuple[str, ...] = ("imu", "encoders", "pose")
     robot: str = "ddagr"
     soil: str = "thesis_a1"
+    soil_uncertainty: float = 1.0
     thresholds: Path | None = None
     seed: int = 0
     overwrite: bool = False
 
 
 def run(arguments: Arguments) -> None:
-    """Make the table, write it, print it."""
+    """Make the table, print it, write it."""
     from ddagr_gym.commands.gates import gates_for
     from ddagr_gym.control.manoeuvres import find_manoeuvre
     from ddagr_gym.diagnosis.isolability import isolability
+    from ddagr_gym.diagnosis.nuisance import NuisancePriors
     from ddagr_gym.physics.effects.registry import effect_kinds
     from ddagr_gym.presets import get_robot, get_soil
-    from ddagr_gym.reporting.isolability_figure import isolability_figure
 
-    check_output_folder(arguments.output, overwrite=arguments.overwrite)
+    if arguments.seed < 0:
+        raise InputError(f"--seed is {arguments.seed}: give at least 0.")
+    if arguments.output is not None:
+        check_output_folder(arguments.output, overwrite=arguments.overwrite)
+    priors = NuisancePriors().with_soil(arguments.soil_uncertainty)
     robot, soil = get_robot(arguments.robot), get_soil(arguments.soil)
     manoeuvres = [find_manoeuvre(name) for name in arguments.manoeuvres]
-    thresholds = gates_for(arguments.thresholds, arguments.robot, arguments.soil)
+    thresholds = gates_for(arguments.thresholds, arguments.robot, arguments.soil, arguments.soil_uncertainty)
     with Progress(len(effect_kinds()), "effects") as progress:
         table = isolability(
             robot,
@@ -72,16 +79,24 @@ def run(arguments: Arguments) -> None:
             thresholds=thresholds,
             seed=arguments.seed,
             soil_name=arguments.soil,
+            priors=priors,
             progress=lambda name: progress.advance(),
         )
-    text = table_text(table)
-    with output_folder(arguments.output, overwrite=arguments.overwrite) as folder:
-        mapping = table.as_mapping()
+    print(table_text(table))
+    if arguments.output is not None:
+        _write(table, arguments.output, overwrite=arguments.overwrite)
+
+
+def _write(table: Isolability, output: Path, *, overwrite: bool) -> None:
+    """Table, JSON and figure."""
+    from ddagr_gym.reporting.isolability_figure import isolability_figure
+
+    mapping = table.as_mapping()
+    with output_folder(output, overwrite=overwrite) as folder:
         write_text(folder / "isolability.json", json.dumps(mapping, indent=1, allow_nan=False) + "\n")
-        write_text(folder / "isolability.txt", text + "\n")
+        write_text(folder / "isolability.txt", table_text(table) + "\n")
         isolability_figure(mapping, folder / "isolability.png")
-    print(text)
-    print(f"\ntable, JSON and figure: {arguments.output}")
+    print(f"\ntable, JSON and figure: {output}")
 
 
 def table_text(table: Isolability) -> str:

@@ -5,13 +5,16 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 from tyro.conf import Positional
 
 from ddagr_gym.commands.output import format_table, write_text
 from ddagr_gym.errors import InputError
+
+if TYPE_CHECKING:
+    from ddagr_gym.diagnosis.setting import Setting
 
 EXAMPLES = (
     "ddagr next-drive diagnosis",
@@ -55,14 +58,16 @@ def run(arguments: Arguments) -> None:
     from ddagr_gym.diagnosis.next_drive import next_drive
     from ddagr_gym.presets import get_robot, get_soil
 
-    if arguments.threads < 1:
-        raise InputError(f"--threads is {arguments.threads}: give at least 1.")
+    for name, least in (("threads", 1), ("seed", 0)):
+        given = getattr(arguments, name)
+        if given < least:
+            raise InputError(f"--{name} is {given}: give at least {least}.")
     if (arguments.diagnosis is None) == (not arguments.rival):
         raise InputError("give either a diagnosis or some --rival name=size, not both.")
     case = _case(arguments)
     robot, soil = get_robot(arguments.robot or case.robot), get_soil(arguments.soil or case.soil)
     sensors, seed, threads = arguments.sensors or case.sensors, arguments.seed, arguments.threads
-    answer = next_drive(robot, soil, case.rivals, sensors=sensors, seed=seed, threads=threads)
+    answer = next_drive(robot, soil, case.rivals, sensors=sensors, seed=seed, threads=threads, setting=case.setting)
     if arguments.output is not None:
         write_text(arguments.output, json.dumps(answer, indent=1, allow_nan=False) + "\n")
     print(answer_text(answer))
@@ -70,16 +75,17 @@ def run(arguments: Arguments) -> None:
 
 @dataclass(frozen=True)
 class _Case:
-    """What is to be told apart, with which sensors, for which robot on which soil."""
+    """What is to be told apart, with which sensors, for which robot on which soil, by which diagnosis."""
 
     rivals: list[Any]
     sensors: tuple[str, ...]
     robot: str
     soil: str
+    setting: Setting | None = None
 
 
 def _case(arguments: Arguments) -> _Case:
-    from ddagr_gym.diagnosis.next_drive import rivals_of_diagnosis, sensors_of_diagnosis
+    from ddagr_gym.diagnosis.next_drive import rivals_of_diagnosis, sensors_of_diagnosis, setting_of_diagnosis
     from ddagr_gym.diagnosis.planned import SENSORS
     from ddagr_gym.diagnosis.verdict import load
     from ddagr_gym.physics.effects.registry import parse_effect
@@ -89,7 +95,7 @@ def _case(arguments: Arguments) -> _Case:
     path = arguments.diagnosis
     mapping = load(path / "diagnosis.json" if path.is_dir() else path)
     named = mapping["robot"] or ROBOT, mapping["soil"] or SOIL
-    return _Case(rivals_of_diagnosis(mapping), sensors_of_diagnosis(mapping), *named)
+    return _Case(rivals_of_diagnosis(mapping), sensors_of_diagnosis(mapping), *named, setting_of_diagnosis(mapping))
 
 
 def answer_text(answer: dict[str, Any]) -> str:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import math
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -41,13 +43,13 @@ class Arguments:
     Attributes:
         runs: recordings of one robot, as `ddagr diagnose` takes them; without any, three drives of 60 s are drawn.
         ordinary: take the runs themselves for null drives: real ones in which nothing is wrong. They are cut into
-            pieces, and no drive is simulated.
-        piece: length of such a piece [s].
+            pieces, of which at least 20 are needed (the level is 5 percent), and no drive is simulated.
+        piece: length of such a piece [s], at least 16 (8 windows of 2 s).
         output: thresholds to write, .json; the runs themselves lie beside it.
         robot: nominal robot.
         soil: nominal soil.
         map: column map, for sources that are not imported yet.
-        count: null drives; at least 20 for the level of 5 percent.
+        count: null drives to simulate; at least 20 for the level of 5 percent.
         seed: of the bank.
         soil_uncertainty: as for `ddagr diagnose`.
         window: length of the windows [s]; diagnoses with these thresholds cut recordings in the same way.
@@ -73,21 +75,18 @@ class Arguments:
 def run(arguments: Arguments) -> None:
     """Make what is missing of the bank, then write the thresholds."""
     from ddagr_gym.diagnosis.fitted_nominal import fitted_nominal
+    from ddagr_gym.diagnosis.inputs import check_recordings
     from ddagr_gym.diagnosis.noise import recording_noise
     from ddagr_gym.diagnosis.nuisance import NuisancePriors
-    from ddagr_gym.diagnosis.null_bank import bank_hash, pieces_of
+    from ddagr_gym.diagnosis.null_bank import bank_hash
     from ddagr_gym.diagnosis.null_drives import template_of
-    from ddagr_gym.diagnosis.setting import SHORTEST, Setting, wheel_radius
-    from ddagr_gym.diagnosis.thresholds import NullRun, save_thresholds, thresholds_from
+    from ddagr_gym.diagnosis.setting import Setting, wheel_radius
+    from ddagr_gym.diagnosis.threshold_files import save_thresholds
+    from ddagr_gym.diagnosis.thresholds import NullRun, thresholds_from
     from ddagr_gym.presets import get_robot, get_soil
     from ddagr_gym.recordings.load import load_recording
 
-    for name, least in (("window", SHORTEST), ("stride", 0.1)):
-        given = getattr(arguments, name)
-        if given is not None and not given >= least:
-            raise InputError(f"--{name} is {given:g}: give at least {least:g} s.")
-    if arguments.ordinary and not arguments.runs:
-        raise InputError("--ordinary takes recordings for null drives and none is given: name some, or leave it out.")
+    _check_options(arguments)
     robot, soil = get_robot(arguments.robot), get_soil(arguments.soil)
     recordings = [load_recording(path, arguments.map or None, arguments.robot) for path in arguments.runs]
     priors = NuisancePriors().with_soil(arguments.soil_uncertainty)
@@ -96,22 +95,56 @@ def run(arguments: Arguments) -> None:
     centre: _Centre = None
     pieces: list[Recording] = []
     if arguments.ordinary:
-        pieces = [piece for recording in recordings for piece in pieces_of(recording, arguments.piece)]
-        template = template_of(pieces, (None,) * 8)
+        pieces = _pieces(recordings, arguments.piece, robot, setting)
     elif recordings:
+        check_recordings(recordings, robot, setting)
         template = template_of(recordings, recording_noise(recordings, wheel_radius(robot)))
         centre = fitted_nominal(robot, soil, recordings, setting)
     drives: list[Template | Recording | None] = [*pieces] or [template] * arguments.count
-    bank = bank_hash(robot, soil, template, setting, len(drives), arguments.seed, centre)
+    bank = bank_hash(robot, soil, template, setting, len(drives), arguments.seed, centre, pieces)
     folder = arguments.output.with_suffix(".bank")
     folder.mkdir(parents=True, exist_ok=True)
     paths = [_part(folder, bank, number) for number in range(len(drives))]
     tasks = [(robot, soil, d, setting, arguments.seed, n, paths[n], centre) for n, d in enumerate(drives)]
     _make([task for task in tasks if not paths[task[5]].exists()], arguments.processes)
     runs = [NullRun(**json.loads(path.read_text())) for path in paths]
-    found = thresholds_from(runs, bank, duration=arguments.window, origin=_origin(arguments))
+    found = thresholds_from(runs, bank, origin=_origin(arguments))
     save_thresholds(found, arguments.output)
     print(f"{arguments.output}: thresholds of {len(runs)} null drives, bank {bank[:12]}")
+
+
+def _check_options(arguments: Arguments) -> None:
+    from ddagr_gym.diagnosis.setting import LEAST_WINDOWS, SHORT, SHORTEST
+    from ddagr_gym.diagnosis.thresholds import LEVEL, least_nulls
+
+    for name, least in (("window", SHORTEST), ("stride", 0.1), ("piece", LEAST_WINDOWS * SHORT)):
+        given = getattr(arguments, name)
+        if given is not None and not least <= given < math.inf:
+            raise InputError(f"--{name} is {given:g}: give a finite time of at least {least:g} s.")
+    for name, smallest in (("seed", 0), ("processes", 1)):
+        if getattr(arguments, name) < smallest:
+            raise InputError(f"--{name} is {getattr(arguments, name)}: give at least {smallest}.")
+    if arguments.ordinary and not arguments.runs:
+        raise InputError("--ordinary takes recordings for null drives and none is given: name some, or leave it out.")
+    if not arguments.ordinary and arguments.count < least_nulls():
+        raise InputError(f"--count is {arguments.count}: give at least {least_nulls()} for the level of {LEVEL:g}.")
+
+
+def _pieces(recordings: Sequence[Recording], length: float, robot: Robot, setting: Setting) -> list[Recording]:
+    """Ordinary drives in pieces, enough of them for thresholds."""
+    from ddagr_gym.diagnosis.inputs import check_recordings
+    from ddagr_gym.diagnosis.null_bank import pieces_of
+    from ddagr_gym.diagnosis.thresholds import LEVEL, least_nulls
+
+    for recording in recordings:
+        check_recordings([recording], robot, setting)
+    pieces = [piece for recording in recordings for piece in pieces_of(recording, length)]
+    if len(pieces) < least_nulls():
+        raise InputError(
+            f"the recordings give {len(pieces)} pieces with commands of {length:g} s and the level of {LEVEL:g} takes "
+            f"at least {least_nulls()}: name more recordings or give a shorter --piece."
+        )
+    return pieces
 
 
 def _origin(arguments: Arguments) -> Origin:

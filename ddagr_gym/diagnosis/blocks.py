@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.diagnosis.noise import ChannelNoise
-from ddagr_gym.recordings.schema import Recording
+from ddagr_gym.diagnosis.noise import ChannelNoise, interpolated
+from ddagr_gym.recordings.schema import GAP_IN_PERIODS, Recording
 from ddagr_gym.replay.pieces import POSE_CHANNELS
 from ddagr_gym.replay.windows import CHANNELS, STATE, WindowSet
 
@@ -130,11 +130,20 @@ def located(windows: WindowSet, recordings: Sequence[Recording], wheel_radius: f
     for number, recording in enumerate(recordings):
         if recording.has(*POSE_CHANNELS):
             continue
-        step = recording.period
-        yaw = np.cumsum(np.nan_to_num(recording["yaw_rate"])) * step
-        banks = [np.nan_to_num(recording[name]) for name in ("encoder_right", "encoder_left")]
+        step, rows = recording.period, _periods(recording)
+        yaw = np.cumsum(interpolated(recording, "yaw_rate") * rows) * step
+        banks = [interpolated(recording, name) * rows for name in ("encoder_right", "encoder_left")]
         travel = wheel_radius * 0.5 * (banks[0] + banks[1]) * step
         path = np.stack([np.cumsum(travel * np.cos(yaw)), np.cumsum(travel * np.sin(yaw)), yaw], axis=1)
         chosen = windows.recording == number
         initial[np.ix_(chosen, [STATE.index(name) for name in ("x", "y", "yaw")])] = path[windows.start[chosen]]
     return replace(windows, initial=initial)
+
+
+def _periods(recording: Recording) -> Array:
+    """(n,) periods since the row before: 1, but for gaps inside a span, whose time is known."""
+    periods = np.ones(len(recording))
+    for span in recording.spans():
+        steps = np.diff(recording.t[span]) / recording.period
+        periods[span][1:] = np.where(steps > GAP_IN_PERIODS, steps, 1.0)
+    return periods

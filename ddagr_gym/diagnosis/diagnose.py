@@ -17,14 +17,16 @@ from ddagr_gym.diagnosis.held import Held, find_held, hold_effect, without_repea
 from ddagr_gym.diagnosis.inputs import data_source
 from ddagr_gym.diagnosis.misfit import LOCAL, explained_share, roughest
 from ddagr_gym.diagnosis.problem import Problem
+from ddagr_gym.diagnosis.refit import Fitted
 from ddagr_gym.diagnosis.scores import dispersion_of
-from ddagr_gym.diagnosis.search import BENT, MOST_EFFECTS, Found, Keep, do, refit_nominal, search
+from ddagr_gym.diagnosis.search import BENT, MOST_EFFECTS, Found, Keep, do, further_gates, refit_nominal, search
 from ddagr_gym.diagnosis.sentences import headline
 from ddagr_gym.diagnosis.setting import SHORT, Setting, make_problem
 from ddagr_gym.diagnosis.standing import Standing, stand
 from ddagr_gym.diagnosis.thresholds import Thresholds
 from ddagr_gym.diagnosis.uncertainty import intervals, least_detectable, resampled_parameters, with_structure
 from ddagr_gym.diagnosis.verdict import NONE, UNKNOWN, Diagnosis, Estimate, Finding
+from ddagr_gym.errors import InputError
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.effects.gyro_sign import GyroSign
@@ -73,6 +75,70 @@ def prepare(robot: Robot, soil: Soil, recordings: Sequence[Recording], setting: 
     return Prepared(clean, tuple(held), flipped, make_problem(robot, soil, clean, setting))
 
 
+@dataclass(frozen=True, eq=False)
+class Begun:
+    """Where a search begins.
+
+    Attributes:
+        setting: of the windows.
+        problem: windows and model.
+        raw: the nominal model as it stands.
+        refitted: the same refitted.
+    """
+
+    setting: Setting
+    problem: Problem
+    raw: Fitted
+    refitted: Fitted
+
+
+def begun(
+    robot: Robot,
+    soil: Soil,
+    recordings: Sequence[Recording],
+    setting: Setting,
+    progress: Callable[[str], None] = lambda text: None,
+    keep: Keep = do,
+) -> Begun:
+    """Nominal models on windows of the set length; on short ones where the refitted one is far off.
+
+    What is large bends long predictions so much that no small step leads to it, and shows in short ones as well.
+
+    Args:
+        robot: nominal.
+        soil: nominal.
+        recordings: at least one, of one period.
+        setting: choices.
+        progress: called with what is being done.
+        keep: see :func:`ddagr_gym.diagnosis.search.search`.
+
+    Raises:
+        InputError: the nominal simulator breaks down on some window.
+    """
+    problem = prepare(robot, soil, recordings, setting).problem
+    raw, refitted = keep("search refit", partial(refit_nominal, problem, progress))
+    if dispersion_of(problem, refitted) > BENT and setting.duration > SHORT:
+        progress("short windows")
+        setting = setting.with_windows(SHORT, SHORT * setting.stride / setting.duration)
+        problem = prepare(robot, soil, recordings, setting).problem
+        raw, refitted = keep("search refit, short windows", partial(refit_nominal, problem, progress))
+    _check_predicted(problem, refitted, recordings)
+    return Begun(setting, problem, raw, refitted)
+
+
+def _check_predicted(problem: Problem, refitted: Fitted, recordings: Sequence[Recording]) -> None:
+    """A window that cannot be predicted has no residual, and nothing could be said of it."""
+    failed = np.flatnonzero(~np.isfinite(refitted.window_cost))
+    if failed.size:
+        windows = problem.blocked.windows
+        source = recordings[int(windows.recording[failed[0]])].meta.source
+        raise InputError(
+            f"the nominal simulator breaks down in {failed.size} of {windows.count} windows, first at "
+            f"{windows.time[failed[0]]:.1f} s of {source}: leave that stretch out, or give a --robot and --soil that "
+            "are closer to the real ones."
+        )
+
+
 def searched(
     robot: Robot,
     soil: Soil,
@@ -82,9 +148,7 @@ def searched(
     progress: Callable[[str], None] = lambda text: None,
     keep: Keep = do,
 ) -> tuple[Setting, Found]:
-    """Search on windows of the set length; on short ones where the refitted nominal model is far off.
-
-    What is large bends long predictions so much that no small step leads to it, and shows in short ones as well.
+    """Search from the nominal models of :func:`begun`.
 
     Args:
         robot: nominal.
@@ -97,17 +161,14 @@ def searched(
 
     Returns:
         The setting of the windows that were searched, for :func:`prepare`, and what was found.
+
+    Raises:
+        InputError: see :func:`begun`.
     """
-    problem = prepare(robot, soil, recordings, setting).problem
-    raw, refitted = keep("search refit", partial(refit_nominal, problem, progress))
-    if dispersion_of(problem, refitted) > BENT and setting.duration > SHORT:
-        progress("short windows")
-        setting = setting.with_windows(SHORT, SHORT * setting.stride / setting.duration)
-        problem = prepare(robot, soil, recordings, setting).problem
-        raw, refitted = keep("search refit, short windows", partial(refit_nominal, problem, progress))
-    begun = raw, keep("search nominal", partial(stand, problem, refitted, progress))
-    gates = thresholds.for_length(problem.covered)
-    return setting, search(problem, gates, begun=begun, progress=progress, keep=keep)
+    first = begun(robot, soil, recordings, setting, progress, keep)
+    nominal = keep("search nominal", partial(stand, first.problem, first.refitted, progress))
+    gates = thresholds.for_length(first.problem.covered)
+    return first.setting, search(first.problem, gates, begun=(first.raw, nominal), progress=progress, keep=keep)
 
 
 def conclude(
@@ -126,19 +187,19 @@ def conclude(
     """
     problem, held = prepared.problem, prepared.held
     seen = [*_held_findings(held), *_flipped_findings(prepared.flipped)]
-    verdict, complete = _verdict(found, [f.name for f in seen], thresholds)
-    findings = [*seen, *_findings(problem, found, thresholds, rng)]
-    if verdict != (UNKNOWN,):
-        findings = [finding for finding in findings if finding.name in verdict]
+    kept = accepted(found, thresholds)
+    verdict, complete = _verdict(kept, [f.name for f in seen], thresholds)
+    fitted = _findings(problem, found, thresholds, rng)
+    findings, rejected = ((*seen, *fitted), ()) if kept is found else (tuple(seen), tuple(fitted))
     from_values = (*((hold_effect(held),) if held else ()), *((GyroSign(1.0),) if prepared.flipped else ()))
-    effects = tuple(e for e in (*from_values, *found.chosen.fitted.point.effects) if e.name in verdict)
-    values = found.chosen.fitted.point.values
+    effects = (*from_values, *kept.chosen.fitted.point.effects)
+    values = kept.chosen.fitted.point.values
     diagnosis = Diagnosis(
         verdict,
         complete,
-        tuple(findings),
+        findings,
         headline(verdict, complete, findings),
-        {"nominal": found.nominal.misfit, "corrected": found.chosen.misfit, "limit": dict(thresholds.misfit)},
+        {"nominal": kept.nominal.misfit, "corrected": kept.chosen.misfit, "limit": dict(thresholds.misfit)},
         _detectable(found, thresholds),
         {p.name: float(v) for p, v in zip(problem.nuisances.parameters, values, strict=True) if p.prior > 0.0},
         tuple(recording.meta.source for recording in prepared.recordings),
@@ -146,6 +207,7 @@ def conclude(
         0.0,
         __version__,
         data=tuple(data_source(recording) for recording in prepared.recordings),
+        rejected=rejected,
     )
     return diagnosis, effects
 
@@ -220,7 +282,8 @@ def _findings(problem: Problem, found: Found, thresholds: Thresholds, rng: np.ra
             # a shape that no resampling moves is not known: nothing shows it
             if p.effect == number and (b[0] < b[1] or p.field in effect.size_names())
         }
-        before = _before(found, effect.name)
+        place = _before(found, effect.name)
+        before, after = found.standings[place : place + 2]
         gain = _gain(found, effect.name)
         estimates = {
             name: Estimate(float(getattr(effect, name)), str(effect.parameter(name).metadata["unit"]), spread.get(name))
@@ -231,10 +294,10 @@ def _findings(problem: Problem, found: Found, thresholds: Thresholds, rng: np.ra
                 effect.name,
                 estimates,
                 gain,
-                thresholds.of(effect.name).gain,
+                further_gates(thresholds, found.standings[: place + 1]).of(effect.name).gain,
                 before.scores[effect.name],
                 before.held_out.get(effect.name, 0.0),
-                _channel_shares(found.nominal, chosen),
+                _channel_shares(before, after),
                 equivalents(found, effect.name, rng),
                 calibrated_p=thresholds.p_value(effect.name, gain),
             )
@@ -255,41 +318,53 @@ def _detectable(found: Found, thresholds: Thresholds) -> dict[str, dict[str, flo
     return {**by_model[0], **by_model[1]}
 
 
-def _before(found: Found, name: str) -> Standing:
-    """The last model of the search that lacks an effect."""
-    return next(s for s in reversed(found.standings) if name not in s.names)
+def _before(found: Found, name: str) -> int:
+    """Place of the last model of the search that lacks an effect."""
+    return max(k for k, standing in enumerate(found.standings) if name not in standing.names)
 
 
 def _gain(found: Found, name: str) -> float:
     """Evidence of an effect: what the scan says, or the joint refit that added it where that says more."""
-    linear = next(item.gain for item in _before(found, name).gains if item.name == name)
+    linear = next(item.gain for item in found.standings[_before(found, name)].gains if item.name == name)
     return max([linear, *(rival.gain for step in found.steps for rival in step if rival.name == name)])
 
 
-def _channel_shares(nominal: Standing, chosen: Standing) -> dict[str, float]:
+def _channel_shares(before: Standing, after: Standing) -> dict[str, float]:
     """Share of each channel in the fall of the misfit; channels that got worse have none."""
-    falls = {name: max(value - chosen.misfit.get(name, value), 0.0) for name, value in nominal.misfit.items()}
+    falls = {name: max(value - after.misfit.get(name, value), 0.0) for name, value in before.misfit.items()}
     total = sum(falls.values())
     return {name: fall / total for name, fall in falls.items() if total > 0.0 and fall > 0.01 * total}
+
+
+def accepted(found: Found, thresholds: Thresholds) -> Found:
+    """What was found; without names where these leave too much of what the channels show."""
+    if not found.chosen.names:
+        return found
+    limits = dict(thresholds.misfit)
+    channels = {name: value for name, value in found.chosen.misfit.items() if name not in LOCAL}
+    _, left = roughest(channels, limits)
+    explained = explained_share({name: found.nominal.misfit[name] for name in channels}, channels, limits)
+    too_much = left > _TOO_MUCH or (left > _MUCH and explained is not None and explained < 0.5)
+    return replace(found, standings=found.standings[:1]) if too_much else found
 
 
 def _verdict(found: Found, seen: Sequence[str], thresholds: Thresholds) -> tuple[tuple[str, ...], bool]:
     """Three values: named and complete, named but incomplete, none of these; or nothing at all.
 
     What was seen in the values themselves (repeats, a reversed gyro) stays named whatever else is left.
+
+    Args:
+        found: and accepted.
+        seen: names.
+        thresholds: of the null bank.
     """
     _, left = roughest(found.chosen.misfit, dict(thresholds.misfit))
     # what passed the gate and was not added has failed in a joint refit, unless the search stopped at its limit
     more = len(found.chosen.names) >= MOST_EFFECTS and any(
-        thresholds.passes(g.name, g.gain, found.chosen) for g in found.chosen.gains
+        further_gates(thresholds, found.standings).passes(g.name, g.gain, found.chosen) for g in found.chosen.gains
     )
     complete = left <= 1.0 and not more
     names = (*seen, *found.chosen.names)
     if not names:
         return ((NONE,), True) if complete else ((UNKNOWN,), False)
-    channels = {name: value for name, value in found.chosen.misfit.items() if name not in LOCAL}
-    _, in_channels = roughest(channels, dict(thresholds.misfit))
-    explained = explained_share({name: found.nominal.misfit[name] for name in channels}, channels, thresholds.misfit)
-    if in_channels > _TOO_MUCH or (in_channels > _MUCH and explained is not None and explained < 0.5):
-        return tuple(seen) or (UNKNOWN,), False
     return names, complete

@@ -16,6 +16,7 @@ from ddagr_gym.physics.effects.sensor_hold import SensorHold
 from ddagr_gym.recordings.schema import Recording
 
 Flags = NDArray[np.bool_]
+Rows = NDArray[np.int64]
 
 SENSORS = {
     "accelerometer": ("specific_force_x", "specific_force_y"),
@@ -43,7 +44,7 @@ class Held:
     Attributes:
         sensor: of SENSORS.
         share: of samples that repeat the one before.
-        duration: mean time for which a reading is repeated after it was new [s].
+        duration: mean time for which a reading that is repeated is repeated after it was new [s].
         samples: that were looked at.
     """
 
@@ -77,15 +78,44 @@ def find_held(recordings: Sequence[Recording]) -> tuple[Held, ...]:
     """Sensors that repeat their readings in more than :data:`LEAST_SHARE` of the samples that say something."""
     found = []
     for sensor, names in SENSORS.items():
-        pairs = [(*_repeats(r, names), r) for r in recordings if r.has(*names)]
-        telling = sum(int(t.sum()) for _, t, _ in pairs)
+        read = [recording for recording in recordings if recording.has(*names)]
+        pairs = [_repeats(recording, names) for recording in read]
+        telling = sum(int(t.sum()) for _, t in pairs)
         if telling < FEWEST:
             continue
-        share = sum(int((repeat & t).sum()) for repeat, t, _ in pairs) / telling
+        share = sum(int((repeat & t).sum()) for repeat, t in pairs) / telling
         if share > LEAST_SHARE:
-            period = 1.0 / np.median([r.rate(names[0]) for _, _, r in pairs])
-            found.append(Held(sensor, share, float(period * share / max(1.0 - share, 1e-3)), telling))
+            found.append(Held(sensor, share, _duration(read, names), telling))
     return tuple(found)
+
+
+def repeat_runs(repeat: Flags) -> tuple[Rows, Rows]:
+    """Of each run of repeats the sample that is repeated, -1 where that is before the first one, and the last repeat.
+
+    Args:
+        repeat: (n,) whether a sample repeats the one before.
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], repeat, [False]]).astype(int)))
+    return edges[::2] - 1, edges[1::2] - 1
+
+
+def _duration(recordings: Sequence[Recording], names: Sequence[str]) -> float:
+    """Mean time over which runs of repeats last [s].
+
+    Samples say something only near a change, so that the share of repeats tells nothing of holds longer than that. Runs
+    without such a sample do not count: successive holds of a steady reading look like one.
+    """
+    found = []
+    for recording in recordings:
+        _, telling = _repeats(recording, names)
+        if telling.any():
+            rows, repeat = repeated_rows(recording, names)
+            first, last = repeat_runs(repeat)
+            hits = np.cumsum(repeat & telling)
+            found.append((recording.t[rows[last]] - recording.t[rows[first]])[hits[last] > hits[first]])
+    lengths = np.concatenate(found)
+    # where nothing but zeros repeats there are none
+    return float(lengths.mean() if len(lengths) else 1.0 / np.median([r.rate(names[0]) for r in recordings]))
 
 
 def repeated_rows(recording: Recording, names: Sequence[str]) -> tuple[NDArray[np.int64], Flags]:
@@ -116,7 +146,7 @@ def without_repeats(recording: Recording, held: Sequence[Held]) -> Recording:
 
 
 def hold_effect(held: Sequence[Held]) -> SensorHold:
-    """The finding as an effect of the library: one duration, that of the sensor held longest."""
+    """The finding as an effect of the library: one duration, that of the sensor held longest, at most its largest."""
     flags = {sensor: float(any(item.sensor == sensor for item in held)) for sensor in SENSORS}
-    longest = max(item.duration for item in held)
+    longest = min(max(item.duration for item in held), SensorHold.parameter("duration").metadata["high"])
     return SensorHold(longest, **flags)

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ddagr_gym.diagnosis.held import LEAST_SHARE, SENSORS, Flags, Held, repeated_rows
+from ddagr_gym.diagnosis.held import LEAST_SHARE, SENSORS, Flags, Held, repeat_runs, repeated_rows
 from ddagr_gym.diagnosis.localisation import Where
-from ddagr_gym.diagnosis.score_process import Array, Span
+from ddagr_gym.diagnosis.score_process import Span
 from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.reporting.wording import EVERYWHERE
 
@@ -61,7 +60,8 @@ def _spans(number: int, recording: Recording, item: Held) -> list[tuple[int, Spa
         hits = first + np.flatnonzero(repeat[first:stop])
         if not len(hits):
             continue
-        holds = _lengths(hits, time)
+        fresh, last = repeat_runs(repeat[first:stop])
+        holds = time[first + last] - time[first + fresh]
         deviation = float(holds.std() / np.sqrt(len(holds))) / item.duration
         start, end = float(time[max(hits[0] - 1, 0)]), float(time[hits[-1]])
         found.append((len(hits), Span(number, start, end, 0.0, float(holds.mean()) / item.duration, deviation)))
@@ -74,14 +74,6 @@ def _dense(repeat: Flags, period: float, duration: float) -> Flags:
     window = np.ones(length)
     share = np.convolve(repeat, window, "same") / np.convolve(np.ones(len(repeat)), window, "same")
     return np.asarray(share > LEAST_SHARE)
-
-
-def _lengths(hits: NDArray[np.int64], time: Array) -> Array:
-    """Times for which readings are repeated, from rows that repeat the one before."""
-    breaks = np.flatnonzero(np.diff(hits) > 1)
-    first = hits[np.concatenate([[0], breaks + 1])]
-    last = hits[np.concatenate([breaks, [len(hits) - 1]])]
-    return np.asarray(time[last] - time[first - 1])
 
 
 def _covered(spans: Sequence[Span]) -> float:

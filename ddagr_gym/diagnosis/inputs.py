@@ -47,7 +47,7 @@ def check_recordings(recordings: Sequence[Recording], robot: Robot, setting: Set
 
     Raises:
         InputError: none given, another robot, different periods, no commands or no sensors, too short, or a robot that
-            stands still throughout.
+            stands still throughout, or one drive given twice.
     """
     if not recordings:
         raise InputError("no recording is given: name one or more files, or a folder of them.")
@@ -58,6 +58,7 @@ def check_recordings(recordings: Sequence[Recording], robot: Robot, setting: Set
     if np.ptp(periods) > PERIOD_TOLERANCE * periods[0]:
         rates = ", ".join(f"{r.meta.source} {1.0 / p:.3g} Hz" for r, p in zip(recordings, periods, strict=True))
         raise InputError(f"the recordings have different rates ({rates}): diagnose those of one rate together.")
+    _check_different(recordings)
     _check_length(recordings, setting)
     _check_motion(recordings)
 
@@ -86,18 +87,29 @@ def _check_channels(recording: Recording) -> None:
         )
 
 
+def _check_different(recordings: Sequence[Recording]) -> None:
+    """A drive that is there twice would be predicted by a model that was fitted to it."""
+    seen: dict[str, str] = {}
+    for recording in recordings:
+        values = content_hash(recording)
+        if values in seen:
+            raise InputError(f"{seen[values]} and {recording.meta.source} hold the same values: give every drive once.")
+        seen[values] = recording.meta.source
+
+
 def _check_length(recordings: Sequence[Recording], setting: Setting) -> None:
     duration = window_duration(recordings, setting)
-    total = sum(
-        # segments are exactly one window long in logs that were cut into steps
-        int((recording.t[s.stop - 1] - recording.t[s.start]) / duration + 1e-6)
-        for recording in recordings
-        for s in recording.segments()
-    )
+    total = 0
+    for recording in recordings:
+        right, left = recording.held_commands()
+        known = np.isfinite(right) & np.isfinite(left)
+        for s in recording.segments():
+            # segments are exactly one window long in logs that were cut into steps
+            total += int((int(known[s].sum()) - 1) * recording.period / duration + 1e-6)
     if total < LEAST_WINDOWS:
         names = ", ".join(recording.meta.source for recording in recordings)
         raise InputError(
-            f"{names}: {total} windows of {duration:g} s without a gap are too few: "
+            f"{names}: {total} windows of {duration:g} s without a gap and with commands are too few: "
             f"give drives of {LEAST_WINDOWS * duration:g} s at least."
         )
 

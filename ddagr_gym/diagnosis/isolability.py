@@ -23,9 +23,10 @@ from numpy.typing import NDArray
 
 from ddagr_gym.control.manoeuvres import Manoeuvre
 from ddagr_gym.diagnosis.candidates import Candidate, moved_field
-from ddagr_gym.diagnosis.planned import information, plan
+from ddagr_gym.diagnosis.nuisance import NuisancePriors
+from ddagr_gym.diagnosis.planned import information, plan, with_room
 from ddagr_gym.diagnosis.scores import Terms, scan
-from ddagr_gym.diagnosis.setting import SHORT, Setting
+from ddagr_gym.diagnosis.setting import Setting
 from ddagr_gym.diagnosis.size_prior import TYPICAL_MULTIPLE
 from ddagr_gym.diagnosis.thresholds import LEVEL, Gate, Thresholds
 from ddagr_gym.parameters import Robot, Soil
@@ -159,6 +160,7 @@ def isolability(
     setting: Setting | None = None,
     seed: int = 0,
     soil_name: str = "",
+    priors: NuisancePriors | None = None,
     progress: Callable[[str], None] = lambda name: None,
 ) -> Isolability:
     """Table of manoeuvres and sensors.
@@ -173,15 +175,16 @@ def isolability(
         setting: of the diagnosis; windows as those of the thresholds, shorter where a manoeuvre is short, by default.
         seed: see :func:`ddagr_gym.diagnosis.planned.plan`.
         soil_name: for the table.
+        priors: of what is uncertain, where no setting is given.
         progress: called with the name of each effect when it is done.
 
     Raises:
         InputError: see :func:`ddagr_gym.diagnosis.planned.plan`.
     """
-    if setting is None and thresholds is not None and manoeuvres:
-        # a drive must have room for two windows, as short ones in a diagnosis do
-        room = 0.5 * min(manoeuvre.duration for manoeuvre in manoeuvres)
-        setting = Setting().with_windows(min(thresholds.duration, max(room, SHORT)))
+    if setting is None:
+        setting = Setting() if priors is None else Setting(priors=priors)
+        if thresholds is not None:
+            setting = with_room(setting.with_windows(thresholds.duration), manoeuvres)
     planned = plan(robot, soil, manoeuvres, sensors, seed=seed, setting=setting)
     terms = scan(planned.problem, planned.fitted, kinds, progress)
     gates = chance_gates(terms) if thresholds is None else thresholds.for_length(planned.problem.covered)

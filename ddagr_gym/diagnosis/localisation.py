@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.diagnosis.misfit import LOCAL
+from ddagr_gym.diagnosis.misfit import LOCAL, explained_share
 from ddagr_gym.diagnosis.problem import Problem
 from ddagr_gym.diagnosis.refit import Fitted
 from ddagr_gym.diagnosis.regimes import Pieces, RegimeShare, Unevenness, shares, uneven
@@ -133,7 +133,7 @@ class Localisation:
 
     Attributes:
         channels: by name.
-        explained: share of the mismatch above the noise that the chosen model explains; None where there is none.
+        explained: share of the mismatch beyond the ordinary that the chosen model explains; None where there is none.
         mismatch: where the chosen model explains what the nominal one leaves; without one, where that is.
         remaining: where that of the chosen model is.
         findings: where each effect of the chosen model acts, by name.
@@ -148,15 +148,16 @@ class Localisation:
     wrench: tuple[WrenchSummary, ...]
 
 
-def locate(problem: Problem, found: Found) -> Localisation:
+def locate(problem: Problem, found: Found, limits: Mapping[str, float]) -> Localisation:
     """Locate what a search found, and what it left.
 
     Args:
         problem: windows and model.
         found: of the search; nominal and chosen model may be the same.
+        limits: of the channels' misfit, of the null bank.
     """
     nominal, chosen = found.nominal, found.chosen
-    channels, explained = channel_shares(nominal.misfit, chosen.misfit, samples(problem))
+    channels = channel_shares(nominal.misfit, chosen.misfit, samples(problem))
     pieces = piece_values(problem, chosen.fitted)
     processes = score_processes(problem, chosen.fitted)
     located = {
@@ -166,7 +167,7 @@ def locate(problem: Problem, found: Found) -> Localisation:
     before, after = (in_blocks(problem, projected_residual(problem, model.fitted)) ** 2 for model in (nominal, chosen))
     return Localisation(
         channels,
-        explained,
+        explained_share(nominal.misfit, chosen.misfit, limits),
         _lying(by_piece(before - after, pieces_of(problem)).ravel(), pieces)
         if located
         else _mismatch(problem, before, rough(nominal.misfit), pieces),
@@ -190,8 +191,8 @@ def samples(problem: Problem) -> dict[str, float]:
 
 def channel_shares(
     nominal: Mapping[str, float], chosen: Mapping[str, float], count: Mapping[str, float]
-) -> tuple[dict[str, ChannelShare], float | None]:
-    """Shares of the channels in the mismatch, and the share of it that the chosen model explains.
+) -> dict[str, ChannelShare]:
+    """Shares of the channels in the mismatch above the noise.
 
     The floor of a channel is 1, the mean square of pure noise, or what the chosen model leaves where that is less
     (ours: noise is estimated with a margin, and the windows' unknowns take a share of it away).
@@ -203,11 +204,9 @@ def channel_shares(
     """
     floors = {name: min(1.0, chosen[name]) for name in nominal}
     above = {name: count[name] * max(nominal[name] - floors[name], 0.0) for name in nominal}
-    left = sum(count[name] * max(chosen[name] - floors[name], 0.0) for name in nominal)
     total = sum(above.values())
     share = {name: above[name] / total if total > 0.0 else 0.0 for name in nominal}
-    table = {name: ChannelShare(nominal[name], chosen[name], floors[name], share[name]) for name in nominal}
-    return table, (max(1.0 - left / total, 0.0) if total > 0.0 else None)
+    return {name: ChannelShare(nominal[name], chosen[name], floors[name], share[name]) for name in nominal}
 
 
 def piece_values(problem: Problem, fitted: Fitted) -> Pieces:

@@ -20,7 +20,8 @@ from ddagr_gym.control.manoeuvres import MANOEUVRES, Manoeuvre
 from ddagr_gym.diagnosis.candidates import Candidate, candidates_of
 from ddagr_gym.diagnosis.hypotheses import looped
 from ddagr_gym.diagnosis.isolability import APART
-from ddagr_gym.diagnosis.planned import RATE, SENSORS, Plan, free_of_nuisances, plan
+from ddagr_gym.diagnosis.nuisance import NuisancePriors
+from ddagr_gym.diagnosis.planned import RATE, SENSORS, Plan, free_of_nuisances, plan, with_room
 from ddagr_gym.diagnosis.scores import drive_extent, probe_column
 from ddagr_gym.diagnosis.setting import Setting
 from ddagr_gym.diagnosis.size_prior import TYPICAL_MULTIPLE
@@ -84,6 +85,7 @@ def next_drive(
     bank: Sequence[Manoeuvre] | None = None,
     seed: int = 0,
     threads: int = 1,
+    setting: Setting | None = None,
     progress: Callable[[str], None] = lambda text: None,
 ) -> dict[str, Any]:
     """Rank manoeuvres by how well they would tell rivals apart.
@@ -96,6 +98,7 @@ def next_drive(
         bank: manoeuvres; all built-in ones by default.
         seed: of the noise whose level is estimated.
         threads: of the simulator.
+        setting: of the diagnosis that shall tell them apart, its windows shortened to the manoeuvres.
         progress: called with what is being done.
 
     Returns:
@@ -113,7 +116,8 @@ def next_drive(
     place = _place(planned)
     starts = None if place is None else [_towards(place, robot, soil, item) for item in manoeuvres]
     progress("simulating the bank of manoeuvres")
-    prepared = plan(robot, soil, manoeuvres, sensors, starts=starts, seed=seed, setting=Setting(threads=threads))
+    own = replace(with_room(Setting() if setting is None else setting, manoeuvres), threads=threads)
+    prepared = plan(robot, soil, manoeuvres, sensors, starts=starts, seed=seed, setting=own)
     progress("simulating the rivals")
     columns = _columns(prepared, planned)
     found = [_separations(prepared, columns, number, len(planned)) for number in range(len(manoeuvres))]
@@ -287,18 +291,20 @@ def _nothing(rivals: Sequence[Effect]) -> str:
 def rivals_of_diagnosis(mapping: Mapping[str, Any]) -> list[Effect]:
     """Effects that a ``diagnosis.json`` leaves open, at their fitted or typical sizes.
 
-    Those of the equivalence set with most names; else, of a finding without rivals, what it is itself; else the effects
-    that could hide in these drives at several times the size that matters.
+    Those of the equivalence set with most names, of what comes nearest where nothing is named; else, of a finding
+    without rivals, what it is itself; else the effects that could hide in these drives at several times the size that
+    matters.
 
     Args:
         mapping: as :func:`ddagr_gym.diagnosis.verdict.load` reads it.
     """
-    findings = [f for f in mapping["findings"] if f["name"] != "sensor_hold"]
+    every = [*mapping["findings"], *mapping["rejected"]]
+    findings = [f for f in every if f["name"] != "sensor_hold"]
     if findings:
         widest = max(findings, key=lambda f: (len(f["equivalence_set"]), -_certainty(f)))
         weights = {widest["name"]: 1.0, **widest["equivalence_set"]}
         names = sorted(weights, key=lambda name: (name != widest["name"], -weights[name]))[:MOST_RIVALS]
-        fitted = {f["name"]: f for f in mapping["findings"]}
+        fitted = {f["name"]: f for f in every}
         known = {name: _at_size(name, fitted[name]) for name in names if name in fitted}
         return [known.get(name) or _retold(name, known) for name in names if name in known or _has_typical_size(name)]
     return [_at_size(name, None) for name in _hidden(mapping["detectable"])]
@@ -353,3 +359,24 @@ def sensors_of_diagnosis(mapping: Mapping[str, Any]) -> tuple[str, ...]:
     """Sensors whose channels a ``diagnosis.json`` has a misfit of."""
     channels = set(mapping["misfit"].get("nominal", {}))
     return tuple(name for name, own in SENSORS.items() if channels & set(own)) or tuple(SENSORS)
+
+
+def setting_of_diagnosis(mapping: Mapping[str, Any]) -> Setting:
+    """Windows and priors of a ``diagnosis.json``; usual ones where it does not say.
+
+    Args:
+        mapping: as :func:`ddagr_gym.diagnosis.verdict.load` reads it.
+
+    Raises:
+        InputError: its options are of another form.
+    """
+    options = mapping["options"]
+    if not options:
+        return Setting()
+    try:
+        priors = NuisancePriors(**options["priors"])
+        return Setting(float(options["window"]), float(options["stride"]), float(options["block"]), priors)
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(
+            f"the options of the diagnosis cannot be read ({error}): make it with `ddagr diagnose`."
+        ) from None

@@ -48,6 +48,9 @@ _JITTERING = 1.3
 _STEPS = 6.0
 """Quanta between two samples at steady speed beyond which the speed was not steady (ours)."""
 
+_AT_REST = 0.1
+"""Standard deviation at rest over that at the quietest speeds where the line over speed ends at 0 (ours)."""
+
 _FEWEST = 40
 """Differences that a level needs (ours)."""
 
@@ -62,6 +65,7 @@ class ChannelNoise:
         correlation: of successive samples [-], -0.5 (a differenced counter) to 0.95.
         quantum: smallest step between values, 0 where none was found.
         inflation: standard deviation of means over what the correlation predicts [-].
+        counter: whether only successive samples are correlated, as by the rounding of a differenced counter.
     """
 
     sigma: float
@@ -69,12 +73,12 @@ class ChannelNoise:
     correlation: float
     quantum: float
     inflation: float = 1.0
+    counter: bool = False
 
     def of_mean(self, samples: int, speed: Array | float = 0.0) -> Array:
         """Standard deviation of the mean of ``samples`` successive samples at a travel speed [m/s]."""
         lags = np.arange(1, samples)
-        # the rounding of a differenced counter is correlated over one sample only, that of AR(1) noise over all
-        powers = np.where(lags == 1, self.correlation, 0.0) if self.quantum > 0.0 else self.correlation**lags
+        powers = np.where(lags == 1, self.correlation, 0.0) if self.counter else self.correlation**lags
         factor = (1.0 + 2.0 * np.sum((1.0 - lags / samples) * powers)) / samples
         factor *= self.inflation**2 if samples > 1 else 1.0
         return np.sqrt(np.maximum(factor, 0.0) * (self.sigma**2 + (self.per_speed * np.asarray(speed)) ** 2))
@@ -120,7 +124,7 @@ def channel_noise(values: Sequence[Array], speeds: Sequence[Array], sparse: bool
         sparse: difference the samples that exist three times instead of neighbouring rows.
 
     Returns:
-        None where there are too few samples.
+        None where there are too few samples, or where they show no noise that a residual could be compared with.
     """
     known = np.concatenate([v[np.isfinite(v)] for v in values] or [np.empty(0)])
     if len(known) < _FEWEST:
@@ -129,12 +133,13 @@ def channel_noise(values: Sequence[Array], speeds: Sequence[Array], sparse: bool
     if sparse:
         thirds = np.concatenate([np.diff(v[np.isfinite(v)], 3) for v in values])
         square = _central_square(thirds) / 20.0
-        return ChannelNoise(float(np.sqrt(square)), 0.0, 0.0, 0.0) if np.isfinite(square) else None
+        return ChannelNoise(float(np.sqrt(square)), 0.0, 0.0, 0.0) if square > 0.0 else None
     one, _ = _pairs(list(values), list(speeds), 1)
     if quantum > 0.0 and _central_square(one) < (_COARSE * quantum) ** 2:
-        return _rounded(list(values), list(speeds), quantum)
-    found = _coloured(list(values), list(speeds))
-    return None if found is None else replace(found, quantum=quantum)
+        found: ChannelNoise | None = _rounded(list(values), list(speeds), quantum)
+    else:
+        found = _coloured(list(values), list(speeds))
+    return replace(found, quantum=quantum) if found is not None and found.sigma > 0.0 else None
 
 
 def _rounded(values: list[Array], speeds: list[Array], quantum: float) -> ChannelNoise:
@@ -143,7 +148,7 @@ def _rounded(values: list[Array], speeds: list[Array], quantum: float) -> Channe
     The rounding of a counter's position enters two successive samples with opposite signs, so that means over several
     are far better than samples; that of a reading, or a jitter of either, does not. Means of the data themselves tell.
     """
-    counter = ChannelNoise(float(quantum / np.sqrt(6.0)), 0.0, -0.5, quantum)
+    counter = ChannelNoise(float(quantum / np.sqrt(6.0)), 0.0, -0.5, quantum, counter=True)
     if _inflation(counter, values, speeds, samples=10) < _NO_COUNTER:
         return counter
     (first, _), (second, _) = (_pairs(values, speeds, lag) for lag in (1, 2))
@@ -155,7 +160,7 @@ def _rounded(values: list[Array], speeds: list[Array], quantum: float) -> Channe
     if correlation < _OPPOSITE:
         # few steady samples scatter more than a counter's; a jittering counter far more
         return counter if sigma < _JITTERING * counter.sigma else replace(counter, sigma=sigma)
-    plain = ChannelNoise(sigma, 0.0, correlation, quantum)
+    plain = ChannelNoise(sigma, 0.0, correlation, quantum, counter=True)
     return replace(plain, inflation=max(_inflation(plain, values, speeds), 1.0))
 
 
@@ -195,7 +200,7 @@ def _inflation(plain: ChannelNoise, values: list[Array], speeds: list[Array], sa
 
 
 def _line(rows: list[tuple[float, float]], fallback: float) -> tuple[float, float]:
-    """Non-negative intercept and slope of variance over squared speed, fitted to relative errors."""
+    """Positive intercept and non-negative slope of variance over squared speed, fitted to relative errors."""
     from scipy.optimize import nnls
 
     if len(rows) < 2:
@@ -205,7 +210,8 @@ def _line(rows: list[tuple[float, float]], fallback: float) -> tuple[float, floa
         return fallback, 0.0
     floor = np.maximum(variance, 1e-3 * variance.max())
     found, _ = nnls(np.stack([1.0 / floor, square / floor], axis=1), variance / floor)
-    return (float(found[0]), float(found[1])) if found.any() else (fallback, 0.0)
+    rest = found[0] if found[0] > 0.0 else _AT_REST**2 * variance[variance > 0.0].min()
+    return (float(rest), float(found[1])) if found.any() else (fallback, 0.0)
 
 
 def travel_speed(recording: Recording, wheel_radius: float) -> Array:
@@ -213,6 +219,17 @@ def travel_speed(recording: Recording, wheel_radius: float) -> Array:
     names = ("encoder_right", "encoder_left")
     banks = [recording[name] for name in names] if recording.has(*names) else recording.held_commands()
     return np.nan_to_num(wheel_radius * 0.5 * (np.abs(banks[0]) + np.abs(banks[1])))
+
+
+def interpolated(recording: Recording, name: str) -> Array:
+    """Channel (n,) with its missing samples on lines between the others of their span; 0 where a span has none."""
+    values = recording[name].copy()
+    for span in recording.spans():
+        known = np.isfinite(values[span])
+        if known.any():
+            t, missing = recording.t[span], ~known
+            values[span][missing] = np.interp(t[missing], t[known], values[span][known])
+    return np.nan_to_num(values)
 
 
 def recording_noise(recordings: Sequence[Recording], wheel_radius: float) -> tuple[ChannelNoise | None, ...]:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.diagnosis.hypotheses import first_guess
+from ddagr_gym.diagnosis.inputs import content_hash
 from ddagr_gym.diagnosis.null_drives import Template, null_recordings
 from ddagr_gym.diagnosis.problem import Problem
 from ddagr_gym.diagnosis.scores import drive_extent
@@ -81,6 +82,7 @@ def scanned(robot: Robot, soil: Soil, recordings: Sequence[Recording], kind: str
         standing.misfit,
         problem.blocked.windows.count,
         _meaningless(problem, standing),
+        problem.blocked.windows.duration,
     )
 
 
@@ -101,10 +103,12 @@ def pieces_of(recording: Recording, length: float) -> list[Recording]:
     known = np.concatenate([[0.0], np.cumsum(recording.command_valid) * recording.period])
     ends = [end for _, end in recording.meta.segments]
     if len(ends) == 1:
-        ends = [*np.searchsorted(known, np.arange(length, known[-1], length)).tolist(), ends[0]]
+        # half a period early, or sums that round down lie a row late and leave the next piece too short to be cut off
+        joints = np.arange(length, known[-1], length) - 0.5 * recording.period
+        ends = [*np.searchsorted(known, joints).tolist(), ends[0]]
     pieces, first = [], recording.meta.segments[0][0]
     for end in ends:
-        if known[end] - known[first] >= length or end == ends[-1]:
+        if known[end] - known[first] >= length - recording.period or end == ends[-1]:
             if known[end] - known[first] > _VALID * length:
                 pieces.append(cut(recording, first, end))
             first = end
@@ -112,17 +116,22 @@ def pieces_of(recording: Recording, length: float) -> list[Recording]:
 
 
 def cut(recording: Recording, first: int, last: int) -> Recording:
-    """Rows ``first`` to ``last`` (exclusive) of a recording."""
+    """Rows ``first`` to ``last`` (exclusive) of a recording, with time from 0 on."""
 
     def inside(ranges: Sequence[tuple[int, int]]) -> tuple[tuple[int, int], ...]:
         kept = ((max(a, first) - first, min(b, last) - first) for a, b in ranges)
         return tuple((a, b) for a, b in kept if b > a)
 
-    meta = replace(recording.meta, segments=inside(recording.meta.segments), spans=inside(recording.meta.spans))
+    meta = replace(
+        recording.meta,
+        start_time=recording.meta.start_time + float(recording.t[first]),
+        segments=inside(recording.meta.segments),
+        spans=inside(recording.meta.spans),
+    )
     rows = slice(first, last)
     return replace(
         recording,
-        t=recording.t[rows],
+        t=recording.t[rows] - recording.t[first],
         channels={name: values[rows] for name, values in recording.channels.items()},
         command_valid=recording.command_valid[rows],
         meta=meta,
@@ -138,16 +147,30 @@ def bank_hash(
     count: int,
     seed: int,
     centre: tuple[Robot, Soil] | None = None,
+    pieces: Sequence[Recording] = (),
 ) -> str:
-    """Hash of everything that a bank depends on, the sources of the diagnosis and the simulator included."""
+    """Hash of everything that a bank depends on, the sources of the diagnosis and the simulator included.
+
+    Args:
+        robot: nominal.
+        soil: nominal.
+        template: of the null drives; None where they are drawn or real.
+        setting: of the diagnosis.
+        count: of null runs.
+        seed: of the bank.
+        centre: see :func:`null_run`.
+        pieces: of real drives that are known to be ordinary, where they are the null runs.
+    """
     from ddagr_gym.diagnosis.sources import source_digest
 
     digest = hashlib.sha256(source_digest().encode())
     noise = [None if n is None else asdict(n) for n in template.noise] if template else []
-    period = template.period if template else 0.0
-    text = json.dumps([repr(robot), repr(soil), repr(setting), noise, period, count, seed], sort_keys=True)
+    period, starts = (template.period, template.starts) if template else (0.0, ())
+    text = json.dumps([repr(robot), repr(soil), repr(setting), noise, period, starts, count, seed], sort_keys=True)
     digest.update(text.encode())
     digest.update(b"" if centre is None else repr(centre).encode())
-    for commands in template.commands if template else ():
-        digest.update(np.ascontiguousarray(commands).tobytes())
+    for values in (*template.commands, *template.present) if template else ():
+        digest.update(np.ascontiguousarray(values).tobytes())
+    for piece in pieces:
+        digest.update(f"{content_hash(piece)}{piece.meta.segments}{piece.meta.spans}".encode())
     return digest.hexdigest()

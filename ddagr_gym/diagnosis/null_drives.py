@@ -44,20 +44,26 @@ class Template:
 
 
 def template_of(recordings: Sequence[Recording], noise: Sequence[ChannelNoise | None]) -> Template:
-    """Commands, sampling and noise of recordings; commands before the first known one are zero."""
+    """Commands, sampling and noise of recordings; commands before the first known one are zero.
+
+    Drives start about the world's origin: there the ground is drawn, and a map's own origin may be far away.
+    """
     commands = tuple(np.nan_to_num(np.stack(r.held_commands(), axis=1)) for r in recordings)
     present = tuple(np.stack([np.isfinite(r[name]) for name in CHANNELS], axis=1) for r in recordings)
-    return Template(
-        commands, recordings[0].period, present, tuple(noise), tuple(_start(recording) for recording in recordings)
-    )
+    return Template(commands, recordings[0].period, present, tuple(noise), _starts(recordings))
 
 
-def _start(recording: Recording) -> tuple[float, float, float]:
-    found = []
-    for name in POSE_CHANNELS:
-        known = recording[name][np.isfinite(recording[name])]
-        found.append(float(known[0]) if known.size else 0.0)
-    return found[0], found[1], found[2]
+def _starts(recordings: Sequence[Recording]) -> tuple[tuple[float, float, float], ...]:
+    """First x, y, yaw of each recording, places from their mean; zero where a recording has none."""
+    found = np.array([[_first(recording[name]) for name in POSE_CHANNELS] for recording in recordings])
+    places = np.ma.masked_invalid(found[:, :2])
+    found[:, :2] = places - places.mean(axis=0)
+    return tuple((x, y, yaw) for x, y, yaw in np.nan_to_num(found).tolist())
+
+
+def _first(values: Array) -> float:
+    known = values[np.isfinite(values)]
+    return float(known[0]) if known.size else np.nan
 
 
 def null_recordings(

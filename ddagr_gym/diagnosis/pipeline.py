@@ -19,12 +19,11 @@ from ddagr_gym.diagnosis.bounds import pushed_to_bounds
 from ddagr_gym.diagnosis.certificate import worse_on_unseen
 from ddagr_gym.diagnosis.certify import certify
 from ddagr_gym.diagnosis.data_checks import DataDoubt, data_doubts, dead_channels
-from ddagr_gym.diagnosis.diagnose import Prepared, conclude, prepare, searched
+from ddagr_gym.diagnosis.diagnose import Prepared, accepted, conclude, prepare, searched
 from ddagr_gym.diagnosis.evidence import Evidence, gather_evidence
 from ddagr_gym.diagnosis.held_spans import held_where
 from ddagr_gym.diagnosis.inputs import check_recordings, content_hash
 from ddagr_gym.diagnosis.localisation import locate
-from ddagr_gym.diagnosis.misfit import explained_share
 from ddagr_gym.diagnosis.next_drive import next_drive, rivals_of_diagnosis, sensors_of_diagnosis
 from ddagr_gym.diagnosis.regimes import Unevenness
 from ddagr_gym.diagnosis.regimes_words import uneven_phrase
@@ -88,6 +87,7 @@ class Task:
         digest = hashlib.sha256(source_digest().encode())
         for recording in self.recordings:
             digest.update(content_hash(recording).encode())
+            digest.update(repr((recording.meta.source, recording.meta.segments, recording.meta.spans)).encode())
         setting = replace(self.setting, threads=1)
         texts = [repr(self.robot), repr(self.soil), repr(setting), asdict(self.thresholds), self.seed]
         digest.update(json.dumps(texts, sort_keys=True).encode())
@@ -151,12 +151,13 @@ def run(
     prepared = prepare(*nominal, setting)
     task = replace(task, thresholds=task.thresholds.for_length(prepared.problem.covered))
     diagnosis, effects = step("verdict", lambda: conclude(prepared, found, task.thresholds, task.rng("verdict")))
-    fit = step("certification", lambda: _certified(task, prepared, found, diagnosis, progress))
-    where = step("localisation", lambda: asdict(locate(prepared.problem, found)))
+    found = accepted(found, task.thresholds)
+    fit = step("certification", lambda: _certified(task, prepared, found, progress))
+    where = step("localisation", lambda: asdict(locate(prepared.problem, found, task.thresholds.misfit)))
     held = held_where(task.recordings, prepared.held)
-    diagnosis = _doubted(diagnosis, found, where, {} if held is None else {"sensor_hold": asdict(held)}, fit, checks)
+    diagnosis = _doubted(diagnosis, where, {} if held is None else {"sensor_hold": asdict(held)}, fit, checks)
     unnamed = step("unnamed terms", lambda: _unnamed(task, prepared, found, diagnosis))
-    following = step("next drive", lambda: _next_drive(task, diagnosis, progress))
+    following = step("next drive", lambda: _next_drive(task, setting, diagnosis, progress))
     evidence = step("evidence", lambda: gather_evidence(prepared.problem, found, task.thresholds))
     seconds = time.monotonic() - began
     entries = {"fit": fit, "localisation": where, "unnamed": unnamed, "next_drive": following, "checks": checks}
@@ -179,7 +180,6 @@ def _options(task: Task, setting: Setting) -> dict[str, Any]:
 
 def _doubted(
     diagnosis: Diagnosis,
-    found: Found,
     where: Mapping[str, Any],
     held: Mapping[str, Any],
     fit: Mapping[str, Any] | None = None,
@@ -205,7 +205,7 @@ def _doubted(
     dead = dead_channels(checks)
     silent = [dead_in_words(dead)] if dead else []
     doubts = silent if diagnosis.verdict in ((NONE,), (UNKNOWN,)) else [*doubts, *silent]
-    share = explained_share(found.nominal.misfit, found.chosen.misfit, diagnosis.misfit["limit"]) if findings else None
+    share = where["explained"] if findings else None
     whole = diagnosis.complete and (share is None or share >= WHOLE)
     sentence = headline(diagnosis.verdict, whole, findings, share, doubts)
     return replace(diagnosis, findings=findings, complete=whole and not doubts, sentence=sentence)
@@ -215,11 +215,12 @@ def _unnamed(task: Task, prepared: Prepared, found: Found, diagnosis: Diagnosis)
     """Terms without a name, where names do not explain everything."""
     if diagnosis.complete:
         return None
-    standing = found.nominal if diagnosis.verdict == (UNKNOWN,) else found.chosen
-    return unnamed_terms(prepared.problem, standing, task.rng("unnamed terms")).as_mapping()
+    return unnamed_terms(prepared.problem, found.chosen, task.rng("unnamed terms")).as_mapping()
 
 
-def _next_drive(task: Task, diagnosis: Diagnosis, progress: Callable[[str], None]) -> Mapping[str, Any]:
+def _next_drive(
+    task: Task, setting: Setting, diagnosis: Diagnosis, progress: Callable[[str], None]
+) -> Mapping[str, Any]:
     """The drive that would tell what is left open apart; without one, why there is none."""
     mapping = as_mapping(diagnosis)
     sensors = sensors_of_diagnosis(mapping)
@@ -232,21 +233,19 @@ def _next_drive(task: Task, diagnosis: Diagnosis, progress: Callable[[str], None
             sensors=sensors,
             seed=task.seed,
             threads=task.setting.threads,
+            setting=setting,
             progress=progress,
         )
     except InputError as error:
         return {"manoeuvre": "", "why": str(error), "separates": [], "power": 0.0, "minutes": None, "alternatives": []}
 
 
-def _certified(
-    task: Task, prepared: Prepared, found: Found, diagnosis: Diagnosis, progress: Callable[[str], None]
-) -> Mapping[str, Any]:
+def _certified(task: Task, prepared: Prepared, found: Found, progress: Callable[[str], None]) -> Mapping[str, Any]:
     """Errors of the models; one that names nothing has no corrected model of its own."""
-    chosen = found.nominal if diagnosis.verdict == (UNKNOWN,) else found.chosen
     return certify(
         prepared.problem,
         found.nominal.fitted,
-        chosen.fitted,
+        found.chosen.fitted,
         task.robot,
         prepared.recordings,
         task.rng("certification"),

@@ -17,7 +17,7 @@ from ddagr_gym.diagnosis.noise import recording_noise
 from ddagr_gym.diagnosis.problem import Problem
 from ddagr_gym.diagnosis.refit import Fitted, fit
 from ddagr_gym.diagnosis.scores import Terms
-from ddagr_gym.diagnosis.setting import Setting, make_problem, wheel_radius
+from ddagr_gym.diagnosis.setting import SHORT, Setting, make_problem, wheel_radius
 from ddagr_gym.errors import InputError, unknown_name
 from ddagr_gym.parameters import Imu, PoseReceiver, Robot, Sensors, Soil, WheelEncoder
 from ddagr_gym.recordings.schema import Recording
@@ -91,6 +91,17 @@ def plan(
     problem = make_problem(robot, soil, recordings, setting, recording_noise(recordings, wheel_radius(robot)))
     problem = _at_truth(problem, recordings)
     return Plan(tuple(manoeuvres), tuple(sensors), problem, fit(problem, iterations=0))
+
+
+def with_room(setting: Setting, manoeuvres: Sequence[Manoeuvre]) -> Setting:
+    """A diagnosis' setting whose windows fit twice into the shortest manoeuvre, as short ones do in a diagnosis.
+
+    Args:
+        setting: of the diagnosis.
+        manoeuvres: to be driven.
+    """
+    room = 0.5 * min((manoeuvre.duration for manoeuvre in manoeuvres), default=2.0 * setting.duration)
+    return setting.with_windows(min(setting.duration, max(room, SHORT)))
 
 
 def _check(manoeuvres: Sequence[Manoeuvre], sensors: Sequence[str], setting: Setting) -> None:

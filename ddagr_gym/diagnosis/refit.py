@@ -125,7 +125,7 @@ def effect_columns(problem: Problem, point: Point, base: Array, parameters: Sequ
     columns = np.empty((*problem.blocked.mask.shape, len(parameters)))
     values = read(point.effects, parameters)
     for k, parameter in enumerate(parameters):
-        step = parameter.step if values[k] + parameter.step <= parameter.high else -parameter.step
+        step = parameter.step if parameter.low <= values[k] + parameter.step <= parameter.high else -parameter.step
         tried = values.copy()
         tried[k] += step
         changed = problem.predict(replace(point, effects=moved(point.effects, parameters, tried)))
@@ -137,6 +137,8 @@ def cost_of(problem: Problem, point: Point, prediction: Array, elimination: Elim
     """Cost with the windows' unknowns eliminated, and the windows' shares (W,); infinite where predictions fail."""
     residual = elimination.project(problem.residual(point, prediction)[..., None])[..., 0]
     shares = 0.5 * (residual**2).sum(axis=1)
+    # residuals leave out what is not there: a window that cannot be predicted would cost nothing
+    shares[~np.isfinite(prediction).all(axis=(1, 2))] = np.inf
     total = float(shares.sum()) + _prior_cost(problem, point)
     return (total if np.isfinite(total) else np.inf), shares
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from ddagr_gym.errors import InputError
 
-SCHEMA = "ddagr-diagnosis/3"
+SCHEMA = "ddagr-diagnosis/4"
 """Name and version: raised whenever an entry is renamed, removed or changes its meaning."""
 
 
@@ -86,7 +86,7 @@ FORM: dict[str, Any] = {
     "recordings": Items(str), "thresholds": {"nulls": int, "bank": str, "level": NUMBER, "gates": Each(NUMBER)},
     "robot": str, "soil": str, "options": dict, "checks": Items(_CHECK), "seconds": NUMBER, "version": str,
     "fit": Maybe(_FIT), "localisation": Maybe(_LOCALISATION), "unnamed": Maybe(_UNNAMED),
-    "next_drive": Maybe(_NEXT_DRIVE), "data": list,
+    "next_drive": Maybe(_NEXT_DRIVE), "data": list, "rejected": list,
 }  # fmt: skip
 _DATA = {"source": str, "sha256": str, "rows": int, "seconds": NUMBER}
 _WORDS = {
@@ -102,7 +102,7 @@ def check_form(mapping: Mapping[str, Any]) -> None:
         InputError: a missing or wrong entry, with the place where it is.
     """
     _check("the diagnosis", mapping, FORM)
-    for finding in mapping["findings"]:
+    for finding in (*mapping["findings"], *mapping["rejected"]):
         _check(f"finding {finding.get('name')!r}", finding, _FINDING)
     for number, source in enumerate(mapping["data"]):
         _check(f"data {number + 1}", source, _DATA)

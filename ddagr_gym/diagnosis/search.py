@@ -231,7 +231,7 @@ def search(
     steps: list[tuple[Rival, ...]] = []
     while len(standings[-1].names) < most:
         number = f"search step {len(standings)}"
-        gates = _gates(thresholds, standings)
+        gates = further_gates(thresholds, standings)
         added = keep(number, partial(_added, problem, standings[-1], raw, steps, gates, rivals, progress))
         if added is None or set(added[0].names) in [set(s.names) for s in standings]:
             break
@@ -243,8 +243,13 @@ def search(
     return Found(tuple(standings), steps[0] if steps else (), tuple(steps))
 
 
-def _gates(thresholds: Thresholds, standings: Sequence[Standing]) -> Thresholds:
-    """Gates of further effects: higher by shares of what the named ones explain."""
+def further_gates(thresholds: Thresholds, standings: Sequence[Standing]) -> Thresholds:
+    """Gates of further effects: higher by shares of what the named ones explain.
+
+    Args:
+        thresholds: of the null bank.
+        standings: models from the nominal one to the one that further effects are to join.
+    """
     explained = _explained(standings)
     near = {name for effect in standings[-1].fitted.point.effects for name in effect.confused_with}
     return thresholds.raised(_FORM * explained).raised((_NEAR_FORM - _FORM) * explained, near)
@@ -285,16 +290,25 @@ def _settled(problem: Problem, standing: Standing) -> Standing:
 def _swapped(problem: Problem, fitted: Fitted, steps: Sequence[tuple[Rival, ...]]) -> Fitted:
     """Swap move: the model with a close rival in place of an effect of an earlier step, where it fits better."""
     best = fitted
-    for number, rivals in enumerate(steps):
+    for rivals in steps:
+        place = _place_of(rivals, fitted)
+        if place is None:
+            continue
         for rival in rivals[1:]:
             names = {effect.name for effect in best.point.effects}
             if rival.gain < _CLOSE * rivals[0].gain or rival.name in names or rival.retold:
                 continue
             effects = list(best.point.effects)
-            effects[number] = rival.fitted.point.effects[number]
+            effects[place] = rival.fitted.point.effects[-1]
             tried = fit(problem, replace(best.point, effects=tuple(effects)), iterations=4, reuse=fitted)
             best = min(best, tried, key=partial(_with_sizes, problem))
     return best
+
+
+def _place_of(rivals: Sequence[Rival], fitted: Fitted) -> int | None:
+    """Place of the effect that a step added, or that was put there instead; None where it has gone again."""
+    names = [effect.name for effect in fitted.point.effects]
+    return next((names.index(rival.name) for rival in rivals if rival.name in names), None)
 
 
 def _with_sizes(problem: Problem, fitted: Fitted) -> float:

@@ -6,13 +6,10 @@ its quantiles are taken, and margins for simulators that nobody thought of.
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
-from pathlib import Path
-from types import UnionType
-from typing import Literal, Protocol, get_args
+from dataclasses import dataclass, replace
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -148,8 +145,9 @@ class Thresholds:
         bank: hash of the bank's data.
         level: of false alarms over the whole library.
         maxima: of each null run, the largest gain over its gate, in increasing order.
-        windows: of a null run, their median; 0 where unknown.
-        duration: of these windows [s]; diagnoses with the thresholds cut recordings in the same way.
+        windows: that cover as much time as those of a null run (median); 0 where unknown.
+        duration: of these windows [s], median over the runs; diagnoses with the thresholds cut recordings in the same
+            way.
         origin: of the bank; None where unknown.
     """
 
@@ -230,6 +228,7 @@ class NullRun:
         misfit: mean square of the residuals by channel.
         windows: of the run.
         meaningless: effects that would be of less than their least meaningful size.
+        duration: of its windows as they were cut [s], shorter than asked for where drives are short.
     """
 
     kind: str
@@ -239,6 +238,7 @@ class NullRun:
     misfit: dict[str, float]
     windows: int = 0
     meaningless: tuple[str, ...] = ()
+    duration: float = SHORT_WINDOW
 
     def evidence(self, name: str) -> float:
         """Gain of an effect that counts against its gate: below its least meaningful size only a multiple passes."""
@@ -246,12 +246,13 @@ class NullRun:
         return gain / UNMISTAKABLE if name in self.meaningless else gain
 
 
+def least_nulls(level: float = LEVEL) -> int:
+    """Null runs that a level of false alarms takes at least."""
+    return math.ceil(1.0 / level)
+
+
 def thresholds_from(
-    runs: Sequence[NullRun],
-    bank: str,
-    level: float = LEVEL,
-    duration: float = SHORT_WINDOW,
-    origin: Origin | None = None,
+    runs: Sequence[NullRun], bank: str, level: float = LEVEL, origin: Origin | None = None
 ) -> Thresholds:
     """Gates such that the share ``level`` of null runs passes any of them, and strangers' nulls hardly more.
 
@@ -260,17 +261,16 @@ def thresholds_from(
     the size of the library), and so does the margin for simulators that nobody thought of.
 
     Args:
-        runs: at least one over the level.
+        runs: as many as :func:`least_nulls` says, or more.
         bank: hash of what they depend on.
         level: of false alarms over the whole library.
-        duration: of the windows [s].
         origin: of the bank.
 
     Raises:
         InputError: too few runs for the level.
     """
-    if len(runs) < 1.0 / level:
-        raise InputError(f"{len(runs)} null runs cannot give a level of {level:g}: make at least {int(1 / level)}.")
+    if len(runs) < least_nulls(level):
+        raise InputError(f"{len(runs)} null runs cannot give a level of {level:g}: make at least {least_nulls(level)}.")
     names = sorted({name for run in runs for name in run.gains})
     table = np.array([[run.evidence(name) for name in names] for run in runs])
     scale = np.maximum(_upper_mean(table), NOISE_GAIN)
@@ -281,7 +281,8 @@ def thresholds_from(
     least = np.maximum(np.median(held, axis=0), 0.0)
     gates = {name: Gate(float(widening[k] * scale[k]), float(least[k])) for k, name in enumerate(names)}
     maxima = np.sort((table / (widening * scale)).max(axis=1))
-    windows = float(np.median([run.windows for run in runs]))
+    duration = float(np.median([run.duration for run in runs]))
+    windows = float(np.median([run.windows * run.duration for run in runs])) / duration
     limits = _misfit_limits(runs, level)
     return Thresholds(gates, limits, len(runs), bank, level, tuple(maxima.tolist()), windows, duration, origin)
 
@@ -309,87 +310,3 @@ def _misfit_limits(runs: Sequence[NullRun], level: float) -> dict[str, float]:
     widening = float(np.quantile(np.nanmax(table / scale, axis=1), 1.0 - level))
     margin = [LOCAL_MARGIN if name in LOCAL else MISFIT_MARGIN for name in channels]
     return {name: margin[k] * max(widening, 1.0) * float(scale[k]) for k, name in enumerate(channels)}
-
-
-def save_thresholds(thresholds: Thresholds, path: Path) -> None:
-    """Write thresholds as JSON, all or nothing."""
-    import os
-
-    body = {"version": VERSION, **asdict(thresholds)}
-    part = path.with_name(f".{path.name}.part")
-    part.write_text(json.dumps(body, indent=1, sort_keys=True) + "\n")
-    os.replace(part, path)
-
-
-def load_thresholds(path: Path) -> Thresholds:
-    """Read thresholds.
-
-    Raises:
-        InputError: a file that is missing, no JSON, of another version, or with an origin that makes no sense.
-    """
-    try:
-        body = json.loads(path.read_text())
-    except (OSError, json.JSONDecodeError) as error:
-        raise InputError(f"{path} cannot be read as thresholds ({error}): make it with `ddagr null-bank`.") from None
-    if not isinstance(body, dict) or body.get("version") != VERSION:
-        raise InputError(f"{path} is not a thresholds file of version {VERSION}: make it with `ddagr null-bank`.")
-    gates = {str(name): Gate(**gate) for name, gate in body["gates"].items()}
-    misfit = {str(name): float(value) for name, value in body["misfit"].items()}
-    maxima = tuple(float(value) for value in body.get("maxima", ()))
-    return Thresholds(
-        gates,
-        misfit,
-        int(body["nulls"]),
-        str(body["bank"]),
-        float(body["level"]),
-        maxima,
-        float(body.get("windows", 0.0)),
-        float(body.get("duration", SHORT_WINDOW)),
-        _origin(body.get("origin"), path),
-    )
-
-
-def _origin(entry: object, path: Path) -> Origin | None:
-    """Origin as it stands in a file; older ones have none."""
-    if entry is None:
-        return None
-    types: dict[str, type | UnionType] = {
-        "robot": str,
-        "soil": str,
-        "soil_uncertainty": int | float,
-        "seed": int,
-        "kind": str,
-    }
-    kinds = get_args(NullKind)
-    if (
-        not isinstance(entry, dict)
-        or entry.keys() != types.keys()
-        or not all(isinstance(entry[name], type_) for name, type_ in types.items())
-        or entry["kind"] not in kinds
-    ):
-        raise InputError(
-            f"the origin in {path} is not robot, soil, soil_uncertainty, seed and kind ({' or '.join(kinds)}): make "
-            "the file with `ddagr null-bank`."
-        )
-    return Origin(**entry)
-
-
-def shipped_thresholds(robot: str) -> Thresholds | None:
-    """Thresholds that ship with the package for a robot, or None."""
-    path = Path(__file__).resolve().parents[1] / "data" / f"null_bank_{robot}.json"
-    return load_thresholds(path) if path.is_file() else None
-
-
-def default_thresholds(robot: str) -> Thresholds:
-    """Thresholds that ship with the package for drives of three times 60 s.
-
-    Raises:
-        InputError: no bank ships for the robot.
-    """
-    found = shipped_thresholds(robot)
-    if found is None:
-        raise InputError(
-            f"no null bank ships for robot {robot!r}: make one with `ddagr null-bank RUN... --robot {robot}` and give "
-            "it as --thresholds."
-        )
-    return found

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -13,6 +12,7 @@ from typing import Any
 from ddagr_gym.diagnosis.data_checks import DataDoubt
 from ddagr_gym.diagnosis.schema import SCHEMA, check_form
 from ddagr_gym.errors import InputError
+from ddagr_gym.files import atomic_path
 
 NONE = "none"
 UNKNOWN = "unknown"
@@ -104,6 +104,7 @@ class Diagnosis:
         soil: name of the nominal soil.
         options: windows, priors and seed, so that the same can be run again.
         checks: what the recordings say is wrong with themselves (:mod:`ddagr_gym.diagnosis.data_checks`).
+        rejected: what fits best where that leaves too much to be named.
         schema: of this file.
     """
 
@@ -127,6 +128,7 @@ class Diagnosis:
     soil: str = ""
     options: Mapping[str, Any] = field(default_factory=dict)
     checks: tuple[DataDoubt, ...] = ()
+    rejected: tuple[Finding, ...] = ()
     schema: str = SCHEMA
 
 
@@ -164,7 +166,8 @@ def validate(mapping: Mapping[str, Any]) -> None:
             f"the diagnosis has the verdict {mapping['verdict']!r}: give names of effects, none or unknown."
         )
     named = [finding["name"] for finding in mapping["findings"]]
-    if mapping["verdict"] not in ([NONE], [UNKNOWN]) and sorted(named) != sorted(mapping["verdict"]):
+    names = [name for name in mapping["verdict"] if name not in (NONE, UNKNOWN)]
+    if sorted(named) != sorted(names):
         raise InputError(f"the diagnosis names {mapping['verdict']!r} and has findings on {named!r}: make them agree.")
 
 
@@ -172,9 +175,8 @@ def save(diagnosis: Diagnosis, path: Path) -> None:
     """Write ``diagnosis.json``, all or nothing, after validation."""
     mapping = as_mapping(diagnosis)
     validate(mapping)
-    part = path.with_name(f".{path.name}.part")
-    part.write_text(json.dumps(mapping, indent=1, allow_nan=False) + "\n")
-    os.replace(part, path)
+    with atomic_path(path) as part:
+        part.write_text(json.dumps(mapping, indent=1, allow_nan=False) + "\n")
 
 
 def load(path: Path) -> dict[str, Any]:
@@ -185,7 +187,7 @@ def load(path: Path) -> dict[str, Any]:
     """
     try:
         mapping = json.loads(path.read_text())
-    except (OSError, json.JSONDecodeError) as error:
+    except (OSError, ValueError) as error:
         raise InputError(f"{path} cannot be read as a diagnosis ({error}): make it with `ddagr diagnose`.") from None
     if not isinstance(mapping, dict):
         raise InputError(f"{path} holds no mapping: make it with `ddagr diagnose`.")

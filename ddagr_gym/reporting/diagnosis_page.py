@@ -89,6 +89,7 @@ def _context(diagnosis: Mapping[str, Any], evidence: Evidence, studio: _Studio) 
         "tiles": tables.tiles(diagnosis, _seconds(evidence)),
         "checks": tables.checks(diagnosis.get("checks")),
         "findings": [tables.finding_card(item, diagnosis["recordings"]) for item in findings],
+        "rejected": tables.rejected(diagnosis.get("rejected")),
         "mismatch": tables.phrase(localisation.get("mismatch")) if findings else "",
         "remaining": tables.phrase(localisation.get("remaining")),
         "window": f"{evidence.duration:.3g}",

@@ -110,6 +110,11 @@ def finding_card(finding: Entry, recordings: Sequence[str]) -> dict[str, Any]:
     }
 
 
+def rejected(items: Sequence[Entry] | None) -> list[dict[str, str]]:
+    """What fits best where nothing may be named: in words, and why it is no name."""
+    return [{"title": title(str(item["name"])), "evidence": _evidence(item)} for item in items or []]
+
+
 def size(amount: Amount) -> str:
     """A parameter with its interval and unit; angles in degrees."""
     unit = amount.unit.replace("^2", "²")

@@ -30,6 +30,8 @@ from ddagr_gym.errors import InputError
 from ddagr_gym.evaluation.metrics import turn_metrics
 from ddagr_gym.evaluation.runs import drive_turn
 from ddagr_gym.physics import layout
+from ddagr_gym.physics.effects import save_effects
+from ddagr_gym.physics.effects.slope import Slope
 from ddagr_gym.policies.archive import load_policy
 from ddagr_gym.policies.controller import PolicyController
 from ddagr_gym.policies.design import PolicyDesign
@@ -190,6 +192,18 @@ def test_configurations_are_read_and_overridden():
     changed = load_settings("ppo_ekf", ["ppo.learning_rate=1e-5", "steps=7", "design.frames=2"])
     assert (changed.ppo.learning_rate, changed.steps, changed.design.frames) == (1e-5, 7, 2)
     assert changed.digest() != load_settings("ppo_ekf").digest()
+
+
+def test_a_file_of_effects_counts_by_what_it_says(tmp_path):
+    path = tmp_path / "effects.yaml"
+    before = load_settings("ppo_ekf")
+
+    def digest(angle: float) -> str:
+        save_effects(path, [Slope(angle)])
+        return replace(before, task=replace(before.task, effects=(str(path),))).digest()
+
+    assert len({digest(0.05), digest(0.3), before.digest()}) == 3
+    assert digest(0.05) == digest(0.05)
     for wrong in ("steps", "nothing.here=1", "ppo.surprise=1", "steps=many", "steps=0", "ppo.clip=: ["):
         with pytest.raises(InputError):
             load_settings("ppo_ekf", [wrong])

@@ -35,7 +35,8 @@ from ddagr_gym.diagnosis.refit import fit
 from ddagr_gym.diagnosis.scores import Gain
 from ddagr_gym.diagnosis.setting import Setting, make_problem
 from ddagr_gym.diagnosis.standing import stand
-from ddagr_gym.diagnosis.thresholds import Gate, Thresholds, default_thresholds
+from ddagr_gym.diagnosis.threshold_files import default_thresholds
+from ddagr_gym.diagnosis.thresholds import Gate, Thresholds
 from ddagr_gym.errors import InputError
 from ddagr_gym.parameters import Imu, PoseReceiver, Sensors, WheelEncoder
 from ddagr_gym.physics.effects.base import DriveExtent

@@ -80,6 +80,12 @@ def test_answers_keep_what_was_said_and_how(runs: list[list[str]], tmp_path: Pat
     assert [path.name for path in tmp_path.iterdir()] == ["answers.json"]
 
 
+def test_arguments_are_kept_without_places_of_this_machine() -> None:
+    bank = str(run_diagnoses.REAL_BANK)
+    kept = run_diagnoses.shown(("/home/me/run_1.csv.gz", "--soil", "firm_ground", "--thresholds", bank))
+    assert kept == ["run_1.csv.gz", "--soil", "firm_ground", "--thresholds", "ddagr_gym/data/null_bank_warthog.json"]
+
+
 def test_finished_cases_are_not_run_again_unless_options_differ(runs: list[list[str]], tmp_path: Path) -> None:
     for options in ((), (), ("--names-only",)):
         diagnose(replace(CASES[0], options=options), tmp_path, 1, 10.0)

@@ -15,7 +15,8 @@ from ddagr_gym.commands.diagnose import outcome_text
 from ddagr_gym.diagnosis import pipeline
 from ddagr_gym.diagnosis.data_checks import DataDoubt
 from ddagr_gym.diagnosis.store import part_folder
-from ddagr_gym.diagnosis.thresholds import Gate, Thresholds, save_thresholds
+from ddagr_gym.diagnosis.threshold_files import save_thresholds
+from ddagr_gym.diagnosis.thresholds import Gate, Thresholds
 from ddagr_gym.diagnosis.verdict import Diagnosis, load
 from ddagr_gym.parameters import Imu, PoseReceiver, Sensors
 from ddagr_gym.physics.effects import load_effects

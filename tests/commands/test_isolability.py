@@ -9,7 +9,7 @@ from ddagr_gym.cli import main
 from ddagr_gym.commands.gates import gates_for
 from ddagr_gym.commands.isolability import table_text
 from ddagr_gym.diagnosis.isolability import Detectable, Isolability
-from ddagr_gym.diagnosis.thresholds import default_thresholds, save_thresholds
+from ddagr_gym.diagnosis.threshold_files import default_thresholds, save_thresholds
 from ddagr_gym.reporting.isolability_figure import isolability_figure
 
 
@@ -40,6 +40,26 @@ def test_writes_table_json_and_figure(tmp_path, capsys, monkeypatch, drive_csv):
     # a second run does not overwrite unasked
     assert main([*arguments, "--output", str(folder)]) == 2
     assert "--overwrite" in capsys.readouterr().err
+
+
+def test_without_output_the_table_is_printed_and_nothing_written(tmp_path, capsys, monkeypatch, drive_csv):
+    from ddagr_gym.physics.effects import registry
+
+    few = {name: registry.effect_kinds()[name] for name in ("slope", "gyro_scale")}
+    monkeypatch.setattr("ddagr_gym.diagnosis.scores.effect_kinds", lambda: few)
+    monkeypatch.chdir(tmp_path)
+    assert main(["isolability", "--manoeuvres", str(drive_csv), "--sensors", "imu", "encoders"]) == 0
+    said = capsys.readouterr().out
+    assert "least detectable" in said
+    assert "gyro_scale" in said
+    assert "figure" not in said
+    assert list(tmp_path.iterdir()) == [drive_csv]
+
+
+def test_negative_seed_is_one_sentence(tmp_path, capsys):
+    assert main(["isolability", "--seed", "-1", "--output", str(tmp_path / "out")]) == 2
+    assert "--seed is -1: give at least 0." in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
 
 
 def test_gates_ship_with_the_robot_or_come_from_chance(tmp_path):

@@ -12,7 +12,8 @@ import pytest
 from ddagr_gym.cli import main
 from ddagr_gym.commands.diagnose import Arguments, _thresholds
 from ddagr_gym.diagnosis import null_bank
-from ddagr_gym.diagnosis.thresholds import NullRun, Origin, load_thresholds
+from ddagr_gym.diagnosis.threshold_files import load_thresholds
+from ddagr_gym.diagnosis.thresholds import NullRun, Origin
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.recordings.storage import save_parquet
@@ -26,21 +27,22 @@ def quick_nulls(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
     def null_run(robot, soil, template, kind, setting, seed, *more, **options):  # type: ignore[no-untyped-def]
         made.append(seed[-1])
-        return drawn(kind, list(seed))
+        return drawn(kind, list(seed), setting.duration)
 
     def scanned(robot, soil, recordings, kind, setting):  # type: ignore[no-untyped-def]
-        return drawn(kind, [len(recordings)])
+        made.append(0)
+        return drawn(kind, [len(recordings)], setting.duration)
 
     monkeypatch.setattr(null_bank, "null_run", null_run)
     monkeypatch.setattr(null_bank, "scanned", scanned)
     return made
 
 
-def drawn(kind: str, seed: list[int]) -> NullRun:
+def drawn(kind: str, seed: list[int], duration: float = 6.0) -> NullRun:
     rng = np.random.default_rng(seed)
     gains = {"slope": float(rng.exponential(300.0)), "payload": float(rng.exponential(100.0))}
     misfit = {name: float(rng.uniform(0.9, 1.1)) for name in CHANNELS}
-    return NullRun(kind, gains, dict.fromkeys(gains, 1.0), dict.fromkeys(gains, 0.5), misfit)
+    return NullRun(kind, gains, dict.fromkeys(gains, 1.0), dict.fromkeys(gains, 0.5), misfit, 10, (), duration)
 
 
 def words(folder: Path, count: int = 20) -> list[str]:
@@ -71,8 +73,9 @@ def test_too_few_drives_for_the_level(
     quick_nulls: list[int], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(words(tmp_path, count=5)) == 2
-    assert "20" in capsys.readouterr().err
-    assert not (tmp_path / "thresholds.json").exists()
+    assert "--count is 5: give at least 20" in capsys.readouterr().err
+    assert quick_nulls == []
+    assert not any(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("option", ["--window", "--stride"])
@@ -89,6 +92,80 @@ def test_thresholds_know_their_windows(quick_nulls: list[int], tmp_path: Path) -
     assert load_thresholds(tmp_path / "thresholds.json").duration == 4.0
 
 
+def test_windows_that_were_cut_shorter_are_those_that_are_kept(
+    quick_nulls: list[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(null_bank, "null_run", lambda *given: drawn(given[3], list(given[5]), 5.0))
+    assert main([*words(tmp_path), "--window", "6"]) == 0
+    found = load_thresholds(tmp_path / "thresholds.json")
+    assert (found.duration, found.windows) == (5.0, 10.0)
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "remedy"),
+    [
+        ("--piece", "0", "at least 16 s"),
+        ("--piece", "inf", "a finite time"),
+        ("--seed", "-1", "at least 0"),
+        ("--processes", "0", "at least 1"),
+    ],
+)
+def test_options_without_a_meaning_are_refused(
+    option: str, value: str, remedy: str, quick_nulls: list[int], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([*words(tmp_path), option, value]) == 2
+    error = capsys.readouterr().err
+    assert f"{option} is {value}: give " in error
+    assert remedy in error
+    assert not any(tmp_path.iterdir())
+
+
+def test_help_says_how_many_pieces_ordinary_drives_must_give(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["null-bank", "--help"]) == 0
+    assert "at least 20 are needed" in " ".join(capsys.readouterr().out.replace("│", " ").split())
+
+
+def save_drive(path: Path, seconds: float, period: float = 0.05, yaw_rate: float = 1.0) -> str:
+    """A drive with commands and a gyro; its path."""
+    count = int(seconds / period)
+    columns = {name: np.linspace(0.0, 1.0, count) for name in ("command_right", "command_left")}
+    columns |= {"yaw_rate": np.full(count, yaw_rate), "t": period * np.arange(1, count + 1)}
+    save_parquet(Recording.from_columns(columns, get_robot("ddagr"), source=path.name), path)
+    return str(path)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "ordinary", "said"),
+    [
+        (0.05, True, "1 rows"),
+        (0.05, False, "1 rows"),
+        (10.0, True, "too few"),
+        (20.0, True, "0 pieces with commands of 60 s and the level of 0.05 takes at least 20"),
+        (120.0, True, "2 pieces with commands"),
+    ],
+)
+def test_recordings_that_are_too_short_are_refused_before_any_work(
+    seconds: float, ordinary: bool, said: str, quick_nulls: list[int], tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    run = save_drive(tmp_path / "run.parquet", seconds)
+    assert main([*words(tmp_path), run, *(["--ordinary"] if ordinary else [])]) == 2
+    error = capsys.readouterr().err
+    assert said in error
+    assert error.count("\n") == 1
+    assert quick_nulls == []
+    assert not (tmp_path / "thresholds.bank").exists()
+
+
+def test_other_readings_make_another_bank(quick_nulls: list[int], tmp_path: Path) -> None:
+    """A corrected map changes what was read, not what was commanded."""
+    for yaw_rate in (1.0, 1.0, -1.0):
+        ordinary = [save_drive(tmp_path / "run.parquet", 400.0, yaw_rate=yaw_rate), "--ordinary", "--piece", "20"]
+        assert main([*words(tmp_path), *ordinary]) == 0
+    assert len(quick_nulls) == 40
+    assert len(list((tmp_path / "thresholds.bank").iterdir())) == 40
+
+
 def test_thresholds_know_their_origin(quick_nulls: list[int], tmp_path: Path) -> None:
     options = ["--robot", "husky", "--soil", "firm_ground", "--soil-uncertainty", "2.5", "--seed", "7"]
     assert main([*words(tmp_path), *options]) == 0
@@ -97,13 +174,9 @@ def test_thresholds_know_their_origin(quick_nulls: list[int], tmp_path: Path) ->
 
 
 def test_thresholds_of_ordinary_drives_say_so(quick_nulls: list[int], tmp_path: Path) -> None:
-    count = 6000  # 60 s
-    columns = {name: np.linspace(0.0, 1.0, count) for name in ("command_right", "command_left", "yaw_rate")}
-    columns["t"] = 0.01 * np.arange(1, count + 1)
-    save_parquet(Recording.from_columns(columns, get_robot("ddagr")), tmp_path / "run.parquet")
-    ordinary = [str(tmp_path / "run.parquet"), "--ordinary", "--piece", "1"]
+    ordinary = [save_drive(tmp_path / "run.parquet", 400.0), "--ordinary", "--piece", "20"]
     assert main([*words(tmp_path), *ordinary]) == 0
-    assert quick_nulls == []
+    assert len(quick_nulls) == 20
     assert load_thresholds(tmp_path / "thresholds.json").origin == Origin("ddagr", "thesis_a1", 1.0, 0, "ordinary")
 
 

@@ -200,6 +200,18 @@ def test_share_of_the_ceiling() -> None:
     assert gain_share(gains(resampled(nothing, clusters, np.random.default_rng(0)), MOTION)) is None
 
 
+def test_intervals_of_few_clusters_are_wide_enough() -> None:
+    """Of 90 % intervals from three drives eight in ten hold the true error; plain resampling has 57 %."""
+    rng, clusters = np.random.default_rng(3), np.repeat(np.arange(3), 8)
+    held = []
+    for _ in range(200):
+        errors = np.exp(0.3 * rng.standard_normal(3))[clusters]
+        draws = resampled({"refitted": {"yaw_rate": errors}}, clusters, rng)["refitted"]["yaw_rate"]
+        low, high = np.quantile(draws[1:], [0.05, 0.95])
+        held.append(low < np.exp(0.09) < high)  # root of the mean of exp(0.6 z)
+    assert 0.73 < np.mean(held) < 0.99
+
+
 def test_a_share_of_a_gain_that_may_be_nothing_is_no_number() -> None:
     """The ceiling is better by 10 % over all, but by its luck in one stretch of six."""
     ones, clusters = np.ones(12), np.repeat(np.arange(6), 2)

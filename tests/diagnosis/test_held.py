@@ -1,9 +1,11 @@
 """Held readings are found in the values, and only there."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from ddagr_gym.diagnosis.held import find_held, hold_effect, without_repeats
+from ddagr_gym.diagnosis.held import Held, find_held, hold_effect, without_repeats
 from ddagr_gym.recordings.schema import Recording
 
 PERIOD, COUNT = 0.02, 2000
@@ -47,3 +49,29 @@ def test_repeats_become_missing_samples() -> None:
     cleaned = without_repeats(recording, find_held([recording]))
     assert np.isfinite(cleaned["yaw_rate"]).mean() == pytest.approx(0.25, abs=0.01)
     assert np.isfinite(cleaned["encoder_right"]).all()
+
+
+@pytest.mark.parametrize("samples", [2, 14, 24, 50])
+def test_long_holds_have_their_duration(samples: int) -> None:
+    """Beyond the reach of the samples that tell whether readings are held."""
+    found = find_held([drive({"yaw_rate": samples})])
+    assert [item.sensor for item in found] == ["gyro"]
+    assert found[0].duration == pytest.approx((samples - 1) * PERIOD, rel=0.02)
+
+
+@pytest.mark.parametrize("steady", ["standing", "cruising"])
+def test_a_steady_reading_between_changes_is_no_hold(steady: str) -> None:
+    """Held encoders of a robot that stops for 2 s in every 4 s, or whose counts are the same for as long."""
+    recording = drive({"encoder_right": 5, "encoder_left": 5})
+    rows = np.arange(COUNT)
+    cruising = np.round(1.5 * np.tanh(4.0 * np.sin(PERIOD * (rows // 5 * 5))) / 0.0157) * 0.0157
+    channels = {**recording.channels}
+    for name in ("encoder_right", "encoder_left"):
+        channels[name] = np.where(rows // 100 % 2, 0.0, channels[name]) if steady == "standing" else cruising
+    found = find_held([replace(recording, channels=channels)])
+    assert [item.sensor for item in found] == ["encoders"]
+    assert found[0].duration == pytest.approx(4 * PERIOD, rel=0.15)
+
+
+def test_a_hold_longer_than_the_effect_knows_is_its_longest() -> None:
+    assert hold_effect([Held("gyro", 0.9, 75.0, 100)]).duration == 60.0

@@ -23,6 +23,13 @@ def made(seconds: float = 30.0, rate: float = 50.0, **channels: float | None) ->
     return Recording.from_columns({"t": t, **columns}, ROBOT, source="drive.csv")
 
 
+def told_late() -> Recording:
+    """A drive whose commands begin two seconds before its end."""
+    drive = made()
+    valid = drive.command_valid & (drive.t > 28.0)
+    return replace(drive, command_valid=valid)
+
+
 def test_a_sound_drive_passes() -> None:
     check_recordings([made()], ROBOT, Setting())
 
@@ -37,6 +44,8 @@ def test_a_sound_drive_passes() -> None:
         ([made(), made(rate=100.0)], "100 Hz"),
         ([made(command_right=0.0, command_left=0.0)], "stand still 100 %"),
         ([made(), made().with_meta(robot="husky")], "--robot husky"),
+        ([made(), made(seconds=20.0), made()], "drive.csv and drive.csv hold the same values"),
+        ([told_late()], "0 windows of 2 s without a gap and with commands"),
     ],
 )
 def test_what_cannot_be_diagnosed_is_refused(recordings: list[Recording], words: str) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from ddagr_gym.diagnosis.localisation import channel_shares, locate, piece_values
-from ddagr_gym.diagnosis.misfit import channel_misfit
+from ddagr_gym.diagnosis.misfit import LOCAL, channel_misfit
 from ddagr_gym.diagnosis.refit import fit
 from ddagr_gym.diagnosis.regimes import Pieces, shares, uneven
 from ddagr_gym.diagnosis.regimes_words import NOWHERE_MORE, phrase_of, uneven_phrase
@@ -26,7 +26,10 @@ from ddagr_gym.diagnosis.search import Found
 from ddagr_gym.diagnosis.standing import Standing
 from ddagr_gym.diagnosis.wrench import HeldWrench, residual_wrench
 from ddagr_gym.physics.effects.registry import parse_effect
+from ddagr_gym.replay.windows import CHANNELS
 from ddagr_gym.reporting.wording import EVERYWHERE, range_in_words
+
+LIMITS = dict.fromkeys((*CHANNELS, *LOCAL), 1.2)
 
 pytest.importorskip("ruptures", reason="needs the extra diagnosis")
 
@@ -48,7 +51,7 @@ def limited(drive, problem_of):
 
 def test_a_limit_shows_only_while_it_is_reached(limited):
     problem, found = limited
-    (where,) = locate(problem, found).findings.values()
+    (where,) = locate(problem, found, LIMITS).findings.values()
     # commands of the fixture beyond 0.75 rad/s: 4 to 8 s, 12 to 16 s, and from 20 s on
     assert where.spans
     for span in where.spans:
@@ -63,7 +66,7 @@ def test_a_limit_shows_only_while_it_is_reached(limited):
 
 
 def test_a_localisation_is_plain_json(limited):
-    located = locate(*limited)
+    located = locate(*limited, LIMITS)
     again = json.loads(json.dumps(asdict(located)))
     assert set(again["findings"]) == {"motor_saturation"}
     assert set(again["channels"]) == set(limited[1].nominal.misfit)
@@ -74,8 +77,9 @@ def test_a_localisation_is_plain_json(limited):
 
 def test_nothing_found_has_no_spans_and_no_phrase(limited):
     problem, found = limited
-    located = locate(problem, Found(found.standings[1:], ()))
-    nothing = locate(problem, Found((standing(problem, as_it_stands(problem, found.nominal.fitted)),), ()))
+    located = locate(problem, Found(found.standings[1:], ()), LIMITS)
+    raw = Found((standing(problem, as_it_stands(problem, found.nominal.fitted)),), ())
+    nothing = locate(problem, raw, LIMITS)
     assert located.remaining.phrase == "nothing above the noise"
     assert nothing.findings == {}
     assert nothing.mismatch.spans == ()
@@ -258,9 +262,8 @@ def test_ranges_in_words():
 
 
 def test_channel_shares_by_hand():
-    # mismatch above the floors: 100 (3 - 1) = 200 and 100 (1.5 - 0.8) = 70; left: 100 (2 - 1) = 100
-    table, explained = channel_shares({"a": 3.0, "b": 1.5}, {"a": 2.0, "b": 0.8}, {"a": 100.0, "b": 100.0})
+    # mismatch above the floors: 100 (3 - 1) = 200 and 100 (1.5 - 0.8) = 70
+    table = channel_shares({"a": 3.0, "b": 1.5}, {"a": 2.0, "b": 0.8}, {"a": 100.0, "b": 100.0})
     assert table["a"].share == pytest.approx(200.0 / 270.0)
     assert table["b"].floor == 0.8
-    assert explained == pytest.approx(170.0 / 270.0)
-    assert channel_shares({"a": 0.9}, {"a": 0.9}, {"a": 10.0})[1] is None
+    assert channel_shares({"a": 0.9}, {"a": 0.9}, {"a": 10.0})["a"].share == 0.0

@@ -1,12 +1,21 @@
 """Which manoeuvre settles classical confusions."""
 
 import math
+from dataclasses import asdict
 
 import pytest
 
 from ddagr_gym.control.manoeuvres import Manoeuvre
 from ddagr_gym.diagnosis.isolability import APART
-from ddagr_gym.diagnosis.next_drive import MOST_MINUTES, next_drive, rivals_of_diagnosis, sensors_of_diagnosis
+from ddagr_gym.diagnosis.next_drive import (
+    MOST_MINUTES,
+    next_drive,
+    rivals_of_diagnosis,
+    sensors_of_diagnosis,
+    setting_of_diagnosis,
+)
+from ddagr_gym.diagnosis.nuisance import NuisancePriors
+from ddagr_gym.diagnosis.setting import Setting
 from ddagr_gym.errors import InputError
 from ddagr_gym.physics.effects.registry import parse_effect
 from ddagr_gym.presets import get_robot, get_soil
@@ -66,7 +75,12 @@ def test_rivals_and_sensors_of_a_diagnosis() -> None:
         "parameters": parameters,
         "equivalence_set": {"slope": 0.6, "accelerometer_bias": 0.3, "imu_tilt": 0.1},
     }
-    mapping = {"findings": [finding], "detectable": {}, "misfit": {"nominal": {"yaw_rate": 1.0, "encoder_left": 1.0}}}
+    mapping = {
+        "findings": [finding],
+        "rejected": [],
+        "detectable": {},
+        "misfit": {"nominal": {"yaw_rate": 1.0, "encoder_left": 1.0}},
+    }
     rivals = rivals_of_diagnosis(mapping)
     assert [rival.name for rival in rivals] == ["slope", "accelerometer_bias", "imu_tilt"]
     assert rivals[0].angle == 0.03
@@ -84,13 +98,28 @@ def test_encoders_that_stand_beside_uneven_radii_are_those_that_the_speed_loop_b
         "parameters": {"difference": {"value": 0.04, "unit": "-"}},
         "equivalence_set": {"wheel_radius_mismatch": 0.5, "encoder_scale": 0.5},
     }
-    rivals = rivals_of_diagnosis({"findings": [finding], "detectable": {}, "misfit": {"nominal": {}}})
+    rivals = rivals_of_diagnosis({"findings": [finding], "rejected": [], "detectable": {}, "misfit": {"nominal": {}}})
     assert rivals[1].as_mapping()["parameters"] == {"right": 0.98, "left": 1.02, "loop": 1.0}
+
+
+def test_where_nothing_is_named_what_comes_nearest_is_planned_for() -> None:
+    near = {"name": "slope", "parameters": {"angle": {"value": 0.03}}, "equivalence_set": {"slope": 1.0}}
+    mapping = {"findings": [], "rejected": [near], "detectable": {}, "misfit": {"nominal": {}}}
+    assert [rival.name for rival in rivals_of_diagnosis(mapping)] == ["slope"]
+
+
+def test_a_plan_has_the_windows_and_priors_of_the_diagnosis() -> None:
+    setting = Setting(priors=NuisancePriors().with_soil(4.0)).with_windows(6.0, 3.0)
+    options = {"window": 6.0, "stride": 3.0, "block": setting.block, "priors": asdict(setting.priors), "seed": 0}
+    assert setting_of_diagnosis({"options": options}) == setting
+    assert setting_of_diagnosis({"options": {}}) == Setting()
+    with pytest.raises(InputError, match="stride"):
+        setting_of_diagnosis({"options": {name: options[name] for name in ("window", "block", "priors")}})
 
 
 def test_without_findings_what_could_hide_is_planned_for() -> None:
     detectable = {"slope": {"angle": 0.002}, "payload": {"mass": 40.0}, "gyro_sign": {}, "gyro_scale": {"scale": None}}
-    mapping = {"findings": [], "detectable": detectable, "misfit": {"nominal": {}}}
+    mapping = {"findings": [], "rejected": [], "detectable": detectable, "misfit": {"nominal": {}}}
     assert [rival.name for rival in rivals_of_diagnosis(mapping)] == ["gyro_scale"]
     del detectable["gyro_scale"]
     assert [rival.name for rival in rivals_of_diagnosis(mapping)] == ["payload"]

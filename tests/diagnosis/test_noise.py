@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from ddagr_gym.diagnosis.noise import ChannelNoise, channel_noise
+from ddagr_gym.diagnosis.noise import ChannelNoise, channel_noise, interpolated
+from ddagr_gym.recordings.schema import Recording
 
 
 def coloured(rng: np.random.Generator, count: int, sigma: float, correlation: float) -> np.ndarray:
@@ -43,6 +44,18 @@ def test_standard_deviation_of_means_is_the_measured_one() -> None:
     assert float(found.of_mean(5)) == pytest.approx(measured, rel=0.12)
 
 
+@pytest.mark.parametrize("quantum", [0.0, 2.4e-3])
+def test_rounding_does_not_change_the_means_of_coloured_noise(quantum: float) -> None:
+    values = coloured(np.random.default_rng(1), 60000, 0.03, 0.7)
+    read = np.round(values / quantum) * quantum if quantum > 0.0 else values
+    found = channel_noise([read], [np.zeros(60000)], sparse=False)
+    assert found is not None
+    assert (found.quantum > 0.0, found.counter) == (quantum > 0.0, False)
+    for samples in (5, 10):
+        measured = values.reshape(-1, samples).mean(axis=1).std()
+        assert float(found.of_mean(samples)) == pytest.approx(measured, rel=0.05)
+
+
 def test_counter_is_recognised_by_its_quantum() -> None:
     rng = np.random.default_rng(4)
     quantum = 0.0157
@@ -73,6 +86,7 @@ def test_means_of_rounded_speeds_are_as_good_as_they_are(kind: str) -> None:
     for samples in (5, 10):
         measured = np.std(error.reshape(-1, samples).mean(axis=1))
         assert float(found.of_mean(samples)) == pytest.approx(measured, rel=0.35)
+    assert found.counter
     assert (found.correlation == -0.5) == (kind != "rounded speed")
 
 
@@ -89,6 +103,23 @@ def test_too_few_samples_give_nothing() -> None:
     assert channel_noise([np.full(500, np.nan)], [np.zeros(500)], sparse=False) is None
 
 
+@pytest.mark.parametrize("sparse", [True, False])
+def test_a_constant_channel_has_no_noise(sparse: bool) -> None:
+    """A heading that is logged as zeros, and a reading that jumps now and then from one exact value to another."""
+    assert channel_noise([np.zeros(500)], [np.ones(500)], sparse=sparse) is None
+    jumps = 7 * np.arange(100) % 40
+    assert channel_noise([np.repeat(jumps, 20).astype(float)], [np.ones(2000)], sparse=sparse) is None
+
+
+def test_noise_that_only_motion_brings_is_positive_at_rest() -> None:
+    rng = np.random.default_rng(9)
+    speed = np.repeat([0.0, 0.1, 0.2, 0.3], 2500)
+    found = channel_noise([0.4 * speed * rng.standard_normal(10000)], [speed], sparse=False)
+    assert found is not None
+    assert 0.0 < float(found.of_mean(5)) < 0.2 * float(found.of_mean(5, 0.1))
+    assert found.per_speed == pytest.approx(0.4, rel=0.1)
+
+
 def test_mean_of_white_noise() -> None:
     assert float(ChannelNoise(0.1, 0.0, 0.0, 0.0).of_mean(4)) == pytest.approx(0.05)
     assert float(ChannelNoise(0.0, 1.0, 0.0, 0.0).of_mean(1, 0.3)) == pytest.approx(0.3)
@@ -101,3 +132,14 @@ def test_fine_rounding_is_not_taken_for_a_counter() -> None:
     assert found is not None
     assert found.sigma == pytest.approx(0.03, rel=0.1)
     assert found.quantum == pytest.approx(6e-4, rel=1e-6)
+
+
+def encoders(values: np.ndarray, t: np.ndarray, **more: object) -> Recording:
+    columns = {"t": t, "encoder_right": values, "encoder_left": -values}
+    return Recording.from_columns(columns, **more)  # type: ignore[arg-type]
+
+
+def test_nothing_is_interpolated_across_spans() -> None:
+    values = np.array([1.0, np.nan, 3.0, np.nan, np.nan, 7.0, np.nan, np.nan])
+    recording = encoders(values, np.arange(8.0), spans=[(0, 4), (4, 6), (6, 8)])
+    np.testing.assert_array_equal(interpolated(recording, "encoder_right"), [1.0, 2.0, 3.0, 3.0, 7.0, 7.0, 0.0, 0.0])

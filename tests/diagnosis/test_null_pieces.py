@@ -31,11 +31,28 @@ def test_a_long_drive_is_cut_by_the_time_of_its_commands():
     assert [seconds_of_commands(piece) for piece in pieces] == pytest.approx([40.0, 40.0, 40.0], abs=0.1)
 
 
+@pytest.mark.parametrize(("period", "length"), [(0.02, 20.0), (0.01, 30.0), (0.05, 20.02)])
+def test_rounding_joins_no_pieces(period, length):
+    """Sums of periods lie a little beside whole seconds."""
+    count = int(400.0 / period)
+    columns = {name: np.linspace(0.0, 1.0, count) for name in ("command_right", "command_left")}
+    recording = Recording.from_columns({"t": period * np.arange(count), **columns}, get_robot("warthog"))
+    pieces = pieces_of(recording, length)
+    assert [len(piece) * period for piece in pieces[:-1]] == pytest.approx([length] * (len(pieces) - 1), abs=period)
+
+
 def test_segments_stay_whole():
     segments = [(k * 120, (k + 1) * 120) for k in range(20)]  # 6 s each
     pieces = pieces_of(drive(np.ones(2400, dtype=bool), segments), 20.0)
     assert [len(piece) for piece in pieces] == [480] * 5
     assert all(len(piece.meta.segments) == 4 for piece in pieces)
+
+
+def test_time_of_every_piece_begins_at_zero():
+    pieces = pieces_of(drive(np.ones(2400, dtype=bool)), 40.0)
+    assert [piece.t[0] for piece in pieces] == [0.0, 0.0, 0.0]
+    assert [piece.meta.start_time for piece in pieces] == pytest.approx([PERIOD, 40.0 + PERIOD, 80.0 + PERIOD])
+    np.testing.assert_allclose(pieces[1].t, PERIOD * np.arange(800), atol=1e-9)
 
 
 def test_a_drive_without_commands_gives_nothing():

@@ -5,10 +5,11 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from ddagr_gym.diagnosis import search as module
-from ddagr_gym.diagnosis.refit import cost_of, fit
+from ddagr_gym.diagnosis.refit import cost_of, effect_columns, effect_parameters, fit
 from ddagr_gym.diagnosis.scores import Gain, gains, nuisance_answer, scan
 from ddagr_gym.diagnosis.search import search
 from ddagr_gym.diagnosis.standing import Rival, Standing
@@ -99,6 +100,20 @@ def test_loops_are_told_from_delays(drive, problem_of) -> None:
         assert costs[1] - costs[0] > 20.0, (truth, costs)
 
 
+def test_a_swap_knows_its_place_after_an_effect_has_gone() -> None:
+    """A beside which B came and A went: steps and places agree no more."""
+
+    def rival(name: str) -> Any:
+        return SimpleNamespace(name=name)
+
+    fitted: Any = SimpleNamespace(
+        point=SimpleNamespace(effects=[parse_effect("slope=0.1"), parse_effect("gyro_scale=1.1")])
+    )
+    assert module._place_of([rival("payload"), rival("towed_drag")], fitted) is None
+    assert module._place_of([rival("slope"), rival("payload")], fitted) == 0
+    assert module._place_of([rival("imu_tilt"), rival("gyro_scale")], fitted) == 1
+
+
 def test_what_is_confused_with_a_named_effect_has_to_explain_more() -> None:
     """A patch of another form than the library's leaves something that looks like a soil that changes."""
 
@@ -107,7 +122,25 @@ def test_what_is_confused_with_a_named_effect_has_to_explain_more() -> None:
         return SimpleNamespace(fitted=SimpleNamespace(cost=cost, point=point), dispersion=1.0)
 
     gates = Thresholds({"soil_change": Gate(40.0, 0.0), "gyro_scale": Gate(20.0, 0.0)}, {}, 20, "x")
-    found = module._gates(gates, [standing(2000.0), standing(1000.0, "soil_patch=0.5")])
+    found = module.further_gates(gates, [standing(2000.0), standing(1000.0, "soil_patch=0.5")])
     assert found.of("soil_change").gain == pytest.approx(40.0 + 0.1 * 1000.0)
     assert found.of("gyro_scale").gain == pytest.approx(20.0 + 0.01 * 1000.0)
-    assert module._gates(gates, [standing(2000.0)]) == gates
+    assert module.further_gates(gates, [standing(2000.0)]) == gates
+
+
+def test_a_shape_at_its_lower_bound_moves_inwards(sloping: Sloping) -> None:
+    problem, fitted = sloping.problem, sloping.nominal
+    lag = parse_effect("motor_lag=0.2,slowing=0")
+    (slowing,) = (p for p in effect_parameters((lag,)) if p.field == "slowing")
+    point = replace(fitted.point, effects=(lag,))
+    assert slowing.step < 0.0 == slowing.low
+    assert np.abs(effect_columns(problem, point, problem.predict(point), [slowing])).max() > 1.0
+
+
+def test_a_window_that_cannot_be_predicted_is_no_perfect_fit(sloping: Sloping) -> None:
+    problem, fitted = sloping.problem, sloping.nominal
+    broken = fitted.prediction.copy()
+    broken[2, 5:] = np.nan
+    total, shares = cost_of(problem, fitted.point, broken, fitted.elimination)
+    assert total == np.inf
+    assert np.flatnonzero(np.isinf(shares)).tolist() == [2]

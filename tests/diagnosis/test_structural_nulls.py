@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ddagr_gym.diagnosis.noise import ChannelNoise
-from ddagr_gym.diagnosis.null_drives import Template, null_recordings
+from ddagr_gym.diagnosis.null_drives import Template, null_recordings, template_of
 from ddagr_gym.diagnosis.null_readings import PARTS, Reading
 from ddagr_gym.diagnosis.structural_nulls import KINDS, draw_world
 from ddagr_gym.presets import get_robot, get_soil
@@ -39,6 +39,28 @@ def test_a_null_drive_is_near_the_nominal_one_and_not_it(kind):
         assert np.isfinite(difference).all()
         shares.append(np.sqrt(np.mean(difference**2)) / np.std(nominal[name]))
     assert 1e-4 < max(shares) < 0.4
+
+
+def placed(x: float, y: float) -> Recording:
+    columns = {"t": PERIOD * np.arange(len(COMMANDS)), "command_right": COMMANDS[:, 0], "command_left": COMMANDS[:, 1]}
+    poses = {"pose_x": x, "pose_y": y, "pose_yaw": 0.5}
+    return Recording.from_columns(
+        columns | {name: np.full(len(COMMANDS), value) for name, value in poses.items()}, ROBOT
+    )
+
+
+def test_drives_far_from_the_origin_of_their_map_start_about_that_of_the_world():
+    """A soil grid about the origin of UTM coordinates would take 1e15 bytes."""
+    recordings = [placed(512_340.0, 5_403_210.0), placed(512_344.0, 5_403_204.0), placed(np.nan, np.nan)]
+    found = template_of(recordings, (None,) * len(CHANNELS))
+    np.testing.assert_allclose(found.starts, [(-2.0, 3.0, 0.5), (2.0, -3.0, 0.5), (0.0, 0.0, 0.5)], atol=1e-6)
+    made = null_recordings(ROBOT, SOIL, found, "plain", np.random.default_rng(0))
+    assert made[1]["pose_x"][0] == pytest.approx(2.0, abs=0.1)
+
+
+def test_drives_without_poses_start_at_the_origin():
+    found = template_of([placed(np.nan, np.nan)], (None,) * len(CHANNELS))
+    assert found.starts == ((0.0, 0.0, 0.5),)
 
 
 def test_the_same_seed_gives_the_same_drive_and_another_another():

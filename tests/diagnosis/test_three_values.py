@@ -5,7 +5,8 @@ from typing import Any
 
 import pytest
 
-from ddagr_gym.diagnosis.diagnose import _verdict
+from ddagr_gym.diagnosis.diagnose import _verdict, accepted
+from ddagr_gym.diagnosis.search import Found
 from ddagr_gym.diagnosis.thresholds import Thresholds
 
 THRESHOLDS = Thresholds({}, {"encoder_left": 1.0, "yaw_rate": 1.0, "local_strength": 1.0}, 20, "a test")
@@ -15,8 +16,12 @@ def standing(*names: str, **misfit: float) -> Any:
     return SimpleNamespace(names=names, gains=(), misfit={"encoder_left": 0.5, "yaw_rate": 0.5} | misfit)
 
 
-def found(nominal: Any, chosen: Any) -> Any:
-    return SimpleNamespace(nominal=nominal, chosen=chosen)
+def found(nominal: Any, chosen: Any) -> Found:
+    return Found((nominal, chosen), ())
+
+
+def concluded(search: Found, seen: tuple[str, ...] = ()) -> tuple[tuple[str, ...], bool]:
+    return _verdict(accepted(search, THRESHOLDS), seen, THRESHOLDS)
 
 
 @pytest.mark.parametrize(
@@ -35,12 +40,19 @@ def test_what_is_left_in_the_channels_takes_a_name_away(
     before: float, left: dict[str, float], verdict: tuple[str, ...], complete: bool
 ) -> None:
     search = found(standing(encoder_left=before), standing("slope", **left))
-    assert _verdict(search, (), THRESHOLDS) == (verdict, complete)
+    assert concluded(search) == (verdict, complete)
 
 
 def test_repeats_stay_named_whatever_is_left() -> None:
     search = found(standing(encoder_left=8.0), standing("slope", encoder_left=7.9))
-    assert _verdict(search, (), THRESHOLDS) == (("unknown",), False)
-    assert _verdict(search, ("sensor_hold",), THRESHOLDS) == (("sensor_hold",), False)
+    assert concluded(search) == (("unknown",), False)
+    assert concluded(search, ("sensor_hold",)) == (("sensor_hold",), False)
     alone = standing(encoder_left=0.5)
-    assert _verdict(found(alone, alone), ("sensor_hold",), THRESHOLDS) == (("sensor_hold",), True)
+    assert concluded(found(alone, alone), ("sensor_hold",)) == (("sensor_hold",), True)
+
+
+def test_names_that_leave_too_much_leave_the_model_too() -> None:
+    rough = found(standing(encoder_left=8.0), standing("slope", encoder_left=7.9))
+    assert accepted(rough, THRESHOLDS).chosen is rough.nominal
+    good = found(standing(encoder_left=8.0), standing("slope"))
+    assert accepted(good, THRESHOLDS) is good

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from ddagr_gym.diagnosis.misfit import LOCAL
+from ddagr_gym.diagnosis.threshold_files import default_thresholds, load_thresholds, save_thresholds, shipped_thresholds
 from ddagr_gym.diagnosis.thresholds import (
     GROUND_MARGIN,
     MARGIN,
@@ -19,10 +20,6 @@ from ddagr_gym.diagnosis.thresholds import (
     NullRun,
     Origin,
     Thresholds,
-    default_thresholds,
-    load_thresholds,
-    save_thresholds,
-    shipped_thresholds,
     thresholds_from,
 )
 from ddagr_gym.errors import InputError
@@ -80,14 +77,22 @@ def test_p_value_counts_null_runs_that_stand_as_high() -> None:
 
 
 def test_what_structure_adds_to_the_gates_goes_with_the_length() -> None:
-    runs = [replace(run, windows=30) for run in null_runs(40, 1)]
-    thresholds = thresholds_from(runs, "x", duration=4.0)
+    runs = [replace(run, windows=30, duration=4.0) for run in null_runs(40, 1)]
+    thresholds = thresholds_from(runs, "x")
     assert thresholds.for_length(120.0).gates == thresholds.gates
     for seconds in (40.0, 360.0):
         other = thresholds.for_length(seconds)
         beyond = thresholds.of("slope").gain - NOISE_GAIN
         assert other.of("slope").gain == pytest.approx(NOISE_GAIN + seconds / 120.0 * beyond)
         assert other.misfit == thresholds.misfit
+
+
+def test_windows_of_unequal_length_cover_their_median_time() -> None:
+    long, short = ([replace(run, windows=w, duration=d) for run in null_runs(n, n)] for w, d, n in
+                   ((8, 6.0, 22), (12, 2.5, 18)))  # fmt: skip
+    thresholds = thresholds_from([*long, *short], "x")
+    assert thresholds.duration == 6.0
+    assert thresholds.for_length(48.0).gates == thresholds.gates
 
 
 def test_what_few_windows_carry_must_be_clear() -> None:
@@ -118,6 +123,28 @@ def test_file_returns_what_was_saved(tmp_path: Path) -> None:
     (tmp_path / "bad.json").write_text("{}")
     with pytest.raises(InputError, match="null-bank"):
         load_thresholds(tmp_path / "bad.json")
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b'{"version": 1}', "has no entry 'gates'"),
+        (b'{"version": 1, "gates": []}', "has an entry of another form"),
+        (b'{"version": 1, "gates": {"slope": {"gain": 1.0}}}', "has an entry of another form"),
+        (b"\x89PNG\r\n\xff\xfe", "cannot be read as thresholds"),
+        (b"[1]", "is not a thresholds file"),
+    ],
+)
+def test_other_files_are_refused(tmp_path: Path, content: bytes, said: str) -> None:
+    (tmp_path / "bad.json").write_bytes(content)
+    with pytest.raises(InputError, match=rf"bad\.json {said}.*null-bank"):
+        load_thresholds(tmp_path / "bad.json")
+
+
+def test_saving_takes_no_other_file_for_its_own(tmp_path: Path) -> None:
+    (tmp_path / ".t.json.part").write_text("of another process")
+    save_thresholds(thresholds_from(null_runs(40, 1), "abc"), tmp_path / "t.json")
+    assert sorted(path.name for path in tmp_path.iterdir()) == [".t.json.part", "t.json"]
 
 
 ORIGIN = Origin("warthog", "firm_ground", 4.0, 3, "ordinary")

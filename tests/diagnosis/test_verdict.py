@@ -29,6 +29,19 @@ def test_saved_and_loaded(tmp_path: Path) -> None:
     assert found["detectable"]["slope"]["angle"] is None
 
 
+def test_saving_takes_no_other_file_for_its_own(tmp_path: Path) -> None:
+    (tmp_path / ".d.json.part").write_text("of another process")
+    save(GOOD, tmp_path / "d.json")
+    assert sorted(path.name for path in tmp_path.iterdir()) == [".d.json.part", "d.json"]
+
+
+@pytest.mark.parametrize("content", [b"\x89PNG\r\n\xff\xfe", b"{", b"[]"])
+def test_other_files_are_refused(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "d.json").write_bytes(content)
+    with pytest.raises(InputError, match=r"d\.json .*: make it with `ddagr diagnose`"):
+        load(tmp_path / "d.json")
+
+
 @pytest.mark.parametrize(
     ("change", "word"),
     [({"verdict": ("incline",)}, "incline"), ({"findings": ()}, "agree"), ({"verdict": ()}, "effects")],

@@ -6,6 +6,8 @@ import re
 import numpy as np
 import pytest
 
+from ddagr_gym.diagnosis.schema import SCHEMA
+from ddagr_gym.diagnosis.verdict import validate
 from ddagr_gym.physics.effects.registry import effect_kinds
 from ddagr_gym.replay.windows import CHANNELS
 from ddagr_gym.reporting.diagnosis_figures import MOST_BARS, MOST_POINTS, _bars, channel_figure, thinned
@@ -73,42 +75,62 @@ def diagnosis(**changes):
     }  # fmt: skip
     misfit = dict.fromkeys(CHANNELS, 1.5)
     return {
-        "schema": "ddagr-diagnosis/2", "verdict": ["slope"], "complete": True, "findings": [finding],
+        "schema": SCHEMA, "verdict": ["slope"], "complete": True, "findings": [finding],
         "sentence": "The ground slopes 3.7 ± 0.3 degrees.", "version": "0.1", "seconds": 61.0,
         "misfit": {"nominal": misfit, "corrected": dict.fromkeys(CHANNELS, 0.9), "limit": dict.fromkeys(CHANNELS, 1.2)},
         "detectable": {"slope": {"angle": 0.01}, "payload": {"mass": None}}, "nuisances": {"soil_strength": -0.1},
-        "recordings": [HOSTILE, "run_2.csv"], "thresholds": {"nulls": 120, "bank": "abc", "level": 0.05},
+        "recordings": [HOSTILE, "run_2.csv"], "thresholds": {"nulls": 120, "bank": "abc", "level": 0.05, "gates": {}},
+        "robot": "", "soil": "", "options": {}, "checks": [], "data": [], "rejected": [],
+        **dict.fromkeys(("fit", "localisation", "unnamed", "next_drive")),
     } | changes  # fmt: skip
 
 
 def later_entries():
-    error = {"value": 0.2, "interval": [0.1, 0.3]}
-    arms = {"raw": error, "refitted": error, "corrected": error, "ceiling": {"value": 0.1, "interval": None}}
+    error, nothing = {"value": 0.2, "interval": [0.1, 0.3]}, {"value": None, "interval": None}
+    arms = dict.fromkeys(("raw", "refitted", "corrected", "black_box"), error)
+    arms |= {"ceiling": {"value": 0.1, "interval": None}, "unit": "rad/s", "count": 40}
     wrench = {"component": "F_x", "unit": "N", "before": 9.0, "after": 0.1, "deviation": 1.0, "chi_before": 9.0}
     return {
         "fit": {
             "folds": "by recording", "note": f"Decided on all drives of {HOSTILE}.", "horizons": [1.0, 30.0],
-            "gain_share": {
-                "1": None, "30": {"value": 0.91, "interval": [0.85, 0.95]},
-            },
-            "channels": {"yaw_rate": {"1.0": arms | {"unit": "rad/s"}, "30.0": {"raw": None, "unit": "rad/s"}}},
+            "gain_share": {"1": None, "30": {"value": 0.91, "interval": [0.85, 0.95]}},
+            "gain_share_readings": {"1": None, "30": None}, "level": 0.9,
+            "gain": {"1": None, "30": {"corrected": error, "ceiling": error}}, "gain_readings": {"1": None},
+            "channels": {"yaw_rate": {"1": arms, "30": arms | {"raw": nothing}}},
         },
         "localisation": {
             "explained": 0.71, "mismatch": where(), "remaining": where(phrase="nothing above the noise", regimes=[]),
-            "wrench": [wrench | {"chi_after": 1.0}],
+            "wrench": [wrench | {"chi_after": 1.0}], "channels": {}, "findings": {},
         },
         "unnamed": {
-            "equation": f"F_x = -12 v_x {HOSTILE}", "ceiling_share": 0.9, "where": "at speed",
+            "equation": f"F_x = -12 v_x {HOSTILE}", "ceiling_share": 0.9, "where": "at speed", "equation_share": 0.5,
             "terms": [{"regressor": "v_x", "target": "F_x", "coefficient": -12.0, "unit": "N s/m",
-                       "interval": [-15.0, -9.0], "stability": 0.95}],
+                       "interval": [-15.0, -9.0], "stability": 0.95, "alternatives": []}],
         },
         "next_drive": {
             "manoeuvre": "square_both_ways", "why": "Gravity turns.", "separates": [["slope", "accelerometer_bias"]],
-            "power": 0.97, "alternatives": [{"manoeuvre": "spin"}],
+            "power": 0.97, "alternatives": [{"manoeuvre": "spin"}], "minutes": None,
         },
-        "checks": [{"recording": "run_2.csv", "channel": HOSTILE, "finding": "stuck", "sentence": "It never changes."}],
+        "checks": [{"recording": "run_2.csv", "channel": HOSTILE, "finding": "stuck", "sentence": "It never changes.",
+                    "suspects": []}],
         "data": [{"source": HOSTILE, "sha256": "f" * 64, "rows": 600, "seconds": 12.0}],
     }  # fmt: skip
+
+
+def test_the_page_is_tried_on_diagnoses_that_could_be():
+    validate(diagnosis())
+    validate(diagnosis(**later_entries()))
+
+
+def test_what_comes_nearest_is_no_finding(tmp_path):
+    (nearest,) = diagnosis()["findings"]
+    unknown = diagnosis(verdict=["unknown"], complete=False, findings=[], rejected=[nearest])
+    validate(unknown)
+    write_report(tmp_path, unknown, evidence())
+    text = (tmp_path / PAGE).read_text()
+    assert "What comes nearest" in text
+    assert "<b>Sloping ground:</b> gain 80" in text
+    assert 'id="findings"' not in text
 
 
 @pytest.fixture(scope="module")
@@ -331,7 +353,7 @@ def test_tables_by_hand():
         {"what": "Sloping ground", "where": "at speeds above 0.50 m/s", "share": "80 %", "time": "30 %", "p": "0.01"}
     ]
     assert "no null drives" in gate_note({"nulls": 0, "level": 0.05})
-    assert fit_table(later_entries()["fit"])["rows"][1] == ["yaw rate after 30 s [rad/s]", "–", "–", "–", "–"]
+    assert fit_table(later_entries()["fit"])["rows"][1][:2] == ["yaw rate after 30 s [rad/s]", "–"]
     labels = [tile["label"] for tile in tiles(diagnosis(complete=False), 24.0)]
     assert labels[0] == "incomplete: something is left"
 

@@ -1,0 +1,56 @@
+"""What a null run keeps, and what tells one bank from another."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ddagr_gym.diagnosis import null_bank
+from ddagr_gym.diagnosis.null_bank import bank_hash, pieces_of, scanned
+from ddagr_gym.diagnosis.null_drives import Template
+from ddagr_gym.diagnosis.setting import Setting
+from ddagr_gym.presets import get_robot, get_soil
+from ddagr_gym.recordings.schema import Recording
+
+ROBOT, SOIL = get_robot("ddagr"), get_soil("thesis_a1")
+
+
+def drive(seconds: float, yaw_rate: float = 0.1) -> Recording:
+    t = 0.02 * np.arange(int(seconds / 0.02))
+    values = {"command_right": 0.5, "command_left": 0.4, "yaw_rate": yaw_rate, "encoder_right": 0.5}
+    return Recording.from_columns({"t": t, **{name: np.full(len(t), v) for name, v in values.items()}}, ROBOT)
+
+
+def hash_of(template: Template | None = None, pieces: Sequence[Recording] = ()) -> str:
+    return bank_hash(ROBOT, SOIL, template, Setting(), 20, 0, None, pieces)
+
+
+def test_ordinary_pieces_are_hashed_with_their_readings_and_segments() -> None:
+    pieces, others = (pieces_of(drive(60.0, yaw_rate), 20.0) for yaw_rate in (0.1, -0.1))
+    cut = [replace(piece, meta=replace(piece.meta, segments=((0, 500), (500, 1000)))) for piece in pieces]
+    assert hash_of(pieces=pieces) == hash_of(pieces=pieces_of(drive(60.0), 20.0))
+    assert len({hash_of(pieces=given) for given in ((), pieces, others, pieces[:2], cut)}) == 5
+
+
+@pytest.mark.parametrize(
+    "change", [{"present": (np.zeros((50, 8), dtype=bool),)}, {"starts": ((1.0, 0.0, 0.0),)}, {"period": 0.05}]
+)
+def test_templates_are_hashed_with_what_is_read_and_where_they_start(change: dict[str, Any]) -> None:
+    present = np.ones((50, 8), dtype=bool)
+    template = Template((np.ones((50, 2)),), 0.02, (present,), (None,) * 8, ((0.0, 0.0, 0.0),))
+    assert hash_of(template) == hash_of(replace(template))
+    assert hash_of(template) != hash_of(replace(template, **change))
+
+
+def test_a_null_run_keeps_the_length_of_the_windows_that_were_cut(monkeypatch: pytest.MonkeyPatch) -> None:
+    standing = SimpleNamespace(gains=(), scores={}, held_out={}, misfit={})
+    monkeypatch.setattr(null_bank, "begin", lambda problem: (None, standing))
+    monkeypatch.setattr(null_bank, "_meaningless", lambda *given: ())
+    run = scanned(ROBOT, SOIL, [drive(40.0)], "plain", Setting().with_windows(6.0))
+    assert run.duration == pytest.approx(5.0)
+    assert run.windows * run.duration == pytest.approx(40.0, rel=0.15)
