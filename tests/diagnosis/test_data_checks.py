@@ -2,8 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -48,15 +46,13 @@ def test_channels_that_no_diagnosis_compares_are_not_called_dead() -> None:
 
 @pytest.mark.parametrize(("verdict", "begin"), [("none", "Nothing is missing"), ("unknown", "Something is missing")])
 def test_with_a_dead_channel_no_answer_is_complete(verdict: str, begin: str) -> None:
-    misfit = {"yaw_rate": 1.0}
-    found: Any = SimpleNamespace(nominal=SimpleNamespace(misfit=misfit), chosen=SimpleNamespace(misfit=misfit))
     answer = Diagnosis((verdict,), True, (), "", {"limit": {"yaw_rate": 1.2}}, {}, {}, ("a",), {}, 1.0, "0")
     dead = [DataDoubt("a", "yaw_rate", "stuck", "It never changes.")]
-    made = _doubted(answer, found, {"findings": {}}, {}, None, dead)
+    made = _doubted(answer, {"explained": None, "findings": {}}, {}, None, dead)
     assert not made.complete
     assert made.sentence.startswith(begin)
     assert made.sentence.endswith("yaw rate never changes while the robot drives, so that it says nothing.")
-    assert _doubted(answer, found, {"findings": {}}, {}).complete
+    assert _doubted(answer, {"explained": None, "findings": {}}, {}).complete
 
 
 def test_several_dead_channels_in_words() -> None:

@@ -1,7 +1,6 @@
 """What localisation adds to the findings and to the sentence."""
 
 from dataclasses import asdict, replace
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -13,7 +12,6 @@ from ddagr_gym.diagnosis.verdict import Diagnosis, Estimate, Finding, as_mapping
 
 MISFIT = {"yaw_rate": 4.0}
 BANK = {"nulls": 60, "bank": "f", "level": 0.05, "gates": {}}
-FOUND: Any = SimpleNamespace(nominal=SimpleNamespace(misfit=MISFIT), chosen=SimpleNamespace(misfit={"yaw_rate": 0.9}))
 
 
 def diagnosis(name: str, field: str, value: float, complete: bool = True) -> Diagnosis:
@@ -26,24 +24,28 @@ def where(uneven: Unevenness | None = None) -> dict[str, Any]:
     return asdict(Where((), 0.0, (), (), uneven, "everywhere"))
 
 
+def located(explained: float = 1.0, **findings: Any) -> dict[str, Any]:
+    return {"explained": explained, "findings": findings}
+
+
 @pytest.mark.parametrize("complete", [True, False])
 def test_a_size_that_is_not_the_same_everywhere_is_said_and_leaves_the_answer_incomplete(complete: bool) -> None:
-    located = {"findings": {"command_delay": where(Unevenness("speed", "m/s", 0.5, None, 1.5, 0.7, 0.01))}}
-    made = _doubted(diagnosis("command_delay", "delay", 0.1, complete), FOUND, located, {})
+    uneven = where(Unevenness("speed", "m/s", 0.5, None, 1.5, 0.7, 0.01))
+    made = _doubted(diagnosis("command_delay", "delay", 0.1, complete), located(command_delay=uneven), {})
     assert not made.complete
     assert "the size of command delay is not the same everywhere: 1.5 of the fitted one" in made.sentence
     assert made.sentence.endswith("above what these data can show." if complete else "that has no name here.")
 
 
 def test_an_even_size_changes_nothing() -> None:
-    made = _doubted(diagnosis("command_delay", "delay", 0.1), FOUND, {"findings": {"command_delay": where()}}, {})
+    made = _doubted(diagnosis("command_delay", "delay", 0.1), located(command_delay=where()), {})
     assert made.complete
     assert "everywhere" not in made.sentence
 
 
 def test_held_readings_keep_their_place() -> None:
     """The model has no such effect, so that localisation says nothing about it."""
-    made = _doubted(diagnosis("sensor_hold", "duration", 0.2), FOUND, {"findings": {}}, {"sensor_hold": where()})
+    made = _doubted(diagnosis("sensor_hold", "duration", 0.2), located(), {"sensor_hold": where()})
     assert made.findings[0].where == where()
     validate(as_mapping(made))
 
@@ -53,7 +55,7 @@ def test_drives_predicted_worse_make_a_name_doubtful() -> None:
 
     def made(interval: list[float]) -> Diagnosis:
         fit = {"gain": {"30": {"corrected": {"value": -0.3, "interval": interval}}}}
-        return _doubted(diagnosis("command_delay", "delay", 0.1), FOUND, {"findings": {}}, {}, fit)
+        return _doubted(diagnosis("command_delay", "delay", 0.1), located(), {}, fit)
 
     assert not made([-0.4, -0.2]).complete
     assert "predicted worse with it, by 30 % (20 to 40 %) after 30 s" in made([-0.4, -0.2]).sentence
@@ -62,13 +64,10 @@ def test_drives_predicted_worse_make_a_name_doubtful() -> None:
 
 
 def test_findings_that_leave_much_of_the_mismatch_are_not_complete() -> None:
-    left: Any = SimpleNamespace(
-        nominal=SimpleNamespace(misfit=MISFIT), chosen=SimpleNamespace(misfit={"yaw_rate": 3.0})
-    )
-    made = _doubted(diagnosis("command_delay", "delay", 0.1), left, {"findings": {}}, {})
+    made = _doubted(diagnosis("command_delay", "delay", 0.1), located(explained=0.4), {})
     assert not made.complete
-    assert made.sentence.endswith("% of the mismatch; something more is left that has no name here.")
-    assert _doubted(diagnosis("command_delay", "delay", 0.1), FOUND, {"findings": {}}, {}).complete
+    assert made.sentence.endswith("; 40 % of the mismatch; something more is left that has no name here.")
+    assert _doubted(diagnosis("command_delay", "delay", 0.1), located(), {}).complete
 
 
 @pytest.mark.parametrize(
@@ -88,6 +87,6 @@ def test_a_size_at_its_bound_makes_its_form_doubtful(
     answer = diagnosis(name, field, value)
     estimate = replace(answer.findings[0].parameters[field], value=value, unit="s" if name == "pose_latency" else "-")
     finding = replace(answer.findings[0], parameters={field: replace(estimate, interval=interval)})
-    made = _doubted(replace(answer, findings=(finding,)), FOUND, {"findings": {}}, {})
+    made = _doubted(replace(answer, findings=(finding,)), located(), {})
     assert made.complete == (not words)
     assert words in made.sentence
