@@ -14,6 +14,7 @@ from ddagr_gym.reporting.figures import house_style
 
 WORDS = {
     "false_alarm_rate": "nulls not called none",
+    "false_alarm_rate_structural": "the same, structural nulls",
     "power": "any alarm, detectable singles",
     "top1": "right name, detectable singles",
     "in_set": "right name in the set, singles",

@@ -148,7 +148,7 @@ def draw(cases: Sequence[Mapping[str, Any]], path: Path) -> None:
         axes.set_yticks(rows, [f"{c['case']}: {' + '.join(c['names'])}" for c in shown])
         axes.invert_yaxis()
         axes.set_xlabel("error on unseen drives that the names save, 5 s ahead [%]")
-        axes.legend(loc="lower right")
+        figure.legend(loc="outside upper right", ncols=2)
         write_atomically(path, lambda to: figure.savefig(to, format="png", dpi=120))
 
 
