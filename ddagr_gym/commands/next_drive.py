@@ -103,7 +103,7 @@ def answer_text(answer: dict[str, Any]) -> str:
     if not answer["manoeuvre"]:
         return str(answer["why"])
     entries = [answer, *answer["alternatives"]]
-    rows = [(e["manoeuvre"], float(e["power"]), 60.0 * e["minutes"]) for e in entries]
+    rows = [(e["manoeuvre"], f"{e['power']:.3g}", f"{60.0 * e['minutes']:.2g}") for e in entries]
     table = format_table(("manoeuvre", "gain per minute", "seconds needed"), rows)
     pairs = ", ".join(" from ".join(pair) for pair in answer["separates"])
     tells = f"It tells {pairs}.\n" if pairs else ""
