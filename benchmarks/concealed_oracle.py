@@ -29,7 +29,7 @@ from benchmarks.score_concealed import RESULT, figure_line, mean, read_equivalen
 from ddagr_gym.commands.progress import Progress
 from ddagr_gym.diagnosis.certificate import LEAST_EXPLAINABLE
 from ddagr_gym.diagnosis.certify import certify
-from ddagr_gym.diagnosis.diagnose import Begun, begun, prepare
+from ddagr_gym.diagnosis.diagnose import Begun, begun
 from ddagr_gym.diagnosis.refit import Fitted, fit
 from ddagr_gym.diagnosis.search import rivals_of
 from ddagr_gym.diagnosis.setting import Setting
@@ -56,13 +56,14 @@ def told(first: Begun, names: Sequence[str]) -> Fitted | None:
     """
     none = Gate(float("inf"), float("inf"))
     gates = Thresholds({"": none} | dict.fromkeys(names, Gate(0.0, -float("inf"))), {}, 0, "an oracle")
-    standing, left = stand(first.problem, first.refitted), set(names)
+    problem = first.prepared.problem
+    standing, left = stand(problem, first.refitted), set(names)
     while left:
-        rivals = [r for r in rivals_of(first.problem, standing, first.raw, gates, len(left)) if r.name in left]
+        rivals = [r for r in rivals_of(problem, standing, first.raw, gates, len(left)) if r.name in left]
         if not rivals:
             return None
         best = rivals[0].fitted
-        standing = stand(first.problem, fit(first.problem, best.point, iterations=8, renewals=2, first=best))
+        standing = stand(problem, fit(problem, best.point, iterations=8, renewals=2, first=best))
         left -= set(standing.names)
     return standing.fitted
 
@@ -79,8 +80,8 @@ def oracle(folder: Path, names: Sequence[str]) -> dict[str, Any] | None:
     fitted = told(first, names)
     if fitted is None:
         return None
-    recordings = prepare(robot, soil, runs, first.setting).recordings
-    return certify(first.problem, first.refitted, fitted, robot, recordings, np.random.default_rng(0))
+    prepared = first.prepared
+    return certify(prepared.problem, first.refitted, fitted, robot, prepared.recordings, np.random.default_rng(0))
 
 
 def gain(fit: Mapping[str, Any] | None, name: str) -> Mapping[str, Any] | None:

@@ -15,6 +15,7 @@ from tyro.conf import Positional
 from ddagr_gym.commands.extras import need
 from ddagr_gym.commands.output import check_output_folder, format_table, output_folder
 from ddagr_gym.commands.progress import Progress
+from ddagr_gym.commands.ranges import check_at_least
 from ddagr_gym.errors import InputError
 
 if TYPE_CHECKING:
@@ -112,10 +113,7 @@ def _task(arguments: Arguments) -> Task:
     from ddagr_gym.recordings.files import Limits
     from ddagr_gym.recordings.load import load_recording
 
-    for name, least in (("threads", 1), ("window", 1.0), ("stride", 0.1), ("seed", 0)):
-        given = getattr(arguments, name)
-        if given is not None and not given >= least:
-            raise InputError(f"--{name} is {given}: give at least {least}.")
+    check_at_least(arguments, threads=1, window=1.0, stride=0.1, seed=0)
     robot, soil = get_robot(arguments.robot), get_soil(arguments.soil)
     limits = Limits(arguments.maximum_rows, arguments.maximum_bytes)
     recordings: list[Recording] = [

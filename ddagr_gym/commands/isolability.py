@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from ddagr_gym.commands.output import check_output_folder, format_table, output_folder, write_text
 from ddagr_gym.commands.progress import Progress
-from ddagr_gym.errors import InputError
+from ddagr_gym.commands.ranges import check_at_least
 
 if TYPE_CHECKING:
     from ddagr_gym.diagnosis.isolability import Isolability
@@ -62,8 +62,7 @@ def run(arguments: Arguments) -> None:
     from ddagr_gym.physics.effects.registry import effect_kinds
     from ddagr_gym.presets import get_robot, get_soil
 
-    if arguments.seed < 0:
-        raise InputError(f"--seed is {arguments.seed}: give at least 0.")
+    check_at_least(arguments, seed=0)
     if arguments.output is not None:
         check_output_folder(arguments.output, overwrite=arguments.overwrite)
     priors = NuisancePriors().with_soil(arguments.soil_uncertainty)

@@ -11,6 +11,7 @@ import tyro
 from tyro.conf import Positional
 
 from ddagr_gym.commands.output import format_table, write_text
+from ddagr_gym.commands.ranges import check_at_least
 from ddagr_gym.errors import InputError
 
 if TYPE_CHECKING:
@@ -58,10 +59,7 @@ def run(arguments: Arguments) -> None:
     from ddagr_gym.diagnosis.next_drive import next_drive
     from ddagr_gym.presets import get_robot, get_soil
 
-    for name, least in (("threads", 1), ("seed", 0)):
-        given = getattr(arguments, name)
-        if given < least:
-            raise InputError(f"--{name} is {given}: give at least {least}.")
+    check_at_least(arguments, threads=1, seed=0)
     if (arguments.diagnosis is None) == (not arguments.rival):
         raise InputError("give either a diagnosis or some --rival name=size, not both.")
     case = _case(arguments)

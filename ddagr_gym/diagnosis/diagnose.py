@@ -81,13 +81,13 @@ class Begun:
 
     Attributes:
         setting: of the windows.
-        problem: windows and model.
+        prepared: recordings and their windows.
         raw: the nominal model as it stands.
         refitted: the same refitted.
     """
 
     setting: Setting
-    problem: Problem
+    prepared: Prepared
     raw: Fitted
     refitted: Fitted
 
@@ -115,23 +115,23 @@ def begun(
     Raises:
         InputError: the nominal simulator breaks down on some window.
     """
-    problem = prepare(robot, soil, recordings, setting).problem
-    raw, refitted = keep("search refit", partial(refit_nominal, problem, progress))
-    if dispersion_of(problem, refitted) > BENT and setting.duration > SHORT:
+    prepared = prepare(robot, soil, recordings, setting)
+    raw, refitted = keep("search refit", partial(refit_nominal, prepared.problem, progress))
+    if dispersion_of(prepared.problem, refitted) > BENT and setting.duration > SHORT:
         progress("short windows")
         setting = setting.with_windows(SHORT, SHORT * setting.stride / setting.duration)
-        problem = prepare(robot, soil, recordings, setting).problem
-        raw, refitted = keep("search refit, short windows", partial(refit_nominal, problem, progress))
-    _check_predicted(problem, refitted, recordings)
-    return Begun(setting, problem, raw, refitted)
+        prepared = prepare(robot, soil, recordings, setting)
+        raw, refitted = keep("search refit, short windows", partial(refit_nominal, prepared.problem, progress))
+    _check_predicted(prepared, refitted)
+    return Begun(setting, prepared, raw, refitted)
 
 
-def _check_predicted(problem: Problem, refitted: Fitted, recordings: Sequence[Recording]) -> None:
+def _check_predicted(prepared: Prepared, refitted: Fitted) -> None:
     """A window that cannot be predicted has no residual, and nothing could be said of it."""
     failed = np.flatnonzero(~np.isfinite(refitted.window_cost))
     if failed.size:
-        windows = problem.blocked.windows
-        source = recordings[int(windows.recording[failed[0]])].meta.source
+        windows = prepared.problem.blocked.windows
+        source = prepared.recordings[int(windows.recording[failed[0]])].meta.source
         raise InputError(
             f"the nominal simulator breaks down in {failed.size} of {windows.count} windows, first at "
             f"{windows.time[failed[0]]:.1f} s of {source}: leave that stretch out, or give a --robot and --soil that "
@@ -166,9 +166,10 @@ def searched(
         InputError: see :func:`begun`.
     """
     first = begun(robot, soil, recordings, setting, progress, keep)
-    nominal = keep("search nominal", partial(stand, first.problem, first.refitted, progress))
-    gates = thresholds.for_length(first.problem.covered)
-    return first.setting, search(first.problem, gates, begun=(first.raw, nominal), progress=progress, keep=keep)
+    problem = first.prepared.problem
+    nominal = keep("search nominal", partial(stand, problem, first.refitted, progress))
+    gates = thresholds.for_length(problem.covered)
+    return first.setting, search(problem, gates, begun=(first.raw, nominal), progress=progress, keep=keep)
 
 
 def conclude(
@@ -284,7 +285,7 @@ def _findings(problem: Problem, found: Found, thresholds: Thresholds, rng: np.ra
         }
         place = _before(found, effect.name)
         before, after = found.standings[place : place + 2]
-        gain = _gain(found, effect.name)
+        gain = _gain(found, before, effect.name)
         estimates = {
             name: Estimate(float(getattr(effect, name)), str(effect.parameter(name).metadata["unit"]), spread.get(name))
             for name in (*effect.size_names(), *effect.shape_names())
@@ -323,9 +324,9 @@ def _before(found: Found, name: str) -> int:
     return max(k for k, standing in enumerate(found.standings) if name not in standing.names)
 
 
-def _gain(found: Found, name: str) -> float:
-    """Evidence of an effect: what the scan says, or the joint refit that added it where that says more."""
-    linear = next(item.gain for item in found.standings[_before(found, name)].gains if item.name == name)
+def _gain(found: Found, before: Standing, name: str) -> float:
+    """Evidence of an effect: what the scan before it says, or the joint refit that added it where that says more."""
+    linear = next(item.gain for item in before.gains if item.name == name)
     return max([linear, *(rival.gain for step in found.steps for rival in step if rival.name == name)])
 
 
@@ -359,12 +360,16 @@ def _verdict(found: Found, seen: Sequence[str], thresholds: Thresholds) -> tuple
         thresholds: of the null bank.
     """
     _, left = roughest(found.chosen.misfit, dict(thresholds.misfit))
-    # what passed the gate and was not added has failed in a joint refit, unless the search stopped at its limit
-    more = len(found.chosen.names) >= MOST_EFFECTS and any(
-        further_gates(thresholds, found.standings).passes(g.name, g.gain, found.chosen) for g in found.chosen.gains
-    )
-    complete = left <= 1.0 and not more
+    complete = left <= 1.0 and not _more(found, thresholds)
     names = (*seen, *found.chosen.names)
     if not names:
         return ((NONE,), True) if complete else ((UNKNOWN,), False)
     return names, complete
+
+
+def _more(found: Found, thresholds: Thresholds) -> bool:
+    """Whether the search stopped at its limit; else, what passed the gate and was not added failed in a joint refit."""
+    if len(found.chosen.names) < MOST_EFFECTS:
+        return False
+    gates = further_gates(thresholds, found.standings)
+    return any(gates.passes(g.name, g.gain, found.chosen) for g in found.chosen.gains)

@@ -3,7 +3,7 @@
 import pytest
 
 from benchmarks.concealed_oracle import told
-from ddagr_gym.diagnosis.diagnose import Begun
+from ddagr_gym.diagnosis.diagnose import Begun, Prepared
 from ddagr_gym.diagnosis.refit import fit
 from ddagr_gym.diagnosis.setting import Setting
 from tests.diagnosis.conftest import Sloping
@@ -11,7 +11,8 @@ from tests.diagnosis.conftest import Sloping
 
 def test_an_oracle_fits_what_it_is_told_and_nothing_else(sloping: Sloping) -> None:
     problem = sloping.problem
-    first = Begun(Setting(), problem, fit(problem, iterations=0), sloping.nominal)
+    prepared = Prepared(sloping.recordings, (), None, problem)
+    first = Begun(Setting(), prepared, fit(problem, iterations=0), sloping.nominal)
     fitted = told(first, ["slope"])
     assert fitted is not None
     assert [effect.name for effect in fitted.point.effects] == ["slope"]
