@@ -112,11 +112,13 @@ def block_windows(
 
 
 def _tracking(windows: WindowSet, blocks: int, length: int) -> Array:
-    """Largest difference between command and bank speed of each block (W, B) [rad/s]; 0 without encoders."""
+    """Largest difference between command and bank speed of each block (W, B) [rad/s]; 0 where no encoder is known."""
     kept = slice(windows.history, windows.history + blocks * length)
     banks = [CHANNELS.index("encoder_right"), CHANNELS.index("encoder_left")]
-    difference = np.nan_to_num(windows.commands[:, kept] - windows.measured[:, : blocks * length, banks])
-    mean = difference.reshape(windows.count, blocks, length, 2).mean(axis=2)
+    difference = windows.commands[:, kept] - windows.measured[:, : blocks * length, banks]
+    difference = difference.reshape(windows.count, blocks, length, 2)
+    known = np.isfinite(difference)
+    mean = np.where(known, difference, 0.0).sum(axis=2) / np.maximum(known.sum(axis=2), 1)
     return np.asarray(np.abs(mean).max(axis=2))
 
 

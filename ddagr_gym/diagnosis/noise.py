@@ -215,9 +215,13 @@ def _line(rows: list[tuple[float, float]], fallback: float) -> tuple[float, floa
 
 
 def travel_speed(recording: Recording, wheel_radius: float) -> Array:
-    """Rim speed (n,) averaged over the banks [m/s], from the encoders or else the commands; 0 where unknown."""
+    """Rim speed (n,) averaged over the banks [m/s], from the encoders or else the commands; 0 where unknown.
+
+    Encoders that come more seldom than the rows are taken along lines between their samples.
+    """
     names = ("encoder_right", "encoder_left")
-    banks = [recording[name] for name in names] if recording.has(*names) else recording.held_commands()
+    has_encoders = recording.has(*names)
+    banks = [interpolated(recording, name) for name in names] if has_encoders else recording.held_commands()
     return np.nan_to_num(wheel_radius * 0.5 * (np.abs(banks[0]) + np.abs(banks[1])))
 
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from ddagr_gym.diagnosis.blocks import block_windows, located
-from ddagr_gym.diagnosis.noise import recording_noise
+from ddagr_gym.diagnosis.blocks import TRACKING_ERROR, block_windows, located
+from ddagr_gym.diagnosis.noise import ChannelNoise, recording_noise, travel_speed
 from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.replay.windows import CHANNELS, WindowSet, cut_windows
 
@@ -46,6 +46,18 @@ def test_places_of_a_recording_with_missing_samples() -> None:
     whole = started(Recording.from_columns(columns()))
     thinned = started(Recording.from_columns(columns(encoders=ROWS % 5 == 0, gyro=ROWS % 2 == 0)))
     np.testing.assert_allclose(thinned, whole, atol=0.01)
+
+
+def test_travel_speed_and_noise_of_missing_samples() -> None:
+    """Four of five encoder rows missing: neither the speed nor what blocks may deviate by is nearer to zero."""
+    whole, thinned = columns(), columns(encoders=ROWS % 5 == 0)
+    fast, slow = (Recording.from_columns(read) for read in (whole, thinned))
+    np.testing.assert_allclose(travel_speed(slow, RADIUS)[:-5], travel_speed(fast, RADIUS)[:-5], atol=0.01)
+    noise = [None] * len(CHANNELS)
+    noise[CHANNELS.index("yaw_rate")] = ChannelNoise(1e-6, 0.0, 0.0, 0.0)
+    for recording in (fast, slow):
+        sigma = block_windows(cut(recording), noise, RADIUS).sigma[..., CHANNELS.index("yaw_rate")]
+        np.testing.assert_allclose(sigma, 0.4 * TRACKING_ERROR["yaw_rate"], rtol=1e-3)
 
 
 def test_time_of_a_gap_counts() -> None:
