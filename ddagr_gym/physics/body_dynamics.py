@@ -108,6 +108,14 @@ def place_wheels(row: Array) -> None:
         row[WHEEL_Y + i] = row[Y] + sine * x + cosine * y
 
 
+@kernel(inline=True)
+def world_rates(row: Array) -> tuple[float, float]:
+    """d/dt of X and Y."""
+    cosine = math.cos(row[YAW])
+    sine = math.sin(row[YAW])
+    return row[V_X] * cosine - row[V_Y] * sine, row[V_X] * sine + row[V_Y] * cosine
+
+
 @kernel()
 def tilt_gravity(row: Array) -> None:
     """Gravity in body axes on a plane of gradient SLOPE; gravity is fixed in the world, so it turns with yaw (6.3)."""

@@ -1,6 +1,7 @@
 """The time step: order, agreement with the converged solution, rest, and invariances of the motion."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -81,6 +82,17 @@ def test_default_numerics_follow_the_converged_solution_under_an_untrained_polic
     error = _stack(_drive(commands, soil=get_soil(name)))
     error -= _stack(_drive(commands, soil=get_soil(name), numerics=CONVERGED))
     assert np.sqrt(np.mean(error**2, axis=1)).max() < 3e-4
+
+
+def test_fine_steps_follow_the_converged_solution_where_friction_changes_sign_within_them():
+    """Shear displacement modulus of 1.2 mm under a robot that starts, stops and speeds up straight."""
+    soil = replace(SOIL, shear_modulus=0.2 * SOIL.shear_modulus, cohesion=1.5 * SOIL.cohesion, exit_angle_ratio=1.0)
+    speeds = np.concatenate([np.full(150, 0.7), np.zeros(100), np.full(150, 0.5), np.linspace(0.5, 1.0, 100)])
+    commands = np.stack([speeds, speeds], axis=1)
+    fine = replace(Numerics.smooth(), maximum_step=0.02, accepted_error=1e-4, launch_change=1e9)
+    error = _stack(_drive(commands, soil=soil, numerics=fine))
+    error -= _stack(_drive(commands, soil=soil, numerics=replace(fine, maximum_step=1e-3, accepted_error=1e-6)))
+    assert np.sqrt(np.mean(error**2, axis=1)).max() < 5e-4
 
 
 @pytest.mark.parametrize("limit", [0.0, 0.03])

@@ -1,0 +1,150 @@
+"""Backward Euler steps of the body, for where the linearised step overshoots.
+
+Friction is monotone in the velocity, so the work of the defect along a Newton step falls with the length of the step,
+and the length at which it vanishes is sought: a Newton step as such is far too long across a change of friction's sign,
+and far too short where the derivative was taken across one.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ddagr_gym.jit import kernel, stack_array
+from ddagr_gym.physics.body_dynamics import evaluate_forces, world_rates
+from ddagr_gym.physics.body_jacobian import damping_inverse, solve
+from ddagr_gym.physics.drivetrain import advance_motors
+from ddagr_gym.physics.layout import (
+    ACCELERATION,
+    HALF_TRACK,
+    MASS,
+    TIME,
+    V_X,
+    YAW,
+    YAW_INERTIA,
+    YAW_RATE,
+    X,
+    Y,
+)
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+NEWTON_ITERATIONS = 15
+LENGTHS = 12  # of a Newton step that are tried
+LEFT_WORK = 0.5  # share of the work before a Newton step that may be left after it
+LONGEST = 30.0  # times the length tried before
+
+
+@kernel(inline=True)
+def _defect(row: Array, start: Array, step: float, defect: Array) -> float:
+    """v - v_n - h f(v) of backward Euler, and its size [m/s]."""
+    for j in range(3):
+        defect[j] = row[V_X + j] - start[j] - step * row[ACCELERATION + j]
+    return max(max(abs(defect[0]), abs(defect[1])), row[HALF_TRACK] * abs(defect[2]))
+
+
+@kernel(inline=True)
+def _work(row: Array, defect: Array, change: Array) -> float:
+    """Mass times velocity of the defect along a change of the motion."""
+    return row[MASS] * (defect[0] * change[0] + defect[1] * change[1]) + row[YAW_INERTIA] * defect[2] * change[2]
+
+
+@kernel()
+def _newton_step(
+    row: Array, start: Array, defect: Array, change: Array, step: float, options: Array, section: Array,
+    contact: Array, coarse: Array, effect_points: Integers, effect_addresses: Integers, parameters: Array,
+    memory: Array,
+) -> None:  # fmt: skip
+    """Move by ``change`` times the length at which its defect does no more work (false position, Illinois).
+
+    Args:
+        row: the environment; moved.
+        start: (3,) motion at the start of the time step.
+        defect: (3,) at the present motion, overwritten.
+        change: (3,) what Newton's method takes off the motion.
+        step: h [s].
+        options: as in :func:`evaluate_forces`, and the following.
+        section: see there.
+        contact: see there.
+        coarse: see there.
+        effect_points: as in :func:`apply_effects`, and the following.
+        effect_addresses: see there.
+        parameters: see there.
+        memory: see there.
+    """
+    before = stack_array(3)
+    for j in range(3):
+        before[j] = row[V_X + j]
+    whole = _work(row, defect, change)
+    low, at_low, high, at_high, length = 0.0, whole, 0.0, 0.0, 1.0
+    for _ in range(LENGTHS):
+        for j in range(3):
+            row[V_X + j] = before[j] - length * change[j]
+        evaluate_forces(
+            row, -1.0, options, section, contact, coarse, effect_points, effect_addresses, parameters, memory
+        )  # fmt: skip
+        _defect(row, start, step, defect)
+        work = _work(row, defect, change)
+        if abs(work) <= LEFT_WORK * whole or not whole > 0.0:
+            break
+        if work > 0.0 and high == 0.0:
+            further = work * (length - low) / (at_low - work) if at_low > work else math.inf
+            low, at_low = length, work
+            length += min(further, LONGEST * length)
+            continue
+        if work > 0.0:
+            low, at_low, at_high = length, work, 0.5 * at_high
+        else:
+            # halved where the forces are not finite
+            high, at_high, at_low = length, work if work < 0.0 else -0.5 * at_low, 0.5 * at_low
+        length = (low * at_high - high * at_low) / (at_high - at_low)
+
+
+@kernel()
+def backward_euler_step(
+    row: Array, step: float, options: Array, section: Array, contact: Array, coarse: Array, effect_points: Integers,
+    effect_addresses: Integers, parameters: Array, memory: Array, tolerance: float,
+) -> None:  # fmt: skip
+    """One backward Euler step.
+
+    Args:
+        row: as in :func:`ddagr_gym.physics.integrators.advance_body`, and the following.
+        step: h [s].
+        options: see there.
+        section: see there.
+        contact: see there.
+        coarse: see there.
+        effect_points: see there.
+        effect_addresses: see there.
+        parameters: see there.
+        memory: see there.
+        tolerance: of the defect [m/s], above which the iteration goes on.
+    """
+    inverse, drive = stack_array(9), stack_array(6)
+    start, defect, change = stack_array(3), stack_array(3), stack_array(3)
+    for j in range(3):
+        start[j] = row[V_X + j]
+    advance_motors(row, step)
+    row[TIME] += step
+    for _ in range(NEWTON_ITERATIONS):
+        evaluate_forces(
+            row, 0.0, options, section, contact, coarse, effect_points, effect_addresses, parameters, memory
+        )  # fmt: skip
+        if _defect(row, start, step, defect) <= tolerance:
+            break
+        damping_inverse(row, step, inverse, drive, effect_points, effect_addresses, parameters, memory)
+        solve(inverse, defect, change)
+        _newton_step(
+            row, start, defect, change, step, options, section, contact, coarse, effect_points, effect_addresses,
+            parameters, memory,
+        )  # fmt: skip
+    rate_x, rate_y = world_rates(row)
+    row[X] += step * rate_x
+    row[Y] += step * rate_y
+    row[YAW] += step * row[YAW_RATE]
+    evaluate_forces(
+        row, 0.0, options, section, contact, coarse, effect_points, effect_addresses, parameters, memory
+    )  # fmt: skip

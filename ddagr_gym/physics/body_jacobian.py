@@ -1,0 +1,152 @@
+"""Damping of the body's three velocities by its wheels' forces: the linear systems of the implicit time step."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ddagr_gym.jit import kernel, stack_array
+from ddagr_gym.physics.body_dynamics import extra_forces, hub_x, hub_y, set_kinematics, sum_extra
+from ddagr_gym.physics.layout import (
+    LOAD,
+    MASS,
+    POINT_BODY_FORCES,
+    POINT_WHEEL_FORCES,
+    V_X,
+    V_Y,
+    WHEEL,
+    YAW_INERTIA,
+    YAW_RATE,
+)
+from ddagr_gym.physics.wheel_derivatives import change_of, relative_motion, stiffness_of
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+@kernel()
+def _add_wheel_jacobian(row: Array, i: int, jacobian: Array, drive: Array) -> None:
+    x = hub_x(row, i)
+    y = hub_y(row, i)
+    stiffness = stiffness_of(row, i)
+    speed = relative_motion(row, i)[3]
+    for direction in range(3):
+        d_x = 1.0 / speed if direction == 0 else 0.0
+        d_y = 1.0 / speed if direction == 1 else 0.0
+        d_rim = (row[WHEEL + i] + row[WHEEL + 8 + i]) / speed if direction == 2 else 0.0
+        settle = -change_of(row, i, 2, d_x, d_y, d_rim, 0.0) / stiffness
+        f_x = change_of(row, i, 0, d_x, d_y, d_rim, settle)
+        f_y = change_of(row, i, 1, d_x, d_y, d_rim, settle)
+        moment = x * f_y - y * f_x + change_of(row, i, 3, d_x, d_y, d_rim, settle)
+        if direction == 2:
+            bank = i % 2
+            drive[bank] += f_x
+            drive[2 + bank] += f_y
+            drive[4 + bank] += moment
+            continue
+        arm = x if direction == 1 else -y
+        jacobian[direction] += f_x
+        jacobian[3 + direction] += f_y
+        jacobian[6 + direction] += moment
+        jacobian[2] += arm * f_x
+        jacobian[5] += arm * f_y
+        jacobian[8] += arm * moment
+
+
+@kernel()
+def _wheel_jacobian(row: Array, jacobian: Array, drive: Array) -> None:
+    """Derivatives of (F_x, F_y, M_z) of all wheels, the sinkage following its load.
+
+    Args:
+        row: reads derivatives and kinematics.
+        jacobian: (9,) by v_x, v_y and yaw rate, row by row, written.
+        drive: (6,) by right and left bank speed, row by row, written.
+    """
+    for j in range(9):
+        jacobian[j] = 0.0
+    for j in range(6):
+        drive[j] = 0.0
+    for i in range(4):
+        if row[LOAD + i] > 0.0 and stiffness_of(row, i) > 0.0:
+            _add_wheel_jacobian(row, i, jacobian, drive)
+
+
+@kernel()
+def _add_effect_jacobian(
+    row: Array, jacobian: Array, effect_points: Integers, effect_addresses: Integers, parameters: Array, memory: Array
+) -> None:
+    """Forward differences of the effects' forces by the three velocities."""
+    active = False
+    for k in range(effect_points.shape[0]):
+        active = active or effect_points[k] == POINT_WHEEL_FORCES or effect_points[k] == POINT_BODY_FORCES
+    if not active:
+        return
+    base, moved = stack_array(3), stack_array(3)
+    sum_extra(row, base)
+    for direction in range(3):
+        before = row[V_X + direction]
+        step = 1e-4 * abs(before) + 1e-6
+        row[V_X + direction] = before + step
+        set_kinematics(row)
+        extra_forces(row, effect_points, effect_addresses, parameters, memory)
+        sum_extra(row, moved)
+        row[V_X + direction] = before
+        for j in range(3):
+            jacobian[3 * j + direction] += (moved[j] - base[j]) / step
+    set_kinematics(row)
+
+
+@kernel(inline=True)
+def _invert(matrix: Array, inverse: Array) -> None:
+    """Inverse of a 3 x 3 matrix, row by row, by cofactors."""
+    a, b, c, d, e, f, g, h, i = (
+        matrix[0], matrix[1], matrix[2], matrix[3], matrix[4], matrix[5], matrix[6], matrix[7], matrix[8]
+    )  # fmt: skip
+    scale = 1.0 / (a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g))
+    inverse[0], inverse[1], inverse[2] = (e * i - f * h) * scale, (c * h - b * i) * scale, (b * f - c * e) * scale
+    inverse[3], inverse[4], inverse[5] = (f * g - d * i) * scale, (a * i - c * g) * scale, (c * d - a * f) * scale
+    inverse[6], inverse[7], inverse[8] = (d * h - e * g) * scale, (b * g - a * h) * scale, (a * e - b * d) * scale
+
+
+@kernel(inline=True)
+def solve(inverse: Array, right: Array, solution: Array) -> None:
+    """Inverse (9,), row by row, times a right side (3,), written to ``solution`` (3,)."""
+    for j in range(3):
+        solution[j] = inverse[3 * j] * right[0] + inverse[3 * j + 1] * right[1] + inverse[3 * j + 2] * right[2]
+
+
+@kernel()
+def damping_inverse(
+    row: Array, step: float, inverse: Array, drive: Array, effect_points: Integers, effect_addresses: Integers,
+    parameters: Array, memory: Array,
+) -> None:  # fmt: skip
+    """(I - step A)^-1, A from the forces' Jacobian and the Coriolis terms, and the accelerations by bank speed.
+
+    Args:
+        row: the environment.
+        step: [s].
+        inverse: (9,) row by row, written.
+        drive: (6,) d(acceleration)/d(right, left bank speed), row by row, written.
+        effect_points: as in :func:`apply_effects`, and the following.
+        effect_addresses: see there.
+        parameters: see there.
+        memory: see there.
+    """
+    jacobian = stack_array(9)
+    _wheel_jacobian(row, jacobian, drive)
+    _add_effect_jacobian(row, jacobian, effect_points, effect_addresses, parameters, memory)
+    for j in range(3):
+        inertia = row[YAW_INERTIA] if j == 2 else row[MASS]
+        for k in range(3):
+            jacobian[3 * j + k] /= inertia
+        drive[2 * j] /= inertia
+        drive[2 * j + 1] /= inertia
+    jacobian[1] += row[YAW_RATE]
+    jacobian[2] += row[V_Y]
+    jacobian[3] -= row[YAW_RATE]
+    jacobian[5] -= row[V_X]
+    for j in range(9):
+        jacobian[j] *= -step
+    for j in range(3):
+        jacobian[4 * j] += 1.0
+    _invert(jacobian, inverse)
