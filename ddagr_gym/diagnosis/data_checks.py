@@ -16,6 +16,9 @@ from ddagr_gym.replay.windows import CHANNELS
 STUCK = "stuck"
 """Family of checks on channels that never change."""
 
+FRAMES = "frames"
+"""Doubt about the frames of poses, which no check of numbers can settle."""
+
 
 @dataclass(frozen=True)
 class DataDoubt:
@@ -48,8 +51,23 @@ def data_doubts(recordings: Sequence[Recording], rng: np.random.Generator) -> tu
     for report in reports:
         found += [DataDoubt(report.source, "", "schema", sentence) for sentence in report.sentences]
         found += [_doubt(report.source, finding) for finding in report.suspicious]
+    found += [_frames_doubt(recording) for recording in recordings if _has_stretches(recording)]
     together = across_runs(recordings, reports)
     return (*found, *(_doubt("", finding) for finding in together if finding.status is Status.SUSPICIOUS))
+
+
+def _has_stretches(recording: Recording) -> bool:
+    """Whether poses come in stretches whose frames need not be the same."""
+    return len(recording.meta.spans) > 1 and recording.has("pose_x", "pose_y", "pose_yaw")
+
+
+def _frames_doubt(recording: Recording) -> DataDoubt:
+    sentence = (
+        f"It consists of {len(recording.meta.spans)} stretches, and their poses are taken to be in one frame. "
+        "If each begins in a frame of its own, what is said of directions and places is wrong (slope, soil patches, "
+        "tilt of the ground): give the stretches as files of their own then."
+    )
+    return DataDoubt(recording.meta.source, "pose_yaw", FRAMES, sentence)
 
 
 def _doubt(recording: str, finding: Finding) -> DataDoubt:

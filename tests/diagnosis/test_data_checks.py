@@ -39,6 +39,16 @@ def test_zeros_logged_as_readings_are_found_and_named(sound: Recording) -> None:
     assert all("look at the sensor" in doubt.sentence for doubt in stuck)
 
 
+def test_stretches_whose_poses_may_be_in_frames_of_their_own(sound: Recording) -> None:
+    half = len(sound) // 2
+    parts = replace(sound, meta=replace(sound.meta, spans=((0, half), (half, len(sound)))))
+    told = [doubt for doubt in doubts(parts, sound) if doubt.finding == "frames"]
+    assert [doubt.recording for doubt in told] == [sound.meta.source]
+    assert "2 stretches" in told[0].sentence
+    without = replace(parts, channels={k: v for k, v in parts.channels.items() if not k.startswith("pose")})
+    assert not any(doubt.finding == "frames" for doubt in doubts(without))
+
+
 def test_channels_that_no_diagnosis_compares_are_not_called_dead() -> None:
     assert dead_channels([DataDoubt("a", "current_left", "stuck", "It never changes.")]) == ()
     assert dead_channels([DataDoubt("a", "yaw_rate", "wait", "It waits.")]) == ()
