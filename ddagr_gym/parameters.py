@@ -184,6 +184,11 @@ class Robot(Validated):
             )
 
     @property
+    def outer_radius(self) -> float:
+        """Mean outer radius of the wheels, hub to tread [m]."""
+        return math.fsum(wheel.outer_radius for wheel in self.wheels) / len(self.wheels)
+
+    @property
     def wheel_x(self) -> tuple[float, float, float, float]:
         """Hub positions forward of the body origin [m]."""
         half = self.half_wheelbase

@@ -20,7 +20,7 @@ from benchmarks.ablations.sparse import sparse_first
 from ddagr_gym.diagnosis.diagnose import Prepared, prepare
 from ddagr_gym.diagnosis.refit import Fitted
 from ddagr_gym.diagnosis.search import BENT, begin
-from ddagr_gym.diagnosis.setting import Setting, make_problem, wheel_radius
+from ddagr_gym.diagnosis.setting import Setting, make_problem
 from ddagr_gym.diagnosis.standing import Standing, stand
 from ddagr_gym.diagnosis.thresholds import Thresholds
 from ddagr_gym.parameters import Robot, Soil
@@ -79,7 +79,7 @@ def examine(folder: Path, thresholds: Thresholds) -> dict[str, dict[str, Any]]:
         "no null bank": lambda: values or first_of(begun.scans, noise_thresholds(problem)),
         "BIC forward": lambda: values or first_of(begun.scans, bic_thresholds(problem, candidates)),
         "one roll-out": lambda: values or _one_roll_out(robot, soil, begun),
-        "SINDy": lambda: sparse_first(problem, begun.scans[0].fitted, wheel_radius(robot)),
+        "SINDy": lambda: sparse_first(problem, begun.scans[0].fitted, robot.outer_radius),
     }
     return found | {name: _timed(work, time.process_time()) for name, work in arms.items()}
 

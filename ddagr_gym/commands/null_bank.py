@@ -81,7 +81,7 @@ def run(arguments: Arguments) -> None:
     from ddagr_gym.diagnosis.nuisance import NuisancePriors
     from ddagr_gym.diagnosis.null_bank import bank_hash
     from ddagr_gym.diagnosis.null_drives import template_of
-    from ddagr_gym.diagnosis.setting import Setting, wheel_radius
+    from ddagr_gym.diagnosis.setting import Setting
     from ddagr_gym.diagnosis.threshold_files import save_thresholds
     from ddagr_gym.diagnosis.thresholds import NullRun, thresholds_from
     from ddagr_gym.presets import get_robot, get_soil
@@ -99,7 +99,7 @@ def run(arguments: Arguments) -> None:
         pieces = _pieces(recordings, arguments.piece, robot, setting)
     elif recordings:
         check_recordings(recordings, robot, setting)
-        template = template_of(recordings, recording_noise(recordings, wheel_radius(robot)))
+        template = template_of(recordings, recording_noise(recordings, robot.outer_radius))
         centre = fitted_nominal(robot, soil, recordings, setting)
     drives: list[Template | Recording | None] = [*pieces] or [template] * arguments.count
     bank = bank_hash(robot, soil, template, setting, len(drives), arguments.seed, centre, pieces)

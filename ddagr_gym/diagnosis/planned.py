@@ -17,7 +17,7 @@ from ddagr_gym.diagnosis.noise import recording_noise
 from ddagr_gym.diagnosis.problem import Problem
 from ddagr_gym.diagnosis.refit import Fitted, fit
 from ddagr_gym.diagnosis.scores import Terms
-from ddagr_gym.diagnosis.setting import SHORT, Setting, make_problem, wheel_radius
+from ddagr_gym.diagnosis.setting import SHORT, Setting, make_problem
 from ddagr_gym.errors import InputError, unknown_name
 from ddagr_gym.parameters import Imu, PoseReceiver, Robot, Sensors, Soil, WheelEncoder
 from ddagr_gym.recordings.schema import Recording
@@ -88,7 +88,7 @@ def plan(
         _drive(robot, soil, manoeuvre, sensors, place, seed + number)
         for number, (manoeuvre, place) in enumerate(zip(manoeuvres, places, strict=True))
     ]
-    problem = make_problem(robot, soil, recordings, setting, recording_noise(recordings, wheel_radius(robot)))
+    problem = make_problem(robot, soil, recordings, setting, recording_noise(recordings, robot.outer_radius))
     problem = _at_truth(problem, recordings)
     return Plan(tuple(manoeuvres), tuple(sensors), problem, fit(problem, iterations=0))
 

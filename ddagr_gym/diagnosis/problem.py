@@ -155,6 +155,11 @@ class Problem:
         """(P,) global parameters that a fit moves."""
         return np.asarray(self.prior > 0.0)
 
+    def open_at(self, values: Array) -> NDArray[np.int64]:
+        """Global parameters that may still move: those held at a bound explain nothing more."""
+        held = (values <= self.low + 1e-9) | (values >= self.high - 1e-9)
+        return np.flatnonzero(self.free & ~held)
+
     def start(self, effects: Sequence[Effect] = ()) -> Point:
         """The nominal model at the windows' first guess."""
         return Point(np.zeros(len(self.prior)), self.blocked.windows.initial.copy(), tuple(effects))

@@ -179,7 +179,7 @@ def _present(problem: Problem) -> set[str]:
 def _body(motion: Motion, problem: Problem) -> list[Signal]:
     """Of the motion alone; readings may depend on the first twelve."""
     v_x, v_y, r = motion["v_x"], motion["v_y"], motion["r"]
-    radius = Signal("R", np.array(_radius(problem)), METRE)
+    radius = Signal("R", np.array(problem.robot.outer_radius), METRE)
     track = Signal("W", np.array(problem.robot.half_track), METRE)
     slips = [
         (radius * motion[f"w_{side}"] - v_x - Signal("1", np.array(sign), NUMBER) * track * r).named(
@@ -238,8 +238,3 @@ def _pose(motion: Motion) -> list[Signal]:
         cos, sin, r, v_x * cos, v_x * sin, yaw.of_number("cos", 2.0), yaw.of_number("sin", 2.0), motion["x"],
         motion["y"], motion["t"],
     ]  # fmt: skip
-
-
-def _radius(problem: Problem) -> float:
-    wheels = problem.robot.wheels
-    return sum(wheel.outer_radius for wheel in wheels) / len(wheels)

@@ -160,7 +160,7 @@ def scan(
             candidates.append(candidate)
             columns += [probe_column(problem, fitted, probe, drives) for probe in candidate.probes]
         progress(name)
-    free = _open(problem, fitted)
+    free = problem.open_at(fitted.point.values)
     raw = np.concatenate(
         [
             problem.residual(fitted.point, fitted.prediction)[..., None],
@@ -180,13 +180,6 @@ def scan(
         windows.time,
         tuple(p.recording for p in problem.nuisances.parameters if p.heading and p.recording is not None),
     )
-
-
-def _open(problem: Problem, fitted: Fitted) -> NDArray[np.int64]:
-    """Nuisances that may still move: those held at a bound explain nothing more."""
-    values = fitted.point.values
-    held = (values <= problem.low + 1e-9) | (values >= problem.high - 1e-9)
-    return np.flatnonzero(problem.free & ~held)
 
 
 @dataclass(frozen=True, eq=False)
@@ -290,7 +283,9 @@ def nuisance_answer(problem: Problem, fitted: Fitted, terms: Terms, gain: Gain) 
     if candidate.has_sizes:
         reduced = reduce(terms)
         columns = 1 + np.array(candidate.columns)
-        change[_open(problem, fitted)] = reduced.nuisance[:, 0] - reduced.nuisance[:, columns] @ gain.multiples
+        change[problem.open_at(fitted.point.values)] = (
+            reduced.nuisance[:, 0] - reduced.nuisance[:, columns] @ gain.multiples
+        )
     return change
 
 

@@ -15,7 +15,7 @@ from ddagr_gym.diagnosis.misfit import channel_misfit
 from ddagr_gym.diagnosis.problem import Point, Problem
 from ddagr_gym.diagnosis.refit import DAMPING, Fitted, cost_of, fit
 from ddagr_gym.diagnosis.retold import TRIAL_STEPS, with_looped_encoders, with_slower_loop
-from ddagr_gym.diagnosis.scores import Gain, Terms, dispersion_of, drive_extent, gains, nuisance_answer
+from ddagr_gym.diagnosis.scores import Gain, Terms, dispersion_of, drive_extent, nuisance_answer
 from ddagr_gym.diagnosis.size_prior import implausibility
 from ddagr_gym.diagnosis.standing import Rival, Standing, rival_of, stand
 from ddagr_gym.diagnosis.thresholds import UNMISTAKABLE, Thresholds
@@ -334,29 +334,3 @@ def _without_idle(
     if least[0] >= 1.0:
         return standing
     return stand(problem, fit(problem, least[1].point, iterations=4), progress)
-
-
-def bootstrap_weights(
-    terms: Terms, names: Sequence[str], rng: np.random.Generator, draws: int = 200
-) -> dict[str, float]:
-    """Weight of each of some effects as the better explanation, averaged over resamplings of the windows.
-
-    In a resampling an effect has the weight exp(gain) over the sum of all: two that explain the same share it equally
-    even where one is always ahead by a little. The weights add up to 1.
-
-    Args:
-        terms: of the scan at the model without any of them.
-        names: of the effects to compare.
-        rng: of the resampling.
-        draws: how often.
-    """
-    wanted = replace(terms, candidates=tuple(c for c in terms.candidates if c.name in names))
-    count = len(terms.time)
-    total = dict.fromkeys(names, 0.0)
-    for _ in range(draws):
-        weights = np.bincount(rng.integers(count, size=count), minlength=count).astype(float)
-        found = gains(wanted, weights)
-        relative = np.exp(np.array([item.gain for item in found]) - found[0].gain)
-        for item, share in zip(found, relative / relative.sum(), strict=True):
-            total[item.name] += float(share) / draws
-    return total

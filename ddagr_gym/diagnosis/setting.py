@@ -57,11 +57,6 @@ class Setting:
         return replace(self, duration=duration, stride=duration if stride is None else stride)
 
 
-def wheel_radius(robot: Robot) -> float:
-    """Mean hub to tread [m]."""
-    return sum(wheel.outer_radius for wheel in robot.wheels) / len(robot.wheels)
-
-
 def window_duration(recordings: Sequence[Recording], setting: Setting) -> float:
     """Length of windows [s]: as set, or shorter where short recordings or segments have no room for enough of them."""
     lengths = [(s.stop - s.start - 1) * recording.period for recording in recordings for s in recording.segments()]
@@ -89,7 +84,7 @@ def make_problem(
     Raises:
         InputError: see :func:`ddagr_gym.replay.windows.cut_windows`.
     """
-    radius = wheel_radius(robot)
+    radius = robot.outer_radius
     duration = window_duration(recordings, setting)
     windows = cut_windows(
         recordings,

@@ -40,9 +40,8 @@ def standard_template(robot: Robot, rng: np.random.Generator) -> Template:
         robot: whose wheels turn the tread speeds into bank speeds.
         rng: of commands, noise levels and starts.
     """
-    radius = sum(wheel.outer_radius for wheel in robot.wheels) / len(robot.wheels)
     programmes = (_straights, _arcs, _anything)
-    commands = tuple(_fill(programme, rng) / radius for programme in programmes)
+    commands = tuple(_fill(programme, rng) / robot.outer_radius for programme in programmes)
     present = np.ones((int(RATE * DURATION), 8), dtype=bool)
     present[:, 5:] = False
     if rng.random() < POSE_SHARE:

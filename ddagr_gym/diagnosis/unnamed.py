@@ -157,18 +157,12 @@ def _answer(problem: Problem, target: str, courses: Array, response: Response) -
 def _raw(problem: Problem, standing: Standing, columns: Array) -> Array:
     """(W, M + S, 1 + P + K) residual, what a refit could still move, and the terms."""
     fitted = standing.fitted
-    free = _open(problem, fitted.point.values)
+    free = problem.open_at(fitted.point.values)
     parameters = effect_parameters(fitted.point.effects)
     by_effect = effect_columns(problem, fitted.point, fitted.prediction, parameters)
     sensitivities = np.concatenate([fitted.by_parameter[..., free], by_effect, columns], axis=2)
     residual = problem.residual(fitted.point, fitted.prediction)[..., None]
     return np.concatenate([residual, problem.padded(np.nan_to_num(sensitivities))], axis=2)
-
-
-def _open(problem: Problem, values: Array) -> NDArray[np.int64]:
-    """Nominal parameters that are not held at a bound."""
-    held = (values <= problem.low + 1e-9) | (values >= problem.high - 1e-9)
-    return np.flatnonzero(problem.free & ~held)
 
 
 def stretches(problem: Problem) -> NDArray[np.int64]:
@@ -185,7 +179,7 @@ def _sums(
 ) -> tuple[Sums, list[Term]]:
     """Inner products by stretch, and the terms that they are of."""
     point = standing.fitted.point
-    free = _open(problem, point.values)
+    free = problem.open_at(point.values)
     parameters = effect_parameters(point.effects)
     number = int(group.max()) + 1
     size = projected.shape[2]

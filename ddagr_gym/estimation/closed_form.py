@@ -36,7 +36,7 @@ def encoder_motion(
     """
     if not track_factor > 0.0:
         raise InputError(f"track_factor is {track_factor:g}: give a positive ratio.")
-    radius = _outer_radius(robot)
+    radius = robot.outer_radius
     right, left = np.asarray(omega_right, dtype=np.float64), np.asarray(omega_left, dtype=np.float64)
     turning = radius * (right - left) / (2.0 * robot.half_track * track_factor)
     return PlanarMotion(0.5 * radius * (right + left), turning)
@@ -59,7 +59,7 @@ def symmetric_forward_speed(robot: Robot, yaw_rate: ArrayLike, omega_right: Arra
         omega_right: right bank speed [rad/s].
         omega_left: left bank speed [rad/s].
     """
-    radius = _outer_radius(robot)
+    radius = robot.outer_radius
     turning = np.asarray(yaw_rate, dtype=np.float64)
     right, left = radius * np.asarray(omega_right, dtype=np.float64), radius * np.asarray(omega_left, dtype=np.float64)
     outer, inner = np.where(turning >= 0.0, right, left), np.where(turning >= 0.0, left, right)
@@ -68,7 +68,3 @@ def symmetric_forward_speed(robot: Robot, yaw_rate: ArrayLike, omega_right: Arra
         y = (q + np.sqrt(q * q + 4.0 * outer * inner)) / (2.0 * outer)
         speed = 0.5 * (outer * y + inner / y)
     return np.asarray(np.where((outer > 0.0) & (inner >= 0.0) & (y > 0.0), speed, np.nan))
-
-
-def _outer_radius(robot: Robot) -> float:
-    return float(np.mean([wheel.outer_radius for wheel in robot.wheels]))

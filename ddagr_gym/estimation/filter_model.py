@@ -205,7 +205,7 @@ class FilterModel(Validated):
     @property
     def outer_radius(self) -> float:
         """Mean outer radius of the wheels [m]."""
-        return float(np.mean([wheel.outer_radius for wheel in self.robot.wheels]))
+        return self.robot.outer_radius
 
     @property
     def wheel_load(self) -> float:

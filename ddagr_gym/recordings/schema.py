@@ -98,8 +98,7 @@ class RobotGeometry:
     @classmethod
     def of(cls, robot: Robot) -> RobotGeometry:
         """Geometry of a robot; the wheel radius is the mean of its four outer radii."""
-        radius = math.fsum(wheel.outer_radius for wheel in robot.wheels) / len(robot.wheels)
-        return cls(robot.name, radius, robot.half_track)
+        return cls(robot.name, robot.outer_radius, robot.half_track)
 
 
 def bank_speeds(forward: Any, turn: Any, geometry: RobotGeometry) -> tuple[Any, Any]:
