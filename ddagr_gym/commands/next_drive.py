@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -64,8 +64,8 @@ def run(arguments: Arguments) -> None:
         raise InputError("give either a diagnosis or some --rival name=size, not both.")
     case = _case(arguments)
     robot, soil = get_robot(arguments.robot or case.robot), get_soil(arguments.soil or case.soil)
-    sensors, seed, threads = arguments.sensors or case.sensors, arguments.seed, arguments.threads
-    answer = next_drive(robot, soil, case.rivals, sensors=sensors, seed=seed, threads=threads, setting=case.setting)
+    sensors, setting = arguments.sensors or case.sensors, replace(case.setting, threads=arguments.threads)
+    answer = next_drive(robot, soil, case.rivals, sensors=sensors, seed=arguments.seed, setting=setting)
     if arguments.output is not None:
         write_text(arguments.output, json.dumps(answer, indent=1, allow_nan=False) + "\n")
     print(answer_text(answer))
@@ -79,17 +79,18 @@ class _Case:
     sensors: tuple[str, ...]
     robot: str
     soil: str
-    setting: Setting | None = None
+    setting: Setting
 
 
 def _case(arguments: Arguments) -> _Case:
     from ddagr_gym.diagnosis.next_drive import rivals_of_diagnosis, sensors_of_diagnosis, setting_of_diagnosis
     from ddagr_gym.diagnosis.planned import SENSORS
+    from ddagr_gym.diagnosis.setting import Setting
     from ddagr_gym.diagnosis.verdict import load
     from ddagr_gym.physics.effects.registry import parse_effect
 
     if arguments.diagnosis is None:
-        return _Case([parse_effect(text) for text in arguments.rival], tuple(SENSORS), ROBOT, SOIL)
+        return _Case([parse_effect(text) for text in arguments.rival], tuple(SENSORS), ROBOT, SOIL, Setting())
     path = arguments.diagnosis
     mapping = load(path / "diagnosis.json" if path.is_dir() else path)
     named = mapping["robot"] or ROBOT, mapping["soil"] or SOIL

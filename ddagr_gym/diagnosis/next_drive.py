@@ -84,7 +84,6 @@ def next_drive(
     sensors: Sequence[str] = tuple(SENSORS),
     bank: Sequence[Manoeuvre] | None = None,
     seed: int = 0,
-    threads: int = 1,
     setting: Setting | None = None,
     progress: Callable[[str], None] = lambda text: None,
 ) -> dict[str, Any]:
@@ -97,7 +96,6 @@ def next_drive(
         sensors: names of :data:`ddagr_gym.diagnosis.planned.SENSORS`.
         bank: manoeuvres; all built-in ones by default.
         seed: of the noise whose level is estimated.
-        threads: of the simulator.
         setting: of the diagnosis that shall tell them apart, its windows shortened to the manoeuvres.
         progress: called with what is being done.
 
@@ -116,7 +114,7 @@ def next_drive(
     place = _place(planned)
     starts = None if place is None else [_towards(place, robot, soil, item) for item in manoeuvres]
     progress("simulating the bank of manoeuvres")
-    own = replace(with_room(Setting() if setting is None else setting, manoeuvres), threads=threads)
+    own = with_room(Setting() if setting is None else setting, manoeuvres)
     prepared = plan(robot, soil, manoeuvres, sensors, starts=starts, seed=seed, setting=own)
     progress("simulating the rivals")
     columns = _columns(prepared, planned)

@@ -232,7 +232,6 @@ def _next_drive(
             rivals,
             sensors=sensors,
             seed=task.seed,
-            threads=task.setting.threads,
             setting=setting,
             progress=progress,
         )
