@@ -44,7 +44,8 @@ class Arguments:
     Attributes:
         runs: recordings of one robot, as `ddagr diagnose` takes them; without any, three drives of 60 s are drawn.
         ordinary: take the runs themselves for null drives: real ones in which nothing is wrong. They are cut into
-            pieces, of which at least 20 are needed (the level is 5 percent), and no drive is simulated.
+            pieces, of which at least 20 are needed (the level is 5 percent), and no drive is simulated. Pieces of twice
+            the length and whole drives are null drives too, since gains grow with the length.
         piece: length of such a piece [s], at least 16 (8 windows of 2 s).
         output: thresholds to write, .json; the runs themselves lie beside it.
         robot: nominal robot.
@@ -130,9 +131,9 @@ def _check_options(arguments: Arguments) -> None:
 
 
 def _pieces(recordings: Sequence[Recording], length: float, robot: Robot, setting: Setting) -> list[Recording]:
-    """Ordinary drives in pieces, enough of them for thresholds."""
+    """Ordinary drives in pieces, enough short ones for thresholds, and as longer ones."""
     from ddagr_gym.diagnosis.inputs import check_recordings
-    from ddagr_gym.diagnosis.null_bank import pieces_of
+    from ddagr_gym.diagnosis.null_bank import ordinary_runs, pieces_of
     from ddagr_gym.diagnosis.thresholds import LEVEL, least_nulls
 
     for recording in recordings:
@@ -143,7 +144,7 @@ def _pieces(recordings: Sequence[Recording], length: float, robot: Robot, settin
             f"the recordings give {len(pieces)} pieces with commands of {length:g} s and the level of {LEVEL:g} takes "
             f"at least {least_nulls()}: name more recordings or give a shorter --piece."
         )
-    return pieces
+    return [run for recording in recordings for run in ordinary_runs(recording, length)]
 
 
 def _origin(arguments: Arguments) -> Origin:

@@ -115,6 +115,17 @@ def pieces_of(recording: Recording, length: float) -> list[Recording]:
     return pieces
 
 
+def ordinary_runs(recording: Recording, length: float) -> list[Recording]:
+    """Null runs of an ordinary drive: pieces of ``length`` [s], pieces of twice that, and the drive as a whole.
+
+    Soil and robot are fitted to every run by itself and explain more of a short one. What is left in a long one shows
+    how gains grow with the length; in proportion to it they do only roughly.
+    """
+    short, double = pieces_of(recording, length), pieces_of(recording, 2.0 * length)
+    longer = [*double, *([recording] if len(double) > 1 else [])] if len(short) > 1 else []
+    return [*short, *longer]
+
+
 def cut(recording: Recording, first: int, last: int) -> Recording:
     """Rows ``first`` to ``last`` (exclusive) of a recording, with time from 0 on."""
 

@@ -175,7 +175,7 @@ class Thresholds:
             return self
         share = seconds / covered
         gates = {
-            name: Gate(NOISE_GAIN + max(gate.gain - NOISE_GAIN, 0.0) * share, gate.held_out * share)
+            name: Gate(max(float(gain_at_length(gate.gain, share)), NOISE_GAIN), gate.held_out * share)
             for name, gate in self.gates.items()
         }
         return replace(self, gates=gates, windows=seconds / self.duration)
@@ -214,6 +214,16 @@ class Thresholds:
         if gain > CLEAR * gate.gain:
             return True
         return gain > gate.gain and scan.held_out.get(name, 0.0) > gate.held_out
+
+
+def gain_at_length(gain: float | NDArray[np.float64], share: float | NDArray[np.float64]) -> NDArray[np.float64]:
+    """Gain that the same structure reaches in drives of another length; what noise alone reaches stays.
+
+    Args:
+        gain: any shape.
+        share: of the other length in the own one, broadcast against it.
+    """
+    return np.where(np.asarray(gain) > NOISE_GAIN, NOISE_GAIN + (gain - NOISE_GAIN) * share, gain)
 
 
 @dataclass(frozen=True)
@@ -258,7 +268,8 @@ def thresholds_from(
 
     Gains of an effect are divided by the mean of their largest tenth over the runs, or by what noise alone reaches; the
     quantile of the largest of these ratios over all effects then widens all gates alike (a max-statistic correction for
-    the size of the library), and so does the margin for simulators that nobody thought of.
+    the size of the library), and so does the margin for simulators that nobody thought of. Runs of different lengths
+    are brought to the median one first, as the gates are for a diagnosis (:meth:`Thresholds.for_length`).
 
     Args:
         runs: as many as :func:`least_nulls` says, or more.
@@ -272,17 +283,19 @@ def thresholds_from(
     if len(runs) < least_nulls(level):
         raise InputError(f"{len(runs)} null runs cannot give a level of {level:g}: make at least {least_nulls(level)}.")
     names = sorted({name for run in runs for name in run.gains})
-    table = np.array([[run.evidence(name) for name in names] for run in runs])
+    covered = np.array([run.windows * run.duration for run in runs])
+    share = np.where(covered > 0.0, np.median(covered) / np.maximum(covered, 1e-9), 1.0)
+    table = gain_at_length(np.array([[run.evidence(name) for name in names] for run in runs]), share[:, None])
     scale = np.maximum(_upper_mean(table), NOISE_GAIN)
     widest = max(float(np.quantile((table / scale).max(axis=1), 1.0 - level)), 1.0)
     widening = widest * np.array([_margin(name) for name in names])
-    held = np.array([[run.held_out.get(name, 0.0) for name in names] for run in runs])
+    held = np.array([[run.held_out.get(name, 0.0) for name in names] for run in runs]) * share[:, None]
     # the gain carries the level; the gain on left-out windows refuses what few of them carry, at the nulls' median
     least = np.maximum(np.median(held, axis=0), 0.0)
     gates = {name: Gate(float(widening[k] * scale[k]), float(least[k])) for k, name in enumerate(names)}
     maxima = np.sort((table / (widening * scale)).max(axis=1))
     duration = float(np.median([run.duration for run in runs]))
-    windows = float(np.median([run.windows * run.duration for run in runs])) / duration
+    windows = float(np.median(covered)) / duration
     limits = _misfit_limits(runs, level)
     return Thresholds(gates, limits, len(runs), bank, level, tuple(maxima.tolist()), windows, duration, origin)
 

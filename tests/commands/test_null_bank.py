@@ -162,8 +162,8 @@ def test_other_readings_make_another_bank(quick_nulls: list[int], tmp_path: Path
     for yaw_rate in (1.0, 1.0, -1.0):
         ordinary = [save_drive(tmp_path / "run.parquet", 400.0, yaw_rate=yaw_rate), "--ordinary", "--piece", "20"]
         assert main([*words(tmp_path), *ordinary]) == 0
-    assert len(quick_nulls) == 40
-    assert len(list((tmp_path / "thresholds.bank").iterdir())) == 40
+    assert len(quick_nulls) == 62
+    assert len(list((tmp_path / "thresholds.bank").iterdir())) == 62
 
 
 def test_thresholds_know_their_origin(quick_nulls: list[int], tmp_path: Path) -> None:
@@ -176,7 +176,7 @@ def test_thresholds_know_their_origin(quick_nulls: list[int], tmp_path: Path) ->
 def test_thresholds_of_ordinary_drives_say_so(quick_nulls: list[int], tmp_path: Path) -> None:
     ordinary = [save_drive(tmp_path / "run.parquet", 400.0), "--ordinary", "--piece", "20"]
     assert main([*words(tmp_path), *ordinary]) == 0
-    assert len(quick_nulls) == 20
+    assert len(quick_nulls) == 31
     assert load_thresholds(tmp_path / "thresholds.json").origin == Origin("ddagr", "thesis_a1", 1.0, 0, "ordinary")
 
 

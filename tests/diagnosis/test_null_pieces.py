@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ddagr_gym.diagnosis.null_bank import pieces_of
+from ddagr_gym.diagnosis.null_bank import ordinary_runs, pieces_of
 from ddagr_gym.presets import get_robot
 from ddagr_gym.recordings.schema import Recording
 
@@ -53,6 +53,13 @@ def test_time_of_every_piece_begins_at_zero():
     assert [piece.t[0] for piece in pieces] == [0.0, 0.0, 0.0]
     assert [piece.meta.start_time for piece in pieces] == pytest.approx([PERIOD, 40.0 + PERIOD, 80.0 + PERIOD])
     np.testing.assert_allclose(pieces[1].t, PERIOD * np.arange(800), atol=1e-9)
+
+
+def test_null_runs_are_pieces_longer_ones_and_the_drive():
+    whole = drive(np.ones(4800, dtype=bool))
+    lengths = [len(run) * PERIOD for run in ordinary_runs(whole, 60.0)]
+    assert lengths == pytest.approx([60.0] * 4 + [120.0] * 2 + [240.0], abs=0.1)
+    assert [len(run) * PERIOD for run in ordinary_runs(drive(np.ones(1200, dtype=bool)), 60.0)] == [60.0]
 
 
 def test_a_drive_without_commands_gives_nothing():

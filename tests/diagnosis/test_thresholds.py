@@ -95,6 +95,17 @@ def test_windows_of_unequal_length_cover_their_median_time() -> None:
     assert thresholds.for_length(48.0).gates == thresholds.gates
 
 
+def test_long_null_runs_count_by_what_they_reach_for_their_length() -> None:
+    runs = [replace(run, windows=10, duration=6.0) for run in null_runs(40, 1)]
+    raised = {name: NOISE_GAIN + 50.0 for name in runs[0].gains}
+    short = thresholds_from([*runs, *(replace(run, gains=raised) for run in runs[:10])], "x")
+    twice = {name: NOISE_GAIN + 100.0 for name in raised}
+    longer = [replace(run, gains=twice, windows=20, held_out={}) for run in runs[:10]]
+    long = thresholds_from([*runs, *longer], "x")
+    assert long.duration * long.windows == short.duration * short.windows == 60.0
+    assert long.of("slope").gain == pytest.approx(short.of("slope").gain)
+
+
 def test_what_few_windows_carry_must_be_clear() -> None:
     thresholds = Thresholds({"slope": Gate(10.0, 0.0)}, {}, 20, "x")
     few, many = SimpleNamespace(held_out={"slope": -5.0}), SimpleNamespace(held_out={"slope": 5.0})
