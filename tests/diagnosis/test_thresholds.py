@@ -97,9 +97,9 @@ def test_windows_of_unequal_length_cover_their_median_time() -> None:
 
 def test_long_null_runs_count_by_what_they_reach_for_their_length() -> None:
     runs = [replace(run, windows=10, duration=6.0) for run in null_runs(40, 1)]
-    raised = {name: NOISE_GAIN + 50.0 for name in runs[0].gains}
+    raised = dict.fromkeys(runs[0].gains, NOISE_GAIN + 50.0)
     short = thresholds_from([*runs, *(replace(run, gains=raised) for run in runs[:10])], "x")
-    twice = {name: NOISE_GAIN + 100.0 for name in raised}
+    twice = dict.fromkeys(raised, NOISE_GAIN + 100.0)
     longer = [replace(run, gains=twice, windows=20, held_out={}) for run in runs[:10]]
     long = thresholds_from([*runs, *longer], "x")
     assert long.duration * long.windows == short.duration * short.windows == 60.0
