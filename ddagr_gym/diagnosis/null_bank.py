@@ -19,7 +19,7 @@ from ddagr_gym.diagnosis.inputs import content_hash
 from ddagr_gym.diagnosis.null_drives import Template, null_recordings
 from ddagr_gym.diagnosis.problem import Problem
 from ddagr_gym.diagnosis.scores import drive_extent
-from ddagr_gym.diagnosis.search import begin
+from ddagr_gym.diagnosis.search import begin, best_gains, scans_of
 from ddagr_gym.diagnosis.setting import Setting, make_problem
 from ddagr_gym.diagnosis.standard_drives import standard_template
 from ddagr_gym.diagnosis.standing import Standing
@@ -73,10 +73,10 @@ def scanned(robot: Robot, soil: Soil, recordings: Sequence[Recording], kind: str
         setting: of the diagnosis.
     """
     problem = make_problem(robot, soil, recordings, setting)
-    _, standing = begin(problem)
+    raw, standing = begin(problem)
     return NullRun(
         kind,
-        {g.name: g.gain for g in standing.gains},
+        {name: gain.gain for name, (gain, _) in best_gains(scans_of(problem, standing, raw)).items()},
         standing.scores,
         standing.held_out,
         standing.misfit,

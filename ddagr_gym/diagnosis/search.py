@@ -152,21 +152,41 @@ def rivals_of(problem: Problem, standing: Standing, raw: Fitted, thresholds: Thr
     return sorted(kept, key=lambda rival: implausibility(rival.fitted.point.effects[-1]) - rival.gain)
 
 
-def _ranked(problem: Problem, standing: Standing, raw: Fitted, thresholds: Thresholds) -> list[tuple[Gain, Terms]]:
-    """Effects that pass the gate with the scan that says so, best first.
+def scans_of(problem: Problem, standing: Standing, raw: Fitted) -> list[Standing]:
+    """Models whose scans count: where the refitted nominal one is far off, the raw nominal one too.
 
-    Where the refitted nominal model is far off, soil and robot are bent so much that the truth may not show there: the
-    raw nominal model is scanned as well, and each effect has the larger of its gains.
+    Soil and robot are bent so much there that the truth may not show.
+
+    Args:
+        problem: what to fit.
+        standing: the model so far.
+        raw: the nominal model with its sensitivities.
     """
-    scans = [standing]
-    if not standing.names and standing.dispersion > BENT:
-        scans.append(stand(problem, raw))
+    bent = not standing.names and standing.dispersion > BENT
+    return [standing, stand(problem, raw)] if bent else [standing]
+
+
+def best_gains(
+    scans: Sequence[Standing], passes: Callable[[str, float, Standing], bool] = lambda name, gain, scan_: True
+) -> dict[str, tuple[Gain, Terms]]:
+    """The larger of each effect's gains, with the scan that says so.
+
+    Args:
+        scans: see :func:`scans_of`.
+        passes: whether a gain counts.
+    """
     best: dict[str, tuple[Gain, Terms]] = {}
     for scan_ in scans:
         for gain in scan_.gains:
             better = gain.name not in best or gain.gain > best[gain.name][0].gain
-            if better and thresholds.passes(gain.name, gain.gain, scan_):
+            if better and passes(gain.name, gain.gain, scan_):
                 best[gain.name] = (gain, scan_.terms)
+    return best
+
+
+def _ranked(problem: Problem, standing: Standing, raw: Fitted, thresholds: Thresholds) -> list[tuple[Gain, Terms]]:
+    """Effects that pass the gate with the scan that says so, best first."""
+    best = best_gains(scans_of(problem, standing, raw), thresholds.passes)
     return sorted(best.values(), key=lambda item: thresholds.of(item[0].name).gain - item[0].gain)
 
 

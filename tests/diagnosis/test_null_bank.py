@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ddagr_gym.diagnosis import null_bank
+from ddagr_gym.diagnosis import null_bank, search
 from ddagr_gym.diagnosis.null_bank import bank_hash, pieces_of, scanned
 from ddagr_gym.diagnosis.null_drives import Template
+from ddagr_gym.diagnosis.search import BENT
 from ddagr_gym.diagnosis.setting import Setting
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.schema import Recording
@@ -48,9 +49,24 @@ def test_templates_are_hashed_with_what_is_read_and_where_they_start(change: dic
 
 
 def test_a_null_run_keeps_the_length_of_the_windows_that_were_cut(monkeypatch: pytest.MonkeyPatch) -> None:
-    standing = SimpleNamespace(gains=(), scores={}, held_out={}, misfit={})
+    standing = SimpleNamespace(gains=(), scores={}, held_out={}, misfit={}, names=(), dispersion=1.0)
     monkeypatch.setattr(null_bank, "begin", lambda problem: (None, standing))
     monkeypatch.setattr(null_bank, "_meaningless", lambda *given: ())
     run = scanned(ROBOT, SOIL, [drive(40.0)], "plain", Setting().with_windows(6.0))
     assert run.duration == pytest.approx(5.0)
     assert run.windows * run.duration == pytest.approx(40.0, rel=0.15)
+
+
+def test_a_null_run_that_bends_the_nominal_model_counts_the_raw_one_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As a search does: its gates would be too low otherwise."""
+
+    def model(gain: float) -> SimpleNamespace:
+        scanned_ = [SimpleNamespace(name="slope", gain=gain)]
+        return SimpleNamespace(
+            gains=scanned_, terms=None, scores={}, held_out={}, misfit={}, names=(), dispersion=2.0 * BENT
+        )
+
+    monkeypatch.setattr(null_bank, "begin", lambda problem: (None, model(3.0)))
+    monkeypatch.setattr(search, "stand", lambda problem, raw: model(70.0))
+    monkeypatch.setattr(null_bank, "_meaningless", lambda *given: ())
+    assert scanned(ROBOT, SOIL, [drive(40.0)], "plain", Setting()).gains == {"slope": 70.0}
