@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -45,7 +45,7 @@ class Arguments:
         runs: recordings of one robot, as `ddagr diagnose` takes them; without any, three drives of 60 s are drawn.
         ordinary: take the runs themselves for null drives: real ones in which nothing is wrong. They are cut into
             pieces, of which at least 20 are needed (the level is 5 percent), and no drive is simulated. Pieces of twice
-            the length and whole drives are null drives too, since gains grow with the length.
+            the length and whole drives say beside them how gains grow with the length.
         piece: length of such a piece [s], at least 16 (8 windows of 2 s).
         output: thresholds to write, .json; the runs themselves lie beside it.
         robot: nominal robot.
@@ -96,23 +96,26 @@ def run(arguments: Arguments) -> None:
     template: Template | None = None
     centre: _Centre = None
     pieces: list[Recording] = []
+    longer: list[Recording] = []
     if arguments.ordinary:
-        pieces = _pieces(recordings, arguments.piece, robot, setting)
+        pieces, longer = _pieces(recordings, arguments.piece, robot, setting)
     elif recordings:
         check_recordings(recordings, robot, setting)
         template = template_of(recordings, recording_noise(recordings, robot.outer_radius))
         centre = fitted_nominal(robot, soil, recordings, setting)
-    drives: list[Template | Recording | None] = [*pieces] or [template] * arguments.count
-    bank = bank_hash(robot, soil, template, setting, len(drives), arguments.seed, centre, pieces)
+    drives: list[Template | Recording | None] = [*pieces, *longer] or [template] * arguments.count
+    bank = bank_hash(robot, soil, template, setting, len(drives), arguments.seed, centre, (*pieces, *longer))
     folder = arguments.output.with_suffix(".bank")
     folder.mkdir(parents=True, exist_ok=True)
     paths = [_part(folder, bank, number) for number in range(len(drives))]
     tasks = [(robot, soil, d, setting, arguments.seed, n, paths[n], centre) for n, d in enumerate(drives)]
     _make([task for task in tasks if not paths[task[5]].exists()], arguments.processes)
-    runs = [NullRun(**json.loads(path.read_text())) for path in paths]
+    made = [NullRun(**json.loads(path.read_text())) for path in paths]
+    runs = [replace(run, own=number < len(drives) - len(longer)) for number, run in enumerate(made)]
     found = thresholds_from(runs, bank, origin=_origin(arguments))
     save_thresholds(found, arguments.output)
-    print(f"{arguments.output}: thresholds of {len(runs)} null drives, bank {bank[:12]}")
+    beside = f" and {len(longer)} longer ones" if longer else ""
+    print(f"{arguments.output}: thresholds of {found.nulls} null drives{beside}, bank {bank[:12]}")
 
 
 def _check_options(arguments: Arguments) -> None:
@@ -130,10 +133,12 @@ def _check_options(arguments: Arguments) -> None:
         raise InputError(f"--count is {arguments.count}: give at least {least_nulls()} for the level of {LEVEL:g}.")
 
 
-def _pieces(recordings: Sequence[Recording], length: float, robot: Robot, setting: Setting) -> list[Recording]:
-    """Ordinary drives in pieces, enough short ones for thresholds, and as longer ones."""
+def _pieces(
+    recordings: Sequence[Recording], length: float, robot: Robot, setting: Setting
+) -> tuple[list[Recording], list[Recording]]:
+    """Ordinary drives in pieces, enough of them for thresholds, and longer ones."""
     from ddagr_gym.diagnosis.inputs import check_recordings
-    from ddagr_gym.diagnosis.null_bank import ordinary_runs, pieces_of
+    from ddagr_gym.diagnosis.null_bank import longer_runs, pieces_of
     from ddagr_gym.diagnosis.thresholds import LEVEL, least_nulls
 
     for recording in recordings:
@@ -144,7 +149,7 @@ def _pieces(recordings: Sequence[Recording], length: float, robot: Robot, settin
             f"the recordings give {len(pieces)} pieces with commands of {length:g} s and the level of {LEVEL:g} takes "
             f"at least {least_nulls()}: name more recordings or give a shorter --piece."
         )
-    return [run for recording in recordings for run in ordinary_runs(recording, length)]
+    return pieces, [run for recording in recordings for run in longer_runs(recording, length)]
 
 
 def _origin(arguments: Arguments) -> Origin:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.diagnosis.noise import ChannelNoise, interpolated
+from ddagr_gym.diagnosis.noise import ChannelNoise, interpolated, on_lines
 from ddagr_gym.recordings.schema import GAP_IN_PERIODS, Recording
 from ddagr_gym.replay.pieces import POSE_CHANNELS
 from ddagr_gym.replay.windows import CHANNELS, STATE, WindowSet
@@ -112,13 +112,18 @@ def block_windows(
 
 
 def _tracking(windows: WindowSet, blocks: int, length: int) -> Array:
-    """Largest difference between command and bank speed of each block (W, B) [rad/s]; 0 where no encoder is known."""
+    """Largest difference between command and bank speed of each block (W, B) [rad/s]; 0 without encoders."""
     kept = slice(windows.history, windows.history + blocks * length)
     banks = [CHANNELS.index("encoder_right"), CHANNELS.index("encoder_left")]
-    difference = windows.commands[:, kept] - windows.measured[:, : blocks * length, banks]
-    difference = difference.reshape(windows.count, blocks, length, 2)
-    known = np.isfinite(difference)
-    mean = np.where(known, difference, 0.0).sum(axis=2) / np.maximum(known.sum(axis=2), 1)
+    driven, measured = windows.commands[:, kept], windows.measured[:, : blocks * length, banks]
+    rows = np.arange(blocks * length, dtype=np.float64)
+    difference = np.zeros(driven.shape)
+    for w in range(windows.count):
+        for bank in range(2):
+            # banks may be read in different rows, and more seldom than once in a block
+            if np.isfinite(measured[w, :, bank]).any():
+                difference[w, :, bank] = driven[w, :, bank] - on_lines(rows, measured[w, :, bank])
+    mean = np.nan_to_num(difference).reshape(windows.count, blocks, length, 2).mean(axis=2)
     return np.asarray(np.abs(mean).max(axis=2))
 
 

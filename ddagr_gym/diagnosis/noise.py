@@ -225,15 +225,20 @@ def travel_speed(recording: Recording, wheel_radius: float) -> Array:
     return np.nan_to_num(wheel_radius * 0.5 * (np.abs(banks[0]) + np.abs(banks[1])))
 
 
+def on_lines(t: Array, values: Array) -> Array:
+    """Values (n,) at times (n,) with the missing ones on lines between the others; 0 where all are missing."""
+    known = np.isfinite(values)
+    if known.all():
+        return values
+    return np.interp(t, t[known], values[known]) if known.any() else np.zeros(len(values))
+
+
 def interpolated(recording: Recording, name: str) -> Array:
     """Channel (n,) with its missing samples on lines between the others of their span; 0 where a span has none."""
-    values = recording[name].copy()
+    values = np.zeros(len(recording))
     for span in recording.spans():
-        known = np.isfinite(values[span])
-        if known.any():
-            t, missing = recording.t[span], ~known
-            values[span][missing] = np.interp(t[missing], t[known], values[span][known])
-    return np.nan_to_num(values)
+        values[span] = on_lines(recording.t[span], recording[name][span])
+    return values
 
 
 def recording_noise(recordings: Sequence[Recording], wheel_radius: float) -> tuple[ChannelNoise | None, ...]:

@@ -18,7 +18,7 @@ from ddagr_gym.diagnosis.hypotheses import first_guess
 from ddagr_gym.diagnosis.inputs import content_hash
 from ddagr_gym.diagnosis.null_drives import Template, null_recordings
 from ddagr_gym.diagnosis.problem import Problem
-from ddagr_gym.diagnosis.scores import drive_extent
+from ddagr_gym.diagnosis.scores import Gain, drive_extent
 from ddagr_gym.diagnosis.search import begin, best_gains, scans_of
 from ddagr_gym.diagnosis.setting import Setting, make_problem
 from ddagr_gym.diagnosis.standard_drives import standard_template
@@ -68,30 +68,29 @@ def scanned(robot: Robot, soil: Soil, recordings: Sequence[Recording], kind: str
     Args:
         robot: nominal.
         soil: nominal.
-        recordings: null drives of one world, or pieces of real drives that are known to be ordinary.
+        recordings: null drives of one world, or (pieces of) real drives that are known to be ordinary.
         kind: of KINDS, or the name of the real drive.
         setting: of the diagnosis.
     """
     problem = make_problem(robot, soil, recordings, setting)
     raw, standing = begin(problem)
+    best = best_gains(scans_of(problem, standing, raw))
     return NullRun(
         kind,
-        {name: gain.gain for name, (gain, _) in best_gains(scans_of(problem, standing, raw)).items()},
-        standing.scores,
-        standing.held_out,
+        {name: gain.gain for name, (gain, _) in best.items()},
+        {name: scan_.scores[name] for name, (_, scan_) in best.items()},
+        {name: scan_.held_out[name] for name, (_, scan_) in best.items()},
         standing.misfit,
         problem.blocked.windows.count,
-        _meaningless(problem, standing),
+        tuple(name for name, (gain, scan_) in best.items() if not _is_meaningful(problem, gain, scan_)),
         problem.blocked.windows.duration,
     )
 
 
-def _meaningless(problem: Problem, standing: Standing) -> tuple[str, ...]:
-    """Effects that the scan puts below their least meaningful size."""
-    extent = drive_extent(problem, standing.fitted.prediction)
-    candidates = standing.terms.candidates
-    guesses = (first_guess(candidates[gain.candidate], gain.multiples) for gain in standing.gains)
-    return tuple(effect.name for effect in guesses if not effect.is_meaningful(extent))
+def _is_meaningful(problem: Problem, gain: Gain, scan_: Standing) -> bool:
+    """Whether a scan puts an effect at its least meaningful size or above."""
+    guess = first_guess(scan_.terms.candidates[gain.candidate], gain.multiples)
+    return guess.is_meaningful(drive_extent(problem, scan_.fitted.prediction))
 
 
 def pieces_of(recording: Recording, length: float) -> list[Recording]:
@@ -115,15 +114,16 @@ def pieces_of(recording: Recording, length: float) -> list[Recording]:
     return pieces
 
 
-def ordinary_runs(recording: Recording, length: float) -> list[Recording]:
-    """Null runs of an ordinary drive: pieces of ``length`` [s], pieces of twice that, and the drive as a whole.
+def longer_runs(recording: Recording, length: float) -> list[Recording]:
+    """Pieces of an ordinary drive of twice ``length`` [s] and the drive as a whole, where they are not pieces of it.
 
-    Soil and robot are fitted to every run by itself and explain more of a short one. What is left in a long one shows
-    how gains grow with the length; in proportion to it they do only roughly.
+    Soil and robot are fitted to every run by itself and explain more of a short one: what is left in long ones shows
+    how gains grow with the length. They are no further evidence of how often a gate is passed, for they share their
+    time with the pieces.
     """
-    short, double = pieces_of(recording, length), pieces_of(recording, 2.0 * length)
-    longer = [*double, *([recording] if len(double) > 1 else [])] if len(short) > 1 else []
-    return [*short, *longer]
+    double = pieces_of(recording, 2.0 * length)
+    known = {content_hash(piece) for piece in pieces_of(recording, length)}
+    return [run for run in (*double, *([recording] if len(double) > 1 else [])) if content_hash(run) not in known]
 
 
 def cut(recording: Recording, first: int, last: int) -> Recording:

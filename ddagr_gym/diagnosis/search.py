@@ -168,26 +168,27 @@ def scans_of(problem: Problem, standing: Standing, raw: Fitted) -> list[Standing
 
 def best_gains(
     scans: Sequence[Standing], passes: Callable[[str, float, Standing], bool] = lambda name, gain, scan_: True
-) -> dict[str, tuple[Gain, Terms]]:
-    """The larger of each effect's gains, with the scan that says so.
+) -> dict[str, tuple[Gain, Standing]]:
+    """The larger of each effect's gains, with the model whose scan says so.
 
     Args:
         scans: see :func:`scans_of`.
         passes: whether a gain counts.
     """
-    best: dict[str, tuple[Gain, Terms]] = {}
+    best: dict[str, tuple[Gain, Standing]] = {}
     for scan_ in scans:
         for gain in scan_.gains:
             better = gain.name not in best or gain.gain > best[gain.name][0].gain
             if better and passes(gain.name, gain.gain, scan_):
-                best[gain.name] = (gain, scan_.terms)
+                best[gain.name] = (gain, scan_)
     return best
 
 
 def _ranked(problem: Problem, standing: Standing, raw: Fitted, thresholds: Thresholds) -> list[tuple[Gain, Terms]]:
     """Effects that pass the gate with the scan that says so, best first."""
-    best = best_gains(scans_of(problem, standing, raw), thresholds.passes)
-    return sorted(best.values(), key=lambda item: thresholds.of(item[0].name).gain - item[0].gain)
+    best = best_gains(scans_of(problem, standing, raw), thresholds.passes).values()
+    ranked = sorted(best, key=lambda item: thresholds.of(item[0].name).gain - item[0].gain)
+    return [(gain, scan_.terms) for gain, scan_ in ranked]
 
 
 def _finish(problem: Problem, standing: Standing, rival: Rival, large: bool) -> Rival:

@@ -61,7 +61,7 @@ SHORT_WINDOW = 2.0
 VERSION = 1
 
 NullKind = Literal["simulated", "ordinary"]
-"""What null drives are: simulated ones, or pieces of real drives in which nothing is wrong."""
+"""What null drives are: simulated ones, or real drives in which nothing is wrong, in pieces and longer."""
 
 
 class Scores(Protocol):
@@ -239,6 +239,7 @@ class NullRun:
         windows: of the run.
         meaningless: effects that would be of less than their least meaningful size.
         duration: of its windows as they were cut [s], shorter than asked for where drives are short.
+        own: whether it shares no time with another run: only such runs say how often a gate is passed.
     """
 
     kind: str
@@ -249,6 +250,7 @@ class NullRun:
     windows: int = 0
     meaningless: tuple[str, ...] = ()
     duration: float = SHORT_WINDOW
+    own: bool = True
 
     def evidence(self, name: str) -> float:
         """Gain of an effect that counts against its gate: below its least meaningful size only a multiple passes."""
@@ -280,24 +282,26 @@ def thresholds_from(
     Raises:
         InputError: too few runs for the level.
     """
-    if len(runs) < least_nulls(level):
-        raise InputError(f"{len(runs)} null runs cannot give a level of {level:g}: make at least {least_nulls(level)}.")
+    own = np.array([run.own for run in runs], dtype=bool)
+    if own.sum() < least_nulls(level):
+        raise InputError(f"{own.sum()} null runs cannot give a level of {level:g}: make at least {least_nulls(level)}.")
     names = sorted({name for run in runs for name in run.gains})
     covered = np.array([run.windows * run.duration for run in runs])
-    share = np.where(covered > 0.0, np.median(covered) / np.maximum(covered, 1e-9), 1.0)
+    usual = float(np.median(covered[covered > 0.0])) if covered.any() else 0.0
+    share = np.where(covered > 0.0, usual / np.maximum(covered, 1e-9), 1.0)
     table = gain_at_length(np.array([[run.evidence(name) for name in names] for run in runs]), share[:, None])
     scale = np.maximum(_upper_mean(table), NOISE_GAIN)
-    widest = max(float(np.quantile((table / scale).max(axis=1), 1.0 - level)), 1.0)
+    widest = max(float(np.quantile((table / scale)[own].max(axis=1), 1.0 - level)), 1.0)
     widening = widest * np.array([_margin(name) for name in names])
     held = np.array([[run.held_out.get(name, 0.0) for name in names] for run in runs]) * share[:, None]
     # the gain carries the level; the gain on left-out windows refuses what few of them carry, at the nulls' median
     least = np.maximum(np.median(held, axis=0), 0.0)
     gates = {name: Gate(float(widening[k] * scale[k]), float(least[k])) for k, name in enumerate(names)}
-    maxima = np.sort((table / (widening * scale)).max(axis=1))
+    maxima = np.sort((table / (widening * scale))[own].max(axis=1))
     duration = float(np.median([run.duration for run in runs]))
-    windows = float(np.median(covered)) / duration
+    windows = usual / duration
     limits = _misfit_limits(runs, level)
-    return Thresholds(gates, limits, len(runs), bank, level, tuple(maxima.tolist()), windows, duration, origin)
+    return Thresholds(gates, limits, int(own.sum()), bank, level, tuple(maxima.tolist()), windows, duration, origin)
 
 
 def _upper_mean(table: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,8 +1,8 @@
 """Backward Euler steps of the body, for where the linearised step overshoots.
 
-Friction is monotone in the velocity, so the work of the defect along a Newton step falls with the length of the step,
-and the length at which it vanishes is sought: a Newton step as such is far too long across a change of friction's sign,
-and far too short where the derivative was taken across one.
+Friction is monotone in the velocity, so the work of the defect along a Newton step falls with the length of the step
+(exactly so with the centre of mass at the origin), and the length at which it vanishes is sought: a Newton step as such
+is far too long across a change of friction's sign, and far too short where the derivative was taken across one.
 """
 
 from __future__ import annotations
@@ -35,7 +35,12 @@ Integers = NDArray[np.int64]
 NEWTON_ITERATIONS = 15
 LENGTHS = 12  # of a Newton step that are tried
 LEFT_WORK = 0.5  # share of the work before a Newton step that may be left after it
-LONGEST = 30.0  # times the length tried before
+LONGEST = 30.0  # length of a Newton step that is tried
+
+
+@kernel(inline=True)
+def _size(row: Array, defect: Array) -> float:
+    return max(max(abs(defect[0]), abs(defect[1])), row[HALF_TRACK] * abs(defect[2]))
 
 
 @kernel(inline=True)
@@ -43,7 +48,7 @@ def _defect(row: Array, start: Array, step: float, defect: Array) -> float:
     """v - v_n - h f(v) of backward Euler, and its size [m/s]."""
     for j in range(3):
         defect[j] = row[V_X + j] - start[j] - step * row[ACCELERATION + j]
-    return max(max(abs(defect[0]), abs(defect[1])), row[HALF_TRACK] * abs(defect[2]))
+    return _size(row, defect)
 
 
 @kernel(inline=True)
@@ -78,29 +83,38 @@ def _newton_step(
     before = stack_array(3)
     for j in range(3):
         before[j] = row[V_X + j]
-    whole = _work(row, defect, change)
-    low, at_low, high, at_high, length = 0.0, whole, 0.0, 0.0, 1.0
+    whole, size = _work(row, defect, change), _size(row, defect)
+    low, at_low, high, at_high, length, work = 0.0, whole, 0.0, 0.0, 1.0, whole
     for _ in range(LENGTHS):
         for j in range(3):
             row[V_X + j] = before[j] - length * change[j]
         evaluate_forces(
             row, -1.0, options, section, contact, coarse, effect_points, effect_addresses, parameters, memory
         )  # fmt: skip
-        _defect(row, start, step, defect)
+        left = _defect(row, start, step, defect)
         work = _work(row, defect, change)
-        if abs(work) <= LEFT_WORK * whole or not whole > 0.0:
+        if abs(work) <= LEFT_WORK * whole or (not whole > 0.0 and left < size):
             break
-        if work > 0.0 and high == 0.0:
-            further = work * (length - low) / (at_low - work) if at_low > work else math.inf
-            low, at_low = length, work
-            length += min(further, LONGEST * length)
+        if not whole > 0.0:
+            length *= 0.5  # friction that is not monotone here: a smaller defect has to do
             continue
-        if work > 0.0:
+        if math.isfinite(work) and work > 0.0 and high == 0.0:
+            if length >= LONGEST:
+                break
+            further = work * (length - low) / (at_low - work) if at_low > work else LONGEST
+            low, at_low = length, work
+            length = min(length + further, LONGEST)
+            continue
+        if not math.isfinite(work):
+            high, at_high = length, -at_low
+        elif work > 0.0:
             low, at_low, at_high = length, work, 0.5 * at_high
         else:
-            # halved where the forces are not finite
-            high, at_high, at_low = length, work if work < 0.0 else -0.5 * at_low, 0.5 * at_low
+            high, at_high, at_low = length, work, 0.5 * at_low
         length = (low * at_high - high * at_low) / (at_high - at_low)
+    if not math.isfinite(work):
+        for j in range(3):
+            row[V_X + j] = before[j]
 
 
 @kernel()

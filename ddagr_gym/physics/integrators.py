@@ -125,6 +125,13 @@ def _fastest(row: Array) -> float:
 
 
 @kernel(inline=True)
+def _accepted(row: Array, options: Array) -> float:
+    """Error of a step that is accepted at the present speed [m/s]."""
+    speed = _fastest(row)
+    return options[OPTION_ACCEPTED_ERROR] * (min(speed / FULL_ERROR_SPEED, 1.0) + speed / DOUBLE_ERROR_SPEED)
+
+
+@kernel(inline=True)
 def _copy(source: Array, target: Array) -> None:
     for j in range(SIZE):
         target[j] = source[j]
@@ -151,6 +158,7 @@ def advance_body(
     """
     saved = stack_array(SIZE)
     _copy(row, saved)
+    tolerance = NEWTON_TOLERANCE + NEWTON_SHARE * _accepted(row, options)
     divisions = 1
     done = 0
     while done < divisions:
@@ -158,8 +166,7 @@ def advance_body(
             row, step / divisions, options, section, contact, coarse, effect_points, effect_addresses, parameters,
             memory,
         )  # fmt: skip
-        speed = _fastest(row)
-        accepted = options[OPTION_ACCEPTED_ERROR] * (min(speed / FULL_ERROR_SPEED, 1.0) + speed / DOUBLE_ERROR_SPEED)
+        speed, accepted = _fastest(row), _accepted(row, options)
         if divisions == 1 and speed > FULL_ERROR_SPEED and not estimate <= accepted + LEAST_ERROR:
             _copy(saved, row)
             divisions = int(options[OPTION_DIVISIONS])
@@ -169,7 +176,7 @@ def advance_body(
             _copy(saved, row)
             backward_euler_step(
                 row, step / divisions, options, section, contact, coarse, effect_points, effect_addresses, parameters,
-                memory, NEWTON_TOLERANCE + NEWTON_SHARE * accepted,
+                memory, tolerance,
             )  # fmt: skip
         done += 1
         _copy(row, saved)

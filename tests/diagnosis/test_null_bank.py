@@ -48,25 +48,49 @@ def test_templates_are_hashed_with_what_is_read_and_where_they_start(change: dic
     assert hash_of(template) != hash_of(replace(template, **change))
 
 
-def test_a_null_run_keeps_the_length_of_the_windows_that_were_cut(monkeypatch: pytest.MonkeyPatch) -> None:
-    standing = SimpleNamespace(gains=(), scores={}, held_out={}, misfit={}, names=(), dispersion=1.0)
-    monkeypatch.setattr(null_bank, "begin", lambda problem: (None, standing))
-    monkeypatch.setattr(null_bank, "_meaningless", lambda *given: ())
+def standing_of(gain: float, meaningful: bool = True, dispersion: float = 1.0) -> Any:
+    """A scan that says only something about a slope."""
+    effect = SimpleNamespace(is_meaningful=lambda extent: meaningful)
+    terms = SimpleNamespace(candidates=[SimpleNamespace(effect=effect)])
+    gains = (SimpleNamespace(name="slope", gain=gain, candidate=0, multiples=(1.0,)),)
+    words = {"slope": 0.1 * gain}
+    fitted = SimpleNamespace(prediction=None)
+    return SimpleNamespace(
+        gains=gains,
+        terms=terms,
+        scores=words,
+        held_out=words,
+        misfit={},
+        names=(),
+        dispersion=dispersion,
+        fitted=fitted,
+    )
+
+
+@pytest.fixture
+def quick_scan(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(null_bank, "first_guess", lambda candidate, multiples: candidate.effect)
+    monkeypatch.setattr(null_bank, "drive_extent", lambda problem, prediction: None)
+
+
+def test_a_null_run_keeps_the_length_of_the_windows_that_were_cut(
+    quick_scan: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(null_bank, "begin", lambda problem: (None, standing_of(1.0)))
     run = scanned(ROBOT, SOIL, [drive(40.0)], "plain", Setting().with_windows(6.0))
     assert run.duration == pytest.approx(5.0)
     assert run.windows * run.duration == pytest.approx(40.0, rel=0.15)
 
 
-def test_a_null_run_that_bends_the_nominal_model_counts_the_raw_one_too(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As a search does: its gates would be too low otherwise."""
-
-    def model(gain: float) -> SimpleNamespace:
-        scanned_ = [SimpleNamespace(name="slope", gain=gain)]
-        return SimpleNamespace(
-            gains=scanned_, terms=None, scores={}, held_out={}, misfit={}, names=(), dispersion=2.0 * BENT
-        )
-
-    monkeypatch.setattr(null_bank, "begin", lambda problem: (None, model(3.0)))
-    monkeypatch.setattr(search, "stand", lambda problem, raw: model(70.0))
-    monkeypatch.setattr(null_bank, "_meaningless", lambda *given: ())
-    assert scanned(ROBOT, SOIL, [drive(40.0)], "plain", Setting()).gains == {"slope": 70.0}
+def test_a_null_run_that_bends_the_nominal_model_counts_the_raw_one_too(
+    quick_scan: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As a search ranks; what is said of an effect beside its gain comes from the same scan."""
+    bent = standing_of(3.0, meaningful=False, dispersion=2.0 * BENT)
+    monkeypatch.setattr(null_bank, "begin", lambda problem: (None, bent))
+    monkeypatch.setattr(search, "stand", lambda problem, raw: standing_of(70.0))
+    run = scanned(ROBOT, SOIL, [drive(40.0)], "plain", Setting())
+    assert (run.gains, run.held_out, run.meaningless) == ({"slope": 70.0}, {"slope": 7.0}, ())
+    monkeypatch.setattr(search, "stand", lambda problem, raw: standing_of(2.0))
+    run = scanned(ROBOT, SOIL, [drive(40.0)], "plain", Setting())
+    assert (run.gains, run.meaningless) == ({"slope": 3.0}, ("slope",))

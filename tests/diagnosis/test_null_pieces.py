@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ddagr_gym.diagnosis.null_bank import ordinary_runs, pieces_of
+from ddagr_gym.diagnosis.null_bank import longer_runs, pieces_of
 from ddagr_gym.presets import get_robot
 from ddagr_gym.recordings.schema import Recording
 
@@ -55,11 +55,17 @@ def test_time_of_every_piece_begins_at_zero():
     np.testing.assert_allclose(pieces[1].t, PERIOD * np.arange(800), atol=1e-9)
 
 
-def test_null_runs_are_pieces_longer_ones_and_the_drive():
-    whole = drive(np.ones(4800, dtype=bool))
-    lengths = [len(run) * PERIOD for run in ordinary_runs(whole, 60.0)]
-    assert lengths == pytest.approx([60.0] * 4 + [120.0] * 2 + [240.0], abs=0.1)
-    assert [len(run) * PERIOD for run in ordinary_runs(drive(np.ones(1200, dtype=bool)), 60.0)] == [60.0]
+def test_longer_runs_are_pieces_of_twice_the_length_and_the_drive():
+    lengths = [len(run) * PERIOD for run in longer_runs(drive(np.ones(4800, dtype=bool)), 60.0)]
+    assert lengths == pytest.approx([120.0] * 2 + [240.0], abs=0.1)
+
+
+def test_what_is_a_piece_already_is_no_longer_run():
+    assert longer_runs(drive(np.ones(1200, dtype=bool)), 60.0) == []
+    segments = [(0, 2600), (2600, 5200)]  # 130 s each
+    whole = drive(np.ones(5200, dtype=bool), segments)
+    assert [len(piece) for piece in pieces_of(whole, 60.0)] == [2600, 2600]
+    assert [len(run) for run in longer_runs(whole, 60.0)] == [5200]
 
 
 def test_a_drive_without_commands_gives_nothing():

@@ -106,6 +106,21 @@ def test_long_null_runs_count_by_what_they_reach_for_their_length() -> None:
     assert long.of("slope").gain == pytest.approx(short.of("slope").gain)
 
 
+def test_runs_that_share_their_time_with_others_are_no_further_evidence() -> None:
+    runs = null_runs(40, 1)
+    thresholds = thresholds_from([*runs, *(replace(run, own=False) for run in runs)], "x")
+    assert (thresholds.nulls, len(thresholds.maxima)) == (40, 40)
+    with pytest.raises(InputError, match="at least 20"):
+        thresholds_from([*runs[:19], *(replace(run, own=False) for run in runs[19:])], "x")
+
+
+def test_runs_of_unknown_length_say_nothing_about_lengths() -> None:
+    known = [replace(run, windows=30, duration=4.0) for run in null_runs(40, 1)]
+    thresholds = thresholds_from([*known, *null_runs(41, 1)], "x")
+    assert thresholds.windows * thresholds.duration == pytest.approx(120.0)
+    assert thresholds.of("slope").gain == pytest.approx(thresholds_from(known, "x").of("slope").gain, rel=0.3)
+
+
 def test_what_few_windows_carry_must_be_clear() -> None:
     thresholds = Thresholds({"slope": Gate(10.0, 0.0)}, {}, 20, "x")
     few, many = SimpleNamespace(held_out={"slope": -5.0}), SimpleNamespace(held_out={"slope": 5.0})
