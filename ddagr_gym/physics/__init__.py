@@ -3,7 +3,8 @@
 The force chain, one module a link (imports go down only)::
 
     contact_geometry -> contact_stress -> contact_patch -> sinkage -> wheel_forces
-                                                      \\-> body_dynamics -> backward_euler -> integrators
+                                                      \\-> body_dynamics -> body_jacobian
+    body_jacobian -> backward_euler -> integrators
 
 Symbols. The thesis uses a, b, c, lambda, W, L, R and a1 for two things each; here every one has its own name.
 
