@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import subprocess
 from pathlib import Path
@@ -189,3 +190,8 @@ def test_the_committed_result_is_of_these_changes(tmp_path: Path) -> None:
     assert all(case["written"] == dict(BY_NAME[case["change"]].truth) for case in cases)
     assert {name: result[name] for name in figures(cases)} == figures(cases)
     draw(cases, tmp_path / "again.png")
+
+
+def test_the_committed_result_is_of_the_bank_that_ships():
+    bank = hashlib.sha256(run_diagnoses.REAL_BANK.read_bytes()).hexdigest()
+    assert json.loads(RESULT.read_text())["bank_sha256"] == bank
