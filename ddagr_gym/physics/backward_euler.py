@@ -69,7 +69,7 @@ def _newton_step(
         row: the environment; moved.
         start: (3,) motion at the start of the time step.
         defect: (3,) at the present motion, overwritten.
-        change: (3,) what Newton's method takes off the motion.
+        change: (3,) what is taken off the motion; the defect does work along it.
         step: h [s].
         options: as in :func:`evaluate_forces`, and the following.
         section: see there.
@@ -83,7 +83,7 @@ def _newton_step(
     before = stack_array(3)
     for j in range(3):
         before[j] = row[V_X + j]
-    whole, size = _work(row, defect, change), _size(row, defect)
+    whole = _work(row, defect, change)
     low, at_low, high, at_high, length, work = 0.0, whole, 0.0, 0.0, 1.0, whole
     for _ in range(LENGTHS):
         for j in range(3):
@@ -91,13 +91,10 @@ def _newton_step(
         evaluate_forces(
             row, -1.0, options, section, contact, coarse, effect_points, effect_addresses, parameters, memory
         )  # fmt: skip
-        left = _defect(row, start, step, defect)
+        _defect(row, start, step, defect)
         work = _work(row, defect, change)
-        if abs(work) <= LEFT_WORK * whole or (not whole > 0.0 and left < size):
+        if abs(work) <= LEFT_WORK * whole:
             break
-        if not whole > 0.0:
-            length *= 0.5  # friction that is not monotone here: a smaller defect has to do
-            continue
         if math.isfinite(work) and work > 0.0 and high == 0.0:
             if length >= LONGEST:
                 break
@@ -151,6 +148,9 @@ def backward_euler_step(
             break
         damping_inverse(row, step, inverse, drive, effect_points, effect_addresses, parameters, memory)
         solve(inverse, defect, change)
+        if not _work(row, defect, change) > 0.0:
+            for j in range(3):
+                change[j] = defect[j]  # which does work whatever the derivative says
         _newton_step(
             row, start, defect, change, step, options, section, contact, coarse, effect_points, effect_addresses,
             parameters, memory,
