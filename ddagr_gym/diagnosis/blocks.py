@@ -66,6 +66,10 @@ class BlockedWindows:
         sigma = self.sigma.reshape(self.sigma.shape + (1,) * (values.ndim - 3))
         return (mean / sigma).reshape(count, blocks * channels, *values.shape[3:])
 
+    def change(self, after: Array, before: Array) -> Array:
+        """(W, M) block means over sigma of a change of predictions (W, T, 8); what breaks down says nothing."""
+        return np.nan_to_num(self.means(after - before))
+
     def residual(self, prediction: Array) -> Array:
         """(W, M) block means of measured less predicted over sigma; headings compared on the circle."""
         difference = self.windows.measured - prediction

@@ -10,8 +10,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ddagr_gym.recordings.schema import Recording
+
+Banks = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 LEAST_CORRELATION = 0.5
 """Negative correlation of yaw rate and difference of bank speeds that says so (ours: ordinary drives have 0.9 and more,
@@ -35,20 +38,41 @@ class Flipped:
 
 
 def find_flipped_gyro(recordings: Sequence[Recording]) -> Flipped | None:
-    """Correlation over all recordings, where it is strongly negative."""
-    rates, differences = [], []
-    for recording in recordings:
-        banks = recording["encoder_right"], recording["encoder_left"]
-        if not recording.has("encoder_right", "encoder_left"):
-            banks = recording.held_commands()
-        both = np.isfinite(recording["yaw_rate"]) & np.isfinite(banks[0]) & np.isfinite(banks[1])
-        rates.append(recording["yaw_rate"][both])
-        differences.append((banks[0] - banks[1])[both])
-    rate, difference = np.concatenate(rates), np.concatenate(differences)
+    """Correlation over all recordings, where it is strongly negative in all that show it.
+
+    Encoders speak where there are some, else commands. Where commands agree with the gyro it is the encoders that are
+    swapped or reversed; where recordings contradict each other the gyro is not the one thing that is wrong.
+    """
+    measured = [_turning(recording, _measured_banks(recording)) for recording in recordings]
+    driven = [_turning(recording, recording.held_commands()) for recording in recordings]
+    rate, difference = np.concatenate(measured, axis=1)
+    correlation = _correlation(rate, difference)
+    if correlation is None or correlation >= -LEAST_CORRELATION:
+        return None
+    others = [_correlation(*one) for one in measured] + [_correlation(*np.concatenate(driven, axis=1))]
+    if any(other is not None and other > LEAST_CORRELATION for other in others):
+        return None
+    return Flipped(correlation, len(rate))
+
+
+def _measured_banks(recording: Recording) -> Banks:
+    """Bank speeds (right, left), or what they are asked to be where no encoder says."""
+    if not recording.has("encoder_right", "encoder_left"):
+        return recording.held_commands()
+    return recording["encoder_right"], recording["encoder_left"]
+
+
+def _turning(recording: Recording, banks: Banks) -> NDArray[np.float64]:
+    """(2, N) yaw rate and difference of bank speeds where all are known."""
+    rows = np.stack([recording["yaw_rate"], banks[0] - banks[1]])
+    return rows[:, np.isfinite(rows).all(axis=0)]
+
+
+def _correlation(rate: NDArray[np.float64], difference: NDArray[np.float64]) -> float | None:
+    """Of the two; None where there are too few samples or one of them never changes."""
     if len(rate) < FEWEST or rate.std() == 0.0 or difference.std() == 0.0:
         return None
-    correlation = float(np.corrcoef(rate, difference)[0, 1])
-    return Flipped(correlation, len(rate)) if correlation < -LEAST_CORRELATION else None
+    return float(np.corrcoef(rate, difference)[0, 1])
 
 
 def with_gyro_turned(recording: Recording) -> Recording:

@@ -127,7 +127,7 @@ def past_elimination(forecasts: Forecasts, point: Point) -> Elimination:
     for index, _ in past.nuisances.local:
         moved = point.values.copy()
         moved[index] += past.nuisances.parameters[index].step
-        change = past.blocked.means(past.predict(replace(point, values=moved)) - base)
+        change = past.blocked.change(past.predict(replace(point, values=moved)), base)
         columns[..., index] = change / past.nuisances.parameters[index].step
     return past.eliminate(point, base, columns)
 

@@ -207,7 +207,7 @@ class Problem:
             step = parameter.step if point.values[k] + parameter.step <= max(parameter.high, 0.03) else -parameter.step
             moved = point.values.copy()
             moved[k] += step
-            columns.append(self.blocked.means(self.predict(replace(point, values=moved)) - base) / step)
+            columns.append(self.blocked.change(self.predict(replace(point, values=moved)), base) / step)
             progress()
         return self.heading_columns(point, base, np.stack(columns, axis=2))
 
@@ -226,7 +226,7 @@ class Problem:
         step = self.nuisances.parameters[own[0]].step
         values = point.values.copy()
         values[own] += step
-        change = self.blocked.means(self.predict(self.moved(point, values)) - base) / step
+        change = self.blocked.change(self.predict(self.moved(point, values)), base) / step
         for k in own:
             chosen = self.blocked.windows.recording == self.nuisances.parameters[k].recording
             found[..., k] = np.where(chosen[:, None], change, 0.0)
@@ -241,7 +241,8 @@ class Problem:
 
     def eliminate(self, point: Point, base: Array, by_parameter: Array) -> Elimination:
         """Basis of the unknowns of each window at a point."""
-        by_state = self.blocked.means(self.model.state_derivatives(point.values, point.states, base, point.effects))
+        changes = self.model.state_derivatives(point.values, point.states, base, point.effects)
+        by_state = np.nan_to_num(self.blocked.means(changes))
         local = by_parameter[..., [index for index, _ in self.nuisances.local]]
         sensors = np.stack([self._bias_column(channel, None) for channel in range(3)], axis=2)
         columns = np.concatenate([by_state, local, sensors], axis=2)

@@ -129,7 +129,7 @@ def effect_columns(problem: Problem, point: Point, base: Array, parameters: Sequ
         tried = values.copy()
         tried[k] += step
         changed = problem.predict(replace(point, effects=moved(point.effects, parameters, tried)))
-        columns[..., k] = problem.blocked.means(changed - base) / step
+        columns[..., k] = problem.blocked.change(changed, base) / step
     return columns
 
 

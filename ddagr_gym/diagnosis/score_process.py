@@ -159,7 +159,7 @@ def _effect_column(problem: Problem, fitted: Fitted, number: int) -> Array:
     """(W, M) weighted change of the block means by one of the effects, all else as it stands."""
     effects = fitted.point.effects
     without = replace(fitted.point, effects=(*effects[:number], *effects[number + 1 :]))
-    return np.nan_to_num(problem.blocked.means(fitted.prediction - problem.predict(without)))
+    return problem.blocked.change(fitted.prediction, problem.predict(without))
 
 
 def _without_nuisances(problem: Problem, fitted: Fitted) -> Callable[[Array], Array]:

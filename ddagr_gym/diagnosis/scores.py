@@ -122,15 +122,15 @@ def probe_column(problem: Problem, fitted: Fitted, probe: Effect, drives: Drives
         drives: simulation of the fitted model, with which an effect on readings needs none of its own.
     """
     if drives is not None and acts_on_readings_only(probe):
-        return np.nan_to_num(problem.blocked.means(drives.readings(probe) - fitted.prediction))
+        return problem.blocked.change(drives.readings(probe), fitted.prediction)
     chosen = touched(probe, problem, fitted.prediction)
     column = np.zeros(problem.blocked.mask.shape)
     if not chosen.any():
         return column
     part = problem if chosen.all() else problem.subset(chosen)
     point = replace(fitted.point, states=fitted.point.states[chosen], effects=(*fitted.point.effects, probe))
-    column[chosen] = part.blocked.means(part.predict(point) - fitted.prediction[chosen])
-    return np.nan_to_num(column)
+    column[chosen] = part.blocked.change(part.predict(point), fitted.prediction[chosen])
+    return column
 
 
 def scan(

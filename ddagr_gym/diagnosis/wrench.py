@@ -95,7 +95,7 @@ def residual_wrench(problem: Problem, before: Fitted, after: Fitted, dispersion:
 def _column(problem: Problem, fitted: Fitted, unit: Sequence[float] | Array) -> Array:
     probe = HeldWrench(*(float(_STEP * item) for item in unit))
     moved = problem.predict(replace(fitted.point, effects=(*fitted.point.effects, probe)))
-    return np.nan_to_num(problem.blocked.means(moved - fitted.prediction)) / _STEP
+    return problem.blocked.change(moved, fitted.prediction) / _STEP
 
 
 def _solve(problem: Problem, fitted: Fitted, columns: Array) -> tuple[Array, Array]:

@@ -33,3 +33,13 @@ def test_dead_gyro_is_not_a_reversed_one(drive: Callable[..., Recording], level:
     dead = drive()
     noise = level * np.random.default_rng(0).standard_normal(len(dead))
     assert find_flipped_gyro([replace(dead, channels={**dead.channels, "yaw_rate": noise})]) is None
+
+
+def test_encoders_that_contradict_commands_or_drives_that_contradict_each_other_are_no_reversed_gyro(
+    drive: Callable[..., Recording],
+) -> None:
+    right, wrong = drive(), drive(("gyro_sign=1",))
+    swapped = {"encoder_right": right["encoder_left"], "encoder_left": right["encoder_right"]}
+    assert find_flipped_gyro([replace(right, channels={**right.channels, **swapped})]) is None
+    assert find_flipped_gyro([wrong, wrong]) is not None
+    assert find_flipped_gyro([wrong, wrong, wrong, right]) is None

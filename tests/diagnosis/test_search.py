@@ -1,5 +1,6 @@
 """Where joint refits begin, and a search that goes on where it was stopped."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -9,13 +10,19 @@ import numpy as np
 import pytest
 
 from ddagr_gym.diagnosis import search as module
+from ddagr_gym.diagnosis.diagnose import begun
+from ddagr_gym.diagnosis.problem import Point, Problem
 from ddagr_gym.diagnosis.refit import cost_of, effect_columns, effect_parameters, fit
 from ddagr_gym.diagnosis.scores import Gain, gains, nuisance_answer, scan
 from ddagr_gym.diagnosis.search import search
+from ddagr_gym.diagnosis.setting import Setting
 from ddagr_gym.diagnosis.standing import Rival, Standing
 from ddagr_gym.diagnosis.store import StepStore
 from ddagr_gym.diagnosis.thresholds import Gate, Thresholds
+from ddagr_gym.errors import InputError
 from ddagr_gym.physics.effects.registry import effect_kind, parse_effect
+from ddagr_gym.presets import get_robot, get_soil
+from ddagr_gym.recordings.schema import Recording
 from tests.diagnosis.conftest import Sloping
 
 THRESHOLDS = Thresholds({"slope": Gate(3.0, 0.0)}, {}, 20, "a test")
@@ -144,3 +151,18 @@ def test_a_window_that_cannot_be_predicted_is_no_perfect_fit(sloping: Sloping) -
     total, shares = cost_of(problem, fitted.point, broken, fitted.elimination)
     assert total == np.inf
     assert np.flatnonzero(np.isinf(shares)).tolist() == [2]
+
+
+def test_a_window_that_no_model_predicts_is_refused_in_a_sentence(
+    drive: Callable[..., Recording], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    predict = Problem.predict
+
+    def broken(problem: Problem, point: Point) -> np.ndarray:
+        found = predict(problem, point)
+        found[problem.blocked.windows.time > 3.0] = np.nan
+        return found
+
+    monkeypatch.setattr(Problem, "predict", broken)
+    with pytest.raises(InputError, match=r"breaks down in 1 of 3 windows, first at 4\.0 s"):
+        begun(get_robot("ddagr"), get_soil("thesis_a1"), (drive(seconds=8.0),), Setting())
