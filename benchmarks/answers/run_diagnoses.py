@@ -127,15 +127,15 @@ def diagnose(case: Case, parts: Path, threads: int, limit: float) -> dict[str, A
     part = parts / f"{case.name}.json"
     if part.is_file():
         kept: dict[str, Any] = json.loads(part.read_text())
-        if kept.get("options") == list(case.options):
+        if (kept.get("options"), kept.get("arguments")) == (list(case.options), shown(case.arguments)):
             return kept
     output = parts / case.name
     command = [sys.executable, "-m", "ddagr_gym", "diagnose", *case.arguments, "--threads", str(threads), *case.options]
-    began = time.monotonic()
+    began, commit = time.monotonic(), commit_of(CHECKOUT)
     done = _run([*command, "--output", str(output), "--overwrite"], limit)
     if done.returncode in INTERRUPTED:
         raise InterruptedRunError(case.name)
-    told = {"arguments": shown(case.arguments), "options": list(case.options), "commit": commit_of(CHECKOUT)}
+    told = {"arguments": shown(case.arguments), "options": list(case.options), "commit": commit}
     answer = _answer(output / "diagnosis.json", done) | told
     answer.setdefault("seconds", time.monotonic() - began)
     write_atomically(part, lambda to: to.write_text(json.dumps(answer, indent=1) + "\n"))

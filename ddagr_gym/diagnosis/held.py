@@ -57,15 +57,13 @@ class Held:
 def _repeats(recording: Recording, names: Sequence[str]) -> tuple[Flags, Flags]:
     """Samples in which all channels of a sensor repeat, and which of them say something, in the order of new samples.
 
-    A standing robot's encoders repeat zeros, and a steady one's the same count: only samples in which the reading
-    changes by two quanta per sample are looked at.
+    A steady robot's encoders repeat the same count: only samples in which the reading changes by two quanta per sample
+    are looked at.
     """
-    values = np.stack([recording[name] for name in names], axis=1)
-    values = values[np.isfinite(values).all(axis=1)]
+    rows, repeat = repeated_rows(recording, names)
+    values = np.stack([recording[name][rows] for name in names], axis=1)
     if len(values) < 2 * _REACH + 2:
         return np.zeros(0, dtype=bool), np.zeros(0, dtype=bool)
-    repeat = np.zeros(len(values), dtype=bool)
-    repeat[1:] = (values[1:] == values[:-1]).all(axis=1)
     telling = np.zeros(len(values), dtype=bool)
     steps = np.abs(np.diff(values, axis=0))
     quantum = np.array([np.min(s[s > 0.0], initial=np.inf) for s in steps.T])

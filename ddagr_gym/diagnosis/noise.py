@@ -9,8 +9,10 @@ means over three (variance 2 s^2).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from operator import itemgetter
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -248,11 +250,14 @@ def recording_noise(recordings: Sequence[Recording], wheel_radius: float) -> tup
         recordings: of one robot and one set of sensors.
         wheel_radius: hub to tread [m].
     """
-    speeds = [travel_speed(r, wheel_radius)[s] for r in recordings for s in r.segments()]
-    steady = [steady_rows(r)[s] for r in recordings for s in r.segments()]
+
+    def cut(values: Callable[[Recording], NDArray[Any]]) -> list[NDArray[Any]]:
+        return [whole[s] for r in recordings for whole in (values(r),) for s in r.segments()]
+
+    speeds, steady = cut(lambda r: travel_speed(r, wheel_radius)), cut(steady_rows)
     found = []
     for name in CHANNELS:
-        pieces = [r[name][s] for r in recordings for s in r.segments()]
+        pieces = cut(itemgetter(name))
         shares = [np.isfinite(r[name]).mean() for r in recordings if r.has(name)]
         sparse = bool(shares) and (max(shares) < SPARSE_SHARE or name.startswith("pose"))
         if name == "pose_yaw":

@@ -169,18 +169,18 @@ def fit(
         tolerance: relative gain of a step that ends the fit.
         renewals: how often the nuisances' sensitivities are computed before they are kept; those of the result are new,
             or from a step before where that step was too small to matter.
-        reuse: fit whose nuisance sensitivities are kept, so that only those of the effects are simulated.
+        reuse: fit whose nuisance sensitivities are kept throughout, so that only those of the effects are simulated.
         first: fit at ``start`` whose nuisance sensitivities serve for the first step only.
         fixed: names of effect parameters to leave alone.
         progress: called after each step.
     """
     point = problem.start() if start is None else start
     parameters = effect_parameters(point.effects, fixed)
-    prediction = problem.predict(point)
+    known = reuse or first
+    prediction = known.prediction if known is not None and known.point is point else problem.predict(point)
     if not np.isfinite(prediction).all():
         point = replace(point, states=problem.starts(point.values))
         prediction = problem.predict(point)
-    known = reuse or first
     if known:
         by_parameter = problem.heading_columns(point, prediction, known.by_parameter)
         elimination = known.elimination
@@ -205,10 +205,11 @@ def fit(
             cost, _ = cost_of(problem, point, prediction, elimination)
             fresh = True
         if parameters and done < max(renewals, _EFFECT_RENEWALS) and not converged:
-            by_effect = effect_columns(problem, point, prediction, parameters)
+            if done < iterations:
+                by_effect = effect_columns(problem, point, prediction, parameters)
             if not fresh:
                 by_parameter = problem.heading_columns(point, prediction, by_parameter)
-    if reuse is None and done and not converged:
+    if reuse is None and done and not converged and not fresh:
         by_parameter, elimination = _sensitivities(problem, point, prediction)
     cost, shares = cost_of(problem, point, prediction, elimination)
     return Fitted(point, prediction, cost, elimination, by_parameter, done, converged, shares)

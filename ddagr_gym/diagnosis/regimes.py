@@ -40,6 +40,9 @@ BINS = 6
 _NEAR_END = 0.05
 """Share of the pieces beyond a range up to which it counts as open (ours)."""
 
+_TIED = 1e-9
+"""Distance over the range of all values below which two count as equal."""
+
 _PERMUTATIONS = 300
 _RADII = (0.5, 1.0, 1.5, 2.5, 4.0)
 _MOST_CENTRES = 60
@@ -154,9 +157,10 @@ def _ordered(name: str, every: Array, values: Array, usual: Array) -> tuple[Regi
     order = np.argsort(values, kind="stable")
     count = len(values)
     ahead = np.cumsum((every - usual)[:, order], axis=1)
-    ahead = np.concatenate([np.zeros((len(every), 1)), ahead], axis=1)
+    cuts = _between_values(values[order])
+    ahead = np.concatenate([np.zeros((len(every), 1)), ahead], axis=1)[:, cuts]
     statistic = ahead.max(axis=1) - ahead.min(axis=1)
-    first, last = int(ahead[0].argmin()), int(ahead[0].argmax())
+    first, last = int(cuts[ahead[0].argmin()]), int(cuts[ahead[0].argmax()])
     inside = np.zeros(count, dtype=bool)
     if first < last:
         inside[order[first:last]] = True
@@ -181,9 +185,17 @@ def _ordered(name: str, every: Array, values: Array, usual: Array) -> tuple[Regi
     return share, statistic
 
 
+def _between_values(ranked: Array) -> Integers:
+    """Places at which sorted values may be cut: nowhere inside a group of equal ones."""
+    inner = 1 + np.flatnonzero(np.diff(ranked) > _TIED * np.ptp(ranked))
+    return np.concatenate([[0], inner, [len(ranked)]])
+
+
 def _trend(every: Array, values: Array) -> Array:
     """(P,) size of the trend of weights (P, n) with the ranks of values (n,)."""
-    rank = np.argsort(np.argsort(values, kind="stable"), kind="stable") - 0.5 * (len(values) - 1)
+    from scipy.stats import rankdata
+
+    rank = rankdata(values) - 0.5 * (len(values) + 1)
     return np.asarray(np.abs(every @ rank) / len(values))
 
 

@@ -11,7 +11,15 @@ from ddagr_gym.physics.effects.registry import effect_kinds
 
 _PACKAGE = Path(__file__).resolve().parents[1]
 _FOLDERS = ("diagnosis", "replay", "physics", "sensors", "recordings", "control")
-_FILES = ("simulator.py", "simulator_kernel.py", "parameters.py", "reporting/wording.py")
+_FILES = (
+    "simulator.py",
+    "simulator_kernel.py",
+    "parameters.py",
+    "frames.py",
+    "jit.py",
+    "reporting/evidence.py",
+    "reporting/wording.py",
+)
 
 
 def source_digest() -> str:

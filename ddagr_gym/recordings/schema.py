@@ -20,6 +20,7 @@ import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -185,7 +186,7 @@ class Recording:
         """Whether every one of the channels holds at least two samples."""
         return all(np.count_nonzero(np.isfinite(self[name])) >= 2 for name in names)
 
-    @property
+    @cached_property
     def period(self) -> float:
         """Median time between rows inside segments [s]."""
         steps = np.concatenate([np.diff(self.t[a:b]) for a, b in self.meta.segments] or [np.empty(0)])

@@ -75,3 +75,13 @@ def test_a_steady_reading_between_changes_is_no_hold(steady: str) -> None:
 
 def test_a_hold_longer_than_the_effect_knows_is_its_longest() -> None:
     assert hold_effect([Held("gyro", 0.9, 75.0, 100)]).duration == 60.0
+
+
+@pytest.mark.parametrize("rate", [5, 10])
+def test_zeros_of_a_robot_that_often_stops_are_no_repeats(rate: int) -> None:
+    """Encoders read seldom and rounded, in a drive of short moves."""
+    t = np.arange(60 * rate) / rate
+    speed = np.where(t % 3.0 < 1.4, 0.8, 0.0) * (1.0 + 0.2 * np.sin(1.7 * t))
+    turned = np.round(speed / 0.02) * 0.02
+    columns = {"t": t, "command_right": speed, "command_left": speed, "encoder_right": turned, "encoder_left": turned}
+    assert find_held([Recording.from_columns(columns)]) == ()

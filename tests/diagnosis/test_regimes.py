@@ -40,3 +40,18 @@ def test_a_size_that_drifts_is_found_in_few_windows() -> None:
 def test_a_constant_size_is_seldom_uneven() -> None:
     """At a level of 5 percent, less those whose sizes differ by little."""
     assert sum(_tested(0.0, seed) is not None for seed in range(100)) <= 8
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_range_holds_all_pieces_with_its_values(seed: int) -> None:
+    """Most commands do not change: pieces with the same value are inside a range together or not at all."""
+    rng = np.random.default_rng(seed)
+    values = np.where(rng.random(300) < 0.6, 0.0, rng.exponential(1.0, 300))
+    weight = rng.exponential(1.0, 300) * np.where(np.arange(300) < 60, 3.0, 1.0)
+    share, _ = _ordered(NAME, weight[None] / weight.sum(), values, np.full(300, 1.0 / 300.0))
+    low = -np.inf if share.low is None else share.low
+    high = np.inf if share.high is None else share.high
+    inside = (values > low) & (values < high)
+    assert share.time_inside == pytest.approx(inside.mean(), abs=0.05)
+    if share.low is not None and share.high is not None:
+        assert share.time_inside == pytest.approx(inside.mean())
