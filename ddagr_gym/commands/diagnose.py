@@ -225,6 +225,9 @@ def outcome_text(diagnosis: Diagnosis) -> str:
         parts.append(f"What comes nearest leaves too much to be named: {nearest}.")
     if diagnosis.fit is not None:
         parts += _fit_texts(diagnosis.fit)
+    if diagnosis.next_drive is not None:
+        manoeuvre = str(diagnosis.next_drive["manoeuvre"]).replace("_", " ")
+        parts.append(f"Next drive: {manoeuvre or 'none'}. {diagnosis.next_drive['why']}")
     return "\n\n".join(parts)
 
 

@@ -187,6 +187,22 @@ def gain_share(gained: Mapping[str, Array]) -> dict[str, Any] | None:
     return _estimate(np.where(sound, gained["corrected"] / np.where(sound, gained["ceiling"], 1.0), np.nan))
 
 
+def of_mended_readings(fit: Mapping[str, Any], named: bool) -> dict[str, Any]:
+    """A certificate of readings that were mended before any model saw them.
+
+    Args:
+        fit: of the mended readings.
+        named: whether effects besides those that were mended are in the corrected model. Without any its share of what
+            could be explained would be nothing, which says nothing about what was mended.
+    """
+    note = (
+        f"{fit['note']} Faults that show in the values themselves (repeats, a reversed gyro) are mended before any "
+        "model is fitted: these errors say nothing about them."
+    )
+    shares = {} if named else {name: dict.fromkeys(fit[name]) for name in ("gain_share", "gain_share_readings")}
+    return {**fit, "note": note, **shares}
+
+
 def worse_on_unseen(fit: Mapping[str, Any] | None) -> dict[str, Any] | None:
     """The horizon and gain at which the corrected model certainly predicts drives worse than the refitted nominal one.
 

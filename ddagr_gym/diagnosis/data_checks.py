@@ -75,6 +75,11 @@ def _doubt(recording: str, finding: Finding) -> DataDoubt:
     return DataDoubt(recording, finding.channel, finding.check, sentence, finding.suspects)
 
 
+def suspects_of(doubts: Sequence[DataDoubt]) -> tuple[str, ...]:
+    """Effects that would explain what the checks found, each once."""
+    return tuple(dict.fromkeys(name for doubt in doubts for name in doubt.suspects))
+
+
 def dead_channels(doubts: Sequence[DataDoubt]) -> tuple[str, ...]:
     """Channels which a diagnosis would compare and which never change while the robot drives."""
     stuck = {doubt.channel for doubt in doubts if doubt.finding == STUCK}

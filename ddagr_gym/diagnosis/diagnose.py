@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -308,9 +308,9 @@ def _findings(problem: Problem, found: Found, thresholds: Thresholds, rng: np.ra
 
 def _thresholds(thresholds: Thresholds) -> dict[str, Any]:
     """Where the gates come from, and all of them."""
-    kind = {} if thresholds.origin is None else {"kind": thresholds.origin.kind}
+    origin = {} if thresholds.origin is None else asdict(thresholds.origin)
     gates = {name: gate.gain for name, gate in thresholds.gates.items()}
-    return {"nulls": thresholds.nulls, "bank": thresholds.bank, "level": thresholds.level, **kind, "gates": gates}
+    return {"nulls": thresholds.nulls, "bank": thresholds.bank, "level": thresholds.level, **origin, "gates": gates}
 
 
 def _detectable(found: Found, thresholds: Thresholds) -> dict[str, dict[str, float]]:

@@ -52,13 +52,16 @@ def roughest(misfit: dict[str, float], limits: dict[str, float]) -> tuple[str, f
 
 
 _ORDINARY = 0.75
-"""Misfit over its limit that drives with nothing missing have (the null bank's median)."""
+"""Misfit over its limit above which it counts as mismatch (ours: the roughest channel of 62 blind drives in which
+nothing was found reached 0.40 in the median and 0.61 at most)."""
 
 
 def explained_share(
     before: Mapping[str, float], after: Mapping[str, float], limits: Mapping[str, float]
 ) -> float | None:
     """Share of the misfit beyond the ordinary that a model takes away, over all channels; None where there is none.
+
+    What does not stand above :data:`_ORDINARY` of a limit counts on neither side: much of it is noise.
 
     Args:
         before: misfit of the nominal model.

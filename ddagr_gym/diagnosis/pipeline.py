@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 
 from ddagr_gym.diagnosis.bounds import pushed_to_bounds
-from ddagr_gym.diagnosis.certificate import worse_on_unseen
+from ddagr_gym.diagnosis.certificate import of_mended_readings, worse_on_unseen
 from ddagr_gym.diagnosis.certify import certify
-from ddagr_gym.diagnosis.data_checks import DataDoubt, data_doubts, dead_channels
+from ddagr_gym.diagnosis.data_checks import DataDoubt, data_doubts, dead_channels, suspects_of
 from ddagr_gym.diagnosis.diagnose import Prepared, accepted, conclude, prepare, searched
 from ddagr_gym.diagnosis.evidence import Evidence, gather_evidence
 from ddagr_gym.diagnosis.held_spans import held_where
@@ -28,7 +28,13 @@ from ddagr_gym.diagnosis.next_drive import next_drive, rivals_of_diagnosis, sens
 from ddagr_gym.diagnosis.regimes import Unevenness
 from ddagr_gym.diagnosis.regimes_words import uneven_phrase
 from ddagr_gym.diagnosis.search import Found
-from ddagr_gym.diagnosis.sentences import dead_in_words, headline, pushed_in_words, worse_in_words
+from ddagr_gym.diagnosis.sentences import (
+    dead_in_words,
+    headline,
+    pushed_in_words,
+    suspects_in_words,
+    worse_in_words,
+)
 from ddagr_gym.diagnosis.setting import Setting
 from ddagr_gym.diagnosis.sources import source_digest
 from ddagr_gym.diagnosis.store import StepStore
@@ -189,7 +195,8 @@ def _doubted(
 
     The verdict is not the whole truth where a size is not the same everywhere or at the bound of what exists, where
     much of the mismatch is left, where drives that nothing was fitted to are certainly predicted worse with it, or
-    where a channel is dead.
+    where a channel is dead. Where nothing has a name, the sentence has the effects that the checks of the recordings
+    suspect.
     """
     located = {**where["findings"], **held}
     findings = tuple(replace(f, where=located.get(f.name)) for f in diagnosis.findings)
@@ -204,10 +211,14 @@ def _doubted(
         doubts.append(worse_in_words(**worse))
     dead = dead_channels(checks)
     silent = [dead_in_words(dead)] if dead else []
-    doubts = silent if diagnosis.verdict in ((NONE,), (UNKNOWN,)) else [*doubts, *silent]
-    share = where["explained"] if findings else None
+    nameless = diagnosis.verdict in ((NONE,), (UNKNOWN,))
+    doubts = silent if nameless else [*doubts, *silent]
+    # what was seen in the values is mended in all models: its share is not known
+    share = where["explained"] if any(f.gate > 0.0 for f in findings) else None
     whole = diagnosis.complete and (share is None or share >= WHOLE)
-    sentence = headline(diagnosis.verdict, whole, findings, share, doubts)
+    suspects = suspects_of(checks) if nameless else ()
+    remarks = [suspects_in_words(suspects)] if suspects else []
+    sentence = headline(diagnosis.verdict, whole, findings, share, [*doubts, *remarks])
     return replace(diagnosis, findings=findings, complete=whole and not doubts, sentence=sentence)
 
 
@@ -241,7 +252,7 @@ def _next_drive(
 
 def _certified(task: Task, prepared: Prepared, found: Found, progress: Callable[[str], None]) -> Mapping[str, Any]:
     """Errors of the models; one that names nothing has no corrected model of its own."""
-    return certify(
+    fit = certify(
         prepared.problem,
         found.nominal.fitted,
         found.chosen.fitted,
@@ -250,6 +261,8 @@ def _certified(task: Task, prepared: Prepared, found: Found, progress: Callable[
         task.rng("certification"),
         progress,
     )
+    mended = prepared.held or prepared.flipped is not None
+    return of_mended_readings(fit, named=bool(found.chosen.names)) if mended else fit
 
 
 def effect_intervals(diagnosis: Diagnosis) -> Sequence[Mapping[str, tuple[float, float]]]:

@@ -7,6 +7,9 @@ from collections.abc import Sequence
 from ddagr_gym.diagnosis.verdict import NONE, UNKNOWN, Finding
 from ddagr_gym.reporting.wording import amounts, describe, in_sentence
 
+RIVAL_WEIGHT = 0.2
+"""Weight in the equivalence set from which a rival stands in the headline (ours)."""
+
 
 def headline(
     verdict: Sequence[str],
@@ -28,10 +31,20 @@ def headline(
         return "; ".join(["Nothing is missing that these recordings can show", *doubts]) + "."
     if tuple(verdict) == (UNKNOWN,):
         return "; ".join(["Something is missing that no effect of the library explains", *doubts]) + "."
-    found = _joined([describe(item.name, amounts(item.parameters)) for item in findings])
+    found = _joined([describe(item.name, amounts(item.parameters)) + _rivals(item) for item in findings])
     share = "" if misfit_share is None else f"; {share_in_words(misfit_share)} of the mismatch"
     rest = "nothing else above what these data can show" if complete else "something more is left that has no name here"
     return "; ".join([f"{found[:1].upper()}{found[1:]}{share}", *doubts, rest]) + "."
+
+
+def _rivals(finding: Finding) -> str:
+    """Names that the same windows may mean nearly as well, in brackets; "" where there are none."""
+    others = [
+        in_sentence(name)
+        for name, weight in finding.equivalence_set.items()
+        if name != finding.name and weight >= RIVAL_WEIGHT
+    ]
+    return f" (or {' or '.join(others)}: these drives do not tell them apart)" if others else ""
 
 
 def share_in_words(share: float) -> str:
@@ -82,6 +95,16 @@ def dead_in_words(channels: Sequence[str]) -> str:
     names = " and ".join(", ".join(name.replace("_", " ") for name in channels).rsplit(", ", 1))
     verb, pronoun = ("never change", "they say") if len(channels) > 1 else ("never changes", "it says")
     return f"{names} {verb} while the robot drives, so that {pronoun} nothing"
+
+
+def suspects_in_words(names: Sequence[str]) -> str:
+    """What the recordings' own checks suspect where no effect has a name.
+
+    Args:
+        names: of effects, at least one.
+    """
+    others = " or ".join(in_sentence(name) for name in names)
+    return f"the recordings themselves look wrong in a way that {others} would explain (see their checks)"
 
 
 def _joined(parts: Sequence[str]) -> str:

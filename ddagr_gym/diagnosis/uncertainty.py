@@ -63,7 +63,7 @@ def resampled_parameters(
         total = np.tensordot(weights, normals, axes=1)
         gradient = total[1:, 0] - precision * (here - middle)
         step = bounded_step(total[1:, 1:] + np.diag(precision), gradient, low - here, high - here)
-        found.append((here + step)[len(free) :])
+        found.append(np.clip(here + step, low, high)[len(free) :])
     return parameters, np.array(found).reshape(draws, len(parameters))
 
 
@@ -90,7 +90,9 @@ def with_structure(interval: tuple[float, float], effect: Effect, field: str) ->
         structure = STRUCTURE_OF_LIMIT * abs(value)
     middle, half = 0.5 * (interval[0] + interval[1]), 0.5 * (interval[1] - interval[0])
     wide = float(np.hypot(half, structure))
-    return max(middle - wide, min(data["low"], interval[0])), min(middle + wide, max(data["high"], interval[1]))
+    low, high = max(middle - wide, min(data["low"], interval[0])), min(middle + wide, max(data["high"], interval[1]))
+    # few windows carry the fit where their resampling leaves its value out
+    return min(low, value), max(high, value)
 
 
 def least_detectable(terms: Terms, thresholds: Thresholds, dispersion: float) -> Mapping[str, dict[str, float]]:

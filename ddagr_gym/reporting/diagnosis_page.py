@@ -94,7 +94,9 @@ def _context(diagnosis: Mapping[str, Any], evidence: Evidence, studio: _Studio) 
         "remaining": tables.phrase(localisation.get("remaining")),
         "window": f"{evidence.duration:.3g}",
         "regime_rows": tables.regime_rows(localisation, findings),
-        "gate_note": tables.gate_note(diagnosis["thresholds"]),
+        "gate_note": tables.gate_note(
+            diagnosis["thresholds"], diagnosis.get("robot") or "", diagnosis.get("soil") or ""
+        ),
         "wrench_rows": tables.wrench_rows(localisation),
         "unnamed": tables.unnamed(diagnosis.get("unnamed")),
         "next_drive": tables.next_drive(diagnosis.get("next_drive")),

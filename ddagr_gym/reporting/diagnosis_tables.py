@@ -106,7 +106,7 @@ def finding_card(finding: Entry, recordings: Sequence[str]) -> dict[str, Any]:
         "sizes": [f"{key.replace('_', ' ')} {size(item)}" for key, item in parameters.items()],
         "spans": _spans(where.get("spans") or [], recordings),
         "equivalents": equivalents,
-        "equivalence_note": _equivalence_note(name, equivalents),
+        "equivalence_note": _equivalence_note(name, equivalents, seen=not finding.get("gate")),
     }
 
 
@@ -155,7 +155,9 @@ def _equivalents(name: str, weights: Mapping[str, float]) -> list[dict[str, Any]
     ]
 
 
-def _equivalence_note(name: str, equivalents: Sequence[Entry]) -> str:
+def _equivalence_note(name: str, equivalents: Sequence[Entry], seen: bool) -> str:
+    if seen:
+        return "Seen in the values themselves, before any model: no other effect was held against it."
     if len(equivalents) > 1:
         others = " or ".join(in_sentence(item["name"]) for item in equivalents if not item["own"])
         return f"These recordings do not separate it from {others}: weights by resampling the windows."
@@ -196,13 +198,22 @@ def _range(item: Entry) -> str:
     return range_in_words(str(item["name"]), item.get("low"), item.get("high"))
 
 
-def gate_note(thresholds: Entry) -> str:
-    """What the gates are made of."""
+def gate_note(thresholds: Entry, robot: str = "", soil: str = "") -> str:
+    """What the gates are made of, and whether that was something else than what is diagnosed.
+
+    Args:
+        thresholds: entry of ``diagnosis.json``.
+        robot: of the diagnosis; "" where unknown.
+        soil: of the diagnosis; "" where unknown.
+    """
     nulls, level = thresholds.get("nulls") or 0, thresholds.get("level")
     if not nulls or level is None:
         return "no null drives stand behind it here."
     drives = _NULLS.get(str(thresholds.get("kind")), "null drives")
-    return f"set by {nulls} {drives} at a level of {percent(level)} false alarms over the whole library."
+    made = f"set by {nulls} {drives} at a level of {percent(level)} false alarms over the whole library."
+    pairs = ((thresholds.get("robot"), robot), (thresholds.get("soil"), soil))
+    others = [f"{theirs} instead of {own}" for theirs, own in pairs if theirs and own and theirs != own]
+    return f"{made} They are of {' and '.join(others)}: the level is not known to hold here." if others else made
 
 
 def wrench_rows(localisation: Entry) -> list[list[str]]:
@@ -275,9 +286,11 @@ def _term_row(term: Entry) -> list[str]:
 
 
 def next_drive(item: Entry | None) -> dict[str, Any] | None:
-    """The proposed manoeuvre as text."""
-    if not item or not item.get("manoeuvre"):
+    """The proposed manoeuvre as text, or why there is none."""
+    if not item or not item.get("why"):
         return None
+    if not item.get("manoeuvre"):
+        return {"manoeuvre": "No drive of the standard ones", "why": item["why"]}
     power = item.get("power")
     others = [_alternative(other) for other in item.get("alternatives") or []]
     return {
@@ -336,9 +349,10 @@ def sources(diagnosis: Entry) -> list[tuple[str, str]]:
     data = diagnosis.get("data") or []
     rows = [(str(item["source"]), f"{item['seconds']:.0f} s, SHA-256 {item['sha256']}") for item in data]
     rows = rows or [("Recordings", ", ".join(diagnosis["recordings"]))]
-    for label, key in (("Hash of the data", "data_hash"), ("Robot", "robot"), ("Soil", "soil"), ("Seed", "seed")):
-        if diagnosis.get(key) not in (None, ""):
-            rows.append((label, str(diagnosis[key])))
+    seed = (diagnosis.get("options") or {}).get("seed")
+    for label, value in (("Robot", diagnosis.get("robot")), ("Soil", diagnosis.get("soil")), ("Seed", seed)):
+        if value not in (None, ""):
+            rows.append((label, str(value)))
     rows += [
         ("Gates", f"{thresholds.get('nulls', 0)} null drives, level {thresholds.get('level', '–')}"),
         ("Null bank", str(thresholds.get("bank", "–"))),

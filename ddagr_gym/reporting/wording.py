@@ -210,10 +210,10 @@ def _tilt(a: Amounts) -> str:
 def _saturation(a: Amounts) -> str:
     parts = []
     if a["speed_limit"].value < 1e3:
-        parts.append(f"no faster than {quantity(a['speed_limit'], 'rad/s')}")
+        parts.append(f"turn no faster than {quantity(a['speed_limit'], 'rad/s')}")
     if a["acceleration_limit"].value < _UNBOUNDED:
-        parts.append(f"change by no more than {quantity(a['acceleration_limit'], 'rad/s²')}")
-    return f"the banks turn {' and '.join(parts)}" if parts else "the banks have a limit that was not reached"
+        parts.append(f"change their speed by no more than {quantity(a['acceleration_limit'], 'rad/s²')}")
+    return f"the banks {' and '.join(parts)}" if parts else "the banks have a limit that was not reached"
 
 
 def _lag(a: Amounts) -> str:

@@ -13,6 +13,7 @@ from ddagr_gym.diagnosis.certificate import (
     finished,
     gain_share,
     gains,
+    of_mended_readings,
     resampled,
     worse_on_unseen,
 )
@@ -245,3 +246,11 @@ def test_what_one_model_does_not_finish_counts_for_none() -> None:
     left, lost = finished(errors)
     assert lost == 1
     assert np.isfinite(left["refitted"]["speed"]).tolist() == [True, False, False]
+
+
+def test_readings_that_were_mended_leave_nothing_to_share(sloping: Sloping) -> None:
+    fit = of_mended_readings(sloping.certificate, named=False)
+    assert set(fit["gain_share"].values()) == set(fit["gain_share_readings"].values()) == {None}
+    assert fit["channels"] == sloping.certificate["channels"]
+    assert "mended before" in fit["note"]
+    assert of_mended_readings(sloping.certificate, named=True)["gain_share"] == sloping.certificate["gain_share"]

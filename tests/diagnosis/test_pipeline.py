@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 
+from ddagr_gym.diagnosis.data_checks import DataDoubt
 from ddagr_gym.diagnosis.localisation import Where
 from ddagr_gym.diagnosis.pipeline import _doubted
 from ddagr_gym.diagnosis.regimes import Unevenness
@@ -90,3 +91,21 @@ def test_a_size_at_its_bound_makes_its_form_doubtful(
     made = _doubted(replace(answer, findings=(finding,)), located(), {})
     assert made.complete == (not words)
     assert words in made.sentence
+
+
+def test_what_is_seen_in_the_values_has_no_share_of_the_mismatch() -> None:
+    """It is mended in all models, so that a model without it is not there to compare with."""
+    answer = diagnosis("sensor_hold", "duration", 0.2)
+    seen = replace(answer, findings=(replace(answer.findings[0], gate=0.0),))
+    made = _doubted(seen, located(explained=0.0), {})
+    assert made.complete
+    assert "mismatch" not in made.sentence
+
+
+def test_without_a_name_the_sentence_has_what_the_recordings_own_checks_suspect() -> None:
+    doubt = DataDoubt("a.csv", "encoder_right", "travel", "Twice as far.", ("encoder_scale",))
+    nothing = replace(diagnosis("slope", "angle", 0.1), verdict=("none",), findings=())
+    made = _doubted(nothing, located(), {}, checks=[doubt, doubt])
+    assert made.complete
+    assert made.sentence.count("in a way that encoder scale would explain") == 1, made.sentence
+    assert "look wrong" not in _doubted(diagnosis("slope", "angle", 0.1), located(), {}, checks=[doubt]).sentence

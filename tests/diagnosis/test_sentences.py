@@ -1,7 +1,7 @@
 """The answer in words: every effect of the library, sizes with their doubt, shares."""
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import pytest
 
@@ -148,3 +148,12 @@ def test_amounts_of_json_and_of_objects_are_the_same():
     of_objects = amounts({"delay": Estimate(0.1, "s", (0.09, 0.11))})
     assert amounts({"delay": {"value": 0.1, "unit": "s", "interval": [0.09, 0.11]}}) == of_objects
     assert amounts({"delay": {"value": 0.1, "unit": "s", "interval": None}})["delay"].interval is None
+
+
+def test_the_headline_names_rivals_that_explain_as_much():
+    item = replace(
+        finding("slope", **SLOPE), equivalence_set={"slope": 0.5, "accelerometer_bias": 0.45, "imu_tilt": 0.05}
+    )
+    sentence = headline(("slope",), True, [item])
+    assert "(or accelerometer bias: these drives do not tell them apart); nothing else" in sentence
+    assert "tilt" not in sentence

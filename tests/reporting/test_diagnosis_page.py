@@ -13,8 +13,10 @@ from ddagr_gym.reporting.diagnosis_page import PAGE, PICTURES, _Studio, write_re
 from ddagr_gym.reporting.diagnosis_tables import (
     checks,
     detectable,
+    finding_card,
     fit_table,
     gate_note,
+    next_drive,
     regime_rows,
     shown_gates,
     sources,
@@ -229,6 +231,9 @@ def test_gates_are_traced_to_the_drives_behind_them():
     assert gate_note(known).startswith("set by 60 null drives at a level of 5 %")
     assert "60 simulated drives with nothing missing" in gate_note(known | {"kind": "simulated"})
     ordinary = gate_note(known | {"kind": "ordinary"})
+    foreign = gate_note(known | {"robot": "warthog", "soil": "firm_ground"}, "husky", "firm_ground")
+    assert foreign.endswith("They are of warthog instead of husky: the level is not known to hold here.")
+    assert "instead" not in gate_note(known | {"robot": "husky", "soil": "firm_ground"}, "husky", "firm_ground")
     assert "60 pieces of real drives that are taken to be ordinary" in ordinary
     assert "simulat" not in ordinary
 
@@ -251,10 +256,22 @@ def test_gates_stand_beside_the_least_sizes_where_nothing_was_found(tmp_path):
 
 
 def test_only_known_names_of_robot_and_soil_are_listed():
-    rows = dict(sources(diagnosis(robot="warthog", soil="", seed=0)))
+    rows = dict(sources(diagnosis(robot="warthog", soil="", options={"seed": 0})))
     assert rows["Robot"] == "warthog"
     assert rows["Seed"] == "0"
     assert "Soil" not in rows
+
+
+def test_why_no_drive_would_help_is_said():
+    none = {"manoeuvre": "", "why": "Nothing would tell them apart.", "separates": [], "power": 0.0}
+    assert next_drive(none)["why"] == "Nothing would tell them apart."
+    assert next_drive(None) is None
+
+
+def test_what_was_seen_in_the_values_was_held_against_nothing():
+    (finding,) = diagnosis()["findings"]
+    card = finding_card(finding | {"name": "gyro_sign", "gate": 0.0, "parameters": {}, "equivalence_set": {}}, ["a"])
+    assert "no other effect was held against it" in card["equivalence_note"]
 
 
 def test_tables_by_hand():
