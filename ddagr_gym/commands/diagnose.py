@@ -31,6 +31,9 @@ EXAMPLES = (
 )
 
 PAGE = "index.html"
+_SAME_WINDOW = 0.5
+"""Difference of lengths of windows up to which gates are taken to hold [s] (ours; short segments shorten windows)."""
+
 _ENDINGS = (".csv", ".csv.gz", ".parquet", ".mcap", ".bag")
 _SHOWN = ("position", "pose_yaw", "heading_by_gyro", "yaw_rate", "speed", "specific_force_x", "specific_force_y")
 
@@ -122,6 +125,12 @@ def _task(arguments: Arguments) -> Task:
     priors = NuisancePriors().with_soil(arguments.soil_uncertainty)
     thresholds = _thresholds(arguments)
     window = thresholds.duration if arguments.window is None else arguments.window
+    if abs(window - thresholds.duration) > _SAME_WINDOW:
+        print(
+            f"ddagr: warning: the thresholds were made with windows of {thresholds.duration:g} s instead of "
+            f"{window:g} s, which show other effects: make others with `ddagr null-bank --window {window:g}`.",
+            file=sys.stderr,
+        )
     setting = Setting(priors=priors, threads=arguments.threads).with_windows(window, arguments.stride)
     return Task(
         robot, soil, tuple(recordings), thresholds, setting, arguments.seed, arguments.names_only, arguments.soil
@@ -162,7 +171,12 @@ def diagnosed(task: Task, store: Any = None) -> Outcome:
     from ddagr_gym.diagnosis import pipeline
 
     with _steps(len(task.steps), store) as began:
-        return pipeline.run(task, store, began)
+        return pipeline.run(task, store, began, _told)
+
+
+def _told(text: str) -> None:
+    """What is being done inside a step, on standard error."""
+    print(f"ddagr diagnose:   {text}", file=sys.stderr, flush=True)
 
 
 @contextmanager

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
@@ -118,7 +117,7 @@ def begun(
     prepared = prepare(robot, soil, recordings, setting)
     raw, refitted = keep("search refit", partial(refit_nominal, prepared.problem, progress))
     if dispersion_of(prepared.problem, refitted) > BENT and setting.duration > SHORT:
-        progress("short windows")
+        progress("far off: again in short windows")
         setting = setting.with_windows(SHORT, SHORT * setting.stride / setting.duration)
         prepared = prepare(robot, soil, recordings, setting)
         raw, refitted = keep("search refit, short windows", partial(refit_nominal, prepared.problem, progress))
@@ -211,39 +210,6 @@ def conclude(
         rejected=rejected,
     )
     return diagnosis, effects
-
-
-def diagnose(
-    robot: Robot,
-    soil: Soil,
-    recordings: Sequence[Recording],
-    thresholds: Thresholds,
-    rng: np.random.Generator,
-    setting: Setting | None = None,
-    progress: Callable[[str], None] = lambda text: None,
-) -> tuple[Diagnosis, tuple[Effect, ...]]:
-    """Name what is missing, without certification and what follows; :mod:`ddagr_gym.diagnosis.pipeline` has it all.
-
-    Args:
-        robot: nominal.
-        soil: nominal.
-        recordings: at least one, of one period.
-        thresholds: of the null bank.
-        rng: of the resampling.
-        setting: choices.
-        progress: called with each step.
-
-    Returns:
-        The diagnosis, and the effects that it names with their fitted sizes.
-    """
-    began = time.monotonic()
-    setting = Setting().with_windows(thresholds.duration) if setting is None else setting
-    setting, found = searched(robot, soil, recordings, thresholds, setting, progress)
-    prepared = prepare(robot, soil, recordings, setting)
-    thresholds = thresholds.for_length(prepared.problem.covered)
-    progress("doubt")
-    diagnosis, effects = conclude(prepared, found, thresholds, rng)
-    return replace(diagnosis, seconds=time.monotonic() - began), effects
 
 
 def _held_findings(held: Sequence[Held]) -> list[Finding]:

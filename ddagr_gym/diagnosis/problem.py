@@ -6,7 +6,7 @@ factorisation, so that a sensitivity that they could explain counts for nothing.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -193,7 +193,7 @@ class Problem:
         rows = np.zeros((columns.shape[0], len(self._unknown_priors), columns.shape[2]))
         return np.concatenate([columns, rows], axis=1)
 
-    def parameter_columns(self, point: Point, base: Array, progress: Callable[[], None] = lambda: None) -> Array:
+    def parameter_columns(self, point: Point, base: Array) -> Array:
         """Weighted sensitivity to every nuisance parameter, (W, M, P)."""
         columns = []
         for k, parameter in enumerate(self.nuisances.parameters):
@@ -208,7 +208,6 @@ class Problem:
             moved = point.values.copy()
             moved[k] += step
             columns.append(self.blocked.change(self.predict(replace(point, values=moved)), base) / step)
-            progress()
         return self.heading_columns(point, base, np.stack(columns, axis=2))
 
     def heading_columns(self, point: Point, base: Array, by_parameter: Array) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -158,7 +158,6 @@ def fit(
     reuse: Fitted | None = None,
     first: Fitted | None = None,
     fixed: frozenset[str] = frozenset(),
-    progress: Callable[[], None] = lambda: None,
 ) -> Fitted:
     """Fit from ``start`` (the nominal model by default).
 
@@ -172,7 +171,6 @@ def fit(
         reuse: fit whose nuisance sensitivities are kept throughout, so that only those of the effects are simulated.
         first: fit at ``start`` whose nuisance sensitivities serve for the first step only.
         fixed: names of effect parameters to leave alone.
-        progress: called after each step.
     """
     point = problem.start() if start is None else start
     parameters = effect_parameters(point.effects, fixed)
@@ -198,7 +196,6 @@ def fit(
         small = before - cost < tolerance * cost
         # a step that fails with sensitivities of another point says nothing about this one
         converged = small and (fresh or reuse is not None)
-        progress()
         fresh = False
         if reuse is None and not converged and (done < renewals or small):
             by_parameter, elimination = _sensitivities(problem, point, prediction)

@@ -49,12 +49,10 @@ class Found:
 
     Attributes:
         standings: models from the nominal one to the chosen one.
-        rivals: refits of the step that chose the first effect, best first.
         steps: refits of every step, best first; of the steps that added an effect, in the order of ``standings[1:]``.
     """
 
     standings: tuple[Standing, ...]
-    rivals: tuple[Rival, ...]
     steps: tuple[tuple[Rival, ...], ...] = ()
 
     @property
@@ -203,7 +201,7 @@ def _finish(problem: Problem, standing: Standing, rival: Rival, large: bool) -> 
 
 def refit_nominal(problem: Problem, progress: Callable[[str], None] = lambda text: None) -> tuple[Fitted, Fitted]:
     """The raw nominal model with its sensitivities, and the refitted one."""
-    progress("nominal refit")
+    progress("refitting the nominal model")
     raw = fit(problem, iterations=0)
     return raw, fit(problem, raw.point, first=raw)
 
@@ -261,7 +259,7 @@ def search(
     if steps and not standings[-1].fitted.converged:
         progress("last refit")
         standings[-1] = _settled(problem, standings[-1])
-    return Found(tuple(standings), steps[0] if steps else (), tuple(steps))
+    return Found(tuple(standings), tuple(steps))
 
 
 def further_gates(thresholds: Thresholds, standings: Sequence[Standing]) -> Thresholds:

@@ -12,6 +12,7 @@ from ddagr_gym.diagnosis.headings import without_poses
 from ddagr_gym.diagnosis.noise import ChannelNoise, recording_noise
 from ddagr_gym.diagnosis.nuisance import NuisancePriors, nuisances
 from ddagr_gym.diagnosis.problem import Problem
+from ddagr_gym.errors import InputError
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.replay.windows import cut_windows
@@ -53,7 +54,15 @@ class Setting:
         Args:
             duration: of a window [s].
             stride: between their starts [s]; by default their length, which uses all samples once.
+
+        Raises:
+            InputError: windows that overlap: gains and intervals would count their samples several times.
         """
+        if stride is not None and stride < duration:
+            raise InputError(
+                f"a stride of {stride:g} s makes windows of {duration:g} s overlap, and samples count several times: "
+                "give at least the windows' length."
+            )
         return replace(self, duration=duration, stride=duration if stride is None else stride)
 
 

@@ -58,7 +58,8 @@ class Rival:
 
 def stand(problem: Problem, fitted: Fitted, progress: Callable[[str], None] = lambda text: None) -> Standing:
     """Scan the library at a fitted model."""
-    terms = scan(problem, fitted, progress=progress)
+    progress("scanning the library")
+    terms = scan(problem, fitted)
     dispersion = dispersion_of(problem, fitted)
     found = tuple(gains(terms, dispersion=dispersion))
     held_out = held_out_gains(terms, dispersion)

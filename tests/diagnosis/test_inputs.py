@@ -74,3 +74,9 @@ def test_logs_cut_into_steps_of_one_window_pass() -> None:
 def test_short_recordings_get_shorter_windows(seconds: float, duration: float) -> None:
     recording = made(rate=50.0, seconds=seconds)
     assert window_duration([recording], Setting().with_windows(6.0)) == pytest.approx(duration, rel=0.01)
+
+
+def test_windows_may_not_overlap() -> None:
+    assert Setting().with_windows(3.0, 8.0).stride == 8.0
+    with pytest.raises(InputError, match=r"a stride of 1 s makes windows of 3 s overlap"):
+        Setting().with_windows(3.0, 1.0)

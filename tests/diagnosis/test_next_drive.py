@@ -109,8 +109,8 @@ def test_where_nothing_is_named_what_comes_nearest_is_planned_for() -> None:
 
 
 def test_a_plan_has_the_windows_and_priors_of_the_diagnosis() -> None:
-    setting = Setting(priors=NuisancePriors().with_soil(4.0)).with_windows(6.0, 3.0)
-    options = {"window": 6.0, "stride": 3.0, "block": setting.block, "priors": asdict(setting.priors), "seed": 0}
+    setting = Setting(priors=NuisancePriors().with_soil(4.0)).with_windows(3.0, 6.0)
+    options = {"window": 3.0, "stride": 6.0, "block": setting.block, "priors": asdict(setting.priors), "seed": 0}
     assert setting_of_diagnosis({"options": options}) == setting
     assert setting_of_diagnosis({"options": {}}) == Setting()
     with pytest.raises(InputError, match="stride"):
