@@ -1,10 +1,11 @@
-"""Named robots and soils, each set with its source, returned fresh."""
+"""Named robots and soils, each set with its source, and those of YAML files, returned fresh."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
 
+from ddagr_gym.config import load_config
 from ddagr_gym.errors import unknown_name
 from ddagr_gym.parameters import Robot, Soil, TorusWheel
 from ddagr_gym.published_soils import PUBLISHED_SOILS
@@ -167,29 +168,40 @@ def soil_names() -> tuple[str, ...]:
     return tuple(_SOILS)
 
 
+def is_file(name: object) -> bool:
+    """Whether this is the path of a YAML file rather than a name."""
+    return str(name).endswith((".yaml", ".yml"))
+
+
 def soil_source(name: str) -> str:
     """Where the soil ``name`` comes from."""
     get_soil(name)
+    if is_file(name):
+        return name
     return _SOILS[name][1]
 
 
 def get_robot(name: str) -> Robot:
-    """Robot by name.
+    """Robot by name, or from a YAML file with the fields of :class:`~ddagr_gym.parameters.Robot`.
 
     Raises:
-        InputError: unknown name, with the closest ones.
+        InputError: unknown name, with the closest ones; a file that is missing or not valid.
     """
+    if is_file(name):
+        return load_config(name, Robot)
     if name not in _ROBOTS:
         raise unknown_name("robot", name, _ROBOTS)
     return _ROBOTS[name]()
 
 
 def get_soil(name: str) -> Soil:
-    """Soil by name.
+    """Soil by name, or from a YAML file with the fields of :class:`~ddagr_gym.parameters.Soil`.
 
     Raises:
-        InputError: unknown name, with the closest ones.
+        InputError: unknown name, with the closest ones; a file that is missing or not valid.
     """
+    if is_file(name):
+        return load_config(name, Soil)
     if name not in _SOILS:
         raise unknown_name("soil", name, _SOILS)
     return _SOILS[name][0]()

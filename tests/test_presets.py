@@ -2,9 +2,11 @@
 
 import csv
 import math
+from dataclasses import replace
 
 import pytest
 
+from ddagr_gym.config import configs_dir, dump_config
 from ddagr_gym.errors import InputError
 from ddagr_gym.presets import get_robot, get_soil, robot_names, soil_names, soil_source
 
@@ -83,3 +85,27 @@ def test_name_like_no_other_lists_all(name):
     with pytest.raises(InputError) as error:
         get_robot(name)
     assert all(known in str(error.value) for known in robot_names())
+
+
+def test_a_robot_of_ones_own_is_a_file():
+    mine = get_robot(str(configs_dir() / "robots" / "example.yaml"))
+    assert replace(mine, name="ddagr", source=get_robot("ddagr").source) == get_robot("ddagr")
+
+
+@pytest.mark.parametrize("name", ["thesis_a1", "firm_ground"])
+def test_soils_come_back_from_files(name, tmp_path):
+    path = tmp_path / "mine.yaml"
+    path.write_text(dump_config(get_soil(name)))
+    assert get_soil(str(path)) == get_soil(name)
+    assert soil_source(str(path)) == str(path)
+
+
+def test_files_that_do_not_fit_are_refused_with_the_place(tmp_path):
+    path = tmp_path / "mine.yaml"
+    with pytest.raises(InputError, match="cannot be read"):
+        get_robot(str(path))
+    path.write_text(dump_config(get_soil("thesis_a1")).replace("cohesion: 4140.0", "cohesion: -1"))
+    with pytest.raises(InputError, match="cohesion"):
+        get_soil(str(path))
+    with pytest.raises(InputError, match="unknown key 'cohesion'"):
+        get_robot(str(path))

@@ -48,10 +48,11 @@ class Arguments:
 
     Attributes:
         runs: recordings (Parquet of `ddagr import`, or any source that it takes), or folders of them.
-        output: folder to write: index.html with its figures, diagnosis.json, evidence.npz, and effects.json and
-            effects.yaml, which `gym.make`, `ddagr simulate` and `ddagr replay` load.
-        robot: nominal robot (see `ddagr robots`).
-        soil: nominal soil (see `ddagr soils`).
+        output: folder to write: index.html with its figures, diagnosis.json, evidence.npz, and what `gym.make`,
+            `ddagr simulate` and `ddagr replay` load: effects.json or effects.yaml with the effects that were named, and
+            robot.yaml and soil.yaml with the refitted nominal parameters.
+        robot: nominal robot (see `ddagr robots`), or the path of a YAML file with one's own.
+        soil: nominal soil (see `ddagr soils`), or the path of a YAML file with one's own.
         map: shipped map by name or the path of one's own YAML file, for sources that are not imported yet.
         thresholds: of `ddagr null-bank`, made with these or similar drives; those that ship with the package when it is
             left out.
@@ -197,7 +198,7 @@ def _steps(count: int, store: Any) -> Iterator[Any]:
 
 
 def write_outcome(outcome: Outcome, folder: Path, page: bool = True) -> None:
-    """Diagnosis, effects, evidence and page into a folder that exists.
+    """Diagnosis, corrected simulator, evidence and page into a folder that exists.
 
     Args:
         outcome: of the pipeline.
@@ -218,11 +219,28 @@ def write_outcome(outcome: Outcome, folder: Path, page: bool = True) -> None:
             data_hash=data_hash(diagnosis),
             source=diagnosis.sentence,
         )
+    _write_simulator(outcome, folder)
     save(diagnosis, folder / "diagnosis.json")
     outcome.evidence.save(folder / evidence.NAME)
     if page:
         diagnosis_page.write_report(folder, as_mapping(diagnosis), outcome.evidence)
         (folder / diagnosis_page.PAGE).rename(folder / PAGE)
+
+
+def _write_simulator(outcome: Outcome, folder: Path) -> None:
+    """Robot and soil as refitted beside the effects, unless the refit went where no soil of these parameters is."""
+    from ddagr_gym.config import dump_config
+    from ddagr_gym.diagnosis.fitted_nominal import with_values
+
+    try:
+        robot, soil = with_values(*outcome.nominal, outcome.diagnosis.nuisances)
+    except InputError as error:
+        print(
+            f"ddagr: robot.yaml and soil.yaml are left out, the refitted values are no soil: {error}", file=sys.stderr
+        )
+        return
+    for name, fitted in (("robot.yaml", robot), ("soil.yaml", soil)):
+        (folder / name).write_text(f"# refitted: {outcome.diagnosis.sentence}\n{dump_config(fitted)}")
 
 
 def outcome_text(diagnosis: Diagnosis) -> str:

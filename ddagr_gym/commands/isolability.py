@@ -33,8 +33,8 @@ class Arguments:
         output: folder for isolability.json, isolability.txt and the figure; the table is only printed without one.
         manoeuvres: names of built-in drives, or CSV files of commands.
         sensors: some of imu, encoders, pose.
-        robot: nominal robot.
-        soil: nominal soil.
+        robot: nominal robot: name (ddagr robots) or YAML file.
+        soil: nominal soil: name (ddagr soils) or YAML file.
         soil_uncertainty: as for `ddagr diagnose`.
         thresholds: gates of `ddagr null-bank`; by default those that ship for the robot, and where none do those that
             normal noise alone asks for (chi-square): real drives need larger sizes then.

@@ -48,8 +48,8 @@ class Arguments:
             the length and whole drives say beside them how gains grow with the length.
         piece: length of such a piece [s], at least 16 (8 windows of 2 s).
         output: thresholds to write, .json; the runs themselves lie beside it.
-        robot: nominal robot.
-        soil: nominal soil.
+        robot: nominal robot: name (ddagr robots) or YAML file.
+        soil: nominal soil: name (ddagr soils) or YAML file.
         map: column map, for sources that are not imported yet.
         count: null drives to simulate; at least 20 for the level of 5 percent.
         seed: of the bank.

@@ -45,8 +45,9 @@ class Arguments:
     Attributes:
         runs: recordings: Parquet of `ddagr import`, or any source that it takes.
         output: folder to write: replay.json, figures as PNG and SVG, and one page, index.html.
-        soil: nominal soil (see `ddagr soils`).
-        robot: robot that drove (see `ddagr robots`); that of the recordings when it is left out.
+        soil: nominal soil (see `ddagr soils`), or the path of a YAML file with one's own.
+        robot: robot that drove (see `ddagr robots`), or a YAML file with one's own; that of the recordings when it is
+            left out.
         map: shipped map by name or the path of one's own YAML file, for sources that are not imported yet.
         effects: missing physics to add, name=size or an effects file; may be repeated.
         window: length of the windows with free initial states [s]; fit with windows as long as the horizon that counts.

@@ -24,8 +24,8 @@ class Arguments:
 
     Attributes:
         manoeuvre: name of a built-in drive, or a CSV with columns t, command_right, command_left [s, rad/s].
-        soil: name of a soil (ddagr soils).
-        robot: name of a robot (ddagr robots).
+        soil: name of a soil (ddagr soils), or the path of a YAML file with one's own.
+        robot: name of a robot (ddagr robots), or the path of a YAML file with one's own.
         effect: missing physics, name=size or name=size,parameter=value, or an effects file; may be repeated.
         output: recording to write, .parquet or .csv.
         figure: figure to write, .png (an .svg stands beside it).

@@ -114,6 +114,7 @@ class Outcome:
         prepared: windows and model.
         found: by the search.
         evidence: what the page draws.
+        nominal: robot and soil that were diagnosed.
     """
 
     diagnosis: Diagnosis
@@ -121,6 +122,7 @@ class Outcome:
     prepared: Prepared
     found: Found
     evidence: Evidence
+    nominal: tuple[Robot, Soil]
 
 
 def run(
@@ -175,7 +177,7 @@ def run(
         seconds=seconds,
         **entries,
     )
-    return Outcome(diagnosis, effects, prepared, found, evidence)
+    return Outcome(diagnosis, effects, prepared, found, evidence, (task.robot, task.soil))
 
 
 def _options(task: Task, setting: Setting) -> dict[str, Any]:

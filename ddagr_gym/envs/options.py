@@ -13,7 +13,7 @@ from ddagr_gym.errors import InputError, unknown_name
 from ddagr_gym.parameters import Numerics, Robot, Sensors, Soil
 from ddagr_gym.physics.effects import Effect, load_effects
 from ddagr_gym.physics.soil_draws import SoilDistribution, distribution_names, get_distribution
-from ddagr_gym.presets import get_robot, get_soil, soil_names
+from ddagr_gym.presets import get_robot, get_soil, is_file, soil_names
 
 DEFAULT_SOIL = "thesis_a1_range"
 DEFAULT_REWARD = RewardWeights()
@@ -23,18 +23,30 @@ Effects = str | Path | Effect | Iterable[str | Effect]
 
 
 def find_soil(soil: str | Soil | SoilDistribution) -> Soil | SoilDistribution:
-    """Soil or distribution by name; objects pass through.
+    """Soil or distribution by name or from a YAML file; objects pass through.
 
     Raises:
-        InputError: unknown name, with the closest ones.
+        InputError: unknown name, with the closest ones; a file that is neither.
     """
     if not isinstance(soil, str):
         return soil
+    if is_file(soil):
+        return _soil_of_file(soil)
     if soil in distribution_names():
         return get_distribution(soil)
     if soil in soil_names():
         return get_soil(soil)
     raise unknown_name("soil", soil, [*distribution_names(), *soil_names()])
+
+
+def _soil_of_file(path: str) -> Soil | SoilDistribution:
+    try:
+        return get_soil(path)
+    except InputError as no_soil:
+        try:
+            return get_distribution(path)
+        except InputError as no_distribution:
+            raise InputError(f"{path} is no soil ({no_soil}) and no distribution ({no_distribution})") from None
 
 
 def make_settings(

@@ -70,7 +70,12 @@ def found(work: Path) -> Path:
     return work / "found"
 
 
-@pytest.mark.slow
+def test_refitted_robot_and_soil_are_nearer_to_the_true_ones(found: Path) -> None:
+    robot, soil = get_robot(str(found / "robot.yaml")), get_soil(str(found / "soil.yaml"))
+    assert robot.name == "ddagr"
+    assert 0.8 < soil.pressure(0.01, 0.1) / get_soil("thesis_a1").pressure(0.01, 0.1) < 1.2
+
+
 def test_the_slope_is_named_and_certified(found: Path) -> None:
     diagnosis = load(found / "diagnosis.json")
     assert diagnosis["verdict"] == ["slope"]
@@ -84,16 +89,15 @@ def test_the_slope_is_named_and_certified(found: Path) -> None:
     assert diagnosis["next_drive"]["why"]
 
 
-@pytest.mark.slow
 def test_the_folder_is_complete(found: Path) -> None:
     names = {path.relative_to(found).as_posix() for path in found.rglob("*") if path.is_file()}
     assert {"index.html", "diagnosis.json", "effects.json", "effects.yaml", "evidence.npz"} <= names
+    assert {"robot.yaml", "soil.yaml"} <= names
     assert any(name.endswith(".png") for name in names)
     assert "Sloping ground" in (found / "index.html").read_text()
     assert not part_folder(found).exists()
 
 
-@pytest.mark.slow
 def test_both_effects_files_hold_what_the_diagnosis_says(found: Path) -> None:
     named = load(found / "diagnosis.json")["findings"][0]["parameters"]
     for name in ("effects.json", "effects.yaml"):
@@ -101,7 +105,6 @@ def test_both_effects_files_hold_what_the_diagnosis_says(found: Path) -> None:
         assert effect.as_mapping()["parameters"] == {key: item["value"] for key, item in named.items()}
 
 
-@pytest.mark.slow
 def test_the_loop_closes(found: Path, work: Path) -> None:
     """Replayed and refitted with the effects file, the drives' errors fall as the diagnosis certified.
 

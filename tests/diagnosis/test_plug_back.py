@@ -9,12 +9,13 @@ import pytest
 
 import ddagr_gym.envs  # noqa: F401 (registers the environments)
 from ddagr_gym import cli
-from ddagr_gym.config import parse_config
+from ddagr_gym.config import dump_config, parse_config
+from ddagr_gym.diagnosis.fitted_nominal import with_values
 from ddagr_gym.diagnosis.forecast import cut_forecasts, errors_at, past_elimination, roll_out, start_states
 from ddagr_gym.diagnosis.problem import Point
 from ddagr_gym.physics.effects import load_effects
 from ddagr_gym.physics.effects.files import read_effects_file, save_effects
-from ddagr_gym.presets import get_robot
+from ddagr_gym.presets import get_robot, get_soil
 from tests.diagnosis.conftest import Sloping
 
 
@@ -79,3 +80,23 @@ def test_a_training_configuration_takes_the_file(sloping: Sloping, effects_file:
     made = gymnasium.make("DDAGR-Turn-v0", **task.environment(PolicyDesign()))
     assert made.unwrapped.settings.effects == sloping.chosen.point.effects
     made.close()
+
+
+def test_the_corrected_simulator_drives_everywhere(sloping: Sloping, effects_file: Path, tmp_path: Path) -> None:
+    """Refitted robot and soil as files beside the effects: an environment and the simulator take them."""
+    names = [parameter.name for parameter in sloping.problem.nuisances.parameters]
+    values = dict(zip(names, sloping.chosen.point.values.tolist(), strict=True))
+    robot, soil = with_values(get_robot("ddagr"), get_soil("thesis_a1"), values)
+    assert soil != get_soil("thesis_a1")
+    paths = [tmp_path / "robot.yaml", tmp_path / "soil.yaml"]
+    for path, item in zip(paths, (robot, soil), strict=True):
+        path.write_text(dump_config(item))
+    files = [os.fspath(path) for path in paths]
+    made = gymnasium.make("DDAGR-Turn-v0", robot=files[0], soil=files[1], effects=os.fspath(effects_file))
+    settings = made.unwrapped.settings
+    assert (settings.robot, settings.soil, settings.effects) == (robot, soil, sloping.chosen.point.effects)
+    made.close()
+    words = ["simulate", "--manoeuvre", "arcs", "--rate", "25", "--no-noise", "--effect", str(effects_file)]
+    output = tmp_path / "drive.csv"
+    assert cli.main([*words, "--robot", files[0], "--soil", files[1], "--output", str(output)]) == 0
+    assert output.is_file()

@@ -1,0 +1,25 @@
+"""Soils of an environment: by name, or from files of single soils and of distributions."""
+
+from pathlib import Path
+
+import pytest
+
+from ddagr_gym.config import configs_dir, dump_config
+from ddagr_gym.envs.options import find_soil
+from ddagr_gym.errors import InputError
+from ddagr_gym.physics.soil_draws import get_distribution
+from ddagr_gym.presets import get_soil
+
+
+def test_soils_and_distributions_come_from_names_and_files(tmp_path: Path) -> None:
+    single = tmp_path / "single.yaml"
+    single.write_text(dump_config(get_soil("thesis_a1")))
+    assert find_soil(str(single)) == find_soil("thesis_a1") == get_soil("thesis_a1")
+    assert find_soil(str(configs_dir() / "soils" / "field.yaml")) == find_soil("field") == get_distribution("field")
+
+
+def test_a_file_that_is_neither_says_why(tmp_path: Path) -> None:
+    wrong = tmp_path / "wrong.yaml"
+    wrong.write_text("cohesion: 3000.0\n")
+    with pytest.raises(InputError, match=r"is no soil .* and no distribution "):
+        find_soil(str(wrong))
