@@ -20,8 +20,8 @@ from typing import Any
 
 from benchmarks.ablations.examine import ROBOT, SOIL, read_runs
 from benchmarks.speeds.kernel_time import against_c
-from ddagr_gym.diagnosis.diagnose import prepare
 from ddagr_gym.diagnosis.pipeline import Task, run
+from ddagr_gym.diagnosis.prepared import prepare
 from ddagr_gym.diagnosis.scores import scan
 from ddagr_gym.diagnosis.search import refit_nominal
 from ddagr_gym.diagnosis.setting import Setting

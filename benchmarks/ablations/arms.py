@@ -10,9 +10,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 
 from ddagr_gym.diagnosis.candidates import Candidate
-from ddagr_gym.diagnosis.diagnose import Prepared
 from ddagr_gym.diagnosis.misfit import LOCAL, roughest
 from ddagr_gym.diagnosis.nuisance import NuisancePriors, Nuisances
+from ddagr_gym.diagnosis.prepared import Prepared
 from ddagr_gym.diagnosis.problem import Problem
 from ddagr_gym.diagnosis.refit import Fitted, cost_of
 from ddagr_gym.diagnosis.standing import Standing, stand

@@ -17,9 +17,10 @@ from benchmarks.ablations.arms import (
     nominal_standing,
 )
 from benchmarks.ablations.sparse import sparse_first
-from ddagr_gym.diagnosis.diagnose import Prepared, prepare
+from ddagr_gym.diagnosis.diagnose import begun
+from ddagr_gym.diagnosis.prepared import Prepared
 from ddagr_gym.diagnosis.refit import Fitted
-from ddagr_gym.diagnosis.search import BENT, begin
+from ddagr_gym.diagnosis.search import begin, scans_of
 from ddagr_gym.diagnosis.setting import Setting, make_problem
 from ddagr_gym.diagnosis.standing import Standing, stand
 from ddagr_gym.diagnosis.thresholds import Thresholds
@@ -70,16 +71,16 @@ def examine(folder: Path, thresholds: Thresholds) -> dict[str, dict[str, Any]]:
     """
     robot, soil = get_robot(ROBOT), get_soil(SOIL)
     began = time.process_time()
-    begun = _begin(robot, soil, folder, thresholds)
-    values = from_values(begun.prepared)
-    problem, candidates = begun.prepared.problem, begun.scans[0].terms.candidates
-    found = {"as it is": _timed(lambda: values or first_of(begun.scans, begun.thresholds), began)}
+    case = _begin(robot, soil, folder, thresholds)
+    values = from_values(case.prepared)
+    problem, candidates = case.prepared.problem, case.scans[0].terms.candidates
+    found = {"as it is": _timed(lambda: values or first_of(case.scans, case.thresholds), began)}
     arms: dict[str, Callable[[], First]] = {
-        "nominal fixed": lambda: values or first_of((nominal_standing(problem, begun.raw, soil),), begun.thresholds),
-        "no null bank": lambda: values or first_of(begun.scans, noise_thresholds(problem)),
-        "BIC forward": lambda: values or first_of(begun.scans, bic_thresholds(problem, candidates)),
-        "one roll-out": lambda: values or _one_roll_out(robot, soil, begun),
-        "SINDy": lambda: sparse_first(problem, begun.scans[0].fitted, robot.outer_radius),
+        "nominal fixed": lambda: values or first_of((nominal_standing(problem, case.raw, soil),), case.thresholds),
+        "no null bank": lambda: values or first_of(case.scans, noise_thresholds(problem)),
+        "BIC forward": lambda: values or first_of(case.scans, bic_thresholds(problem, candidates)),
+        "one roll-out": lambda: values or _one_roll_out(robot, soil, case),
+        "SINDy": lambda: sparse_first(problem, case.scans[0].fitted, robot.outer_radius),
     }
     return found | {name: _timed(work, time.process_time()) for name, work in arms.items()}
 
@@ -90,16 +91,14 @@ def _timed(work: Callable[[], First], began: float) -> dict[str, Any]:
 
 
 def _begin(robot: Robot, soil: Soil, folder: Path, thresholds: Thresholds) -> _Begun:
-    recordings = read_runs(folder)
-    prepared = prepare(robot, soil, recordings, Setting().with_windows(thresholds.duration))
-    problem = prepared.problem
-    raw, standing = begin(problem)
-    scans = (standing, stand(problem, raw)) if standing.dispersion > BENT else (standing,)
-    return _Begun(prepared, raw, scans, thresholds.for_length(problem.covered))
+    first = begun(robot, soil, read_runs(folder), Setting().with_windows(thresholds.duration))
+    problem = first.prepared.problem
+    scans = scans_of(problem, stand(problem, first.refitted), first.raw)
+    return _Begun(first.prepared, first.raw, tuple(scans), thresholds.for_length(problem.covered))
 
 
-def _one_roll_out(robot: Robot, soil: Soil, begun: _Begun) -> First:
+def _one_roll_out(robot: Robot, soil: Soil, case: _Begun) -> First:
     """The same with windows as long as the drives."""
     setting = Setting(duration=_WHOLE_DRIVE, stride=_WHOLE_DRIVE)
-    _, standing = begin(make_problem(robot, soil, begun.prepared.recordings, setting))
-    return first_of((standing,), begun.thresholds)
+    _, standing = begin(make_problem(robot, soil, case.prepared.recordings, setting))
+    return first_of((standing,), case.thresholds)

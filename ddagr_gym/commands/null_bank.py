@@ -82,6 +82,7 @@ def run(arguments: Arguments) -> None:
     from ddagr_gym.diagnosis.nuisance import NuisancePriors
     from ddagr_gym.diagnosis.null_bank import bank_hash
     from ddagr_gym.diagnosis.null_drives import template_of
+    from ddagr_gym.diagnosis.prepared import mended
     from ddagr_gym.diagnosis.setting import Setting
     from ddagr_gym.diagnosis.threshold_files import save_thresholds
     from ddagr_gym.diagnosis.thresholds import NullRun, thresholds_from
@@ -90,7 +91,8 @@ def run(arguments: Arguments) -> None:
 
     _check_options(arguments)
     robot, soil = get_robot(arguments.robot), get_soil(arguments.soil)
-    recordings = [load_recording(path, arguments.map or None, arguments.robot) for path in arguments.runs]
+    loaded = [load_recording(path, arguments.map or None, arguments.robot) for path in arguments.runs]
+    recordings = mended(loaded).recordings if loaded else ()
     priors = NuisancePriors().with_soil(arguments.soil_uncertainty)
     setting = Setting(priors=priors).with_windows(arguments.window, arguments.stride)
     template: Template | None = None

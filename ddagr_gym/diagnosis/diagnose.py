@@ -11,16 +11,17 @@ from typing import Any
 import numpy as np
 
 from ddagr_gym.diagnosis.equivalence import equivalents
-from ddagr_gym.diagnosis.flipped import Flipped, find_flipped_gyro, with_gyro_turned
-from ddagr_gym.diagnosis.held import Held, find_held, hold_effect, without_repeats
+from ddagr_gym.diagnosis.flipped import Flipped
+from ddagr_gym.diagnosis.held import Held, hold_effect
 from ddagr_gym.diagnosis.inputs import data_source
 from ddagr_gym.diagnosis.misfit import LOCAL, explained_share, roughest
+from ddagr_gym.diagnosis.prepared import Prepared, prepare
 from ddagr_gym.diagnosis.problem import Problem
 from ddagr_gym.diagnosis.refit import Fitted
 from ddagr_gym.diagnosis.scores import dispersion_of
 from ddagr_gym.diagnosis.search import BENT, MOST_EFFECTS, Found, Keep, do, further_gates, refit_nominal, search
 from ddagr_gym.diagnosis.sentences import headline
-from ddagr_gym.diagnosis.setting import SHORT, Setting, make_problem
+from ddagr_gym.diagnosis.setting import SHORT, Setting
 from ddagr_gym.diagnosis.standing import Standing, stand
 from ddagr_gym.diagnosis.thresholds import Thresholds
 from ddagr_gym.diagnosis.uncertainty import intervals, least_detectable, resampled_parameters, with_structure
@@ -38,40 +39,6 @@ leaves up to seven times the limit, one that no library has and that borrows a n
 
 _MUCH = 1.5
 """The same where the names explain less than half of the channels' misfit."""
-
-
-@dataclass(frozen=True, eq=False)
-class Prepared:
-    """Recordings ready for a search.
-
-    Attributes:
-        recordings: with repeats as missing samples.
-        held: sensors that repeat their readings.
-        flipped: evidence of a reversed gyro, whose sign is mended in the recordings.
-        problem: their windows.
-    """
-
-    recordings: tuple[Recording, ...]
-    held: tuple[Held, ...]
-    flipped: Flipped | None
-    problem: Problem
-
-
-def prepare(robot: Robot, soil: Soil, recordings: Sequence[Recording], setting: Setting) -> Prepared:
-    """Held readings, noise, windows.
-
-    Args:
-        robot: nominal.
-        soil: nominal.
-        recordings: at least one, of one period.
-        setting: choices.
-    """
-    held = find_held(recordings)
-    clean = tuple(without_repeats(recording, held) for recording in recordings) if held else tuple(recordings)
-    flipped = find_flipped_gyro(clean)
-    if flipped is not None:
-        clean = tuple(with_gyro_turned(recording) for recording in clean)
-    return Prepared(clean, tuple(held), flipped, make_problem(robot, soil, clean, setting))
 
 
 @dataclass(frozen=True, eq=False)

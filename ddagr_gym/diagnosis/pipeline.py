@@ -19,12 +19,13 @@ from ddagr_gym.diagnosis.bounds import pushed_to_bounds
 from ddagr_gym.diagnosis.certificate import of_mended_readings, worse_on_unseen
 from ddagr_gym.diagnosis.certify import certify
 from ddagr_gym.diagnosis.data_checks import DataDoubt, data_doubts, dead_channels, suspects_of
-from ddagr_gym.diagnosis.diagnose import Prepared, accepted, conclude, prepare, searched
+from ddagr_gym.diagnosis.diagnose import accepted, conclude, searched
 from ddagr_gym.diagnosis.evidence import Evidence, gather_evidence
 from ddagr_gym.diagnosis.held_spans import held_where
 from ddagr_gym.diagnosis.inputs import check_recordings, content_hash
 from ddagr_gym.diagnosis.localisation import locate
 from ddagr_gym.diagnosis.next_drive import next_drive, rivals_of_diagnosis, sensors_of_diagnosis
+from ddagr_gym.diagnosis.prepared import Prepared, prepare
 from ddagr_gym.diagnosis.regimes import Unevenness
 from ddagr_gym.diagnosis.regimes_words import uneven_phrase
 from ddagr_gym.diagnosis.search import Found

@@ -319,7 +319,8 @@ def _margin(name: str) -> float:
 
 
 def _misfit_limits(runs: Sequence[NullRun], level: float) -> dict[str, float]:
-    """Limits that the share ``level`` of null runs passes in any channel."""
+    """Limits that the share ``level`` of null runs passes in any channel; only those that share no time speak."""
+    runs = [run for run in runs if run.own]
     channels = sorted({name for run in runs for name in run.misfit})
     # a run without a receiver says nothing about poses
     table = np.array([[run.misfit.get(name, np.nan) for name in channels] for run in runs])

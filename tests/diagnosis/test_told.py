@@ -3,7 +3,8 @@
 import pytest
 
 from benchmarks.concealed_oracle import told
-from ddagr_gym.diagnosis.diagnose import Begun, Prepared
+from ddagr_gym.diagnosis.diagnose import Begun
+from ddagr_gym.diagnosis.prepared import Prepared
 from ddagr_gym.diagnosis.refit import fit
 from ddagr_gym.diagnosis.setting import Setting
 from tests.diagnosis.conftest import Sloping
