@@ -78,10 +78,12 @@ def detectable(label: Mapping[str, Any], answer: Mapping[str, Any], equivalents:
 
     Args:
         label: of the case.
-        answer: with the least detectable distances from neutral, by effect and field.
+        answer: with the least detectable distances from neutral, by effect and field. Of a single effect they count as
+            they are before anything was named: a wrong name beside it does not make it undetectable.
         equivalents: sizes in the library's terms of effects whose own mean something else, by name.
     """
-    limits = answer.get("detectable") or {}
+    alone = answer.get("detectable_alone") if len(label["effects"]) == 1 else None
+    limits = alone or answer.get("detectable") or {}
     known = equivalents or {}
     return all(
         is_detectable(effect["name"], true_sizes(effect) or known.get(effect["name"], {}), limits)

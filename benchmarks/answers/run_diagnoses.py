@@ -37,7 +37,8 @@ from ddagr_gym.version import __version__, commit_of
 HERE = Path(__file__).resolve().parent
 CHECKOUT = HERE.parents[1]
 ENTRIES = (
-    "verdict", "complete", "findings", "rejected", "sentence", "fit", "detectable", "misfit", "seconds", "version",
+    "verdict", "complete", "findings", "rejected", "sentence", "fit", "detectable", "detectable_alone", "misfit",
+    "seconds", "version",
 )  # fmt: skip
 """What an answer keeps of a diagnosis.json."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from typing import Any
@@ -161,13 +161,14 @@ def conclude(
     from_values = (*((hold_effect(held),) if held else ()), *((GyroSign(1.0),) if prepared.flipped else ()))
     effects = (*from_values, *kept.chosen.fitted.point.effects)
     values = kept.chosen.fitted.point.values
+    alone, beside = _detectable(found, thresholds)
     diagnosis = Diagnosis(
         verdict,
         complete,
         findings,
         headline(verdict, complete, findings),
         {"nominal": kept.nominal.misfit, "corrected": kept.chosen.misfit, "limit": dict(thresholds.misfit)},
-        _detectable(found, thresholds),
+        {**alone, **beside},
         {p.name: float(v) for p, v in zip(problem.nuisances.parameters, values, strict=True) if p.prior > 0.0},
         tuple(recording.meta.source for recording in prepared.recordings),
         _thresholds(thresholds),
@@ -175,6 +176,7 @@ def conclude(
         __version__,
         data=tuple(data_source(recording) for recording in prepared.recordings),
         rejected=rejected,
+        detectable_alone=alone,
     )
     return diagnosis, effects
 
@@ -246,10 +248,11 @@ def _thresholds(thresholds: Thresholds) -> dict[str, Any]:
     return {"nulls": thresholds.nulls, "bank": thresholds.bank, "level": thresholds.level, **origin, "gates": gates}
 
 
-def _detectable(found: Found, thresholds: Thresholds) -> dict[str, dict[str, float]]:
-    """Least detectable sizes: of named effects before any was named, of the others beside those that were."""
-    by_model = [least_detectable(s.terms, thresholds, s.dispersion) for s in (found.nominal, found.chosen)]
-    return {**by_model[0], **by_model[1]}
+def _detectable(found: Found, thresholds: Thresholds) -> Iterator[Mapping[str, dict[str, float]]]:
+    """Least detectable sizes: of all effects before any was named, and of the others beside those that were."""
+    named = found.chosen
+    yield least_detectable(found.nominal.terms, thresholds, found.nominal.dispersion)
+    yield least_detectable(named.terms, further_gates(thresholds, found.standings), named.dispersion)
 
 
 def _before(found: Found, name: str) -> int:

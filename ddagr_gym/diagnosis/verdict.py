@@ -89,7 +89,8 @@ class Diagnosis:
         findings: one per name, in the order in which they were found.
         sentence: the answer in words.
         misfit: mean square of each channel's residual for "nominal" and "corrected", and the null bank's "limit".
-        detectable: least detectable distance from neutral by effect and field (None: none, however large).
+        detectable: least detectable distance from neutral by effect and field (None: none, however large), of effects
+            without a name beside those that have one.
         nuisances: refitted nominal parameters by name.
         recordings: names of the sources.
         thresholds: nulls, hash and kind of the bank, level, and the gate of every effect.
@@ -105,6 +106,7 @@ class Diagnosis:
         options: windows, priors and seed, so that the same can be run again.
         checks: what the recordings say is wrong with themselves (:mod:`ddagr_gym.diagnosis.data_checks`).
         rejected: what fits best where that leaves too much to be named.
+        detectable_alone: the same as ``detectable`` for all effects before any was named.
         schema: of this file.
     """
 
@@ -129,6 +131,7 @@ class Diagnosis:
     options: Mapping[str, Any] = field(default_factory=dict)
     checks: tuple[DataDoubt, ...] = ()
     rejected: tuple[Finding, ...] = ()
+    detectable_alone: Mapping[str, Mapping[str, float | None]] = field(default_factory=dict)
     schema: str = SCHEMA
 
 

@@ -91,6 +91,13 @@ def test_a_size_counts_as_detectable_by_its_distance_from_neutral() -> None:
         assert score(labels, {"a": missed})["top1"]["count"] == count
 
 
+def test_a_wrong_name_beside_it_makes_a_single_effect_no_less_detectable() -> None:
+    labels = {"a": label("single", "command_delay", delay=0.1)}
+    beside, alone = ({"command_delay": {"delay": least}} for least in (0.2, 0.05))
+    named = {**answer("slope"), "detectable": beside, "detectable_alone": alone}
+    assert score(labels, {"a": named})["top1"]["count"] == 1
+
+
 def test_what_can_be_shown_at_no_size_does_not_count_as_missed() -> None:
     labels = {"a": label("single", "payload", mass=400.0)}
     missed = {**answer("none"), "detectable": {"payload": {"mass": None}}}

@@ -87,6 +87,8 @@ def test_the_slope_is_named_and_certified(found: Path) -> None:
     assert [source["source"] for source in diagnosis["data"]] == ["run_1", "run_2"]
     assert diagnosis["findings"][0]["where"]["phrase"]
     assert diagnosis["next_drive"]["why"]
+    assert set(diagnosis["detectable_alone"]) == set(diagnosis["detectable"])
+    assert diagnosis["detectable_alone"]["slope"] == diagnosis["detectable"]["slope"]
 
 
 def test_the_folder_is_complete(found: Path) -> None:
