@@ -8,7 +8,7 @@ matrices, without another simulation.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +43,8 @@ class Terms:
         recording: (W,) of each window.
         time: (W,) of each window [s].
         turned: recordings whose headings are unknown.
+        overlap: by effect, share of what it does that lies in the windows and channels in which the effects of the
+            model act already (0 to 1); empty for a model without effects.
     """
 
     normals: Array
@@ -53,6 +55,7 @@ class Terms:
     recording: NDArray[np.int64]
     time: Array
     turned: tuple[int, ...] = ()
+    overlap: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def placed(self) -> NDArray[np.bool_]:
@@ -169,6 +172,7 @@ def scan(
         axis=2,
     )
     projected = fitted.elimination.project(raw)
+    overlap = _overlaps(problem, fitted, candidates, projected[..., 1 + len(free) :])
     windows = problem.blocked.windows
     return Terms(
         np.matmul(projected.transpose(0, 2, 1), projected),
@@ -179,7 +183,38 @@ def scan(
         windows.recording,
         windows.time,
         tuple(p.recording for p in problem.nuisances.parameters if p.heading and p.recording is not None),
+        overlap,
     )
+
+
+def _overlaps(problem: Problem, fitted: Fitted, candidates: Sequence[Candidate], columns: Array) -> dict[str, float]:
+    """Largest overlap of any probe of each effect with what the effects of the model do together.
+
+    Args:
+        problem: what was fitted.
+        fitted: the model.
+        candidates: what the columns are of.
+        columns: (W, M + S, K) of the probes, the windows' unknowns eliminated.
+    """
+    if not fitted.point.effects:
+        return {}
+    without = problem.predict(replace(fitted.point, effects=()))
+    acting = problem.padded(problem.blocked.change(fitted.prediction, without)[..., None])
+    shape = problem.blocked.sigma.shape
+    where = _energy(fitted.elimination.project(acting), shape)
+    shares = np.minimum(_energy(columns, shape), where).sum(axis=(0, 1))
+    found: dict[str, float] = {}
+    for candidate in candidates:
+        found[candidate.name] = max(found.get(candidate.name, 0.0), *(float(shares[k]) for k in candidate.columns))
+    return found
+
+
+def _energy(columns: Array, shape: tuple[int, ...]) -> Array:
+    """(W, C, K) share of each column's sum of squares by window and channel, of (W, M + S, K)."""
+    count, blocks, channels = shape
+    squares = columns[:, : blocks * channels] ** 2
+    cells = squares.reshape(count, blocks, channels, -1).sum(axis=1)
+    return np.asarray(cells / np.maximum(cells.sum(axis=(0, 1)), 1e-30))
 
 
 @dataclass(frozen=True, eq=False)

@@ -265,13 +265,18 @@ def search(
 def further_gates(thresholds: Thresholds, standings: Sequence[Standing]) -> Thresholds:
     """Gates of further effects: higher by shares of what the named ones explain.
 
+    What is left of another form of an effect lies in the windows and channels in which it acts: a further effect that
+    acts elsewhere (:attr:`~ddagr_gym.diagnosis.scores.Terms.overlap`) need not explain it.
+
     Args:
         thresholds: of the null bank.
         standings: models from the nominal one to the one that further effects are to join.
     """
     explained = _explained(standings)
     near = {name for effect in standings[-1].fitted.point.effects for name in effect.confused_with}
-    return thresholds.raised(_FORM * explained).raised((_NEAR_FORM - _FORM) * explained, near)
+    overlap = standings[-1].terms.overlap
+    shares = {name: _NEAR_FORM if name in near else _FORM * overlap.get(name, 1.0) for name in thresholds.gates}
+    return thresholds.raised({name: share * explained for name, share in shares.items()})
 
 
 def _explained(standings: Sequence[Standing]) -> float:

@@ -7,7 +7,7 @@ its quantiles are taken, and margins for simulators that nobody thought of.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, Protocol
 
@@ -180,10 +180,9 @@ class Thresholds:
         }
         return replace(self, gates=gates, windows=seconds / self.duration)
 
-    def raised(self, by: float, names: Collection[str] | None = None) -> Thresholds:
-        """The same with gates that lie higher by a gain: all of them, or those of some effects."""
-        chosen = self.gates if names is None else names
-        gates = {n: replace(g, gain=g.gain + by) if n in chosen else g for n, g in self.gates.items()}
+    def raised(self, by: Mapping[str, float]) -> Thresholds:
+        """The same with gates that lie higher by a gain, by name of the effect."""
+        gates = {name: replace(gate, gain=gate.gain + by.get(name, 0.0)) for name, gate in self.gates.items()}
         return replace(self, gates=gates)
 
     def p_value(self, name: str, gain: float) -> float | None:

@@ -126,12 +126,15 @@ def test_what_is_confused_with_a_named_effect_has_to_explain_more() -> None:
 
     def standing(cost: float, *effects: str) -> Any:
         point = SimpleNamespace(effects=tuple(parse_effect(text) for text in effects))
-        return SimpleNamespace(fitted=SimpleNamespace(cost=cost, point=point), dispersion=1.0)
+        terms = SimpleNamespace(overlap={"gyro_scale": 0.2, "soil_change": 0.2} if effects else {})
+        return SimpleNamespace(fitted=SimpleNamespace(cost=cost, point=point), dispersion=1.0, terms=terms)
 
-    gates = Thresholds({"soil_change": Gate(40.0, 0.0), "gyro_scale": Gate(20.0, 0.0)}, {}, 20, "x")
+    names = ("soil_change", "gyro_scale", "payload")
+    gates = Thresholds({name: Gate(40.0, 0.0) for name in names}, {}, 20, "x")
     found = module.further_gates(gates, [standing(2000.0), standing(1000.0, "soil_patch=0.5")])
     assert found.of("soil_change").gain == pytest.approx(40.0 + 0.1 * 1000.0)
-    assert found.of("gyro_scale").gain == pytest.approx(20.0 + 0.01 * 1000.0)
+    assert found.of("gyro_scale").gain == pytest.approx(40.0 + 0.2 * 0.01 * 1000.0)
+    assert found.of("payload").gain == pytest.approx(40.0 + 0.01 * 1000.0)
     assert module.further_gates(gates, [standing(2000.0)]) == gates
 
 

@@ -61,11 +61,10 @@ def test_gains_of_sizes_that_do_not_matter_count_less() -> None:
 
 def test_further_effects_have_raised_gates() -> None:
     thresholds = thresholds_from(null_runs(40, 1), "x")
-    assert thresholds.raised(12.0).of("slope").gain == pytest.approx(12.0 + thresholds.of("slope").gain)
-    assert thresholds.raised(12.0).of("slope").held_out == thresholds.of("slope").held_out
-    some = thresholds.raised(12.0, {"slope"})
-    assert some.of("slope") == thresholds.raised(12.0).of("slope")
-    assert some.of("payload") == thresholds.of("payload")
+    raised = thresholds.raised({"slope": 12.0})
+    assert raised.of("slope").gain == pytest.approx(12.0 + thresholds.of("slope").gain)
+    assert raised.of("slope").held_out == thresholds.of("slope").held_out
+    assert raised.of("payload") == thresholds.of("payload")
 
 
 def test_p_value_counts_null_runs_that_stand_as_high() -> None:
@@ -182,7 +181,7 @@ def test_file_returns_the_origin(tmp_path: Path) -> None:
     thresholds = thresholds_from(null_runs(40, 1), "abc", origin=ORIGIN)
     save_thresholds(thresholds, tmp_path / "t.json")
     assert load_thresholds(tmp_path / "t.json").origin == ORIGIN
-    assert thresholds.raised(1.0).for_length(60.0).origin == ORIGIN
+    assert thresholds.raised({}).for_length(60.0).origin == ORIGIN
 
 
 def with_origin(path: Path, entry: object) -> Path:
