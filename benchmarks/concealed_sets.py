@@ -2,7 +2,8 @@
 
     python -m benchmarks.concealed_sets benchmarks/results/concealed_fifth.json benchmarks/results/concealed.json
 
-The sets were answered by different versions of the diagnosis, which ``about`` names.
+The sets were answered by different versions of the diagnosis, which ``about`` names. From the seventh set on a single
+effect counts as detectable by the sizes that show before anything is named, whatever was named then.
 """
 
 from __future__ import annotations
@@ -43,6 +44,11 @@ def pooled(sets: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     return {**found, "targets": {name: targets[name] for name in RATES}, "sets": each, "about": {"commits": commits}}
 
 
+def known(result: Mapping[str, Any]) -> list[str]:
+    """Rates of which there are cases."""
+    return [name for name in RATES if result[name]["count"]]
+
+
 def draw(result: Mapping[str, Any], path: Path) -> None:
     """Write the picture as PNG, all or nothing.
 
@@ -53,20 +59,21 @@ def draw(result: Mapping[str, Any], path: Path) -> None:
     with house_style():
         from matplotlib.figure import Figure
 
-        figure = Figure(figsize=(8.0, 0.9 + 0.62 * len(RATES)), layout="constrained")
+        names = known(result)
+        figure = Figure(figsize=(8.0, 0.9 + 0.62 * len(names)), layout="constrained")
         panel = figure.subplots()
-        for y, name in enumerate(RATES):
+        for y, name in enumerate(names):
             aim = result["targets"][name]
             panel.barh(y, aim["most"] - aim["least"], left=aim["least"], height=0.66, color=palette.SKY_BLUE, alpha=0.3)
-            rows = [(entry[name], palette.GREY, 2.5) for entry in result["sets"]]
+            rows = [(entry[name], palette.GREY, 2.5) for entry in result["sets"] if entry[name]["count"]]
             rows.append((result[name], palette.GREEN if aim["met"] else palette.VERMILLION, 6.0))
             for number, (entry, colour, size) in enumerate(rows):
                 at = y + 0.22 * (number - 0.5 * (len(rows) - 1))
                 panel.plot(entry["interval"], [at, at], color=colour, lw=1.4)
                 panel.plot(entry["value"], at, "o", color=colour, ms=size)
-        words = [f"{WORDS[name]}\n{100.0 * result[name]['value']:.0f} % of {result[name]['count']}" for name in RATES]
-        panel.set_yticks(range(len(RATES)), words)
-        panel.set_ylim(len(RATES) - 0.4, -0.6)
+        words = [f"{WORDS[name]}\n{100.0 * result[name]['value']:.0f} % of {result[name]['count']}" for name in names]
+        panel.set_yticks(range(len(names)), words)
+        panel.set_ylim(len(names) - 0.4, -0.6)
         panel.set_xlim(-0.02, 1.02)
         panel.set_xlabel("share, 95 % interval; small: each set in its order, large: together; blue: the aim")
         write_atomically(path, lambda to: figure.savefig(to, format="png", dpi=110))
@@ -85,7 +92,7 @@ def main(words: Sequence[str] | None = None) -> int:
     result = pooled([json.loads(path.read_text()) for path in arguments.scores])
     write_atomically(arguments.output, lambda to: to.write_text(json.dumps(result, indent=1) + "\n"))
     draw(result, arguments.output.with_suffix(".png"))
-    for name in RATES:
+    for name in known(result):
         met = "met" if result["targets"][name]["met"] else "missed"
         print(f"{figure_line(name, result[name])}  {met}")
     return 0

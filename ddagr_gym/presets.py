@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from pathlib import Path
 
 from ddagr_gym.config import load_config
 from ddagr_gym.errors import unknown_name
@@ -171,6 +172,11 @@ def soil_names() -> tuple[str, ...]:
 def is_file(name: object) -> bool:
     """Whether this is the path of a YAML file rather than a name."""
     return str(name).endswith((".yaml", ".yml"))
+
+
+def full_name(name: str) -> str:
+    """A name as it is; of a file its whole path, which means the same in any folder."""
+    return str(Path(name).expanduser().resolve()) if is_file(name) else name
 
 
 def soil_source(name: str) -> str:

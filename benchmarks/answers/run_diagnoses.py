@@ -126,9 +126,11 @@ def diagnose(case: Case, parts: Path, threads: int, limit: float) -> dict[str, A
         InterruptedRunError: the run was told to stop.
     """
     part = parts / f"{case.name}.json"
+    data = data_hash(case.arguments)
+    asked = {"arguments": shown(case.arguments), "options": list(case.options), "data": data}
     if part.is_file():
         kept: dict[str, Any] = json.loads(part.read_text())
-        if (kept.get("options"), kept.get("arguments")) == (list(case.options), shown(case.arguments)):
+        if [kept.get(name) for name in asked] == list(asked.values()):
             return kept
     output = parts / case.name
     command = [sys.executable, "-m", "ddagr_gym", "diagnose", *case.arguments, "--threads", str(threads), *case.options]
@@ -136,7 +138,7 @@ def diagnose(case: Case, parts: Path, threads: int, limit: float) -> dict[str, A
     done = _run([*command, "--output", str(output), "--overwrite"], limit)
     if done.returncode in INTERRUPTED:
         raise InterruptedRunError(case.name)
-    told = {"arguments": shown(case.arguments), "options": list(case.options), "commit": commit}
+    told = {**asked, "commit": commit}
     answer = _answer(output / "diagnosis.json", done) | told
     answer.setdefault("seconds", time.monotonic() - began)
     write_atomically(part, lambda to: to.write_text(json.dumps(answer, indent=1) + "\n"))
@@ -147,6 +149,15 @@ def diagnose(case: Case, parts: Path, threads: int, limit: float) -> dict[str, A
 def shown(arguments: Sequence[str]) -> list[str]:
     """Arguments of a run as they are kept with its answer: recordings by name, files of the checkout from there."""
     return [Path(word).name if word.endswith(_RECORDING) else word.removeprefix(f"{CHECKOUT}/") for word in arguments]
+
+
+def data_hash(arguments: Sequence[str]) -> str:
+    """SHA-256 over the recordings among the arguments."""
+    digest = hashlib.sha256()
+    for word in arguments:
+        if word.endswith(_RECORDING):
+            digest.update(hashlib.sha256(Path(word).read_bytes()).digest())
+    return digest.hexdigest()
 
 
 def _run(command: list[str], limit: float) -> subprocess.CompletedProcess[str]:

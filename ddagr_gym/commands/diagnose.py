@@ -113,7 +113,7 @@ def _task(arguments: Arguments) -> Task:
     from ddagr_gym.diagnosis.nuisance import NuisancePriors
     from ddagr_gym.diagnosis.pipeline import Task
     from ddagr_gym.diagnosis.setting import Setting
-    from ddagr_gym.presets import get_robot, get_soil
+    from ddagr_gym.presets import full_name, get_robot, get_soil, is_file
     from ddagr_gym.recordings.files import Limits
     from ddagr_gym.recordings.load import load_recording
 
@@ -134,7 +134,15 @@ def _task(arguments: Arguments) -> Task:
         )
     setting = Setting(priors=priors, threads=arguments.threads).with_windows(window, arguments.stride)
     return Task(
-        robot, soil, tuple(recordings), thresholds, setting, arguments.seed, arguments.names_only, arguments.soil
+        robot,
+        soil,
+        tuple(recordings),
+        thresholds,
+        setting,
+        arguments.seed,
+        arguments.names_only,
+        full_name(arguments.soil),
+        full_name(arguments.robot) if is_file(arguments.robot) else "",
     )
 
 
@@ -271,7 +279,8 @@ def _doubt_line(doubt: DataDoubt) -> str:
 def _finding_rows(finding: Any) -> Iterator[tuple[str, ...]]:
     """One row per parameter; what the finding as a whole has stands in the first."""
     others = [f"{name} {weight:.2f}" for name, weight in finding.equivalence_set.items() if name != finding.name]
-    whole = (f"{finding.gain:.1f}", f"{finding.gate:.1f}", ", ".join(others) or "nothing else")
+    none = "nothing else" if finding.gate > 0.0 else "seen in the values"
+    whole = (f"{finding.gain:.1f}", f"{finding.gate:.1f}", ", ".join(others) or none)
     for number, (name, estimate) in enumerate(finding.parameters.items()):
         interval = "" if estimate.interval is None else f"{estimate.interval[0]:.3g} to {estimate.interval[1]:.3g}"
         first = number == 0

@@ -15,18 +15,20 @@ def gates_for(path: Path | None, robot: str, soil: str, soil_uncertainty: float 
 
     Args:
         path: of ``ddagr null-bank``.
-        robot: name of the run's nominal one.
-        soil: name of the run's nominal one.
+        robot: name or file of the run's nominal one.
+        soil: name or file of the run's nominal one.
         soil_uncertainty: of the run.
 
     Raises:
         InputError: the file cannot be read.
     """
     from ddagr_gym.diagnosis.threshold_files import load_thresholds, shipped_thresholds
+    from ddagr_gym.presets import full_name, get_robot
 
-    thresholds = shipped_thresholds(robot) if path is None else load_thresholds(path)
+    name = get_robot(robot).name
+    thresholds = shipped_thresholds(name) if path is None else load_thresholds(path)
     if thresholds is not None and thresholds.origin is not None:
-        warning = thresholds.origin.mismatch(robot, soil, soil_uncertainty)
+        warning = thresholds.origin.mismatch(name, full_name(soil), soil_uncertainty)
         if warning:
             print(f"ddagr: warning: {warning}", file=sys.stderr)
     return thresholds

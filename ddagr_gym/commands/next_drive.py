@@ -93,7 +93,7 @@ def _case(arguments: Arguments) -> _Case:
         return _Case([parse_effect(text) for text in arguments.rival], tuple(SENSORS), ROBOT, SOIL, Setting())
     path = arguments.diagnosis
     mapping = load(path / "diagnosis.json" if path.is_dir() else path)
-    named = mapping["robot"] or ROBOT, mapping["soil"] or SOIL
+    named = mapping["options"].get("robot_file") or mapping["robot"] or ROBOT, mapping["soil"] or SOIL
     return _Case(rivals_of_diagnosis(mapping), sensors_of_diagnosis(mapping), *named, setting_of_diagnosis(mapping))
 
 

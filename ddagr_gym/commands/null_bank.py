@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -82,7 +83,6 @@ def run(arguments: Arguments) -> None:
     from ddagr_gym.diagnosis.nuisance import NuisancePriors
     from ddagr_gym.diagnosis.null_bank import bank_hash
     from ddagr_gym.diagnosis.null_drives import template_of
-    from ddagr_gym.diagnosis.prepared import mended
     from ddagr_gym.diagnosis.setting import Setting
     from ddagr_gym.diagnosis.threshold_files import save_thresholds
     from ddagr_gym.diagnosis.thresholds import NullRun, thresholds_from
@@ -92,7 +92,7 @@ def run(arguments: Arguments) -> None:
     _check_options(arguments)
     robot, soil = get_robot(arguments.robot), get_soil(arguments.soil)
     loaded = [load_recording(path, arguments.map or None, arguments.robot) for path in arguments.runs]
-    recordings = mended(loaded).recordings if loaded else ()
+    recordings = _mended(loaded)
     priors = NuisancePriors().with_soil(arguments.soil_uncertainty)
     setting = Setting(priors=priors).with_windows(arguments.window, arguments.stride)
     template: Template | None = None
@@ -118,6 +118,20 @@ def run(arguments: Arguments) -> None:
     save_thresholds(found, arguments.output)
     beside = f" and {len(longer)} longer ones" if longer else ""
     print(f"{arguments.output}: thresholds of {found.nulls} null drives{beside}, bank {bank[:12]}")
+
+
+def _mended(loaded: Sequence[Recording]) -> Sequence[Recording]:
+    """Recordings as a diagnosis sees them; what had to be mended is told."""
+    from ddagr_gym.diagnosis.prepared import mended
+
+    if not loaded:
+        return loaded
+    found = mended(loaded)
+    faults = [f"repeated readings ({item.sensor})" for item in found.held]
+    faults += ["a reversed gyro"] if found.flipped is not None else []
+    if faults:
+        print(f"ddagr: warning: the recordings have {' and '.join(faults)}, which is mended first.", file=sys.stderr)
+    return found.recordings
 
 
 def _check_options(arguments: Arguments) -> None:
@@ -156,9 +170,11 @@ def _pieces(
 
 def _origin(arguments: Arguments) -> Origin:
     from ddagr_gym.diagnosis.thresholds import Origin
+    from ddagr_gym.presets import full_name, get_robot
 
     kind: NullKind = "ordinary" if arguments.ordinary else "simulated"
-    return Origin(arguments.robot, arguments.soil, arguments.soil_uncertainty, arguments.seed, kind)
+    robot, soil = get_robot(arguments.robot).name, full_name(arguments.soil)
+    return Origin(robot, soil, arguments.soil_uncertainty, arguments.seed, kind)
 
 
 def _part(folder: Path, bank: str, number: int) -> Path:

@@ -161,7 +161,7 @@ def conclude(
     from_values = (*((hold_effect(held),) if held else ()), *((GyroSign(1.0),) if prepared.flipped else ()))
     effects = (*from_values, *kept.chosen.fitted.point.effects)
     values = kept.chosen.fitted.point.values
-    alone, beside = _detectable(found, thresholds)
+    alone, beside = _detectable(kept, thresholds)
     diagnosis = Diagnosis(
         verdict,
         complete,

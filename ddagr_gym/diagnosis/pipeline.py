@@ -73,6 +73,7 @@ class Task:
         seed: of everything random.
         names_only: leave out certification, unnamed terms and the next drive.
         soil_name: of the nominal soil, for the report.
+        robot_file: where the nominal robot came from, where that was a file.
     """
 
     robot: Robot
@@ -83,6 +84,7 @@ class Task:
     seed: int = 0
     names_only: bool = False
     soil_name: str = ""
+    robot_file: str = ""
 
     @property
     def steps(self) -> tuple[str, ...]:
@@ -184,7 +186,8 @@ def run(
 def _options(task: Task, setting: Setting) -> dict[str, Any]:
     """Choices that the answer depends on besides data, robot, soil and thresholds; windows as they were searched."""
     windows = {"window": setting.duration, "stride": setting.stride, "block": setting.block}
-    return {**windows, "priors": asdict(setting.priors), "seed": task.seed, "names_only": task.names_only}
+    choices = {"priors": asdict(setting.priors), "seed": task.seed, "names_only": task.names_only}
+    return {**windows, **choices, **({"robot_file": task.robot_file} if task.robot_file else {})}
 
 
 def _doubted(

@@ -266,7 +266,8 @@ def further_gates(thresholds: Thresholds, standings: Sequence[Standing]) -> Thre
     """Gates of further effects: higher by shares of what the named ones explain.
 
     What is left of another form of an effect lies in the windows and channels in which it acts: a further effect that
-    acts elsewhere (:attr:`~ddagr_gym.diagnosis.scores.Terms.overlap`) need not explain it.
+    acts elsewhere (:attr:`~ddagr_gym.diagnosis.scores.Terms.overlap`) need not explain it. Of a named one the overlap
+    with those before it counts.
 
     Args:
         thresholds: of the null bank.
@@ -274,8 +275,9 @@ def further_gates(thresholds: Thresholds, standings: Sequence[Standing]) -> Thre
     """
     explained = _explained(standings)
     near = {name for effect in standings[-1].fitted.point.effects for name in effect.confused_with}
-    overlap = standings[-1].terms.overlap
-    shares = {name: _NEAR_FORM if name in near else _FORM * overlap.get(name, 1.0) for name in thresholds.gates}
+    overlap = {name: share for standing in standings for name, share in standing.terms.overlap.items()}
+    names = {*thresholds.gates, *overlap}
+    shares = {name: _NEAR_FORM if name in near else _FORM * overlap.get(name, 1.0) for name in names}
     return thresholds.raised({name: share * explained for name, share in shares.items()})
 
 

@@ -182,8 +182,8 @@ class Thresholds:
 
     def raised(self, by: Mapping[str, float]) -> Thresholds:
         """The same with gates that lie higher by a gain, by name of the effect."""
-        gates = {name: replace(gate, gain=gate.gain + by.get(name, 0.0)) for name, gate in self.gates.items()}
-        return replace(self, gates=gates)
+        gates = {name: replace(self.of(name), gain=self.of(name).gain + more) for name, more in by.items()}
+        return replace(self, gates={**self.gates, **gates})
 
     def p_value(self, name: str, gain: float) -> float | None:
         """Share of null runs in which some effect stands as high over its gate, the run at hand counted with them.

@@ -22,12 +22,14 @@ INFO_LEVELS = ("small", "full")
 Effects = str | Path | Effect | Iterable[str | Effect]
 
 
-def find_soil(soil: str | Soil | SoilDistribution) -> Soil | SoilDistribution:
+def find_soil(soil: str | Path | Soil | SoilDistribution) -> Soil | SoilDistribution:
     """Soil or distribution by name or from a YAML file; objects pass through.
 
     Raises:
         InputError: unknown name, with the closest ones; a file that is neither.
     """
+    if isinstance(soil, Path):
+        soil = str(soil)
     if not isinstance(soil, str):
         return soil
     if is_file(soil):
@@ -51,8 +53,8 @@ def _soil_of_file(path: str) -> Soil | SoilDistribution:
 
 def make_settings(
     *,
-    robot: str | Robot = "ddagr",
-    soil: str | Soil | SoilDistribution = DEFAULT_SOIL,
+    robot: str | Path | Robot = "ddagr",
+    soil: str | Path | Soil | SoilDistribution = DEFAULT_SOIL,
     radius: float | tuple[float, float] = 0.80,
     side: str = "random",
     run_in: float = 0.5,
@@ -73,7 +75,7 @@ def make_settings(
     if isinstance(randomisation, bool):
         randomisation = Randomisation() if randomisation else Randomisation.none()
     return TurnSettings(
-        robot=get_robot(robot) if isinstance(robot, str) else robot,
+        robot=get_robot(str(robot)) if isinstance(robot, str | Path) else robot,
         soil=find_soil(soil),
         radius=radius,
         side=side,

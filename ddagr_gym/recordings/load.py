@@ -46,7 +46,7 @@ def load_recording(
         source: recording in Parquet, CSV (also gzip), foreign Parquet, ROS 1 or 2 bag, MCAP.
         map_name: shipped map's name or a map's path; a table without one takes the shipped map that explains
             most of its columns, a bag the default topic map.
-        robot: robot's name; the map's own where absent.
+        robot: robot's name or its YAML file; the map's own where absent.
         limits: on rows and bytes.
         geometry_of: where a robot's geometry comes from.
 
@@ -73,13 +73,13 @@ def _geometry(robot: str, geometry_of: GeometryByName) -> RobotGeometry | None:
 
 
 def _with_robot(recording: Recording, robot: str, geometry_of: GeometryByName) -> Recording:
-    if recording.meta.robot and recording.meta.robot != robot:
+    geometry = geometry_of(robot)
+    if recording.meta.robot not in ("", geometry.name):
         raise InputError(
-            f"{recording.meta.source} was imported for the robot {recording.meta.robot!r}, not {robot!r}: "
-            "leave --robot out "
-            "or import it again."
+            f"{recording.meta.source} was imported for the robot {recording.meta.robot!r}, not {geometry.name!r}: "
+            f"give --robot with that one, or import it again."
         )
-    return recording.with_meta(robot=robot, geometry=geometry_of(robot))
+    return recording.with_meta(robot=geometry.name, geometry=geometry)
 
 
 def _table(path: Path, kind: str, map_name: str | None, limits: Limits) -> tuple[RawTable, ColumnMap]:

@@ -58,7 +58,7 @@ def tiles(diagnosis: Entry, seconds: float) -> list[dict[str, str]]:
         {"value": f"{seconds:.0f} s", "label": f"of drive in {len(diagnosis['recordings'])} recordings"},
         {"value": str(diagnosis["thresholds"].get("nulls", "–")), "label": "null drives behind the gates"},
     ]
-    if explained is not None and diagnosis.get("findings"):
+    if explained is not None and any(finding.get("gate") for finding in diagnosis.get("findings") or []):
         found.insert(1, {"value": percent(explained), "label": "of the mismatch above the noise explained"})
     if shares:
         horizon, share = shares[0]

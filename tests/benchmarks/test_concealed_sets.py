@@ -33,6 +33,8 @@ def test_command_writes_figures_and_picture(tmp_path: Path, capsys: pytest.Captu
     assert json.loads((tmp_path / "all.json").read_text())["top1"]["count"] == 20
     assert (tmp_path / "all.png").read_bytes().startswith(b"\x89PNG")
     assert "top1" in capsys.readouterr().out
+    paths[0].write_text(json.dumps(scored(0, 0)))
+    assert main([str(paths[0]), "--output", str(tmp_path / "nothing.json")]) == 0
     assert main([str(tmp_path / "none.json")]) == 2
     assert "none.json is no file" in capsys.readouterr().err
 

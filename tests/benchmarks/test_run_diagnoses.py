@@ -119,3 +119,16 @@ def test_a_run_that_takes_too_long_is_stopped_and_is_an_answer(tmp_path: Path) -
     assert done.returncode == 124
     found: dict[str, Any] = _answer(tmp_path / "absent.json", done)
     assert found["failure"] == {"exit_code": 124, "message": "stopped after 0.05 s"}
+
+
+def test_a_kept_answer_is_of_the_same_recordings_and_arguments(runs: list[list[str]], tmp_path: Path) -> None:
+    parts, file = tmp_path / "parts", tmp_path / "run_1.csv.gz"
+    parts.mkdir()
+    file.write_bytes(b"drive")
+    case = Case("case_001", (str(file), "--robot", "ddagr"))
+    for number, (content, robot) in enumerate([(b"drive", "ddagr"), (b"drive", "husky"), (b"other", "husky")], 1):
+        file.write_bytes(content)
+        asked = replace(case, arguments=(str(file), "--robot", robot))
+        diagnose(asked, parts, 1, 10.0)
+        diagnose(asked, parts, 1, 10.0)
+        assert len(runs) == number

@@ -71,9 +71,25 @@ def found(work: Path) -> Path:
 
 
 def test_refitted_robot_and_soil_are_nearer_to_the_true_ones(found: Path) -> None:
+    """The pressures of the true soil are 8 % less than the nominal ones."""
     robot, soil = get_robot(str(found / "robot.yaml")), get_soil(str(found / "soil.yaml"))
     assert robot.name == "ddagr"
-    assert 0.8 < soil.pressure(0.01, 0.1) / get_soil("thesis_a1").pressure(0.01, 0.1) < 1.2
+    nominal = get_soil("thesis_a1").pressure(0.01, 0.1)
+    assert abs(soil.pressure(0.01, 0.1) / nominal - 0.92) < 0.08
+
+
+def test_the_refitted_robot_and_soil_diagnose_and_plan(
+    found: Path, work: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Parquet of the same robot, its file and the answer fit together; nothing is left to find in the soil."""
+    files = ["--robot", str(found / "robot.yaml"), "--soil", str(found / "soil.yaml")]
+    assert main([*words(work, "again"), "--names-only", *files]) == 0
+    told = capsys.readouterr()
+    assert "The ground slopes" in told.out
+    assert "ddagr diagnose:   scanning the library" in told.err
+    diagnosis = load(work / "again" / "diagnosis.json")
+    assert diagnosis["options"]["robot_file"] == str((found / "robot.yaml").resolve())
+    assert diagnosis["soil"] == str((found / "soil.yaml").resolve())
 
 
 def test_the_slope_is_named_and_certified(found: Path) -> None:

@@ -1,14 +1,17 @@
 """``ddagr next-drive``: from rivals or a diagnosis to a manoeuvre."""
 
 import json
+from dataclasses import asdict, replace
 
 import pytest
 
 from ddagr_gym.cli import main
 from ddagr_gym.commands.next_drive import answer_text
+from ddagr_gym.config import dump_config
 from ddagr_gym.control.manoeuvres import MANOEUVRES
+from ddagr_gym.diagnosis.nuisance import NuisancePriors
 from ddagr_gym.diagnosis.verdict import Diagnosis, Estimate, Finding, save
-from ddagr_gym.presets import get_soil
+from ddagr_gym.presets import get_robot, get_soil
 
 
 @pytest.fixture
@@ -76,3 +79,9 @@ def test_a_diagnosis_knows_its_robot_and_soil(tmp_path, monkeypatch, capsys):
         ("husky", get_soil("thesis_a1"), rivals),
     ]
     assert "No manoeuvre helps." in capsys.readouterr().out
+    own = tmp_path / "own.yaml"
+    own.write_text(dump_config(replace(get_robot("husky"), name="mine")))
+    options = {"window": 6.0, "stride": 6.0, "block": 0.1, "priors": asdict(NuisancePriors()), "robot_file": str(own)}
+    save(replace(found, robot="mine", options=options), tmp_path / "diagnosis.json")
+    assert main(["next-drive", str(tmp_path)]) == 0
+    assert planned[-1][0] == "mine"

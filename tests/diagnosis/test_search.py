@@ -169,3 +169,32 @@ def test_a_window_that_no_model_predicts_is_refused_in_a_sentence(
     monkeypatch.setattr(Problem, "predict", broken)
     with pytest.raises(InputError, match=r"breaks down in 1 of 3 windows, first at 4\.0 s"):
         begun(get_robot("ddagr"), get_soil("thesis_a1"), (drive(seconds=8.0),), Setting())
+
+
+def test_a_second_effect_keeps_the_overlap_it_had_before_it_was_named() -> None:
+    def standing(cost: float, overlap: dict[str, float], *effects: str) -> Any:
+        point = SimpleNamespace(effects=tuple(parse_effect(text) for text in effects))
+        fitted = SimpleNamespace(cost=cost, point=point)
+        return SimpleNamespace(fitted=fitted, dispersion=1.0, terms=SimpleNamespace(overlap=overlap))
+
+    names = ("command_deadband", "accelerometer_bias", "of_ones_own")
+    gates = Thresholds({name: Gate(10.0, 0.0) for name in names[:2]}, {}, 20, "x")
+    found = [
+        standing(20000.0, {}),
+        standing(1000.0, {"accelerometer_bias": 0.05, "of_ones_own": 0.1}, "command_deadband=0.1"),
+        standing(0.0, {"of_ones_own": 0.2}, "command_deadband=0.1", "accelerometer_bias=0.2"),
+    ]
+    raised = module.further_gates(gates, found)
+    assert raised.of("accelerometer_bias").gain == pytest.approx(10.0 + 0.05 * 0.01 * 20000.0)
+    assert raised.of("command_deadband").gain == pytest.approx(10.0 + 0.01 * 20000.0)
+    assert raised.of("of_ones_own").gain == pytest.approx(10.0 + 0.2 * 0.01 * 20000.0)
+
+
+def test_overlap_says_where_effects_act(sloping: Sloping) -> None:
+    """A slope acts on the accelerometer as a bias does, and hardly where an encoder's scale acts."""
+    kinds = {name: effect_kind(name) for name in ("accelerometer_bias", "encoder_scale", "gyro_scale")}
+    assert scan(sloping.problem, sloping.nominal, kinds).overlap == {}
+    overlap = scan(sloping.problem, sloping.chosen, kinds).overlap
+    assert 0.3 < overlap["accelerometer_bias"] <= 1.0
+    assert 0.0 <= overlap["encoder_scale"] < 0.1
+    assert overlap["gyro_scale"] < overlap["accelerometer_bias"]

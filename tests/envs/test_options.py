@@ -1,20 +1,21 @@
 """Soils of an environment: by name, or from files of single soils and of distributions."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from ddagr_gym.config import configs_dir, dump_config
-from ddagr_gym.envs.options import find_soil
+from ddagr_gym.envs.options import find_soil, make_settings
 from ddagr_gym.errors import InputError
 from ddagr_gym.physics.soil_draws import get_distribution
-from ddagr_gym.presets import get_soil
+from ddagr_gym.presets import get_robot, get_soil
 
 
 def test_soils_and_distributions_come_from_names_and_files(tmp_path: Path) -> None:
     single = tmp_path / "single.yaml"
     single.write_text(dump_config(get_soil("thesis_a1")))
-    assert find_soil(str(single)) == find_soil("thesis_a1") == get_soil("thesis_a1")
+    assert find_soil(str(single)) == find_soil(single) == find_soil("thesis_a1") == get_soil("thesis_a1")
     assert find_soil(str(configs_dir() / "soils" / "field.yaml")) == find_soil("field") == get_distribution("field")
 
 
@@ -23,3 +24,10 @@ def test_a_file_that_is_neither_says_why(tmp_path: Path) -> None:
     wrong.write_text("cohesion: 3000.0\n")
     with pytest.raises(InputError, match=r"is no soil .* and no distribution "):
         find_soil(str(wrong))
+
+
+def test_paths_serve_as_well_as_texts(tmp_path: Path) -> None:
+    own = tmp_path / "own.yaml"
+    own.write_text(dump_config(replace(get_robot("ddagr"), name="mine")))
+    assert make_settings(robot=own).robot == make_settings(robot=str(own)).robot
+    assert make_settings(robot=own).robot.name == "mine"

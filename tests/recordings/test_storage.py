@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pyarrow as pa
@@ -10,7 +11,9 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from pyarrow import parquet
 
+from ddagr_gym.config import dump_config
 from ddagr_gym.errors import InputError
+from ddagr_gym.presets import get_robot
 from ddagr_gym.recordings.files import Limits
 from ddagr_gym.recordings.load import load_recording
 from ddagr_gym.recordings.schema import Recording
@@ -142,3 +145,15 @@ def test_another_robot_than_the_imported_one_is_refused(tmp_path, make_drive):
     save_parquet(make_drive(seconds=10), path)
     with pytest.raises(InputError, match="imported for the robot 'warthog'"):
         load_recording(path, robot="husky")
+
+
+def test_a_recording_and_a_file_of_its_robot_agree_by_the_robots_name(tmp_path, make_drive):
+    path, own = tmp_path / "run.parquet", tmp_path / "own.yaml"
+    save_parquet(make_drive(seconds=10), path)
+    own.write_text(dump_config(replace(get_robot("warthog"), half_track=0.6)))
+    recording = load_recording(path, robot=str(own))
+    assert recording.meta.robot == "warthog"
+    assert recording.meta.geometry.half_track == 0.6
+    own.write_text(dump_config(replace(get_robot("warthog"), name="mine")))
+    with pytest.raises(InputError, match="imported for the robot 'warthog', not 'mine'"):
+        load_recording(path, robot=str(own))
