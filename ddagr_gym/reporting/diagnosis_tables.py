@@ -289,12 +289,11 @@ def next_drive(item: Entry | None) -> dict[str, Any] | None:
     """The proposed manoeuvre as text, or why there is none."""
     if not item or not item.get("why"):
         return None
-    if not item.get("manoeuvre"):
-        return {"manoeuvre": "No drive of the standard ones", "why": item["why"]}
-    power = item.get("power")
+    drive = str(item.get("manoeuvre") or "No drive of the standard ones")
+    power = item.get("power") if item.get("manoeuvre") else None
     others = [_alternative(other) for other in item.get("alternatives") or []]
     return {
-        "manoeuvre": str(item["manoeuvre"]).replace("_", " "),
+        "manoeuvre": drive.replace("_", " "),
         "why": item.get("why") or "",
         "separates": [" from ".join(in_sentence(str(name)) for name in pair) for pair in item.get("separates") or []],
         "gain_rate": "" if power is None else number(power, 2),

@@ -262,9 +262,13 @@ def test_only_known_names_of_robot_and_soil_are_listed():
     assert "Soil" not in rows
 
 
-def test_why_no_drive_would_help_is_said():
+def test_why_no_drive_would_help_is_said(tmp_path):
     none = {"manoeuvre": "", "why": "Nothing would tell them apart.", "separates": [], "power": 0.0}
-    assert next_drive(none)["why"] == "Nothing would tell them apart."
+    none |= {"minutes": None, "alternatives": []}
+    write_report(tmp_path, diagnosis(next_drive=none), evidence())
+    text = (tmp_path / PAGE).read_text()
+    assert "Nothing would tell them apart." in text
+    assert "raises the expected gain" not in text
     assert next_drive(None) is None
 
 
