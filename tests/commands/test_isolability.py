@@ -64,7 +64,7 @@ def test_negative_seed_is_one_sentence(tmp_path, capsys):
 
 def test_gates_ship_with_the_robot_or_come_from_chance(tmp_path):
     assert gates_for(None, "ddagr", "thesis_a1") == default_thresholds("ddagr")
-    assert gates_for(None, "a_robot_of_mine", "thesis_a1") is None
+    assert gates_for(None, "husky", "thesis_a1") is None
     given = replace(default_thresholds("ddagr"), bank="given")
     save_thresholds(given, tmp_path / "gates.json")
     assert gates_for(tmp_path / "gates.json", "ddagr", "thesis_a1") == given
