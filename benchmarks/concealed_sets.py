@@ -1,6 +1,8 @@
 """Rates over several sealed sets together: a target that one set meets or misses by a case says little by itself.
 
-    R=benchmarks/results; python -m benchmarks.concealed_sets $R/concealed_fifth.json $R/concealed_sixth.json $R/concealed.json
+    python -m benchmarks.concealed_sets RESULTS/concealed_fifth.json RESULTS/concealed_sixth.json RESULTS/concealed.json
+
+with benchmarks/results for RESULTS.
 
 The sets were answered by different versions of the diagnosis, which ``about`` names. From the seventh set on a single
 effect counts as detectable by the sizes that show before anything is named, whatever was named then.
