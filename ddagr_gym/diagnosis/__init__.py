@@ -10,8 +10,8 @@ Method (measured reasons in the study that the project follows)
     *data_checks* clocks, signs, units and dead channels, as `ddagr check` judges them, before any physics.
     *noise*       level, growth with speed and colour of each channel from the recordings alone.
     *held*        repeated readings, found in the values; repeats count as missing samples afterwards. *flipped*: a
-                  reversed gyro, found and mended in the same way, because first guesses come from its readings. *prepared*:
-                  both, for diagnoses and banks of given drives alike.
+                  reversed gyro, found and mended in the same way, because first guesses come from its readings.
+    *prepared*    both, for diagnoses and banks of given drives alike.
     *blocks*      windows as means over 0.1 s. The error of the nominal speed loop adds to their noise.
     *nuisance*    what is uncertain about soil, robot, biases and clocks, as global parameters with priors, and how the
                   field differs from window to window, as local ones. Initial states and local parameters are eliminated
