@@ -114,7 +114,7 @@ def run(arguments: Arguments) -> None:
     _make([task for task in tasks if not paths[task[5]].exists()], arguments.processes)
     made = [NullRun(**json.loads(path.read_text())) for path in paths]
     runs = [replace(run, own=number < len(drives) - len(longer)) for number, run in enumerate(made)]
-    found = thresholds_from(runs, bank, origin=_origin(arguments))
+    found = thresholds_from(runs, bank, origin=_origin(arguments, robot))
     save_thresholds(found, arguments.output)
     beside = f" and {len(longer)} longer ones" if longer else ""
     print(f"{arguments.output}: thresholds of {found.nulls} null drives{beside}, bank {bank[:12]}")
@@ -168,13 +168,12 @@ def _pieces(
     return pieces, [run for recording in recordings for run in longer_runs(recording, length)]
 
 
-def _origin(arguments: Arguments) -> Origin:
+def _origin(arguments: Arguments, robot: Robot) -> Origin:
     from ddagr_gym.diagnosis.thresholds import Origin
-    from ddagr_gym.presets import full_name, get_robot
+    from ddagr_gym.presets import full_name
 
     kind: NullKind = "ordinary" if arguments.ordinary else "simulated"
-    robot, soil = get_robot(arguments.robot).name, full_name(arguments.soil)
-    return Origin(robot, soil, arguments.soil_uncertainty, arguments.seed, kind)
+    return Origin(robot.name, full_name(arguments.soil), arguments.soil_uncertainty, arguments.seed, kind)
 
 
 def _part(folder: Path, bank: str, number: int) -> Path:

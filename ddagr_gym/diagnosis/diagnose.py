@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from typing import Any
@@ -32,6 +32,8 @@ from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.effects.gyro_sign import GyroSign
 from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.version import __version__
+
+_Sizes = Mapping[str, Mapping[str, float]]
 
 _TOO_MUCH = 10.0
 """Misfit of a channel over its limit that may remain beside a name (ours): a library's effect in a form of its own
@@ -248,11 +250,11 @@ def _thresholds(thresholds: Thresholds) -> dict[str, Any]:
     return {"nulls": thresholds.nulls, "bank": thresholds.bank, "level": thresholds.level, **origin, "gates": gates}
 
 
-def _detectable(found: Found, thresholds: Thresholds) -> Iterator[Mapping[str, dict[str, float]]]:
+def _detectable(found: Found, thresholds: Thresholds) -> tuple[_Sizes, _Sizes]:
     """Least detectable sizes: of all effects before any was named, and of the others beside those that were."""
-    named = found.chosen
-    yield least_detectable(found.nominal.terms, thresholds, found.nominal.dispersion)
-    yield least_detectable(named.terms, further_gates(thresholds, found.standings), named.dispersion)
+    first, named = found.nominal, found.chosen
+    alone = least_detectable(first.terms, thresholds, first.dispersion)
+    return alone, least_detectable(named.terms, further_gates(thresholds, found.standings), named.dispersion)
 
 
 def _before(found: Found, name: str) -> int:

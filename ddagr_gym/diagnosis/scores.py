@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.diagnosis.candidates import Candidate, candidates_of
+from ddagr_gym.diagnosis.overlap import overlaps
 from ddagr_gym.diagnosis.problem import Problem
 from ddagr_gym.diagnosis.refit import Fitted
 from ddagr_gym.diagnosis.reread import Drives, acts_on_readings_only, record_drives
@@ -172,7 +173,7 @@ def scan(
         axis=2,
     )
     projected = fitted.elimination.project(raw)
-    overlap = _overlaps(problem, fitted, candidates, projected[..., 1 + len(free) :])
+    overlap = overlaps(problem, fitted, candidates, projected[..., 1 + len(free) :])
     windows = problem.blocked.windows
     return Terms(
         np.matmul(projected.transpose(0, 2, 1), projected),
@@ -185,36 +186,6 @@ def scan(
         tuple(p.recording for p in problem.nuisances.parameters if p.heading and p.recording is not None),
         overlap,
     )
-
-
-def _overlaps(problem: Problem, fitted: Fitted, candidates: Sequence[Candidate], columns: Array) -> dict[str, float]:
-    """Largest overlap of any probe of each effect with what the effects of the model do together.
-
-    Args:
-        problem: what was fitted.
-        fitted: the model.
-        candidates: what the columns are of.
-        columns: (W, M + S, K) of the probes, the windows' unknowns eliminated.
-    """
-    if not fitted.point.effects:
-        return {}
-    without = problem.predict(replace(fitted.point, effects=()))
-    acting = problem.padded(problem.blocked.change(fitted.prediction, without)[..., None])
-    shape = problem.blocked.sigma.shape
-    where = _energy(fitted.elimination.project(acting), shape)
-    shares = np.minimum(_energy(columns, shape), where).sum(axis=(0, 1))
-    found: dict[str, float] = {}
-    for candidate in candidates:
-        found[candidate.name] = max(found.get(candidate.name, 0.0), *(float(shares[k]) for k in candidate.columns))
-    return found
-
-
-def _energy(columns: Array, shape: tuple[int, ...]) -> Array:
-    """(W, C, K) share of each column's sum of squares by window and channel, of (W, M + S, K)."""
-    count, blocks, channels = shape
-    squares = columns[:, : blocks * channels] ** 2
-    cells = squares.reshape(count, blocks, channels, -1).sum(axis=1)
-    return np.asarray(cells / np.maximum(cells.sum(axis=(0, 1)), 1e-30))
 
 
 @dataclass(frozen=True, eq=False)

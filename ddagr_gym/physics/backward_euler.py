@@ -39,16 +39,11 @@ LONGEST = 30.0  # length of a Newton step that is tried
 
 
 @kernel(inline=True)
-def _size(row: Array, defect: Array) -> float:
-    return max(max(abs(defect[0]), abs(defect[1])), row[HALF_TRACK] * abs(defect[2]))
-
-
-@kernel(inline=True)
 def _defect(row: Array, start: Array, step: float, defect: Array) -> float:
     """v - v_n - h f(v) of backward Euler, and its size [m/s]."""
     for j in range(3):
         defect[j] = row[V_X + j] - start[j] - step * row[ACCELERATION + j]
-    return _size(row, defect)
+    return max(max(abs(defect[0]), abs(defect[1])), row[HALF_TRACK] * abs(defect[2]))
 
 
 @kernel(inline=True)

@@ -77,7 +77,7 @@ def _with_robot(recording: Recording, robot: str, geometry_of: GeometryByName) -
     if recording.meta.robot not in ("", geometry.name):
         raise InputError(
             f"{recording.meta.source} was imported for the robot {recording.meta.robot!r}, not {geometry.name!r}: "
-            f"give --robot with that one, or import it again."
+            "give --robot with that one, or import it again."
         )
     return recording.with_meta(robot=geometry.name, geometry=geometry)
 
