@@ -20,7 +20,7 @@ Method (measured reasons in the study that the project follows)
     *refit*       Gauss-Newton with priors and bounds; jointly with any effect that is assumed.
     *scores*      one simulation per probe of the library; from inner products per window follow gains (fall of the
                   cost), cluster-robust scores, gains on left-out windows and resampled gains without another one.
-    *overlap*     how much of an effect lies where named ones act; what acts elsewhere is no rest of another form of them.
+    *overlap*     how much of an effect lies where named ones act; what acts elsewhere is no rest of them.
     *reread*      effects that act on readings only need no simulation of their own.
     *null_bank*   the same scan of drives from structurally different simulators (over *standard_drives* or given ones),
                   or of real drives that were ordinary; *thresholds* are its quantiles, with margins for strangers.
