@@ -20,7 +20,7 @@ from ddagr_gym.physics.contact_geometry import contact_rule, section_rule
 from ddagr_gym.physics.effects import Effect, effect_table, load_effects
 from ddagr_gym.physics.terrain import SoilField
 from ddagr_gym.physics.wheel_forces import finite_array, soil_vector
-from ddagr_gym.simulator_kernel import advance_rows, settle_rows
+from ddagr_gym.simulator_kernel import advance_rows, remember_rows, settle_rows
 
 Array = NDArray[np.float64]
 
@@ -240,6 +240,17 @@ class Simulator:
             self.rows[np.ix_(indices, np.arange(index, index + size))] = 0.0
         self.effect_memory[indices] = 0.0
         settle_rows(self.rows, indices, *self._ground(), *self._effects(), self._options, *self._rules)
+
+    def remember(self, past: Array) -> None:
+        """Tell effects on commands and motors what was commanded before the present motion, which stays as it is.
+
+        A delay or a lag that is told nothing takes the motors to have settled at their speeds of the start.
+
+        Args:
+            past: (N, H, 2) commands of the samples before, the latest last [rad/s].
+        """
+        if np.isin(self._points, (layout.POINT_COMMANDS, layout.POINT_MOTORS)).any():
+            remember_rows(self.rows, np.ascontiguousarray(past), *self._effects())
 
     def _ground(self) -> tuple[Array, Array, NDArray[np.int64]]:
         return self._fields, self._field_geometry, self.field_index

@@ -39,6 +39,7 @@ from ddagr_gym.physics.layout import (
     POINT_SOIL,
     READING,
     SAMPLE_PERIOD,
+    TIME,
     V_X,
     V_Y,
     WHEEL,
@@ -126,6 +127,29 @@ def settle_rows(
             row, options[OPTION_REFRESH], options, section, contact, coarse, points, addresses, parameters[n],
             memory[n],
         )  # fmt: skip
+
+
+@kernel()
+def remember_rows(
+    rows: Array, past: Array, points: Integers, addresses: Integers, parameters: Array, memory: Array
+) -> None:
+    """Let effects on commands and motors see what was commanded before the rows' present motion, which stays.
+
+    Args:
+        rows: (N, layout.SIZE).
+        past: (N, H, 2) commands of the samples before, the latest last.
+        points: see :func:`advance_rows`, and the others.
+        addresses: see there.
+        parameters: see there.
+        memory: see there.
+    """
+    count = past.shape[1]
+    for n in range(rows.shape[0]):
+        row, now = rows[n], rows[n, TIME]
+        for k in range(count):
+            row[TIME] = now - (count - k) * row[SAMPLE_PERIOD]
+            _drive(row, past[n, k], points, addresses, parameters[n], memory[n])
+        row[TIME] = now
 
 
 @kernel()

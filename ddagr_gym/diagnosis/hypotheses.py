@@ -14,6 +14,7 @@ from ddagr_gym.diagnosis.problem import Point, Problem
 from ddagr_gym.diagnosis.scores import Gain, Terms, best_multiples, reduce
 from ddagr_gym.frames import wrap_angle
 from ddagr_gym.physics.effects import Effect
+from ddagr_gym.physics.effects.command_delay import CommandDelay
 from ddagr_gym.physics.effects.encoder_scale import EncoderScale
 from ddagr_gym.physics.effects.motor_lag import MotorLag
 from ddagr_gym.physics.effects.wheel_radius_mismatch import WheelRadiusMismatch
@@ -165,3 +166,25 @@ def slower_loop(problem: Problem, point: Point) -> Point | None:
     values[place] = 0.0
     lag = MotorLag(math.expm1(-value) / problem.robot.motor_rate)
     return replace(point, values=values, effects=(*point.effects, lag))
+
+
+def with_whole_delay(problem: Problem, point: Point) -> Point:
+    """The same predictions with all of a dead time told by the effect, none by what a row's command may mean.
+
+    Both are one time, so that no step leads from one split to another; by its prior the shift is none, and only the
+    effect goes on to other drives.
+
+    Args:
+        problem: with the nuisances.
+        point: where no delay is assumed, it stays as it is.
+    """
+    place = [parameter.name for parameter in problem.nuisances.parameters].index("command_shift")
+    shift, effects = float(point.values[place]), list(point.effects)
+    for number, effect in enumerate(effects):
+        if isinstance(effect, CommandDelay) and effect.delay > 0.0 and shift > 0.0:
+            whole = min(effect.delay + shift, effect.parameter("delay").metadata["high"])
+            effects[number] = CommandDelay(whole, effect.imbalance * effect.delay / whole)
+            values = point.values.copy()
+            values[place] = 0.0
+            return replace(point, values=values, effects=tuple(effects))
+    return point

@@ -10,7 +10,7 @@ from typing import Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.diagnosis.hypotheses import first_guess, turned_to_agree
+from ddagr_gym.diagnosis.hypotheses import first_guess, turned_to_agree, with_whole_delay
 from ddagr_gym.diagnosis.misfit import channel_misfit
 from ddagr_gym.diagnosis.problem import Point, Problem
 from ddagr_gym.diagnosis.refit import DAMPING, Fitted, cost_of, fit
@@ -302,7 +302,8 @@ def _added(
         return None
     progress(f"joint refit with {tried[0].name}")
     best = _swapped(problem, tried[0].fitted, steps)
-    more = stand(problem, fit(problem, best.point, iterations=8, renewals=2, first=best), progress)
+    point = with_whole_delay(problem, best.point)
+    more = stand(problem, fit(problem, point, iterations=8, renewals=2, first=best), progress)
     return _without_idle(problem, more, thresholds, progress), tuple(tried)
 
 

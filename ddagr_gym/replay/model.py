@@ -121,10 +121,13 @@ class WindowModel:
             simulator.field_index[:] = 0
         for parameter, value in zip(self.parameters, values, strict=True):
             parameter.apply(simulator.rows, float(value), self.windows.recording)
-        commands, start = self._drive(values, states)
+        delay = self._delay + sum(float(v) for p, v in zip(self.parameters, values, strict=True) if p.shift)
+        commands, start = self._drive(delay, states)
         simulator.reset(state=dict(zip(STATE, start.T, strict=True)))
         simulator.rows[:, layout.TIME] = self.windows.time
         simulator.rows[:, layout.NEXT_POSE_TIME] = self.windows.time
+        if not self._imposed:
+            simulator.remember(self.windows.past(delay))
         recorded = np.asarray(entries, dtype=np.int64).reshape(-1)
         readings = np.empty((self.windows.count, self.windows.samples, len(CHANNELS)))
         record = np.empty((self.windows.count, self.windows.samples, recorded.size))
@@ -132,9 +135,8 @@ class WindowModel:
         simulator.close()
         return readings, record
 
-    def _drive(self, values: Array, states: Array) -> tuple[Array, Array]:
-        """(W, T, 2) commands, delayed by the shift parameters, and the states to start from."""
-        delay = self._delay + sum(float(v) for p, v in zip(self.parameters, values, strict=True) if p.shift)
+    def _drive(self, delay: float, states: Array) -> tuple[Array, Array]:
+        """(W, T, 2) commands as they act after ``delay`` [s], and the states to start from."""
         commands = self.windows.drive(delay)
         if not self._imposed:
             return commands, states

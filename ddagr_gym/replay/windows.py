@@ -80,9 +80,17 @@ class WindowSet:
 
         Between samples of the period they are interpolated; before and after what was kept, held.
         """
+        return self._commands(np.arange(self.samples), delay)
+
+    def past(self, delay: float = 0.0) -> Array:
+        """(W, H, 2) commands that acted in the same way before the start, the latest last."""
+        return self._commands(np.arange(-self.history, 0), delay)
+
+    def _commands(self, samples: NDArray[np.int64], delay: float) -> Array:
+        """Commands that act in samples counted from the start."""
         whole = int(np.floor(delay / self.period))
         part = delay / self.period - whole
-        rows = self.history + np.arange(self.samples) - whole
+        rows = self.history + samples - whole
         last = self.commands.shape[1] - 1
         newer, older = np.clip(rows, 0, last), np.clip(rows - 1, 0, last)
         if part == 0.0:

@@ -11,7 +11,13 @@ import pytest
 
 from ddagr_gym.diagnosis.candidates import candidates_of
 from ddagr_gym.diagnosis.certify import _recording_fold, refitted_on
-from ddagr_gym.diagnosis.hypotheses import first_guess, looped_encoders, slower_loop, turned_to_agree
+from ddagr_gym.diagnosis.hypotheses import (
+    first_guess,
+    looped_encoders,
+    slower_loop,
+    turned_to_agree,
+    with_whole_delay,
+)
 from ddagr_gym.diagnosis.problem import Point, Problem
 from ddagr_gym.diagnosis.refit import Fitted, fit
 from ddagr_gym.diagnosis.scores import Gain, Terms, gains, scan
@@ -53,6 +59,25 @@ def test_a_slow_loop_is_a_lag_of_the_same_time_constant() -> None:
     assert told.values.tolist() == [0.01, 0.0]
     assert [effect.name for effect in told.effects] == ["gyro_scale", "motor_lag"]
     assert 1.0 / 4.5 + told.effects[1].lag == pytest.approx(1.0 / (4.5 * math.exp(-0.893)))
+
+
+def late(shift: float, *effects: str) -> Point:
+    names = (SimpleNamespace(name="mass"), SimpleNamespace(name="command_shift"))
+    problem: Any = SimpleNamespace(nuisances=SimpleNamespace(parameters=names))
+    return with_whole_delay(problem, Point(np.array([0.01, shift]), np.zeros((1, 8)), load_effects(effects)))
+
+
+def test_a_delay_takes_over_what_the_meaning_of_rows_had_taken() -> None:
+    told = late(0.04, "gyro_scale=1.1", "command_delay=0.06,imbalance=0.5")
+    assert told.values.tolist() == [0.01, 0.0]
+    delay = told.effects[1]
+    for way in (1.0, -1.0):
+        assert delay.delay * (1.0 + way * delay.imbalance) == pytest.approx(0.06 * (1.0 + way * 0.5) + 0.04)
+
+
+@pytest.mark.parametrize("effects", [("gyro_scale=1.1",), ("command_delay=0",), ()])
+def test_without_a_delay_rows_mean_what_they_meant(effects: tuple[str, ...]) -> None:
+    assert late(0.04, *effects).values.tolist() == [0.01, 0.04]
 
 
 @pytest.mark.parametrize(("value", "effects"), [(-0.2, ()), (0.893, ()), (-0.893, ("motor_lag=0.1",))])

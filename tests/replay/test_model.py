@@ -17,6 +17,7 @@ from ddagr_gym.simulator import simulate
 
 RATE = 50.0
 TRUTH = {"v_x": "true_v_x", "v_y": "true_v_y", "yaw_rate": "true_yaw_rate", "omega_right": "true_omega_right"}
+CHANNELS_OF_COMMANDS = ("t", "command_right", "command_left", "encoder_right", "encoder_left", "yaw_rate")
 TRUTH |= {"omega_left": "true_omega_left", "x": "true_x", "y": "true_y", "yaw": "true_yaw"}
 
 
@@ -61,6 +62,41 @@ def test_a_delay_moves_the_commands(robot, soil, windows):
     by_parameter = shift.predict(np.array([0.04]), windows.initial)
     np.testing.assert_array_equal(by_parameter, late.predict(np.zeros(0), windows.initial))
     assert np.abs(by_parameter - shift.predict(np.zeros(1), windows.initial)).max() > 0.01
+
+
+@pytest.mark.parametrize(
+    ("effect", "tolerance"), [("command_delay=0.3,imbalance=0.2", 1e-6), ("motor_lag=0.1,second_pole=1", 2e-3)]
+)
+def test_effects_on_commands_know_what_was_commanded_before_a_window(robot, soil, effect, tolerance):
+    """A window that begins while the command of before still acts: nothing but the past says which."""
+    from ddagr_gym.recordings.schema import Recording
+
+    steps = [(0.9, 0.4), (0.4, 0.3), (0.0, 0.4), (0.7, 0.9)]
+    commands = np.repeat(np.tile(steps, (4, 1)), 45, axis=0)
+    sensors = ideal_sensors(1.0 / RATE)
+    columns = simulate(robot, soil, commands, sensors=sensors, numerics=Numerics.smooth(), effects=(effect,))
+    recording = Recording.from_columns({name: columns[name] for name in CHANNELS_OF_COMMANDS}, robot)
+    geometry = RobotGeometry.of(robot)
+    cut = cut_windows([recording], 1.0, wheel_radius=geometry.wheel_radius, half_track=geometry.half_track)
+    cut = cut.subset(cut.time > 1.0)
+    states = np.stack([columns[TRUTH[name]][cut.start] for name in STATE], axis=1)
+    entries = (layout.OMEGA, layout.OMEGA + 1)
+    model = WindowModel(robot, soil, cut)
+    _, record = model.predict_recorded(np.zeros(0), states, entries, load_effects(effect))
+    rows = cut.start[:, None] + 1 + np.arange(cut.samples)
+    for bank, name in enumerate(("true_omega_right", "true_omega_left")):
+        np.testing.assert_allclose(record[..., bank], columns[name][rows], atol=tolerance)
+    # told nothing, the effect takes the motors to have settled
+    _, forgetful = WindowModel(
+        robot, soil, replace(cut, commands=cut.commands[:, cut.history :], history=0)
+    ).predict_recorded(np.zeros(0), states, entries, load_effects(effect))
+    assert np.abs(forgetful - record).max() > 0.05
+
+
+def test_the_past_is_delayed_as_the_commands_are(windows):
+    late = windows.past(0.06)
+    np.testing.assert_allclose(late[:, 3:], windows.past()[:, :-3], atol=1e-9)
+    np.testing.assert_allclose(windows.drive(0.06)[:, :3], windows.past()[:, -3:], atol=1e-9)
 
 
 def test_imposed_wheel_speeds_are_those_at_the_samples(robot, soil, windows):
