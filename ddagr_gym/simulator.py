@@ -244,10 +244,11 @@ class Simulator:
     def remember(self, past: Array) -> None:
         """Tell effects on commands and motors what was commanded before the present motion, which stays as it is.
 
-        A delay or a lag that is told nothing takes the motors to have settled at their speeds of the start.
+        A delay or a lag that is told nothing takes the motors to have settled at their speeds of the start. One that is
+        told takes this for the time before what it is told.
 
         Args:
-            past: (N, H, 2) commands of the samples before, the latest last [rad/s].
+            past: (N, H, 2) commands of the samples before, the latest last [rad/s]; NaN where unknown.
         """
         if np.isin(self._points, (layout.POINT_COMMANDS, layout.POINT_MOTORS)).any():
             remember_rows(self.rows, np.ascontiguousarray(past), *self._effects())

@@ -137,7 +137,7 @@ def remember_rows(
 
     Args:
         rows: (N, layout.SIZE).
-        past: (N, H, 2) commands of the samples before, the latest last.
+        past: (N, H, 2) commands of the samples before, the latest last; NaN where unknown.
         points: see :func:`advance_rows`, and the others.
         addresses: see there.
         parameters: see there.
@@ -147,6 +147,8 @@ def remember_rows(
     for n in range(rows.shape[0]):
         row, now = rows[n], rows[n, TIME]
         for k in range(count):
+            if math.isnan(past[n, k, 0]):
+                continue
             row[TIME] = now - (count - k) * row[SAMPLE_PERIOD]
             _drive(row, past[n, k], points, addresses, parameters[n], memory[n])
         row[TIME] = now

@@ -210,13 +210,13 @@ def _findings(problem: Problem, found: Found, thresholds: Thresholds, rng: np.ra
     chosen = found.chosen
     if not chosen.names:
         return []
-    resampled = resampled_parameters(problem, chosen.fitted, rng)
-    bounds = intervals(resampled.draws)
+    parameters, draws = resampled_parameters(problem, chosen.fitted, rng)
+    bounds = intervals(draws)
     findings = []
     for number, effect in enumerate(chosen.fitted.point.effects):
         spread = {
-            p.field: with_structure(b, effect, p.field, form)
-            for p, b, form in zip(resampled.parameters, bounds, resampled.form.tolist(), strict=True)
+            p.field: with_structure(b, effect, p.field)
+            for p, b in zip(parameters, bounds, strict=True)
             # a shape that no resampling moves is not known: nothing shows it
             if p.effect == number and (b[0] < b[1] or p.field in effect.size_names())
         }

@@ -87,6 +87,7 @@ def part_of(windows: WindowSet, first: int, samples: int) -> WindowSet:
         time=windows.time + first * windows.period,
         commands=windows.commands[:, first:stop],
         measured=windows.measured[:, first : first + samples],
+        unknown=np.maximum(windows.unknown - first, 0),
     )
 
 

@@ -176,15 +176,23 @@ def with_whole_delay(problem: Problem, point: Point) -> Point:
 
     Args:
         problem: with the nuisances.
-        point: where no delay is assumed, it stays as it is.
+        point: where no delay is assumed, or the whole is longer than one may be, it stays as it is.
     """
     place = [parameter.name for parameter in problem.nuisances.parameters].index("command_shift")
-    shift, effects = float(point.values[place]), list(point.effects)
-    for number, effect in enumerate(effects):
-        if isinstance(effect, CommandDelay) and effect.delay > 0.0 and shift > 0.0:
-            whole = min(effect.delay + shift, effect.parameter("delay").metadata["high"])
-            effects[number] = CommandDelay(whole, effect.imbalance * effect.delay / whole)
-            values = point.values.copy()
-            values[place] = 0.0
-            return replace(point, values=values, effects=tuple(effects))
-    return point
+    shift = float(point.values[place])
+    told = [_later(effect, shift) if isinstance(effect, CommandDelay) else None for effect in point.effects]
+    if shift <= 0.0 or not any(told):
+        return point
+    values = point.values.copy()
+    values[place] = 0.0
+    return replace(point, values=values, effects=tuple(a or b for a, b in zip(told, point.effects, strict=True)))
+
+
+def _later(delay: CommandDelay, shift: float) -> CommandDelay | None:
+    """A delay of both banks that is longer by a shift; None where there is none yet, or more than there may be."""
+    if delay.delay <= 0.0:
+        return None
+    whole = delay.delay + shift
+    imbalance = delay.imbalance * delay.delay / whole
+    fits = whole * (1.0 + abs(imbalance)) <= delay.parameter("delay").metadata["high"]
+    return CommandDelay(whole, imbalance) if fits else None

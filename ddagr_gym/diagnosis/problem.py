@@ -155,9 +155,14 @@ class Problem:
         """(P,) global parameters that a fit moves."""
         return np.asarray(self.prior > 0.0)
 
-    def open_at(self, values: Array) -> NDArray[np.int64]:
-        """Global parameters that may still move: those held at a bound explain nothing more."""
-        held = (values <= self.low + 1e-9) | (values >= self.high - 1e-9)
+    def open_at(self, point: Point) -> NDArray[np.int64]:
+        """Global parameters that may still move: those held at a bound explain nothing more.
+
+        The shift of the commands, which a delay takes over, stands for that delay.
+        """
+        held = (point.values <= self.low + 1e-9) | (point.values >= self.high - 1e-9)
+        if any(effect.name == "command_delay" for effect in point.effects):
+            held &= ~np.array([parameter.shift for parameter in self.nuisances.parameters])
         return np.flatnonzero(self.free & ~held)
 
     def start(self, effects: Sequence[Effect] = ()) -> Point:

@@ -164,7 +164,7 @@ def scan(
             candidates.append(candidate)
             columns += [probe_column(problem, fitted, probe, drives) for probe in candidate.probes]
         progress(name)
-    free = problem.open_at(fitted.point.values)
+    free = problem.open_at(fitted.point)
     raw = np.concatenate(
         [
             problem.residual(fitted.point, fitted.prediction)[..., None],
@@ -289,9 +289,7 @@ def nuisance_answer(problem: Problem, fitted: Fitted, terms: Terms, gain: Gain) 
     if candidate.has_sizes:
         reduced = reduce(terms)
         columns = 1 + np.array(candidate.columns)
-        change[problem.open_at(fitted.point.values)] = (
-            reduced.nuisance[:, 0] - reduced.nuisance[:, columns] @ gain.multiples
-        )
+        change[problem.open_at(fitted.point)] = reduced.nuisance[:, 0] - reduced.nuisance[:, columns] @ gain.multiples
     return change
 
 

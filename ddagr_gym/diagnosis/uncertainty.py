@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,52 +26,16 @@ held the truth, and most misses were within a tenth of the least meaningful size
 
 FORM = 0.1
 """The same as a share of the effect's size, in quadrature: a larger effect differs by more (on two sets of drives of
-the project's own blind generator 34 of 45 intervals held the truth without it, 39 with it). An effect of several sizes
-differs in the direction that the drives show worst, see :func:`form_deviations`."""
+the project's own blind generator 34 of 45 intervals held the truth without it, 39 with it)."""
 
 STRUCTURE_OF_LIMIT = 0.02
 """The same of a limit, as a share of it: one that a robot does not reach is no least size (one per cent there)."""
 
 
-@dataclass(frozen=True, eq=False)
-class Resampled:
-    """Effect parameters and how far they may be off.
-
-    Attributes:
-        parameters: (E,) of the assumed effects.
-        draws: (draws, E) values of resamplings.
-        form: (E,) half widths for another form of the effects, see :func:`form_deviations`.
-    """
-
-    parameters: tuple[EffectParameter, ...]
-    draws: Array
-    form: Array
-
-
-def form_deviations(parameters: Sequence[EffectParameter], values: Array, covariance: Array) -> Array:
-    """Half the widths, (E,), by which the sizes of another form of each effect may differ from those of the library's.
-
-    A robot's effect pulls differently by a share :data:`FORM` of the whole effect, in units of what the data show: a
-    size x with covariance C has the deviation FORM sqrt(x' C^-1 x C_kk) in component k. That is FORM x for one size;
-    of several that do for each other (strength and stiffness of a soil), those that the data hardly tell apart differ
-    by more. Shapes and limits have none.
-
-    Args:
-        parameters: (E,).
-        values: (E,) fitted.
-        covariance: (E, E) of the fit.
-    """
-    found = np.zeros(len(parameters))
-    for number in {p.effect for p in parameters}:
-        places = [k for k, p in enumerate(parameters) if p.effect == number and np.isfinite(p.scale)]
-        away = np.array([values[k] - parameters[k].neutral for k in places])
-        block = covariance[np.ix_(places, places)]
-        found[places] = FORM * np.sqrt((away @ np.linalg.solve(block, away)) * np.diag(block)) if places else 0.0
-    return found
-
-
-def resampled_parameters(problem: Problem, fitted: Fitted, rng: np.random.Generator, draws: int = 400) -> Resampled:
-    """Effect parameters from resamplings of the windows by one Gauss-Newton step from the fit.
+def resampled_parameters(
+    problem: Problem, fitted: Fitted, rng: np.random.Generator, draws: int = 400
+) -> tuple[tuple[EffectParameter, ...], Array]:
+    """Effect parameters from resamplings of the windows, (draws, E), by one Gauss-Newton step from the fit.
 
     Windows rather than samples are drawn, so that errors which are alike within a window widen the intervals. What a
     prior expects is drawn from it each time, so that sizes which the data cannot tell from something uncertain (a delay
@@ -98,7 +61,6 @@ def resampled_parameters(problem: Problem, fitted: Fitted, rng: np.random.Genera
     precision = np.concatenate([1.0 / problem.prior[free] ** 2, [p.scale**-2 for p in parameters]])
     middle = np.concatenate([np.zeros(len(free)), [p.neutral for p in parameters]])
     count, found = len(normals), []
-    covariance = _inverse(normals.sum(axis=0)[1:, 1:] + np.diag(precision))[len(free) :, len(free) :]
     for _ in range(draws):
         weights = np.bincount(rng.integers(count, size=count), minlength=count).astype(float)
         total = np.tensordot(weights, normals, axes=1)
@@ -106,15 +68,7 @@ def resampled_parameters(problem: Problem, fitted: Fitted, rng: np.random.Genera
         gradient = total[1:, 0] - precision * (here - expected)
         step = bounded_step(total[1:, 1:] + np.diag(precision), gradient, low - here, high - here)
         found.append(np.clip(here + step, low, high)[len(free) :])
-    form = form_deviations(parameters, here[len(free) :], covariance)
-    return Resampled(parameters, np.array(found).reshape(draws, len(parameters)), form)
-
-
-def _inverse(information: Array) -> Array:
-    """Of a positive semidefinite matrix; what nothing shows is as good as free."""
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(information), 1e-30))
-    scaled = information * np.outer(scale, scale) + 1e-9 * np.eye(len(scale))
-    return np.asarray(np.linalg.inv(scaled) * np.outer(scale, scale))
+    return parameters, np.array(found).reshape(draws, len(parameters))
 
 
 def intervals(draws: Array, level: float = LEVEL) -> list[tuple[float, float]]:
@@ -123,19 +77,19 @@ def intervals(draws: Array, level: float = LEVEL) -> list[tuple[float, float]]:
     return [(float(a), float(b)) for a, b in np.quantile(draws, [tail, 1.0 - tail], axis=0).T]
 
 
-def with_structure(interval: tuple[float, float], effect: Effect, field: str, form: float) -> tuple[float, float]:
+def with_structure(interval: tuple[float, float], effect: Effect, field: str) -> tuple[float, float]:
     """An interval widened in quadrature by what resampling one simulator's fit cannot show, within the field's bounds.
 
     Args:
         interval: resampled.
         effect: at its fitted size.
         field: of the effect; a shape, which has no least meaningful size, keeps its interval.
-        form: its half width for another form of the effect.
     """
     data = effect.parameter(field).metadata
     value = getattr(effect, field)
     if effect.differentiable:
-        structure = float(np.hypot(STRUCTURE * data["least"], form))
+        away = 0.0 if data["neutral"] is None else value - data["neutral"]
+        structure = float(np.hypot(STRUCTURE * data["least"], FORM * away))
     else:
         structure = STRUCTURE_OF_LIMIT * abs(value)
     middle, half = 0.5 * (interval[0] + interval[1]), 0.5 * (interval[1] - interval[0])

@@ -157,7 +157,7 @@ def _answer(problem: Problem, target: str, courses: Array, response: Response) -
 def _raw(problem: Problem, standing: Standing, columns: Array) -> Array:
     """(W, M + S, 1 + P + K) residual, what a refit could still move, and the terms."""
     fitted = standing.fitted
-    free = problem.open_at(fitted.point.values)
+    free = problem.open_at(fitted.point)
     parameters = effect_parameters(fitted.point.effects)
     by_effect = effect_columns(problem, fitted.point, fitted.prediction, parameters)
     sensitivities = np.concatenate([fitted.by_parameter[..., free], by_effect, columns], axis=2)
@@ -179,7 +179,7 @@ def _sums(
 ) -> tuple[Sums, list[Term]]:
     """Inner products by stretch, and the terms that they are of."""
     point = standing.fitted.point
-    free = problem.open_at(point.values)
+    free = problem.open_at(point)
     parameters = effect_parameters(point.effects)
     number = int(group.max()) + 1
     size = projected.shape[2]

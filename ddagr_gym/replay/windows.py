@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +48,8 @@ class WindowSet:
         measured: (W, T, 8) in the order of CHANNELS, NaN where there is no new sample.
         initial: (W, 8) first guess of STATE at the start.
         ahead: A.
+        unknown: (W,) how many of the first commands nobody recorded: before a recording, or a stretch of it, the first
+            one stands for them.
     """
 
     period: float
@@ -59,6 +61,7 @@ class WindowSet:
     measured: Array
     initial: Array
     ahead: int = 0
+    unknown: NDArray[np.int64] = field(default_factory=lambda: np.zeros(1, dtype=np.int64))
 
     @property
     def count(self) -> int:
@@ -83,8 +86,10 @@ class WindowSet:
         return self._commands(np.arange(self.samples), delay)
 
     def past(self, delay: float = 0.0) -> Array:
-        """(W, H, 2) commands that acted in the same way before the start, the latest last."""
-        return self._commands(np.arange(-self.history, 0), delay)
+        """(W, H, 2) commands that acted in the same way before the start, the latest last; NaN where unknown."""
+        oldest = np.arange(self.history) - int(np.ceil(delay / self.period - 1e-9))
+        known = oldest >= np.broadcast_to(self.unknown, self.start.shape)[:, None]
+        return np.where(known[..., None], self._commands(np.arange(-self.history, 0), delay), np.nan)
 
     def _commands(self, samples: NDArray[np.int64], delay: float) -> Array:
         """Commands that act in samples counted from the start."""
@@ -100,7 +105,8 @@ class WindowSet:
     def subset(self, chosen: NDArray[np.int64] | NDArray[np.bool_]) -> WindowSet:
         """Only the chosen windows."""
         names = ("recording", "start", "time", "commands", "measured", "initial")
-        return replace(self, **{name: getattr(self, name)[chosen] for name in names})
+        unknown = np.broadcast_to(self.unknown, self.start.shape)[chosen]
+        return replace(self, unknown=unknown, **{name: getattr(self, name)[chosen] for name in names})
 
 
 def cut_windows(
@@ -191,7 +197,7 @@ def cut_runs(
     )
 
 
-_Part = tuple[int, int, float, Array, Array]
+_Part = tuple[int, int, float, Array, Array, int]
 
 
 def _stack(
@@ -202,12 +208,12 @@ def _stack(
     wheel_radius: float,
     half_track: float,
 ) -> WindowSet:
-    number, start, time, commands, measured = (np.array(column) for column in zip(*parts, strict=True))
+    number, start, time, commands, measured, unknown = (np.array(column) for column in zip(*parts, strict=True))
     guesses = [
         _guess(recordings[n], int(s), drive, wheel_radius, half_track)
         for n, s, drive in zip(number, start, commands[:, max(kept[0] - 1, 0)], strict=True)
     ]
-    return WindowSet(period, number, start, time, commands, kept[0], measured, np.stack(guesses), kept[1])
+    return WindowSet(period, number, start, time, commands, kept[0], measured, np.stack(guesses), kept[1], unknown)
 
 
 def _common_period(recordings: Sequence[Recording]) -> float:
@@ -253,9 +259,10 @@ def _window(
     # before the first known command of the segment the robot is taken to have had that one
     known = np.isfinite(commands).all(axis=1)
     commands = commands[np.maximum.accumulate(np.where(known, np.arange(len(rows)), np.argmax(known)))]
+    unknown = max(int((rows < segment.start).sum()), int(np.argmax(known)))
     inside = slice(first + 1, first + 1 + samples)
     measured = np.stack([recording[name][inside] for name in CHANNELS], axis=1)
-    return number, first, float(recording.t[first]), commands, measured
+    return number, first, float(recording.t[first]), commands, measured, unknown
 
 
 def _guess(recording: Recording, row: int, drive: Array, wheel_radius: float, half_track: float) -> Array:

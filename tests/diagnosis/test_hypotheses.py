@@ -75,7 +75,7 @@ def test_a_delay_takes_over_what_the_meaning_of_rows_had_taken() -> None:
         assert delay.delay * (1.0 + way * delay.imbalance) == pytest.approx(0.06 * (1.0 + way * 0.5) + 0.04)
 
 
-@pytest.mark.parametrize("effects", [("gyro_scale=1.1",), ("command_delay=0",), ()])
+@pytest.mark.parametrize("effects", [("gyro_scale=1.1",), ("command_delay=0",), ("command_delay=0.47",), ()])
 def test_without_a_delay_rows_mean_what_they_meant(effects: tuple[str, ...]) -> None:
     assert late(0.04, *effects).values.tolist() == [0.01, 0.04]
 

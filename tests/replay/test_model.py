@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from ddagr_gym.control.manoeuvres import MANOEUVRES
+from ddagr_gym.diagnosis.forecast import part_of
 from ddagr_gym.parameters import Numerics
 from ddagr_gym.physics import layout
 from ddagr_gym.physics.effects import load_effects
@@ -78,7 +79,6 @@ def test_effects_on_commands_know_what_was_commanded_before_a_window(robot, soil
     recording = Recording.from_columns({name: columns[name] for name in CHANNELS_OF_COMMANDS}, robot)
     geometry = RobotGeometry.of(robot)
     cut = cut_windows([recording], 1.0, wheel_radius=geometry.wheel_radius, half_track=geometry.half_track)
-    cut = cut.subset(cut.time > 1.0)
     states = np.stack([columns[TRUTH[name]][cut.start] for name in STATE], axis=1)
     entries = (layout.OMEGA, layout.OMEGA + 1)
     model = WindowModel(robot, soil, cut)
@@ -96,7 +96,19 @@ def test_effects_on_commands_know_what_was_commanded_before_a_window(robot, soil
 def test_the_past_is_delayed_as_the_commands_are(windows):
     late = windows.past(0.06)
     np.testing.assert_allclose(late[:, 3:], windows.past()[:, :-3], atol=1e-9)
-    np.testing.assert_allclose(windows.drive(0.06)[:, :3], windows.past()[:, -3:], atol=1e-9)
+    np.testing.assert_allclose(windows.drive(0.06)[1:, :3], windows.past()[1:, -3:], atol=1e-9)
+
+
+def test_before_a_recording_nothing_is_known(windows):
+    """One command is: the first row's was in force up to it."""
+    assert np.isnan(windows.past()[0]).all(axis=1).tolist() == [True] * (windows.history - 1) + [False]
+    assert np.isnan(windows.past(0.03)[0]).all()
+    assert not np.isnan(windows.past()[1:]).any()
+    alone = windows.subset(np.array([0, 3]))
+    np.testing.assert_array_equal(alone.past(), windows.past()[[0, 3]])
+    # a part that begins later knows more
+    later = part_of(windows, 10, 20).past()
+    assert np.isnan(later[0, :, 0]).sum() == windows.history - 11
 
 
 def test_imposed_wheel_speeds_are_those_at_the_samples(robot, soil, windows):

@@ -84,7 +84,9 @@ class Effect(Validated):
     """Base of all effects. Subclasses are final, set the class attributes and add fields with size() and shape().
 
     Actions are pure functions of row, parameters and memory. At the points wheel_forces and body_forces they are called
-    several times per step, in any order of trial states: there they must leave their memory alone.
+    several times per step, in any order of trial states: there they must leave their memory alone. Before a window of
+    a replay those at the points commands and motors are called for each earlier sample whose command is known, at the
+    motion of the window's start, so that they know what was commanded; they must not count on that motion to change.
     """
 
     name: ClassVar[str]
