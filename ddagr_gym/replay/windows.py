@@ -125,7 +125,7 @@ def cut_windows(
     Args:
         recordings: of one robot.
         duration: of a window [s].
-        stride: between starts [s]; ``duration`` by default.
+        stride: between starts [s], gaps left out; ``duration`` by default.
         wheel_radius: for the first guess of the speed [m].
         half_track: for the first guess of the yaw rate where no gyro is [m].
         drive_by: "commands", or "encoders" to impose the recorded wheel speeds.
@@ -142,11 +142,13 @@ def cut_windows(
     parts = []
     for number, recording in enumerate(recordings):
         drive = _drive(recording, drive_by)
+        due = 0
         for segment in recording.segments():
-            for first in range(segment.start, segment.stop - samples, step):
+            for first in range(max(segment.start, due), segment.stop - samples, step):
                 part = _window(recording, number, drive, first, samples, (past, later), segment)
                 if part is not None:
                     parts.append(part)
+                    due = first + step
     if not parts:
         names = ", ".join(r.meta.source for r in recordings)
         raise InputError(f"{names}: no window of {duration:g} s fits into valid {drive_by}: choose a shorter one.")

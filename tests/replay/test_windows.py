@@ -55,6 +55,14 @@ def test_stride_makes_windows_overlap(counting):
     assert set(np.diff(windows.start)) == {20}
 
 
+def test_a_stride_holds_across_short_segments(counting):
+    """Recordings in pieces of 2 s: one window in four, as in a recording without gaps."""
+    pieces = [(row, row + 41) for row in range(0, 1960, 41)]
+    windows = cut_windows([counting(segments=pieces)], 2.0, stride=8.0, **GEOMETRY)
+    assert set(np.diff(windows.start)) == {164}
+    assert cut_windows([counting(segments=pieces)], 2.0, **GEOMETRY).count == len(pieces)
+
+
 def test_encoders_that_hold_samples_are_joined_by_lines(counting):
     speeds = np.where(np.arange(2000) % 5 == 0, 0.1 * np.arange(2000), np.nan)
     recording = counting(encoder_right=speeds, encoder_left=speeds)
