@@ -239,7 +239,9 @@ class _Direction:
 def _directions(name: str, terms: Terms, matrix: Array, gate: float) -> list[_Direction]:
     """Probes of an effect's best-placed candidate; of limits and flips those that the table states."""
     own = [c for c in terms.candidates if c.name == name]
-    found = [[_direction(c, k, matrix, gate) for k in range(len(c.columns))] for c in own]
+    found = [
+        [_direction(c, k, matrix, gate, terms.absorbed.get(name, 0.0)) for k in range(len(c.columns))] for c in own
+    ]
     if not own[0].has_sizes:
         every = [item for group in found for item in group]
         stated = _best_by_field([item.size for item in every])
@@ -247,7 +249,8 @@ def _directions(name: str, terms: Terms, matrix: Array, gate: float) -> list[_Di
     return min(found, key=lambda group: min(item.size.multiples for item in group))
 
 
-def _direction(candidate: Candidate, k: int, matrix: Array, gate: float) -> _Direction:
+def _direction(candidate: Candidate, k: int, matrix: Array, gate: float, absorbed: float) -> _Direction:
+    """A probe's size that shows: beyond what a nuisance would take over."""
     probe, column = candidate.probes[k], candidate.columns[k]
     name, data, away = moved_field(probe)
     if candidate.whole is not None:
@@ -257,7 +260,7 @@ def _direction(candidate: Candidate, k: int, matrix: Array, gate: float) -> _Dir
     else:
         least, distance = 1.0, abs(float(getattr(probe, name)))
     gain = 0.5 * least**2 * max(float(matrix[column, column]), 0.0)
-    multiples = math.sqrt(gate / gain) if gain > 1e-12 else math.inf
+    multiples = (math.sqrt(gate / gain) if gain > 1e-12 else math.inf) + absorbed / distance
     if probe.differentiable and candidate.whole is None:
         size = distance * multiples if distance * multiples <= probe.reach(name) else math.inf
     else:  # a limit or a flip is there or not

@@ -11,6 +11,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ddagr_gym.errors import InputError
 from ddagr_gym.parameters import Robot
 from ddagr_gym.physics import layout
@@ -152,3 +155,16 @@ def nuisances(
         (names.index("strength_right"), priors.local_split),
     )
     return Nuisances(parameters, local)
+
+
+def absorbed_sizes(parameters: Sequence[ModelParameter], values: NDArray[np.float64]) -> dict[str, float]:
+    """Sizes of effects, in their units, that a nuisance can still take over without a trace.
+
+    A delay of all commands is no other thing than a row whose command acts later.
+
+    Args:
+        parameters: (P,) global ones.
+        values: (P,) where they stand.
+    """
+    rooms = [p.high - float(value) for p, value in zip(parameters, values, strict=True) if p.shift]
+    return {"command_delay": sum(rooms)} if rooms else {}

@@ -90,6 +90,8 @@ def plan(
     ]
     problem = make_problem(robot, soil, recordings, setting, recording_noise(recordings, robot.outer_radius))
     problem = _at_truth(problem, recordings)
+    # the nominal value may be a bound, but no data have pushed a parameter there
+    problem.low, problem.high = np.full_like(problem.low, -np.inf), np.full_like(problem.high, np.inf)
     return Plan(tuple(manoeuvres), tuple(sensors), problem, fit(problem, iterations=0))
 
 

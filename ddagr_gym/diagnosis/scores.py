@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.diagnosis.candidates import Candidate, candidates_of
+from ddagr_gym.diagnosis.nuisance import absorbed_sizes
 from ddagr_gym.diagnosis.overlap import overlaps
 from ddagr_gym.diagnosis.problem import Problem
 from ddagr_gym.diagnosis.refit import Fitted
@@ -46,6 +47,7 @@ class Terms:
         turned: recordings whose headings are unknown.
         overlap: by effect, share of what it does that lies in the windows and channels in which the effects of the
             model act already (0 to 1); empty for a model without effects.
+        absorbed: by effect, the size that a nuisance would take over without a trace.
     """
 
     normals: Array
@@ -57,6 +59,7 @@ class Terms:
     time: Array
     turned: tuple[int, ...] = ()
     overlap: Mapping[str, float] = field(default_factory=dict)
+    absorbed: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def placed(self) -> NDArray[np.bool_]:
@@ -185,6 +188,7 @@ def scan(
         windows.time,
         tuple(p.recording for p in problem.nuisances.parameters if p.heading and p.recording is not None),
         overlap,
+        absorbed_sizes(problem.nuisances.parameters, fitted.point.values),
     )
 
 

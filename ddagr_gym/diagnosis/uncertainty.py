@@ -106,7 +106,7 @@ def least_detectable(terms: Terms, thresholds: Thresholds, dispersion: float) ->
     none, or where the size lies beyond the bound of what exists. Of an effect that may act at any time or in any way,
     the usual one counts, which is its default (a change of soil from the beginning on); of one that has a place, the
     median over the places that the drives touch. Of a limit stands the mildest of the tried ones that shows, as it is,
-    and of a reversed sign 1.
+    and of a reversed sign 1. What a nuisance can take over (see :attr:`Terms.absorbed`) comes on top.
     """
     information = np.diag(reduce(terms).information)
     found: dict[str, dict[str, list[tuple[bool, float]]]] = {}
@@ -126,7 +126,10 @@ def least_detectable(terms: Terms, thresholds: Thresholds, dispersion: float) ->
         for usual, name, size in sizes:
             found.setdefault(candidate.name, {}).setdefault(name, []).append((usual or candidate.is_direction, size))
     return {
-        effect: {name: float(np.median(_that_count(effect, name, sizes))) for name, sizes in fields.items()}
+        effect: {
+            name: float(np.median(_that_count(effect, name, sizes))) + terms.absorbed.get(effect, 0.0)
+            for name, sizes in fields.items()
+        }
         for effect, fields in found.items()
     } | {
         effect: {name: max(shown, default=np.inf) for name, shown in fields.items()} for effect, fields in whole.items()

@@ -57,6 +57,13 @@ def test_a_gyro_scale_does_not_show_in_a_straight_drive(straight, turn) -> None:
     assert entry(turn, "gyro_scale", "gyro_sign") > 0.9
 
 
+def test_a_delay_shows_beyond_what_the_meaning_of_rows_may_take() -> None:
+    """Two samples, here of 20 ms: loggers differ by as much."""
+    found = table([TURN], names=("command_delay", "motor_lag")).of("command_delay")
+    assert 0.04 < found.size < 0.1
+    assert found.multiples * found.least_meaningful == pytest.approx(found.size)
+
+
 def test_limits_are_given_as_values_that_would_show(turn) -> None:
     limits = [item for item in turn.detectable if item.effect == "motor_saturation"]
     speed = next(item for item in limits if item.field == "speed_limit")

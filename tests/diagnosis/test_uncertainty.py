@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ddagr_gym.diagnosis.candidates import Candidate, candidates_of, moved_field
-from ddagr_gym.diagnosis.nuisance import NuisancePriors
+from ddagr_gym.diagnosis.nuisance import NuisancePriors, absorbed_sizes, nuisances
 from ddagr_gym.diagnosis.refit import fit
 from ddagr_gym.diagnosis.scores import Terms
 from ddagr_gym.diagnosis.size_prior import size_scale
@@ -23,6 +23,7 @@ from ddagr_gym.diagnosis.uncertainty import (
 )
 from ddagr_gym.physics.effects import effect_kind, parse_effect
 from ddagr_gym.physics.effects.base import DriveExtent
+from ddagr_gym.presets import get_robot
 
 EXTENT = DriveExtent(60.0, (0.0, 8.0), (0.0, 6.0), 1.2, 3.0)
 GATE, DISPERSION = 2.0, 4.0
@@ -63,7 +64,10 @@ def test_shapes_keep_their_intervals_and_bounds_hold() -> None:
 
 
 def least_of(
-    candidates: list[Candidate], information: Mapping[int, float], explained: Mapping[int, float] | None = None
+    candidates: list[Candidate],
+    information: Mapping[int, float],
+    explained: Mapping[int, float] | None = None,
+    absorbed: Mapping[str, float] | None = None,
 ) -> dict[str, float]:
     """Least detectable sizes of one effect, whose probes have this information, one nuisance explaining some of it."""
     count = sum(len(candidate.columns) for candidate in candidates)
@@ -74,7 +78,7 @@ def least_of(
     for column, value in (explained or {}).items():
         normals[0, 1, 2 + column] = normals[0, 2 + column, 1] = math.sqrt(value)
     none = np.zeros(1, dtype=np.int64)
-    terms = Terms(normals, 1, np.zeros(1), np.zeros(1), tuple(candidates), none, np.zeros(1))
+    terms = Terms(normals, 1, np.zeros(1), np.zeros(1), tuple(candidates), none, np.zeros(1), absorbed=absorbed or {})
     name = candidates[0].name
     return least_detectable(terms, Thresholds({name: Gate(GATE, 0.0)}, {}, 20, "a test"), DISPERSION)[name]
 
@@ -153,6 +157,16 @@ def test_of_limits_the_mildest_that_shows_stands_as_it_is() -> None:
     assert least_of(candidates, all_of_them | {mildest: 0.99 * enough})["speed_limit"] == pytest.approx(values[-2])
     nothing = least_of(candidates, dict.fromkeys(all_of_them, 0.99 * enough))
     assert nothing == {"speed_limit": np.inf, "acceleration_limit": np.inf}
+
+
+def test_what_a_nuisance_would_take_over_comes_on_top() -> None:
+    late = nuisances(get_robot("ddagr"), 1, 0.02).parameters
+    values = np.array([0.015 if parameter.name == "command_shift" else 0.0 for parameter in late])
+    assert absorbed_sizes(late, values) == {"command_delay": pytest.approx(0.025)}
+    candidates = candidates_of(effect_kind("command_delay"), EXTENT, 0)
+    every = {column: 1e4 for candidate in candidates for column in candidate.columns}
+    bare = least_of(candidates, every)["delay"]
+    assert least_of(candidates, every, absorbed={"command_delay": 0.025})["delay"] == pytest.approx(bare + 0.025)
 
 
 def test_a_reversed_sign_shows_or_does_not() -> None:
