@@ -70,7 +70,7 @@ def draw(result: Mapping[str, Any], path: Path) -> None:
             rows = [(entry[name], palette.GREY, 2.5) for entry in result["sets"] if entry[name]["count"]]
             rows.append((result[name], palette.GREEN if aim["met"] else palette.VERMILLION, 6.0))
             for number, (entry, colour, size) in enumerate(rows):
-                at = y + 0.22 * (number - 0.5 * (len(rows) - 1))
+                at = y + 0.66 * ((number + 0.5) / len(rows) - 0.5)
                 panel.plot(entry["interval"], [at, at], color=colour, lw=1.4)
                 panel.plot(entry["value"], at, "o", color=colour, ms=size)
         words = [f"{WORDS[name]}\n{100.0 * result[name]['value']:.0f} % of {result[name]['count']}" for name in names]
