@@ -162,10 +162,15 @@ def slower_loop(problem: Problem, point: Point) -> Point | None:
     value = float(point.values[place])
     if value > -PULLED * float(problem.prior[place]):
         return None
+    lag = MotorLag(math.expm1(-value) / problem.robot.motor_rate)
+    return _handed_over(point, place, (*point.effects, lag))
+
+
+def _handed_over(point: Point, place: int, effects: tuple[Effect, ...]) -> Point:
+    """A point whose effects tell what a nuisance did, which is back at its nominal value."""
     values = point.values.copy()
     values[place] = 0.0
-    lag = MotorLag(math.expm1(-value) / problem.robot.motor_rate)
-    return replace(point, values=values, effects=(*point.effects, lag))
+    return replace(point, values=values, effects=effects)
 
 
 def with_whole_delay(problem: Problem, point: Point) -> Point:
@@ -183,9 +188,7 @@ def with_whole_delay(problem: Problem, point: Point) -> Point:
     told = [_later(effect, shift) if isinstance(effect, CommandDelay) else None for effect in point.effects]
     if shift <= 0.0 or not any(told):
         return point
-    values = point.values.copy()
-    values[place] = 0.0
-    return replace(point, values=values, effects=tuple(a or b for a, b in zip(told, point.effects, strict=True)))
+    return _handed_over(point, place, tuple(a or b for a, b in zip(told, point.effects, strict=True)))
 
 
 def _later(delay: CommandDelay, shift: float) -> CommandDelay | None:

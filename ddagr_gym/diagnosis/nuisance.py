@@ -157,14 +157,16 @@ def nuisances(
     return Nuisances(parameters, local)
 
 
+SHIFT_AS_EFFECT = "command_delay"
+"""Effect that is no other thing than a row whose command acts later."""
+
+
 def absorbed_sizes(parameters: Sequence[ModelParameter], values: NDArray[np.float64]) -> dict[str, float]:
     """Sizes of effects, in their units, that a nuisance can still take over without a trace.
-
-    A delay of all commands is no other thing than a row whose command acts later.
 
     Args:
         parameters: (P,) global ones.
         values: (P,) where they stand.
     """
     rooms = [p.high - float(value) for p, value in zip(parameters, values, strict=True) if p.shift]
-    return {"command_delay": sum(rooms)} if rooms else {}
+    return {SHIFT_AS_EFFECT: sum(rooms)} if rooms else {}

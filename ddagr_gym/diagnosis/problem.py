@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ddagr_gym.diagnosis.blocks import BlockedWindows
 from ddagr_gym.diagnosis.headings import headings_matter, turned_starts
-from ddagr_gym.diagnosis.nuisance import NuisancePriors, Nuisances
+from ddagr_gym.diagnosis.nuisance import SHIFT_AS_EFFECT, NuisancePriors, Nuisances
 from ddagr_gym.parameters import Numerics, Robot, Soil
 from ddagr_gym.physics import layout
 from ddagr_gym.physics.effects import Effect
@@ -161,7 +161,7 @@ class Problem:
         The shift of the commands, which a delay takes over, stands for that delay.
         """
         held = (point.values <= self.low + 1e-9) | (point.values >= self.high - 1e-9)
-        if any(effect.name == "command_delay" for effect in point.effects):
+        if any(effect.name == SHIFT_AS_EFFECT for effect in point.effects):
             held &= ~np.array([parameter.shift for parameter in self.nuisances.parameters])
         return np.flatnonzero(self.free & ~held)
 

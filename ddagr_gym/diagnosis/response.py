@@ -188,7 +188,7 @@ def _pieces(problem: Problem, fitted: Fitted, course: Course) -> tuple[WindowSet
             windows.history,
             np.zeros((count * blocks, length, len(CHANNELS))),
             starts,
-            unknown=np.maximum(repeated(np.broadcast_to(windows.unknown, count)) - np.tile(rows, count), 0),
+            unknown=np.maximum(np.repeat(windows.unknown, blocks) - np.tile(rows, count), 0),
         ),
         starts,
     )

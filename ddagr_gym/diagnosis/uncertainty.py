@@ -57,16 +57,15 @@ def resampled_parameters(
     here = np.concatenate([fitted.point.values[free], read(fitted.point.effects, parameters)])
     low = np.concatenate([problem.low[free], [p.low for p in parameters]])
     high = np.concatenate([problem.high[free], [p.high for p in parameters]])
-    deviation = np.concatenate([problem.prior[free], [p.scale if np.isfinite(p.scale) else 0.0 for p in parameters]])
-    precision = np.concatenate([1.0 / problem.prior[free] ** 2, [p.scale**-2 for p in parameters]])
+    deviation = np.concatenate([problem.prior[free], [p.scale for p in parameters]])
     middle = np.concatenate([np.zeros(len(free)), [p.neutral for p in parameters]])
     count, found = len(normals), []
     for _ in range(draws):
         weights = np.bincount(rng.integers(count, size=count), minlength=count).astype(float)
         total = np.tensordot(weights, normals, axes=1)
-        expected = middle + rng.normal(size=len(middle)) * deviation
-        gradient = total[1:, 0] - precision * (here - expected)
-        step = bounded_step(total[1:, 1:] + np.diag(precision), gradient, low - here, high - here)
+        # a shape's deviation is infinite: nothing is expected of it
+        gradient = total[1:, 0] - ((here - middle) / deviation - rng.normal(size=len(middle))) / deviation
+        step = bounded_step(total[1:, 1:] + np.diag(deviation**-2.0), gradient, low - here, high - here)
         found.append(np.clip(here + step, low, high)[len(free) :])
     return parameters, np.array(found).reshape(draws, len(parameters))
 

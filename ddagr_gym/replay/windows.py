@@ -63,6 +63,10 @@ class WindowSet:
     ahead: int = 0
     unknown: NDArray[np.int64] = field(default_factory=lambda: np.zeros(1, dtype=np.int64))
 
+    def __post_init__(self) -> None:
+        """One count for all windows, by default none, stands for each of them."""
+        object.__setattr__(self, "unknown", np.broadcast_to(self.unknown, self.start.shape))
+
     @property
     def count(self) -> int:
         """W."""
@@ -88,7 +92,7 @@ class WindowSet:
     def past(self, delay: float = 0.0) -> Array:
         """(W, H, 2) commands that acted in the same way before the start, the latest last; NaN where unknown."""
         oldest = np.arange(self.history) - int(np.ceil(delay / self.period - 1e-9))
-        known = oldest >= np.broadcast_to(self.unknown, self.start.shape)[:, None]
+        known = oldest >= self.unknown[:, None]
         return np.where(known[..., None], self._commands(np.arange(-self.history, 0), delay), np.nan)
 
     def _commands(self, samples: NDArray[np.int64], delay: float) -> Array:
@@ -104,9 +108,8 @@ class WindowSet:
 
     def subset(self, chosen: NDArray[np.int64] | NDArray[np.bool_]) -> WindowSet:
         """Only the chosen windows."""
-        names = ("recording", "start", "time", "commands", "measured", "initial")
-        unknown = np.broadcast_to(self.unknown, self.start.shape)[chosen]
-        return replace(self, unknown=unknown, **{name: getattr(self, name)[chosen] for name in names})
+        names = ("recording", "start", "time", "commands", "measured", "initial", "unknown")
+        return replace(self, **{name: getattr(self, name)[chosen] for name in names})
 
 
 def cut_windows(
@@ -260,8 +263,9 @@ def _window(
         return None
     # before the first known command of the segment the robot is taken to have had that one
     known = np.isfinite(commands).all(axis=1)
-    commands = commands[np.maximum.accumulate(np.where(known, np.arange(len(rows)), np.argmax(known)))]
-    unknown = max(int((rows < segment.start).sum()), int(np.argmax(known)))
+    first_known = int(np.argmax(known))
+    commands = commands[np.maximum.accumulate(np.where(known, np.arange(len(rows)), first_known))]
+    unknown = max(int((rows < segment.start).sum()), first_known)
     inside = slice(first + 1, first + 1 + samples)
     measured = np.stack([recording[name][inside] for name in CHANNELS], axis=1)
     return number, first, float(recording.t[first]), commands, measured, unknown
