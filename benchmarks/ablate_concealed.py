@@ -94,8 +94,8 @@ def _spread(names: Sequence[str], labels: Mapping[str, Any]) -> list[str]:
 def examined(work: Work) -> str:
     """Examine a case unless that is done; returns its name."""
     from benchmarks.ablations.examine import ROBOT, examine
-    from ddagr_gym.diagnosis.sources import source_digest
-    from ddagr_gym.diagnosis.threshold_files import default_thresholds, load_thresholds
+    from ddagr_gym.diagnosis.gates.source_digest import source_digest
+    from ddagr_gym.diagnosis.gates.threshold_files import default_thresholds, load_thresholds
 
     thresholds = default_thresholds(ROBOT) if work.thresholds is None else load_thresholds(work.thresholds)
     key = f"{source_digest()} {thresholds.bank}"

@@ -32,12 +32,12 @@ from benchmarks.concealed.simulate import simulate_case
 from benchmarks.concealed.storage import csv_bytes, digest, read_json, recording_digest, write_case
 from benchmarks.concealed_truth import true_sizes
 from ddagr_gym.commands.progress import Progress
-from ddagr_gym.diagnosis.problem import Point
-from ddagr_gym.diagnosis.refit import fit
-from ddagr_gym.diagnosis.search import refit_nominal
+from ddagr_gym.diagnosis.gates.threshold_files import default_thresholds
+from ddagr_gym.diagnosis.search.stepwise import refit_nominal
 from ddagr_gym.diagnosis.setting import Setting, make_problem
-from ddagr_gym.diagnosis.threshold_files import default_thresholds
 from ddagr_gym.errors import InputError
+from ddagr_gym.identification.gauss_newton import fit
+from ddagr_gym.identification.problem import Point
 from ddagr_gym.physics.effects.base import Effect
 from ddagr_gym.physics.effects.registry import effect_kind
 from ddagr_gym.presets import get_robot, get_soil

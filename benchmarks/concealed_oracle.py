@@ -27,16 +27,16 @@ from benchmarks.ablations.examine import ROBOT, SOIL, read_runs
 from benchmarks.concealed_truth import Sizes, detectable
 from benchmarks.score_concealed import RESULT, figure_line, mean, read_equivalents, right
 from ddagr_gym.commands.progress import Progress
-from ddagr_gym.diagnosis.certificate import LEAST_EXPLAINABLE
-from ddagr_gym.diagnosis.certify import certify
-from ddagr_gym.diagnosis.diagnose import Begun, begun
-from ddagr_gym.diagnosis.refit import Fitted, fit
-from ddagr_gym.diagnosis.search import rivals_of
+from ddagr_gym.diagnosis.certification.certificate import LEAST_EXPLAINABLE
+from ddagr_gym.diagnosis.certification.certify import certify
+from ddagr_gym.diagnosis.gates.threshold_files import default_thresholds
+from ddagr_gym.diagnosis.gates.thresholds import Gate, Thresholds
+from ddagr_gym.diagnosis.result.conclusion import Begun, begun
+from ddagr_gym.diagnosis.search.search_node import stand
+from ddagr_gym.diagnosis.search.stepwise import rivals_of
 from ddagr_gym.diagnosis.setting import Setting
-from ddagr_gym.diagnosis.standing import stand
-from ddagr_gym.diagnosis.threshold_files import default_thresholds
-from ddagr_gym.diagnosis.thresholds import Gate, Thresholds
 from ddagr_gym.errors import InputError
+from ddagr_gym.identification.gauss_newton import Fitted, fit
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.files import write_atomically
 from ddagr_gym.reporting import palette

@@ -20,13 +20,13 @@ from typing import Any
 
 from benchmarks.ablations.examine import ROBOT, SOIL, read_runs
 from benchmarks.speeds.kernel_time import against_c
+from ddagr_gym.diagnosis.gates.threshold_files import default_thresholds
+from ddagr_gym.diagnosis.gates.thresholds import Thresholds
 from ddagr_gym.diagnosis.pipeline import Task, run
-from ddagr_gym.diagnosis.prepared import prepare
-from ddagr_gym.diagnosis.scores import scan
-from ddagr_gym.diagnosis.search import refit_nominal
+from ddagr_gym.diagnosis.preprocessing.mended_recordings import prepare
+from ddagr_gym.diagnosis.search.scan import scan
+from ddagr_gym.diagnosis.search.stepwise import refit_nominal
 from ddagr_gym.diagnosis.setting import Setting
-from ddagr_gym.diagnosis.threshold_files import default_thresholds
-from ddagr_gym.diagnosis.thresholds import Thresholds
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.files import write_atomically
 from ddagr_gym.reporting.figures import house_style, save_figure

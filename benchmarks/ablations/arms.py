@@ -9,17 +9,17 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 
-from ddagr_gym.diagnosis.candidates import Candidate
-from ddagr_gym.diagnosis.misfit import LOCAL, roughest
-from ddagr_gym.diagnosis.nuisance import NuisancePriors, Nuisances
-from ddagr_gym.diagnosis.prepared import Prepared
-from ddagr_gym.diagnosis.problem import Problem
-from ddagr_gym.diagnosis.refit import Fitted, cost_of
-from ddagr_gym.diagnosis.standing import Standing, stand
-from ddagr_gym.diagnosis.thresholds import Gate, Thresholds
+from ddagr_gym.diagnosis.gates.thresholds import Gate, Thresholds
+from ddagr_gym.diagnosis.preprocessing.mended_recordings import Prepared
+from ddagr_gym.diagnosis.search.candidates import Candidate
+from ddagr_gym.diagnosis.search.search_node import Standing, stand
+from ddagr_gym.identification.gauss_newton import Fitted, cost_of
+from ddagr_gym.identification.misfit import LOCAL, roughest
+from ddagr_gym.identification.nuisances import NuisancePriors, Nuisances
+from ddagr_gym.identification.problem import Problem
+from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.parameters import Soil
 from ddagr_gym.physics.effects.registry import effect_kinds
-from ddagr_gym.replay.windows import CHANNELS
 
 _LOCKED = 1e-6
 """Deviation that allows nothing, in any unit of a local variation; zero would divide by it."""

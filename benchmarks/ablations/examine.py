@@ -17,13 +17,13 @@ from benchmarks.ablations.arms import (
     nominal_standing,
 )
 from benchmarks.ablations.sparse import sparse_first
-from ddagr_gym.diagnosis.diagnose import begun
-from ddagr_gym.diagnosis.prepared import Prepared
-from ddagr_gym.diagnosis.refit import Fitted
-from ddagr_gym.diagnosis.search import begin, scans_of
+from ddagr_gym.diagnosis.gates.thresholds import Thresholds
+from ddagr_gym.diagnosis.preprocessing.mended_recordings import Prepared
+from ddagr_gym.diagnosis.result.conclusion import begun
+from ddagr_gym.diagnosis.search.search_node import Standing, stand
+from ddagr_gym.diagnosis.search.stepwise import begin, scans_of
 from ddagr_gym.diagnosis.setting import Setting, make_problem
-from ddagr_gym.diagnosis.standing import Standing, stand
-from ddagr_gym.diagnosis.thresholds import Thresholds
+from ddagr_gym.identification.gauss_newton import Fitted
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.load import load_recording

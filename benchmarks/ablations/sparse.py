@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.ablations.arms import First
-from ddagr_gym.diagnosis.problem import Problem
-from ddagr_gym.diagnosis.refit import Fitted
-from ddagr_gym.replay.windows import CHANNELS
+from ddagr_gym.identification.gauss_newton import Fitted
+from ddagr_gym.identification.problem import Problem
+from ddagr_gym.identification.windows import CHANNELS
 
 Array = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from ddagr_gym.diagnosis.thresholds import Thresholds
+    from ddagr_gym.diagnosis.gates.thresholds import Thresholds
     from ddagr_gym.recordings.schema import Recording
 
 SECONDS = 30.0
@@ -23,7 +23,7 @@ MISSING = "slope=0.04,direction=2.0"
 """What the drives have and the nominal simulator lacks."""
 
 WORLD = "pressure law"
-"""Structure of the simulator that made them, of :data:`ddagr_gym.diagnosis.structural_nulls.KINDS`."""
+"""Structure of the simulator that made them, of :data:`ddagr_gym.diagnosis.null_bank.structural_variants.KINDS`."""
 
 _RATE, _POSE_RATE, _REACH = 50.0, 5.0, 20.0
 
@@ -36,7 +36,7 @@ def drives(seed: int) -> tuple[Recording, ...]:
     """
     import numpy as np
 
-    from ddagr_gym.diagnosis.structural_nulls import draw_world
+    from ddagr_gym.diagnosis.null_bank.structural_variants import draw_world
     from ddagr_gym.parameters import Imu, PoseReceiver, Sensors
     from ddagr_gym.physics.effects import load_effects
     from ddagr_gym.presets import get_robot, get_soil
@@ -78,9 +78,9 @@ def diagnosis_step(folder: Path, seed: int = 1, thresholds: Thresholds | None = 
         thresholds: of the gate; those that ship with the package by default.
     """
     from ddagr_gym.commands.diagnose import PAGE, diagnosed, outcome_text, write_outcome
+    from ddagr_gym.diagnosis.gates.threshold_files import default_thresholds
     from ddagr_gym.diagnosis.pipeline import Task
     from ddagr_gym.diagnosis.setting import Setting
-    from ddagr_gym.diagnosis.threshold_files import default_thresholds
     from ddagr_gym.presets import get_robot, get_soil
 
     print("Diagnosing two drives on ground of which the nominal simulator does not know that it slopes ...", flush=True)

@@ -19,10 +19,10 @@ from ddagr_gym.commands.ranges import check_at_least
 from ddagr_gym.errors import InputError
 
 if TYPE_CHECKING:
-    from ddagr_gym.diagnosis.data_checks import DataDoubt
+    from ddagr_gym.diagnosis.gates.thresholds import Thresholds
     from ddagr_gym.diagnosis.pipeline import Outcome, Task
-    from ddagr_gym.diagnosis.thresholds import Thresholds
-    from ddagr_gym.diagnosis.verdict import Diagnosis
+    from ddagr_gym.diagnosis.preprocessing.data_checks import DataDoubt
+    from ddagr_gym.diagnosis.result.verdict import Diagnosis
     from ddagr_gym.recordings.schema import Recording
 
 EXAMPLES = (
@@ -87,7 +87,7 @@ class Arguments:
 
 def run(arguments: Arguments) -> int | None:
     """Diagnose, write the folder, print the answer; 130 when interrupted."""
-    from ddagr_gym.diagnosis.inputs import check_recordings
+    from ddagr_gym.diagnosis.preprocessing.input_requirements import check_recordings
     from ddagr_gym.diagnosis.store import StepStore, part_folder
 
     check_output_folder(arguments.output, overwrite=arguments.overwrite)
@@ -110,9 +110,9 @@ def run(arguments: Arguments) -> int | None:
 
 
 def _task(arguments: Arguments) -> Task:
-    from ddagr_gym.diagnosis.nuisance import NuisancePriors
     from ddagr_gym.diagnosis.pipeline import Task
     from ddagr_gym.diagnosis.setting import Setting
+    from ddagr_gym.identification.nuisances import NuisancePriors
     from ddagr_gym.presets import full_name, get_robot, get_soil, is_file
     from ddagr_gym.recordings.files import Limits
     from ddagr_gym.recordings.load import load_recording
@@ -164,7 +164,7 @@ def _sources(runs: Sequence[Path]) -> list[Path]:
 
 def _thresholds(arguments: Arguments) -> Thresholds:
     from ddagr_gym.commands.gates import gates_for
-    from ddagr_gym.diagnosis.threshold_files import default_thresholds
+    from ddagr_gym.diagnosis.gates.threshold_files import default_thresholds
 
     found = gates_for(arguments.thresholds, arguments.robot, arguments.soil, arguments.soil_uncertainty)
     return default_thresholds(arguments.robot) if found is None else found
@@ -214,7 +214,7 @@ def write_outcome(outcome: Outcome, folder: Path, page: bool = True) -> None:
         page: whether to write the page with its figures.
     """
     from ddagr_gym.diagnosis.pipeline import data_hash, effect_intervals
-    from ddagr_gym.diagnosis.verdict import as_mapping, save
+    from ddagr_gym.diagnosis.result.verdict import as_mapping, save
     from ddagr_gym.physics.effects.files import save_effects
     from ddagr_gym.reporting import diagnosis_page, evidence
 
@@ -238,7 +238,7 @@ def write_outcome(outcome: Outcome, folder: Path, page: bool = True) -> None:
 def _write_simulator(outcome: Outcome, folder: Path) -> None:
     """Robot and soil as refitted beside the effects, unless the refit went where no soil of these parameters is."""
     from ddagr_gym.config import dump_config
-    from ddagr_gym.diagnosis.fitted_nominal import with_values
+    from ddagr_gym.diagnosis.null_bank.fitted_nominal import with_values
 
     try:
         robot, soil = with_values(*outcome.nominal, outcome.diagnosis.nuisances)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from ddagr_gym.diagnosis.thresholds import Thresholds
+    from ddagr_gym.diagnosis.gates.thresholds import Thresholds
 
 
 def gates_for(path: Path | None, robot: str, soil: str, soil_uncertainty: float = 1.0) -> Thresholds | None:
@@ -22,7 +22,7 @@ def gates_for(path: Path | None, robot: str, soil: str, soil_uncertainty: float 
     Raises:
         InputError: the file cannot be read.
     """
-    from ddagr_gym.diagnosis.threshold_files import load_thresholds, shipped_thresholds
+    from ddagr_gym.diagnosis.gates.threshold_files import load_thresholds, shipped_thresholds
     from ddagr_gym.presets import full_name, get_robot
 
     name = get_robot(robot).name

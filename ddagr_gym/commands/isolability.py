@@ -13,7 +13,7 @@ from ddagr_gym.commands.progress import Progress
 from ddagr_gym.commands.ranges import check_at_least
 
 if TYPE_CHECKING:
-    from ddagr_gym.diagnosis.isolability import Isolability
+    from ddagr_gym.diagnosis.planning.isolability import Isolability
 
 EXAMPLES = (
     "ddagr isolability --manoeuvres straight two_headings --output isolability",
@@ -57,8 +57,8 @@ def run(arguments: Arguments) -> None:
     """Make the table, print it, write it."""
     from ddagr_gym.commands.gates import gates_for
     from ddagr_gym.control.manoeuvres import find_manoeuvre
-    from ddagr_gym.diagnosis.isolability import isolability
-    from ddagr_gym.diagnosis.nuisance import NuisancePriors
+    from ddagr_gym.diagnosis.planning.isolability import isolability
+    from ddagr_gym.identification.nuisances import NuisancePriors
     from ddagr_gym.physics.effects.registry import effect_kinds
     from ddagr_gym.presets import get_robot, get_soil
 

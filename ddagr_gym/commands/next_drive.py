@@ -56,7 +56,7 @@ class Arguments:
 
 def run(arguments: Arguments) -> None:
     """Rank the manoeuvres and print the best."""
-    from ddagr_gym.diagnosis.next_drive import next_drive
+    from ddagr_gym.diagnosis.planning.next_drive import next_drive
     from ddagr_gym.presets import get_robot, get_soil
 
     check_at_least(arguments, threads=1, seed=0)
@@ -83,10 +83,10 @@ class _Case:
 
 
 def _case(arguments: Arguments) -> _Case:
-    from ddagr_gym.diagnosis.next_drive import rivals_of_diagnosis, sensors_of_diagnosis, setting_of_diagnosis
-    from ddagr_gym.diagnosis.planned import SENSORS
+    from ddagr_gym.diagnosis.planning.next_drive import rivals_of_diagnosis, sensors_of_diagnosis, setting_of_diagnosis
+    from ddagr_gym.diagnosis.planning.planned_drive import SENSORS
+    from ddagr_gym.diagnosis.result.verdict import load
     from ddagr_gym.diagnosis.setting import Setting
-    from ddagr_gym.diagnosis.verdict import load
     from ddagr_gym.physics.effects.registry import parse_effect
 
     if arguments.diagnosis is None:

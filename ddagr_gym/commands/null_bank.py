@@ -18,9 +18,9 @@ from ddagr_gym.commands.ranges import check_at_least
 from ddagr_gym.errors import InputError
 
 if TYPE_CHECKING:
-    from ddagr_gym.diagnosis.null_drives import Template
+    from ddagr_gym.diagnosis.gates.thresholds import NullKind, NullRun, Origin
+    from ddagr_gym.diagnosis.null_bank.drives import Template
     from ddagr_gym.diagnosis.setting import Setting
-    from ddagr_gym.diagnosis.thresholds import NullKind, NullRun, Origin
     from ddagr_gym.parameters import Robot, Soil
     from ddagr_gym.recordings.schema import Recording
 
@@ -77,15 +77,15 @@ class Arguments:
 
 def run(arguments: Arguments) -> None:
     """Make what is missing of the bank, then write the thresholds."""
-    from ddagr_gym.diagnosis.fitted_nominal import fitted_nominal
-    from ddagr_gym.diagnosis.inputs import check_recordings
-    from ddagr_gym.diagnosis.noise import recording_noise
-    from ddagr_gym.diagnosis.nuisance import NuisancePriors
-    from ddagr_gym.diagnosis.null_bank import bank_hash
-    from ddagr_gym.diagnosis.null_drives import template_of
+    from ddagr_gym.diagnosis.gates.threshold_files import save_thresholds
+    from ddagr_gym.diagnosis.gates.thresholds import NullRun, thresholds_from
+    from ddagr_gym.diagnosis.null_bank.bank import bank_hash
+    from ddagr_gym.diagnosis.null_bank.drives import template_of
+    from ddagr_gym.diagnosis.null_bank.fitted_nominal import fitted_nominal
+    from ddagr_gym.diagnosis.preprocessing.input_requirements import check_recordings
     from ddagr_gym.diagnosis.setting import Setting
-    from ddagr_gym.diagnosis.threshold_files import save_thresholds
-    from ddagr_gym.diagnosis.thresholds import NullRun, thresholds_from
+    from ddagr_gym.identification.noise import recording_noise
+    from ddagr_gym.identification.nuisances import NuisancePriors
     from ddagr_gym.presets import get_robot, get_soil
     from ddagr_gym.recordings.load import load_recording
 
@@ -122,7 +122,7 @@ def run(arguments: Arguments) -> None:
 
 def _mended(loaded: Sequence[Recording]) -> Sequence[Recording]:
     """Recordings as a diagnosis sees them; what had to be mended is told."""
-    from ddagr_gym.diagnosis.prepared import mended
+    from ddagr_gym.diagnosis.preprocessing.mended_recordings import mended
 
     if not loaded:
         return loaded
@@ -135,8 +135,8 @@ def _mended(loaded: Sequence[Recording]) -> Sequence[Recording]:
 
 
 def _check_options(arguments: Arguments) -> None:
+    from ddagr_gym.diagnosis.gates.thresholds import LEVEL, least_nulls
     from ddagr_gym.diagnosis.setting import LEAST_WINDOWS, SHORT, SHORTEST
-    from ddagr_gym.diagnosis.thresholds import LEVEL, least_nulls
 
     for name, least in (("window", SHORTEST), ("stride", 0.1), ("piece", LEAST_WINDOWS * SHORT)):
         given = getattr(arguments, name)
@@ -153,9 +153,9 @@ def _pieces(
     recordings: Sequence[Recording], length: float, robot: Robot, setting: Setting
 ) -> tuple[list[Recording], list[Recording]]:
     """Ordinary drives in pieces, enough of them for thresholds, and longer ones."""
-    from ddagr_gym.diagnosis.inputs import check_recordings
-    from ddagr_gym.diagnosis.null_bank import longer_runs, pieces_of
-    from ddagr_gym.diagnosis.thresholds import LEVEL, least_nulls
+    from ddagr_gym.diagnosis.gates.thresholds import LEVEL, least_nulls
+    from ddagr_gym.diagnosis.null_bank.bank import longer_runs, pieces_of
+    from ddagr_gym.diagnosis.preprocessing.input_requirements import check_recordings
 
     for recording in recordings:
         check_recordings([recording], robot, setting)
@@ -169,7 +169,7 @@ def _pieces(
 
 
 def _origin(arguments: Arguments, robot: Robot) -> Origin:
-    from ddagr_gym.diagnosis.thresholds import Origin
+    from ddagr_gym.diagnosis.gates.thresholds import Origin
     from ddagr_gym.presets import full_name
 
     kind: NullKind = "ordinary" if arguments.ordinary else "simulated"
@@ -198,8 +198,8 @@ def _make(tasks: list[_Task], processes: int) -> None:
 
 
 def _one(task: _Task) -> None:
-    from ddagr_gym.diagnosis.null_bank import null_run, scanned
-    from ddagr_gym.diagnosis.structural_nulls import KINDS
+    from ddagr_gym.diagnosis.null_bank.bank import null_run, scanned
+    from ddagr_gym.diagnosis.null_bank.structural_variants import KINDS
     from ddagr_gym.recordings.schema import Recording
 
     robot, soil, drives, setting, seed, number, path, centre = task

@@ -47,6 +47,6 @@ Limits so far
     of several recordings are found where a slope shows them; a patch that they share is looked for as if they had
     begun at one place.
 
-Conventions: SI units, radians, channels and states in the order of :mod:`ddagr_gym.replay.windows`. Costs are half sums
-of squares in units of the noise; gains are divided by the dispersion of the model they start from.
+Conventions: SI units, radians, channels and states in the order of :mod:`ddagr_gym.identification.windows`.
+Costs are half sums of squares in units of the noise; gains are divided by the dispersion of the model they start from.
 """

@@ -5,10 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.diagnosis.localisation import piece_values
-from ddagr_gym.diagnosis.problem import Problem
-from ddagr_gym.diagnosis.refit import Fitted
-from ddagr_gym.diagnosis.score_process import (
+from ddagr_gym.diagnosis.gates.thresholds import Thresholds
+from ddagr_gym.diagnosis.localisation.effect_timeline import (
     as_it_stands,
     in_blocks,
     piece_length,
@@ -16,9 +14,11 @@ from ddagr_gym.diagnosis.score_process import (
     projected_residual,
     score_processes,
 )
-from ddagr_gym.diagnosis.search import Found
-from ddagr_gym.diagnosis.thresholds import Thresholds
-from ddagr_gym.diagnosis.wrench import residual_wrench
+from ddagr_gym.diagnosis.localisation.localise import piece_values
+from ddagr_gym.diagnosis.localisation.residual_wrench import residual_wrench
+from ddagr_gym.diagnosis.search.stepwise import Found
+from ddagr_gym.identification.gauss_newton import Fitted
+from ddagr_gym.identification.problem import Problem
 from ddagr_gym.reporting.evidence import NAME, Evidence
 
 __all__ = ["NAME", "Evidence", "gather_evidence"]

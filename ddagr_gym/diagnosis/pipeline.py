@@ -15,33 +15,33 @@ from typing import Any
 
 import numpy as np
 
-from ddagr_gym.diagnosis.bounds import pushed_to_bounds
-from ddagr_gym.diagnosis.certificate import of_mended_readings, worse_on_unseen
-from ddagr_gym.diagnosis.certify import certify
-from ddagr_gym.diagnosis.data_checks import DataDoubt, data_doubts, dead_channels, suspects_of
-from ddagr_gym.diagnosis.diagnose import accepted, conclude, searched
+from ddagr_gym.diagnosis.certification.certificate import of_mended_readings, worse_on_unseen
+from ddagr_gym.diagnosis.certification.certify import certify
 from ddagr_gym.diagnosis.evidence import Evidence, gather_evidence
-from ddagr_gym.diagnosis.held_spans import held_where
-from ddagr_gym.diagnosis.inputs import check_recordings, content_hash
-from ddagr_gym.diagnosis.localisation import locate
-from ddagr_gym.diagnosis.next_drive import next_drive, rivals_of_diagnosis, sensors_of_diagnosis
-from ddagr_gym.diagnosis.prepared import Prepared, prepare
-from ddagr_gym.diagnosis.regimes import Unevenness
-from ddagr_gym.diagnosis.regimes_words import uneven_phrase
-from ddagr_gym.diagnosis.search import Found
-from ddagr_gym.diagnosis.sentences import (
+from ddagr_gym.diagnosis.gates.source_digest import source_digest
+from ddagr_gym.diagnosis.gates.thresholds import Thresholds
+from ddagr_gym.diagnosis.localisation.localise import locate
+from ddagr_gym.diagnosis.localisation.operating_condition_words import uneven_phrase
+from ddagr_gym.diagnosis.localisation.operating_conditions import Unevenness
+from ddagr_gym.diagnosis.planning.next_drive import next_drive, rivals_of_diagnosis, sensors_of_diagnosis
+from ddagr_gym.diagnosis.preprocessing.data_checks import DataDoubt, data_doubts, dead_channels, suspects_of
+from ddagr_gym.diagnosis.preprocessing.input_requirements import check_recordings, content_hash
+from ddagr_gym.diagnosis.preprocessing.mended_recordings import Prepared, prepare
+from ddagr_gym.diagnosis.preprocessing.repeat_spans import held_where
+from ddagr_gym.diagnosis.result.conclusion import accepted, conclude, searched
+from ddagr_gym.diagnosis.result.sentences import (
     dead_in_words,
     headline,
     pushed_in_words,
     suspects_in_words,
     worse_in_words,
 )
+from ddagr_gym.diagnosis.result.size_bounds import pushed_to_bounds
+from ddagr_gym.diagnosis.result.verdict import NONE, UNKNOWN, Diagnosis, as_mapping
+from ddagr_gym.diagnosis.search.stepwise import Found
 from ddagr_gym.diagnosis.setting import Setting
-from ddagr_gym.diagnosis.sources import source_digest
 from ddagr_gym.diagnosis.store import StepStore
-from ddagr_gym.diagnosis.thresholds import Thresholds
-from ddagr_gym.diagnosis.unnamed import unnamed_terms
-from ddagr_gym.diagnosis.verdict import NONE, UNKNOWN, Diagnosis, as_mapping
+from ddagr_gym.diagnosis.unnamed.terms import unnamed_terms
 from ddagr_gym.errors import InputError
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.physics.effects import Effect

@@ -7,15 +7,15 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ddagr_gym.diagnosis.blocks import BLOCK, block_windows, located
-from ddagr_gym.diagnosis.headings import without_poses
-from ddagr_gym.diagnosis.noise import ChannelNoise, recording_noise
-from ddagr_gym.diagnosis.nuisance import NuisancePriors, nuisances
-from ddagr_gym.diagnosis.problem import Problem
 from ddagr_gym.errors import InputError
+from ddagr_gym.identification.block_means import BLOCK, block_windows, located
+from ddagr_gym.identification.headings import without_poses
+from ddagr_gym.identification.noise import ChannelNoise, recording_noise
+from ddagr_gym.identification.nuisances import NuisancePriors, nuisances
+from ddagr_gym.identification.problem import Problem
+from ddagr_gym.identification.windows import cut_windows
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.recordings.schema import Recording
-from ddagr_gym.replay.windows import cut_windows
 
 SHORTEST = 1.0
 """Shortest windows that are cut to fit segments [s]: five time constants of a bank."""
@@ -91,7 +91,7 @@ def make_problem(
         noise: of the channels, where it is known; estimated by default.
 
     Raises:
-        InputError: see :func:`ddagr_gym.replay.windows.cut_windows`.
+        InputError: see :func:`ddagr_gym.identification.windows.cut_windows`.
     """
     radius = robot.outer_radius
     duration = window_duration(recordings, setting)

@@ -14,6 +14,8 @@ from ddagr_gym.estimation import FilterModel, FilterRun, roll_out
 from ddagr_gym.estimation.layout import OMEGA
 from ddagr_gym.evaluation.recording_filter import filter_recording, set_up_filter
 from ddagr_gym.frames import wrap_angle
+from ddagr_gym.identification.data_split import clusters, held_out, training
+from ddagr_gym.identification.windows import CHANNELS, WindowSet
 from ddagr_gym.parameters import Robot
 from ddagr_gym.presets import get_robot
 from ddagr_gym.recordings.load import load_recording
@@ -23,8 +25,6 @@ from ddagr_gym.replay.kinematic import KinematicModel, bank_speeds_at_samples
 from ddagr_gym.replay.models import Baselines, fit_baselines
 from ddagr_gym.replay.prepare import Prepared, prepare
 from ddagr_gym.replay.report import EFFECTIVE_TRACK
-from ddagr_gym.replay.split import clusters, held_out, training
-from ddagr_gym.replay.windows import CHANNELS, WindowSet
 
 Array = NDArray[np.float64]
 

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ddagr_gym.identification.data_split import clusters, held_out, training
+from ddagr_gym.identification.windows import WindowSet
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.replay.fitting import (
@@ -41,8 +43,6 @@ from ddagr_gym.replay.report import (
     Speed,
 )
 from ddagr_gym.replay.residuals import RECORDED, channel_residuals, regime_values, regimes, residuals
-from ddagr_gym.replay.split import clusters, held_out, training
-from ddagr_gym.replay.windows import WindowSet
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]

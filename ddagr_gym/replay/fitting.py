@@ -8,12 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.parameters import Robot, Soil
-from ddagr_gym.physics.effects import Effect
-from ddagr_gym.replay.kinematic import Motor
-from ddagr_gym.replay.model import WindowModel, fit_numerics
-from ddagr_gym.replay.noise import RecordingNoise
-from ddagr_gym.replay.parameters import (
+from ddagr_gym.identification.parameters import (
     KIND_STIFFNESS_DEVIATION,
     ModelParameter,
     command_shift,
@@ -22,9 +17,14 @@ from ddagr_gym.replay.parameters import (
     soil_parameters,
     wheel_speed_shift,
 )
-from ddagr_gym.replay.refit import Refit, Refitter
+from ddagr_gym.identification.sample_noise import RecordingNoise
+from ddagr_gym.identification.window_fit import Refit, Refitter
+from ddagr_gym.identification.window_model import WindowModel, fit_numerics
+from ddagr_gym.identification.windows import CHANNELS, WindowSet
+from ddagr_gym.parameters import Robot, Soil
+from ddagr_gym.physics.effects import Effect
+from ddagr_gym.replay.kinematic import Motor
 from ddagr_gym.replay.residuals import residuals, successive_correlation
-from ddagr_gym.replay.windows import CHANNELS, WindowSet
 
 Array = NDArray[np.float64]
 

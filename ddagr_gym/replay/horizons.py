@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.frames import rotation_matrix, wrap_angle
-from ddagr_gym.replay.windows import CHANNELS, WindowSet
+from ddagr_gym.identification.windows import CHANNELS, WindowSet
 
 Array = NDArray[np.float64]
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.frames import wrap_angle
-from ddagr_gym.replay.windows import CHANNELS, WindowSet
+from ddagr_gym.identification.windows import CHANNELS, WindowSet
 
 Array = NDArray[np.float64]
 
@@ -115,7 +115,8 @@ def fit_track(
         half_track: geometric [m].
         motor: that follows the commands, for windows driven by commands.
         sigma: of the gyro [rad/s], for the loss.
-        robust: weighted residual from which the loss is linear, as for :class:`~ddagr_gym.replay.refit.Refitter`.
+        robust: weighted residual from which the loss is linear, as for
+            :class:`~ddagr_gym.identification.window_fit.Refitter`.
 
     Returns:
         None where nothing measures a turn that goes with the wheel speeds.

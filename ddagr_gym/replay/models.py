@@ -9,15 +9,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ddagr_gym.identification.window_fit import Refitter
+from ddagr_gym.identification.window_model import WindowModel, fit_numerics
+from ddagr_gym.identification.windows import CHANNELS, WindowSet
 from ddagr_gym.parameters import Numerics, Robot, Soil
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.replay.fitting import ROBUST, ArmFit, noise_weights
 from ddagr_gym.replay.kinematic import KinematicModel, Motor, fit_motor, fit_track
-from ddagr_gym.replay.model import WindowModel, fit_numerics
 from ddagr_gym.replay.prepare import Prepared
-from ddagr_gym.replay.refit import Refitter
 from ddagr_gym.replay.report import EFFECTIVE_TRACK, NO_SLIP, BaselineReport, Speed
-from ddagr_gym.replay.windows import CHANNELS, WindowSet
 
 Array = NDArray[np.float64]
 

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.errors import InputError
+from ddagr_gym.identification.data_split import Split, evenly, split_recording
+from ddagr_gym.identification.sample_noise import RecordingNoise, dead_channels, recording_noise
+from ddagr_gym.identification.timing_repair import aligned_poses, bridged
+from ddagr_gym.identification.windows import WindowSet, cut_runs, cut_windows
 from ddagr_gym.parameters import Robot
 from ddagr_gym.recordings.schema import Recording, RobotGeometry
 from ddagr_gym.replay.fitting import LATEST_CLOCK
-from ddagr_gym.replay.noise import RecordingNoise, dead_channels, recording_noise
-from ddagr_gym.replay.pieces import aligned_poses, bridged
-from ddagr_gym.replay.split import Split, evenly, split_recording
-from ddagr_gym.replay.windows import WindowSet, cut_runs, cut_windows
 
 Array = NDArray[np.float64]
 Part = Callable[[WindowSet, Sequence[Split]], NDArray[np.bool_]]
@@ -63,7 +63,7 @@ class Prepared:
             duration: of a window [s].
             drive_by: of DRIVES.
             stride: between starts [s].
-            part: picks a part, such as :func:`ddagr_gym.replay.split.training`.
+            part: picks a part, such as :func:`ddagr_gym.identification.data_split.training`.
             most: windows.
         """
         try:
@@ -78,7 +78,7 @@ class Prepared:
         return windows.subset(rows[evenly(rows.size, most)]) if rows.size else None
 
     def runs(self, drive_by: str) -> tuple[WindowSet, ...]:
-        """Every stretch with a known drive as one window; see :func:`ddagr_gym.replay.windows.cut_runs`."""
+        """Every stretch with a known drive as one window; see :func:`ddagr_gym.identification.windows.cut_runs`."""
         return cut_runs(
             self.recordings, wheel_radius=self.geometry.wheel_radius, half_track=self.geometry.half_track,
             drive_by=drive_by, history=LATEST_CLOCK, ahead=LATEST_CLOCK,

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.frames import wrap_angle
+from ddagr_gym.identification.windows import CHANNELS, WindowSet
 from ddagr_gym.physics import layout
 from ddagr_gym.recordings.schema import CHANNELS as SCHEMA
-from ddagr_gym.replay.windows import CHANNELS, WindowSet
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.recordings.schema import CHANNELS as SCHEMA
-from ddagr_gym.replay.windows import CHANNELS
 from ddagr_gym.reporting import palette
 from ddagr_gym.reporting.evidence import Evidence
 from ddagr_gym.reporting.figures import DASHED

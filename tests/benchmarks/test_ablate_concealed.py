@@ -29,15 +29,15 @@ from benchmarks.concealed.catalogue import LIBRARY_FORMS
 from benchmarks.concealed.simulate import simulate_case
 from benchmarks.concealed.sizes import LEAST_MEANINGFUL
 from benchmarks.concealed.storage import write_case
-from ddagr_gym.diagnosis.candidates import candidates_of
-from ddagr_gym.diagnosis.problem import Problem
-from ddagr_gym.diagnosis.refit import fit
-from ddagr_gym.diagnosis.scores import Gain
+from ddagr_gym.diagnosis.gates.threshold_files import default_thresholds
+from ddagr_gym.diagnosis.gates.thresholds import Gate, Thresholds
+from ddagr_gym.diagnosis.search.candidates import candidates_of
+from ddagr_gym.diagnosis.search.scan import Gain
+from ddagr_gym.diagnosis.search.search_node import stand
 from ddagr_gym.diagnosis.setting import Setting, make_problem
-from ddagr_gym.diagnosis.standing import stand
-from ddagr_gym.diagnosis.threshold_files import default_thresholds
-from ddagr_gym.diagnosis.thresholds import Gate, Thresholds
 from ddagr_gym.errors import InputError
+from ddagr_gym.identification.gauss_newton import fit
+from ddagr_gym.identification.problem import Problem
 from ddagr_gym.parameters import Imu, PoseReceiver, Sensors, WheelEncoder
 from ddagr_gym.physics.effects.base import DriveExtent
 from ddagr_gym.physics.effects.registry import effect_kind, effect_kinds

@@ -13,18 +13,18 @@ import pytest
 from ddagr_gym.cli import main
 from ddagr_gym.commands.diagnose import outcome_text
 from ddagr_gym.diagnosis import pipeline
-from ddagr_gym.diagnosis.data_checks import DataDoubt
+from ddagr_gym.diagnosis.gates.threshold_files import save_thresholds
+from ddagr_gym.diagnosis.gates.thresholds import Gate, Thresholds
+from ddagr_gym.diagnosis.preprocessing.data_checks import DataDoubt
+from ddagr_gym.diagnosis.result.verdict import Diagnosis, load
 from ddagr_gym.diagnosis.store import part_folder
-from ddagr_gym.diagnosis.threshold_files import save_thresholds
-from ddagr_gym.diagnosis.thresholds import Gate, Thresholds
-from ddagr_gym.diagnosis.verdict import Diagnosis, load
+from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.parameters import Imu, PoseReceiver, Sensors
 from ddagr_gym.physics.effects import load_effects
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.recordings.storage import save_parquet
 from ddagr_gym.replay.report import REFITTED
-from ddagr_gym.replay.windows import CHANNELS
 from ddagr_gym.simulator import simulate
 
 RATE = 50.0

@@ -8,8 +8,8 @@ import pytest
 from ddagr_gym.cli import main
 from ddagr_gym.commands.gates import gates_for
 from ddagr_gym.commands.isolability import table_text
-from ddagr_gym.diagnosis.isolability import Detectable, Isolability
-from ddagr_gym.diagnosis.threshold_files import default_thresholds, save_thresholds
+from ddagr_gym.diagnosis.gates.threshold_files import default_thresholds, save_thresholds
+from ddagr_gym.diagnosis.planning.isolability import Detectable, Isolability
 from ddagr_gym.reporting.isolability_figure import isolability_figure
 
 
@@ -24,7 +24,7 @@ def test_writes_table_json_and_figure(tmp_path, capsys, monkeypatch, drive_csv):
     from ddagr_gym.physics.effects import registry
 
     few = {name: registry.effect_kinds()[name] for name in ("slope", "gyro_scale", "imu_tilt")}
-    monkeypatch.setattr("ddagr_gym.diagnosis.scores.effect_kinds", lambda: few)
+    monkeypatch.setattr("ddagr_gym.diagnosis.search.scan.effect_kinds", lambda: few)
     folder = tmp_path / "out"
     arguments = ["isolability", "--manoeuvres", str(drive_csv), "--sensors", "imu", "encoders"]
     assert main([*arguments, "--output", str(folder)]) == 0
@@ -46,7 +46,7 @@ def test_without_output_the_table_is_printed_and_nothing_written(tmp_path, capsy
     from ddagr_gym.physics.effects import registry
 
     few = {name: registry.effect_kinds()[name] for name in ("slope", "gyro_scale")}
-    monkeypatch.setattr("ddagr_gym.diagnosis.scores.effect_kinds", lambda: few)
+    monkeypatch.setattr("ddagr_gym.diagnosis.search.scan.effect_kinds", lambda: few)
     monkeypatch.chdir(tmp_path)
     assert main(["isolability", "--manoeuvres", str(drive_csv), "--sensors", "imu", "encoders"]) == 0
     said = capsys.readouterr().out

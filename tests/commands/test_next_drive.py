@@ -9,15 +9,15 @@ from ddagr_gym.cli import main
 from ddagr_gym.commands.next_drive import answer_text
 from ddagr_gym.config import dump_config
 from ddagr_gym.control.manoeuvres import MANOEUVRES
-from ddagr_gym.diagnosis.nuisance import NuisancePriors
-from ddagr_gym.diagnosis.verdict import Diagnosis, Estimate, Finding, save
+from ddagr_gym.diagnosis.result.verdict import Diagnosis, Estimate, Finding, save
+from ddagr_gym.identification.nuisances import NuisancePriors
 from ddagr_gym.presets import get_robot, get_soil
 
 
 @pytest.fixture
 def small_bank(monkeypatch):
     bank = {name: MANOEUVRES[name] for name in ("straight", "two_headings")}
-    monkeypatch.setattr("ddagr_gym.diagnosis.next_drive.MANOEUVRES", bank)
+    monkeypatch.setattr("ddagr_gym.diagnosis.planning.next_drive.MANOEUVRES", bank)
 
 
 def test_rivals_by_hand(tmp_path, capsys, small_bank):
@@ -60,7 +60,7 @@ def test_a_diagnosis_knows_its_robot_and_soil(tmp_path, monkeypatch, capsys):
         planned.append((robot.name, soil, [rival.name for rival in rivals]))
         return {"manoeuvre": "", "why": "No manoeuvre helps.", "alternatives": []}
 
-    monkeypatch.setattr("ddagr_gym.diagnosis.next_drive.next_drive", plan)
+    monkeypatch.setattr("ddagr_gym.diagnosis.planning.next_drive.next_drive", plan)
     finding = Finding(
         "slope", {"angle": Estimate(0.02, "rad"), "direction": Estimate(0.3, "rad")}, 30.0, 8.0, 4.0, 20.0,
         equivalence_set={"slope": 0.6, "accelerometer_bias": 0.4},

@@ -11,13 +11,13 @@ import pytest
 
 from ddagr_gym.cli import main
 from ddagr_gym.commands.diagnose import Arguments, _thresholds
-from ddagr_gym.diagnosis import null_bank
-from ddagr_gym.diagnosis.threshold_files import load_thresholds
-from ddagr_gym.diagnosis.thresholds import NullRun, Origin
+from ddagr_gym.diagnosis.gates.threshold_files import load_thresholds
+from ddagr_gym.diagnosis.gates.thresholds import NullRun, Origin
+from ddagr_gym.diagnosis.null_bank import bank as null_bank
+from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.recordings.storage import save_parquet
-from ddagr_gym.replay.windows import CHANNELS
 
 
 @pytest.fixture
@@ -228,7 +228,7 @@ def test_banks_of_given_drives_are_drawn_about_the_nominal_model_that_fits_them(
         return drawn(kind, list(seed))
 
     monkeypatch.setattr(null_bank, "null_run", null_run)
-    monkeypatch.setattr("ddagr_gym.diagnosis.fitted_nominal.fitted_nominal", lambda *given: centre)
+    monkeypatch.setattr("ddagr_gym.diagnosis.null_bank.fitted_nominal.fitted_nominal", lambda *given: centre)
     columns = {name: np.linspace(0.0, 1.0, 3000) for name in ("command_right", "command_left", "yaw_rate")}
     columns["t"] = 0.01 * np.arange(1, 3001)
     save_parquet(Recording.from_columns(columns, get_robot("ddagr")), tmp_path / "run.parquet")

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ddagr_gym.diagnosis.certify import certify
-from ddagr_gym.diagnosis.problem import Problem
-from ddagr_gym.diagnosis.refit import Fitted, fit
+from ddagr_gym.diagnosis.certification.certify import certify
 from ddagr_gym.diagnosis.setting import Setting, make_problem
+from ddagr_gym.identification.gauss_newton import Fitted, fit
+from ddagr_gym.identification.problem import Problem
 from ddagr_gym.parameters import Imu, PoseReceiver, Sensors, WheelEncoder
 from ddagr_gym.physics.effects import load_effects
 from ddagr_gym.presets import get_robot, get_soil

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ddagr_gym.diagnosis.refit import bounded_step
+from ddagr_gym.identification.gauss_newton import bounded_step
 
 
 def test_without_bounds_it_is_the_newton_step() -> None:

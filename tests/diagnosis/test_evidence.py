@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from ddagr_gym.diagnosis.evidence import Evidence, gather_evidence
-from ddagr_gym.diagnosis.misfit import channel_misfit
-from ddagr_gym.diagnosis.refit import fit
-from ddagr_gym.diagnosis.scores import Gain, dispersion_of
-from ddagr_gym.diagnosis.search import Found
-from ddagr_gym.diagnosis.standing import Standing
-from ddagr_gym.diagnosis.thresholds import Gate, Thresholds
+from ddagr_gym.diagnosis.gates.thresholds import Gate, Thresholds
+from ddagr_gym.diagnosis.search.scan import Gain, dispersion_of
+from ddagr_gym.diagnosis.search.search_node import Standing
+from ddagr_gym.diagnosis.search.stepwise import Found
 from ddagr_gym.errors import InputError
+from ddagr_gym.identification.gauss_newton import fit
+from ddagr_gym.identification.misfit import channel_misfit
+from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.physics.effects.registry import parse_effect
-from ddagr_gym.replay.windows import CHANNELS
 
 
 @pytest.fixture(scope="module")

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ddagr_gym.diagnosis import refit
-from ddagr_gym.diagnosis.problem import Point, Problem
-from ddagr_gym.diagnosis.refit import DAMPING, cost_of, fit
+from ddagr_gym.identification import gauss_newton as refit
+from ddagr_gym.identification.gauss_newton import DAMPING, cost_of, fit
+from ddagr_gym.identification.problem import Point, Problem
 from tests.diagnosis.conftest import Sloping
 
 

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ddagr_gym.diagnosis.headings import headings_matter, turned_starts, without_poses
-from ddagr_gym.diagnosis.problem import Problem
+from ddagr_gym.identification.headings import headings_matter, turned_starts, without_poses
+from ddagr_gym.identification.parameters import command_shift, heading_parameters
+from ddagr_gym.identification.problem import Problem
+from ddagr_gym.identification.windows import STATE, WindowSet
 from ddagr_gym.physics.effects import load_effects
 from ddagr_gym.recordings.schema import Recording
-from ddagr_gym.replay.parameters import command_shift, heading_parameters
-from ddagr_gym.replay.windows import STATE, WindowSet
 
 POSE = [STATE.index(name) for name in ("x", "y", "yaw")]
 PARAMETERS = (command_shift(0.02), *heading_parameters((1, 2), math.pi))

@@ -5,11 +5,11 @@ from typing import Any
 
 import pytest
 
-from ddagr_gym.diagnosis.data_checks import DataDoubt
-from ddagr_gym.diagnosis.localisation import Where
+from ddagr_gym.diagnosis.localisation.localise import Where
+from ddagr_gym.diagnosis.localisation.operating_conditions import Unevenness
 from ddagr_gym.diagnosis.pipeline import _doubted
-from ddagr_gym.diagnosis.regimes import Unevenness
-from ddagr_gym.diagnosis.verdict import Diagnosis, Estimate, Finding, as_mapping, validate
+from ddagr_gym.diagnosis.preprocessing.data_checks import DataDoubt
+from ddagr_gym.diagnosis.result.verdict import Diagnosis, Estimate, Finding, as_mapping, validate
 
 MISFIT = {"yaw_rate": 4.0}
 BANK = {"nulls": 60, "bank": "f", "level": 0.05, "gates": {}}

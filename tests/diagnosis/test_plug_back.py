@@ -10,9 +10,15 @@ import pytest
 import ddagr_gym.envs  # noqa: F401 (registers the environments)
 from ddagr_gym import cli
 from ddagr_gym.config import dump_config, parse_config
-from ddagr_gym.diagnosis.fitted_nominal import with_values
-from ddagr_gym.diagnosis.forecast import cut_forecasts, errors_at, past_elimination, roll_out, start_states
-from ddagr_gym.diagnosis.problem import Point
+from ddagr_gym.diagnosis.certification.forecast import (
+    cut_forecasts,
+    errors_at,
+    past_elimination,
+    roll_out,
+    start_states,
+)
+from ddagr_gym.diagnosis.null_bank.fitted_nominal import with_values
+from ddagr_gym.identification.problem import Point
 from ddagr_gym.physics.effects import load_effects
 from ddagr_gym.physics.effects.files import read_effects_file, save_effects
 from ddagr_gym.presets import get_robot, get_soil

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ddagr_gym.diagnosis.hypotheses import first_guess
-from ddagr_gym.diagnosis.misfit import channel_misfit
-from ddagr_gym.diagnosis.refit import fit
-from ddagr_gym.diagnosis.scores import gains, held_out_gains, scan
-from ddagr_gym.diagnosis.uncertainty import intervals, resampled_parameters
+from ddagr_gym.diagnosis.result.uncertainty import intervals, resampled_parameters
+from ddagr_gym.diagnosis.search.initial_guess import first_guess
+from ddagr_gym.diagnosis.search.scan import gains, held_out_gains, scan
+from ddagr_gym.identification.gauss_newton import fit
+from ddagr_gym.identification.misfit import channel_misfit
 from ddagr_gym.physics.effects.registry import effect_kinds, parse_effect
 
 FEW = ("gyro_scale", "slope", "motor_lag", "towed_drag", "encoder_scale")

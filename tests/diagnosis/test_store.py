@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ddagr_gym.diagnosis.scores import gains, scan
-from ddagr_gym.diagnosis.search import Found
-from ddagr_gym.diagnosis.standing import Standing
+from ddagr_gym.diagnosis.search.scan import gains, scan
+from ddagr_gym.diagnosis.search.search_node import Standing
+from ddagr_gym.diagnosis.search.stepwise import Found
 from ddagr_gym.diagnosis.store import StepStore
 from ddagr_gym.errors import InputError
 from ddagr_gym.physics.effects import load_effects

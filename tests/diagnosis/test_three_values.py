@@ -5,9 +5,9 @@ from typing import Any
 
 import pytest
 
-from ddagr_gym.diagnosis.diagnose import _verdict, accepted
-from ddagr_gym.diagnosis.search import Found
-from ddagr_gym.diagnosis.thresholds import Thresholds
+from ddagr_gym.diagnosis.gates.thresholds import Thresholds
+from ddagr_gym.diagnosis.result.conclusion import _verdict, accepted
+from ddagr_gym.diagnosis.search.stepwise import Found
 
 THRESHOLDS = Thresholds({}, {"encoder_left": 1.0, "yaw_rate": 1.0, "local_strength": 1.0}, 20, "a test")
 

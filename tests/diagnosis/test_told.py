@@ -3,10 +3,10 @@
 import pytest
 
 from benchmarks.concealed_oracle import told
-from ddagr_gym.diagnosis.diagnose import Begun
-from ddagr_gym.diagnosis.prepared import Prepared
-from ddagr_gym.diagnosis.refit import fit
+from ddagr_gym.diagnosis.preprocessing.mended_recordings import Prepared
+from ddagr_gym.diagnosis.result.conclusion import Begun
 from ddagr_gym.diagnosis.setting import Setting
+from ddagr_gym.identification.gauss_newton import fit
 from tests.diagnosis.conftest import Sloping
 
 

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from ddagr_gym.control.manoeuvres import MANOEUVRES
+from ddagr_gym.identification.windows import CHANNELS as PREDICTED
+from ddagr_gym.identification.windows import WindowSet
 from ddagr_gym.parameters import Imu, PoseReceiver, Sensors
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.schema import CHANNELS, Recording
-from ddagr_gym.replay.windows import CHANNELS as PREDICTED
-from ddagr_gym.replay.windows import WindowSet
 from ddagr_gym.simulator import simulate
 
 RATE = 50.0

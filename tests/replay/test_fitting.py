@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ddagr_gym.identification.sample_noise import ChannelNoise, RecordingNoise
+from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.replay.fitting import (
     LATEST_CLOCK,
@@ -16,8 +18,6 @@ from ddagr_gym.replay.fitting import (
     noise_weights,
 )
 from ddagr_gym.replay.kinematic import Motor
-from ddagr_gym.replay.noise import ChannelNoise, RecordingNoise
-from ddagr_gym.replay.windows import CHANNELS
 
 GYRO = CHANNELS.index("yaw_rate")
 

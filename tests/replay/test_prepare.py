@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from ddagr_gym.errors import InputError
+from ddagr_gym.identification.data_split import held_out, training
 from ddagr_gym.presets import get_robot
 from ddagr_gym.replay.prepare import prepare
-from ddagr_gym.replay.split import held_out, training
 
 
 def prepared(recordings, robot, **more):

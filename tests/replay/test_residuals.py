@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.replay.residuals import (
     REGIMES,
     channel_residuals,
@@ -13,7 +14,6 @@ from ddagr_gym.replay.residuals import (
     residuals,
     successive_correlation,
 )
-from ddagr_gym.replay.windows import CHANNELS
 
 GYRO, YAW = CHANNELS.index("yaw_rate"), CHANNELS.index("pose_yaw")
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ddagr_gym.diagnosis.candidates import candidates_of
-from ddagr_gym.diagnosis.hypotheses import first_guess
+from ddagr_gym.diagnosis.search.candidates import candidates_of
+from ddagr_gym.diagnosis.search.initial_guess import first_guess
 from ddagr_gym.physics.effects import effect_kind, registry
 from ddagr_gym.physics.effects.base import DriveExtent
 from ddagr_gym.simulator import simulate

@@ -1,0 +1,1 @@
+"""What the named effects are worth on drives that their sizes were not fitted to."""

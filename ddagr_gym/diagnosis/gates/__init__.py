@@ -1,0 +1,1 @@
+"""How much evidence an effect needs: thresholds made of drives in which nothing is missing."""

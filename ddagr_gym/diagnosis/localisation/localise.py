@@ -1,0 +1,321 @@
+"""Where the mismatch is: channels, stretches of time, regimes of motion, places, and the force that is missing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ddagr_gym.diagnosis.localisation.effect_timeline import (
+    ScoreProcess,
+    Span,
+    as_it_stands,
+    by_piece,
+    in_blocks,
+    piece_length,
+    pieces_of,
+    projected_residual,
+    score_processes,
+    spans,
+    time_share,
+)
+from ddagr_gym.diagnosis.localisation.operating_condition_words import phrase_of, uneven_phrase
+from ddagr_gym.diagnosis.localisation.operating_conditions import Pieces, RegimeShare, Unevenness, shares, uneven
+from ddagr_gym.diagnosis.localisation.residual_wrench import COMPONENTS, residual_wrench
+from ddagr_gym.diagnosis.search.stepwise import Found
+from ddagr_gym.frames import wrap_angle
+from ddagr_gym.identification.gauss_newton import Fitted
+from ddagr_gym.identification.misfit import LOCAL, explained_share
+from ddagr_gym.identification.problem import Problem
+from ddagr_gym.identification.windows import CHANNELS
+from ddagr_gym.physics import layout
+from ddagr_gym.physics.effects import Effect
+
+Array = NDArray[np.float64]
+
+_SEED = 20240
+"""Of the shifts in the tests of regimes: the same recordings give the same phrases."""
+
+_ROUGH = 1.25
+"""Mean square of the standardised residuals from which a channel's squares are located (ours: windows take 10 to 20
+percent of the squares away, and noise is known to about as much)."""
+
+_PLACE = ("centre_x", "centre_y", "radius")
+
+_RECORDED = (*range(layout.SLIP_RATIO, layout.SLIP_RATIO + 4), layout.YAW_RATE, layout.V_X, layout.YAW)
+
+
+@dataclass(frozen=True)
+class ChannelShare:
+    """What is left of one channel.
+
+    Attributes:
+        nominal: mean square of the standardised residual of the refitted nominal model.
+        corrected: of the chosen model.
+        floor: what noise alone leaves: 1, or less where the windows' unknowns take a share away.
+        share: of the channel in the mismatch above the floors.
+    """
+
+    nominal: float
+    corrected: float
+    floor: float
+    share: float
+
+
+@dataclass(frozen=True)
+class Place:
+    """A round place in which something acts.
+
+    Attributes:
+        x: of its centre, world [m].
+        y: the same.
+        radius: [m].
+        share: of the gain in it; None for one that was fitted.
+        time_share: of the driven time in it; None the same.
+    """
+
+    x: float
+    y: float
+    radius: float
+    share: float | None = None
+    time_share: float | None = None
+
+
+@dataclass(frozen=True)
+class Where:
+    """Where something acts.
+
+    Attributes:
+        spans: stretches of time, of effects only.
+        time_share: share of the driven time that they cover.
+        regimes: how it lies over each regime, what stands out first.
+        places: where it is bound to a place.
+        uneven: regime in which its size is not what it is elsewhere, None where none is.
+        phrase: in words.
+    """
+
+    spans: tuple[Span, ...]
+    time_share: float
+    regimes: tuple[RegimeShare, ...]
+    places: tuple[Place, ...]
+    uneven: Unevenness | None
+    phrase: str
+
+
+@dataclass(frozen=True)
+class WrenchSummary:
+    """Residual wrench of one component over all windows, each with the weight of its precision.
+
+    Attributes:
+        component: F_x, F_y or M_z, body axes at the body origin.
+        unit: of the numbers.
+        before: mean that the nominal model lacks as it stands.
+        after: the same of the corrected model.
+        deviation: standard deviation of both.
+        chi_before: root mean square over the standard deviation; about 1 where nothing is missing.
+        chi_after: the same.
+    """
+
+    component: str
+    unit: str
+    before: float
+    after: float
+    deviation: float
+    chi_before: float
+    chi_after: float
+
+
+@dataclass(frozen=True)
+class Localisation:
+    """Where the mismatch of a diagnosis is.
+
+    Attributes:
+        channels: by name.
+        explained: share of the mismatch beyond the ordinary that the chosen model explains; None where there is none.
+        mismatch: where the chosen model explains what the nominal one leaves; without one, where that is.
+        remaining: where that of the chosen model is.
+        findings: where each effect of the chosen model acts, by name.
+        wrench: residual force and moment.
+    """
+
+    channels: Mapping[str, ChannelShare]
+    explained: float | None
+    mismatch: Where
+    remaining: Where
+    findings: Mapping[str, Where]
+    wrench: tuple[WrenchSummary, ...]
+
+
+def locate(problem: Problem, found: Found, limits: Mapping[str, float]) -> Localisation:
+    """Locate what a search found, and what it left.
+
+    Args:
+        problem: windows and model.
+        found: of the search; nominal and chosen model may be the same.
+        limits: of the channels' misfit, of the null bank.
+    """
+    nominal, chosen = found.nominal, found.chosen
+    channels = channel_shares(nominal.misfit, chosen.misfit, samples(problem))
+    pieces = piece_values(problem, chosen.fitted)
+    processes = score_processes(problem, chosen.fitted)
+    located = {
+        process.name: _where(problem, process, effect, pieces, chosen.dispersion)
+        for process, effect in zip(processes, chosen.fitted.point.effects, strict=True)
+    }
+    before, after = (in_blocks(problem, projected_residual(problem, model.fitted)) ** 2 for model in (nominal, chosen))
+    return Localisation(
+        channels,
+        explained_share(nominal.misfit, chosen.misfit, limits),
+        _lying(by_piece(before - after, pieces_of(problem)).ravel(), pieces)
+        if located
+        else _mismatch(problem, before, rough(nominal.misfit), pieces),
+        _mismatch(problem, after, rough(chosen.misfit), pieces),
+        located,
+        _wrench(problem, found),
+    )
+
+
+def rough(misfit: Mapping[str, float]) -> list[str]:
+    """Channels whose mean square stands so far above that of noise that it can be said where."""
+    return [name for name, value in misfit.items() if name in CHANNELS and value > _ROUGH]
+
+
+def samples(problem: Problem) -> dict[str, float]:
+    """Block means of each channel, and windows of each local variation."""
+    count = problem.blocked.mask.reshape(problem.blocked.sigma.shape).sum(axis=(0, 1))
+    found = {name: float(count[k]) for k, name in enumerate(CHANNELS) if count[k] > 0}
+    return found | dict.fromkeys(LOCAL, float(problem.blocked.windows.count))
+
+
+def channel_shares(
+    nominal: Mapping[str, float], chosen: Mapping[str, float], count: Mapping[str, float]
+) -> dict[str, ChannelShare]:
+    """Shares of the channels in the mismatch above the noise.
+
+    The floor of a channel is 1, the mean square of pure noise, or what the chosen model leaves where that is less
+    (ours: noise is estimated with a margin, and the windows' unknowns take a share of it away).
+
+    Args:
+        nominal: mean square of the standardised residuals by channel.
+        chosen: the same of the chosen model.
+        count: block means of each channel.
+    """
+    floors = {name: min(1.0, chosen[name]) for name in nominal}
+    above = {name: count[name] * max(nominal[name] - floors[name], 0.0) for name in nominal}
+    total = sum(above.values())
+    share = {name: above[name] / total if total > 0.0 else 0.0 for name in nominal}
+    return {name: ChannelShare(nominal[name], chosen[name], floors[name], share[name]) for name in nominal}
+
+
+def piece_values(problem: Problem, fitted: Fitted) -> Pieces:
+    """What the robot did in each piece of each window, (W * Q,), by the fitted model; one simulation."""
+    windows, pieces = problem.blocked.windows, pieces_of(problem)
+    prediction, record = problem.model.predict_recorded(
+        fitted.point.values, fitted.point.states, _RECORDED, fitted.point.effects
+    )
+    length = problem.blocked.weights.shape[2]
+    sample_piece = np.repeat(pieces, length)
+    kept = len(sample_piece)
+
+    def mean(values: Array) -> Array:
+        return by_piece(values[:, :kept], sample_piece) / np.bincount(sample_piece)
+
+    heading = np.arctan2(mean(np.sin(record[..., 6])), mean(np.cos(record[..., 6])))
+    commands = windows.commands[:, windows.history : windows.history + kept]
+    start = windows.time[:, None] + piece_length(problem) * np.arange(int(pieces[-1]) + 1)
+    values = {
+        "speed": mean(record[..., 5]),
+        "slip": mean(np.abs(record[..., :4]).mean(axis=-1)),
+        "turning": mean(np.abs(record[..., 4])),
+        "yaw_rate": mean(record[..., 4]),
+        "heading": wrap_angle(heading),
+        "command": mean(np.abs(commands).max(axis=2)),
+        "command_change": _command_change(problem, sample_piece),
+        "time": start,
+    }
+    shape = values["speed"].shape
+    recording = np.repeat(windows.recording[:, None], shape[1], axis=1).ravel()
+    x, y = mean(prediction[..., 5]), mean(prediction[..., 6])
+    return Pieces(recording, {name: item.ravel() for name, item in values.items()}, x.ravel(), y.ravel())
+
+
+def _command_change(problem: Problem, sample_piece: NDArray[np.int64]) -> Array:
+    """(W, Q) largest less smallest command of either bank in each piece and the one before [rad/s]."""
+    windows = problem.blocked.windows
+    count = int(sample_piece[-1]) + 1
+    first = windows.history + np.searchsorted(sample_piece, np.arange(count))
+    last = windows.history + np.searchsorted(sample_piece, np.arange(count), side="right")
+    length = int(np.bincount(sample_piece)[0])
+    ranges = [
+        np.ptp(windows.commands[:, max(a - length, 0) : b], axis=1).max(axis=1)
+        for a, b in zip(first.tolist(), last.tolist(), strict=True)
+    ]
+    return np.stack(ranges, axis=1)
+
+
+def _where(
+    problem: Problem,
+    process: ScoreProcess,
+    effect: Effect,
+    pieces: Pieces,
+    dispersion: float,
+) -> Where:
+    """Where one effect of the chosen model acts."""
+    rng = np.random.default_rng(_SEED)
+    windows, piece = problem.blocked.windows, piece_length(problem)
+    shown = spans(process, windows.recording, windows.time, piece, windows.duration, dispersion)
+    lying = shares(process.gain.ravel(), pieces, rng)
+    window = np.repeat(np.arange(windows.count), process.gain.shape[1])
+    other = uneven(process.remainder.ravel(), process.information.ravel(), window, pieces, rng)
+    places = _fitted_place(effect) or _standing_place(lying)
+    covered = time_share(shown, windows.count, windows.duration)
+    phrase = phrase_of(lying, _fitted_place(effect), covered)
+    if other is not None:
+        phrase = f"{phrase}; {uneven_phrase(other)}"
+    return Where(shown, covered, lying, places, other, phrase)
+
+
+def _fitted_place(effect: Effect) -> tuple[Place, ...]:
+    """Centre and radius of an effect that has them."""
+    values = effect.as_mapping()["parameters"]
+    if not set(_PLACE) <= set(values):
+        return ()
+    return (Place(*(float(values[name]) for name in _PLACE)),)
+
+
+def _standing_place(lying: Sequence[RegimeShare]) -> tuple[Place, ...]:
+    """The disc that stands out, if that is what stands out."""
+    if not lying or lying[0].name != "place" or not lying[0].stands_out:
+        return ()
+    x, y, radius = lying[0].edges
+    return (Place(x, y, radius, lying[0].weight_inside, lying[0].time_inside),)
+
+
+def _mismatch(problem: Problem, squares: Array, channels: Sequence[str], pieces: Pieces) -> Where:
+    """Where squared residuals (W, B, 8) exceed those of pure noise, in the channels that do so on the whole."""
+    nothing = Where((), 0.0, (), (), None, "nothing above the noise")
+    chosen = [CHANNELS.index(name) for name in channels]
+    if not chosen:
+        return nothing
+    above = (squares - np.isfinite(problem.blocked.sigma))[..., chosen]
+    return _lying(by_piece(above, pieces_of(problem)).ravel(), pieces)
+
+
+def _lying(weight: Array, pieces: Pieces) -> Where:
+    """Where a weight of the pieces lies, without spans."""
+    lying = shares(weight, pieces, np.random.default_rng(_SEED))
+    return Where((), 0.0, lying, _standing_place(lying), None, phrase_of(lying))
+
+
+def _wrench(problem: Problem, found: Found) -> tuple[WrenchSummary, ...]:
+    raw = as_it_stands(problem, found.nominal.fitted)
+    wrench = residual_wrench(problem, raw, found.chosen.fitted, found.chosen.dispersion)
+    summaries = []
+    for k, (component, unit) in enumerate(COMPONENTS):
+        precision = wrench.deviation[:, k] ** -2
+        before, after = (float(v[:, k] @ precision / precision.sum()) for v in (wrench.before, wrench.after))
+        chi = [float(np.sqrt(np.mean(v[:, k] ** 2 * precision))) for v in (wrench.before, wrench.after)]
+        summaries.append(WrenchSummary(component, unit, before, after, float(precision.sum() ** -0.5), chi[0], chi[1]))
+    return tuple(summaries)

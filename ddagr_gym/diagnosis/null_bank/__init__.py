@@ -1,0 +1,1 @@
+"""Drives in which nothing is missing, from which the gates are made."""

@@ -1,0 +1,1 @@
+"""Before a drive: what could be seen in it, and which drive would settle what is open."""

@@ -1,0 +1,86 @@
+"""Step 0: what the recordings say is wrong with themselves, before any physics is looked for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ddagr_gym.identification.windows import CHANNELS
+from ddagr_gym.recordings.checks.across import across_runs
+from ddagr_gym.recordings.checks.findings import Finding, Status
+from ddagr_gym.recordings.checks.run import check_recording
+from ddagr_gym.recordings.schema import Recording
+
+STUCK = "stuck"
+"""Family of checks on channels that never change."""
+
+FRAMES = "frames"
+"""Doubt about the frames of poses, which no check of numbers can settle."""
+
+
+@dataclass(frozen=True)
+class DataDoubt:
+    """Something suspicious about a recording's clocks, signs, units or channels.
+
+    Attributes:
+        recording: its name; "" for what several say together.
+        channel: of the recording, or "a to b" for a pair; "" where it is about all.
+        finding: family of checks (`ddagr check`).
+        sentence: what it is and what to do.
+        suspects: effects that would explain it.
+    """
+
+    recording: str
+    channel: str
+    finding: str
+    sentence: str
+    suspects: tuple[str, ...] = ()
+
+
+def data_doubts(recordings: Sequence[Recording], rng: np.random.Generator) -> tuple[DataDoubt, ...]:
+    """All that `ddagr check` finds suspicious.
+
+    Args:
+        recordings: at least one, of one robot.
+        rng: for the resampled intervals of the checks.
+    """
+    reports = [check_recording(recording, rng) for recording in recordings]
+    found = []
+    for report in reports:
+        found += [DataDoubt(report.source, "", "schema", sentence) for sentence in report.sentences]
+        found += [_doubt(report.source, finding) for finding in report.suspicious]
+    found += [_frames_doubt(recording) for recording in recordings if _has_stretches(recording)]
+    together = across_runs(recordings, reports)
+    return (*found, *(_doubt("", finding) for finding in together if finding.status is Status.SUSPICIOUS))
+
+
+def _has_stretches(recording: Recording) -> bool:
+    """Whether poses come in stretches whose frames need not be the same."""
+    return len(recording.meta.spans) > 1 and recording.has("pose_x", "pose_y", "pose_yaw")
+
+
+def _frames_doubt(recording: Recording) -> DataDoubt:
+    sentence = (
+        f"It consists of {len(recording.meta.spans)} stretches, and their poses are taken to be in one frame. "
+        "If each begins in a frame of its own, what is said of directions and places is wrong (slope, soil patches, "
+        "tilt of the ground): give the stretches as files of their own then."
+    )
+    return DataDoubt(recording.meta.source, "pose_yaw", FRAMES, sentence)
+
+
+def _doubt(recording: str, finding: Finding) -> DataDoubt:
+    sentence = f"{finding.meaning} {finding.remedy}".strip()
+    return DataDoubt(recording, finding.channel, finding.check, sentence, finding.suspects)
+
+
+def suspects_of(doubts: Sequence[DataDoubt]) -> tuple[str, ...]:
+    """Effects that would explain what the checks found, each once."""
+    return tuple(dict.fromkeys(name for doubt in doubts for name in doubt.suspects))
+
+
+def dead_channels(doubts: Sequence[DataDoubt]) -> tuple[str, ...]:
+    """Channels which a diagnosis would compare and which never change while the robot drives."""
+    stuck = {doubt.channel for doubt in doubts if doubt.finding == STUCK}
+    return tuple(name for name in CHANNELS if name in stuck)

@@ -1,0 +1,128 @@
+"""What a diagnosis needs of recordings, said before anything is computed, and what identifies them afterwards."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+
+import numpy as np
+
+from ddagr_gym.diagnosis.result.verdict import DataSource
+from ddagr_gym.diagnosis.setting import LEAST_WINDOWS, Setting, window_duration
+from ddagr_gym.errors import InputError
+from ddagr_gym.identification.windows import PERIOD_TOLERANCE
+from ddagr_gym.parameters import Robot
+from ddagr_gym.recordings.schema import Recording
+
+LEAST_SPEED = 0.02
+"""Bank speed that counts as moving [rad/s] (ours: 5 mm/s at the rim of the thesis's robot)."""
+
+LEAST_MOVING = 0.05
+"""Share of the time that a robot must be told to move (ours)."""
+
+
+def content_hash(recording: Recording) -> str:
+    """SHA-256 of the values, whatever file they came from."""
+    digest = hashlib.sha256()
+    for name, values in (*recording.columns().items(), ("command_valid", recording.command_valid.astype(float))):
+        digest.update(name.encode())
+        digest.update(np.ascontiguousarray(values, dtype=np.float64).tobytes())
+    return digest.hexdigest()
+
+
+def data_source(recording: Recording) -> DataSource:
+    """Name, hash and length of a recording."""
+    seconds = float(recording.t[-1] - recording.t[0]) if len(recording) else 0.0
+    hashed = recording.meta.source_sha256 or content_hash(recording)
+    return DataSource(recording.meta.source, hashed, len(recording), seconds)
+
+
+def check_recordings(recordings: Sequence[Recording], robot: Robot, setting: Setting) -> None:
+    """Refuse what cannot be diagnosed.
+
+    Args:
+        recordings: to be diagnosed together.
+        robot: nominal.
+        setting: of the diagnosis.
+
+    Raises:
+        InputError: none given, another robot, different periods, no commands or no sensors, too short, or a robot that
+            stands still throughout, or one drive given twice.
+    """
+    if not recordings:
+        raise InputError("no recording is given: name one or more files, or a folder of them.")
+    for recording in recordings:
+        _check_robot(recording, robot)
+        _check_channels(recording)
+    periods = [recording.period for recording in recordings]
+    if np.ptp(periods) > PERIOD_TOLERANCE * periods[0]:
+        rates = ", ".join(f"{r.meta.source} {1.0 / p:.3g} Hz" for r, p in zip(recordings, periods, strict=True))
+        raise InputError(f"the recordings have different rates ({rates}): diagnose those of one rate together.")
+    _check_different(recordings)
+    _check_length(recordings, setting)
+    _check_motion(recordings)
+
+
+def _check_robot(recording: Recording, robot: Robot) -> None:
+    if recording.meta.robot not in ("", robot.name):
+        raise InputError(
+            f"{recording.meta.source} is a recording of the robot {recording.meta.robot!r}: "
+            f"diagnose it with --robot {recording.meta.robot}, and not together with one of {robot.name!r}."
+        )
+
+
+def _check_channels(recording: Recording) -> None:
+    if not np.isfinite(recording.period):
+        raise InputError(f"{recording.meta.source} has {len(recording)} rows: a diagnosis needs a drive.")
+    if not recording.has("command_right", "command_left"):
+        raise InputError(
+            f"{recording.meta.source} has no commands (command_right, command_left): "
+            "without what the robot was told nothing can be predicted; name their columns in a --map."
+        )
+    sensors = (("yaw_rate",), ("encoder_right", "encoder_left"), ("pose_x", "pose_y"))
+    if not any(recording.has(*names) for names in sensors):
+        raise InputError(
+            f"{recording.meta.source} has neither yaw_rate nor encoders nor poses: "
+            "a diagnosis needs one of them; name their columns in a --map."
+        )
+
+
+def _check_different(recordings: Sequence[Recording]) -> None:
+    """A drive that is there twice would be predicted by a model that was fitted to it."""
+    seen: dict[str, str] = {}
+    for recording in recordings:
+        values = content_hash(recording)
+        if values in seen:
+            raise InputError(f"{seen[values]} and {recording.meta.source} hold the same values: give every drive once.")
+        seen[values] = recording.meta.source
+
+
+def _check_length(recordings: Sequence[Recording], setting: Setting) -> None:
+    duration = window_duration(recordings, setting)
+    total = 0
+    for recording in recordings:
+        right, left = recording.held_commands()
+        known = np.isfinite(right) & np.isfinite(left)
+        for s in recording.segments():
+            # segments are exactly one window long in logs that were cut into steps
+            total += int((int(known[s].sum()) - 1) * recording.period / duration + 1e-6)
+    if total < LEAST_WINDOWS:
+        names = ", ".join(recording.meta.source for recording in recordings)
+        raise InputError(
+            f"{names}: {total} windows of {duration:g} s without a gap and with commands are too few: "
+            f"give drives of {LEAST_WINDOWS * duration:g} s at least."
+        )
+
+
+def _check_motion(recordings: Sequence[Recording]) -> None:
+    shares = []
+    for recording in recordings:
+        speed = np.max(np.abs(np.stack(recording.held_commands())), axis=0)
+        speed = speed[np.isfinite(speed)]
+        shares.append(float(np.mean(speed > LEAST_SPEED)) if speed.size else 0.0)
+    if max(shares) < LEAST_MOVING:
+        names = ", ".join(recording.meta.source for recording in recordings)
+        raise InputError(
+            f"{names}: the robot is told to stand still {100.0 * (1.0 - max(shares)):.0f} % of the time: "
+            "record a drive with straight pieces and arcs to both sides."
+        )

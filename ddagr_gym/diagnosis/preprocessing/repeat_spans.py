@@ -1,0 +1,94 @@
+"""When readings were held: stretches of the recordings in which a sensor repeats itself."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ddagr_gym.diagnosis.localisation.effect_timeline import Span
+from ddagr_gym.diagnosis.localisation.localise import Where
+from ddagr_gym.diagnosis.preprocessing.repeated_readings import (
+    LEAST_SHARE,
+    SENSORS,
+    Flags,
+    Held,
+    repeat_runs,
+    repeated_rows,
+)
+from ddagr_gym.recordings.schema import Recording
+from ddagr_gym.reporting.wording import EVERYWHERE
+
+_LOOK = 1.0
+"""Time over which the share of repeats is taken [s] (ours), or four holds where these are longer."""
+
+_ALL = 0.95
+"""Share of the time from which a sensor is said to be held everywhere (ours)."""
+
+
+def held_where(recordings: Sequence[Recording], held: Sequence[Held]) -> Where | None:
+    """Stretches in which the held sensors repeat their readings; None where none is held.
+
+    Args:
+        recordings: as they were read, repeats included.
+        held: from :func:`ddagr_gym.diagnosis.preprocessing.repeated_readings.find_held`.
+    """
+    if not held:
+        return None
+    found = [
+        span
+        for number, recording in enumerate(recordings)
+        for item in held
+        if recording.has(*SENSORS[item.sensor])
+        for span in _spans(number, recording, item)
+    ]
+    repeats = max(sum(repeats for repeats, _ in found), 1)
+    spans = tuple(
+        Span(s.recording, s.start, s.end, repeats_ / repeats, s.size, s.deviation)
+        for repeats_, s in sorted(found, key=lambda pair: (pair[1].recording, pair[1].start))
+    )
+    covered = _covered(spans) / max(sum(float(r.t[-1] - r.t[0]) for r in recordings), 1e-12)
+    sensors = " and ".join(item.sensor for item in held)
+    count = "one stretch" if len(spans) == 1 else f"{len(spans)} stretches"
+    when = EVERYWHERE if covered >= _ALL else f"in {count}, {100.0 * covered:.0f} % of the time"
+    return Where(spans, min(covered, 1.0), (), (), None, f"{sensors}: {when}")
+
+
+def _spans(number: int, recording: Recording, item: Held) -> list[tuple[int, Span]]:
+    """Stretches of one sensor in one recording with the number of repeats in each, whose shares come later."""
+    rows, repeat = repeated_rows(recording, SENSORS[item.sensor])
+    if len(rows) < 2:
+        return []
+    time = recording.t[rows]
+    inside = _dense(repeat, float(np.median(np.diff(time))), item.duration)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]]).astype(int)))
+    found = []
+    for first, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        hits = first + np.flatnonzero(repeat[first:stop])
+        if not len(hits):
+            continue
+        fresh, last = repeat_runs(repeat[first:stop])
+        holds = time[first + last] - time[first + fresh]
+        deviation = float(holds.std() / np.sqrt(len(holds))) / item.duration
+        start, end = float(time[max(hits[0] - 1, 0)]), float(time[hits[-1]])
+        found.append((len(hits), Span(number, start, end, 0.0, float(holds.mean()) / item.duration, deviation)))
+    return found
+
+
+def _dense(repeat: Flags, period: float, duration: float) -> Flags:
+    """Samples around which more than :data:`ddagr_gym.diagnosis.preprocessing.repeated_readings.LEAST_SHARE` repeat."""
+    length = min(max(round(max(_LOOK, 4.0 * duration) / period), 3), len(repeat))
+    window = np.ones(length)
+    share = np.convolve(repeat, window, "same") / np.convolve(np.ones(len(repeat)), window, "same")
+    return np.asarray(share > LEAST_SHARE)
+
+
+def _covered(spans: Sequence[Span]) -> float:
+    """Seconds that spans cover, overlaps of sensors counted once."""
+    total, recording, until = 0.0, -1, 0.0
+    for span in spans:
+        if span.recording != recording:
+            recording, until = span.recording, -np.inf
+        total += max(span.end - max(span.start, until), 0.0)
+        until = max(until, span.end)
+    return total

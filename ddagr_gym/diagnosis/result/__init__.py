@@ -1,0 +1,1 @@
+"""The answer of a diagnosis: findings with intervals, equivalents, verdict, sentences, JSON."""

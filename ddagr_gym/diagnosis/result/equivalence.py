@@ -1,0 +1,80 @@
+"""What else it could be: rivals that the same windows may mean, with weights."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ddagr_gym.diagnosis.search.search_node import Rival
+from ddagr_gym.diagnosis.search.stepwise import Found
+from ddagr_gym.identification.size_prior import implausibility
+
+Array = NDArray[np.float64]
+
+LEAST_WEIGHT = 0.05
+"""Weight that a rival needs to stand in the equivalence set (ours, with the level)."""
+
+
+FORM = 0.08
+"""Share of its gain that an effect may lose because the library's form of it is not the robot's (ours)."""
+
+
+def equivalence_weights(
+    rivals: Sequence[Rival], dispersion: float, rng: np.random.Generator, draws: int = 400
+) -> dict[str, float]:
+    """Weight of each rival as the better explanation, averaged over resamplings of the windows.
+
+    In a resampling a joint refit has the weight exp(-cost/dispersion) over the sum of all: two that explain the same
+    share it equally even where one is always ahead by a little. The library's form of an effect is not the robot's:
+    differences of cost count in units of :data:`FORM` of what the best explains, where that is more than 1.
+
+    Args:
+        rivals: joint refits of one step of the search, best first.
+        dispersion: of the model before.
+        rng: of the resampling.
+        draws: how often.
+
+    Returns:
+        Weights that add up to 1, of the first rival and of all with :data:`LEAST_WEIGHT`.
+    """
+    windows = np.stack([rival.fitted.window_cost for rival in rivals])
+    priors = np.array([rival.fitted.cost for rival in rivals]) - windows.sum(axis=1)
+    unusual = np.array([implausibility(rival.fitted.point.effects[-1]) for rival in rivals])
+    count = windows.shape[1]
+    counts = rng.multinomial(count, np.full(count, 1.0 / count), size=draws).astype(float)
+    form = max(FORM * rivals[0].gain, 1.0)
+    costs = (counts @ windows.T + priors) / dispersion / form + unusual
+    relative = np.exp(costs.min(axis=1, keepdims=True) - costs)
+    weights = (relative / relative.sum(axis=1, keepdims=True)).mean(axis=0)
+    kept = {
+        rival.name: float(weight)
+        for number, (rival, weight) in enumerate(zip(rivals, weights, strict=True))
+        if number == 0 or weight >= LEAST_WEIGHT
+    }
+    total = sum(kept.values())
+    return {name: weight / total for name, weight in kept.items()} if total > 0.0 else {rivals[0].name: 1.0}
+
+
+def equivalents(found: Found, name: str, rng: np.random.Generator) -> dict[str, float]:
+    """Names that explain nearly as much as one that was chosen, with their weights.
+
+    The step that chose it counts: in an earlier one it may have stood beside an effect that became idle when it was
+    added. An effect that the final model has besides it is no rival of it.
+
+    Args:
+        found: by the search.
+        name: of an effect of the chosen model.
+        rng: of the resampling.
+    """
+    tried = [
+        (step, before)
+        for step, before in zip(found.steps, found.standings, strict=False)
+        if name in [rival.name for rival in step]
+    ]
+    if not tried:
+        return {name: 1.0}
+    step, before = next((item for item in tried if item[0][0].name == name), tried[0])
+    rivals = [rival for rival in step if rival.name == name or rival.name not in found.chosen.names]
+    return equivalence_weights(sorted(rivals, key=lambda rival: rival.name != name), before.dispersion, rng)

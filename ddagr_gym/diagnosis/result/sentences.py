@@ -1,0 +1,113 @@
+"""The answer of a diagnosis in one sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ddagr_gym.diagnosis.result.verdict import NONE, UNKNOWN, Finding
+from ddagr_gym.reporting.wording import amounts, describe, in_sentence
+
+RIVAL_WEIGHT = 0.2
+"""Weight in the equivalence set from which a rival stands in the headline (ours)."""
+
+
+def headline(
+    verdict: Sequence[str],
+    complete: bool,
+    findings: Sequence[Finding],
+    misfit_share: float | None = None,
+    doubts: Sequence[str] = (),
+) -> str:
+    """What is missing, how big, how much of the mismatch that is, and whether more is left.
+
+    Args:
+        verdict: names of the table, or ("none",) or ("unknown",).
+        complete: whether nothing more is left than in drives with nothing missing.
+        findings: one per name.
+        misfit_share: share of the mismatch above the noise that the findings explain (0 to 1), None where unknown.
+        doubts: what speaks against it or is not of one size everywhere, in words.
+    """
+    if tuple(verdict) == (NONE,):
+        return "; ".join(["Nothing is missing that these recordings can show", *doubts]) + "."
+    if tuple(verdict) == (UNKNOWN,):
+        return "; ".join(["Something is missing that no effect of the library explains", *doubts]) + "."
+    found = _joined([describe(item.name, amounts(item.parameters)) + _rivals(item) for item in findings])
+    share = "" if misfit_share is None else f"; {share_in_words(misfit_share)} of the mismatch"
+    rest = "nothing else above what these data can show" if complete else "something more is left that has no name here"
+    return "; ".join([f"{found[:1].upper()}{found[1:]}{share}", *doubts, rest]) + "."
+
+
+def _rivals(finding: Finding) -> str:
+    """Names that the same windows may mean nearly as well, in brackets; "" where there are none."""
+    others = [
+        in_sentence(name)
+        for name, weight in finding.equivalence_set.items()
+        if name != finding.name and weight >= RIVAL_WEIGHT
+    ]
+    return f" (or {' or '.join(others)}: these drives do not tell them apart)" if others else ""
+
+
+def share_in_words(share: float) -> str:
+    """A share as percent, between "less than 1 %" and "all"."""
+    percent = 100.0 * share
+    if percent < 1.0:
+        return "less than 1 %"
+    return "all" if percent >= 99.5 else f"{percent:.0f} %"
+
+
+def worse_in_words(horizon: float, value: float, interval: Sequence[float]) -> str:
+    """That drives which nothing was fitted to are predicted worse.
+
+    Args:
+        horizon: of the predictions [s].
+        value: change of their error over that of the nominal model, negative.
+        interval: of it.
+    """
+    span = f"{-100.0 * interval[1]:.0f} to {-100.0 * interval[0]:.0f} %"
+    return (
+        f"drives that it was not fitted to are predicted worse with it, by {-100.0 * value:.0f} % ({span}) after "
+        f"{horizon:g} s, which makes the name doubtful"
+    )
+
+
+def pushed_in_words(name: str, field: str, bound: float, unit: str) -> str:
+    """That a size is at the bound of what exists.
+
+    Args:
+        name: of the effect.
+        field: the size.
+        bound: in unit.
+        unit: SI.
+    """
+    amount = f"{bound:g}" if unit == "-" else f"{bound:g} {unit}"
+    return (
+        f"the {field.replace('_', ' ')} of {in_sentence(name)} reaches {amount}, the bound of what exists, which makes "
+        "its form doubtful"
+    )
+
+
+def dead_in_words(channels: Sequence[str]) -> str:
+    """That channels never change and so say nothing.
+
+    Args:
+        channels: at least one, by name.
+    """
+    names = " and ".join(", ".join(name.replace("_", " ") for name in channels).rsplit(", ", 1))
+    verb, pronoun = ("never change", "they say") if len(channels) > 1 else ("never changes", "it says")
+    return f"{names} {verb} while the robot drives, so that {pronoun} nothing"
+
+
+def suspects_in_words(names: Sequence[str]) -> str:
+    """What the recordings' own checks suspect where no effect has a name.
+
+    Args:
+        names: of effects, at least one.
+    """
+    others = " or ".join(in_sentence(name) for name in names)
+    return f"the recordings themselves look wrong in a way that {others} would explain (see their checks)"
+
+
+def _joined(parts: Sequence[str]) -> str:
+    if len(parts) < 2:
+        return "".join(parts)
+    return f"{'; '.join(parts[:-1])}; and {parts[-1]}" if len(parts) > 2 else f"{parts[0]}, and {parts[1]}"

@@ -1,0 +1,1 @@
+"""Which effects are named: the scan of the library, joint refits, and the stepwise search."""

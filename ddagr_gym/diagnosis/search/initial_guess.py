@@ -1,0 +1,201 @@
+"""From what the scan found to an effect to start a fit from."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ddagr_gym.diagnosis.search.candidates import Candidate
+from ddagr_gym.diagnosis.search.scan import Gain, Terms, best_multiples, reduce
+from ddagr_gym.frames import wrap_angle
+from ddagr_gym.identification.problem import Point, Problem
+from ddagr_gym.physics.effects import Effect
+from ddagr_gym.physics.effects.command_delay import CommandDelay
+from ddagr_gym.physics.effects.encoder_scale import EncoderScale
+from ddagr_gym.physics.effects.motor_lag import MotorLag
+from ddagr_gym.physics.effects.wheel_radius_mismatch import WheelRadiusMismatch
+
+PULLED = 4.0
+"""Standard deviations from the nominal value beyond which a refitted nuisance stands for something missing (ours)."""
+
+
+def first_guess(candidate: Candidate, multiples: Sequence[float]) -> Effect:
+    """Effect that the multiples of a candidate's probes stand for, inside its bounds.
+
+    Probes that move different sizes add up; probes of one size in different directions (slope) or at different
+    distances (towed drag) make one effect between them.
+
+    Args:
+        candidate: probes of one effect.
+        multiples: of each.
+    """
+    kind = type(candidate.probes[0])
+    if candidate.whole is not None or not kind.differentiable:
+        return candidate.probes[0] if candidate.whole is None else _whole(candidate)
+    if candidate.is_direction:
+        return _directed(candidate, multiples)
+    values: dict[str, float] = {}
+    for name in kind.size_names():
+        data = kind.parameter(name).metadata
+        total = sum(m * (getattr(p, name) - data["neutral"]) for m, p in zip(multiples, candidate.probes, strict=True))
+        values[name] = min(max(data["neutral"] + total, data["low"]), data["high"])
+    weight = [abs(m) for m in multiples]
+    for name in kind.shape_names():
+        shapes = [getattr(p, name) for p in candidate.probes]
+        if sum(weight) > 0.0:
+            mean = sum(w * s for w, s in zip(weight, shapes, strict=True)) / sum(weight)
+            # rounding must not lead out of the probes' range: an onset of "always" lies at its bound
+            values[name] = min(max(mean, min(shapes)), max(shapes))
+        else:
+            values[name] = shapes[0]
+    return kind(**values)
+
+
+def _whole(candidate: Candidate) -> Effect:
+    """A categorical probe taken to its bound."""
+    probe = candidate.probes[0]
+    moved = {}
+    for name in probe.size_names():
+        data = probe.parameter(name).metadata
+        if getattr(probe, name) != data["neutral"]:
+            moved[name] = data["high"]
+    return probe.with_values(**moved)  # type: ignore[no-any-return]
+
+
+def _directed(candidate: Candidate, multiples: Sequence[float]) -> Effect:
+    """Components along the axes of the world as a size and a direction."""
+    probe = candidate.probes[0]
+    size = probe.size_names()[0]
+    parts = [
+        (m * getattr(p, size), p.as_mapping()["parameters"]["direction"])
+        for m, p in zip(multiples, candidate.probes, strict=True)
+    ]
+    x = sum(length * math.cos(direction) for length, direction in parts)
+    y = sum(length * math.sin(direction) for length, direction in parts)
+    length = min(math.hypot(x, y), probe.parameter(size).metadata["high"])
+    return probe.with_values(**{size: length, "direction": math.atan2(y, x)})  # type: ignore[no-any-return]
+
+
+def turned_to_agree(problem: Problem, terms: Terms, gain: Gain, point: Point, share: float = 1.0) -> Point:
+    """A point where recordings without poses are turned so that the direction of its last effect, a slope, agrees.
+
+    Each of them shows the slope towards a direction of its own frame, and no small step turns frames that differ by
+    more than a right angle.
+
+    Args:
+        problem: with the nuisances.
+        terms: of the scan that found the effect.
+        gain: of the effect.
+        point: with the effect as the scan guesses it for one frame; one without a direction stays as it is.
+        share: of the size that the scan says.
+    """
+    parameters = enumerate(problem.nuisances.parameters)
+    shown = set(terms.recording.tolist())
+    turned = {p.recording: k for k, p in parameters if p.heading and p.recording in shown}
+    candidate = terms.candidates[gain.candidate]
+    directed = candidate.is_direction and candidate.name == point.effects[-1].name
+    if not directed or not turned or not terms.placed.any():
+        return point
+    own = {number: _shown_by(terms, candidate, terms.recording == number) for number in turned}
+    length, direction = _shown_by(terms, candidate, terms.placed)
+    values = point.values.copy()
+    for number, (_, seen) in own.items():
+        values[turned[number]] += wrap_angle(direction - seen)
+    mean = float(np.mean([length, *(size for size, _ in own.values())]))
+    last = point.effects[-1]
+    last = last.with_values(**{last.size_names()[0]: share * mean, "direction": direction})
+    return problem.moved(replace(point, effects=(*point.effects[:-1], last)), values)
+
+
+def _shown_by(terms: Terms, candidate: Candidate, chosen: NDArray[np.bool_]) -> tuple[float, float]:
+    """Size and direction that some of the windows show."""
+    _, multiples = best_multiples(reduce(terms, chosen.astype(float)), candidate)
+    parameters = _directed(candidate, multiples.tolist()).as_mapping()["parameters"]
+    return parameters[candidate.probes[0].size_names()[0]], parameters["direction"]
+
+
+def looped_encoders(point: Point) -> Point | None:
+    """Uneven wheel radii told as encoders of the wrong scale which the speed loop believes.
+
+    No reading tells one from the other, except that both encoders may be wrong by the same share as well.
+
+    Args:
+        point: with the effect to translate as its last one.
+
+    Returns:
+        None where the last effect is another.
+    """
+    radii = point.effects[-1]
+    if not isinstance(radii, WheelRadiusMismatch) or EncoderScale.name in [e.name for e in point.effects]:
+        return None
+    return replace(point, effects=(*point.effects[:-1], looped(radii)))
+
+
+def looped(radii: WheelRadiusMismatch) -> EncoderScale:
+    """Encoders that make a speed loop turn the wheels as unevenly as these radii let them roll."""
+    half = 0.5 * radii.difference
+    return EncoderScale(1.0 - half, 1.0 + half, 1.0)
+
+
+def slower_loop(problem: Problem, point: Point) -> Point | None:
+    """The same predictions with a slow speed loop told as motor_lag, where its nuisance stands far from what is known.
+
+    Refitted rate and lag are one time constant, 1/rate + lag. The scan, which is linear, does not find the way from one
+    to the other: it is curved, and long where the loop is slow. Null drives leave the rate within a tenth of its
+    standard deviation.
+
+    Args:
+        problem: with the nuisances.
+        point: fitted.
+
+    Returns:
+        None where the rate is near the nominal one or fast, or motor_lag is assumed.
+    """
+    names = [parameter.name for parameter in problem.nuisances.parameters]
+    if "motor_rate" not in names or "motor_lag" in [effect.name for effect in point.effects]:
+        return None
+    place = names.index("motor_rate")
+    value = float(point.values[place])
+    if value > -PULLED * float(problem.prior[place]):
+        return None
+    lag = MotorLag(math.expm1(-value) / problem.robot.motor_rate)
+    return _handed_over(point, place, (*point.effects, lag))
+
+
+def _handed_over(point: Point, place: int, effects: tuple[Effect, ...]) -> Point:
+    """A point whose effects tell what a nuisance did, which is back at its nominal value."""
+    values = point.values.copy()
+    values[place] = 0.0
+    return replace(point, values=values, effects=effects)
+
+
+def with_whole_delay(problem: Problem, point: Point) -> Point:
+    """The same predictions with all of a dead time told by the effect, none by what a row's command may mean.
+
+    Both are one time, so that no step leads from one split to another; by its prior the shift is none, and only the
+    effect goes on to other drives.
+
+    Args:
+        problem: with the nuisances.
+        point: where no delay is assumed, or the whole is longer than one may be, it stays as it is.
+    """
+    place = [parameter.name for parameter in problem.nuisances.parameters].index("command_shift")
+    shift = float(point.values[place])
+    told = [_later(effect, shift) if isinstance(effect, CommandDelay) else None for effect in point.effects]
+    if shift <= 0.0 or not any(told):
+        return point
+    return _handed_over(point, place, tuple(a or b for a, b in zip(told, point.effects, strict=True)))
+
+
+def _later(delay: CommandDelay, shift: float) -> CommandDelay | None:
+    """A delay of both banks that is longer by a shift; None where there is none yet, or more than there may be."""
+    if delay.delay <= 0.0:
+        return None
+    whole = delay.delay + shift
+    imbalance = delay.imbalance * delay.delay / whole
+    fits = whole * (1.0 + abs(imbalance)) <= delay.parameter("delay").metadata["high"]
+    return CommandDelay(whole, imbalance) if fits else None

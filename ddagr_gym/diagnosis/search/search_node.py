@@ -1,0 +1,72 @@
+"""Where a search stands: a fitted model with its scan, and refits with one further effect."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from ddagr_gym.diagnosis.search.scan import Gain, Terms, dispersion_of, gains, held_out_gains, scan, scores
+from ddagr_gym.identification.gauss_newton import Fitted
+from ddagr_gym.identification.misfit import channel_misfit
+from ddagr_gym.identification.problem import Problem
+
+
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """A model and what the scan at it says about every effect that it lacks.
+
+    Attributes:
+        fitted: the model.
+        terms: of the scan.
+        gains: of absent effects over the dispersion, largest first.
+        scores: cluster-robust, by name.
+        held_out: gains on left-out windows over the dispersion, by name.
+        dispersion: mean square of the weighted residuals of this model, at least 1.
+        misfit: mean square of the residuals by channel.
+    """
+
+    fitted: Fitted
+    terms: Terms
+    gains: tuple[Gain, ...]
+    scores: dict[str, float]
+    held_out: dict[str, float]
+    dispersion: float
+    misfit: dict[str, float]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Assumed effects."""
+        return tuple(effect.name for effect in self.fitted.point.effects)
+
+
+@dataclass(frozen=True, eq=False)
+class Rival:
+    """A joint refit with one further effect.
+
+    Attributes:
+        name: of the effect.
+        fitted: the refit.
+        gain: fall of the cost against the model before, over the dispersion.
+        retold: whether it tells another rival in other words, and so cannot be told from it by its fit.
+    """
+
+    name: str
+    fitted: Fitted
+    gain: float
+    retold: bool = False
+
+
+def stand(problem: Problem, fitted: Fitted, progress: Callable[[str], None] = lambda text: None) -> Standing:
+    """Scan the library at a fitted model."""
+    progress("scanning the library")
+    terms = scan(problem, fitted)
+    dispersion = dispersion_of(problem, fitted)
+    found = tuple(gains(terms, dispersion=dispersion))
+    held_out = held_out_gains(terms, dispersion)
+    misfit = channel_misfit(problem, fitted)
+    return Standing(fitted, terms, found, scores(terms, found), held_out, dispersion, misfit)
+
+
+def rival_of(standing: Standing, name: str, fitted: Fitted) -> Rival:
+    """A refit beside the model before it."""
+    return Rival(name, fitted, (standing.fitted.cost - fitted.cost) / standing.dispersion)

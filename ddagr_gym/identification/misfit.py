@@ -1,0 +1,74 @@
+"""What a model leaves of each channel, in units of its noise."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ddagr_gym.identification.gauss_newton import Fitted
+from ddagr_gym.identification.problem import Problem
+from ddagr_gym.identification.windows import CHANNELS, STATE
+
+LOCAL = (
+    "local_strength",
+    "local_stiffness",
+    "local_split",
+    "local_accelerometer_x",
+    "local_accelerometer_y",
+    "local_gyro",
+)
+"""Local variations in the order of the unknowns of a window, after its states."""
+
+
+def channel_misfit(problem: Problem, fitted: Fitted) -> dict[str, float]:
+    """Mean square of the residuals of every channel with samples, windows' unknowns eliminated [-].
+
+    About 1 where the model is right and the noise is estimated well; unknowns of the windows take a share away. The
+    local variations count as channels of their own (:data:`LOCAL`): what they have to make up for is misfit too.
+    """
+    blocked = problem.blocked
+    rows = blocked.mask.shape[1]
+    residual = fitted.elimination.project(problem.residual(fitted.point, fitted.prediction)[..., None])
+    squares = (residual[:, :rows, 0] ** 2).reshape(blocked.sigma.shape).sum(axis=(0, 1))
+    counts = blocked.mask.reshape(blocked.sigma.shape).sum(axis=(0, 1))
+    found = {name: float(squares[k] / counts[k]) for k, name in enumerate(CHANNELS) if counts[k] > 0}
+    local = (residual[:, rows + len(STATE) :, 0] ** 2).mean(axis=0)
+    return found | {name: float(value) for name, value in zip(LOCAL, local, strict=True)}
+
+
+def roughest(misfit: dict[str, float], limits: dict[str, float]) -> tuple[str, float]:
+    """Channel whose misfit stands highest over its limit, and by how much (a ratio); channels without one are left out.
+
+    Args:
+        misfit: of a model.
+        limits: of the null bank.
+    """
+    ratios = {name: value / limits[name] for name, value in misfit.items() if limits.get(name, 0.0) > 0.0}
+    if not ratios:
+        return "", 0.0
+    worst = max(ratios, key=lambda name: ratios[name])
+    return worst, float(np.float64(ratios[worst]))
+
+
+_ORDINARY = 0.75
+"""Misfit over its limit above which it counts as mismatch (ours: the roughest channel of 62 blind drives in which
+nothing was found reached 0.40 in the median and 0.61 at most)."""
+
+
+def explained_share(
+    before: Mapping[str, float], after: Mapping[str, float], limits: Mapping[str, float]
+) -> float | None:
+    """Share of the misfit beyond the ordinary that a model takes away, over all channels; None where there is none.
+
+    What does not stand above :data:`_ORDINARY` of a limit counts on neither side: much of it is noise.
+
+    Args:
+        before: misfit of the nominal model.
+        after: of the model.
+        limits: of the null bank.
+    """
+    known = [name for name in before if limits.get(name, 0.0) > 0.0]
+    first = sum(max(before[name] / limits[name] - _ORDINARY, 0.0) for name in known)
+    left = sum(max(after[name] / limits[name] - _ORDINARY, 0.0) for name in known)
+    return max(1.0 - left / first, 0.0) if first > 0.0 else None

@@ -1,0 +1,55 @@
+"""A robot and a soil that stand for fitted nuisance parameters, and null drives about them."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from ddagr_gym.diagnosis.null_bank import fitted_nominal as module
+from ddagr_gym.diagnosis.null_bank.bank import bank_hash
+from ddagr_gym.diagnosis.null_bank.drives import null_recordings, template_of
+from ddagr_gym.diagnosis.null_bank.fitted_nominal import fitted_nominal, with_values
+from ddagr_gym.diagnosis.setting import Setting
+from ddagr_gym.identification.nuisances import nuisances
+from ddagr_gym.identification.window_model import ideal_sensors
+from ddagr_gym.presets import get_robot, get_soil
+from ddagr_gym.recordings.schema import Recording
+from ddagr_gym.simulator import build_row
+
+ROBOT, SOIL = get_robot("ddagr"), get_soil("thesis_a1")
+GLOBAL = [p for p in nuisances(ROBOT, 1, 0.02).parameters if p.entries and p.recording is None and p.prior > 0.0]
+
+
+@pytest.mark.parametrize("parameter", GLOBAL, ids=lambda parameter: parameter.name)
+def test_rows_are_those_that_the_parameter_makes(parameter) -> None:
+    """Whatever the fit moves in a row, the robot and the soil have in the same entries."""
+    sensors = ideal_sensors(0.02)
+    value = 0.07
+    expected = build_row(ROBOT, SOIL, sensors)[None].copy()
+    parameter.apply(expected, value, np.zeros(1, dtype=np.int64))
+    moved = build_row(*with_values(ROBOT, SOIL, {parameter.name: value}), sensors)
+    assert np.allclose(moved, expected[0], rtol=1e-12)
+    assert not np.array_equal(moved, build_row(ROBOT, SOIL, sensors))
+
+
+def test_shifts_stay_inside_what_a_soil_may_be() -> None:
+    _, soil = with_values(ROBOT, SOIL, {"exit_angle_ratio": -5.0, "stress_peak": 5.0})
+    assert soil.exit_angle_ratio == 0.0
+    assert soil.peak_stress_coefficient_0 == 1.0
+
+
+def test_null_drives_are_drawn_about_the_fit(drive: Callable[..., Recording], monkeypatch: pytest.MonkeyPatch) -> None:
+    """A drive with slow motors gives null drives with slow motors, and a bank of its own."""
+    recording = drive(effects=("motor_lag=0.15",), seconds=20.0)
+    setting = Setting().with_windows(2.0)
+    centre = fitted_nominal(ROBOT, SOIL, [recording], setting)
+    assert centre[0].motor_rate < 0.9 * ROBOT.motor_rate
+    template = template_of([recording], (None,) * 8)
+    slow, usual = (
+        null_recordings(*about, template, "patchy", np.random.default_rng(5))[0] for about in (centre, (ROBOT, SOIL))
+    )
+    first = int(0.2 / recording.period)
+    assert slow["encoder_right"][first] < 0.95 * usual["encoder_right"][first]
+    hashes = {bank_hash(ROBOT, SOIL, template, setting, 20, 0, about) for about in (None, centre, (ROBOT, SOIL))}
+    assert len(hashes) == 3
+    assert module.with_values(ROBOT, SOIL, {}) == (ROBOT, SOIL)

@@ -1,0 +1,70 @@
+"""What the recordings say against themselves comes before any physics, and a dead channel is no evidence."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ddagr_gym.diagnosis.pipeline import _doubted
+from ddagr_gym.diagnosis.preprocessing.data_checks import DataDoubt, data_doubts, dead_channels
+from ddagr_gym.diagnosis.result.sentences import dead_in_words
+from ddagr_gym.diagnosis.result.verdict import Diagnosis
+from ddagr_gym.recordings.schema import Recording
+
+
+def doubts(*recordings: Recording) -> tuple[DataDoubt, ...]:
+    return data_doubts(recordings, np.random.default_rng(1))
+
+
+def with_zeros(recording: Recording, *names: str) -> Recording:
+    zeros = {name: np.zeros(len(recording)) for name in names}
+    return replace(recording, channels={**recording.channels, **zeros})
+
+
+@pytest.fixture(scope="module")
+def sound(drive: Callable[..., Recording]) -> Recording:
+    return drive()
+
+
+def test_a_sound_drive_has_no_dead_channel(sound: Recording) -> None:
+    assert dead_channels(doubts(sound)) == ()
+
+
+def test_zeros_logged_as_readings_are_found_and_named(sound: Recording) -> None:
+    found = doubts(with_zeros(sound, "yaw_rate", "specific_force_x"), sound)
+    assert dead_channels(found) == ("specific_force_x", "yaw_rate")
+    stuck = [doubt for doubt in found if doubt.finding == "stuck"]
+    assert {doubt.recording for doubt in stuck} == {sound.meta.source}
+    assert all("look at the sensor" in doubt.sentence for doubt in stuck)
+
+
+def test_stretches_whose_poses_may_be_in_frames_of_their_own(sound: Recording) -> None:
+    half = len(sound) // 2
+    parts = replace(sound, meta=replace(sound.meta, spans=((0, half), (half, len(sound)))))
+    told = [doubt for doubt in doubts(parts, sound) if doubt.finding == "frames"]
+    assert [doubt.recording for doubt in told] == [sound.meta.source]
+    assert "2 stretches" in told[0].sentence
+    without = replace(parts, channels={k: v for k, v in parts.channels.items() if not k.startswith("pose")})
+    assert not any(doubt.finding == "frames" for doubt in doubts(without))
+
+
+def test_channels_that_no_diagnosis_compares_are_not_called_dead() -> None:
+    assert dead_channels([DataDoubt("a", "current_left", "stuck", "It never changes.")]) == ()
+    assert dead_channels([DataDoubt("a", "yaw_rate", "wait", "It waits.")]) == ()
+
+
+@pytest.mark.parametrize(("verdict", "begin"), [("none", "Nothing is missing"), ("unknown", "Something is missing")])
+def test_with_a_dead_channel_no_answer_is_complete(verdict: str, begin: str) -> None:
+    answer = Diagnosis((verdict,), True, (), "", {"limit": {"yaw_rate": 1.2}}, {}, {}, ("a",), {}, 1.0, "0")
+    dead = [DataDoubt("a", "yaw_rate", "stuck", "It never changes.")]
+    made = _doubted(answer, {"explained": None, "findings": {}}, {}, None, dead)
+    assert not made.complete
+    assert made.sentence.startswith(begin)
+    assert made.sentence.endswith("yaw rate never changes while the robot drives, so that it says nothing.")
+    assert _doubted(answer, {"explained": None, "findings": {}}, {}).complete
+
+
+def test_several_dead_channels_in_words() -> None:
+    words = dead_in_words(["specific_force_x", "specific_force_y", "yaw_rate"])
+    assert words.startswith("specific force x, specific force y and yaw rate never change ")

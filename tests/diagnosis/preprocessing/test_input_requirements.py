@@ -1,0 +1,82 @@
+"""Recordings that cannot be diagnosed are refused with the reason before anything is computed."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ddagr_gym.diagnosis.preprocessing.input_requirements import check_recordings, content_hash, data_source
+from ddagr_gym.diagnosis.setting import Setting, window_duration
+from ddagr_gym.errors import InputError
+from ddagr_gym.presets import get_robot
+from ddagr_gym.recordings.schema import Recording
+
+ROBOT = get_robot("ddagr")
+
+
+def made(seconds: float = 30.0, rate: float = 50.0, **channels: float | None) -> Recording:
+    """A drive with constant channels; None leaves one out."""
+    t = np.arange(int(seconds * rate)) / rate
+    values = {"command_right": 0.5, "command_left": 0.5, "yaw_rate": 0.1} | channels
+    columns = {name: np.full(len(t), value) for name, value in values.items() if value is not None}
+    return Recording.from_columns({"t": t, **columns}, ROBOT, source="drive.csv")
+
+
+def told_late() -> Recording:
+    """A drive whose commands begin two seconds before its end."""
+    drive = made()
+    valid = drive.command_valid & (drive.t > 28.0)
+    return replace(drive, command_valid=valid)
+
+
+def test_a_sound_drive_passes() -> None:
+    check_recordings([made()], ROBOT, Setting())
+
+
+@pytest.mark.parametrize(
+    ("recordings", "words"),
+    [
+        ([], "no recording"),
+        ([made(command_left=None)], "no commands"),
+        ([made(yaw_rate=None)], "neither yaw_rate nor encoders nor poses"),
+        ([made(seconds=10.0)], "too few"),
+        ([made(), made(rate=100.0)], "100 Hz"),
+        ([made(command_right=0.0, command_left=0.0)], "stand still 100 %"),
+        ([made(), made().with_meta(robot="husky")], "--robot husky"),
+        ([made(), made(seconds=20.0), made()], "drive.csv and drive.csv hold the same values"),
+        ([told_late()], "0 windows of 2 s without a gap and with commands"),
+    ],
+)
+def test_what_cannot_be_diagnosed_is_refused(recordings: list[Recording], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        check_recordings(recordings, ROBOT, Setting())
+
+
+def test_the_hash_knows_every_value(drive: Callable[..., Recording]) -> None:
+    recording = drive()
+    changed = {**recording.channels, "yaw_rate": recording["yaw_rate"].copy()}
+    changed["yaw_rate"][7] += 1e-9
+    assert content_hash(recording) == content_hash(drive())
+    assert content_hash(replace(recording, channels=changed)) != content_hash(recording)
+    source = data_source(recording)
+    assert source.sha256 == content_hash(recording)
+    assert source.seconds == pytest.approx(23.98)
+
+
+def test_logs_cut_into_steps_of_one_window_pass() -> None:
+    drive = made(rate=20.0)
+    segments = tuple((k, k + 40) for k in range(0, 600, 40))
+    check_recordings([replace(drive, meta=replace(drive.meta, segments=segments))], ROBOT, Setting())
+
+
+@pytest.mark.parametrize(("seconds", "duration"), [(24.0, 3.0), (60.0, 6.0), (10.0, 2.0)])
+def test_short_recordings_get_shorter_windows(seconds: float, duration: float) -> None:
+    recording = made(rate=50.0, seconds=seconds)
+    assert window_duration([recording], Setting().with_windows(6.0)) == pytest.approx(duration, rel=0.01)
+
+
+def test_windows_may_not_overlap() -> None:
+    assert Setting().with_windows(3.0, 8.0).stride == 8.0
+    with pytest.raises(InputError, match=r"a stride of 1 s makes windows of 3 s overlap"):
+        Setting().with_windows(3.0, 1.0)

@@ -1,0 +1,200 @@
+"""Where joint refits begin, and a search that goes on where it was stopped."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ddagr_gym.diagnosis.gates.thresholds import Gate, Thresholds
+from ddagr_gym.diagnosis.result.conclusion import begun
+from ddagr_gym.diagnosis.search import stepwise as module
+from ddagr_gym.diagnosis.search.scan import Gain, gains, nuisance_answer, scan
+from ddagr_gym.diagnosis.search.search_node import Rival, Standing
+from ddagr_gym.diagnosis.search.stepwise import search
+from ddagr_gym.diagnosis.setting import Setting
+from ddagr_gym.diagnosis.store import StepStore
+from ddagr_gym.errors import InputError
+from ddagr_gym.identification.gauss_newton import cost_of, effect_columns, effect_parameters, fit
+from ddagr_gym.identification.problem import Point, Problem
+from ddagr_gym.physics.effects.registry import effect_kind, parse_effect
+from ddagr_gym.presets import get_robot, get_soil
+from ddagr_gym.recordings.schema import Recording
+from tests.diagnosis.conftest import Sloping
+
+THRESHOLDS = Thresholds({"slope": Gate(3.0, 0.0)}, {}, 20, "a test")
+
+
+@pytest.fixture(scope="module")
+def standing(sloping: Sloping) -> Standing:
+    """The nominal model on sloping ground and what the slope would gain."""
+    terms = scan(sloping.problem, sloping.nominal, {"slope": effect_kind("slope")})
+    return Standing(sloping.nominal, terms, tuple(gains(terms)), {}, {}, 1.0, {})
+
+
+def cost_at(sloping: Sloping, point: module.Point) -> float:
+    prediction = sloping.problem.predict(point)
+    return cost_of(sloping.problem, point, prediction, sloping.nominal.elimination)[0]
+
+
+def test_a_damped_guess_begins_with_the_answer_of_soil_and_robot(sloping: Sloping, standing: Standing) -> None:
+    """The scan promises a fall of the cost for the effect and the nuisances' answer together."""
+    gain = standing.gains[0]
+    answer = nuisance_answer(sloping.problem, sloping.nominal, standing.terms, gain)
+    assert (answer[sloping.problem.free] != 0.0).any()
+    assert (answer[~sloping.problem.free] == 0.0).all()
+    point = module._damped_guess(sloping.problem, standing, gain, standing.terms, sloping.nominal)
+    alone = replace(point, values=sloping.nominal.point.values)
+    assert cost_at(sloping, point) < cost_at(sloping, alone)
+    assert sloping.nominal.cost - cost_at(sloping, point) > 0.5 * gain.gain
+
+
+def test_a_guess_that_is_far_too_large_is_damped(sloping: Sloping, standing: Standing) -> None:
+    gain = standing.gains[0]
+    exaggerated = Gain(gain.candidate, gain.name, gain.gain, tuple(3.0 * m for m in gain.multiples))
+    point = module._damped_guess(sloping.problem, standing, exaggerated, standing.terms, sloping.nominal)
+    guessed = module._damped_guess(sloping.problem, standing, gain, standing.terms, sloping.nominal)
+    assert point.effects[0].angle < 2.0 * guessed.effects[0].angle
+    assert cost_at(sloping, point) < sloping.nominal.cost
+
+
+def test_a_search_goes_on_behind_its_last_step(
+    sloping: Sloping, standing: Standing, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    chosen = replace(standing, fitted=sloping.chosen)
+    done: list[str] = []
+    stop = [True]
+
+    def begin(problem: object, progress: object) -> tuple[object, Standing]:
+        done.append("nominal")
+        return sloping.nominal, standing
+
+    def added(problem: object, last: Standing, *rest: object) -> tuple[Standing, tuple[Rival, ...]] | None:
+        done.append(f"after {last.names}")
+        if not last.names:
+            return chosen, (Rival("slope", sloping.chosen, 9.0),)
+        if stop.pop():
+            raise KeyboardInterrupt
+        return None
+
+    monkeypatch.setattr(module, "begin", begin)
+    monkeypatch.setattr(module, "_added", added)
+    monkeypatch.setattr(module, "_settled", lambda problem, last: last)
+    with pytest.raises(KeyboardInterrupt):
+        search(sloping.problem, THRESHOLDS, keep=StepStore(tmp_path / "part", "key").step)
+    assert done == ["nominal", "after ()", "after ('slope',)"]
+    stop[:] = [False]
+    found = search(sloping.problem, THRESHOLDS, keep=StepStore(tmp_path / "part", "key").step)
+    assert done[3:] == ["after ('slope',)"]
+    assert found.chosen.names == ("slope",)
+    assert found.steps[0][0].fitted.point.effects == sloping.chosen.point.effects
+
+
+def test_loops_are_told_from_delays(drive, problem_of) -> None:
+    """Both are late by the same time; only one rounds the corner of a step."""
+    for truth, other in (("motor_lag=0.25,second_pole=1", "command_delay"), ("command_delay=0.2", "motor_lag")):
+        problem = problem_of(drive((truth,)))
+        raw = fit(problem, iterations=0)
+        right = parse_effect(truth)
+        wrong = {"command_delay": "command_delay=0.2", "motor_lag": "motor_lag=0.2,second_pole=0.9"}[other]
+        costs = [
+            fit(problem, replace(raw.point, effects=(effect,)), iterations=6, reuse=raw).cost
+            for effect in (right.with_values(**{right.size_names()[0]: 0.15}), parse_effect(wrong))
+        ]
+        assert costs[1] - costs[0] > 20.0, (truth, costs)
+
+
+def test_a_swap_knows_its_place_after_an_effect_has_gone() -> None:
+    """A beside which B came and A went: steps and places agree no more."""
+
+    def rival(name: str) -> Any:
+        return SimpleNamespace(name=name)
+
+    fitted: Any = SimpleNamespace(
+        point=SimpleNamespace(effects=[parse_effect("slope=0.1"), parse_effect("gyro_scale=1.1")])
+    )
+    assert module._place_of([rival("payload"), rival("towed_drag")], fitted) is None
+    assert module._place_of([rival("slope"), rival("payload")], fitted) == 0
+    assert module._place_of([rival("imu_tilt"), rival("gyro_scale")], fitted) == 1
+
+
+def test_what_is_confused_with_a_named_effect_has_to_explain_more() -> None:
+    """A patch of another form than the library's leaves something that looks like a soil that changes."""
+
+    def standing(cost: float, *effects: str) -> Any:
+        point = SimpleNamespace(effects=tuple(parse_effect(text) for text in effects))
+        terms = SimpleNamespace(overlap={"gyro_scale": 0.2, "soil_change": 0.2} if effects else {})
+        return SimpleNamespace(fitted=SimpleNamespace(cost=cost, point=point), dispersion=1.0, terms=terms)
+
+    names = ("soil_change", "gyro_scale", "payload")
+    gates = Thresholds({name: Gate(40.0, 0.0) for name in names}, {}, 20, "x")
+    found = module.further_gates(gates, [standing(2000.0), standing(1000.0, "soil_patch=0.5")])
+    assert found.of("soil_change").gain == pytest.approx(40.0 + 0.1 * 1000.0)
+    assert found.of("gyro_scale").gain == pytest.approx(40.0 + 0.2 * 0.01 * 1000.0)
+    assert found.of("payload").gain == pytest.approx(40.0 + 0.01 * 1000.0)
+    assert module.further_gates(gates, [standing(2000.0)]) == gates
+
+
+def test_a_shape_at_its_lower_bound_moves_inwards(sloping: Sloping) -> None:
+    problem, fitted = sloping.problem, sloping.nominal
+    lag = parse_effect("motor_lag=0.2,slowing=0")
+    (slowing,) = (p for p in effect_parameters((lag,)) if p.field == "slowing")
+    point = replace(fitted.point, effects=(lag,))
+    assert slowing.step < 0.0 == slowing.low
+    assert np.abs(effect_columns(problem, point, problem.predict(point), [slowing])).max() > 1.0
+
+
+def test_a_window_that_cannot_be_predicted_is_no_perfect_fit(sloping: Sloping) -> None:
+    problem, fitted = sloping.problem, sloping.nominal
+    broken = fitted.prediction.copy()
+    broken[2, 5:] = np.nan
+    total, shares = cost_of(problem, fitted.point, broken, fitted.elimination)
+    assert total == np.inf
+    assert np.flatnonzero(np.isinf(shares)).tolist() == [2]
+
+
+def test_a_window_that_no_model_predicts_is_refused_in_a_sentence(
+    drive: Callable[..., Recording], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    predict = Problem.predict
+
+    def broken(problem: Problem, point: Point) -> np.ndarray:
+        found = predict(problem, point)
+        found[problem.blocked.windows.time > 3.0] = np.nan
+        return found
+
+    monkeypatch.setattr(Problem, "predict", broken)
+    with pytest.raises(InputError, match=r"breaks down in 1 of 3 windows, first at 4\.0 s"):
+        begun(get_robot("ddagr"), get_soil("thesis_a1"), (drive(seconds=8.0),), Setting())
+
+
+def test_a_second_effect_keeps_the_overlap_it_had_before_it_was_named() -> None:
+    def standing(cost: float, overlap: dict[str, float], *effects: str) -> Any:
+        point = SimpleNamespace(effects=tuple(parse_effect(text) for text in effects))
+        fitted = SimpleNamespace(cost=cost, point=point)
+        return SimpleNamespace(fitted=fitted, dispersion=1.0, terms=SimpleNamespace(overlap=overlap))
+
+    names = ("command_deadband", "accelerometer_bias", "of_ones_own")
+    gates = Thresholds({name: Gate(10.0, 0.0) for name in names[:2]}, {}, 20, "x")
+    found = [
+        standing(20000.0, {}),
+        standing(1000.0, {"accelerometer_bias": 0.05, "of_ones_own": 0.1}, "command_deadband=0.1"),
+        standing(0.0, {"of_ones_own": 0.2}, "command_deadband=0.1", "accelerometer_bias=0.2"),
+    ]
+    raised = module.further_gates(gates, found)
+    assert raised.of("accelerometer_bias").gain == pytest.approx(10.0 + 0.05 * 0.01 * 20000.0)
+    assert raised.of("command_deadband").gain == pytest.approx(10.0 + 0.01 * 20000.0)
+    assert raised.of("of_ones_own").gain == pytest.approx(10.0 + 0.2 * 0.01 * 20000.0)
+
+
+def test_overlap_says_where_effects_act(sloping: Sloping) -> None:
+    """A slope acts on the accelerometer as a bias does, and hardly where an encoder's scale acts."""
+    kinds = {name: effect_kind(name) for name in ("accelerometer_bias", "encoder_scale", "gyro_scale")}
+    assert scan(sloping.problem, sloping.nominal, kinds).overlap == {}
+    overlap = scan(sloping.problem, sloping.chosen, kinds).overlap
+    assert 0.3 < overlap["accelerometer_bias"] <= 1.0
+    assert 0.0 <= overlap["encoder_scale"] < 0.1
+    assert overlap["gyro_scale"] < overlap["accelerometer_bias"]
