@@ -17,7 +17,7 @@ from agents.settings import TrainingSettings
 from ddagr_gym.commands.output import write_text
 from ddagr_gym.config import dump_config
 from ddagr_gym.files import atomic_path, make_folder
-from ddagr_gym.reporting import palette
+from ddagr_gym.rendering import palette
 from ddagr_gym.reporting.figures import house_style
 
 AIMS = {"radius_error_median": 0.02, "radius_error_p95": 0.06, "success_rate": 0.98}

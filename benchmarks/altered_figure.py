@@ -9,7 +9,7 @@ from typing import Any
 from benchmarks.altered_changes import CHANGES, DRIVES
 from benchmarks.score_concealed import names_of
 from ddagr_gym.recordings.files import write_atomically
-from ddagr_gym.reporting import palette
+from ddagr_gym.rendering import palette
 from ddagr_gym.reporting.figures import house_style
 
 

@@ -39,7 +39,7 @@ from ddagr_gym.errors import InputError
 from ddagr_gym.identification.gauss_newton import Fitted, fit
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.files import write_atomically
-from ddagr_gym.reporting import palette
+from ddagr_gym.rendering import palette
 from ddagr_gym.reporting.figures import house_style
 
 HORIZON = "5"

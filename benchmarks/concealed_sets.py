@@ -20,7 +20,7 @@ from typing import Any
 from benchmarks.concealed_figure import WORDS
 from benchmarks.score_concealed import TARGETS, against_targets, figure_line, share
 from ddagr_gym.recordings.files import write_atomically
-from ddagr_gym.reporting import palette
+from ddagr_gym.rendering import palette
 from ddagr_gym.reporting.figures import house_style
 
 RESULT = Path(__file__).resolve().parent / "results" / "concealed_sets.json"

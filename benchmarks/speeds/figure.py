@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from ddagr_gym.reporting import palette
+from ddagr_gym.rendering import palette
 from ddagr_gym.reporting.figures import COLOURS, house_style, save_figure
 
 TARGET = 1e-3  # force error of the default numerics

@@ -188,10 +188,10 @@ def _estimate_rows(driven: TurnRun, track: Array) -> list[tuple[str, str]]:
 
 def _write(folder: Path, driven: TurnRun, track: Array) -> None:
     from ddagr_gym.commands.simulate import write_recording
+    from ddagr_gym.rendering.render import SceneRenderer
+    from ddagr_gym.rendering.scene import scenes, turn_stage
+    from ddagr_gym.rendering.video import write_video
     from ddagr_gym.reporting.figures import turn_figure
-    from ddagr_gym.reporting.render import SceneRenderer
-    from ddagr_gym.reporting.scene import scenes, turn_stage
-    from ddagr_gym.reporting.video import write_video
 
     episode = driven.episode
     write_recording(folder / "row_turn.csv", driven.columns, episode.robot)

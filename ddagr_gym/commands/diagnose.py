@@ -214,9 +214,10 @@ def write_outcome(outcome: Outcome, folder: Path, page: bool = True) -> None:
         page: whether to write the page with its figures.
     """
     from ddagr_gym.diagnosis.pipeline import data_hash, effect_intervals
+    from ddagr_gym.diagnosis.result import evidence
     from ddagr_gym.diagnosis.result.verdict import as_mapping, save
     from ddagr_gym.physics.effects.files import save_effects
-    from ddagr_gym.reporting import diagnosis_page, evidence
+    from ddagr_gym.reporting import diagnosis_page
 
     diagnosis = outcome.diagnosis
     for name in ("effects.json", "effects.yaml"):

@@ -11,8 +11,8 @@ from ddagr_gym.commands.output import atomic_path, format_table, make_folder, wr
 from ddagr_gym.commands.progress import Progress
 
 if TYPE_CHECKING:
+    from ddagr_gym.evaluation.report_data import Arm, Evaluation, Film, SetNote
     from ddagr_gym.evaluation.runs import TurnRun
-    from ddagr_gym.reporting.evaluation_data import Arm, Evaluation, Film, SetNote
 
 VIDEOS = "videos"
 
@@ -63,8 +63,8 @@ def assemble(
 ) -> Evaluation:
     """Evidence of the page before anything is driven again."""
     from ddagr_gym.evaluation.claims import load_claims
+    from ddagr_gym.evaluation.report_data import Evaluation
     from ddagr_gym.evaluation.shown import infeasible_soils
-    from ddagr_gym.reporting.evaluation_data import Evaluation
 
     headline = load_claims().headline
     arms, sets = _arms(rows, summary), _sets(rows)
@@ -111,7 +111,7 @@ def _seeds_text(headline: str, seeds: Collection[int]) -> str:
 def _arms(rows: Sequence[Mapping[str, Any]], summary: Mapping[str, Any]) -> list[Arm]:
     """Arms in the order of the summary, those that are never deployable last."""
     from ddagr_gym.evaluation.controllers import controller_names, controller_title, controller_version, is_deployable
-    from ddagr_gym.reporting.evaluation_data import Arm, arm_name
+    from ddagr_gym.evaluation.report_data import Arm, arm_name
 
     members: dict[str, dict[str, None]] = {}
     for row in rows:
@@ -126,9 +126,9 @@ def _arms(rows: Sequence[Mapping[str, Any]], summary: Mapping[str, Any]) -> list
 
 
 def _sets(rows: Sequence[Mapping[str, Any]]) -> list[SetNote]:
+    from ddagr_gym.evaluation.report_data import SetNote
     from ddagr_gym.evaluation.scenario_sets import PLANS
     from ddagr_gym.evaluation.scenarios import load_scenarios, set_hash
-    from ddagr_gym.reporting.evaluation_data import SetNote
 
     driven: dict[str, set[int]] = {}
     for row in rows:
@@ -165,8 +165,8 @@ def _digest(path: Path) -> str:
 
 def _film(folder: Path, number: int, title: str, row: Mapping[str, Any], progress: Progress) -> Film:
     from ddagr_gym.evaluation.controllers import needs_filter
+    from ddagr_gym.evaluation.report_data import Film, arm_name, display_name
     from ddagr_gym.evaluation.shown import replayed
-    from ddagr_gym.reporting.evaluation_data import Film, arm_name, display_name
     from ddagr_gym.reporting.evaluation_film import film_turn
     from ddagr_gym.reporting.evaluation_tables import replay_command
 
@@ -182,7 +182,7 @@ def _film(folder: Path, number: int, title: str, row: Mapping[str, Any], progres
 
 def _file_name(row: Mapping[str, Any]) -> str:
     """Letters, digits and underscores only, whatever a policy's name holds; its training seed where that is not 0."""
-    from ddagr_gym.reporting.evaluation_data import arm_name, display_name
+    from ddagr_gym.evaluation.report_data import arm_name, display_name
 
     name = display_name(arm_name(row)) + (f"_{row['run']}" if row["run"] else "")
     plain = "".join(letter if letter.isalnum() else "_" for letter in name)

@@ -101,9 +101,9 @@ def _write(arguments: Arguments, columns: Any, robot: Any, title: str) -> None:
 
         drive_figure(columns, arguments.figure, robot=robot, soil_name=arguments.soil, title=title)
     if arguments.video is not None:
-        from ddagr_gym.reporting.render import SceneRenderer
-        from ddagr_gym.reporting.scene import open_stage, scenes
-        from ddagr_gym.reporting.video import write_video
+        from ddagr_gym.rendering.render import SceneRenderer
+        from ddagr_gym.rendering.scene import open_stage, scenes
+        from ddagr_gym.rendering.video import write_video
 
         stage = open_stage(columns["true_x"], columns["true_y"], robot, arguments.soil, title)
         renderer = SceneRenderer()

@@ -16,10 +16,10 @@ from ddagr_gym.diagnosis.localisation.effect_timeline import (
 )
 from ddagr_gym.diagnosis.localisation.localise import piece_values
 from ddagr_gym.diagnosis.localisation.residual_wrench import residual_wrench
+from ddagr_gym.diagnosis.result.evidence import NAME, Evidence
 from ddagr_gym.diagnosis.search.stepwise import Found
 from ddagr_gym.identification.gauss_newton import Fitted
 from ddagr_gym.identification.problem import Problem
-from ddagr_gym.reporting.evidence import NAME, Evidence
 
 __all__ = ["NAME", "Evidence", "gather_evidence"]
 

@@ -42,11 +42,11 @@ from ddagr_gym.diagnosis.search.stepwise import Found
 from ddagr_gym.diagnosis.setting import Setting
 from ddagr_gym.diagnosis.store import StepStore
 from ddagr_gym.diagnosis.unnamed.terms import unnamed_terms
+from ddagr_gym.diagnosis.wording import in_sentence
 from ddagr_gym.errors import InputError
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.recordings.schema import Recording
-from ddagr_gym.reporting.wording import in_sentence
 
 STEPS = ("checks", "search", "verdict", "certification", "localisation", "unnamed terms", "next drive", "evidence")
 """Names of the steps that are kept."""

@@ -7,7 +7,7 @@ import numpy as np
 from ddagr_gym.control.circle import running_radius
 from ddagr_gym.envs.turn_batch import TurnBatch
 from ddagr_gym.physics import layout
-from ddagr_gym.reporting.scene import Scene, turn_stage
+from ddagr_gym.rendering.scene import Scene, turn_stage
 
 
 class SceneHistory:

@@ -134,7 +134,7 @@ class TurnEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def _draw(self) -> NDArray[np.uint8]:
         if self._renderer is None:
-            from ddagr_gym.reporting.render import SceneRenderer
+            from ddagr_gym.rendering.render import SceneRenderer
 
             mode: Any = self.render_mode
             self._renderer = SceneRenderer(mode=mode, frame_rate=self.metadata["render_fps"])

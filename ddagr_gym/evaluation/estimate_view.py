@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.estimation import CHANNELS, channel_statistics
+from ddagr_gym.evaluation.estimate_panels import DEVIATIONS, EstimateView, Line, Panel
 from ddagr_gym.evaluation.estimate_run import EstimatedRun, dead_reckoned
-from ddagr_gym.reporting import palette
-from ddagr_gym.reporting.estimate_figures import DEVIATIONS, EstimateView, Line, Panel
+from ddagr_gym.rendering import palette
 
 Array = NDArray[np.float64]
 

@@ -16,12 +16,7 @@ from ddagr_gym.evaluation.campaign import drive_scenario, episode_row
 from ddagr_gym.evaluation.controllers import find_controller, needs_filter
 from ddagr_gym.evaluation.estimator_metrics import integrate_track
 from ddagr_gym.evaluation.metrics import headland_samples
-from ddagr_gym.evaluation.runs import TurnRun
-from ddagr_gym.evaluation.scenarios import Scenario, load_scenarios, scenario_names
-from ddagr_gym.frames import body_to_world
-from ddagr_gym.parameters import Sensors
-from ddagr_gym.presets import ddagr
-from ddagr_gym.reporting.evaluation_data import (
+from ddagr_gym.evaluation.report_data import (
     Evaluation,
     Row,
     ShownDrive,
@@ -30,6 +25,11 @@ from ddagr_gym.reporting.evaluation_data import (
     best_arm,
     size_of,
 )
+from ddagr_gym.evaluation.runs import TurnRun
+from ddagr_gym.evaluation.scenarios import Scenario, load_scenarios, scenario_names
+from ddagr_gym.frames import body_to_world
+from ddagr_gym.parameters import Sensors
+from ddagr_gym.presets import ddagr
 
 Array = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from ddagr_gym.recordings.checks.gravity import rests
 from ddagr_gym.recordings.checks.signals import filled
 from ddagr_gym.recordings.files import write_atomically
 from ddagr_gym.recordings.schema import FloatArray, Recording
-from ddagr_gym.reporting import palette
+from ddagr_gym.rendering import palette
 from ddagr_gym.reporting.figures import house_style
 
 if TYPE_CHECKING:

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ddagr_gym.diagnosis.result.evidence import Evidence
 from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.recordings.schema import CHANNELS as SCHEMA
-from ddagr_gym.reporting import palette
-from ddagr_gym.reporting.evidence import Evidence
+from ddagr_gym.rendering import palette
 from ddagr_gym.reporting.figures import DASHED
 
 Array = NDArray[np.float64]

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.reporting import palette
+from ddagr_gym.diagnosis.result.evidence import Evidence
+from ddagr_gym.rendering import palette
 from ddagr_gym.reporting.diagnosis_figures import BEFORE, MODELS, MOST_PATHS, Figure, blank_figure, thinned
-from ddagr_gym.reporting.evidence import Evidence
 
 Array = NDArray[np.float64]
 

@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from ddagr_gym.diagnosis.result.evidence import Evidence
+from ddagr_gym.diagnosis.wording import title
 from ddagr_gym.errors import InputError
 from ddagr_gym.files import atomic_path, make_folder
 from ddagr_gym.reporting import diagnosis_figures as figures
 from ddagr_gym.reporting import diagnosis_maps as maps
 from ddagr_gym.reporting import diagnosis_tables as tables
-from ddagr_gym.reporting.evidence import Evidence
 from ddagr_gym.reporting.figures import house_style, svg_data
-from ddagr_gym.reporting.wording import title
 
 PAGE = "report.html"
 PICTURES = "figures"

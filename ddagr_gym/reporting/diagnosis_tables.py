@@ -6,11 +6,9 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from ddagr_gym.reporting.diagnosis_figures import LABELS
-from ddagr_gym.reporting.wording import (
+from ddagr_gym.diagnosis.localisation.operating_conditions import REGIME_EXCESS, REGIME_LEVEL
+from ddagr_gym.diagnosis.wording import (
     DEGREES,
-    REGIME_EXCESS,
-    REGIME_LEVEL,
     Amount,
     amounts,
     describe,
@@ -20,6 +18,7 @@ from ddagr_gym.reporting.wording import (
     range_in_words,
     title,
 )
+from ddagr_gym.reporting.diagnosis_figures import LABELS
 
 if TYPE_CHECKING:
     from ddagr_gym.physics.effects import Effect

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ddagr_gym.errors import InputError
 from ddagr_gym.parameters import Robot
-from ddagr_gym.reporting import palette
+from ddagr_gym.rendering import palette
 from ddagr_gym.reporting.figures import DASHED, WHEELS, draw_robot, house_style, save_figure
 
 DRIVE_FIGURE_COLUMNS = (

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ddagr_gym.reporting import palette
-from ddagr_gym.reporting.evaluation_data import Arm, Evaluation, best_arm, display_name
+from ddagr_gym.evaluation.report_data import Arm, Evaluation, best_arm, display_name
+from ddagr_gym.rendering import palette
 from ddagr_gym.reporting.figures import COLOURS, house_style, save_figure
 
 ROW_HEIGHT = 0.2

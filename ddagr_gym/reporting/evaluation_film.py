@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 
 from ddagr_gym.control.row_turn import RowTurn
 from ddagr_gym.parameters import Robot
-from ddagr_gym.reporting.render import SceneRenderer
-from ddagr_gym.reporting.scene import scenes, turn_stage
-from ddagr_gym.reporting.video import write_video
+from ddagr_gym.rendering.render import SceneRenderer
+from ddagr_gym.rendering.scene import scenes, turn_stage
+from ddagr_gym.rendering.video import write_video
 
 SIZE = (640, 480)
 """Of the pictures [px]."""

@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from ddagr_gym.errors import InputError
+from ddagr_gym.evaluation.report_data import Evaluation, Film
 from ddagr_gym.files import atomic_path, make_folder
 from ddagr_gym.parameters import Robot
 from ddagr_gym.reporting import evaluation_figures as figures
 from ddagr_gym.reporting import evaluation_paths as paths
 from ddagr_gym.reporting import evaluation_tables as tables
-from ddagr_gym.reporting.evaluation_data import Evaluation, Film
 from ddagr_gym.reporting.figures import house_style, svg_data
 
 PAGE = "report.html"

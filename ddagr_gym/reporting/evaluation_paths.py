@@ -15,13 +15,13 @@ from ddagr_gym.control.row_turn import (
     RowTurn,
     side_sign,
 )
+from ddagr_gym.evaluation.report_data import Evaluation, ShownDrive, display_name
 from ddagr_gym.parameters import Robot
-from ddagr_gym.reporting import palette
-from ddagr_gym.reporting.evaluation_data import Evaluation, ShownDrive, display_name
+from ddagr_gym.rendering import palette
+from ddagr_gym.rendering.scene import turn_stage
+from ddagr_gym.rendering.sketch import rounded_rectangle
 from ddagr_gym.reporting.evaluation_figures import arm_colours
 from ddagr_gym.reporting.figures import DASHED
-from ddagr_gym.reporting.scene import turn_stage
-from ddagr_gym.reporting.sketch import rounded_rectangle
 
 _LATERAL_LIMIT = 0.30
 _HEADING_LIMIT = math.radians(45.0)

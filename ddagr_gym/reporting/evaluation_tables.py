@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ddagr_gym.reporting.evaluation_data import (
+from ddagr_gym.evaluation.report_data import (
     Evaluation,
     Row,
     arm_name,

@@ -23,10 +23,10 @@ from ddagr_gym.errors import InputError
 from ddagr_gym.frames import body_to_world
 from ddagr_gym.parameters import Robot
 from ddagr_gym.recordings.files import write_atomically
-from ddagr_gym.reporting import palette
-from ddagr_gym.reporting.panel import signed
-from ddagr_gym.reporting.scene import turn_stage
-from ddagr_gym.reporting.sketch import rounded_rectangle
+from ddagr_gym.rendering import palette
+from ddagr_gym.rendering.panel import signed
+from ddagr_gym.rendering.scene import turn_stage
+from ddagr_gym.rendering.sketch import rounded_rectangle
 
 Array = NDArray[np.float64]
 

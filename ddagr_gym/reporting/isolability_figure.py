@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ddagr_gym.reporting import palette
+from ddagr_gym.rendering import palette
 from ddagr_gym.reporting.figures import house_style, save_figure
 
 _SMALLEST, _LARGEST = 1e-2, 1e2

@@ -16,7 +16,7 @@ from benchmarks.altered_changes import CHANGES, CONTROL, DRIVES, LATE_POSES, TUR
 from benchmarks.altered_drives import RESULT, covered, detectable, figures, main, scored, with_own
 from benchmarks.altered_figure import draw, outcome
 from benchmarks.answers import run_diagnoses
-from ddagr_gym.reporting import palette
+from ddagr_gym.rendering import palette
 from tests.benchmarks.test_altered_changes import BY_NAME, TABLES
 
 LIMITS = {"pose_latency": {"latency": 0.6}, "encoder_scale": {"right": 0.5, "left": None}}

@@ -115,8 +115,8 @@ def test_figure_and_film_of_the_turn_show_the_estimate(monkeypatch, driven, tmp_
 
     seen, filmed = [], []
     monkeypatch.setattr(demo, "_drive", lambda _: driven)
-    monkeypatch.setattr("ddagr_gym.reporting.render.SceneRenderer", Renderer)
-    monkeypatch.setattr("ddagr_gym.reporting.video.write_video", lambda path, frames: filmed.extend(frames))
+    monkeypatch.setattr("ddagr_gym.rendering.render.SceneRenderer", Renderer)
+    monkeypatch.setattr("ddagr_gym.rendering.video.write_video", lambda path, frames: filmed.extend(frames))
     monkeypatch.setattr("ddagr_gym.reporting.figures.turn_figure", lambda columns, *_, **__: seen.append(columns))
     section = demo.turn_step(Arguments(), tmp_path)
     track = estimated_track(driven)

@@ -8,9 +8,9 @@ from ddagr_gym.cli import main
 from ddagr_gym.commands import demo_evaluation, evaluation_report
 from ddagr_gym.commands.evaluation_report import assemble, write_report
 from ddagr_gym.evaluation.campaign import run_campaign
+from ddagr_gym.evaluation.report_data import Arm
 from ddagr_gym.evaluation.summary import summaries
 from ddagr_gym.policies import shipped
-from ddagr_gym.reporting.evaluation_data import Arm
 
 pytest.importorskip("matplotlib", reason="needs the extra report")
 pytest.importorskip("jinja2", reason="needs the extra report")

@@ -5,6 +5,7 @@ import pytest
 
 from ddagr_gym.errors import InputError
 from ddagr_gym.evaluation.campaign import drive_scenario, episode_row
+from ddagr_gym.evaluation.report_data import Arm, Evaluation, SetNote
 from ddagr_gym.evaluation.scenarios import load_scenarios
 from ddagr_gym.evaluation.shown import (
     drive_shown,
@@ -17,7 +18,6 @@ from ddagr_gym.evaluation.shown import (
     replayed,
     tracked_rows,
 )
-from ddagr_gym.reporting.evaluation_data import Arm, Evaluation, SetNote
 
 
 def rows_of(controller, errors, infeasible=()):

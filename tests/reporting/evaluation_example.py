@@ -5,8 +5,8 @@ from functools import lru_cache
 import numpy as np
 
 from ddagr_gym.control.row_turn import RowTurn
+from ddagr_gym.evaluation.report_data import Arm, Evaluation, SetNote, ShownDrive
 from ddagr_gym.evaluation.summary import summaries
-from ddagr_gym.reporting.evaluation_data import Arm, Evaluation, SetNote, ShownDrive
 
 HOSTILE = "<script>alert('$x_1$')</script>"
 

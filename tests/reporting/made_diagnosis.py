@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from ddagr_gym.diagnosis.result.evidence import Evidence
 from ddagr_gym.diagnosis.result.schema import SCHEMA
 from ddagr_gym.identification.windows import CHANNELS
-from ddagr_gym.reporting.evidence import Evidence
 
 HOSTILE = "<script>alert('$x_1$')</script>.csv"
 

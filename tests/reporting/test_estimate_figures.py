@@ -5,15 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ddagr_gym.reporting.estimate_figures import (
-    EstimateView,
-    Line,
-    Panel,
-    _gapped,
-    _limit,
-    figure_count,
-    save_estimate_figures,
-)
+from ddagr_gym.evaluation.estimate_panels import EstimateView, Line, Panel
+from ddagr_gym.reporting.estimate_figures import _gapped, _limit, figure_count, save_estimate_figures
 
 pytest.importorskip("matplotlib")
 

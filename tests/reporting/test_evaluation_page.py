@@ -7,8 +7,8 @@ from pathlib import PurePosixPath
 import pytest
 
 from ddagr_gym.errors import InputError
+from ddagr_gym.evaluation.report_data import Film
 from ddagr_gym.presets import ddagr
-from ddagr_gym.reporting.evaluation_data import Film
 from ddagr_gym.reporting.evaluation_page import FIGURES, PAGE, PICTURE, write_page
 
 from .browser import Browser, find_browser

@@ -4,8 +4,8 @@ import math
 
 import pytest
 
+from ddagr_gym.evaluation.report_data import Arm, SetNote, badness, best_arm, judged_set
 from ddagr_gym.evaluation.summary import summaries
-from ddagr_gym.reporting.evaluation_data import Arm, SetNote, badness, best_arm, judged_set
 from ddagr_gym.reporting.evaluation_tables import (
     answer_rows,
     claim_rows,

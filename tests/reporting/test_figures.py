@@ -9,7 +9,8 @@ import pytest
 from ddagr_gym.control.row_turn import RowTurn
 from ddagr_gym.errors import InputError
 from ddagr_gym.presets import get_robot
-from ddagr_gym.reporting import figures, palette
+from ddagr_gym.rendering import palette
+from ddagr_gym.reporting import figures
 from ddagr_gym.reporting.figures import (
     TURN_FIGURE_COLUMNS,
     headland_times,

@@ -17,8 +17,6 @@ _FILES = (
     "parameters.py",
     "frames.py",
     "jit.py",
-    "reporting/evidence.py",
-    "reporting/wording.py",
 )
 
 

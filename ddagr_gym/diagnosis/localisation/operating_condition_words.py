@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from ddagr_gym.diagnosis.localisation.operating_conditions import RegimeShare, Unevenness
-from ddagr_gym.reporting.wording import EVERYWHERE, number, range_in_words
+from ddagr_gym.diagnosis.wording import EVERYWHERE, number, range_in_words
 
 NOWHERE_MORE = "no motion, place or time stands out"
 

@@ -15,9 +15,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.reporting.wording import REGIME_EXCESS, REGIME_LEVEL
-
 Array = NDArray[np.float64]
+
+REGIME_LEVEL = 0.05
+"""Of the test over all regimes, for one to be put in words."""
+
+REGIME_EXCESS = 0.25
+"""Share of something beyond the share of the time from which a regime is put in words (ours)."""
 Integers = NDArray[np.int64]
 
 REGIMES: Mapping[str, tuple[str, str]] = {

@@ -16,8 +16,8 @@ from ddagr_gym.diagnosis.preprocessing.repeated_readings import (
     repeat_runs,
     repeated_rows,
 )
+from ddagr_gym.diagnosis.wording import EVERYWHERE
 from ddagr_gym.recordings.schema import Recording
-from ddagr_gym.reporting.wording import EVERYWHERE
 
 _LOOK = 1.0
 """Time over which the share of repeats is taken [s] (ours), or four holds where these are longer."""

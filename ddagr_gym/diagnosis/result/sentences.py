@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ddagr_gym.diagnosis.result.verdict import NONE, UNKNOWN, Finding
-from ddagr_gym.reporting.wording import amounts, describe, in_sentence
+from ddagr_gym.diagnosis.wording import amounts, describe, in_sentence
 
 RIVAL_WEIGHT = 0.2
 """Weight in the equivalence set from which a rival stands in the headline (ours)."""

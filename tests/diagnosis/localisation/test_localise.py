@@ -23,11 +23,11 @@ from ddagr_gym.diagnosis.localisation.residual_wrench import HeldWrench, residua
 from ddagr_gym.diagnosis.search.scan import dispersion_of
 from ddagr_gym.diagnosis.search.search_node import Standing
 from ddagr_gym.diagnosis.search.stepwise import Found
+from ddagr_gym.diagnosis.wording import EVERYWHERE, range_in_words
 from ddagr_gym.identification.gauss_newton import fit
 from ddagr_gym.identification.misfit import LOCAL, channel_misfit
 from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.physics.effects.registry import parse_effect
-from ddagr_gym.reporting.wording import EVERYWHERE, range_in_words
 
 LIMITS = dict.fromkeys((*CHANNELS, *LOCAL), 1.2)
 

@@ -9,8 +9,8 @@ from ddagr_gym.diagnosis.localisation.operating_condition_words import uneven_ph
 from ddagr_gym.diagnosis.localisation.operating_conditions import Unevenness
 from ddagr_gym.diagnosis.result.sentences import headline, share_in_words
 from ddagr_gym.diagnosis.result.verdict import Estimate, Finding
+from ddagr_gym.diagnosis.wording import SENTENCES, Amount, amounts, describe, in_sentence, number, quantity, title
 from ddagr_gym.physics.effects.registry import effect_kinds
-from ddagr_gym.reporting.wording import SENTENCES, Amount, amounts, describe, in_sentence, number, quantity, title
 
 
 def finding(name, **parameters):
@@ -115,7 +115,7 @@ def test_effects_of_other_packages_are_described_by_title_and_sizes(monkeypatch)
     class Kind:
         title = "Wet GPS antenna"
 
-    import ddagr_gym.reporting.wording as wording
+    import ddagr_gym.diagnosis.wording as wording
 
     monkeypatch.setattr(wording, "effect_kinds", lambda: {"wet_antenna": Kind})
     assert title("wet_antenna") == "Wet GPS antenna"

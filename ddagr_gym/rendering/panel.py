@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from ddagr_gym.errors import InputError
-from ddagr_gym.reporting import palette
-from ddagr_gym.reporting.scene import Scene
+from ddagr_gym.rendering import palette
+from ddagr_gym.rendering.scene import Scene
 
 Align = Literal["left", "right", "centre"]
 

@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.errors import InputError, unknown_name
-from ddagr_gym.reporting import palette
-from ddagr_gym.reporting.camera import Camera
-from ddagr_gym.reporting.ground import Image, paint_ground
-from ddagr_gym.reporting.panel import HEIGHT, WIDTH, Box, Drawing, Text, lay_out_panel
-from ddagr_gym.reporting.ruts import RutMap
-from ddagr_gym.reporting.scene import BedLayout, Scene, Stage, View
-from ddagr_gym.reporting.sketch import Line, RobotSketch, dashes, dots, thin_out
+from ddagr_gym.rendering import palette
+from ddagr_gym.rendering.camera import Camera
+from ddagr_gym.rendering.ground import Image, paint_ground
+from ddagr_gym.rendering.panel import HEIGHT, WIDTH, Box, Drawing, Text, lay_out_panel
+from ddagr_gym.rendering.ruts import RutMap
+from ddagr_gym.rendering.scene import BedLayout, Scene, Stage, View
+from ddagr_gym.rendering.sketch import Line, RobotSketch, dashes, dots, thin_out
 
 Mode = Literal["rgb_array", "human"]
 MODES = ("rgb_array", "human")

@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ddagr_gym.frames import body_to_world, rotation_matrix
 from ddagr_gym.parameters import Robot
-from ddagr_gym.reporting import palette
-from ddagr_gym.reporting.camera import Camera
+from ddagr_gym.rendering import palette
+from ddagr_gym.rendering.camera import Camera
 
 Array = NDArray[np.float64]
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ddagr_gym.errors import InputError
-from ddagr_gym.reporting.video import write_video
+from ddagr_gym.rendering.video import write_video
 
 imageio_ffmpeg = pytest.importorskip("imageio_ffmpeg", reason="needs the extra render")
 

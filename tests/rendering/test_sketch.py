@@ -3,7 +3,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from ddagr_gym.reporting.sketch import dashes, dots, ribbons, rounded_rectangle, thin_out
+from ddagr_gym.rendering.sketch import dashes, dots, ribbons, rounded_rectangle, thin_out
 
 
 def area(outline):

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from ddagr_gym.frames import body_to_world, unwrap_heading
 from ddagr_gym.parameters import Robot, TorusWheel
-from ddagr_gym.reporting import palette
-from ddagr_gym.reporting.camera import Camera
-from ddagr_gym.reporting.ground import Image, pixel_offsets, pixel_window, rounded_box, shade_by_slope
+from ddagr_gym.rendering import palette
+from ddagr_gym.rendering.camera import Camera
+from ddagr_gym.rendering.ground import Image, pixel_offsets, pixel_window, rounded_box, shade_by_slope
 
 Array = NDArray[np.float64]
 

@@ -9,11 +9,11 @@ import pytest
 from ddagr_gym.control.row_turn import RowTurn
 from ddagr_gym.errors import InputError
 from ddagr_gym.presets import get_robot
-from ddagr_gym.reporting import palette, render
-from ddagr_gym.reporting.camera import Camera
-from ddagr_gym.reporting.panel import lay_out_panel
-from ddagr_gym.reporting.render import SceneRenderer
-from ddagr_gym.reporting.scene import Scene, open_stage, turn_stage
+from ddagr_gym.rendering import palette, render
+from ddagr_gym.rendering.camera import Camera
+from ddagr_gym.rendering.panel import lay_out_panel
+from ddagr_gym.rendering.render import SceneRenderer
+from ddagr_gym.rendering.scene import Scene, open_stage, turn_stage
 
 pytest.importorskip("pygame", reason="needs the extra render")
 
@@ -237,9 +237,9 @@ def test_missing_pygame_names_the_extra(monkeypatch, module):
 def test_import_is_light_and_drawing_needs_no_display():
     code = (
         "import sys, os; os.environ['SDL_VIDEODRIVER'] = 'no_such_driver'\n"
-        "import ddagr_gym.reporting.render, ddagr_gym.reporting.video, ddagr_gym.reporting.figures\n"
+        "import ddagr_gym.rendering.render, ddagr_gym.rendering.video, ddagr_gym.reporting.figures\n"
         "assert not {'pygame', 'matplotlib', 'imageio_ffmpeg'} & set(sys.modules)\n"
-        "ddagr_gym.reporting.render.SceneRenderer().close()\n"
+        "ddagr_gym.rendering.render.SceneRenderer().close()\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr

@@ -3,10 +3,10 @@ import math
 import numpy as np
 import pytest
 
-from ddagr_gym.reporting import palette
-from ddagr_gym.reporting.camera import Camera
-from ddagr_gym.reporting.ground import paint_ground, pixel_window, rounded_box, shade_by_slope, value_noise
-from ddagr_gym.reporting.scene import BedLayout, View
+from ddagr_gym.rendering import palette
+from ddagr_gym.rendering.camera import Camera
+from ddagr_gym.rendering.ground import paint_ground, pixel_window, rounded_box, shade_by_slope, value_noise
+from ddagr_gym.rendering.scene import BedLayout, View
 
 CAMERA = Camera(View(-2.0, 2.0, -2.0, 2.0), 400, 400)
 

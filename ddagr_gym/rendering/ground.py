@@ -10,9 +10,9 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ddagr_gym.reporting import palette
-from ddagr_gym.reporting.camera import Camera
-from ddagr_gym.reporting.scene import BedLayout
+from ddagr_gym.rendering import palette
+from ddagr_gym.rendering.camera import Camera
+from ddagr_gym.rendering.scene import BedLayout
 
 Image = NDArray[np.float32]
 

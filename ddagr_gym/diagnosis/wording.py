@@ -348,12 +348,6 @@ _BACKWARDS = 0.02
 _STEADY = 0.01
 """Change of commands below which they count as held [rad/s] (ours)."""
 
-REGIME_LEVEL = 0.05
-"""Of the test over all regimes, for one to be put in words."""
-
-REGIME_EXCESS = 0.25
-"""Share of something beyond the share of the time from which a regime is put in words (ours)."""
-
 _RANGES: dict[str, tuple[str, str]] = {
     "speed": ("at speeds", "m/s"),
     "slip": ("at slips", ""),

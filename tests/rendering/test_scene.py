@@ -6,7 +6,7 @@ import pytest
 from ddagr_gym.control.row_turn import RowTurn
 from ddagr_gym.errors import InputError
 from ddagr_gym.presets import get_robot
-from ddagr_gym.reporting.scene import Scene, View, bed_layout, open_stage, scenes, turn_stage
+from ddagr_gym.rendering.scene import Scene, View, bed_layout, open_stage, scenes, turn_stage
 
 ROBOT = get_robot("ddagr")
 

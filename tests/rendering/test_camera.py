@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from ddagr_gym.reporting.camera import Camera
-from ddagr_gym.reporting.scene import View
+from ddagr_gym.rendering.camera import Camera
+from ddagr_gym.rendering.scene import View
 
 
 def test_camera_keeps_proportions_and_middle():

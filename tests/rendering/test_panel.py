@@ -6,9 +6,9 @@ import pytest
 from ddagr_gym.control.row_turn import RowTurn
 from ddagr_gym.errors import InputError
 from ddagr_gym.presets import get_robot
-from ddagr_gym.reporting import palette
-from ddagr_gym.reporting.panel import lay_out_panel, signed
-from ddagr_gym.reporting.scene import Scene, turn_stage
+from ddagr_gym.rendering import palette
+from ddagr_gym.rendering.panel import lay_out_panel, signed
+from ddagr_gym.rendering.scene import Scene, turn_stage
 
 SCENE = Scene(
     stage=turn_stage(RowTurn(), get_robot("ddagr"), "thesis_a1"),

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ddagr_gym.reporting.scene import View
+from ddagr_gym.rendering.scene import View
 
 Array = NDArray[np.float64]
 

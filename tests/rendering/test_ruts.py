@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from ddagr_gym.presets import get_robot
-from ddagr_gym.reporting.camera import Camera
-from ddagr_gym.reporting.ruts import SPACING, RutMap, contact_outline, prints_along
-from ddagr_gym.reporting.scene import View
+from ddagr_gym.rendering.camera import Camera
+from ddagr_gym.rendering.ruts import SPACING, RutMap, contact_outline, prints_along
+from ddagr_gym.rendering.scene import View
 
 ROBOT = get_robot("ddagr")
 CAMERA = Camera(View(-1.5, 2.5, -2.0, 2.0), 400, 400)
