@@ -13,7 +13,7 @@ What was fixed before any error on an unseen part was looked at
 - Fit windows of 5 s, as long as the horizon that counts: chosen by cross-validation inside the training part of
   the sand recording, where they beat 2 s by 2 percent (wheel speeds) and 7 percent (commands).
 - What is fitted: the gyro and the poses, with the encoders where commands drive; the parameters are those of
-  ``ddagr_gym.replay.fitting``.
+  ``ddagr_gym.replay_analysis.fitting``.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ from ddagr_gym import __version__
 from ddagr_gym.commands.output import write_text
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.load import load_recording
-from ddagr_gym.replay.arm import ArmResult, ArmSettings, HorizonResult, horizon_tables
-from ddagr_gym.replay.horizons import METRICS
-from ddagr_gym.replay.report import EFFECTIVE_TRACK, NO_SLIP, REFITTED
-from ddagr_gym.replay.run import RunResult, replay_run
+from ddagr_gym.replay_analysis.arm import ArmResult, ArmSettings, HorizonResult, horizon_tables
+from ddagr_gym.replay_analysis.horizons import METRICS
+from ddagr_gym.replay_analysis.report import EFFECTIVE_TRACK, NO_SLIP, REFITTED
+from ddagr_gym.replay_analysis.run import RunResult, replay_run
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 SOILS = {"warthog_sand": "lete_sand_wong", "warthog_grass": "grenville_loam_wong_24", "warthog_asphalt": "firm_ground"}
@@ -148,7 +148,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     document = {
         "schema": "ddagr-gym/replay-open",
         "schema_version": 1,
-        "document": "folds, errors and comparisons are those of ddagr_gym.replay.report",
+        "document": "folds, errors and comparisons are those of ddagr_gym.replay_analysis.report",
         "program": __version__,
         "window": WINDOW,
         "seed": given.seed,

@@ -130,7 +130,7 @@ def replay_step(drive: DriveToReplay, folder: Path) -> Section:
     """A recording driven again in the simulator, with a refit; report, figures and page into ``folder/replay``."""
     from ddagr_gym.commands.replay import lead_text, replay_groups
     from ddagr_gym.presets import get_robot, get_soil
-    from ddagr_gym.replay.arm import ArmSettings
+    from ddagr_gym.replay_analysis.arm import ArmSettings
 
     print(f"Replaying {drive.recording.meta.source} and refitting the simulator ...", flush=True)
     replayed = folder / "replay"

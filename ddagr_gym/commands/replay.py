@@ -17,8 +17,8 @@ from ddagr_gym.errors import InputError
 
 if TYPE_CHECKING:
     from ddagr_gym.recordings.schema import Recording
-    from ddagr_gym.replay.report import ArmReport, ReplayReport
-    from ddagr_gym.replay.run import RunResult
+    from ddagr_gym.replay_analysis.report import ArmReport, ReplayReport
+    from ddagr_gym.replay_analysis.run import RunResult
 
 EXAMPLES = (
     "ddagr replay run.parquet --robot ddagr --soil thesis_a1 --output replayed",
@@ -80,7 +80,7 @@ def run(arguments: Arguments) -> None:
     """Replay, print the tables, write report, figures and page."""
     from ddagr_gym.physics.effects import load_effects
     from ddagr_gym.presets import get_robot, get_soil
-    from ddagr_gym.replay.arm import ArmSettings
+    from ddagr_gym.replay_analysis.arm import ArmSettings
 
     if arguments.threads < 1:
         raise InputError(f"--threads is {arguments.threads}: give at least 1.")
@@ -131,11 +131,11 @@ def replay_groups(
         robot: nominal.
         soil: nominal.
         soil_name: for the report.
-        settings: :class:`~ddagr_gym.replay.arm.ArmSettings`.
+        settings: :class:`~ddagr_gym.replay_analysis.arm.ArmSettings`.
         folder: that exists.
     """
-    from ddagr_gym.replay.report import save_report
-    from ddagr_gym.replay.run import make_report, replay_run, steps
+    from ddagr_gym.replay_analysis.report import save_report
+    from ddagr_gym.replay_analysis.run import make_report, replay_run, steps
     from ddagr_gym.reporting.replay_page import replay_page
 
     results = []
@@ -189,7 +189,7 @@ def summary(report: ReplayReport) -> list[str]:
 
 def arm_text(arm: ArmReport) -> str:
     """Errors and residuals of one arm as tables."""
-    from ddagr_gym.replay.report import MODELS
+    from ddagr_gym.replay_analysis.report import MODELS
 
     models = [m for m in MODELS if any(e.model == m for e in arm.horizons)]
     rows = []
@@ -216,7 +216,7 @@ def arm_text(arm: ArmReport) -> str:
 
 def lead_text(report: ReplayReport) -> str:
     """Heading errors after 5 s of every model as one short table, a row per run and arm."""
-    from ddagr_gym.replay.report import MODELS, lead_errors
+    from ddagr_gym.replay_analysis.report import MODELS, lead_errors
 
     rows = []
     for item in report.runs:

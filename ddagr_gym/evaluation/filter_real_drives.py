@@ -19,12 +19,12 @@ from ddagr_gym.identification.windows import CHANNELS, WindowSet
 from ddagr_gym.parameters import Robot
 from ddagr_gym.presets import get_robot
 from ddagr_gym.recordings.load import load_recording
-from ddagr_gym.replay.horizons import LAST, SPEED_TIME, horizon_errors
-from ddagr_gym.replay.intervals import compare, error_statistics
-from ddagr_gym.replay.kinematic import KinematicModel, bank_speeds_at_samples
-from ddagr_gym.replay.models import Baselines, fit_baselines
-from ddagr_gym.replay.prepare import Prepared, prepare
-from ddagr_gym.replay.report import EFFECTIVE_TRACK
+from ddagr_gym.replay_analysis.horizons import LAST, SPEED_TIME, horizon_errors
+from ddagr_gym.replay_analysis.intervals import compare, error_statistics
+from ddagr_gym.replay_analysis.kinematic import KinematicModel, bank_speeds_at_samples
+from ddagr_gym.replay_analysis.models import Baselines, fit_baselines
+from ddagr_gym.replay_analysis.prepare import Prepared, prepare
+from ddagr_gym.replay_analysis.report import EFFECTIVE_TRACK
 
 Array = NDArray[np.float64]
 

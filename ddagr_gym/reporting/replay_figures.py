@@ -13,10 +13,10 @@ from ddagr_gym.frames import rotation_matrix
 from ddagr_gym.identification.data_split import evenly
 from ddagr_gym.identification.windows import CHANNELS, WindowSet
 from ddagr_gym.rendering import palette
-from ddagr_gym.replay.arm import ArmResult
-from ddagr_gym.replay.horizons import start_headings
-from ddagr_gym.replay.report import EFFECTIVE_TRACK, MODELS, NO_SLIP, NOMINAL, REFITTED, HorizonError
-from ddagr_gym.replay.residuals import REGIMES
+from ddagr_gym.replay_analysis.arm import ArmResult
+from ddagr_gym.replay_analysis.horizons import start_headings
+from ddagr_gym.replay_analysis.report import EFFECTIVE_TRACK, MODELS, NO_SLIP, NOMINAL, REFITTED, HorizonError
+from ddagr_gym.replay_analysis.residuals import REGIMES
 from ddagr_gym.reporting.figures import DASHED, house_style, save_figure
 
 Array = NDArray[np.float64]

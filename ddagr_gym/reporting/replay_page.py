@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from pathlib import Path
 
-from ddagr_gym.replay.horizons import METRICS
-from ddagr_gym.replay.report import MODELS, ArmReport, ErrorStatistics, ReplayReport, RunReport, lead_errors
+from ddagr_gym.replay_analysis.horizons import METRICS
+from ddagr_gym.replay_analysis.report import MODELS, ArmReport, ErrorStatistics, ReplayReport, RunReport, lead_errors
 from ddagr_gym.reporting.replay_figures import MODEL_STYLES
 
 STYLE = """

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from benchmarks.replay_open import JUDGED, SOILS, acceptance, both_folds, pooled, recording_results
-from ddagr_gym.replay.arm import HorizonResult
-from ddagr_gym.replay.report import EFFECTIVE_TRACK, NO_SLIP, REFITTED
+from ddagr_gym.replay_analysis.arm import HorizonResult
+from ddagr_gym.replay_analysis.report import EFFECTIVE_TRACK, NO_SLIP, REFITTED
 
 
 @pytest.fixture

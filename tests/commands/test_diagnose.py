@@ -24,7 +24,7 @@ from ddagr_gym.physics.effects import load_effects
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.recordings.storage import save_parquet
-from ddagr_gym.replay.report import REFITTED
+from ddagr_gym.replay_analysis.report import REFITTED
 from ddagr_gym.simulator import simulate
 
 RATE = 50.0

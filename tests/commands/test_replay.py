@@ -12,7 +12,7 @@ from ddagr_gym.parameters import Imu, PoseReceiver, Sensors
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.schema import CHANNELS, Recording
 from ddagr_gym.recordings.storage import save_parquet
-from ddagr_gym.replay.report import load_report
+from ddagr_gym.replay_analysis.report import load_report
 from ddagr_gym.simulator import simulate
 
 RATE = 50.0

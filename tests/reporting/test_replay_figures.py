@@ -7,8 +7,8 @@ from ddagr_gym.control.manoeuvres import MANOEUVRES
 from ddagr_gym.parameters import Imu, PoseReceiver, Sensors
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.schema import CHANNELS, Recording
-from ddagr_gym.replay.arm import ArmSettings
-from ddagr_gym.replay.run import replay_run
+from ddagr_gym.replay_analysis.arm import ArmSettings
+from ddagr_gym.replay_analysis.run import replay_run
 from ddagr_gym.reporting.replay_figures import (
     CELLS,
     _chosen,

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from ddagr_gym.replay.intervals import ErrorStatistics
-from ddagr_gym.replay.report import (
+from ddagr_gym.replay_analysis.intervals import ErrorStatistics
+from ddagr_gym.replay_analysis.report import (
     EFFECTIVE_TRACK,
     MODELS,
     NO_SLIP,

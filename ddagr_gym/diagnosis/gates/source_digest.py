@@ -10,7 +10,7 @@ from pathlib import Path
 from ddagr_gym.physics.effects.registry import effect_kinds
 
 _PACKAGE = Path(__file__).resolve().parents[2]
-_FOLDERS = ("diagnosis", "identification", "replay", "physics", "sensors", "recordings", "control")
+_FOLDERS = ("diagnosis", "identification", "replay_analysis", "physics", "sensors", "recordings", "control")
 _FILES = (
     "simulator.py",
     "simulator_kernel.py",

@@ -15,8 +15,8 @@ from typing import Any, Literal
 
 from ddagr_gym.config import config_from
 from ddagr_gym.errors import InputError
-from ddagr_gym.replay.intervals import Comparison, ErrorStatistics
-from ddagr_gym.replay.residuals import ChannelResidual, Regime
+from ddagr_gym.replay_analysis.intervals import Comparison, ErrorStatistics
+from ddagr_gym.replay_analysis.residuals import ChannelResidual, Regime
 
 SCHEMA = "ddagr-gym/replay"
 SCHEMA_VERSION = 1
@@ -36,7 +36,7 @@ class HorizonError:
     Attributes:
         model: of MODELS.
         horizon: [s].
-        metric: of :data:`ddagr_gym.replay.horizons.METRICS`.
+        metric: of :data:`ddagr_gym.replay_analysis.horizons.METRICS`.
         unit: of the metric.
         error: its size.
     """

@@ -6,7 +6,7 @@ import pytest
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.data_split import held_out, training
 from ddagr_gym.presets import get_robot
-from ddagr_gym.replay.prepare import prepare
+from ddagr_gym.replay_analysis.prepare import prepare
 
 
 def prepared(recordings, robot, **more):
@@ -70,7 +70,7 @@ def test_opposed_signs_are_said(make_recording, robot):
 
 
 def test_the_track_is_fitted_to_poses_by_the_poses_noise_where_the_gyro_is_dead(make_recording, robot):
-    from ddagr_gym.replay.models import fit_baselines
+    from ddagr_gym.replay_analysis.models import fit_baselines
 
     rng = np.random.default_rng(0)
     speeds = np.repeat(rng.uniform(0.5, 2.0, (20, 2)), 100, axis=0)

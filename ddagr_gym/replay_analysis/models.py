@@ -14,10 +14,10 @@ from ddagr_gym.identification.window_model import WindowModel, fit_numerics
 from ddagr_gym.identification.windows import CHANNELS, WindowSet
 from ddagr_gym.parameters import Numerics, Robot, Soil
 from ddagr_gym.physics.effects import Effect
-from ddagr_gym.replay.fitting import ROBUST, ArmFit, noise_weights
-from ddagr_gym.replay.kinematic import KinematicModel, Motor, fit_motor, fit_track
-from ddagr_gym.replay.prepare import Prepared
-from ddagr_gym.replay.report import EFFECTIVE_TRACK, NO_SLIP, BaselineReport, Speed
+from ddagr_gym.replay_analysis.fitting import ROBUST, ArmFit, noise_weights
+from ddagr_gym.replay_analysis.kinematic import KinematicModel, Motor, fit_motor, fit_track
+from ddagr_gym.replay_analysis.prepare import Prepared
+from ddagr_gym.replay_analysis.report import EFFECTIVE_TRACK, NO_SLIP, BaselineReport, Speed
 
 Array = NDArray[np.float64]
 

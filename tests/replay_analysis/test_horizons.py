@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from ddagr_gym.identification.windows import CHANNELS
-from ddagr_gym.replay.horizons import METRICS, heading_growth, horizon_errors, integrated, start_headings
-from ddagr_gym.replay.kinematic import KinematicModel
+from ddagr_gym.replay_analysis.horizons import METRICS, heading_growth, horizon_errors, integrated, start_headings
+from ddagr_gym.replay_analysis.kinematic import KinematicModel
 
 GYRO, YAW = CHANNELS.index("yaw_rate"), CHANNELS.index("pose_yaw")
 POSE = [CHANNELS.index(name) for name in ("pose_x", "pose_y", "pose_yaw")]

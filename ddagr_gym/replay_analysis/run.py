@@ -12,9 +12,9 @@ from ddagr_gym.errors import InputError
 from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.recordings.schema import Recording
-from ddagr_gym.replay.arm import STEPS, ArmResult, ArmSettings, replay_arm
-from ddagr_gym.replay.prepare import DRIVES, Prepared, prepare
-from ddagr_gym.replay.report import SCHEMA, SCHEMA_VERSION, ReplayReport, RunReport
+from ddagr_gym.replay_analysis.arm import STEPS, ArmResult, ArmSettings, replay_arm
+from ddagr_gym.replay_analysis.prepare import DRIVES, Prepared, prepare
+from ddagr_gym.replay_analysis.report import SCHEMA, SCHEMA_VERSION, ReplayReport, RunReport
 
 SHORTEST_WINDOW = 0.2
 LONGEST_WINDOW = 60.0

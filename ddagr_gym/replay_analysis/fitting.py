@@ -23,8 +23,8 @@ from ddagr_gym.identification.window_model import WindowModel, fit_numerics
 from ddagr_gym.identification.windows import CHANNELS, WindowSet
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.physics.effects import Effect
-from ddagr_gym.replay.kinematic import Motor
-from ddagr_gym.replay.residuals import residuals, successive_correlation
+from ddagr_gym.replay_analysis.kinematic import Motor
+from ddagr_gym.replay_analysis.residuals import residuals, successive_correlation
 
 Array = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ddagr_gym.identification.windows import CHANNELS
-from ddagr_gym.replay.kinematic import KinematicModel, Motor, fit_motor, fit_track
+from ddagr_gym.replay_analysis.kinematic import KinematicModel, Motor, fit_motor, fit_track
 
 GYRO, YAW = CHANNELS.index("yaw_rate"), CHANNELS.index("pose_yaw")
 X, Y = CHANNELS.index("pose_x"), CHANNELS.index("pose_y")

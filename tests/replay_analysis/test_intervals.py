@@ -3,7 +3,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ddagr_gym.replay.intervals import compare, error_statistics, resampled_counts, resampled_median, resampled_rms
+from ddagr_gym.replay_analysis.intervals import (
+    compare,
+    error_statistics,
+    resampled_counts,
+    resampled_median,
+    resampled_rms,
+)
 
 
 def generator():

@@ -8,7 +8,7 @@ import pytest
 from ddagr_gym.identification.sample_noise import ChannelNoise, RecordingNoise
 from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.presets import get_robot, get_soil
-from ddagr_gym.replay.fitting import (
+from ddagr_gym.replay_analysis.fitting import (
     LATEST_CLOCK,
     ROBUST,
     UNKNOWN_GYRO_BIAS,
@@ -17,7 +17,7 @@ from ddagr_gym.replay.fitting import (
     motor_start,
     noise_weights,
 )
-from ddagr_gym.replay.kinematic import Motor
+from ddagr_gym.replay_analysis.kinematic import Motor
 
 GYRO = CHANNELS.index("yaw_rate")
 

@@ -10,9 +10,9 @@ import pytest
 
 from ddagr_gym.errors import InputError
 from ddagr_gym.parameters import Imu, PoseReceiver, Sensors
-from ddagr_gym.replay.arm import STEPS, ArmSettings
-from ddagr_gym.replay.horizons import METRICS
-from ddagr_gym.replay.report import (
+from ddagr_gym.replay_analysis.arm import STEPS, ArmSettings
+from ddagr_gym.replay_analysis.horizons import METRICS
+from ddagr_gym.replay_analysis.report import (
     EFFECTIVE_TRACK,
     NO_SLIP,
     NOMINAL,
@@ -23,7 +23,7 @@ from ddagr_gym.replay.report import (
     save_report,
     to_json,
 )
-from ddagr_gym.replay.run import make_report, replay_run, steps
+from ddagr_gym.replay_analysis.run import make_report, replay_run, steps
 
 STRENGTH, MOTOR_RATE = 0.8, 0.85
 

@@ -8,9 +8,9 @@ import pytest
 from ddagr_gym.cli import main
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.load import load_recording
-from ddagr_gym.replay.arm import ArmSettings
-from ddagr_gym.replay.report import NO_SLIP, NOMINAL, load_report, save_report
-from ddagr_gym.replay.run import make_report, replay_run
+from ddagr_gym.replay_analysis.arm import ArmSettings
+from ddagr_gym.replay_analysis.report import NO_SLIP, NOMINAL, load_report, save_report
+from ddagr_gym.replay_analysis.run import make_report, replay_run
 
 FOLDERS = {"open": 3, "concealed": 9}
 """Files in each folder."""

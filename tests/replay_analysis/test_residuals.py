@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ddagr_gym.identification.windows import CHANNELS
-from ddagr_gym.replay.residuals import (
+from ddagr_gym.replay_analysis.residuals import (
     REGIMES,
     channel_residuals,
     regime_values,

@@ -13,7 +13,7 @@ from ddagr_gym.identification.data_split import clusters, held_out, training
 from ddagr_gym.identification.windows import WindowSet
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.physics.effects import Effect
-from ddagr_gym.replay.fitting import (
+from ddagr_gym.replay_analysis.fitting import (
     ITERATIONS,
     MOST_WINDOWS,
     PASSES,
@@ -23,12 +23,12 @@ from ddagr_gym.replay.fitting import (
     motor_start,
     noise_weights,
 )
-from ddagr_gym.replay.horizons import HORIZONS, METRICS, heading_growth, horizon_errors
-from ddagr_gym.replay.intervals import compare, error_statistics
-from ddagr_gym.replay.kinematic import KinematicModel
-from ddagr_gym.replay.models import Baselines, SimulatorOfArm, fit_baselines, predict_all, weights_of
-from ddagr_gym.replay.prepare import Prepared
-from ddagr_gym.replay.report import (
+from ddagr_gym.replay_analysis.horizons import HORIZONS, METRICS, heading_growth, horizon_errors
+from ddagr_gym.replay_analysis.intervals import compare, error_statistics
+from ddagr_gym.replay_analysis.kinematic import KinematicModel
+from ddagr_gym.replay_analysis.models import Baselines, SimulatorOfArm, fit_baselines, predict_all, weights_of
+from ddagr_gym.replay_analysis.prepare import Prepared
+from ddagr_gym.replay_analysis.report import (
     EFFECTIVE_TRACK,
     NO_SLIP,
     NOMINAL,
@@ -42,7 +42,7 @@ from ddagr_gym.replay.report import (
     Rollout,
     Speed,
 )
-from ddagr_gym.replay.residuals import RECORDED, channel_residuals, regime_values, regimes, residuals
+from ddagr_gym.replay_analysis.residuals import RECORDED, channel_residuals, regime_values, regimes, residuals
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]

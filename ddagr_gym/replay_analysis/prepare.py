@@ -15,7 +15,7 @@ from ddagr_gym.identification.timing_repair import aligned_poses, bridged
 from ddagr_gym.identification.windows import WindowSet, cut_runs, cut_windows
 from ddagr_gym.parameters import Robot
 from ddagr_gym.recordings.schema import Recording, RobotGeometry
-from ddagr_gym.replay.fitting import LATEST_CLOCK
+from ddagr_gym.replay_analysis.fitting import LATEST_CLOCK
 
 Array = NDArray[np.float64]
 Part = Callable[[WindowSet, Sequence[Split]], NDArray[np.bool_]]
