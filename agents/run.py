@@ -23,12 +23,12 @@ from agents.export import archive_of
 from agents.settings import TrainingSettings
 from agents.validation import ValidationResult, drive_all
 from ddagr_gym.commands.output import write_text
-from ddagr_gym.commands.progress import Progress
 from ddagr_gym.config import dump_config
 from ddagr_gym.envs.options import make_settings
 from ddagr_gym.envs.settings import Episode
 from ddagr_gym.files import make_folder
 from ddagr_gym.policies.archive import save_policy
+from ddagr_gym.progress import Progress
 from ddagr_gym.wrappers.policy_view import PolicyViewVecEnv
 from ddagr_gym.wrappers.sb3 import TurnVecEnv
 

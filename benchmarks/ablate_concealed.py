@@ -32,8 +32,8 @@ import numpy as np
 
 from benchmarks.ablations.figure import draw
 from benchmarks.score_concealed import NULLS, mean, share
-from ddagr_gym.commands.progress import Progress
 from ddagr_gym.errors import InputError
+from ddagr_gym.progress import Progress
 from ddagr_gym.recordings.files import write_atomically
 
 RESULT = Path(__file__).resolve().parent / "results" / "concealed_ablations.json"

@@ -31,7 +31,6 @@ from benchmarks.concealed.generate import warm_up
 from benchmarks.concealed.simulate import simulate_case
 from benchmarks.concealed.storage import csv_bytes, digest, read_json, recording_digest, write_case
 from benchmarks.concealed_truth import true_sizes
-from ddagr_gym.commands.progress import Progress
 from ddagr_gym.diagnosis.gates.threshold_files import default_thresholds
 from ddagr_gym.diagnosis.search.stepwise import refit_nominal
 from ddagr_gym.diagnosis.setting import Setting, make_problem
@@ -41,6 +40,7 @@ from ddagr_gym.identification.problem import Point
 from ddagr_gym.physics.effects.base import Effect
 from ddagr_gym.physics.effects.registry import effect_kind
 from ddagr_gym.presets import get_robot, get_soil
+from ddagr_gym.progress import Progress
 from ddagr_gym.recordings.files import write_atomically
 from ddagr_gym.recordings.schema import Recording
 

@@ -26,7 +26,6 @@ import numpy as np
 from benchmarks.ablations.examine import ROBOT, SOIL, read_runs
 from benchmarks.concealed_truth import Sizes, detectable
 from benchmarks.score_concealed import RESULT, figure_line, mean, read_equivalents, right
-from ddagr_gym.commands.progress import Progress
 from ddagr_gym.diagnosis.certification.certificate import LEAST_EXPLAINABLE
 from ddagr_gym.diagnosis.certification.certify import certify
 from ddagr_gym.diagnosis.gates.threshold_files import default_thresholds
@@ -38,6 +37,7 @@ from ddagr_gym.diagnosis.setting import Setting
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.gauss_newton import Fitted, fit
 from ddagr_gym.presets import get_robot, get_soil
+from ddagr_gym.progress import Progress
 from ddagr_gym.recordings.files import write_atomically
 from ddagr_gym.rendering import palette
 from ddagr_gym.reporting.figures import house_style

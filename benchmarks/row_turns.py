@@ -22,12 +22,12 @@ from typing import Any
 from ddagr_gym.commands.evaluate import without_stars
 from ddagr_gym.commands.evaluation_report import assemble, write_files, write_report
 from ddagr_gym.commands.output import make_folder, write_bytes, write_text
-from ddagr_gym.commands.progress import Progress
 from ddagr_gym.evaluation.campaign import run_campaign, wanted_episodes, with_bounds
 from ddagr_gym.evaluation.claims import check_claims, load_claims
 from ddagr_gym.evaluation.controllers import BOUNDS
 from ddagr_gym.evaluation.report_data import Evaluation
 from ddagr_gym.evaluation.summary import summaries
+from ddagr_gym.progress import Progress
 from ddagr_gym.reporting.evaluation_figures import radius_error_figure
 from ddagr_gym.version import commit_of
 

@@ -1,8 +1,9 @@
-"""Files that are whole or absent."""
+"""Files and folders that are whole or absent."""
 
 from __future__ import annotations
 
 import os
+import shutil
 import stat
 import tempfile
 from collections.abc import Iterator
@@ -10,6 +11,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from ddagr_gym.errors import InputError
+
+FOLDER_MARK = ".ddagr-output"
+"""Empty file in every folder that a command wrote; only such a folder is ever replaced."""
 
 
 @contextmanager
@@ -57,3 +61,75 @@ def make_folder(path: str | os.PathLike[str]) -> Path:
     except (FileExistsError, NotADirectoryError):
         raise InputError(f"{folder} cannot be a folder, a file stands in the way: choose another path.") from None
     return folder
+
+
+def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
+    """Write ``data`` so that ``path`` holds all of it or what it held before."""
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(data)
+
+
+def write_text(path: str | os.PathLike[str], text: str) -> None:
+    """Write ``text`` (UTF-8, its line ends as they are) so that ``path`` holds all of it or what it held before."""
+    write_bytes(path, text.encode())
+
+
+@contextmanager
+def output_folder(path: str | os.PathLike[str], *, overwrite: bool = False) -> Iterator[Path]:
+    """Folder to fill in place of ``path``, moved there when the block ends without an error.
+
+    After an error it is removed and ``path`` is as it was.
+
+    Args:
+        path: folder to end up with; parents are made.
+        overwrite: replace a folder that an earlier command wrote. One that holds anything else is never touched.
+
+    Raises:
+        InputError: ``path`` is a file, holds the current folder, or has content that may not be replaced.
+    """
+    final = Path(path).expanduser().resolve()
+    _check_replaceable(final, overwrite)
+    make_folder(final.parent)
+    temporary = Path(tempfile.mkdtemp(prefix=f".{final.name}-", dir=final.parent))
+    try:
+        yield temporary
+        (temporary / FOLDER_MARK).touch()
+        mask = os.umask(0)
+        os.umask(mask)
+        temporary.chmod(0o777 & ~mask)
+        _check_replaceable(final, overwrite)
+        _replace_folder(temporary, final)
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def check_output_folder(path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
+    """Refuse before long work what :func:`output_folder` would refuse after it; the same InputError."""
+    _check_replaceable(Path(path).expanduser().resolve(), overwrite)
+
+
+def _check_replaceable(folder: Path, overwrite: bool) -> None:
+    if not folder.exists():
+        return
+    if not folder.is_dir():
+        raise InputError(f"{folder} is a file: give the path of a folder.")
+    if folder == Path.cwd() or folder in Path.cwd().parents:
+        raise InputError(f"{folder} holds the current folder: give the name of a new one.")
+    if not any(folder.iterdir()):
+        return
+    if not (folder / FOLDER_MARK).exists():
+        raise InputError(f"{folder} holds files that no ddagr command wrote: choose another folder.")
+    if not overwrite:
+        raise InputError(
+            f"{folder} holds an earlier output: choose another folder, or add --overwrite (overwrite=True in Python)."
+        )
+
+
+def _replace_folder(temporary: Path, final: Path) -> None:
+    if not final.exists():
+        os.rename(temporary, final)
+        return
+    old = Path(tempfile.mkdtemp(prefix=f".{final.name}-old-", dir=final.parent))
+    os.rename(final, old)
+    os.rename(temporary, final)
+    shutil.rmtree(old)

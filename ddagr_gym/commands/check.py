@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 from tyro.conf import Positional
 
 from ddagr_gym.commands.output import format_table, output_folder
-from ddagr_gym.commands.progress import Progress
 from ddagr_gym.errors import InputError
+from ddagr_gym.progress import Progress
 
 if TYPE_CHECKING:
     from ddagr_gym.recordings.checks.findings import CheckReport, Finding

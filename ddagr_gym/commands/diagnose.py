@@ -14,9 +14,9 @@ from tyro.conf import Positional
 
 from ddagr_gym.commands.extras import need
 from ddagr_gym.commands.output import check_output_folder, format_table, output_folder
-from ddagr_gym.commands.progress import Progress
 from ddagr_gym.commands.ranges import check_at_least
 from ddagr_gym.errors import InputError
+from ddagr_gym.progress import Progress
 
 if TYPE_CHECKING:
     from ddagr_gym.diagnosis.gates.thresholds import Thresholds

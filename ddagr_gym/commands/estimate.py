@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, Literal
 from tyro.conf import Positional
 
 from ddagr_gym.commands.output import atomic_path, format_table, output_folder, write_text
-from ddagr_gym.commands.progress import Progress
 from ddagr_gym.errors import InputError
+from ddagr_gym.progress import Progress
 
 if TYPE_CHECKING:
     from ddagr_gym.evaluation.estimate_run import EstimatedRun

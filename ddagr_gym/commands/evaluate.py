@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from ddagr_gym.commands.output import format_table, make_folder, write_text
-from ddagr_gym.commands.progress import Progress
 from ddagr_gym.errors import InputError, unknown_name
+from ddagr_gym.progress import Progress
 
 EXAMPLES = (
     "ddagr evaluate --controllers B1,B4,ppo_ekf --scenarios S0 --output evaluation",

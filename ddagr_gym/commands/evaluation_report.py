@@ -8,7 +8,7 @@ from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 
 from ddagr_gym.commands.output import atomic_path, format_table, make_folder, write_text
-from ddagr_gym.commands.progress import Progress
+from ddagr_gym.progress import Progress
 
 if TYPE_CHECKING:
     from ddagr_gym.evaluation.report_data import Arm, Evaluation, Film, SetNote

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from tyro.conf import Positional
 
-from ddagr_gym.commands.progress import Progress
 from ddagr_gym.errors import InputError, unknown_name
+from ddagr_gym.progress import Progress
 
 EXAMPLES = (
     "ddagr freeze-scenarios V --output my_scenarios",

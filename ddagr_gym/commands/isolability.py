@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ddagr_gym.commands.output import check_output_folder, format_table, output_folder, write_text
-from ddagr_gym.commands.progress import Progress
 from ddagr_gym.commands.ranges import check_at_least
+from ddagr_gym.progress import Progress
 
 if TYPE_CHECKING:
     from ddagr_gym.diagnosis.planning.isolability import Isolability

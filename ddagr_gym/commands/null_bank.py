@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 from tyro.conf import Positional
 
 from ddagr_gym.commands.output import atomic_path
-from ddagr_gym.commands.progress import Progress
 from ddagr_gym.commands.ranges import check_at_least
 from ddagr_gym.errors import InputError
+from ddagr_gym.progress import Progress
 
 if TYPE_CHECKING:
     from ddagr_gym.diagnosis.gates.thresholds import NullKind, NullRun, Origin

@@ -12,8 +12,8 @@ import tyro
 from tyro.conf import Positional
 
 from ddagr_gym.commands.output import format_table, output_folder, write_text
-from ddagr_gym.commands.progress import Progress
 from ddagr_gym.errors import InputError
+from ddagr_gym.progress import Progress
 
 if TYPE_CHECKING:
     from ddagr_gym.recordings.schema import Recording

@@ -11,7 +11,7 @@ from typing import Any, Literal
 from tyro.conf import Positional
 
 from ddagr_gym.commands.output import format_table, make_folder, write_text
-from ddagr_gym.commands.progress import Progress
+from ddagr_gym.progress import Progress
 
 EXAMPLES = (
     "ddagr study filter",

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ddagr_gym.commands.output import write_text
-from ddagr_gym.commands.progress import Progress
 from ddagr_gym.files import make_folder
+from ddagr_gym.progress import Progress
 
 EXAMPLES = (
     "ddagr tune-controllers --output gains",

@@ -7,7 +7,7 @@ import re
 
 import pytest
 
-from ddagr_gym.commands.progress import Progress
+from ddagr_gym.progress import LinePrinter, Progress, counting
 
 
 class Terminal(io.StringIO):
@@ -61,3 +61,32 @@ def test_an_interrupted_bar_keeps_its_state():
 def test_no_steps_are_a_bug():
     with pytest.raises(ValueError, match="total is 0"):
         Progress(0, "x")
+
+
+def counted(progress, total: int = 2) -> None:
+    with counting(total, "drawing", progress) as steps:
+        for _ in range(total):
+            steps.advance()
+
+
+def test_a_callable_is_given_one_line_at_a_time():
+    lines: list[str] = []
+    counted(lines.append)
+    assert [line.split(" (")[0] for line in lines] == ["drawing: 50 %", "drawing: 100 %"]
+    assert not any("\n" in line for line in lines)
+
+
+def test_nobody_who_listens_sees_nothing(capsys):
+    counted(None)
+    assert capsys.readouterr() == ("", "")
+
+
+def test_a_printer_of_lines_has_a_bar_on_its_terminal_and_lines_elsewhere():
+    terminal, file = Terminal(), io.StringIO()
+    for stream in (terminal, file):
+        printer = LinePrinter("ddagr: ", stream=stream)
+        printer("begun")
+        counted(printer)
+    assert terminal.getvalue().startswith("ddagr: begun\n\rdrawing [")
+    assert file.getvalue().splitlines()[:2][0] == "ddagr: begun"
+    assert file.getvalue().splitlines()[1].startswith("drawing: 50 %")

@@ -1,11 +1,16 @@
-"""Progress on standard error: a bar on a terminal, one line per ten percent elsewhere. Never any colour."""
+"""Progress: a bar on a terminal, one line per ten percent elsewhere. Never any colour.
+
+Functions take a callable that is given one line of text at a time (``print`` will do). :func:`counting` shows counted
+steps on it: as lines, or as a bar where the callable is a :class:`LinePrinter` on a terminal.
+"""
 
 from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Callable
 from types import TracebackType
-from typing import TextIO
+from typing import TextIO, cast
 
 _BAR_WIDTH = 30
 _SECONDS_BETWEEN_DRAWS = 0.1
@@ -88,3 +93,50 @@ class Progress:
     def _write(self, text: str) -> None:
         self._stream.write(text)
         self._stream.flush()
+
+
+class LinePrinter:
+    """Prints lines of progress on a stream.
+
+    Args:
+        prefix: at the beginning of each line.
+        stream: standard error when None.
+    """
+
+    def __init__(self, prefix: str = "", *, stream: TextIO | None = None) -> None:
+        self.stream = sys.stderr if stream is None else stream
+        self._prefix = prefix
+
+    def __call__(self, line: str) -> None:
+        """Print one line."""
+        print(f"{self._prefix}{line}", file=self.stream, flush=True)
+
+
+def counting(total: int, label: str, progress: Callable[[str], None] | None) -> Progress:
+    """Counter of steps that is shown where ``progress`` says.
+
+    Args:
+        total: number of steps, at least 1.
+        label: what is being done.
+        progress: called with one line per ten percent; a :class:`LinePrinter` gets a bar on its stream. None shows
+            nothing.
+    """
+    stream = progress.stream if isinstance(progress, LinePrinter) else cast(TextIO, _Lines(progress))
+    return Progress(total, label, stream=stream)
+
+
+class _Lines:
+    """What :class:`Progress` needs of a stream, over a callable that takes lines."""
+
+    def __init__(self, take: Callable[[str], None] | None) -> None:
+        self._take = take
+
+    def isatty(self) -> bool:
+        return False
+
+    def write(self, text: str) -> None:
+        if self._take is not None:
+            self._take(text.rstrip("\n"))
+
+    def flush(self) -> None:
+        """Lines are given at once."""
