@@ -31,7 +31,7 @@ from ddagr_gym.diagnosis.certification.certify import certify
 from ddagr_gym.diagnosis.gates.threshold_files import default_thresholds
 from ddagr_gym.diagnosis.gates.thresholds import Gate, Thresholds
 from ddagr_gym.diagnosis.result.conclusion import Begun, begun
-from ddagr_gym.diagnosis.search.search_node import stand
+from ddagr_gym.diagnosis.search.scanned_model import scan_model
 from ddagr_gym.diagnosis.search.stepwise import rivals_of
 from ddagr_gym.diagnosis.setting import Setting
 from ddagr_gym.errors import InputError
@@ -57,15 +57,15 @@ def told(first: Begun, names: Sequence[str]) -> Fitted | None:
     none = Gate(float("inf"), float("inf"))
     gates = Thresholds({"": none} | dict.fromkeys(names, Gate(0.0, -float("inf"))), {}, 0, "an oracle")
     problem = first.prepared.problem
-    standing, left = stand(problem, first.refitted), set(names)
+    model, left = scan_model(problem, first.refitted), set(names)
     while left:
-        rivals = [r for r in rivals_of(problem, standing, first.raw, gates, len(left)) if r.name in left]
+        rivals = [r for r in rivals_of(problem, model, first.raw, gates, len(left)) if r.name in left]
         if not rivals:
             return None
         best = rivals[0].fitted
-        standing = stand(problem, fit(problem, best.point, iterations=8, renewals=2, first=best))
-        left -= set(standing.names)
-    return standing.fitted
+        model = scan_model(problem, fit(problem, best.point, iterations=8, renewals=2, first=best))
+        left -= set(model.names)
+    return model.fitted
 
 
 def oracle(folder: Path, names: Sequence[str]) -> dict[str, Any] | None:

@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass, replace
 from ddagr_gym.diagnosis.gates.thresholds import Gate, Thresholds
 from ddagr_gym.diagnosis.preprocessing.mended_recordings import Prepared
 from ddagr_gym.diagnosis.search.candidates import Candidate
-from ddagr_gym.diagnosis.search.search_node import Standing, stand
+from ddagr_gym.diagnosis.search.scanned_model import ScannedModel, scan_model
 from ddagr_gym.identification.gauss_newton import Fitted, cost_of
 from ddagr_gym.identification.misfit import LOCAL, roughest
 from ddagr_gym.identification.nuisances import NuisancePriors, Nuisances
@@ -65,7 +65,7 @@ def from_values(prepared: Prepared) -> First | None:
     return First("gyro_sign", True, _CERTAIN) if prepared.flipped is not None else None
 
 
-def first_of(scans: Sequence[Standing], thresholds: Thresholds) -> First:
+def first_of(scans: Sequence[ScannedModel], thresholds: Thresholds) -> First:
     """The effect that a search tries first: by how much its gain exceeds its gate, those that pass before the others.
 
     Args:
@@ -148,7 +148,7 @@ def without_nuisances(problem: Problem, soil: Soil) -> Problem:
     return Problem(problem.robot, soil, problem.blocked, fixed, NuisancePriors(**locked))
 
 
-def nominal_standing(problem: Problem, raw: Fitted, soil: Soil) -> Standing:
+def scan_raw_nominal(problem: Problem, raw: Fitted, soil: Soil) -> ScannedModel:
     """Scan at the raw nominal model with nothing but the windows' states eliminated.
 
     Args:
@@ -159,4 +159,4 @@ def nominal_standing(problem: Problem, raw: Fitted, soil: Soil) -> Standing:
     fixed = without_nuisances(problem, soil)
     elimination = fixed.eliminate(raw.point, raw.prediction, raw.by_parameter)
     cost, shares = cost_of(fixed, raw.point, raw.prediction, elimination)
-    return stand(fixed, replace(raw, cost=cost, elimination=elimination, window_cost=shares))
+    return scan_model(fixed, replace(raw, cost=cost, elimination=elimination, window_cost=shares))

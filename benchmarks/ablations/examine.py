@@ -14,14 +14,14 @@ from benchmarks.ablations.arms import (
     first_of,
     from_values,
     noise_thresholds,
-    nominal_standing,
+    scan_raw_nominal,
 )
 from benchmarks.ablations.sparse import sparse_first
 from ddagr_gym.diagnosis.gates.thresholds import Thresholds
 from ddagr_gym.diagnosis.preprocessing.mended_recordings import Prepared
 from ddagr_gym.diagnosis.result.conclusion import begun
-from ddagr_gym.diagnosis.search.search_node import Standing, stand
-from ddagr_gym.diagnosis.search.stepwise import begin, scans_of
+from ddagr_gym.diagnosis.search.scanned_model import ScannedModel, scan_model
+from ddagr_gym.diagnosis.search.stepwise import refit_and_scan, scans_of
 from ddagr_gym.diagnosis.setting import Setting, make_problem
 from ddagr_gym.identification.gauss_newton import Fitted
 from ddagr_gym.parameters import Robot, Soil
@@ -54,7 +54,7 @@ class _Begun:
 
     prepared: Prepared
     raw: Fitted
-    scans: tuple[Standing, ...]
+    scans: tuple[ScannedModel, ...]
     thresholds: Thresholds
 
 
@@ -76,7 +76,7 @@ def examine(folder: Path, thresholds: Thresholds) -> dict[str, dict[str, Any]]:
     problem, candidates = case.prepared.problem, case.scans[0].terms.candidates
     found = {"as it is": _timed(lambda: values or first_of(case.scans, case.thresholds), began)}
     arms: dict[str, Callable[[], First]] = {
-        "nominal fixed": lambda: values or first_of((nominal_standing(problem, case.raw, soil),), case.thresholds),
+        "nominal fixed": lambda: values or first_of((scan_raw_nominal(problem, case.raw, soil),), case.thresholds),
         "no null bank": lambda: values or first_of(case.scans, noise_thresholds(problem)),
         "BIC forward": lambda: values or first_of(case.scans, bic_thresholds(problem, candidates)),
         "one roll-out": lambda: values or _one_roll_out(robot, soil, case),
@@ -93,12 +93,12 @@ def _timed(work: Callable[[], First], began: float) -> dict[str, Any]:
 def _begin(robot: Robot, soil: Soil, folder: Path, thresholds: Thresholds) -> _Begun:
     first = begun(robot, soil, read_runs(folder), Setting().with_windows(thresholds.duration))
     problem = first.prepared.problem
-    scans = scans_of(problem, stand(problem, first.refitted), first.raw)
+    scans = scans_of(problem, scan_model(problem, first.refitted), first.raw)
     return _Begun(first.prepared, first.raw, tuple(scans), thresholds.for_length(problem.covered))
 
 
 def _one_roll_out(robot: Robot, soil: Soil, case: _Begun) -> First:
     """The same with windows as long as the drives."""
     setting = Setting(duration=_WHOLE_DRIVE, stride=_WHOLE_DRIVE)
-    _, standing = begin(make_problem(robot, soil, case.prepared.recordings, setting))
-    return first_of((standing,), case.thresholds)
+    _, model = refit_and_scan(make_problem(robot, soil, case.prepared.recordings, setting))
+    return first_of((model,), case.thresholds)

@@ -32,7 +32,7 @@ Method (measured reasons in the study that the project follows)
     *misfit*      what is left by channel, and of what the local variations have to make up for.
     *equivalence* rivals whose joint refits are nearly as good, weighted over resampled windows.
     *search*      forward and backward moves over joint refits, each through the gate; *hypotheses* says where they
-                  begin, *retold* adds rivals that no scan finds, *standing* is what a search holds.
+                  begin, *equivalent* adds rivals that no scan finds, *standing* is what a search holds.
     *certify*     sizes fitted to the other recordings predict each one from states known at the start, over 1, 5 and
                   30 s; a flexible model of what is left says how much could have been explained.
 

@@ -17,7 +17,7 @@ from ddagr_gym.diagnosis.localisation.effect_timeline import (
 from ddagr_gym.diagnosis.localisation.localise import piece_values
 from ddagr_gym.diagnosis.localisation.residual_wrench import residual_wrench
 from ddagr_gym.diagnosis.result.evidence import NAME, Evidence
-from ddagr_gym.diagnosis.search.stepwise import Found
+from ddagr_gym.diagnosis.search.scanned_model import SearchResult
 from ddagr_gym.identification.gauss_newton import Fitted
 from ddagr_gym.identification.problem import Problem
 
@@ -26,7 +26,7 @@ __all__ = ["NAME", "Evidence", "gather_evidence"]
 Array = NDArray[np.float64]
 
 
-def gather_evidence(problem: Problem, found: Found, thresholds: Thresholds | None = None) -> Evidence:
+def gather_evidence(problem: Problem, found: SearchResult, thresholds: Thresholds | None = None) -> Evidence:
     """Collect what the page draws; a handful of simulations.
 
     Args:

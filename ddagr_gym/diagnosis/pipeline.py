@@ -27,7 +27,7 @@ from ddagr_gym.diagnosis.planning.next_drive import next_drive, rivals_of_diagno
 from ddagr_gym.diagnosis.preprocessing.data_checks import DataDoubt, data_doubts, dead_channels, suspects_of
 from ddagr_gym.diagnosis.preprocessing.input_requirements import check_recordings, content_hash
 from ddagr_gym.diagnosis.preprocessing.mended_recordings import Prepared, prepare
-from ddagr_gym.diagnosis.preprocessing.repeat_spans import held_where
+from ddagr_gym.diagnosis.preprocessing.repeat_spans import where_readings_repeat
 from ddagr_gym.diagnosis.result.conclusion import accepted, conclude, searched
 from ddagr_gym.diagnosis.result.sentences import (
     dead_in_words,
@@ -38,7 +38,7 @@ from ddagr_gym.diagnosis.result.sentences import (
 )
 from ddagr_gym.diagnosis.result.size_bounds import pushed_to_bounds
 from ddagr_gym.diagnosis.result.verdict import NONE, UNKNOWN, Diagnosis, as_mapping
-from ddagr_gym.diagnosis.search.stepwise import Found
+from ddagr_gym.diagnosis.search.scanned_model import SearchResult
 from ddagr_gym.diagnosis.setting import Setting
 from ddagr_gym.diagnosis.store import StepStore
 from ddagr_gym.diagnosis.unnamed.terms import unnamed_terms
@@ -123,7 +123,7 @@ class Outcome:
     diagnosis: Diagnosis
     effects: tuple[Effect, ...]
     prepared: Prepared
-    found: Found
+    found: SearchResult
     evidence: Evidence
     nominal: tuple[Robot, Soil]
 
@@ -165,7 +165,7 @@ def run(
     found = accepted(found, task.thresholds)
     fit = step("certification", lambda: _certified(task, prepared, found, progress))
     where = step("localisation", lambda: asdict(locate(prepared.problem, found, task.thresholds.misfit)))
-    held = held_where(task.recordings, prepared.held)
+    held = where_readings_repeat(task.recordings, prepared.held)
     diagnosis = _doubted(diagnosis, where, {} if held is None else {"sensor_hold": asdict(held)}, fit, checks)
     unnamed = step("unnamed terms", lambda: _unnamed(task, prepared, found, diagnosis))
     following = step("next drive", lambda: _next_drive(task, setting, diagnosis, progress))
@@ -228,7 +228,7 @@ def _doubted(
     return replace(diagnosis, findings=findings, complete=whole and not doubts, sentence=sentence)
 
 
-def _unnamed(task: Task, prepared: Prepared, found: Found, diagnosis: Diagnosis) -> Mapping[str, Any] | None:
+def _unnamed(task: Task, prepared: Prepared, found: SearchResult, diagnosis: Diagnosis) -> Mapping[str, Any] | None:
     """Terms without a name, where names do not explain everything."""
     if diagnosis.complete:
         return None
@@ -256,7 +256,9 @@ def _next_drive(
         return {"manoeuvre": "", "why": str(error), "separates": [], "power": 0.0, "minutes": None, "alternatives": []}
 
 
-def _certified(task: Task, prepared: Prepared, found: Found, progress: Callable[[str], None]) -> Mapping[str, Any]:
+def _certified(
+    task: Task, prepared: Prepared, found: SearchResult, progress: Callable[[str], None]
+) -> Mapping[str, Any]:
     """Errors of the models; one that names nothing has no corrected model of its own."""
     fit = certify(
         prepared.problem,

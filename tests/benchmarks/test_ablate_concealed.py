@@ -18,8 +18,8 @@ from benchmarks.ablations.arms import (
     first_of,
     from_values,
     noise_thresholds,
-    nominal_standing,
     parameter_counts,
+    scan_raw_nominal,
 )
 from benchmarks.ablations.examine import ARMS, examine
 from benchmarks.ablations.sparse import MEANING, sparse_equation, thresholded
@@ -33,7 +33,7 @@ from ddagr_gym.diagnosis.gates.threshold_files import default_thresholds
 from ddagr_gym.diagnosis.gates.thresholds import Gate, Thresholds
 from ddagr_gym.diagnosis.search.candidates import candidates_of
 from ddagr_gym.diagnosis.search.scan import Gain
-from ddagr_gym.diagnosis.search.search_node import stand
+from ddagr_gym.diagnosis.search.scanned_model import scan_model
 from ddagr_gym.diagnosis.setting import Setting, make_problem
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.gauss_newton import fit
@@ -128,16 +128,16 @@ def test_without_nuisances_nothing_but_states_is_eliminated() -> None:
     """A soil that differs is explained by the refit and stands as an effect where nothing is refitted."""
     problem = problem_of("soil_change=0.7,stiffness=0.6")
     raw = fit(problem, iterations=0)
-    standing = nominal_standing(problem, raw, get_soil("thesis_a1"))
-    assert standing.terms.nuisances == 0
+    model = scan_raw_nominal(problem, raw, get_soil("thesis_a1"))
+    assert model.terms.nuisances == 0
     refitted = fit(problem, raw.point, first=raw, iterations=3)
-    explained = standing.fitted.cost - refitted.cost
+    explained = model.fitted.cost - refitted.cost
     assert explained > 10.0
-    gain = next(gain.gain for gain in standing.gains if gain.name == "soil_change")
+    gain = next(gain.gain for gain in model.gains if gain.name == "soil_change")
     # a drag says the same of so short a drive
-    assert gain > 0.99 * standing.gains[0].gain
+    assert gain > 0.99 * model.gains[0].gain
     # one effect moves less than the refit does, from the same point
-    assert 0.5 * explained < gain * standing.dispersion < explained
+    assert 0.5 * explained < gain * model.dispersion < explained
 
 
 def test_noise_limits_hold_on_a_drive_of_the_same_simulator() -> None:
@@ -186,12 +186,12 @@ def test_an_effect_passes_the_criterion_where_it_falls_whatever_left_out_windows
 
 def test_the_criterion_names_what_is_there_on_a_drive_of_the_same_simulator() -> None:
     problem = problem_of("gyro_bias=0.02")
-    standing = stand(problem, fit(problem, iterations=0))
-    thresholds = bic_thresholds(problem, standing.terms.candidates)
-    first = first_of([standing], thresholds)
+    model = scan_model(problem, fit(problem, iterations=0))
+    thresholds = bic_thresholds(problem, model.terms.candidates)
+    first = first_of([model], thresholds)
     assert first.name == "gyro_bias"
     assert first.alarm
-    assert set(thresholds.gates) == {gain.name for gain in standing.gains}
+    assert set(thresholds.gates) == {gain.name for gain in model.gains}
 
 
 def test_sparse_regression_finds_the_terms_that_are_there() -> None:

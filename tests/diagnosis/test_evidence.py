@@ -8,8 +8,7 @@ import pytest
 from ddagr_gym.diagnosis.evidence import Evidence, gather_evidence
 from ddagr_gym.diagnosis.gates.thresholds import Gate, Thresholds
 from ddagr_gym.diagnosis.search.scan import Gain, dispersion_of
-from ddagr_gym.diagnosis.search.search_node import Standing
-from ddagr_gym.diagnosis.search.stepwise import Found
+from ddagr_gym.diagnosis.search.scanned_model import ScannedModel, SearchResult
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.gauss_newton import fit
 from ddagr_gym.identification.misfit import channel_misfit
@@ -21,26 +20,26 @@ from ddagr_gym.physics.effects.registry import parse_effect
 def gathered(drive, problem_of):
     problem = problem_of(drive(("gyro_scale=1.2",), seconds=12.0))
 
-    def standing(fitted, gains):
+    def scanned(fitted, gains):
         misfit, dispersion = channel_misfit(problem, fitted), dispersion_of(problem, fitted)
-        return Standing(fitted, None, gains, {}, {}, dispersion, misfit)
+        return ScannedModel(fitted, None, gains, {}, {}, dispersion, misfit)
 
     nominal = fit(problem, iterations=1)
     known = replace(nominal.point, effects=(parse_effect("gyro_scale=1.2"),))
     chosen = fit(problem, known, iterations=1, reuse=nominal)
     gains = (Gain(0, "gyro_scale", 50.0, (1.0,)), Gain(1, "slope", 2.0, (1.0,)))
-    found = Found((standing(nominal, gains), standing(chosen, (Gain(1, "slope", 1.5, (1.0,)),))), ())
+    found = SearchResult((scanned(nominal, gains), scanned(chosen, (Gain(1, "slope", 1.5, (1.0,)),))), ())
     thresholds = Thresholds({"gyro_scale": Gate(5.0, 0.0), "slope": Gate(7.0, 0.0)}, {}, 20, "bank")
     return problem, found, gather_evidence(problem, found, thresholds)
 
 
 def test_shown_residuals_have_the_misfit_of_the_models(gathered):
     _, found, evidence = gathered
-    for model, standing in (("nominal", found.nominal), ("corrected", found.chosen)):
+    for model, scanned in (("nominal", found.nominal), ("corrected", found.chosen)):
         squares = evidence.standardised(model) ** 2
         for k, name in enumerate(CHANNELS):
             known = squares[..., k][np.isfinite(squares[..., k])]
-            assert known.mean() == pytest.approx(standing.misfit[name], rel=1e-6)
+            assert known.mean() == pytest.approx(scanned.misfit[name], rel=1e-6)
 
 
 def test_the_effect_is_what_the_corrected_model_lacks_no_more(gathered):

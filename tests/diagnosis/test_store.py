@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from ddagr_gym.diagnosis.search.scan import gains, scan
-from ddagr_gym.diagnosis.search.search_node import Standing
-from ddagr_gym.diagnosis.search.stepwise import Found
+from ddagr_gym.diagnosis.search.scanned_model import ScannedModel, SearchResult
 from ddagr_gym.diagnosis.store import StepStore
 from ddagr_gym.errors import InputError
 from ddagr_gym.physics.effects import load_effects
@@ -24,8 +23,8 @@ def never() -> None:
 def test_a_search_comes_back_whole(sloping: Sloping, tmp_path: Path) -> None:
     fitted, name = sloping.nominal, "slope"
     terms = scan(sloping.problem, fitted, {name: effect_kind(name)})
-    standing = Standing(fitted, terms, tuple(gains(terms)), {name: 1.0}, {name: 2.0}, 1.0, {})
-    found = Found((standing, replace(standing, fitted=sloping.chosen)), ())
+    model = ScannedModel(fitted, terms, tuple(gains(terms)), {name: 1.0}, {name: 2.0}, 1.0, {})
+    found = SearchResult((model, replace(model, fitted=sloping.chosen)), ())
     assert StepStore(tmp_path / "part", "key").step("search", lambda: found) is found
     again = StepStore(tmp_path / "part", "key").step("search", never)
     chosen = again.chosen

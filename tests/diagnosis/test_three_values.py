@@ -7,7 +7,7 @@ import pytest
 
 from ddagr_gym.diagnosis.gates.thresholds import Thresholds
 from ddagr_gym.diagnosis.result.conclusion import _verdict, accepted
-from ddagr_gym.diagnosis.search.stepwise import Found
+from ddagr_gym.diagnosis.search.scanned_model import SearchResult
 
 THRESHOLDS = Thresholds({}, {"encoder_left": 1.0, "yaw_rate": 1.0, "local_strength": 1.0}, 20, "a test")
 
@@ -16,11 +16,11 @@ def standing(*names: str, **misfit: float) -> Any:
     return SimpleNamespace(names=names, gains=(), misfit={"encoder_left": 0.5, "yaw_rate": 0.5} | misfit)
 
 
-def found(nominal: Any, chosen: Any) -> Found:
-    return Found((nominal, chosen), ())
+def found(nominal: Any, chosen: Any) -> SearchResult:
+    return SearchResult((nominal, chosen), ())
 
 
-def concluded(search: Found, seen: tuple[str, ...] = ()) -> tuple[tuple[str, ...], bool]:
+def concluded(search: SearchResult, seen: tuple[str, ...] = ()) -> tuple[tuple[str, ...], bool]:
     return _verdict(accepted(search, THRESHOLDS), seen, THRESHOLDS)
 
 

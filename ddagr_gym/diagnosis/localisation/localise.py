@@ -24,7 +24,7 @@ from ddagr_gym.diagnosis.localisation.effect_timeline import (
 from ddagr_gym.diagnosis.localisation.operating_condition_words import phrase_of, uneven_phrase
 from ddagr_gym.diagnosis.localisation.operating_conditions import Pieces, RegimeShare, Unevenness, shares, uneven
 from ddagr_gym.diagnosis.localisation.residual_wrench import COMPONENTS, residual_wrench
-from ddagr_gym.diagnosis.search.stepwise import Found
+from ddagr_gym.diagnosis.search.scanned_model import SearchResult
 from ddagr_gym.frames import wrap_angle
 from ddagr_gym.identification.gauss_newton import Fitted
 from ddagr_gym.identification.misfit import LOCAL, explained_share
@@ -148,7 +148,7 @@ class Localisation:
     wrench: tuple[WrenchSummary, ...]
 
 
-def locate(problem: Problem, found: Found, limits: Mapping[str, float]) -> Localisation:
+def locate(problem: Problem, found: SearchResult, limits: Mapping[str, float]) -> Localisation:
     """Locate what a search found, and what it left.
 
     Args:
@@ -309,7 +309,7 @@ def _lying(weight: Array, pieces: Pieces) -> Where:
     return Where((), 0.0, lying, _standing_place(lying), None, phrase_of(lying))
 
 
-def _wrench(problem: Problem, found: Found) -> tuple[WrenchSummary, ...]:
+def _wrench(problem: Problem, found: SearchResult) -> tuple[WrenchSummary, ...]:
     raw = as_it_stands(problem, found.nominal.fitted)
     wrench = residual_wrench(problem, raw, found.chosen.fitted, found.chosen.dispersion)
     summaries = []

@@ -21,8 +21,8 @@ from ddagr_gym.diagnosis.null_bank.standard_drives import standard_template
 from ddagr_gym.diagnosis.preprocessing.input_requirements import content_hash
 from ddagr_gym.diagnosis.search.initial_guess import first_guess
 from ddagr_gym.diagnosis.search.scan import Gain, drive_extent
-from ddagr_gym.diagnosis.search.search_node import Standing
-from ddagr_gym.diagnosis.search.stepwise import begin, best_gains, scans_of
+from ddagr_gym.diagnosis.search.scanned_model import ScannedModel
+from ddagr_gym.diagnosis.search.stepwise import best_gains, refit_and_scan, scans_of
 from ddagr_gym.diagnosis.setting import Setting, make_problem
 from ddagr_gym.identification.problem import Problem
 from ddagr_gym.parameters import Robot, Soil
@@ -74,21 +74,21 @@ def scanned(robot: Robot, soil: Soil, recordings: Sequence[Recording], kind: str
         setting: of the diagnosis.
     """
     problem = make_problem(robot, soil, recordings, setting)
-    raw, standing = begin(problem)
-    best = best_gains(scans_of(problem, standing, raw))
+    raw, model = refit_and_scan(problem)
+    best = best_gains(scans_of(problem, model, raw))
     return NullRun(
         kind,
         {name: gain.gain for name, (gain, _) in best.items()},
         {name: scan_.scores[name] for name, (_, scan_) in best.items()},
         {name: scan_.held_out[name] for name, (_, scan_) in best.items()},
-        standing.misfit,
+        model.misfit,
         problem.blocked.windows.count,
         tuple(name for name, (gain, scan_) in best.items() if not _is_meaningful(problem, gain, scan_)),
         problem.blocked.windows.duration,
     )
 
 
-def _is_meaningful(problem: Problem, gain: Gain, scan_: Standing) -> bool:
+def _is_meaningful(problem: Problem, gain: Gain, scan_: ScannedModel) -> bool:
     """Whether a scan puts an effect at its least meaningful size or above."""
     guess = first_guess(scan_.terms.candidates[gain.candidate], gain.multiples)
     return guess.is_meaningful(drive_extent(problem, scan_.fitted.prediction))

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ddagr_gym.diagnosis.preprocessing.repeated_readings import Held, find_held, without_repeats
-from ddagr_gym.diagnosis.preprocessing.reversed_gyro import Flipped, find_flipped_gyro, with_gyro_turned
+from ddagr_gym.diagnosis.preprocessing.repeated_readings import Held, find_repeated_readings, without_repeats
+from ddagr_gym.diagnosis.preprocessing.reversed_gyro import ReversedGyro, find_reversed_gyro, with_gyro_reversed
 from ddagr_gym.diagnosis.setting import Setting, make_problem
 from ddagr_gym.identification.problem import Problem
 from ddagr_gym.parameters import Robot, Soil
@@ -25,7 +25,7 @@ class Mended:
 
     recordings: tuple[Recording, ...]
     held: tuple[Held, ...]
-    flipped: Flipped | None
+    flipped: ReversedGyro | None
 
 
 def mended(recordings: Sequence[Recording]) -> Mended:
@@ -34,11 +34,11 @@ def mended(recordings: Sequence[Recording]) -> Mended:
     Args:
         recordings: at least one, of one robot.
     """
-    held = tuple(find_held(recordings))
+    held = tuple(find_repeated_readings(recordings))
     clean = tuple(without_repeats(recording, held) for recording in recordings) if held else tuple(recordings)
-    flipped = find_flipped_gyro(clean)
+    flipped = find_reversed_gyro(clean)
     if flipped is not None:
-        clean = tuple(with_gyro_turned(recording) for recording in clean)
+        clean = tuple(with_gyro_reversed(recording) for recording in clean)
     return Mended(clean, held, flipped)
 
 

@@ -26,12 +26,12 @@ _ALL = 0.95
 """Share of the time from which a sensor is said to be held everywhere (ours)."""
 
 
-def held_where(recordings: Sequence[Recording], held: Sequence[Held]) -> Where | None:
+def where_readings_repeat(recordings: Sequence[Recording], held: Sequence[Held]) -> Where | None:
     """Stretches in which the held sensors repeat their readings; None where none is held.
 
     Args:
         recordings: as they were read, repeats included.
-        held: from :func:`ddagr_gym.diagnosis.preprocessing.repeated_readings.find_held`.
+        held: from :func:`ddagr_gym.diagnosis.preprocessing.repeated_readings.find_repeated_readings`.
     """
     if not held:
         return None

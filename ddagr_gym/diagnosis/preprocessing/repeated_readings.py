@@ -72,7 +72,7 @@ def _repeats(recording: Recording, names: Sequence[str]) -> tuple[Flags, Flags]:
     return repeat, telling
 
 
-def find_held(recordings: Sequence[Recording]) -> tuple[Held, ...]:
+def find_repeated_readings(recordings: Sequence[Recording]) -> tuple[Held, ...]:
     """Sensors that repeat their readings in more than :data:`LEAST_SHARE` of the samples that say something."""
     found = []
     for sensor, names in SENSORS.items():

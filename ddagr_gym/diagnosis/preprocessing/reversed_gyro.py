@@ -25,7 +25,7 @@ FEWEST = 200
 
 
 @dataclass(frozen=True)
-class Flipped:
+class ReversedGyro:
     """Evidence of a reversed gyro.
 
     Attributes:
@@ -37,7 +37,7 @@ class Flipped:
     samples: int
 
 
-def find_flipped_gyro(recordings: Sequence[Recording]) -> Flipped | None:
+def find_reversed_gyro(recordings: Sequence[Recording]) -> ReversedGyro | None:
     """Correlation over all recordings, where it is strongly negative in all that show it.
 
     Encoders speak where there are some, else commands. Where commands agree with the gyro it is the encoders that are
@@ -52,7 +52,7 @@ def find_flipped_gyro(recordings: Sequence[Recording]) -> Flipped | None:
     others = [_correlation(*one) for one in measured] + [_correlation(*np.concatenate(driven, axis=1))]
     if any(other is not None and other > LEAST_CORRELATION for other in others):
         return None
-    return Flipped(correlation, len(rate))
+    return ReversedGyro(correlation, len(rate))
 
 
 def _measured_banks(recording: Recording) -> Banks:
@@ -75,6 +75,6 @@ def _correlation(rate: NDArray[np.float64], difference: NDArray[np.float64]) -> 
     return float(np.corrcoef(rate, difference)[0, 1])
 
 
-def with_gyro_turned(recording: Recording) -> Recording:
+def with_gyro_reversed(recording: Recording) -> Recording:
     """Recording with the sign of the yaw rate mended."""
     return replace(recording, channels={**recording.channels, "yaw_rate": -recording["yaw_rate"]})

@@ -14,24 +14,22 @@ from ddagr_gym.diagnosis.gates.thresholds import Thresholds
 from ddagr_gym.diagnosis.preprocessing.input_requirements import data_source
 from ddagr_gym.diagnosis.preprocessing.mended_recordings import Prepared, prepare
 from ddagr_gym.diagnosis.preprocessing.repeated_readings import Held, hold_effect
-from ddagr_gym.diagnosis.preprocessing.reversed_gyro import Flipped
+from ddagr_gym.diagnosis.preprocessing.reversed_gyro import ReversedGyro
 from ddagr_gym.diagnosis.result.equivalence import equivalents
 from ddagr_gym.diagnosis.result.sentences import headline
 from ddagr_gym.diagnosis.result.uncertainty import intervals, least_detectable, resampled_parameters, with_structure
 from ddagr_gym.diagnosis.result.verdict import NONE, UNKNOWN, Diagnosis, Estimate, Finding
 from ddagr_gym.diagnosis.search.scan import dispersion_of
-from ddagr_gym.diagnosis.search.search_node import Standing, stand
+from ddagr_gym.diagnosis.search.scanned_model import ScannedModel, SearchResult, scan_model
 from ddagr_gym.diagnosis.search.stepwise import (
     BENT,
     MOST_EFFECTS,
-    Found,
-    Keep,
-    do,
     further_gates,
     refit_nominal,
     search,
 )
 from ddagr_gym.diagnosis.setting import SHORT, Setting
+from ddagr_gym.diagnosis.store import StepCache, compute_without_cache
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.gauss_newton import Fitted
 from ddagr_gym.identification.misfit import LOCAL, explained_share, roughest
@@ -75,7 +73,7 @@ def begun(
     recordings: Sequence[Recording],
     setting: Setting,
     progress: Callable[[str], None] = lambda text: None,
-    keep: Keep = do,
+    cache: StepCache = compute_without_cache,
 ) -> Begun:
     """Nominal models on windows of the set length; on short ones where the refitted one is far off.
 
@@ -87,18 +85,18 @@ def begun(
         recordings: at least one, of one period.
         setting: choices.
         progress: called with what is being done.
-        keep: see :func:`ddagr_gym.diagnosis.search.stepwise.search`.
+        cache: see :func:`ddagr_gym.diagnosis.search.stepwise.search`.
 
     Raises:
         InputError: the nominal simulator breaks down on some window.
     """
     prepared = prepare(robot, soil, recordings, setting)
-    raw, refitted = keep("search refit", partial(refit_nominal, prepared.problem, progress))
+    raw, refitted = cache("search refit", partial(refit_nominal, prepared.problem, progress))
     if dispersion_of(prepared.problem, refitted) > BENT and setting.duration > SHORT:
         progress("far off: again in short windows")
         setting = setting.with_windows(SHORT, SHORT * setting.stride / setting.duration)
         prepared = prepare(robot, soil, recordings, setting)
-        raw, refitted = keep("search refit, short windows", partial(refit_nominal, prepared.problem, progress))
+        raw, refitted = cache("search refit, short windows", partial(refit_nominal, prepared.problem, progress))
     _check_predicted(prepared, refitted)
     return Begun(setting, prepared, raw, refitted)
 
@@ -123,8 +121,8 @@ def searched(
     thresholds: Thresholds,
     setting: Setting,
     progress: Callable[[str], None] = lambda text: None,
-    keep: Keep = do,
-) -> tuple[Setting, Found]:
+    cache: StepCache = compute_without_cache,
+) -> tuple[Setting, SearchResult]:
     """Search from the nominal models of :func:`begun`.
 
     Args:
@@ -134,7 +132,7 @@ def searched(
         thresholds: of the bank.
         setting: choices.
         progress: called with what is being done.
-        keep: see :func:`ddagr_gym.diagnosis.search.stepwise.search`.
+        cache: see :func:`ddagr_gym.diagnosis.search.stepwise.search`.
 
     Returns:
         The setting of the windows that were searched, for :func:`prepare`, and what was found.
@@ -142,15 +140,15 @@ def searched(
     Raises:
         InputError: see :func:`begun`.
     """
-    first = begun(robot, soil, recordings, setting, progress, keep)
+    first = begun(robot, soil, recordings, setting, progress, cache)
     problem = first.prepared.problem
-    nominal = keep("search nominal", partial(stand, problem, first.refitted, progress))
+    nominal = cache("search nominal", partial(scan_model, problem, first.refitted, progress))
     gates = thresholds.for_length(problem.covered)
-    return first.setting, search(problem, gates, begun=(first.raw, nominal), progress=progress, keep=keep)
+    return first.setting, search(problem, gates, nominal=(first.raw, nominal), progress=progress, cache=cache)
 
 
 def conclude(
-    prepared: Prepared, found: Found, thresholds: Thresholds, rng: np.random.Generator
+    prepared: Prepared, found: SearchResult, thresholds: Thresholds, rng: np.random.Generator
 ) -> tuple[Diagnosis, tuple[Effect, ...]]:
     """Findings with intervals and equivalence sets, and the verdict.
 
@@ -205,7 +203,7 @@ def _held_findings(held: Sequence[Held]) -> list[Finding]:
     return [Finding("sensor_hold", parameters, repeats, 0.0, repeats**0.5, repeats, {}, {"sensor_hold": 1.0})]
 
 
-def _flipped_findings(flipped: Flipped | None) -> list[Finding]:
+def _flipped_findings(flipped: ReversedGyro | None) -> list[Finding]:
     """A reversed gyro needs no fit: the correlation is the evidence, as the gain of a line through the origin."""
     if flipped is None:
         return []
@@ -214,7 +212,7 @@ def _flipped_findings(flipped: Flipped | None) -> list[Finding]:
     return [Finding("gyro_sign", flip, gain, 0.0, (2.0 * gain) ** 0.5, gain, {"yaw_rate": 1.0}, {"gyro_sign": 1.0})]
 
 
-def _findings(problem: Problem, found: Found, thresholds: Thresholds, rng: np.random.Generator) -> list[Finding]:
+def _findings(problem: Problem, found: SearchResult, thresholds: Thresholds, rng: np.random.Generator) -> list[Finding]:
     """One finding per effect of the chosen model."""
     chosen = found.chosen
     if not chosen.names:
@@ -230,7 +228,7 @@ def _findings(problem: Problem, found: Found, thresholds: Thresholds, rng: np.ra
             if p.effect == number and (b[0] < b[1] or p.field in effect.size_names())
         }
         place = _before(found, effect.name)
-        before, after = found.standings[place : place + 2]
+        before, after = found.models[place : place + 2]
         gain = _gain(found, before, effect.name)
         estimates = {
             name: Estimate(float(getattr(effect, name)), str(effect.parameter(name).metadata["unit"]), spread.get(name))
@@ -241,7 +239,7 @@ def _findings(problem: Problem, found: Found, thresholds: Thresholds, rng: np.ra
                 effect.name,
                 estimates,
                 gain,
-                further_gates(thresholds, found.standings[: place + 1]).of(effect.name).gain,
+                further_gates(thresholds, found.models[: place + 1]).of(effect.name).gain,
                 before.scores[effect.name],
                 before.held_out.get(effect.name, 0.0),
                 _channel_shares(before, after),
@@ -259,32 +257,32 @@ def _thresholds(thresholds: Thresholds) -> dict[str, Any]:
     return {"nulls": thresholds.nulls, "bank": thresholds.bank, "level": thresholds.level, **origin, "gates": gates}
 
 
-def _detectable(found: Found, thresholds: Thresholds) -> tuple[_Sizes, _Sizes]:
+def _detectable(found: SearchResult, thresholds: Thresholds) -> tuple[_Sizes, _Sizes]:
     """Least detectable sizes: of all effects before any was named, and of the others beside those that were."""
     first, named = found.nominal, found.chosen
     alone = least_detectable(first.terms, thresholds, first.dispersion)
-    return alone, least_detectable(named.terms, further_gates(thresholds, found.standings), named.dispersion)
+    return alone, least_detectable(named.terms, further_gates(thresholds, found.models), named.dispersion)
 
 
-def _before(found: Found, name: str) -> int:
+def _before(found: SearchResult, name: str) -> int:
     """Place of the last model of the search that lacks an effect."""
-    return max(k for k, standing in enumerate(found.standings) if name not in standing.names)
+    return max(k for k, model in enumerate(found.models) if name not in model.names)
 
 
-def _gain(found: Found, before: Standing, name: str) -> float:
+def _gain(found: SearchResult, before: ScannedModel, name: str) -> float:
     """Evidence of an effect: what the scan before it says, or the joint refit that added it where that says more."""
     linear = next(item.gain for item in before.gains if item.name == name)
     return max([linear, *(rival.gain for step in found.steps for rival in step if rival.name == name)])
 
 
-def _channel_shares(before: Standing, after: Standing) -> dict[str, float]:
+def _channel_shares(before: ScannedModel, after: ScannedModel) -> dict[str, float]:
     """Share of each channel in the fall of the misfit; channels that got worse have none."""
     falls = {name: max(value - after.misfit.get(name, value), 0.0) for name, value in before.misfit.items()}
     total = sum(falls.values())
     return {name: fall / total for name, fall in falls.items() if total > 0.0 and fall > 0.01 * total}
 
 
-def accepted(found: Found, thresholds: Thresholds) -> Found:
+def accepted(found: SearchResult, thresholds: Thresholds) -> SearchResult:
     """What was found; without names where these leave too much of what the channels show."""
     if not found.chosen.names:
         return found
@@ -293,10 +291,10 @@ def accepted(found: Found, thresholds: Thresholds) -> Found:
     _, left = roughest(channels, limits)
     explained = explained_share({name: found.nominal.misfit[name] for name in channels}, channels, limits)
     too_much = left > _TOO_MUCH or (left > _MUCH and explained is not None and explained < 0.5)
-    return replace(found, standings=found.standings[:1]) if too_much else found
+    return replace(found, models=found.models[:1]) if too_much else found
 
 
-def _verdict(found: Found, seen: Sequence[str], thresholds: Thresholds) -> tuple[tuple[str, ...], bool]:
+def _verdict(found: SearchResult, seen: Sequence[str], thresholds: Thresholds) -> tuple[tuple[str, ...], bool]:
     """Three values: named and complete, named but incomplete, none of these; or nothing at all.
 
     What was seen in the values themselves (repeats, a reversed gyro) stays named whatever else is left.
@@ -314,9 +312,9 @@ def _verdict(found: Found, seen: Sequence[str], thresholds: Thresholds) -> tuple
     return names, complete
 
 
-def _more(found: Found, thresholds: Thresholds) -> bool:
+def _more(found: SearchResult, thresholds: Thresholds) -> bool:
     """Whether the search stopped at its limit; else, what passed the gate and was not added failed in a joint refit."""
     if len(found.chosen.names) < MOST_EFFECTS:
         return False
-    gates = further_gates(thresholds, found.standings)
+    gates = further_gates(thresholds, found.models)
     return any(gates.passes(g.name, g.gain, found.chosen) for g in found.chosen.gains)

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.diagnosis.search.search_node import Rival
-from ddagr_gym.diagnosis.search.stepwise import Found
+from ddagr_gym.diagnosis.search.scanned_model import Rival, SearchResult
 from ddagr_gym.identification.size_prior import implausibility
 
 Array = NDArray[np.float64]
@@ -57,7 +56,7 @@ def equivalence_weights(
     return {name: weight / total for name, weight in kept.items()} if total > 0.0 else {rivals[0].name: 1.0}
 
 
-def equivalents(found: Found, name: str, rng: np.random.Generator) -> dict[str, float]:
+def equivalents(found: SearchResult, name: str, rng: np.random.Generator) -> dict[str, float]:
     """Names that explain nearly as much as one that was chosen, with their weights.
 
     The step that chose it counts: in an earlier one it may have stood beside an effect that became idle when it was
@@ -70,7 +69,7 @@ def equivalents(found: Found, name: str, rng: np.random.Generator) -> dict[str, 
     """
     tried = [
         (step, before)
-        for step, before in zip(found.steps, found.standings, strict=False)
+        for step, before in zip(found.steps, found.models, strict=False)
         if name in [rival.name for rival in step]
     ]
     if not tried:

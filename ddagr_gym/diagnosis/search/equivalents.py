@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ddagr_gym.diagnosis.search.initial_guess import looped_encoders, slower_loop
-from ddagr_gym.diagnosis.search.search_node import Rival, Standing, rival_of
+from ddagr_gym.diagnosis.search.scanned_model import Rival, ScannedModel, rival_of
 from ddagr_gym.identification.gauss_newton import fit
 from ddagr_gym.identification.problem import Problem
 
@@ -16,24 +16,24 @@ _SECOND_SIZE = 0.05
 """Share of its gain by which a rival with a size more must be ahead of one that tells the same story (ours)."""
 
 
-def with_slower_loop(problem: Problem, standing: Standing, tried: list[Rival]) -> list[Rival]:
+def with_slower_loop(problem: Problem, model: ScannedModel, tried: list[Rival]) -> list[Rival]:
     """Rivals and, where the refitted speed loop is far from the nominal one, motor_lag in its stead."""
-    point = slower_loop(problem, standing.fitted.point)
+    point = slower_loop(problem, model.fitted.point)
     if point is None:
         return tried
-    fitted = fit(problem, point, iterations=TRIAL_STEPS, renewals=2, reuse=standing.fitted)
-    return _beside(tried, rival_of(standing, "motor_lag", fitted))
+    fitted = fit(problem, point, iterations=TRIAL_STEPS, renewals=2, reuse=model.fitted)
+    return _beside(tried, rival_of(model, "motor_lag", fitted))
 
 
-def with_looped_encoders(problem: Problem, standing: Standing, tried: list[Rival]) -> list[Rival]:
+def with_looped_encoders(problem: Problem, model: ScannedModel, tried: list[Rival]) -> list[Rival]:
     """Rivals and, beside uneven radii, encoders that the speed loop believes; they fit as well and have a size more."""
     radii = next((rival for rival in tried if rival.name == "wheel_radius_mismatch"), None)
     point = None if radii is None else looped_encoders(radii.fitted.point)
     if radii is None or point is None:
         return tried
-    looped = rival_of(standing, "encoder_scale", fit(problem, point, iterations=TRIAL_STEPS, reuse=radii.fitted))
+    looped = rival_of(model, "encoder_scale", fit(problem, point, iterations=TRIAL_STEPS, reuse=radii.fitted))
     if looped.gain - radii.gain < _SECOND_SIZE * radii.gain:
-        looped = replace(looped, gain=min(looped.gain, radii.gain) * (1.0 - _SECOND_SIZE), retold=True)
+        looped = replace(looped, gain=min(looped.gain, radii.gain) * (1.0 - _SECOND_SIZE), equivalent=True)
     return _beside(tried, looped)
 
 

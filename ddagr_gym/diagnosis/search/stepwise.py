@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
-from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,14 +13,14 @@ from ddagr_gym.diagnosis.gates.thresholds import UNMISTAKABLE, Thresholds
 from ddagr_gym.diagnosis.search.equivalents import TRIAL_STEPS, with_looped_encoders, with_slower_loop
 from ddagr_gym.diagnosis.search.initial_guess import first_guess, turned_to_agree, with_whole_delay
 from ddagr_gym.diagnosis.search.scan import Gain, Terms, dispersion_of, drive_extent, nuisance_answer
-from ddagr_gym.diagnosis.search.search_node import Rival, Standing, rival_of, stand
+from ddagr_gym.diagnosis.search.scanned_model import Rival, ScannedModel, SearchResult, rival_of, scan_model
+from ddagr_gym.diagnosis.store import StepCache, compute_without_cache
 from ddagr_gym.identification.gauss_newton import DAMPING, Fitted, cost_of, fit
 from ddagr_gym.identification.misfit import channel_misfit
 from ddagr_gym.identification.problem import Point, Problem
 from ddagr_gym.identification.size_prior import implausibility
 
 Array = NDArray[np.float64]
-Result = TypeVar("Result")
 
 _HOPELESS = 0.4  # share of the best linear gain below which no joint refit is tried
 _LARGE = 100.0  # gain above which the linear scan may be far off: refits then begin from two points
@@ -43,30 +42,7 @@ MOST_EFFECTS = 3
 """Simultaneous effects that a search goes up to (diagnosis.md, step 6)."""
 
 
-@dataclass(frozen=True, eq=False)
-class Found:
-    """Result of a search.
-
-    Attributes:
-        standings: models from the nominal one to the chosen one.
-        steps: refits of every step, best first; of the steps that added an effect, in the order of ``standings[1:]``.
-    """
-
-    standings: tuple[Standing, ...]
-    steps: tuple[tuple[Rival, ...], ...] = ()
-
-    @property
-    def nominal(self) -> Standing:
-        """The refitted nominal model."""
-        return self.standings[0]
-
-    @property
-    def chosen(self) -> Standing:
-        """The last model."""
-        return self.standings[-1]
-
-
-def _trial(problem: Problem, standing: Standing, gain: Gain, terms: Terms, start: Fitted) -> Fitted:
+def _trial(problem: Problem, model: ScannedModel, gain: Gain, terms: Terms, start: Fitted) -> Fitted:
     """A few steps with one further effect from a starting point, whose sensitivities of the nuisances serve.
 
     Where something large is missing, a nominal refit bends soil and robot to make up for it, so far that no step leads
@@ -74,19 +50,19 @@ def _trial(problem: Problem, standing: Standing, gain: Gain, terms: Terms, start
     """
     candidate = terms.candidates[gain.candidate]
     effect = first_guess(candidate, gain.multiples)
-    point = replace(start.point, effects=(*standing.fitted.point.effects, effect))
+    point = replace(start.point, effects=(*model.fitted.point.effects, effect))
     point = turned_to_agree(problem, terms, gain, point)
     fitted = fit(problem, point, iterations=TRIAL_STEPS, renewals=2, reuse=start)
-    scanned_here = (terms is standing.terms) == (start is standing.fitted)
-    if fitted.cost < standing.fitted.cost or not (scanned_here and candidate.has_sizes):
+    scanned_here = (terms is model.terms) == (start is model.fitted)
+    if fitted.cost < model.fitted.cost or not (scanned_here and candidate.has_sizes):
         return fitted
     # the guess was too far off: nothing at all would have been better
-    point = _damped_guess(problem, standing, gain, terms, start)
+    point = _damped_guess(problem, model, gain, terms, start)
     again = fit(problem, point, iterations=TRIAL_STEPS, renewals=2, reuse=start)
     return min(fitted, again, key=lambda trial: trial.cost)
 
 
-def _damped_guess(problem: Problem, standing: Standing, gain: Gain, terms: Terms, start: Fitted) -> Point:
+def _damped_guess(problem: Problem, model: ScannedModel, gain: Gain, terms: Terms, start: Fitted) -> Point:
     """The scan's step, damped as any other: the effect as guessed, and what soil and robot give back for it.
 
     A nominal refit has made up for what is missing. With the effect alone that counts twice, and where the guess lies
@@ -94,7 +70,7 @@ def _damped_guess(problem: Problem, standing: Standing, gain: Gain, terms: Terms
 
     Args:
         problem: what to fit.
-        standing: the model before.
+        model: the model before.
         gain: of the effect.
         terms: of the scan that says so, made at ``start``.
         start: where to begin.
@@ -105,7 +81,7 @@ def _damped_guess(problem: Problem, standing: Standing, gain: Gain, terms: Terms
     for share in DAMPING:
         effect = first_guess(candidate, [share * multiple for multiple in gain.multiples])
         values = np.clip(start.point.values + share * answer, problem.low, problem.high)
-        point = replace(start.point, values=values, effects=(*standing.fitted.point.effects, effect))
+        point = replace(start.point, values=values, effects=(*model.fitted.point.effects, effect))
         point = turned_to_agree(problem, terms, gain, point, share)
         points.append(point)
         costs.append(cost_of(problem, point, problem.predict(point), start.elimination)[0])
@@ -114,33 +90,33 @@ def _damped_guess(problem: Problem, standing: Standing, gain: Gain, terms: Terms
     return points[int(np.argmin(costs))]
 
 
-def rivals_of(problem: Problem, standing: Standing, raw: Fitted, thresholds: Thresholds, most: int) -> list[Rival]:
+def rivals_of(problem: Problem, model: ScannedModel, raw: Fitted, thresholds: Thresholds, most: int) -> list[Rival]:
     """Joint refits of the effects that pass the gate, best first: all for a few steps, the close ones to the end.
 
     Args:
         problem: what to fit.
-        standing: the model so far.
+        model: the model so far.
         raw: the nominal model with its sensitivities.
         thresholds: of the gate.
         most: effects that are tried.
     """
-    ranked = _ranked(problem, standing, raw, thresholds)
+    ranked = _ranked(problem, model, raw, thresholds)
     large = bool(ranked) and ranked[0][0].gain > _LARGE
     least = (_HOPELESS_LARGE if large else _HOPELESS) * ranked[0][0].gain if ranked else 0.0
-    extent = drive_extent(problem, standing.fitted.prediction)
-    starts = [standing.fitted, raw] if large else [standing.fitted]
+    extent = drive_extent(problem, model.fitted.prediction)
+    starts = [model.fitted, raw] if large else [model.fitted]
     tried = []
     for gain, terms in ranked[:most]:
         if gain.gain > least:
-            trials = [_trial(problem, standing, gain, terms, start) for start in starts]
+            trials = [_trial(problem, model, gain, terms, start) for start in starts]
             best_start = min(range(len(trials)), key=lambda k: trials[k].cost)
             # the start that serves the first rival serves the others
             starts = [starts[best_start]]
-            tried.append(rival_of(standing, gain.name, trials[best_start]))
-    tried = with_slower_loop(problem, standing, tried)
+            tried.append(rival_of(model, gain.name, trials[best_start]))
+    tried = with_slower_loop(problem, model, tried)
     best = max((rival.gain for rival in tried), default=0.0)
-    rivals = [_finish(problem, standing, rival, large) if rival.gain > _CLOSE * best else rival for rival in tried]
-    rivals = with_looped_encoders(problem, standing, rivals)
+    rivals = [_finish(problem, model, rival, large) if rival.gain > _CLOSE * best else rival for rival in tried]
+    rivals = with_looped_encoders(problem, model, rivals)
     kept = [
         rival
         for rival in rivals
@@ -150,30 +126,30 @@ def rivals_of(problem: Problem, standing: Standing, raw: Fitted, thresholds: Thr
     return sorted(kept, key=lambda rival: implausibility(rival.fitted.point.effects[-1]) - rival.gain)
 
 
-def scans_of(problem: Problem, standing: Standing, raw: Fitted) -> list[Standing]:
+def scans_of(problem: Problem, model: ScannedModel, raw: Fitted) -> list[ScannedModel]:
     """Models whose scans count: where the refitted nominal one is far off, the raw nominal one too.
 
     Soil and robot are bent so much there that the truth may not show.
 
     Args:
         problem: what to fit.
-        standing: the model so far.
+        model: the model so far.
         raw: the nominal model with its sensitivities.
     """
-    bent = not standing.names and standing.dispersion > BENT
-    return [standing, stand(problem, raw)] if bent else [standing]
+    bent = not model.names and model.dispersion > BENT
+    return [model, scan_model(problem, raw)] if bent else [model]
 
 
 def best_gains(
-    scans: Sequence[Standing], passes: Callable[[str, float, Standing], bool] = lambda name, gain, scan_: True
-) -> dict[str, tuple[Gain, Standing]]:
+    scans: Sequence[ScannedModel], passes: Callable[[str, float, ScannedModel], bool] = lambda name, gain, scan_: True
+) -> dict[str, tuple[Gain, ScannedModel]]:
     """The larger of each effect's gains, with the model whose scan says so.
 
     Args:
         scans: see :func:`scans_of`.
         passes: whether a gain counts.
     """
-    best: dict[str, tuple[Gain, Standing]] = {}
+    best: dict[str, tuple[Gain, ScannedModel]] = {}
     for scan_ in scans:
         for gain in scan_.gains:
             better = gain.name not in best or gain.gain > best[gain.name][0].gain
@@ -182,21 +158,21 @@ def best_gains(
     return best
 
 
-def _ranked(problem: Problem, standing: Standing, raw: Fitted, thresholds: Thresholds) -> list[tuple[Gain, Terms]]:
+def _ranked(problem: Problem, model: ScannedModel, raw: Fitted, thresholds: Thresholds) -> list[tuple[Gain, Terms]]:
     """Effects that pass the gate with the scan that says so, best first."""
-    best = best_gains(scans_of(problem, standing, raw), thresholds.passes).values()
+    best = best_gains(scans_of(problem, model, raw), thresholds.passes).values()
     ranked = sorted(best, key=lambda item: thresholds.of(item[0].name).gain - item[0].gain)
     return [(gain, scan_.terms) for gain, scan_ in ranked]
 
 
-def _finish(problem: Problem, standing: Standing, rival: Rival, large: bool) -> Rival:
+def _finish(problem: Problem, model: ScannedModel, rival: Rival, large: bool) -> Rival:
     """A rival fitted to the end; one that explains much changes the nuisances' sensitivities, which are renewed."""
     point, known = rival.fitted.point, rival.fitted
     if large:
         fitted = fit(problem, point, iterations=6, renewals=1, first=known)
     else:
         fitted = fit(problem, point, iterations=6, renewals=2, reuse=known)
-    return rival_of(standing, rival.name, min(fitted, known, key=lambda trial: trial.cost))
+    return rival_of(model, rival.name, min(fitted, known, key=lambda trial: trial.cost))
 
 
 def refit_nominal(problem: Problem, progress: Callable[[str], None] = lambda text: None) -> tuple[Fitted, Fitted]:
@@ -206,22 +182,12 @@ def refit_nominal(problem: Problem, progress: Callable[[str], None] = lambda tex
     return raw, fit(problem, raw.point, first=raw)
 
 
-def begin(problem: Problem, progress: Callable[[str], None] = lambda text: None) -> tuple[Fitted, Standing]:
+def refit_and_scan(
+    problem: Problem, progress: Callable[[str], None] = lambda text: None
+) -> tuple[Fitted, ScannedModel]:
     """The raw nominal model with its sensitivities, and the refitted one with its scan."""
     raw, refitted = refit_nominal(problem, progress)
-    return raw, stand(problem, refitted, progress)
-
-
-class Keep(Protocol):
-    """Where finished parts of a search go: :meth:`ddagr_gym.diagnosis.store.StepStore.step`, or nowhere."""
-
-    def __call__(self, name: str, work: Callable[[], Result]) -> Result:
-        """Result of a part: the kept one, or that of ``work``."""
-
-
-def do(name: str, work: Callable[[], Result]) -> Result:
-    """A :class:`Keep` that keeps nothing."""
-    return work()
+    return raw, scan_model(problem, refitted, progress)
 
 
 def search(
@@ -231,9 +197,9 @@ def search(
     rivals: int = 4,
     most: int = MOST_EFFECTS,
     progress: Callable[[str], None] = lambda text: None,
-    begun: tuple[Fitted, Standing] | None = None,
-    keep: Keep = do,
-) -> Found:
+    nominal: tuple[Fitted, ScannedModel] | None = None,
+    cache: StepCache = compute_without_cache,
+) -> SearchResult:
     """Refit, scan, and add effects while one passes the gate.
 
     Args:
@@ -242,27 +208,28 @@ def search(
         rivals: effects that are refitted jointly at each step.
         most: effects at the same time.
         progress: called with what is being done.
-        begun: raw and refitted nominal model of an earlier :func:`begin`.
-        keep: of the nominal refit and of each step, so that a search that was stopped goes on behind the last one.
+        nominal: raw and refitted nominal model of an earlier :func:`refit_and_scan`.
+        cache: of the nominal refit and of each step, so that a search that was stopped goes on behind the last one.
     """
-    raw, standing = keep("search begin", lambda: begin(problem, progress)) if begun is None else begun
-    standings: list[Standing] = [standing]
+    first = cache("search begin", partial(refit_and_scan, problem, progress)) if nominal is None else nominal
+    raw, model = first
+    models: list[ScannedModel] = [model]
     steps: list[tuple[Rival, ...]] = []
-    while len(standings[-1].names) < most:
-        number = f"search step {len(standings)}"
-        gates = further_gates(thresholds, standings)
-        added = keep(number, partial(_added, problem, standings[-1], raw, steps, gates, rivals, progress))
-        if added is None or set(added[0].names) in [set(s.names) for s in standings]:
+    while len(models[-1].names) < most:
+        number = f"search step {len(models)}"
+        gates = further_gates(thresholds, models)
+        added = cache(number, partial(_added, problem, models[-1], raw, steps, gates, rivals, progress))
+        if added is None or set(added[0].names) in [set(s.names) for s in models]:
             break
-        standings.append(added[0])
+        models.append(added[0])
         steps.append(added[1])
-    if steps and not standings[-1].fitted.converged:
+    if steps and not models[-1].fitted.converged:
         progress("last refit")
-        standings[-1] = _settled(problem, standings[-1])
-    return Found(tuple(standings), tuple(steps))
+        models[-1] = _settled(problem, models[-1])
+    return SearchResult(tuple(models), tuple(steps))
 
 
-def further_gates(thresholds: Thresholds, standings: Sequence[Standing]) -> Thresholds:
+def further_gates(thresholds: Thresholds, models: Sequence[ScannedModel]) -> Thresholds:
     """Gates of further effects: higher by shares of what the named ones explain.
 
     What is left of another form of an effect lies in the windows and channels in which it acts: a further effect that
@@ -271,47 +238,47 @@ def further_gates(thresholds: Thresholds, standings: Sequence[Standing]) -> Thre
 
     Args:
         thresholds: of the null bank.
-        standings: models from the nominal one to the one that further effects are to join.
+        models: models from the nominal one to the one that further effects are to join.
     """
-    explained = _explained(standings)
-    near = {name for effect in standings[-1].fitted.point.effects for name in effect.confused_with}
-    overlap = {name: share for standing in standings for name, share in standing.terms.overlap.items()}
+    explained = _explained(models)
+    near = {name for effect in models[-1].fitted.point.effects for name in effect.confused_with}
+    overlap = {name: share for model in models for name, share in model.terms.overlap.items()}
     names = {*thresholds.gates, *overlap}
     shares = {name: _NEAR_FORM if name in near else _FORM * overlap.get(name, 1.0) for name in names}
     return thresholds.raised({name: share * explained for name, share in shares.items()})
 
 
-def _explained(standings: Sequence[Standing]) -> float:
+def _explained(models: Sequence[ScannedModel]) -> float:
     """Gain of the named effects together."""
-    return (standings[0].fitted.cost - standings[-1].fitted.cost) / standings[-1].dispersion
+    return (models[0].fitted.cost - models[-1].fitted.cost) / models[-1].dispersion
 
 
 def _added(
     problem: Problem,
-    standing: Standing,
+    model: ScannedModel,
     raw: Fitted,
     steps: Sequence[tuple[Rival, ...]],
     thresholds: Thresholds,
     most: int,
     progress: Callable[[str], None],
-) -> tuple[Standing, tuple[Rival, ...]] | None:
+) -> tuple[ScannedModel, tuple[Rival, ...]] | None:
     """The model with one further effect and the refits that it was chosen from; None where none passes the gate."""
-    tried = rivals_of(problem, standing, raw, thresholds, most)
+    tried = rivals_of(problem, model, raw, thresholds, most)
     tried = [rival for rival in tried if rival.gain > thresholds.of(rival.name).gain]
     if not tried:
         return None
     progress(f"joint refit with {tried[0].name}")
     best = _swapped(problem, tried[0].fitted, steps)
     point = with_whole_delay(problem, best.point)
-    more = stand(problem, fit(problem, point, iterations=8, renewals=2, first=best), progress)
+    more = scan_model(problem, fit(problem, point, iterations=8, renewals=2, first=best), progress)
     return _without_idle(problem, more, thresholds, progress), tuple(tried)
 
 
-def _settled(problem: Problem, standing: Standing) -> Standing:
+def _settled(problem: Problem, model: ScannedModel) -> ScannedModel:
     """The same model fitted to the end; what the scan said of others stays."""
-    point, last = standing.fitted.point, standing.fitted
+    point, last = model.fitted.point, model.fitted
     fitted = min(fit(problem, point, iterations=8, renewals=2, first=last), last, key=lambda trial: trial.cost)
-    return replace(standing, fitted=fitted, misfit=channel_misfit(problem, fitted))
+    return replace(model, fitted=fitted, misfit=channel_misfit(problem, fitted))
 
 
 def _swapped(problem: Problem, fitted: Fitted, steps: Sequence[tuple[Rival, ...]]) -> Fitted:
@@ -323,7 +290,7 @@ def _swapped(problem: Problem, fitted: Fitted, steps: Sequence[tuple[Rival, ...]
             continue
         for rival in rivals[1:]:
             names = {effect.name for effect in best.point.effects}
-            if rival.gain < _CLOSE * rivals[0].gain or rival.name in names or rival.retold:
+            if rival.gain < _CLOSE * rivals[0].gain or rival.name in names or rival.equivalent:
                 continue
             effects = list(best.point.effects)
             effects[place] = rival.fitted.point.effects[-1]
@@ -345,19 +312,19 @@ def _with_sizes(problem: Problem, fitted: Fitted) -> float:
 
 
 def _without_idle(
-    problem: Problem, standing: Standing, thresholds: Thresholds, progress: Callable[[str], None]
-) -> Standing:
+    problem: Problem, model: ScannedModel, thresholds: Thresholds, progress: Callable[[str], None]
+) -> ScannedModel:
     """Backward move: the effect whose removal costs less than its threshold goes."""
-    effects = standing.fitted.point.effects
+    effects = model.fitted.point.effects
     if len(effects) < 2:
-        return standing
+        return model
     losses = []
     for number, effect in enumerate(effects):
         kept = (*effects[:number], *effects[number + 1 :])
-        without = fit(problem, replace(standing.fitted.point, effects=kept), iterations=4, reuse=standing.fitted)
-        loss = (without.cost - standing.fitted.cost) / standing.dispersion
+        without = fit(problem, replace(model.fitted.point, effects=kept), iterations=4, reuse=model.fitted)
+        loss = (without.cost - model.fitted.cost) / model.dispersion
         losses.append((loss / thresholds.of(effect.name).gain, without))
     least = min(losses, key=lambda item: item[0])
     if least[0] >= 1.0:
-        return standing
-    return stand(problem, fit(problem, least[1].point, iterations=4), progress)
+        return model
+    return scan_model(problem, fit(problem, least[1].point, iterations=4), progress)

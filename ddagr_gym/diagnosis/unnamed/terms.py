@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.diagnosis.search.search_node import Standing
+from ddagr_gym.diagnosis.search.scanned_model import ScannedModel
 from ddagr_gym.diagnosis.unnamed.boosted_baseline import boosted_share, regime_of
 from ddagr_gym.diagnosis.unnamed.regressors import Motion, Term, library, motion_of
 from ddagr_gym.diagnosis.unnamed.response import INPUTS, Response, course_of, linearise
@@ -102,22 +102,22 @@ class Unnamed:
         return mapping
 
 
-def unnamed_terms(problem: Problem, standing: Standing, rng: np.random.Generator) -> Unnamed:
+def unnamed_terms(problem: Problem, model: ScannedModel, rng: np.random.Generator) -> Unnamed:
     """Search for terms that explain what a model leaves.
 
     Args:
         problem: windows and nominal model.
-        standing: the model whose residual is to be explained, with the effects that it names.
+        model: the model whose residual is to be explained, with the effects that it names.
         rng: of the halves.
     """
-    fitted = standing.fitted
+    fitted = model.fitted
     course = course_of(problem, fitted)
     motion = motion_of(problem, course)
     terms = library(problem, motion)
     columns = term_columns(problem, terms, linearise(problem, fitted, course))
-    projected = fitted.elimination.project(_raw(problem, standing, columns))
+    projected = fitted.elimination.project(_raw(problem, model, columns))
     group = stretches(problem)
-    sums, terms = _sums(problem, standing, projected, group, terms)
+    sums, terms = _sums(problem, model, projected, group, terms)
     fold = np.arange(int(group.max()) + 1) % _FOLDS
 
     found = select(
@@ -161,9 +161,9 @@ def _answer(problem: Problem, target: str, courses: Array, response: Response) -
     return pushed
 
 
-def _raw(problem: Problem, standing: Standing, columns: Array) -> Array:
+def _raw(problem: Problem, model: ScannedModel, columns: Array) -> Array:
     """(W, M + S, 1 + P + K) residual, what a refit could still move, and the terms."""
-    fitted = standing.fitted
+    fitted = model.fitted
     free = problem.open_at(fitted.point)
     parameters = effect_parameters(fitted.point.effects)
     by_effect = effect_columns(problem, fitted.point, fitted.prediction, parameters)
@@ -182,10 +182,10 @@ def stretches(problem: Problem) -> NDArray[np.int64]:
 
 
 def _sums(
-    problem: Problem, standing: Standing, projected: Array, group: NDArray[np.int64], terms: Sequence[Term]
+    problem: Problem, model: ScannedModel, projected: Array, group: NDArray[np.int64], terms: Sequence[Term]
 ) -> tuple[Sums, list[Term]]:
     """Inner products by stretch, and the terms that they are of."""
-    point = standing.fitted.point
+    point = model.fitted.point
     free = problem.open_at(point)
     parameters = effect_parameters(point.effects)
     number = int(group.max()) + 1

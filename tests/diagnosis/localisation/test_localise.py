@@ -21,8 +21,7 @@ from ddagr_gym.diagnosis.localisation.operating_condition_words import NOWHERE_M
 from ddagr_gym.diagnosis.localisation.operating_conditions import Pieces, shares, uneven
 from ddagr_gym.diagnosis.localisation.residual_wrench import HeldWrench, residual_wrench
 from ddagr_gym.diagnosis.search.scan import dispersion_of
-from ddagr_gym.diagnosis.search.search_node import Standing
-from ddagr_gym.diagnosis.search.stepwise import Found
+from ddagr_gym.diagnosis.search.scanned_model import ScannedModel, SearchResult
 from ddagr_gym.diagnosis.wording import EVERYWHERE, range_in_words
 from ddagr_gym.identification.gauss_newton import fit
 from ddagr_gym.identification.misfit import LOCAL, channel_misfit
@@ -34,9 +33,9 @@ LIMITS = dict.fromkeys((*CHANNELS, *LOCAL), 1.2)
 pytest.importorskip("ruptures", reason="needs the extra diagnosis")
 
 
-def standing(problem, fitted):
+def scanned(problem, fitted):
     misfit = channel_misfit(problem, fitted)
-    return Standing(fitted, None, (), {}, {}, dispersion_of(problem, fitted), misfit)
+    return ScannedModel(fitted, None, (), {}, {}, dispersion_of(problem, fitted), misfit)
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +45,7 @@ def limited(drive, problem_of):
     nominal = fit(problem, iterations=2)
     start = replace(nominal.point, effects=(parse_effect("motor_saturation=0.75"),))
     chosen = fit(problem, start, iterations=2, reuse=nominal, fixed=frozenset(["speed_limit"]))
-    return problem, Found((standing(problem, nominal), standing(problem, chosen)), ())
+    return problem, SearchResult((scanned(problem, nominal), scanned(problem, chosen)), ())
 
 
 def test_a_limit_shows_only_while_it_is_reached(limited):
@@ -77,8 +76,8 @@ def test_a_localisation_is_plain_json(limited):
 
 def test_nothing_found_has_no_spans_and_no_phrase(limited):
     problem, found = limited
-    located = locate(problem, Found(found.standings[1:], ()), LIMITS)
-    raw = Found((standing(problem, as_it_stands(problem, found.nominal.fitted)),), ())
+    located = locate(problem, SearchResult(found.models[1:], ()), LIMITS)
+    raw = SearchResult((scanned(problem, as_it_stands(problem, found.nominal.fitted)),), ())
     nothing = locate(problem, raw, LIMITS)
     assert located.remaining.phrase == "nothing above the noise"
     assert nothing.findings == {}

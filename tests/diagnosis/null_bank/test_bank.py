@@ -49,7 +49,7 @@ def test_templates_are_hashed_with_what_is_read_and_where_they_start(change: dic
     assert hash_of(template) != hash_of(replace(template, **change))
 
 
-def standing_of(gain: float, meaningful: bool = True, dispersion: float = 1.0) -> Any:
+def model_of(gain: float, meaningful: bool = True, dispersion: float = 1.0) -> Any:
     """A scan that says only something about a slope."""
     effect = SimpleNamespace(is_meaningful=lambda extent: meaningful)
     terms = SimpleNamespace(candidates=[SimpleNamespace(effect=effect)])
@@ -77,7 +77,7 @@ def quick_scan(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_null_run_keeps_the_length_of_the_windows_that_were_cut(
     quick_scan: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(null_bank, "begin", lambda problem: (None, standing_of(1.0)))
+    monkeypatch.setattr(null_bank, "refit_and_scan", lambda problem: (None, model_of(1.0)))
     run = scanned(ROBOT, SOIL, [drive(40.0)], "plain", Setting().with_windows(6.0))
     assert run.duration == pytest.approx(5.0)
     assert run.windows * run.duration == pytest.approx(40.0, rel=0.15)
@@ -87,11 +87,11 @@ def test_a_null_run_that_bends_the_nominal_model_counts_the_raw_one_too(
     quick_scan: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As a search ranks; what is said of an effect beside its gain comes from the same scan."""
-    bent = standing_of(3.0, meaningful=False, dispersion=2.0 * BENT)
-    monkeypatch.setattr(null_bank, "begin", lambda problem: (None, bent))
-    monkeypatch.setattr(search, "stand", lambda problem, raw: standing_of(70.0))
+    bent = model_of(3.0, meaningful=False, dispersion=2.0 * BENT)
+    monkeypatch.setattr(null_bank, "refit_and_scan", lambda problem: (None, bent))
+    monkeypatch.setattr(search, "scan_model", lambda problem, raw: model_of(70.0))
     run = scanned(ROBOT, SOIL, [drive(40.0)], "plain", Setting())
     assert (run.gains, run.held_out, run.meaningless) == ({"slope": 70.0}, {"slope": 7.0}, ())
-    monkeypatch.setattr(search, "stand", lambda problem, raw: standing_of(2.0))
+    monkeypatch.setattr(search, "scan_model", lambda problem, raw: model_of(2.0))
     run = scanned(ROBOT, SOIL, [drive(40.0)], "plain", Setting())
     assert (run.gains, run.meaningless) == ({"slope": 3.0}, ("slope",))

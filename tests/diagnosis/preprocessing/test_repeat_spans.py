@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ddagr_gym.diagnosis.preprocessing.repeat_spans import held_where
-from ddagr_gym.diagnosis.preprocessing.repeated_readings import Held, find_held
+from ddagr_gym.diagnosis.preprocessing.repeat_spans import where_readings_repeat
+from ddagr_gym.diagnosis.preprocessing.repeated_readings import Held, find_repeated_readings
 from ddagr_gym.recordings.schema import Recording
 
 PERIOD, COUNT = 0.02, 2000
@@ -26,7 +26,7 @@ def drive(held: np.ndarray, channel: str = "yaw_rate", seed: int = 1) -> Recordi
 
 def test_a_sensor_slower_than_the_log_is_held_everywhere() -> None:
     recordings = [drive(np.arange(COUNT) % 5 > 0)]
-    found = held_where(recordings, find_held(recordings))
+    found = where_readings_repeat(recordings, find_repeated_readings(recordings))
     assert found is not None
     assert len(found.spans) == 1
     assert found.time_share == pytest.approx(1.0, abs=0.01)
@@ -41,7 +41,7 @@ def test_freezes_are_found_where_they_are() -> None:
     held[501:1100] = held[1501:1650] = True
     held[::50] = False
     recordings = [drive(np.zeros(COUNT, dtype=bool)), drive(held, seed=2)]
-    found = held_where(recordings, (Held("gyro", 0.3, 0.3, 2000),))
+    found = where_readings_repeat(recordings, (Held("gyro", 0.3, 0.3, 2000),))
     assert found is not None
     assert [span.recording for span in found.spans] == [1, 1]
     edges = [(span.start, span.end) for span in found.spans]
@@ -52,7 +52,7 @@ def test_freezes_are_found_where_they_are() -> None:
 
 
 def test_nothing_held_has_no_place() -> None:
-    assert held_where([drive(np.zeros(COUNT, dtype=bool))], ()) is None
+    assert where_readings_repeat([drive(np.zeros(COUNT, dtype=bool))], ()) is None
 
 
 def test_two_sensors_cover_their_time_once() -> None:
@@ -62,7 +62,7 @@ def test_two_sensors_cover_their_time_once() -> None:
     for name in ("specific_force_x", "specific_force_y"):
         channels[name] = channels[name][np.arange(COUNT) // 4 * 4]
     recordings = [replace(both, channels=channels)]
-    found = held_where(recordings, find_held(recordings))
+    found = where_readings_repeat(recordings, find_repeated_readings(recordings))
     assert found is not None
     assert len(found.spans) == 2
     assert found.time_share == pytest.approx(1.0, abs=0.01)

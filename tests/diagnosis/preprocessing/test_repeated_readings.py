@@ -5,7 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ddagr_gym.diagnosis.preprocessing.repeated_readings import Held, find_held, hold_effect, without_repeats
+from ddagr_gym.diagnosis.preprocessing.repeated_readings import (
+    Held,
+    find_repeated_readings,
+    hold_effect,
+    without_repeats,
+)
 from ddagr_gym.recordings.schema import Recording
 
 PERIOD, COUNT = 0.02, 2000
@@ -27,7 +32,7 @@ def drive(held: dict[str, int]) -> Recording:
 
 
 def test_nothing_is_held_in_a_sound_drive() -> None:
-    assert find_held([drive({})]) == ()
+    assert find_repeated_readings([drive({})]) == ()
 
 
 @pytest.mark.parametrize(
@@ -36,7 +41,7 @@ def test_nothing_is_held_in_a_sound_drive() -> None:
      (("encoder_right", "encoder_left"), "encoders")],
 )  # fmt: skip
 def test_a_held_sensor_is_named_with_its_duration(channels: tuple[str, ...], sensor: str) -> None:
-    found = find_held([drive(dict.fromkeys(channels, 5))])
+    found = find_repeated_readings([drive(dict.fromkeys(channels, 5))])
     assert [item.sensor for item in found] == [sensor]
     assert found[0].duration == pytest.approx(4 * PERIOD, rel=0.15)
     effect = hold_effect(found)
@@ -46,7 +51,7 @@ def test_a_held_sensor_is_named_with_its_duration(channels: tuple[str, ...], sen
 
 def test_repeats_become_missing_samples() -> None:
     recording = drive({"yaw_rate": 4})
-    cleaned = without_repeats(recording, find_held([recording]))
+    cleaned = without_repeats(recording, find_repeated_readings([recording]))
     assert np.isfinite(cleaned["yaw_rate"]).mean() == pytest.approx(0.25, abs=0.01)
     assert np.isfinite(cleaned["encoder_right"]).all()
 
@@ -54,7 +59,7 @@ def test_repeats_become_missing_samples() -> None:
 @pytest.mark.parametrize("samples", [2, 14, 24, 50])
 def test_long_holds_have_their_duration(samples: int) -> None:
     """Beyond the reach of the samples that tell whether readings are held."""
-    found = find_held([drive({"yaw_rate": samples})])
+    found = find_repeated_readings([drive({"yaw_rate": samples})])
     assert [item.sensor for item in found] == ["gyro"]
     assert found[0].duration == pytest.approx((samples - 1) * PERIOD, rel=0.02)
 
@@ -68,7 +73,7 @@ def test_a_steady_reading_between_changes_is_no_hold(steady: str) -> None:
     channels = {**recording.channels}
     for name in ("encoder_right", "encoder_left"):
         channels[name] = np.where(rows // 100 % 2, 0.0, channels[name]) if steady == "standing" else cruising
-    found = find_held([replace(recording, channels=channels)])
+    found = find_repeated_readings([replace(recording, channels=channels)])
     assert [item.sensor for item in found] == ["encoders"]
     assert found[0].duration == pytest.approx(4 * PERIOD, rel=0.15)
 
@@ -84,4 +89,4 @@ def test_zeros_of_a_robot_that_often_stops_are_no_repeats(rate: int) -> None:
     speed = np.where(t % 3.0 < 1.4, 0.8, 0.0) * (1.0 + 0.2 * np.sin(1.7 * t))
     turned = np.round(speed / 0.02) * 0.02
     columns = {"t": t, "command_right": speed, "command_left": speed, "encoder_right": turned, "encoder_left": turned}
-    assert find_held([Recording.from_columns(columns)]) == ()
+    assert find_repeated_readings([Recording.from_columns(columns)]) == ()

@@ -6,33 +6,33 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ddagr_gym.diagnosis.preprocessing.reversed_gyro import find_flipped_gyro, with_gyro_turned
+from ddagr_gym.diagnosis.preprocessing.reversed_gyro import find_reversed_gyro, with_gyro_reversed
 from ddagr_gym.recordings.schema import Recording
 
 
 def test_reversed_gyro_is_found_and_mended(drive: Callable[..., Recording]) -> None:
     right = drive()
     wrong = drive(("gyro_sign=1",))
-    assert find_flipped_gyro([right]) is None
-    found = find_flipped_gyro([wrong, wrong])
+    assert find_reversed_gyro([right]) is None
+    found = find_reversed_gyro([wrong, wrong])
     assert found is not None
     assert found.correlation < -0.8
     assert found.samples == 2 * len(wrong)
-    assert find_flipped_gyro([with_gyro_turned(wrong)]) is None
-    np.testing.assert_allclose(with_gyro_turned(wrong)["yaw_rate"], -wrong["yaw_rate"])
+    assert find_reversed_gyro([with_gyro_reversed(wrong)]) is None
+    np.testing.assert_allclose(with_gyro_reversed(wrong)["yaw_rate"], -wrong["yaw_rate"])
 
 
 def test_commands_serve_where_there_are_no_encoders(drive: Callable[..., Recording]) -> None:
     wrong = drive(("gyro_sign=1",))
     kept = {name: values for name, values in wrong.channels.items() if not name.startswith("encoder")}
-    assert find_flipped_gyro([replace(wrong, channels=kept)]) is not None
+    assert find_reversed_gyro([replace(wrong, channels=kept)]) is not None
 
 
 @pytest.mark.parametrize("level", [0.0, 0.003])
 def test_dead_gyro_is_not_a_reversed_one(drive: Callable[..., Recording], level: float) -> None:
     dead = drive()
     noise = level * np.random.default_rng(0).standard_normal(len(dead))
-    assert find_flipped_gyro([replace(dead, channels={**dead.channels, "yaw_rate": noise})]) is None
+    assert find_reversed_gyro([replace(dead, channels={**dead.channels, "yaw_rate": noise})]) is None
 
 
 def test_encoders_that_contradict_commands_or_drives_that_contradict_each_other_are_no_reversed_gyro(
@@ -40,6 +40,6 @@ def test_encoders_that_contradict_commands_or_drives_that_contradict_each_other_
 ) -> None:
     right, wrong = drive(), drive(("gyro_sign=1",))
     swapped = {"encoder_right": right["encoder_left"], "encoder_left": right["encoder_right"]}
-    assert find_flipped_gyro([replace(right, channels={**right.channels, **swapped})]) is None
-    assert find_flipped_gyro([wrong, wrong]) is not None
-    assert find_flipped_gyro([wrong, wrong, wrong, right]) is None
+    assert find_reversed_gyro([replace(right, channels={**right.channels, **swapped})]) is None
+    assert find_reversed_gyro([wrong, wrong]) is not None
+    assert find_reversed_gyro([wrong, wrong, wrong, right]) is None

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from ddagr_gym.diagnosis.result.equivalence import FORM, equivalence_weights, equivalents
-from ddagr_gym.diagnosis.search.search_node import Rival
+from ddagr_gym.diagnosis.search.scanned_model import Rival
 from ddagr_gym.physics.effects import load_effects
 
 
@@ -62,17 +62,15 @@ def test_what_an_effect_made_idle_is_no_rival_of_it() -> None:
     cost = np.full(30, 10.0)
     encoders = rival("encoder_scale=1.02", cost)
     droop_alone, droop_beside = rival("motor_droop=0.002", cost + 9.0), rival("motor_droop=0.002", cost - 9.0)
-    standings = [SimpleNamespace(dispersion=1.0, names=names) for names in ((), ("motor_droop",))]
-    found: Any = SimpleNamespace(
-        steps=((encoders, droop_alone), (droop_beside,)), standings=standings, chosen=standings[-1]
-    )
+    models = [SimpleNamespace(dispersion=1.0, names=names) for names in ((), ("motor_droop",))]
+    found: Any = SimpleNamespace(steps=((encoders, droop_alone), (droop_beside,)), models=models, chosen=models[-1])
     assert equivalents(found, "motor_droop", np.random.default_rng(1)) == {"motor_droop": 1.0}
 
 
 def test_an_effect_swapped_in_keeps_the_rivals_of_its_step() -> None:
     cost = np.full(30, 10.0)
     tilt, bias = rival("imu_tilt=0,pitch=0.0102", cost), rival("accelerometer_bias=0.1", cost)
-    standings = [SimpleNamespace(dispersion=1.0, names=names) for names in ((), ("accelerometer_bias", "slope"))]
-    found: Any = SimpleNamespace(steps=((tilt, bias),), standings=standings, chosen=standings[-1])
+    models = [SimpleNamespace(dispersion=1.0, names=names) for names in ((), ("accelerometer_bias", "slope"))]
+    found: Any = SimpleNamespace(steps=((tilt, bias),), models=models, chosen=models[-1])
     assert set(equivalents(found, "accelerometer_bias", np.random.default_rng(1))) == {"imu_tilt", "accelerometer_bias"}
     assert equivalents(found, "slope", np.random.default_rng(1)) == {"slope": 1.0}

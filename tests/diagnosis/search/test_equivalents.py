@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ddagr_gym.diagnosis.search import equivalents as retold
+from ddagr_gym.diagnosis.search import equivalents
 from ddagr_gym.diagnosis.search.equivalents import with_looped_encoders
-from ddagr_gym.diagnosis.search.search_node import Rival
+from ddagr_gym.diagnosis.search.scanned_model import Rival
 from ddagr_gym.identification.problem import Point
 from ddagr_gym.physics.effects import load_effects
 
@@ -28,7 +28,7 @@ def rival(gain: float, *effects: str) -> Rival:
 
 def beside(monkeypatch: pytest.MonkeyPatch, gain: float, *tried: Rival) -> list[Rival]:
     """Rivals where a fit of the encoders reaches a gain."""
-    monkeypatch.setattr(retold, "fit", lambda problem, point, **options: fitted_at(point, gain))
+    monkeypatch.setattr(equivalents, "fit", lambda problem, point, **options: fitted_at(point, gain))
     return with_looped_encoders(PROBLEM, STANDING, list(tried))
 
 
@@ -39,15 +39,15 @@ RADII = rival(100.0, "gyro_scale=1.1", "wheel_radius_mismatch=0.04")
 def test_encoders_that_fit_as_well_stand_behind_the_radii(monkeypatch: pytest.MonkeyPatch, gain: float) -> None:
     kept, told = beside(monkeypatch, gain, RADII)
     assert kept is RADII
-    assert (told.name, told.retold) == ("encoder_scale", True)
-    assert told.gain == pytest.approx(min(gain, 100.0) * (1.0 - retold._SECOND_SIZE))
+    assert (told.name, told.equivalent) == ("encoder_scale", True)
+    assert told.gain == pytest.approx(min(gain, 100.0) * (1.0 - equivalents._SECOND_SIZE))
     assert [effect.name for effect in told.fitted.point.effects] == ["gyro_scale", "encoder_scale"]
     assert told.fitted.point.effects[-1].loop == 1.0
 
 
 def test_encoders_that_fit_clearly_better_are_a_rival_as_any_other(monkeypatch: pytest.MonkeyPatch) -> None:
     told = beside(monkeypatch, 106.0, RADII)[1]
-    assert (told.name, told.retold) == ("encoder_scale", False)
+    assert (told.name, told.equivalent) == ("encoder_scale", False)
     assert told.gain == pytest.approx(106.0)
 
 
@@ -57,7 +57,7 @@ def test_of_two_kinds_of_encoders_the_better_stays(monkeypatch: pytest.MonkeyPat
     assert beside(monkeypatch, 100.0, RADII, better, slope) == [RADII, better, slope]
     found = beside(monkeypatch, 100.0, RADII, worse, slope)
     assert found[:2] == [RADII, slope]
-    assert [item.retold for item in found] == [False, False, True]
+    assert [item.equivalent for item in found] == [False, False, True]
 
 
 def test_without_uneven_radii_nothing_is_told_again(monkeypatch: pytest.MonkeyPatch) -> None:

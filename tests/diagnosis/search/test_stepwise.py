@@ -13,7 +13,7 @@ from ddagr_gym.diagnosis.gates.thresholds import Gate, Thresholds
 from ddagr_gym.diagnosis.result.conclusion import begun
 from ddagr_gym.diagnosis.search import stepwise as module
 from ddagr_gym.diagnosis.search.scan import Gain, gains, nuisance_answer, scan
-from ddagr_gym.diagnosis.search.search_node import Rival, Standing
+from ddagr_gym.diagnosis.search.scanned_model import Rival, ScannedModel
 from ddagr_gym.diagnosis.search.stepwise import search
 from ddagr_gym.diagnosis.setting import Setting
 from ddagr_gym.diagnosis.store import StepStore
@@ -29,10 +29,10 @@ THRESHOLDS = Thresholds({"slope": Gate(3.0, 0.0)}, {}, 20, "a test")
 
 
 @pytest.fixture(scope="module")
-def standing(sloping: Sloping) -> Standing:
+def scanned(sloping: Sloping) -> ScannedModel:
     """The nominal model on sloping ground and what the slope would gain."""
     terms = scan(sloping.problem, sloping.nominal, {"slope": effect_kind("slope")})
-    return Standing(sloping.nominal, terms, tuple(gains(terms)), {}, {}, 1.0, {})
+    return ScannedModel(sloping.nominal, terms, tuple(gains(terms)), {}, {}, 1.0, {})
 
 
 def cost_at(sloping: Sloping, point: module.Point) -> float:
@@ -40,39 +40,39 @@ def cost_at(sloping: Sloping, point: module.Point) -> float:
     return cost_of(sloping.problem, point, prediction, sloping.nominal.elimination)[0]
 
 
-def test_a_damped_guess_begins_with_the_answer_of_soil_and_robot(sloping: Sloping, standing: Standing) -> None:
+def test_a_damped_guess_begins_with_the_answer_of_soil_and_robot(sloping: Sloping, scanned: ScannedModel) -> None:
     """The scan promises a fall of the cost for the effect and the nuisances' answer together."""
-    gain = standing.gains[0]
-    answer = nuisance_answer(sloping.problem, sloping.nominal, standing.terms, gain)
+    gain = scanned.gains[0]
+    answer = nuisance_answer(sloping.problem, sloping.nominal, scanned.terms, gain)
     assert (answer[sloping.problem.free] != 0.0).any()
     assert (answer[~sloping.problem.free] == 0.0).all()
-    point = module._damped_guess(sloping.problem, standing, gain, standing.terms, sloping.nominal)
+    point = module._damped_guess(sloping.problem, scanned, gain, scanned.terms, sloping.nominal)
     alone = replace(point, values=sloping.nominal.point.values)
     assert cost_at(sloping, point) < cost_at(sloping, alone)
     assert sloping.nominal.cost - cost_at(sloping, point) > 0.5 * gain.gain
 
 
-def test_a_guess_that_is_far_too_large_is_damped(sloping: Sloping, standing: Standing) -> None:
-    gain = standing.gains[0]
+def test_a_guess_that_is_far_too_large_is_damped(sloping: Sloping, scanned: ScannedModel) -> None:
+    gain = scanned.gains[0]
     exaggerated = Gain(gain.candidate, gain.name, gain.gain, tuple(3.0 * m for m in gain.multiples))
-    point = module._damped_guess(sloping.problem, standing, exaggerated, standing.terms, sloping.nominal)
-    guessed = module._damped_guess(sloping.problem, standing, gain, standing.terms, sloping.nominal)
+    point = module._damped_guess(sloping.problem, scanned, exaggerated, scanned.terms, sloping.nominal)
+    guessed = module._damped_guess(sloping.problem, scanned, gain, scanned.terms, sloping.nominal)
     assert point.effects[0].angle < 2.0 * guessed.effects[0].angle
     assert cost_at(sloping, point) < sloping.nominal.cost
 
 
 def test_a_search_goes_on_behind_its_last_step(
-    sloping: Sloping, standing: Standing, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    sloping: Sloping, scanned: ScannedModel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    chosen = replace(standing, fitted=sloping.chosen)
+    chosen = replace(scanned, fitted=sloping.chosen)
     done: list[str] = []
     stop = [True]
 
-    def begin(problem: object, progress: object) -> tuple[object, Standing]:
+    def refit_and_scan(problem: object, progress: object) -> tuple[object, ScannedModel]:
         done.append("nominal")
-        return sloping.nominal, standing
+        return sloping.nominal, scanned
 
-    def added(problem: object, last: Standing, *rest: object) -> tuple[Standing, tuple[Rival, ...]] | None:
+    def added(problem: object, last: ScannedModel, *rest: object) -> tuple[ScannedModel, tuple[Rival, ...]] | None:
         done.append(f"after {last.names}")
         if not last.names:
             return chosen, (Rival("slope", sloping.chosen, 9.0),)
@@ -80,14 +80,14 @@ def test_a_search_goes_on_behind_its_last_step(
             raise KeyboardInterrupt
         return None
 
-    monkeypatch.setattr(module, "begin", begin)
+    monkeypatch.setattr(module, "refit_and_scan", refit_and_scan)
     monkeypatch.setattr(module, "_added", added)
     monkeypatch.setattr(module, "_settled", lambda problem, last: last)
     with pytest.raises(KeyboardInterrupt):
-        search(sloping.problem, THRESHOLDS, keep=StepStore(tmp_path / "part", "key").step)
+        search(sloping.problem, THRESHOLDS, cache=StepStore(tmp_path / "part", "key").step)
     assert done == ["nominal", "after ()", "after ('slope',)"]
     stop[:] = [False]
-    found = search(sloping.problem, THRESHOLDS, keep=StepStore(tmp_path / "part", "key").step)
+    found = search(sloping.problem, THRESHOLDS, cache=StepStore(tmp_path / "part", "key").step)
     assert done[3:] == ["after ('slope',)"]
     assert found.chosen.names == ("slope",)
     assert found.steps[0][0].fitted.point.effects == sloping.chosen.point.effects
@@ -124,18 +124,18 @@ def test_a_swap_knows_its_place_after_an_effect_has_gone() -> None:
 def test_what_is_confused_with_a_named_effect_has_to_explain_more() -> None:
     """A patch of another form than the library's leaves something that looks like a soil that changes."""
 
-    def standing(cost: float, *effects: str) -> Any:
+    def scanned(cost: float, *effects: str) -> Any:
         point = SimpleNamespace(effects=tuple(parse_effect(text) for text in effects))
         terms = SimpleNamespace(overlap={"gyro_scale": 0.2, "soil_change": 0.2} if effects else {})
         return SimpleNamespace(fitted=SimpleNamespace(cost=cost, point=point), dispersion=1.0, terms=terms)
 
     names = ("soil_change", "gyro_scale", "payload")
     gates = Thresholds({name: Gate(40.0, 0.0) for name in names}, {}, 20, "x")
-    found = module.further_gates(gates, [standing(2000.0), standing(1000.0, "soil_patch=0.5")])
+    found = module.further_gates(gates, [scanned(2000.0), scanned(1000.0, "soil_patch=0.5")])
     assert found.of("soil_change").gain == pytest.approx(40.0 + 0.1 * 1000.0)
     assert found.of("gyro_scale").gain == pytest.approx(40.0 + 0.2 * 0.01 * 1000.0)
     assert found.of("payload").gain == pytest.approx(40.0 + 0.01 * 1000.0)
-    assert module.further_gates(gates, [standing(2000.0)]) == gates
+    assert module.further_gates(gates, [scanned(2000.0)]) == gates
 
 
 def test_a_shape_at_its_lower_bound_moves_inwards(sloping: Sloping) -> None:
@@ -172,7 +172,7 @@ def test_a_window_that_no_model_predicts_is_refused_in_a_sentence(
 
 
 def test_a_second_effect_keeps_the_overlap_it_had_before_it_was_named() -> None:
-    def standing(cost: float, overlap: dict[str, float], *effects: str) -> Any:
+    def scanned(cost: float, overlap: dict[str, float], *effects: str) -> Any:
         point = SimpleNamespace(effects=tuple(parse_effect(text) for text in effects))
         fitted = SimpleNamespace(cost=cost, point=point)
         return SimpleNamespace(fitted=fitted, dispersion=1.0, terms=SimpleNamespace(overlap=overlap))
@@ -180,9 +180,9 @@ def test_a_second_effect_keeps_the_overlap_it_had_before_it_was_named() -> None:
     names = ("command_deadband", "accelerometer_bias", "of_ones_own")
     gates = Thresholds({name: Gate(10.0, 0.0) for name in names[:2]}, {}, 20, "x")
     found = [
-        standing(20000.0, {}),
-        standing(1000.0, {"accelerometer_bias": 0.05, "of_ones_own": 0.1}, "command_deadband=0.1"),
-        standing(0.0, {"of_ones_own": 0.2}, "command_deadband=0.1", "accelerometer_bias=0.2"),
+        scanned(20000.0, {}),
+        scanned(1000.0, {"accelerometer_bias": 0.05, "of_ones_own": 0.1}, "command_deadband=0.1"),
+        scanned(0.0, {"of_ones_own": 0.2}, "command_deadband=0.1", "accelerometer_bias=0.2"),
     ]
     raised = module.further_gates(gates, found)
     assert raised.of("accelerometer_bias").gain == pytest.approx(10.0 + 0.05 * 0.01 * 20000.0)

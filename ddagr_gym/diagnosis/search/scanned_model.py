@@ -1,4 +1,4 @@
-"""Where a search stands: a fitted model with its scan, and refits with one further effect."""
+"""What a search holds: fitted models with their scans, refits with one further effect, and its result."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ddagr_gym.identification.problem import Problem
 
 
 @dataclass(frozen=True, eq=False)
-class Standing:
+class ScannedModel:
     """A model and what the scan at it says about every effect that it lacks.
 
     Attributes:
@@ -47,16 +47,39 @@ class Rival:
         name: of the effect.
         fitted: the refit.
         gain: fall of the cost against the model before, over the dispersion.
-        retold: whether it tells another rival in other words, and so cannot be told from it by its fit.
+        equivalent: whether it predicts the same as another rival with other parameters, so that no fit separates them.
     """
 
     name: str
     fitted: Fitted
     gain: float
-    retold: bool = False
+    equivalent: bool = False
 
 
-def stand(problem: Problem, fitted: Fitted, progress: Callable[[str], None] = lambda text: None) -> Standing:
+@dataclass(frozen=True, eq=False)
+class SearchResult:
+    """Result of a search.
+
+    Attributes:
+        models: from the nominal one to the chosen one.
+        steps: refits of every step, best first; of the steps that added an effect, in the order of ``models[1:]``.
+    """
+
+    models: tuple[ScannedModel, ...]
+    steps: tuple[tuple[Rival, ...], ...] = ()
+
+    @property
+    def nominal(self) -> ScannedModel:
+        """The refitted nominal model."""
+        return self.models[0]
+
+    @property
+    def chosen(self) -> ScannedModel:
+        """The last model."""
+        return self.models[-1]
+
+
+def scan_model(problem: Problem, fitted: Fitted, progress: Callable[[str], None] = lambda text: None) -> ScannedModel:
     """Scan the library at a fitted model."""
     progress("scanning the library")
     terms = scan(problem, fitted)
@@ -64,9 +87,9 @@ def stand(problem: Problem, fitted: Fitted, progress: Callable[[str], None] = la
     found = tuple(gains(terms, dispersion=dispersion))
     held_out = held_out_gains(terms, dispersion)
     misfit = channel_misfit(problem, fitted)
-    return Standing(fitted, terms, found, scores(terms, found), held_out, dispersion, misfit)
+    return ScannedModel(fitted, terms, found, scores(terms, found), held_out, dispersion, misfit)
 
 
-def rival_of(standing: Standing, name: str, fitted: Fitted) -> Rival:
+def rival_of(model: ScannedModel, name: str, fitted: Fitted) -> Rival:
     """A refit beside the model before it."""
-    return Rival(name, fitted, (standing.fitted.cost - fitted.cost) / standing.dispersion)
+    return Rival(name, fitted, (model.fitted.cost - fitted.cost) / model.dispersion)
