@@ -84,7 +84,7 @@ def run(arguments: Arguments) -> None:
     from ddagr_gym.diagnosis.null_bank.fitted_nominal import fitted_nominal
     from ddagr_gym.diagnosis.preprocessing.input_requirements import check_recordings
     from ddagr_gym.diagnosis.setting import Setting
-    from ddagr_gym.identification.noise import recording_noise
+    from ddagr_gym.identification.noise import noise_from_differences
     from ddagr_gym.identification.nuisances import NuisancePriors
     from ddagr_gym.presets import get_robot, get_soil
     from ddagr_gym.recordings.load import load_recording
@@ -103,7 +103,7 @@ def run(arguments: Arguments) -> None:
         pieces, longer = _pieces(recordings, arguments.piece, robot, setting)
     elif recordings:
         check_recordings(recordings, robot, setting)
-        template = template_of(recordings, recording_noise(recordings, robot.outer_radius))
+        template = template_of(recordings, noise_from_differences(recordings, robot.outer_radius))
         centre = fitted_nominal(robot, soil, recordings, setting)
     drives: list[Template | Recording | None] = [*pieces, *longer] or [template] * arguments.count
     bank = bank_hash(robot, soil, template, setting, len(drives), arguments.seed, centre, (*pieces, *longer))

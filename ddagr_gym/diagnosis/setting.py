@@ -10,7 +10,7 @@ import numpy as np
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.block_means import BLOCK, block_windows, located
 from ddagr_gym.identification.headings import without_poses
-from ddagr_gym.identification.noise import ChannelNoise, recording_noise
+from ddagr_gym.identification.noise import ChannelNoise, noise_from_differences
 from ddagr_gym.identification.nuisances import NuisancePriors, nuisances
 from ddagr_gym.identification.problem import Problem
 from ddagr_gym.identification.windows import cut_windows
@@ -103,7 +103,7 @@ def make_problem(
         half_track=robot.half_track,
         history=HISTORY,
     )
-    found = recording_noise(recordings, radius) if noise is None else noise
+    found = noise_from_differences(recordings, radius) if noise is None else noise
     blocked = block_windows(located(windows, recordings, radius), found, radius, setting.block)
     reckoned = without_poses(recordings)
     # where none has poses the first one begins along the world's x axis

@@ -25,7 +25,7 @@ from ddagr_gym.estimation import (
 from ddagr_gym.evaluation.filter_arms import drive_law_fit
 from ddagr_gym.evaluation.force_law_fits import LawFit, fit_law, true_forces, turn_states
 from ddagr_gym.evaluation.recording_filter import FilterSetUp, filter_recording, set_up_filter
-from ddagr_gym.identification.sample_noise import recording_noise
+from ddagr_gym.identification.recording_noise import recording_noise
 from ddagr_gym.parameters import Robot, Sensors, Soil
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.schema import Recording

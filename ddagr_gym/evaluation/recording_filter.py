@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ddagr_gym.errors import InputError
 from ddagr_gym.estimation import CHANNELS, STATE, FilterModel, FilterNoise, FilterRun, channel_statistics, run_filter
 from ddagr_gym.estimation.layout import COMMANDS
-from ddagr_gym.identification.sample_noise import RecordingNoise
+from ddagr_gym.identification.recording_noise import RecordingNoise
 from ddagr_gym.parameters import Robot
 from ddagr_gym.recordings.schema import Recording
 

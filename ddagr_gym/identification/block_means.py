@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.identification.noise import ChannelNoise, interpolated, on_lines
+from ddagr_gym.identification.noise import ChannelNoise
+from ddagr_gym.identification.signals import interpolated, on_lines
 from ddagr_gym.identification.timing_repair import POSE_CHANNELS
 from ddagr_gym.identification.windows import CHANNELS, STATE, WindowSet
 from ddagr_gym.recordings.schema import GAP_IN_PERIODS, Recording

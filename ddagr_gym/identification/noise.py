@@ -1,15 +1,19 @@
-"""Noise of each channel from the recordings alone: level, growth with speed, correlation, quantisation.
+"""Noise of a channel, and the two ways to learn it from recordings.
 
-Differences over one and two samples leave the motion out and keep the noise. For a first-order autoregressive noise
-with standard deviation s and correlation r, var(x[k+1] - x[k]) = 2 s^2 (1 - r) and
+:func:`noise_from_differences` measures the sensor's noise as it enters block means: level, growth with speed,
+correlation, quantisation. Differences over one and two samples leave the motion out and keep the noise. For a
+first-order autoregressive noise with standard deviation s and correlation r, var(x[k+1] - x[k]) = 2 s^2 (1 - r) and
 var(x[k+2] - x[k]) = 2 s^2 (1 - r^2), so that their ratio is 1 + r. Poses come seldom and are differenced three times
 (variance 20 s^2) instead. What slower components add to means over several samples is measured on differences of such
-means over three (variance 2 s^2).
+means over three (variance 2 s^2). A diagnosis weighs with it.
+
+:func:`noise_about_lines` measures what a rigid model on even ground cannot explain: the scatter about lines through
+pieces of steady driving, vibration included, never below a good instrument's. A replay on field data weighs with it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from operator import itemgetter
 from typing import Any
@@ -17,7 +21,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ddagr_gym.identification.signals import steady_rows, travel_speed
 from ddagr_gym.identification.windows import CHANNELS
+from ddagr_gym.recordings.checks.noise import noise_at_rest
+from ddagr_gym.recordings.checks.signals import filled
 from ddagr_gym.recordings.schema import Recording
 
 Array = NDArray[np.float64]
@@ -30,12 +37,6 @@ _CENTRAL = 0.8
 
 _COARSE = 1.5
 """Quanta by which successive samples of a channel differ at most (rms) if its rounding is what limits it (ours)."""
-
-_STEADY = 0.8
-"""Time without a change of command after which a robot's motion counts as steady [s]: four time constants."""
-
-_STEADY_CHANGE = 0.02
-"""Change of a bank's command that still counts as none [rad/s] (ours)."""
 
 _NO_COUNTER = 1.7
 """Standard deviation of means of ten over that of a differenced counter above which a channel is none: with rounding
@@ -57,6 +58,24 @@ _FEWEST = 40
 """Differences that a level needs (ours)."""
 
 
+PIECE = 1.0
+"""Length of the pieces in which steady driving is judged [s]: five time constants of a bank."""
+
+STEADY_SHARE = 0.1
+"""Change of both bank speeds inside a piece over the larger one below which driving counts as steady (ours)."""
+
+LEAST_PIECES = 5
+"""Pieces below which their scatter is not taken (ours)."""
+
+INSTRUMENT_NOISE = {
+    "specific_force_x": 0.02, "specific_force_y": 0.02, "yaw_rate": 1e-3, "encoder_right": 0.01, "encoder_left": 0.01,
+    "pose_x": 0.01, "pose_y": 0.01, "pose_yaw": 0.005,
+}  # fmt: skip
+"""Least standard deviations [SI], from good instruments' data sheets: an ideal recording must not get infinite weight.
+
+MPU 6050 accelerometer and gyro, encoder quantisation at 0.2 m/s, RTK GNSS compass (thesis section 6.2)."""
+
+
 @dataclass(frozen=True)
 class ChannelNoise:
     """Noise of one channel.
@@ -71,9 +90,9 @@ class ChannelNoise:
     """
 
     sigma: float
-    per_speed: float
-    correlation: float
-    quantum: float
+    per_speed: float = 0.0
+    correlation: float = 0.0
+    quantum: float = 0.0
     inflation: float = 1.0
     counter: bool = False
 
@@ -117,7 +136,9 @@ def _pairs(values: list[Array], speeds: list[Array], lag: int) -> tuple[Array, A
     return both[0][known], both[1][known]
 
 
-def channel_noise(values: Sequence[Array], speeds: Sequence[Array], sparse: bool) -> ChannelNoise | None:
+def channel_noise_from_differences(
+    values: Sequence[Array], speeds: Sequence[Array], sparse: bool
+) -> ChannelNoise | None:
     """Noise of one channel from pieces without gaps.
 
     Args:
@@ -216,34 +237,7 @@ def _line(rows: list[tuple[float, float]], fallback: float) -> tuple[float, floa
     return (float(rest), float(found[1])) if found.any() else (fallback, 0.0)
 
 
-def travel_speed(recording: Recording, wheel_radius: float) -> Array:
-    """Rim speed (n,) averaged over the banks [m/s], from the encoders or else the commands; 0 where unknown.
-
-    Encoders that come more seldom than the rows are taken along lines between their samples.
-    """
-    names = ("encoder_right", "encoder_left")
-    has_encoders = recording.has(*names)
-    banks = [interpolated(recording, name) for name in names] if has_encoders else recording.held_commands()
-    return np.nan_to_num(wheel_radius * 0.5 * (np.abs(banks[0]) + np.abs(banks[1])))
-
-
-def on_lines(t: Array, values: Array) -> Array:
-    """Values (n,) at times (n,) with the missing ones on lines between the others; 0 where all are missing."""
-    known = np.isfinite(values)
-    if known.all():
-        return values
-    return np.interp(t, t[known], values[known]) if known.any() else np.zeros(len(values))
-
-
-def interpolated(recording: Recording, name: str) -> Array:
-    """Channel (n,) with its missing samples on lines between the others of their span; 0 where a span has none."""
-    values = np.zeros(len(recording))
-    for span in recording.spans():
-        values[span] = on_lines(recording.t[span], recording[name][span])
-    return values
-
-
-def recording_noise(recordings: Sequence[Recording], wheel_radius: float) -> tuple[ChannelNoise | None, ...]:
+def noise_from_differences(recordings: Sequence[Recording], wheel_radius: float) -> tuple[ChannelNoise | None, ...]:
     """Noise of the eight channels of :data:`ddagr_gym.identification.windows.CHANNELS`; None for an absent one.
 
     Args:
@@ -264,22 +258,8 @@ def recording_noise(recordings: Sequence[Recording], wheel_radius: float) -> tup
             pieces = [_unwrapped(piece) for piece in pieces]
         if not sparse:
             pieces = _where_steady(pieces, steady)
-        found.append(channel_noise(pieces, speeds, sparse))
+        found.append(channel_noise_from_differences(pieces, speeds, sparse))
     return tuple(found)
-
-
-def steady_rows(recording: Recording) -> NDArray[np.bool_]:
-    """(n,) rows at which the commands have not changed for a while, so that what changes in a reading is noise."""
-    from scipy.ndimage import maximum_filter1d, minimum_filter1d
-
-    size = max(round(_STEADY / recording.period), 1)
-    steady = np.ones(len(recording), dtype=bool)
-    for command in recording.held_commands():
-        known = np.nan_to_num(command)
-        highest = maximum_filter1d(known, size, origin=(size - 1) // 2)
-        lowest = minimum_filter1d(known, size, origin=(size - 1) // 2)
-        steady &= highest - lowest < _STEADY_CHANGE
-    return steady
 
 
 def _where_steady(pieces: list[Array], steady: list[NDArray[np.bool_]]) -> list[Array]:
@@ -294,3 +274,53 @@ def _unwrapped(values: Array) -> Array:
     result = values.copy()
     result[known] = np.unwrap(values[known])
     return result
+
+
+def _steady_pieces(recording: Recording) -> Iterator[slice]:
+    speeds = np.stack([filled(recording, "encoder_right"), filled(recording, "encoder_left")], axis=1)
+    length = max(round(PIECE / recording.period), 4)
+    for segment in recording.segments():
+        for start in range(segment.start, segment.stop - length + 1, length):
+            piece = speeds[start : start + length]
+            if not np.isfinite(piece).all():
+                continue
+            mean = np.abs(piece).mean(axis=0)
+            if mean.max() > 0.0 and (np.ptp(piece, axis=0) <= STEADY_SHARE * mean.max()).all():
+                yield slice(start, start + length)
+
+
+def noise_about_lines(recording: Recording) -> dict[str, ChannelNoise]:
+    """Noise by name of CHANNELS, but of the poses: the larger one of at rest and of steady driving, with vibration.
+
+    Args:
+        recording: as recorded; a channel that neither rest nor steady driving shows has its instrument's noise.
+    """
+    steady = list(_steady_pieces(recording))
+    return {name: _channel_about_lines(recording, name, steady) for name in CHANNELS if not name.startswith("pose")}
+
+
+def _channel_about_lines(recording: Recording, name: str, steady: list[slice]) -> ChannelNoise:
+    at_rest = noise_at_rest(recording, name)
+    moving, correlation = _about_lines(recording, name, steady)
+    if moving == 0.0 and at_rest is not None:
+        correlation = at_rest.correlation
+    rest = 0.0 if at_rest is None else at_rest.sigma
+    return ChannelNoise(max(rest, moving, INSTRUMENT_NOISE[name]), correlation=correlation)
+
+
+def _about_lines(recording: Recording, name: str, pieces: list[slice]) -> tuple[float, float]:
+    """Standard deviation and correlation of successive samples about the line through each piece; 0 for too few."""
+    power, product, freedom, pairs = 0.0, 0.0, 0, 0
+    for piece in pieces:
+        known = np.isfinite(recording[name][piece])
+        if known.sum() < 4:
+            continue
+        t, values = recording.t[piece][known], recording[name][piece][known]
+        rest = values - np.polyval(np.polyfit(t - t[0], values, 1), t - t[0])
+        power += float(rest @ rest)
+        product += float(rest[1:] @ rest[:-1])
+        freedom += rest.size - 2
+        pairs += 1
+    if pairs < LEAST_PIECES or power == 0.0:
+        return 0.0, 0.0
+    return float(np.sqrt(power / freedom)), product / power

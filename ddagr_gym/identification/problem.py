@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.identification.block_means import BlockedWindows
+from ddagr_gym.identification.fit_numerics import block_mean_numerics
 from ddagr_gym.identification.headings import headings_matter, turned_starts
 from ddagr_gym.identification.nuisances import SHIFT_AS_EFFECT, NuisancePriors, Nuisances
 from ddagr_gym.identification.window_fit import STATE_PRIOR
@@ -31,15 +32,6 @@ _BIAS_CHANNEL = {
     layout.GYRO_BIAS: CHANNELS.index("yaw_rate"),
 }
 """Entries that add to one channel, whose derivative needs no simulation."""
-
-
-def fit_numerics() -> Numerics:
-    """Smooth predictions at steps of 20 ms, divided where the integrator's own error estimate asks for it.
-
-    Accelerations of starts, arcs, stops and spins are within 0.5 mm/s^2 (r.m.s.) of converged ones. Dividing at
-    launches instead (``Numerics.smooth()``) costs up to 1.5 times as much and errs by 2.3 mm/s^2.
-    """
-    return replace(Numerics.smooth(), maximum_step=0.02, accepted_error=1e-4, launch_change=1e9, contact_nodes=5)
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +103,7 @@ class Problem:
         self.blocked = blocked
         self.nuisances = nuisances
         self.priors = NuisancePriors() if priors is None else priors
-        self._setting = (robot, soil, threads, fit_numerics() if numerics is None else numerics)
+        self._setting = (robot, soil, threads, block_mean_numerics() if numerics is None else numerics)
         windows = blocked.windows
         self.model = self.model_of(windows)
         self.prior = np.array([p.prior for p in nuisances.parameters])

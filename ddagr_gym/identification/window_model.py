@@ -40,15 +40,6 @@ def ideal_sensors(period: float) -> Sensors:
     return Sensors(imu, WheelEncoder(counts_per_revolution=0.0), PoseReceiver(1.0 / period, 0.0, 0.0))
 
 
-def fit_numerics() -> Numerics:
-    """For refits on field data: smooth, with steps of up to 25 ms.
-
-    Yaw rates are within 2e-3 rad/s (r.m.s.) of converged ones on drives of several m/s, a hundredth of what such
-    drives leave unexplained, at a quarter of the cost of ``Numerics.smooth()``.
-    """
-    return replace(Numerics.smooth(), maximum_step=0.025, jacobian_refresh=0.05, launch_change=0.1)
-
-
 class WindowModel:
     """Predicts all windows of a set at once.
 

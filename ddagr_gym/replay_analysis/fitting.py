@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ddagr_gym.identification.fit_numerics import field_numerics
 from ddagr_gym.identification.parameters import (
     KIND_STIFFNESS_DEVIATION,
     ModelParameter,
@@ -17,9 +18,9 @@ from ddagr_gym.identification.parameters import (
     soil_parameters,
     wheel_speed_shift,
 )
-from ddagr_gym.identification.sample_noise import RecordingNoise
+from ddagr_gym.identification.recording_noise import RecordingNoise
 from ddagr_gym.identification.window_fit import Refit, Refitter
-from ddagr_gym.identification.window_model import WindowModel, fit_numerics
+from ddagr_gym.identification.window_model import WindowModel
 from ddagr_gym.identification.windows import CHANNELS, WindowSet
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.physics.effects import Effect
@@ -181,7 +182,7 @@ def fit_arm(
         threads: of the simulator.
         progress: called after each of at most PASSES * ITERATIONS iterations.
     """
-    model = WindowModel(robot, soil, windows, parameters, imposed=imposed, numerics=fit_numerics(), threads=threads)
+    model = WindowModel(robot, soil, windows, parameters, imposed=imposed, numerics=field_numerics(), threads=threads)
     given = start or {}
     low, high = ([getattr(p, bound) for p in parameters] for bound in ("low", "high"))
     values = np.clip([given.get(p.name, 0.0) for p in parameters], low, high)

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ddagr_gym.identification.fit_numerics import field_numerics
 from ddagr_gym.identification.window_fit import Refitter
-from ddagr_gym.identification.window_model import WindowModel, fit_numerics
+from ddagr_gym.identification.window_model import WindowModel
 from ddagr_gym.identification.windows import CHANNELS, WindowSet
 from ddagr_gym.parameters import Numerics, Robot, Soil
 from ddagr_gym.physics.effects import Effect
@@ -80,7 +81,7 @@ class SimulatorOfArm:
 
     def with_free_states(self, windows: WindowSet, sigma: Array, entries: Sequence[int]) -> tuple[Array, Array]:
         """Channels (W, T, 8) from fitted initial states, and row entries (W, T, K); sigma (W, 1, 8)."""
-        model = self.model(windows, fit_numerics())
+        model = self.model(windows, field_numerics())
         states, _ = Refitter(model, sigma, self._effects, robust=ROBUST).fit_states(self.values)
         return model.predict_recorded(self.values, states, entries, self._effects)
 

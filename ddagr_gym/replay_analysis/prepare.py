@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.data_split import Split, evenly, split_recording
-from ddagr_gym.identification.sample_noise import RecordingNoise, dead_channels, recording_noise
+from ddagr_gym.identification.recording_noise import RecordingNoise, dead_channels, recording_noise
 from ddagr_gym.identification.timing_repair import aligned_poses, bridged
 from ddagr_gym.identification.windows import WindowSet, cut_runs, cut_windows
 from ddagr_gym.parameters import Robot

@@ -10,7 +10,7 @@ import pytest
 from ddagr_gym.errors import InputError
 from ddagr_gym.estimation import FilterModel, run_filter
 from ddagr_gym.evaluation.recording_filter import FilterSetUp, filter_recording, set_up_filter
-from ddagr_gym.identification.sample_noise import recording_noise
+from ddagr_gym.identification.recording_noise import recording_noise
 from ddagr_gym.parameters import Imu, Sensors
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.schema import Recording

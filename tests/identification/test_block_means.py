@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from ddagr_gym.identification.block_means import TRACKING_ERROR, block_windows, located
-from ddagr_gym.identification.noise import ChannelNoise, recording_noise, travel_speed
+from ddagr_gym.identification.noise import ChannelNoise, noise_from_differences
+from ddagr_gym.identification.signals import travel_speed
 from ddagr_gym.identification.windows import CHANNELS, WindowSet, cut_windows
 from ddagr_gym.recordings.schema import Recording
 
@@ -103,7 +104,7 @@ def test_a_heading_logged_as_zeros_is_left_out() -> None:
         read[name] = np.where(ROWS % 10 == 0, rng.standard_normal(COUNT) * (name != "pose_yaw"), np.nan)
     recording = Recording.from_columns(read)
     windows = cut(recording)
-    blocked = block_windows(windows, recording_noise([recording], RADIUS), RADIUS)
+    blocked = block_windows(windows, noise_from_differences([recording], RADIUS), RADIUS)
     present = np.isfinite(blocked.sigma).any(axis=(0, 1))
     assert [CHANNELS[k] for k in np.flatnonzero(~present)] == ["pose_yaw"]
     assert np.isfinite(blocked.residual(np.zeros(windows.measured.shape))).all()

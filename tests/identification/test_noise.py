@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from ddagr_gym.identification.noise import ChannelNoise, channel_noise, interpolated
+from ddagr_gym.identification.noise import ChannelNoise
+from ddagr_gym.identification.noise import channel_noise_from_differences as channel_noise
+from ddagr_gym.identification.signals import interpolated
 from ddagr_gym.recordings.schema import Recording
 
 

@@ -3,9 +3,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from ddagr_gym.identification.fit_numerics import field_numerics
 from ddagr_gym.identification.parameters import robot_parameters, soil_parameters
 from ddagr_gym.identification.window_fit import Refitter, _bounded_step, project, weighted, with_prior
-from ddagr_gym.identification.window_model import WindowModel, fit_numerics
+from ddagr_gym.identification.window_model import WindowModel
 from ddagr_gym.identification.windows import CHANNELS, cut_windows
 from ddagr_gym.parameters import Imu, PoseReceiver, Sensors
 from ddagr_gym.recordings.schema import RobotGeometry
@@ -26,7 +27,7 @@ def model(make_drive, robot, soil):
     chosen = [
         p for p in (*soil_parameters(soil), *robot_parameters(robot)) if p.name in ("soil_strength", "motor_rate")
     ]
-    return WindowModel(robot, soil, windows.subset(np.arange(1, 17, 2)), chosen, numerics=fit_numerics())
+    return WindowModel(robot, soil, windows.subset(np.arange(1, 17, 2)), chosen, numerics=field_numerics())
 
 
 def test_projection_removes_what_the_states_explain():

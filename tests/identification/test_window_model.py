@@ -7,8 +7,9 @@ import pytest
 
 from ddagr_gym.control.manoeuvres import MANOEUVRES
 from ddagr_gym.diagnosis.certification.forecast import part_of
+from ddagr_gym.identification.fit_numerics import field_numerics
 from ddagr_gym.identification.parameters import command_shift, sensor_parameters, soil_parameters
-from ddagr_gym.identification.window_model import WindowModel, fit_numerics, ideal_sensors
+from ddagr_gym.identification.window_model import WindowModel, ideal_sensors
 from ddagr_gym.identification.windows import CHANNELS, STATE, cut_windows
 from ddagr_gym.parameters import Numerics
 from ddagr_gym.physics import layout
@@ -51,8 +52,8 @@ def test_from_true_states_the_model_repeats_the_drive(robot, soil, windows):
         np.testing.assert_allclose(prediction[..., k], windows.measured[..., k], atol=tolerance)
 
 
-def test_fit_numerics_are_as_close_as_they_say(robot, soil, windows):
-    prediction = WindowModel(robot, soil, windows, numerics=fit_numerics()).predict(np.zeros(0), windows.initial)
+def test_field_numerics_are_as_close_as_they_say(robot, soil, windows):
+    prediction = WindowModel(robot, soil, windows, numerics=field_numerics()).predict(np.zeros(0), windows.initial)
     k = CHANNELS.index("yaw_rate")
     assert np.sqrt(np.mean((prediction[..., k] - windows.measured[..., k]) ** 2)) < 2e-3
 

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ddagr_gym.identification.sample_noise import ChannelNoise, RecordingNoise
+from ddagr_gym.identification.noise import ChannelNoise
+from ddagr_gym.identification.recording_noise import RecordingNoise
 from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.replay_analysis.fitting import (
@@ -23,7 +24,7 @@ GYRO = CHANNELS.index("yaw_rate")
 
 
 def noise(sigma=0.1, correlation=0.0, bias=None):
-    return RecordingNoise({c: ChannelNoise(None, sigma, correlation, sigma) for c in CHANNELS}, 0.0, 0.0, bias)
+    return RecordingNoise({c: ChannelNoise(sigma, correlation=correlation) for c in CHANNELS}, 0.0, 0.0, bias)
 
 
 def test_correlated_samples_count_for_less(make_windows):

@@ -17,7 +17,7 @@ from ddagr_gym.errors import InputError
 from ddagr_gym.frames import wrap_angle
 from ddagr_gym.identification.block_means import block_windows, located
 from ddagr_gym.identification.data_split import evenly
-from ddagr_gym.identification.noise import recording_noise
+from ddagr_gym.identification.noise import noise_from_differences
 from ddagr_gym.identification.problem import Elimination, Point, Problem
 from ddagr_gym.identification.windows import CHANNELS, STATE, WindowSet, cut_windows
 from ddagr_gym.parameters import Robot
@@ -114,7 +114,7 @@ def cut_forecasts(
         return None
     whole = located(whole.subset(evenly(whole.count, most)), recordings, shape.wheel_radius)
     samples = round(PAST / whole.period)
-    noise = recording_noise(recordings, shape.wheel_radius)
+    noise = noise_from_differences(recordings, shape.wheel_radius)
     past = block_windows(part_of(whole, 0, samples), noise, shape.wheel_radius)
     return Forecasts(problem.on(past), part_of(whole, samples, whole.samples - samples))
 

