@@ -13,7 +13,7 @@ import argparse
 import json
 from pathlib import Path
 
-from ddagr_gym.evaluation.force_law_fits import draw_soils, soil_set_costs
+from benchmarks.filter_study.force_law_costs import draw_soils, soil_set_costs
 from ddagr_gym.files import atomic_path
 from ddagr_gym.presets import get_robot
 

@@ -12,6 +12,7 @@ import os
 import re
 import sys
 from collections.abc import Sequence
+from types import ModuleType
 from typing import Any
 
 import tyro
@@ -24,18 +25,19 @@ _HELP = ("-h", "--help")
 _USER_ERRNO = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.ENAMETOOLONG, errno.ELOOP)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def main(arguments: Sequence[str] | None = None, package: ModuleType = commands) -> int:
     """Run one command line and return its exit code.
 
     Args:
         arguments: words after ``ddagr``; those of the process when None.
+        package: holds the commands, as :mod:`ddagr_gym.commands` describes.
 
     Returns:
         Exit code; bad input is reported on standard error in one sentence and gives 2. An exception that nobody
         foresaw is a bug and passes through with its traceback.
     """
     try:
-        code = _dispatch(list(sys.argv[1:] if arguments is None else arguments))
+        code = _dispatch(list(sys.argv[1:] if arguments is None else arguments), package)
         sys.stdout.flush()
         return code
     except InputError as error:
@@ -79,29 +81,29 @@ def _file_sentence(error: OSError) -> str:
     raise error
 
 
-def _dispatch(words: list[str]) -> int:
+def _dispatch(words: list[str], package: ModuleType) -> int:
     if not words or words[0] in _HELP:
-        print(_overview())
+        print(_overview(package))
         return 0
     if words[0] == "--version":
         print(f"ddagr-gym {__version__}")
         return 0
     if words[0].startswith("-"):
         raise InputError(f"unknown option {words[0]!r} before a command: see ddagr --help.")
-    command = commands.load(words[0])
+    command = commands.load(words[0], package)
     arguments = _parse(command, words[1:])
     return 0 if arguments is None else command.run(arguments) or 0
 
 
-def _overview() -> str:
-    loaded = [commands.load(name) for name in commands.NAMES]
+def _overview(package: ModuleType) -> str:
+    loaded = [commands.load(name, package) for name in package.NAMES]
     width = max(len(command.name) for command in loaded)
     lines = [f"  {command.name:<{width}}  {command.summary}" for command in loaded]
     return "\n".join(
         [
-            "usage: ddagr COMMAND [OPTIONS]",
+            f"usage: {package.USAGE}",
             "",
-            "Skid-steer field robots on soft soil: simulate, train, compare, diagnose.",
+            package.PURPOSE,
             "",
             "commands:",
             *lines,

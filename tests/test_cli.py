@@ -13,6 +13,7 @@ from types import ModuleType
 
 import pytest
 
+import tools
 from ddagr_gym import __version__, cli, commands
 from ddagr_gym.errors import InputError
 
@@ -111,7 +112,7 @@ def test_command_lines_of_the_readme_parse(line):
     assert program == "./ddagr"
     if not words or words[0].startswith("-"):
         pytest.skip("names no command")
-    command = commands.load(words[0])
+    command = commands.load(words[0], tools if words[0] in tools.NAMES else commands)
     if len(words) == 1 and f"`{line}`" in README:
         pytest.skip("a sentence names the command without its arguments")
     given = ["path" if re.fullmatch(r"[A-Z]{2,}(\.\.\.)?", word) else word for word in words[1:]]
@@ -120,6 +121,11 @@ def test_command_lines_of_the_readme_parse(line):
 
 def test_unknown_command_names_the_closest(capsys):
     assert "'soils'" in refused(capsys, "soil")
+
+
+@pytest.mark.parametrize("name", commands.CHECKOUT_TOOLS)
+def test_a_tool_of_the_checkout_is_no_command(name, capsys):
+    assert f"run ./ddagr {name} in the checkout" in refused(capsys, name)
 
 
 def test_option_before_the_command(capsys):
@@ -148,13 +154,14 @@ def test_bad_options_are_one_sentence_with_the_value(fake_command, capsys, words
 @pytest.mark.parametrize("encoding", ["utf-8", "ascii"])
 def test_bad_options_read_the_same_in_every_encoding(encoding):
     done = subprocess.run(
-        [sys.executable, "-m", "ddagr_gym", "test", "--worker", "3"],
+        [sys.executable, "-m", "ddagr_gym", "evaluate", "--worker", "3"],
         capture_output=True,
         text=True,
         env={**os.environ, "PYTHONIOENCODING": encoding},
     )
     assert done.returncode == 2
-    assert done.stderr == "ddagr: Unrecognized options: --worker, 3: did you mean --workers; see ddagr test --help.\n"
+    complaint = "Unrecognized options: --worker, 3: did you mean --workers"
+    assert done.stderr == f"ddagr: {complaint}; see ddagr evaluate --help.\n"
 
 
 def test_negative_numbers_are_values_not_options(fake_command):

@@ -23,6 +23,7 @@ def loaded_after(statement: str) -> set[str]:
         "import ddagr_gym",
         "import ddagr_gym.cli",
         "from ddagr_gym import commands; [commands.load(name) for name in commands.NAMES]",
+        "import tools; from ddagr_gym import commands; [commands.load(name, tools) for name in tools.NAMES]",
     ],
 )
 def test_heavy_libraries_stay_out(statement):

@@ -71,7 +71,7 @@ def test_extra_all_is_all(project):
 
 def test_table_of_extras_is_that_of_the_project(project):
     expected = {}
-    for extra, items in extras_without(project, "all", "dev").items():
+    for extra, items in extras_without(project, "all", "dev", "docs").items():
         for item in items:
             name = Requirement(item).name
             expected[MODULE_OF.get(name, name)] = extra
@@ -95,7 +95,7 @@ def test_what_long_work_needs_at_its_end_is_asked_for_before(monkeypatch: pytest
 
 def test_script_asks_for_extras_that_exist(project, repository):
     script = (repository / "ddagr").read_text()
-    body = script[script.index("extras_of() {") : script.index("checkout_of() {")]
+    body = script[script.index("extras_of() {") : script.index("program_of() {")]
     asked = dict(re.findall(r"^ +([\w| ]+)\) echo \"([\w ]+)\"", body, re.MULTILINE))
     assert "test" in asked
     assert {word for words in asked.values() for word in words.split()} <= set(extras_without(project, "all"))

@@ -65,6 +65,9 @@ class Checkout:
         self.root.mkdir()
         shutil.copy(repository / "ddagr", self.root)
         (self.root / "pyproject.toml").write_text("# project\n")
+        tools = self.root / "tools"
+        tools.mkdir()
+        (tools / "__main__.py").write_text("import sys\nprint('tool', sys.argv[1:])\n")
         (self.root / "constraints.txt").write_text("# constraints\n")
         self.bin = folder / "bin"
         self.bin.mkdir()
@@ -131,6 +134,11 @@ def test_second_start_is_fast_and_calls_no_pip(checkout):
 
 def test_threads_are_the_users_when_set(checkout):
     assert checkout.run(OMP_NUM_THREADS="3").stdout.endswith(" 3\n")
+
+
+def test_tools_come_from_the_checkout_whatever_the_path_says(checkout):
+    done = checkout.run("test", "--only", "types", PYTHONPATH="/nowhere")
+    assert (done.returncode, done.stdout) == (0, "tool ['test', '--only', 'types']\n"), done.stderr
 
 
 def test_extras_follow_the_command_and_add_up(checkout):

@@ -9,7 +9,7 @@ import numpy as np
 from benchmarks.speeds.kernel_time import Kernel
 from benchmarks.speeds.timing import Contestant, race
 from benchmarks.speeds.workloads import EPISODES
-from ddagr_gym.envs.constants import CONTROL_INTERVAL
+from ddagr_gym.control.timing import CONTROL_INTERVAL
 from ddagr_gym.parameters import Numerics
 from ddagr_gym.physics import equilibrium_sinkage, layout, wheel_force
 from ddagr_gym.presets import get_robot, get_soil, soil_names

@@ -6,7 +6,7 @@ import gymnasium
 import numpy as np
 
 from benchmarks.speeds.timing import Contestant
-from ddagr_gym.envs.constants import CONTROL_INTERVAL
+from ddagr_gym.control.timing import CONTROL_INTERVAL
 from ddagr_gym.parameters import Sensors
 
 ENVIRONMENT = "ddagr_gym:DDAGR-Turn-v0"

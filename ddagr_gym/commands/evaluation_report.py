@@ -127,14 +127,13 @@ def _arms(rows: Sequence[Mapping[str, Any]], summary: Mapping[str, Any]) -> list
 
 def _sets(rows: Sequence[Mapping[str, Any]]) -> list[SetNote]:
     from ddagr_gym.evaluation.report_data import SetNote
-    from ddagr_gym.evaluation.scenario_sets import PLANS
-    from ddagr_gym.evaluation.scenarios import load_scenarios, set_hash
+    from ddagr_gym.evaluation.scenarios import load_scenarios, set_description, set_hash
 
     driven: dict[str, set[int]] = {}
     for row in rows:
         driven.setdefault(row["set"], set()).add(row["number"])
     return [
-        SetNote(name, PLANS[name].description, len(load_scenarios(name)), len(numbers), set_hash(name))
+        SetNote(name, set_description(name), len(load_scenarios(name)), len(numbers), set_hash(name))
         for name, numbers in driven.items()
     ]
 

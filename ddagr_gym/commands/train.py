@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import importlib
-import sys
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Literal
 
@@ -62,11 +62,11 @@ def _agents(module: str) -> Any:
     """A module of the checkout's folder agents.
 
     Raises:
-        InputError: the package was installed without its checkout.
+        InputError: it is not on the path: only ``./ddagr`` and an editable install put the checkout there.
     """
-    root = Path(__file__).resolve().parents[2]
-    if not (root / "pyproject.toml").is_file() or not (root / "agents" / "main.py").is_file():
+    # Other packages own the name `agents` too: only the folder beside this package holds the training.
+    folder = Path(__file__).resolve().parents[2] / "agents"
+    found = find_spec("agents")
+    if found is None or found.origin is None or Path(found.origin).resolve().parent != folder:
         raise InputError("training needs the folder agents/ of the source: clone the repository and run ./ddagr train.")
-    if str(root) not in sys.path:
-        sys.path.insert(0, str(root))
     return importlib.import_module(f"agents.{module}")

@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from ddagr_gym.control.observation import EKF_FEATURES, FEATURE_SCALES, OBSERVATION, TurnObservation, decode
 from ddagr_gym.control.pid import Pid, PidGains
 from ddagr_gym.control.row_turn import Phase
-from ddagr_gym.control.turn_controller import CONTROL_PERIOD, TurnController
+from ddagr_gym.control.timing import CONTROL_PERIOD
+from ddagr_gym.control.turn_controller import TurnController
 from ddagr_gym.errors import InputError
 from ddagr_gym.parameters import Robot
 

@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from ddagr_gym.control.observation import TurnObservation, decode
 from ddagr_gym.control.pid import Pid, PidGains
 from ddagr_gym.control.row_turn import Phase, RowTurn
-from ddagr_gym.control.turn_controller import CONTROL_PERIOD, TurnController, commanded_turn
+from ddagr_gym.control.timing import CONTROL_PERIOD
+from ddagr_gym.control.turn_controller import TurnController, commanded_turn
 from ddagr_gym.errors import InputError
 from ddagr_gym.parameters import Robot
 

@@ -12,9 +12,6 @@ from ddagr_gym.control.observation import TurnObservation, decode
 from ddagr_gym.control.row_turn import SIDES, Phase, RowTurn
 from ddagr_gym.parameters import Robot
 
-CONTROL_PERIOD = 0.08
-"""Time between actions [s]: ten sensor samples at 125 Hz."""
-
 
 def commanded_turn(seen: TurnObservation) -> RowTurn:
     """The manoeuvre that an episode's first observation commands; the run-out is not observed."""

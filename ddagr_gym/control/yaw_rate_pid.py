@@ -7,7 +7,8 @@ from typing import Any
 from ddagr_gym.control.observation import TurnObservation
 from ddagr_gym.control.pid import Pid, PidGains
 from ddagr_gym.control.row_turn import Phase
-from ddagr_gym.control.turn_controller import CONTROL_PERIOD, TurnController
+from ddagr_gym.control.timing import CONTROL_PERIOD
+from ddagr_gym.control.turn_controller import TurnController
 from ddagr_gym.parameters import Robot
 
 

@@ -1,7 +1,9 @@
 """Numbers of the environment that need no physics to be loaded."""
 
-CONTROL_INTERVAL = 10
-"""Sensor samples per environment step: 12.5 Hz control at 125 Hz sensors."""
+from ddagr_gym.control.timing import CONTROL_PERIOD
 
-EPISODE_STEPS = 312
-"""Environment steps in 25 s."""
+EPISODE_DURATION = 25.0
+"""Longest time that a row turn may take [s]."""
+
+EPISODE_STEPS = int(EPISODE_DURATION / CONTROL_PERIOD)
+"""Environment steps in that time."""

@@ -11,8 +11,8 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from ddagr_gym.control.observation import OBSERVATION
+from ddagr_gym.control.timing import CONTROL_INTERVAL
 from ddagr_gym.envs import turn_kernel as kernel
-from ddagr_gym.envs.constants import CONTROL_INTERVAL
 from ddagr_gym.envs.ekf_features import FEATURE_COUNT, EkfFeatureBatch
 from ddagr_gym.envs.settings import Episode, TurnSettings
 from ddagr_gym.errors import InputError

@@ -29,11 +29,11 @@ from ddagr_gym.evaluation.controllers import (
 )
 from ddagr_gym.evaluation.estimator_metrics import estimator_errors
 from ddagr_gym.evaluation.metrics import turn_metrics
-from ddagr_gym.evaluation.other_ground import ground_effects
 from ddagr_gym.evaluation.runs import TurnRun, drive_turn, drive_turns
 from ddagr_gym.evaluation.scenarios import Scenario, load_scenarios, set_hash
 from ddagr_gym.files import atomic_path
 from ddagr_gym.parameters import Sensors
+from ddagr_gym.physics.soil_laws import ground_effects
 from ddagr_gym.presets import ddagr
 
 _CHUNK = 50

@@ -19,20 +19,20 @@ from ddagr_gym.control.predictive_model import PredictiveModel
 from ddagr_gym.control.radial_pid import RadialPid
 from ddagr_gym.control.rolling import RollingWithoutSlip
 from ddagr_gym.control.row_turn import RowTurn
+from ddagr_gym.control.timing import CONTROL_PERIOD
 from ddagr_gym.control.true_curvature import TrueCurvature
 from ddagr_gym.control.true_path import TruePath
 from ddagr_gym.control.true_soil import TrueSoil
-from ddagr_gym.control.turn_controller import CONTROL_PERIOD
 from ddagr_gym.control.yaw_rate_pid import YawRatePid
 from ddagr_gym.errors import InputError, unknown_name
 from ddagr_gym.estimation import FilterModel
 from ddagr_gym.estimation.force_balance import arc_bank_speeds
 from ddagr_gym.evaluation.arms import policy_arm, policy_version
 from ddagr_gym.evaluation.calibration import calibrate_constant_speeds
-from ddagr_gym.evaluation.other_ground import NOMINAL_LAW
 from ddagr_gym.evaluation.runs import BatchController, Controller
-from ddagr_gym.evaluation.true_ground import soil_of, steady_bank_speeds
 from ddagr_gym.parameters import Sensors, Validated, bounded
+from ddagr_gym.physics.soil_laws import NOMINAL_LAW
+from ddagr_gym.physics.steady_arc import soil_of, steady_bank_speeds
 from ddagr_gym.presets import ddagr, get_soil
 
 

@@ -22,8 +22,7 @@ from ddagr_gym.estimation import (
     estimates,
     run_thesis_filter,
 )
-from ddagr_gym.evaluation.filter_arms import drive_law_fit
-from ddagr_gym.evaluation.force_law_fits import LawFit, fit_law, true_forces, turn_states
+from ddagr_gym.evaluation.force_law_fits import LAUNCH, LawFit, drive_law_fit, fit_law, true_forces, turn_states
 from ddagr_gym.evaluation.recording_filter import FilterSetUp, filter_recording, set_up_filter
 from ddagr_gym.identification.recording_noise import recording_noise
 from ddagr_gym.parameters import Robot, Sensors, Soil
@@ -37,7 +36,6 @@ PARAMETERS = ("traction_limit", "traction_rate", "lateral_stiffness", "motion_re
 """a1 [N], a2 [-], b [N/rad], Rc [N]."""
 TRUTH = ("true_v_x", "true_v_y", "true_yaw_rate", "true_omega_right", "true_omega_left")
 _TRUTH_NEEDED = (*TRUTH, *(f"true_force_{axis}_{wheel}" for axis in "xy" for wheel in (1, 2, 3, 4)))
-_START = 1.6  # [s], from which errors are judged
 _TURNING = 0.02  # [rad/s], above which a radius is judged
 
 
@@ -257,7 +255,7 @@ def summary_of(estimated: EstimatedRun) -> dict[str, Any]:
 def _errors(estimated: EstimatedRun) -> dict[str, float | None]:
     """Root mean square errors from 1.6 s on, and the error of the mean radius while turning; empty without truth."""
     truth, run = estimated.truth, estimated.run
-    late = run.t - run.t[0] > _START
+    late = run.t - run.t[0] > LAUNCH
     found = {
         f"{name}_rmse": _number(np.sqrt(np.mean((run.states[late, k] - truth[name][late]) ** 2)))
         for k, name in enumerate(STATE[:3])

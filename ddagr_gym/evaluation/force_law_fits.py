@@ -1,12 +1,12 @@
-"""What the filter's force laws cost against the terramechanic wheel, and which parameters fit it.
+"""The parameters of the filter's force laws that fit true wheel forces best.
 
 Errors are relative to the largest force of the fitted set.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,23 +16,18 @@ from ddagr_gym.estimation.force_laws import ForceLaw, wheel_law
 from ddagr_gym.jit import kernel
 from ddagr_gym.parameters import STANDARD_GRAVITY, Robot, Soil
 from ddagr_gym.physics import equilibrium_sinkage, wheel_force
-from ddagr_gym.physics.soil_draws import draw_soil, get_distribution
-from ddagr_gym.presets import get_soil
 
 Array = NDArray[np.float64]
+Columns = Mapping[str, Array]
 
 REST_SPEED, REVERSAL_SPEED = 1e-3, 1e-2
 """Smoothing of the laws in a fit [m/s]."""
-LAWS: Mapping[str, tuple[ForceLaw, bool]] = {
-    "thesis": (ForceLaw.thesis, False),
-    "thesis_with_resistance": (ForceLaw.thesis, True),
-    "coupled": (ForceLaw.coupled, True),
-}
-"""Laws by name: form, and whether motion resistance is fitted."""
-STATE_SETS = ("grid", "turn")
-RATIOS = ("traction_limit_over_load", "traction_rate", "coupling", "resistance_over_limit")
+LAUNCH = 1.6
+"""Time after the start from which a drive is fitted and judged [s]: the launch is over."""
+_EVERY = 20
+"""Samples between fitted ones: 0.16 s, about the time in which wheel forces change."""
 _NONE = np.log(1e-9)
-_SPEED = 0.2  # [m/s]; forces depend on ratios of speeds only
+"""Log of a motion resistance that is left out [N]."""
 
 
 class LawFit(NamedTuple):
@@ -47,15 +42,6 @@ class LawFit(NamedTuple):
     logs: Array
     errors: Array
     peak: Array
-
-
-def grid_states(robot: Robot) -> Array:
-    """The thesis's 2,500 points: slip -1..1, slip angle -60..60 degrees. Columns v_x, v_y, omega, yaw rate."""
-    slips, angles = np.meshgrid(np.linspace(-0.98, 0.98, 50), np.linspace(-np.pi / 3, np.pi / 3, 50))
-    slip, angle = np.ravel(slips), np.ravel(angles)
-    rim = np.where(slip >= 0, _SPEED / (1 - np.maximum(slip, 0)), _SPEED * (1 + slip))
-    zero = np.zeros(slip.size)
-    return np.column_stack([zero + _SPEED, _SPEED * np.tan(angle), rim / robot.wheels[0].outer_radius, zero])
 
 
 def turn_states(robot: Robot, rng: np.random.Generator, count: int = 400) -> Array:
@@ -116,56 +102,21 @@ def fit_law(law: ForceLaw, states: Array, forces: Array, radius: float, *, resis
     return LawFit(logs(best.x), best.fun.reshape(-1, 2), peak)
 
 
-def summarise(fits: Sequence[LawFit], load: float) -> dict[str, Any]:
-    """Medians over soils of the relative errors, and the prior's ratios with their scatter."""
-    worst = np.array([np.abs(fit.errors).max(axis=0) / fit.peak for fit in fits])
-    rms = np.array([np.sqrt((fit.errors**2).mean(axis=0)) / fit.peak for fit in fits])
-    logs = np.array([fit.logs for fit in fits])
-    ratios = np.column_stack(
-        [logs[:, 0] - np.log(load), logs[:, 1], logs[:, 2] - logs[:, 0] - logs[:, 1], logs[:, 3] - logs[:, 0]]
-    )
-    return {
-        "peak_error_x": float(np.median(worst[:, 0])),
-        "peak_error_y": float(np.median(worst[:, 1])),
-        "rms_error_x": float(np.median(rms[:, 0])),
-        "rms_error_y": float(np.median(rms[:, 1])),
-        "prior": {
-            name: {"median": float(np.exp(np.median(r))), "log_deviation": float(r.std()) if len(r) > 1 else 0.0}
-            for name, r in zip(RATIOS, ratios.T, strict=True)
-        },
-    }
+def wheel_states(robot: Robot, columns: Columns, rows: NDArray[np.int64]) -> tuple[Array, Array]:
+    """True wheel states (4 N, 4) v_x, v_y, bank speed, yaw rate and forces (4 N, 2) of chosen samples."""
+    states, forces = [], []
+    turning = columns["true_yaw_rate"][rows]
+    for wheel in range(4):
+        bank = "right" if wheel % 2 == 0 else "left"
+        v_x = columns["true_v_x"][rows] - robot.wheel_y[wheel] * turning
+        v_y = columns["true_v_y"][rows] + robot.wheel_x[wheel] * turning
+        states.append(np.column_stack([v_x, v_y, columns[f"true_omega_{bank}"][rows], turning]))
+        forces.append(np.column_stack([columns[f"true_force_{axis}_{wheel + 1}"][rows] for axis in "xy"]))
+    return np.concatenate(states), np.concatenate(forces)
 
 
-def draw_soils(name: str, robot: Robot, count: int, seed: int) -> list[Soil]:
-    """``count`` soils of a distribution, or the one preset of that name."""
-    if name == "thesis_a1":
-        return [get_soil(name)]
-    rng = np.random.default_rng(seed)
-    return [draw_soil(get_distribution(name), rng, robot)[0] for _ in range(count)]
-
-
-def soil_set_costs(robot: Robot, soils: Sequence[Soil], seed: int) -> dict[str, dict[str, Any]]:
-    """What each law costs on the thesis's grid (chapter 3) and on wheel states of row turns: {states: {law: summary}}.
-
-    Args:
-        robot: for wheel, load and geometry.
-        soils: each is fitted by itself.
-        seed: of the wheel states of turns.
-    """
-    radius, load = robot.wheels[0].outer_radius, robot.mass * STANDARD_GRAVITY / 4
-    costs: dict[str, dict[str, Any]] = {}
-    for kind in STATE_SETS:
-        rng = np.random.default_rng(seed)
-        samples = [_samples(robot, soil, kind, rng) for soil in soils]
-        costs[kind] = {
-            name: summarise([fit_law(law, s, f, radius, resistance=rolls) for s, f in samples], load)
-            for name, (law, rolls) in LAWS.items()
-        }
-    return costs
-
-
-def _samples(robot: Robot, soil: Soil, kind: str, rng: np.random.Generator) -> tuple[Array, Array]:
-    states = grid_states(robot) if kind == "grid" else turn_states(robot, rng)
-    forces = true_forces(robot, soil, states)
-    carried = np.isfinite(forces).all(axis=1)
-    return states[carried], forces[carried]
+def drive_law_fit(robot: Robot, columns: Columns, law: ForceLaw, resistance: bool = True) -> LawFit:
+    """The force law's parameters that fit a drive's true wheel forces best, from samples 0.16 s apart."""
+    period = float(columns["t"][1] - columns["t"][0])
+    rows = np.arange(round(LAUNCH / period), len(columns["t"]), _EVERY)
+    return fit_law(law, *wheel_states(robot, columns, rows), robot.wheels[0].outer_radius, resistance=resistance)

@@ -25,9 +25,9 @@ from ddagr_gym.config import configs_dir
 from ddagr_gym.control.row_turn import RowTurn
 from ddagr_gym.envs.settings import Episode
 from ddagr_gym.errors import InputError, unknown_name
-from ddagr_gym.evaluation.other_ground import NOMINAL_LAW
 from ddagr_gym.files import atomic_path
 from ddagr_gym.parameters import Robot, Sensors, Soil
+from ddagr_gym.physics.soil_laws import NOMINAL_LAW
 from ddagr_gym.physics.terrain import SoilField
 from ddagr_gym.presets import get_robot
 
@@ -52,7 +52,7 @@ class Scenario:
         number: in the set, from 0.
         seed: of the sensor noise.
         episode: what is driven.
-        law: name of the soil's law, see :mod:`ddagr_gym.evaluation.other_ground`.
+        law: name of the soil's law, see :mod:`ddagr_gym.physics.soil_laws`.
     """
 
     set_name: str
@@ -196,6 +196,12 @@ def set_hash(name: str) -> str:
     """SHA-256 of a frozen set, checked against its content; InputError as :func:`load_scenarios`."""
     content = _read(name, scenario_folder() / f"{name}{SUFFIX}")
     return str(content["sha256"])
+
+
+def set_description(name: str) -> str:
+    """What a frozen set holds, in one line; InputError as :func:`load_scenarios`."""
+    content = _read(name, scenario_folder() / f"{name}{SUFFIX}")
+    return str(content["description"])
 
 
 def load_scenarios(name: str) -> list[Scenario]:

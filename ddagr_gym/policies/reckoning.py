@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.control.row_turn import project_left_turn
-from ddagr_gym.control.turn_controller import CONTROL_PERIOD
-from ddagr_gym.envs.constants import CONTROL_INTERVAL
+from ddagr_gym.control.timing import CONTROL_INTERVAL, CONTROL_PERIOD
 from ddagr_gym.estimation.sideslip import SideslipFilter
 from ddagr_gym.parameters import Sensors
 

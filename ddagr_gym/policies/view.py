@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.control.observation import FEATURE_SCALES, OBSERVATION, SCALES
-from ddagr_gym.control.turn_controller import CONTROL_PERIOD
+from ddagr_gym.control.timing import CONTROL_PERIOD
 from ddagr_gym.estimation import FilterModel
 from ddagr_gym.estimation.force_balance import arc_bank_speed_rows
 from ddagr_gym.parameters import Robot, Sensors

@@ -12,11 +12,11 @@ pytest.importorskip("jinja2", reason="needs the extra report")
 pytest.importorskip("pyarrow", reason="needs the extra io")
 
 from benchmarks import row_turns
+from benchmarks.scenario_sets import PLANS, draw_set
 from ddagr_gym.commands.evaluate import without_stars
 from ddagr_gym.evaluation import scenarios as scenario_module
 from ddagr_gym.evaluation.claims import HEADLINE, check_claims, load_claims
 from ddagr_gym.evaluation.controllers import controller_arm, controller_version, drives_on
-from ddagr_gym.evaluation.scenario_sets import PLANS, draw_set
 from ddagr_gym.evaluation.scenarios import save_scenarios, set_hash
 from ddagr_gym.evaluation.summary import BASELINES, summaries
 

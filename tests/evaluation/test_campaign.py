@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+from benchmarks.scenario_sets import PLANS, as_scenario, draw_set
 from ddagr_gym.errors import InputError
 from ddagr_gym.evaluation import campaign
 from ddagr_gym.evaluation import scenarios as scenario_module
@@ -26,10 +27,9 @@ from ddagr_gym.evaluation.controllers import (
     is_deployable,
     needs_filter,
 )
-from ddagr_gym.evaluation.other_ground import LAW
-from ddagr_gym.evaluation.scenario_sets import PLANS, as_scenario, draw_set
 from ddagr_gym.evaluation.scenarios import load_scenarios, save_scenarios, scenario_names
 from ddagr_gym.evaluation.summary import summaries
+from ddagr_gym.physics.soil_laws import LAW
 from ddagr_gym.policies.archive import Policy, save_policy
 from ddagr_gym.policies.design import PolicyDesign
 

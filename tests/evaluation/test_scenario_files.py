@@ -6,11 +6,11 @@ import json
 import numpy as np
 import pytest
 
+from benchmarks.scenario_sets import PLANS
 from ddagr_gym.errors import InputError
 from ddagr_gym.evaluation import scenarios as scenario_module
-from ddagr_gym.evaluation.other_ground import LAW, NOMINAL_LAW
-from ddagr_gym.evaluation.scenario_sets import PLANS
 from ddagr_gym.evaluation.scenarios import load_scenarios, scenario_folder, scenario_names, set_hash
+from ddagr_gym.physics.soil_laws import LAW, NOMINAL_LAW
 
 FROZEN = {
     "S0": "ad22ca6c05158da86a53f51f3a0dc9c72da30b66cec531b42c34fccb61f21aeb",

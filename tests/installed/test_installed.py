@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.metadata
+import importlib.util
 import subprocess
 import sys
 from pathlib import Path
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 
 import ddagr_gym
+from ddagr_gym.commands import CHECKOUT_TOOLS
 from ddagr_gym.config import configs_dir
 
 ENVIRONMENT = Path(sys.prefix).resolve()
@@ -98,8 +100,10 @@ def test_the_id_with_its_module_needs_no_import(make):
     assert done.returncode == 0, done.stderr.splitlines()[-1:]
 
 
-def test_test_needs_a_checkout():
-    done = run("test")
+@pytest.mark.parametrize("name", CHECKOUT_TOOLS)
+def test_tools_of_the_checkout_say_where_they_are(name):
+    done = run(name)
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
     assert "checkout" in done.stderr
+    assert importlib.util.find_spec("tools") is None

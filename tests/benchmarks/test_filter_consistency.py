@@ -5,10 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ddagr_gym.errors import InputError
-from ddagr_gym.estimation import CHANNELS
-from ddagr_gym.estimation.layout import PARAMETER
-from ddagr_gym.evaluation.filter_consistency import (
+from benchmarks.filter_study.consistency import (
     MOST_RESISTANCE,
     counted,
     instants,
@@ -18,6 +15,9 @@ from ddagr_gym.evaluation.filter_consistency import (
     nis_bands,
     row_turn_commands,
 )
+from ddagr_gym.errors import InputError
+from ddagr_gym.estimation import CHANNELS
+from ddagr_gym.estimation.layout import PARAMETER
 from ddagr_gym.parameters import Sensors, WheelEncoder
 from ddagr_gym.presets import get_robot
 
@@ -75,7 +75,7 @@ def test_commands_turn_to_their_side():
 
 
 def test_soils_on_which_nothing_moves_are_drawn_again():
-    from ddagr_gym.evaluation.filter_consistency import _moving_soil
+    from benchmarks.filter_study.consistency import _moving_soil
 
     model = matched_model(get_robot("ddagr"), Sensors(), "default_prior")
     rng = np.random.default_rng(2)

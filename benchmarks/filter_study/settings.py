@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
+from pathlib import Path
 
-from ddagr_gym.config import find_config, load_config
+from ddagr_gym.config import load_config
 from ddagr_gym.errors import InputError
 from ddagr_gym.physics.soil_draws import get_distribution
+
+SHIPPED_PLAN = Path(__file__).with_name("plan.yaml")
 
 
 @dataclass(frozen=True)
@@ -52,10 +54,6 @@ class FilterStudySettings:
         return hashlib.sha256(json.dumps(asdict(self), sort_keys=True).encode()).hexdigest()
 
 
-def load_filter_study(name: str | os.PathLike[str]) -> FilterStudySettings:
-    """Plan by name of a file of configs/evaluation, or from a YAML file of one's own.
-
-    Raises:
-        InputError: no such file, or content that does not fit.
-    """
-    return load_config(find_config("evaluation", name), FilterStudySettings)
+def load_filter_study(path: Path = SHIPPED_PLAN) -> FilterStudySettings:
+    """Plan from a YAML file; InputError where there is none or its content does not fit."""
+    return load_config(path, FilterStudySettings)

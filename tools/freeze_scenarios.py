@@ -1,4 +1,4 @@
-"""``ddagr freeze-scenarios``: draw the scenario sets once and write them with their hash."""
+"""``./ddagr freeze-scenarios``: draw the scenario sets once and write them with their hash."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Arguments:
 
 def run(arguments: Arguments) -> None:
     """Draw and write."""
-    from ddagr_gym.evaluation.scenario_sets import PLANS, draw_set
+    from benchmarks.scenario_sets import PLANS, draw_set
     from ddagr_gym.evaluation.scenarios import SUFFIX, save_scenarios
 
     for name in arguments.sets:

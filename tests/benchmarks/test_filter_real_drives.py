@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ddagr_gym.evaluation.filter_real_drives import METRICS, motion_channels, prediction_errors, real_drive
+from benchmarks.filter_study.real_drives import METRICS, motion_channels, prediction_errors, real_drive
 from ddagr_gym.identification.windows import CHANNELS, WindowSet
 
 REPOSITORY = Path(__file__).resolve().parents[2]

@@ -24,7 +24,7 @@ from ddagr_gym.estimation import (
     slip_ratio,
     symmetric_forward_speed,
 )
-from ddagr_gym.evaluation.force_law_fits import LawFit, fit_law
+from ddagr_gym.evaluation.force_law_fits import LAUNCH, drive_law_fit
 from ddagr_gym.parameters import Robot, Sensors
 
 Array = NDArray[np.float64]
@@ -32,8 +32,6 @@ Columns = Mapping[str, Array]
 
 SMOOTHING = 25
 """Samples over which the yardsticks average encoders and gyro: 0.2 s, a fifth of the motors' time constant more lag."""
-START = 1.6
-"""Time after the start from which speed and slip are judged [s]: the launch is over."""
 SLOW = 0.05
 """Speed of rim and hub below which slip is not judged [m/s]."""
 KNOWN_DEVIATION = 0.02
@@ -138,25 +136,6 @@ ARMS: dict[str, Arm] = {
 """The estimators that are compared, by name."""
 
 
-def wheel_states(robot: Robot, columns: Columns, rows: NDArray[np.int64]) -> tuple[Array, Array]:
-    """True wheel states (4 N, 4) v_x, v_y, bank speed, yaw rate and forces (4 N, 2) of chosen samples."""
-    states, forces = [], []
-    turning = columns["true_yaw_rate"][rows]
-    for wheel in range(4):
-        bank = "right" if wheel % 2 == 0 else "left"
-        v_x = columns["true_v_x"][rows] - robot.wheel_y[wheel] * turning
-        v_y = columns["true_v_y"][rows] + robot.wheel_x[wheel] * turning
-        states.append(np.column_stack([v_x, v_y, columns[f"true_omega_{bank}"][rows], turning]))
-        forces.append(np.column_stack([columns[f"true_force_{axis}_{wheel + 1}"][rows] for axis in "xy"]))
-    return np.concatenate(states), np.concatenate(forces)
-
-
-def drive_law_fit(robot: Robot, columns: Columns, law: ForceLaw, resistance: bool = True) -> LawFit:
-    """The force law's parameters that fit a drive's true wheel forces best, from samples 0.16 s apart."""
-    rows = np.arange(round(START / _period(columns)), len(columns["t"]), 20)
-    return fit_law(law, *wheel_states(robot, columns, rows), robot.wheels[0].outer_radius, resistance=resistance)
-
-
 def judge(motion: Motion, robot: Robot, columns: Columns, side: str) -> dict[str, Any]:
     """Errors of an estimate.
 
@@ -186,7 +165,7 @@ def judge(motion: Motion, robot: Robot, columns: Columns, side: str) -> dict[str
     ours = motion.v_x[window].sum() / motion.yaw_rate[window].sum()
     with np.errstate(divide="ignore", invalid="ignore"):
         momentary = np.abs(motion.v_x[window] / motion.yaw_rate[window] / (speed / turning) - 1.0)
-    late = slice(round(START / _period(columns)), None)
+    late = slice(round(LAUNCH / _period(columns)), None)
     wrong = (motion.v_x - columns["true_v_x"])[late]
     deviation = motion.v_x_deviation
     values = (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from ddagr_gym.reporting.filter_study_figure import ARMS, filter_study_figure
+from benchmarks.filter_study.figure import ARMS, filter_study_figure
 
 pytest.importorskip("matplotlib")
 

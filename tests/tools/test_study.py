@@ -6,6 +6,7 @@ import json
 
 import pytest
 
+import tools
 from ddagr_gym.cli import main
 
 PLAN = """\
@@ -23,7 +24,7 @@ def test_table_figure_and_progress(tmp_path, capsys, monkeypatch):
     monkeypatch.delenv("DDAGR_RECORDINGS", raising=False)
     plan, folder = tmp_path / "plan.yaml", tmp_path / "out"
     plan.write_text(PLAN)
-    assert main(["study", "filter", "--plan", str(plan), "--output", str(folder)]) == 0
+    assert main(["study", "filter", "--plan", str(plan), "--output", str(folder)], tools) == 0
     printed = capsys.readouterr()
     assert "our filter" in printed.out
     assert "No real drives" in printed.out
@@ -38,7 +39,7 @@ def test_table_figure_and_progress(tmp_path, capsys, monkeypatch):
 def test_a_bad_plan_is_one_sentence(tmp_path, capsys):
     plan = tmp_path / "plan.yaml"
     plan.write_text(PLAN.replace("drives: 2", "drives: 0"))
-    assert main(["study", "filter", "--plan", str(plan), "--output", str(tmp_path / "out")]) == 2
+    assert main(["study", "filter", "--plan", str(plan), "--output", str(tmp_path / "out")], tools) == 2
     message = capsys.readouterr().err
     assert "drives is 0" in message
     assert message.count("\n") == 1

@@ -14,13 +14,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.filter_study.arms import ARMS, innovations, judge
+from benchmarks.filter_study.consistency import PRIORS, matched_drive, matched_model, row_turn_commands
+from benchmarks.filter_study.force_law_costs import LAWS, draw_soils, soil_set_costs
+from benchmarks.filter_study.real_drives import real_drive
+from benchmarks.filter_study.settings import FilterStudySettings
 from ddagr_gym.envs.options import make_settings
 from ddagr_gym.evaluation.controllers import nominal_constants
-from ddagr_gym.evaluation.filter_arms import ARMS, drive_law_fit, innovations, judge
-from ddagr_gym.evaluation.filter_consistency import PRIORS, matched_drive, matched_model, row_turn_commands
-from ddagr_gym.evaluation.filter_real_drives import real_drive
-from ddagr_gym.evaluation.filter_study_settings import FilterStudySettings
-from ddagr_gym.evaluation.force_law_fits import LAWS, draw_soils, soil_set_costs
+from ddagr_gym.evaluation.force_law_fits import drive_law_fit
 from ddagr_gym.evaluation.runs import drive_turn
 from ddagr_gym.parameters import Sensors
 from ddagr_gym.presets import ddagr

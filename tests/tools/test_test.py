@@ -6,9 +6,8 @@ import sys
 
 import pytest
 
-from ddagr_gym.commands import test as command
-from ddagr_gym.commands.test import Arguments, Outcome
-from ddagr_gym.errors import InputError
+from tools import test as command
+from tools.test import Arguments, Outcome
 
 MIXED = """
 import pytest
@@ -81,11 +80,3 @@ def test_selections(monkeypatch, capsys):
     command.run(Arguments(only="types"))
     command.run(Arguments(slow=True))
     assert ran == ["types", "tests"]
-
-
-def test_outside_a_checkout_it_says_so(monkeypatch, tmp_path):
-    package = tmp_path / "site-packages" / "ddagr_gym" / "commands"
-    package.mkdir(parents=True)
-    monkeypatch.setattr(command, "__file__", str(package / "test.py"))
-    with pytest.raises(InputError, match="needs a checkout"):
-        command.run(Arguments())

@@ -1,4 +1,4 @@
-"""``ddagr tune-controllers``: search the gains of the ladder's closed loops on the validation set."""
+"""``./ddagr tune-controllers``: search the gains of the ladder's closed loops on the validation set."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ EXAMPLES = (
 class Arguments:
     """Search the controllers' gains on the validation set.
 
-    Every controller gets the same budget, scenarios and objective: see ddagr_gym.evaluation.gain_search. An interrupted
+    Every controller gets the same budget, scenarios and objective: see benchmarks.gain_search. An interrupted
     search continues when it is started again with the same folder. The result, ladder_gains.yaml and gain_search.json,
     takes effect in configs/evaluation.
 
@@ -37,7 +37,7 @@ class Arguments:
 
 def run(arguments: Arguments) -> None:
     """Search, write, print what was found."""
-    from ddagr_gym.evaluation.gain_search import STAGES, GainSearch, check_names, episodes_of, write_gains
+    from benchmarks.gain_search import STAGES, GainSearch, check_names, episodes_of, write_gains
 
     names = check_names([name.strip() for name in arguments.controllers.split(",") if name.strip()])
     folder = make_folder(arguments.output)

@@ -1,4 +1,4 @@
-"""``ddagr study``: experiments on a part of the toolkit, with a table and a figure."""
+"""``./ddagr study``: experiments on a part of the toolkit, with a table and a figure."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from tyro.conf import Positional
 
 from ddagr_gym.commands.output import format_table, make_folder, write_text
 from ddagr_gym.progress import Progress
+from tools import CHECKOUT
 
 EXAMPLES = (
     "ddagr study filter",
@@ -27,23 +28,23 @@ class Arguments:
 
     Attributes:
         subject: what is studied.
-        plan: soils, drives and seeds: a name of configs/evaluation or a file.
+        plan: YAML file of soils, drives and seeds.
         recordings: folder that holds open/ with real drives; DDAGR_RECORDINGS by default, none where that is not set.
         output: folder for filter.json and filter.png.
     """
 
     subject: Positional[Literal["filter"]]
-    plan: str = "filter_study"
+    plan: Path = CHECKOUT / "benchmarks" / "filter_study" / "plan.yaml"
     recordings: Path | None = None
     output: Path = Path("ddagr_filter_study")
 
 
 def run(arguments: Arguments) -> None:
     """Do the parts, write table and figure, print the main figures."""
-    from ddagr_gym.evaluation.filter_study import run_study, study_parts
-    from ddagr_gym.evaluation.filter_study_settings import load_filter_study
-    from ddagr_gym.evaluation.filter_summary import summarise_study
-    from ddagr_gym.reporting.filter_study_figure import filter_study_figure
+    from benchmarks.filter_study.figure import filter_study_figure
+    from benchmarks.filter_study.settings import load_filter_study
+    from benchmarks.filter_study.study import run_study, study_parts
+    from benchmarks.filter_study.summary import summarise_study
 
     settings = load_filter_study(arguments.plan)
     recordings = _recordings(arguments.recordings)
@@ -67,7 +68,7 @@ def _recordings(given: Path | None) -> Path | None:
 
 
 def _table(document: dict[str, Any]) -> tuple[tuple[str, ...], list[tuple[object, ...]]]:
-    from ddagr_gym.evaluation.filter_arms import ARMS
+    from benchmarks.filter_study.arms import ARMS
 
     header = ("estimator", "soils", "radius error median", "95th percentile", "speed RMSE [mm/s]", "slip RMSE")
     rows: list[tuple[object, ...]] = []

@@ -14,8 +14,8 @@ import numpy as np
 
 from ddagr_gym.envs.options import make_settings
 from ddagr_gym.envs.settings import Episode, Randomisation, TurnSettings
-from ddagr_gym.evaluation.other_ground import LAW, NOMINAL_LAW
 from ddagr_gym.evaluation.scenarios import GroundRecipe, Scenario, build_field
+from ddagr_gym.physics.soil_laws import LAW, NOMINAL_LAW
 
 _ROOT_SEED = 20_261_120
 

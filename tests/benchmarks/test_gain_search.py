@@ -5,11 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from ddagr_gym.config import load_config
-from ddagr_gym.errors import InputError
-from ddagr_gym.evaluation import gain_search
-from ddagr_gym.evaluation.controllers import LadderGains, gains_file, ladder_gains
-from ddagr_gym.evaluation.gain_search import (
+from benchmarks import gain_search
+from benchmarks.gain_search import (
     SPACES,
     STAGES,
     VALIDATION_SET,
@@ -19,6 +16,9 @@ from ddagr_gym.evaluation.gain_search import (
     objective,
     write_gains,
 )
+from ddagr_gym.config import load_config
+from ddagr_gym.errors import InputError
+from ddagr_gym.evaluation.controllers import LadderGains, gains_file, ladder_gains
 
 FEW = ((4, 1), (2, 2))
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from benchmarks.filter_study.arms import ARMS, Motion, innovations, judge
 from ddagr_gym.errors import InputError
-from ddagr_gym.estimation import ForceLaw
-from ddagr_gym.evaluation.filter_arms import ARMS, Motion, drive_law_fit, innovations, judge, wheel_states
 from ddagr_gym.parameters import Sensors
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.simulator import simulate
@@ -74,24 +73,3 @@ def test_ours_beats_every_yardstick(robot, drive):
         assert errors["filter"]["speed_square"] < 0.5 * errors[other]["speed_square"]
         assert abs(errors["filter"]["radius_error"]) < abs(errors[other]["radius_error"])
     assert abs(errors["filter_known_soil"]["radius_error"]) < 0.02
-
-
-def test_wheel_states_are_those_of_the_slip_ratios(robot, drive):
-    rows = np.array([1000, 1500])
-    states, forces = wheel_states(robot, drive, rows)
-    assert states.shape == (8, 4)
-    assert forces.shape == (8, 2)
-    radius = robot.wheels[0].outer_radius
-    for wheel in range(4):
-        for k, row in enumerate(rows):
-            v_x, _, omega, _ = states[2 * wheel + k]
-            rim = radius * omega
-            slip = (rim - v_x) / max(abs(rim), abs(v_x))
-            assert slip == pytest.approx(drive[f"true_slip_ratio_{wheel + 1}"][row], abs=2e-3)
-    assert forces[0, 0] == drive["true_force_x_1"][1000]
-
-
-def test_the_law_fit_reproduces_the_drive(robot, drive):
-    coupled = drive_law_fit(robot, drive, ForceLaw.coupled)
-    thesis = drive_law_fit(robot, drive, ForceLaw.thesis)
-    assert np.sqrt(np.mean(coupled.errors**2)) < 0.3 * np.sqrt(np.mean(thesis.errors**2))

@@ -9,7 +9,10 @@ import pytest
 from ddagr_gym.control.constant_speeds import ConstantSpeeds
 from ddagr_gym.envs.options import make_settings
 from ddagr_gym.errors import InputError
-from ddagr_gym.evaluation.other_ground import (
+from ddagr_gym.evaluation.runs import drive_turn
+from ddagr_gym.physics import layout
+from ddagr_gym.physics.effects import effect_kinds
+from ddagr_gym.physics.soil_laws import (
     LAW,
     NOMINAL_LAW,
     PEAK_OVER_MODULUS,
@@ -22,9 +25,6 @@ from ddagr_gym.evaluation.other_ground import (
     mobilised_strength,
     shear_patch,
 )
-from ddagr_gym.evaluation.runs import drive_turn
-from ddagr_gym.physics import layout
-from ddagr_gym.physics.effects import effect_kinds
 from ddagr_gym.physics.wheel_forces import soil_vector
 from ddagr_gym.presets import get_robot, get_soil
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ddagr_gym.evaluation.calibration import steady_motion
-from ddagr_gym.evaluation.true_ground import soil_of, steady_bank_speeds
+from ddagr_gym.physics.steady_arc import soil_of, steady_bank_speeds
 from ddagr_gym.physics.wheel_forces import soil_vector
 from ddagr_gym.presets import get_robot, get_soil
 

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.filter_study.arms import ARMS
+from benchmarks.filter_study.consistency import PRIORS, nees_table, nis_bands
+from benchmarks.filter_study.force_law_costs import LAWS
+from benchmarks.filter_study.settings import FilterStudySettings
+from benchmarks.filter_study.study import DRIVE, FORCE_LAWS, MATCHED, REAL, Part
 from ddagr_gym.estimation import CHANNELS, Band
-from ddagr_gym.evaluation.filter_arms import ARMS
-from ddagr_gym.evaluation.filter_consistency import PRIORS, nees_table, nis_bands
-from ddagr_gym.evaluation.filter_study import DRIVE, FORCE_LAWS, MATCHED, REAL, Part
-from ddagr_gym.evaluation.filter_study_settings import FilterStudySettings
-from ddagr_gym.evaluation.force_law_fits import LAWS
 from ddagr_gym.version import __version__
 
 Array = NDArray[np.float64]

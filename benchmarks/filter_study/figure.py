@@ -51,7 +51,7 @@ def filter_study_figure(document: Document, path: Path) -> None:
     """Write the figure as PNG.
 
     Args:
-        document: of :func:`ddagr_gym.evaluation.filter_summary.summarise_study`.
+        document: of :func:`benchmarks.filter_study.summary.summarise_study`.
         path: file to write.
     """
     with house_style():

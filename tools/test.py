@@ -1,4 +1,4 @@
-"""``ddagr test``: everything that continuous integration runs, from the checkout."""
+"""``./ddagr test``: everything that continuous integration runs."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from typing import Literal
 from xml.etree import ElementTree
 
 from ddagr_gym.errors import InputError
+from tools import CHECKOUT, wheel
 
 EXAMPLES = (
     "ddagr test",
@@ -65,10 +66,9 @@ class Outcome:
 
 def run(arguments: Arguments) -> int:
     """Run the checks, print a summary that ends with ``N passed, N failed``, and return the exit code."""
-    root = _checkout()
     if arguments.workers < 1:
         raise InputError(f"--workers is {arguments.workers}: give 1 or more.")
-    checks = _checks(root, arguments)
+    checks = _checks(CHECKOUT, arguments)
     selected = checks if arguments.only == "all" else {arguments.only: checks[arguments.only]}
     if arguments.slow or arguments.paths:
         selected = {"tests": checks["tests"]}
@@ -81,18 +81,11 @@ def run(arguments: Arguments) -> int:
     return 1 if any(outcome.failed for outcome, _ in outcomes.values()) else 0
 
 
-def _checkout() -> Path:
-    root = Path(__file__).resolve().parents[2]
-    if not (root / "pyproject.toml").is_file() or not (root / "tests").is_dir():
-        raise InputError("`ddagr test` needs a checkout of ddagr-gym: clone the repository and run ./ddagr test there.")
-    return root
-
-
 def _checks(root: Path, arguments: Arguments) -> dict[str, Callable[[], Outcome]]:
     return {
         "lint": lambda: _tool(root, "-m", "ruff", "check", "."),
         "format": lambda: _tool(root, "-m", "ruff", "format", "--check", "."),
-        "types": lambda: _tool(root, "-m", "mypy", "ddagr_gym"),
+        "types": lambda: _tool(root, "-m", "mypy"),
         "contracts": lambda: _tool(root, "-c", _LINT_IMPORTS),
         "tests": lambda: _tests(root, arguments),
         "wheel": lambda: _installed_wheel(root),
@@ -133,8 +126,6 @@ def _read_report(report: Path) -> Outcome:
 
 def _installed_wheel(root: Path) -> Outcome:
     """Build the wheel, install it with its core dependencies outside the checkout, and run tests/installed on it."""
-    from ddagr_gym.commands import wheel
-
     with tempfile.TemporaryDirectory(prefix="ddagr-wheel-") as temporary:
         folder = Path(temporary).resolve()
         try:

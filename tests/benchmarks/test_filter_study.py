@@ -7,13 +7,12 @@ import json
 import numpy as np
 import pytest
 
-from ddagr_gym.config import configs_dir
+from benchmarks.filter_study import study as filter_study
+from benchmarks.filter_study.arms import ARMS
+from benchmarks.filter_study.settings import FilterStudySettings, load_filter_study
+from benchmarks.filter_study.study import DRIVE, FORCE_LAWS, MATCHED, Part, run_study, study_parts
+from benchmarks.filter_study.summary import interval, summarise_study
 from ddagr_gym.errors import InputError
-from ddagr_gym.evaluation import filter_study
-from ddagr_gym.evaluation.filter_arms import ARMS
-from ddagr_gym.evaluation.filter_study import DRIVE, FORCE_LAWS, MATCHED, Part, run_study, study_parts
-from ddagr_gym.evaluation.filter_study_settings import FilterStudySettings, load_filter_study
-from ddagr_gym.evaluation.filter_summary import interval, summarise_study
 
 SMALL = FilterStudySettings(
     seed=3, soil_sets=("thesis_a1_range",), drives=3, radius=(0.8, 1.0), matched_drives=4, force_law_soils=1
@@ -31,8 +30,7 @@ def document(results):
 
 
 def test_the_shipped_plan_reads():
-    plan = load_filter_study("filter_study")
-    assert plan == load_filter_study(configs_dir() / "evaluation" / "filter_study.yaml")
+    plan = load_filter_study()
     assert plan.drives >= 100
     assert plan.fingerprint != SMALL.fingerprint
 

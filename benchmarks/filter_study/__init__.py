@@ -1,0 +1,1 @@
+"""The filter on soils that it does not know and on real drives: ``./ddagr study filter``."""
