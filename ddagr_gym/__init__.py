@@ -1,6 +1,12 @@
 """Skid-steer field robots on soft soil: simulator, Gymnasium environments, recordings, diagnosis.
 
-Importing the package registers the environments; :func:`gymnasium.make` then knows ``DDAGR-Turn-v0``.
+Importing the package registers the environments; :func:`gymnasium.make` then knows ``DDAGR-Turn-v0``. The functions are
+what the commands of the same names do, with typed results::
+
+    drive = ddagr_gym.simulate("arcs", effects="slope=0.05")     # or load_recording("run.csv")
+    ddagr_gym.check(drive)                                       # clocks, signs, units, sensors
+    result = ddagr_gym.diagnose(drive)                           # which physics the simulator leaves out
+    result.findings[0].parameters["angle"], result.effects       # how big; what gym.make(effects=...) takes
 
 Conventions, everywhere in the package:
 
@@ -25,9 +31,51 @@ Columns of a drive: ``t``; ``command_right``, ``command_left``, ``encoder_right`
 Bad input raises :class:`ddagr_gym.errors.InputError`: one sentence with the offending value and the remedy.
 """
 
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
 from ddagr_gym.envs.registration import register_environments
 from ddagr_gym.version import __version__
 
-__all__ = ["__version__", "register_environments"]
+if TYPE_CHECKING:
+    from ddagr_gym.api.check import CheckResult, check
+    from ddagr_gym.api.load_recording import load_recording
+    from ddagr_gym.api.simulate import SimulationResult, simulate
+
+__all__ = [
+    "CheckResult",
+    "SimulationResult",
+    "__version__",
+    "check",
+    "load_recording",
+    "register_environments",
+    "simulate",
+]
+
+_MODULES = {
+    "CheckResult": "check",
+    "SimulationResult": "simulate",
+    "check": "check",
+    "load_recording": "load_recording",
+    "simulate": "simulate",
+}
+"""Module of :mod:`ddagr_gym.api` that defines a public name; it is imported when the name is asked for."""
+
+
+def __getattr__(name: str) -> Any:
+    """A function or result class, imported at its first use (PEP 562)."""
+    if name not in _MODULES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    found = getattr(importlib.import_module(f"{__name__}.api.{_MODULES[name]}"), name)
+    globals()[name] = found
+    return found
+
+
+def __dir__() -> list[str]:
+    """Names of the module, those that are not loaded yet included."""
+    return sorted({*globals(), *__all__})
+
 
 register_environments()

@@ -11,15 +11,16 @@ import io
 import os
 import re
 import sys
-from collections.abc import Sequence
+import warnings
+from collections.abc import Iterator, Sequence
 from types import ModuleType
-from typing import Any
+from typing import Any, TextIO
 
 import tyro
 
 from ddagr_gym import __version__, commands
 from ddagr_gym.commands.extras import missing_extra
-from ddagr_gym.errors import InputError
+from ddagr_gym.errors import InputError, InputWarning
 
 _HELP = ("-h", "--help")
 _USER_ERRNO = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.ENAMETOOLONG, errno.ELOOP)
@@ -92,7 +93,34 @@ def _dispatch(words: list[str], package: ModuleType) -> int:
         raise InputError(f"unknown option {words[0]!r} before a command: see ddagr --help.")
     command = commands.load(words[0], package)
     arguments = _parse(command, words[1:])
-    return 0 if arguments is None else command.run(arguments) or 0
+    if arguments is None:
+        return 0
+    with _warnings_as_lines():
+        return command.run(arguments) or 0
+
+
+@contextlib.contextmanager
+def _warnings_as_lines() -> Iterator[None]:
+    """Print an :class:`InputWarning` as one line on standard error, without the place in the code."""
+    others = warnings.showwarning
+
+    def show(
+        message: Warning | str,
+        category: type[Warning],
+        filename: str,
+        lineno: int,
+        file: TextIO | None = None,
+        line: str | None = None,
+    ) -> None:
+        if issubclass(category, InputWarning):
+            print("ddagr: warning:", " ".join(str(message).split()), file=sys.stderr)
+        else:
+            others(message, category, filename, lineno, file, line)
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", InputWarning)
+        warnings.showwarning = show
+        yield
 
 
 def _overview(package: ModuleType) -> str:

@@ -1,4 +1,4 @@
-"""Errors that a person caused and can mend: one sentence with the offending value and the remedy."""
+"""Errors and warnings that a person caused and can mend: one sentence with the offending value and the remedy."""
 
 from __future__ import annotations
 
@@ -8,6 +8,10 @@ from collections.abc import Iterable
 
 class InputError(ValueError):
     """Bad input from the user. The command line prints the message and exits with code 2."""
+
+
+class InputWarning(UserWarning):
+    """Input that is used as it is, though something about it makes results doubtful. Commands print it as one line."""
 
 
 def unknown_name(kind: str, name: object, known: Iterable[str]) -> InputError:

@@ -2,21 +2,12 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 from tyro.conf import Positional
 
-from ddagr_gym.commands.output import format_table, output_folder
-from ddagr_gym.errors import InputError
-from ddagr_gym.progress import Progress
-
-if TYPE_CHECKING:
-    from ddagr_gym.recordings.checks.findings import CheckReport, Finding
-    from ddagr_gym.recordings.schema import Recording
+from ddagr_gym.progress import LinePrinter
 
 EXAMPLES = (
     "ddagr check run.parquet",
@@ -59,100 +50,15 @@ class Arguments:
 
 def run(arguments: Arguments) -> int:
     """Check every run, print the tables, write figures and reports; 1 when anything is suspicious."""
-    import numpy as np
-
-    from ddagr_gym.recordings.checks.across import across_runs
-    from ddagr_gym.recordings.checks.run import check_recording
-
-    recordings = _load(arguments)
-    reports = []
-    for recording in recordings:
-        report = check_recording(recording, np.random.default_rng(arguments.seed))
-        print(report_text(report, arguments.all))
-        reports.append(report)
-    together = across_runs(recordings, reports)
-    if together:
-        print(f"\nall {len(reports)} runs together")
-        print(findings_text(together, arguments.all))
-    if arguments.output is not None:
-        _write(arguments, recordings, reports, together)
-    found = any(report.suspicious or report.sentences for report in reports)
-    return 1 if found or any(f.status == "suspicious" for f in together) else 0
-
-
-def _load(arguments: Arguments) -> list[Recording]:
+    import ddagr_gym
+    from ddagr_gym.api.inputs import recordings_from
     from ddagr_gym.recordings.files import Limits
-    from ddagr_gym.recordings.load import load_recording
 
-    if not arguments.runs:
-        raise InputError("no recording is given: name one or more files.")
     limits = Limits(arguments.maximum_rows, arguments.maximum_bytes)
-    recordings = [load_recording(r, arguments.map or None, arguments.robot or None, limits) for r in arguments.runs]
-    robots = {recording.meta.robot for recording in recordings}
-    if len(robots) > 1:
-        raise InputError(f"the runs are of the robots {', '.join(sorted(robots))}: check one robot at a time.")
-    return recordings
-
-
-def report_text(report: CheckReport, everything: bool = False) -> str:
-    """A report as text: verdict, doubts, and the table.
-
-    Args:
-        report: of one run.
-        everything: list what passed, too.
-    """
-    robot = f", {report.robot}" if report.robot else ""
-    lines = [f"\n{report.source}{robot}: {report.rows} rows, {report.seconds:.0f} s"]
-    lines += [f"  doubt: {sentence}" for sentence in report.sentences]
-    return "\n".join([*lines, findings_text(report.findings, everything)])
-
-
-def findings_text(findings: Sequence[Finding], everything: bool = False) -> str:
-    """Findings as a table with what to do below; passes are only counted unless ``everything``."""
-    shown = [f for f in findings if everything or f.status != "pass"]
-    rows = [(str(f.status).replace("_", " "), f.check, f.channel, _number(f), f.meaning) for f in shown]
-    lines = [format_table(("status", "check", "channel", "value", "meaning"), rows)] if rows else []
-    lines += [f"  -> {f.check}, {f.channel}: {f.remedy}" for f in shown if f.status == "suspicious"]
-    count = {kind: sum(f.status == kind for f in findings) for kind in ("pass", "suspicious", "not_testable")}
-    lines.append(f"{count['pass']} pass, {count['suspicious']} suspicious, {count['not_testable']} not testable")
-    return "\n".join(lines)
-
-
-def _number(finding: Finding) -> str:
-    if finding.value is None:
-        return ""
-    unit = "" if finding.unit in ("-", "SI") else f" {finding.unit}"
-    if finding.interval is None or finding.interval[0] == finding.interval[1]:
-        return f"{finding.value:.3g}{unit}"
-    return f"{finding.value:.3g} ({finding.interval[0]:.3g} to {finding.interval[1]:.3g}){unit}"
-
-
-def _write(
-    arguments: Arguments, recordings: list[Recording], reports: list[CheckReport], together: list[Finding]
-) -> None:
-    import numpy as np
-
-    from ddagr_gym.reporting.check_figure import save_check_figure
-
-    assert arguments.output is not None
-    stems = [Path(report.source).name.split(".", 1)[0] or "run" for report in reports]
-    names = _unique(["together", *stems])[1:]
-    with output_folder(arguments.output, overwrite=arguments.overwrite) as folder:
-        with Progress(len(reports), "drawing") as progress:
-            for name, recording, report in zip(names, recordings, reports, strict=True):
-                rng = np.random.default_rng(arguments.seed)
-                save_check_figure(recording, report, rng, folder / f"{name}.png")
-                _write_json(folder / f"{name}.json", report.to_json())
-                progress.advance()
-        if together:
-            _write_json(folder / "together.json", {"schema_version": 1, "findings": [f.to_json() for f in together]})
-    print(f"\nfigures and reports: {arguments.output}")
-
-
-def _unique(names: list[str]) -> list[str]:
-    """Names with a number where one occurs again."""
-    return [f"{n}_{names[:i].count(n) + 1}" if names.count(n) > 1 else n for i, n in enumerate(names)]
-
-
-def _write_json(path: Path, content: dict[str, Any]) -> None:
-    path.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    recordings = recordings_from(arguments.runs, arguments.robot or None, arguments.map or None, limits)
+    result = ddagr_gym.check(recordings, seed=arguments.seed)
+    print(result.text(arguments.all))
+    if arguments.output is not None:
+        result.report(arguments.output, overwrite=arguments.overwrite, progress=LinePrinter())
+        print(f"\nfigures and reports: {arguments.output}")
+    return 0 if result.sound else 1

@@ -187,14 +187,14 @@ def _estimate_rows(driven: TurnRun, track: Array) -> list[tuple[str, str]]:
 
 
 def _write(folder: Path, driven: TurnRun, track: Array) -> None:
-    from ddagr_gym.commands.simulate import write_recording
+    from ddagr_gym.recordings.storage import save_drive
     from ddagr_gym.rendering.render import SceneRenderer
     from ddagr_gym.rendering.scene import scenes, turn_stage
     from ddagr_gym.rendering.video import write_video
     from ddagr_gym.reporting.figures import turn_figure
 
     episode = driven.episode
-    write_recording(folder / "row_turn.csv", driven.columns, episode.robot)
+    save_drive(folder / "row_turn.csv", driven.columns, episode.robot)
     columns = driven.columns | {"estimated_x": track[:, 0], "estimated_y": track[:, 1]}
     turn_figure(columns, episode.turn, folder / "row_turn.png", robot=episode.robot, soil_name="a drawn soil")
     stage = turn_stage(episode.turn, episode.robot, "a drawn soil")

@@ -208,9 +208,9 @@ def replay_scenario(text: str, folder: Path) -> None:
     """
     import json
 
-    from ddagr_gym.commands.simulate import write_recording
     from ddagr_gym.evaluation.controllers import needs_filter
     from ddagr_gym.evaluation.shown import parse_replay, replayed
+    from ddagr_gym.recordings.storage import save_drive
     from ddagr_gym.reporting.evaluation_film import film_turn
     from ddagr_gym.reporting.figures import turn_figure
 
@@ -221,7 +221,7 @@ def replay_scenario(text: str, folder: Path) -> None:
     seen = _with_estimate(run) if needs_filter(controller) else run
     name, turn, robot = f"{set_name} {number}", run.episode.turn, run.episode.robot
     turn_figure(seen.columns, turn, folder / f"{stem}.png", robot=robot, soil_name=f"soil {name}")
-    write_recording(folder / f"{stem}.parquet", run.columns, robot)
+    save_drive(folder / f"{stem}.parquet", run.columns, robot)
     write_text(folder / f"{stem}.json", json.dumps(row, indent=1) + "\n")
     film_turn(seen.columns, turn, robot, folder / f"{stem}.mp4", f"soil {name}")
     print(format_table((f"{controller} on {name}", "value"), _replay_rows(row)))

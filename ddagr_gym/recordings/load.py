@@ -62,7 +62,7 @@ def load_recording(
         return read(path, topic_map, geometry, limits)
     if kind == "parquet" and is_recording(path, limits):
         recording = load_parquet(path, limits)
-        return recording if robot is None else _with_robot(recording, robot, geometry_of)
+        return recording if robot is None else with_robot(recording, robot, geometry_of)
     table, column_map = _table(path, kind, map_name, limits)
     geometry = _geometry(robot or column_map.robot, geometry_of)
     return build_recording(table, column_map, geometry, source=path.name, source_sha256=sha256_of(path))
@@ -72,7 +72,17 @@ def _geometry(robot: str, geometry_of: GeometryByName) -> RobotGeometry | None:
     return geometry_of(robot) if robot else None
 
 
-def _with_robot(recording: Recording, robot: str, geometry_of: GeometryByName) -> Recording:
+def with_robot(recording: Recording, robot: str, geometry_of: GeometryByName = preset_geometry) -> Recording:
+    """A recording with the geometry of a robot.
+
+    Args:
+        recording: of that robot, or of one that it does not name.
+        robot: its name or YAML file.
+        geometry_of: where its geometry comes from.
+
+    Raises:
+        InputError: the recording is of another robot.
+    """
     geometry = geometry_of(robot)
     if recording.meta.robot not in ("", geometry.name):
         raise InputError(

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from ddagr_gym.cli import main
-from ddagr_gym.commands.check import findings_text
 from ddagr_gym.parameters import Imu, PoseReceiver, Sensors
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.checks.findings import judge, not_testable
 from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.recordings.storage import save_parquet
+from ddagr_gym.reporting.check_text import findings_text
 from ddagr_gym.simulator import simulate
 
 

@@ -1,0 +1,132 @@
+"""Recordings from what a caller has: recordings, tables, simulated drives, files and folders."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias, Union
+
+from ddagr_gym.api.tables import is_table, recording_of_table
+from ddagr_gym.errors import InputError
+from ddagr_gym.parameters import Robot
+from ddagr_gym.recordings.files import DEFAULT_LIMITS, Limits
+from ddagr_gym.recordings.schema import Recording, RobotGeometry
+
+if TYPE_CHECKING:
+    import pandas
+    import pyarrow
+
+    from ddagr_gym.api.simulate import SimulationResult
+
+RobotLike: TypeAlias = str | os.PathLike[str] | Robot
+"""Name of a robot, path of a YAML file, or a robot."""
+
+Source: TypeAlias = Union[
+    Recording,
+    "SimulationResult",
+    "pandas.DataFrame",
+    "pyarrow.Table",
+    Mapping[str, Any],
+    str,
+    os.PathLike[str],
+]
+"""One recording: as it is, a simulated drive, a table or a mapping with the schema's columns, or a path."""
+
+Sources: TypeAlias = Source | Sequence[Source]
+"""One recording or several; the path of a folder stands for the recordings in it."""
+
+ENDINGS = (".csv", ".csv.gz", ".parquet", ".mcap", ".bag")
+"""Of the recordings that are taken from a folder."""
+
+
+def recordings_from(
+    given: Sources,
+    robot: RobotLike | None = None,
+    column_map: str | os.PathLike[str] | None = None,
+    limits: Limits = DEFAULT_LIMITS,
+) -> tuple[Recording, ...]:
+    """Recordings of one or several sources.
+
+    Args:
+        given: see :data:`Sources`.
+        robot: that drove; the recordings' own where it is None.
+        column_map: shipped map by name or the path of one's own, for files that are not imported yet.
+        limits: on rows and bytes of files.
+
+    Raises:
+        InputError: nothing given, a file that cannot be read, a table without time, another robot's recording.
+    """
+    several = isinstance(given, Sequence) and not isinstance(given, str)
+    items: list[Any] = list(given) if several else [given]  # type: ignore[arg-type]
+    found: list[Recording] = []
+    for item in _expanded(items):
+        found.append(_recording(item, f"table {len(found) + 1}", robot, column_map, limits))
+    if not found:
+        raise InputError("no recording is given: name one or more files, or a folder of them.")
+    return tuple(found)
+
+
+def recording_from(
+    given: Source,
+    robot: RobotLike | None = None,
+    column_map: str | os.PathLike[str] | None = None,
+    limits: Limits = DEFAULT_LIMITS,
+) -> Recording:
+    """The recording of one source; otherwise as :func:`recordings_from`."""
+    found = recordings_from(given, robot, column_map, limits)
+    if len(found) > 1:
+        raise InputError(f"{len(found)} recordings are given: name a single one.")
+    return found[0]
+
+
+def _expanded(items: Sequence[Any]) -> list[Any]:
+    """Sources with the recordings of a folder in its place, unless it is one itself (a ROS 2 bag)."""
+    found: list[Any] = []
+    for item in items:
+        path = Path(item) if isinstance(item, str | os.PathLike) else None
+        if path is None or not path.is_dir() or (path / "metadata.yaml").exists() or any(path.glob("*.db3")):
+            found.append(item)
+            continue
+        inside = sorted(file for file in path.iterdir() if file.is_file() and file.name.endswith(ENDINGS))
+        if not inside:
+            raise InputError(f"the folder {path} holds no recording ({', '.join(ENDINGS)}): name another one.")
+        found += inside
+    return found
+
+
+def _recording(
+    item: Any, name: str, robot: RobotLike | None, column_map: str | os.PathLike[str] | None, limits: Limits
+) -> Recording:
+    from ddagr_gym.recordings.load import load_recording, with_robot
+
+    label, geometry_of = _robot(robot)
+    if isinstance(item, str | os.PathLike):
+        return load_recording(Path(item), None if column_map is None else str(column_map), label, limits, geometry_of)
+    if not isinstance(item, Recording):
+        item = item.recording if _is_simulated(item) else _from_table(item, name)
+    return item if label is None else with_robot(item, label, geometry_of)
+
+
+def _is_simulated(item: Any) -> bool:
+    from ddagr_gym.api.simulate import SimulationResult
+
+    return isinstance(item, SimulationResult)
+
+
+def _from_table(item: Any, name: str) -> Recording:
+    if not is_table(item):
+        raise InputError(
+            f"a recording is given as {type(item).__name__}: give a path, a Recording, a pandas.DataFrame, a "
+            "pyarrow.Table or a mapping of columns."
+        )
+    return recording_of_table(item, name)
+
+
+def _robot(robot: RobotLike | None) -> tuple[str | None, Any]:
+    """Robot's name as readers take it, and where its geometry comes from."""
+    from ddagr_gym.recordings.load import preset_geometry
+
+    if isinstance(robot, Robot):
+        return robot.name, lambda name: RobotGeometry.of(robot)
+    return (None if robot is None or str(robot) == "" else str(robot)), preset_geometry

@@ -1,0 +1,110 @@
+"""Robots, soils and thresholds from names, paths or objects."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeAlias, Union
+
+from ddagr_gym.api.inputs import RobotLike
+from ddagr_gym.errors import InputWarning
+from ddagr_gym.parameters import Robot, Soil
+from ddagr_gym.presets import full_name, get_robot, get_soil, is_file, robot_names, soil_names
+
+if TYPE_CHECKING:
+    from ddagr_gym.diagnosis.gates.thresholds import Thresholds
+
+SoilLike: TypeAlias = str | os.PathLike[str] | Soil
+"""Name of a soil, path of a YAML file, or a soil."""
+
+ThresholdsLike: TypeAlias = Union["Thresholds", str, os.PathLike[str]]
+"""Thresholds, or the path of a file that ``ddagr null-bank`` wrote."""
+
+OWN = "given in Python"
+"""Stands in reports for the name of a soil or the file of a robot that is an object and no preset: nothing loads it."""
+
+
+@dataclass(frozen=True)
+class Nominal:
+    """The simulator that recordings are compared with, and what reports call it.
+
+    Attributes:
+        robot: nominal.
+        soil: nominal.
+        robot_file: full path of the robot's YAML file, :data:`OWN` for an object that is no preset, "" for a preset.
+        soil_name: name of the soil, full path of its YAML file, or :data:`OWN`.
+    """
+
+    robot: Robot
+    soil: Soil
+    robot_file: str
+    soil_name: str
+
+
+def nominal_from(robot: RobotLike, soil: SoilLike) -> Nominal:
+    """Robot and soil with their names.
+
+    Raises:
+        InputError: an unknown name, with the closest ones; a file that is missing or not valid.
+    """
+    return Nominal(robot_from(robot), soil_from(soil), _robot_file(robot), soil_name_of(soil))
+
+
+def robot_from(given: RobotLike) -> Robot:
+    """Robot by name, from a YAML file, or as it is; InputError as :func:`ddagr_gym.presets.get_robot`."""
+    return given if isinstance(given, Robot) else get_robot(str(given))
+
+
+def soil_from(given: SoilLike) -> Soil:
+    """Soil by name, from a YAML file, or as it is; InputError as :func:`ddagr_gym.presets.get_soil`."""
+    return given if isinstance(given, Soil) else get_soil(str(given))
+
+
+def soil_name_of(given: SoilLike) -> str:
+    """What reports call a soil: name, full path of its file, the preset's name of an equal object, or :data:`OWN`."""
+    if isinstance(given, Soil):
+        return next((name for name in soil_names() if get_soil(name) == given), OWN)
+    return full_name(str(given))
+
+
+def soil_label(given: SoilLike) -> str:
+    """What a figure calls a soil: name or path as it was given; of an object as :func:`soil_name_of`."""
+    return soil_name_of(given) if isinstance(given, Soil) else str(given)
+
+
+def _robot_file(given: RobotLike) -> str:
+    if isinstance(given, Robot):
+        return "" if given.name in robot_names() and get_robot(given.name) == given else OWN
+    return full_name(str(given)) if is_file(given) else ""
+
+
+def thresholds_from(
+    given: ThresholdsLike | None, robot: Robot, soil_name: str, soil_uncertainty: float = 1.0
+) -> Thresholds | None:
+    """Thresholds as given or from a file, or those that ship for a robot; None where none do.
+
+    Those that were made for something else are used with an :class:`~ddagr_gym.errors.InputWarning`.
+
+    Args:
+        given: of ``ddagr null-bank``.
+        robot: nominal one of the run.
+        soil_name: name or full path of the run's nominal soil.
+        soil_uncertainty: of the run.
+
+    Raises:
+        InputError: the file cannot be read.
+    """
+    from ddagr_gym.diagnosis.gates.threshold_files import load_thresholds, shipped_thresholds
+    from ddagr_gym.diagnosis.gates.thresholds import Thresholds
+
+    if given is None:
+        found = shipped_thresholds(robot.name)
+    else:
+        found = given if isinstance(given, Thresholds) else load_thresholds(Path(given))
+    if found is not None and found.origin is not None:
+        warning = found.origin.mismatch(robot.name, soil_name, soil_uncertainty)
+        if warning:
+            warnings.warn(warning, InputWarning, stacklevel=3)
+    return found

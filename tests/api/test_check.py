@@ -1,0 +1,99 @@
+"""``ddagr_gym.check``: findings, text, notebook and files; the command's own tests cover what it says."""
+
+from __future__ import annotations
+
+import json
+from html.parser import HTMLParser
+
+import pytest
+
+import ddagr_gym
+from ddagr_gym.errors import InputError
+from ddagr_gym.presets import get_robot
+
+
+@pytest.fixture(scope="module")
+def flipped(drive):
+    """The drive with its gyro upside down, as a table."""
+    table = drive.to_pandas()
+    table["yaw_rate"] = -table["yaw_rate"]
+    return ddagr_gym.check(table, robot="ddagr")
+
+
+def test_a_flipped_gyro_is_found_in_a_table(flipped):
+    assert not flipped.sound
+    assert "sign_and_scale" in {finding.check for finding in flipped.suspicious}
+    assert "The gyro turns the wrong way." in str(flipped)
+    assert repr(flipped).startswith("<CheckResult: table 1: ")
+
+
+def test_a_sound_drive_passes(drive):
+    result = ddagr_gym.check(drive)
+    assert result.sound
+    assert result.suspicious == ()
+    assert "\npass " in result.text(everything=True)
+    assert "\npass " not in str(result)
+
+
+class Page(HTMLParser):
+    """Tags that are open at the end of a page, and its text."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.text = ""
+        self.feed(text)
+
+    def handle_starttag(self, tag, attributes):
+        self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.text += data
+
+
+def test_a_notebook_shows_headline_and_table_with_texts_escaped(drive):
+    recording = drive.recording.with_meta(source="<b>a&b</b>.csv")
+    page = Page(ddagr_gym.check(recording)._repr_html_())
+    assert page.open == []
+    assert "<b>a&b</b>.csv" in page.text
+    assert "not testable" in page.text
+
+
+def test_reports_of_several_runs_are_those_of_the_command(drive, tmp_path):
+    pytest.importorskip("matplotlib")
+    other = ddagr_gym.simulate("s_weave", rate=50.0, pose_rate=5.0)
+    runs = [drive.recording.with_meta(source="one.sim"), other.recording.with_meta(source="two.sim")]
+    result = ddagr_gym.check(runs)
+    lines: list[str] = []
+    assert result.report(tmp_path / "checked", progress=lines.append) == tmp_path / "checked"
+    names = {path.name for path in (tmp_path / "checked").iterdir()} - {".ddagr-output"}
+    assert names == {"one.json", "one.png", "two.json", "two.png", "together.json"}
+    assert [line.split(" (")[0] for line in lines] == ["drawing: 50 %", "drawing: 100 %"]
+    result.to_json(tmp_path / "all.json")
+    content = json.loads((tmp_path / "all.json").read_text())
+    assert [run["source"] for run in content["runs"]] == ["one.sim", "two.sim"]
+    assert content["runs"][0] == json.loads((tmp_path / "checked" / "one.json").read_text())
+    assert content["together"] == json.loads((tmp_path / "checked" / "together.json").read_text())["findings"]
+    with pytest.raises(InputError, match="overwrite=True"):
+        result.report(tmp_path / "checked")
+
+
+def test_a_report_that_fails_leaves_nothing(drive, tmp_path, monkeypatch):
+    def fails(*arguments, **options):
+        raise OSError("no space left")
+
+    monkeypatch.setattr("ddagr_gym.reporting.check_figure.save_check_figure", fails)
+    with pytest.raises(OSError, match="no space"):
+        ddagr_gym.check(drive).report(tmp_path / "checked")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_two_robots_and_bad_seeds_are_refused(drive):
+    other = ddagr_gym.simulate("straight", get_robot("husky"), "firm_ground", rate=50.0)
+    with pytest.raises(InputError, match="one robot at a time"):
+        ddagr_gym.check([drive, other])
+    with pytest.raises(InputError, match="seed is -1"):
+        ddagr_gym.check(drive, seed=-1)
