@@ -32,7 +32,7 @@ from benchmarks.concealed.simulate import simulate_case
 from benchmarks.concealed.storage import csv_bytes, digest, read_json, recording_digest, write_case
 from benchmarks.concealed_truth import true_sizes
 from ddagr_gym.diagnosis.gates.threshold_files import default_thresholds
-from ddagr_gym.diagnosis.search.stepwise import refit_nominal
+from ddagr_gym.diagnosis.search.starting_models import refit_nominal
 from ddagr_gym.diagnosis.setting import Setting, make_problem
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.gauss_newton import fit

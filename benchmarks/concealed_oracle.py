@@ -30,9 +30,10 @@ from ddagr_gym.diagnosis.certification.certificate import LEAST_EXPLAINABLE
 from ddagr_gym.diagnosis.certification.certify import certify
 from ddagr_gym.diagnosis.gates.threshold_files import default_thresholds
 from ddagr_gym.diagnosis.gates.thresholds import Gate, Thresholds
-from ddagr_gym.diagnosis.result.conclusion import Begun, begun
+from ddagr_gym.diagnosis.preprocessing.session import prepare
+from ddagr_gym.diagnosis.search.rivals import rivals_of
 from ddagr_gym.diagnosis.search.scanned_model import scan_model
-from ddagr_gym.diagnosis.search.stepwise import rivals_of
+from ddagr_gym.diagnosis.search.starting_models import StartingModels, starting_models
 from ddagr_gym.diagnosis.setting import Setting
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.gauss_newton import Fitted, fit
@@ -47,7 +48,7 @@ SEEN_IN_VALUES = ("sensor_hold", "gyro_sign")
 """Effects that are found without a fit, and taken out of the recordings before it."""
 
 
-def told(first: Begun, names: Sequence[str]) -> Fitted | None:
+def fit_named_effects(first: StartingModels, names: Sequence[str]) -> Fitted | None:
     """The nominal model with the effects of some names, the one that explains most first; None where one has no trace.
 
     Args:
@@ -56,7 +57,7 @@ def told(first: Begun, names: Sequence[str]) -> Fitted | None:
     """
     none = Gate(float("inf"), float("inf"))
     gates = Thresholds({"": none} | dict.fromkeys(names, Gate(0.0, -float("inf"))), {}, 0, "an oracle")
-    problem = first.prepared.problem
+    problem = first.session.problem
     model, left = scan_model(problem, first.refitted), set(names)
     while left:
         rivals = [r for r in rivals_of(problem, model, first.raw, gates, len(left)) if r.name in left]
@@ -76,12 +77,13 @@ def oracle(folder: Path, names: Sequence[str]) -> dict[str, Any] | None:
         names: of effects that are fitted.
     """
     robot, soil, runs = get_robot(ROBOT), get_soil(SOIL), read_runs(folder)
-    first = begun(robot, soil, runs, Setting().with_windows(default_thresholds(ROBOT).duration))
-    fitted = told(first, names)
+    thresholds = default_thresholds(ROBOT)
+    first = starting_models(prepare(runs, robot, soil, thresholds, Setting().with_windows(thresholds.duration)))
+    fitted = fit_named_effects(first, names)
     if fitted is None:
         return None
-    prepared = first.prepared
-    return certify(prepared.problem, first.refitted, fitted, robot, prepared.recordings, np.random.default_rng(0))
+    session, rng = first.session, np.random.default_rng(0)
+    return certify(session.problem, first.refitted, fitted, robot, session.mended.recordings, rng)
 
 
 def gain(fit: Mapping[str, Any] | None, name: str) -> Mapping[str, Any] | None:

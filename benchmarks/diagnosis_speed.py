@@ -22,10 +22,10 @@ from benchmarks.ablations.examine import ROBOT, SOIL, read_runs
 from benchmarks.speeds.kernel_time import against_c
 from ddagr_gym.diagnosis.gates.threshold_files import default_thresholds
 from ddagr_gym.diagnosis.gates.thresholds import Thresholds
-from ddagr_gym.diagnosis.pipeline import Task, run
-from ddagr_gym.diagnosis.preprocessing.mended_recordings import prepare
+from ddagr_gym.diagnosis.pipeline import diagnose
+from ddagr_gym.diagnosis.preprocessing.session import prepare
 from ddagr_gym.diagnosis.search.scan import scan
-from ddagr_gym.diagnosis.search.stepwise import refit_nominal
+from ddagr_gym.diagnosis.search.starting_models import refit_nominal
 from ddagr_gym.diagnosis.setting import Setting
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.files import write_atomically
@@ -71,15 +71,15 @@ def timed(folder: Path, thresholds: Thresholds, threads: int) -> Timed:
     """
     robot, soil, runs = get_robot(ROBOT), get_soil(SOIL), tuple(read_runs(folder))
     setting = Setting(threads=threads).with_windows(thresholds.duration)
-    problem = prepare(robot, soil, runs, setting).problem
+    problem = prepare(runs, robot, soil, thresholds, setting).problem
     _, refitted = refit_nominal(problem)
     scan(problem, refitted)  # what is compiled or read from the disk on first use
     began = time.perf_counter()
     terms = scan(problem, refitted)
     scanned = time.perf_counter() - began
     marks: list[tuple[str, float]] = []
-    outcome = run(
-        Task(robot, soil, runs, thresholds, setting), began_step=lambda name: marks.append((name, time.perf_counter()))
+    outcome = diagnose(
+        runs, robot, soil, thresholds, setting, on_step=lambda name, kept: marks.append((name, time.perf_counter()))
     )
     ends = [mark for _, mark in marks[1:]] + [time.perf_counter()]
     steps = {name: end - start for (name, start), end in zip(marks, ends, strict=True)}

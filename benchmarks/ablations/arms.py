@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 
 from ddagr_gym.diagnosis.gates.thresholds import Gate, Thresholds
-from ddagr_gym.diagnosis.preprocessing.mended_recordings import Prepared
+from ddagr_gym.diagnosis.preprocessing.mended_recordings import MendedRecordings
 from ddagr_gym.diagnosis.search.candidates import Candidate
 from ddagr_gym.diagnosis.search.scanned_model import ScannedModel, scan_model
 from ddagr_gym.identification.gauss_newton import Fitted, cost_of
@@ -58,11 +58,9 @@ class First:
         return asdict(self) | {"alarm": self.alarm}
 
 
-def from_values(prepared: Prepared) -> First | None:
+def from_values(mended: MendedRecordings) -> First | None:
     """What the readings themselves show before any simulation, alike in all arms that scan; None for nothing."""
-    if prepared.held:
-        return First("sensor_hold", True, _CERTAIN)
-    return First("gyro_sign", True, _CERTAIN) if prepared.flipped is not None else None
+    return First(mended.names[0], True, _CERTAIN) if mended.names else None
 
 
 def first_of(scans: Sequence[ScannedModel], thresholds: Thresholds) -> First:

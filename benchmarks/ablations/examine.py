@@ -18,10 +18,10 @@ from benchmarks.ablations.arms import (
 )
 from benchmarks.ablations.sparse import sparse_first
 from ddagr_gym.diagnosis.gates.thresholds import Thresholds
-from ddagr_gym.diagnosis.preprocessing.mended_recordings import Prepared
-from ddagr_gym.diagnosis.result.conclusion import begun
+from ddagr_gym.diagnosis.preprocessing.session import DiagnosisSession, prepare
+from ddagr_gym.diagnosis.search.rivals import scans_of
 from ddagr_gym.diagnosis.search.scanned_model import ScannedModel, scan_model
-from ddagr_gym.diagnosis.search.stepwise import refit_and_scan, scans_of
+from ddagr_gym.diagnosis.search.starting_models import refit_nominal, starting_models
 from ddagr_gym.diagnosis.setting import Setting, make_problem
 from ddagr_gym.identification.gauss_newton import Fitted
 from ddagr_gym.parameters import Robot, Soil
@@ -49,13 +49,12 @@ def read_runs(folder: Path) -> list[Recording]:
 
 
 @dataclass(frozen=True, eq=False)
-class _Begun:
+class _FirstScan:
     """The case as the diagnosis sees it before its search."""
 
-    prepared: Prepared
+    session: DiagnosisSession
     raw: Fitted
     scans: tuple[ScannedModel, ...]
-    thresholds: Thresholds
 
 
 def examine(folder: Path, thresholds: Thresholds) -> dict[str, dict[str, Any]]:
@@ -71,12 +70,12 @@ def examine(folder: Path, thresholds: Thresholds) -> dict[str, dict[str, Any]]:
     """
     robot, soil = get_robot(ROBOT), get_soil(SOIL)
     began = time.process_time()
-    case = _begin(robot, soil, folder, thresholds)
-    values = from_values(case.prepared)
-    problem, candidates = case.prepared.problem, case.scans[0].terms.candidates
-    found = {"as it is": _timed(lambda: values or first_of(case.scans, case.thresholds), began)}
+    case = _first_scan(robot, soil, folder, thresholds)
+    values = from_values(case.session.mended)
+    problem, candidates = case.session.problem, case.scans[0].terms.candidates
+    found = {"as it is": _timed(lambda: values or first_of(case.scans, case.session.gates), began)}
     arms: dict[str, Callable[[], First]] = {
-        "nominal fixed": lambda: values or first_of((scan_raw_nominal(problem, case.raw, soil),), case.thresholds),
+        "nominal fixed": lambda: values or first_of((scan_raw_nominal(problem, case.raw, soil),), case.session.gates),
         "no null bank": lambda: values or first_of(case.scans, noise_thresholds(problem)),
         "BIC forward": lambda: values or first_of(case.scans, bic_thresholds(problem, candidates)),
         "one roll-out": lambda: values or _one_roll_out(robot, soil, case),
@@ -90,15 +89,17 @@ def _timed(work: Callable[[], First], began: float) -> dict[str, Any]:
     return first.as_mapping() | {"seconds": time.process_time() - began}
 
 
-def _begin(robot: Robot, soil: Soil, folder: Path, thresholds: Thresholds) -> _Begun:
-    first = begun(robot, soil, read_runs(folder), Setting().with_windows(thresholds.duration))
-    problem = first.prepared.problem
-    scans = scans_of(problem, scan_model(problem, first.refitted), first.raw)
-    return _Begun(first.prepared, first.raw, tuple(scans), thresholds.for_length(problem.covered))
+def _first_scan(robot: Robot, soil: Soil, folder: Path, thresholds: Thresholds) -> _FirstScan:
+    setting = Setting().with_windows(thresholds.duration)
+    start = starting_models(prepare(read_runs(folder), robot, soil, thresholds, setting))
+    problem = start.session.problem
+    return _FirstScan(
+        start.session, start.raw, tuple(scans_of(problem, scan_model(problem, start.refitted), start.raw))
+    )
 
 
-def _one_roll_out(robot: Robot, soil: Soil, case: _Begun) -> First:
+def _one_roll_out(robot: Robot, soil: Soil, case: _FirstScan) -> First:
     """The same with windows as long as the drives."""
     setting = Setting(duration=_WHOLE_DRIVE, stride=_WHOLE_DRIVE)
-    _, model = refit_and_scan(make_problem(robot, soil, case.prepared.recordings, setting))
-    return first_of((model,), case.thresholds)
+    problem = make_problem(robot, soil, case.session.mended.recordings, setting)
+    return first_of((scan_model(problem, refit_nominal(problem)[1]),), case.session.gates)

@@ -122,13 +122,13 @@ def run(arguments: Arguments) -> None:
 
 def _mended(loaded: Sequence[Recording]) -> Sequence[Recording]:
     """Recordings as a diagnosis sees them; what had to be mended is told."""
-    from ddagr_gym.diagnosis.preprocessing.mended_recordings import mended
+    from ddagr_gym.diagnosis.preprocessing.mended_recordings import mend_recordings
 
     if not loaded:
         return loaded
-    found = mended(loaded)
-    faults = [f"repeated readings ({item.sensor})" for item in found.held]
-    faults += ["a reversed gyro"] if found.flipped is not None else []
+    found = mend_recordings(loaded)
+    faults = [f"repeated readings ({item.sensor})" for item in found.repeated]
+    faults += ["a reversed gyro"] if found.reversed_gyro is not None else []
     if faults:
         print(f"ddagr: warning: the recordings have {' and '.join(faults)}, which is mended first.", file=sys.stderr)
     return found.recordings
@@ -198,14 +198,14 @@ def _make(tasks: list[_Task], processes: int) -> None:
 
 
 def _one(task: _Task) -> None:
-    from ddagr_gym.diagnosis.null_bank.bank import null_run, scanned
+    from ddagr_gym.diagnosis.null_bank.bank import null_run, scan_null_drives
     from ddagr_gym.diagnosis.null_bank.structural_variants import KINDS
     from ddagr_gym.recordings.schema import Recording
 
     robot, soil, drives, setting, seed, number, path, centre = task
     made: NullRun
     if isinstance(drives, Recording):
-        made = scanned(robot, soil, [drives], f"real {Path(drives.meta.source).name}", setting)
+        made = scan_null_drives(robot, soil, [drives], f"real {Path(drives.meta.source).name}", setting)
     else:
         made = null_run(robot, soil, drives, KINDS[number % len(KINDS)], setting, (seed, number), centre)
     with atomic_path(path) as part:

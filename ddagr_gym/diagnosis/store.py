@@ -53,7 +53,7 @@ class StepStore:
     """
 
     def __init__(self, folder: Path | None, key: str) -> None:
-        self._folder = folder
+        self.folder = folder
         if folder is None:
             return
         if folder.exists() and any(folder.iterdir()) and not (folder / _KEY).is_file():
@@ -66,22 +66,22 @@ class StepStore:
 
     def has(self, name: str) -> bool:
         """Whether the step is finished."""
-        return self._folder is not None and (self._folder / f"{name}.json").is_file()
+        return self.folder is not None and (self.folder / f"{name}.json").is_file()
 
     def step(self, name: str, work: Callable[[], Result]) -> Result:
         """Result of a step: the kept one, or that of ``work``, which is kept."""
-        if self._folder is None:
+        if self.folder is None:
             return work()
         if self.has(name):
-            return _load(self._folder, name)  # type: ignore[no-any-return]
+            return _load(self.folder, name)  # type: ignore[no-any-return]
         made = work()
-        _save(self._folder, name, made)
+        _save(self.folder, name, made)
         return made
 
     def clear(self) -> None:
         """Remove the folder."""
-        if self._folder is not None:
-            shutil.rmtree(self._folder, ignore_errors=True)
+        if self.folder is not None:
+            shutil.rmtree(self.folder, ignore_errors=True)
 
 
 def _save(folder: Path, name: str, value: Any) -> None:

@@ -31,6 +31,9 @@ from benchmarks.concealed.sizes import LEAST_MEANINGFUL
 from benchmarks.concealed.storage import write_case
 from ddagr_gym.diagnosis.gates.threshold_files import default_thresholds
 from ddagr_gym.diagnosis.gates.thresholds import Gate, Thresholds
+from ddagr_gym.diagnosis.preprocessing.mended_recordings import MendedRecordings
+from ddagr_gym.diagnosis.preprocessing.repeated_readings import RepeatedReadings
+from ddagr_gym.diagnosis.preprocessing.reversed_gyro import ReversedGyro
 from ddagr_gym.diagnosis.search.candidates import candidates_of
 from ddagr_gym.diagnosis.search.scan import Gain
 from ddagr_gym.diagnosis.search.scanned_model import scan_model
@@ -118,10 +121,9 @@ def test_the_first_effect_is_the_one_furthest_over_its_gate_and_passing_ones_com
 
 
 def test_readings_that_speak_for_themselves_come_first() -> None:
-    nothing: Any = SimpleNamespace(held=(), flipped=None)
-    assert from_values(nothing) is None
-    held: Any = SimpleNamespace(held=(1,), flipped=None)
-    assert (from_values(held) or First("", False, 0.0)).name == "sensor_hold"
+    assert from_values(MendedRecordings((), ())) is None
+    repeats = MendedRecordings((), (), (RepeatedReadings("gyro", 0.5, 0.1, 100),), ReversedGyro(-0.9, 500))
+    assert (from_values(repeats) or First("", False, 0.0)).name == "sensor_hold"
 
 
 def test_without_nuisances_nothing_but_states_is_eliminated() -> None:

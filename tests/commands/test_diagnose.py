@@ -169,10 +169,10 @@ def test_a_stopped_diagnosis_goes_on(
     assert "goes on" in capsys.readouterr().err
     assert not (work / "stopped").exists()
 
-    def searched(*arguments: object, **options: object) -> None:
+    def search(*arguments: object, **options: object) -> None:
         raise AssertionError("the search was done again")
 
-    monkeypatch.setattr(pipeline, "searched", searched)
+    monkeypatch.setattr(pipeline, "search", search)
     assert main(words(work, "stopped")) == 0
     again, before = (load(work / name / "diagnosis.json") for name in ("stopped", "found"))
     assert {**again, "seconds": 0} == {**before, "seconds": 0}

@@ -29,12 +29,12 @@ def quick_nulls(monkeypatch: pytest.MonkeyPatch) -> list[int]:
         made.append(seed[-1])
         return drawn(kind, list(seed), setting.duration)
 
-    def scanned(robot, soil, recordings, kind, setting):  # type: ignore[no-untyped-def]
+    def scan_null_drives(robot, soil, recordings, kind, setting):  # type: ignore[no-untyped-def]
         made.append(0)
         return drawn(kind, [len(recordings)], setting.duration)
 
     monkeypatch.setattr(null_bank, "null_run", null_run)
-    monkeypatch.setattr(null_bank, "scanned", scanned)
+    monkeypatch.setattr(null_bank, "scan_null_drives", scan_null_drives)
     return made
 
 

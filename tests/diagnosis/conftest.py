@@ -1,6 +1,6 @@
 """Short simulated drives and the problem that they make."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -8,6 +8,9 @@ import numpy as np
 import pytest
 
 from ddagr_gym.diagnosis.certification.certify import certify
+from ddagr_gym.diagnosis.gates.thresholds import Thresholds
+from ddagr_gym.diagnosis.preprocessing.mended_recordings import MendedRecordings
+from ddagr_gym.diagnosis.preprocessing.session import DiagnosisSession
 from ddagr_gym.diagnosis.setting import Setting, make_problem
 from ddagr_gym.identification.gauss_newton import Fitted, fit
 from ddagr_gym.identification.problem import Problem
@@ -72,6 +75,12 @@ class Sloping:
     nominal: Fitted
     chosen: Fitted
     certificate: dict[str, Any]
+
+
+def session_of(problem: Problem, recordings: Sequence[Recording], gates: Thresholds) -> DiagnosisSession:
+    """Session of a problem that is made already, with gates that hold for any length."""
+    mended = MendedRecordings(tuple(recordings), tuple(recordings))
+    return DiagnosisSession(get_robot("ddagr"), get_soil("thesis_a1"), mended, Setting(), problem, gates, gates)
 
 
 SLOPE = "slope=0.06,direction=0.8"

@@ -6,13 +6,13 @@ from typing import Any
 import pytest
 
 from ddagr_gym.diagnosis.gates.thresholds import Thresholds
-from ddagr_gym.diagnosis.result.conclusion import _verdict, accepted
+from ddagr_gym.diagnosis.result.conclusion import _verdict, accept
 from ddagr_gym.diagnosis.search.scanned_model import SearchResult
 
 THRESHOLDS = Thresholds({}, {"encoder_left": 1.0, "yaw_rate": 1.0, "local_strength": 1.0}, 20, "a test")
 
 
-def standing(*names: str, **misfit: float) -> Any:
+def model(*names: str, **misfit: float) -> Any:
     return SimpleNamespace(names=names, gains=(), misfit={"encoder_left": 0.5, "yaw_rate": 0.5} | misfit)
 
 
@@ -21,7 +21,7 @@ def found(nominal: Any, chosen: Any) -> SearchResult:
 
 
 def concluded(search: SearchResult, seen: tuple[str, ...] = ()) -> tuple[tuple[str, ...], bool]:
-    return _verdict(accepted(search, THRESHOLDS), seen, THRESHOLDS)
+    return _verdict(accept(search, THRESHOLDS), seen, THRESHOLDS)
 
 
 @pytest.mark.parametrize(
@@ -39,20 +39,20 @@ def concluded(search: SearchResult, seen: tuple[str, ...] = ()) -> tuple[tuple[s
 def test_what_is_left_in_the_channels_takes_a_name_away(
     before: float, left: dict[str, float], verdict: tuple[str, ...], complete: bool
 ) -> None:
-    search = found(standing(encoder_left=before), standing("slope", **left))
+    search = found(model(encoder_left=before), model("slope", **left))
     assert concluded(search) == (verdict, complete)
 
 
 def test_repeats_stay_named_whatever_is_left() -> None:
-    search = found(standing(encoder_left=8.0), standing("slope", encoder_left=7.9))
+    search = found(model(encoder_left=8.0), model("slope", encoder_left=7.9))
     assert concluded(search) == (("unknown",), False)
     assert concluded(search, ("sensor_hold",)) == (("sensor_hold",), False)
-    alone = standing(encoder_left=0.5)
+    alone = model(encoder_left=0.5)
     assert concluded(found(alone, alone), ("sensor_hold",)) == (("sensor_hold",), True)
 
 
 def test_names_that_leave_too_much_leave_the_model_too() -> None:
-    rough = found(standing(encoder_left=8.0), standing("slope", encoder_left=7.9))
-    assert accepted(rough, THRESHOLDS).chosen is rough.nominal
-    good = found(standing(encoder_left=8.0), standing("slope"))
-    assert accepted(good, THRESHOLDS) is good
+    rough = found(model(encoder_left=8.0), model("slope", encoder_left=7.9))
+    assert accept(rough, THRESHOLDS).chosen is rough.nominal
+    good = found(model(encoder_left=8.0), model("slope"))
+    assert accept(good, THRESHOLDS) is good

@@ -20,9 +20,10 @@ from ddagr_gym.diagnosis.null_bank.drives import Template, null_recordings
 from ddagr_gym.diagnosis.null_bank.standard_drives import standard_template
 from ddagr_gym.diagnosis.preprocessing.input_requirements import content_hash
 from ddagr_gym.diagnosis.search.initial_guess import first_guess
+from ddagr_gym.diagnosis.search.rivals import best_gains, scans_of
 from ddagr_gym.diagnosis.search.scan import Gain, drive_extent
-from ddagr_gym.diagnosis.search.scanned_model import ScannedModel
-from ddagr_gym.diagnosis.search.stepwise import best_gains, refit_and_scan, scans_of
+from ddagr_gym.diagnosis.search.scanned_model import ScannedModel, scan_model
+from ddagr_gym.diagnosis.search.starting_models import refit_nominal
 from ddagr_gym.diagnosis.setting import Setting, make_problem
 from ddagr_gym.identification.problem import Problem
 from ddagr_gym.parameters import Robot, Soil
@@ -60,10 +61,10 @@ def null_run(
     if template is None:
         template = standard_template(robot, rng)
     drives = null_recordings(*((robot, soil) if centre is None else centre), template, kind, rng)
-    return scanned(robot, soil, drives, kind, setting)
+    return scan_null_drives(robot, soil, drives, kind, setting)
 
 
-def scanned(robot: Robot, soil: Soil, recordings: Sequence[Recording], kind: str, setting: Setting) -> NullRun:
+def scan_null_drives(robot: Robot, soil: Soil, recordings: Sequence[Recording], kind: str, setting: Setting) -> NullRun:
     """Refit and scan of drives in which nothing is missing.
 
     Args:
@@ -74,7 +75,8 @@ def scanned(robot: Robot, soil: Soil, recordings: Sequence[Recording], kind: str
         setting: of the diagnosis.
     """
     problem = make_problem(robot, soil, recordings, setting)
-    raw, model = refit_and_scan(problem)
+    raw, refitted = refit_nominal(problem)
+    model = scan_model(problem, refitted)
     best = best_gains(scans_of(problem, model, raw))
     return NullRun(
         kind,

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from ddagr_gym.diagnosis.search.stepwise import refit_nominal
+from ddagr_gym.diagnosis.search.starting_models import refit_nominal
 from ddagr_gym.diagnosis.setting import Setting, make_problem
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.recordings.schema import Recording

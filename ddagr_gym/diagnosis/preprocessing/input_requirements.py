@@ -7,7 +7,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ddagr_gym.diagnosis.result.verdict import DataSource
 from ddagr_gym.diagnosis.setting import LEAST_WINDOWS, Setting, window_duration
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.windows import PERIOD_TOLERANCE
@@ -28,13 +27,6 @@ def content_hash(recording: Recording) -> str:
         digest.update(name.encode())
         digest.update(np.ascontiguousarray(values, dtype=np.float64).tobytes())
     return digest.hexdigest()
-
-
-def data_source(recording: Recording) -> DataSource:
-    """Name, hash and length of a recording."""
-    seconds = float(recording.t[-1] - recording.t[0]) if len(recording) else 0.0
-    hashed = recording.meta.source_sha256 or content_hash(recording)
-    return DataSource(recording.meta.source, hashed, len(recording), seconds)
 
 
 def check_recordings(recordings: Sequence[Recording], robot: Robot, setting: Setting) -> None:

@@ -1,4 +1,4 @@
-"""Held readings, found in the values themselves: a noisy sensor hardly ever reads exactly the same twice.
+"""Repeated readings, found in the values themselves: a noisy sensor hardly ever reads exactly the same twice.
 
 No model is needed, and none could say it as surely. Repeats are then treated as what they are, "no new sample", and the
 rest of the diagnosis sees the readings that were new.
@@ -38,7 +38,7 @@ _QUANTA = 20.0
 
 
 @dataclass(frozen=True)
-class Held:
+class RepeatedReadings:
     """A sensor that repeats its readings.
 
     Attributes:
@@ -72,7 +72,7 @@ def _repeats(recording: Recording, names: Sequence[str]) -> tuple[Flags, Flags]:
     return repeat, telling
 
 
-def find_repeated_readings(recordings: Sequence[Recording]) -> tuple[Held, ...]:
+def find_repeated_readings(recordings: Sequence[Recording]) -> tuple[RepeatedReadings, ...]:
     """Sensors that repeat their readings in more than :data:`LEAST_SHARE` of the samples that say something."""
     found = []
     for sensor, names in SENSORS.items():
@@ -83,7 +83,7 @@ def find_repeated_readings(recordings: Sequence[Recording]) -> tuple[Held, ...]:
             continue
         share = sum(int((repeat & t).sum()) for repeat, t in pairs) / telling
         if share > LEAST_SHARE:
-            found.append(Held(sensor, share, _duration(read, names), telling))
+            found.append(RepeatedReadings(sensor, share, _duration(read, names), telling))
     return tuple(found)
 
 
@@ -128,10 +128,10 @@ def repeated_rows(recording: Recording, names: Sequence[str]) -> tuple[NDArray[n
     return rows, same & ~(values[rows] == 0.0).all(axis=1)
 
 
-def without_repeats(recording: Recording, held: Sequence[Held]) -> Recording:
-    """Recording in which repeated readings of the held sensors are missing samples."""
+def without_repeats(recording: Recording, repeated: Sequence[RepeatedReadings]) -> Recording:
+    """Recording in which repeated readings of the given sensors are missing samples."""
     channels = dict(recording.channels)
-    for item in held:
+    for item in repeated:
         names = [name for name in SENSORS[item.sensor] if recording.has(name)]
         if not names:
             continue
@@ -143,8 +143,8 @@ def without_repeats(recording: Recording, held: Sequence[Held]) -> Recording:
     return replace(recording, channels=channels)
 
 
-def hold_effect(held: Sequence[Held]) -> SensorHold:
-    """The finding as an effect of the library: one duration, that of the sensor held longest, at most its largest."""
-    flags = {sensor: float(any(item.sensor == sensor for item in held)) for sensor in SENSORS}
-    longest = min(max(item.duration for item in held), SensorHold.parameter("duration").metadata["high"])
+def hold_effect(repeated: Sequence[RepeatedReadings]) -> SensorHold:
+    """The finding as an effect of the library, with the longest duration of any sensor that it allows."""
+    flags = {sensor: float(any(item.sensor == sensor for item in repeated)) for sensor in SENSORS}
+    longest = min(max(item.duration for item in repeated), SensorHold.parameter("duration").metadata["high"])
     return SensorHold(longest, **flags)

@@ -1,40 +1,25 @@
-"""From recordings to a verdict: the steps in their order."""
+"""The verdict of a search: which names are accepted, their findings with intervals, and whether anything is left."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
-from functools import partial
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, replace
 from typing import Any
 
-import numpy as np
-
 from ddagr_gym.diagnosis.gates.thresholds import Thresholds
-from ddagr_gym.diagnosis.preprocessing.input_requirements import data_source
-from ddagr_gym.diagnosis.preprocessing.mended_recordings import Prepared, prepare
-from ddagr_gym.diagnosis.preprocessing.repeated_readings import Held, hold_effect
+from ddagr_gym.diagnosis.preprocessing.input_requirements import content_hash
+from ddagr_gym.diagnosis.preprocessing.mended_recordings import MendedRecordings
+from ddagr_gym.diagnosis.preprocessing.repeated_readings import RepeatedReadings, hold_effect
 from ddagr_gym.diagnosis.preprocessing.reversed_gyro import ReversedGyro
+from ddagr_gym.diagnosis.preprocessing.session import DiagnosisSession
 from ddagr_gym.diagnosis.result.equivalence import equivalents
 from ddagr_gym.diagnosis.result.sentences import headline
 from ddagr_gym.diagnosis.result.uncertainty import intervals, least_detectable, resampled_parameters, with_structure
-from ddagr_gym.diagnosis.result.verdict import NONE, UNKNOWN, Diagnosis, Estimate, Finding
-from ddagr_gym.diagnosis.search.scan import dispersion_of
-from ddagr_gym.diagnosis.search.scanned_model import ScannedModel, SearchResult, scan_model
-from ddagr_gym.diagnosis.search.stepwise import (
-    BENT,
-    MOST_EFFECTS,
-    further_gates,
-    refit_nominal,
-    search,
-)
-from ddagr_gym.diagnosis.setting import SHORT, Setting
-from ddagr_gym.diagnosis.store import StepCache, compute_without_cache
-from ddagr_gym.errors import InputError
-from ddagr_gym.identification.gauss_newton import Fitted
+from ddagr_gym.diagnosis.result.verdict import NONE, UNKNOWN, DataSource, Diagnosis, Estimate, Finding
+from ddagr_gym.diagnosis.search.scanned_model import ScannedModel, SearchResult
+from ddagr_gym.diagnosis.search.stepwise import MOST_EFFECTS, further_gates
 from ddagr_gym.identification.misfit import LOCAL, explained_share, roughest
-from ddagr_gym.identification.problem import Problem
-from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.effects.gyro_sign import GyroSign
 from ddagr_gym.recordings.schema import Recording
@@ -50,171 +35,82 @@ _MUCH = 1.5
 """The same where the names explain less than half of the channels' misfit."""
 
 
-@dataclass(frozen=True, eq=False)
-class Begun:
-    """Where a search begins.
-
-    Attributes:
-        setting: of the windows.
-        prepared: recordings and their windows.
-        raw: the nominal model as it stands.
-        refitted: the same refitted.
-    """
-
-    setting: Setting
-    prepared: Prepared
-    raw: Fitted
-    refitted: Fitted
-
-
-def begun(
-    robot: Robot,
-    soil: Soil,
-    recordings: Sequence[Recording],
-    setting: Setting,
-    progress: Callable[[str], None] = lambda text: None,
-    cache: StepCache = compute_without_cache,
-) -> Begun:
-    """Nominal models on windows of the set length; on short ones where the refitted one is far off.
-
-    What is large bends long predictions so much that no small step leads to it, and shows in short ones as well.
-
-    Args:
-        robot: nominal.
-        soil: nominal.
-        recordings: at least one, of one period.
-        setting: choices.
-        progress: called with what is being done.
-        cache: see :func:`ddagr_gym.diagnosis.search.stepwise.search`.
-
-    Raises:
-        InputError: the nominal simulator breaks down on some window.
-    """
-    prepared = prepare(robot, soil, recordings, setting)
-    raw, refitted = cache("search refit", partial(refit_nominal, prepared.problem, progress))
-    if dispersion_of(prepared.problem, refitted) > BENT and setting.duration > SHORT:
-        progress("far off: again in short windows")
-        setting = setting.with_windows(SHORT, SHORT * setting.stride / setting.duration)
-        prepared = prepare(robot, soil, recordings, setting)
-        raw, refitted = cache("search refit, short windows", partial(refit_nominal, prepared.problem, progress))
-    _check_predicted(prepared, refitted)
-    return Begun(setting, prepared, raw, refitted)
-
-
-def _check_predicted(prepared: Prepared, refitted: Fitted) -> None:
-    """A window that cannot be predicted has no residual, and nothing could be said of it."""
-    failed = np.flatnonzero(~np.isfinite(refitted.window_cost))
-    if failed.size:
-        windows = prepared.problem.blocked.windows
-        source = prepared.recordings[int(windows.recording[failed[0]])].meta.source
-        raise InputError(
-            f"the nominal simulator breaks down in {failed.size} of {windows.count} windows, first at "
-            f"{windows.time[failed[0]]:.1f} s of {source}: leave that stretch out, or give a --robot and --soil that "
-            "are closer to the real ones."
-        )
-
-
-def searched(
-    robot: Robot,
-    soil: Soil,
-    recordings: Sequence[Recording],
-    thresholds: Thresholds,
-    setting: Setting,
-    progress: Callable[[str], None] = lambda text: None,
-    cache: StepCache = compute_without_cache,
-) -> tuple[Setting, SearchResult]:
-    """Search from the nominal models of :func:`begun`.
-
-    Args:
-        robot: nominal.
-        soil: nominal.
-        recordings: at least one, of one period.
-        thresholds: of the bank.
-        setting: choices.
-        progress: called with what is being done.
-        cache: see :func:`ddagr_gym.diagnosis.search.stepwise.search`.
-
-    Returns:
-        The setting of the windows that were searched, for :func:`prepare`, and what was found.
-
-    Raises:
-        InputError: see :func:`begun`.
-    """
-    first = begun(robot, soil, recordings, setting, progress, cache)
-    problem = first.prepared.problem
-    nominal = cache("search nominal", partial(scan_model, problem, first.refitted, progress))
-    gates = thresholds.for_length(problem.covered)
-    return first.setting, search(problem, gates, nominal=(first.raw, nominal), progress=progress, cache=cache)
-
-
 def conclude(
-    prepared: Prepared, found: SearchResult, thresholds: Thresholds, rng: np.random.Generator
+    session: DiagnosisSession, found: SearchResult, accepted: SearchResult
 ) -> tuple[Diagnosis, tuple[Effect, ...]]:
     """Findings with intervals and equivalence sets, and the verdict.
 
     Args:
-        prepared: what was searched.
+        session: of the diagnosis.
         found: by the search.
-        thresholds: of the null bank.
-        rng: of the resampling.
+        accepted: the same, or only its nominal model where :func:`accept` refuses the names.
 
     Returns:
         The diagnosis (its time is 0), and the effects that it names with their fitted sizes.
     """
-    problem, held = prepared.problem, prepared.held
-    seen = [*_held_findings(held), *_flipped_findings(prepared.flipped)]
-    kept = accepted(found, thresholds)
-    verdict, complete = _verdict(kept, [f.name for f in seen], thresholds)
-    fitted = _findings(problem, found, thresholds, rng)
-    findings, rejected = ((*seen, *fitted), ()) if kept is found else (tuple(seen), tuple(fitted))
-    from_values = (*((hold_effect(held),) if held else ()), *((GyroSign(1.0),) if prepared.flipped else ()))
-    effects = (*from_values, *kept.chosen.fitted.point.effects)
-    values = kept.chosen.fitted.point.values
-    alone, beside = _detectable(kept, thresholds)
+    gates, mended, values = session.gates, session.mended, accepted.chosen.fitted.point.values
+    verdict, complete = _verdict(accepted, mended.names, gates)
+    seen = [*_repeat_findings(mended.repeated), *_reversed_gyro_findings(mended.reversed_gyro)]
+    fitted = _findings(session, found)
+    findings, rejected = ((*seen, *fitted), ()) if accepted is found else (tuple(seen), tuple(fitted))
+    alone, beside = _detectable(accepted, gates)
     diagnosis = Diagnosis(
         verdict,
         complete,
         findings,
         headline(verdict, complete, findings),
-        {"nominal": kept.nominal.misfit, "corrected": kept.chosen.misfit, "limit": dict(thresholds.misfit)},
+        {"nominal": accepted.nominal.misfit, "corrected": accepted.chosen.misfit, "limit": dict(gates.misfit)},
         {**alone, **beside},
-        {p.name: float(v) for p, v in zip(problem.nuisances.parameters, values, strict=True) if p.prior > 0.0},
-        tuple(recording.meta.source for recording in prepared.recordings),
-        _thresholds(thresholds),
+        {p.name: float(v) for p, v in zip(session.problem.nuisances.parameters, values, strict=True) if p.prior > 0.0},
+        tuple(recording.meta.source for recording in mended.recordings),
+        _thresholds(gates),
         0.0,
         __version__,
-        data=tuple(data_source(recording) for recording in prepared.recordings),
+        data=tuple(data_source(recording) for recording in mended.recordings),
         rejected=rejected,
         detectable_alone=alone,
     )
-    return diagnosis, effects
+    return diagnosis, (*_effects_of_values(mended), *accepted.chosen.fitted.point.effects)
 
 
-def _held_findings(held: Sequence[Held]) -> list[Finding]:
-    """Held readings need no fit: the share of repeats is the evidence, and its own score."""
-    if not held:
+def data_source(recording: Recording) -> DataSource:
+    """Name, hash and length of a recording."""
+    seconds = float(recording.t[-1] - recording.t[0]) if len(recording) else 0.0
+    hashed = recording.meta.source_sha256 or content_hash(recording)
+    return DataSource(recording.meta.source, hashed, len(recording), seconds)
+
+
+def _effects_of_values(mended: MendedRecordings) -> tuple[Effect, ...]:
+    """Effects that were found in the values themselves."""
+    hold = (hold_effect(mended.repeated),) if mended.repeated else ()
+    return hold if mended.reversed_gyro is None else (*hold, GyroSign(1.0))
+
+
+def _repeat_findings(repeated: Sequence[RepeatedReadings]) -> list[Finding]:
+    """Repeated readings need no fit: the share of repeats is the evidence, and its own score."""
+    if not repeated:
         return []
-    effect = hold_effect(held)
+    effect = hold_effect(repeated)
     parameters = {
         name: Estimate(float(getattr(effect, name)), str(effect.parameter(name).metadata["unit"]))
         for name in ("duration", "accelerometer", "gyro", "encoders", "pose")
     }
-    repeats = sum(item.share * item.samples for item in held)
+    repeats = sum(item.share * item.samples for item in repeated)
     return [Finding("sensor_hold", parameters, repeats, 0.0, repeats**0.5, repeats, {}, {"sensor_hold": 1.0})]
 
 
-def _flipped_findings(flipped: ReversedGyro | None) -> list[Finding]:
+def _reversed_gyro_findings(reversed_gyro: ReversedGyro | None) -> list[Finding]:
     """A reversed gyro needs no fit: the correlation is the evidence, as the gain of a line through the origin."""
-    if flipped is None:
+    if reversed_gyro is None:
         return []
-    gain = -0.5 * flipped.samples * math.log1p(-min(flipped.correlation**2, 1.0 - 1e-12))
+    gain = -0.5 * reversed_gyro.samples * math.log1p(-min(reversed_gyro.correlation**2, 1.0 - 1e-12))
     flip = {"flip": Estimate(1.0, "-")}
     return [Finding("gyro_sign", flip, gain, 0.0, (2.0 * gain) ** 0.5, gain, {"yaw_rate": 1.0}, {"gyro_sign": 1.0})]
 
 
-def _findings(problem: Problem, found: SearchResult, thresholds: Thresholds, rng: np.random.Generator) -> list[Finding]:
+def _findings(session: DiagnosisSession, found: SearchResult) -> list[Finding]:
     """One finding per effect of the chosen model."""
-    chosen = found.chosen
+    problem, gates, chosen, rng = session.problem, session.gates, found.chosen, session.rng("verdict")
     if not chosen.names:
         return []
     parameters, draws = resampled_parameters(problem, chosen.fitted, rng)
@@ -239,12 +135,12 @@ def _findings(problem: Problem, found: SearchResult, thresholds: Thresholds, rng
                 effect.name,
                 estimates,
                 gain,
-                further_gates(thresholds, found.models[: place + 1]).of(effect.name).gain,
+                further_gates(gates, found.models[: place + 1]).of(effect.name).gain,
                 before.scores[effect.name],
                 before.held_out.get(effect.name, 0.0),
                 _channel_shares(before, after),
                 equivalents(found, effect.name, rng),
-                calibrated_p=thresholds.p_value(effect.name, gain),
+                calibrated_p=gates.p_value(effect.name, gain),
             )
         )
     return findings
@@ -282,7 +178,7 @@ def _channel_shares(before: ScannedModel, after: ScannedModel) -> dict[str, floa
     return {name: fall / total for name, fall in falls.items() if total > 0.0 and fall > 0.01 * total}
 
 
-def accepted(found: SearchResult, thresholds: Thresholds) -> SearchResult:
+def accept(found: SearchResult, thresholds: Thresholds) -> SearchResult:
     """What was found; without names where these leave too much of what the channels show."""
     if not found.chosen.names:
         return found

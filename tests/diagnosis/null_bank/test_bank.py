@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from ddagr_gym.diagnosis.null_bank import bank as null_bank
-from ddagr_gym.diagnosis.null_bank.bank import bank_hash, pieces_of, scanned
+from ddagr_gym.diagnosis.null_bank.bank import bank_hash, pieces_of, scan_null_drives
 from ddagr_gym.diagnosis.null_bank.drives import Template
-from ddagr_gym.diagnosis.search import stepwise as search
-from ddagr_gym.diagnosis.search.stepwise import BENT
+from ddagr_gym.diagnosis.search import rivals
+from ddagr_gym.diagnosis.search.starting_models import FAR_OFF
 from ddagr_gym.diagnosis.setting import Setting
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.schema import Recording
@@ -74,11 +74,17 @@ def quick_scan(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(null_bank, "drive_extent", lambda problem, prediction: None)
 
 
+def nominal_is(monkeypatch: pytest.MonkeyPatch, model: Any) -> None:
+    """Refit and scan of the nominal model are not computed."""
+    monkeypatch.setattr(null_bank, "refit_nominal", lambda problem: (None, None))
+    monkeypatch.setattr(null_bank, "scan_model", lambda problem, fitted: model)
+
+
 def test_a_null_run_keeps_the_length_of_the_windows_that_were_cut(
     quick_scan: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(null_bank, "refit_and_scan", lambda problem: (None, model_of(1.0)))
-    run = scanned(ROBOT, SOIL, [drive(40.0)], "plain", Setting().with_windows(6.0))
+    nominal_is(monkeypatch, model_of(1.0))
+    run = scan_null_drives(ROBOT, SOIL, [drive(40.0)], "plain", Setting().with_windows(6.0))
     assert run.duration == pytest.approx(5.0)
     assert run.windows * run.duration == pytest.approx(40.0, rel=0.15)
 
@@ -87,11 +93,11 @@ def test_a_null_run_that_bends_the_nominal_model_counts_the_raw_one_too(
     quick_scan: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As a search ranks; what is said of an effect beside its gain comes from the same scan."""
-    bent = model_of(3.0, meaningful=False, dispersion=2.0 * BENT)
-    monkeypatch.setattr(null_bank, "refit_and_scan", lambda problem: (None, bent))
-    monkeypatch.setattr(search, "scan_model", lambda problem, raw: model_of(70.0))
-    run = scanned(ROBOT, SOIL, [drive(40.0)], "plain", Setting())
+    bent = model_of(3.0, meaningful=False, dispersion=2.0 * FAR_OFF)
+    nominal_is(monkeypatch, bent)
+    monkeypatch.setattr(rivals, "scan_model", lambda problem, raw: model_of(70.0))
+    run = scan_null_drives(ROBOT, SOIL, [drive(40.0)], "plain", Setting())
     assert (run.gains, run.held_out, run.meaningless) == ({"slope": 70.0}, {"slope": 7.0}, ())
-    monkeypatch.setattr(search, "scan_model", lambda problem, raw: model_of(2.0))
-    run = scanned(ROBOT, SOIL, [drive(40.0)], "plain", Setting())
+    monkeypatch.setattr(rivals, "scan_model", lambda problem, raw: model_of(2.0))
+    run = scan_null_drives(ROBOT, SOIL, [drive(40.0)], "plain", Setting())
     assert (run.gains, run.meaningless) == ({"slope": 3.0}, ("slope",))

@@ -6,11 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ddagr_gym.diagnosis.pipeline import _doubted
+from ddagr_gym.diagnosis.localisation.localise import Localisation, Where
 from ddagr_gym.diagnosis.preprocessing.data_checks import DataDoubt, data_doubts, dead_channels
 from ddagr_gym.diagnosis.result.sentences import dead_in_words
 from ddagr_gym.diagnosis.result.verdict import Diagnosis
+from ddagr_gym.diagnosis.review import review
 from ddagr_gym.recordings.schema import Recording
+
+_NOTHING = Where((), 0.0, (), (), None, "")
+NOWHERE = Localisation({}, None, _NOTHING, _NOTHING, {}, ())
 
 
 def doubts(*recordings: Recording) -> tuple[DataDoubt, ...]:
@@ -58,11 +62,11 @@ def test_channels_that_no_diagnosis_compares_are_not_called_dead() -> None:
 def test_with_a_dead_channel_no_answer_is_complete(verdict: str, begin: str) -> None:
     answer = Diagnosis((verdict,), True, (), "", {"limit": {"yaw_rate": 1.2}}, {}, {}, ("a",), {}, 1.0, "0")
     dead = [DataDoubt("a", "yaw_rate", "stuck", "It never changes.")]
-    made = _doubted(answer, {"explained": None, "findings": {}}, {}, None, dead)
+    made = review(answer, NOWHERE, checks=dead)
     assert not made.complete
     assert made.sentence.startswith(begin)
     assert made.sentence.endswith("yaw rate never changes while the robot drives, so that it says nothing.")
-    assert _doubted(answer, {"explained": None, "findings": {}}, {}).complete
+    assert review(answer, NOWHERE).complete
 
 
 def test_several_dead_channels_in_words() -> None:

@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ddagr_gym.diagnosis.preprocessing.input_requirements import check_recordings, content_hash, data_source
+from ddagr_gym.diagnosis.preprocessing.input_requirements import check_recordings, content_hash
+from ddagr_gym.diagnosis.result.conclusion import data_source
 from ddagr_gym.diagnosis.setting import Setting, window_duration
 from ddagr_gym.errors import InputError
 from ddagr_gym.presets import get_robot

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ddagr_gym.diagnosis.preprocessing.repeated_readings import (
-    Held,
+    RepeatedReadings,
     find_repeated_readings,
     hold_effect,
     without_repeats,
@@ -79,7 +79,7 @@ def test_a_steady_reading_between_changes_is_no_hold(steady: str) -> None:
 
 
 def test_a_hold_longer_than_the_effect_knows_is_its_longest() -> None:
-    assert hold_effect([Held("gyro", 0.9, 75.0, 100)]).duration == 60.0
+    assert hold_effect([RepeatedReadings("gyro", 0.9, 75.0, 100)]).duration == 60.0
 
 
 @pytest.mark.parametrize("rate", [5, 10])

@@ -10,20 +10,19 @@ import numpy as np
 import pytest
 
 from ddagr_gym.diagnosis.gates.thresholds import Gate, Thresholds
-from ddagr_gym.diagnosis.result.conclusion import begun
+from ddagr_gym.diagnosis.search import rivals
 from ddagr_gym.diagnosis.search import stepwise as module
 from ddagr_gym.diagnosis.search.scan import Gain, gains, nuisance_answer, scan
 from ddagr_gym.diagnosis.search.scanned_model import Rival, ScannedModel
+from ddagr_gym.diagnosis.search.starting_models import StartingModels, starting_models
 from ddagr_gym.diagnosis.search.stepwise import search
-from ddagr_gym.diagnosis.setting import Setting
 from ddagr_gym.diagnosis.store import StepStore
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.gauss_newton import cost_of, effect_columns, effect_parameters, fit
 from ddagr_gym.identification.problem import Point, Problem
 from ddagr_gym.physics.effects.registry import effect_kind, parse_effect
-from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.schema import Recording
-from tests.diagnosis.conftest import Sloping
+from tests.diagnosis.conftest import Sloping, session_of
 
 THRESHOLDS = Thresholds({"slope": Gate(3.0, 0.0)}, {}, 20, "a test")
 
@@ -35,7 +34,7 @@ def scanned(sloping: Sloping) -> ScannedModel:
     return ScannedModel(sloping.nominal, terms, tuple(gains(terms)), {}, {}, 1.0, {})
 
 
-def cost_at(sloping: Sloping, point: module.Point) -> float:
+def cost_at(sloping: Sloping, point: Point) -> float:
     prediction = sloping.problem.predict(point)
     return cost_of(sloping.problem, point, prediction, sloping.nominal.elimination)[0]
 
@@ -46,7 +45,7 @@ def test_a_damped_guess_begins_with_the_answer_of_soil_and_robot(sloping: Slopin
     answer = nuisance_answer(sloping.problem, sloping.nominal, scanned.terms, gain)
     assert (answer[sloping.problem.free] != 0.0).any()
     assert (answer[~sloping.problem.free] == 0.0).all()
-    point = module._damped_guess(sloping.problem, scanned, gain, scanned.terms, sloping.nominal)
+    point = rivals._damped_guess(sloping.problem, scanned, gain, scanned.terms, sloping.nominal)
     alone = replace(point, values=sloping.nominal.point.values)
     assert cost_at(sloping, point) < cost_at(sloping, alone)
     assert sloping.nominal.cost - cost_at(sloping, point) > 0.5 * gain.gain
@@ -55,8 +54,8 @@ def test_a_damped_guess_begins_with_the_answer_of_soil_and_robot(sloping: Slopin
 def test_a_guess_that_is_far_too_large_is_damped(sloping: Sloping, scanned: ScannedModel) -> None:
     gain = scanned.gains[0]
     exaggerated = Gain(gain.candidate, gain.name, gain.gain, tuple(3.0 * m for m in gain.multiples))
-    point = module._damped_guess(sloping.problem, scanned, exaggerated, scanned.terms, sloping.nominal)
-    guessed = module._damped_guess(sloping.problem, scanned, gain, scanned.terms, sloping.nominal)
+    point = rivals._damped_guess(sloping.problem, scanned, exaggerated, scanned.terms, sloping.nominal)
+    guessed = rivals._damped_guess(sloping.problem, scanned, gain, scanned.terms, sloping.nominal)
     assert point.effects[0].angle < 2.0 * guessed.effects[0].angle
     assert cost_at(sloping, point) < sloping.nominal.cost
 
@@ -68,26 +67,28 @@ def test_a_search_goes_on_behind_its_last_step(
     done: list[str] = []
     stop = [True]
 
-    def refit_and_scan(problem: object, progress: object) -> tuple[object, ScannedModel]:
+    def scan_model(problem: object, fitted: object, progress: object) -> ScannedModel:
         done.append("nominal")
-        return sloping.nominal, scanned
+        return scanned
 
-    def added(problem: object, last: ScannedModel, *rest: object) -> tuple[ScannedModel, tuple[Rival, ...]] | None:
-        done.append(f"after {last.names}")
-        if not last.names:
+    def add(session: object, raw: object, models: list[ScannedModel], steps: object) -> Any:
+        done.append(f"after {models[-1].names}")
+        if not models[-1].names:
             return chosen, (Rival("slope", sloping.chosen, 9.0),)
         if stop.pop():
             raise KeyboardInterrupt
         return None
 
-    monkeypatch.setattr(module, "refit_and_scan", refit_and_scan)
-    monkeypatch.setattr(module, "_added", added)
-    monkeypatch.setattr(module, "_settled", lambda problem, last: last)
+    monkeypatch.setattr(module, "scan_model", scan_model)
+    monkeypatch.setattr(module, "_add_effect", add)
+    monkeypatch.setattr(module, "_fitted_to_the_end", lambda problem, last: last)
+    session = session_of(sloping.problem, sloping.recordings, THRESHOLDS)
+    start = StartingModels(session, sloping.nominal, sloping.nominal)
     with pytest.raises(KeyboardInterrupt):
-        search(sloping.problem, THRESHOLDS, cache=StepStore(tmp_path / "part", "key").step)
+        search(session, start, StepStore(tmp_path / "part", "key").step)
     assert done == ["nominal", "after ()", "after ('slope',)"]
     stop[:] = [False]
-    found = search(sloping.problem, THRESHOLDS, cache=StepStore(tmp_path / "part", "key").step)
+    found = search(session, start, StepStore(tmp_path / "part", "key").step)
     assert done[3:] == ["after ('slope',)"]
     assert found.chosen.names == ("slope",)
     assert found.steps[0][0].fitted.point.effects == sloping.chosen.point.effects
@@ -157,8 +158,10 @@ def test_a_window_that_cannot_be_predicted_is_no_perfect_fit(sloping: Sloping) -
 
 
 def test_a_window_that_no_model_predicts_is_refused_in_a_sentence(
-    drive: Callable[..., Recording], monkeypatch: pytest.MonkeyPatch
+    drive: Callable[..., Recording], problem_of: Callable[..., Problem], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    recordings = (drive(seconds=8.0),)
+    session = session_of(problem_of(*recordings), recordings, THRESHOLDS)
     predict = Problem.predict
 
     def broken(problem: Problem, point: Point) -> np.ndarray:
@@ -168,7 +171,7 @@ def test_a_window_that_no_model_predicts_is_refused_in_a_sentence(
 
     monkeypatch.setattr(Problem, "predict", broken)
     with pytest.raises(InputError, match=r"breaks down in 1 of 3 windows, first at 4\.0 s"):
-        begun(get_robot("ddagr"), get_soil("thesis_a1"), (drive(seconds=8.0),), Setting())
+        starting_models(session)
 
 
 def test_a_second_effect_keeps_the_overlap_it_had_before_it_was_named() -> None:

@@ -1,15 +1,14 @@
-"""What localisation adds to the findings and to the sentence."""
+"""What localisation, certification and checks add to the findings and to the sentence."""
 
 from dataclasses import asdict, replace
-from typing import Any
 
 import pytest
 
-from ddagr_gym.diagnosis.localisation.localise import Where
+from ddagr_gym.diagnosis.localisation.localise import Localisation, Where
 from ddagr_gym.diagnosis.localisation.operating_conditions import Unevenness
-from ddagr_gym.diagnosis.pipeline import _doubted
 from ddagr_gym.diagnosis.preprocessing.data_checks import DataDoubt
 from ddagr_gym.diagnosis.result.verdict import Diagnosis, Estimate, Finding, as_mapping, validate
+from ddagr_gym.diagnosis.review import review
 
 MISFIT = {"yaw_rate": 4.0}
 BANK = {"nulls": 60, "bank": "f", "level": 0.05, "gates": {}}
@@ -21,33 +20,33 @@ def diagnosis(name: str, field: str, value: float, complete: bool = True) -> Dia
     return Diagnosis((name,), complete, (finding,), "", limits, {}, {}, ("a.csv",), BANK, 1.0, "0")
 
 
-def where(uneven: Unevenness | None = None) -> dict[str, Any]:
-    return asdict(Where((), 0.0, (), (), uneven, "everywhere"))
+def where(uneven: Unevenness | None = None) -> Where:
+    return Where((), 0.0, (), (), uneven, "everywhere")
 
 
-def located(explained: float = 1.0, **findings: Any) -> dict[str, Any]:
-    return {"explained": explained, "findings": findings}
+def located(explained: float | None = 1.0, **findings: Where) -> Localisation:
+    return Localisation({}, explained, where(), where(), findings, ())
 
 
 @pytest.mark.parametrize("complete", [True, False])
 def test_a_size_that_is_not_the_same_everywhere_is_said_and_leaves_the_answer_incomplete(complete: bool) -> None:
     uneven = where(Unevenness("speed", "m/s", 0.5, None, 1.5, 0.7, 0.01))
-    made = _doubted(diagnosis("command_delay", "delay", 0.1, complete), located(command_delay=uneven), {})
+    made = review(diagnosis("command_delay", "delay", 0.1, complete), located(command_delay=uneven))
     assert not made.complete
     assert "the size of command delay is not the same everywhere: 1.5 of the fitted one" in made.sentence
     assert made.sentence.endswith("above what these data can show." if complete else "that has no name here.")
 
 
 def test_an_even_size_changes_nothing() -> None:
-    made = _doubted(diagnosis("command_delay", "delay", 0.1), located(command_delay=where()), {})
+    made = review(diagnosis("command_delay", "delay", 0.1), located(command_delay=where()))
     assert made.complete
     assert "everywhere" not in made.sentence
 
 
-def test_held_readings_keep_their_place() -> None:
+def test_repeated_readings_keep_their_place() -> None:
     """The model has no such effect, so that localisation says nothing about it."""
-    made = _doubted(diagnosis("sensor_hold", "duration", 0.2), located(), {"sensor_hold": where()})
-    assert made.findings[0].where == where()
+    made = review(diagnosis("sensor_hold", "duration", 0.2), located(), where())
+    assert made.findings[0].where == asdict(where())
     validate(as_mapping(made))
 
 
@@ -56,7 +55,7 @@ def test_drives_predicted_worse_make_a_name_doubtful() -> None:
 
     def made(interval: list[float]) -> Diagnosis:
         fit = {"gain": {"30": {"corrected": {"value": -0.3, "interval": interval}}}}
-        return _doubted(diagnosis("command_delay", "delay", 0.1), located(), {}, fit)
+        return review(diagnosis("command_delay", "delay", 0.1), located(), None, fit)
 
     assert not made([-0.4, -0.2]).complete
     assert "predicted worse with it, by 30 % (20 to 40 %) after 30 s" in made([-0.4, -0.2]).sentence
@@ -65,10 +64,10 @@ def test_drives_predicted_worse_make_a_name_doubtful() -> None:
 
 
 def test_findings_that_leave_much_of_the_mismatch_are_not_complete() -> None:
-    made = _doubted(diagnosis("command_delay", "delay", 0.1), located(explained=0.4), {})
+    made = review(diagnosis("command_delay", "delay", 0.1), located(explained=0.4))
     assert not made.complete
     assert made.sentence.endswith("; 40 % of the mismatch; something more is left that has no name here.")
-    assert _doubted(diagnosis("command_delay", "delay", 0.1), located(), {}).complete
+    assert review(diagnosis("command_delay", "delay", 0.1), located()).complete
 
 
 @pytest.mark.parametrize(
@@ -88,7 +87,7 @@ def test_a_size_at_its_bound_makes_its_form_doubtful(
     answer = diagnosis(name, field, value)
     estimate = replace(answer.findings[0].parameters[field], value=value, unit="s" if name == "pose_latency" else "-")
     finding = replace(answer.findings[0], parameters={field: replace(estimate, interval=interval)})
-    made = _doubted(replace(answer, findings=(finding,)), located(), {})
+    made = review(replace(answer, findings=(finding,)), located())
     assert made.complete == (not words)
     assert words in made.sentence
 
@@ -97,7 +96,7 @@ def test_what_is_seen_in_the_values_has_no_share_of_the_mismatch() -> None:
     """It is mended in all models, so that a model without it is not there to compare with."""
     answer = diagnosis("sensor_hold", "duration", 0.2)
     seen = replace(answer, findings=(replace(answer.findings[0], gate=0.0),))
-    made = _doubted(seen, located(explained=0.0), {})
+    made = review(seen, located(explained=0.0))
     assert made.complete
     assert "mismatch" not in made.sentence
 
@@ -105,7 +104,7 @@ def test_what_is_seen_in_the_values_has_no_share_of_the_mismatch() -> None:
 def test_without_a_name_the_sentence_has_what_the_recordings_own_checks_suspect() -> None:
     doubt = DataDoubt("a.csv", "encoder_right", "travel", "Twice as far.", ("encoder_scale",))
     nothing = replace(diagnosis("slope", "angle", 0.1), verdict=("none",), findings=())
-    made = _doubted(nothing, located(), {}, checks=[doubt, doubt])
+    made = review(nothing, located(), checks=[doubt, doubt])
     assert made.complete
     assert made.sentence.count("in a way that encoder scale would explain") == 1, made.sentence
-    assert "look wrong" not in _doubted(diagnosis("slope", "angle", 0.1), located(), {}, checks=[doubt]).sentence
+    assert "look wrong" not in review(diagnosis("slope", "angle", 0.1), located(), checks=[doubt]).sentence

@@ -1,4 +1,4 @@
-"""When readings were held: stretches of the recordings in which a sensor repeats itself."""
+"""When readings repeat: stretches of the recordings in which a sensor gives the same reading again and again."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ddagr_gym.diagnosis.preprocessing.repeated_readings import (
     LEAST_SHARE,
     SENSORS,
     Flags,
-    Held,
+    RepeatedReadings,
     repeat_runs,
     repeated_rows,
 )
@@ -23,22 +23,22 @@ _LOOK = 1.0
 """Time over which the share of repeats is taken [s] (ours), or four holds where these are longer."""
 
 _ALL = 0.95
-"""Share of the time from which a sensor is said to be held everywhere (ours)."""
+"""Share of the time from which a sensor is said to repeat its readings everywhere (ours)."""
 
 
-def where_readings_repeat(recordings: Sequence[Recording], held: Sequence[Held]) -> Where | None:
-    """Stretches in which the held sensors repeat their readings; None where none is held.
+def where_readings_repeat(recordings: Sequence[Recording], repeated: Sequence[RepeatedReadings]) -> Where | None:
+    """Stretches in which sensors repeat their readings; None where none does.
 
     Args:
         recordings: as they were read, repeats included.
-        held: from :func:`ddagr_gym.diagnosis.preprocessing.repeated_readings.find_repeated_readings`.
+        repeated: from :func:`ddagr_gym.diagnosis.preprocessing.repeated_readings.find_repeated_readings`.
     """
-    if not held:
+    if not repeated:
         return None
     found = [
         span
         for number, recording in enumerate(recordings)
-        for item in held
+        for item in repeated
         if recording.has(*SENSORS[item.sensor])
         for span in _spans(number, recording, item)
     ]
@@ -48,13 +48,13 @@ def where_readings_repeat(recordings: Sequence[Recording], held: Sequence[Held])
         for repeats_, s in sorted(found, key=lambda pair: (pair[1].recording, pair[1].start))
     )
     covered = _covered(spans) / max(sum(float(r.t[-1] - r.t[0]) for r in recordings), 1e-12)
-    sensors = " and ".join(item.sensor for item in held)
+    sensors = " and ".join(item.sensor for item in repeated)
     count = "one stretch" if len(spans) == 1 else f"{len(spans)} stretches"
     when = EVERYWHERE if covered >= _ALL else f"in {count}, {100.0 * covered:.0f} % of the time"
     return Where(spans, min(covered, 1.0), (), (), None, f"{sensors}: {when}")
 
 
-def _spans(number: int, recording: Recording, item: Held) -> list[tuple[int, Span]]:
+def _spans(number: int, recording: Recording, item: RepeatedReadings) -> list[tuple[int, Span]]:
     """Stretches of one sensor in one recording with the number of repeats in each, whose shares come later."""
     rows, repeat = repeated_rows(recording, SENSORS[item.sensor])
     if len(rows) < 2:

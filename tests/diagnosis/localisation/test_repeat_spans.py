@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ddagr_gym.diagnosis.preprocessing.repeat_spans import where_readings_repeat
-from ddagr_gym.diagnosis.preprocessing.repeated_readings import Held, find_repeated_readings
+from ddagr_gym.diagnosis.localisation.repeat_spans import where_readings_repeat
+from ddagr_gym.diagnosis.preprocessing.repeated_readings import RepeatedReadings, find_repeated_readings
 from ddagr_gym.recordings.schema import Recording
 
 PERIOD, COUNT = 0.02, 2000
@@ -41,7 +41,7 @@ def test_freezes_are_found_where_they_are() -> None:
     held[501:1100] = held[1501:1650] = True
     held[::50] = False
     recordings = [drive(np.zeros(COUNT, dtype=bool)), drive(held, seed=2)]
-    found = where_readings_repeat(recordings, (Held("gyro", 0.3, 0.3, 2000),))
+    found = where_readings_repeat(recordings, (RepeatedReadings("gyro", 0.3, 0.3, 2000),))
     assert found is not None
     assert [span.recording for span in found.spans] == [1, 1]
     edges = [(span.start, span.end) for span in found.spans]

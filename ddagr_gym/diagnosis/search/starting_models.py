@@ -1,0 +1,78 @@
+"""Where a search starts: the nominal model as it is and refitted, on windows in which a refit can succeed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from ddagr_gym.diagnosis.preprocessing.session import DiagnosisSession, be_silent
+from ddagr_gym.diagnosis.search.scan import dispersion_of
+from ddagr_gym.diagnosis.setting import SHORT
+from ddagr_gym.diagnosis.store import StepCache, compute_without_cache
+from ddagr_gym.errors import InputError
+from ddagr_gym.identification.gauss_newton import Fitted, fit
+from ddagr_gym.identification.problem import Problem
+
+FAR_OFF = 4.0
+"""Dispersion of the refitted nominal model above which something large is missing: windows are then short, and the raw
+model is scanned too (ours; chosen on the development set)."""
+
+
+@dataclass(frozen=True, eq=False)
+class StartingModels:
+    """Nominal models before any effect is assumed.
+
+    Attributes:
+        session: with the windows to search.
+        raw: the nominal model as it stands, with its sensitivities.
+        refitted: the same with refitted nuisances.
+    """
+
+    session: DiagnosisSession
+    raw: Fitted
+    refitted: Fitted
+
+
+def starting_models(session: DiagnosisSession, cache: StepCache = compute_without_cache) -> StartingModels:
+    """Nominal models on windows of the set length; on short ones where the refitted one is far off.
+
+    What is large bends long predictions so much that no small step leads to it, and shows in short ones as well.
+
+    Args:
+        session: of the diagnosis.
+        cache: of the refits.
+
+    Raises:
+        InputError: the nominal simulator breaks down on some window.
+    """
+    raw, refitted = cache("search refit", partial(refit_nominal, session.problem, session.progress))
+    if dispersion_of(session.problem, refitted) > FAR_OFF and session.setting.duration > SHORT:
+        session.progress("far off: again in short windows")
+        session = session.with_windows(SHORT, SHORT * session.setting.stride / session.setting.duration)
+        again = partial(refit_nominal, session.problem, session.progress)
+        raw, refitted = cache("search refit, short windows", again)
+    _check_predicted(session, refitted)
+    return StartingModels(session, raw, refitted)
+
+
+def refit_nominal(problem: Problem, progress: Callable[[str], None] = be_silent) -> tuple[Fitted, Fitted]:
+    """The raw nominal model with its sensitivities, and the refitted one."""
+    progress("refitting the nominal model")
+    raw = fit(problem, iterations=0)
+    return raw, fit(problem, raw.point, first=raw)
+
+
+def _check_predicted(session: DiagnosisSession, refitted: Fitted) -> None:
+    """A window that cannot be predicted has no residual, and nothing could be said of it."""
+    failed = np.flatnonzero(~np.isfinite(refitted.window_cost))
+    if failed.size:
+        windows = session.problem.blocked.windows
+        source = session.mended.recordings[int(windows.recording[failed[0]])].meta.source
+        raise InputError(
+            f"the nominal simulator breaks down in {failed.size} of {windows.count} windows, first at "
+            f"{windows.time[failed[0]]:.1f} s of {source}: leave that stretch out, or give a --robot and --soil that "
+            "are closer to the real ones."
+        )
