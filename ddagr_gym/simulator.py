@@ -16,8 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 from ddagr_gym.errors import InputError
 from ddagr_gym.parameters import Numerics, Robot, Sensors, Soil
 from ddagr_gym.physics import layout
-from ddagr_gym.physics.contact_geometry import contact_rule, section_rule
 from ddagr_gym.physics.effects import Effect, effect_table, load_effects
+from ddagr_gym.physics.numerics import step_numerics
 from ddagr_gym.physics.terrain import SoilField
 from ddagr_gym.physics.wheel_forces import finite_array, soil_vector
 from ddagr_gym.simulator_kernel import advance_rows, remember_rows, settle_rows
@@ -113,21 +113,9 @@ def build_row(robot: Robot, soil: Soils, sensors: Sensors) -> Array:
     return row
 
 
-def _options(numerics: Numerics) -> Array:
-    """Numerics as the kernels read them."""
-    values = {
-        layout.OPTION_REFRESH: numerics.jacobian_refresh,
-        layout.OPTION_TOLERANCE: numerics.sinkage_tolerance,
-        layout.OPTION_SHEAR_RATE: numerics.minimum_shear_rate,
-        layout.OPTION_REST_SPEED: numerics.rest_speed,
-        layout.OPTION_EXTRAPOLATION: numerics.force_extrapolation,
-        layout.OPTION_ACCEPTED_ERROR: numerics.accepted_error,
-        layout.OPTION_DIVISIONS: numerics.launch_substeps,
-        layout.OPTION_LAUNCH_CHANGE: numerics.launch_change,
-        layout.OPTION_STEPS: numerics.substeps,
-        layout.OPTION_MAXIMUM_STEP: numerics.maximum_step,
-    }
-    return np.array([float(values[k]) for k in range(len(values))])
+def _plain(bundle: tuple[Any, ...]) -> tuple[Any, ...]:
+    """A named tuple, and those inside it, as plain ones."""
+    return tuple(_plain(item) if isinstance(item, tuple) else item for item in bundle)
 
 
 class Simulator:
@@ -167,12 +155,7 @@ class Simulator:
         self.effect_memory = np.zeros((count, len(parameters), layout.EFFECT_MEMORY))
         self.field_index = np.full(count, -1, dtype=np.int64)
         self._set_fields(fields)
-        self._options = _options(numerics)
-        self._rules = (
-            section_rule(numerics.section_nodes),
-            contact_rule(numerics.contact_nodes),
-            contact_rule(numerics.jacobian_contact_nodes),
-        )
+        self._numerics = _plain(step_numerics(numerics))
         threads = min(threads, count)
         self._threads = threads
         self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
@@ -239,7 +222,7 @@ class Simulator:
         for index, size in ((layout.WHEEL_ANGLE, 2), (layout.LAST_COUNT, 2), (layout.SINKAGE, 4)):
             self.rows[np.ix_(indices, np.arange(index, index + size))] = 0.0
         self.effect_memory[indices] = 0.0
-        settle_rows(self.rows, indices, *self._ground(), *self._effects(), self._options, *self._rules)
+        settle_rows(self.rows, indices, self._grids(), self._actions(), self._numerics)
 
     def remember(self, past: Array) -> None:
         """Tell effects on commands and motors what was commanded before the present motion, which stays as it is.
@@ -251,12 +234,12 @@ class Simulator:
             past: (N, H, 2) commands of the samples before, the latest last [rad/s]; NaN where unknown.
         """
         if np.isin(self._points, (layout.POINT_COMMANDS, layout.POINT_MOTORS)).any():
-            remember_rows(self.rows, np.ascontiguousarray(past), *self._effects())
+            remember_rows(self.rows, np.ascontiguousarray(past), self._actions())
 
-    def _ground(self) -> tuple[Array, Array, NDArray[np.int64]]:
+    def _grids(self) -> tuple[Any, ...]:
         return self._fields, self._field_geometry, self.field_index
 
-    def _effects(self) -> tuple[NDArray[np.int64], NDArray[np.int64], Array, Array]:
+    def _actions(self) -> tuple[Any, ...]:
         return self._points, self._addresses, self.effect_parameters, self.effect_memory
 
     def advance(
@@ -271,19 +254,14 @@ class Simulator:
             readings: (N, samples, 8), written in the order of ``layout.READINGS``.
             record: (N, samples, K), written.
         """
-
-        chunks = self._chunks(noise.shape[1])
-
-        def run(part: int) -> None:
-            advance_rows(
-                self.rows, chunks[part], chunks[part + 1], commands, noise, *self._ground(),
-                *self._effects(), self._options, *self._rules, readings, recorded, record,
-            )  # fmt: skip
+        stretch = (commands, noise, recorded, readings, record)
+        shared = (stretch, self._grids(), self._actions(), self._numerics)
 
         if self._pool is None:
-            run(0)
-        else:
-            list(self._pool.map(run, range(len(chunks) - 1)))
+            advance_rows(self.rows, 0, self.count, *shared)
+            return
+        ends = self._chunks(noise.shape[1])
+        list(self._pool.map(lambda first, last: advance_rows(self.rows, first, last, *shared), ends[:-1], ends[1:]))
 
     def _chunks(self, samples: int) -> NDArray[np.int64]:
         """Ends of the parts that threads take: one each for a short stretch, several for a long one.

@@ -8,13 +8,14 @@ Environments are rows of a matrix and independent of each other; see :mod:`ddagr
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.jit import kernel
 from ddagr_gym.physics.body_dynamics import evaluate_forces, place_wheels, restore_body
-from ddagr_gym.physics.callbacks import apply_effects
+from ddagr_gym.physics.callbacks import EffectActions, actions_on, apply_effects
 from ddagr_gym.physics.integrators import advance_body
 from ddagr_gym.physics.layout import (
     BASE_MOTOR_RATE,
@@ -27,11 +28,6 @@ from ddagr_gym.physics.layout import (
     MOTOR_RATE,
     MOTOR_TARGET,
     OMEGA,
-    OPTION_DIVISIONS,
-    OPTION_LAUNCH_CHANGE,
-    OPTION_MAXIMUM_STEP,
-    OPTION_REFRESH,
-    OPTION_STEPS,
     POINT_COMMANDS,
     POINT_LOADS,
     POINT_MOTORS,
@@ -45,54 +41,72 @@ from ddagr_gym.physics.layout import (
     WHEEL,
     YAW_RATE,
 )
-from ddagr_gym.physics.terrain import sample_soil
+from ddagr_gym.physics.numerics import StepNumerics, named_numerics
+from ddagr_gym.physics.terrain import SoilGrids, sample_soil
 from ddagr_gym.sensors.imu import read_imu
 from ddagr_gym.sensors.pose_receiver import read_pose
 from ddagr_gym.sensors.wheel_encoder import read_encoders
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
+Bundle = tuple[Any, ...]
+"""Fields of a named tuple as a plain one: numba takes these from Python several times faster."""
+
+
+class Stretch(NamedTuple):
+    """Samples to drive over: what N environments are given, and what is written of them.
+
+    Attributes:
+        commands: (N, samples or 1, 2) bank speed commands; one is held over all samples [rad/s].
+        noise: (N, samples, NOISE_CHANNELS) standard normal draws.
+        recorded: (K,) row entries to record.
+        readings: (N, samples, 8), written.
+        record: (N, samples, K), written.
+    """
+
+    commands: Array
+    noise: Array
+    recorded: Integers
+    readings: Array
+    record: Array
 
 
 @kernel()
-def _drive(row: Array, command: Array, points: Integers, addresses: Integers, parameters: Array, memory: Array) -> None:
+def _drive(row: Array, command: Array, actions: EffectActions) -> None:
     """Commands and motor loops for the coming sample."""
     row[COMMAND] = command[0]
     row[COMMAND + 1] = command[1]
-    apply_effects(POINT_COMMANDS, row, points, addresses, parameters, memory)
+    apply_effects(POINT_COMMANDS, row, actions)
     for bank in range(2):
         limit = row[MAXIMUM_WHEEL_SPEED]
         row[COMMAND + bank] = min(max(row[COMMAND + bank], -limit), limit)
         row[MOTOR_TARGET + bank] = row[COMMAND + bank]
         row[MOTOR_RATE + bank] = row[BASE_MOTOR_RATE]
-    apply_effects(POINT_MOTORS, row, points, addresses, parameters, memory)
+    apply_effects(POINT_MOTORS, row, actions)
 
 
 @kernel()
-def _division(row: Array, options: Array) -> int:
+def _division(row: Array, numerics: StepNumerics) -> int:
     """Steps for the coming sample: more while a bank's rim speed changes fast against the wheel's speed."""
-    steps = max(int(options[OPTION_STEPS]), math.ceil(row[SAMPLE_PERIOD] / options[OPTION_MAXIMUM_STEP] - 1e-9))
+    steps = max(numerics.substeps, math.ceil(row[SAMPLE_PERIOD] / numerics.maximum_step - 1e-9))
     step = row[SAMPLE_PERIOD] / steps
     for bank in range(2):
         rim = row[WHEEL + bank] + row[WHEEL + 8 + bank]
         change = (row[MOTOR_TARGET + bank] - row[OMEGA + bank]) * (1.0 - math.exp(-row[MOTOR_RATE + bank] * step))
         speed = max(abs(rim * row[OMEGA + bank]), abs(row[V_X]))
-        if abs(rim * change) > options[OPTION_LAUNCH_CHANGE] * speed and change != 0.0:
-            return steps * int(options[OPTION_DIVISIONS])
+        if abs(rim * change) > numerics.launch_change * speed and change != 0.0:
+            return steps * numerics.launch_substeps
     return steps
 
 
 @kernel()
-def _prepare_ground(
-    row: Array, values: Array, geometry: Array, use_field: bool, points: Integers, addresses: Integers,
-    parameters: Array, memory: Array,
-) -> None:  # fmt: skip
+def _prepare_ground(row: Array, grids: SoilGrids, n: int, actions: EffectActions) -> None:
     """Loads and soil as the effects leave them."""
     restore_body(row)
-    apply_effects(POINT_LOADS, row, points, addresses, parameters, memory)
+    apply_effects(POINT_LOADS, row, actions)
     place_wheels(row)
-    sample_soil(row, values, geometry, use_field)
-    apply_effects(POINT_SOIL, row, points, addresses, parameters, memory)
+    sample_soil(row, grids, n)
+    apply_effects(POINT_SOIL, row, actions)
 
 
 @kernel()
@@ -110,101 +124,68 @@ def _average_motion(row: Array, v_x: float, v_y: float, yaw_rate: float) -> None
 
 
 @kernel()
-def settle_rows(
-    rows: Array, chosen: Integers, fields: Array, field_geometry: Array, field_index: Integers, points: Integers,
-    addresses: Integers, parameters: Array, memory: Array, options: Array, section: Array, contact: Array,
-    coarse: Array,
-) -> None:  # fmt: skip
-    """Sinkages and forces at the rows' present motion, from nothing; arguments as :func:`advance_rows`."""
+def settle_rows(rows: Array, chosen: Integers, grids: Bundle, actions: Bundle, numerics: Bundle) -> None:
+    """Sinkages and forces at the present motion of the rows ``chosen`` (K,), whatever they were before."""
+    accuracy = named_numerics(numerics)
     for n in chosen:
-        row = rows[n]
-        use_field = field_index[n] >= 0
-        values = fields[max(field_index[n], 0)]
-        geometry = field_geometry[max(field_index[n], 0)]
-        _prepare_ground(row, values, geometry, use_field, points, addresses, parameters[n], memory[n])
+        row, own = rows[n], actions_on(EffectActions(*actions), n)
+        _prepare_ground(row, SoilGrids(*grids), n, own)
         row[DERIVATIVE_VALID] = 0.0
-        evaluate_forces(
-            row, options[OPTION_REFRESH], options, section, contact, coarse, points, addresses, parameters[n],
-            memory[n],
-        )  # fmt: skip
+        evaluate_forces(row, accuracy.jacobian_refresh, accuracy, own)
 
 
 @kernel()
-def remember_rows(
-    rows: Array, past: Array, points: Integers, addresses: Integers, parameters: Array, memory: Array
-) -> None:
+def remember_rows(rows: Array, past: Array, actions: Bundle) -> None:
     """Let effects on commands and motors see what was commanded before the rows' present motion, which stays.
 
     Args:
         rows: (N, layout.SIZE).
         past: (N, H, 2) commands of the samples before, the latest last; NaN where unknown.
-        points: see :func:`advance_rows`, and the others.
-        addresses: see there.
-        parameters: see there.
-        memory: see there.
+        actions: of N environments.
     """
     count = past.shape[1]
     for n in range(rows.shape[0]):
-        row, now = rows[n], rows[n, TIME]
+        row, now, own = rows[n], rows[n, TIME], actions_on(EffectActions(*actions), n)
         for k in range(count):
             if math.isnan(past[n, k, 0]):
                 continue
             row[TIME] = now - (count - k) * row[SAMPLE_PERIOD]
-            _drive(row, past[n, k], points, addresses, parameters[n], memory[n])
+            _drive(row, past[n, k], own)
         row[TIME] = now
 
 
 @kernel()
 def advance_rows(
-    rows: Array, first: int, last: int, commands: Array, noise: Array, fields: Array, field_geometry: Array,
-    field_index: Integers, points: Integers, addresses: Integers, parameters: Array, memory: Array, options: Array,
-    section: Array, contact: Array, coarse: Array, readings: Array, recorded: Integers, record: Array,
-) -> None:  # fmt: skip
-    """Advance rows ``first`` to ``last`` (exclusive) by the samples in ``readings``.
+    rows: Array, first: int, last: int, stretch: Bundle, grids: Bundle, actions: Bundle, numerics: Bundle
+) -> None:
+    """Advance rows ``first`` to ``last`` (exclusive) by the samples of ``stretch``.
 
     Args:
         rows: (N, layout.SIZE), updated.
         first: first row.
         last: one past the last row.
-        commands: (N, samples or 1, 2) bank speed commands; one is held over all samples.
-        noise: (N, samples, NOISE_CHANNELS) standard normal draws.
-        fields: (fields or 1, nx, ny, 9) soil grids.
-        field_geometry: (fields or 1, 4).
-        field_index: (N,) grid of each row, -1 for its base soils.
-        points: (effects,).
-        addresses: (effects,).
-        parameters: (N, effects, EFFECT_PARAMETERS).
-        memory: (N, effects, EFFECT_MEMORY), updated.
-        options: numerics in the order of ``layout.OPTION_*``.
-        section: section rule.
-        contact: contact rule.
-        coarse: contact rule of the derivative.
-        readings: (N, samples, 8), written.
-        recorded: (K,) row entries to record.
-        record: (N, samples, K), written.
+        stretch: fields of :class:`Stretch`.
+        grids: fields of :class:`SoilGrids`.
+        actions: fields of :class:`EffectActions` on N environments.
+        numerics: fields of :class:`StepNumerics`.
     """
-    samples = readings.shape[1]
+    commands, noise, recorded, readings, record = Stretch(*stretch)
+    accuracy = named_numerics(numerics)
     held = commands.shape[1] == 1
     for n in range(first, last):
-        row, own_parameters, own_memory = rows[n], parameters[n], memory[n]
-        use_field = field_index[n] >= 0
-        values = fields[max(field_index[n], 0)]
-        geometry = field_geometry[max(field_index[n], 0)]
-        for k in range(samples):
-            _drive(row, commands[n, 0 if held else k], points, addresses, own_parameters, own_memory)
-            _prepare_ground(row, values, geometry, use_field, points, addresses, own_parameters, own_memory)
+        row, own = rows[n], actions_on(EffectActions(*actions), n)
+        for k in range(readings.shape[1]):
+            _drive(row, commands[n, 0 if held else k], own)
+            _prepare_ground(row, SoilGrids(*grids), n, own)
             v_x, v_y, yaw_rate = row[V_X], row[V_Y], row[YAW_RATE]
-            steps = _division(row, options)
+            steps = _division(row, accuracy)
             for _ in range(steps):
-                advance_body(
-                    row, row[SAMPLE_PERIOD] / steps, options, section, contact, coarse, points, addresses,
-                    own_parameters, own_memory,
-                )  # fmt: skip
+                advance_body(row, row[SAMPLE_PERIOD] / steps, accuracy, own)
             _average_motion(row, v_x, v_y, yaw_rate)
             read_imu(row, noise[n, k, 0:3])
             read_encoders(row, noise[n, k, 3:5], row[SAMPLE_PERIOD])
             read_pose(row, noise[n, k, 5:8])
-            apply_effects(POINT_READINGS, row, points, addresses, own_parameters, own_memory)
+            apply_effects(POINT_READINGS, row, own)
             for j in range(8):
                 readings[n, k, j] = row[READING + j]
             for j in range(recorded.shape[0]):

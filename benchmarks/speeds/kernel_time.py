@@ -14,8 +14,8 @@ import numpy as np
 from benchmarks.speeds.timing import Contestant, race, ratio
 from ddagr_gym.jit import kernel
 from ddagr_gym.parameters import Numerics
-from ddagr_gym.physics.contact_geometry import contact_rule, section_rule
-from ddagr_gym.physics.contact_patch import WRENCH, wheel_wrench
+from ddagr_gym.physics.contact_patch import WRENCH, WheelMotion, wheel_wrench
+from ddagr_gym.physics.numerics import PatchNumerics, patch_numerics
 from ddagr_gym.physics.wheel_forces import soil_vector, wheel_vector
 from ddagr_gym.presets import get_robot, get_soil
 
@@ -34,18 +34,13 @@ def evaluate(
     soil: np.ndarray,
     states: np.ndarray,
     repeats: int,
-    shear_rate: float,
-    rest_speed: float,
-    section: np.ndarray,
-    contact: np.ndarray,
+    numerics: PatchNumerics,
     wrenches: np.ndarray,
 ) -> None:
     for _ in range(repeats):
         for n in range(states.shape[0]):
-            wheel_wrench(
-                wheel, soil, states[n, 0], states[n, 1], states[n, 2], states[n, 3], states[n, 4], shear_rate,
-                rest_speed, section, contact, wrenches[n],
-            )  # fmt: skip
+            motion = WheelMotion(states[n, 0], states[n, 1], states[n, 2], states[n, 3])
+            wheel_wrench(wheel, soil, motion, states[n, 4], numerics, wrenches[n])
 
 
 def forward_states(count: int = STATES, seed: int = 0) -> np.ndarray:
@@ -68,18 +63,14 @@ class Kernel:
         self.wheel = wheel_vector(get_robot("ddagr").wheels[0])
         self.soil = soil_vector(get_soil("thesis_a1"))
         self.states = forward_states() if states is None else np.ascontiguousarray(states)
-        self.limits = (numerics.minimum_shear_rate, numerics.rest_speed)
-        self.section = section_rule(numerics.section_nodes)
-        self.contact = contact_rule(contact_nodes or numerics.contact_nodes)
+        self.numerics = patch_numerics(numerics, contact_nodes)
         self.wrenches = np.zeros((len(self.states), WRENCH))
 
     def contestant(self, name: str, repeats: int) -> Contestant:
         """The compiled Python; the amount is evaluations."""
 
         def run() -> float:
-            evaluate(
-                self.wheel, self.soil, self.states, repeats, *self.limits, self.section, self.contact, self.wrenches
-            )
+            evaluate(self.wheel, self.soil, self.states, repeats, self.numerics, self.wrenches)
             return float(repeats * len(self.states))
 
         return Contestant(name, run)
@@ -87,10 +78,11 @@ class Kernel:
     def in_c(self, name: str, function: Callable[..., None], repeats: int) -> Contestant:
         """The same in C."""
         wrenches = np.zeros_like(self.wrenches)
+        section, contact, *limits = self.numerics
         arguments = (
             _pointer(self.wheel), _pointer(self.soil), _pointer(self.states), len(self.states), repeats,
-            *map(ctypes.c_double, self.limits), _pointer(self.section), self.section.size // 2,
-            _pointer(self.contact), self.contact.shape[1], _pointer(wrenches),
+            *map(ctypes.c_double, limits), _pointer(section), section.size // 2,
+            _pointer(contact), contact.shape[1], _pointer(wrenches),
         )  # fmt: skip
 
         def run() -> float:
@@ -148,7 +140,7 @@ def against_c(repeats: int, evaluations: int) -> dict[str, object]:
     return {
         "compiler": version,
         "flags": [*FLAGS, VECTOR_LOOPS],
-        "nodes": int(ours.section.size // 2 * ours.contact.shape[1] * 2),
+        "nodes": int(ours.numerics.section_nodes.size // 2 * ours.numerics.contact_nodes.shape[1] * 2),
         "nanoseconds": {name: round(1e9 / found.median, 1) for name, found in rates.items()},
         # times, so the other's rate over ours
         "time_ratios": [ratio(rates, name, "ours") for name in BUILDS],

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ddagr_gym.jit import kernel, stack_array
 from ddagr_gym.physics.body_dynamics import evaluate_forces, world_rates
 from ddagr_gym.physics.body_jacobian import damping_inverse, solve
+from ddagr_gym.physics.callbacks import EffectActions
 from ddagr_gym.physics.drivetrain import advance_motors
 from ddagr_gym.physics.layout import (
     ACCELERATION,
@@ -28,9 +29,9 @@ from ddagr_gym.physics.layout import (
     X,
     Y,
 )
+from ddagr_gym.physics.numerics import StepNumerics
 
 Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 NEWTON_ITERATIONS = 15
 LENGTHS = 12  # of a Newton step that are tried
@@ -54,10 +55,8 @@ def _work(row: Array, defect: Array, change: Array) -> float:
 
 @kernel()
 def _newton_step(
-    row: Array, start: Array, defect: Array, change: Array, step: float, options: Array, section: Array,
-    contact: Array, coarse: Array, effect_points: Integers, effect_addresses: Integers, parameters: Array,
-    memory: Array,
-) -> None:  # fmt: skip
+    row: Array, start: Array, defect: Array, change: Array, step: float, numerics: StepNumerics, actions: EffectActions
+) -> None:
     """Move by ``change`` times the length at which its defect does no more work (false position, Illinois).
 
     Args:
@@ -66,14 +65,8 @@ def _newton_step(
         defect: (3,) at the present motion, overwritten.
         change: (3,) what is taken off the motion; the defect does work along it.
         step: h [s].
-        options: as in :func:`evaluate_forces`, and the following.
-        section: see there.
-        contact: see there.
-        coarse: see there.
-        effect_points: as in :func:`apply_effects`, and the following.
-        effect_addresses: see there.
-        parameters: see there.
-        memory: see there.
+        numerics: accuracy.
+        actions: effects on this environment.
     """
     before = stack_array(3)
     for j in range(3):
@@ -83,9 +76,7 @@ def _newton_step(
     for _ in range(LENGTHS):
         for j in range(3):
             row[V_X + j] = before[j] - length * change[j]
-        evaluate_forces(
-            row, -1.0, options, section, contact, coarse, effect_points, effect_addresses, parameters, memory
-        )  # fmt: skip
+        evaluate_forces(row, -1.0, numerics, actions)
         _defect(row, start, step, defect)
         work = _work(row, defect, change)
         if abs(work) <= LEFT_WORK * whole:
@@ -111,23 +102,16 @@ def _newton_step(
 
 @kernel()
 def backward_euler_step(
-    row: Array, step: float, options: Array, section: Array, contact: Array, coarse: Array, effect_points: Integers,
-    effect_addresses: Integers, parameters: Array, memory: Array, tolerance: float,
-) -> None:  # fmt: skip
+    row: Array, step: float, tolerance: float, numerics: StepNumerics, actions: EffectActions
+) -> None:
     """One backward Euler step.
 
     Args:
-        row: as in :func:`ddagr_gym.physics.integrators.advance_body`, and the following.
+        row: of the environment, with the forces at its present state; left with those at the new one.
         step: h [s].
-        options: see there.
-        section: see there.
-        contact: see there.
-        coarse: see there.
-        effect_points: see there.
-        effect_addresses: see there.
-        parameters: see there.
-        memory: see there.
         tolerance: of the defect [m/s], above which the iteration goes on.
+        numerics: accuracy.
+        actions: effects on this environment.
     """
     inverse, drive = stack_array(9), stack_array(6)
     start, defect, change = stack_array(3), stack_array(3), stack_array(3)
@@ -136,24 +120,17 @@ def backward_euler_step(
     advance_motors(row, step)
     row[TIME] += step
     for _ in range(NEWTON_ITERATIONS):
-        evaluate_forces(
-            row, 0.0, options, section, contact, coarse, effect_points, effect_addresses, parameters, memory
-        )  # fmt: skip
+        evaluate_forces(row, 0.0, numerics, actions)
         if _defect(row, start, step, defect) <= tolerance:
             break
-        damping_inverse(row, step, inverse, drive, effect_points, effect_addresses, parameters, memory)
+        damping_inverse(row, step, inverse, drive, actions)
         solve(inverse, defect, change)
         if not _work(row, defect, change) > 0.0:
             for j in range(3):
                 change[j] = defect[j]  # which does work whatever the derivative says
-        _newton_step(
-            row, start, defect, change, step, options, section, contact, coarse, effect_points, effect_addresses,
-            parameters, memory,
-        )  # fmt: skip
+        _newton_step(row, start, defect, change, step, numerics, actions)
     rate_x, rate_y = world_rates(row)
     row[X] += step * rate_x
     row[Y] += step * rate_y
     row[YAW] += step * row[YAW_RATE]
-    evaluate_forces(
-        row, 0.0, options, section, contact, coarse, effect_points, effect_addresses, parameters, memory
-    )  # fmt: skip
+    evaluate_forces(row, 0.0, numerics, actions)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ddagr_gym.jit import kernel, stack_array
 from ddagr_gym.parameters import STANDARD_GRAVITY
-from ddagr_gym.physics.callbacks import apply_effects
+from ddagr_gym.physics.callbacks import EffectActions, apply_effects
 from ddagr_gym.physics.contact_patch import WRENCH, wheel_wrench
 from ddagr_gym.physics.contact_stress import slip_ratio
 from ddagr_gym.physics.layout import (
@@ -34,9 +34,6 @@ from ddagr_gym.physics.layout import (
     LOAD,
     MASS,
     OMEGA,
-    OPTION_REST_SPEED,
-    OPTION_SHEAR_RATE,
-    OPTION_TOLERANCE,
     POINT_BODY_FORCES,
     POINT_WHEEL_FORCES,
     SINKAGE,
@@ -59,10 +56,12 @@ from ddagr_gym.physics.layout import (
     X,
     Y,
 )
+from ddagr_gym.physics.numerics import PatchNumerics, StepNumerics
 from ddagr_gym.physics.sinkage import solve_sinkage
 from ddagr_gym.physics.wheel_derivatives import (
     change_of,
     is_stale,
+    motion_of,
     predict_sinkage,
     refresh_derivative,
     relative_motion,
@@ -178,7 +177,7 @@ def _load_wheel(row: Array, i: int, wheel: Array, soil: Array) -> None:
 
 @kernel()
 def _carry_load(
-    row: Array, i: int, wheel: Array, soil: Array, options: Array, section: Array, contact: Array, wrench: Array
+    row: Array, i: int, wheel: Array, soil: Array, tolerance: float, numerics: PatchNumerics, wrench: Array
 ) -> None:
     """Wrench at the sinkage that carries the wheel's load, warm-started at the one in ``row``.
 
@@ -192,14 +191,11 @@ def _carry_load(
         for j in range(WRENCH):
             wrench[j] = 0.0
         return
-    tolerance = options[OPTION_TOLERANCE]
+    motion = motion_of(row, i)
     sinkage = row[SINKAGE + i]
     stiffness = stiffness_of(row, i)
     if stiffness > 0.0 and sinkage > 0.0:
-        wheel_wrench(
-            wheel, soil, row[WHEEL_V_X + i], row[WHEEL_V_Y + i], row[WHEEL_OMEGA + i], row[YAW_RATE], sinkage,
-            options[OPTION_SHEAR_RATE], options[OPTION_REST_SPEED], section, contact, wrench,
-        )  # fmt: skip
+        wheel_wrench(wheel, soil, motion, sinkage, numerics, wrench)
         step = (load - wrench[2]) / stiffness
         within = abs(load - wrench[2]) <= tolerance * load and abs(step) <= _EXTRAPOLATION_LIMIT * sinkage
         if within and sinkage + step <= wheel[0]:
@@ -211,17 +207,12 @@ def _carry_load(
     elif sinkage <= 0.0:
         sinkage = 0.3 * wheel[0]
     # Half the extrapolation error that is accepted above, so that the next step can extrapolate again.
-    row[SINKAGE + i], bogged = solve_sinkage(
-        wheel, soil, row[WHEEL_V_X + i], row[WHEEL_V_Y + i], row[WHEEL_OMEGA + i], row[YAW_RATE], load, sinkage,
-        0.05 * tolerance, options[OPTION_SHEAR_RATE], options[OPTION_REST_SPEED], section, contact, wrench,
-    )  # fmt: skip
+    row[SINKAGE + i], bogged = solve_sinkage(wheel, soil, motion, load, sinkage, 0.05 * tolerance, numerics, wrench)
     row[BOGGED + i] = 1.0 if bogged else 0.0
 
 
 @kernel()
-def extra_forces(
-    row: Array, effect_points: NDArray[np.int64], effect_addresses: NDArray[np.int64], parameters: Array, memory: Array
-) -> None:
+def extra_forces(row: Array, actions: EffectActions) -> None:
     """Forces that effects add to wheels and body."""
     for i in range(4):
         row[EXTRA_FORCE_X + i] = 0.0
@@ -230,8 +221,8 @@ def extra_forces(
         row[EXTRA_AXLE_TORQUE + i] = 0.0
     for j in range(3):
         row[BODY_FORCE + j] = 0.0
-    apply_effects(POINT_WHEEL_FORCES, row, effect_points, effect_addresses, parameters, memory)
-    apply_effects(POINT_BODY_FORCES, row, effect_points, effect_addresses, parameters, memory)
+    apply_effects(POINT_WHEEL_FORCES, row, actions)
+    apply_effects(POINT_BODY_FORCES, row, actions)
 
 
 @kernel()
@@ -267,12 +258,10 @@ def accelerate(row: Array, total: Array) -> None:
 
 
 @kernel()
-def _gather_forces(
-    row: Array, effect_points: NDArray[np.int64], effect_addresses: NDArray[np.int64], parameters: Array, memory: Array
-) -> None:
+def _gather_forces(row: Array, actions: EffectActions) -> None:
     """Add the effects' forces to those of the wheels, which are in ``row`` without them, and accelerate the body."""
     total = stack_array(3)
-    extra_forces(row, effect_points, effect_addresses, parameters, memory)
+    extra_forces(row, actions)
     sum_extra(row, total)
     for i in range(4):
         total[0] += row[FORCE_X + i]
@@ -286,23 +275,14 @@ def _gather_forces(
 
 
 @kernel()
-def evaluate_forces(
-    row: Array, refresh: float, options: Array, section: Array, contact: Array, coarse: Array,
-    effect_points: NDArray[np.int64], effect_addresses: NDArray[np.int64], parameters: Array, memory: Array,
-) -> None:  # fmt: skip
+def evaluate_forces(row: Array, refresh: float, numerics: StepNumerics, actions: EffectActions) -> None:
     """Wheel forces, sinkages and accelerations for the motion in ``row``.
 
     Args:
         row: reads motion, loads, soil; writes kinematics, forces, ACCELERATION, SPECIFIC_FORCE.
         refresh: relative change of motion that renews a wheel's derivative; negative: leave it alone.
-        options: numerics in the order of ``layout.OPTION_*``.
-        section: section rule.
-        contact: contact rule.
-        coarse: contact rule of the derivative.
-        effect_points: as in :func:`apply_effects`, and the following.
-        effect_addresses: see there.
-        parameters: see there.
-        memory: see there.
+        numerics: accuracy.
+        actions: effects on this environment.
     """
     tilt_gravity(row)
     share_load(row)
@@ -312,17 +292,17 @@ def evaluate_forces(
         _set_wheel_kinematics(row, i)
         predict_sinkage(row, i, v_x, v_y, rim)
         _load_wheel(row, i, wheel, soil)
-        _carry_load(row, i, wheel, soil, options, section, contact, wrench)
+        _carry_load(row, i, wheel, soil, numerics.sinkage_tolerance, numerics.forces, wrench)
         row[FORCE_X + i] = wrench[0]
         row[FORCE_Y + i] = wrench[1]
         row[FORCE_Z + i] = wrench[2]
         row[YAW_MOMENT + i] = wrench[3]
         row[AXLE_TORQUE + i] = wrench[4]
         if refresh >= 0.0 and row[LOAD + i] > 0.0 and is_stale(row, i, refresh):
-            refresh_derivative(row, i, wheel, soil, options, section, coarse)
+            refresh_derivative(row, i, wheel, soil, numerics.derivative)
     if refresh >= 0.0:
         row[DERIVATIVE_VALID] = 1.0
-    _gather_forces(row, effect_points, effect_addresses, parameters, memory)
+    _gather_forces(row, actions)
 
 
 @kernel()
@@ -339,19 +319,13 @@ def _may_extrapolate(row: Array, limit: float) -> bool:
 
 
 @kernel()
-def extrapolate_forces(
-    row: Array, limit: float, effect_points: NDArray[np.int64], effect_addresses: NDArray[np.int64], parameters: Array,
-    memory: Array,
-) -> bool:  # fmt: skip
+def extrapolate_forces(row: Array, limit: float, actions: EffectActions) -> bool:
     """Forces for a motion close to that of the last evaluation, by the wheels' derivatives (error of second order).
 
     Args:
         row: as in :func:`evaluate_forces`.
         limit: change of a wheel's velocity over its speed up to which this is done.
-        effect_points: as in :func:`apply_effects`, and the following.
-        effect_addresses: see there.
-        parameters: see there.
-        memory: see there.
+        actions: effects on this environment.
 
     Returns:
         Whether it was done; otherwise ``row`` is as before.
@@ -372,5 +346,5 @@ def extrapolate_forces(
         row[FORCE_Z + i] += change_of(row, i, 2, d_x, d_y, d_rim, d_z)
         row[YAW_MOMENT + i] += change_of(row, i, 3, d_x, d_y, d_rim, d_z) - row[EXTRA_YAW_MOMENT + i]
         row[AXLE_TORQUE + i] += change_of(row, i, 4, d_x, d_y, d_rim, d_z) - row[EXTRA_AXLE_TORQUE + i]
-    _gather_forces(row, effect_points, effect_addresses, parameters, memory)
+    _gather_forces(row, actions)
     return True

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from ddagr_gym.jit import kernel, stack_array
 from ddagr_gym.physics.body_dynamics import extra_forces, hub_x, hub_y, set_kinematics, sum_extra
+from ddagr_gym.physics.callbacks import EffectActions
 from ddagr_gym.physics.layout import (
     LOAD,
     MASS,
@@ -21,7 +22,6 @@ from ddagr_gym.physics.layout import (
 from ddagr_gym.physics.wheel_derivatives import change_of, relative_motion, stiffness_of
 
 Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 
 @kernel()
@@ -72,13 +72,11 @@ def _wheel_jacobian(row: Array, jacobian: Array, drive: Array) -> None:
 
 
 @kernel()
-def _add_effect_jacobian(
-    row: Array, jacobian: Array, effect_points: Integers, effect_addresses: Integers, parameters: Array, memory: Array
-) -> None:
+def _add_effect_jacobian(row: Array, jacobian: Array, actions: EffectActions) -> None:
     """Forward differences of the effects' forces by the three velocities."""
     active = False
-    for k in range(effect_points.shape[0]):
-        active = active or effect_points[k] == POINT_WHEEL_FORCES or effect_points[k] == POINT_BODY_FORCES
+    for point in actions.points:
+        active = active or point in (POINT_WHEEL_FORCES, POINT_BODY_FORCES)
     if not active:
         return
     base, moved = stack_array(3), stack_array(3)
@@ -88,7 +86,7 @@ def _add_effect_jacobian(
         step = 1e-4 * abs(before) + 1e-6
         row[V_X + direction] = before + step
         set_kinematics(row)
-        extra_forces(row, effect_points, effect_addresses, parameters, memory)
+        extra_forces(row, actions)
         sum_extra(row, moved)
         row[V_X + direction] = before
         for j in range(3):
@@ -116,10 +114,7 @@ def solve(inverse: Array, right: Array, solution: Array) -> None:
 
 
 @kernel()
-def damping_inverse(
-    row: Array, step: float, inverse: Array, drive: Array, effect_points: Integers, effect_addresses: Integers,
-    parameters: Array, memory: Array,
-) -> None:  # fmt: skip
+def damping_inverse(row: Array, step: float, inverse: Array, drive: Array, actions: EffectActions) -> None:
     """(I - step A)^-1, A from the forces' Jacobian and the Coriolis terms, and the accelerations by bank speed.
 
     Args:
@@ -127,14 +122,11 @@ def damping_inverse(
         step: [s].
         inverse: (9,) row by row, written.
         drive: (6,) d(acceleration)/d(right, left bank speed), row by row, written.
-        effect_points: as in :func:`apply_effects`, and the following.
-        effect_addresses: see there.
-        parameters: see there.
-        memory: see there.
+        actions: effects on this environment.
     """
     jacobian = stack_array(9)
     _wheel_jacobian(row, jacobian, drive)
-    _add_effect_jacobian(row, jacobian, effect_points, effect_addresses, parameters, memory)
+    _add_effect_jacobian(row, jacobian, actions)
     for j in range(3):
         inertia = row[YAW_INERTIA] if j == 2 else row[MASS]
         for k in range(3):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from types import FunctionType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from llvmlite import ir
@@ -19,8 +19,27 @@ from numpy.typing import NDArray
 from ddagr_gym.jit import callback_stamp, compile_callback, kernel
 from ddagr_gym.physics.layout import EFFECT_MEMORY, EFFECT_PARAMETERS, SIZE
 
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
 _FLOATS = types.CPointer(types.float64)
 _SIGNATURE = types.void(_FLOATS, _FLOATS, _FLOATS)
+
+
+class EffectActions(NamedTuple):
+    """Compiled actions of the effects on one environment; on N of them parameters and memory have N in front.
+
+    Attributes:
+        points: (actions,) where each acts, ``layout.POINT_*``.
+        addresses: (actions,) from :func:`compile_effect`.
+        parameters: (actions, EFFECT_PARAMETERS).
+        memory: (actions, EFFECT_MEMORY), which they update.
+    """
+
+    points: Integers
+    addresses: Integers
+    parameters: Array
+    memory: Array
 
 
 def _callback(row_pointer: Any, parameter_pointer: Any, memory_pointer: Any) -> None:
@@ -54,25 +73,16 @@ def _call(typing_context: Any, address: Any, row: Any, parameters: Any, memory: 
     return types.void(types.int64, types.int64, types.int64, types.int64), generate
 
 
-@kernel()
-def apply_effects(
-    point: int,
-    row: NDArray[np.float64],
-    effect_points: NDArray[np.int64],
-    effect_addresses: NDArray[np.int64],
-    parameters: NDArray[np.float64],
-    memory: NDArray[np.float64],
-) -> None:
-    """Call, in order, the effects attached at ``point`` on one environment.
+@kernel(inline=True)
+def actions_on(actions: EffectActions, n: int) -> EffectActions:
+    """Those of environment ``n`` out of a batch."""
+    return EffectActions(actions.points, actions.addresses, actions.parameters[n], actions.memory[n])
 
-    Args:
-        point: one of ``layout.POINT_*``.
-        row: (SIZE,).
-        effect_points: (effects,) point of each.
-        effect_addresses: (effects,) from :func:`compile_effect`.
-        parameters: (effects, EFFECT_PARAMETERS).
-        memory: (effects, EFFECT_MEMORY).
-    """
-    for k in range(effect_points.shape[0]):
-        if effect_points[k] == point:
-            _call(effect_addresses[k], row.ctypes.data, parameters[k].ctypes.data, memory[k].ctypes.data)
+
+@kernel()
+def apply_effects(point: int, row: Array, actions: EffectActions) -> None:
+    """Call, in order, the actions at ``point`` (one of ``layout.POINT_*``) on the row of one environment."""
+    for k in range(actions.points.shape[0]):
+        if actions.points[k] == point:
+            parameters, memory = actions.parameters[k], actions.memory[k]
+            _call(actions.addresses[k], row.ctypes.data, parameters.ctypes.data, memory.ctypes.data)

@@ -6,6 +6,8 @@ rear of the patch share the normal stress: behind the peak A.7 maps each angle t
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -45,6 +47,7 @@ from ddagr_gym.physics.layout import (
     SOIL_PEAK_1,
     SOIL_SHEAR_MODULUS,
 )
+from ddagr_gym.physics.numerics import PatchNumerics
 
 Array = NDArray[np.float64]
 
@@ -58,6 +61,22 @@ WRENCH = 5
     TANGENTIAL_COS, TANGENTIAL_SIN, _WRENCH,
 ) = (SECTION_SIZE + LANES * i for i in range(13))  # fmt: skip
 _SIZE = _WRENCH + WRENCH * LANES
+
+
+class WheelMotion(NamedTuple):
+    """Motion of a wheel in its own axes.
+
+    Attributes:
+        v_x: velocity of the hub forward [m/s].
+        v_y: velocity of the hub to the left [m/s].
+        omega: wheel speed, rolling forward positive [rad/s].
+        yaw_rate: of the wheel about the vertical, counter-clockwise positive [rad/s].
+    """
+
+    v_x: float
+    v_y: float
+    omega: float
+    yaw_rate: float
 
 
 @kernel(inline=True)
@@ -118,44 +137,29 @@ def _add_slices(work: Array) -> None:
 
 @kernel()
 def integrate_patch(
-    wheel: Array,
-    soil: Array,
-    v_x: float,
-    v_y: float,
-    omega: float,
-    yaw_rate: float,
-    sinkage: float,
-    minimum_shear_rate: float,
-    rest_speed: float,
-    section_nodes: Array,
-    contact_nodes: Array,
-    wrench: Array,
+    wheel: Array, soil: Array, motion: WheelMotion, sinkage: float, numerics: PatchNumerics, wrench: Array
 ) -> None:
     """Wrench on a wheel that travels forward (R0 omega + v_x >= 0) at a given sinkage in (0, minor_radius].
 
     Args:
         wheel: (minor_radius, half_width, major_radius) [m].
         soil: nine parameters in the order of ``layout.SOIL_PARAMETERS``.
-        v_x: hub velocity along the wheel [m/s].
-        v_y: hub velocity to the left [m/s].
-        omega: wheel speed, forward positive [rad/s].
-        yaw_rate: spin of the wheel about the vertical [rad/s].
+        motion: of the wheel.
         sinkage: [m].
-        minimum_shear_rate: nu_min [rad/s].
-        rest_speed: see :func:`wheel_wrench` [m/s].
-        section_nodes: from ``contact_geometry.section_rule``.
-        contact_nodes: from ``contact_geometry.contact_rule``.
+        numerics: quadrature.
         wrench: WRENCH floats, the result.
     """
+    v_x, v_y, omega, yaw_rate = motion
+    section_nodes, contact_nodes = numerics.section_nodes, numerics.contact_nodes
     outer_radius = wheel[0] + wheel[2]
     hub_height = outer_radius - sinkage
     edge = lateral_edge(wheel[0], sinkage)
-    slip = forward_slip_ratio(outer_radius * omega, v_x, rest_speed)
+    slip = forward_slip_ratio(outer_radius * omega, v_x, numerics.rest_speed)
     peak = peak_fraction(soil[SOIL_PEAK_0], soil[SOIL_PEAK_1], slip)
     modulus = pressure_modulus(
         soil[SOIL_COHESIVE_MODULUS], soil[SOIL_FRICTIONAL_MODULUS], wheel[1], sin_edge(wheel[0], sinkage)
     )
-    rate = max(max(abs(omega), abs(v_x) / outer_radius), minimum_shear_rate)
+    rate = max(max(abs(omega), abs(v_x) / outer_radius), numerics.minimum_shear_rate)
     decay = -1.0 / (rate * soil[SOIL_SHEAR_MODULUS])
     front = 1.0 - peak
     rear = peak + soil[SOIL_EXIT_RATIO]
@@ -195,43 +199,27 @@ def integrate_patch(
 
 @kernel()
 def wheel_wrench(
-    wheel: Array,
-    soil: Array,
-    v_x: float,
-    v_y: float,
-    omega: float,
-    yaw_rate: float,
-    sinkage: float,
-    minimum_shear_rate: float,
-    rest_speed: float,
-    section_nodes: Array,
-    contact_nodes: Array,
-    wrench: Array,
+    wheel: Array, soil: Array, motion: WheelMotion, sinkage: float, numerics: PatchNumerics, wrench: Array
 ) -> None:
     """As :func:`integrate_patch` for any direction of travel; backwards is the mirror image in x.
 
     The side on which soil enters is the sign of R0 omega + v_x (the larger of the two decides, section 3). Where
     that sum is below ``rest_speed`` both images are blended, so that the force is continuous through rest (ours).
     """
-    direction = (wheel[0] + wheel[2]) * omega + v_x
-    forward = direction / rest_speed
+    direction = (wheel[0] + wheel[2]) * motion.omega + motion.v_x
+    forward = direction / numerics.rest_speed
     blend = 1.0
     if abs(forward) < 1.0:
         blend = 0.5 + forward * (0.75 - 0.25 * forward * forward)
     elif forward < 0.0:
         blend = 0.0
     if blend > 0.0:
-        integrate_patch(
-            wheel, soil, v_x, v_y, omega, yaw_rate, sinkage, minimum_shear_rate, rest_speed, section_nodes,
-            contact_nodes, wrench,
-        )  # fmt: skip
+        integrate_patch(wheel, soil, motion, sinkage, numerics, wrench)
         if blend == 1.0:
             return
     f_x, f_y, f_z, m_z, torque = wrench[0], wrench[1], wrench[2], wrench[3], wrench[4]
-    integrate_patch(
-        wheel, soil, -v_x, v_y, -omega, -yaw_rate, sinkage, minimum_shear_rate, rest_speed, section_nodes,
-        contact_nodes, wrench,
-    )  # fmt: skip
+    mirrored = WheelMotion(-motion.v_x, motion.v_y, -motion.omega, -motion.yaw_rate)
+    integrate_patch(wheel, soil, mirrored, sinkage, numerics, wrench)
     wrench[0] = -wrench[0]
     wrench[3] = -wrench[3]
     wrench[4] = -wrench[4]

@@ -32,15 +32,12 @@ from ddagr_gym.physics.body_dynamics import (
     world_rates,
 )
 from ddagr_gym.physics.body_jacobian import damping_inverse, solve
+from ddagr_gym.physics.callbacks import EffectActions
 from ddagr_gym.physics.drivetrain import advance_motors
 from ddagr_gym.physics.layout import (
     ACCELERATION,
     HALF_TRACK,
     OMEGA,
-    OPTION_ACCEPTED_ERROR,
-    OPTION_DIVISIONS,
-    OPTION_EXTRAPOLATION,
-    OPTION_REFRESH,
     SIZE,
     TIME,
     V_X,
@@ -51,9 +48,9 @@ from ddagr_gym.physics.layout import (
     X,
     Y,
 )
+from ddagr_gym.physics.numerics import StepNumerics
 
 Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
 NEWTON_TOLERANCE = 1e-9  # [m/s], at rest
@@ -65,14 +62,11 @@ OVERSHOOT = 4.0  # times the accepted error: the linearised step has failed, and
 
 
 @kernel()
-def _w_step(
-    row: Array, step: float, options: Array, section: Array, contact: Array, coarse: Array, effect_points: Integers,
-    effect_addresses: Integers, parameters: Array, memory: Array,
-) -> float:  # fmt: skip
+def _w_step(row: Array, step: float, numerics: StepNumerics, actions: EffectActions) -> float:
     """One W-step; returns the size of the embedded error estimate [m/s]. Arguments as :func:`advance_body`."""
     inverse, drive, drift = stack_array(9), stack_array(6), stack_array(3)
     start, first, second, right = stack_array(3), stack_array(3), stack_array(3), stack_array(3)
-    damping_inverse(row, GAMMA * step, inverse, drive, effect_points, effect_addresses, parameters, memory)
+    damping_inverse(row, GAMMA * step, inverse, drive, actions)
     x, y, yaw, yaw_rate = row[X], row[Y], row[YAW], row[YAW_RATE]
     rate_x, rate_y = world_rates(row)
     right_omega, left_omega = row[OMEGA], row[OMEGA + 1]
@@ -89,11 +83,8 @@ def _w_step(
         row[V_X + j] = start[j] + first[j]
     row[YAW] = yaw + step * yaw_rate
     row[TIME] += step
-    refresh = options[OPTION_REFRESH] if options[OPTION_EXTRAPOLATION] > 0.0 else -1.0
-    evaluate_forces(
-        row, refresh, options, section, contact, coarse, effect_points, effect_addresses, parameters,
-        memory,
-    )  # fmt: skip
+    refresh = numerics.jacobian_refresh if numerics.force_extrapolation > 0.0 else -1.0
+    evaluate_forces(row, refresh, numerics, actions)
     for j in range(3):
         right[j] = step * row[ACCELERATION + j] - 2.0 * first[j] - drift[j]
     solve(inverse, right, second)
@@ -107,11 +98,8 @@ def _w_step(
         row[V_X + j] = start[j] + 1.5 * first[j] + 0.5 * second[j]
         weight = row[HALF_TRACK] if j == 2 else 1.0
         estimate = max(estimate, 0.5 * weight * abs(first[j] + second[j]))
-    if not extrapolate_forces(row, options[OPTION_EXTRAPOLATION], effect_points, effect_addresses, parameters, memory):
-        evaluate_forces(
-            row, options[OPTION_REFRESH], options, section, contact, coarse, effect_points, effect_addresses,
-            parameters, memory,
-        )  # fmt: skip
+    if not extrapolate_forces(row, numerics.force_extrapolation, actions):
+        evaluate_forces(row, numerics.jacobian_refresh, numerics, actions)
     return estimate
 
 
@@ -125,10 +113,10 @@ def _fastest(row: Array) -> float:
 
 
 @kernel(inline=True)
-def _accepted(row: Array, options: Array) -> float:
+def _accepted(row: Array, accepted_error: float) -> float:
     """Error of a step that is accepted at the present speed [m/s]."""
     speed = _fastest(row)
-    return options[OPTION_ACCEPTED_ERROR] * (min(speed / FULL_ERROR_SPEED, 1.0) + speed / DOUBLE_ERROR_SPEED)
+    return accepted_error * (min(speed / FULL_ERROR_SPEED, 1.0) + speed / DOUBLE_ERROR_SPEED)
 
 
 @kernel(inline=True)
@@ -138,45 +126,30 @@ def _copy(source: Array, target: Array) -> None:
 
 
 @kernel()
-def advance_body(
-    row: Array, step: float, options: Array, section: Array, contact: Array, coarse: Array, effect_points: Integers,
-    effect_addresses: Integers, parameters: Array, memory: Array,
-) -> None:  # fmt: skip
+def advance_body(row: Array, step: float, numerics: StepNumerics, actions: EffectActions) -> None:
     """One step. Needs the forces at the present state in ``row`` and leaves those at the new one.
 
     Args:
         row: the environment.
         step: h [s].
-        options: as in :func:`evaluate_forces`, and the following.
-        section: see there.
-        contact: see there.
-        coarse: see there.
-        effect_points: as in :func:`apply_effects`, and the following.
-        effect_addresses: see there.
-        parameters: see there.
-        memory: see there.
+        numerics: accuracy.
+        actions: effects on this environment.
     """
     saved = stack_array(SIZE)
     _copy(row, saved)
-    tolerance = NEWTON_TOLERANCE + NEWTON_SHARE * _accepted(row, options)
+    tolerance = NEWTON_TOLERANCE + NEWTON_SHARE * _accepted(row, numerics.accepted_error)
     divisions = 1
     done = 0
     while done < divisions:
-        estimate = _w_step(
-            row, step / divisions, options, section, contact, coarse, effect_points, effect_addresses, parameters,
-            memory,
-        )  # fmt: skip
-        speed, accepted = _fastest(row), _accepted(row, options)
+        estimate = _w_step(row, step / divisions, numerics, actions)
+        speed, accepted = _fastest(row), _accepted(row, numerics.accepted_error)
         if divisions == 1 and speed > FULL_ERROR_SPEED and not estimate <= accepted + LEAST_ERROR:
             _copy(saved, row)
-            divisions = int(options[OPTION_DIVISIONS])
+            divisions = numerics.launch_substeps
             if divisions > 1:
                 continue
         if not estimate <= OVERSHOOT * accepted + LEAST_ERROR:
             _copy(saved, row)
-            backward_euler_step(
-                row, step / divisions, options, section, contact, coarse, effect_points, effect_addresses, parameters,
-                memory, tolerance,
-            )  # fmt: skip
+            backward_euler_step(row, step / divisions, tolerance, numerics, actions)
         done += 1
         _copy(row, saved)

@@ -141,20 +141,6 @@ SOIL_PARAMETERS = (
     SOIL_EXIT_RATIO,
 ) = range(9)
 
-# Options of the numerics, as the kernels read them (see ``parameters.Numerics``)
-(
-    OPTION_REFRESH,
-    OPTION_TOLERANCE,
-    OPTION_SHEAR_RATE,
-    OPTION_REST_SPEED,
-    OPTION_EXTRAPOLATION,
-    OPTION_ACCEPTED_ERROR,
-    OPTION_DIVISIONS,
-    OPTION_LAUNCH_CHANGE,
-    OPTION_STEPS,
-    OPTION_MAXIMUM_STEP,
-) = range(10)
-
 # Points at which effects act, in the order of a sample
 POINT_COMMANDS, POINT_MOTORS, POINT_LOADS, POINT_SOIL, POINT_WHEEL_FORCES, POINT_BODY_FORCES, POINT_READINGS = range(7)
 POINTS = ("commands", "motors", "loads", "soil", "wheel_forces", "body_forces", "readings")

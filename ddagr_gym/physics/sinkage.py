@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.jit import kernel
-from ddagr_gym.physics.contact_patch import wheel_wrench
+from ddagr_gym.physics.contact_patch import WheelMotion, wheel_wrench
+from ddagr_gym.physics.numerics import PatchNumerics
 
 MAXIMUM_ITERATIONS = 60
 
@@ -29,17 +30,11 @@ class SinkageStatus(IntEnum):
 def solve_sinkage(
     wheel: NDArray[np.float64],
     soil: NDArray[np.float64],
-    v_x: float,
-    v_y: float,
-    omega: float,
-    yaw_rate: float,
+    motion: WheelMotion,
     load: float,
     guess: float,
     tolerance: float,
-    minimum_shear_rate: float,
-    rest_speed: float,
-    section_nodes: NDArray[np.float64],
-    contact_nodes: NDArray[np.float64],
+    numerics: PatchNumerics,
     wrench: NDArray[np.float64],
 ) -> tuple[float, bool]:
     """Root of F_z(sinkage) = load in (0, minor_radius], and whether the wheel is bogged.
@@ -54,10 +49,7 @@ def solve_sinkage(
     last_log_sinkage = 0.0
     last_log_force = 0.0
     for iteration in range(MAXIMUM_ITERATIONS):
-        wheel_wrench(
-            wheel, soil, v_x, v_y, omega, yaw_rate, sinkage, minimum_shear_rate, rest_speed, section_nodes,
-            contact_nodes, wrench,
-        )  # fmt: skip
+        wheel_wrench(wheel, soil, motion, sinkage, numerics, wrench)
         force = wrench[2]
         if abs(force - load) <= tolerance * load:
             return sinkage, False

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -56,6 +57,20 @@ class SoilField:
         return cls((float(xs[0]), float(ys[0])), spacing, values)
 
 
+class SoilGrids(NamedTuple):
+    """Soil grids of a batch of N environments.
+
+    Attributes:
+        values: (grids, nx, ny, 9) in the order of ``layout.SOIL_PARAMETERS``.
+        geometry: (grids, 4) origin x, origin y, spacing x, spacing y [m].
+        chosen: (N,) grid of each environment, -1 for the base soils of its row.
+    """
+
+    values: NDArray[np.float64]
+    geometry: NDArray[np.float64]
+    chosen: NDArray[np.int64]
+
+
 @kernel()
 def _cell(position: float, origin: float, spacing: float, nodes: int) -> tuple[int, float]:
     """Lower node of the cell and the fraction across it, clamped to the grid."""
@@ -65,21 +80,19 @@ def _cell(position: float, origin: float, spacing: float, nodes: int) -> tuple[i
 
 
 @kernel()
-def sample_soil(
-    row: NDArray[np.float64], values: NDArray[np.float64], geometry: NDArray[np.float64], use_field: bool
-) -> None:
-    """Soil under each wheel: the robot's base soils, or the field interpolated bilinearly at the hub.
+def sample_soil(row: NDArray[np.float64], grids: SoilGrids, n: int) -> None:
+    """Soil under each wheel: the robot's base soils, or its grid interpolated bilinearly at the hub.
 
     Args:
-        row: reads WHEEL_X, WHEEL_Y, BASE_SOIL; writes SOIL.
-        values: (nx, ny, 9).
-        geometry: origin x, origin y, spacing x, spacing y [m].
-        use_field: False leaves the base soils.
+        row: of environment ``n``: reads WHEEL_X, WHEEL_Y, BASE_SOIL; writes SOIL.
+        grids: of the batch.
+        n: environment.
     """
-    if not use_field:
+    if grids.chosen[n] < 0:
         for j in range(36):
             row[SOIL + j] = row[BASE_SOIL + j]
         return
+    values, geometry = grids.values[grids.chosen[n]], grids.geometry[grids.chosen[n]]
     for wheel in range(4):
         i, fx = _cell(row[WHEEL_X + wheel], geometry[0], geometry[2], values.shape[0])
         j, fy = _cell(row[WHEEL_Y + wheel], geometry[1], geometry[3], values.shape[1])

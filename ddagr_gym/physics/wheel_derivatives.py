@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.jit import kernel, stack_array
-from ddagr_gym.physics.contact_patch import WRENCH, wheel_wrench
+from ddagr_gym.physics.contact_patch import WRENCH, WheelMotion, wheel_wrench
 from ddagr_gym.physics.layout import (
     BY_RIM,
     BY_SINKAGE,
@@ -20,8 +20,6 @@ from ddagr_gym.physics.layout import (
     DERIVATIVE_AT,
     DERIVATIVE_SIZE,
     DERIVATIVE_VALID,
-    OPTION_REST_SPEED,
-    OPTION_SHEAR_RATE,
     SINKAGE,
     WHEEL,
     WHEEL_OMEGA,
@@ -29,12 +27,19 @@ from ddagr_gym.physics.layout import (
     WHEEL_V_Y,
     YAW_RATE,
 )
+from ddagr_gym.physics.numerics import PatchNumerics
 
 Array = NDArray[np.float64]
 
 _SLOWEST = 1e-3  # [m/s], ours: below it forces depend on velocities, not on their ratios
 _STEP = 1e-4  # of the speed and of the sinkage
 _LARGEST_CHANGE = 0.1  # of the sinkage in one prediction, ours
+
+
+@kernel(inline=True)
+def motion_of(row: Array, i: int) -> WheelMotion:
+    """Motion of wheel ``i`` as the last evaluation left it."""
+    return WheelMotion(row[WHEEL_V_X + i], row[WHEEL_V_Y + i], row[WHEEL_OMEGA + i], row[YAW_RATE])
 
 
 @kernel(inline=True)
@@ -86,38 +91,30 @@ def is_stale(row: Array, i: int, refresh: float) -> bool:
 
 
 @kernel()
-def refresh_derivative(
-    row: Array, i: int, wheel: Array, soil: Array, options: Array, section: Array, coarse: Array
-) -> None:
-    """Forward differences of wheel ``i``'s wrench on the coarse rule.
+def refresh_derivative(row: Array, i: int, wheel: Array, soil: Array, numerics: PatchNumerics) -> None:
+    """Forward differences of wheel ``i``'s wrench.
 
     Args:
         row: reads kinematics and sinkage, writes the derivative.
         i: wheel.
         wheel: (3,) its geometry.
         soil: (9,) under it.
-        options: see :func:`ddagr_gym.physics.body_dynamics.evaluate_forces`.
-        section: section rule.
-        coarse: contact rule.
+        numerics: quadrature; a coarse one is enough.
     """
-    v_x, v_y, omega, sinkage = row[WHEEL_V_X + i], row[WHEEL_V_Y + i], row[WHEEL_OMEGA + i], row[SINKAGE + i]
-    shear_rate, rest_speed = options[OPTION_SHEAR_RATE], options[OPTION_REST_SPEED]
+    motion = motion_of(row, i)
+    sinkage = row[SINKAGE + i]
     x, y, rim, speed = relative_motion(row, i)
     base = stack_array(WRENCH)
     moved = stack_array(WRENCH)
-    wheel_wrench(
-        wheel, soil, v_x, v_y, omega, row[YAW_RATE], sinkage, shear_rate, rest_speed, section, coarse, base
-    )  # fmt: skip
+    wheel_wrench(wheel, soil, motion, sinkage, numerics, base)
     first = DERIVATIVE + DERIVATIVE_SIZE * i
     for direction in (BY_V_X, BY_V_Y, BY_RIM, BY_SINKAGE):
         d_x = _STEP * speed if direction == BY_V_X else 0.0
         d_y = _STEP * speed if direction == BY_V_Y else 0.0
         d_omega = _STEP * speed / (wheel[0] + wheel[2]) if direction == BY_RIM else 0.0
         d_sinkage = -_STEP * sinkage if direction == BY_SINKAGE else 0.0
-        wheel_wrench(
-            wheel, soil, v_x + d_x, v_y + d_y, omega + d_omega, row[YAW_RATE], sinkage + d_sinkage, shear_rate,
-            rest_speed, section, coarse, moved,
-        )  # fmt: skip
+        changed = WheelMotion(motion.v_x + d_x, motion.v_y + d_y, motion.omega + d_omega, motion.yaw_rate)
+        wheel_wrench(wheel, soil, changed, sinkage + d_sinkage, numerics, moved)
         scale = 1.0 / (d_sinkage if direction == BY_SINKAGE else _STEP)
         for j in range(WRENCH):
             row[first + direction + j] = scale * (moved[j] - base[j])

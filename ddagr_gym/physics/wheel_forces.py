@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from ddagr_gym.errors import InputError
 from ddagr_gym.jit import kernel, stack_array
 from ddagr_gym.parameters import Numerics, Soil, TorusWheel
-from ddagr_gym.physics.contact_geometry import contact_rule, section_rule
-from ddagr_gym.physics.contact_patch import WRENCH, wheel_wrench
+from ddagr_gym.physics.contact_patch import WRENCH, WheelMotion, wheel_wrench
 from ddagr_gym.physics.contact_stress import slip_ratio
+from ddagr_gym.physics.numerics import PatchNumerics, patch_numerics
 from ddagr_gym.physics.sinkage import SinkageStatus, solve_sinkage
 
 Array = NDArray[np.float64]
@@ -59,23 +59,22 @@ def wheel_vector(wheel: TorusWheel) -> Array:
     return np.array([wheel.minor_radius, wheel.half_width, wheel.major_radius])
 
 
+@kernel(inline=True)
+def _motion(state: Array) -> WheelMotion:
+    return WheelMotion(state[0], state[1], state[2], state[3])
+
+
 @kernel()
-def _wrenches(
-    wheel: Array, soil: Array, states: Array, shear_rate: float, rest_speed: float, section: Array, contact: Array,
-    wrenches: Array,
-) -> None:  # fmt: skip
+def _wrenches(wheel: Array, soil: Array, states: Array, numerics: PatchNumerics, wrenches: Array) -> None:
     for i in range(states.shape[0]):
-        wheel_wrench(
-            wheel, soil, states[i, 0], states[i, 1], states[i, 2], states[i, 3], states[i, 4], shear_rate, rest_speed,
-            section, contact, wrenches[i],
-        )  # fmt: skip
+        wheel_wrench(wheel, soil, _motion(states[i]), states[i, 4], numerics, wrenches[i])
         wrenches[i, WRENCH] = slip_ratio((wheel[0] + wheel[2]) * states[i, 2], states[i, 0])
 
 
 @kernel()
 def _sinkages(
-    wheel: Array, soil: Array, states: Array, tolerance: float, shear_rate: float, rest_speed: float, section: Array,
-    contact: Array, sinkage: Array, status: NDArray[np.int64],
+    wheel: Array, soil: Array, states: Array, tolerance: float, numerics: PatchNumerics, sinkage: Array,
+    status: NDArray[np.int64],
 ) -> None:  # fmt: skip
     wrench = stack_array(WRENCH)
     for i in range(states.shape[0]):
@@ -83,9 +82,8 @@ def _sinkages(
             status[i] = 2
             continue
         sinkage[i], bogged = solve_sinkage(
-            wheel, soil, states[i, 0], states[i, 1], states[i, 2], states[i, 3], states[i, 4], 0.3 * wheel[0],
-            tolerance, shear_rate, rest_speed, section, contact, wrench,
-        )  # fmt: skip
+            wheel, soil, _motion(states[i]), states[i, 4], 0.3 * wheel[0], tolerance, numerics, wrench
+        )
         status[i] = 1 if bogged else 0
 
 
@@ -112,15 +110,6 @@ def _broadcast(names: tuple[str, ...], values: tuple[ArrayLike, ...]) -> tuple[A
     for j, array in enumerate(arrays):
         states[..., j] = array
     return states.reshape(-1, len(arrays)), shape
-
-
-def _common(numerics: Numerics, nodes: int) -> tuple[Any, ...]:
-    return (
-        numerics.minimum_shear_rate,
-        numerics.rest_speed,
-        section_rule(numerics.section_nodes),
-        contact_rule(nodes),
-    )
 
 
 def wheel_force(
@@ -157,8 +146,7 @@ def wheel_force(
             "(minor_radius); use equilibrium_sinkage to find one."
         )
     wrenches = np.empty((states.shape[0], WRENCH + 1))
-    rate, rest, section, contact = _common(numerics, numerics.contact_nodes)
-    _wrenches(wheel_vector(wheel), soil_vector(soil), states, rate, rest, section, contact, wrenches)
+    _wrenches(wheel_vector(wheel), soil_vector(soil), states, patch_numerics(numerics), wrenches)
     yaw_moment, torque, slip = (wrenches[:, j].reshape(shape) for j in (3, 4, 5))
     return WheelForce(wrenches[:, :3].reshape(*shape, 3), yaw_moment, torque, slip)
 
@@ -196,12 +184,9 @@ def equilibrium_sinkage(
     states, shape = _broadcast(("v_x", "v_y", "omega", "yaw_rate", "load"), (v_x, v_y, omega, yaw_rate, load))
     sinkage = np.zeros(states.shape[0])
     status = np.zeros(states.shape[0], dtype=np.int64)
-    rate, rest, section, contact = _common(numerics, numerics.contact_nodes)
     tolerance = min(numerics.sinkage_tolerance, 1e-6)
-    _sinkages(
-        wheel_vector(wheel), soil_vector(soil), states, tolerance, rate, rest, section, contact, sinkage,
-        status,
-    )  # fmt: skip
+    rules = patch_numerics(numerics)
+    _sinkages(wheel_vector(wheel), soil_vector(soil), states, tolerance, rules, sinkage, status)
     if shape == ():
         return float(sinkage[0]), SinkageStatus(int(status[0]))
     return sinkage.reshape(shape), status.reshape(shape)

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 from ddagr_gym.jit import stack_array
 from ddagr_gym.parameters import Numerics
-from ddagr_gym.physics.contact_geometry import contact_rule, section_rule
 from ddagr_gym.physics.contact_patch import WRENCH, wheel_wrench
 from ddagr_gym.physics.effects.base import Effect, Vector, size
 from ddagr_gym.physics.layout import (
@@ -17,16 +16,11 @@ from ddagr_gym.physics.layout import (
     SOIL_COHESION,
     SOIL_FRICTION_TANGENT,
     WHEEL,
-    WHEEL_OMEGA,
-    WHEEL_V_X,
-    WHEEL_V_Y,
-    YAW_RATE,
 )
+from ddagr_gym.physics.numerics import patch_numerics
+from ddagr_gym.physics.wheel_derivatives import motion_of
 
-_SECTION = section_rule(Numerics().section_nodes).copy()
-_CONTACT = contact_rule(Numerics().contact_nodes).copy()
-_SHEAR_RATE = Numerics().minimum_shear_rate
-_REST_SPEED = Numerics().rest_speed
+_NUMERICS = patch_numerics(Numerics())
 
 
 def cancel_compaction(row: Vector, parameters: Vector, memory: Vector) -> None:
@@ -43,10 +37,7 @@ def cancel_compaction(row: Vector, parameters: Vector, memory: Vector) -> None:
             soil[j] = row[SOIL + 9 * i + j]
         soil[SOIL_COHESION] = 0.0
         soil[SOIL_FRICTION_TANGENT] = 0.0
-        wheel_wrench(
-            wheel, soil, row[WHEEL_V_X + i], row[WHEEL_V_Y + i], row[WHEEL_OMEGA + i], row[YAW_RATE],
-            row[SINKAGE + i], _SHEAR_RATE, _REST_SPEED, _SECTION, _CONTACT, wrench,
-        )  # fmt: skip
+        wheel_wrench(wheel, soil, motion_of(row, i), row[SINKAGE + i], _NUMERICS, wrench)
         row[EXTRA_FORCE_X + i] -= parameters[0] * wrench[0]
 
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from ddagr_gym.errors import InputError
 from ddagr_gym.parameters import Soil
 from ddagr_gym.physics import layout
-from ddagr_gym.physics.terrain import SoilField, sample_soil
+from ddagr_gym.physics.terrain import SoilField, SoilGrids, sample_soil
 from ddagr_gym.physics.wheel_forces import soil_vector
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.simulator import Simulator, simulate
@@ -25,7 +25,8 @@ def _cohesion_at(field, x, y):
     row = np.zeros(layout.SIZE)
     row[layout.WHEEL_X : layout.WHEEL_X + 4] = x
     row[layout.WHEEL_Y : layout.WHEEL_Y + 4] = y
-    sample_soil(row, field.values, np.array([*field.origin, *field.spacing]), True)
+    geometry = np.array([[*field.origin, *field.spacing]])
+    sample_soil(row, SoilGrids(field.values[None], geometry, np.zeros(1, dtype=np.int64)), 0)
     return row[layout.SOIL : layout.SOIL + 36 : 9]
 
 

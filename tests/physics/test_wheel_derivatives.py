@@ -8,7 +8,8 @@ import pytest
 from ddagr_gym.parameters import Numerics
 from ddagr_gym.physics import layout, wheel_force
 from ddagr_gym.physics.body_dynamics import evaluate_forces, extrapolate_forces
-from ddagr_gym.physics.contact_geometry import contact_rule, section_rule
+from ddagr_gym.physics.callbacks import EffectActions
+from ddagr_gym.physics.numerics import step_numerics
 from ddagr_gym.physics.wheel_derivatives import change_of, is_stale, predict_sinkage, relative_motion
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.simulator import Simulator
@@ -31,13 +32,12 @@ def simulator():
 
 
 def _evaluate(simulator, row, refresh):
-    rules = (section_rule(16), contact_rule(16), contact_rule(16))
-    evaluate_forces(row, refresh, simulator._options, *rules, *_no_effects())
+    evaluate_forces(row, refresh, step_numerics(simulator.numerics), _no_effects())
 
 
 def _no_effects():
     nothing = np.zeros(0, dtype=np.int64)
-    return nothing, nothing, np.zeros((0, layout.EFFECT_PARAMETERS)), np.zeros((0, layout.EFFECT_MEMORY))
+    return EffectActions(nothing, nothing, np.zeros((0, layout.EFFECT_PARAMETERS)), np.zeros((0, layout.EFFECT_MEMORY)))
 
 
 def _wrench(v_x, v_y, omega, yaw_rate, sinkage):
@@ -139,7 +139,7 @@ def test_predicted_sinkage_is_right_to_second_order(simulator):
 
 def test_extrapolated_forces_are_right_to_second_order(simulator):
     def predict(row, exact):
-        assert extrapolate_forces(row, 0.2, *_no_effects())
+        assert extrapolate_forces(row, 0.2, _no_effects())
         np.testing.assert_allclose(
             row[layout.WHEEL_V_X : layout.WHEEL_V_X + 12], exact[layout.WHEEL_V_X : layout.WHEEL_V_X + 12], rtol=1e-14
         )
@@ -168,5 +168,5 @@ def test_forces_are_not_extrapolated_where_it_may_not_be(simulator, reason):
     else:
         row[layout.DERIVATIVE_VALID] = 0.0
     before = row.copy()
-    assert not extrapolate_forces(row, limit, *_no_effects())
+    assert not extrapolate_forces(row, limit, _no_effects())
     np.testing.assert_array_equal(row, before)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ddagr_gym.identification.problem import Point, Problem
 from ddagr_gym.physics import layout
+from ddagr_gym.physics.callbacks import EffectActions
 from ddagr_gym.physics.effects import Effect, effect_table
 
 Array = NDArray[np.float64]
@@ -43,9 +44,10 @@ class Drives:
 
         points, addresses, parameters = effect_table((effect,))
         windows, samples = self.record.shape[:2]
+        repeated = np.repeat(parameters[None], windows, axis=0)
         memory = np.zeros((windows, len(points), layout.EFFECT_MEMORY))
         readings = np.empty((windows, samples, 8))
-        read_again(self.record, points, addresses, parameters, memory, readings)
+        read_again(self.record, EffectActions(points, addresses, repeated, memory), readings)
         return readings
 
 

@@ -16,7 +16,7 @@ from ddagr_gym.errors import InputError
 from ddagr_gym.parameters import Numerics
 from ddagr_gym.physics import effects as package
 from ddagr_gym.physics import layout
-from ddagr_gym.physics.callbacks import apply_effects
+from ddagr_gym.physics.callbacks import EffectActions, apply_effects
 from ddagr_gym.physics.effects import GROUPS, DriveExtent, effect_kinds, effect_table
 from ddagr_gym.simulator import Simulator
 
@@ -270,11 +270,11 @@ class TestEveryEffect:
 
 
 @numba.njit
-def call_often(count, point, row, start, points, addresses, parameters, memory):
+def call_often(count, point, row, start, actions):
     for _ in range(count):
         row[:] = start
         if point >= 0:
-            apply_effects(point, row, points, addresses, parameters, memory)
+            apply_effects(point, row, actions)
 
 
 def test_no_action_is_slow(turning_row):
@@ -283,7 +283,8 @@ def test_no_action_is_slow(turning_row):
     costs = {}
     for name, kind in KINDS.items():
         points, addresses, parameters = effect_table((kind.probes(EXTENT)[0],))
-        arguments = (row, turning_row, points, addresses, parameters, np.zeros((1, layout.EFFECT_MEMORY)))
+        actions = EffectActions(points, addresses, parameters, np.zeros((1, layout.EFFECT_MEMORY)))
+        arguments = (row, turning_row, actions)
         best = {}
         for point in (points[0], -1):
             call_often(1, point, *arguments)
