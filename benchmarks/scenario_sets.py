@@ -1,4 +1,4 @@
-"""How the scenario sets S0 to S8, V (validation) and T (transfer) were drawn (control.md, "Protocol").
+"""How the scenario sets S0 to S8, V (validation) and T (transfer) were drawn (theory: control, section 5).
 
 Sets are frozen once by ``ddagr freeze-scenarios`` and then read, never drawn again. V alone serves tuning and
 selection; the others are opened only after the claims of ``configs/evaluation/claims.yaml`` are written.

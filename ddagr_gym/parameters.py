@@ -77,7 +77,7 @@ class Validated:
 
 @dataclass(frozen=True)
 class TorusWheel(Validated):
-    """Elliptic torus tyre, physics.md section 2 (thesis eq. 3.1: a, b, c).
+    """Elliptic torus tyre (theory: wheel model, eq. (2); thesis (3.1): a, b, c).
 
     Attributes:
         minor_radius: semi-axis of the section in the wheel plane [m] (thesis a).
@@ -105,7 +105,7 @@ class TorusWheel(Validated):
 
 @dataclass(frozen=True)
 class Soil(Validated):
-    """Bekker-Wong-Janosi soil, physics.md section 4 (thesis Table A.1).
+    """Bekker-Wong-Janosi soil (theory: wheel model, section 4; thesis Table A.1).
 
     Attributes:
         cohesion: c [Pa].
@@ -139,7 +139,7 @@ class Soil(Validated):
 class Robot(Validated):
     """Four-wheel skid-steer robot. Wheels 1 front right, 2 front left, 3 rear right, 4 rear left.
 
-    The body origin is the geometric centre of the four wheels (physics.md section 1).
+    The body origin is the geometric centre of the four wheels (theory: wheel model, section 1).
 
     Attributes:
         name: identifier.
@@ -300,16 +300,16 @@ class Numerics(Validated):
         maximum_step: longest integrator step [s].
         launch_substeps: steps into which a step is divided at a launch, and where its error estimate is too large.
         launch_change: change of a rim speed within a step, relative to the wheel's speed, above which it is divided
-            beforehand, as at a start from rest (the damping varies as 1/speed, physics.md section 6).
+            beforehand, as at a start from rest (the damping varies as 1/speed).
         accepted_error: embedded error estimate of a step above which it is redone, divided [m/s]; more at speed,
             twice that at 0.33 m/s.
         force_extrapolation: relative change of a wheel's motion up to which the forces that begin a step are
             extrapolated from the middle of the last one; 0 evaluates them always.
         jacobian_refresh: relative change of a wheel's motion after which its derivative is renewed.
         sinkage_tolerance: |F_z - load| / load above which the sinkage is iterated, not extrapolated.
-        minimum_shear_rate: nu_min of physics.md section 4 [rad/s].
+        minimum_shear_rate: nu_min of theory: wheel model, eq. (14) [rad/s].
         rest_speed: |R0 omega + v_x| below which forward and backward travel are blended [m/s]
-            (ours: the stress peak jumps from front to rear there, physics.md section 3).
+            (ours: the stress peak jumps from front to rear there; theory: wheel model, eq. (10)).
     """
 
     section_nodes: int = 8

@@ -2,8 +2,8 @@
 
 Linearly implicit Euler with the 5 x 5 derivative of the soil and motor forces in (v_x, v_y, yaw rate, omega_right,
 omega_left), by differences wheel by wheel; sinkage, loads and the drives' memories advance explicitly. Unlike the
-quasi-static sinkage of ``shared/physics.md`` a wheel sinks at the rate (load - support)/soil_damping, and loads
-follow the specific force with a lag and the frame's twist.
+quasi-static sinkage of the package (theory: wheel model, section 5) a wheel sinks at the rate (load -
+support)/soil_damping, and loads follow the specific force with a lag and the frame's twist.
 """
 
 from __future__ import annotations

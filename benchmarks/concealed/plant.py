@@ -1,6 +1,6 @@
 """The robot and its drives as plain numbers, and the whole plant that a drive is integrated with.
 
-Sources: thesis Table 6.1 (mass, inertia, W, L), ``shared/physics.md`` sections 1 and 6 (torus wheels, k_omega).
+Sources: thesis Table 6.1 (mass, inertia, W, L), theory: wheel model, sections 1 and 6 (torus wheels, k_omega).
 The speed loop, the frame's compliance and the height of the centre of mass are assumptions of this benchmark.
 """
 

@@ -1,6 +1,6 @@
 """Soil laws of the benchmark's own field: pressure against depth, shear stress against displacement.
 
-None of them is the Bekker-Wong-Janosi chain of ``shared/physics.md``:
+None of them is the Bekker-Wong-Janosi chain of the package (theory: wheel model, section 4):
 
 =====================  ===============================================================================
 pressure law           p(z) under a contact of width b

@@ -9,7 +9,7 @@ from ddagr_gym.commands.demo_section import Section
 
 LADDER = ("B0", "B1", "B2", "B3", "B4")
 POLICIES = ("ppo_ekf", "ppo_history", "ppo_raw")
-"""The arms of control.md; ablations are in the full evaluation."""
+"""The ladder's arms (theory: control, section 3); ablations are in the full evaluation."""
 SET = "V"
 SCENARIOS = 8
 """The first ones of the validation set: enough for a look, not for a result."""

@@ -13,7 +13,7 @@ from ddagr_gym.errors import InputError
 from ddagr_gym.frames import unwrap_heading
 
 WINDOW = (math.radians(30.0), math.radians(150.0))
-"""Heading change between which a turn's radius is fitted [rad] (control.md, metric 1)."""
+"""Heading change between which a turn's radius is fitted [rad] (theory: control, metric 1)."""
 
 STRAIGHT = 1e-6
 """Ours: extent over radius below which points are on a line, not on a circle [-]."""

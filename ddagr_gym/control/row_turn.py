@@ -1,4 +1,4 @@
-"""Geometry of a row turn: straight run-in, half circle on the headland, straight run-out (control.md, "The task").
+"""Geometry of a row turn: straight run-in, half circle on the headland, straight run-out (theory: control, section 1).
 
 World frame: x along the rows, the headland boundary at x = 0 with the rows at x < 0. The robot starts at
 (-run_in, 0) heading +x, turns by 180 degrees about (0, sign radius) and leaves along y = 2 sign radius heading
@@ -28,10 +28,10 @@ FURROW_SLACK = 0.127
 """Smallest lateral slack of a wheel in its furrow [m]: half of 18 inches less a tyre of 20.3 cm (thesis chapter 1)."""
 
 PRACTICE_LATERAL_TOLERANCE = 0.10
-"""Lateral exit error accepted in practice [m] (control.md, metric 4)."""
+"""Lateral exit error accepted in practice [m] (theory: control, metric 4)."""
 
 PRACTICE_HEADING_TOLERANCE = math.radians(15.0)
-"""Heading exit error accepted in practice [rad] (control.md, metric 4)."""
+"""Heading exit error accepted in practice [rad] (theory: control, metric 4)."""
 
 
 class Phase(enum.IntEnum):
@@ -206,7 +206,7 @@ class RowTurn(Validated):
 
 
 def wheels_fit_furrow(lateral_error: float, heading_error: float, half_wheelbase: float) -> bool:
-    """Success of a turn: |e_y| + L |sin e_psi| <= 0.127 m keeps every wheel in its furrow (control.md, metric 4).
+    """Success of a turn: |e_y| + L |sin e_psi| <= 0.127 m keeps every wheel in its furrow (theory: control, metric 4).
 
     A heading error above 90 degrees fails, whatever its sine: the robot points back to the headland.
     """
@@ -215,5 +215,5 @@ def wheels_fit_furrow(lateral_error: float, heading_error: float, half_wheelbase
 
 
 def within_practice_tolerance(lateral_error: float, heading_error: float) -> bool:
-    """Whether the exit is within 0.10 m and 15 degrees (control.md, metric 4)."""
+    """Whether the exit is within 0.10 m and 15 degrees (theory: control, metric 4)."""
     return abs(lateral_error) <= PRACTICE_LATERAL_TOLERANCE and abs(heading_error) <= PRACTICE_HEADING_TOLERANCE

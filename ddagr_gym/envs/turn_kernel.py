@@ -89,7 +89,7 @@ OBSERVATION_LIMIT = 10.0
 CORRIDOR = 0.35
 """Beyond this distance from its row's line a robot between the rows stands on a bed [m] (ours)."""
 HEADLAND_DEPTH = 3.0
-"""Depth of the headland from the boundary, to a ditch or road [m] (ours; control.md gives none)."""
+"""Depth of the headland from the boundary, to a ditch or road [m] (ours)."""
 HEADLAND_MARGIN = 1.5
 """Room beside the two rows [m] (ours)."""
 _LARGEST_EXIT_RATIO = 10.0
@@ -121,7 +121,7 @@ def _off_headland(task: Array, x: float, y: float) -> bool:
 
 @kernel()
 def _cross_exit_line(task: Array, x: float, y: float, yaw: float) -> None:
-    """Note lateral and heading error where the path crosses x = 0 into the next row (control.md, metric 4)."""
+    """Note lateral and heading error where the path crosses x = 0 into the next row (theory: control, metric 4)."""
     if task[LAST_X] >= 0.0 > x and task[SIGN] * y > task[RADIUS] and task[EXITED] == 0.0:
         part = task[LAST_X] / (task[LAST_X] - x)
         y = task[LAST_Y] + part * (y - task[LAST_Y])

@@ -29,7 +29,7 @@ def encoder_motion(
         robot: wheel radius and track.
         omega_right: right bank speed [rad/s].
         omega_left: left bank speed [rad/s].
-        track_factor: effective over geometric track; 1.3-1.85 on soils (physics.md section 9).
+        track_factor: effective over geometric track; 1.3-1.85 on soils (theory: wheel model, section 9).
 
     Raises:
         InputError: a factor that is not positive.

@@ -84,7 +84,7 @@ def estimates(model: FilterModel, states: ArrayLike, covariances: ArrayLike) -> 
 
 
 def slip_ratio(rim: ArrayLike, speed: ArrayLike) -> Array:
-    """Slip ratio of physics.md section 3 (4.3): rim = R0 omega and wheel speed v_x [m/s], 0 where both are 0."""
+    """Slip ratio (theory: wheel model, eq. (8)): rim = R0 omega and wheel speed v_x [m/s], 0 where both are 0."""
     rim, speed = np.asarray(rim, dtype=np.float64), np.asarray(speed, dtype=np.float64)
     larger = np.where(np.abs(rim) >= np.abs(speed), rim, speed)
     divisor = np.where(larger == 0.0, 1.0, np.abs(larger))

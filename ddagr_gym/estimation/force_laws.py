@@ -9,7 +9,7 @@ lateral_stiffness       b       lateral force per slip angle at small slip [N/ra
 motion_resistance       Rc      force against rolling, which the thesis's law lacks [N]
 ======================  ======  =========================================================================
 
-Slip (physics.md section 3): ``s_x = (rim - v_x)/d``, ``s_y = -v_y/d`` with ``rim = R0 omega`` and, ours near rest,
+Slip (theory: filter, eq. (1)): ``s_x = (rim - v_x)/d``, ``s_y = -v_y/d`` with ``rim = R0 omega`` and, ours near rest,
 ``d = sqrt(max(rim^2, v_x^2) + rest_speed^2)``. Resistance is ``-Rc t/sqrt(t^2 + reversal_speed^2)``, ``t = rim + v_x``:
 soil piles up on the side to which the wheel rolls, also while its hub already moves the other way (ours: smoothed).
 
@@ -73,7 +73,7 @@ def thesis_law(
 ) -> Gradient:  # fmt: skip
     """``F_x = a1 sgn(s_x) (1 - exp(-a2 |s_x|)) - resistance``, ``F_y = -b atan2(v_y, |v_x|)``.
 
-    Thesis (3.15), (3.16) in the signs of physics.md section 8, plus motion resistance.
+    Thesis (3.15), (3.16) with consistent signs, plus motion resistance (theory: filter, eq. (3)).
 
     Args:
         v_x: hub velocity forward [m/s].

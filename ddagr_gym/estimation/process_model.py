@@ -5,8 +5,9 @@
     dyaw_rate/dt = M/I
     domega/dt    = k_omega (command - omega)           per bank (4.11)
 
-with ``F_x, F_y, M`` the sums over the wheels of :mod:`~ddagr_gym.estimation.force_laws` (4.6), (4.7), (4.10) in the
-signs of physics.md section 8, the centre of mass at the body origin, and slope the gravity along the body axes (6.3).
+with ``F_x, F_y, M`` the sums over the wheels of :mod:`~ddagr_gym.estimation.force_laws` (4.6), (4.7), (4.10) in
+consistent signs (theory: filter, eq. (5)), the centre of mass at the body origin, and slope the gravity along the body
+axes (6.3).
 
 Integration. Damping reaches 1e3 1/s near a locked wheel, so that a step of 8 ms must not be explicit. The bank speeds
 have an exact solution. For the velocities v, with f and A = df/dv at the start of a step h and the bank speeds at its

@@ -1,7 +1,7 @@
 """The thesis's own filter (chapter 5), put right and kept for comparison; nothing of ours is added.
 
 States v_x, v_y, yaw rate, omega_right, omega_left, a1, a2, b: linear parameters, no resistance, no biases (5.1).
-Put right: signs of the force law and rows of the model (physics.md section 8), specific force F/m as the
+Put right: signs of the force law and rows of the model (theory: wheel model, eq. (37)), specific force F/m as the
 accelerometer's reading instead of the body velocity's derivative (5.5), innovation y - h(x) (5.12 prints y - Hx), the
 transpose in the Joseph form (5.11). Kept: fourth-order Runge-Kutta of state and covariance (5.7), (5.8), the vector
 update (5.10), noise of (6.2). Ours, because the thesis says nothing: initial parameters and their

@@ -1,4 +1,4 @@
-"""What a drive costs (control.md, "Metrics" 5): headland, slip energy, restless wheels, stalls. Pure functions."""
+"""What a drive costs (theory: control, metric 5): headland, slip energy, restless wheels, stalls. Pure functions."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def headland_depth(x: ArrayLike, y: ArrayLike, yaw: ArrayLike, robot: Robot) -> 
 def wheel_quantities(columns: Mapping[str, ArrayLike], robot: Robot) -> dict[str, Array] | None:
     """What :func:`slip_energy` needs, each (T, 4), from the truth columns of a simulated drive.
 
-    Hub velocities follow from the body's (physics.md section 1), wheel speeds are their banks'.
+    Hub velocities follow from the body's (theory: wheel model, eq. (1)), wheel speeds are their banks'.
 
     Args:
         columns: ``true_v_x``, ``true_v_y``, ``true_yaw_rate``, ``true_omega_right``, ``true_omega_left`` and the
@@ -78,7 +78,7 @@ def wheel_quantities(columns: Mapping[str, ArrayLike], robot: Robot) -> dict[str
 def slip_energy(t: ArrayLike, columns: Mapping[str, ArrayLike]) -> float:
     """Work lost between wheels and soil [J]: integral of -(F_x v_x + F_y v_y + M_z yaw rate + T omega), four wheels.
 
-    That power is never negative (passivity, physics.md section 9). Trapezoidal rule.
+    That power is never negative (passivity; theory: wheel model, eq. (38)). Trapezoidal rule.
 
     Args:
         t: time (T,) [s].

@@ -1,4 +1,4 @@
-"""How far the filter was off in a simulated drive (control.md, "Metrics" 6): pure functions of a drive's columns."""
+"""How far the filter was off in a simulated drive (theory: control, metric 6): pure functions of a drive's columns."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ddagr_gym.evaluation.metrics import headland_samples
 Array = NDArray[np.float64]
 
 HORIZONS = (1.0, 5.0)
-"""Of the predictions that are judged [s] (control.md, metric 6)."""
+"""Of the predictions that are judged [s] (theory: control, metric 6)."""
 
 _START_SPACING = 2.0
 """Between the starts of predictions [s] (ours)."""

@@ -1,4 +1,4 @@
-"""How a row turn is judged (control.md, "Metrics" 1 to 5): pure functions of what was truly driven.
+"""How a row turn is judged (theory: control, section 4): pure functions of what was truly driven.
 
 Results are frozen dataclasses without NaN. What a drive leaves undefined is None, and a status says why.
 World frame and signs as in :mod:`ddagr_gym.control.row_turn`.
@@ -32,7 +32,7 @@ from ddagr_gym.parameters import Robot
 Array = NDArray[np.float64]
 
 RADIUS_AGREEMENT = 0.01
-"""Largest relative difference of the two radii before a turn is flagged [-] (control.md, metric 2)."""
+"""Largest relative difference of the two radii before a turn is flagged [-] (theory: control, metric 2)."""
 
 TURN_COLUMNS = (
     "t",
@@ -133,7 +133,7 @@ class TurnMetrics:
 
 
 def integral_radius(x: ArrayLike, y: ArrayLike, side: str) -> float | None:
-    """R_int: arc length over course change of a track (control.md, metric 2).
+    """R_int: arc length over course change of a track (theory: control, metric 2).
 
     Both are taken between the middles of the first and the last chord, where the chords' directions hold.
 

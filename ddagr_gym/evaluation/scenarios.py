@@ -1,4 +1,4 @@
-"""Frozen scenario sets: what every controller drives, the same soils and the same noise (control.md, "Protocol").
+"""Frozen scenario sets: what every controller drives, the same soils and the same noise (theory: control, section 5).
 
 A set is a compressed JSON file of episodes with their noise seeds, and a SHA-256 over all of them. Soil grids are
 rebuilt from their own seed and checked against a sum that the file holds. A set that no longer agrees is refused, not

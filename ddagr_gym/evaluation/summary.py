@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 Value = dict[str, Any]
 
 BASELINES = ("B1", "B4")
-"""Arms against which every other one is compared (control.md, "The ladder of controllers")."""
+"""Arms against which every other one is compared (theory: control, section 3)."""
 
 PROFILE_THRESHOLDS = tuple(round(0.005 * k, 3) for k in range(41))
 """|e_R| at which performance profiles are given: 0 to 20 %."""

@@ -6,6 +6,11 @@ The force chain, one module a link (imports go down only)::
                                                       \\-> body_dynamics -> body_jacobian
     body_jacobian -> backward_euler -> integrators
 
+The thesis is P. Menendez-Aponte, *Approximated Control Affine Dynamics Model for an Agricultural Field Robot
+Considering Wheel Terrain Interaction*, Master of Science, University of Central Florida (its text states no year).
+"Thesis (3.12)" and a number alone such as "(A.8)" are its equations, "theory: wheel model, eq. (8)" are those of
+``docs/theory/wheel_model.md``, "E14" is an entry of that page's errata; "ours" is what no source has.
+
 Symbols. The thesis uses a, b, c, lambda, W, L, R and a1 for two things each; here every one has its own name.
 
 ===========================  =========  ==========================================================
@@ -19,7 +24,7 @@ theta, psi                              angle from bottom dead centre to the fro
 theta_f, theta_m, theta_r               entry angle, angle of peak stress, exit angle [rad]
 peak_stress_coefficient_0/1  a0, a1     theta_m = (a0 + a1 slip) theta_f
 exit_angle_ratio             lambda     -theta_r / theta_f
-slip_ratio                   lambda     section 3 of the model; 1 spinning, -1 locked, up to +-2 counter-rotating
+slip_ratio                   lambda     theory: wheel model, eq. (8); 1 spinning, -1 locked, up to +-2 counter-rotating
 shear_modulus                K          shear displacement modulus [m]
 ===========================  =========  ==========================================================
 

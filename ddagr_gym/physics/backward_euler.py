@@ -1,4 +1,4 @@
-"""Backward Euler steps of the body, for where the linearised step overshoots.
+"""Backward Euler steps of the body, for where the linearised step overshoots (theory: wheel model, eq. (32), (33)).
 
 Friction is monotone in the velocity, so the work of the defect along a Newton step falls with the length of the step
 (exactly so with the centre of mass at the origin), and the length at which it vanishes is sought: a Newton step as such

@@ -1,4 +1,4 @@
-"""Rigid body on a plane: wheel loads, wheel forces, accelerations (physics.md section 6)."""
+"""Rigid body on a plane: wheel loads, wheel forces, accelerations (theory: wheel model, section 6)."""
 
 from __future__ import annotations
 
@@ -136,6 +136,7 @@ def tilt_gravity(row: Array) -> None:
 def share_load(row: Array) -> None:
     """Quasi-static wheel loads N_i = N/4 (1 +- x_p/L)(1 +- y_p/W), (x_p, y_p) where gravity's line meets the ground.
 
+    Theory: wheel model, eq. (24).
     Acceleration is left out (thesis section 2.3: constant loads). Beyond the wheels' rectangle a side is unloaded.
     """
     normal = -row[GRAVITY + 2]
@@ -162,7 +163,7 @@ def _set_wheel_kinematics(row: Array, i: int) -> None:
 
 @kernel()
 def set_kinematics(row: Array) -> None:
-    """Hub velocities and slip from the body's motion (physics.md section 1)."""
+    """Hub velocities and slip from the body's motion (theory: wheel model, eq. (1), (8))."""
     for i in range(4):
         _set_wheel_kinematics(row, i)
 
@@ -240,7 +241,10 @@ def sum_extra(row: Array, total: Array) -> None:
 
 @kernel()
 def accelerate(row: Array, total: Array) -> None:
-    """Newton-Euler at the body origin for forces that act there (2.10), with an offset centre of mass."""
+    """Newton-Euler at the body origin for forces that act there (2.10), with an offset centre of mass.
+
+    Theory: wheel model, eq. (26), (27).
+    """
     x = row[CENTRE_OF_MASS]
     y = row[CENTRE_OF_MASS + 1]
     rate = row[YAW_RATE]

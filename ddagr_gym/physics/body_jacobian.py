@@ -1,4 +1,7 @@
-"""Damping of the body's three velocities by its wheels' forces: the linear systems of the implicit time step."""
+"""Damping of the body's three velocities by its wheels' forces: the linear systems of the implicit time step.
+
+Theory: wheel model, section 6.3.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The part of a torus wheel that touches the soil (physics.md section 2).
+"""The part of a torus wheel that touches the soil (theory: wheel model, section 2).
 
 Angle theta from bottom dead centre, positive to the front; psi across the section, positive to the left.
 """

@@ -1,4 +1,4 @@
-"""The kernel: stresses integrated over the contact patch (physics.md section 5).
+"""The kernel: stresses integrated over the contact patch (theory: wheel model, section 5).
 
 Loops run over nodes inside one wheel, never over the batch, so a result cannot depend on the batch. Front and
 rear of the patch share the normal stress: behind the peak A.7 maps each angle to one in front with the same u.
@@ -203,8 +203,9 @@ def wheel_wrench(
 ) -> None:
     """As :func:`integrate_patch` for any direction of travel; backwards is the mirror image in x.
 
-    The side on which soil enters is the sign of R0 omega + v_x (the larger of the two decides, section 3). Where
-    that sum is below ``rest_speed`` both images are blended, so that the force is continuous through rest (ours).
+    The side on which soil enters is the sign of R0 omega + v_x (the larger of the two decides). Where that sum is below
+    ``rest_speed`` both images are blended, so that the force is continuous through rest (ours).
+    Theory: wheel model, eq. (9), (10).
     """
     direction = (wheel[0] + wheel[2]) * motion.omega + motion.v_x
     forward = direction / numerics.rest_speed

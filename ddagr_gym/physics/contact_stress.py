@@ -1,4 +1,4 @@
-"""Stresses under a wheel (physics.md sections 3 and 4; thesis A.7-A.25, signs as in physics.md).
+"""Stresses under a wheel (theory: wheel model, sections 3 and 4; thesis A.7-A.25 with its errata).
 
 Each formula stands here once; the kernel of :mod:`ddagr_gym.physics.contact_patch` sums them over the patch.
 """
@@ -11,14 +11,17 @@ from ddagr_gym.jit import kernel
 from ddagr_gym.physics.fast_math import LOG2_E, exp2_bounded, inverse_sqrt, log2_positive
 
 PEAK_CEILING = 0.9
-"""Ours: theta_m stays below 0.9 theta_f, else the front of the patch vanishes at slip 1 (physics.md section 2)."""
+"""Ours: theta_m stays below 0.9 theta_f, else the front of the patch vanishes at slip 1 (theory: wheel model, E17)."""
 
 _TINY = 1e-300
 
 
 @kernel(inline=True)
 def slip_ratio(rim_speed: float, v_x: float) -> float:
-    """s (R0 omega - v_x) / max(|R0 omega|, |v_x|), s the sign of the larger; 0 at rest (section 3)."""
+    """s (R0 omega - v_x) / max(|R0 omega|, |v_x|), s the sign of the larger; 0 at rest.
+
+    Theory: wheel model, eq. (8).
+    """
     largest = max(abs(rim_speed), abs(v_x))
     if largest == 0.0:
         return 0.0
@@ -36,19 +39,19 @@ def forward_slip_ratio(rim_speed: float, v_x: float, rest_speed: float) -> float
 
 @kernel(inline=True)
 def peak_fraction(coefficient_0: float, coefficient_1: float, slip: float) -> float:
-    """theta_m / theta_f = clip(a0 + a1 slip, 0, PEAK_CEILING) (A.8)."""
+    """theta_m / theta_f = clip(a0 + a1 slip, 0, PEAK_CEILING) (theory: wheel model, eq. (7); A.8)."""
     return min(max(coefficient_0 + coefficient_1 * slip, 0.0), PEAK_CEILING)
 
 
 @kernel(inline=True)
 def pressure_modulus(cohesive: float, frictional: float, half_width: float, sin_edge: float) -> float:
-    """k_c/b_patch + k_phi with b_patch = 2 half_width sin(psi_l) (section 4 in place of A.9)."""
+    """k_c/b_patch + k_phi with b_patch = 2 half_width sin(psi_l) (theory: wheel model, eq. (11), E14)."""
     return cohesive / (2.0 * half_width * sin_edge) + frictional
 
 
 @kernel(inline=True)
 def normal_stress(modulus: float, exponent: float, depth: float) -> float:
-    """sigma = (k_c/b + k_phi) z^n (A.7)."""
+    """sigma = (k_c/b + k_phi) z^n (theory: wheel model, eq. (11), (12); thesis A.5, A.7)."""
     return modulus * exp2_bounded(exponent * log2_positive(max(depth, _TINY)))
 
 
@@ -57,6 +60,8 @@ def shear_over_speed(
     strength: float, displacement_t: float, displacement_l: float, v_t: float, v_l: float, decay: float
 ) -> float:
     """tau/|V|: strength (1 - exp(-|j|/K)) over the sliding speed, so that tau_t = -result * V_t (Janosi).
+
+    Theory: wheel model, eq. (15), (16).
 
     Args:
         strength: cohesion + sigma tan(phi) [Pa].

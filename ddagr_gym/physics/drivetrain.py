@@ -1,4 +1,4 @@
-"""Bank speed loops: first order, solved exactly (thesis 4.11)."""
+"""Bank speed loops: first order, solved exactly (theory: wheel model, eq. (28); thesis 4.11)."""
 
 from __future__ import annotations
 

@@ -6,8 +6,8 @@
 
 with gamma = 1 - 1/sqrt(2) (Verwer, Spee, Blom and Hundsdorfer, SIAM J. Sci. Comput. 20 (1999) 1456, eq. 2.7). It
 is L-stable with the exact Jacobian A and of order two with any A, so A may be coarse and kept over steps; it acts
-on the three velocities, where the stiffness is (physics.md section 6). Bank speeds are solved exactly; their change
-enters through f_t, without which the robot would lag behind its wheels when it creeps.
+on the three velocities, where the stiffness is (theory: wheel model, eq. (30)). Bank speeds are solved exactly; their
+change enters through f_t, without which the robot would lag behind its wheels when it creeps.
 
 The forces at y_{n+1} that the next step starts from are extrapolated from those at y_n + k1 with the wheels'
 derivatives: the two states differ by O(h^2), so the order stays, and a step costs one evaluation.

@@ -1,4 +1,4 @@
-"""Sinkage at which the soil carries a wheel's load (physics.md section 5; thesis A.4)."""
+"""Sinkage at which the soil carries a wheel's load (theory: wheel model, eq. (20), (21); thesis A.4)."""
 
 from __future__ import annotations
 

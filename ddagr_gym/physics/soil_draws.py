@@ -1,7 +1,8 @@
 """Random soils: named ranges, draws from them that do not immobilise the robot, and soil that varies by place.
 
-A soil is not nine independent numbers (physics.md section 10). k_phi's unit depends on the exponent n, so n and the
-pressure of a plate at 3 cm are drawn and the moduli derived; cohesion and shear modulus follow n as published soils do.
+A soil is not nine independent numbers (theory: wheel model, eq. (39)). k_phi's unit depends on the exponent n, so n and
+the pressure of a plate at 3 cm are drawn and the moduli derived; cohesion and shear modulus follow n as published soils
+do.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """How a wheel's forces change with its motion: what predicts sinkages, forces and the integrator's Jacobian.
 
-Forces depend on ratios of velocities only (physics.md section 9). Derivatives are therefore kept by velocity over
-speed, the speed of a wheel being the larger of |v_x| and |R0 omega|: they stay good while the robot gains speed.
+Forces depend on ratios of velocities only (theory: wheel model, eq. (29)). Derivatives are therefore kept by velocity
+over speed, the speed of a wheel being the larger of |v_x| and |R0 omega|: they stay good while the robot gains speed.
 """
 
 from __future__ import annotations

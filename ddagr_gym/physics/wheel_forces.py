@@ -1,4 +1,4 @@
-"""Forces on a single wheel: the stable entry points (physics.md section 5)."""
+"""Forces on a single wheel: the stable entry points (theory: wheel model, section 5)."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class WheelForce:
         force: (..., 3) [N].
         yaw_moment: (...) M_z [N m].
         axle_torque: (...) the soil's moment about the hub's y axis [N m]; negative brakes a driven wheel.
-        slip_ratio: (...) [-], physics.md section 3.
+        slip_ratio: (...) [-] (theory: wheel model, eq. (8)).
     """
 
     force: Array
@@ -123,7 +123,7 @@ def wheel_force(
     *,
     numerics: Numerics = Numerics(),
 ) -> WheelForce:
-    """Force of the soil on a wheel at a given sinkage (physics.md sections 2-5).
+    """Force of the soil on a wheel at a given sinkage (theory: wheel model, eq. (17), (18)).
 
     Args:
         wheel: geometry.

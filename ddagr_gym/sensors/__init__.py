@@ -1,1 +1,1 @@
-"""Sensors: what the robot's instruments read of the true motion (physics.md section 7)."""
+"""Sensors: what the robot's instruments read of the true motion (theory: wheel model, section 7)."""

@@ -9,9 +9,9 @@ Why the two differ (each measured by a variant of :data:`VARIANTS`, not guessed)
 - **No push against compaction in SCM.** It applies the pressure of a grid node along the normal of the *undeformed
   terrain*, that is straight up (``SCMTerrain.cpp``: the force is pressure along the node's terrain normal plus shear
   along the tangent). Pressure then brakes the axle, by its offset ahead of the hub, but never the robot. Here it acts
-  along the tyre's surface, and the compaction resistance (physics.md section 9) has to be overcome by traction: the
-  robot drives at 11 % slip where SCM's drives at 1 to 3 %. With the horizontal part of the pressure cancelled, and
-  nothing else changed (variant ``no compaction resistance``), the yaw rates agree.
+  along the tyre's surface, and the compaction resistance (theory: wheel model, section 9) has to be overcome by
+  traction: the robot drives at 11 % slip where SCM's drives at 1 to 3 %. With the horizontal part of the pressure
+  cancelled, and nothing else changed (variant ``no compaction resistance``), the yaw rates agree.
 - **Rear wheels in ruts.** SCM's rear wheels run where the front ones have been, and inherit the shear displacement
   that each grid node has added up, in whatever direction, so they grip at full strength at once: its outer rear wheel
   pulls half as much again as its front one. Here every wheel meets fresh soil. The variant ``rear wheels at full shear

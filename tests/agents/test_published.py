@@ -20,7 +20,7 @@ from ddagr_gym.policies.controller import policy_controller
 from ddagr_gym.policies.shipped import policies_dir, selected_policies
 
 SEEDS_AT_LEAST = {"ppo_ekf": 10, "ppo_raw": 5, "ppo_history": 5}
-"""Of control.md, "Protocol", and of what the arms are said to have."""
+"""Of the protocol (theory: control, section 5), and of what the arms are said to have."""
 
 
 ABSOLUTE_PATH = re.compile(r"(?<![\w.*/)])/[a-z]\w*/")

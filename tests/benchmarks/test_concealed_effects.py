@@ -105,7 +105,7 @@ def test_every_pair_of_laws_drives_alike(pressure_law, shear_law):
 
 
 def test_wheel_forces_resemble_the_reference_wheel():
-    """Against values computed from shared/physics.md for Table A.1 at a quarter of the weight."""
+    """Against values of the package (theory: wheel model, eq. (17)) for Table A.1 at a quarter of the weight."""
     reference = {-0.2: -0.265, -0.05: -0.133, 0.05: 0.090, 0.2: 0.223, 0.5: 0.287}
     for slip, pull in reference.items():
         spin = 0.2 / RADIUS * (1.0 + slip if slip < 0 else 1.0 / (1.0 - slip))

@@ -39,7 +39,7 @@ def test_the_coupled_law_is_several_times_closer(robot):
         assert set(costs[kind]) == set(LAWS)
         for key in ("peak_error_x", "peak_error_y", "rms_error_x", "rms_error_y"):
             assert costs[kind]["coupled"][key] < 0.25 * costs[kind]["thesis"][key]
-    # physics.md section 7: the approximate law errs by a third to a half of the largest force
+    # thesis, remark 1: the approximate law errs by a third to a half of the largest force
     assert 0.3 < costs["turn"]["thesis"]["peak_error_x"] < 0.6
 
 

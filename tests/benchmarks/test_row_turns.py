@@ -21,7 +21,7 @@ from ddagr_gym.evaluation.scenarios import save_scenarios, set_hash
 from ddagr_gym.evaluation.summary import BASELINES, summaries
 
 SEEDS = 10
-"""Training seeds of the headline at least (control.md, "Protocol")."""
+"""Training seeds of the headline at least (theory: control, section 5)."""
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,8 @@ from ddagr_gym.errors import InputError
 from ddagr_gym.parameters import Numerics, Soil, TorusWheel
 from ddagr_gym.physics import SinkageStatus, equilibrium_sinkage, wheel_force
 
-# At almost no lateral sliding |V| has a kink inside the patch; any fixed rule converges slowly there (physics.md 5).
+# At almost no lateral sliding |V| has a kink inside the patch; any fixed rule converges slowly there.
+# Theory: wheel model, section 5.
 KINKED = {"driven_straight": (4e-3, 5e-4), "yawing_at_rest": (3e-2, 2e-3)}
 # Sunk to the limit, or in soil with n = 1.6, the patch is wider than the default rule is meant for.
 COARSE = {"sunk_to_the_limit": 3e-3, "braked_in_snow": 2e-3}

@@ -17,7 +17,7 @@ Errors = dict[str, dict[str, Array]]
 """(K,) by model and quantity."""
 
 HORIZONS = (1.0, 5.0, 30.0)
-"""[s], diagnosis.md, step 10."""
+"""[s] (theory: diagnosis, section 9)."""
 
 MODELS = ("raw", "refitted", "corrected", "black_box", "ceiling")
 

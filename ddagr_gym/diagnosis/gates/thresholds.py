@@ -18,7 +18,7 @@ from ddagr_gym.errors import InputError
 from ddagr_gym.identification.misfit import LOCAL
 
 LEVEL = 0.05
-"""False alarms that a gate lets through, over the whole library (diagnosis.md, step 3)."""
+"""False alarms that a gate lets through, over the whole library (theory: diagnosis, eq. (6); ours)."""
 
 _UPPER = 0.1  # share of the null runs whose mean scales an effect
 

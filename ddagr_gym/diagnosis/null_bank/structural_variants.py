@@ -1,8 +1,9 @@
 """Simulators that differ from the nominal one in structure, with nothing missing that the library could name.
 
 Null drives from the very simulator that is fitted to them would make every threshold far too low (the inverse crime,
-diagnosis.md). Each kind here changes something that real ground and real robots do otherwise; none is in the library.
-They are effects only in how they attach to the simulator; they are not registered and cannot be named by a verdict.
+theory: diagnosis, section 1). Each kind here changes something that real ground and real robots do otherwise; none is
+in the library. They are effects only in how they attach to the simulator; they are not registered and cannot be named
+by a verdict.
 """
 
 from __future__ import annotations

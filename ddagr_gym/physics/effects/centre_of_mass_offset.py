@@ -25,7 +25,7 @@ class CentreOfMassOffset(Effect):
     title = "Offset centre of mass"
     group = "robot"
     equation = "N_i = N/4 (1 +- x_c/L)(1 +- y_c/W)"
-    source = "statics of four wheels (physics.md section 6; diagnosis vocabulary)"
+    source = "statics of four wheels (theory: wheel model, eq. (24))"
     signature = (
         "y: pulls to the heavier side, little while speed loops hold; turns to either side differ; x: turns about it"
     )

@@ -39,7 +39,7 @@ class ImuLeverArm(Effect):
     title = "IMU lever arm"
     group = "sensors"
     equation = "specific force + (-yaw_acceleration y - yaw_rate^2 x, yaw_acceleration x - yaw_rate^2 y)"
-    source = "physics.md section 7; Farrell, Aided Navigation"
+    source = "theory: wheel model, eq. (35); Farrell, Aided Navigation"
     signature = "specific force at the start and end of turns, and with the square of the yaw rate; none straight"
     confused_with = ("centre_of_mass_offset", "imu_misalignment")
     actions = ((POINT_READINGS, move_sensor),)

@@ -16,7 +16,7 @@ def tilt_ground(row: Vector, parameters: Vector, memory: Vector) -> None:
 
 @dataclass(frozen=True)
 class Slope(Effect):
-    """Inclined plane, rising towards a direction of the world (physics.md section 6).
+    """Inclined plane, rising towards a direction of the world (theory: wheel model, eq. (23)).
 
     Attributes:
         angle: of inclination; least: half a degree, about what a machine guidance system resolves.
