@@ -188,7 +188,7 @@ def _unnamed(session: DiagnosisSession, found: SearchResult, diagnosis: Diagnosi
 
 
 def _next_drive(session: DiagnosisSession, diagnosis: Diagnosis) -> Mapping[str, Any]:
-    """The drive that would tell what is left open apart; without one, why there is none."""
+    """The drive that would separate the explanations that are left; without one, why there is none."""
     mapping = as_mapping(diagnosis)
     sensors = sensors_of_diagnosis(mapping)
     try:

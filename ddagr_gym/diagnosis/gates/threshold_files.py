@@ -43,7 +43,7 @@ def load_thresholds(path: Path) -> Thresholds:
 
 
 def _thresholds(body: dict[str, Any], origin: Origin | None) -> Thresholds:
-    """Thresholds as they stand in a file."""
+    """Thresholds from the mapping of a file."""
     gates = {str(name): Gate(**gate) for name, gate in body["gates"].items()}
     misfit = {str(name): float(value) for name, value in body["misfit"].items()}
     maxima = tuple(float(value) for value in body.get("maxima", ()))
@@ -61,7 +61,7 @@ def _thresholds(body: dict[str, Any], origin: Origin | None) -> Thresholds:
 
 
 def _origin(entry: object, path: Path) -> Origin | None:
-    """Origin as it stands in a file; older ones have none."""
+    """Origin from its entry in a file; older files have none."""
     if entry is None:
         return None
     types: dict[str, type | UnionType] = {

@@ -17,7 +17,7 @@ LEAST_SPEED = 0.02
 """Bank speed that counts as moving [rad/s] (ours: 5 mm/s at the rim of the thesis's robot)."""
 
 LEAST_MOVING = 0.05
-"""Share of the time that a robot must be told to move (ours)."""
+"""Share of the time in which a robot must be commanded to move (ours: 3 s of a drive of 60 s)."""
 
 
 def content_hash(recording: Recording) -> str:
@@ -69,7 +69,7 @@ def _check_channels(recording: Recording) -> None:
     if not recording.has("command_right", "command_left"):
         raise InputError(
             f"{recording.meta.source} has no commands (command_right, command_left): "
-            "without what the robot was told nothing can be predicted; name their columns in a --map."
+            "without what the robot was commanded nothing can be predicted; name their columns in a --map."
         )
     sensors = (("yaw_rate",), ("encoder_right", "encoder_left"), ("pose_x", "pose_y"))
     if not any(recording.has(*names) for names in sensors):
@@ -115,6 +115,6 @@ def _check_motion(recordings: Sequence[Recording]) -> None:
     if max(shares) < LEAST_MOVING:
         names = ", ".join(recording.meta.source for recording in recordings)
         raise InputError(
-            f"{names}: the robot is told to stand still {100.0 * (1.0 - max(shares)):.0f} % of the time: "
+            f"{names}: the robot is commanded to stand still {100.0 * (1.0 - max(shares)):.0f} % of the time: "
             "record a drive with straight pieces and arcs to both sides."
         )

@@ -34,7 +34,11 @@ FEWEST = 30
 """Samples that a share needs (ours)."""
 
 _REACH = 5
+"""Samples before and after one over which its reading must change for a repeat to be informative (ours)."""
+
 _QUANTA = 20.0
+"""Quanta by which it must change over these 2 x 5 samples: two per sample, so that an honest count hardly repeats
+(ours)."""
 
 
 @dataclass(frozen=True)
@@ -64,12 +68,12 @@ def _repeats(recording: Recording, names: Sequence[str]) -> tuple[Flags, Flags]:
     values = np.stack([recording[name][rows] for name in names], axis=1)
     if len(values) < 2 * _REACH + 2:
         return np.zeros(0, dtype=bool), np.zeros(0, dtype=bool)
-    telling = np.zeros(len(values), dtype=bool)
+    informative = np.zeros(len(values), dtype=bool)
     steps = np.abs(np.diff(values, axis=0))
     quantum = np.array([np.min(s[s > 0.0], initial=np.inf) for s in steps.T])
     change = np.abs(values[2 * _REACH :] - values[: -2 * _REACH])
-    telling[_REACH:-_REACH] = (change > _QUANTA * quantum).any(axis=1)
-    return repeat, telling
+    informative[_REACH:-_REACH] = (change > _QUANTA * quantum).any(axis=1)
+    return repeat, informative
 
 
 def find_repeated_readings(recordings: Sequence[Recording]) -> tuple[RepeatedReadings, ...]:
@@ -78,12 +82,12 @@ def find_repeated_readings(recordings: Sequence[Recording]) -> tuple[RepeatedRea
     for sensor, names in SENSORS.items():
         read = [recording for recording in recordings if recording.has(*names)]
         pairs = [_repeats(recording, names) for recording in read]
-        telling = sum(int(t.sum()) for _, t in pairs)
-        if telling < FEWEST:
+        informative = sum(int(t.sum()) for _, t in pairs)
+        if informative < FEWEST:
             continue
-        share = sum(int((repeat & t).sum()) for repeat, t in pairs) / telling
+        share = sum(int((repeat & t).sum()) for repeat, t in pairs) / informative
         if share > LEAST_SHARE:
-            found.append(RepeatedReadings(sensor, share, _duration(read, names), telling))
+            found.append(RepeatedReadings(sensor, share, _duration(read, names), informative))
     return tuple(found)
 
 
@@ -100,16 +104,16 @@ def repeat_runs(repeat: Flags) -> tuple[Rows, Rows]:
 def _duration(recordings: Sequence[Recording], names: Sequence[str]) -> float:
     """Mean time over which runs of repeats last [s].
 
-    Samples say something only near a change, so that the share of repeats tells nothing of holds longer than that. Runs
+    Samples are informative only near a change, so that the share of repeats says nothing of longer holds. Runs
     without such a sample do not count: successive holds of a steady reading look like one.
     """
     found = []
     for recording in recordings:
-        _, telling = _repeats(recording, names)
-        if telling.any():
+        _, informative = _repeats(recording, names)
+        if informative.any():
             rows, repeat = repeated_rows(recording, names)
             first, last = repeat_runs(repeat)
-            hits = np.cumsum(repeat & telling)
+            hits = np.cumsum(repeat & informative)
             found.append((recording.t[rows[last]] - recording.t[rows[first]])[hits[last] > hits[first]])
     lengths = np.concatenate(found)
     # where nothing but zeros repeats there are none
@@ -119,7 +123,7 @@ def _duration(recordings: Sequence[Recording], names: Sequence[str]) -> float:
 def repeated_rows(recording: Recording, names: Sequence[str]) -> tuple[NDArray[np.int64], Flags]:
     """Rows (n,) with a reading of all channels, and whether each repeats the reading before.
 
-    A standing robot's encoders say zero all the time and mean it: zeros are no repeats.
+    Encoders of a robot at rest read zero all the time: zeros are no repeats.
     """
     values = np.stack([recording[name] for name in names], axis=1)
     rows = np.flatnonzero(np.isfinite(values).all(axis=1))

@@ -17,11 +17,11 @@ from ddagr_gym.recordings.schema import Recording
 Banks = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 LEAST_CORRELATION = 0.5
-"""Negative correlation of yaw rate and difference of bank speeds that says so (ours: ordinary drives have 0.9 and more,
-a dead gyro none)."""
+"""Negative correlation of yaw rate and difference of bank speeds from which on the gyro is reversed (ours: ordinary
+drives have +0.9 and more, a dead gyro none)."""
 
 FEWEST = 200
-"""Samples that a correlation needs."""
+"""Samples that a correlation needs (ours: its standard error is then 0.07)."""
 
 
 @dataclass(frozen=True)

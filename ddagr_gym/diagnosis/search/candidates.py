@@ -24,7 +24,7 @@ class Candidate:
         one_sided: (k,) whether only positive multiples exist.
         scales: (k,) standard deviation of each multiple before any data, see
             :mod:`ddagr_gym.identification.size_prior`.
-        whole: multiple of the only probe at which a categorical effect stands, None for others.
+        whole: multiple of the only probe at which a categorical effect has its full size; None for others.
     """
 
     name: str
@@ -41,14 +41,14 @@ class Candidate:
 
     @property
     def has_sizes(self) -> bool:
-        """Whether its multiples are sizes; a flip or a limit stands at its probe whatever its multiple."""
+        """Whether its multiples are sizes; a flip or a limit keeps the size of its probe whatever its multiple."""
         return self.whole is None and self.probes[0].differentiable
 
 
 def candidates_of(kind: type[Effect], extent: DriveExtent, first: int) -> list[Candidate]:
     """Candidates of one kind: up to two probes span it; more are grouped by their shapes (place, onset).
 
-    Probes of an effect without a derivative (limits) stand alone.
+    Probes of an effect without a derivative (limits) are candidates of their own.
 
     Args:
         kind: the effect.
@@ -115,7 +115,7 @@ def _scale(probe: Effect) -> float:
 
 
 def _whole(probe: Effect) -> float:
-    """Multiple of a categorical probe that stands at its bound."""
+    """Multiple that takes a categorical probe to its bound."""
     for name in probe.size_names():
         data = probe.parameter(name).metadata
         moved = getattr(probe, name) - data["neutral"]

@@ -1,4 +1,4 @@
-"""Rivals that tell in other words what a nuisance or another rival says; no scan finds them."""
+"""Equivalent parameterisations of a nuisance or of another rival, which the linear scan cannot find."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from ddagr_gym.identification.gauss_newton import fit
 from ddagr_gym.identification.problem import Problem
 
 TRIAL_STEPS = 3
-"""Gauss-Newton steps after which a rival is judged."""
+"""Gauss-Newton steps after which a rival is judged (ours: each costs a simulation per size)."""
 
 _SECOND_SIZE = 0.05
-"""Share of its gain by which a rival with a size more must be ahead of one that tells the same story (ours)."""
+"""Share of the gain by which a rival with one more size must exceed the rival that predicts the same (ours)."""
 
 
 def with_slower_loop(problem: Problem, model: ScannedModel, tried: list[Rival]) -> list[Rival]:

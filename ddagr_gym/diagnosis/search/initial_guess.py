@@ -1,4 +1,4 @@
-"""From what the scan found to an effect to start a fit from."""
+"""Where a joint refit starts: the effect that a scan points to, or one that predicts what a nuisance made up for."""
 
 from __future__ import annotations
 
@@ -20,11 +20,12 @@ from ddagr_gym.physics.effects.motor_lag import MotorLag
 from ddagr_gym.physics.effects.wheel_radius_mismatch import WheelRadiusMismatch
 
 PULLED = 4.0
-"""Standard deviations from the nominal value beyond which a refitted nuisance stands for something missing (ours)."""
+"""Prior standard deviations from the nominal value beyond which a refitted nuisance makes up for something missing
+(ours: null drives stay within a tenth of one)."""
 
 
 def first_guess(candidate: Candidate, multiples: Sequence[float]) -> Effect:
-    """Effect that the multiples of a candidate's probes stand for, inside its bounds.
+    """Effect with the sizes that the multiples of a candidate's probes mean, inside its bounds.
 
     Probes that move different sizes add up; probes of one size in different directions (slope) or at different
     distances (towed drag) make one effect between them.
@@ -119,9 +120,9 @@ def _shown_by(terms: Terms, candidate: Candidate, chosen: NDArray[np.bool_]) -> 
 
 
 def looped_encoders(point: Point) -> Point | None:
-    """Uneven wheel radii told as encoders of the wrong scale which the speed loop believes.
+    """Encoders of the wrong scale, which the speed loop believes, in place of uneven wheel radii.
 
-    No reading tells one from the other, except that both encoders may be wrong by the same share as well.
+    Both predict the same readings, except that both encoders may be wrong by the same share as well.
 
     Args:
         point: with the effect to translate as its last one.
@@ -142,7 +143,7 @@ def looped(radii: WheelRadiusMismatch) -> EncoderScale:
 
 
 def slower_loop(problem: Problem, point: Point) -> Point | None:
-    """The same predictions with a slow speed loop told as motor_lag, where its nuisance stands far from what is known.
+    """The same predictions with motor_lag in place of a slow speed loop, where its nuisance is far from its prior.
 
     Refitted rate and lag are one time constant, 1/rate + lag. The scan, which is linear, does not find the way from one
     to the other: it is curved, and long where the loop is slow. Null drives leave the rate within a tenth of its
@@ -167,14 +168,14 @@ def slower_loop(problem: Problem, point: Point) -> Point | None:
 
 
 def _handed_over(point: Point, place: int, effects: tuple[Effect, ...]) -> Point:
-    """A point whose effects tell what a nuisance did, which is back at its nominal value."""
+    """A point with effects in place of what a nuisance did, which is back at its nominal value."""
     values = point.values.copy()
     values[place] = 0.0
     return replace(point, values=values, effects=effects)
 
 
 def with_whole_delay(problem: Problem, point: Point) -> Point:
-    """The same predictions with all of a dead time told by the effect, none by what a row's command may mean.
+    """The same predictions with all of a dead time in the effect, none in the nuisance that shifts the commands.
 
     Both are one time, so that no step leads from one split to another; by its prior the shift is none, and only the
     effect goes on to other drives.
@@ -185,10 +186,10 @@ def with_whole_delay(problem: Problem, point: Point) -> Point:
     """
     place = [parameter.name for parameter in problem.nuisances.parameters].index("command_shift")
     shift = float(point.values[place])
-    told = [_later(effect, shift) if isinstance(effect, CommandDelay) else None for effect in point.effects]
-    if shift <= 0.0 or not any(told):
+    longer = [_later(effect, shift) if isinstance(effect, CommandDelay) else None for effect in point.effects]
+    if shift <= 0.0 or not any(longer):
         return point
-    return _handed_over(point, place, tuple(a or b for a, b in zip(told, point.effects, strict=True)))
+    return _handed_over(point, place, tuple(a or b for a, b in zip(longer, point.effects, strict=True)))
 
 
 def _later(delay: CommandDelay, shift: float) -> CommandDelay | None:

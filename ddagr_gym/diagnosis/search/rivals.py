@@ -18,16 +18,16 @@ from ddagr_gym.identification.problem import Point, Problem
 from ddagr_gym.identification.size_prior import implausibility
 
 _HOPELESS = 0.4
-"""Share of the best linear gain below which no joint refit is tried (ours, chosen on the development set)."""
+"""Share of the best linear gain below which no joint refit is tried (ours: linear and joint gains differ by less)."""
 
 _LARGE = 100.0
-"""Gain above which the linear scan may be far off, so that refits begin from two points (ours, development set)."""
+"""Gain above which the linear scan may be far off, so that refits begin from two points (ours)."""
 
 _HOPELESS_LARGE = 0.1
-"""Share as above where the best gain is large: linear gains rank rivals worse there (ours, development set)."""
+"""Share as above where the best gain is large: linear gains are worse guides there (ours)."""
 
 CLOSE = 0.6
-"""Share of the best joint gain above which a rival is fitted to the end (ours, chosen on the development set)."""
+"""Share of the best joint gain above which a rival is fitted to the end (ours: trial steps leave less open)."""
 
 
 def rivals_of(problem: Problem, model: ScannedModel, raw: Fitted, thresholds: Thresholds, most: int) -> list[Rival]:
@@ -83,7 +83,7 @@ def scans_of(problem: Problem, model: ScannedModel, raw: Fitted) -> list[Scanned
 def best_gains(
     scans: Sequence[ScannedModel], passes: Callable[[str, float, ScannedModel], bool] = lambda name, gain, scan_: True
 ) -> dict[str, tuple[Gain, ScannedModel]]:
-    """The larger of each effect's gains, with the model whose scan says so.
+    """The larger of each effect's gains, with the model whose scan gives it.
 
     Args:
         scans: see :func:`scans_of`.
@@ -99,7 +99,7 @@ def best_gains(
 
 
 def _ranked(problem: Problem, model: ScannedModel, raw: Fitted, thresholds: Thresholds) -> list[tuple[Gain, Terms]]:
-    """Effects that pass the gate with the scan that says so, best first."""
+    """Effects that pass the gate with the scan that gives their gain, best first."""
     best = best_gains(scans_of(problem, model, raw), thresholds.passes).values()
     ranked = sorted(best, key=lambda item: thresholds.of(item[0].name).gain - item[0].gain)
     return [(gain, scan_.terms) for gain, scan_ in ranked]
@@ -145,7 +145,7 @@ def _damped_guess(problem: Problem, model: ScannedModel, gain: Gain, terms: Term
         problem: what to fit.
         model: the model before.
         gain: of the effect.
-        terms: of the scan that says so, made at ``start``.
+        terms: of the scan that gives it, made at ``start``.
         start: where to begin.
     """
     candidate = terms.candidates[gain.candidate]

@@ -40,7 +40,7 @@ class Terms:
         normals: (W, 1 + P + K, 1 + P + K) of residual, free nuisances and probes, in this order.
         nuisances: P.
         precision: (P,) of the nuisances' priors.
-        values: (P,) where the nuisances stand.
+        values: (P,) of the nuisances at the fitted model.
         candidates: what the probes are of.
         recording: (W,) of each window.
         time: (W,) of each window [s].
@@ -160,7 +160,7 @@ def scan(
     columns: list[Array] = []
     drives = record_drives(problem, fitted.point)
     for name, kind in (effect_kinds() if kinds is None else kinds).items():
-        # held readings are found in the values themselves (ddagr_gym.diagnosis.preprocessing.repeated_readings)
+        # repeated readings are found in the values themselves (ddagr_gym.diagnosis.preprocessing.repeated_readings)
         if name in assumed or name == "sensor_hold":
             continue
         for candidate in candidates_of(kind, extent, len(columns)):
@@ -272,7 +272,7 @@ def gains(terms: Terms, weights: Array | None = None, dispersion: float = 1.0) -
 def _gain_by_frame(terms: Terms, candidate: Candidate, weights: Array | None, dispersion: float) -> float:
     """Gain of a direction that every frame may see turned, less what a heading explains by chance in each further one.
 
-    Drives out and back show the same slope with opposite signs: seen as begun alike they would say nothing together.
+    Drives out and back show the same slope with opposite signs: taken to start in one direction they cancel.
     """
     frames = [frame if weights is None else frame * weights for frame in terms.frames]
     found = [best_multiples(reduce(terms, frame), candidate, dispersion)[0] for frame in frames if frame.any()]
@@ -286,7 +286,7 @@ def nuisance_answer(problem: Problem, fitted: Fitted, terms: Terms, gain: Gain) 
         problem: what was fitted.
         fitted: the model that was scanned.
         terms: of that scan.
-        gain: of the candidate; a categorical or a limiting effect stands at its probe whatever its multiple.
+        gain: of the candidate; a categorical or a limiting effect keeps its probe's size whatever its multiple.
     """
     candidate = terms.candidates[gain.candidate]
     change = np.zeros(len(fitted.point.values))

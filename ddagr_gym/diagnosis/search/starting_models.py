@@ -18,7 +18,7 @@ from ddagr_gym.identification.problem import Problem
 
 FAR_OFF = 4.0
 """Dispersion of the refitted nominal model above which something large is missing: windows are then short, and the raw
-model is scanned too (ours; chosen on the development set)."""
+model is scanned too (ours: residuals of twice the noise)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +27,7 @@ class StartingModels:
 
     Attributes:
         session: with the windows to search.
-        raw: the nominal model as it stands, with its sensitivities.
+        raw: the nominal model before any fit, with its sensitivities.
         refitted: the same with refitted nuisances.
     """
 
