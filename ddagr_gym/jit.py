@@ -27,13 +27,17 @@ from numba.core.caching import IndexDataCacheFile
 from numba.core.ccallback import CFunc
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
-from numba.extending import intrinsic
+from numba.extending import intrinsic as numba_intrinsic
 from numba.np.arrayobj import populate_array
 
 _PACKAGE = Path(__file__).parent
 _SHARED_SOURCES = ("jit.py", "simulator_kernel.py", "physics", "sensors")
 _CALLED_BY_POINTER = _PACKAGE / "physics" / "effects"
 """Code that kernels call through pointers only: it is in no kernel, so its edits recompile nothing but itself."""
+
+
+# numba's stub counts the typing context among the arguments of a call; no call gives it.
+intrinsic: Callable[[Callable[..., Any]], Any] = numba_intrinsic
 
 
 @lru_cache
@@ -70,7 +74,7 @@ def callback_stamp(function: Callable[..., Any]) -> str | None:
     return _folder_stamp(file.parent) if file.is_file() else None
 
 
-class _CacheFile(IndexDataCacheFile):  # type: ignore[misc]
+class _CacheFile(IndexDataCacheFile):
     """Machine code on disk, a file for each state of the sources and each signature.
 
     numba's own index is written before the file that it points to: of two processes that compile at the same time
@@ -107,7 +111,7 @@ def _stamp(compiled: Any, module: str) -> None:
     _keep_apart(getattr(compiled, "_cache", None), kernel_stamp(folder))
 
 
-class _OwnCopies(JITCodeLibrary):  # type: ignore[misc]
+class _OwnCopies(JITCodeLibrary):
     """Machine code of a kernel that runs its own copies of what it calls; other kernels still inline from it."""
 
     def _finalize_final_module(self) -> None:
@@ -121,7 +125,7 @@ class _OwnCopies(JITCodeLibrary):  # type: ignore[misc]
         super()._finalize_final_module()
 
 
-class _Compiler(Compiler):  # type: ignore[misc]
+class _Compiler(Compiler):
     """numba's, into :class:`_OwnCopies`."""
 
     def __init__(self, typing: Any, target: Any, _: None, *rest: Any) -> None:
@@ -144,7 +148,13 @@ def kernel(*, inline: bool = False, fused: bool = True, cached: bool = True) -> 
     fastmath = {"contract"} if fused else False
 
     def decorate(function: Callable[..., Any]) -> Any:
-        options = {"fastmath": fastmath, "error_model": "numpy", "nogil": True, "cache": cached, "forceinline": inline}
+        options: dict[str, Any] = {
+            "fastmath": fastmath,
+            "error_model": "numpy",
+            "nogil": True,
+            "cache": cached,
+            "forceinline": inline,
+        }
         compiled = numba.njit(pipeline_class=_Compiler, **options)(function)
         if cached:
             _stamp(compiled, function.__module__)

@@ -73,7 +73,7 @@ class StepStore:
         if self.folder is None:
             return work()
         if self.has(name):
-            return _load(self.folder, name)  # type: ignore[no-any-return]
+            return _load(self.folder, name)
         made = work()
         _save(self.folder, name, made)
         return made

@@ -54,7 +54,7 @@ def amounts(parameters: Mapping[str, Any]) -> dict[str, Amount]:
 
 
 def _amount(item: Any) -> Amount:
-    get = item.get if isinstance(item, Mapping) else lambda key: getattr(item, key, None)
+    get: Callable[[str], Any] = item.get if isinstance(item, Mapping) else lambda key: getattr(item, key, None)
     value, interval = get("value"), get("interval")
     ends = None
     if interval is not None and all(end is not None for end in interval):

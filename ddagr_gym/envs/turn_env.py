@@ -143,7 +143,7 @@ class TurnEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         frame: NDArray[np.uint8] = self._renderer.draw(self._history.scene())
         return frame
 
-    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
+    def render(self) -> NDArray[np.uint8] | None:
         """Picture (H, W, 3) of the field from above in mode "rgb_array"; None in "human", which draws by itself."""
         if self.render_mode is None:
             gymnasium.logger.warn('render() without render_mode: use gym.make(..., render_mode="rgb_array").')

@@ -40,11 +40,6 @@ class Correction(NamedTuple):
     covariance: Array
     standardised: Array
 
-    @property
-    def normalised_squared(self) -> Array:
-        """Contribution of each channel to the NIS, (5,)."""
-        return self.standardised**2
-
 
 def predict(
     model: FilterModel,

@@ -12,11 +12,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from llvmlite import ir
-from numba import carray, types
-from numba.extending import intrinsic
+from numba import carray, types  # type: ignore[attr-defined]
 from numpy.typing import NDArray
 
-from ddagr_gym.jit import callback_stamp, compile_callback, kernel
+from ddagr_gym.jit import callback_stamp, compile_callback, intrinsic, kernel
 from ddagr_gym.physics.layout import EFFECT_MEMORY, EFFECT_PARAMETERS, SIZE
 
 Array = NDArray[np.float64]

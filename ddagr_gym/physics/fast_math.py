@@ -10,9 +10,8 @@ from typing import Any
 
 from llvmlite import ir
 from numba import types
-from numba.extending import intrinsic
 
-from ddagr_gym.jit import kernel
+from ddagr_gym.jit import intrinsic, kernel
 
 LOG2_E = 1.4426950408889634
 _ROUND = 6755399441055744.0  # 1.5 * 2**52: adding it leaves an integer in the low mantissa bits

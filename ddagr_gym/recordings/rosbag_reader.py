@@ -9,25 +9,12 @@ from typing import Any
 
 from ddagr_gym.errors import InputError
 from ddagr_gym.recordings.files import DEFAULT_LIMITS, Limits, kind_of, open_source, sha256_of
-from ddagr_gym.recordings.mcap_reader import mcap_topics, read_mcap
+from ddagr_gym.recordings.mcap_reader import read_mcap
 from ddagr_gym.recordings.schema import Recording, RobotGeometry
 from ddagr_gym.recordings.streams import StreamCollector
 from ddagr_gym.recordings.topic_map import Topic, TopicMap, choose_topics
 
 _LARGEST_METADATA = 4 * 2**20
-
-
-def rosbag_topics(path: Path, limits: Limits = DEFAULT_LIMITS) -> tuple[Topic, ...]:
-    """Topics of a bag.
-
-    Raises:
-        InputError: damaged or not a bag.
-    """
-    inner = _storage(path)
-    if inner is not None:
-        return mcap_topics(inner, limits)
-    with _open(path, limits) as reader:
-        return _topics(reader)
 
 
 def read_rosbag(

@@ -7,7 +7,8 @@ from html import escape
 from pathlib import Path
 
 from ddagr_gym.replay_analysis.horizons import METRICS
-from ddagr_gym.replay_analysis.report import MODELS, ArmReport, ErrorStatistics, ReplayReport, RunReport, lead_errors
+from ddagr_gym.replay_analysis.intervals import ErrorStatistics
+from ddagr_gym.replay_analysis.report import MODELS, ArmReport, ReplayReport, RunReport, lead_errors
 from ddagr_gym.reporting.replay_figures import MODEL_STYLES
 
 STYLE = """

@@ -217,12 +217,6 @@ def bank_slips(turns: Turns, robot: Robot) -> Array:
     return np.asarray(1.0 - speed / np.where(rim == 0.0, np.nan, rim))
 
 
-def kinematic_yaw_rate(turns: Turns, robot: Robot) -> Array:
-    """Yaw rate without any slip [rad/s], (N,)."""
-    difference = turns.commands[:, 0] - turns.commands[:, 1]
-    return np.asarray(robot.wheels[0].outer_radius * difference / (2.0 * robot.half_track))
-
-
 def agreement(variant: str, model: Turns, reference: Turns) -> Agreement:
     """Ratios and differences of one variant against the reference."""
     robot = reference_robot()

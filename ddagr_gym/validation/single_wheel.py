@@ -44,7 +44,6 @@ FILE = "single_wheel/single_wheel_smooth.csv"
 PUBLISHED_SOIL = "soil_direct_90_sand_cmu"
 """Preset with the values that the authors of the data published."""
 
-QUANTITIES = ("drawbar", "lateral", "sinkage")
 
 FIT_ANGLES = (0.0, 30.0, 60.0)
 """Slip angles [deg] that the fitted variant sees; the others are held out."""

@@ -12,7 +12,7 @@ from rosbags.typesys import Stores, get_typestore
 from ddagr_gym.errors import InputError
 from ddagr_gym.recordings.files import Limits
 from ddagr_gym.recordings.load import load_recording
-from ddagr_gym.recordings.rosbag_reader import read_rosbag, rosbag_topics
+from ddagr_gym.recordings.rosbag_reader import read_rosbag
 from ddagr_gym.recordings.topic_map import load_topic_map
 
 DEFAULT = "topics_default"
@@ -217,16 +217,6 @@ def test_a_named_topic_of_the_wrong_type_is_refused(tmp_path, messages, warthog)
     own.write_text("topics: {imu: {topic: /odom}, wheels: {}}\n")
     with pytest.raises(InputError, match="type Odometry"):
         read_rosbag(write("ros1", tmp_path, messages), load_topic_map(str(own)), warthog)
-
-
-def test_the_topics_of_a_bag(tmp_path, messages):
-    topics = rosbag_topics(write("ros1", tmp_path, messages))
-    assert [(t.name, t.message_type, t.count) for t in topics] == [
-        ("/cmd_vel", "Twist", 80),
-        ("/imu/data", "Imu", 200),
-        ("/joint_states", "JointState", 40),
-        ("/odom", "Odometry", 20),
-    ]
 
 
 def test_too_many_messages_are_refused(tmp_path, messages, warthog):

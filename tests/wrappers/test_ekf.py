@@ -1,4 +1,4 @@
-"""The filter's features: one result through constructor, id, batch and wrappers."""
+"""The filter's features: one result through constructor, id, batch and wrapper."""
 
 import warnings
 
@@ -12,7 +12,7 @@ import ddagr_gym  # noqa: F401  registers the ids
 from ddagr_gym.control.observation import EKF_FEATURES, OBSERVATION
 from ddagr_gym.envs.registration import TURN_EKF_ID, TURN_ID
 from ddagr_gym.errors import InputError
-from ddagr_gym.wrappers.ekf import EkfFeatures, VectorEkfFeatures
+from ddagr_gym.wrappers.ekf import EKFObservation
 
 NAMES = [name for name, _, _ in (*OBSERVATION, *EKF_FEATURES)]
 SCALES = np.array([scale for _, _, scale in (*OBSERVATION, *EKF_FEATURES)])
@@ -30,7 +30,7 @@ def test_checker_finds_nothing():
 
 def test_wrapper_equals_the_composed_id():
     composed = gymnasium.make(TURN_EKF_ID)
-    wrapped = EkfFeatures(gymnasium.make(TURN_ID, info_level="full"))
+    wrapped = EKFObservation(gymnasium.make(TURN_ID, info_level="full"))
     assert wrapped.observation_space == composed.observation_space
     for seed in (3, 4):
         np.testing.assert_array_equal(composed.reset(seed=seed)[0], wrapped.reset(seed=seed)[0])
@@ -45,15 +45,6 @@ def test_batch_equals_single_environments(mode):
     np.testing.assert_array_equal(single.reset(seed=1)[0], native.reset(seed=1)[0])
     for action in actions(40, 3):
         np.testing.assert_array_equal(single.step(action)[0], native.step(action)[0])
-
-
-def test_vector_wrapper_equals_the_native_batch():
-    arguments = {"num_envs": 3, "max_episode_steps": 12}
-    native = gymnasium.make_vec(TURN_EKF_ID, **arguments)
-    wrapped = VectorEkfFeatures(gymnasium.make_vec(TURN_ID, info_level="full", **arguments))
-    np.testing.assert_array_equal(native.reset(seed=1)[0], wrapped.reset(seed=1)[0])
-    for action in actions(40, 3):
-        np.testing.assert_array_equal(native.step(action)[0], wrapped.step(action)[0])
 
 
 def test_features_follow_the_truth():
@@ -80,6 +71,4 @@ def test_a_reset_forgets():
 
 def test_samples_are_needed():
     with pytest.raises(InputError, match="full"):
-        EkfFeatures(gymnasium.make(TURN_ID)).reset(seed=0)
-    with pytest.raises(InputError, match="SameStep"):
-        VectorEkfFeatures(gymnasium.make_vec(TURN_ID, num_envs=2, info_level="full", autoreset_mode="SameStep"))
+        EKFObservation(gymnasium.make(TURN_ID)).reset(seed=0)

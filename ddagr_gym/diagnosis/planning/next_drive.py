@@ -133,7 +133,7 @@ def _check(rivals: Sequence[Effect]) -> None:
 def _timeless(rival: Effect) -> Effect:
     """An effect that began at some time holds from the start of the next drive on."""
     if "onset" in rival.shape_names():
-        return rival.with_values(onset=float(rival.parameter("onset").metadata["low"]))  # type: ignore[no-any-return]
+        return rival.with_values(onset=float(rival.parameter("onset").metadata["low"]))
     return rival
 
 
@@ -336,7 +336,7 @@ def _at_size(name: str, finding: Mapping[str, Any] | None) -> Effect:
         return replace(kind.neutral(), **{size: data["high"]})
     direction = math.copysign(1.0, data["step"])
     value = data["neutral"] + direction * TYPICAL_MULTIPLE * data["least"]
-    return kind.neutral().with_values(**{size: min(max(value, data["low"]), data["high"])})  # type: ignore[no-any-return]
+    return kind.neutral().with_values(**{size: min(max(value, data["low"]), data["high"])})
 
 
 def _hidden(detectable: Mapping[str, Mapping[str, float | None]]) -> list[str]:

@@ -163,5 +163,5 @@ def _restored(values: NDArray[np.generic]) -> object:
     if values.dtype.kind == "U":
         return tuple(str(item) for item in values)
     if values.ndim == 0:
-        return float(values)  # type: ignore[arg-type]
+        return float(values)
     return values.astype(np.float64) if values.dtype.kind == "f" else values

@@ -139,7 +139,7 @@ class Diagnosis:
 
 def as_mapping(diagnosis: Diagnosis) -> dict[str, Any]:
     """Plain mapping as it stands in ``diagnosis.json``."""
-    return json.loads(json.dumps(_finite(asdict(diagnosis))))  # type: ignore[no-any-return]
+    return json.loads(json.dumps(_finite(asdict(diagnosis))))
 
 
 def _finite(value: Any) -> Any:

@@ -64,7 +64,7 @@ def _whole(candidate: Candidate) -> Effect:
         data = probe.parameter(name).metadata
         if getattr(probe, name) != data["neutral"]:
             moved[name] = data["high"]
-    return probe.with_values(**moved)  # type: ignore[no-any-return]
+    return probe.with_values(**moved)
 
 
 def _directed(candidate: Candidate, multiples: Sequence[float]) -> Effect:
@@ -78,7 +78,7 @@ def _directed(candidate: Candidate, multiples: Sequence[float]) -> Effect:
     x = sum(length * math.cos(direction) for length, direction in parts)
     y = sum(length * math.sin(direction) for length, direction in parts)
     length = min(math.hypot(x, y), probe.parameter(size).metadata["high"])
-    return probe.with_values(**{size: length, "direction": math.atan2(y, x)})  # type: ignore[no-any-return]
+    return probe.with_values(**{size: length, "direction": math.atan2(y, x)})
 
 
 def turned_to_agree(problem: Problem, terms: Terms, gain: Gain, point: Point, share: float = 1.0) -> Point:
