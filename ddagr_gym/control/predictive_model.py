@@ -30,6 +30,7 @@ STATE_SIZE, INPUT_SIZE, PARAMETER_SIZE = 7, 2, 7
 """Parameters: a1 [N], a2 [-], b [N/rad], Rc [N], curvature of the path [1/m], offsets of v_x and yaw rate."""
 
 _SLIP_FLOOR = 1e-12
+"""Added to the squared slip, as in the filter's force law, so that its direction has a derivative at zero slip."""
 _STEPS = 2
 """Integration steps in one control period."""
 

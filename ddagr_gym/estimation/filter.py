@@ -17,7 +17,7 @@ from ddagr_gym.estimation.steps import gravity_along_body, positive_duration
 
 Array = NDArray[np.float64]
 
-_LEVEL = np.zeros((1, 1, 2))
+_LEVEL = np.zeros((1, 1, 2))  # gravity along the body where no attitude is known [m/s^2]
 
 
 class BatchFilter:

@@ -11,7 +11,7 @@ from ddagr_gym.jit import kernel
 
 Array = NDArray[np.float64]
 
-_ITERATIONS = 30
+_ITERATIONS = 30  # of a damped Newton search (ours): each bank may move 0.33 of the speed a step, ten speeds in all
 _LARGEST_RIM_RATIO = 5.0  # a rim speed beyond five times the body's means that the soil does not carry the arc
 
 

@@ -18,14 +18,14 @@ STATE = (
 )
 """Entries of the state, see :mod:`ddagr_gym.estimation` for units."""
 
-STATE_SIZE = 12
+STATE_SIZE = 12  # entries of STATE
 VELOCITY = 0  # v_x, v_y, yaw_rate
 OMEGA = 3  # right, left
 PARAMETER = 5  # ln a1, ln a2, ln b, ln Rc
-GYRO_BIAS = 9
+GYRO_BIAS = 9  # as in STATE
 ACCELEROMETER_BIAS = 10  # x, y
 
-PARAMETER_SIZE = 4
+PARAMETER_SIZE = 4  # of the force law
 
 MOTION_SIZE = 9
 """Entries 0-8 are those on which forces depend: velocities, bank speeds, parameters."""
@@ -36,10 +36,10 @@ CHANNELS = ("specific_force_x", "specific_force_y", "yaw_rate", "encoder_right",
 COMMANDS = ("command_right", "command_left")
 """Names of the columns of bank speed commands."""
 
-CHANNEL_SIZE = 5
-FORCE_CHANNEL = 0
+CHANNEL_SIZE = 5  # entries of CHANNELS
+FORCE_CHANNEL = 0  # x, y
 GYRO_CHANNEL = 2
-ENCODER_CHANNEL = 3
+ENCODER_CHANNEL = 3  # right, left
 
 _next = 0
 

@@ -53,8 +53,8 @@ from ddagr_gym.jit import kernel
 
 Array = NDArray[np.float64]
 
-_GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
-_LEAST_DETERMINANT = 1e-9
+_GAMMA = 1.0 - 1.0 / math.sqrt(2.0)  # L-stable: theory: filter, eq. (6)
+_LEAST_DETERMINANT = 1e-9  # of I - gamma h A, which is 1 without damping and grows with it (ours: no division by 0)
 
 _Bank = tuple[
     float, float, float, float, float, float, float, float, float, float, float, float, float, float,

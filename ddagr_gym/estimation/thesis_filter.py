@@ -43,10 +43,10 @@ Array = NDArray[np.float64]
 THESIS_STATE = ("v_x", "v_y", "yaw_rate", "omega_right", "omega_left", "a1", "a2", "b")
 """Entries of the thesis's state (5.1)."""
 
-_SIZE = 8
-_LEAST_STEPS = 8
-_STAGES = np.array([0.0, 0.5, 0.5, 1.0])
-_NO_RESISTANCE = np.log(1e-12)
+_SIZE = 8  # entries of THESIS_STATE
+_LEAST_STEPS = 8  # of Runge-Kutta in a sample (ours): 1 ms, the period of the thesis's inner loop, at its 125 Hz
+_STAGES = np.array([0.0, 0.5, 0.5, 1.0])  # of the classical fourth-order Runge-Kutta method
+_NO_RESISTANCE = np.log(1e-12)  # [ln N]: the thesis's law has none, and the logarithm of nothing is infinite
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,7 @@ from ddagr_gym.physics.numerics import StepNumerics
 
 Array = NDArray[np.float64]
 
-NEWTON_ITERATIONS = 15
+NEWTON_ITERATIONS = 15  # at most (ours): each leaves at most half of the work along its step
 LENGTHS = 12  # of a Newton step that are tried
 LEFT_WORK = 0.5  # share of the work before a Newton step that may be left after it
 LONGEST = 30.0  # length of a Newton step that is tried

@@ -21,7 +21,7 @@ LANES = 8
 RHO, ENTRY, COS_ENTRY, SIN_ENTRY, NORMAL_Y, LATERAL_Y, V_X_LOCAL, Y_LOCAL, AREA, NODE, WEIGHT = (
     LANES * i for i in range(11)
 )
-SECTION_SIZE = 11 * LANES
+SECTION_SIZE = 11 * LANES  # the eleven rows above
 
 
 @kernel(inline=True)

@@ -14,6 +14,7 @@ PEAK_CEILING = 0.9
 """Ours: theta_m stays below 0.9 theta_f, else the front of the patch vanishes at slip 1 (theory: wheel model, E17)."""
 
 _TINY = 1e-300
+"""Keeps logarithms and inverse roots finite where depth or sliding vanish; far below any that counts."""
 
 
 @kernel(inline=True)

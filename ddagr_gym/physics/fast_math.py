@@ -13,7 +13,7 @@ from numba import types
 
 from ddagr_gym.jit import intrinsic, kernel
 
-LOG2_E = 1.4426950408889634
+LOG2_E = 1.4426950408889634  # 1/ln(2): exp(x) = 2^(x LOG2_E)
 _ROUND = 6755399441055744.0  # 1.5 * 2**52: adding it leaves an integer in the low mantissa bits
 
 # Polynomials through the Chebyshev nodes of each range; the largest errors are those of the docstrings.

@@ -52,7 +52,7 @@ from ddagr_gym.physics.numerics import StepNumerics
 
 Array = NDArray[np.float64]
 
-GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
+GAMMA = 1.0 - 1.0 / math.sqrt(2.0)  # L-stable (Verwer et al., eq. 2.7)
 NEWTON_TOLERANCE = 1e-9  # [m/s], at rest
 NEWTON_SHARE = 0.01  # of the accepted error, which is tolerated besides
 DOUBLE_ERROR_SPEED = 0.33  # [m/s], at which twice Numerics.accepted_error is accepted

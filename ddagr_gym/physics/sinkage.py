@@ -13,6 +13,7 @@ from ddagr_gym.physics.contact_patch import WheelMotion, wheel_wrench
 from ddagr_gym.physics.numerics import PatchNumerics
 
 MAXIMUM_ITERATIONS = 60
+"""Ours: bisections alone, to which the search falls back, narrow a tyre's 5 cm below 1e-15 m in 46."""
 
 
 class SinkageStatus(IntEnum):

@@ -48,14 +48,15 @@ CORRELATIONS = np.array(
 )
 """Of n, ln p(3 cm), ln c, ln K and phi over the 18 field soils of Wong's table (snow and simulants left out)."""
 
-_MOST_REJECTIONS = 1000
+_MOST_REJECTIONS = 1000  # ours: ranges in which less than one soil in a thousand can be driven on are a mistake
 _SPEED = 0.2  # [m/s]; forces do not depend on it
+# Slips that are tried (ours): forces saturate beyond a few tenths, so the outer ones lie wider apart
 _STRAIGHT_SLIPS = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
 _OUTER_SLIPS = np.array([0.05, 0.1, 0.2, 0.35, 0.55, 0.75, 0.9])
 _INNER_SLIPS = np.array([-0.95, -0.5, -0.2, -0.1, -0.05, 0.0, 0.05, 0.1, 0.2, 0.35, 0.55, 0.75, 0.9])
 _PARTS = 6  # between two slips the forces are interpolated
 _TIGHTEST = 1.05  # half tracks: closer in, the inner bank stands still or reverses and slip says nothing
-_COARSE = Numerics(contact_nodes=4)
+_COARSE = Numerics(contact_nodes=4)  # ours: errs by 1.4e-4 of the force (median), 1.6 % at most over preset soils
 
 Range = tuple[float, float]
 

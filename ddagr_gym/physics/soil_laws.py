@@ -64,8 +64,8 @@ CRUST_DEPTH, HARDENING_DEPTH, REFERENCE_DEPTH = 4e-3, 15e-3, 12e-3
 PEAK_OVER_MODULUS, RESIDUAL = 2.5, 0.75
 """Displacement of the peak over Janosi's K, and residual over peak strength [-]."""
 
-_MUTED = 1e-6
-_POINTS = 12
+_MUTED = 1e-6  # factor that switches the nominal shear stress off; undone by division (ours)
+_POINTS = 12  # of the midpoint rule along the contact (ours)
 _REST_SPEED = 2e-3  # [m/s]
 _LEAST_DEPTH, _GREATEST_DEPTH = 1e-3, 60e-3  # [m] between which the tangent is taken
 

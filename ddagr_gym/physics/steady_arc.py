@@ -13,7 +13,7 @@ from ddagr_gym.physics.wheel_forces import equilibrium_sinkage, wheel_force
 
 Array = NDArray[np.float64]
 
-_ITERATIONS = 12
+_ITERATIONS = 12  # of a damped Newton search (ours): each bank may move a third of the speed a step, four speeds in all
 _TOLERANCE = 2e-3
 """Largest imbalance over the robot's weight at which the arc counts as steady [-]."""
 

@@ -19,9 +19,9 @@ from ddagr_gym.recordings.schema import FloatArray
 if TYPE_CHECKING:
     import pyarrow as pa
 
-_BLOCK = 2**20
-_LONGEST_HEADER = 64 * 1024
-_MOST_LABELS = 100_000
+_BLOCK = 2**20  # bytes that are parsed at once (ours): about ten thousand rows
+_LONGEST_HEADER = 64 * 1024  # bytes (ours): beyond it a first line names no columns
+_MOST_LABELS = 100_000  # different values of a column that numbers spans (ours): more are readings, not labels
 
 
 def csv_columns(path: Path, limits: Limits = DEFAULT_LIMITS, delimiter: str = ",") -> tuple[str, ...]:

@@ -16,7 +16,7 @@ from ddagr_gym.recordings.files import DEFAULT_LIMITS, Limits, open_source
 if TYPE_CHECKING:
     import pyarrow.parquet as pq
 
-_BATCH = 65_536
+_BATCH = 65_536  # rows that are read at once (ours): a few megabytes
 
 
 @contextmanager

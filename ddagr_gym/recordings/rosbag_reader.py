@@ -14,7 +14,7 @@ from ddagr_gym.recordings.schema import Recording, RobotGeometry
 from ddagr_gym.recordings.streams import StreamCollector
 from ddagr_gym.recordings.topic_map import Topic, TopicMap, choose_topics
 
-_LARGEST_METADATA = 4 * 2**20
+_LARGEST_METADATA = 4 * 2**20  # bytes (ours): about ten thousand topics; more is no metadata
 
 
 def read_rosbag(

@@ -41,12 +41,16 @@ MOST_WINDOWS = 150
 UNKNOWN_GYRO_BIAS = 0.005
 """Prior where a robot never stood [rad/s]."""
 LEAST_GYRO_BIAS = 2e-4
+"""Prior at least [rad/s] (ours): a bias that was seen at rest wanders by so much over a drive."""
 PASSES = 2
+"""Of a fit: the second one weighs channels by the residuals of the first."""
 ITERATIONS = 8
+"""Gauss-Newton steps of a pass at most (ours)."""
 TOLERANCE = 5e-4
-_NORMAL = 1.4826
-_STRONGEST = 0.98
-_FEWEST = 20
+"""Relative fall of the cost that ends a pass (ours)."""
+_NORMAL = 1.4826  # standard deviation of a normal variable over its median absolute deviation
+_STRONGEST = 0.98  # correlation that counts at most (ours): of 99 samples one is left
+_FEWEST = 20  # residuals that a robust size needs (ours)
 
 
 @dataclass(frozen=True, eq=False)

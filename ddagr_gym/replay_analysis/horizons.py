@@ -29,8 +29,11 @@ METRICS = {
 """Unit and meaning of every metric."""
 
 LAST = 0.5
+"""Time before a horizon over which rates are averaged [s] (ours): vibration averages out."""
 SPEED_TIME = 1.0
+"""Time over which a speed is taken from poses [s] (ours): five poses at 5 Hz."""
 LEAST_GYRO_SHARE = 0.9
+"""Share of the samples that an integral of the gyro needs (ours)."""
 
 _GYRO = CHANNELS.index("yaw_rate")
 _ENCODERS = [CHANNELS.index("encoder_right"), CHANNELS.index("encoder_left")]

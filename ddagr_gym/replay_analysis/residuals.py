@@ -29,7 +29,9 @@ RECORDED = (*range(layout.SLIP_RATIO, layout.SLIP_RATIO + 4), layout.YAW_RATE, l
 """Entries of the simulator's row that :func:`regimes` needs, as :meth:`WindowModel.predict_recorded` records them."""
 
 BINS = 12
+"""At most, of a quantity that residuals are drawn against (ours): as many as a small panel shows."""
 LEAST_IN_BIN = 20
+"""Residuals that a bin needs for its median and quartiles (ours)."""
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,9 @@ from ddagr_gym.replay_analysis.prepare import DRIVES, Prepared, prepare
 from ddagr_gym.replay_analysis.report import SCHEMA, SCHEMA_VERSION, ReplayReport, RunReport
 
 SHORTEST_WINDOW = 0.2
+"""[s], ours: a time constant of the DDAGR's motors."""
 LONGEST_WINDOW = 60.0
+"""[s], ours: beyond it a window is a roll-out, which a replay has besides."""
 
 
 @dataclass(frozen=True, eq=False)

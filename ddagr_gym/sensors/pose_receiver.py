@@ -20,7 +20,7 @@ from ddagr_gym.physics.layout import (
     Y,
 )
 
-_CLOCK_SLACK = 1e-9
+_CLOCK_SLACK = 1e-9  # [s], ours: rounding of summed sample periods must not put a fix off by a sample
 
 
 @kernel()

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from ddagr_gym.physics.effects.base import DriveExtent, Effect, Vector, shape, size
 from ddagr_gym.physics.layout import COMMAND, OMEGA, POINT_COMMANDS
 
-_STARTED = 2
+_STARTED = 2  # entry of the memory behind the two banks'
 _USUAL = 0.12  # share of the fastest command that a threshold for small ones is tried at, ours
 _EDGE = 0.1  # share of the band over which a command that passes whole sets in, ours
 

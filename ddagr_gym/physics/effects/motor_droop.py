@@ -10,7 +10,7 @@ _FOLLOWING = 0.1  # [s] of rotor and gear, ours: without it the torque of a whee
 # to set it, and the speed drive each other to and fro from sample to sample
 _SLOW = 0.02  # [rad/s] bank speeds about which "alike" changes its sign
 _USUAL = 0.7  # [rad/s] of the thesis's row turns, at which power counts as torque
-_STARTED = 2
+_STARTED = 2  # entry of the memory behind the two banks'
 
 
 def droop_speed(row: Vector, parameters: Vector, memory: Vector) -> None:

@@ -8,10 +8,10 @@ from ddagr_gym.physics.effects.base import DriveExtent, Effect, Vector, shape, s
 from ddagr_gym.physics.layout import MOTOR_RATE, MOTOR_TARGET, OMEGA, POINT_MOTORS, SAMPLE_PERIOD
 
 _FASTEST = 0.05  # of the nominal time constant: a negative lag cannot make the loop faster than 20 times
-_STARTED = 2
+_STARTED = 2  # entry of the memory behind the two banks'
 _STARTING = 0.1  # of the wanted change counts as the way in which a bank turns, so that it has one at rest, ours
 _SLOW = 0.02  # [rad/s], ours: speeding up or slowing down, made differentiable
-_PROBED = ((0.0, 1.0), (1.0, 1.0), (0.0, 0.0))
+_PROBED = ((0.0, 1.0), (1.0, 1.0), (0.0, 0.0))  # second pole and slowing: the corners that differ
 
 
 @kernel(inline=True)

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from ddagr_gym.physics.effects.base import DriveExtent, Effect, Vector, size
 from ddagr_gym.physics.layout import MOTOR_RATE, MOTOR_TARGET, OMEGA, POINT_MOTORS
 
-_NO_SPEED_LIMIT = 1e3
-_NO_ACCELERATION_LIMIT = 1e6
+_NO_SPEED_LIMIT = 1e3  # [rad/s] the most that a robot may have as its maximum wheel speed
+_NO_ACCELERATION_LIMIT = 1e6  # [rad/s^2] far beyond any wheel's
 _HIGHEST_SPEED_LIMIT = 20.0  # [rad/s] that any of the preset robots would meet
 _HIGHEST_ACCELERATION_LIMIT = 200.0  # [rad/s^2], the same
 _BINDING = 0.95  # of what the drive reaches: limits above it cost less than 5 percent
-_PROBED = (0.9, 0.6)
+_PROBED = (0.9, 0.6)  # shares of the fastest that limits are tried at, ours: just binding, and cutting deep
 _PROBED_ACCELERATION = (
     0.9,
     0.6,

@@ -18,7 +18,7 @@ from ddagr_gym.physics.layout import (
 
 _CORNER = 0.02  # of slip: |slip| made differentiable, ours
 _DIGGING_LENGTH = 0.1  # [m] of rim or ground passed until the sinkage has followed the slip to 63 percent, ours
-_STARTED = 4
+_STARTED = 4  # entry of the memory behind the four wheels'
 
 
 def dig_in(row: Vector, parameters: Vector, memory: Vector) -> None:

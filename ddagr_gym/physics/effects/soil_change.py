@@ -8,8 +8,8 @@ from ddagr_gym.physics.effects.soil_factors import HIGHEST_FACTOR, LOWEST_FACTOR
 from ddagr_gym.physics.layout import POINT_SOIL, TIME
 
 _TRANSITION = 0.5  # [s], ours: the onset, made differentiable
-_ALWAYS = -1e6
-_ONSETS = (0.25, 0.5, 0.75)
+_ALWAYS = -1e6  # [s], an onset before any drive
+_ONSETS = (0.25, 0.5, 0.75)  # shares of a drive's length from which it is tried, ours
 
 
 def change_soil(row: Vector, parameters: Vector, memory: Vector) -> None:

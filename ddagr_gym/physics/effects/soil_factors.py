@@ -14,7 +14,7 @@ from ddagr_gym.physics.layout import (
     SOIL_FRICTIONAL_MODULUS,
 )
 
-LOWEST_FACTOR = 0.1
+LOWEST_FACTOR = 0.1  # the inverse of the highest
 HIGHEST_FACTOR = 10.0
 """Bounds of factors on strength and stiffness: published soils of one kind differ by no more."""
 

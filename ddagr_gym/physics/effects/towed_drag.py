@@ -23,7 +23,7 @@ _GIVE = 0.01  # [m] of slack over which the pull of a rope goes, ours
 _SHORT = 0.1  # [m], ours: a shorter rope is rather a hitch itself, so that length 0 is nothing apart
 _SHORTEST = 1e-6  # [m], so that a rope has a direction
 _USUAL_ROPE = 0.8  # [m], about one robot behind
-_LAID = 2
+_LAID = 2  # entry of the memory behind the load's place
 
 
 @kernel(inline=True)

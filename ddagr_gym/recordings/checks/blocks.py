@@ -19,8 +19,11 @@ from ddagr_gym.recordings.checks.findings import Interval
 from ddagr_gym.recordings.schema import FloatArray, Recording
 
 CONFIDENCE = 0.99
+"""Of all intervals of the checks (ours): many are asked of a recording, and at 95 % one in twenty alarms by chance."""
 RESAMPLES = 400
+"""Ours: two of them lie beyond each end of a 99 % interval."""
 FEWEST_BLOCKS = 5
+"""Below it resampling says nothing about scatter (ours)."""
 
 Estimator = Callable[[FloatArray], FloatArray]
 

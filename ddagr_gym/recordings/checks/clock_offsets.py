@@ -33,6 +33,7 @@ POSE_RANGE = (-0.15, 1.0)
 """Lateness of poses [s]: a lidar or GNSS pose is computed after its scan (0.5 to 0.75 s on the open recordings);
 earlier than the gyro is not possible."""
 LEAST_CORRELATION = 0.5
+"""Of two signals at their best offset, below which it says nothing (ours: a quarter of the variance is common)."""
 WIDEST_INTERVAL = 0.8
 """Interval [s] beyond which the offset counts as not testable."""
 
