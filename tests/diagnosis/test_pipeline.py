@@ -1,0 +1,101 @@
+"""The stages of a diagnosis: in their order, each once, and behind the last finished one after an interruption."""
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from ddagr_gym.diagnosis import diagnose, pipeline
+from ddagr_gym.diagnosis.gates.thresholds import Thresholds
+from ddagr_gym.diagnosis.localisation.localise import Localisation, Where
+from ddagr_gym.diagnosis.pipeline import LATER, STEPS
+from ddagr_gym.diagnosis.result.verdict import Diagnosis
+from ddagr_gym.diagnosis.setting import Setting
+from ddagr_gym.presets import get_robot, get_soil
+
+_NOTHING = Where((), 0.0, (), (), None, "")
+LOCATED = Localisation({}, None, _NOTHING, _NOTHING, {}, ())
+ANSWER = Diagnosis(("none",), False, (), "", {"limit": {"yaw_rate": 1.2}}, {}, {}, ("a",), {}, 0.0, "0")
+STAGES: dict[str, Any] = {
+    "data_doubts": (),
+    "search": "what was found",
+    "conclude": (ANSWER, ()),
+    "_certify": {"gain": None},
+    "locate": LOCATED,
+    "_unnamed": {"terms": []},
+    "_next_drive": {"why": "nothing is left open"},
+    "gather_evidence": "arrays",
+}
+"""Stages by the name that the pipeline calls them by, and what they give here."""
+
+
+class Stages:
+    """Stands in for all stages of the pipeline; says which were called and stops in one of them."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.called: list[str] = []
+        self.stopped_in = ""
+        mended = SimpleNamespace(given=(), recordings=(), repeated=(), names=())
+        self.session = SimpleNamespace(
+            robot=get_robot("ddagr"), soil=get_soil("thesis_a1"), mended=mended, problem=None, seed=3,
+            setting=Setting(), gates=SimpleNamespace(misfit={}), rng=lambda stage: None, key=lambda: "the same",
+        )  # fmt: skip
+        for name, result in STAGES.items():
+            monkeypatch.setattr(pipeline, name, self._stage(name, result))
+        monkeypatch.setattr(pipeline, "prepare", self._stage("prepare", self.session))
+        start = SimpleNamespace(session=self.session)
+        monkeypatch.setattr(pipeline, "starting_models", self._stage("starting_models", start))
+        monkeypatch.setattr(pipeline, "accept", lambda found, gates: found)
+
+    def _stage(self, name: str, result: Any) -> Any:
+        def stage(*inputs: object, **named: object) -> Any:
+            self.called.append(name)
+            if name == self.stopped_in:
+                raise KeyboardInterrupt
+            return result
+
+        return stage
+
+    def run(self, **options: Any) -> tuple[Any, list[tuple[str, bool]]]:
+        """Diagnose; the outcome, and the steps that began with whether they were kept."""
+        self.called.clear()
+        began: list[tuple[str, bool]] = []
+        nominal = (self.session.robot, self.session.soil, Thresholds({}, {}, 20, "a test"), Setting())
+        outcome = diagnose((), *nominal, on_step=lambda name, kept: began.append((name, kept)), **options)
+        return outcome, began
+
+
+@pytest.fixture
+def stages(monkeypatch: pytest.MonkeyPatch) -> Stages:
+    return Stages(monkeypatch)
+
+
+def test_every_stage_is_called_once_in_its_order(stages: Stages) -> None:
+    outcome, began = stages.run(soil_name="loam")
+    assert began == [(name, False) for name in STEPS]
+    first, *later = STAGES
+    assert stages.called == ["prepare", first, "starting_models", *later]
+    diagnosis = outcome.diagnosis
+    assert (diagnosis.robot, diagnosis.soil, diagnosis.options["seed"]) == ("ddagr", "loam", 3)
+    assert (diagnosis.fit, diagnosis.unnamed) == (STAGES["_certify"], STAGES["_unnamed"])
+    assert diagnosis.localisation["mismatch"]["time_share"] == 0.0
+
+
+def test_names_only_leaves_out_what_follows_the_verdict(stages: Stages) -> None:
+    outcome, began = stages.run(names_only=True)
+    assert [name for name, _ in began] == [name for name in STEPS if name not in LATER]
+    assert (outcome.diagnosis.fit, outcome.diagnosis.unnamed, outcome.diagnosis.next_drive) == (None, None, None)
+
+
+def test_a_stopped_diagnosis_goes_on_behind_its_last_step(stages: Stages, tmp_path: Path) -> None:
+    stages.stopped_in = "locate"
+    with pytest.raises(KeyboardInterrupt):
+        stages.run(cache=tmp_path / "steps")
+    stages.stopped_in = ""
+    _, began = stages.run(cache=tmp_path / "steps")
+    kept = [name for name, was_kept in began if was_kept]
+    assert kept == ["checks", "search", "verdict", "certification"]
+    assert stages.called == ["prepare", "starting_models", "locate", "_unnamed", "_next_drive", "gather_evidence"]
+    stages.run(cache=tmp_path / "steps")
+    assert stages.called == ["prepare", "starting_models"]
