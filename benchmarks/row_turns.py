@@ -1,6 +1,6 @@
 """The full evaluation of row turns: which controllers and policies drive which scenario sets, and what is kept of it.
 
-    python benchmarks/row_turns.py --output FOLDER [--workers 2]
+    python -m benchmarks.row_turns --output FOLDER [--workers 2]
 
 Drives :data:`PLAN` as ``ddagr evaluate`` does, with the same journal, page and files (about twenty minutes of one core;
 stopped and started again with the same folder, it goes on), then writes ``benchmarks/results/row_turns.json`` and the
@@ -19,6 +19,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
+from benchmarks.commits import commit_of
 from ddagr_gym.commands.evaluate import without_stars
 from ddagr_gym.commands.evaluation_report import assemble, write_files, write_report
 from ddagr_gym.commands.output import make_folder, write_bytes, write_text
@@ -29,7 +30,6 @@ from ddagr_gym.evaluation.report_data import Evaluation
 from ddagr_gym.evaluation.summary import summaries
 from ddagr_gym.progress import Progress
 from ddagr_gym.reporting.evaluation_figures import radius_error_figure
-from ddagr_gym.version import commit_of
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 RESULT = CHECKOUT / "benchmarks" / "results" / "row_turns.json"
@@ -173,7 +173,7 @@ def main() -> int:
     folder = make_folder(arguments.output)
     made_at = remembered_commits(folder)
     rows = drive(folder, arguments.workers)
-    keep(folder, rows, "python benchmarks/row_turns.py --output FOLDER", made_at, arguments.workers)
+    keep(folder, rows, "python -m benchmarks.row_turns --output FOLDER", made_at, arguments.workers)
     return 0
 
 

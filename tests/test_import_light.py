@@ -13,7 +13,7 @@ import pytest
 import ddagr_gym
 from ddagr_gym import commands
 
-HEAVY = ("torch", "matplotlib", "pyarrow", "pandas", "scipy.stats", "sklearn", "numba", "ray", "stable_baselines3")
+HEAVY = ("torch", "matplotlib", "pyarrow", "pandas", "scipy.stats", "sklearn", "numba", "stable_baselines3")
 
 
 def loaded_after(statement: str) -> set[str]:

@@ -7,10 +7,11 @@ import tomllib
 from pathlib import Path
 
 import pytest
+import yaml
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
-from ddagr_gym import commands
+from ddagr_gym import __version__, commands
 from ddagr_gym.commands import extras
 from ddagr_gym.commands.extras import EXTRA_OF_MODULE, missing_extra, need
 from ddagr_gym.errors import InputError
@@ -105,3 +106,19 @@ def test_registered_commands_have_a_module(repository):
     for name in commands.NAMES:
         assert commands.load(name).summary
     assert len(set(commands.NAMES)) == len(commands.NAMES)
+
+
+def test_citation_names_this_version_and_license(repository, project):
+    citation = yaml.safe_load((repository / "CITATION.cff").read_text())
+    assert (citation["version"], citation["license"]) == (__version__, project["license"])
+    assert [author["name"] for author in citation["authors"]] == [item["name"] for item in project["authors"]]
+
+
+def test_the_hooks_before_a_commit_call_programs_of_the_environment(repository, project):
+    (hooks,) = yaml.safe_load((repository / ".pre-commit-config.yaml").read_text())["repos"]
+    tools = {Requirement(item).name for item in project["optional-dependencies"]["dev"]}
+    assert hooks["repo"] == "local"
+    for hook in hooks["hooks"]:
+        folder, _, program = hook["entry"].split()[0].rpartition("/")
+        assert (folder, hook["language"]) == (".venv/bin", "system")
+        assert program in tools

@@ -1,8 +1,8 @@
 """Run ``ddagr diagnose`` on cases as a user would and write what it says, one entry a case, failures included.
 
-    python benchmarks/answers/run_diagnoses.py concealed             every case of shared/concealed -> concealed.json
-    python benchmarks/answers/run_diagnoses.py recordings            every real drive -> recordings.json
-    python benchmarks/answers/run_diagnoses.py DIR --output FILE     a set of the project's own generator
+    python -m benchmarks.answers.run_diagnoses concealed             every case of shared/concealed -> concealed.json
+    python -m benchmarks.answers.run_diagnoses recordings            every real drive -> recordings.json
+    python -m benchmarks.answers.run_diagnoses DIR --output FILE     a set of the project's own generator
 
 Options after ``--`` go to every run; ``-- --names-only`` leaves out what follows the verdict and halves the time.
 ``--full-every N`` runs one case in N to the end and names only in the others. Which ones, a hash of their names and
@@ -31,8 +31,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from benchmarks.commits import commit_of
 from ddagr_gym.recordings.files import write_atomically
-from ddagr_gym.version import __version__, commit_of
+from ddagr_gym.version import __version__
 
 HERE = Path(__file__).resolve().parent
 CHECKOUT = HERE.parents[1]

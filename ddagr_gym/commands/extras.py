@@ -14,7 +14,6 @@ EXTRA_OF_MODULE = {
     "mcap": "io",
     "pyarrow": "io",
     "pygame": "render",
-    "ray": "cluster",
     "rosbags": "io",
     "ruptures": "diagnosis",
     "sb3_contrib": "rl",

@@ -24,6 +24,7 @@ from ddagr_gym.estimation import (
 )
 from ddagr_gym.evaluation.force_law_fits import LAUNCH, LawFit, drive_law_fit, fit_law, true_forces, turn_states
 from ddagr_gym.evaluation.recording_filter import FilterSetUp, filter_recording, set_up_filter
+from ddagr_gym.evaluation.thesis_runs import thesis_run
 from ddagr_gym.identification.recording_noise import recording_noise
 from ddagr_gym.parameters import Robot, Sensors, Soil
 from ddagr_gym.presets import get_robot, get_soil
@@ -37,30 +38,6 @@ PARAMETERS = ("traction_limit", "traction_rate", "lateral_stiffness", "motion_re
 TRUTH = ("true_v_x", "true_v_y", "true_yaw_rate", "true_omega_right", "true_omega_left")
 _TRUTH_NEEDED = (*TRUTH, *(f"true_force_{axis}_{wheel}" for axis in "xy" for wheel in (1, 2, 3, 4)))
 _TURNING = 0.02  # [rad/s], above which a radius is judged
-
-
-@dataclass(frozen=True)
-class ThesisRun:
-    """One of the thesis's two runs (chapter 6).
-
-    Attributes:
-        manoeuvre: commands.
-        motor_rate: k_omega [1/s].
-        soil: on which it is driven here.
-        title: in words.
-    """
-
-    manoeuvre: str
-    motor_rate: float
-    soil: str
-    title: str
-
-
-THESIS_RUNS = {
-    "6.2": ThesisRun("table_6_2", 4.5, "thesis_a1", "thesis Table 6.2, simulated on Table A.1's soil"),
-    "6.3": ThesisRun("table_6_3", 1.4, "lete_sand_wong", "thesis Table 6.3, simulated on dry sand"),
-}
-"""Section 6.1's run; section 6.2's, driven in a field of drier, looser sand (section 6.3) with slow motors."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,8 +78,8 @@ class EstimatedRun:
 
 
 def simulate_thesis_run(name: str, soil_name: str, seed: int) -> tuple[Recording, Robot]:
-    """Recording and robot of one of THESIS_RUNS; ``soil_name`` "" takes the run's own."""
-    plan = THESIS_RUNS[name]
+    """Recording and robot of one of the thesis's runs; ``soil_name`` "" takes the run's own."""
+    plan = thesis_run(name)
     robot = replace(get_robot("ddagr"), motor_rate=plan.motor_rate)
     sensors = Sensors()
     commands = find_manoeuvre(plan.manoeuvre).commands(1.0 / sensors.period)
@@ -111,10 +88,10 @@ def simulate_thesis_run(name: str, soil_name: str, seed: int) -> tuple[Recording
 
 
 def estimate_thesis_run(name: str, soil_name: str, estimator: str, law: ForceLaw, seed: int) -> EstimatedRun:
-    """One of THESIS_RUNS, driven in the simulator and filtered with the sensors' data sheets."""
+    """One of the thesis's runs, driven in the simulator and filtered with the sensors' data sheets."""
     recording, robot = simulate_thesis_run(name, soil_name, seed)
     set_up = FilterSetUp(FilterModel.of(robot, Sensors(), law=law))
-    title = THESIS_RUNS[name].title if not soil_name else f"thesis Table {name}, simulated on {soil_name}"
+    title = thesis_run(name).title if not soil_name else f"thesis Table {name}, simulated on {soil_name}"
     return _estimate(recording, robot, set_up, estimator, None, title)
 
 

@@ -2,28 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.estimation import CHANNELS, channel_statistics
 from ddagr_gym.evaluation.estimate_panels import DEVIATIONS, EstimateView, Line, Panel
 from ddagr_gym.evaluation.estimate_run import EstimatedRun, dead_reckoned
+from ddagr_gym.evaluation.thesis_runs import thesis_run
 from ddagr_gym.rendering import palette
 
 Array = NDArray[np.float64]
 
 _STATES = ("v_x", "v_y", "yaw_rate", "omega_right", "omega_left")
-_NUMBERS = {
-    "6.2": {
-        "path": "6.1", "bank_speeds": "6.2", "v_x": "6.3", "v_y": "6.4", "yaw_rate": "6.5", "a1": "6.6", "a2": "6.7",
-        "b": "6.8", "trace": "6.9",
-    },
-    "6.3": {
-        "right_bank": "6.11", "left_bank": "6.12", "v_x": "6.13", "v_y": "6.14", "yaw_rate": "6.15", "a1": "6.16",
-        "a2": "6.17", "b": "6.18", "trace": "6.19",
-    },
-}  # fmt: skip
-"""Figures of the thesis by its table of commands."""
 _FILES = {
     "path": "path", "bank_speeds": "bank_speeds", "right_bank": "right_bank_speed", "left_bank": "left_bank_speed",
     "v_x": "longitudinal_velocity", "v_y": "lateral_velocity", "yaw_rate": "yaw_rate", "a1": "a1", "a2": "a2",
@@ -32,8 +24,8 @@ _FILES = {
 
 
 def estimate_view(estimated: EstimatedRun, thesis: str | None) -> EstimateView:
-    """Panels of a run; those of THESIS_RUNS carry the numbers of the thesis's figures."""
-    numbers = _NUMBERS.get(thesis or "", {})
+    """Panels of a run; those of the thesis's runs carry the numbers of the thesis's figures."""
+    numbers = _numbers(thesis)
     motion = [
         ("v_x", "Longitudinal velocity", "m/s", None),
         ("v_y", "Lateral velocity", "m/s", None),
@@ -59,7 +51,12 @@ def estimate_view(estimated: EstimatedRun, thesis: str | None) -> EstimateView:
     )
 
 
-def figure_file(name: str, numbers: dict[str, str]) -> str:
+def _numbers(thesis: str | None) -> Mapping[str, str]:
+    """Numbers of the thesis's figures of a run, none for a recording."""
+    return {} if thesis is None else thesis_run(thesis).figures
+
+
+def figure_file(name: str, numbers: Mapping[str, str]) -> str:
     """Name of a figure's file, without suffix."""
     number = numbers.get(name)
     return _FILES[name] if number is None else f"figure_{number.replace('.', '_')}_{_FILES[name]}"
@@ -67,10 +64,10 @@ def figure_file(name: str, numbers: dict[str, str]) -> str:
 
 def path_file(thesis: str | None) -> str:
     """Name of the path's file."""
-    return figure_file("path", _NUMBERS.get(thesis or "", {}))
+    return figure_file("path", _numbers(thesis))
 
 
-def _title(title: str, name: str, numbers: dict[str, str]) -> str:
+def _title(title: str, name: str, numbers: Mapping[str, str]) -> str:
     return title if name not in numbers else f"{title} (Fig. {numbers[name]})"
 
 
@@ -88,7 +85,7 @@ def _state_line(estimated: EstimatedRun, name: str, reading: str | None, label: 
     )
 
 
-def _bank_panels(estimated: EstimatedRun, numbers: dict[str, str]) -> list[Panel]:
+def _bank_panels(estimated: EstimatedRun, numbers: Mapping[str, str]) -> list[Panel]:
     if "right_bank" in numbers:
         return [
             Panel(
@@ -106,7 +103,7 @@ def _bank_panels(estimated: EstimatedRun, numbers: dict[str, str]) -> list[Panel
     return [Panel(figure_file("bank_speeds", numbers), _title("Bank speeds", "bank_speeds", numbers), "rad/s", lines)]
 
 
-def _parameter_panels(estimated: EstimatedRun, numbers: dict[str, str]) -> list[Panel]:
+def _parameter_panels(estimated: EstimatedRun, numbers: Mapping[str, str]) -> list[Panel]:
     values, deviations = estimated.parameters
     truth = None if estimated.law_fit is None else np.exp(estimated.law_fit.logs)
     names = [
@@ -127,7 +124,7 @@ def _parameter_panels(estimated: EstimatedRun, numbers: dict[str, str]) -> list[
     return panels
 
 
-def _trace_panel(estimated: EstimatedRun, numbers: dict[str, str]) -> Panel:
+def _trace_panel(estimated: EstimatedRun, numbers: Mapping[str, str]) -> Panel:
     """The thesis's filter has one trace over all states; ours is told apart by block, because units differ."""
     variances = np.square(estimated.run.deviations)
     if estimated.model is None:
