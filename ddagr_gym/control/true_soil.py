@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ddagr_gym.control.observation import TurnObservation, decode
-from ddagr_gym.control.pid import Pid, PidGains
+from ddagr_gym.control.pid import PidGains
 from ddagr_gym.control.row_turn import Phase
-from ddagr_gym.control.timing import CONTROL_PERIOD
-from ddagr_gym.control.turn_controller import TurnController
+from ddagr_gym.control.turn_controller import FeedbackController
 from ddagr_gym.errors import InputError
 from ddagr_gym.parameters import Robot
 
@@ -21,7 +20,7 @@ TrueFeedForward = Callable[[NDArray[np.float64], float, float], tuple[float, flo
 """(soil (9,) in the simulator's order, speed, curvature) -> bank speeds [rad/s] or None."""
 
 
-class TrueSoil(TurnController):
+class TrueSoil(FeedbackController):
     """B4 with the truth for its estimate: bank speeds by the true soil's own force law, PI on the true curvature.
 
     Needs ``info_level="full"``. Where the soil has no steady solution the kinematic bank speeds with ``track_ratio``
@@ -29,22 +28,17 @@ class TrueSoil(TurnController):
 
     Args:
         robot: nominal robot.
-        gains: the loop's output and error are curvatures [1/m].
+        gains: of the loop, whose output and error are curvatures [1/m].
         feed_forward: steady bank speeds on a soil.
-        track_ratio: see :class:`TurnController`.
-        lead: see there.
+        track_ratio: effective over geometric track [-].
+        lead: heading before the end of the turn at which it straightens [rad].
     """
 
     def __init__(
         self, robot: Robot, gains: PidGains, feed_forward: TrueFeedForward, track_ratio: float = 1.0, lead: float = 0.0
     ) -> None:
-        super().__init__(robot, track_ratio, lead)
+        super().__init__(robot, gains, track_ratio, lead)
         self._feed_forward = feed_forward
-        self._pid = Pid(gains, CONTROL_PERIOD)
-
-    def reset(self) -> None:
-        """Forget the integral."""
-        self._pid.reset()
 
     def __call__(self, observation: ArrayLike, info: Any = None) -> NDArray[np.float32]:
         """Action (2,), right and left bank speed over the robot's maximum."""
@@ -62,10 +56,7 @@ class TrueSoil(TurnController):
         speeds = np.array([steady[0] + spread * correction, steady[1] - spread * correction])
         return np.clip(speeds / self.robot.maximum_wheel_speed, -1.0, 1.0).astype(np.float32)
 
-    def curvature(self, seen: TurnObservation, phase: Phase, info: Any) -> float:
-        """Commanded curvature, corrected in the turn by the true one."""
-        commanded = super().curvature(seen, phase, info)
-        if phase != Phase.TURN:
-            return commanded
+    def error(self, seen: TurnObservation, feed_forward: float, info: Any) -> float:
+        """Commanded less true curvature [1/m]."""
         speed = max(math.hypot(info["true_v_x"], info["true_v_y"]), 0.25 * seen.target_speed)
-        return commanded + self._pid.update(commanded - info["true_yaw_rate"] / speed)
+        return float(feed_forward - info["true_yaw_rate"] / speed)

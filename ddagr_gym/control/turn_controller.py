@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ddagr_gym.control.observation import TurnObservation, decode
+from ddagr_gym.control.pid import Pid, PidGains
 from ddagr_gym.control.row_turn import SIDES, Phase, RowTurn
+from ddagr_gym.control.timing import CONTROL_PERIOD
 from ddagr_gym.parameters import Robot
 
 
@@ -66,3 +69,39 @@ class TurnController:
         curvature = self.curvature(seen, self.phase(seen), info)
         speeds = np.array(self.bank_speeds(seen.target_speed, curvature)) / self.robot.maximum_wheel_speed
         return np.clip(speeds, -1.0, 1.0).astype(np.float32)
+
+
+class FeedbackController(TurnController, ABC):
+    """Feed-forward plus one control loop that acts in the turn; a subclass names the error that the loop removes.
+
+    Args:
+        robot: nominal robot.
+        gains: of the loop, whose output corrects the curvature [1/m].
+        track_ratio: effective over geometric track [-]; 1 is rolling without slip.
+        lead: heading before the end of the turn at which it straightens [rad].
+    """
+
+    def __init__(self, robot: Robot, gains: PidGains, track_ratio: float = 1.0, lead: float = 0.0) -> None:
+        super().__init__(robot, track_ratio, lead)
+        self._pid = Pid(gains, CONTROL_PERIOD)
+
+    def reset(self) -> None:
+        """Forget the integral."""
+        self._pid.reset()
+
+    def curvature(self, seen: TurnObservation, phase: Phase, info: Any) -> float:
+        """Feed-forward [1/m], corrected in the turn by the loop."""
+        feed_forward = super().curvature(seen, phase, info)
+        if phase != Phase.TURN:
+            return feed_forward
+        return feed_forward + self._pid.update(self.error(seen, feed_forward, info))
+
+    @abstractmethod
+    def error(self, seen: TurnObservation, feed_forward: float, info: Any) -> float:
+        """Error that the loop removes, positive where more curvature is needed.
+
+        Args:
+            seen: the observation.
+            feed_forward: commanded curvature [1/m].
+            info: the environment's; only controllers that see the truth read it.
+        """

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ddagr_gym.estimation.filter_model import FilterModel
-from ddagr_gym.estimation.force_laws import ForceLaw, wheel_law
+from ddagr_gym.estimation.force_laws import LawParameters, wheel_law
 from ddagr_gym.jit import kernel
 
 Array = NDArray[np.float64]
@@ -15,22 +17,39 @@ _ITERATIONS = 30  # of a damped Newton search (ours): each bank may move 0.33 of
 _LARGEST_RIM_RATIO = 5.0  # a rim speed beyond five times the body's means that the soil does not carry the arc
 
 
+class _Arc(NamedTuple):
+    """A steady arc of a robot on a soil.
+
+    Attributes:
+        speed: v_x [m/s].
+        rate: yaw rate [rad/s].
+        mass: [kg].
+        half_wheelbase: [m].
+        half_track: [m].
+        law: number of the :class:`~ddagr_gym.estimation.force_laws.ForceLaw`.
+        soil: parameters of the law.
+    """
+
+    speed: float
+    rate: float
+    mass: float
+    half_wheelbase: float
+    half_track: float
+    law: float
+    soil: LawParameters
+
+
 @kernel()
-def _imbalance(
-    law: float, unknown: Array, speed: float, rate: float, mass: float, half_wheelbase: float, half_track: float,
-    parameters: Array, rest_speed: float, reversal_speed: float, result: Array,
-) -> None:  # fmt: skip
+def _imbalance(arc: _Arc, unknown: Array, result: Array) -> None:
     """Sums of F_x, F_y and M_z less what the steady arc needs, at rim speeds right, left and v_y."""
-    result[0] = mass * rate * unknown[2]
-    result[1] = -mass * rate * speed
+    result[0] = arc.mass * arc.rate * unknown[2]
+    result[1] = -arc.mass * arc.rate * arc.speed
     result[2] = 0.0
     for wheel in range(4):
-        x = half_wheelbase if wheel < 2 else -half_wheelbase
-        y = half_track if wheel % 2 else -half_track
-        forces = wheel_law(
-            law, speed - rate * y, unknown[2] + rate * x, unknown[wheel % 2], parameters[0], parameters[1],
-            parameters[2], parameters[3], rest_speed, reversal_speed,
-        )  # fmt: skip
+        x = arc.half_wheelbase if wheel < 2 else -arc.half_wheelbase
+        y = arc.half_track if wheel % 2 else -arc.half_track
+        v_x, v_y = arc.speed - arc.rate * y, unknown[2] + arc.rate * x
+        forces = wheel_law(arc.law, v_x, v_y, unknown[wheel % 2], arc.soil)
         f_x, f_y = forces[0], forces[8]
         result[0] += f_x
         result[1] += f_y
@@ -38,28 +57,21 @@ def _imbalance(
 
 
 @kernel()
-def _solve(
-    law: float, speed: float, rate: float, mass: float, half_wheelbase: float, half_track: float, parameters: Array,
-    rest_speed: float, reversal_speed: float, unknown: Array,
-) -> bool:  # fmt: skip
+def _solve(arc: _Arc, unknown: Array) -> bool:
+    """Newton's method for the rim speeds and v_y of the arc, from those in ``unknown`` (3,); whether it converged."""
     base = np.zeros(3)
     moved = np.zeros(3)
     jacobian = np.zeros((3, 3))
-    limit = _LARGEST_RIM_RATIO * abs(speed)
+    limit = _LARGEST_RIM_RATIO * abs(arc.speed)
     for _ in range(_ITERATIONS):
-        _imbalance(
-            law, unknown, speed, rate, mass, half_wheelbase, half_track, parameters, rest_speed, reversal_speed, base
-        )  # fmt: skip
+        _imbalance(arc, unknown, base)
         size = max(abs(base[0]), abs(base[1]), abs(base[2]))
-        if size < 1e-6 * mass:
+        if size < 1e-6 * arc.mass:
             return True
         for k in range(3):
-            step = 1e-6 * max(abs(speed), 0.01)
+            step = 1e-6 * max(abs(arc.speed), 0.01)
             unknown[k] += step
-            _imbalance(
-                law, unknown, speed, rate, mass, half_wheelbase, half_track, parameters, rest_speed, reversal_speed,
-                moved,
-            )  # fmt: skip
+            _imbalance(arc, unknown, moved)
             unknown[k] -= step
             for j in range(3):
                 jacobian[j, k] = (moved[j] - base[j]) / step
@@ -68,7 +80,7 @@ def _solve(
         change = np.linalg.solve(jacobian, base)
         # a bank may not change by more than a third of the speed at once: the law saturates
         largest = max(abs(change[0]), abs(change[1]), abs(change[2]))
-        damping = min(1.0, 0.33 * abs(speed) / max(largest, 1e-12))
+        damping = min(1.0, 0.33 * abs(arc.speed) / max(largest, 1e-12))
         for k in range(3):
             unknown[k] = min(max(unknown[k] - damping * change[k], -limit), limit)
     return False
@@ -88,12 +100,10 @@ def arc_bank_speeds(
     robot = model.robot
     spread = 1.3 * robot.half_track * curvature  # effective over geometric track of most soils
     unknown = np.array([speed * (1.0 + spread), speed * (1.0 - spread), 0.0])
-    law = 1.0 if model.law is ForceLaw.coupled else 0.0
-    found = _solve(
-        law, speed, speed * curvature, robot.mass, robot.half_wheelbase, robot.half_track,
-        np.asarray(parameters, dtype=np.float64), model.rest_speed, model.reversal_speed, unknown,
-    )  # fmt: skip
-    if not found:
+    limit, rate, stiffness, resistance = np.asarray(parameters, dtype=np.float64)
+    soil = LawParameters(limit, rate, stiffness, resistance, model.rest_speed, model.reversal_speed)
+    arc = _Arc(speed, speed * curvature, robot.mass, robot.half_wheelbase, robot.half_track, float(model.law), soil)
+    if not _solve(arc, unknown):
         return None
     radius = model.outer_radius
     return float(unknown[0] / radius), float(unknown[1] / radius)
@@ -114,10 +124,10 @@ def arc_speed_rows(
         unknown[0] = speeds[n] * (1.0 + 1.3 * spread)
         unknown[1] = speeds[n] * (1.0 - 1.3 * spread)
         unknown[2] = 0.0
-        found = _solve(
-            law, speeds[n], speeds[n] * curvatures[n], robot[0], robot[1], robot[2], parameters[n], rest_speed,
-            reversal_speed, unknown,
-        )  # fmt: skip
+        own = parameters[n]
+        soil = LawParameters(own[0], own[1], own[2], own[3], rest_speed, reversal_speed)
+        arc = _Arc(speeds[n], speeds[n] * curvatures[n], robot[0], robot[1], robot[2], law, soil)
+        found = _solve(arc, unknown)
         banks[n, 0] = unknown[0] if found else speeds[n] * (1.0 + fallback * spread)
         banks[n, 1] = unknown[1] if found else speeds[n] * (1.0 - fallback * spread)
 
@@ -140,7 +150,7 @@ def arc_bank_speed_rows(
     robot = model.robot
     banks = np.empty((len(speeds), 2))
     arc_speed_rows(
-        1.0 if model.law is ForceLaw.coupled else 0.0,
+        float(model.law),
         np.ascontiguousarray(speeds, dtype=np.float64),
         np.ascontiguousarray(curvatures, dtype=np.float64),
         np.ascontiguousarray(parameters, dtype=np.float64),

@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import math
 from enum import IntEnum
+from typing import NamedTuple
 
 from ddagr_gym.jit import kernel
 
@@ -29,6 +30,26 @@ _SLIP_FLOOR = 1e-12
 Gradient = tuple[
     float, float, float, float, float, float, float, float, float, float, float, float, float, float, float, float
 ]
+
+
+class LawParameters(NamedTuple):
+    """What a force law needs besides the wheel's motion.
+
+    Attributes:
+        limit: a1 [N].
+        rate: a2 [-].
+        stiffness: b [N/rad].
+        resistance: Rc [N].
+        rest_speed: smoothing of slip near standstill [m/s].
+        reversal_speed: smoothing of the resistance where rolling reverses [m/s].
+    """
+
+    limit: float
+    rate: float
+    stiffness: float
+    resistance: float
+    rest_speed: float
+    reversal_speed: float
 
 
 class ForceLaw(IntEnum):
@@ -67,10 +88,7 @@ def _resistance(v_x: float, rim: float, resistance: float, reversal_speed: float
 
 
 @kernel(inline=True)
-def thesis_law(
-    v_x: float, v_y: float, rim: float, limit: float, rate: float, stiffness: float, resistance: float,
-    rest_speed: float, reversal_speed: float,
-) -> Gradient:  # fmt: skip
+def thesis_law(v_x: float, v_y: float, rim: float, parameters: LawParameters) -> Gradient:
     """``F_x = a1 sgn(s_x) (1 - exp(-a2 |s_x|)) - resistance``, ``F_y = -b atan2(v_y, |v_x|)``.
 
     Thesis (3.15), (3.16) with consistent signs, plus motion resistance (theory: filter, eq. (3)).
@@ -79,13 +97,9 @@ def thesis_law(
         v_x: hub velocity forward [m/s].
         v_y: hub velocity to the left [m/s].
         rim: R0 omega [m/s].
-        limit: a1 [N].
-        rate: a2 [-].
-        stiffness: b [N/rad].
-        resistance: Rc [N].
-        rest_speed: smoothing of slip near standstill [m/s].
-        reversal_speed: smoothing of the resistance where rolling reverses [m/s].
+        parameters: of soil and wheel.
     """
+    limit, rate, stiffness, resistance, rest_speed, reversal_speed = parameters
     slip, slip_v, slip_rim, _, _, _ = _slip(v_x, rim, rest_speed)
     decay = math.exp(-rate * abs(slip))
     traction = math.copysign(limit * (1.0 - decay), slip)
@@ -101,16 +115,14 @@ def thesis_law(
 
 
 @kernel(inline=True)
-def coupled_law(
-    v_x: float, v_y: float, rim: float, limit: float, rate: float, stiffness: float, resistance: float,
-    rest_speed: float, reversal_speed: float,
-) -> Gradient:  # fmt: skip
+def coupled_law(v_x: float, v_y: float, rim: float, parameters: LawParameters) -> Gradient:
     """``F_x = g s_x - resistance``, ``F_y = g c s_y`` (ours): one traction for slip and slip angle.
 
     ``g = a1 (1 - exp(-a2 q))/q``, ``q^2 = s_x^2 + c s_y^2``, ``c = b/(a1 a2)``: both forces derive from one
     dissipation potential of q. Without lateral slip F_x is (3.15), at small slip F_y is (3.16); a wheel that
     skids sideways has no full longitudinal force left, and the reverse. Arguments as :func:`thesis_law`.
     """
+    limit, rate, stiffness, resistance, rest_speed, reversal_speed = parameters
     slip, slip_v, slip_rim, inverse, divisor_v, divisor_rim = _slip(v_x, rim, rest_speed)
     lateral_slip = -v_y * inverse
     full = limit * rate
@@ -141,11 +153,8 @@ def coupled_law(
 
 
 @kernel(inline=True)
-def wheel_law(
-    law: float, v_x: float, v_y: float, rim: float, limit: float, rate: float, stiffness: float, resistance: float,
-    rest_speed: float, reversal_speed: float,
-) -> Gradient:  # fmt: skip
+def wheel_law(law: float, v_x: float, v_y: float, rim: float, parameters: LawParameters) -> Gradient:
     """The law ``law`` (a :class:`ForceLaw`); the other arguments as :func:`thesis_law`."""
     if law == 1.0:
-        return coupled_law(v_x, v_y, rim, limit, rate, stiffness, resistance, rest_speed, reversal_speed)
-    return thesis_law(v_x, v_y, rim, limit, rate, stiffness, resistance, rest_speed, reversal_speed)
+        return coupled_law(v_x, v_y, rim, parameters)
+    return thesis_law(v_x, v_y, rim, parameters)

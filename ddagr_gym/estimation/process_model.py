@@ -28,7 +28,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.estimation.force_laws import wheel_law
+from ddagr_gym.estimation.force_laws import LawParameters, wheel_law
 from ddagr_gym.estimation.layout import (
     FORCE,
     GRADIENT,
@@ -72,9 +72,9 @@ def _bank_forces(
     The hubs stand at (+-L, y) and move with v_x = v_x,body - yaw_rate y and v_y = v_y,body +- yaw_rate L.
     """
     length = model[HALF_WHEELBASE]
-    rest, reversal = model[REST_SPEED], model[REVERSAL_SPEED]
-    a = wheel_law(model[LAW], v_x, v_front, rim, limit, rate, stiffness, resistance, rest, reversal)
-    b = wheel_law(model[LAW], v_x, v_rear, rim, limit, rate, stiffness, resistance, rest, reversal)
+    parameters = LawParameters(limit, rate, stiffness, resistance, model[REST_SPEED], model[REVERSAL_SPEED])
+    a = wheel_law(model[LAW], v_x, v_front, rim, parameters)
+    b = wheel_law(model[LAW], v_x, v_rear, rim, parameters)
     x_v, y_v = a[1] + b[1], a[9] + b[9]
     x_w, y_w = a[2] + b[2], a[10] + b[10]
     x_turn = length * (a[2] - b[2]) - y * x_v

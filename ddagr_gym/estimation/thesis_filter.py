@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -81,6 +82,27 @@ class ThesisModel(Validated):
                 raise InputError(f"ThesisModel.{name} is {getattr(self, name)!r}: give {length} variances.")
 
 
+class _Scratch(NamedTuple):
+    """Arrays that a step writes into.
+
+    Attributes:
+        k_x: (5, 8) derivatives of the state at the four stages, and the state of a stage.
+        k_p: (5, 8, 8) the same of the covariance.
+        a: (8, 8) Jacobian.
+        work: (WORK_SIZE,) of the force law.
+    """
+
+    k_x: Array
+    k_p: Array
+    a: Array
+    work: Array
+
+    @classmethod
+    def empty(cls) -> _Scratch:
+        """Zeros."""
+        return cls(np.zeros((5, _SIZE)), np.zeros((5, _SIZE, _SIZE)), np.zeros((_SIZE, _SIZE)), np.zeros(WORK_SIZE))
+
+
 @kernel()
 def _derivative(
     model: Array, x: Array, p: Array, command: Array, noise: Array, a: Array, x_dot: Array, p_dot: Array, work: Array
@@ -130,10 +152,10 @@ def _evaluate(model: Array, x: Array, work: Array) -> None:
 
 @kernel()
 def _predict(
-    model: Array, x: Array, p: Array, command: Array, noise: Array, duration: float, stability: float, k_x: Array,
-    k_p: Array, a: Array, work: Array,
-) -> None:  # fmt: skip
-    """Fourth-order Runge-Kutta of state (8,) and covariance (8, 8); ``k_x`` (5, 8), ``k_p`` (5, 8, 8) are scratch."""
+    model: Array, x: Array, p: Array, command: Array, noise: Array, duration: float, stability: float, scratch: _Scratch
+) -> None:
+    """Fourth-order Runge-Kutta of state (8,) and covariance (8, 8)."""
+    k_x, k_p, a, work = scratch
     _derivative(model, x, p, command, noise, a, k_x[0], k_p[0], work)
     steepest = 0.0
     for i in range(PARAMETER):
@@ -203,12 +225,12 @@ def run_thesis_filter(model: ThesisModel, columns: Mapping[str, ArrayLike]) -> F
     x, p = np.concatenate([np.zeros(5), model.parameters]), np.diag(np.asarray(model.initial_variance, dtype=float))
     packed = FilterModel(model.robot, law=ForceLaw.thesis).pack()
     noise, variances = np.asarray(model.process, dtype=float), np.asarray(model.measurement, dtype=float)
-    scratch = np.zeros((5, _SIZE)), np.zeros((5, _SIZE, _SIZE)), np.zeros((_SIZE, _SIZE)), np.zeros(WORK_SIZE)
+    scratch = _Scratch.empty()
     for k in range(t.size):
-        _predict(packed, x, p, commands[k], noise, durations[k], model.stability, *scratch)
+        _predict(packed, x, p, commands[k], noise, durations[k], model.stability, scratch)
         # A filter that has broken down carries NaN on; that is its result.
         with np.errstate(invalid="ignore", over="ignore"):
-            standardised[k] = _correct(packed, x, p, readings[k], variances, scratch[3])
+            standardised[k] = _correct(packed, x, p, readings[k], variances, scratch.work)
         x[5:] = np.maximum(x[5:], model.least_parameter)
         states[k], covariances[k] = x, p
     return FilterRun(t, states, covariances, standardised)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from ddagr_gym.estimation.force_laws import ForceLaw, wheel_law
+from ddagr_gym.estimation.force_laws import ForceLaw, LawParameters, wheel_law
 from ddagr_gym.jit import kernel
 from ddagr_gym.parameters import STANDARD_GRAVITY, Robot, Soil
 from ddagr_gym.physics import equilibrium_sinkage, wheel_force
@@ -69,10 +69,9 @@ def true_forces(robot: Robot, soil: Soil, states: Array) -> Array:
 @kernel()
 def law_forces(law: float, p: Array, states: Array, radius: float, forces: Array) -> None:
     """Forces (N, 2) of a law with parameters p = a1, a2, b, Rc; written to ``forces``."""
+    parameters = LawParameters(p[0], p[1], p[2], p[3], REST_SPEED, REVERSAL_SPEED)
     for n in range(states.shape[0]):
-        values = wheel_law(
-            law, states[n, 0], states[n, 1], radius * states[n, 2], p[0], p[1], p[2], p[3], REST_SPEED, REVERSAL_SPEED
-        )
+        values = wheel_law(law, states[n, 0], states[n, 1], radius * states[n, 2], parameters)
         forces[n, 0], forces[n, 1] = values[0], values[8]
 
 

@@ -15,7 +15,7 @@ from ddagr_gym.control.row_turn import RowTurn
 from ddagr_gym.envs.options import make_settings
 from ddagr_gym.errors import InputError
 from ddagr_gym.estimation import STATE, FilterModel, roll_out
-from ddagr_gym.estimation.force_laws import coupled_law
+from ddagr_gym.estimation.force_laws import LawParameters, coupled_law
 from ddagr_gym.evaluation.controllers import find_controller
 from ddagr_gym.evaluation.metrics import turn_metrics
 from ddagr_gym.evaluation.runs import drive_turn
@@ -43,7 +43,7 @@ def test_force_law_is_the_filters(seed):
     rng = np.random.default_rng(seed)
     v_x, v_y, rim = rng.uniform(-0.3, 0.5, 3)
     soil = np.exp(PRIOR + 0.5 * rng.standard_normal(4))
-    expected = coupled_law(v_x, v_y, rim, *soil, FILTER.rest_speed, FILTER.reversal_speed)
+    expected = coupled_law(v_x, v_y, rim, LawParameters(*soil, FILTER.rest_speed, FILTER.reversal_speed))
     found = wheel_forces(casadi, MODEL, v_x, v_y, rim, list(soil))
     assert float(found[0]) == pytest.approx(expected[0], rel=1e-9, abs=1e-9)
     assert float(found[1]) == pytest.approx(expected[8], rel=1e-9, abs=1e-9)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ddagr_gym.estimation.force_laws import ForceLaw, coupled_law, thesis_law, wheel_law
+from ddagr_gym.estimation.force_laws import ForceLaw, LawParameters, coupled_law, thesis_law, wheel_law
 
 REST, REVERSAL = 0.005, 0.01
 LAWS = [thesis_law, coupled_law]
@@ -17,7 +17,7 @@ PARAMETERS = (165.0, 5.0, 840.0, 23.0)  # a1 [N], a2, b [N/rad], Rc [N]
 
 
 def forces(law, v_x, v_y, rim, parameters=PARAMETERS, rest=REST, reversal=REVERSAL):
-    values = law(v_x, v_y, rim, *parameters, rest, reversal)
+    values = law(v_x, v_y, rim, LawParameters(*parameters, rest, reversal))
     return values[0], values[8]
 
 
@@ -117,10 +117,10 @@ def test_derivatives_against_fourth_order_differences(v_x, v_y, rim, parameters)
     for law in LAWS:
 
         def at(p, law=law):
-            values = law(p[0], p[1], p[2], *np.exp(p[3:]), REST, REVERSAL)
+            values = law(p[0], p[1], p[2], LawParameters(*np.exp(p[3:]), REST, REVERSAL))
             return np.array([values[0], values[8]])
 
-        found = law(*point[:3], *np.exp(point[3:]), REST, REVERSAL)
+        found = law(*point[:3], LawParameters(*np.exp(point[3:]), REST, REVERSAL))
         for k, h in enumerate(steps):
             e = np.eye(7)[k] * h
             difference = (8 * (at(point + e) - at(point - e)) - at(point + 2 * e) + at(point - 2 * e)) / (12 * h)
@@ -129,7 +129,7 @@ def test_derivatives_against_fourth_order_differences(v_x, v_y, rim, parameters)
 
 
 def test_selection_by_number():
-    arguments = (0.2, 0.03, 0.25, *PARAMETERS, REST, REVERSAL)
+    arguments = (0.2, 0.03, 0.25, LawParameters(*PARAMETERS, REST, REVERSAL))
     assert wheel_law(float(ForceLaw.thesis), *arguments) == thesis_law(*arguments)
     assert wheel_law(float(ForceLaw.coupled), *arguments) == coupled_law(*arguments)
     assert thesis_law(*arguments)[8] != coupled_law(*arguments)[8]
@@ -138,4 +138,4 @@ def test_selection_by_number():
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("motion", [(0.0, 0.0, 0.0), (0.0, 0.1, 0.0), (1e-300, 0.0, -1e-300), (5.0, -5.0, -5.0)])
 def test_finite_at_rest_and_far_out(law, motion):
-    assert np.isfinite(law(*motion, *PARAMETERS, REST, REVERSAL)).all()
+    assert np.isfinite(law(*motion, LawParameters(*PARAMETERS, REST, REVERSAL))).all()

@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from ddagr_gym.estimation import FilterModel, ForceLaw, SoilPrior, layout, predict, roll_out
-from ddagr_gym.estimation.force_laws import wheel_law
+from ddagr_gym.estimation.force_laws import LawParameters, wheel_law
 from ddagr_gym.estimation.process_model import advance_state, body_forces
 
 MODELS = [ForceLaw.thesis, ForceLaw.coupled]
@@ -26,14 +26,11 @@ MOTIONS = [
 def wheel_sums(model, state):
     """Specific force x, y and yaw acceleration, wheel by wheel."""
     robot = model.robot
-    parameters = np.exp(state[5:9])
+    parameters = LawParameters(*np.exp(state[5:9]), model.rest_speed, model.reversal_speed)
     total = np.zeros(3)
     for i, (x, y) in enumerate(zip(robot.wheel_x, robot.wheel_y, strict=True)):
         rim = model.outer_radius * state[3 + i % 2]
-        values = wheel_law(
-            float(model.law), state[0] - state[2] * y, state[1] + state[2] * x, rim, *parameters,
-            model.rest_speed, model.reversal_speed,
-        )  # fmt: skip
+        values = wheel_law(float(model.law), state[0] - state[2] * y, state[1] + state[2] * x, rim, parameters)
         f_x, f_y = values[0], values[8]
         total += [f_x / robot.mass, f_y / robot.mass, (x * f_y - y * f_x) / robot.yaw_inertia]
     return total
