@@ -154,7 +154,7 @@ def _pieces(
 ) -> tuple[list[Recording], list[Recording]]:
     """Ordinary drives in pieces, enough of them for thresholds, and longer ones."""
     from ddagr_gym.diagnosis.gates.thresholds import LEVEL, least_nulls
-    from ddagr_gym.diagnosis.null_bank.bank import longer_runs, pieces_of
+    from ddagr_gym.diagnosis.null_bank.ordinary_drives import longer_runs, pieces_of
     from ddagr_gym.diagnosis.preprocessing.input_requirements import check_recordings
 
     for recording in recordings:

@@ -21,7 +21,10 @@ from ddagr_gym.simulator import simulate
 Array = NDArray[np.float64]
 
 _MARGIN = 3.0
-"""Ground beyond the straight-line reach of a drive [m]."""
+"""Ground beyond the straight-line reach of a drive [m] (ours: more than a robot's length)."""
+
+_FARTHEST = 40.0
+"""Farthest place from its start for which ground is drawn [m] (ours: keeps the field of soil small)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +83,7 @@ def null_recordings(
     """
     fastest = max(float(np.abs(c).mean(axis=1).sum()) * template.period for c in template.commands)
     places = max(max(abs(s[0]), abs(s[1])) for s in template.starts)
-    reach = min(fastest * robot.wheels[0].outer_radius, 40.0) + places + _MARGIN
+    reach = min(fastest * robot.wheels[0].outer_radius, _FARTHEST) + places + _MARGIN
     world = draw_world(kind, soil, reach, rng)
     return tuple(_drive(robot, soil, template, world, number, rng) for number in range(len(template.commands)))
 

@@ -17,16 +17,16 @@ from ddagr_gym.identification.noise import ChannelNoise
 Array = NDArray[np.float64]
 
 PARTS = 4
-"""Parts of a sample in which a null world is simulated, so that readings may fall between samples."""
+"""Parts of a sample in which a null world is simulated, so that readings may fall between samples (ours)."""
 
 _SLOW = 0.98
-"""Correlation of successive samples of the slow part of the noise [-]."""
+"""Correlation of successive samples of the slow part of the noise [-] (ours: a time constant of 1 s at 50 Hz)."""
 
 _COUNTER = -0.4
-"""Correlation of successive samples below which rounding is that of a differenced counter."""
+"""Correlation of successive samples below which rounding is that of a differenced counter (whose own is -0.5)."""
 
 _JITTER = 0.4
-"""Of a speed that is rounded by itself, in quanta."""
+"""Standard deviation of a speed before it is rounded by itself, in quanta (ours)."""
 
 _MEANS = ("encoder_right", "encoder_left")
 _INERTIAL = ("specific_force_x", "specific_force_y", "yaw_rate")

@@ -7,6 +7,7 @@ lengths and order are drawn, so that thresholds hold for drives of this kind and
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,13 +19,13 @@ from ddagr_gym.parameters import Robot
 Array = NDArray[np.float64]
 
 RATE = 50.0
-"""[Hz]"""
+"""Samples per second [Hz] (ours: a common rate of field robots' inertial units)."""
 
 DURATION = 60.0
-"""Of one drive [s]."""
+"""Of one drive [s] (ours: as the drives that the project's blind cases have)."""
 
 POSE_PERIOD = 0.2
-"""[s]"""
+"""Between poses [s] (a satellite receiver at 5 Hz)."""
 
 POSE_SHARE = 0.8
 """Share of the robots that carry a receiver (ours)."""
@@ -61,7 +62,7 @@ def _noise(rng: np.random.Generator) -> tuple[ChannelNoise, ...]:
     return (*shaking, gyro, encoder, encoder, place, place, heading)
 
 
-def _fill(programme, rng: np.random.Generator) -> Array:  # type: ignore[no-untyped-def]
+def _fill(programme: Callable[[np.random.Generator], Array], rng: np.random.Generator) -> Array:
     """Pieces of a programme joined to a drive that starts at rest, (n, 2) tread speeds [m/s]."""
     samples = int(RATE * DURATION)
     pieces = [np.zeros((int(RATE), 2))]
@@ -71,10 +72,12 @@ def _fill(programme, rng: np.random.Generator) -> Array:  # type: ignore[no-unty
 
 
 def _hold(seconds: float, right: float, left: float) -> Array:
+    """Constant tread speeds [m/s] of the right and the left bank for a time."""
     return np.tile([right, left], (round(seconds * RATE), 1))
 
 
 def _signed(rng: np.random.Generator, low: float, high: float) -> float:
+    """A tread speed of either sign between two shares of the fastest [m/s]."""
     return float(rng.uniform(low, high) * rng.choice([-1.0, 1.0]) * _FASTEST)
 
 

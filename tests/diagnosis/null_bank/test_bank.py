@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from ddagr_gym.diagnosis.null_bank import bank as null_bank
-from ddagr_gym.diagnosis.null_bank.bank import bank_hash, pieces_of, scan_null_drives
+from ddagr_gym.diagnosis.null_bank.bank import bank_hash, scan_null_drives
 from ddagr_gym.diagnosis.null_bank.drives import Template
+from ddagr_gym.diagnosis.null_bank.ordinary_drives import pieces_of
 from ddagr_gym.diagnosis.search import rivals
 from ddagr_gym.diagnosis.search.starting_models import FAR_OFF
 from ddagr_gym.diagnosis.setting import Setting

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ddagr_gym.diagnosis.null_bank.bank import longer_runs, pieces_of
+from ddagr_gym.diagnosis.null_bank.ordinary_drives import longer_runs, pieces_of
 from ddagr_gym.presets import get_robot
 from ddagr_gym.recordings.schema import Recording
 
