@@ -51,6 +51,16 @@ def test_contracts_hold(repository):
         ("diagnosis/broken.py", "import gymnasium", "ddagr_gym.diagnosis.broken->gymnasium"),
         ("diagnosis/broken.py", "import ddagr_gym.envs", "ddagr_gym.diagnosisisnotallowedtoimportddagr_gym.envs"),
         ("unknown_layer.py", "", "-ddagr_gym.unknown_layer"),
+        (
+            "identification/windows.py",
+            "import ddagr_gym.identification.gauss_newton",
+            "ddagr_gym.identification.windows->ddagr_gym.identification.gauss_newton",
+        ),
+        (
+            "rendering/palette.py",
+            "import ddagr_gym.rendering.ruts",
+            "ddagr_gym.rendering.palette->ddagr_gym.rendering.ruts",
+        ),
     ],
 )
 def test_contracts_notice(package_copy, module, line, complaint):
