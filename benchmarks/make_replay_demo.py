@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ddagr_gym.commands.replay import SAMPLE, SAMPLE_SOIL
+from ddagr_gym.commands.demo import SAMPLE, SAMPLE_SOIL
 from ddagr_gym.control.manoeuvres import MANOEUVRES
 from ddagr_gym.parameters import Imu, PoseReceiver, Sensors
 from ddagr_gym.presets import get_robot, get_soil

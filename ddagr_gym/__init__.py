@@ -41,24 +41,50 @@ from ddagr_gym.version import __version__
 
 if TYPE_CHECKING:
     from ddagr_gym.api.check import CheckResult, check
+    from ddagr_gym.api.diagnose import diagnose
+    from ddagr_gym.api.diagnosis_result import DiagnosisResult
+    from ddagr_gym.api.estimate import EstimateResult, estimate
+    from ddagr_gym.api.isolability import IsolabilityResult, isolability
     from ddagr_gym.api.load_recording import load_recording
+    from ddagr_gym.api.next_drive import NextDriveResult, next_drive
+    from ddagr_gym.api.replay import ReplayResult, replay
     from ddagr_gym.api.simulate import SimulationResult, simulate
 
 __all__ = [
     "CheckResult",
+    "DiagnosisResult",
+    "EstimateResult",
+    "IsolabilityResult",
+    "NextDriveResult",
+    "ReplayResult",
     "SimulationResult",
     "__version__",
     "check",
+    "diagnose",
+    "estimate",
+    "isolability",
     "load_recording",
+    "next_drive",
     "register_environments",
+    "replay",
     "simulate",
 ]
 
 _MODULES = {
     "CheckResult": "check",
+    "DiagnosisResult": "diagnosis_result",
+    "EstimateResult": "estimate",
+    "IsolabilityResult": "isolability",
+    "NextDriveResult": "next_drive",
+    "ReplayResult": "replay",
     "SimulationResult": "simulate",
     "check": "check",
+    "diagnose": "diagnose",
+    "estimate": "estimate",
+    "isolability": "isolability",
     "load_recording": "load_recording",
+    "next_drive": "next_drive",
+    "replay": "replay",
     "simulate": "simulate",
 }
 """Module of :mod:`ddagr_gym.api` that defines a public name; it is imported when the name is asked for."""

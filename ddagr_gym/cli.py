@@ -19,8 +19,8 @@ from typing import Any, TextIO
 import tyro
 
 from ddagr_gym import __version__, commands
-from ddagr_gym.commands.extras import missing_extra
 from ddagr_gym.errors import InputError, InputWarning
+from ddagr_gym.extras import missing_extra
 
 _HELP = ("-h", "--help")
 _USER_ERRNO = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.ENAMETOOLONG, errno.ELOOP)
@@ -95,12 +95,12 @@ def _dispatch(words: list[str], package: ModuleType) -> int:
     arguments = _parse(command, words[1:])
     if arguments is None:
         return 0
-    with _warnings_as_lines():
+    with warnings_as_lines():
         return command.run(arguments) or 0
 
 
 @contextlib.contextmanager
-def _warnings_as_lines() -> Iterator[None]:
+def warnings_as_lines() -> Iterator[None]:
     """Print an :class:`InputWarning` as one line on standard error, without the place in the code."""
     others = warnings.showwarning
 

@@ -11,10 +11,9 @@ import yaml
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
-from ddagr_gym import __version__, commands
-from ddagr_gym.commands import extras
-from ddagr_gym.commands.extras import EXTRA_OF_MODULE, missing_extra, need
+from ddagr_gym import __version__, commands, extras
 from ddagr_gym.errors import InputError
+from ddagr_gym.extras import EXTRA_OF_MODULE, missing_extra, need
 
 # Libraries whose import name is not their distribution's name.
 MODULE_OF = {

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from ddagr_gym.commands.demo_section import Section
 from ddagr_gym.commands.output import output_folder, write_text
+from ddagr_gym.progress import LinePrinter
 
 if TYPE_CHECKING:
     import numpy as np
@@ -26,6 +27,11 @@ EXAMPLES = (
     "ddagr demo --output my_demo --seed 7",
     "ddagr demo --recording drive.csv.gz --robot warthog --soil lete_sand_wong",
 )
+
+SAMPLE = "replay_demo.parquet"
+"""Simulated drive that ships with the package, in ``ddagr_gym/data``."""
+SAMPLE_SOIL = "sandy_loam_lll_15"
+"""Soil from which the sample's refit starts; it was driven on a somewhat different one."""
 
 HARD_GROUND = "firm_ground"
 """Nominal soil of a given recording, unless another is named: the refit moves it."""
@@ -112,36 +118,35 @@ class DriveToReplay:
 
 def _drive_to_replay(arguments: Arguments) -> DriveToReplay:
     """Read first, so that a wrong path or name ends the demonstration before it has begun."""
-    from ddagr_gym.commands.replay import SAMPLE, SAMPLE_SOIL, robot_name
-    from ddagr_gym.presets import get_robot, get_soil
+    from ddagr_gym.api.replay import driven_robot
+    from ddagr_gym.presets import get_soil
     from ddagr_gym.recordings.load import load_recording
 
     shipped = Path(__file__).resolve().parents[1] / "data" / SAMPLE
     path = shipped if arguments.recording is None else arguments.recording
     recording = load_recording(path, None, arguments.robot or None)
-    name = robot_name(arguments.robot, [recording])
+    driven_robot(arguments.robot or None, [recording])
+    robot = arguments.robot or recording.meta.robot
     soil = arguments.soil or (SAMPLE_SOIL if arguments.recording is None else HARD_GROUND)
-    get_robot(name), get_soil(soil)
+    get_soil(soil)
     words = "a simulated drive on weaker soil, with slower motors, than the nominal simulator's"
-    return DriveToReplay(recording, name, soil, words if arguments.recording is None else path.name)
+    return DriveToReplay(recording, robot, soil, words if arguments.recording is None else path.name)
 
 
 def replay_step(drive: DriveToReplay, folder: Path) -> Section:
     """A recording driven again in the simulator, with a refit; report, figures and page into ``folder/replay``."""
-    from ddagr_gym.commands.replay import lead_text, replay_groups
-    from ddagr_gym.presets import get_robot, get_soil
-    from ddagr_gym.replay_analysis.arm import ArmSettings
+    import ddagr_gym
+    from ddagr_gym.reporting.replay_text import lead_text
 
     print(f"Replaying {drive.recording.meta.source} and refitting the simulator ...", flush=True)
     replayed = folder / "replay"
-    replayed.mkdir()
-    robot, soil = get_robot(drive.robot), get_soil(drive.soil)
-    report = replay_groups([[drive.recording]], robot, soil, drive.soil, ArmSettings(refit=True), replayed)
+    result = ddagr_gym.replay(drive.recording, drive.robot, drive.soil, refit=True, progress=LinePrinter())
+    result.report(replayed, progress=LinePrinter())
     overview = min(path.name for path in replayed.glob("*.png") if not path.stem.endswith("_residuals"))
     html = f"""<p>Replayed: {escape(drive.words)}. Errors are those on the part of the drive that no fit has seen.</p>
 <div class="wide"><a href="replay/index.html"><img src="replay/{escape(overview)}" alt="Roll-outs and errors"></a></div>
 <p>Everything about it: <a href="replay/index.html">page</a>, <a href="replay/replay.json">JSON</a>.</p>"""
-    return Section("A recording driven again in the simulator", lead_text(report), html)
+    return Section("A recording driven again in the simulator", lead_text(result.document), html)
 
 
 def _drive(arguments: Arguments) -> TurnRun:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ddagr_gym.commands.demo_section import Section
+from ddagr_gym.progress import LinePrinter
 
 if TYPE_CHECKING:
     import numpy as np
@@ -77,22 +78,18 @@ def diagnosis_step(folder: Path, seed: int = 1, thresholds: Thresholds | None = 
         seed: of the drives.
         thresholds: of the gate; those that ship with the package by default.
     """
-    from ddagr_gym.commands.diagnose import PAGE, diagnosed, outcome_text, write_outcome
-    from ddagr_gym.diagnosis.gates.threshold_files import default_thresholds
-    from ddagr_gym.diagnosis.pipeline import Task
-    from ddagr_gym.diagnosis.setting import Setting
-    from ddagr_gym.presets import get_robot, get_soil
+    import ddagr_gym
+    from ddagr_gym.api.diagnosis_result import PAGE
 
     print("Diagnosing two drives on ground of which the nominal simulator does not know that it slopes ...", flush=True)
-    gates = default_thresholds(ROBOT) if thresholds is None else thresholds
-    setting = Setting(threads=2).with_windows(gates.duration)
-    outcome = diagnosed(Task(get_robot(ROBOT), get_soil(SOIL), drives(seed), gates, setting, seed))
-    target = folder / "diagnosis"
-    target.mkdir()
-    write_outcome(outcome, target)
+    progress = LinePrinter("ddagr diagnose: ")
+    result = ddagr_gym.diagnose(
+        drives(seed), ROBOT, SOIL, thresholds=thresholds, seed=seed, threads=2, progress=progress
+    )
+    result.report(folder / "diagnosis")
     html = f"""<p>The drives were simulated on ground that slopes ({escape(MISSING)}), by a simulator with another
 soil law ({escape(WORLD)}); the diagnosis was told neither.</p>
 <p>Everything about it: <a href="diagnosis/{PAGE}">page</a>, <a href="diagnosis/diagnosis.json">JSON</a>, and the
 <a href="diagnosis/effects.yaml">effects file</a> that <code>gym.make</code>, <code>ddagr simulate</code> and
 <code>ddagr replay</code> load.</p>"""
-    return Section("What the nominal simulator leaves out", outcome_text(outcome.diagnosis), html)
+    return Section("What the nominal simulator leaves out", str(result), html)

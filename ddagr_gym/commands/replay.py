@@ -2,23 +2,16 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import tyro
 from tyro.conf import Positional
 
-from ddagr_gym.commands.output import format_table, output_folder, write_text
-from ddagr_gym.errors import InputError
-from ddagr_gym.progress import Progress
-
-if TYPE_CHECKING:
-    from ddagr_gym.recordings.schema import Recording
-    from ddagr_gym.replay_analysis.report import ArmReport, ReplayReport
-    from ddagr_gym.replay_analysis.run import RunResult
+from ddagr_gym.commands.output import check_output_folder
+from ddagr_gym.commands.ranges import check_at_least
+from ddagr_gym.progress import LinePrinter
 
 EXAMPLES = (
     "ddagr replay run.parquet --robot ddagr --soil thesis_a1 --output replayed",
@@ -26,11 +19,6 @@ EXAMPLES = (
     "ddagr replay run_1.parquet run_2.parquet --robot ddagr --soil thesis_a1 --refit --together "
     "--effects slope=0.05 --output both",
 )
-
-SAMPLE = "replay_demo.parquet"
-"""Simulated drive that ships with the package, in ``ddagr_gym/data``; ``ddagr demo`` replays it."""
-SAMPLE_SOIL = "sandy_loam_lll_15"
-"""Soil from which the sample's refit starts; it was driven on a somewhat different one."""
 
 
 @dataclass(frozen=True)
@@ -78,165 +66,25 @@ class Arguments:
 
 def run(arguments: Arguments) -> None:
     """Replay, print the tables, write report, figures and page."""
-    from ddagr_gym.physics.effects import load_effects
-    from ddagr_gym.presets import get_robot, get_soil
-    from ddagr_gym.replay_analysis.arm import ArmSettings
-
-    if arguments.threads < 1:
-        raise InputError(f"--threads is {arguments.threads}: give at least 1.")
-    soil = get_soil(arguments.soil)
-    effects = tuple(effect for item in arguments.effects for effect in load_effects(item))
-    recordings = _load(arguments)
-    robot = get_robot(robot_name(arguments.robot, recordings))
-    settings = ArmSettings(arguments.window, arguments.refit, effects, threads=arguments.threads, seed=arguments.seed)
-    groups = [recordings] if arguments.together else [[recording] for recording in recordings]
-    with output_folder(arguments.output, overwrite=arguments.overwrite) as folder:
-        report = replay_groups(groups, robot, soil, arguments.soil, settings, folder)
-    for text in summary(report):
-        print(text)
-    print(f"\nreport, figures and page: {arguments.output}")
-
-
-def _load(arguments: Arguments) -> list[Recording]:
+    import ddagr_gym
+    from ddagr_gym.api.inputs import recordings_from
     from ddagr_gym.recordings.files import Limits
-    from ddagr_gym.recordings.load import load_recording
 
-    if not arguments.runs:
-        raise InputError("no recording is given: name one or more files.")
-    limits = Limits(arguments.maximum_rows, arguments.maximum_bytes)
-    return [load_recording(r, arguments.map or None, arguments.robot or None, limits) for r in arguments.runs]
-
-
-def robot_name(asked: str, recordings: Sequence[Recording]) -> str:
-    """Robot that drove: the one asked for, else the recordings' own.
-
-    Raises:
-        InputError: recordings of two robots, or none named.
-    """
-    names = sorted({recording.meta.robot for recording in recordings} - {""})
-    if len(names) > 1:
-        raise InputError(f"the runs are of the robots {', '.join(names)}: replay one robot at a time.")
-    if not asked and not names:
-        raise InputError("the recordings do not say which robot drove: name it with --robot.")
-    return asked or names[0]
-
-
-def replay_groups(
-    groups: Sequence[Sequence[Recording]], robot: Any, soil: Any, soil_name: str, settings: Any, folder: Path
-) -> ReplayReport:
-    """Replay groups of recordings and write report, figures and page into a folder.
-
-    Args:
-        groups: recordings that share fitted parameters.
-        robot: nominal.
-        soil: nominal.
-        soil_name: for the report.
-        settings: :class:`~ddagr_gym.replay_analysis.arm.ArmSettings`.
-        folder: that exists.
-    """
-    from ddagr_gym.replay_analysis.report import save_report
-    from ddagr_gym.replay_analysis.run import make_report, replay_run, steps
-    from ddagr_gym.reporting.replay_page import replay_page
-
-    results = []
-    with Progress(steps(len(groups)), "replaying", stream=sys.stderr) as progress:
-        for group in groups:
-            results.append(replay_run(group, robot, soil, settings, progress.advance))
-    report = make_report(results, robot.name, soil_name, settings)
-    figures = _draw(results, folder)
-    save_report(report, folder / "replay.json")
-    write_text(folder / "index.html", replay_page(report, figures))
-    return report
-
-
-def _draw(results: Sequence[RunResult], folder: Path) -> dict[tuple[int, str], list[Path]]:
-    from ddagr_gym.reporting.replay_figures import replay_overview, replay_residuals
-
-    figures: dict[tuple[int, str], list[Path]] = {}
-    with Progress(sum(len(result.arms) for result in results), "drawing") as progress:
-        for number, result in enumerate(results):
-            stem = _stem(result, number, len(results))
-            for arm in result.arms:
-                title = f"{', '.join(result.report.sources)}, driven by {_DRIVEN[arm.report.drive]}"
-                overview, _ = replay_overview(arm, folder / f"{stem}_{arm.report.drive}", title)
-                detail, _ = replay_residuals(arm, folder / f"{stem}_{arm.report.drive}_residuals", title)
-                figures[number, arm.report.drive] = [overview, detail]
-                progress.advance()
-    return figures
-
-
-_DRIVEN = {"commands": "commands", "encoders": "wheel speeds"}
-_SHORT = ("simulator", "refitted", "no slip", "effective track")
-"""Of the models, in their order."""
-
-
-def _stem(result: RunResult, number: int, count: int) -> str:
-    name = Path(result.report.sources[0]).name.split(".", 1)[0] or "run"
-    name = f"{name}_and_{len(result.report.sources) - 1}_more" if len(result.report.sources) > 1 else name
-    return f"{number + 1}_{name}" if count > 1 else name
-
-
-def summary(report: ReplayReport) -> list[str]:
-    """Tables of a report as text, one per arm of each run."""
-    texts = []
-    for item in report.runs:
-        texts.append(f"\n{', '.join(item.sources)}: {item.seconds:.0f} s; {item.split}")
-        texts += [f"note: {note}" for note in item.notes]
-        texts += [arm_text(arm) for arm in item.arms]
-        texts.append(f"replayed in {item.cpu_seconds:.1f} s of one core")
-    return texts
-
-
-def arm_text(arm: ArmReport) -> str:
-    """Errors and residuals of one arm as tables."""
-    from ddagr_gym.replay_analysis.report import MODELS
-
-    models = [m for m in MODELS if any(e.model == m for e in arm.horizons)]
-    rows = []
-    for horizon, metric in dict.fromkeys((e.horizon, e.metric) for e in arm.horizons if e.error.count):
-        found = {e.model: e for e in arm.horizons if (e.horizon, e.metric) == (horizon, metric)}
-        sizes = [_number(found[m].error.rms) for m in models]
-        first = found[models[0]]
-        rows.append((f"{metric} after {horizon:g} s", first.unit, str(first.error.count), *sizes))
-    errors = format_table(("root mean square error", "unit", "windows", *models), rows) if rows else "no unseen windows"
-    names = [table.model for table in arm.residuals]
-    channels = [
-        (c.channel, c.unit, _number(c.noise), *(_number(t.channels[k].rms) for t in arm.residuals),
-         *(_number(t.channels[k].bias) for t in arm.residuals), f"{arm.residuals[-1].channels[k].correlation:.2f}")
-        for k, c in enumerate(arm.residuals[0].channels)
-    ]  # fmt: skip
-    head = ("residual", "unit", "noise", *(f"rms {n}" for n in names), *(f"bias {n}" for n in names), "correlation")
-    parts = [f"\ndriven by {_DRIVEN[arm.drive]}", errors]
-    parts += [format_table(head, channels)] if channels else []
-    parts += [f"note: {note}" for note in arm.notes]
-    parts.append(_fit_text(arm))
-    parts.append(f"simulator: {arm.speed.times_real_time:.0f} times real time on one core")
-    return "\n".join(part for part in parts if part)
-
-
-def lead_text(report: ReplayReport) -> str:
-    """Heading errors after 5 s of every model as one short table, a row per run and arm."""
-    from ddagr_gym.replay_analysis.report import MODELS, lead_errors
-
-    rows = []
-    for item in report.runs:
-        for arm in item.arms:
-            found = lead_errors(arm)
-            errors = (_number(found[m].error.rms) if m in found else "-" for m in MODELS)
-            rows.append((", ".join(item.sources), _DRIVEN[arm.drive], *errors))
-    return format_table(("heading error after 5 s [rad]", "driven by", *_SHORT), rows)
-
-
-def _number(value: float | None) -> str:
-    return "-" if value is None else f"{value:.3g}"
-
-
-def _fit_text(arm: ArmReport) -> str:
-    if arm.refit is None:
-        return ""
-    rows = [
-        (p.name, "ln factor" if p.unit == "-" else p.unit, f"{p.value:+.3f}", f"{p.window_deviation:.3f}",
-         f"{p.prior:.3f}", f"{p.pull:+.1f}", "at bound" if p.at_bound else "pulled" if abs(p.pull) > 3.0 else "")
-        for p in arm.refit.parameters
-    ]  # fmt: skip
-    return format_table(("refitted", "unit", "value", "deviation", "prior", "pull", ""), rows)
+    check_at_least(arguments, threads=1)
+    check_output_folder(arguments.output, overwrite=arguments.overwrite)
+    robot, limits = arguments.robot or None, Limits(arguments.maximum_rows, arguments.maximum_bytes)
+    result = ddagr_gym.replay(
+        recordings_from(arguments.runs, robot, arguments.map or None, limits),
+        robot,
+        arguments.soil,
+        effects=arguments.effects,
+        window=arguments.window,
+        refit=arguments.refit,
+        together=arguments.together,
+        threads=arguments.threads,
+        seed=arguments.seed,
+        progress=LinePrinter(),
+    )
+    result.report(arguments.output, overwrite=arguments.overwrite, progress=LinePrinter())
+    print(result)
+    print(f"\nreport, figures and page: {arguments.output}")

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from ddagr_gym.cli import main
-from ddagr_gym.commands.diagnose import outcome_text
 from ddagr_gym.diagnosis import pipeline
 from ddagr_gym.diagnosis.gates.threshold_files import save_thresholds
 from ddagr_gym.diagnosis.gates.thresholds import Gate, Thresholds
@@ -25,6 +24,7 @@ from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.recordings.storage import save_parquet
 from ddagr_gym.replay_analysis.report import REFITTED
+from ddagr_gym.reporting.diagnosis_text import outcome_text
 from ddagr_gym.simulator import simulate
 
 RATE = 50.0

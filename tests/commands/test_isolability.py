@@ -5,12 +5,13 @@ from dataclasses import replace
 
 import pytest
 
-from ddagr_gym.cli import main
-from ddagr_gym.commands.gates import gates_for
-from ddagr_gym.commands.isolability import table_text
+from ddagr_gym.api.nominal import thresholds_from
+from ddagr_gym.cli import main, warnings_as_lines
 from ddagr_gym.diagnosis.gates.threshold_files import default_thresholds, save_thresholds
 from ddagr_gym.diagnosis.planning.isolability import Detectable, Isolability
+from ddagr_gym.presets import get_robot
 from ddagr_gym.reporting.isolability_figure import isolability_figure
+from ddagr_gym.reporting.isolability_text import table_text
 
 
 @pytest.fixture
@@ -63,17 +64,18 @@ def test_negative_seed_is_one_sentence(tmp_path, capsys):
 
 
 def test_gates_ship_with_the_robot_or_come_from_chance(tmp_path):
-    assert gates_for(None, "ddagr", "thesis_a1") == default_thresholds("ddagr")
-    assert gates_for(None, "husky", "thesis_a1") is None
+    assert thresholds_from(None, get_robot("ddagr"), "thesis_a1") == default_thresholds("ddagr")
+    assert thresholds_from(None, get_robot("husky"), "thesis_a1") is None
     given = replace(default_thresholds("ddagr"), bank="given")
     save_thresholds(given, tmp_path / "gates.json")
-    assert gates_for(tmp_path / "gates.json", "ddagr", "thesis_a1") == given
+    assert thresholds_from(tmp_path / "gates.json", get_robot("ddagr"), "thesis_a1") == given
 
 
+@warnings_as_lines()
 def test_gates_of_another_soil_are_warned_of(capsys):
-    gates_for(None, "ddagr", "thesis_a1")
+    thresholds_from(None, get_robot("ddagr"), "thesis_a1")
     assert capsys.readouterr().err == ""
-    gates_for(None, "ddagr", "loose_sand")
+    thresholds_from(None, get_robot("ddagr"), "loose_sand")
     assert "the thresholds were made for soil thesis_a1 instead of loose_sand" in capsys.readouterr().err
 
 

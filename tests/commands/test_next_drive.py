@@ -6,12 +6,12 @@ from dataclasses import asdict, replace
 import pytest
 
 from ddagr_gym.cli import main
-from ddagr_gym.commands.next_drive import answer_text
 from ddagr_gym.config import dump_config
 from ddagr_gym.control.manoeuvres import MANOEUVRES
 from ddagr_gym.diagnosis.result.verdict import Diagnosis, Estimate, Finding, save
 from ddagr_gym.identification.nuisances import NuisancePriors
 from ddagr_gym.presets import get_robot, get_soil
+from ddagr_gym.reporting.next_drive_text import answer_text
 
 
 @pytest.fixture

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ddagr_gym.cli import main
-from ddagr_gym.commands.diagnose import Arguments, _thresholds
+from ddagr_gym.api.diagnose import _gates
+from ddagr_gym.api.nominal import nominal_from
+from ddagr_gym.cli import main, warnings_as_lines
 from ddagr_gym.diagnosis.gates.threshold_files import load_thresholds
-from ddagr_gym.diagnosis.gates.thresholds import NullRun, Origin
+from ddagr_gym.diagnosis.gates.thresholds import NullRun, Origin, Thresholds
 from ddagr_gym.diagnosis.null_bank import bank as null_bank
 from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.presets import get_robot, get_soil
@@ -180,6 +181,14 @@ def test_thresholds_of_ordinary_drives_say_so(quick_nulls: list[int], tmp_path: 
     assert load_thresholds(tmp_path / "thresholds.json").origin == Origin("ddagr", "thesis_a1", 1.0, 0, "ordinary")
 
 
+@warnings_as_lines()
+def gates_of(
+    path: Path | None, robot: str = "ddagr", soil: str = "thesis_a1", soil_uncertainty: float = 1.0
+) -> Thresholds:
+    """Thresholds that a diagnosis takes, its warnings printed as the command prints them."""
+    return _gates(path, nominal_from(robot, soil), soil_uncertainty)
+
+
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
@@ -195,7 +204,7 @@ def test_a_diagnosis_of_something_else_is_warned(
     assert main(words(tmp_path)) == 0
     path = tmp_path / "thresholds.json"
     capsys.readouterr()
-    given = _thresholds(Arguments((), tmp_path / "found", thresholds=path, **changes))
+    given = gates_of(path, **changes)
     assert given == load_thresholds(path)
     error = capsys.readouterr().err
     assert said in error
@@ -204,10 +213,10 @@ def test_a_diagnosis_of_something_else_is_warned(
 
 
 def test_a_diagnosis_with_the_shipped_thresholds_is_warned_too(capsys: pytest.CaptureFixture[str]) -> None:
-    _thresholds(Arguments((), Path("found"), robot="warthog"))
+    gates_of(None, robot="warthog")
     assert "soil firm_ground instead of thesis_a1, soil uncertainty 4 instead of 1" in capsys.readouterr().err
-    _thresholds(Arguments((), Path("found"), robot="warthog", soil="firm_ground", soil_uncertainty=4.0))
-    _thresholds(Arguments((), Path("found")))
+    gates_of(None, robot="warthog", soil="firm_ground", soil_uncertainty=4.0)
+    gates_of(None)
     assert capsys.readouterr().err == ""
 
 

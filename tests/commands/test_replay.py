@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from ddagr_gym.cli import main
-from ddagr_gym.commands.replay import summary
 from ddagr_gym.parameters import Imu, PoseReceiver, Sensors
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.schema import CHANNELS, Recording
 from ddagr_gym.recordings.storage import save_parquet
 from ddagr_gym.replay_analysis.report import load_report
+from ddagr_gym.reporting.replay_text import summary
 from ddagr_gym.simulator import simulate
 
 RATE = 50.0

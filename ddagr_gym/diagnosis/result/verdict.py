@@ -32,6 +32,14 @@ class Estimate:
     unit: str
     interval: tuple[float, float] | None = None
 
+    def __float__(self) -> float:
+        return self.value
+
+    def __str__(self) -> str:
+        unit = "" if self.unit == "-" else f" {self.unit}"
+        between = "" if self.interval is None else f" ({self.interval[0]:.3g} to {self.interval[1]:.3g})"
+        return f"{self.value:.3g}{unit}{between}"
+
 
 @dataclass(frozen=True)
 class Finding:

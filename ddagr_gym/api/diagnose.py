@@ -1,0 +1,151 @@
+"""``ddagr_gym.diagnose``: which physics the nominal simulator leaves out, from recordings."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ddagr_gym.api.diagnosis_result import DiagnosisResult
+from ddagr_gym.api.inputs import RobotLike, Sources, recordings_from
+from ddagr_gym.api.nominal import Nominal, SoilLike, ThresholdsLike, nominal_from, thresholds_from
+from ddagr_gym.api.results import at_least
+from ddagr_gym.errors import InputWarning
+from ddagr_gym.extras import need
+from ddagr_gym.progress import counting
+
+if TYPE_CHECKING:
+    from ddagr_gym.diagnosis.gates.thresholds import Thresholds
+
+__all__ = ["DiagnosisResult", "diagnose"]
+
+_SAME_WINDOW = 0.5
+"""Difference of lengths of windows up to which gates are taken to hold [s] (ours; short segments shorten windows)."""
+
+
+def diagnose(
+    recordings: Sources,
+    robot: RobotLike = "ddagr",
+    soil: SoilLike = "thesis_a1",
+    *,
+    thresholds: ThresholdsLike | None = None,
+    soil_uncertainty: float = 1.0,
+    window: float | None = None,
+    stride: float | None = None,
+    seed: int = 0,
+    threads: int = 1,
+    names_only: bool = False,
+    column_map: str | os.PathLike[str] | None = None,
+    progress: Callable[[str], None] | None = None,
+    cache: str | os.PathLike[str] | None = None,
+) -> DiagnosisResult:
+    """Find the physics that a nominal simulator leaves out: where, what, how big, how sure.
+
+    Several recordings of one robot on one ground are diagnosed together; each is then predicted by a model whose sizes
+    were fitted to the others. With a single one its halves judge each other, which is weaker: place, day and biases are
+    the same.
+
+    Args:
+        recordings: one or several recordings, tables with the schema's columns, paths of files or folders.
+        robot: nominal: name, YAML file or object.
+        soil: nominal: name, YAML file or object.
+        thresholds: of ``ddagr null-bank``, made with these or similar drives; those that ship with the package when it
+            is None.
+        soil_uncertainty: factor on how far the soil may be from the nominal one; larger where it is only guessed. The
+            thresholds must be of the same.
+        window: length of the windows [s]; that of the thresholds when it is None.
+        stride: seconds between the starts of windows; their length, which uses all samples, when it is None.
+        seed: of the resampling.
+        threads: of the simulator.
+        names_only: only name what is missing: no errors on unseen drives, no unnamed terms, no next drive, no page.
+        column_map: shipped map by name or the path of one's own, for files that are not imported yet.
+        progress: called with a line of text when a step begins and on what it does; ``print`` will do.
+        cache: folder in which finished steps are kept. After an interruption (KeyboardInterrupt) the same call goes on
+            from it; it stays when all is done, and is emptied when it is of another diagnosis.
+
+    Returns:
+        Verdict, findings with sizes and intervals, effects and refitted robot and soil for the simulator.
+
+    Raises:
+        InputError: recordings that cannot be diagnosed, unknown names, no thresholds for the robot.
+        InputWarning: (a warning) the thresholds were made for another robot, soil, uncertainty or window.
+
+    Examples:
+        >>> import ddagr_gym
+        >>> drives = [ddagr_gym.simulate(name, effects="slope=0.06", rate=25.0, pose_rate=5.0, seed=seed)
+        ...           for seed, name in enumerate(["arcs", "s_weave"])]
+        >>> result = ddagr_gym.diagnose(drives, names_only=True)
+        >>> result.verdict
+        ('slope',)
+        >>> abs(float(result.findings[0].parameters["angle"]) - 0.06) < 0.005  # rad
+        True
+    """
+    from ddagr_gym.diagnosis.pipeline import diagnose as diagnosed
+    from ddagr_gym.diagnosis.pipeline import steps_of
+    from ddagr_gym.diagnosis.setting import Setting
+    from ddagr_gym.identification.nuisances import NuisancePriors
+
+    at_least(threads=(threads, 1), window=(window, 1.0), stride=(stride, 0.1), seed=(seed, 0))
+    need("ruptures", *(() if names_only else ("sklearn",)))
+    nominal = nominal_from(robot, soil)
+    found = recordings_from(recordings, robot, column_map)
+    priors = NuisancePriors().with_soil(soil_uncertainty)
+    gates = _gates(thresholds, nominal, soil_uncertainty)
+    setting = Setting(priors=priors, threads=threads).with_windows(_window(window, gates), stride)
+    with _steps(len(steps_of(names_only)), progress) as on_step:
+        outcome = diagnosed(
+            found,
+            nominal.robot,
+            nominal.soil,
+            gates,
+            setting,
+            seed=seed,
+            names_only=names_only,
+            soil_name=nominal.soil_name,
+            robot_file=nominal.robot_file,
+            cache=None if cache is None else Path(cache),
+            on_step=on_step,
+            progress=lambda line: None if progress is None else progress(f"  {line}"),
+        )
+    return DiagnosisResult(outcome)
+
+
+def _gates(given: ThresholdsLike | None, nominal: Nominal, soil_uncertainty: float) -> Thresholds:
+    from ddagr_gym.diagnosis.gates.threshold_files import default_thresholds
+
+    found = thresholds_from(given, nominal.robot, nominal.soil_name, soil_uncertainty)
+    return default_thresholds(nominal.robot.name) if found is None else found
+
+
+def _window(window: float | None, gates: Thresholds) -> float:
+    """Length of the windows [s]; one that the thresholds were not made with is warned of."""
+    if window is None:
+        return gates.duration
+    if abs(window - gates.duration) > _SAME_WINDOW:
+        warnings.warn(
+            f"the thresholds were made with windows of {gates.duration:g} s instead of {window:g} s, which show other "
+            f"effects: make others with `ddagr null-bank --window {window:g}`.",
+            InputWarning,
+            stacklevel=3,
+        )
+    return window
+
+
+@contextmanager
+def _steps(count: int, progress: Callable[[str], None] | None) -> Iterator[Callable[[str, bool], None]]:
+    """Function to call with the name of each step when it begins; the last one ends with the block."""
+    names: list[str] = []
+    with counting(count, "diagnosing", progress) as steps:
+
+        def begin(name: str, kept: bool) -> None:
+            if names:
+                steps.advance()
+            names.append(name)
+            if progress is not None:
+                progress(f"step {len(names)} of {count}, {name}{', kept from before' if kept else ''}")
+
+        yield begin
+        steps.advance()

@@ -1,0 +1,169 @@
+"""Result of ``ddagr_gym.diagnose``: the answer, the corrected simulator, and their files."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ddagr_gym.api.results import Result, Table
+from ddagr_gym.errors import InputError
+from ddagr_gym.files import output_folder
+
+if TYPE_CHECKING:
+    from ddagr_gym.diagnosis.pipeline import Outcome
+    from ddagr_gym.diagnosis.result.verdict import Diagnosis, Finding
+    from ddagr_gym.parameters import Robot, Soil
+    from ddagr_gym.physics.effects import Effect
+
+PAGE = "index.html"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DiagnosisResult(Result):
+    """Which physics the nominal simulator leaves out, how big and how sure.
+
+    ``findings[0].parameters["angle"]`` is an estimate with ``value``, ``unit`` and a 90 % ``interval``; ``float()`` of
+    it is its value.
+
+    Attributes:
+        outcome: answer, session and search behind it (:mod:`ddagr_gym.diagnosis.pipeline`).
+    """
+
+    outcome: Outcome
+
+    @property
+    def diagnosis(self) -> Diagnosis:
+        """The whole answer, as ``diagnosis.json`` holds it."""
+        return self.outcome.diagnosis
+
+    @property
+    def verdict(self) -> tuple[str, ...]:
+        """Names of effects, or ("none",), or ("unknown",)."""
+        return self.diagnosis.verdict
+
+    @property
+    def complete(self) -> bool:
+        """Whether nothing more is left than in drives in which nothing is missing."""
+        return self.diagnosis.complete
+
+    @property
+    def sentence(self) -> str:
+        """The answer in words."""
+        return self.diagnosis.sentence
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """One per named effect, in the order in which they were found."""
+        return self.diagnosis.findings
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """Named effects at their fitted sizes, as ``gym.make(effects=...)``, simulate and replay take them."""
+        return self.outcome.effects
+
+    @property
+    def nominal(self) -> tuple[Robot, Soil]:
+        """Robot and soil that the recordings were compared with."""
+        return self.outcome.nominal
+
+    @property
+    def robot(self) -> Robot | None:
+        """Robot with refitted parameters; None where the refitted values exist nowhere (see ``refit_note``)."""
+        return self._refitted[0]
+
+    @property
+    def soil(self) -> Soil | None:
+        """Soil with refitted parameters; None where the refitted values exist nowhere (see ``refit_note``)."""
+        return self._refitted[1]
+
+    @property
+    def refit_note(self) -> str:
+        """Why there is no refitted robot and soil; "" where there is."""
+        return self._refitted[2]
+
+    @cached_property
+    def _refitted(self) -> tuple[Robot | None, Soil | None, str]:
+        from ddagr_gym.diagnosis.null_bank.fitted_nominal import with_values
+
+        try:
+            return *with_values(*self.nominal, self.diagnosis.nuisances), ""
+        except InputError as error:
+            return None, None, f"the refitted values are no soil: {error}"
+
+    @property
+    def headline(self) -> str:
+        """The answer in words."""
+        return self.sentence
+
+    def tables(self) -> Sequence[Table]:
+        """Findings with sizes, and errors on unseen drives."""
+        from ddagr_gym.reporting.diagnosis_text import FINDING_HEADER, FIT_HEADER, finding_rows, fit_rows
+
+        found = [Table(FINDING_HEADER, finding_rows(self.diagnosis))] if self.findings else []
+        rows = [] if self.diagnosis.fit is None else fit_rows(self.diagnosis.fit)
+        return [*found, *([Table(FIT_HEADER, rows)] if rows else [])]
+
+    def __str__(self) -> str:
+        from ddagr_gym.reporting.diagnosis_text import outcome_text
+
+        return outcome_text(self.diagnosis)
+
+    def to_json(self, path: str | os.PathLike[str]) -> None:
+        """Write diagnosis.json (``docs/diagnosis_schema.md``), whole or not at all."""
+        from ddagr_gym.diagnosis.result.verdict import save
+
+        save(self.diagnosis, Path(path))
+
+    def report(self, folder: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
+        """Write diagnosis.json, evidence.npz, and what the simulator loads; with a page unless ``names_only``.
+
+        effects.json and effects.yaml hold the named effects, robot.yaml and soil.yaml the refitted nominal parameters
+        (left out where ``robot`` is None). The page, index.html, and its figures need matplotlib and jinja2.
+
+        Args:
+            folder: to make, whole or not at all.
+            overwrite: replace a folder that an earlier report wrote.
+
+        Returns:
+            The folder.
+
+        Raises:
+            InputError: the folder holds something else, or an earlier report without ``overwrite``.
+        """
+        from ddagr_gym.diagnosis.result import evidence
+        from ddagr_gym.diagnosis.result.verdict import as_mapping
+        from ddagr_gym.reporting import diagnosis_page
+
+        with output_folder(folder, overwrite=overwrite) as filled:
+            self._save_effects(filled)
+            self._save_refitted(filled)
+            self.to_json(filled / "diagnosis.json")
+            self.outcome.evidence.save(filled / evidence.NAME)
+            if not self.diagnosis.options["names_only"]:
+                diagnosis_page.write_report(filled, as_mapping(self.diagnosis), self.outcome.evidence)
+                (filled / diagnosis_page.PAGE).rename(filled / PAGE)
+        return Path(folder)
+
+    def _save_effects(self, folder: Path) -> None:
+        from ddagr_gym.diagnosis.pipeline import data_hash, effect_intervals
+        from ddagr_gym.physics.effects.files import save_effects
+
+        for name in ("effects.json", "effects.yaml"):
+            save_effects(
+                folder / name,
+                self.effects,
+                intervals=effect_intervals(self.diagnosis) if self.effects else (),
+                data_hash=data_hash(self.diagnosis),
+                source=self.sentence,
+            )
+
+    def _save_refitted(self, folder: Path) -> None:
+        from ddagr_gym.config import dump_config
+
+        for name, fitted in (("robot.yaml", self.robot), ("soil.yaml", self.soil)):
+            if fitted is not None:
+                (folder / name).write_text(f"# refitted: {self.sentence}\n{dump_config(fitted)}")

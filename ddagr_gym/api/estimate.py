@@ -1,0 +1,230 @@
+"""``ddagr_gym.estimate``: speeds and soil over a recording, by the filter."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from ddagr_gym.api.inputs import RobotLike, Source, recording_from
+from ddagr_gym.api.nominal import SoilLike, robot_from, soil_from
+from ddagr_gym.api.results import Result, Table, at_least
+from ddagr_gym.errors import InputError
+from ddagr_gym.files import atomic_path, output_folder, write_text
+from ddagr_gym.progress import counting
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from ddagr_gym.evaluation.estimate_run import EstimatedRun
+
+ThesisTable = Literal["6.2", "6.3"]
+UNITS = {"traction_limit": "N", "traction_rate": "-", "lateral_stiffness": "N/rad", "motion_resistance": "N"}
+"""Of the force law's parameters a1, a2, b and Rc."""
+
+
+@dataclass(frozen=True)
+class SoilParameter:
+    """A parameter of the force law at the end of a drive; ``float()`` gives its value.
+
+    Attributes:
+        value: in unit; None where the filter broke down.
+        unit: SI.
+        relative_deviation: standard deviation of its logarithm.
+        best_fit: value that the true forces fit best, None where they are unknown.
+    """
+
+    value: float | None
+    unit: str
+    relative_deviation: float | None
+    best_fit: float | None
+
+    def __float__(self) -> float:
+        return float("nan") if self.value is None else self.value
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class EstimateResult(Result):
+    """Estimates over a recording.
+
+    Attributes:
+        run: states, covariances, innovations and the recording behind them.
+        thesis: table of the thesis whose run was driven, None for a recording.
+    """
+
+    run: EstimatedRun
+    thesis: ThesisTable | None = None
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """Final parameters, errors where the truth is known, normalised innovations squared with bands."""
+        from ddagr_gym.evaluation.estimate_run import summary_of
+
+        return summary_of(self.run)
+
+    @cached_property
+    def columns(self) -> dict[str, NDArray[np.float64]]:
+        """(T,) by name: ``t`` [s], states with standard deviations, soil parameters, path, innovations."""
+        from ddagr_gym.evaluation.estimate_run import table_of
+
+        return table_of(self.run)
+
+    @property
+    def parameters(self) -> dict[str, SoilParameter]:
+        """Final parameters of the force law by name."""
+        return {
+            name: SoilParameter(item["value"], UNITS[name], item["log_deviation"], item["best_fit"])
+            for name, item in self.summary["parameters"].items()
+        }
+
+    @property
+    def errors(self) -> dict[str, float | None]:
+        """Root mean square errors and the radius error, empty without truth; None where the filter broke down."""
+        return dict(self.summary["errors"])
+
+    @property
+    def headline(self) -> str:
+        """What was estimated, by which filter."""
+        found = self.summary
+        return f"{found['title']}: {found['seconds']:.0f} s, filter {found['filter']}, force law {found['force_law']}"
+
+    def tables(self) -> Sequence[Table]:
+        """Final parameters, and errors where the truth is known."""
+        from ddagr_gym.reporting.estimate_text import HEADER, error_rows, parameter_rows
+
+        errors = error_rows(self.summary)
+        return [
+            Table(HEADER, parameter_rows(self.summary)),
+            *([Table(("error", "value"), errors)] if errors else []),
+        ]
+
+    def __str__(self) -> str:
+        from ddagr_gym.reporting.estimate_text import estimate_text
+
+        return estimate_text(self.summary)
+
+    def to_pandas(self) -> Any:
+        """The columns as a pandas.DataFrame."""
+        from ddagr_gym.api.tables import pandas_of
+
+        return pandas_of(self.columns)
+
+    def to_json(self, path: str | os.PathLike[str]) -> None:
+        """Write the summary as JSON, whole or not at all."""
+        write_text(path, json.dumps(self.summary, indent=1, allow_nan=False) + "\n")
+
+    def report(
+        self,
+        folder: str | os.PathLike[str],
+        *,
+        overwrite: bool = False,
+        progress: Callable[[str], None] | None = None,
+    ) -> Path:
+        """Write estimates.parquet, summary.json and the figures; needs matplotlib and pyarrow.
+
+        Figures stand in the order of the thesis's chapter 6, with bands of two standard deviations, and the truth where
+        the recording holds it.
+
+        Args:
+            folder: to make, whole or not at all.
+            overwrite: replace a folder that an earlier report wrote.
+            progress: called with a line of text as figures are drawn.
+
+        Returns:
+            The folder.
+
+        Raises:
+            InputError: the folder holds something else, or an earlier report without ``overwrite``.
+        """
+        from ddagr_gym.evaluation.estimate_view import estimate_view, path_file
+        from ddagr_gym.reporting.estimate_figures import figure_count, save_estimate_figures
+
+        view = estimate_view(self.run, self.thesis)
+        with output_folder(folder, overwrite=overwrite) as filled:
+            self._write_table(filled / "estimates.parquet")
+            self.to_json(filled / "summary.json")
+            with counting(figure_count(view), "figures", progress) as steps:
+                save_estimate_figures(view, filled, path_file(self.thesis), steps.advance)
+        return Path(folder)
+
+    def _write_table(self, path: Path) -> None:
+        import pyarrow as pa
+        from pyarrow import parquet
+
+        with atomic_path(path) as part:
+            parquet.write_table(pa.table(self.columns), part)
+
+
+def estimate(
+    recording: Source | None = None,
+    robot: RobotLike = "ddagr",
+    *,
+    thesis: ThesisTable | None = None,
+    soil: SoilLike | None = None,
+    motor_rate: float | None = None,
+    filter: Literal["ours", "thesis"] = "ours",
+    law: Literal["coupled", "thesis"] = "coupled",
+    attitude: bool = False,
+    seed: int = 0,
+    column_map: str | os.PathLike[str] | None = None,
+) -> EstimateResult:
+    """Estimate speeds and soil over a recording.
+
+    Args:
+        recording: one recording, table with the schema's columns, or path; None with ``thesis``.
+        robot: that drove: name, YAML file or object.
+        thesis: drive and estimate the run of this table of the thesis's chapter 6 instead.
+        soil: with ``thesis`` the name of the soil to drive on; else the soil whose parameters are shown for comparison.
+        motor_rate: of the speed loop [1/s], where it is not the robot's.
+        filter: ours, or the thesis's eight-state filter.
+        law: force law of our filter.
+        attitude: use the recorded roll and pitch [rad]; only right where they count from the horizon.
+        seed: of the simulated run, and of what is resampled.
+        column_map: shipped map by name or the path of one's own, for a file that is not imported yet.
+
+    Returns:
+        States, soil parameters, errors where the recording holds the truth, figures.
+
+    Raises:
+        InputError: neither a recording nor a table of the thesis, or both; unknown names; no rows.
+
+    Examples:
+        >>> import ddagr_gym
+        >>> drive = ddagr_gym.simulate("arcs", rate=50.0)
+        >>> result = ddagr_gym.estimate(drive)
+        >>> abs(result.errors["radius_error"]) < 0.08
+        True
+        >>> result.parameters["motion_resistance"].unit
+        'N'
+    """
+    from ddagr_gym.estimation import ForceLaw
+    from ddagr_gym.evaluation.estimate_run import estimate_recording, estimate_thesis_run
+
+    at_least(seed=(seed, 0))
+    if (recording is None) == (thesis is None):
+        raise InputError(
+            "give either a recording or --thesis 6.2 or 6.3 (thesis=... in Python): one of them is what is estimated."
+        )
+    chosen = ForceLaw[law]
+    if thesis is not None:
+        _refuse_own(robot=(robot, "ddagr"), motor_rate=(motor_rate, None), map=(column_map, None))
+        return EstimateResult(estimate_thesis_run(thesis, str(soil or ""), filter, chosen, seed), thesis)
+    assert recording is not None
+    found = robot_from(robot)
+    if motor_rate is not None:
+        found = replace(found, motor_rate=motor_rate)
+    read = recording_from(recording, robot, column_map)
+    expected = None if soil is None else soil_from(soil)
+    return EstimateResult(estimate_recording(read, found, expected, filter, chosen, attitude, seed))
+
+
+def _refuse_own(**options: tuple[Any, Any]) -> None:
+    """Refuse what a run of the thesis has already."""
+    for name, (given, default) in options.items():
+        if given != default:
+            raise InputError(f"{name.replace('_', '-')} {given}: the thesis's runs have their own; leave it out.")

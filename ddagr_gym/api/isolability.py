@@ -1,0 +1,165 @@
+"""``ddagr_gym.isolability``: what manoeuvres and sensors could show and tell apart, before any data."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeAlias
+
+from ddagr_gym.api.inputs import RobotLike
+from ddagr_gym.api.nominal import (
+    SoilLike,
+    ThresholdsLike,
+    robot_from,
+    soil_from,
+    soil_label,
+    soil_name_of,
+    thresholds_from,
+)
+from ddagr_gym.api.results import Result, Table, at_least
+from ddagr_gym.control.manoeuvres import Manoeuvre, find_manoeuvre
+from ddagr_gym.files import output_folder, write_text
+from ddagr_gym.progress import counting
+
+if TYPE_CHECKING:
+    from ddagr_gym.diagnosis.planning.isolability import Isolability
+
+ManoeuvreLike: TypeAlias = str | os.PathLike[str] | Manoeuvre
+"""Name of a built-in drive, path of a CSV file of commands, or a manoeuvre."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class IsolabilityResult(Result):
+    """Which effects planned drives could show, how small, and which they could tell apart.
+
+    Attributes:
+        table: sizes and pairs (:class:`ddagr_gym.diagnosis.planning.isolability.Isolability`).
+    """
+
+    table: Isolability
+
+    @property
+    def least_detectable(self) -> dict[str, float]:
+        """Least detectable distance from neutral of each effect's most visible size; infinite where nothing shows."""
+        return {name: self.table.of(name).size for name in self.table.effects}
+
+    def confused_with(self, effect: str) -> tuple[str, ...]:
+        """Effects that could not be told from one, the closest first."""
+        return self.table.confused(effect)
+
+    @property
+    def headline(self) -> str:
+        """Robot, soil, manoeuvres, sensors and gates."""
+        from ddagr_gym.reporting.isolability_text import table_head
+
+        return table_head(self.table)
+
+    def tables(self) -> Sequence[Table]:
+        """One row per size, the effects that show at the smallest sizes first."""
+        from ddagr_gym.reporting.isolability_text import HEADER, table_rows
+
+        return [Table(HEADER, table_rows(self.table))]
+
+    def __str__(self) -> str:
+        from ddagr_gym.reporting.isolability_text import table_text
+
+        return table_text(self.table)
+
+    def to_json(self, path: str | os.PathLike[str]) -> None:
+        """Write the table as JSON, whole or not at all; what cannot be seen or told apart is null."""
+        write_text(path, json.dumps(self.table.as_mapping(), indent=1, allow_nan=False) + "\n")
+
+    def report(self, folder: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
+        """Write isolability.json, isolability.txt and the figure; needs matplotlib.
+
+        Args:
+            folder: to make, whole or not at all.
+            overwrite: replace a folder that an earlier report wrote.
+
+        Returns:
+            The folder.
+
+        Raises:
+            InputError: the folder holds something else, or an earlier report without ``overwrite``.
+        """
+        from ddagr_gym.reporting.isolability_figure import isolability_figure
+
+        with output_folder(folder, overwrite=overwrite) as filled:
+            self.to_json(filled / "isolability.json")
+            write_text(filled / "isolability.txt", f"{self}\n")
+            isolability_figure(self.table.as_mapping(), filled / "isolability.png")
+        return Path(folder)
+
+
+def isolability(
+    manoeuvres: ManoeuvreLike | Sequence[ManoeuvreLike] = ("stops", "arcs", "spin", "s_weave"),
+    sensors: Sequence[str] = ("imu", "encoders", "pose"),
+    robot: RobotLike = "ddagr",
+    soil: SoilLike = "thesis_a1",
+    *,
+    soil_uncertainty: float = 1.0,
+    thresholds: ThresholdsLike | None = None,
+    seed: int = 0,
+    progress: Callable[[str], None] | None = None,
+) -> IsolabilityResult:
+    """Say which effects planned drives could show, how small, and which they could tell apart.
+
+    The nominal robot is simulated over the manoeuvres with the sensors' default noise; from its sensitivities follow
+    the least detectable size of each effect and the share of its trace that every other effect cannot imitate.
+
+    Args:
+        manoeuvres: one or several: names of built-in drives, CSV files of commands, or manoeuvres.
+        sensors: some of imu, encoders, pose.
+        robot: nominal: name, YAML file or object.
+        soil: nominal: name, YAML file or object.
+        soil_uncertainty: factor on how far the soil may be from the nominal one, as for a diagnosis.
+        thresholds: gates of ``ddagr null-bank``; by default those that ship for the robot, and where none do those that
+            normal noise alone asks for (chi-square): real drives need larger sizes then.
+        seed: of the sensor noise.
+        progress: called with a line of text at every tenth of the effects.
+
+    Returns:
+        Least detectable sizes and the pairs that are confused.
+
+    Raises:
+        InputError: unknown names, or drives too short for a diagnosis.
+        InputWarning: (a warning) the thresholds were made for another robot, soil or uncertainty.
+
+    Examples:
+        >>> import ddagr_gym
+        >>> result = ddagr_gym.isolability("two_headings", sensors=["imu", "encoders"])
+        >>> result.least_detectable["slope"] < 0.05  # rad
+        True
+        >>> "accelerometer_bias" in result.confused_with("slope")
+        False
+    """
+    from ddagr_gym.diagnosis.planning.isolability import isolability as tabulated
+    from ddagr_gym.identification.nuisances import NuisancePriors
+    from ddagr_gym.physics.effects.registry import effect_kinds
+
+    at_least(seed=(seed, 0))
+    priors = NuisancePriors().with_soil(soil_uncertainty)
+    nominal, ground = robot_from(robot), soil_from(soil)
+    drives = _manoeuvres(manoeuvres)
+    gates = thresholds_from(thresholds, nominal, soil_name_of(soil), soil_uncertainty)
+    with counting(len(effect_kinds()), "effects", progress) as steps:
+        table = tabulated(
+            nominal,
+            ground,
+            drives,
+            tuple(sensors),
+            thresholds=gates,
+            seed=seed,
+            soil_name=soil_label(soil),
+            priors=priors,
+            progress=lambda name: steps.advance(),
+        )
+    return IsolabilityResult(table)
+
+
+def _manoeuvres(given: ManoeuvreLike | Sequence[ManoeuvreLike]) -> list[Manoeuvre]:
+    items = [given] if isinstance(given, str | os.PathLike | Manoeuvre) else given
+    return [item if isinstance(item, Manoeuvre) else find_manoeuvre(str(item)) for item in items]

@@ -1,0 +1,183 @@
+"""``ddagr_gym.next_drive``: the manoeuvre that would settle what a diagnosis leaves open."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias, Union
+
+from ddagr_gym.api.inputs import RobotLike
+from ddagr_gym.api.nominal import SoilLike, robot_from, soil_from
+from ddagr_gym.api.results import Result, Table, at_least
+from ddagr_gym.errors import InputError
+from ddagr_gym.files import write_text
+
+if TYPE_CHECKING:
+    from ddagr_gym.api.diagnosis_result import DiagnosisResult
+    from ddagr_gym.diagnosis.setting import Setting
+    from ddagr_gym.physics.effects import Effect
+
+RivalsLike: TypeAlias = "Sequence[str | Effect]"
+"""Effects at the sizes to tell apart: ``name=size`` texts or objects."""
+
+QuestionLike: TypeAlias = Union["DiagnosisResult", str, os.PathLike[str], RivalsLike]
+"""A diagnosis (result, its folder or its diagnosis.json), or rivals."""
+
+ROBOT, SOIL = "ddagr", "thesis_a1"
+"""Nominal for rivals without a diagnosis."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class NextDriveResult(Result):
+    """The drive that would tell explanations apart best, and the runners-up.
+
+    Attributes:
+        answer: as :func:`ddagr_gym.diagnosis.planning.next_drive.next_drive` says it and ``to_json`` writes it.
+    """
+
+    answer: Mapping[str, Any]
+
+    @property
+    def manoeuvre(self) -> str:
+        """Name of the manoeuvre, as :func:`ddagr_gym.simulate` takes it; "" where none helps."""
+        return str(self.answer["manoeuvre"])
+
+    @property
+    def why(self) -> str:
+        """Why this one, or why none, in a sentence."""
+        return str(self.answer["why"])
+
+    @property
+    def separates(self) -> tuple[tuple[str, str], ...]:
+        """Pairs of effects that it tells apart."""
+        return tuple((str(one), str(other)) for one, other in self.answer["separates"])
+
+    @property
+    def minutes(self) -> float | None:
+        """Driving time until the worst pair is told apart [min]; None where never."""
+        found = self.answer["minutes"]
+        return None if found is None else float(found)
+
+    @property
+    def alternatives(self) -> tuple[str, ...]:
+        """Names of the runners-up, the best first."""
+        return tuple(str(entry["manoeuvre"]) for entry in self.answer["alternatives"])
+
+    @property
+    def headline(self) -> str:
+        """The manoeuvre, and why."""
+        return f"Drive {self.manoeuvre}: {self.why}" if self.manoeuvre else self.why
+
+    def tables(self) -> Sequence[Table]:
+        """The manoeuvre and the runners-up."""
+        from ddagr_gym.reporting.next_drive_text import HEADER, answer_rows
+
+        return [Table(HEADER, answer_rows(self.answer))] if self.manoeuvre else []
+
+    def __str__(self) -> str:
+        from ddagr_gym.reporting.next_drive_text import answer_text
+
+        return answer_text(self.answer)
+
+    def to_json(self, path: str | os.PathLike[str]) -> None:
+        """Write the answer as JSON, whole or not at all."""
+        write_text(path, json.dumps(self.answer, indent=1, allow_nan=False) + "\n")
+
+
+def next_drive(
+    diagnosis_or_rivals: QuestionLike,
+    robot: RobotLike | None = None,
+    soil: SoilLike | None = None,
+    *,
+    sensors: Sequence[str] = (),
+    seed: int = 0,
+    threads: int = 1,
+    progress: Callable[[str], None] | None = None,
+) -> NextDriveResult:
+    """Name the drive that would tell the remaining explanations of a diagnosis apart.
+
+    Every rival is simulated at its fitted size over every built-in manoeuvre; the others imitate it as well as they
+    can, with soil and robot refitted. Manoeuvres are ranked by what is left per minute of driving.
+
+    Args:
+        diagnosis_or_rivals: result of :func:`ddagr_gym.diagnose`, folder or diagnosis.json of a diagnosis; or a list of
+            effects to tell apart, as ``name=size`` texts or objects.
+        robot: nominal: name, YAML file or object; that of the diagnosis by default, ddagr without one.
+        soil: nominal: name, YAML file or object; that of the diagnosis by default, thesis_a1 without one.
+        sensors: some of imu, encoders, pose; those of the diagnosis by default, all without one.
+        seed: of the sensor noise.
+        threads: of the simulator.
+        progress: called with a line of text on what is being done.
+
+    Returns:
+        The best manoeuvre, why, how long it must be driven, and the runners-up.
+
+    Raises:
+        InputError: no diagnosis at the path, unknown names, no rival or the same one twice.
+
+    Examples:
+        >>> import ddagr_gym
+        >>> result = ddagr_gym.next_drive(["slope=0.02", "accelerometer_bias=0.2"])
+        >>> result.separates
+        (('slope', 'accelerometer_bias'),)
+    """
+    from ddagr_gym.diagnosis.planning.next_drive import next_drive as planned
+    from ddagr_gym.diagnosis.preprocessing.session import be_silent
+
+    at_least(seed=(seed, 0), threads=(threads, 1))
+    question = _question(diagnosis_or_rivals)
+    answer = planned(
+        robot_from(question.robot if robot is None else robot),
+        soil_from(question.soil if soil is None else soil),
+        question.rivals,
+        sensors=tuple(sensors) or question.sensors,
+        seed=seed,
+        setting=replace(question.setting, threads=threads),
+        progress=be_silent if progress is None else progress,
+    )
+    return NextDriveResult(answer)
+
+
+@dataclass(frozen=True)
+class _Question:
+    """What is to be told apart, with which sensors, for which robot on which soil, by which diagnosis."""
+
+    rivals: list[Effect]
+    sensors: tuple[str, ...]
+    robot: RobotLike
+    soil: SoilLike
+    setting: Setting
+
+
+def _question(given: QuestionLike) -> _Question:
+    from ddagr_gym.api.diagnosis_result import DiagnosisResult
+    from ddagr_gym.diagnosis.result.verdict import as_mapping, load
+
+    if isinstance(given, DiagnosisResult):
+        return _of_diagnosis(as_mapping(given.diagnosis), *given.nominal)
+    if isinstance(given, str | os.PathLike):
+        path = Path(given)
+        mapping = load(path / "diagnosis.json" if path.is_dir() else path)
+        named = mapping["options"].get("robot_file") or mapping["robot"] or ROBOT, mapping["soil"] or SOIL
+        return _of_diagnosis(mapping, *named)
+    return _of_rivals(given)
+
+
+def _of_diagnosis(mapping: Mapping[str, Any], robot: RobotLike, soil: SoilLike) -> _Question:
+    from ddagr_gym.diagnosis.planning.next_drive import rivals_of_diagnosis, sensors_of_diagnosis, setting_of_diagnosis
+
+    setting = setting_of_diagnosis(mapping)
+    return _Question(rivals_of_diagnosis(mapping), sensors_of_diagnosis(mapping), robot, soil, setting)
+
+
+def _of_rivals(given: RivalsLike) -> _Question:
+    from ddagr_gym.diagnosis.planning.planned_drive import SENSORS
+    from ddagr_gym.diagnosis.setting import Setting
+    from ddagr_gym.physics.effects import Effect, load_effects
+
+    if not isinstance(given, Sequence) or not all(isinstance(item, str | Effect) for item in given):
+        raise InputError(f"{given!r} is neither a diagnosis nor a list of effects: give one of them.")
+    return _Question(list(load_effects(given)), tuple(SENSORS), ROBOT, SOIL, Setting())

@@ -1,0 +1,206 @@
+"""``ddagr_gym.replay``: recorded drives driven again in the simulator, and what it gets wrong."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ddagr_gym.api.inputs import RobotLike, Sources, recordings_from
+from ddagr_gym.api.nominal import SoilLike, robot_from, soil_from, soil_label
+from ddagr_gym.api.results import Result, Table, at_least
+from ddagr_gym.api.simulate import EffectsLike
+from ddagr_gym.errors import InputError
+from ddagr_gym.files import atomic_path, output_folder, write_text
+from ddagr_gym.parameters import Robot
+from ddagr_gym.progress import counting
+from ddagr_gym.recordings.schema import Recording
+
+if TYPE_CHECKING:
+    from ddagr_gym.replay_analysis.report import HorizonError, ReplayReport
+    from ddagr_gym.replay_analysis.run import RunResult
+
+NAME = "replay.json"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ReplayResult(Result):
+    """Residuals, error growth, refit and baselines of replayed drives.
+
+    Attributes:
+        document: what ``replay.json`` holds (:mod:`ddagr_gym.replay_analysis.report`): by run and arm, errors at the
+            horizons, residuals, fitted parameters, speed.
+        runs: windows, predictions and residuals behind it, one per recording, or one for all together.
+    """
+
+    document: ReplayReport
+    runs: tuple[RunResult, ...]
+
+    def errors(self, horizon: float = 5.0, metric: str = "heading", driven_by: str = "commands") -> list[HorizonError]:
+        """Errors of every model after a horizon, on the part of the drives that no fit has seen, run by run.
+
+        Args:
+            horizon: 1, 5 or 30 [s].
+            metric: of :data:`ddagr_gym.replay_analysis.horizons.METRICS`, such as position or heading.
+            driven_by: commands or encoders.
+        """
+        arms = [arm for run in self.document.runs for arm in run.arms if arm.drive == driven_by]
+        return [e for arm in arms for e in arm.horizons if (e.horizon, e.metric) == (horizon, metric)]
+
+    @property
+    def headline(self) -> str:
+        """What was replayed."""
+        sources = ", ".join(source for run in self.document.runs for source in run.sources)
+        seconds = sum(run.seconds for run in self.document.runs)
+        fit = "refitted" if self.document.refit else "nominal"
+        return f"{sources}: {seconds:.0f} s by {self.document.robot} on {self.document.soil}, {fit}"
+
+    def tables(self) -> Sequence[Table]:
+        """Heading errors after 5 s of every model."""
+        from ddagr_gym.reporting.replay_text import LEAD_HEADER, lead_rows
+
+        return [Table(LEAD_HEADER, lead_rows(self.document))]
+
+    def __str__(self) -> str:
+        from ddagr_gym.reporting.replay_text import summary
+
+        return "\n".join(summary(self.document))
+
+    def to_json(self, path: str | os.PathLike[str]) -> None:
+        """Write the document as JSON, whole or not at all."""
+        from ddagr_gym.replay_analysis.report import save_report
+
+        with atomic_path(path) as part:
+            save_report(self.document, part)
+
+    def report(
+        self,
+        folder: str | os.PathLike[str],
+        *,
+        overwrite: bool = False,
+        progress: Callable[[str], None] | None = None,
+    ) -> Path:
+        """Write replay.json, figures as PNG and SVG, and a page, index.html; needs matplotlib.
+
+        Args:
+            folder: to make, whole or not at all.
+            overwrite: replace a folder that an earlier report wrote.
+            progress: called with a line of text as figures are drawn.
+
+        Returns:
+            The folder.
+
+        Raises:
+            InputError: the folder holds something else, or an earlier report without ``overwrite``.
+        """
+        from ddagr_gym.reporting.replay_page import replay_page
+
+        with output_folder(folder, overwrite=overwrite) as filled:
+            figures = _draw(self.runs, filled, progress)
+            self.to_json(filled / NAME)
+            write_text(filled / "index.html", replay_page(self.document, figures))
+        return Path(folder)
+
+
+def replay(
+    recordings: Sources,
+    robot: RobotLike | None = None,
+    soil: SoilLike = "thesis_a1",
+    *,
+    effects: EffectsLike = (),
+    window: float = 2.0,
+    refit: bool = False,
+    together: bool = False,
+    threads: int = 1,
+    seed: int = 0,
+    column_map: str | os.PathLike[str] | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> ReplayResult:
+    """Drive recordings again in the simulator.
+
+    The simulator is driven by the recorded commands and, as a second arm, by the recorded wheel speeds: in short
+    windows with free initial states, and from the state at a start over 1, 5 and 30 s and over every whole stretch.
+    Parameters and baselines are fitted on one part of each recording and judged on the other.
+
+    Args:
+        recordings: one or several recordings, tables with the schema's columns, paths of files or folders.
+        robot: that drove: name, YAML file or object; the recordings' own when it is None.
+        soil: nominal: name, YAML file or object.
+        effects: missing physics to add: ``name=size`` texts, objects (``result.effects`` of a diagnosis) or a file.
+        window: length of the windows with free initial states [s].
+        refit: fit soil and uncertain robot parameters.
+        together: let all recordings share one set of fitted parameters; otherwise each is fitted on its own.
+        threads: of the simulator.
+        seed: of the resampled intervals.
+        column_map: shipped map by name or the path of one's own, for files that are not imported yet.
+        progress: called with a line of text at every tenth of the work; ``print`` will do.
+
+    Returns:
+        Errors and fitted parameters, with page and figures.
+
+    Raises:
+        InputError: no recording, one of another robot, unknown names, or nothing that can be replayed.
+
+    Examples:
+        >>> import ddagr_gym
+        >>> drive = ddagr_gym.simulate("arcs", effects="slope=0.08", rate=25.0, pose_rate=5.0)
+        >>> level = ddagr_gym.replay(drive, soil="thesis_a1")
+        >>> sloping = ddagr_gym.replay(drive, soil="thesis_a1", effects="slope=0.08")
+        >>> before, after = (result.errors(5.0, "position")[0].error.rms for result in (level, sloping))
+        >>> after < 0.5 * before  # metres
+        True
+    """
+    from ddagr_gym.physics.effects import load_effects
+    from ddagr_gym.replay_analysis.arm import ArmSettings
+    from ddagr_gym.replay_analysis.run import make_report, replay_run, steps
+
+    at_least(threads=(threads, 1), seed=(seed, 0))
+    ground, added = soil_from(soil), load_effects(effects)
+    found = recordings_from(recordings, robot, column_map)
+    nominal = driven_robot(robot, found)
+    settings = ArmSettings(window, refit, added, threads=threads, seed=seed)
+    groups = [found] if together else [(recording,) for recording in found]
+    with counting(steps(len(groups)), "replaying", progress) as count:
+        runs = tuple(replay_run(group, nominal, ground, settings, count.advance) for group in groups)
+    return ReplayResult(make_report(runs, nominal.name, soil_label(soil), settings), runs)
+
+
+def driven_robot(robot: RobotLike | None, recordings: Sequence[Recording]) -> Robot:
+    """Robot that drove: the one given, else the recordings' own.
+
+    Raises:
+        InputError: recordings of two robots, or none named.
+    """
+    names = sorted({recording.meta.robot for recording in recordings} - {""})
+    if len(names) > 1:
+        raise InputError(f"the runs are of the robots {', '.join(names)}: replay one robot at a time.")
+    if robot is None and not names:
+        raise InputError("the recordings do not say which robot drove: name it with --robot (robot=... in Python).")
+    return robot_from(names[0] if robot is None else robot)
+
+
+def _draw(
+    runs: Sequence[RunResult], folder: Path, progress: Callable[[str], None] | None
+) -> dict[tuple[int, str], list[Path]]:
+    from ddagr_gym.reporting.replay_figures import replay_overview, replay_residuals
+    from ddagr_gym.reporting.replay_text import DRIVEN_BY
+
+    figures: dict[tuple[int, str], list[Path]] = {}
+    with counting(sum(len(run.arms) for run in runs), "drawing", progress) as steps:
+        for number, run in enumerate(runs):
+            stem = _stem(run, number, len(runs))
+            for arm in run.arms:
+                title = f"{', '.join(run.report.sources)}, driven by {DRIVEN_BY[arm.report.drive]}"
+                overview, _ = replay_overview(arm, folder / f"{stem}_{arm.report.drive}", title)
+                detail, _ = replay_residuals(arm, folder / f"{stem}_{arm.report.drive}_residuals", title)
+                figures[number, arm.report.drive] = [overview, detail]
+                steps.advance()
+    return figures
+
+
+def _stem(run: RunResult, number: int, count: int) -> str:
+    name = Path(run.report.sources[0]).name.split(".", 1)[0] or "run"
+    name = f"{name}_and_{len(run.report.sources) - 1}_more" if len(run.report.sources) > 1 else name
+    return f"{number + 1}_{name}" if count > 1 else name

@@ -1,0 +1,84 @@
+"""A diagnosis as text."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+from ddagr_gym.reporting.text_table import format_table
+
+if TYPE_CHECKING:
+    from ddagr_gym.diagnosis.preprocessing.data_checks import DataDoubt
+    from ddagr_gym.diagnosis.result.verdict import Diagnosis, Finding
+
+FINDING_HEADER = ("effect", "size", "90 % interval", "unit", "gain", "gate", "could also be")
+
+FIT_HEADER = ("error on unseen drives", "raw", "refitted", "corrected", "black box", "ceiling", "unit")
+
+_SHOWN = ("position", "pose_yaw", "heading_by_gyro", "yaw_rate", "speed", "specific_force_x", "specific_force_y")
+"""Channels whose errors are shown, in this order."""
+
+
+def outcome_text(diagnosis: Diagnosis) -> str:
+    """Answer, findings and errors at the horizons, as tables."""
+    parts = [diagnosis.sentence]
+    if diagnosis.checks:
+        lines = [_doubt_line(doubt) for doubt in diagnosis.checks]
+        parts.append("\n".join(["The recordings themselves are suspicious (`ddagr check` says more):", *lines]))
+    if diagnosis.findings:
+        parts.append(format_table(FINDING_HEADER, finding_rows(diagnosis)))
+    if diagnosis.rejected:
+        nearest = ", ".join(f"{item.name} (gain {item.gain:.1f})" for item in diagnosis.rejected)
+        parts.append(f"What comes nearest leaves too much to be named: {nearest}.")
+    if diagnosis.fit is not None:
+        parts += _fit_texts(diagnosis.fit)
+    if diagnosis.next_drive is not None:
+        manoeuvre = str(diagnosis.next_drive["manoeuvre"]).replace("_", " ")
+        parts.append(f"Next drive: {manoeuvre or 'none'}. {diagnosis.next_drive['why']}")
+    return "\n\n".join(parts)
+
+
+def _doubt_line(doubt: DataDoubt) -> str:
+    place = " ".join(filter(None, (doubt.recording, doubt.channel)))
+    return f"  {place}: {doubt.sentence}" if place else f"  {doubt.sentence}"
+
+
+def finding_rows(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
+    """One row per parameter of each finding, under :data:`FINDING_HEADER`."""
+    return [row for finding in diagnosis.findings for row in _finding_rows(finding)]
+
+
+def _finding_rows(finding: Finding) -> Iterator[tuple[str, ...]]:
+    """One row per parameter; what the finding as a whole has stands in the first."""
+    others = [f"{name} {weight:.2f}" for name, weight in finding.equivalence_set.items() if name != finding.name]
+    none = "nothing else" if finding.gate > 0.0 else "seen in the values"
+    whole = (f"{finding.gain:.1f}", f"{finding.gate:.1f}", ", ".join(others) or none)
+    for number, (name, estimate) in enumerate(finding.parameters.items()):
+        interval = "" if estimate.interval is None else f"{estimate.interval[0]:.3g} to {estimate.interval[1]:.3g}"
+        first = number == 0
+        label = f"{finding.name if first else ''} {name}".strip()
+        yield label, f"{estimate.value:.3g}", interval, estimate.unit, *(whole if first else ("", "", ""))
+
+
+def fit_rows(fit: Mapping[str, Any]) -> list[tuple[str, ...]]:
+    """Errors on unseen drives by channel and horizon, under :data:`FIT_HEADER`."""
+    models = ("raw", "refitted", "corrected", "black_box", "ceiling")
+    return [
+        (f"{channel} after {horizon} s", *(f"{entry[model]['value']:.3g}" for model in models), entry["unit"])
+        for channel in _SHOWN
+        for horizon, entry in fit["channels"].get(channel, {}).items()
+    ]
+
+
+def _fit_texts(fit: Mapping[str, Any]) -> Iterator[str]:
+    rows = fit_rows(fit)
+    if rows:
+        yield format_table(FIT_HEADER, rows)
+    shares = [
+        f"{100.0 * share['value']:.0f} % after {horizon} s"
+        for horizon, share in fit["gain_share"].items()
+        if share is not None
+    ]
+    if shares:
+        yield f"Share of the explainable error that the named effects explain: {', '.join(shares)}."
+    yield f"Predicted {fit['folds']}. {fit['note']}"
