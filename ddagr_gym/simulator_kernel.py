@@ -114,6 +114,7 @@ def _average_motion(row: Array, v_x: float, v_y: float, yaw_rate: float) -> None
     """Mean specific force and yaw acceleration over the sample that began at the given motion.
 
     The change of velocity in body axes is that of the inertial one less the turning of the axes and gravity.
+    Theory: wheel model, eq. (34).
     """
     period = row[SAMPLE_PERIOD]
     turning_x = 0.5 * (yaw_rate * v_y + row[YAW_RATE] * row[V_Y])

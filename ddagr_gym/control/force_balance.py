@@ -19,9 +19,10 @@ FeedForward = Callable[[NDArray[np.float64], float, float], tuple[float, float] 
 
 
 class ForceBalance(FeedbackController):
-    """Bank speeds from the estimated soil, corrected by PI on ``u_hat/R* - r_hat``; needs the filter's features.
+    """Bank speeds from the estimated soil, corrected by PI on ``kappa* - r_hat/u_hat``; needs the filter's features.
 
-    Where the estimated soil has no solution the kinematic bank speeds with ``track_ratio`` serve.
+    Theory: control, eq. (5). Where the estimated soil has no solution the kinematic bank speeds with ``track_ratio``
+    serve.
 
     Args:
         robot: nominal robot.

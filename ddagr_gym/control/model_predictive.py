@@ -1,4 +1,4 @@
-"""B5: model-predictive control on the control-affine model at the filter's estimate."""
+"""B5: model-predictive control on the control-affine model at the filter's estimate (theory: control, eq. (6))."""
 
 from __future__ import annotations
 

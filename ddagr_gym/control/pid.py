@@ -1,4 +1,4 @@
-"""A PID loop in discrete time with clamped output and conditional integration."""
+"""A PID loop in discrete time with clamped output and conditional integration (theory: control, eq. (3))."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ class TurnController:
     """Base of the closed-loop controllers; a subclass turns an observation into a curvature.
 
     The speed is the reference speed; curvature becomes bank speeds by the kinematics without slip times
-    ``track_ratio``, the effective over the geometric track.
+    ``track_ratio``, the effective over the geometric track (theory: control, eq. (2)).
 
     Args:
         robot: nominal robot.

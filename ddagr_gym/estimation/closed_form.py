@@ -51,7 +51,7 @@ def symmetric_forward_speed(robot: Robot, yaw_rate: ArrayLike, omega_right: Arra
         y = (q + sqrt(q^2 + 4 A B))/(2 A),   v_x = (A y + B/y)/2.
 
     Exact for every force law in the slip ratio that is odd in it. NaN where its premise fails: outer bank not
-    rolling forward, inner bank rolling backward, no motion.
+    rolling forward, inner bank rolling backward, no motion. Theory: filter, eq. (11).
 
     Args:
         robot: wheel radius and track.

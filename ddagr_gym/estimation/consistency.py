@@ -1,4 +1,7 @@
-"""Is a filter as good as it says? NEES, NIS, whiteness, each with the band that a consistent filter keeps."""
+"""Is a filter as good as it says? NEES, NIS, whiteness, each with the band that a consistent filter keeps.
+
+Theory: filter, section 6.
+"""
 
 from __future__ import annotations
 
@@ -52,7 +55,7 @@ def chi_square_band(degrees: int, count: int = 1, probability: float = 0.95) -> 
 
 
 def normalised_estimation_error(errors: ArrayLike, covariances: ArrayLike, block: slice | str = slice(None)) -> Array:
-    """Normalised estimation error squared over its degrees of freedom, 1 on average for a consistent filter.
+    """NEES over its degrees of freedom, 1 on average for a consistent filter (theory: filter, eq. (10)).
 
     Args:
         errors: (..., n) truth less estimate.

@@ -84,7 +84,7 @@ def propagate(work: Array, decay_right: float, decay_left: float) -> None:
 
 @kernel()
 def joseph_update(work: Array, expected: float, variance: float) -> None:
-    """``P <- (I - K h) P (I - K h)^T + K R K^T`` for one scalar measurement and any gain.
+    """``P <- (I - K h) P (I - K h)^T + K R K^T`` for one scalar measurement and any gain (theory: filter, eq. (8)).
 
     Evaluated as the product it is: ``B = P - K c^T`` with ``c = P h^T``, then ``B - (B h^T) K^T + R K K^T``, where
     ``B h^T = c - K (h c)``.

@@ -1,4 +1,4 @@
-"""Predict and correct: one robot, one sample, in place on the kernels' workspace.
+"""Predict and correct: one robot, one sample, in place on the kernels' workspace (theory: filter, sections 3 to 5).
 
 Ours, beyond the textbook:
 
@@ -183,7 +183,7 @@ def update(
     model: Array, work: Array, innovation: float, expected: float, variance: float, deweighting: float,
     learning: float, learn: bool, scaled: bool,
 ) -> float:  # fmt: skip
-    """Use one innovation.
+    """Use one innovation (theory: filter, eq. (8), (9)).
 
     Args:
         model: packed model.

@@ -41,7 +41,7 @@ class _Arc(NamedTuple):
 
 @kernel()
 def _imbalance(arc: _Arc, unknown: Array, result: Array) -> None:
-    """Sums of F_x, F_y and M_z less what the steady arc needs, at rim speeds right, left and v_y."""
+    """Sums of F_x, F_y and M_z less what the steady arc needs, at rim speeds and v_y (theory: control, eq. (4))."""
     result[0] = arc.mass * arc.rate * unknown[2]
     result[1] = -arc.mass * arc.rate * arc.speed
     result[2] = 0.0

@@ -116,7 +116,7 @@ def thesis_law(v_x: float, v_y: float, rim: float, parameters: LawParameters) ->
 
 @kernel(inline=True)
 def coupled_law(v_x: float, v_y: float, rim: float, parameters: LawParameters) -> Gradient:
-    """``F_x = g s_x - resistance``, ``F_y = g c s_y`` (ours): one traction for slip and slip angle.
+    """``F_x = g s_x - resistance``, ``F_y = g c s_y`` (ours; theory: filter, eq. (4)): one traction for both slips.
 
     ``g = a1 (1 - exp(-a2 q))/q``, ``q^2 = s_x^2 + c s_y^2``, ``c = b/(a1 a2)``: both forces derive from one
     dissipation potential of q. Without lateral slip F_x is (3.15), at small slip F_y is (3.16); a wheel that

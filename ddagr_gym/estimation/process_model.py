@@ -18,7 +18,7 @@ middle, and g = 1 - 1/sqrt(2),
 is second order and L-stable (1 + z psi(z) is the stability function of ROS2). The same ``G = h psi(hA)`` gives the
 transition matrix (``I + G A``, and ``G`` times the derivative of f by bank speeds and parameters) and the effect of an
 acceleration that is constant over the step: state, covariance and process noise share one scheme. The derivatives of
-A are left out of the transition matrix, as in any extended Kalman filter.
+A are left out of the transition matrix, as in any extended Kalman filter. Theory: filter, eq. (6), (7).
 """
 
 from __future__ import annotations

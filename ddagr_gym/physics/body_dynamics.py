@@ -117,7 +117,10 @@ def world_rates(row: Array) -> tuple[float, float]:
 
 @kernel()
 def tilt_gravity(row: Array) -> None:
-    """Gravity in body axes on a plane of gradient SLOPE; gravity is fixed in the world, so it turns with yaw (6.3)."""
+    """Gravity in body axes on a plane of gradient SLOPE; gravity is fixed in the world, so it turns with yaw (6.3).
+
+    Theory: wheel model, eq. (23).
+    """
     if row[SLOPE] == 0.0 and row[SLOPE + 1] == 0.0:
         row[GRAVITY] = 0.0
         row[GRAVITY + 1] = 0.0

@@ -45,7 +45,10 @@ def digitise(value: float, resolution: float, limit: float) -> float:
 
 @kernel()
 def read_imu(row: NDArray[np.float64], noise: NDArray[np.float64]) -> None:
-    """Write READING[0:3]. ``noise``: standard normal draws for specific force x, y and yaw rate."""
+    """Write READING[0:3]. ``noise``: standard normal draws for specific force x, y and yaw rate.
+
+    Theory: wheel model, eq. (35).
+    """
     rate = row[YAW_RATE]
     turn = row[MEAN_YAW_ACCELERATION]
     x = row[IMU_POSITION]

@@ -1,4 +1,7 @@
-"""Quadrature encoders on the banks: counts differenced at the sample rate, so the mean speed over a sample."""
+"""Quadrature encoders on the banks: counts differenced at the sample rate, so the mean speed over a sample.
+
+Theory: wheel model, eq. (36).
+"""
 
 from __future__ import annotations
 
