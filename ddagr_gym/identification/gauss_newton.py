@@ -134,7 +134,10 @@ def effect_columns(problem: Problem, point: Point, base: Array, parameters: Sequ
 
 
 def cost_of(problem: Problem, point: Point, prediction: Array, elimination: Elimination) -> tuple[float, Array]:
-    """Cost with the windows' unknowns eliminated, and the windows' shares (W,); infinite where predictions fail."""
+    """Cost with the windows' unknowns eliminated, and the windows' shares (W,); infinite where predictions fail.
+
+    Theory: identification, eq. (6).
+    """
     residual = elimination.project(problem.residual(point, prediction)[..., None])[..., 0]
     shares = 0.5 * (residual**2).sum(axis=1)
     # residuals leave out what is not there: a window that cannot be predicted would cost nothing
@@ -295,6 +298,8 @@ def _best_by_window(
 
 def bounded_step(information: Array, gradient: Array, low: Array, high: Array) -> Array:
     """Newton step inside bounds: the minimum of the quadratic model there (bounded-variable least squares).
+
+    Theory: identification, eq. (8).
 
     Args:
         information: (P, P), positive definite or nearly so.

@@ -97,7 +97,10 @@ class ChannelNoise:
     counter: bool = False
 
     def of_mean(self, samples: int, speed: Array | float = 0.0) -> Array:
-        """Standard deviation of the mean of ``samples`` successive samples at a travel speed [m/s]."""
+        """Standard deviation of the mean of ``samples`` successive samples at a travel speed [m/s].
+
+        Theory: identification, eq. (4).
+        """
         lags = np.arange(1, samples)
         powers = np.where(lags == 1, self.correlation, 0.0) if self.counter else self.correlation**lags
         factor = (1.0 + 2.0 * np.sum((1.0 - lags / samples) * powers)) / samples

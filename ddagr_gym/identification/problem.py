@@ -236,7 +236,7 @@ class Problem:
         return self.blocked.means(ones)
 
     def eliminate(self, point: Point, base: Array, by_parameter: Array) -> Elimination:
-        """Basis of the unknowns of each window at a point."""
+        """Basis of the unknowns of each window at a point (theory: identification, eq. (7))."""
         changes = self.model.state_derivatives(point.values, point.states, base, point.effects)
         by_state = np.nan_to_num(self.blocked.means(changes))
         local = by_parameter[..., [index for index, _ in self.nuisances.local]]

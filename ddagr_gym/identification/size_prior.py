@@ -16,7 +16,7 @@ TYPICAL_MULTIPLE = 5.0
 
 
 def size_scale(effect: Effect | type[Effect], name: str) -> float:
-    """Standard deviation of a size about neutral, in its unit."""
+    """Standard deviation of a size about neutral, in its unit (theory: identification, eq. (5))."""
     return TYPICAL_MULTIPLE * float(effect.parameter(name).metadata["least"])
 
 

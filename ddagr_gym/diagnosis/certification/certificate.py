@@ -156,6 +156,8 @@ def _estimate(values: Array) -> dict[str, Any]:
 def gains(table: Table, quantities: Sequence[str]) -> dict[str, Array]:
     """(1 + DRAWS,) share of the refitted model's error that a model saves, by model, as a mean over quantities.
 
+    Theory: diagnosis, eq. (12).
+
     Every quantity counts by its error over that of the refitted model. Empty where none of them was measured.
     """
     names = [name for name in quantities if name in table["refitted"] and table["refitted"][name][0] > 0.0]

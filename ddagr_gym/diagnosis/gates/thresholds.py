@@ -85,7 +85,7 @@ class Gate:
 
     @property
     def detectable(self) -> float:
-        """Expected gain of a size that passes nine times in ten.
+        """Expected gain of a size that passes nine times in ten (theory: diagnosis, eq. (11)).
 
         A gain is half the square of a score with variance 1: a size whose expected gain just reaches the gate is missed
         every other time.
@@ -188,6 +188,8 @@ class Thresholds:
     def p_value(self, name: str, gain: float) -> float | None:
         """Share of null runs in which some effect stands as high over its gate, the run at hand counted with them.
 
+        Theory: diagnosis, eq. (8).
+
         None without a bank that kept its runs.
         """
         if not self.maxima:
@@ -217,6 +219,8 @@ class Thresholds:
 
 def gain_at_length(gain: float | NDArray[np.float64], share: float | NDArray[np.float64]) -> NDArray[np.float64]:
     """Gain that the same structure reaches in drives of another length; what noise alone reaches stays.
+
+    Theory: diagnosis, eq. (7).
 
     Args:
         gain: any shape.
@@ -266,6 +270,8 @@ def thresholds_from(
     runs: Sequence[NullRun], bank: str, level: float = LEVEL, origin: Origin | None = None
 ) -> Thresholds:
     """Gates such that the share ``level`` of null runs passes any of them, and strangers' nulls hardly more.
+
+    Theory: diagnosis, eq. (5), (6).
 
     Gains of an effect are divided by the mean of their largest tenth over the runs, or by what noise alone reaches; the
     quantile of the largest of these ratios over all effects then widens all gates alike (a max-statistic correction for

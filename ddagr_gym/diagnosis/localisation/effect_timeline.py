@@ -178,6 +178,8 @@ def _without_nuisances(problem: Problem, fitted: Fitted) -> Callable[[Array], Ar
 def change_points(signal: Array) -> list[int]:
     """Ends of the stretches of (n,) between whose means a signal of unit variance jumps, the last one n.
 
+    Theory: diagnosis, section 10.
+
     PELT with squared errors (R. Killick, P. Fearnhead, I. Eckley, 2012; in C with a linear kernel).
 
     Raises:

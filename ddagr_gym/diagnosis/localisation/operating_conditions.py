@@ -273,6 +273,8 @@ def uneven(
 ) -> Unevenness | None:
     """The regime by which a fitted effect's size differs most, if that is no chance: a score test of its constancy.
 
+    Theory: diagnosis, section 10.
+
     Ordered by a regime, the running sum of what is left along the effect wanders off where its size is not the same
     (A. Zeileis, K. Hornik, 2007, generalised M-fluctuation tests), and its trend is steep where the size drifts, which
     few windows show more clearly; signs drawn by window give the null distribution.

@@ -163,7 +163,7 @@ def isolability(
     priors: NuisancePriors | None = None,
     progress: Callable[[str], None] = lambda name: None,
 ) -> Isolability:
-    """Table of manoeuvres and sensors.
+    """Table of manoeuvres and sensors (theory: diagnosis, section 12).
 
     Args:
         robot: nominal.

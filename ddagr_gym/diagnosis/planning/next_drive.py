@@ -87,7 +87,7 @@ def next_drive(
     setting: Setting | None = None,
     progress: Callable[[str], None] = lambda text: None,
 ) -> dict[str, Any]:
-    """Rank manoeuvres by how well they would tell rivals apart.
+    """Rank manoeuvres by how well they would tell rivals apart (theory: diagnosis, section 12).
 
     Args:
         robot: nominal.

@@ -25,6 +25,8 @@ def equivalence_weights(
 ) -> dict[str, float]:
     """Weight of each rival as the better explanation, averaged over resamplings of the windows.
 
+    Theory: diagnosis, eq. (9).
+
     In a resampling a joint refit has the weight exp(-cost/dispersion) over the sum of all: two that explain the same
     share it equally even where one is always ahead by a little. The library's form of an effect is not the robot's:
     differences of cost count in units of :data:`FORM` of what the best explains, where that is more than 1.

@@ -86,6 +86,8 @@ def intervals(draws: Array, level: float = LEVEL) -> list[tuple[float, float]]:
 def with_structure(interval: tuple[float, float], effect: Effect, field: str) -> tuple[float, float]:
     """An interval widened in quadrature by what resampling one simulator's fit cannot show, within the field's bounds.
 
+    Theory: diagnosis, eq. (10).
+
     Args:
         interval: resampled.
         effect: at its fitted size.
@@ -107,6 +109,8 @@ def with_structure(interval: tuple[float, float], effect: Effect, field: str) ->
 
 def least_detectable(terms: Terms, thresholds: Thresholds, dispersion: float) -> Mapping[str, dict[str, float]]:
     """Distance of each size from neutral that passes the gate nine times in ten, by effect and field.
+
+    Theory: diagnosis, eq. (11).
 
     The gain of a size s is s^2 I / 2 with the information I that is left beside the nuisances; infinite where there is
     none, or where the size lies beyond the bound of what exists. Of an effect that may act at any time or in any way,

@@ -208,7 +208,7 @@ class Reduced:
 
 
 def reduce(terms: Terms, weights: Array | None = None) -> Reduced:
-    """Sum the windows, with weights (W,) if given, and project the nuisances out."""
+    """Sum the windows, with weights (W,) if given, and project the nuisances out (theory: diagnosis, eq. (2))."""
     total = terms.normals.sum(axis=0) if weights is None else np.tensordot(weights, terms.normals, axes=1)
     share = 1.0 if weights is None else float(np.mean(weights))
     p = terms.nuisances
@@ -221,7 +221,7 @@ def reduce(terms: Terms, weights: Array | None = None) -> Reduced:
 
 
 def best_multiples(reduced: Reduced, candidate: Candidate, dispersion: float = 1.0) -> tuple[float, Array]:
-    """Gain and multiples of a candidate's probes, inside what exists in nature.
+    """Gain and multiples of a candidate's probes, inside what exists in nature (theory: diagnosis, eq. (3)).
 
     Args:
         reduced: sums over windows.
@@ -298,7 +298,7 @@ def nuisance_answer(problem: Problem, fitted: Fitted, terms: Terms, gain: Gain) 
 
 
 def dispersion_of(problem: Problem, fitted: Fitted) -> float:
-    """Mean square of the weighted residuals of the fit, at least 1."""
+    """Mean square of the weighted residuals of the fit, at least 1 (theory: diagnosis, eq. (1))."""
     unknowns = fitted.elimination.basis.shape[2] * problem.blocked.windows.count
     count = float(problem.blocked.mask.sum()) - unknowns - float(problem.free.sum())
     return max(2.0 * float(fitted.window_cost.sum()) / max(count, 1.0), 1.0)
@@ -306,6 +306,8 @@ def dispersion_of(problem: Problem, fitted: Fitted) -> float:
 
 def scores(terms: Terms, gains_: Sequence[Gain]) -> dict[str, float]:
     """Cluster-robust score of each effect along its best direction: sum over windows over its own scatter [-].
+
+    Theory: diagnosis, eq. (4).
 
     The scatter is the sandwich estimate by window, so that correlated errors inside windows do not count as evidence.
     """
@@ -333,6 +335,8 @@ def fold_of(terms: Terms, folds: int, length: float) -> NDArray[np.int64]:
 
 def held_out_gains(terms: Terms, dispersion: float = 1.0, folds: int = 4, length: float = 6.0) -> dict[str, float]:
     """Fall of the cost on windows that were left out while multiples and nuisances were fitted, by effect.
+
+    Theory: diagnosis, section 4.
 
     Args:
         terms: of a scan.

@@ -35,7 +35,7 @@ _MOST_RIVALS = 4
 
 
 def search(session: DiagnosisSession, start: StartingModels, cache: StepCache = compute_without_cache) -> SearchResult:
-    """Scan the refitted nominal model, and add effects while one passes the gate.
+    """Scan the refitted nominal model, and add effects while one passes the gate (theory: diagnosis, section 6).
 
     Args:
         session: of the diagnosis.

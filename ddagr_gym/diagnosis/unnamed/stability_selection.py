@@ -136,6 +136,8 @@ def select(
 ) -> list[Stable]:
     """Stable columns, one after the other: of those that are stable the one that is worth most.
 
+    Theory: diagnosis, eq. (13).
+
     Args:
         sums: by group; halves are drawn of the groups.
         plainness: (K,) rank; of members of a cluster that explain the same the plainer one is given.
