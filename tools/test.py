@@ -39,7 +39,8 @@ sys.exit(lint_imports(no_logo=True))
 class Arguments:
     """Run everything that continuous integration runs.
 
-    In order: lint, format, types, import contracts, tests (all but the slow ones), and the tests of the wheel installed
+    In order: lint, format, types, import contracts, tests (all but the slow ones), the documentation site with broken
+    links as errors, and the tests of the wheel installed
     in an environment of its own outside the checkout. The exit code is 1 when anything failed.
 
     Attributes:
@@ -51,7 +52,7 @@ class Arguments:
 
     slow: bool = False
     workers: int = 2
-    only: Literal["all", "lint", "format", "types", "contracts", "tests", "wheel"] = "all"
+    only: Literal["all", "lint", "format", "types", "contracts", "tests", "docs", "wheel"] = "all"
     paths: tuple[Path, ...] = ()
 
 
@@ -88,8 +89,15 @@ def _checks(root: Path, arguments: Arguments) -> dict[str, Callable[[], Outcome]
         "types": lambda: _tool(root, "-m", "mypy"),
         "contracts": lambda: _tool(root, "-c", _LINT_IMPORTS),
         "tests": lambda: _tests(root, arguments),
+        "docs": lambda: _site(root),
         "wheel": lambda: _installed_wheel(root),
     }
+
+
+def _site(root: Path) -> Outcome:
+    """Build the documentation site into a folder that is thrown away."""
+    with tempfile.TemporaryDirectory(prefix="ddagr-site-") as temporary:
+        return _tool(root, "-m", "tools", "docs", "--output", temporary)
 
 
 def _tool(root: Path, *words: str) -> Outcome:
