@@ -190,6 +190,16 @@ def _ending(task: Array, row: Array, x: float, y: float) -> float:
 
 
 @kernel()
+def _exit_ratio(task: Array, half_wheelbase: float) -> float:
+    """Deviation at the exit line over what a furrow forgives, at most ``_LARGEST_EXIT_RATIO``; notes success."""
+    deviation = abs(task[EXIT_LATERAL]) + half_wheelbase * abs(math.sin(task[EXIT_HEADING]))
+    ratio = deviation / FURROW_SLACK
+    forward = abs(task[EXIT_HEADING]) < 0.5 * math.pi
+    task[SUCCESS] = 1.0 if ratio <= 1.0 and forward else 0.0
+    return min(ratio if forward else _LARGEST_EXIT_RATIO, _LARGEST_EXIT_RATIO)
+
+
+@kernel()
 def observe(task: Array, readings: Array, outer_radius: float, observation: NDArray[np.float32]) -> None:
     """Write the scaled observation: means of the readings over the interval, and the task's reference."""
     values = np.zeros(len(SCALES))
@@ -239,19 +249,14 @@ def judge(
     terms[1] = -offset * duration
     speed = math.hypot(row[V_X], row[V_Y])
     curvature = task[RADIUS] * row[YAW_RATE] / max(speed, 0.02)
-    turning = x >= 0.0
-    terms[2] = -min(abs(curvature - task[SIGN]), 2.0) * duration if turning else 0.0
+    terms[2] = -min(abs(curvature - task[SIGN]), 2.0) * duration if x >= 0.0 else 0.0
     right, left = action[0] - task[ACTION_RIGHT], action[1] - task[ACTION_LEFT]
     terms[3] = -(right * right + left * left)
     task[ACTION_RIGHT], task[ACTION_LEFT] = action[0], action[1]
     terms[4] = -_slip_power(row) * duration
     terms[5], terms[6], terms[7] = 0.0, 0.0, 0.0
     if task[EXITED] > was_exited:
-        deviation = abs(task[EXIT_LATERAL]) + row[HALF_WHEELBASE] * abs(math.sin(task[EXIT_HEADING]))
-        ratio = deviation / FURROW_SLACK
-        forward = abs(task[EXIT_HEADING]) < 0.5 * math.pi
-        task[SUCCESS] = 1.0 if ratio <= 1.0 and forward else 0.0
-        terms[5] = -min(ratio if forward else _LARGEST_EXIT_RATIO, _LARGEST_EXIT_RATIO)
+        terms[5] = -_exit_ratio(task, row[HALF_WHEELBASE])
         terms[6] = task[SUCCESS]
     task[ENDING] = _ending(task, row, x, y)
     if task[ENDING] == BOGGED_DOWN or task[ENDING] == LEFT_HEADLAND:

@@ -135,6 +135,17 @@ def _add_slices(work: Array) -> None:
         work[_WRENCH + 4 * LANES + i] += rho * area * work[TANGENTIAL + i]
 
 
+@kernel(inline=True)
+def _sum_lanes(work: Array, wrench: Array) -> None:
+    """Sum the lanes' wrenches in pairs, and write the result."""
+    for half in (4, 2, 1):
+        for j in range(WRENCH):
+            for i in range(half):
+                work[_WRENCH + LANES * j + i] += work[_WRENCH + LANES * j + half + i]
+    for j in range(WRENCH):
+        wrench[j] = work[_WRENCH + LANES * j]
+
+
 @kernel()
 def integrate_patch(
     wheel: Array, soil: Array, motion: WheelMotion, sinkage: float, numerics: PatchNumerics, wrench: Array
@@ -161,8 +172,7 @@ def integrate_patch(
     )
     rate = max(max(abs(omega), abs(v_x) / outer_radius), numerics.minimum_shear_rate)
     decay = -1.0 / (rate * soil[SOIL_SHEAR_MODULUS])
-    front = 1.0 - peak
-    rear = peak + soil[SOIL_EXIT_RATIO]
+    front, rear = 1.0 - peak, peak + soil[SOIL_EXIT_RATIO]
     work = stack_array(_SIZE)
     for i in range(_WRENCH, _SIZE):
         work[i] = 0.0
@@ -170,10 +180,8 @@ def integrate_patch(
         fill_section(wheel[0], wheel[1], wheel[2], hub_height, edge, v_x, yaw_rate, section_nodes, first, work)
         _begin_slices(work, v_y, omega, yaw_rate)
         for k in range(contact_nodes.shape[1]):
-            front_swept = front * contact_nodes[0, k]
-            rear_swept = front + rear - rear * contact_nodes[0, k]
-            front_weight = front * contact_nodes[1, k]
-            rear_weight = rear * contact_nodes[1, k]
+            front_swept, rear_swept = front * contact_nodes[0, k], front + rear - rear * contact_nodes[0, k]
+            front_weight, rear_weight = front * contact_nodes[1, k], rear * contact_nodes[1, k]
             for i in range(LANES):
                 swept = work[ENTRY + i] * front_swept
                 cos_theta = cos_small(work[ENTRY + i] - swept)
@@ -189,12 +197,7 @@ def integrate_patch(
                     rear_weight * sigma, rear_weight * strength, decay,
                 )  # fmt: skip
         _add_slices(work)
-    for half in (4, 2, 1):
-        for j in range(WRENCH):
-            for i in range(half):
-                work[_WRENCH + LANES * j + i] += work[_WRENCH + LANES * j + half + i]
-    for j in range(WRENCH):
-        wrench[j] = work[_WRENCH + LANES * j]
+    _sum_lanes(work, wrench)
 
 
 @kernel()

@@ -47,8 +47,7 @@ def solve_sinkage(
     high = wheel[0]
     sinkage = min(max(guess, 1e-4 * high), high)
     power = 1.0
-    last_log_sinkage = 0.0
-    last_log_force = 0.0
+    last_log_sinkage = last_log_force = 0.0
     for iteration in range(MAXIMUM_ITERATIONS):
         wheel_wrench(wheel, soil, motion, sinkage, numerics, wrench)
         force = wrench[2]

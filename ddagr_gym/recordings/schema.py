@@ -258,15 +258,13 @@ class Recording:
         t = arrays.pop("t")
         geometry = RobotGeometry.of(robot) if isinstance(robot, Robot) else robot
         whole: Ranges = ((0, len(t)),) if len(t) else ()
-        span_ranges = whole if spans is None else tuple((int(a), int(b)) for a, b in spans)
+        span_ranges = whole if spans is None else _whole_numbers(spans)
         meta = RecordingMeta(
             robot=geometry.name if geometry else "",
             source=source,
             geometry=geometry,
             start_time=float(t[0]) if t.size else 0.0,
-            segments=split_at_gaps(t, span_ranges)
-            if segments is None
-            else tuple((int(a), int(b)) for a, b in segments),
+            segments=split_at_gaps(t, span_ranges) if segments is None else _whole_numbers(segments),
             spans=span_ranges,
             notes=tuple(notes),
         )
@@ -386,3 +384,7 @@ def _gravity(recording: Recording) -> Iterator[str]:
         yield f"specific_force_z has the median {middle:.3g} m/s^2: z points down here; give the axes signs in the map."
     elif abs(middle) < 1.0:
         yield f"specific_force_z has the median {middle:.3g} m/s^2: gravity was taken out; the schema wants it in."
+
+
+def _whole_numbers(ranges: Iterable[tuple[int, int]]) -> Ranges:
+    return tuple((int(first), int(end)) for first, end in ranges)

@@ -146,10 +146,7 @@ def _travel_findings(recording: Recording, rng: np.random.Generator) -> list[Fin
         return [
             not_testable(CHECK, pair, why, "Name the robot with --robot." if missing else "Record poses while driving.")
         ]
-    along, across, coherence = (float(v) for v in found.values)
-    angle = float(np.arctan2(across, along))
-    low, high = found.intervals[1]
-    spread = max(abs(along), 1e-3)
+    along, _, coherence = (float(v) for v in found.values)
     return [
         judge(
             CHECK,
@@ -162,17 +159,7 @@ def _travel_findings(recording: Recording, rng: np.random.Generator) -> list[Fin
             remedy="Check the encoders' sign and unit, the wheel radius, and the pose's unit.",
             suspects=("encoder_scale",),
         ),
-        judge(
-            "direction",
-            "pose",
-            angle,
-            (angle + (low - across) / spread, angle + (high - across) / spread),
-            DIRECTION_RANGE,
-            "rad",
-            meaning=f"The robot travels {angle:.3f} rad to the left of the pose's heading.",
-            remedy="Check the heading's zero, sign and frame against REP 103; a steady side slope makes robots crab.",
-            suspects=("slope",),
-        ),
+        _direction_finding(found),
         judge(
             "coherence",
             pair,
@@ -185,6 +172,25 @@ def _travel_findings(recording: Recording, rng: np.random.Generator) -> list[Fin
             suspects=("encoder_scale", "gyro_sign", "pose_latency"),
         ),
     ]
+
+
+def _direction_finding(found: Estimate) -> Finding:
+    """Whether the robot travels where the pose says that it points."""
+    along, across, _ = (float(v) for v in found.values)
+    angle = float(np.arctan2(across, along))
+    low, high = found.intervals[1]
+    spread = max(abs(along), 1e-3)
+    return judge(
+        "direction",
+        "pose",
+        angle,
+        (angle + (low - across) / spread, angle + (high - across) / spread),
+        DIRECTION_RANGE,
+        "rad",
+        meaning=f"The robot travels {angle:.3f} rad to the left of the pose's heading.",
+        remedy="Check the heading's zero, sign and frame against REP 103; a steady side slope makes robots crab.",
+        suspects=("slope",),
+    )
 
 
 def _gain_findings(recording: Recording, rng: np.random.Generator) -> list[Finding]:
