@@ -66,8 +66,11 @@ def missing(theory: dict[str, str], page: str, target: str) -> list[str]:
 
 
 def test_no_file_cites_a_document_that_is_not_here(repository: Path):
+    """Links between pages are checked when the site is built: some of its pages are written then."""
     absent = []
     for path, text in texts(repository):
+        if path.relative_to(repository).parts[0] == "docs" or (repository / "tests" / "docs") in path.parents:
+            continue
         for name in DOCUMENT.findall(text):
             places = (path.parent / name, repository / name, repository / "docs" / name)
             if not any(place.exists() for place in places):
