@@ -36,6 +36,7 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from ddagr_gym.deprecation import install as install_moved_modules
 from ddagr_gym.envs.registration import register_environments
 from ddagr_gym.version import __version__
 
@@ -104,4 +105,5 @@ def __dir__() -> list[str]:
     return sorted({*globals(), *__all__})
 
 
+install_moved_modules()
 register_environments()

@@ -44,14 +44,18 @@ class Arguments:
 
 def run(arguments: Arguments) -> None:
     """Read, convert, validate, write."""
-    from ddagr_gym.recordings.files import Limits
-    from ddagr_gym.recordings.load import load_recording
+    import ddagr_gym
     from ddagr_gym.recordings.storage import save_parquet
 
     if arguments.output.suffix != ".parquet":
         raise InputError(f"--output is {arguments.output}: give a file that ends in .parquet.")
-    limits = Limits(arguments.maximum_rows, arguments.maximum_bytes)
-    recording = load_recording(arguments.source, arguments.map or None, arguments.robot or None, limits)
+    recording = ddagr_gym.load_recording(
+        arguments.source,
+        arguments.map or None,
+        arguments.robot or None,
+        arguments.maximum_rows,
+        arguments.maximum_bytes,
+    )
     save_parquet(recording, arguments.output)
     print(
         f"{arguments.output}: {len(recording)} rows, {len(recording.meta.spans)} spans, "
