@@ -16,7 +16,7 @@ from ddagr_gym.files import output_folder, write_text
 from ddagr_gym.progress import counting
 
 if TYPE_CHECKING:
-    from ddagr_gym.recordings.checks.findings import CheckReport, Finding
+    from ddagr_gym.recordings.checks.findings import CheckFinding, CheckReport
     from ddagr_gym.recordings.schema import Recording
 
 SCHEMA_VERSION = 1
@@ -35,17 +35,17 @@ class CheckResult(Result):
     """
 
     reports: tuple[CheckReport, ...]
-    together: tuple[Finding, ...]
+    together: tuple[CheckFinding, ...]
     recordings: tuple[Recording, ...]
     seed: int
 
     @property
-    def findings(self) -> tuple[Finding, ...]:
+    def findings(self) -> tuple[CheckFinding, ...]:
         """Answers to all questions, one recording after the other, then those about all together."""
         return (*(finding for report in self.reports for finding in report.findings), *self.together)
 
     @property
-    def suspicious(self) -> tuple[Finding, ...]:
+    def suspicious(self) -> tuple[CheckFinding, ...]:
         """Findings that need attention."""
         return tuple(finding for finding in self.findings if finding.status == "suspicious")
 

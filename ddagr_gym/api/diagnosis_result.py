@@ -114,7 +114,7 @@ class DiagnosisResult(Result):
 
     def to_json(self, path: str | os.PathLike[str]) -> None:
         """Write diagnosis.json (``docs/diagnosis_schema.md``), whole or not at all."""
-        from ddagr_gym.diagnosis.result.verdict import save
+        from ddagr_gym.diagnosis.result.files import save
 
         save(self.diagnosis, Path(path))
 
@@ -135,7 +135,6 @@ class DiagnosisResult(Result):
             InputError: the folder holds something else, or an earlier report without ``overwrite``.
         """
         from ddagr_gym.diagnosis.result import evidence
-        from ddagr_gym.diagnosis.result.verdict import as_mapping
         from ddagr_gym.reporting import diagnosis_page
 
         with output_folder(folder, overwrite=overwrite) as filled:
@@ -143,8 +142,8 @@ class DiagnosisResult(Result):
             self._save_refitted(filled)
             self.to_json(filled / "diagnosis.json")
             self.outcome.evidence.save(filled / evidence.NAME)
-            if not self.diagnosis.options["names_only"]:
-                diagnosis_page.write_report(filled, as_mapping(self.diagnosis), self.outcome.evidence)
+            if not self.diagnosis.options.names_only:
+                diagnosis_page.write_report(filled, self.diagnosis, self.outcome.evidence)
                 (filled / diagnosis_page.PAGE).rename(filled / PAGE)
         return Path(folder)
 

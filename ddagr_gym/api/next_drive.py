@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias, Union
+from typing import TYPE_CHECKING, TypeAlias, Union
 
 from ddagr_gym.api.inputs import RobotLike
 from ddagr_gym.api.nominal import SoilLike, robot_from, soil_from
@@ -17,6 +17,8 @@ from ddagr_gym.files import write_text
 
 if TYPE_CHECKING:
     from ddagr_gym.api.diagnosis_result import DiagnosisResult
+    from ddagr_gym.diagnosis.result.next_drive_plan import NextDrivePlan
+    from ddagr_gym.diagnosis.result.verdict import Diagnosis
     from ddagr_gym.diagnosis.setting import Setting
     from ddagr_gym.physics.effects import Effect
 
@@ -38,33 +40,32 @@ class NextDriveResult(Result):
         answer: as :func:`ddagr_gym.diagnosis.planning.next_drive.next_drive` says it and ``to_json`` writes it.
     """
 
-    answer: Mapping[str, Any]
+    answer: NextDrivePlan
 
     @property
     def manoeuvre(self) -> str:
         """Name of the manoeuvre, as :func:`ddagr_gym.simulate` takes it; "" where none helps."""
-        return str(self.answer["manoeuvre"])
+        return self.answer.manoeuvre
 
     @property
     def why(self) -> str:
         """Why this one, or why none, in a sentence."""
-        return str(self.answer["why"])
+        return self.answer.why
 
     @property
     def separates(self) -> tuple[tuple[str, str], ...]:
         """Pairs of effects that it tells apart."""
-        return tuple((str(one), str(other)) for one, other in self.answer["separates"])
+        return self.answer.separates
 
     @property
     def minutes(self) -> float | None:
         """Driving time until the worst pair is told apart [min]; None where never."""
-        found = self.answer["minutes"]
-        return None if found is None else float(found)
+        return self.answer.minutes
 
     @property
     def alternatives(self) -> tuple[str, ...]:
         """Names of the runners-up, the best first."""
-        return tuple(str(entry["manoeuvre"]) for entry in self.answer["alternatives"])
+        return tuple(entry.manoeuvre for entry in self.answer.alternatives)
 
     @property
     def headline(self) -> str:
@@ -84,7 +85,9 @@ class NextDriveResult(Result):
 
     def to_json(self, path: str | os.PathLike[str]) -> None:
         """Write the answer as JSON, whole or not at all."""
-        write_text(path, json.dumps(self.answer, indent=1, allow_nan=False) + "\n")
+        from ddagr_gym.diagnosis.result.files import plain
+
+        write_text(path, json.dumps(plain(self.answer), indent=1, allow_nan=False) + "\n")
 
 
 def next_drive(
@@ -154,23 +157,23 @@ class _Question:
 
 def _question(given: QuestionLike) -> _Question:
     from ddagr_gym.api.diagnosis_result import DiagnosisResult
-    from ddagr_gym.diagnosis.result.verdict import as_mapping, load
+    from ddagr_gym.diagnosis.result.files import load
 
     if isinstance(given, DiagnosisResult):
-        return _of_diagnosis(as_mapping(given.diagnosis), *given.nominal)
+        return _of_diagnosis(given.diagnosis, *given.nominal)
     if isinstance(given, str | os.PathLike):
         path = Path(given)
-        mapping = load(path / "diagnosis.json" if path.is_dir() else path)
-        named = mapping["options"].get("robot_file") or mapping["robot"] or ROBOT, mapping["soil"] or SOIL
-        return _of_diagnosis(mapping, *named)
+        diagnosis = load(path / "diagnosis.json" if path.is_dir() else path)
+        robot = diagnosis.options.robot_file or diagnosis.robot or ROBOT
+        return _of_diagnosis(diagnosis, robot, diagnosis.soil or SOIL)
     return _of_rivals(given)
 
 
-def _of_diagnosis(mapping: Mapping[str, Any], robot: RobotLike, soil: SoilLike) -> _Question:
+def _of_diagnosis(diagnosis: Diagnosis, robot: RobotLike, soil: SoilLike) -> _Question:
     from ddagr_gym.diagnosis.planning.next_drive import rivals_of_diagnosis, sensors_of_diagnosis, setting_of_diagnosis
 
-    setting = setting_of_diagnosis(mapping)
-    return _Question(rivals_of_diagnosis(mapping), sensors_of_diagnosis(mapping), robot, soil, setting)
+    setting = setting_of_diagnosis(diagnosis)
+    return _Question(rivals_of_diagnosis(diagnosis), sensors_of_diagnosis(diagnosis), robot, soil, setting)
 
 
 def _of_rivals(given: RivalsLike) -> _Question:

@@ -50,7 +50,7 @@ NAMES = (
 )
 """Every command, in the order of ``ddagr --help``."""
 
-CHECKOUT_TOOLS = ("test", "docs", "benchmark", "study", "tune-controllers", "freeze-scenarios")
+CHECKOUT_TOOLS = ("test", "docs", "benchmark", "study", "tune-controllers", "freeze-scenarios", "diagnosis-schema")
 """Tools of the checkout, which ``./ddagr`` starts there."""
 
 

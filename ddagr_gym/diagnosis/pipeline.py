@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, ParamSpec, TypeVar
+from typing import ParamSpec, TypeVar
 
 from ddagr_gym.diagnosis.certification.certificate import of_mended_readings
 from ddagr_gym.diagnosis.certification.certify import certify
@@ -21,8 +21,11 @@ from ddagr_gym.diagnosis.localisation.repeat_spans import where_readings_repeat
 from ddagr_gym.diagnosis.planning.next_drive import next_drive, rivals_of_diagnosis, sensors_of_diagnosis
 from ddagr_gym.diagnosis.preprocessing.data_checks import data_doubts
 from ddagr_gym.diagnosis.preprocessing.session import DiagnosisSession, Progress, be_silent, prepare
+from ddagr_gym.diagnosis.result.certificate import Certificate
 from ddagr_gym.diagnosis.result.conclusion import accept, conclude
-from ddagr_gym.diagnosis.result.verdict import Diagnosis, as_mapping
+from ddagr_gym.diagnosis.result.next_drive_plan import NextDrivePlan
+from ddagr_gym.diagnosis.result.unnamed_terms import UnnamedTerms
+from ddagr_gym.diagnosis.result.verdict import Diagnosis, Options
 from ddagr_gym.diagnosis.review import review
 from ddagr_gym.diagnosis.search.scanned_model import SearchResult
 from ddagr_gym.diagnosis.search.starting_models import starting_models
@@ -154,7 +157,7 @@ def diagnose(
     diagnosis = replace(
         diagnosis,
         fit=fit,
-        localisation=asdict(located),
+        localisation=located,
         unnamed=unnamed,
         next_drive=following,
         checks=checks,
@@ -166,7 +169,7 @@ def diagnose(
     return Outcome(diagnosis, effects, session, accepted, evidence)
 
 
-def _certify(session: DiagnosisSession, found: SearchResult) -> Mapping[str, Any]:
+def _certify(session: DiagnosisSession, found: SearchResult) -> Certificate:
     """Errors of the models; one that names nothing has no corrected model of its own."""
     fit = certify(
         session.problem,
@@ -180,37 +183,41 @@ def _certify(session: DiagnosisSession, found: SearchResult) -> Mapping[str, Any
     return of_mended_readings(fit, named=bool(found.chosen.names)) if session.mended.names else fit
 
 
-def _unnamed(session: DiagnosisSession, found: SearchResult, diagnosis: Diagnosis) -> Mapping[str, Any] | None:
+def _unnamed(session: DiagnosisSession, found: SearchResult, diagnosis: Diagnosis) -> UnnamedTerms | None:
     """Terms without a name, where names do not explain everything."""
     if diagnosis.complete:
         return None
-    return unnamed_terms(session.problem, found.chosen, session.rng("unnamed terms")).as_mapping()
+    return unnamed_terms(session.problem, found.chosen, session.rng("unnamed terms"))
 
 
-def _next_drive(session: DiagnosisSession, diagnosis: Diagnosis) -> Mapping[str, Any]:
+def _next_drive(session: DiagnosisSession, diagnosis: Diagnosis) -> NextDrivePlan:
     """The drive that would separate the explanations that are left; without one, why there is none."""
-    mapping = as_mapping(diagnosis)
-    sensors = sensors_of_diagnosis(mapping)
     try:
         return next_drive(
             session.robot,
             session.soil,
-            rivals_of_diagnosis(mapping),
-            sensors=sensors,
+            rivals_of_diagnosis(diagnosis),
+            sensors=sensors_of_diagnosis(diagnosis),
             seed=session.seed,
             setting=session.setting,
             progress=session.progress,
         )
     except InputError as error:
-        return {"manoeuvre": "", "why": str(error), "separates": [], "power": 0.0, "minutes": None, "alternatives": []}
+        return NextDrivePlan.none(str(error))
 
 
-def _options(session: DiagnosisSession, names_only: bool, robot_file: str) -> dict[str, Any]:
+def _options(session: DiagnosisSession, names_only: bool, robot_file: str) -> Options:
     """Choices that the answer depends on besides data, robot, soil and thresholds; windows as they were searched."""
     setting = session.setting
-    windows = {"window": setting.duration, "stride": setting.stride, "block": setting.block}
-    choices = {"priors": asdict(setting.priors), "seed": session.seed, "names_only": names_only}
-    return {**windows, **choices, **({"robot_file": robot_file} if robot_file else {})}
+    return Options(
+        window=setting.duration,
+        stride=setting.stride,
+        block=setting.block,
+        priors=asdict(setting.priors),
+        seed=session.seed,
+        names_only=names_only,
+        robot_file=robot_file or None,
+    )
 
 
 def effect_intervals(diagnosis: Diagnosis) -> Sequence[Mapping[str, tuple[float, float]]]:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, replace
-from typing import Any
+from dataclasses import replace
 
 from ddagr_gym.diagnosis.certification.certificate import worse_on_unseen
-from ddagr_gym.diagnosis.localisation.localise import Localisation, Where
 from ddagr_gym.diagnosis.localisation.operating_condition_words import uneven_phrase
-from ddagr_gym.diagnosis.preprocessing.data_checks import DataDoubt, dead_channels, suspects_of
+from ddagr_gym.diagnosis.preprocessing.data_checks import dead_channels, suspects_of
+from ddagr_gym.diagnosis.result.certificate import Certificate
+from ddagr_gym.diagnosis.result.location import EffectLocation, Localisation
 from ddagr_gym.diagnosis.result.sentences import (
     dead_in_words,
     headline,
@@ -18,7 +18,7 @@ from ddagr_gym.diagnosis.result.sentences import (
     worse_in_words,
 )
 from ddagr_gym.diagnosis.result.size_bounds import pushed_to_bounds
-from ddagr_gym.diagnosis.result.verdict import NONE, UNKNOWN, Diagnosis
+from ddagr_gym.diagnosis.result.verdict import NONE, UNKNOWN, DataDoubt, Diagnosis
 from ddagr_gym.diagnosis.wording import in_sentence
 
 WHOLE = 0.8
@@ -29,8 +29,8 @@ ones explain 0.99 or more, a patch in place of a disturbed compass 0.3)."""
 def review(
     diagnosis: Diagnosis,
     located: Localisation,
-    repeats: Where | None = None,
-    fit: Mapping[str, Any] | None = None,
+    repeats: EffectLocation | None = None,
+    fit: Certificate | None = None,
     checks: Sequence[DataDoubt] = (),
 ) -> Diagnosis:
     """Findings with their places, and the headline with what speaks against them.
@@ -48,7 +48,7 @@ def review(
         checks: of the recordings.
     """
     places = {**located.findings, **({} if repeats is None else {"sensor_hold": repeats})}
-    findings = tuple(replace(f, where=asdict(places[f.name]) if f.name in places else None) for f in diagnosis.findings)
+    findings = tuple(replace(f, where=places.get(f.name)) for f in diagnosis.findings)
     nameless = diagnosis.verdict in ((NONE,), (UNKNOWN,))
     dead = dead_channels(checks)
     doubts = [] if nameless else _doubts_of_names(replace(diagnosis, findings=findings), places, fit)
@@ -62,7 +62,7 @@ def review(
     return replace(diagnosis, findings=findings, complete=whole and not doubts, sentence=sentence)
 
 
-def _doubts_of_names(diagnosis: Diagnosis, places: Mapping[str, Where], fit: Mapping[str, Any] | None) -> list[str]:
+def _doubts_of_names(diagnosis: Diagnosis, places: Mapping[str, EffectLocation], fit: Certificate | None) -> list[str]:
     """Sentences on findings that are uneven, at a bound, or predict unseen drives worse."""
     named = [finding.name for finding in diagnosis.findings]
     uneven = {name: places[name].uneven for name in named if name in places}
@@ -71,4 +71,4 @@ def _doubts_of_names(diagnosis: Diagnosis, places: Mapping[str, Where], fit: Map
     ]
     doubts += [pushed_in_words(**vars(pushed)) for pushed in pushed_to_bounds(diagnosis.findings)]
     worse = worse_on_unseen(fit) if named else None
-    return doubts if worse is None else [*doubts, worse_in_words(**worse)]
+    return doubts if worse is None else [*doubts, worse_in_words(**vars(worse))]

@@ -8,8 +8,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
 
+from ddagr_gym.diagnosis.result.verdict import Estimate
 from ddagr_gym.physics.effects.registry import effect_kinds
 
 DEGREES = 180.0 / math.pi
@@ -48,18 +48,14 @@ class Amount:
 Amounts = Mapping[str, Amount]
 
 
-def amounts(parameters: Mapping[str, Any]) -> dict[str, Amount]:
-    """Amounts of a finding's parameters, given as mappings (of a JSON file) or as objects, with the same entries."""
-    return {str(name): _amount(item) for name, item in parameters.items()}
+def amounts(parameters: Mapping[str, Estimate]) -> dict[str, Amount]:
+    """Amounts of a finding's parameters; an interval whose ends are not finite is none."""
+    return {name: _amount(item) for name, item in parameters.items()}
 
 
-def _amount(item: Any) -> Amount:
-    get: Callable[[str], Any] = item.get if isinstance(item, Mapping) else lambda key: getattr(item, key, None)
-    value, interval = get("value"), get("interval")
-    ends = None
-    if interval is not None and all(end is not None for end in interval):
-        ends = (float(interval[0]), float(interval[1]))
-    return Amount(math.nan if value is None else float(value), str(get("unit") or "-"), ends)
+def _amount(item: Estimate) -> Amount:
+    known = item.interval is not None and all(math.isfinite(end) for end in item.interval)
+    return Amount(item.value, item.unit or "-", item.interval if known else None)
 
 
 def number(value: float, digits: int = 2) -> str:
@@ -360,10 +356,10 @@ _RANGES: dict[str, tuple[str, str]] = {
 
 
 def range_in_words(name: str, low: float | None, high: float | None) -> str:
-    """A range of a regime, such as "at speeds above 0.6 m/s".
+    """A range of an operating condition, such as "at speeds above 0.6 m/s".
 
     Args:
-        name: of the regime.
+        name: of the operating condition.
         low: None where it is open.
         high: the same.
     """

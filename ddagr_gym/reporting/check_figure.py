@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ddagr_gym.recordings.checks.clock_offsets import LAGS, Offset, offsets
-from ddagr_gym.recordings.checks.findings import CheckReport, Finding, Status
+from ddagr_gym.recordings.checks.findings import CheckFinding, CheckReport, Status
 from ddagr_gym.recordings.checks.gravity import rests
 from ddagr_gym.recordings.checks.signals import filled
 from ddagr_gym.recordings.files import write_atomically
@@ -150,7 +150,7 @@ def _gravity(axes: Any, recording: Recording) -> None:
     axes.legend()
 
 
-def _shown(finding: Finding) -> str:
+def _shown(finding: CheckFinding) -> str:
     unit = "" if finding.unit in ("-", "SI") else f" {finding.unit}"
     return f"{finding.value:.3g}{unit}"
 
@@ -175,7 +175,7 @@ def position(value: float, expected: tuple[float, float]) -> float:
     return float(np.sign(value - end) if np.isfinite(low) else np.sign(end - value)) * 0.5
 
 
-def shown_findings(report: CheckReport) -> list[Finding]:
+def shown_findings(report: CheckReport) -> list[CheckFinding]:
     """Findings for the figure: those with an interval of some width, and every suspicious one."""
     return [
         f

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ddagr_gym.recordings.checks.findings import CheckReport, Finding
+from ddagr_gym.recordings.checks.findings import CheckFinding, CheckReport
 from ddagr_gym.reporting.text_table import format_table
 
 
@@ -21,7 +21,7 @@ def report_text(report: CheckReport, everything: bool = False) -> str:
     return "\n".join([*lines, findings_text(report.findings, everything)])
 
 
-def findings_text(findings: Sequence[Finding], everything: bool = False) -> str:
+def findings_text(findings: Sequence[CheckFinding], everything: bool = False) -> str:
     """Findings as a table with what to do below; passes are only counted unless ``everything``."""
     shown = [f for f in findings if everything or f.status != "pass"]
     rows = [finding_row(f) for f in shown]
@@ -35,12 +35,12 @@ def findings_text(findings: Sequence[Finding], everything: bool = False) -> str:
 FINDING_HEADER = ("status", "check", "channel", "value", "meaning")
 
 
-def finding_row(finding: Finding) -> tuple[str, ...]:
+def finding_row(finding: CheckFinding) -> tuple[str, ...]:
     """A finding under :data:`FINDING_HEADER`."""
     return str(finding.status).replace("_", " "), finding.check, finding.channel, _number(finding), finding.meaning
 
 
-def _number(finding: Finding) -> str:
+def _number(finding: CheckFinding) -> str:
     if finding.value is None:
         return ""
     unit = "" if finding.unit in ("-", "SI") else f" {finding.unit}"

@@ -1,14 +1,17 @@
-"""Figures of a diagnosis: where the mismatch is, what each channel says before and after, scores, regimes, forces."""
+"""Figures of a diagnosis: where the mismatch is, what each channel says before and after, scores, motion, forces."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ddagr_gym.diagnosis.result.certificate import Measured, ModelErrors
 from ddagr_gym.diagnosis.result.evidence import Evidence
+from ddagr_gym.diagnosis.result.location import EffectLocation
 from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.recordings.schema import CHANNELS as SCHEMA
 from ddagr_gym.rendering import palette
@@ -27,7 +30,7 @@ LABELS = {
     "local_split": "soil left/right by window", "local_accelerometer_x": "accelerometer x by window",
     "local_accelerometer_y": "accelerometer y by window", "local_gyro": "gyro by window",
 }  # fmt: skip
-REGIME_LABELS = {
+CONDITION_LABELS = {
     "speed": "speed [m/s]", "slip": "slip [-]", "turning": "size of the yaw rate [rad/s]",
     "yaw_rate": "yaw rate [rad/s]", "heading": "heading [degrees]", "command": "larger command [rad/s]",
     "command_change": "change of command [rad/s]", "time": "time [s]",
@@ -169,7 +172,7 @@ def _broken(time: Array, values: Array) -> tuple[Array, Array]:
     return np.concatenate(xs), np.concatenate(ys)
 
 
-def misfit_figure(misfit: Mapping[str, Mapping[str, float | None]]) -> Figure:
+def misfit_figure(misfit: Mapping[str, Mapping[str, float]]) -> Figure:
     """Mean square residual of each channel before and after, with the limit of drives that lack nothing.
 
     Args:
@@ -180,10 +183,10 @@ def misfit_figure(misfit: Mapping[str, Mapping[str, float | None]]) -> Figure:
     axes = figure.subplots()
     place = np.arange(len(names))[::-1]
     for shift, (model, label, colour) in zip((0.19, -0.19), MODELS[1:], strict=True):
-        sizes = [_root(misfit.get(model, {}).get(name)) for name in names]
+        sizes = [_root(misfit.get(model, {}).get(name, math.nan)) for name in names]
         axes.barh(place + shift, sizes, height=0.34, color=colour, label=label)
     for name, y in zip(names, place, strict=True):
-        limit = _root(misfit.get("limit", {}).get(name))
+        limit = _root(misfit.get("limit", {}).get(name, math.nan))
         if limit > 0.0:
             axes.plot([limit, limit], [y - 0.42, y + 0.42], color=palette.INK, linewidth=1.4)
     axes.plot([], [], color=palette.INK, linewidth=1.4, label="limit of the null drives")
@@ -191,8 +194,8 @@ def misfit_figure(misfit: Mapping[str, Mapping[str, float | None]]) -> Figure:
     return figure
 
 
-def _root(value: float | None) -> float:
-    return float(np.sqrt(value)) if value is not None and value > 0.0 else 0.0
+def _root(value: float) -> float:
+    return math.sqrt(value) if value > 0.0 and math.isfinite(value) else 0.0
 
 
 def shown_effects(evidence: Evidence) -> NDArray[np.int64]:
@@ -248,12 +251,12 @@ def _edges(values: Array) -> Array:
     return np.array([*kept, wanted[-1]])
 
 
-def regime_figure(evidence: Evidence, name: str) -> Figure | None:
-    """Mean residual over noise against a regime, before and after; None where it never changes.
+def condition_figure(evidence: Evidence, name: str) -> Figure | None:
+    """Mean residual over noise against an operating condition, before and after; None where it never changes.
 
     Args:
         evidence: of the diagnosis.
-        name: of the regime.
+        name: of the operating condition.
     """
     values = evidence.regimes[evidence.regime_names.index(name)].ravel()
     factor = 180.0 / np.pi if name == "heading" else 1.0
@@ -270,19 +273,19 @@ def regime_figure(evidence: Evidence, name: str) -> Figure | None:
         size = np.sqrt(np.bincount(place, squares, minlength=len(edges) - 1) / count)
         top = max(top, float(size.max()))
         axes.stairs(size, factor * edges, color=colour, linewidth=1.6, baseline=None, linestyle=_LINES[model])
-    axes.set(xlabel=REGIME_LABELS.get(name, name), ylabel="residual / noise")
+    axes.set(xlabel=CONDITION_LABELS.get(name, name), ylabel="residual / noise")
     axes.set_ylim(0.0, 1.08 * top)
     axes.margins(x=0.02)
     return figure
 
 
-def score_figure(evidence: Evidence, number: int, finding: Mapping[str, Any]) -> Figure:
+def score_figure(evidence: Evidence, number: int, where: EffectLocation | None) -> Figure:
     """Standardised score of one effect along each recording, with the stretches in which it shows.
 
     Args:
         evidence: of the diagnosis.
         number: of the effect among the evidence's findings.
-        finding: entry of ``diagnosis.json`` with its ``where``.
+        where: stretches in which it shows; None where nothing says.
     """
     recordings = np.unique(evidence.recording)
     figure = blank_figure(0.55 + 0.85 * len(recordings), 11.0)
@@ -290,12 +293,12 @@ def score_figure(evidence: Evidence, number: int, finding: Mapping[str, Any]) ->
     bars = [_bars(evidence, number, recording) for recording in recordings]
     every = np.concatenate([values for _, _, values in bars])
     limits = (min(float(every.min()), -2.5), max(float(every.max()), 2.5))
-    spans = (finding.get("where") or {}).get("spans") or []
+    spans = () if where is None else where.spans
     for axes, recording, (start, end, values) in zip(panels, recordings, bars, strict=True):
         axes.axhspan(-2.0, 2.0, color=palette.SHADE, linewidth=0.0)
         for span in spans:
-            if span["recording"] == recording:
-                axes.axvspan(span["start"], span["end"], color=palette.PALE_ORANGE, alpha=0.35, linewidth=0.0)
+            if span.recording == recording:
+                axes.axvspan(span.start, span.end, color=palette.PALE_ORANGE, alpha=0.35, linewidth=0.0)
         none = np.zeros(len(values))
         outline = np.stack([[start, start, end, end], [none, values, values, none]])
         axes.fill(*outline.transpose(0, 2, 1).reshape(2, -1), color=palette.INK, linewidth=0.0)
@@ -326,29 +329,28 @@ def _bars(evidence: Evidence, number: int, recording: int) -> tuple[Array, Array
     return start.ravel()[first], end.ravel()[last], standard
 
 
-def horizon_figure(channels: Mapping[str, Mapping[str, Any]], channel: str) -> Figure:
+def horizon_figure(horizons: Mapping[str, ModelErrors], channel: str) -> Figure:
     """Held-out errors of one channel after each horizon: raw, refitted, corrected, and the ceiling.
 
     Args:
-        channels: entry ``fit.channels`` of ``diagnosis.json``.
+        horizons: errors by horizon.
         channel: which.
     """
-    horizons = list(channels[channel])
-    arms = (
+    models = (
         ("raw", "nominal", RAW), ("refitted", "nominal, refitted", BEFORE), ("corrected", "corrected", AFTER),
         ("ceiling", "flexible model (ceiling)", palette.GREEN),
     )  # fmt: skip
     figure = blank_figure(2.2, 2.9)
     axes = figure.subplots()
-    for shift, (arm, _, colour) in zip((-0.27, -0.09, 0.09, 0.27), arms, strict=True):
-        for place, horizon in enumerate(horizons):
-            item = channels[channel][horizon].get(arm) or {}
-            if item.get("value") is None:
+    for shift, (model, _, colour) in zip((-0.27, -0.09, 0.09, 0.27), models, strict=True):
+        for place, errors in enumerate(horizons.values()):
+            item: Measured = getattr(errors, model)
+            if not math.isfinite(item.value):
                 continue
-            if item.get("interval"):
-                axes.plot([place + shift] * 2, item["interval"], color=colour, linewidth=1.4)
-            axes.plot(place + shift, item["value"], "o", color=colour, markersize=4.5)
-    unit = next((channels[channel][h].get("unit") for h in horizons if channels[channel][h].get("unit")), "")
+            if item.interval is not None:
+                axes.plot([place + shift] * 2, item.interval, color=colour, linewidth=1.4)
+            axes.plot(place + shift, item.value, "o", color=colour, markersize=4.5)
+    unit = next(iter(horizons.values())).unit
     axes.set_title(f"{LABELS.get(channel, channel.replace('_', ' '))} [{unit.replace('^2', '²')}]")
     axes.set_xticks(range(len(horizons)), [f"{float(h):g} s" for h in horizons])
     axes.set_xlim(-0.6, len(horizons) - 0.4)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.diagnosis.result.evidence import Evidence
+from ddagr_gym.diagnosis.result.verdict import Finding
 from ddagr_gym.rendering import palette
 from ddagr_gym.reporting.diagnosis_figures import BEFORE, MODELS, MOST_PATHS, Figure, blank_figure, thinned
 
@@ -18,7 +19,7 @@ _PIXELS = 200
 """Per inch, of what is drawn as pixels."""
 
 
-def map_figures(evidence: Evidence, findings: Sequence[Mapping[str, Any]] = ()) -> tuple[Figure, ...]:
+def map_figures(evidence: Evidence, findings: Sequence[Finding] = ()) -> tuple[Figure, ...]:
     """The drives coloured by their mismatch: as the simulator stands, refitted, corrected; on one scale.
 
     Args:
@@ -31,7 +32,7 @@ def map_figures(evidence: Evidence, findings: Sequence[Mapping[str, Any]] = ()) 
     return tuple(_map(evidence, size, top, text, findings) for size, text in zip(sizes, titles, strict=True))
 
 
-def _map(evidence: Evidence, size: Array, top: float, title: str, findings: Sequence[Mapping[str, Any]]) -> Figure:
+def _map(evidence: Evidence, size: Array, top: float, title: str, findings: Sequence[Finding]) -> Figure:
     """Map with sizes (W,) of the windows."""
     from matplotlib.collections import LineCollection
     from matplotlib.colors import LinearSegmentedColormap, Normalize
@@ -58,18 +59,18 @@ def _map(evidence: Evidence, size: Array, top: float, title: str, findings: Sequ
     return figure
 
 
-def _draw_places(axes: Any, evidence: Evidence, findings: Sequence[Mapping[str, Any]]) -> None:
+def _draw_places(axes: Any, evidence: Evidence, findings: Sequence[Finding]) -> None:
     """Circles of places, and an arrow uphill in the corner where a slope was named."""
     from matplotlib.patches import Circle
 
     for finding in findings:
-        for place in (finding.get("where") or {}).get("places") or []:
-            centre = (place["x"], place["y"])
-            axes.add_patch(Circle(centre, place["radius"], facecolor=palette.BED, edgecolor=palette.GREY, zorder=0.5))
-        parameters = finding.get("parameters") or {}
-        if finding.get("name") == "slope" and "direction" in parameters:
-            turned = np.pi * (parameters["angle"]["value"] < 0.0)
-            direction = parameters["direction"]["value"] + turned
+        for place in () if finding.where is None else finding.where.places:
+            centre = (place.x, place.y)
+            axes.add_patch(Circle(centre, place.radius, facecolor=palette.BED, edgecolor=palette.GREY, zorder=0.5))
+        parameters = finding.parameters
+        if finding.name == "slope" and "direction" in parameters:
+            turned = np.pi * (parameters["angle"].value < 0.0)
+            direction = parameters["direction"].value + turned
             step = 0.07 * np.array([np.cos(direction), np.sin(direction)])
             middle = np.array([0.9, 0.88])
             axes.annotate(

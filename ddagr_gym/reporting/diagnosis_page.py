@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ddagr_gym.diagnosis.result.certificate import Certificate
 from ddagr_gym.diagnosis.result.evidence import Evidence
+from ddagr_gym.diagnosis.result.verdict import Diagnosis
 from ddagr_gym.diagnosis.wording import title
 from ddagr_gym.errors import InputError
 from ddagr_gym.files import atomic_path, make_folder
@@ -43,13 +45,13 @@ class _Studio:
 
 
 def write_report(
-    folder: Path, diagnosis: Mapping[str, Any], evidence: Evidence, progress: Progress = lambda name: None
+    folder: Path, diagnosis: Diagnosis, evidence: Evidence, progress: Progress = lambda name: None
 ) -> None:
     """Write ``report.html`` and, in ``figures``, its pictures as PNG.
 
     Args:
         folder: to write to; made where absent.
-        diagnosis: content of ``diagnosis.json``; entries that later steps add may be absent.
+        diagnosis: what later steps add may be absent.
         evidence: of the same diagnosis.
         progress: called with the name of each figure.
 
@@ -76,36 +78,33 @@ def _template() -> Any:
     return environment.get_template("diagnosis.html")
 
 
-def _context(diagnosis: Mapping[str, Any], evidence: Evidence, studio: _Studio) -> dict[str, Any]:
-    findings = diagnosis.get("findings") or []
-    localisation = diagnosis.get("localisation") or {}
+def _context(diagnosis: Diagnosis, evidence: Evidence, studio: _Studio) -> dict[str, Any]:
+    findings, localisation = diagnosis.findings, diagnosis.localisation
     return {
         "raw": figures.RAW,
         "before": figures.BEFORE,
         "after": figures.AFTER,
-        "verdict": ", ".join(diagnosis["verdict"]),
-        "sentence": diagnosis["sentence"],
-        "recordings": diagnosis["recordings"],
+        "verdict": ", ".join(diagnosis.verdict),
+        "sentence": diagnosis.sentence,
+        "recordings": diagnosis.recordings,
         "tiles": tables.tiles(diagnosis, _seconds(evidence)),
-        "checks": tables.checks(diagnosis.get("checks")),
-        "findings": [tables.finding_card(item, diagnosis["recordings"]) for item in findings],
-        "rejected": tables.rejected(diagnosis.get("rejected")),
-        "mismatch": tables.phrase(localisation.get("mismatch")) if findings else "",
-        "remaining": tables.phrase(localisation.get("remaining")),
+        "checks": tables.checks(diagnosis.checks),
+        "findings": [tables.finding_card(item, diagnosis.recordings) for item in findings],
+        "rejected": tables.rejected(diagnosis.rejected),
+        "mismatch": localisation.mismatch.phrase if localisation and findings else "",
+        "remaining": localisation.remaining.phrase if localisation else "",
         "window": f"{evidence.duration:.3g}",
-        "regime_rows": tables.regime_rows(localisation, findings),
-        "gate_note": tables.gate_note(
-            diagnosis["thresholds"], diagnosis.get("robot") or "", diagnosis.get("soil") or ""
-        ),
+        "condition_rows": tables.condition_rows(localisation, findings),
+        "gate_note": tables.gate_note(diagnosis.thresholds, diagnosis.robot, diagnosis.soil),
         "wrench_rows": tables.wrench_rows(localisation),
-        "unnamed": tables.unnamed(diagnosis.get("unnamed")),
-        "next_drive": tables.next_drive(diagnosis.get("next_drive")),
+        "unnamed": tables.unnamed(diagnosis.unnamed),
+        "next_drive": tables.next_drive(diagnosis.next_drive),
         "gates": bool(tables.shown_gates(diagnosis)),
-        "detectable": tables.detectable(diagnosis.get("detectable") or {}, tables.shown_gates(diagnosis)),
+        "detectable": tables.detectable(diagnosis.detectable, tables.shown_gates(diagnosis)),
         "sources": tables.sources(diagnosis),
-        "nuisances": tables.nuisances(diagnosis.get("nuisances") or {}),
-        "fit": _fit(diagnosis.get("fit"), studio),
-        **_pictures(diagnosis, evidence, findings, studio),
+        "nuisances": tables.nuisances(diagnosis.nuisances),
+        "fit": _fit(diagnosis.fit, studio),
+        **_pictures(diagnosis, evidence, studio),
     }
 
 
@@ -118,10 +117,8 @@ def _seconds(evidence: Evidence) -> float:
     return total
 
 
-def _pictures(
-    diagnosis: Mapping[str, Any], evidence: Evidence, findings: Iterable[Mapping[str, Any]], studio: _Studio
-) -> dict[str, Any]:
-    drawn = zip(maps.map_figures(evidence, list(findings)), figures.MODELS, strict=True)
+def _pictures(diagnosis: Diagnosis, evidence: Evidence, studio: _Studio) -> dict[str, Any]:
+    drawn = zip(maps.map_figures(evidence, diagnosis.findings), figures.MODELS, strict=True)
     force_before, force_after = maps.wrench_figures(evidence)
     rows = figures.best_stretch(evidence)
     return {
@@ -131,17 +128,17 @@ def _pictures(
         ],
         "misfit": [
             studio.picture(figures.lasting_figure(evidence), "lasting", "What lasts of each channel's residual"),
-            studio.picture(figures.misfit_figure(diagnosis["misfit"]), "misfit", "Residual over noise by channel"),
+            studio.picture(figures.misfit_figure(diagnosis.misfit), "misfit", "Residual over noise by channel"),
         ],
-        "stretch": _stretch(evidence, rows, diagnosis["recordings"]),
+        "stretch": _stretch(evidence, rows, diagnosis.recordings),
         "channels": [
             studio.picture(
                 figures.channel_figure(evidence, name, rows), f"channel_{name}", f"{figures.LABELS[name]} over time"
             )
             for name in figures.present(evidence)
         ],
-        "scores": _scores(evidence, findings, studio),
-        "regimes": _regimes(evidence, studio),
+        "scores": _scores(diagnosis, evidence, studio),
+        "conditions": _conditions(evidence, studio),
         "gains": studio.picture(
             figures.gain_figure(evidence, title), "gains", "Gain of each effect of the library, with its gate"
         ),
@@ -153,18 +150,18 @@ def _pictures(
     }
 
 
-def _stretch(evidence: Evidence, rows: Any, recordings: list[str]) -> str:
+def _stretch(evidence: Evidence, rows: Any, recordings: Sequence[str]) -> str:
     number = int(evidence.recording[rows[0]])
     start, end = float(evidence.time[rows[0]]), float(evidence.time[rows[-1]]) + evidence.duration
     name = recordings[number] if number < len(recordings) else f"recording {number + 1}"
     return f"stretch in which the correction helps most: {start:.0f} to {end:.0f} s of {name}"
 
 
-def _scores(evidence: Evidence, findings: Iterable[Mapping[str, Any]], studio: _Studio) -> list[dict[str, Any]]:
-    by_name = {str(item["name"]): item for item in findings}
+def _scores(diagnosis: Diagnosis, evidence: Evidence, studio: _Studio) -> list[dict[str, Any]]:
+    where = {finding.name: finding.where for finding in diagnosis.findings}
     return [
         studio.picture(
-            figures.score_figure(evidence, number, by_name.get(name, {})),
+            figures.score_figure(evidence, number, where.get(name)),
             f"score_{number + 1}",
             f"Score of {title(name)} over time",
             title=title(name),
@@ -173,8 +170,8 @@ def _scores(evidence: Evidence, findings: Iterable[Mapping[str, Any]], studio: _
     ]
 
 
-def _regimes(evidence: Evidence, studio: _Studio) -> list[dict[str, Any]]:
-    drawn = [(name, figures.regime_figure(evidence, name)) for name in evidence.regime_names]
+def _conditions(evidence: Evidence, studio: _Studio) -> list[dict[str, Any]]:
+    drawn = [(name, figures.condition_figure(evidence, name)) for name in evidence.regime_names]
     return [
         studio.picture(figure, f"regime_{name}", f"Residual over noise against {name.replace('_', ' ')}")
         for name, figure in drawn
@@ -182,12 +179,11 @@ def _regimes(evidence: Evidence, studio: _Studio) -> list[dict[str, Any]]:
     ]
 
 
-def _fit(fit: Mapping[str, Any] | None, studio: _Studio) -> dict[str, Any] | None:
-    channels = (fit or {}).get("channels") or {}
-    if fit is None or not channels:
+def _fit(fit: Certificate | None, studio: _Studio) -> dict[str, Any] | None:
+    if fit is None or not fit.channels:
         return None
     pictures = [
-        studio.picture(figures.horizon_figure(channels, name), f"errors_{number + 1}", f"Held-out errors of {name}")
-        for number, name in enumerate(channels)
+        studio.picture(figures.horizon_figure(horizons, name), f"errors_{number + 1}", f"Held-out errors of {name}")
+        for number, (name, horizons) in enumerate(fit.channels.items())
     ]
     return {**tables.fit_table(fit), "pictures": pictures}

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 from ddagr_gym.reporting.text_table import format_table
 
 if TYPE_CHECKING:
-    from ddagr_gym.diagnosis.preprocessing.data_checks import DataDoubt
-    from ddagr_gym.diagnosis.result.verdict import Diagnosis, Finding
+    from ddagr_gym.diagnosis.result.certificate import Certificate
+    from ddagr_gym.diagnosis.result.verdict import DataDoubt, Diagnosis, Finding
 
 FINDING_HEADER = ("effect", "size", "90 % interval", "unit", "gain", "gate", "could also be")
 
@@ -33,8 +33,8 @@ def outcome_text(diagnosis: Diagnosis) -> str:
     if diagnosis.fit is not None:
         parts += _fit_texts(diagnosis.fit)
     if diagnosis.next_drive is not None:
-        manoeuvre = str(diagnosis.next_drive["manoeuvre"]).replace("_", " ")
-        parts.append(f"Next drive: {manoeuvre or 'none'}. {diagnosis.next_drive['why']}")
+        manoeuvre = diagnosis.next_drive.manoeuvre.replace("_", " ")
+        parts.append(f"Next drive: {manoeuvre or 'none'}. {diagnosis.next_drive.why}")
     return "\n\n".join(parts)
 
 
@@ -60,25 +60,25 @@ def _finding_rows(finding: Finding) -> Iterator[tuple[str, ...]]:
         yield label, f"{estimate.value:.3g}", interval, estimate.unit, *(whole if first else ("", "", ""))
 
 
-def fit_rows(fit: Mapping[str, Any]) -> list[tuple[str, ...]]:
+def fit_rows(fit: Certificate) -> list[tuple[str, ...]]:
     """Errors on unseen drives by channel and horizon, under :data:`FIT_HEADER`."""
     models = ("raw", "refitted", "corrected", "black_box", "ceiling")
     return [
-        (f"{channel} after {horizon} s", *(f"{entry[model]['value']:.3g}" for model in models), entry["unit"])
+        (f"{channel} after {horizon} s", *(f"{getattr(errors, model).value:.3g}" for model in models), errors.unit)
         for channel in _SHOWN
-        for horizon, entry in fit["channels"].get(channel, {}).items()
+        for horizon, errors in fit.channels.get(channel, {}).items()
     ]
 
 
-def _fit_texts(fit: Mapping[str, Any]) -> Iterator[str]:
+def _fit_texts(fit: Certificate) -> Iterator[str]:
     rows = fit_rows(fit)
     if rows:
         yield format_table(FIT_HEADER, rows)
     shares = [
-        f"{100.0 * share['value']:.0f} % after {horizon} s"
-        for horizon, share in fit["gain_share"].items()
+        f"{100.0 * share.value:.0f} % after {horizon} s"
+        for horizon, share in fit.gain_share.items()
         if share is not None
     ]
     if shares:
         yield f"Share of the explainable error that the named effects explain: {', '.join(shares)}."
-    yield f"Predicted {fit['folds']}. {fit['note']}"
+    yield f"Predicted {fit.folds}. {fit.note}"

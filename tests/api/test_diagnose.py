@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import ddagr_gym
-from ddagr_gym.diagnosis.result.verdict import load
+from ddagr_gym.diagnosis.result.files import load
 from ddagr_gym.errors import InputError, InputWarning
 from ddagr_gym.physics.effects import load_effects
 from ddagr_gym.presets import get_robot, get_soil

@@ -14,8 +14,8 @@ from ddagr_gym.cli import main
 from ddagr_gym.diagnosis import pipeline
 from ddagr_gym.diagnosis.gates.threshold_files import save_thresholds
 from ddagr_gym.diagnosis.gates.thresholds import Gate, Thresholds
-from ddagr_gym.diagnosis.preprocessing.data_checks import DataDoubt
-from ddagr_gym.diagnosis.result.verdict import Diagnosis, load
+from ddagr_gym.diagnosis.result.files import as_mapping, load
+from ddagr_gym.diagnosis.result.verdict import DataDoubt, Diagnosis, GatesUsed
 from ddagr_gym.diagnosis.store import part_folder
 from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.parameters import Imu, PoseReceiver, Sensors
@@ -27,6 +27,7 @@ from ddagr_gym.replay_analysis.report import REFITTED
 from ddagr_gym.reporting.diagnosis_text import outcome_text
 from ddagr_gym.simulator import simulate
 
+NO_GATES = GatesUsed(nulls=0, bank="", level=0.05)
 RATE = 50.0
 STEPS = [(0.7, 0.7), (0.9, 0.4), (0.0, 0.0), (0.4, 0.9), (-0.5, 0.5), (1.0, 1.0)]
 
@@ -88,23 +89,28 @@ def test_the_refitted_robot_and_soil_diagnose_and_plan(
     assert "The ground slopes" in told.out
     assert "ddagr diagnose:   scanning the library" in told.err
     diagnosis = load(work / "again" / "diagnosis.json")
-    assert diagnosis["options"]["robot_file"] == str((found / "robot.yaml").resolve())
-    assert diagnosis["soil"] == str((found / "soil.yaml").resolve())
+    assert diagnosis.options.robot_file == str((found / "robot.yaml").resolve())
+    assert diagnosis.soil == str((found / "soil.yaml").resolve())
 
 
 def test_the_slope_is_named_and_certified(found: Path) -> None:
     diagnosis = load(found / "diagnosis.json")
-    assert diagnosis["verdict"] == ["slope"]
-    estimate = diagnosis["findings"][0]["parameters"]["angle"]
-    assert estimate["value"] == pytest.approx(0.06, abs=0.005)
-    position = diagnosis["fit"]["channels"]["position"]["5"]
-    assert position["corrected"]["value"] < 0.5 * position["refitted"]["value"]
-    assert diagnosis["fit"]["gain_share"]["5"]["value"] > 0.7
-    assert [source["source"] for source in diagnosis["data"]] == ["run_1", "run_2"]
-    assert diagnosis["findings"][0]["where"]["phrase"]
-    assert diagnosis["next_drive"]["why"]
-    assert set(diagnosis["detectable_alone"]) == set(diagnosis["detectable"])
-    assert diagnosis["detectable_alone"]["slope"] == diagnosis["detectable"]["slope"]
+    assert diagnosis.verdict == ("slope",)
+    estimate = diagnosis.findings[0].parameters["angle"]
+    assert estimate.value == pytest.approx(0.06, abs=0.005)
+    fit = diagnosis.fit
+    assert fit is not None
+    position = fit.channels["position"]["5"]
+    assert position.corrected.value < 0.5 * position.refitted.value
+    share = fit.gain_share["5"]
+    assert share is not None
+    assert share.value > 0.7
+    assert [source.source for source in diagnosis.data] == ["run_1", "run_2"]
+    assert diagnosis.findings[0].where is not None
+    assert diagnosis.next_drive is not None
+    assert diagnosis.next_drive.why
+    assert set(diagnosis.detectable_alone) == set(diagnosis.detectable)
+    assert diagnosis.detectable_alone["slope"] == diagnosis.detectable["slope"]
 
 
 def test_the_folder_is_complete(found: Path) -> None:
@@ -117,10 +123,10 @@ def test_the_folder_is_complete(found: Path) -> None:
 
 
 def test_both_effects_files_hold_what_the_diagnosis_says(found: Path) -> None:
-    named = load(found / "diagnosis.json")["findings"][0]["parameters"]
+    named = load(found / "diagnosis.json").findings[0].parameters
     for name in ("effects.json", "effects.yaml"):
         (effect,) = load_effects(found / name)
-        assert effect.as_mapping()["parameters"] == {key: item["value"] for key, item in named.items()}
+        assert effect.as_mapping()["parameters"] == {key: item.value for key, item in named.items()}
 
 
 def test_the_loop_closes(found: Path, work: Path) -> None:
@@ -135,9 +141,11 @@ def test_the_loop_closes(found: Path, work: Path) -> None:
     assert main(["replay", *runs, *options, str(output)]) == 0
     assert main(["replay", *runs, *options, str(output) + "_with", *effects]) == 0
     errors = [_replayed(Path(path)) for path in (str(output), str(output) + "_with")]
-    certified = load(found / "diagnosis.json")["fit"]["channels"]["position"]["5"]
+    fit = load(found / "diagnosis.json").fit
+    assert fit is not None
+    certified = fit.channels["position"]["5"]
     assert errors[1] < 0.6 * errors[0]
-    assert errors[1] < certified["corrected"]["value"] + 0.02
+    assert errors[1] < certified.corrected.value + 0.02
 
 
 def _replayed(folder: Path) -> float:
@@ -174,7 +182,7 @@ def test_a_stopped_diagnosis_goes_on(
 
     monkeypatch.setattr(pipeline, "search", search)
     assert main(words(work, "stopped")) == 0
-    again, before = (load(work / name / "diagnosis.json") for name in ("stopped", "found"))
+    again, before = (as_mapping(load(work / name / "diagnosis.json")) for name in ("stopped", "found"))
     assert {**again, "seconds": 0} == {**before, "seconds": 0}
 
 
@@ -219,7 +227,7 @@ def test_what_is_wrong_with_the_recordings_is_printed_first() -> None:
         DataDoubt("run_1.csv", "yaw_rate", "stuck", "It never changes."),
         DataDoubt("", "", "schema", "Times go back."),
     )
-    answer = Diagnosis(("none",), False, (), "Nothing is missing.", {}, {}, {}, (), {}, 1.0, "0", checks=doubts)
+    answer = Diagnosis(("none",), False, (), "Nothing is missing.", {}, {}, {}, (), NO_GATES, 1.0, "0", checks=doubts)
     lines = outcome_text(answer).splitlines()
     assert lines[0] == "Nothing is missing."
     assert lines[2].startswith("The recordings themselves are suspicious")

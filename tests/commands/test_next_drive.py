@@ -8,7 +8,9 @@ import pytest
 from ddagr_gym.cli import main
 from ddagr_gym.config import dump_config
 from ddagr_gym.control.manoeuvres import MANOEUVRES
-from ddagr_gym.diagnosis.result.verdict import Diagnosis, Estimate, Finding, save
+from ddagr_gym.diagnosis.result.files import save
+from ddagr_gym.diagnosis.result.next_drive_plan import NextDrivePlan
+from ddagr_gym.diagnosis.result.verdict import Diagnosis, Estimate, Finding, GatesUsed, Options
 from ddagr_gym.identification.nuisances import NuisancePriors
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.reporting.next_drive_text import answer_text
@@ -48,8 +50,7 @@ def test_bad_input_is_one_sentence(capsys, arguments, words):
 
 
 def test_an_answer_of_nothing_is_its_sentence():
-    nothing = {"manoeuvre": "", "why": "No manoeuvre helps.", "alternatives": []}
-    assert answer_text(nothing) == "No manoeuvre helps."
+    assert answer_text(NextDrivePlan.none("No manoeuvre helps.")) == "No manoeuvre helps."
 
 
 def test_a_diagnosis_knows_its_robot_and_soil(tmp_path, monkeypatch, capsys):
@@ -58,14 +59,14 @@ def test_a_diagnosis_knows_its_robot_and_soil(tmp_path, monkeypatch, capsys):
 
     def plan(robot, soil, rivals, **rest):
         planned.append((robot.name, soil, [rival.name for rival in rivals]))
-        return {"manoeuvre": "", "why": "No manoeuvre helps.", "alternatives": []}
+        return NextDrivePlan.none("No manoeuvre helps.")
 
     monkeypatch.setattr("ddagr_gym.diagnosis.planning.next_drive.next_drive", plan)
     finding = Finding(
         "slope", {"angle": Estimate(0.02, "rad"), "direction": Estimate(0.3, "rad")}, 30.0, 8.0, 4.0, 20.0,
         equivalence_set={"slope": 0.6, "accelerometer_bias": 0.4},
     )  # fmt: skip
-    bank = {"nulls": 60, "bank": "f", "level": 0.05, "gates": {}}
+    bank = GatesUsed(nulls=60, bank="f", level=0.05)
     found = Diagnosis(
         ("slope",), True, (finding,), "It slopes.", {"nominal": {"yaw_rate": 2.0}}, {}, {}, ("a.csv",), bank, 1.0, "0",
         robot="warthog", soil="firm_ground",
@@ -81,7 +82,7 @@ def test_a_diagnosis_knows_its_robot_and_soil(tmp_path, monkeypatch, capsys):
     assert "No manoeuvre helps." in capsys.readouterr().out
     own = tmp_path / "own.yaml"
     own.write_text(dump_config(replace(get_robot("husky"), name="mine")))
-    options = {"window": 6.0, "stride": 6.0, "block": 0.1, "priors": asdict(NuisancePriors()), "robot_file": str(own)}
+    options = Options(6.0, 6.0, 0.1, asdict(NuisancePriors()), robot_file=str(own))
     save(replace(found, robot="mine", options=options), tmp_path / "diagnosis.json")
     assert main(["next-drive", str(tmp_path)]) == 0
     assert planned[-1][0] == "mine"

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +10,7 @@ from ddagr_gym.diagnosis.certification.certify import certify
 from ddagr_gym.diagnosis.gates.thresholds import Thresholds
 from ddagr_gym.diagnosis.preprocessing.mended_recordings import MendedRecordings
 from ddagr_gym.diagnosis.preprocessing.session import DiagnosisSession
+from ddagr_gym.diagnosis.result.certificate import Certificate
 from ddagr_gym.diagnosis.setting import Setting, make_problem
 from ddagr_gym.identification.gauss_newton import Fitted, fit
 from ddagr_gym.identification.problem import Problem
@@ -74,7 +74,7 @@ class Sloping:
     problem: Problem
     nominal: Fitted
     chosen: Fitted
-    certificate: dict[str, Any]
+    certificate: Certificate
 
 
 def session_of(problem: Problem, recordings: Sequence[Recording], gates: Thresholds) -> DiagnosisSession:

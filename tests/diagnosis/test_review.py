@@ -1,17 +1,17 @@
 """What localisation, certification and checks add to the findings and to the sentence."""
 
-from dataclasses import asdict, replace
+from dataclasses import replace
 
 import pytest
 
-from ddagr_gym.diagnosis.localisation.localise import Localisation, Where
-from ddagr_gym.diagnosis.localisation.operating_conditions import Unevenness
-from ddagr_gym.diagnosis.preprocessing.data_checks import DataDoubt
-from ddagr_gym.diagnosis.result.verdict import Diagnosis, Estimate, Finding, as_mapping, validate
+from ddagr_gym.diagnosis.result.certificate import Certificate, Gains, Measured
+from ddagr_gym.diagnosis.result.files import as_mapping, validate
+from ddagr_gym.diagnosis.result.location import EffectLocation, Localisation, Unevenness
+from ddagr_gym.diagnosis.result.verdict import DataDoubt, Diagnosis, Estimate, Finding, GatesUsed
 from ddagr_gym.diagnosis.review import review
 
 MISFIT = {"yaw_rate": 4.0}
-BANK = {"nulls": 60, "bank": "f", "level": 0.05, "gates": {}}
+BANK = GatesUsed(nulls=60, bank="f", level=0.05)
 
 
 def diagnosis(name: str, field: str, value: float, complete: bool = True) -> Diagnosis:
@@ -20,11 +20,11 @@ def diagnosis(name: str, field: str, value: float, complete: bool = True) -> Dia
     return Diagnosis((name,), complete, (finding,), "", limits, {}, {}, ("a.csv",), BANK, 1.0, "0")
 
 
-def where(uneven: Unevenness | None = None) -> Where:
-    return Where((), 0.0, (), (), uneven, "everywhere")
+def where(uneven: Unevenness | None = None) -> EffectLocation:
+    return EffectLocation((), 0.0, (), (), uneven, "everywhere")
 
 
-def located(explained: float | None = 1.0, **findings: Where) -> Localisation:
+def located(explained: float | None = 1.0, **findings: EffectLocation) -> Localisation:
     return Localisation({}, explained, where(), where(), findings, ())
 
 
@@ -46,21 +46,22 @@ def test_an_even_size_changes_nothing() -> None:
 def test_repeated_readings_keep_their_place() -> None:
     """The model has no such effect, so that localisation says nothing about it."""
     made = review(diagnosis("sensor_hold", "duration", 0.2), located(), where())
-    assert made.findings[0].where == asdict(where())
+    assert made.findings[0].where == where()
     validate(as_mapping(made))
 
 
 def test_drives_predicted_worse_make_a_name_doubtful() -> None:
     """Only where the fall of the error is certain."""
 
-    def made(interval: list[float]) -> Diagnosis:
-        fit = {"gain": {"30": {"corrected": {"value": -0.3, "interval": interval}}}}
+    def made(interval: tuple[float, float]) -> Diagnosis:
+        gain = Gains(Measured(-0.3, interval), Measured(0.0), Measured(0.0))
+        fit = Certificate("by recording", "", (30.0,), 0.9, {}, {"30": gain}, {}, {}, {})
         return review(diagnosis("command_delay", "delay", 0.1), located(), None, fit)
 
-    assert not made([-0.4, -0.2]).complete
-    assert "predicted worse with it, by 30 % (20 to 40 %) after 30 s" in made([-0.4, -0.2]).sentence
-    assert made([-0.4, 0.1]).complete
-    assert "worse" not in made([-0.4, 0.1]).sentence
+    assert not made((-0.4, -0.2)).complete
+    assert "predicted worse with it, by 30 % (20 to 40 %) after 30 s" in made((-0.4, -0.2)).sentence
+    assert made((-0.4, 0.1)).complete
+    assert "worse" not in made((-0.4, 0.1)).sentence
 
 
 def test_findings_that_leave_much_of_the_mismatch_are_not_complete() -> None:

@@ -1,9 +1,10 @@
-"""A diagnosis and its evidence, made by hand, for the tests of its page."""
+"""A diagnosis, by its entries in the file, and its evidence, made by hand, for the tests of its page."""
 
 import numpy as np
 
 from ddagr_gym.diagnosis.result.evidence import Evidence
-from ddagr_gym.diagnosis.result.schema import SCHEMA
+from ddagr_gym.diagnosis.result.files import validate
+from ddagr_gym.diagnosis.result.verdict import SCHEMA
 from ddagr_gym.identification.windows import CHANNELS
 
 HOSTILE = "<script>alert('$x_1$')</script>.csv"
@@ -41,6 +42,12 @@ def where(**changes):
 
 
 def diagnosis(**changes):
+    """The answer with some entries of the file changed."""
+    return validate(entries() | changes)
+
+
+def entries():
+    """Entries of the file."""
     angle = {"value": 0.065, "unit": "rad", "interval": [0.06, 0.07]}
     direction = {"value": 0.56, "unit": "rad", "interval": [0.5, 0.62]}
     finding = {
@@ -57,7 +64,7 @@ def diagnosis(**changes):
         "recordings": [HOSTILE, "run_2.csv"], "thresholds": {"nulls": 120, "bank": "abc", "level": 0.05, "gates": {}},
         "robot": "", "soil": "", "options": {}, "checks": [], "data": [], "rejected": [],
         **dict.fromkeys(("fit", "localisation", "unnamed", "next_drive")),
-    } | changes  # fmt: skip
+    }  # fmt: skip
 
 
 def later_entries():
@@ -70,7 +77,8 @@ def later_entries():
             "folds": "by recording", "note": f"Decided on all drives of {HOSTILE}.", "horizons": [1.0, 30.0],
             "gain_share": {"1": None, "30": {"value": 0.91, "interval": [0.85, 0.95]}},
             "gain_share_readings": {"1": None, "30": None}, "level": 0.9,
-            "gain": {"1": None, "30": {"corrected": error, "ceiling": error}}, "gain_readings": {"1": None},
+            "gain": {"1": None, "30": dict.fromkeys(("corrected", "black_box", "ceiling"), error)},
+            "gain_readings": {"1": None},
             "channels": {"yaw_rate": {"1": arms, "30": arms | {"raw": nothing}}},
         },
         "localisation": {
@@ -84,7 +92,8 @@ def later_entries():
         },
         "next_drive": {
             "manoeuvre": "square_both_ways", "why": "Gravity turns.", "separates": [["slope", "accelerometer_bias"]],
-            "power": 0.97, "alternatives": [{"manoeuvre": "spin"}], "minutes": None,
+            "power": 0.97, "minutes": None,
+            "alternatives": [{"manoeuvre": "spin", "why": "", "separates": [], "power": 0.5, "minutes": 9.0}],
         },
         "checks": [{"recording": "run_2.csv", "channel": HOSTILE, "finding": "stuck", "sentence": "It never changes.",
                     "suspects": []}],

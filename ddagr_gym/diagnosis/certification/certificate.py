@@ -1,14 +1,15 @@
-"""Errors of predictions as the entries of a certificate: root mean squares, intervals, and shares of the ceiling."""
+"""A certificate from errors of predictions: root mean squares, intervals, and shares of the ceiling."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.diagnosis.certification.forecast import MOTION, UNITS
+from ddagr_gym.diagnosis.result.certificate import Certificate, Folds, Gains, Measured, ModelErrors
 from ddagr_gym.diagnosis.result.uncertainty import LEVEL
 from ddagr_gym.identification.windows import CHANNELS
 
@@ -17,22 +18,24 @@ Errors = dict[str, dict[str, Array]]
 """(K,) by model and quantity."""
 
 HORIZONS = (1.0, 5.0, 30.0)
-"""[s] (theory: diagnosis, section 9)."""
+"""Of the predictions [s]: a turn of a wheel, a turn at the headland, a row (theory: diagnosis, section 9)."""
 
 MODELS = ("raw", "refitted", "corrected", "black_box", "ceiling")
 
-BY_RECORDING, BY_TIME = "by recording", "by time"
+BY_RECORDING: Folds = "by recording"
+BY_TIME: Folds = "by time"
 
 DRAWS = 500
+"""Resamplings: the ends of a 90 % interval scatter by a tenth of its width then (ours)."""
 
 LEAST_EXPLAINABLE = 0.03
 """Share of the refitted error that the ceiling must explain before a share of it means anything (ours)."""
 
 
 def certificate(
-    rule: str, found: Mapping[float, Errors], clusters: Mapping[float, NDArray[np.int64]], rng: np.random.Generator
-) -> dict[str, Any]:
-    """Entries of ``fit`` in ``diagnosis.json``.
+    rule: Folds, found: Mapping[float, Errors], clusters: Mapping[float, NDArray[np.int64]], rng: np.random.Generator
+) -> Certificate:
+    """Errors of all models with their intervals.
 
     Args:
         rule: BY_RECORDING or BY_TIME.
@@ -40,10 +43,9 @@ def certificate(
         clusters: of the predictions, by horizon.
         rng: of the resampling.
     """
-    channels: dict[str, dict[str, Any]] = {}
-    shares: dict[str, dict[str, Any]] = {
-        name: {} for name in ("gain", "gain_readings", "gain_share", "gain_share_readings")
-    }
+    channels: dict[str, dict[str, ModelErrors]] = {}
+    gain: dict[str, dict[str, Gains | None]] = {"": {}, "_readings": {}}
+    share: dict[str, dict[str, Measured | None]] = {"": {}, "_readings": {}}
     lost = 0
     for horizon, every in found.items():
         key = f"{horizon:g}"
@@ -52,19 +54,23 @@ def certificate(
         table = resampled(errors, clusters[horizon], rng)
         for quantity in UNITS:
             if quantity in table["refitted"]:
-                channels.setdefault(quantity, {})[key] = _entry(table, quantity, errors)
+                channels.setdefault(quantity, {})[key] = _model_errors(table, quantity, errors)
         for quantities, ending in ((MOTION, ""), (CHANNELS, "_readings")):
             gained = gains(table, quantities)
-            shares[f"gain{ending}"][key] = {model: _estimate(values) for model, values in gained.items()} or None
-            shares[f"gain_share{ending}"][key] = gain_share(gained)
-    return {
-        "folds": rule,
-        "note": _note(rule, found, lost),
-        "horizons": list(HORIZONS),
-        "level": LEVEL,
-        "channels": channels,
-        **shares,
-    }
+            measured = {model: _measured(values) for model, values in gained.items()}
+            gain[ending][key] = Gains(**measured) if measured else None
+            share[ending][key] = gain_share(gained)
+    return Certificate(
+        folds=rule,
+        note=_note(rule, found, lost),
+        horizons=HORIZONS,
+        level=LEVEL,
+        channels=channels,
+        gain=gain[""],
+        gain_readings=gain["_readings"],
+        gain_share=share[""],
+        gain_share_readings=share["_readings"],
+    )
 
 
 def finished(errors: Errors) -> tuple[Errors, int]:
@@ -75,7 +81,7 @@ def finished(errors: Errors) -> tuple[Errors, int]:
     return {m: {q: np.where(every[q], v, np.nan) for q, v in e.items()} for m, e in errors.items()}, lost
 
 
-def _note(rule: str, found: Mapping[float, Errors], lost: int) -> str:
+def _note(rule: Folds, found: Mapping[float, Errors], lost: int) -> str:
     parts = ["Which effects are in the model was decided on all drives; their sizes and the nominal model's were not."]
     if rule == BY_TIME:
         parts.append(
@@ -137,20 +143,20 @@ def _widened(draws: Array, clusters: int) -> Array:
     return np.asarray(draws[0] * (draws / draws[0]) ** wider)
 
 
-def _entry(table: Table, quantity: str, errors: Errors) -> dict[str, Any]:
-    entry: dict[str, Any] = {name: _estimate(table[name][quantity]) for name in MODELS}
+def _model_errors(table: Table, quantity: str, errors: Errors) -> ModelErrors:
     count = int(np.isfinite(errors["refitted"][quantity]).sum())
-    return entry | {"unit": UNITS[quantity], "count": count}
+    measured = {name: _measured(table[name][quantity]) for name in MODELS}
+    return ModelErrors(**measured, unit=UNITS[quantity], count=count)
 
 
-def _estimate(values: Array) -> dict[str, Any]:
+def _measured(values: Array) -> Measured:
     """The first value, and the interval of the others."""
     rest = values[1:][np.isfinite(values[1:])]
     if rest.size < DRAWS // 2:
-        return {"value": float(values[0]), "interval": None}
+        return Measured(float(values[0]))
     tail = 0.5 * (1.0 - LEVEL)
     low, high = np.quantile(rest, [tail, 1.0 - tail])
-    return {"value": float(values[0]), "interval": [float(low), float(high)]}
+    return Measured(float(values[0]), (float(low), float(high)))
 
 
 def gains(table: Table, quantities: Sequence[str]) -> dict[str, Array]:
@@ -171,7 +177,7 @@ def gains(table: Table, quantities: Sequence[str]) -> dict[str, Array]:
     return {model: saved(model) for model in ("corrected", "black_box", "ceiling") if model in table}
 
 
-def gain_share(gained: Mapping[str, Array]) -> dict[str, Any] | None:
+def gain_share(gained: Mapping[str, Array]) -> Measured | None:
     """Share of what the ceiling gains over the refitted nominal model that the named effects gain.
 
     None where not even the ceiling gains :data:`LEAST_EXPLAINABLE`, or where the interval of its gain holds nothing:
@@ -182,14 +188,14 @@ def gain_share(gained: Mapping[str, Array]) -> dict[str, Any] | None:
     """
     if not gained or gained["ceiling"][0] < LEAST_EXPLAINABLE:
         return None
-    ceiling = _estimate(gained["ceiling"])["interval"]
+    ceiling = _measured(gained["ceiling"]).interval
     if ceiling is not None and ceiling[0] <= 0.0:
         return None
     sound = gained["ceiling"] > 0.5 * LEAST_EXPLAINABLE
-    return _estimate(np.where(sound, gained["corrected"] / np.where(sound, gained["ceiling"], 1.0), np.nan))
+    return _measured(np.where(sound, gained["corrected"] / np.where(sound, gained["ceiling"], 1.0), np.nan))
 
 
-def of_mended_readings(fit: Mapping[str, Any], named: bool) -> dict[str, Any]:
+def of_mended_readings(fit: Certificate, named: bool) -> Certificate:
     """A certificate of readings that were mended before any model saw them.
 
     Args:
@@ -198,32 +204,47 @@ def of_mended_readings(fit: Mapping[str, Any], named: bool) -> dict[str, Any]:
             could be explained would be nothing, which says nothing about what was mended.
     """
     note = (
-        f"{fit['note']} Faults that show in the values themselves (repeats, a reversed gyro) are mended before any "
+        f"{fit.note} Faults that show in the values themselves (repeats, a reversed gyro) are mended before any "
         "model is fitted: these errors say nothing about them."
     )
-    shares = {} if named else {name: dict.fromkeys(fit[name]) for name in ("gain_share", "gain_share_readings")}
-    return {**fit, "note": note, **shares}
+    if named:
+        return replace(fit, note=note)
+    none = dict.fromkeys(fit.gain_share), dict.fromkeys(fit.gain_share_readings)
+    return replace(fit, note=note, gain_share=none[0], gain_share_readings=none[1])
 
 
-def worse_on_unseen(fit: Mapping[str, Any] | None) -> dict[str, Any] | None:
-    """The horizon and gain at which the corrected model certainly predicts drives worse than the refitted nominal one.
+@dataclass(frozen=True)
+class Worse:
+    """That drives which nothing was fitted to are certainly predicted worse.
+
+    Attributes:
+        horizon: of the predictions [s].
+        value: change of their error over that of the refitted nominal model, negative.
+        interval: of it.
+    """
+
+    horizon: float
+    value: float
+    interval: tuple[float, float]
+
+
+def worse_on_unseen(fit: Certificate | None) -> Worse | None:
+    """Where the corrected model certainly predicts drives worse than the refitted nominal one, and by how much.
 
     None where nothing was certified, nowhere, or where it certainly predicts better elsewhere: a name that helps with
     one quantity at one horizon is not refuted by another.
 
     Args:
-        fit: of a certificate.
+        fit: of the corrected model.
     """
-    entries = [
-        (float(horizon), models["corrected"])
-        for name in ("gain", "gain_readings")
-        for horizon, models in ((fit or {}).get(name) or {}).items()
-        if models is not None and models["corrected"]["interval"] is not None
+    if fit is None:
+        return None
+    certain = [
+        Worse(float(horizon), gained.corrected.value, gained.corrected.interval)
+        for by_horizon in (fit.gain, fit.gain_readings)
+        for horizon, gained in by_horizon.items()
+        if gained is not None and gained.corrected.interval is not None
     ]
-    if any(entry["interval"][0] > 0.0 for _, entry in entries):
+    if any(item.interval[0] > 0.0 for item in certain):
         return None
-    worse = [(horizon, entry) for horizon, entry in entries if entry["interval"][1] < 0.0]
-    if not worse:
-        return None
-    horizon, entry = min(worse, key=lambda item: item[1]["value"])
-    return {"horizon": horizon, **entry}
+    return min((item for item in certain if item.interval[1] < 0.0), key=lambda item: item.value, default=None)

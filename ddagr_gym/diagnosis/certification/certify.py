@@ -16,7 +16,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +31,7 @@ from ddagr_gym.diagnosis.certification.forecast import (
     start_states,
 )
 from ddagr_gym.diagnosis.certification.residual_model import ResidualModel, Rollout, corrected, fit_residual_model
+from ddagr_gym.diagnosis.result.certificate import Certificate, Folds
 from ddagr_gym.identification.gauss_newton import Fitted, fit
 from ddagr_gym.identification.problem import Elimination, Point, Problem
 from ddagr_gym.parameters import Robot
@@ -64,7 +64,7 @@ class Fold:
     unseen: frozenset[int]
 
 
-def folds_of(problem: Problem) -> tuple[str, list[Fold]]:
+def folds_of(problem: Problem) -> tuple[Folds, list[Fold]]:
     """By recording where there are two or more with windows, else both halves of the time."""
     windows = problem.blocked.windows
     numbers = np.unique(windows.recording)
@@ -146,8 +146,8 @@ def certify(
     recordings: Sequence[Recording],
     rng: np.random.Generator,
     progress: Callable[[str], None] = lambda text: None,
-) -> dict[str, Any]:
-    """Errors of the models at the horizons, as they stand under ``fit`` in ``diagnosis.json``.
+) -> Certificate:
+    """Errors of the models at the horizons.
 
     Args:
         problem: of all windows.

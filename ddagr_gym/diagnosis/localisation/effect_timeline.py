@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ddagr_gym.diagnosis.result.location import Span
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.gauss_newton import Fitted
 from ddagr_gym.identification.problem import Problem
@@ -62,27 +63,6 @@ class ScoreProcess:
     gain: Array
     remainder: Array
     own: Array
-
-
-@dataclass(frozen=True)
-class Span:
-    """A stretch of one recording in which an effect shows.
-
-    Attributes:
-        recording: its number, from 0.
-        start: [s].
-        end: [s].
-        share: of the effect's whole gain.
-        size: over the fitted size [-].
-        deviation: standard deviation of that.
-    """
-
-    recording: int
-    start: float
-    end: float
-    share: float
-    size: float
-    deviation: float
 
 
 def piece_blocks(blocks: int, block: float) -> Integers:

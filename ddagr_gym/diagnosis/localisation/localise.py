@@ -1,16 +1,14 @@
-"""Where the mismatch is: channels, stretches of time, regimes of motion, places, and the force that is missing."""
+"""Where the mismatch is: channels, stretches of time, operating conditions, places, and the force that is missing."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.diagnosis.localisation.effect_timeline import (
     ScoreProcess,
-    Span,
     as_it_stands,
     by_piece,
     in_blocks,
@@ -22,8 +20,16 @@ from ddagr_gym.diagnosis.localisation.effect_timeline import (
     time_share,
 )
 from ddagr_gym.diagnosis.localisation.operating_condition_words import phrase_of, uneven_phrase
-from ddagr_gym.diagnosis.localisation.operating_conditions import Pieces, RegimeShare, Unevenness, shares, uneven
+from ddagr_gym.diagnosis.localisation.operating_conditions import Pieces, shares, uneven
 from ddagr_gym.diagnosis.localisation.residual_wrench import COMPONENTS, residual_wrench
+from ddagr_gym.diagnosis.result.location import (
+    ChannelShare,
+    EffectLocation,
+    Localisation,
+    OperatingConditionShare,
+    Place,
+    WrenchSummary,
+)
 from ddagr_gym.diagnosis.search.scanned_model import SearchResult
 from ddagr_gym.frames import wrap_angle
 from ddagr_gym.identification.gauss_newton import Fitted
@@ -36,7 +42,7 @@ from ddagr_gym.physics.effects import Effect
 Array = NDArray[np.float64]
 
 _SEED = 20240
-"""Of the shifts in the tests of regimes: the same recordings give the same phrases."""
+"""Of the shifts in the tests of operating conditions, any number: the same recordings give the same phrases."""
 
 _ROUGH = 1.25
 """Mean square of the standardised residuals from which a channel's squares are located (ours: windows take 10 to 20
@@ -45,107 +51,6 @@ percent of the squares away, and noise is known to about as much)."""
 _PLACE = ("centre_x", "centre_y", "radius")
 
 _RECORDED = (*range(layout.SLIP_RATIO, layout.SLIP_RATIO + 4), layout.YAW_RATE, layout.V_X, layout.YAW)
-
-
-@dataclass(frozen=True)
-class ChannelShare:
-    """What is left of one channel.
-
-    Attributes:
-        nominal: mean square of the standardised residual of the refitted nominal model.
-        corrected: of the chosen model.
-        floor: what noise alone leaves: 1, or less where the windows' unknowns take a share away.
-        share: of the channel in the mismatch above the floors.
-    """
-
-    nominal: float
-    corrected: float
-    floor: float
-    share: float
-
-
-@dataclass(frozen=True)
-class Place:
-    """A round place in which something acts.
-
-    Attributes:
-        x: of its centre, world [m].
-        y: the same.
-        radius: [m].
-        share: of the gain in it; None for one that was fitted.
-        time_share: of the driven time in it; None the same.
-    """
-
-    x: float
-    y: float
-    radius: float
-    share: float | None = None
-    time_share: float | None = None
-
-
-@dataclass(frozen=True)
-class Where:
-    """Where something acts.
-
-    Attributes:
-        spans: stretches of time, of effects only.
-        time_share: share of the driven time that they cover.
-        regimes: how it lies over each regime, what stands out first.
-        places: where it is bound to a place.
-        uneven: regime in which its size is not what it is elsewhere, None where none is.
-        phrase: in words.
-    """
-
-    spans: tuple[Span, ...]
-    time_share: float
-    regimes: tuple[RegimeShare, ...]
-    places: tuple[Place, ...]
-    uneven: Unevenness | None
-    phrase: str
-
-
-@dataclass(frozen=True)
-class WrenchSummary:
-    """Residual wrench of one component over all windows, each with the weight of its precision.
-
-    Attributes:
-        component: F_x, F_y or M_z, body axes at the body origin.
-        unit: of the numbers.
-        before: mean that the nominal model lacks as it stands.
-        after: the same of the corrected model.
-        deviation: standard deviation of both.
-        chi_before: root mean square over the standard deviation; about 1 where nothing is missing.
-        chi_after: the same.
-    """
-
-    component: str
-    unit: str
-    before: float
-    after: float
-    deviation: float
-    chi_before: float
-    chi_after: float
-
-
-@dataclass(frozen=True)
-class Localisation:
-    """Where the mismatch of a diagnosis is.
-
-    Attributes:
-        channels: by name.
-        explained: share of the mismatch beyond the ordinary that the chosen model explains; None where there is none.
-        mismatch: where the chosen model explains what the nominal one leaves; without one, where that is.
-        remaining: where that of the chosen model is.
-        findings: where each effect of the chosen model acts, by name.
-        wrench: residual force and moment.
-    """
-
-    channels: Mapping[str, ChannelShare]
-    explained: float | None
-    mismatch: Where
-    remaining: Where
-    findings: Mapping[str, Where]
-    wrench: tuple[WrenchSummary, ...]
 
 
 def locate(problem: Problem, found: SearchResult, limits: Mapping[str, float]) -> Localisation:
@@ -261,7 +166,7 @@ def _where(
     effect: Effect,
     pieces: Pieces,
     dispersion: float,
-) -> Where:
+) -> EffectLocation:
     """Where one effect of the chosen model acts."""
     rng = np.random.default_rng(_SEED)
     windows, piece = problem.blocked.windows, piece_length(problem)
@@ -274,7 +179,7 @@ def _where(
     phrase = phrase_of(lying, _fitted_place(effect), covered)
     if other is not None:
         phrase = f"{phrase}; {uneven_phrase(other)}"
-    return Where(shown, covered, lying, places, other, phrase)
+    return EffectLocation(shown, covered, lying, places, other, phrase)
 
 
 def _fitted_place(effect: Effect) -> tuple[Place, ...]:
@@ -285,7 +190,7 @@ def _fitted_place(effect: Effect) -> tuple[Place, ...]:
     return (Place(*(float(values[name]) for name in _PLACE)),)
 
 
-def _standing_place(lying: Sequence[RegimeShare]) -> tuple[Place, ...]:
+def _standing_place(lying: Sequence[OperatingConditionShare]) -> tuple[Place, ...]:
     """The disc that stands out, if that is what stands out."""
     if not lying or lying[0].name != "place" or not lying[0].stands_out:
         return ()
@@ -293,9 +198,9 @@ def _standing_place(lying: Sequence[RegimeShare]) -> tuple[Place, ...]:
     return (Place(x, y, radius, lying[0].weight_inside, lying[0].time_inside),)
 
 
-def _mismatch(problem: Problem, squares: Array, channels: Sequence[str], pieces: Pieces) -> Where:
+def _mismatch(problem: Problem, squares: Array, channels: Sequence[str], pieces: Pieces) -> EffectLocation:
     """Where squared residuals (W, B, 8) exceed those of pure noise, in the channels that do so on the whole."""
-    nothing = Where((), 0.0, (), (), None, "nothing above the noise")
+    nothing = EffectLocation((), 0.0, (), (), None, "nothing above the noise")
     chosen = [CHANNELS.index(name) for name in channels]
     if not chosen:
         return nothing
@@ -303,10 +208,10 @@ def _mismatch(problem: Problem, squares: Array, channels: Sequence[str], pieces:
     return _lying(by_piece(above, pieces_of(problem)).ravel(), pieces)
 
 
-def _lying(weight: Array, pieces: Pieces) -> Where:
+def _lying(weight: Array, pieces: Pieces) -> EffectLocation:
     """Where a weight of the pieces lies, without spans."""
     lying = shares(weight, pieces, np.random.default_rng(_SEED))
-    return Where((), 0.0, lying, _standing_place(lying), None, phrase_of(lying))
+    return EffectLocation((), 0.0, lying, _standing_place(lying), None, phrase_of(lying))
 
 
 def _wrench(problem: Problem, found: SearchResult) -> tuple[WrenchSummary, ...]:

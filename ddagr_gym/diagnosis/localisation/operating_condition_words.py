@@ -1,11 +1,11 @@
-"""Regimes in words: "mostly at speeds above 0.6 m/s"."""
+"""Operating conditions in words: "mostly at speeds above 0.6 m/s"."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Protocol
 
-from ddagr_gym.diagnosis.localisation.operating_conditions import RegimeShare, Unevenness
+from ddagr_gym.diagnosis.result.location import OperatingConditionShare, Unevenness
 from ddagr_gym.diagnosis.wording import EVERYWHERE, number, range_in_words
 
 NOWHERE_MORE = "no motion, place or time stands out"
@@ -28,11 +28,11 @@ class Disc(Protocol):
     def radius(self) -> float: ...  # noqa: D102
 
 
-def phrase_of(lying: Sequence[RegimeShare], fitted: Sequence[Disc] = (), covered: float = 0.0) -> str:
+def phrase_of(lying: Sequence[OperatingConditionShare], fitted: Sequence[Disc] = (), covered: float = 0.0) -> str:
     """What stands out, in words.
 
     Args:
-        lying: how the weight lies over the regimes, what stands out first.
+        lying: how the weight lies over the operating conditions, what stands out first.
         fitted: place of an effect that is bound to one.
         covered: share of the driven time in which it shows.
     """

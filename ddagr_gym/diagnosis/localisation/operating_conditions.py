@@ -1,10 +1,10 @@
-"""Where in what the robot did something stands out: regimes of motion, command, time and place.
+"""Where in what the robot did something stands out: in which motion, at which command, time or place.
 
-What is tested is a list of pieces with a weight each (the gain of an effect, or the mismatch). Ordered by a regime's
-value, the share of the weight runs ahead of the share of the time where the weight is concentrated; the largest excess
-over all ranges is N. Kuiper's statistic, over all discs for places. Its null distribution shifts the weights along each
-recording, which keeps their correlation; the largest standardised excess over all regimes is what a finding is held
-against (a max-statistic), so that noise makes no phrases.
+What is tested is a list of pieces with a weight each (the gain of an effect, or the mismatch). Ordered by the value of
+an operating condition, the share of the weight runs ahead of the share of the time where the weight is concentrated;
+the largest excess over all ranges is N. Kuiper's statistic, over all discs for places. Its null distribution shifts the
+weights along each recording, which keeps their correlation; the largest standardised excess over all operating
+conditions is what a finding is held against (a max-statistic), so that noise makes no phrases.
 """
 
 from __future__ import annotations
@@ -15,16 +15,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ddagr_gym.diagnosis.result.location import CONDITION_LEVEL, OperatingConditionShare, Unevenness
+
 Array = NDArray[np.float64]
-
-REGIME_LEVEL = 0.05
-"""Of the test over all regimes, for one to be put in words."""
-
-REGIME_EXCESS = 0.25
-"""Share of something beyond the share of the time from which a regime is put in words (ours)."""
 Integers = NDArray[np.int64]
 
-REGIMES: Mapping[str, tuple[str, str]] = {
+CONDITIONS: Mapping[str, tuple[str, str]] = {
     "speed": ("m/s", "forward speed, predicted"),
     "slip": ("-", "mean size of the four wheels' slip ratios, predicted"),
     "turning": ("rad/s", "size of the yaw rate, predicted"),
@@ -34,10 +30,10 @@ REGIMES: Mapping[str, tuple[str, str]] = {
     "command_change": ("rad/s", "largest change of a command in the piece and the one before"),
     "time": ("s", "of the recording"),
 }
-"""Unit and meaning of the ordered regimes; places and recordings come beside them."""
+"""Unit and meaning of the ordered operating conditions; places and recordings come beside them."""
 
 LEAST_DIFFERENCE = 0.3
-"""Difference between the sizes of an effect in two regimes, over the fitted size, worth naming (ours)."""
+"""Difference between the sizes of an effect in two operating conditions, over the fitted size, worth naming (ours)."""
 
 BINS = 6
 
@@ -58,7 +54,7 @@ class Pieces:
 
     Attributes:
         recording: (n,) number.
-        values: (n,) by name of REGIMES; NaN where unknown.
+        values: (n,) by name of CONDITIONS; NaN where unknown.
         x: (n,) world [m].
         y: (n,) the same.
     """
@@ -67,43 +63,6 @@ class Pieces:
     values: Mapping[str, Array]
     x: Array
     y: Array
-
-
-@dataclass(frozen=True)
-class RegimeShare:
-    """How a weight lies over one regime.
-
-    Attributes:
-        name: of REGIMES, or "place".
-        unit: of the edges.
-        edges: of the bins, each with about as much time; of a place its centre and radius (x, y, r).
-        time_share: of each bin; of a place the disc's.
-        weight_share: of each bin.
-        low: of the range that stands out; None where it is open.
-        high: the same.
-        excess: share of the weight less share of the time in that range.
-        weight_inside: share of the weight in it.
-        time_inside: share of the time in it.
-        p: of an excess as large in any regime, by shifting the weights.
-    """
-
-    name: str
-    unit: str
-    edges: tuple[float, ...]
-    time_share: tuple[float, ...]
-    weight_share: tuple[float, ...]
-    low: float | None
-    high: float | None
-    excess: float
-    weight_inside: float
-    time_inside: float
-    p: float
-
-    @property
-    def stands_out(self) -> bool:
-        """Whether it is worth a phrase."""
-        bounded = self.name == "place" or self.low is not None or self.high is not None
-        return bounded and self.p < REGIME_LEVEL and self.excess >= REGIME_EXCESS
 
 
 def shifted(weight: Array, recording: Integers, rng: np.random.Generator, count: int) -> Array:
@@ -116,8 +75,8 @@ def shifted(weight: Array, recording: Integers, rng: np.random.Generator, count:
     return np.asarray(weight[order])
 
 
-def shares(weight: Array, pieces: Pieces, rng: np.random.Generator) -> tuple[RegimeShare, ...]:
-    """How a weight lies over all regimes, the one that stands out most first; none where the weight sums to nothing.
+def shares(weight: Array, pieces: Pieces, rng: np.random.Generator) -> tuple[OperatingConditionShare, ...]:
+    """How a weight lies over all operating conditions, what stands out most first; none where it sums to nothing.
 
     Args:
         weight: (n,) of the pieces; single ones may be negative.
@@ -129,7 +88,7 @@ def shares(weight: Array, pieces: Pieces, rng: np.random.Generator) -> tuple[Reg
         return ()
     trials = shifted(weight / total, pieces.recording, rng, _PERMUTATIONS)
     every = np.concatenate([weight[None] / total, trials])
-    found: list[tuple[RegimeShare, Array]] = []
+    found: list[tuple[OperatingConditionShare, Array]] = []
     for name, values in pieces.values.items():
         known = np.isfinite(values)
         if known.all() and np.ptp(values) > 0.0:
@@ -138,8 +97,8 @@ def shares(weight: Array, pieces: Pieces, rng: np.random.Generator) -> tuple[Reg
     return _with_p(found)
 
 
-def _with_p(found: list[tuple[RegimeShare, Array]]) -> tuple[RegimeShare, ...]:
-    """Probabilities over all regimes at once, from statistics (1 + permutations,) of each."""
+def _with_p(found: list[tuple[OperatingConditionShare, Array]]) -> tuple[OperatingConditionShare, ...]:
+    """Probabilities over all operating conditions at once, from statistics (1 + permutations,) of each."""
     table = np.stack([statistic for _, statistic in found])
     middle, spread = table[:, 1:].mean(axis=1), np.maximum(table[:, 1:].std(axis=1), 1e-9)
     standard = (table - middle[:, None]) / spread[:, None]
@@ -149,13 +108,13 @@ def _with_p(found: list[tuple[RegimeShare, Array]]) -> tuple[RegimeShare, ...]:
     return tuple(sorted(named, key=lambda share: (not share.stands_out, -share.excess)))
 
 
-def _ordered(name: str, every: Array, values: Array, usual: Array) -> tuple[RegimeShare, Array]:
+def _ordered(name: str, every: Array, values: Array, usual: Array) -> tuple[OperatingConditionShare, Array]:
     """Kuiper's statistic of weights (P, n) over values (n,), and the range that stands out for the first row.
 
     Args:
-        name: of the regime.
+        name: of the operating condition.
         every: the weights, and trials of the null distribution.
-        values: of the regime.
+        values: of the operating condition.
         usual: (n,) weights where nothing stands out.
     """
     order = np.argsort(values, kind="stable")
@@ -180,8 +139,8 @@ def _ordered(name: str, every: Array, values: Array, usual: Array) -> tuple[Regi
     place = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, max(len(edges) - 2, 0))
     bins = max(len(edges) - 1, 1)
     weight, time = float(every[0][inside].sum()), float(inside.mean())
-    share = RegimeShare(
-        name, REGIMES[name][0], tuple(edges.tolist()),
+    share = OperatingConditionShare(
+        name, CONDITIONS[name][0], tuple(edges.tolist()),
         tuple((np.bincount(place, minlength=bins) / count).tolist()),
         tuple(np.bincount(place, every[0], minlength=bins).tolist()),
         ends[0], ends[1], weight - time, weight, time, 1.0,
@@ -227,7 +186,7 @@ def _ends(values: Array, order: Integers, first: int, last: int, circular: bool)
     return low, high
 
 
-def _places(every: Array, pieces: Pieces) -> tuple[RegimeShare, Array]:
+def _places(every: Array, pieces: Pieces) -> tuple[OperatingConditionShare, Array]:
     """Largest excess of weights (P, n) in a disc."""
     step = max(len(pieces.x) // _MOST_CENTRES, 1)
     centres = np.stack([pieces.x, pieces.y], axis=1)[::step]
@@ -241,43 +200,21 @@ def _places(every: Array, pieces: Pieces) -> tuple[RegimeShare, Array]:
     x, y = float(pieces.x[inside] @ weight) / scale, float(pieces.y[inside] @ weight) / scale
     radius = float(_RADII[best // len(centres)])
     share, time = float(every[0][inside].sum()), float(inside.mean())
-    found = RegimeShare("place", "m", (x, y, radius), (time,), (share,), None, None, share - time, share, time, 1.0)
+    found = OperatingConditionShare(
+        "place", "m", (x, y, radius), (time,), (share,), None, None, share - time, share, time, 1.0
+    )
     return found, excess.max(axis=1)
-
-
-@dataclass(frozen=True)
-class Unevenness:
-    """A regime in which the size of an effect differs from that elsewhere.
-
-    Attributes:
-        name: of REGIMES.
-        unit: of the limits.
-        low: of the range; None where it is open.
-        high: the same.
-        size_inside: over the fitted size [-].
-        size_outside: the same.
-        p: of a difference as clear in any regime.
-    """
-
-    name: str
-    unit: str
-    low: float | None
-    high: float | None
-    size_inside: float
-    size_outside: float
-    p: float
 
 
 def uneven(
     remainder: Array, information: Array, window: Integers, pieces: Pieces, rng: np.random.Generator
 ) -> Unevenness | None:
-    """The regime by which a fitted effect's size differs most, if that is no chance: a score test of its constancy.
+    """The operating condition by which a fitted effect's size differs most, if that is no chance.
 
-    Theory: diagnosis, section 10.
-
-    Ordered by a regime, the running sum of what is left along the effect wanders off where its size is not the same
-    (A. Zeileis, K. Hornik, 2007, generalised M-fluctuation tests), and its trend is steep where the size drifts, which
-    few windows show more clearly; signs drawn by window give the null distribution.
+    Theory: diagnosis, section 10. A score test of its constancy: ordered by an operating condition, the running sum of
+    what is left along the effect wanders off where its size is not the same (A. Zeileis, K. Hornik, 2007, generalised
+    M-fluctuation tests), and its trend is steep where the size drifts, which few windows show more clearly; signs drawn
+    by window give the null distribution.
 
     Args:
         remainder: (n,) inner product of the residual beside the effect and the effect.
@@ -299,14 +236,14 @@ def uneven(
     found += [(share, _trend(every, known[share.name])) for share, _ in found if share.name != "heading"]
     if not found:
         return None
-    clear = [share for share in _with_p(found) if share.p < REGIME_LEVEL]
+    clear = [share for share in _with_p(found) if share.p < CONDITION_LEVEL]
     split = [_split(share, remainder, information, _inside(pieces.values[share.name], share)) for share in clear]
     wide = [(explained, item) for explained, item in split if item is not None]
     return max(wide, key=lambda pair: pair[0])[1] if wide else None
 
 
 def _split(
-    share: RegimeShare, remainder: Array, information: Array, inside: NDArray[np.bool_]
+    share: OperatingConditionShare, remainder: Array, information: Array, inside: NDArray[np.bool_]
 ) -> tuple[float, Unevenness | None]:
     """Fall of the squares by a size of its own in a range, and the sizes; none where they differ by little."""
     within, beyond = float(information[inside].sum()), float(information[~inside].sum())
@@ -320,8 +257,8 @@ def _split(
     return explained, Unevenness(share.name, share.unit, share.low, share.high, *sizes, share.p)
 
 
-def _inside(values: Array, share: RegimeShare) -> NDArray[np.bool_]:
-    """(n,) whether values lie in the range of a regime; one of headings may wrap around."""
+def _inside(values: Array, share: OperatingConditionShare) -> NDArray[np.bool_]:
+    """(n,) whether values lie in the range of an operating condition; one of headings may wrap around."""
     low = -np.inf if share.low is None else share.low
     high = np.inf if share.high is None else share.high
     if low > high:

@@ -6,8 +6,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ddagr_gym.diagnosis.localisation.effect_timeline import Span
-from ddagr_gym.diagnosis.localisation.localise import Where
 from ddagr_gym.diagnosis.preprocessing.repeated_readings import (
     LEAST_SHARE,
     SENSORS,
@@ -16,6 +14,7 @@ from ddagr_gym.diagnosis.preprocessing.repeated_readings import (
     repeat_runs,
     repeated_rows,
 )
+from ddagr_gym.diagnosis.result.location import EffectLocation, Span
 from ddagr_gym.diagnosis.wording import EVERYWHERE
 from ddagr_gym.recordings.schema import Recording
 
@@ -26,7 +25,9 @@ _ALL = 0.95
 """Share of the time from which a sensor is said to repeat its readings everywhere (ours)."""
 
 
-def where_readings_repeat(recordings: Sequence[Recording], repeated: Sequence[RepeatedReadings]) -> Where | None:
+def where_readings_repeat(
+    recordings: Sequence[Recording], repeated: Sequence[RepeatedReadings]
+) -> EffectLocation | None:
     """Stretches in which sensors repeat their readings; None where none does.
 
     Args:
@@ -51,7 +52,7 @@ def where_readings_repeat(recordings: Sequence[Recording], repeated: Sequence[Re
     sensors = " and ".join(item.sensor for item in repeated)
     count = "one stretch" if len(spans) == 1 else f"{len(spans)} stretches"
     when = EVERYWHERE if covered >= _ALL else f"in {count}, {100.0 * covered:.0f} % of the time"
-    return Where(spans, min(covered, 1.0), (), (), None, f"{sensors}: {when}")
+    return EffectLocation(spans, min(covered, 1.0), (), (), None, f"{sensors}: {when}")
 
 
 def _spans(number: int, recording: Recording, item: RepeatedReadings) -> list[tuple[int, Span]]:

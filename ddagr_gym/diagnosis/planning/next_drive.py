@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +18,8 @@ from numpy.typing import NDArray
 from ddagr_gym.control.manoeuvres import MANOEUVRES, Manoeuvre
 from ddagr_gym.diagnosis.planning.isolability import APART
 from ddagr_gym.diagnosis.planning.planned_drive import RATE, SENSORS, Plan, free_of_nuisances, plan, with_room
+from ddagr_gym.diagnosis.result.next_drive_plan import DriveProposal, NextDrivePlan
+from ddagr_gym.diagnosis.result.verdict import Diagnosis, Finding, Options
 from ddagr_gym.diagnosis.search.candidates import Candidate, candidates_of
 from ddagr_gym.diagnosis.search.initial_guess import looped
 from ddagr_gym.diagnosis.search.scan import drive_extent, probe_column
@@ -86,7 +87,7 @@ def next_drive(
     seed: int = 0,
     setting: Setting | None = None,
     progress: Callable[[str], None] = lambda text: None,
-) -> dict[str, Any]:
+) -> NextDrivePlan:
     """Rank manoeuvres by how well they would tell rivals apart (theory: diagnosis, section 12).
 
     Args:
@@ -98,12 +99,6 @@ def next_drive(
         seed: of the noise whose level is estimated.
         setting: of the diagnosis that shall tell them apart, its windows shortened to the manoeuvres.
         progress: called with what is being done.
-
-    Returns:
-        ``manoeuvre`` (name, "" where none of the bank helps), ``why`` (a sentence), ``separates`` (pairs of names that
-        it tells apart within MOST_MINUTES), ``power`` (least expected gain of a pair per minute of driving),
-        ``minutes`` (until the worst pair is told apart; None where never), ``alternatives`` (further manoeuvres with
-        the same).
 
     Raises:
         InputError: no rival, or the same one twice.
@@ -225,37 +220,29 @@ def _left_over(
 
 def _answer(
     manoeuvres: Sequence[Manoeuvre], rivals: Sequence[Effect], found: Sequence[Mapping[tuple[int, int], _Separation]]
-) -> dict[str, Any]:
+) -> NextDrivePlan:
     minutes = [m.duration / 60.0 for m in manoeuvres]
     power = [min(s.gain for s in f.values()) / t for f, t in zip(found, minutes, strict=True)]
     order = sorted(range(len(manoeuvres)), key=lambda k: -power[k])
-    entries = [_entry(manoeuvres[k], rivals, found[k], power[k], minutes[k]) for k in order]
-    best = entries[0]
-    if best["minutes"] is None:
-        return {
-            "manoeuvre": "", "why": _nothing(rivals), "separates": [], "power": best["power"], "minutes": None,
-            "alternatives": [],
-        }  # fmt: skip
-    others = [entry for entry in entries[1:] if entry["minutes"] is not None][:_ALTERNATIVES]
-    return {**best, "alternatives": others}
+    proposals = [_proposal(manoeuvres[k], rivals, found[k], power[k], minutes[k]) for k in order]
+    best = proposals[0]
+    if best.minutes is None:
+        return NextDrivePlan.none(_nothing(rivals), best.power)
+    others = tuple(item for item in proposals[1:] if item.minutes is not None)[:_ALTERNATIVES]
+    return NextDrivePlan(**vars(best), alternatives=others)
 
 
-def _entry(
+def _proposal(
     manoeuvre: Manoeuvre, rivals: Sequence[Effect], found: Mapping[tuple[int, int], _Separation], power: float, t: float
-) -> dict[str, Any]:
+) -> DriveProposal:
     needed = APART / power if power > _NOTHING else math.inf
-    separates = [
-        [rivals[a].name, rivals[b].name]
+    separates = tuple(
+        (rivals[a].name, rivals[b].name)
         for a, b in found
         if 0 <= a < b and min(found[a, b].gain, found[b, a].gain) / t >= APART / MOST_MINUTES
-    ]
-    return {
-        "manoeuvre": manoeuvre.name,
-        "why": _why(manoeuvre, rivals, found, needed),
-        "separates": separates,
-        "power": power,
-        "minutes": needed if needed <= MOST_MINUTES else None,
-    }
+    )
+    why = _why(manoeuvre, rivals, found, needed)
+    return DriveProposal(manoeuvre.name, why, separates, power, needed if needed <= MOST_MINUTES else None)
 
 
 def _why(
@@ -286,26 +273,23 @@ def _nothing(rivals: Sequence[Effect]) -> str:
     return f"No manoeuvre of the bank tells {names} apart within {MOST_MINUTES:g} min with these sensors."
 
 
-def rivals_of_diagnosis(mapping: Mapping[str, Any]) -> list[Effect]:
-    """Effects that a ``diagnosis.json`` leaves open, at their fitted or typical sizes.
+def rivals_of_diagnosis(diagnosis: Diagnosis) -> list[Effect]:
+    """Effects that a diagnosis leaves open, at their fitted or typical sizes.
 
     Those of the equivalence set with most names, of what comes nearest where nothing is named; else, of a finding
     without rivals, what it is itself; else the effects that could hide in these drives at several times the size that
     matters.
-
-    Args:
-        mapping: as :func:`ddagr_gym.diagnosis.result.verdict.load` reads it.
     """
-    every = [*mapping["findings"], *mapping["rejected"]]
-    findings = [f for f in every if f["name"] != "sensor_hold"]
+    every = [*diagnosis.findings, *diagnosis.rejected]
+    findings = [f for f in every if f.name != "sensor_hold"]
     if findings:
-        widest = max(findings, key=lambda f: (len(f["equivalence_set"]), -_certainty(f)))
-        weights = {widest["name"]: 1.0, **widest["equivalence_set"]}
-        names = sorted(weights, key=lambda name: (name != widest["name"], -weights[name]))[:MOST_RIVALS]
-        fitted = {f["name"]: f for f in every}
+        widest = max(findings, key=lambda f: (len(f.equivalence_set), -_certainty(f)))
+        weights = {widest.name: 1.0, **widest.equivalence_set}
+        names = sorted(weights, key=lambda name: (name != widest.name, -weights[name]))[:MOST_RIVALS]
+        fitted = {f.name: f for f in every}
         known = {name: _at_size(name, fitted[name]) for name in names if name in fitted}
         return [known.get(name) or _retold(name, known) for name in names if name in known or _has_typical_size(name)]
-    return [_at_size(name, None) for name in _hidden(mapping["detectable"])]
+    return [_at_size(name, None) for name in _hidden(diagnosis.detectable)]
 
 
 def _retold(name: str, known: Mapping[str, Effect]) -> Effect:
@@ -316,8 +300,8 @@ def _retold(name: str, known: Mapping[str, Effect]) -> Effect:
     return _at_size(name, None)
 
 
-def _certainty(finding: Mapping[str, Any]) -> float:
-    return float(finding["equivalence_set"].get(finding["name"], 1.0))
+def _certainty(finding: Finding) -> float:
+    return finding.equivalence_set.get(finding.name, 1.0)
 
 
 def _has_typical_size(name: str) -> bool:
@@ -326,10 +310,10 @@ def _has_typical_size(name: str) -> bool:
     return kind.categorical or kind.differentiable
 
 
-def _at_size(name: str, finding: Mapping[str, Any] | None) -> Effect:
+def _at_size(name: str, finding: Finding | None) -> Effect:
     kind = effect_kind(name)
     if finding is not None:
-        return kind(**{key: float(item["value"]) for key, item in finding["parameters"].items()})
+        return kind(**{key: item.value for key, item in finding.parameters.items()})
     size = kind.size_names()[0]
     data = kind.parameter(size).metadata
     if kind.categorical:
@@ -353,28 +337,26 @@ def _hidden(detectable: Mapping[str, Mapping[str, float | None]]) -> list[str]:
     return [name for _, name in sorted(found, key=lambda item: (-item[0], item[1]))[:1]]
 
 
-def sensors_of_diagnosis(mapping: Mapping[str, Any]) -> tuple[str, ...]:
-    """Sensors whose channels a ``diagnosis.json`` has a misfit of."""
-    channels = set(mapping["misfit"].get("nominal", {}))
+def sensors_of_diagnosis(diagnosis: Diagnosis) -> tuple[str, ...]:
+    """Sensors whose channels a diagnosis has a misfit of."""
+    channels = set(diagnosis.misfit.get("nominal", {}))
     return tuple(name for name, own in SENSORS.items() if channels & set(own)) or tuple(SENSORS)
 
 
-def setting_of_diagnosis(mapping: Mapping[str, Any]) -> Setting:
-    """Windows and priors of a ``diagnosis.json``; usual ones where it does not say.
-
-    Args:
-        mapping: as :func:`ddagr_gym.diagnosis.result.verdict.load` reads it.
+def setting_of_diagnosis(diagnosis: Diagnosis) -> Setting:
+    """Windows and priors of a diagnosis; usual ones where it does not say.
 
     Raises:
-        InputError: its options are of another form.
+        InputError: its options are not whole, or have priors of another form.
     """
-    options = mapping["options"]
-    if not options:
+    options = diagnosis.options
+    if options == Options():
         return Setting()
     try:
-        priors = NuisancePriors(**options["priors"])
-        return Setting(float(options["window"]), float(options["stride"]), float(options["block"]), priors)
-    except (KeyError, TypeError, ValueError) as error:
+        if options.window is None or options.stride is None or options.block is None or options.priors is None:
+            raise ValueError("window, stride, block and priors are not all there")
+        return Setting(options.window, options.stride, options.block, NuisancePriors(**options.priors))
+    except (TypeError, ValueError) as error:
         raise InputError(
             f"the options of the diagnosis cannot be read ({error}): make it with `ddagr diagnose`."
         ) from None

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from ddagr_gym.diagnosis.result.verdict import DataDoubt
 from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.recordings.checks.across import across_runs
-from ddagr_gym.recordings.checks.findings import Finding, Status
+from ddagr_gym.recordings.checks.findings import CheckFinding, Status
 from ddagr_gym.recordings.checks.run import check_recording
 from ddagr_gym.recordings.schema import Recording
 
@@ -18,25 +18,6 @@ STUCK = "stuck"
 
 FRAMES = "frames"
 """Doubt about the frames of poses, which no check of numbers can settle."""
-
-
-@dataclass(frozen=True)
-class DataDoubt:
-    """Something suspicious about a recording's clocks, signs, units or channels.
-
-    Attributes:
-        recording: its name; "" for what several say together.
-        channel: of the recording, or "a to b" for a pair; "" where it is about all.
-        finding: family of checks (`ddagr check`).
-        sentence: what it is and what to do.
-        suspects: effects that would explain it.
-    """
-
-    recording: str
-    channel: str
-    finding: str
-    sentence: str
-    suspects: tuple[str, ...] = ()
 
 
 def data_doubts(recordings: Sequence[Recording], rng: np.random.Generator) -> tuple[DataDoubt, ...]:
@@ -70,7 +51,7 @@ def _frames_doubt(recording: Recording) -> DataDoubt:
     return DataDoubt(recording.meta.source, "pose_yaw", FRAMES, sentence)
 
 
-def _doubt(recording: str, finding: Finding) -> DataDoubt:
+def _doubt(recording: str, finding: CheckFinding) -> DataDoubt:
     sentence = f"{finding.meaning} {finding.remedy}".strip()
     return DataDoubt(recording, finding.channel, finding.check, sentence, finding.suspects)
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
-from typing import Any
 
 from ddagr_gym.diagnosis.gates.thresholds import Thresholds
 from ddagr_gym.diagnosis.preprocessing.input_requirements import content_hash
@@ -16,7 +15,7 @@ from ddagr_gym.diagnosis.preprocessing.session import DiagnosisSession
 from ddagr_gym.diagnosis.result.equivalence import equivalents
 from ddagr_gym.diagnosis.result.sentences import headline
 from ddagr_gym.diagnosis.result.uncertainty import intervals, least_detectable, resampled_parameters, with_structure
-from ddagr_gym.diagnosis.result.verdict import NONE, UNKNOWN, DataSource, Diagnosis, Estimate, Finding
+from ddagr_gym.diagnosis.result.verdict import NONE, UNKNOWN, DataSource, Diagnosis, Estimate, Finding, GatesUsed
 from ddagr_gym.diagnosis.search.scanned_model import ScannedModel, SearchResult
 from ddagr_gym.diagnosis.search.stepwise import MOST_EFFECTS, further_gates
 from ddagr_gym.identification.misfit import LOCAL, explained_share, roughest
@@ -63,7 +62,7 @@ def conclude(
         {**alone, **beside},
         {p.name: float(v) for p, v in zip(session.problem.nuisances.parameters, values, strict=True) if p.prior > 0.0},
         tuple(recording.meta.source for recording in mended.recordings),
-        _thresholds(gates),
+        _gates_used(gates),
         0.0,
         __version__,
         data=tuple(data_source(recording) for recording in mended.recordings),
@@ -146,11 +145,11 @@ def _findings(session: DiagnosisSession, found: SearchResult) -> list[Finding]:
     return findings
 
 
-def _thresholds(thresholds: Thresholds) -> dict[str, Any]:
+def _gates_used(thresholds: Thresholds) -> GatesUsed:
     """Where the gates come from, and all of them."""
     origin = {} if thresholds.origin is None else asdict(thresholds.origin)
     gates = {name: gate.gain for name, gate in thresholds.gates.items()}
-    return {"nulls": thresholds.nulls, "bank": thresholds.bank, "level": thresholds.level, **origin, "gates": gates}
+    return GatesUsed(nulls=thresholds.nulls, bank=thresholds.bank, level=thresholds.level, **origin, gates=gates)
 
 
 def _detectable(found: SearchResult, thresholds: Thresholds) -> tuple[_Sizes, _Sizes]:

@@ -1,6 +1,7 @@
 """What the pictures of a diagnosis are drawn from: plain arrays, kept in one file without pickles.
 
-W windows of B block means, Q pieces per window, K effects of the library, F effects of the chosen model, R regimes;
+W windows of B block means, Q pieces per window, K effects of the library, F effects of the chosen model, R operating
+conditions;
 channels in the order of :data:`ddagr_gym.identification.windows.CHANNELS`.
 """
 
@@ -52,8 +53,8 @@ class Evidence:
         gains: (K,) fall of the cost by each at the nominal model, over the dispersion.
         left: (K,) the same at the chosen model; NaN for its own effects.
         gates: (K,) what a gain has to pass: the end of the null band. NaN where there is none.
-        regime_names: (R,) see :mod:`ddagr_gym.diagnosis.localisation.operating_conditions`.
-        regimes: (R, W, Q) values.
+        regime_names: (R,) operating conditions, see :mod:`ddagr_gym.diagnosis.localisation.operating_conditions`.
+        regimes: (R, W, Q) values of the operating conditions.
         places: (W, Q, 2) x, y [m].
         findings: (F,) names of the chosen model's effects.
         score: (F, W, Q) see :mod:`ddagr_gym.diagnosis.localisation.effect_timeline`.

@@ -1,159 +1,99 @@
-"""The JSON form of a diagnosis, entry by entry; ``docs/diagnosis_schema.md`` says what they mean."""
+"""The form of ``diagnosis.json`` from the types of the answer: a JSON Schema, and a page on what entries mean."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from typing import Any
+import inspect
+import json
+import re
+from collections.abc import Iterator
+from dataclasses import fields, is_dataclass
+from typing import Any, get_args, get_type_hints
 
-from ddagr_gym.errors import InputError
+import msgspec
 
-SCHEMA = "ddagr-diagnosis/4"
-"""Name and version: raised whenever an entry is renamed, removed or changes its meaning."""
+from ddagr_gym.diagnosis.result.verdict import SCHEMA, Diagnosis
 
+_HEAD = f"""# diagnosis.json
 
-@dataclass(frozen=True)
-class Each:
-    """A mapping by name, every entry of one form."""
+What `ddagr diagnose` writes, schema `{SCHEMA}`. SI units and radians. This page and the JSON Schema in
+`diagnosis.schema.json` are made of the docstrings and types of `ddagr_gym.diagnosis.result` by
+`python -m tools diagnosis-schema`. `ddagr_gym.diagnosis.result.files` reads a file into these types and refuses one of
+another form or version. null stands for what is not known, and for a number that is not finite.
+"""
 
-    of: Any
+_TAIL = """
+# effects.json, effects.yaml, robot.yaml, soil.yaml
 
-
-@dataclass(frozen=True)
-class Items:
-    """A list of one form."""
-
-    of: Any
-
-
-@dataclass(frozen=True)
-class Maybe:
-    """A form, or null."""
-
-    of: Any
-
-
-NUMBER = (int, float)
-VALUE = Maybe(NUMBER)
-"""A number that may be unknown, or that was not finite."""
-
-ESTIMATE = {"value": VALUE, "interval": Maybe(Items(VALUE))}
-
-_PARAMETER = {"value": NUMBER, "unit": str, "interval": Maybe(Items(VALUE))}
-_REGIME = {
-    "name": str, "unit": str, "edges": Items(VALUE), "time_share": Items(VALUE), "weight_share": Items(VALUE),
-    **dict.fromkeys(("low", "high", "excess", "weight_inside", "time_inside", "p"), VALUE),
-}  # fmt: skip
-_SPAN = {"recording": int, **dict.fromkeys(("start", "end", "share", "size", "deviation"), VALUE)}
-_WHERE = {
-    "spans": Items(_SPAN), "time_share": VALUE, "regimes": Items(_REGIME),
-    "places": Items({"x": VALUE, "y": VALUE, "radius": VALUE}), "uneven": Maybe(dict), "phrase": str,
-}  # fmt: skip
-_FINDING = {
-    "name": str, "parameters": Each(_PARAMETER), "gain": NUMBER, "gate": NUMBER, "score": NUMBER, "held_out": NUMBER,
-    "channels": Each(NUMBER), "equivalence_set": Each(NUMBER), "where": Maybe(_WHERE), "calibrated_p": VALUE,
-}  # fmt: skip
-_MODELS = ("raw", "refitted", "corrected", "black_box", "ceiling")
-_SHARES = Each(Maybe(ESTIMATE))
-_FIT = {
-    "folds": str, "note": str, "horizons": Items(NUMBER), "level": NUMBER,
-    "channels": Each(Each({"unit": str, "count": int, **dict.fromkeys(_MODELS, ESTIMATE)})),
-    "gain_share": _SHARES, "gain_share_readings": _SHARES,
-    "gain": Each(Maybe(Each(Maybe(ESTIMATE)))), "gain_readings": Each(Maybe(Each(Maybe(ESTIMATE)))),
-}  # fmt: skip
-_WRENCH = dict.fromkeys(("before", "after", "deviation", "chi_before", "chi_after"), VALUE)
-_LOCALISATION = {
-    "channels": Each(dict.fromkeys(("nominal", "corrected", "floor", "share"), VALUE)),
-    "explained": VALUE, "mismatch": _WHERE, "remaining": _WHERE, "findings": Each(_WHERE),
-    "wrench": Items({"component": str, "unit": str, **_WRENCH}),
-}  # fmt: skip
-_TERM = {
-    "regressor": str, "target": str, "coefficient": VALUE, "unit": str, "interval": Items(VALUE),
-    "stability": VALUE, "alternatives": Items(str),
-}  # fmt: skip
-_UNNAMED = {
-    "equation": str, "terms": Items(_TERM), "equation_share": VALUE, "ceiling_share": VALUE, "where": str,
-}  # fmt: skip
-_NEXT_DRIVE = {
-    "manoeuvre": str, "why": str, "separates": Items(Items(str)), "power": VALUE, "minutes": VALUE,
-    "alternatives": Items(dict),
-}  # fmt: skip
-_CHECK = {"recording": str, "channel": str, "finding": str, "sentence": str, "suspects": Items(str)}
-
-FORM: dict[str, Any] = {
-    "schema": str, "verdict": Items(str), "complete": bool, "findings": list, "sentence": str,
-    "misfit": Each(Each(VALUE)), "detectable": Each(Each(VALUE)), "nuisances": Each(NUMBER),
-    "recordings": Items(str), "thresholds": {"nulls": int, "bank": str, "level": NUMBER, "gates": Each(NUMBER)},
-    "robot": str, "soil": str, "options": dict, "checks": Items(_CHECK), "seconds": NUMBER, "version": str,
-    "fit": Maybe(_FIT), "localisation": Maybe(_LOCALISATION), "unnamed": Maybe(_UNNAMED),
-    "next_drive": Maybe(_NEXT_DRIVE), "data": list, "rejected": list,
-}  # fmt: skip
-_DATA = {"source": str, "sha256": str, "rows": int, "seconds": NUMBER}
-_WORDS = {
-    str: "a text", bool: "true or false", int: "a whole number", float: "a number", list: "a list",
-    dict: "a mapping", type(None): "null",
-}  # fmt: skip
+The named effects with values, units, intervals and the hash of the data, in the form of
+`ddagr_gym.physics.effects.files`. Both load in `gym.make("DDAGR-Turn-v0", effects="effects.yaml")`,
+`ddagr simulate --effects effects.yaml` and `ddagr replay --effects effects.yaml`. The list is empty where nothing, or
+nothing with a name, was found. `robot.yaml` and `soil.yaml` are the nominal ones with the refitted `nuisances` (biases,
+clocks, headings and a difference between left and right soil are not in them): together with the effects they are the
+corrected simulator, `gym.make("DDAGR-Turn-v0", robot="robot.yaml", soil="soil.yaml", effects="effects.yaml")`.
+"""
 
 
-def check_form(mapping: Mapping[str, Any]) -> None:
-    """Check a mapping against the schema; further entries are allowed.
+def json_schema() -> str:
+    """JSON Schema of ``diagnosis.json``, with the docstrings' meanings."""
+    (found,), parts = msgspec.json.schema_components([Diagnosis], ref_template="#/$defs/{name}")
+    kinds = {kind.__name__: kind for kind in answer_types()}
+    for name, part in parts.items():
+        summary, meanings = meanings_of(kinds[name])
+        part["description"] = summary
+        for entry, meaning in part["properties"].items():
+            meaning["description"] = meanings[entry]
+    whole = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": SCHEMA, **found, "$defs": parts}
+    return json.dumps(_with_null(whole), indent=1, ensure_ascii=False) + "\n"
+
+
+def _with_null(part: Any) -> Any:
+    """The same with null for numbers too, which stands for what is not finite."""
+    if isinstance(part, dict):
+        inner = {key: _with_null(item) for key, item in part.items()}
+        return inner | {"type": ["number", "null"]} if inner.get("type") == "number" else inner
+    return [_with_null(item) for item in part] if isinstance(part, list) else part
+
+
+def schema_page() -> str:
+    """Page that says what the entries mean, one table per type, the whole answer first."""
+    return _HEAD + "".join(_table(kind) for kind in answer_types()) + _TAIL
+
+
+def _table(kind: type[Any]) -> str:
+    summary, meanings = meanings_of(kind)
+    rows = "".join(f"| `{name}` | {meaning} |\n" for name, meaning in meanings.items())
+    return f"\n## {kind.__name__}\n\n{summary}\n\n| entry | content |\n|---|---|\n{rows}"
+
+
+def answer_types() -> tuple[type[Any], ...]:
+    """The answer and the types that it is made of, in the order in which its entries name them."""
+    return tuple(dict.fromkeys(_types(Diagnosis)))
+
+
+def _types(kind: type[Any]) -> Iterator[type[Any]]:
+    yield kind
+    for hint in get_type_hints(kind).values():
+        for inner in _dataclasses_in(hint):
+            yield from _types(inner)
+
+
+def _dataclasses_in(hint: Any) -> Iterator[type[Any]]:
+    if isinstance(hint, type) and is_dataclass(hint):
+        yield hint
+    for argument in get_args(hint):
+        yield from _dataclasses_in(argument)
+
+
+def meanings_of(kind: type[Any]) -> tuple[str, dict[str, str]]:
+    """Text above the attributes of a type's docstring, and the meaning of each of its entries.
 
     Raises:
-        InputError: a missing or wrong entry, with the place where it is.
+        KeyError: the docstring leaves an entry out.
     """
-    _check("the diagnosis", mapping, FORM)
-    for finding in (*mapping["findings"], *mapping["rejected"]):
-        _check(f"finding {finding.get('name')!r}", finding, _FINDING)
-    for number, source in enumerate(mapping["data"]):
-        _check(f"data {number + 1}", source, _DATA)
-
-
-def _check(place: str, value: Any, form: Any) -> None:
-    """Entries of a mapping against their forms."""
-    for key, inner in form.items():
-        if key not in value:
-            raise InputError(f"{place} has no entry {key!r}: make it again with `ddagr diagnose`.")
-        check_entry(place, key, value[key], inner)
-
-
-def check_entry(place: str, key: str, value: Any, form: Any) -> None:
-    """One entry against its form.
-
-    Args:
-        place: where it is, for the sentence.
-        key: of the entry.
-        value: of the entry.
-        form: that it should have, of :data:`FORM`.
-
-    Raises:
-        InputError: it has another.
-    """
-    kinds = _kinds(form)
-    if (isinstance(value, bool) and bool not in kinds) or not isinstance(value, kinds):
-        words = " or ".join(_WORDS[kind] for kind in kinds if not (kind is int and float in kinds))
-        raise InputError(f"{place} has {key} = {value!r}: give {words}.")
-    for name, inner, inner_form in _inside(value, form):
-        check_entry(f"{place}, {key}", name, inner, inner_form)
-    required = form.of if isinstance(form, Maybe) else form
-    if value is not None and isinstance(required, dict):
-        _check(f"{place}, {key}", value, required)
-
-
-def _kinds(form: Any) -> tuple[type, ...]:
-    """Python types of a form."""
-    if isinstance(form, Maybe):
-        return (*_kinds(form.of), type(None))
-    if isinstance(form, Each | dict):
-        return (dict,)
-    if isinstance(form, Items):
-        return (list,)
-    return form if isinstance(form, tuple) else (form,)
-
-
-def _inside(value: Any, form: Any) -> Iterator[tuple[str, Any, Any]]:
-    """Names, values and forms of the entries of a mapping by name or a list."""
-    form = form.of if isinstance(form, Maybe) else form
-    if value is not None and isinstance(form, Each):
-        yield from ((str(name), item, form.of) for name, item in value.items())
-    elif value is not None and isinstance(form, Items):
-        yield from ((f"item {number + 1}", item, form.of) for number, item in enumerate(value))
+    found: dict[str, str] = {}
+    for owner in reversed(kind.__mro__[:-1]):
+        above, _, attributes = (inspect.getdoc(owner) or "").partition("\nAttributes:\n")
+        for name, meaning in re.findall(r"^    (\w+): (.*(?:\n        .*)*)", attributes, flags=re.MULTILINE):
+            found[name] = " ".join(meaning.split())
+    summary = "\n\n".join(" ".join(paragraph.split()) for paragraph in above.strip().split("\n\n"))
+    return summary, {item.name: found[item.name] for item in fields(kind)}

@@ -1,18 +1,17 @@
-"""The answer of a diagnosis and its JSON form, which ``docs/diagnosis_schema.md`` explains entry by entry."""
+"""The answer of a diagnosis. ``docs/diagnosis_schema.md`` is made of these classes' docstrings."""
 
 from __future__ import annotations
 
-import json
-import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
-from pathlib import Path
-from typing import Any
+from dataclasses import dataclass, field
 
-from ddagr_gym.diagnosis.preprocessing.data_checks import DataDoubt
-from ddagr_gym.diagnosis.result.schema import SCHEMA, check_form
-from ddagr_gym.errors import InputError
-from ddagr_gym.files import atomic_path
+from ddagr_gym.diagnosis.result.certificate import Certificate
+from ddagr_gym.diagnosis.result.location import EffectLocation, Localisation
+from ddagr_gym.diagnosis.result.next_drive_plan import NextDrivePlan
+from ddagr_gym.diagnosis.result.unnamed_terms import UnnamedTerms
+
+SCHEMA = "ddagr-diagnosis/4"
+"""Name and version: raised whenever an entry is renamed, removed or changes its meaning."""
 
 NONE = "none"
 UNKNOWN = "unknown"
@@ -23,9 +22,12 @@ class Estimate:
     """A parameter of a named effect.
 
     Attributes:
-        value: in unit.
+        value: in unit. Directions and places refer to the world of the poses, or, where no recording has any, to the
+            start of the first.
         unit: SI.
-        interval: 90 %, resampled over windows and widened by the forms of simulators; None where it was not fitted.
+        interval: 90 %, resampled over windows, holding the value in any case; for sizes at least 10 % of their distance
+            from neutral to either side, 2 % of a limit, by which forms of other simulators differ; null where it was
+            not fitted or nothing shows it.
     """
 
     value: float
@@ -46,17 +48,17 @@ class Finding:
     """One named effect.
 
     Attributes:
-        name: word of the verdict's table.
-        parameters: by name.
-        gain: fall of the cost over the dispersion when it was added (linear scan).
-        gate: what the gain had to pass.
+        name: of the effect (`ddagr effects`).
+        parameters: by field.
+        gain: fall of the cost over the dispersion when it was added.
+        gate: what the gain had to pass: beside other names more than alone (`thresholds` has the gates of first names);
+            0 where it was seen in the values themselves.
         score: cluster-robust, along the fitted direction.
-        held_out: gain on left-out windows.
-        channels: share of each channel in the fall of its misfit.
-        equivalence_set: names that the same windows may mean, with their weights; itself included.
-        where: where it shows: a mapping of :mod:`ddagr_gym.diagnosis.localisation.localise`; None where it was not
-            asked.
-        calibrated_p: share of null drives that reach its evidence; None where no bank was asked.
+        held_out: gain on windows that its size was not fitted to.
+        channels: share of each channel, `local_` ones included, in the fall of the misfit when it was added.
+        equivalence_set: names that the same windows may mean, with weights that add up to 1; itself included.
+        where: where it shows; null where nothing was located.
+        calibrated_p: share of null drives that reach as much; null without a bank.
     """
 
     name: str
@@ -67,7 +69,7 @@ class Finding:
     held_out: float
     channels: Mapping[str, float] = field(default_factory=dict)
     equivalence_set: Mapping[str, float] = field(default_factory=dict)
-    where: Mapping[str, Any] | None = None
+    where: EffectLocation | None = None
     calibrated_p: float | None = None
 
 
@@ -89,35 +91,118 @@ class DataSource:
 
 
 @dataclass(frozen=True)
+class DataDoubt:
+    """Something suspicious about a recording's clocks, signs, units or channels, as `ddagr check` says it.
+
+    Attributes:
+        recording: its name; "" for what several say together.
+        channel: of the recording, or "a to b" for a pair; "" where it is about all.
+        finding: family of checks. With a channel that never changes while the robot drives (`stuck`) no answer is
+            `complete`.
+        sentence: what it is and what to do.
+        suspects: effects that would explain it.
+    """
+
+    recording: str
+    channel: str
+    finding: str
+    sentence: str
+    suspects: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class GatesUsed:
+    """Where the gates come from: what gain an effect had to reach. How long windows are comes from the bank as well.
+
+    Attributes:
+        nulls: null drives behind them.
+        bank: its hash.
+        level: of false alarms over the whole library.
+        robot: nominal one of the bank; absent where its file does not say.
+        soil: the same.
+        soil_uncertainty: factor on how far the soil may be from the nominal one; absent the same.
+        seed: of the bank; absent the same.
+        kind: "simulated" or "ordinary" real drives; absent the same.
+        gates: of all effects, for recordings of this length.
+    """
+
+    nulls: int
+    bank: str
+    level: float
+    robot: str | None = None
+    soil: str | None = None
+    soil_uncertainty: float | None = None
+    seed: int | None = None
+    kind: str | None = None
+    gates: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Options:
+    """Choices that the answer depends on besides data, robot, soil and gates, so that the same can be run again.
+
+    An entry is absent where the diagnosis was not made by the command.
+
+    Attributes:
+        window: length of the windows as they were searched [s].
+        stride: between their starts [s].
+        block: length of the means that were compared [s].
+        priors: standard deviations of what is uncertain, by name.
+        seed: of everything random.
+        names_only: whether certification, unnamed terms and the next drive were left out.
+        robot_file: where the nominal robot came from, where that was a file.
+    """
+
+    window: float | None = None
+    stride: float | None = None
+    block: float | None = None
+    priors: Mapping[str, float] | None = None
+    seed: int | None = None
+    names_only: bool | None = None
+    robot_file: str | None = None
+
+
+@dataclass(frozen=True)
 class Diagnosis:
     """What recordings say about the physics that the nominal simulator leaves out.
 
     Attributes:
-        verdict: names of the table, or ("none",) or ("unknown",).
-        complete: whether nothing more is left than in drives with nothing missing.
-        findings: one per name, in the order in which they were found.
+        verdict: names of effects (`ddagr effects`), or `["none"]`: nothing that these data can show, or `["unknown"]`:
+            something that no effect explains.
+        complete: whether no more is left than in drives with nothing missing, the names explain at least 80 % of the
+            mismatch, every size is the same everywhere, none reaches the bound of what exists, no drive that nothing
+            was fitted to is certainly predicted worse, and no channel is dead. Rivals in an equivalence set and what
+            the checks of the recordings suspect leave it as it is; the sentence has them.
+        findings: one per name of the verdict, in the order in which they were found; none with `["none"]` and
+            `["unknown"]`.
         sentence: the answer in words.
-        misfit: mean square of each channel's residual for "nominal" and "corrected", and the null bank's "limit".
-        detectable: least detectable distance from neutral by effect and field (None: none, however large), of effects
-            without a name beside those that have one.
-        nuisances: refitted nominal parameters by name.
+        misfit: mean square of each channel's residual over its noise: `nominal` (refitted), `corrected`, and the null
+            bank's `limit`; the names that begin with `local_` are the variations of soil and sensors from window to
+            window, which have to make up for what is missing.
+        detectable: least distance from neutral that these recordings would have shown nine times in ten, by effect and
+            field, of the usual shape (a soil changed from the beginning on), in the worst direction, at the median of
+            the places driven on; of a limit the mildest tried one that shows, as it is, of a reversed sign 1 (held
+            readings are found in the values, from a fifth of repeats on, and not listed); named effects beside the
+            nominal model, the others beside what was named, whose gates are higher; null: none that can exist.
+        nuisances: refitted soil, robot, biases, clocks and headings of recordings without poses (0 where nothing shows
+            them) by name; logarithms of factors where they have no unit.
         recordings: names of the sources.
-        thresholds: nulls, hash and kind of the bank, level, and the gate of every effect.
-        seconds: of the run.
+        thresholds: where the gates come from.
+        seconds: that the run took.
         version: of the package.
-        fit: errors of the models on drives that they were not fitted to
-            (:mod:`ddagr_gym.diagnosis.certification.certify`).
-        localisation: where something is missing (:mod:`ddagr_gym.diagnosis.localisation.localise`).
-        unnamed: terms without a name, with their equations, where the verdict is incomplete or unknown.
-        next_drive: the drive that would tell the remaining rivals apart best.
+        fit: errors on drives that the models were not fitted to; null with `--names-only`.
+        localisation: where the mismatch is.
+        unnamed: what has no name; null where the names suffice.
+        next_drive: the drive that would tell what is left open apart best; null with `--names-only`.
         data: the recordings, with hashes.
-        robot: name of the nominal robot.
-        soil: name of the nominal soil.
-        options: windows, priors and seed, so that the same can be run again.
-        checks: what the recordings say is wrong with themselves (:mod:`ddagr_gym.diagnosis.preprocessing.data_checks`).
-        rejected: what fits best where that leaves too much to be named.
-        detectable_alone: the same as ``detectable`` for all effects before any was named.
-        schema: of this file.
+        robot: name of the nominal one; "" where the diagnosis was not made by the command.
+        soil: the same.
+        options: windows, priors and seed.
+        checks: what the recordings say against themselves.
+        rejected: what fits best where that leaves too much in the channels to be a name; it is in no model of `misfit`,
+            `fit` and `localisation`, and in no effects.yaml.
+        detectable_alone: the same as `detectable` for all effects beside the nominal model, before any was named.
+        schema: name and version of the file's form.
     """
 
     verdict: tuple[str, ...]
@@ -128,81 +213,18 @@ class Diagnosis:
     detectable: Mapping[str, Mapping[str, float | None]]
     nuisances: Mapping[str, float]
     recordings: tuple[str, ...]
-    thresholds: Mapping[str, Any]
+    thresholds: GatesUsed
     seconds: float
     version: str
-    fit: Mapping[str, Any] | None = None
-    localisation: Mapping[str, Any] | None = None
-    unnamed: Mapping[str, Any] | None = None
-    next_drive: Mapping[str, Any] | None = None
+    fit: Certificate | None = None
+    localisation: Localisation | None = None
+    unnamed: UnnamedTerms | None = None
+    next_drive: NextDrivePlan | None = None
     data: tuple[DataSource, ...] = ()
     robot: str = ""
     soil: str = ""
-    options: Mapping[str, Any] = field(default_factory=dict)
+    options: Options = field(default_factory=Options)
     checks: tuple[DataDoubt, ...] = ()
     rejected: tuple[Finding, ...] = ()
     detectable_alone: Mapping[str, Mapping[str, float | None]] = field(default_factory=dict)
     schema: str = SCHEMA
-
-
-def as_mapping(diagnosis: Diagnosis) -> dict[str, Any]:
-    """Plain mapping as it stands in ``diagnosis.json``."""
-    return json.loads(json.dumps(_finite(asdict(diagnosis))))
-
-
-def _finite(value: Any) -> Any:
-    """Infinite and undefined numbers as None, which JSON can hold."""
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, Mapping):
-        return {str(key): _finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
-    return value
-
-
-def validate(mapping: Mapping[str, Any]) -> None:
-    """Check a mapping against the schema.
-
-    Raises:
-        InputError: another schema, a missing or wrong entry, names that no library has.
-    """
-    from ddagr_gym.physics.effects.registry import effect_kinds
-
-    if mapping.get("schema") != SCHEMA:
-        raise InputError(f"the diagnosis has schema {mapping.get('schema')!r}: this version reads {SCHEMA!r}.")
-    check_form(mapping)
-    known = {NONE, UNKNOWN, *effect_kinds()}
-    wrong = [name for name in mapping["verdict"] if name not in known]
-    if wrong or not mapping["verdict"]:
-        raise InputError(
-            f"the diagnosis has the verdict {mapping['verdict']!r}: give names of effects, none or unknown."
-        )
-    named = [finding["name"] for finding in mapping["findings"]]
-    names = [name for name in mapping["verdict"] if name not in (NONE, UNKNOWN)]
-    if sorted(named) != sorted(names):
-        raise InputError(f"the diagnosis names {mapping['verdict']!r} and has findings on {named!r}: make them agree.")
-
-
-def save(diagnosis: Diagnosis, path: Path) -> None:
-    """Write ``diagnosis.json``, all or nothing, after validation."""
-    mapping = as_mapping(diagnosis)
-    validate(mapping)
-    with atomic_path(path) as part:
-        part.write_text(json.dumps(mapping, indent=1, allow_nan=False) + "\n")
-
-
-def load(path: Path) -> dict[str, Any]:
-    """Read and validate a ``diagnosis.json``.
-
-    Raises:
-        InputError: no such file, no JSON, or not of this schema.
-    """
-    try:
-        mapping = json.loads(path.read_text())
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path} cannot be read as a diagnosis ({error}): make it with `ddagr diagnose`.") from None
-    if not isinstance(mapping, dict):
-        raise InputError(f"{path} holds no mapping: make it with `ddagr diagnose`.")
-    validate(mapping)
-    return mapping

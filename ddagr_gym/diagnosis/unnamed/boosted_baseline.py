@@ -67,13 +67,13 @@ def boosted_share(residual: Array, known: Flags, motion: Motion, fold: NDArray[n
 
 
 @dataclass(frozen=True)
-class Regime:
-    """Where something acts.
+class Concentration:
+    """A subset of the drives in which something is concentrated.
 
     Attributes:
         words: short phrase.
         share: of all of it that lies there.
-        fraction: of the time that the regime takes.
+        fraction: of the time that this takes.
     """
 
     words: str
@@ -81,8 +81,10 @@ class Regime:
     fraction: float
 
 
-def regime_of(energy: Array, motion: Motion, recording: NDArray[np.int64]) -> Regime:
-    """The simple regime with most energy against its share of the time (largest Kullback-Leibler divergence).
+def concentration_of(energy: Array, motion: Motion, recording: NDArray[np.int64]) -> Concentration:
+    """The simple subset of the drives with most energy against its share of the time.
+
+    The one of largest Kullback-Leibler divergence between the shares of energy and of time.
 
     Args:
         energy: (W, B), of any sign.
@@ -91,10 +93,10 @@ def regime_of(energy: Array, motion: Motion, recording: NDArray[np.int64]) -> Re
     """
     total = float(energy.sum())
     if total <= 0.0:
-        return Regime("everywhere", 1.0, 1.0)
-    best = Regime("everywhere", 1.0, 1.0)
+        return Concentration("everywhere", 1.0, 1.0)
+    best = Concentration("everywhere", 1.0, 1.0)
     strongest = _LEAST_INFORMATION
-    for words, inside in _regimes(motion, recording):
+    for words, inside in _subsets(motion, recording):
         fraction = float(inside.mean())
         share = min(max(float(energy[inside].sum()) / total, 0.0), 1.0)
         if not 0.05 <= fraction <= 0.6 or share <= fraction:
@@ -103,18 +105,18 @@ def regime_of(energy: Array, motion: Motion, recording: NDArray[np.int64]) -> Re
         if share < 1.0:
             information += (1.0 - share) * np.log((1.0 - share) / (1.0 - fraction))
         if information > strongest:
-            best, strongest = Regime(words, share, fraction), information
+            best, strongest = Concentration(words, share, fraction), information
     if best.words == "everywhere":
         return best
     text = f"{best.words}: {100 * best.share:.0f} % of it in {100 * best.fraction:.0f} % of the time"
-    return Regime(text, best.share, best.fraction)
+    return Concentration(text, best.share, best.fraction)
 
 
 _LEAST_INFORMATION = 0.05  # ours: 60 % of it in 45 % of the time
 
 
-def _regimes(motion: Motion, recording: NDArray[np.int64]) -> list[tuple[str, Flags]]:
-    """Regimes in words and where they hold."""
+def _subsets(motion: Motion, recording: NDArray[np.int64]) -> list[tuple[str, Flags]]:
+    """Simple subsets of the drives, in words, and the blocks that belong to them."""
     speed, turn = np.abs(motion["v_x"].values), motion["r"].values
     change = np.maximum(np.abs(motion["c_dot_right"].values), np.abs(motion["c_dot_left"].values))
     found = [

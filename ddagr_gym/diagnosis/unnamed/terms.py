@@ -12,14 +12,13 @@ and the sizes of the named effects, so a term is what is left after all of these
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ddagr_gym.diagnosis.result.unnamed_terms import UnnamedTerm, UnnamedTerms
 from ddagr_gym.diagnosis.search.scanned_model import ScannedModel
-from ddagr_gym.diagnosis.unnamed.boosted_baseline import boosted_share, regime_of
+from ddagr_gym.diagnosis.unnamed.boosted_baseline import boosted_share, concentration_of
 from ddagr_gym.diagnosis.unnamed.regressors import Motion, Term, library, motion_of
 from ddagr_gym.diagnosis.unnamed.response import INPUTS, Response, course_of, linearise
 from ddagr_gym.diagnosis.unnamed.stability_selection import (
@@ -50,59 +49,7 @@ _RIDGES = (0.03, 0.3, 3.0)
 _LEVEL = 0.9
 
 
-@dataclass(frozen=True)
-class UnnamedTerm:
-    """One term of the equation.
-
-    Attributes:
-        regressor: on what it depends.
-        target: what it is added to: F_x, F_y, M_z [N, N m], gravity_x, gravity_y [m/s^2], command_right, command_left
-            [rad/s], or the name of a channel.
-        coefficient: in unit.
-        unit: of the target over that of the regressor.
-        interval: 90 %, from fits that leave out one stretch at a time.
-        stability: share of the halves of the data in which the term was taken.
-        alternatives: terms that say nearly the same in these drives, "target ~ regressor".
-    """
-
-    regressor: str
-    target: str
-    coefficient: float
-    unit: str
-    interval: tuple[float, float]
-    stability: float
-    alternatives: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class Unnamed:
-    """What no name of the library explains.
-
-    Attributes:
-        equation: sum of the terms in words, "" where none is stable.
-        terms: of the equation.
-        equation_share: share of the chosen model's residual sum of squares, noise included, that the equation removes
-            on stretches that it was not fitted to.
-        ceiling_share: the same of a flexible model of the same signals: what anything could explain.
-        where: regime in which it acts.
-    """
-
-    equation: str
-    terms: tuple[UnnamedTerm, ...]
-    equation_share: float
-    ceiling_share: float
-    where: str
-
-    def as_mapping(self) -> dict[str, Any]:
-        """As it stands in ``diagnosis.json``."""
-        mapping = asdict(self)
-        mapping["terms"] = [{**term, "interval": list(term["interval"])} for term in mapping["terms"]]
-        for term in mapping["terms"]:
-            term["alternatives"] = list(term["alternatives"])
-        return mapping
-
-
-def unnamed_terms(problem: Problem, model: ScannedModel, rng: np.random.Generator) -> Unnamed:
+def unnamed_terms(problem: Problem, model: ScannedModel, rng: np.random.Generator) -> UnnamedTerms:
     """Search for terms that explain what a model leaves.
 
     Args:
@@ -132,7 +79,7 @@ def unnamed_terms(problem: Problem, model: ScannedModel, rng: np.random.Generato
     ceiling = _ceiling(problem, sums, projected, motion, fold[group], fold)
     where = _where(problem, sums, projected, columns, motion, chosen)
     written = _written(sums, terms, found)
-    return Unnamed(_equation(written), written, share, max(ceiling, share), where)
+    return UnnamedTerms(_equation(written), written, share, max(ceiling, share), where)
 
 
 def term_columns(problem: Problem, terms: Sequence[Term], response: Response) -> Array:
@@ -213,14 +160,14 @@ def _ceiling(
 def _where(
     problem: Problem, sums: Sums, projected: Array, columns: Array, motion: Motion, chosen: Sequence[int]
 ) -> str:
-    """Regime in which the terms act most, or in which most is left where there is none."""
+    """Operating condition in which the terms act most, or in which most is left where there is none."""
     shape = problem.blocked.sigma.shape
     if chosen:
         acting = columns[..., np.asarray(chosen)] @ coefficients(sums, chosen)
     else:
         acting = projected[:, : shape[1] * shape[2], 0]
     energy = (acting.reshape(shape) ** 2).sum(axis=2)
-    return regime_of(energy, motion, problem.blocked.windows.recording).words
+    return concentration_of(energy, motion, problem.blocked.windows.recording).words
 
 
 def _written(sums: Sums, terms: Sequence[Term], found: Sequence[Stable]) -> tuple[UnnamedTerm, ...]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ddagr_gym.recordings.checks.clock_offsets import encoder_offset
-from ddagr_gym.recordings.checks.findings import Finding, Interval, judge, not_testable
+from ddagr_gym.recordings.checks.findings import CheckFinding, Interval, judge, not_testable
 from ddagr_gym.recordings.checks.regression import Estimate, blocks_in_spans, estimate, sampled, solve
 from ddagr_gym.recordings.checks.signals import filled, slope, smoothed
 from ddagr_gym.recordings.schema import FloatArray, Recording
@@ -33,7 +33,7 @@ WINDOW = 0.75
 """Smoothing of forces and speeds [s], three times the slowest encoder's period."""
 
 
-def accelerometer(recording: Recording, rng: np.random.Generator) -> list[Finding]:
+def accelerometer(recording: Recording, rng: np.random.Generator) -> list[CheckFinding]:
     """Findings on the accelerometer's axes.
 
     Args:
@@ -105,7 +105,7 @@ def _values(totals: FloatArray) -> FloatArray:
     return np.stack([on_x[:, 0], on_y[:, 1], angle, on_x[:, 4], on_y[:, 4]], axis=1)
 
 
-def _coefficient(channel: str, motion: str, value: float, interval: Interval, expected: Interval) -> Finding:
+def _coefficient(channel: str, motion: str, value: float, interval: Interval, expected: Interval) -> CheckFinding:
     if not interval[1] - interval[0] <= 2 * WIDEST:
         why = f"Its response to {motion} is uncertain by {interval[1] - interval[0]:.2g}."
         return not_testable(CHECK, channel, why, "Drive arcs at speed, with starts and stops.")
@@ -122,7 +122,7 @@ def _coefficient(channel: str, motion: str, value: float, interval: Interval, ex
     )
 
 
-def _mounting(angle: float, interval: Interval) -> Finding:
+def _mounting(angle: float, interval: Interval) -> CheckFinding:
     if not interval[1] - interval[0] <= 2 * WIDEST_ANGLE:
         why = f"The mounting angle is uncertain by {interval[1] - interval[0]:.2g} rad."
         return not_testable("mounting", "specific_force", why, "Drive arcs at speed, with starts and stops.")
@@ -139,7 +139,7 @@ def _mounting(angle: float, interval: Interval) -> Finding:
     )
 
 
-def _offset(channel: str, offset: float, interval: Interval) -> Finding:
+def _offset(channel: str, offset: float, interval: Interval) -> CheckFinding:
     return judge(
         "offset",
         channel,

@@ -9,12 +9,12 @@ import numpy as np
 from scipy.special import ndtri, stdtrit
 
 from ddagr_gym.recordings.checks.blocks import CONFIDENCE
-from ddagr_gym.recordings.checks.findings import CheckReport, Finding, Interval, judge
+from ddagr_gym.recordings.checks.findings import CheckFinding, CheckReport, Interval, judge
 from ddagr_gym.recordings.checks.gravity import Rest, offset_by_heading, offset_findings, rests
 from ddagr_gym.recordings.schema import Recording
 
 
-def across_runs(recordings: Sequence[Recording], reports: Sequence[CheckReport]) -> list[Finding]:
+def across_runs(recordings: Sequence[Recording], reports: Sequence[CheckReport]) -> list[CheckFinding]:
     """Findings that need more than one run.
 
     Args:
@@ -27,7 +27,7 @@ def across_runs(recordings: Sequence[Recording], reports: Sequence[CheckReport])
     """
     if len(recordings) < 2:
         return []
-    groups: dict[tuple[str, str], list[Finding]] = {}
+    groups: dict[tuple[str, str], list[CheckFinding]] = {}
     for report in reports:
         for finding in report.findings:
             if finding.interval is not None and _has_width(finding.interval):
@@ -61,7 +61,7 @@ def pooled_value(values: Sequence[float], intervals: Sequence[Interval]) -> tupl
     return mean, (mean - half, mean + half)
 
 
-def _pooled(group: Sequence[Finding]) -> Finding:
+def _pooled(group: Sequence[CheckFinding]) -> CheckFinding:
     first = group[0]
     values = [f.value for f in group if f.value is not None]
     value, interval = pooled_value(values, [f.interval for f in group if f.interval is not None])
@@ -81,7 +81,7 @@ def _pooled(group: Sequence[Finding]) -> Finding:
     )
 
 
-def _gravity(recordings: Sequence[Recording]) -> list[Finding]:
+def _gravity(recordings: Sequence[Recording]) -> list[CheckFinding]:
     """Offset over the rests of all runs that have one frame; a slope common to all of them is fitted."""
     found: list[Rest] = [rest for r in recordings if len(r.meta.spans) == 1 for rest in rests(r)]
     by_heading = offset_by_heading(found)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ddagr_gym.recordings.checks.blocks import FEWEST_BLOCKS, cut_blocks, interval_of, resample
-from ddagr_gym.recordings.checks.findings import Finding, Interval, judge, not_testable
+from ddagr_gym.recordings.checks.findings import CheckFinding, Interval, judge, not_testable
 from ddagr_gym.recordings.checks.signals import filled, integral, new_rows, wrap
 from ddagr_gym.recordings.schema import FloatArray, Recording
 
@@ -59,7 +59,7 @@ class Offset:
     blocks: int
 
 
-def clock_offsets(recording: Recording, rng: np.random.Generator) -> list[Finding]:
+def clock_offsets(recording: Recording, rng: np.random.Generator) -> list[CheckFinding]:
     """Findings on the clocks of commands, encoders, gyro and pose.
 
     Args:
@@ -216,7 +216,7 @@ def _finding(
     remedy: str,
     drive: str,
     suspects: tuple[str, ...],
-) -> Finding:
+) -> CheckFinding:
     if offset is None or abs(offset.correlation) < LEAST_CORRELATION:
         found = "they share too little motion" if offset is None else f"they correlate by {offset.correlation:.2f} only"
         return not_testable(CHECK, pair, f"The offset cannot be told: {found}.", drive)
@@ -229,7 +229,7 @@ def _finding(
     )
 
 
-def _response(offset: Offset | None) -> Finding:
+def _response(offset: Offset | None) -> CheckFinding:
     return _finding(
         offset,
         RESPONSE,
@@ -241,7 +241,7 @@ def _response(offset: Offset | None) -> Finding:
     )
 
 
-def _encoder(recording: Recording, offset: Offset | None) -> Finding:
+def _encoder(recording: Recording, offset: Offset | None) -> CheckFinding:
     rates = [recording.rate(name) for name in ("encoder_right", "encoder_left")]
     half = 0.5 / min(rates) if min(rates) > 0 else 0.0
     return _finding(
@@ -255,7 +255,7 @@ def _encoder(recording: Recording, offset: Offset | None) -> Finding:
     )
 
 
-def _pose(offset: Offset | None) -> Finding:
+def _pose(offset: Offset | None) -> CheckFinding:
     return _finding(
         offset,
         POSE,

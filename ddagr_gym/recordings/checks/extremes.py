@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ddagr_gym.recordings.checks.findings import Finding, judge
+from ddagr_gym.recordings.checks.findings import CheckFinding, judge
 from ddagr_gym.recordings.checks.signals import moving_mask
 from ddagr_gym.recordings.schema import FloatArray, Recording
 
@@ -21,7 +21,7 @@ LONGEST_RUN = 1.0
 """Time up to which a run of zeros counts as short [s]: a robot that brakes to a stop stays longer."""
 
 
-def extremes(recording: Recording) -> list[Finding]:
+def extremes(recording: Recording) -> list[CheckFinding]:
     """Findings on stuck, saturated and zeroed channels, for every channel that has samples."""
     driving = bool(np.count_nonzero(moving_mask(recording)) * recording.period > 5.0)
     findings = []
@@ -37,7 +37,7 @@ def extremes(recording: Recording) -> list[Finding]:
     return findings
 
 
-def _stuck(name: str, values: FloatArray) -> Finding:
+def _stuck(name: str, values: FloatArray) -> CheckFinding:
     spread = float(np.ptp(values))
     return judge(
         "stuck",
@@ -66,7 +66,7 @@ def saturated_share(values: FloatArray) -> float:
     return share if levels.size > 10 else 0.0
 
 
-def _saturated(name: str, values: FloatArray) -> Finding:
+def _saturated(name: str, values: FloatArray) -> CheckFinding:
     share = saturated_share(values)
     return judge(
         "saturation",
@@ -112,7 +112,7 @@ def false_zeros(values: FloatArray, longest: int, heaps_count: bool) -> int:
     return count
 
 
-def _zeros(recording: Recording, name: str) -> Finding:
+def _zeros(recording: Recording, name: str) -> CheckFinding:
     parts = [recording[name][s][np.isfinite(recording[name][s])] for s in recording.spans()]
     values = np.concatenate(parts)
     longest = max(1, round(LONGEST_RUN * recording.rate(name)))

@@ -36,7 +36,7 @@ class Status(StrEnum):
 
 
 @dataclass(frozen=True)
-class Finding:
+class CheckFinding:
     """Answer to one question about one channel or pair of channels.
 
     Attributes:
@@ -90,8 +90,8 @@ def judge(
     meaning: str,
     remedy: str,
     suspects: tuple[str, ...] = (),
-) -> Finding:
-    """Finding that is suspicious exactly when the whole interval lies outside the expected range.
+) -> CheckFinding:
+    """CheckFinding that is suspicious exactly when the whole interval lies outside the expected range.
 
     Args:
         check: family.
@@ -105,7 +105,7 @@ def judge(
         suspects: effects behind a suspicious value.
     """
     outside = interval[0] > expected[1] or interval[1] < expected[0]
-    return Finding(
+    return CheckFinding(
         check=check,
         channel=channel,
         status=Status.SUSPICIOUS if outside else Status.PASS,
@@ -119,9 +119,9 @@ def judge(
     )
 
 
-def not_testable(check: str, channel: str, why: str, remedy: str) -> Finding:
-    """Finding for a question that this recording cannot answer."""
-    return Finding(check, channel, Status.NOT_TESTABLE, why, remedy)
+def not_testable(check: str, channel: str, why: str, remedy: str) -> CheckFinding:
+    """CheckFinding for a question that this recording cannot answer."""
+    return CheckFinding(check, channel, Status.NOT_TESTABLE, why, remedy)
 
 
 @dataclass(frozen=True)
@@ -144,10 +144,10 @@ class CheckReport:
     rows: int
     seconds: float
     sentences: tuple[str, ...]
-    findings: tuple[Finding, ...]
+    findings: tuple[CheckFinding, ...]
 
     @classmethod
-    def of(cls, recording: Recording, findings: Iterable[Finding]) -> CheckReport:
+    def of(cls, recording: Recording, findings: Iterable[CheckFinding]) -> CheckReport:
         """Report on a recording."""
         meta = recording.meta
         seconds = math.fsum(float(recording.t[s.stop - 1] - recording.t[s.start]) for s in recording.spans())
@@ -162,7 +162,7 @@ class CheckReport:
         )
 
     @property
-    def suspicious(self) -> tuple[Finding, ...]:
+    def suspicious(self) -> tuple[CheckFinding, ...]:
         """Findings that need attention."""
         return tuple(f for f in self.findings if f.status is Status.SUSPICIOUS)
 

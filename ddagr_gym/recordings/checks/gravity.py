@@ -14,7 +14,7 @@ from scipy.special import stdtrit
 
 from ddagr_gym.parameters import STANDARD_GRAVITY
 from ddagr_gym.recordings.checks.blocks import CONFIDENCE, mean_interval
-from ddagr_gym.recordings.checks.findings import Finding, Interval, judge, not_testable
+from ddagr_gym.recordings.checks.findings import CheckFinding, Interval, judge, not_testable
 from ddagr_gym.recordings.checks.signals import filled, standing
 from ddagr_gym.recordings.schema import FloatArray, Recording
 
@@ -62,7 +62,7 @@ def _mean(values: FloatArray) -> float:
     return float(known.mean()) if known.size else float("nan")
 
 
-def gravity(recording: Recording) -> list[Finding]:
+def gravity(recording: Recording) -> list[CheckFinding]:
     """Findings on size and direction of the specific force at rest."""
     found = rests(recording)
     if not found:
@@ -75,7 +75,7 @@ def gravity(recording: Recording) -> list[Finding]:
     return findings + _direction(recording, found)
 
 
-def _norm(norms: FloatArray) -> Finding:
+def _norm(norms: FloatArray) -> CheckFinding:
     size, interval = mean_interval(norms)
     if norms.size < 2:
         interval = (size, size)
@@ -92,7 +92,7 @@ def _norm(norms: FloatArray) -> Finding:
     )
 
 
-def _direction(recording: Recording, found: list[Rest]) -> list[Finding]:
+def _direction(recording: Recording, found: list[Rest]) -> list[CheckFinding]:
     absolute = len(recording.meta.spans) == 1 and all(np.isfinite([r.roll, r.pitch]).all() for r in found)
     if absolute and len(found) >= 2:
         return offset_findings(*offset_by_attitude(found), "against the pose's roll and pitch", len(found))
@@ -134,7 +134,7 @@ def offset_by_heading(found: list[Rest]) -> tuple[FloatArray, list[Interval]] | 
     return values[2:], [(float(v - h), float(v + h)) for v, h in zip(values[2:], half[2:], strict=True)]
 
 
-def offset_findings(values: FloatArray, intervals: list[Interval], how: str, count: int) -> list[Finding]:
+def offset_findings(values: FloatArray, intervals: list[Interval], how: str, count: int) -> list[CheckFinding]:
     """Findings on a body-fixed offset.
 
     Args:
@@ -159,7 +159,7 @@ def offset_findings(values: FloatArray, intervals: list[Interval], how: str, cou
     ]
 
 
-def _single_heading(found: list[Rest]) -> Finding:
+def _single_heading(found: list[Rest]) -> CheckFinding:
     tilts = np.array([np.hypot(*r.force[:2]) for r in found])
     tilt, interval = mean_interval(tilts)
     if tilts.size < 2:

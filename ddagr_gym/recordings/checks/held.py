@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ddagr_gym.recordings.checks.findings import Finding, judge, not_testable
+from ddagr_gym.recordings.checks.findings import CheckFinding, judge, not_testable
 from ddagr_gym.recordings.checks.signals import moving_mask
 from ddagr_gym.recordings.schema import BoolArray, FloatArray, Recording
 
@@ -29,7 +29,7 @@ QUANTA = 3.0
 """A channel whose changes are mostly this many quanta or fewer repeats itself naturally (ours)."""
 
 
-def held(recording: Recording) -> list[Finding]:
+def held(recording: Recording) -> list[CheckFinding]:
     """Findings on repeated samples, one for each channel that the map does not declare as held.
 
     Exact zeros are left out: a locked bank repeats them, and :mod:`.extremes` looks at them.
@@ -79,7 +79,7 @@ def natural_repeats(steps: FloatArray) -> float:
     return 0.5 * float(np.mean((steps > 0) & (steps <= 1.5 * quantum)))
 
 
-def _repeats(name: str, steps: FloatArray) -> Finding:
+def _repeats(name: str, steps: FloatArray) -> CheckFinding:
     if steps.size < 50:
         return not_testable(CHECK, name, "The channel has too few samples while driving.", "Record a longer drive.")
     share, natural = float(np.mean(steps == 0)), natural_repeats(steps)
@@ -121,7 +121,7 @@ def longest_freeze(recording: Recording, name: str, driving: BoolArray) -> float
     return longest
 
 
-def _frozen(recording: Recording, name: str, driving: BoolArray) -> Finding:
+def _frozen(recording: Recording, name: str, driving: BoolArray) -> CheckFinding:
     longest = longest_freeze(recording, name, driving)
     return judge(
         "frozen",

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from ddagr_gym.recordings.checks.blocks import CONFIDENCE, mean_interval
-from ddagr_gym.recordings.checks.findings import Finding, Interval, judge, not_testable
+from ddagr_gym.recordings.checks.findings import CheckFinding, Interval, judge, not_testable
 from ddagr_gym.recordings.checks.signals import standing
 from ddagr_gym.recordings.schema import FloatArray, Recording
 
@@ -76,7 +76,7 @@ def noise_at_rest(recording: Recording, name: str) -> Noise | None:
     )
 
 
-def noise(recording: Recording) -> list[Finding]:
+def noise(recording: Recording) -> list[CheckFinding]:
     """Findings on level, correlation and bias of the inertial channels at rest."""
     findings = []
     for name, expected in NOISE_RANGES.items():
@@ -93,7 +93,7 @@ def noise(recording: Recording) -> list[Finding]:
     return findings
 
 
-def _level(name: str, found: Noise, expected: Interval) -> Finding:
+def _level(name: str, found: Noise, expected: Interval) -> CheckFinding:
     unit = "rad/s" if name == "yaw_rate" else "m/s^2"
     return judge(
         "noise",
@@ -111,7 +111,7 @@ def _level(name: str, found: Noise, expected: Interval) -> Finding:
     )
 
 
-def _correlation(name: str, found: Noise) -> Finding:
+def _correlation(name: str, found: Noise) -> CheckFinding:
     return judge(
         "correlation",
         name,
@@ -125,7 +125,7 @@ def _correlation(name: str, found: Noise) -> Finding:
     )
 
 
-def _bias(found: Noise) -> Finding:
+def _bias(found: Noise) -> CheckFinding:
     bias, interval = mean_interval(found.means)
     if found.means.size < 2:
         scatter = found.sigma * math.sqrt((1 + found.correlation) / (1 - min(found.correlation, 0.99)) / found.samples)

@@ -7,7 +7,7 @@ import numpy as np
 from ddagr_gym.recordings.checks.accelerometer import accelerometer
 from ddagr_gym.recordings.checks.clock_offsets import clock_offsets
 from ddagr_gym.recordings.checks.extremes import extremes
-from ddagr_gym.recordings.checks.findings import CheckReport, Finding
+from ddagr_gym.recordings.checks.findings import CheckFinding, CheckReport
 from ddagr_gym.recordings.checks.gravity import gravity
 from ddagr_gym.recordings.checks.held import held
 from ddagr_gym.recordings.checks.noise import noise
@@ -24,7 +24,7 @@ def check_recording(recording: Recording, rng: np.random.Generator) -> CheckRepo
         recording: any that the schema admits; questions that it cannot answer come back as not testable.
         rng: for the resampled intervals.
     """
-    findings: list[Finding] = []
+    findings: list[CheckFinding] = []
     if len(recording) >= 3:
         findings += timing(recording) + held(recording) + extremes(recording)
         findings += clock_offsets(recording, rng) + turning(recording, rng) + travel(recording, rng)

@@ -6,7 +6,7 @@ import itertools
 
 import numpy as np
 
-from ddagr_gym.recordings.checks.findings import Finding, Interval, judge, not_testable
+from ddagr_gym.recordings.checks.findings import CheckFinding, Interval, judge, not_testable
 from ddagr_gym.recordings.checks.signals import moving_mask
 from ddagr_gym.recordings.schema import CHANNELS, COMMANDS, BoolArray, FloatArray, Recording
 
@@ -30,7 +30,7 @@ LONG_HOLD = 5.0
 """Wait, in median periods, from which a channel counts as held."""
 
 
-def timing(recording: Recording) -> list[Finding]:
+def timing(recording: Recording) -> list[CheckFinding]:
     """Findings on the rows' times and on each channel's rate."""
     return [*_row_findings(recording), *_rate_findings(recording)]
 
@@ -40,7 +40,7 @@ def _fixed(value: float) -> Interval:
     return (value, value)
 
 
-def _row_findings(recording: Recording) -> list[Finding]:
+def _row_findings(recording: Recording) -> list[CheckFinding]:
     steps = np.concatenate([np.diff(recording.t[s]) for s in recording.segments()] or [np.empty(0)])
     if steps.size < 2:
         return [not_testable(CHECK, "t", "There are fewer than three rows in a row.", "Record for longer.")]
@@ -84,9 +84,9 @@ def _row_findings(recording: Recording) -> list[Finding]:
     ]
 
 
-def _rate_findings(recording: Recording) -> list[Finding]:
+def _rate_findings(recording: Recording) -> list[CheckFinding]:
     driving = moving_mask(recording)
-    findings: list[Finding] = []
+    findings: list[CheckFinding] = []
     for name, channel in CHANNELS.items():
         if recording.has(name):
             # Commands may come only when they change.
@@ -117,7 +117,7 @@ def waits(recording: Recording, name: str, driving: BoolArray) -> FloatArray:
     return np.array(found)
 
 
-def _hold_findings(recording: Recording, name: str, driving: BoolArray) -> list[Finding]:
+def _hold_findings(recording: Recording, name: str, driving: BoolArray) -> list[CheckFinding]:
     between = waits(recording, name, driving)
     if between.size < 20:
         return [not_testable("rate", name, "The robot hardly drives.", "Record a drive.")]

@@ -6,7 +6,7 @@ import numpy as np
 
 from ddagr_gym.recordings.checks.blocks import cut_blocks
 from ddagr_gym.recordings.checks.clock_offsets import gyro_direction, pose_offset, unwrapped_heading
-from ddagr_gym.recordings.checks.findings import Finding, judge, not_testable
+from ddagr_gym.recordings.checks.findings import CheckFinding, judge, not_testable
 from ddagr_gym.recordings.checks.regression import Estimate, blocks_in_spans, estimate, inside, sampled
 from ddagr_gym.recordings.checks.signals import filled, integral
 from ddagr_gym.recordings.schema import BoolArray, FloatArray, Recording
@@ -31,7 +31,7 @@ WINDOW = 2.0
 """Time over which distances are compared [s]."""
 
 
-def travel(recording: Recording, rng: np.random.Generator) -> list[Finding]:
+def travel(recording: Recording, rng: np.random.Generator) -> list[CheckFinding]:
     """Findings on pose against encoders and on encoders against commands.
 
     Args:
@@ -137,7 +137,7 @@ def _settled(recording: Recording, commands: tuple[FloatArray, FloatArray]) -> B
     return settled
 
 
-def _travel_findings(recording: Recording, rng: np.random.Generator) -> list[Finding]:
+def _travel_findings(recording: Recording, rng: np.random.Generator) -> list[CheckFinding]:
     pair = "encoder to pose"
     found = travelled_over_rolled(recording, rng)
     if found is None:
@@ -174,7 +174,7 @@ def _travel_findings(recording: Recording, rng: np.random.Generator) -> list[Fin
     ]
 
 
-def _direction_finding(found: Estimate) -> Finding:
+def _direction_finding(found: Estimate) -> CheckFinding:
     """Whether the robot travels where the pose says that it points."""
     along, across, _ = (float(v) for v in found.values)
     angle = float(np.arctan2(across, along))
@@ -193,7 +193,7 @@ def _direction_finding(found: Estimate) -> Finding:
     )
 
 
-def _gain_findings(recording: Recording, rng: np.random.Generator) -> list[Finding]:
+def _gain_findings(recording: Recording, rng: np.random.Generator) -> list[CheckFinding]:
     found = command_gains(recording, rng)
     if found is None:
         why = "No command was held long enough for the banks to settle."

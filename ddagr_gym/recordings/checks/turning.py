@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ddagr_gym.recordings.checks.clock_offsets import encoder_offset, pose_offset, unwrapped_heading
-from ddagr_gym.recordings.checks.findings import Finding, judge, not_testable
+from ddagr_gym.recordings.checks.findings import CheckFinding, judge, not_testable
 from ddagr_gym.recordings.checks.regression import (
     Estimate,
     blocks_in_spans,
@@ -36,7 +36,7 @@ LEAST_TURN = 0.05
 _DRIVE = "Drive turns to both sides at several speeds."
 
 
-def turning(recording: Recording, rng: np.random.Generator) -> list[Finding]:
+def turning(recording: Recording, rng: np.random.Generator) -> list[CheckFinding]:
     """Findings on gyro against pose and on encoders against gyro.
 
     Args:
@@ -111,7 +111,7 @@ def _turns(recording: Recording) -> bool:
     return bool(rate.size) and float(np.sqrt(np.mean(rate**2))) >= LEAST_TURN
 
 
-def _gyro_findings(recording: Recording, rng: np.random.Generator) -> list[Finding]:
+def _gyro_findings(recording: Recording, rng: np.random.Generator) -> list[CheckFinding]:
     pair = "yaw_rate to pose_yaw"
     found = gyro_against_pose(recording, rng) if _turns(recording) else None
     if found is None:
@@ -145,7 +145,7 @@ def _gyro_findings(recording: Recording, rng: np.random.Generator) -> list[Findi
     ]
 
 
-def _track_findings(recording: Recording, rng: np.random.Generator) -> list[Finding]:
+def _track_findings(recording: Recording, rng: np.random.Generator) -> list[CheckFinding]:
     pair = "encoder to yaw_rate"
     found = effective_track(recording, rng) if _turns(recording) else None
     if found is None:

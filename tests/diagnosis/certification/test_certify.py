@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -26,8 +25,7 @@ from ddagr_gym.diagnosis.certification.forecast import (
     past_elimination,
     start_states,
 )
-from ddagr_gym.diagnosis.result.schema import FORM, check_entry
-from ddagr_gym.errors import InputError
+from ddagr_gym.diagnosis.result.certificate import Certificate, Gains, Measured
 from ddagr_gym.identification.problem import Problem
 from ddagr_gym.identification.windows import CHANNELS, WindowSet
 from ddagr_gym.presets import get_robot
@@ -38,26 +36,22 @@ ROBOT = get_robot("ddagr")
 
 def test_the_planted_effect_predicts_unseen_drives(sloping: Sloping) -> None:
     found = sloping.certificate
-    assert found["folds"] == BY_RECORDING
+    assert found.folds == BY_RECORDING
     for channel, ratio in (("position", 0.3), ("specific_force_x", 0.1), ("yaw_rate", 0.3)):
-        errors = found["channels"][channel]["5"]
-        assert errors["corrected"]["value"] < ratio * errors["refitted"]["value"], channel
-        low, high = errors["corrected"]["interval"]
-        assert low <= errors["corrected"]["value"] <= high
-        assert errors["ceiling"]["value"] <= min(errors[m]["value"] for m in ("refitted", "corrected", "black_box"))
-    assert found["gain_share"]["5"]["value"] > 0.9
-    check_entry("the diagnosis", "fit", found, FORM["fit"])
+        errors = found.channels[channel]["5"]
+        assert errors.corrected.value < ratio * errors.refitted.value, channel
+        assert errors.corrected.interval is not None
+        low, high = errors.corrected.interval
+        assert low <= errors.corrected.value <= high
+        assert errors.ceiling.value <= min(item.value for item in (errors.refitted, errors.corrected, errors.black_box))
+    share = found.gain_share["5"]
+    assert share is not None
+    assert share.value > 0.9
 
 
 def test_a_horizon_that_no_drive_holds_is_left_out_and_said(sloping: Sloping) -> None:
-    assert set(sloping.certificate["channels"]["position"]) == {"1", "5"}
-    assert "30 s" in sloping.certificate["note"]
-
-
-def test_what_is_wrong_in_the_schema_is_refused(sloping: Sloping) -> None:
-    broken = {**sloping.certificate, "channels": {"speed": {"1": {"unit": "m/s"}}}}
-    with pytest.raises(InputError, match=r"fit, channels, speed, 1 has no entry .count."):
-        check_entry("the diagnosis", "fit", broken, FORM["fit"])
+    assert set(sloping.certificate.channels["position"]) == {"1", "5"}
+    assert "30 s" in sloping.certificate.note
 
 
 def test_sizes_do_not_see_the_recording_that_judges(sloping: Sloping) -> None:
@@ -142,10 +136,10 @@ def test_halves_are_named_as_the_weaker_proof(problem_of: Callable[..., Problem]
     )
     rng = np.random.default_rng(0)
     found = certify(problem, part, part, ROBOT, sloping.recordings[:1], rng)
-    assert found["folds"] == BY_TIME
-    assert "one recording" in found["note"]
-    errors = found["channels"]["position"]["1"]
-    assert errors["corrected"] == errors["refitted"]
+    assert found.folds == BY_TIME
+    assert "one recording" in found.note
+    errors = found.channels["position"]["1"]
+    assert errors.corrected == errors.refitted
 
 
 def _columns(sloping: Sloping, problem: Problem) -> list[int]:
@@ -202,8 +196,8 @@ def test_share_of_the_ceiling() -> None:
     table = resampled(errors, clusters, np.random.default_rng(0))
     share = gain_share(gains(table, MOTION))
     assert share is not None
-    assert share["value"] == pytest.approx(0.75)
-    assert share["interval"] == pytest.approx([0.75, 0.75])
+    assert share.value == pytest.approx(0.75)
+    assert share.interval == pytest.approx([0.75, 0.75])
     nothing = {name: {"yaw_rate": ones} for name in ("refitted", "corrected", "black_box")}
     assert gain_share(gains(resampled(nothing, clusters, np.random.default_rng(0)), MOTION)) is None
 
@@ -230,17 +224,24 @@ def test_a_share_of_a_gain_that_may_be_nothing_is_no_number() -> None:
     assert gain_share(gained) is None
 
 
-def _gain(*intervals: tuple[float, float]) -> dict[str, Any]:
-    entries = [{"value": sum(interval) / 2.0, "interval": list(interval)} for interval in intervals]
-    return {f"{5.0 * k:g}": {"corrected": entry} for k, entry in enumerate(entries, 1)}
+def _gain(*intervals: tuple[float, float]) -> dict[str, Gains | None]:
+    none = Measured(0.0)
+    entries = [Gains(Measured(sum(interval) / 2.0, interval), none, none) for interval in intervals]
+    return {f"{5.0 * k:g}": entry for k, entry in enumerate(entries, 1)}
+
+
+def _fit(gain: dict[str, Gains | None], readings: dict[str, Gains | None]) -> Certificate:
+    return Certificate(BY_RECORDING, "", (5.0, 10.0), 0.9, {}, gain, readings, {}, {})
 
 
 def test_a_model_that_predicts_unseen_drives_worse_is_found() -> None:
-    fit = {"gain": {"1": None}, "gain_readings": _gain((-0.1, 0.2), (-0.4, -0.2))}
-    assert worse_on_unseen(fit) == {"horizon": 10.0, "value": pytest.approx(-0.3), "interval": [-0.4, -0.2]}
-    assert worse_on_unseen({"gain": _gain((0.1, 0.2)), "gain_readings": _gain((-0.4, -0.2))}) is None
-    assert worse_on_unseen({"gain": _gain((-0.1, 0.2))}) is None
-    assert worse_on_unseen({}) is None
+    worse = worse_on_unseen(_fit({"1": None}, _gain((-0.1, 0.2), (-0.4, -0.2))))
+    assert worse is not None
+    assert (worse.horizon, worse.interval) == (10.0, (-0.4, -0.2))
+    assert worse.value == pytest.approx(-0.3)
+    assert worse_on_unseen(_fit(_gain((0.1, 0.2)), _gain((-0.4, -0.2)))) is None
+    assert worse_on_unseen(_fit(_gain((-0.1, 0.2)), {})) is None
+    assert worse_on_unseen(_fit({}, {})) is None
     assert worse_on_unseen(None) is None
 
 
@@ -257,7 +258,7 @@ def test_what_one_model_does_not_finish_counts_for_none() -> None:
 
 def test_readings_that_were_mended_leave_nothing_to_share(sloping: Sloping) -> None:
     fit = of_mended_readings(sloping.certificate, named=False)
-    assert set(fit["gain_share"].values()) == set(fit["gain_share_readings"].values()) == {None}
-    assert fit["channels"] == sloping.certificate["channels"]
-    assert "mended before" in fit["note"]
-    assert of_mended_readings(sloping.certificate, named=True)["gain_share"] == sloping.certificate["gain_share"]
+    assert set(fit.gain_share.values()) == set(fit.gain_share_readings.values()) == {None}
+    assert fit.channels == sloping.certificate.channels
+    assert "mended before" in fit.note
+    assert of_mended_readings(sloping.certificate, named=True).gain_share == sloping.certificate.gain_share

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from ddagr_gym.diagnosis.localisation.operating_conditions import REGIMES, Pieces, Unevenness, _ordered, uneven
+from ddagr_gym.diagnosis.localisation.operating_conditions import CONDITIONS, Pieces, _ordered, uneven
+from ddagr_gym.diagnosis.result.location import Unevenness
 
-NAME = next(name for name in REGIMES if name != "heading")
+NAME = next(name for name in CONDITIONS if name != "heading")
 
 
 @pytest.mark.parametrize(

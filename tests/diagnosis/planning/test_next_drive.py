@@ -1,7 +1,8 @@
 """Which manoeuvre settles classical confusions."""
 
 import math
-from dataclasses import asdict
+from dataclasses import asdict, replace
+from typing import Any
 
 import pytest
 
@@ -14,6 +15,7 @@ from ddagr_gym.diagnosis.planning.next_drive import (
     sensors_of_diagnosis,
     setting_of_diagnosis,
 )
+from ddagr_gym.diagnosis.result.verdict import Diagnosis, Estimate, Finding, GatesUsed, Options
 from ddagr_gym.diagnosis.setting import Setting
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.nuisances import NuisancePriors
@@ -32,97 +34,95 @@ def drive(*rivals: str, bank=(STRAIGHT, TURN), **options):
 
 def test_slope_against_bias_asks_for_a_change_of_heading() -> None:
     answer = drive("slope=0.02", "accelerometer_bias=0.2")
-    assert answer["manoeuvre"] == "two_headings_short"
-    assert answer["separates"] == [["slope", "accelerometer_bias"]]
-    assert answer["minutes"] == pytest.approx(APART / answer["power"])
-    assert answer["why"].startswith("with a turn: ")
+    assert answer.manoeuvre == "two_headings_short"
+    assert answer.separates == (("slope", "accelerometer_bias"),)
+    assert answer.minutes == pytest.approx(APART / answer.power)
+    assert answer.why.startswith("with a turn: ")
     # the straight is no alternative worth its time, or far behind
-    assert all(item["power"] < 0.1 * answer["power"] for item in answer["alternatives"])
+    assert all(item.power < 0.1 * answer.power for item in answer.alternatives)
 
 
 def test_one_heading_alone_settles_nothing() -> None:
     answer = drive("imu_tilt=0.0,pitch=0.03", "accelerometer_bias=0.3")
-    assert answer["manoeuvre"] == ""
-    assert answer["separates"] == []
-    assert answer["minutes"] is None
-    assert f"{MOST_MINUTES:g} min" in answer["why"]
+    assert answer.manoeuvre == ""
+    assert answer.separates == ()
+    assert answer.minutes is None
+    assert f"{MOST_MINUTES:g} min" in answer.why
 
 
 def test_kinds_of_drag_ask_for_several_speeds() -> None:
     answer = drive("towed_drag=150", "viscous_drag=700", bank=(STRAIGHT, SPEEDS))
-    assert answer["manoeuvre"] == "speeds_short"
+    assert answer.manoeuvre == "speeds_short"
 
 
 def test_a_single_name_asks_for_the_drive_that_shows_it_best() -> None:
     answer = drive("gyro_scale=1.05")
-    assert answer["manoeuvre"] == "two_headings_short"
-    assert answer["separates"] == []
-    assert "stands out" in answer["why"]
+    assert answer.manoeuvre == "two_headings_short"
+    assert answer.separates == ()
+    assert "stands out" in answer.why
 
 
 def test_a_place_is_driven_over() -> None:
     far = drive("soil_patch=2.5,centre_x=30.0,centre_y=-20.0", bank=(STRAIGHT,))
     near = drive("soil_patch=2.5,centre_x=1.0,centre_y=0.0", bank=(STRAIGHT,))
-    assert far["power"] == pytest.approx(near["power"], rel=0.1)
+    assert far.power == pytest.approx(near.power, rel=0.1)
     # 0.0812 with steps of 5 ms and nine contact nodes; steps divided at launches read 1.2 out of their own noise
-    assert far["power"] == pytest.approx(0.0812, rel=0.3)
+    assert far.power == pytest.approx(0.0812, rel=0.3)
+
+
+def finding(name: str, weights: dict[str, float], **parameters: float) -> Finding:
+    estimates = {key: Estimate(value, "-") for key, value in parameters.items()}
+    return Finding(name, estimates, 30.0, 8.0, 4.0, 20.0, equivalence_set=weights)
+
+
+def diagnosis(*findings: Finding, **entries: Any) -> Diagnosis:
+    names = tuple(item.name for item in findings) or ("unknown",)
+    gates = GatesUsed(nulls=60, bank="f", level=0.05)
+    empty = Diagnosis(names, bool(findings), findings, "", {"nominal": {}}, {}, {}, ("a.csv",), gates, 1.0, "0")
+    return replace(empty, **entries)
 
 
 def test_rivals_and_sensors_of_a_diagnosis() -> None:
-    parameters = {"angle": {"value": 0.03, "unit": "rad"}, "direction": {"value": 0.5, "unit": "rad"}}
-    finding = {
-        "name": "slope",
-        "parameters": parameters,
-        "equivalence_set": {"slope": 0.6, "accelerometer_bias": 0.3, "imu_tilt": 0.1},
-    }
-    mapping = {
-        "findings": [finding],
-        "rejected": [],
-        "detectable": {},
-        "misfit": {"nominal": {"yaw_rate": 1.0, "encoder_left": 1.0}},
-    }
-    rivals = rivals_of_diagnosis(mapping)
+    weights = {"slope": 0.6, "accelerometer_bias": 0.3, "imu_tilt": 0.1}
+    misfit = {"nominal": {"yaw_rate": 1.0, "encoder_left": 1.0}}
+    found = diagnosis(finding("slope", weights, angle=0.03, direction=0.5), misfit=misfit)
+    rivals = rivals_of_diagnosis(found)
     assert [rival.name for rival in rivals] == ["slope", "accelerometer_bias", "imu_tilt"]
     assert rivals[0].angle == 0.03
     # five times the least meaningful bias of 0.05 m/s^2
     assert abs(rivals[1].x) == pytest.approx(0.25)
-    assert sensors_of_diagnosis(mapping) == ("imu", "encoders")
+    assert sensors_of_diagnosis(found) == ("imu", "encoders")
     # a limit that was not fitted has no size to plan with
-    finding["equivalence_set"] = {"slope": 0.6, "motor_saturation": 0.4}
-    assert [rival.name for rival in rivals_of_diagnosis(mapping)] == ["slope"]
+    limited = diagnosis(finding("slope", {"slope": 0.6, "motor_saturation": 0.4}, angle=0.03, direction=0.5))
+    assert [rival.name for rival in rivals_of_diagnosis(limited)] == ["slope"]
 
 
 def test_encoders_that_stand_beside_uneven_radii_are_those_that_the_speed_loop_believes() -> None:
-    finding = {
-        "name": "wheel_radius_mismatch",
-        "parameters": {"difference": {"value": 0.04, "unit": "-"}},
-        "equivalence_set": {"wheel_radius_mismatch": 0.5, "encoder_scale": 0.5},
-    }
-    rivals = rivals_of_diagnosis({"findings": [finding], "rejected": [], "detectable": {}, "misfit": {"nominal": {}}})
+    weights = {"wheel_radius_mismatch": 0.5, "encoder_scale": 0.5}
+    rivals = rivals_of_diagnosis(diagnosis(finding("wheel_radius_mismatch", weights, difference=0.04)))
     assert rivals[1].as_mapping()["parameters"] == {"right": 0.98, "left": 1.02, "loop": 1.0}
 
 
 def test_where_nothing_is_named_what_comes_nearest_is_planned_for() -> None:
-    near = {"name": "slope", "parameters": {"angle": {"value": 0.03}}, "equivalence_set": {"slope": 1.0}}
-    mapping = {"findings": [], "rejected": [near], "detectable": {}, "misfit": {"nominal": {}}}
-    assert [rival.name for rival in rivals_of_diagnosis(mapping)] == ["slope"]
+    near = finding("slope", {"slope": 1.0}, angle=0.03)
+    assert [rival.name for rival in rivals_of_diagnosis(diagnosis(rejected=(near,)))] == ["slope"]
 
 
 def test_a_plan_has_the_windows_and_priors_of_the_diagnosis() -> None:
     setting = Setting(priors=NuisancePriors().with_soil(4.0)).with_windows(3.0, 6.0)
-    options = {"window": 3.0, "stride": 6.0, "block": setting.block, "priors": asdict(setting.priors), "seed": 0}
-    assert setting_of_diagnosis({"options": options}) == setting
-    assert setting_of_diagnosis({"options": {}}) == Setting()
-    with pytest.raises(InputError, match="stride"):
-        setting_of_diagnosis({"options": {name: options[name] for name in ("window", "block", "priors")}})
+    options = Options(window=3.0, stride=6.0, block=setting.block, priors=asdict(setting.priors), seed=0)
+    assert setting_of_diagnosis(diagnosis(options=options)) == setting
+    assert setting_of_diagnosis(diagnosis()) == Setting()
+    for wrong, words in (({"stride": None}, "stride"), ({"priors": {"wetness": 1.0}}, "wetness")):
+        with pytest.raises(InputError, match=words):
+            setting_of_diagnosis(diagnosis(options=replace(options, **wrong)))
 
 
 def test_without_findings_what_could_hide_is_planned_for() -> None:
     detectable = {"slope": {"angle": 0.002}, "payload": {"mass": 40.0}, "gyro_sign": {}, "gyro_scale": {"scale": None}}
-    mapping = {"findings": [], "rejected": [], "detectable": detectable, "misfit": {"nominal": {}}}
-    assert [rival.name for rival in rivals_of_diagnosis(mapping)] == ["gyro_scale"]
+    assert [rival.name for rival in rivals_of_diagnosis(diagnosis(detectable=detectable))] == ["gyro_scale"]
     del detectable["gyro_scale"]
-    assert [rival.name for rival in rivals_of_diagnosis(mapping)] == ["payload"]
+    assert [rival.name for rival in rivals_of_diagnosis(diagnosis(detectable=detectable))] == ["payload"]
 
 
 @pytest.mark.parametrize(("rivals", "words"), [((), "no rival"), (("slope=0.1", "slope=0.2"), "once")])
@@ -135,4 +135,4 @@ def test_power_is_per_minute() -> None:
     twice = Manoeuvre("twice", TURN.segments * 2, "twice")
     one = drive("gyro_scale=1.05", bank=(TURN,))
     two = drive("gyro_scale=1.05", bank=(twice,))
-    assert math.isclose(one["power"], two["power"], rel_tol=0.35)
+    assert math.isclose(one.power, two.power, rel_tol=0.35)

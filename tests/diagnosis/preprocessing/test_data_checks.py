@@ -6,15 +6,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ddagr_gym.diagnosis.localisation.localise import Localisation, Where
-from ddagr_gym.diagnosis.preprocessing.data_checks import DataDoubt, data_doubts, dead_channels
+from ddagr_gym.diagnosis.preprocessing.data_checks import data_doubts, dead_channels
+from ddagr_gym.diagnosis.result.location import EffectLocation, Localisation
 from ddagr_gym.diagnosis.result.sentences import dead_in_words
-from ddagr_gym.diagnosis.result.verdict import Diagnosis
+from ddagr_gym.diagnosis.result.verdict import DataDoubt, Diagnosis, GatesUsed
 from ddagr_gym.diagnosis.review import review
 from ddagr_gym.recordings.schema import Recording
 
-_NOTHING = Where((), 0.0, (), (), None, "")
+_NOTHING = EffectLocation((), 0.0, (), (), None, "")
 NOWHERE = Localisation({}, None, _NOTHING, _NOTHING, {}, ())
+
+
+NO_GATES = GatesUsed(nulls=0, bank="", level=0.05)
 
 
 def doubts(*recordings: Recording) -> tuple[DataDoubt, ...]:
@@ -60,7 +63,7 @@ def test_channels_that_no_diagnosis_compares_are_not_called_dead() -> None:
 
 @pytest.mark.parametrize(("verdict", "begin"), [("none", "Nothing is missing"), ("unknown", "Something is missing")])
 def test_with_a_dead_channel_no_answer_is_complete(verdict: str, begin: str) -> None:
-    answer = Diagnosis((verdict,), True, (), "", {"limit": {"yaw_rate": 1.2}}, {}, {}, ("a",), {}, 1.0, "0")
+    answer = Diagnosis((verdict,), True, (), "", {"limit": {"yaw_rate": 1.2}}, {}, {}, ("a",), NO_GATES, 1.0, "0")
     dead = [DataDoubt("a", "yaw_rate", "stuck", "It never changes.")]
     made = review(answer, NOWHERE, checks=dead)
     assert not made.complete

@@ -1,12 +1,13 @@
 """The answer in words: every effect of the library, sizes with their doubt, shares."""
 
+import math
 import re
 from dataclasses import dataclass, replace
 
 import pytest
 
 from ddagr_gym.diagnosis.localisation.operating_condition_words import uneven_phrase
-from ddagr_gym.diagnosis.localisation.operating_conditions import Unevenness
+from ddagr_gym.diagnosis.result.location import Unevenness
 from ddagr_gym.diagnosis.result.sentences import headline, share_in_words
 from ddagr_gym.diagnosis.result.verdict import Estimate, Finding
 from ddagr_gym.diagnosis.wording import SENTENCES, Amount, amounts, describe, in_sentence, number, quantity, title
@@ -144,10 +145,11 @@ def test_numbers():
     assert [number(v) for v in (0.01234, -5.0, 1234.0, 2e-5, 3e7)] == ["0.012", "−5.0", "1234", "2.0e−05", "3.0e+07"]
 
 
-def test_amounts_of_json_and_of_objects_are_the_same():
-    of_objects = amounts({"delay": Estimate(0.1, "s", (0.09, 0.11))})
-    assert amounts({"delay": {"value": 0.1, "unit": "s", "interval": [0.09, 0.11]}}) == of_objects
-    assert amounts({"delay": {"value": 0.1, "unit": "s", "interval": None}})["delay"].interval is None
+def test_an_interval_without_ends_is_none():
+    sound = amounts({"delay": Estimate(0.1, "s", (0.09, 0.11))})["delay"]
+    assert (sound.value, sound.unit, sound.interval) == (0.1, "s", (0.09, 0.11))
+    assert amounts({"delay": Estimate(0.1, "s", (0.09, math.nan))})["delay"].interval is None
+    assert amounts({"delay": Estimate(0.1, "s")})["delay"].interval is None
 
 
 def test_the_headline_names_rivals_that_explain_as_much():

@@ -1,6 +1,5 @@
 """Equations for what has no name: on drives of the simulator with a push that no effect of the library makes."""
 
-import json
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -8,7 +7,8 @@ import numpy as np
 import pytest
 
 from ddagr_gym.diagnosis.localisation.residual_wrench import HeldWrench
-from ddagr_gym.diagnosis.unnamed.boosted_baseline import regime_of
+from ddagr_gym.diagnosis.result.files import plain
+from ddagr_gym.diagnosis.unnamed.boosted_baseline import concentration_of
 from ddagr_gym.diagnosis.unnamed.regressors import TARGETS, library, motion_of
 from ddagr_gym.diagnosis.unnamed.response import INPUTS, course_of, linearise
 from ddagr_gym.diagnosis.unnamed.terms import stretches, unnamed_terms
@@ -61,7 +61,7 @@ def test_a_push_is_found_with_its_size_unit_and_interval(pushed) -> None:
     assert term.interval[0] < term.coefficient < term.interval[1]
     assert 0.0 < found.equation_share <= found.ceiling_share < 1.0
     assert found.equation.startswith(f"F_y = {term.coefficient:.3g} [")
-    mapping = json.loads(json.dumps(found.as_mapping(), allow_nan=False))
+    mapping = plain(found)
     assert set(mapping) == {"equation", "terms", "equation_share", "ceiling_share", "where"}
     assert mapping["terms"][0]["interval"] == list(found.terms[0].interval)
 
@@ -106,6 +106,6 @@ def test_regime_in_words(nominal) -> None:
     motion = motion_of(problem, course_of(problem, fitted))
     recording = problem.blocked.windows.recording
     turning = motion["r"].values > 0.05
-    regime = regime_of(turning.astype(float), motion, recording)
+    regime = concentration_of(turning.astype(float), motion, recording)
     assert regime.words.startswith("turning left: 100 % of it")
-    assert regime_of(np.ones(turning.shape), motion, recording).words == "everywhere"
+    assert concentration_of(np.ones(turning.shape), motion, recording).words == "everywhere"

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from ddagr_gym.recordings.checks.across import across_runs, pooled_value
-from ddagr_gym.recordings.checks.findings import CheckReport, Finding, Status, judge, not_testable
+from ddagr_gym.recordings.checks.findings import CheckFinding, CheckReport, Status, judge, not_testable
 from ddagr_gym.recordings.checks.run import check_recording
 from ddagr_gym.recordings.schema import Recording
 
@@ -53,7 +53,7 @@ def test_the_report_is_strict_json_with_the_documented_keys(make_drive):
 
 
 def test_values_that_are_not_finite_become_null():
-    finding = Finding("c", "x", Status.PASS, "m", value=math.nan, interval=(-math.inf, 1.0))
+    finding = CheckFinding("c", "x", Status.PASS, "m", value=math.nan, interval=(-math.inf, 1.0))
     assert finding.to_json()["value"] is None
     assert finding.to_json()["interval"] == [None, 1.0]
 
