@@ -6,7 +6,7 @@ All say what they say after the first scan, before any joint refit: the search o
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 
 from ddagr_gym.diagnosis.gates.thresholds import Gate, Thresholds
@@ -14,8 +14,8 @@ from ddagr_gym.diagnosis.preprocessing.mended_recordings import MendedRecordings
 from ddagr_gym.diagnosis.search.candidates import Candidate
 from ddagr_gym.diagnosis.search.scanned_model import ScannedModel, scan_model
 from ddagr_gym.identification.gauss_newton import Fitted, cost_of
-from ddagr_gym.identification.misfit import LOCAL, roughest
-from ddagr_gym.identification.nuisances import NuisancePriors, Nuisances
+from ddagr_gym.identification.misfit import roughest
+from ddagr_gym.identification.nuisances import LOCAL, Nuisances
 from ddagr_gym.identification.problem import Problem
 from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.parameters import Soil
@@ -141,9 +141,8 @@ def without_nuisances(problem: Problem, soil: Soil) -> Problem:
         soil: nominal.
     """
     parameters = tuple(replace(parameter, prior=0.0) for parameter in problem.nuisances.parameters)
-    fixed = Nuisances(parameters, tuple((index, _LOCKED) for index, _ in problem.nuisances.local))
-    locked: Mapping[str, float] = dict.fromkeys(("local_accelerometer", "local_gyro"), _LOCKED)
-    return Problem(problem.robot, soil, problem.blocked, fixed, NuisancePriors(**locked))
+    local = tuple(replace(unknown, deviation=_LOCKED) for unknown in problem.nuisances.local)
+    return Problem(problem.robot, soil, problem.blocked, Nuisances(parameters, local))
 
 
 def scan_raw_nominal(problem: Problem, raw: Fitted, soil: Soil) -> ScannedModel:

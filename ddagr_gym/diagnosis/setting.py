@@ -109,4 +109,4 @@ def make_problem(
     # where none has poses the first one begins along the world's x axis
     unplaced = reckoned[1:] if len(reckoned) == len(recordings) else reckoned
     uncertain = nuisances(robot, len(recordings), windows.period, setting.priors, unplaced)
-    return Problem(robot, soil, blocked, uncertain, setting.priors, threads=setting.threads)
+    return Problem(robot, soil, blocked, uncertain, threads=setting.threads)

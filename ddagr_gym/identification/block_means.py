@@ -116,6 +116,19 @@ def block_windows(
     return BlockedWindows(windows, weights, sigma)
 
 
+def sample_windows(windows: WindowSet, sigma: Array) -> BlockedWindows:
+    """Every sample a block of its own.
+
+    Args:
+        windows: all samples.
+        sigma: standard deviations of the samples, (8,) or anything that broadcasts to (W, T, 8); infinite for channels
+            that are left out.
+    """
+    known = np.isfinite(windows.measured)
+    widths = np.where(known, np.broadcast_to(sigma, known.shape), np.inf)
+    return BlockedWindows(windows, known[:, :, None].astype(float), widths)
+
+
 def _tracking(windows: WindowSet, blocks: int, length: int) -> Array:
     """Largest difference between command and bank speed of each block (W, B) [rad/s]; 0 without encoders."""
     kept = slice(windows.history, windows.history + blocks * length)

@@ -1,59 +1,43 @@
-"""Joint fit of nuisance parameters, initial states and the parameters of assumed effects by Gauss-Newton."""
+"""The Gauss-Newton iteration: joint fit of nuisance parameters, initial states and the parameters of assumed effects.
+
+Each step solves the linearised problem of :mod:`ddagr_gym.identification.least_squares`, moves parameters and initial
+states, and is shortened until the cost falls. Where windows have variations besides their states, which no step moves,
+the cost is that with every local unknown at its best (variable projection; G. H. Golub and V. Pereyra, SIAM J. Numer.
+Anal. 10 (1973) 413), to first order about the last derivatives; otherwise it is that of the states as they stand.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.identification.problem import Elimination, Point, Problem
-from ddagr_gym.identification.size_prior import size_penalty, size_scale
-from ddagr_gym.identification.window_fit import STATE_PRIOR
-from ddagr_gym.physics.effects import Effect
+from ddagr_gym.identification.effect_parameters import (
+    EffectParameter,
+    effect_columns,
+    effect_parameters,
+    moved,
+    read,
+)
+from ddagr_gym.identification.least_squares import Elimination, Linearised
+from ddagr_gym.identification.problem import STATE_PRIOR, Point, Problem
+from ddagr_gym.identification.size_prior import size_penalty
 
 Array = NDArray[np.float64]
 
 DAMPING = (1.0, 0.5, 0.25, 0.1, 0.03)
-"""Shares of a step that are tried until the cost falls."""
+"""Shares of a step that are tried until the cost falls (ours): below a thirtieth the derivatives are wrong, not the
+length."""
 
-_LONGEST = 3.0  # standard deviations that a parameter moves in one step: beyond, the sensitivities are of no use
-_KEPT = frozenset(
-    {
-        ("payload", "x"), ("payload", "y"), ("payload", "height"), ("lateral_bulldozing", "density"),
-        ("soil_patch", "edge"), ("towed_drag", "hitch_distance"), ("encoder_scale", "loop"),
-    }
-)  # fmt: skip
-"""Shapes that a diagnosis leaves at their defaults: free, they let one effect stand for another (a payload that is not
-at the centre is a centre of mass offset too), and drives hardly show them."""
+_LONGEST = 3.0
+"""Prior standard deviations that a parameter moves in one step (ours): beyond, the derivatives are of no use."""
 
-_EFFECT_RENEWALS = 5  # effects are less linear than nuisances, and fewer
+_EFFECT_RENEWALS = 5
+"""Steps in which derivatives to effects are computed anew (ours): they are less linear than nuisances, and fewer."""
+
 _STATES = len(STATE_PRIOR)
-_NEVER = 1e5  # an onset at which an effect holds always, or never
-
-
-@dataclass(frozen=True)
-class EffectParameter:
-    """One moving field of an assumed effect.
-
-    Attributes:
-        effect: its place among the assumed effects.
-        field: name of the field.
-        step: for finite differences, in its unit.
-        low: bound.
-        high: bound.
-        neutral: value without effect; of a shape its default, which costs nothing.
-        scale: standard deviation about neutral before any data, infinite for a shape.
-    """
-
-    effect: int
-    field: str
-    step: float
-    low: float
-    high: float
-    neutral: float
-    scale: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,8 +47,8 @@ class Fitted:
     Attributes:
         point: where it stands.
         prediction: (W, T, 8).
-        cost: half the sum of squares of weighted residuals and priors, the windows' unknowns eliminated.
-        elimination: of the windows' unknowns at the last derivatives.
+        cost: losses of the weighted residuals and priors.
+        elimination: of the local unknowns at the last derivatives.
         by_parameter: (W, M, P) weighted nuisance sensitivities there.
         iterations: steps taken.
         converged: whether the last step lowered the cost by less than the tolerance.
@@ -81,69 +65,27 @@ class Fitted:
     window_cost: Array
 
 
-def effect_parameters(effects: Sequence[Effect], fixed: frozenset[str] = frozenset()) -> tuple[EffectParameter, ...]:
-    """Fields of effects that a fit moves: all with a step, but none of a categorical effect and no flags.
-
-    Args:
-        effects: assumed.
-        fixed: names of fields to leave alone.
-    """
-    found = []
-    for number, effect in enumerate(effects):
-        if effect.categorical or effect.name == "sensor_hold":
-            continue
-        for name in (*effect.size_names(), *effect.shape_names()):
-            data = effect.parameter(name).metadata
-            at_neutral = not effect.differentiable and getattr(effect, name) == data["neutral"]
-            if (effect.name, name) in _KEPT:
-                continue
-            if data["step"] == 0.0 or name in fixed or abs(getattr(effect, name)) > _NEVER or at_neutral:
-                continue
-            of_size = data["neutral"] is not None and effect.differentiable
-            scale = size_scale(effect, name) if of_size else np.inf
-            neutral = data["neutral"] if of_size else 0.0
-            found.append(EffectParameter(number, name, data["step"], data["low"], data["high"], neutral, scale))
-    return tuple(found)
-
-
-def moved(effects: tuple[Effect, ...], parameters: Sequence[EffectParameter], values: Array) -> tuple[Effect, ...]:
-    """Effects with parameters at values, clipped to their bounds."""
-    changed = list(effects)
-    for parameter, value in zip(parameters, values, strict=True):
-        inside = float(min(max(value, parameter.low), parameter.high))
-        changed[parameter.effect] = changed[parameter.effect].with_values(**{parameter.field: inside})
-    return tuple(changed)
-
-
-def read(effects: Sequence[Effect], parameters: Sequence[EffectParameter]) -> Array:
-    """Values of parameters of effects."""
-    return np.array([getattr(effects[p.effect], p.field) for p in parameters], dtype=np.float64)
-
-
-def effect_columns(problem: Problem, point: Point, base: Array, parameters: Sequence[EffectParameter]) -> Array:
-    """Weighted sensitivity to effect parameters, (W, M, E)."""
-    columns = np.empty((*problem.blocked.mask.shape, len(parameters)))
-    values = read(point.effects, parameters)
-    for k, parameter in enumerate(parameters):
-        step = parameter.step if parameter.low <= values[k] + parameter.step <= parameter.high else -parameter.step
-        tried = values.copy()
-        tried[k] += step
-        changed = problem.predict(replace(point, effects=moved(point.effects, parameters, tried)))
-        columns[..., k] = problem.blocked.change(changed, base) / step
-    return columns
-
-
 def cost_of(problem: Problem, point: Point, prediction: Array, elimination: Elimination) -> tuple[float, Array]:
-    """Cost with the windows' unknowns eliminated, and the windows' shares (W,); infinite where predictions fail.
+    """Cost, and the windows' shares of it (W,); infinite where predictions fail.
 
     Theory: identification, eq. (6).
     """
-    residual = elimination.project(problem.residual(point, prediction)[..., None])[..., 0]
-    shares = 0.5 * (residual**2).sum(axis=1)
-    # residuals leave out what is not there: a window that cannot be predicted would cost nothing
-    shares[~np.isfinite(prediction).all(axis=(1, 2))] = np.inf
+    shares = _losses(problem, _counted(problem, elimination, problem.residual(point, prediction)), prediction)
     total = float(shares.sum()) + _prior_cost(problem, point)
     return (total if np.isfinite(total) else np.inf), shares
+
+
+def _counted(problem: Problem, elimination: Elimination, residual: Array) -> Array:
+    """Residuals (W, R) as they enter the cost: what steps never move, the variations of a window, is eliminated."""
+    return elimination.remaining(residual) if problem.nuisances.local else residual
+
+
+def _losses(problem: Problem, residual: Array, prediction: Array) -> Array:
+    """(W,) losses of residuals; infinite where the prediction failed.
+
+    Residuals leave out what is not there: a window that cannot be predicted would cost nothing.
+    """
+    return np.where(np.isfinite(prediction).all(axis=(1, 2)), problem.losses(residual), np.inf)
 
 
 def _prior_cost(problem: Problem, point: Point) -> float:
@@ -161,6 +103,7 @@ def fit(
     reuse: Fitted | None = None,
     first: Fitted | None = None,
     fixed: frozenset[str] = frozenset(),
+    progress: Callable[[], None] = lambda: None,
 ) -> Fitted:
     """Fit from ``start`` (the nominal model by default).
 
@@ -174,6 +117,7 @@ def fit(
         reuse: fit whose nuisance sensitivities are kept throughout, so that only those of the effects are simulated.
         first: fit at ``start`` whose nuisance sensitivities serve for the first step only.
         fixed: names of effect parameters to leave alone.
+        progress: called after each step.
     """
     point = problem.start() if start is None else start
     parameters = effect_parameters(point.effects, fixed)
@@ -196,6 +140,7 @@ def fit(
         point, prediction, cost = _step(
             problem, point, prediction, cost, elimination, by_parameter, by_effect, parameters, tolerance * cost
         )
+        progress()
         small = before - cost < tolerance * cost
         # a step that fails with sensitivities of another point says nothing about this one
         converged = small and (fresh or reuse is not None)
@@ -215,9 +160,61 @@ def fit(
     return Fitted(point, prediction, cost, elimination, by_parameter, done, converged, shares)
 
 
+def linearised(problem: Problem, fitted: Fitted) -> Linearised:
+    """The linearised problem at a fit: its free nuisances, then the parameters of its effects."""
+    parameters = effect_parameters(fitted.point.effects)
+    by_effect = effect_columns(problem, fitted.point, fitted.prediction, parameters)
+    raw = _raw_columns(problem, fitted.point, fitted.prediction, fitted.by_parameter, by_effect)
+    return _linearised(problem, fitted.point, fitted.elimination.project(raw), parameters)
+
+
+def fit_states(problem: Problem, values: Array, iterations: int = 2) -> tuple[Array, Array]:
+    """Initial states (W, 8) and prediction (W, T, 8) at fixed parameters, from the windows' first guess.
+
+    Args:
+        problem: with its windows.
+        values: (P,) of the parameters.
+        iterations: Gauss-Newton steps; a step that raises a window's cost is not taken in that window.
+    """
+    point = Point(values, problem.starts(values))
+    prediction = problem.predict(point)
+    cost = _losses(problem, problem.residual(point, prediction), prediction)
+    for _ in range(iterations):
+        elimination = problem.eliminate(point, prediction, problem.local_columns(point, prediction))
+        change = elimination.explain(problem.residual(point, prediction)[..., None])[:, :_STATES, 0]
+        tried = replace(point, states=point.states + change)
+        changed = problem.predict(tried)
+        after = _losses(problem, problem.residual(tried, changed), changed)
+        better = after < cost
+        point = replace(point, states=np.where(better[:, None], tried.states, point.states))
+        prediction = np.where(better[:, None, None], changed, prediction)
+        cost = np.where(better, after, cost)
+    return point.states, prediction
+
+
 def _sensitivities(problem: Problem, point: Point, prediction: Array) -> tuple[Array, Elimination]:
     by_parameter = problem.parameter_columns(point, prediction)
     return by_parameter, problem.eliminate(point, prediction, by_parameter)
+
+
+def _raw_columns(problem: Problem, point: Point, prediction: Array, by_parameter: Array, by_effect: Array) -> Array:
+    """Residual and sensitivities as columns (W, R, 1 + P)."""
+    sensitivities = np.concatenate([by_parameter[..., problem.free], by_effect], axis=2)
+    return np.concatenate([problem.residual(point, prediction)[..., None], problem.padded(sensitivities)], axis=2)
+
+
+def _linearised(problem: Problem, point: Point, columns: Array, parameters: Sequence[EffectParameter]) -> Linearised:
+    """Of projected columns: residual first, then the free nuisances, then effect parameters."""
+    free = problem.free
+    return Linearised(
+        columns[..., 0],
+        columns[..., 1:],
+        here=np.concatenate([point.values[free], read(point.effects, parameters)]),
+        expected=np.concatenate([np.zeros(free.sum()), [p.neutral for p in parameters]]),
+        deviation=np.concatenate([problem.prior[free], [p.scale for p in parameters]]),
+        low=np.concatenate([problem.low[free], [p.low for p in parameters]]),
+        high=np.concatenate([problem.high[free], [p.high for p in parameters]]),
+    )
 
 
 def _step(
@@ -235,32 +232,30 @@ def _step(
 
     Shares of it that promise less than ``least`` are not tried.
     """
-    free = np.flatnonzero(problem.free)
-    sensitivities = np.concatenate([by_parameter[..., free], by_effect], axis=2)
-    raw = np.concatenate([problem.residual(point, prediction)[..., None], problem.padded(sensitivities)], axis=2)
-    columns = elimination.project(raw)
-    right, left = columns[..., 0], columns[..., 1:]
-    precision = np.concatenate([1.0 / problem.prior[free] ** 2, [p.scale**-2 for p in parameters]])
-    middle = np.concatenate([np.zeros(len(free)), [p.neutral for p in parameters]])
-    here = np.concatenate([point.values[free], read(point.effects, parameters)])
-    low = np.concatenate([problem.low[free], [p.low for p in parameters]])
-    high = np.concatenate([problem.high[free], [p.high for p in parameters]])
-    information = np.einsum("wmp,wmq->pq", left, left, optimize=True) + np.diag(precision)
-    gradient = np.einsum("wmp,wm->p", left, right) - precision * (here - middle)
-    reach = _LONGEST * np.concatenate([problem.prior[free], [p.scale for p in parameters]])
-    change = bounded_step(information, gradient, np.maximum(low - here, -reach), np.minimum(high - here, reach))
+    raw = _raw_columns(problem, point, prediction, by_parameter, by_effect)
+    linear = _linearised(problem, point, elimination.project(raw), parameters)
+    gradient = linear.gradient
+    change = linear.step(linear.information, gradient, _LONGEST)
     explained = elimination.explain(raw)
     states = explained[:, :_STATES, 0] - explained[:, :_STATES, 1:] @ change
-    shares = 0.5 * (right**2).sum(axis=1)
+    shares = problem.losses(_counted(problem, elimination, raw[..., 0]))
+    promised = float(gradient @ change)
+    if not problem.nuisances.local:
+        promised += elimination.explained_square(raw[..., 0])
+    free = np.flatnonzero(problem.free)
     for damping in DAMPING:
-        if damping < 1.0 and damping * float(gradient @ change) < least:
+        if damping < 1.0 and damping * promised < least:
             break
         values = point.values.copy()
         values[free] += damping * change[: len(free)]
-        effects = moved(point.effects, parameters, here[len(free) :] + damping * change[len(free) :])
+        effects = moved(point.effects, parameters, linear.here[len(free) :] + damping * change[len(free) :])
         start = problem.moved(replace(point, effects=effects), values)
         stepped = replace(start, states=start.states + damping * states)
-        tried, predicted, after = _best_by_window(problem, stepped, start, elimination, shares)
+        if problem.nuisances.local:
+            tried, predicted, after = _best_by_window(problem, stepped, start, elimination, shares)
+        else:
+            tried, predicted = stepped, problem.predict(stepped)
+            after = cost_of(problem, tried, predicted, elimination)[0]
         if after < cost:
             return tried, predicted, after
     return point, prediction, cost
@@ -277,7 +272,7 @@ def _best_by_window(
         problem: what to fit.
         trial: with the linear step of the states.
         other: the same with other states.
-        elimination: of the windows' unknowns.
+        elimination: of the local unknowns.
         before: (W,) costs of the windows before the step.
     """
     prediction = problem.predict(trial)
@@ -294,26 +289,3 @@ def _best_by_window(
         states[rows], prediction[rows], costs[rows] = again.states[better], predicted[better], others[better]
     total = float(costs.sum()) + _prior_cost(problem, trial)
     return replace(trial, states=states), prediction, total if np.isfinite(total) else np.inf
-
-
-def bounded_step(information: Array, gradient: Array, low: Array, high: Array) -> Array:
-    """Newton step inside bounds: the minimum of the quadratic model there (bounded-variable least squares).
-
-    Theory: identification, eq. (8).
-
-    Args:
-        information: (P, P), positive definite or nearly so.
-        gradient: (P,) downhill.
-        low: (P,) at most 0.
-        high: (P,) at least 0.
-    """
-    from scipy.optimize import lsq_linear
-
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(information), 1e-30))
-    scaled = information * np.outer(scale, scale) + 1e-9 * np.eye(len(scale))
-    lower = np.linalg.cholesky(scaled)
-    right = np.linalg.solve(lower, gradient * scale)
-    # a fixed parameter would be an empty interval
-    bounds = (np.minimum(low, 0.0) / scale - 1e-12, np.maximum(high, 0.0) / scale + 1e-12)
-    found = lsq_linear(lower.T, right, bounds=bounds, method="bvls")
-    return np.asarray(found.x * scale)

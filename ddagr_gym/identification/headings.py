@@ -44,7 +44,7 @@ def turned_starts(windows: WindowSet, parameters: Sequence[ModelParameter], valu
     initial = windows.initial.copy()
     for parameter, yaw in zip(parameters, values, strict=True):
         if parameter.heading:
-            chosen = windows.recording == parameter.recording
+            chosen = parameter.acts_in(windows.recording)
             before = windows.initial[chosen]
             initial[chosen, _X] = np.cos(yaw) * before[:, _X] - np.sin(yaw) * before[:, _Y]
             initial[chosen, _Y] = np.sin(yaw) * before[:, _X] + np.cos(yaw) * before[:, _Y]

@@ -10,22 +10,12 @@ from ddagr_gym.identification.gauss_newton import Fitted
 from ddagr_gym.identification.problem import Problem
 from ddagr_gym.identification.windows import CHANNELS, STATE
 
-LOCAL = (
-    "local_strength",
-    "local_stiffness",
-    "local_split",
-    "local_accelerometer_x",
-    "local_accelerometer_y",
-    "local_gyro",
-)
-"""Local variations in the order of the unknowns of a window, after its states."""
-
 
 def channel_misfit(problem: Problem, fitted: Fitted) -> dict[str, float]:
     """Mean square of the residuals of every channel with samples, windows' unknowns eliminated [-].
 
     About 1 where the model is right and the noise is estimated well; unknowns of the windows take a share away. The
-    local variations count as channels of their own (:data:`LOCAL`): what they have to make up for is misfit too.
+    local unknowns count as channels of their own: what they have to make up for is misfit too.
     """
     blocked = problem.blocked
     rows = blocked.mask.shape[1]
@@ -34,7 +24,8 @@ def channel_misfit(problem: Problem, fitted: Fitted) -> dict[str, float]:
     counts = blocked.mask.reshape(blocked.sigma.shape).sum(axis=(0, 1))
     found = {name: float(squares[k] / counts[k]) for k, name in enumerate(CHANNELS) if counts[k] > 0}
     local = (residual[:, rows + len(STATE) :, 0] ** 2).mean(axis=0)
-    return found | {name: float(value) for name, value in zip(LOCAL, local, strict=True)}
+    names = [unknown.name for unknown in problem.nuisances.local]
+    return found | {name: float(value) for name, value in zip(names, local, strict=True)}
 
 
 def roughest(misfit: dict[str, float], limits: dict[str, float]) -> tuple[str, float]:

@@ -21,8 +21,10 @@ from ddagr_gym.identification.parameters import (
     heading_parameters,
     robot_parameters,
     sensor_parameters,
+    soil_entries,
     soil_parameters,
 )
+from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.parameters import Robot
 from ddagr_gym.physics import layout
 
@@ -80,16 +82,44 @@ class NuisancePriors:
 
 
 @dataclass(frozen=True)
+class LocalUnknown:
+    """A variation of one window about the value of all windows.
+
+    Attributes:
+        name: identifier.
+        deviation: standard deviation about 0, in the unit of what it moves.
+        parameter: index of the global parameter that it moves in its window; None for one that moves a reading.
+        channel: index in CHANNELS of the reading that it adds to; None for one that moves a parameter.
+    """
+
+    name: str
+    deviation: float
+    parameter: int | None = None
+    channel: int | None = None
+
+
+@dataclass(frozen=True)
 class Nuisances:
-    """Parameters of a diagnosis.
+    """Parameters of a fit.
 
     Attributes:
         parameters: (P,) global ones, with their priors.
-        local: (L,) index of the parameter that each local variation moves, and its standard deviation.
+        local: (L,) unknowns that each window has besides its initial state.
     """
 
     parameters: tuple[ModelParameter, ...]
-    local: tuple[tuple[int, float], ...]
+    local: tuple[LocalUnknown, ...] = ()
+
+
+LOCAL = (
+    "local_strength",
+    "local_stiffness",
+    "local_split",
+    "local_accelerometer_x",
+    "local_accelerometer_y",
+    "local_gyro",
+)
+"""Local unknowns of a diagnosis, in their order."""
 
 
 _SOIL_STEP = 0.05
@@ -97,21 +127,18 @@ _SOIL_STEP = 0.05
 linear in the logarithms over 5 percent."""
 
 
-def _soil(index: int, wheels: Sequence[int] = range(4)) -> tuple[int, ...]:
-    return tuple(layout.BASE_SOIL + 9 * wheel + index for wheel in wheels)
-
-
 def _structural(priors: NuisancePriors) -> tuple[ModelParameter, ...]:
     """Directions in which another soil law differs from the nominal one."""
-    friction = (*_soil(layout.SOIL_FRICTION_TANGENT),)
-    right = (*_soil(layout.SOIL_COHESION, (0, 2)), *_soil(layout.SOIL_FRICTION_TANGENT, (0, 2)))
+    friction = soil_entries(layout.SOIL_FRICTION_TANGENT)
+    peak, peak_slip = soil_entries(layout.SOIL_PEAK_0), soil_entries(layout.SOIL_PEAK_1)
+    right = (*soil_entries(layout.SOIL_COHESION, (0, 2)), *soil_entries(layout.SOIL_FRICTION_TANGENT, (0, 2)))
     return (
         ModelParameter("friction", "-", friction, True, priors.friction, _SOIL_STEP, -0.8, 0.8),
         ModelParameter(
-            "sinkage_exponent", "-", _soil(layout.SOIL_EXPONENT), True, priors.exponent, _SOIL_STEP, -0.7, 0.7
+            "sinkage_exponent", "-", soil_entries(layout.SOIL_EXPONENT), True, priors.exponent, _SOIL_STEP, -0.7, 0.7
         ),
-        ModelParameter("stress_peak", "-", _soil(layout.SOIL_PEAK_0), False, priors.peak, _SOIL_STEP, -0.3, 0.3),
-        ModelParameter("stress_peak_slip", "-", _soil(layout.SOIL_PEAK_1), False, priors.peak, _SOIL_STEP, -0.3, 0.3),
+        ModelParameter("stress_peak", "-", peak, False, priors.peak, _SOIL_STEP, -0.3, 0.3),
+        ModelParameter("stress_peak_slip", "-", peak_slip, False, priors.peak, _SOIL_STEP, -0.3, 0.3),
         # only local: as a global parameter it would be the effect soil_split
         ModelParameter("strength_right", "-", right, True, 0.0, _SOIL_STEP, 0.0, 0.0),
     )
@@ -150,9 +177,12 @@ def nuisances(
     )
     names = [p.name for p in parameters]
     local = (
-        (names.index("soil_strength"), priors.local_strength),
-        (names.index("soil_stiffness"), priors.local_stiffness),
-        (names.index("strength_right"), priors.local_split),
+        LocalUnknown(LOCAL[0], priors.local_strength, parameter=names.index("soil_strength")),
+        LocalUnknown(LOCAL[1], priors.local_stiffness, parameter=names.index("soil_stiffness")),
+        LocalUnknown(LOCAL[2], priors.local_split, parameter=names.index("strength_right")),
+        LocalUnknown(LOCAL[3], priors.local_accelerometer, channel=CHANNELS.index("specific_force_x")),
+        LocalUnknown(LOCAL[4], priors.local_accelerometer, channel=CHANNELS.index("specific_force_y")),
+        LocalUnknown(LOCAL[5], priors.local_gyro, channel=CHANNELS.index("yaw_rate")),
     )
     return Nuisances(parameters, local)
 

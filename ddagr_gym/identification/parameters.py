@@ -1,14 +1,21 @@
-"""Uncertain parameters of the nominal model: what a refit may move, how far, and where it stands in a row."""
+"""Uncertain parameters of the nominal model: what a fit may move, how far, in which recordings, and where in a row.
+
+A parameter is *shared* by all recordings, or has a *scope*: the recordings in which it acts. A fit over many drives
+takes the shared ones as they are and, for the others, one of a kind per group (:func:`per_group`): a motor rate for
+the robot, a strength for each ground, a bias for each drive. Both may move the same entries; the shared value is then
+the mean of the grounds, and the prior of each own one is how much grounds differ (a hierarchical prior).
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ddagr_gym.errors import InputError
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.physics import layout
 
@@ -28,7 +35,7 @@ class ModelParameter:
         step: for finite differences.
         low: bound.
         high: bound.
-        recording: only windows of this recording, or None for all.
+        scope: numbers of the recordings in which it acts; None for all of them.
         shift: the value is a delay of the commands [s] instead of a row entry.
         heading: the value turns the recording's starts [rad] instead of changing a row entry.
     """
@@ -41,25 +48,80 @@ class ModelParameter:
     step: float
     low: float
     high: float
-    recording: int | None = None
+    scope: frozenset[int] | None = None
     shift: bool = False
     heading: bool = False
 
+    @property
+    def recording(self) -> int | None:
+        """The one recording in which it acts; None for a parameter of all or several."""
+        return next(iter(self.scope)) if self.scope is not None and len(self.scope) == 1 else None
+
+    def acts_in(self, recording: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """(W,) whether it acts in windows of these recordings (W,)."""
+        if self.scope is None:
+            return np.ones(len(recording), dtype=bool)
+        return np.isin(recording, tuple(self.scope))
+
     def apply(self, rows: Array, value: float, recording: NDArray[np.int64]) -> None:
-        """Change the rows (W, SIZE) of the windows it concerns, in place."""
+        """Change the rows (W, SIZE) of the windows in which it acts, in place."""
         if not self.entries or value == 0.0:
             return
-        chosen = np.ones(len(rows), dtype=bool) if self.recording is None else recording == self.recording
-        index = np.ix_(chosen, np.array(self.entries))
+        index = np.ix_(self.acts_in(recording), np.array(self.entries))
         rows[index] = rows[index] * math.exp(value) if self.factor else rows[index] + value
+
+
+def per_group(parameter: ModelParameter, groups: Mapping[str, Collection[int]]) -> tuple[ModelParameter, ...]:
+    """One of a parameter for each group of recordings, such as a soil strength for each ground.
+
+    Args:
+        parameter: shared; its bounds, step and prior hold for each of them.
+        groups: numbers of the recordings by label, which ends the name (``soil_strength_sand``).
+
+    Raises:
+        InputError: a group without recordings, or a recording in two groups.
+    """
+    listed = [number for numbers in groups.values() for number in numbers]
+    twice = sorted({number for number in listed if listed.count(number) > 1})
+    empty = [label for label, numbers in groups.items() if not numbers]
+    if twice or empty:
+        wrong = f"recording {twice[0]} is in two groups" if twice else f"the group {empty[0]!r} has no recording"
+        raise InputError(f"{parameter.name}: {wrong}: give each recording to one group at most, and each group one.")
+    return tuple(
+        replace(parameter, name=f"{parameter.name}_{label}", scope=frozenset(numbers))
+        for label, numbers in groups.items()
+    )
+
+
+def disjoint_scopes(parameters: Sequence[ModelParameter], chosen: Sequence[int]) -> list[list[int]]:
+    """Indices of parameters in lists within which no two act in the same recording; a shared one is alone.
+
+    Args:
+        parameters: of a model.
+        chosen: indices among them.
+    """
+    together: list[list[int]] = []
+    taken: list[frozenset[int] | None] = []
+    for k in chosen:
+        scope = parameters[k].scope
+        fits = (n for n, other in enumerate(taken) if scope is not None and other is not None and not scope & other)
+        place = next(fits, len(together))
+        if place == len(together):
+            together.append([])
+            taken.append(scope)
+        elif scope is not None:
+            taken[place] = scope.union(taken[place] or ())
+        together[place].append(k)
+    return together
 
 
 def _log(name: str, entries: Sequence[int], prior: float, limit: float = 1.6) -> ModelParameter:
     return ModelParameter(name, "-", tuple(entries), True, prior, 0.02, -limit, limit)
 
 
-def _soil(index: int) -> list[int]:
-    return [layout.BASE_SOIL + 9 * wheel + index for wheel in range(4)]
+def soil_entries(index: int, wheels: Sequence[int] = range(4)) -> tuple[int, ...]:
+    """Row entries of one soil parameter under some wheels."""
+    return tuple(layout.BASE_SOIL + 9 * wheel + index for wheel in wheels)
 
 
 FIELD_STIFFNESS_DEVIATION = 0.4
@@ -78,14 +140,14 @@ def soil_parameters(
         soil: nominal one, which bounds the exit angle ratio; bounds that suit any preset's by default.
         stiffness_deviation: prior of the logarithm of the stiffness.
     """
-    strength = _soil(layout.SOIL_COHESION) + _soil(layout.SOIL_FRICTION_TANGENT)
-    stiffness = _soil(layout.SOIL_COHESIVE_MODULUS) + _soil(layout.SOIL_FRICTIONAL_MODULUS)
+    strength = soil_entries(layout.SOIL_COHESION) + soil_entries(layout.SOIL_FRICTION_TANGENT)
+    stiffness = soil_entries(layout.SOIL_COHESIVE_MODULUS) + soil_entries(layout.SOIL_FRICTIONAL_MODULUS)
     low, high = (-0.85, 0.1) if soil is None else (-soil.exit_angle_ratio, 1.0 - soil.exit_angle_ratio)
     return (
         _log("soil_strength", strength, 0.3),
         _log("soil_stiffness", stiffness, stiffness_deviation, max(1.6, 3.0 * stiffness_deviation)),
-        _log("shear_modulus", _soil(layout.SOIL_SHEAR_MODULUS), 0.5),
-        ModelParameter("exit_angle_ratio", "-", tuple(_soil(layout.SOIL_EXIT_RATIO)), False, 0.2, 0.02, low, high),
+        _log("shear_modulus", soil_entries(layout.SOIL_SHEAR_MODULUS), 0.5),
+        ModelParameter("exit_angle_ratio", "-", soil_entries(layout.SOIL_EXIT_RATIO), False, 0.2, 0.02, low, high),
     )
 
 
@@ -122,29 +184,23 @@ def robot_parameters(robot: Robot) -> tuple[ModelParameter, ...]:
 
 def sensor_parameters(recordings: int, gyro_bias: float, accelerometer_bias: float) -> tuple[ModelParameter, ...]:
     """Biases of each recording, with their standard deviations [rad/s], [m/s^2]."""
-    made: list[ModelParameter] = []
-    for number in range(recordings):
-        made.append(
+    kinds = [
+        ModelParameter("gyro_bias", "rad/s", (layout.GYRO_BIAS,), False, gyro_bias, 1e-4, -1.0, 1.0),
+        *(
             ModelParameter(
-                f"gyro_bias_{number + 1}", "rad/s", (layout.GYRO_BIAS,), False, gyro_bias, 1e-4, -1.0, 1.0, number
-            )
-        )
-        made += [
-            ModelParameter(
-                f"accelerometer_bias_{axis}_{number + 1}", "m/s^2", (layout.ACCELEROMETER_BIAS + k,), False,
-                accelerometer_bias, 1e-3, -5.0, 5.0, number,
+                f"accelerometer_bias_{axis}", "m/s^2", (layout.ACCELEROMETER_BIAS + k,), False,
+                accelerometer_bias, 1e-3, -5.0, 5.0,
             )
             for k, axis in enumerate("xy")
-        ]  # fmt: skip
-    return tuple(made)
+        ),
+    ]  # fmt: skip
+    return tuple(made for n in range(recordings) for kind in kinds for made in per_group(kind, {str(n + 1): (n,)}))
 
 
 def heading_parameters(recordings: Sequence[int], deviation: float) -> tuple[ModelParameter, ...]:
     """Headings at which recordings without poses begin, with their standard deviation [rad]."""
-    return tuple(
-        ModelParameter(f"heading_{number + 1}", "rad", (), False, deviation, 0.02, -1e3, 1e3, number, heading=True)
-        for number in recordings
-    )
+    heading = ModelParameter("heading", "rad", (), False, deviation, 0.02, -1e3, 1e3, heading=True)
+    return per_group(heading, {str(number + 1): (number,) for number in recordings})
 
 
 def command_shift(period: float) -> ModelParameter:

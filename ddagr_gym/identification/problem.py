@@ -1,12 +1,15 @@
-"""The fit problem of a diagnosis: block means of windows, nuisances, and whatever effects are assumed.
+"""What a fit minimises: weighted residuals of windows, nuisances with priors, and whatever effects are assumed.
 
-Unknowns of every window (initial state and local variations, all with priors) are eliminated linearly by a QR
-factorisation, so that a sensitivity that they could explain counts for nothing.
+Local unknowns of every window (initial state and local variations, all with priors) are eliminated linearly by a QR
+factorisation, so that a sensitivity that they could explain counts for nothing. This module says what residuals and
+sensitivities are; :mod:`~ddagr_gym.identification.least_squares` has the algebra,
+:mod:`~ddagr_gym.identification.gauss_newton` the iteration.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,8 +18,9 @@ from numpy.typing import NDArray
 from ddagr_gym.identification.block_means import BlockedWindows
 from ddagr_gym.identification.fit_numerics import block_mean_numerics
 from ddagr_gym.identification.headings import headings_matter, turned_starts
-from ddagr_gym.identification.nuisances import SHIFT_AS_EFFECT, NuisancePriors, Nuisances
-from ddagr_gym.identification.window_fit import STATE_PRIOR
+from ddagr_gym.identification.least_squares import Elimination, huber_loss, huber_roots
+from ddagr_gym.identification.nuisances import SHIFT_AS_EFFECT, Nuisances
+from ddagr_gym.identification.parameters import disjoint_scopes
 from ddagr_gym.identification.window_model import WindowModel
 from ddagr_gym.identification.windows import CHANNELS, WindowSet
 from ddagr_gym.parameters import Numerics, Robot, Soil
@@ -34,6 +38,15 @@ _BIAS_CHANNEL = {
 """Entries that add to one channel, whose derivative needs no simulation."""
 
 
+_NEAR_BOUND = 0.03
+"""An upper bound below this (that of the commands' shift [s], two samples) is no limit to finite differences: it says
+what is believed, not what can be simulated."""
+
+STATE_PRIOR = np.array([1e3, 1e3, 1e2, 0.5, 0.2, 0.5, 1.0, 1.0])
+"""Standard deviations of the first guess of STATE [m, m, rad, m/s, m/s, rad/s, rad/s, rad/s]: wide for the pose, loose
+for the motion (ours)."""
+
+
 @dataclass(frozen=True, eq=False)
 class Point:
     """Where a model stands.
@@ -49,42 +62,18 @@ class Point:
     effects: tuple[Effect, ...] = ()
 
 
-@dataclass(frozen=True, eq=False)
-class Elimination:
-    """Orthonormal basis of what the unknowns of each window explain.
-
-    Attributes:
-        basis: (W, M + S, S).
-        upper: (W, S, S) triangular factor.
-    """
-
-    basis: Array
-    upper: Array
-
-    def project(self, columns: Array) -> Array:
-        """Columns (W, M + S, K) without what the basis explains."""
-        return np.asarray(columns - np.matmul(self.basis, np.matmul(self.basis.transpose(0, 2, 1), columns)))
-
-    def explain(self, columns: Array) -> Array:
-        """(W, S, K) changes of the unknowns that explain columns (W, M + S, K) best."""
-        return np.asarray(
-            np.linalg.solve(self.upper, np.matmul(self.basis.transpose(0, 2, 1), columns)), dtype=np.float64
-        )
-
-    def subset(self, chosen: NDArray[np.int64] | Chosen) -> Elimination:
-        """Only the chosen windows."""
-        return Elimination(self.basis[chosen], self.upper[chosen])
-
-
 class Problem:
-    """Windows, model and nuisances of a diagnosis.
+    """What a fit minimises: windows, model, nuisances, and how residuals count.
 
     Args:
         robot: nominal robot.
         soil: nominal soil.
         blocked: windows with their noise.
         nuisances: what is uncertain.
-        priors: their standard deviations, for the local variations of the sensors.
+        imposed: whether the windows' commands are recorded wheel speeds, see :class:`WindowModel`.
+        known: missing physics that is taken as it is, beside the effects of a :class:`Point`, which a fit moves.
+        robust: (8,) size of a weighted residual of each channel from which the loss is linear; None for squares.
+        delay: by which the commands act late besides the shift parameters [s].
         threads: of the simulator.
         numerics: of the simulator.
     """
@@ -95,21 +84,28 @@ class Problem:
         soil: Soil,
         blocked: BlockedWindows,
         nuisances: Nuisances,
-        priors: NuisancePriors | None = None,
         *,
+        imposed: bool = False,
+        known: Sequence[Effect] = (),
+        robust: Array | None = None,
+        delay: float = 0.0,
         threads: int = 1,
         numerics: Numerics | None = None,
     ) -> None:
+        self.robot = robot
         self.blocked = blocked
         self.nuisances = nuisances
-        self.priors = NuisancePriors() if priors is None else priors
-        self._setting = (robot, soil, threads, block_mean_numerics() if numerics is None else numerics)
-        windows = blocked.windows
-        self.model = self.model_of(windows)
+        self.model = WindowModel(
+            robot, soil, blocked.windows, nuisances.parameters, imposed=imposed,
+            numerics=block_mean_numerics() if numerics is None else numerics, threads=threads,
+            delay=delay,
+        )  # fmt: skip
         self.prior = np.array([p.prior for p in nuisances.parameters])
-        self._headings = [k for k, parameter in enumerate(nuisances.parameters) if parameter.heading]
         self.low = np.array([p.low for p in nuisances.parameters])
         self.high = np.array([p.high for p in nuisances.parameters])
+        self.local_prior = np.array([*STATE_PRIOR, *(unknown.deviation for unknown in nuisances.local)])
+        self._known = tuple(known)
+        self._robust = robust
 
     def subset(self, chosen: NDArray[np.int64] | Chosen) -> Problem:
         """The same problem on some of the windows."""
@@ -117,24 +113,19 @@ class Problem:
 
     def with_held_headings(self) -> Problem:
         """The same problem whose headings stay where they are."""
-        held = self.on(self.blocked)
-        held.prior[self._headings] = 0.0
+        held = copy(self)
+        held.prior = np.where([p.heading for p in self.nuisances.parameters], 0.0, self.prior)
         return held
 
     def on(self, blocked: BlockedWindows) -> Problem:
         """The same problem on other windows of the same recordings."""
-        robot, soil, threads, numerics = self._setting
-        return Problem(robot, soil, blocked, self.nuisances, self.priors, threads=threads, numerics=numerics)
+        other = copy(self)
+        other.blocked, other.model = blocked, self.model.on(blocked.windows)
+        return other
 
     def model_of(self, windows: WindowSet) -> WindowModel:
         """The same model over other windows of the same recordings."""
-        robot, soil, threads, numerics = self._setting
-        return WindowModel(robot, soil, windows, self.nuisances.parameters, numerics=numerics, threads=threads)
-
-    @property
-    def robot(self) -> Robot:
-        """The nominal robot."""
-        return self._setting[0]
+        return self.model.on(windows)
 
     @property
     def covered(self) -> float:
@@ -171,48 +162,83 @@ class Problem:
 
     def predict(self, point: Point) -> Array:
         """(W, T, 8)."""
-        return self.model.predict(point.values, point.states, point.effects)
+        return self.model.predict(point.values, point.states, (*self._known, *point.effects))
 
     def residual(self, point: Point, prediction: Array) -> Array:
-        """Weighted block residuals with the states' prior below, (W, M + S)."""
-        offset = np.zeros((self.blocked.windows.count, len(self._unknown_priors)))
+        """Weighted block residuals with the priors of the local unknowns below, (W, M + S)."""
+        offset = np.zeros((self.blocked.windows.count, len(self.local_prior)))
         offset[:, : len(STATE_PRIOR)] = (self.starts(point.values) - point.states) / STATE_PRIOR
         return np.concatenate([self.blocked.residual(prediction), offset], axis=1)
 
+    def losses(self, residual: Array) -> Array:
+        """(W,) loss of residuals (W, M + S)."""
+        limits = self._limits
+        loss = 0.5 * residual**2 if limits is None else huber_loss(residual, limits)
+        return np.asarray(loss.sum(axis=1))
+
     @property
-    def _unknown_priors(self) -> Array:
-        """(S,) of the states, the local parameters and the local sensor biases."""
-        sensors = [self.priors.local_accelerometer, self.priors.local_accelerometer, self.priors.local_gyro]
-        return np.array([*STATE_PRIOR, *(deviation for _, deviation in self.nuisances.local), *sensors])
+    def _limits(self) -> Array | None:
+        """(M + S,) sizes of residuals from which the loss is linear; priors are squares throughout."""
+        if self._robust is None:
+            return None
+        blocks = self.blocked.weights.shape[1]
+        return np.concatenate([np.tile(self._robust, blocks), np.full(len(self.local_prior), np.inf)])
 
     def padded(self, columns: Array) -> Array:
         """Columns (W, M, K) with the rows of the unknowns' priors below, (W, M + S, K)."""
-        rows = np.zeros((columns.shape[0], len(self._unknown_priors), columns.shape[2]))
+        rows = np.zeros((columns.shape[0], len(self.local_prior), columns.shape[2]))
         return np.concatenate([columns, rows], axis=1)
 
     def parameter_columns(self, point: Point, base: Array) -> Array:
-        """Weighted sensitivity to every nuisance parameter, (W, M, P)."""
-        columns = []
+        """Weighted sensitivity to every nuisance parameter, (W, M, P).
+
+        One simulation serves all parameters of scopes that do not overlap: a window sees one of them. So do headings,
+        see :meth:`heading_columns`, and biases need none.
+        """
+        columns = np.zeros((*self.blocked.mask.shape, len(self.prior)))
+        simulated = []
         for k, parameter in enumerate(self.nuisances.parameters):
-            if parameter.heading:
-                columns.append(np.zeros(self.blocked.mask.shape))
-                continue
             channel = _BIAS_CHANNEL.get(parameter.entries[0]) if len(parameter.entries) == 1 else None
             if channel is not None and not parameter.factor:
-                columns.append(self._bias_column(channel, parameter.recording))
-                continue
-            step = parameter.step if point.values[k] + parameter.step <= max(parameter.high, 0.03) else -parameter.step
+                columns[..., k] = self._bias_column(channel, parameter.acts_in(self.blocked.windows.recording))
+            elif not parameter.heading:
+                simulated.append(k)
+        for together in disjoint_scopes(self.nuisances.parameters, simulated):
+            steps = [self._difference(k, point.values[k]) for k in together]
             moved = point.values.copy()
-            moved[k] += step
-            columns.append(self.blocked.change(self.predict(replace(point, values=moved)), base) / step)
-        return self.heading_columns(point, base, np.stack(columns, axis=2))
+            moved[together] += steps
+            change = self.blocked.change(self.predict(replace(point, values=moved)), base)
+            for k, step in zip(together, steps, strict=True):
+                acts = self.nuisances.parameters[k].acts_in(self.blocked.windows.recording)
+                columns[acts, :, k] = change[acts] / step
+        return self.heading_columns(point, base, columns)
+
+    def _difference(self, k: int, value: float) -> float:
+        """Step of the finite difference to parameter k: back from an upper bound, but for one that is next to 0."""
+        step = self.nuisances.parameters[k].step
+        return step if value + step <= max(self.high[k], _NEAR_BOUND) else -step
+
+    def local_columns(self, point: Point, base: Array) -> Array:
+        """The sensitivities (W, M, P) to the parameters that have a local unknown; 0 for all others."""
+        columns = np.zeros((*self.blocked.mask.shape, len(self.prior)))
+        for index in self._varied:
+            moved = point.values.copy()
+            moved[index] += self.nuisances.parameters[index].step
+            change = self.blocked.change(self.predict(replace(point, values=moved)), base)
+            columns[..., index] = change / self.nuisances.parameters[index].step
+        return columns
+
+    @property
+    def _varied(self) -> list[int]:
+        """Indices of the parameters that have a local unknown."""
+        return [unknown.parameter for unknown in self.nuisances.local if unknown.parameter is not None]
 
     def heading_columns(self, point: Point, base: Array, by_parameter: Array) -> Array:
         """Sensitivities (W, M, P) with those to the headings as they are with the effects of a point.
 
         One simulation serves all headings: every window belongs to one recording.
         """
-        own = self._headings
+        own = [k for k, parameter in enumerate(self.nuisances.parameters) if parameter.heading]
         if not own:
             return by_parameter
         found = by_parameter.copy()
@@ -224,26 +250,33 @@ class Problem:
         values[own] += step
         change = self.blocked.change(self.predict(self.moved(point, values)), base) / step
         for k in own:
-            chosen = self.blocked.windows.recording == self.nuisances.parameters[k].recording
+            chosen = self.nuisances.parameters[k].acts_in(self.blocked.windows.recording)
             found[..., k] = np.where(chosen[:, None], change, 0.0)
         return found
 
-    def _bias_column(self, channel: int, recording: int | None) -> Array:
-        windows = self.blocked.windows
-        ones = np.zeros(windows.measured.shape)
-        chosen = slice(None) if recording is None else windows.recording == recording
+    def _bias_column(self, channel: int, chosen: Chosen | slice = slice(None)) -> Array:
+        """(W, M) sensitivity to what adds to a channel in the chosen windows."""
+        ones = np.zeros(self.blocked.windows.measured.shape)
         ones[chosen, :, channel] = 1.0
         return self.blocked.means(ones)
 
     def eliminate(self, point: Point, base: Array, by_parameter: Array) -> Elimination:
-        """Basis of the unknowns of each window at a point (theory: identification, eq. (7))."""
-        changes = self.model.state_derivatives(point.values, point.states, base, point.effects)
+        """Basis of the local unknowns of each window at a point (theory: identification, eq. (7)).
+
+        Args:
+            point: where the model stands.
+            base: (W, T, 8) prediction there.
+            by_parameter: (W, M, P) sensitivities, of which those with a local unknown count.
+        """
+        changes = self.model.state_derivatives(point.values, point.states, base, (*self._known, *point.effects))
         by_state = np.nan_to_num(self.blocked.means(changes))
-        local = by_parameter[..., [index for index, _ in self.nuisances.local]]
-        sensors = np.stack([self._bias_column(channel, None) for channel in range(3)], axis=2)
-        columns = np.concatenate([by_state, local, sensors], axis=2)
-        rows = np.broadcast_to(
-            np.diag(1.0 / self._unknown_priors), (columns.shape[0], columns.shape[2], columns.shape[2])
-        )
-        basis, upper = np.linalg.qr(np.concatenate([columns * self.blocked.mask[..., None], rows], axis=1))
-        return Elimination(basis, upper)
+        local = [
+            by_parameter[..., unknown.parameter] if unknown.channel is None else self._bias_column(unknown.channel)
+            for unknown in self.nuisances.local
+        ]
+        columns = np.concatenate([by_state, *(column[..., None] for column in local)], axis=2)
+        rows = np.broadcast_to(np.diag(1.0 / self.local_prior), (len(columns), *2 * (columns.shape[2],)))
+        stacked = np.concatenate([columns * self.blocked.mask[..., None], rows], axis=1)
+        limits = self._limits
+        roots = None if limits is None else huber_roots(self.residual(point, base), limits)
+        return Elimination.of(stacked, roots)

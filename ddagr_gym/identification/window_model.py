@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -112,7 +113,7 @@ class WindowModel:
             simulator.field_index[:] = 0
         for parameter, value in zip(self.parameters, values, strict=True):
             parameter.apply(simulator.rows, float(value), self.windows.recording)
-        delay = self._delay + sum(float(v) for p, v in zip(self.parameters, values, strict=True) if p.shift)
+        delay = self._delays(values)
         commands, start = self._drive(delay, states)
         simulator.reset(state=dict(zip(STATE, start.T, strict=True)))
         simulator.rows[:, layout.TIME] = self.windows.time
@@ -126,8 +127,23 @@ class WindowModel:
         simulator.close()
         return readings, record
 
-    def _drive(self, delay: float, states: Array) -> tuple[Array, Array]:
-        """(W, T, 2) commands as they act after ``delay`` [s], and the states to start from."""
+    def on(self, windows: WindowSet) -> WindowModel:
+        """The same model over other windows of the same period."""
+        other = copy(self)
+        other.windows = windows
+        other._no_noise = np.zeros((windows.count, windows.samples, layout.NOISE_CHANNELS))
+        return other
+
+    def _delays(self, values: Array) -> Array:
+        """(W,) by which the commands of each window act late [s]."""
+        delays = np.full(self.windows.count, self._delay)
+        for parameter, value in zip(self.parameters, values, strict=True):
+            if parameter.shift:
+                delays[parameter.acts_in(self.windows.recording)] += value
+        return delays
+
+    def _drive(self, delay: Array, states: Array) -> tuple[Array, Array]:
+        """(W, T, 2) commands as they act after ``delay`` (W,) [s], and the states to start from."""
         commands = self.windows.drive(delay)
         if not self._imposed:
             return commands, states
@@ -148,14 +164,4 @@ class WindowModel:
             moved = states.copy()
             moved[:, k] += STATE_STEPS[k]
             derivatives[..., k] = (self.predict(values, moved, effects) - base) / STATE_STEPS[k]
-        return derivatives
-
-    def parameter_derivatives(self, values: Array, states: Array, base: Array, effects: Sequence[Effect] = ()) -> Array:
-        """d prediction / d parameters, (W, T, 8, P), by differences that stay inside the bounds."""
-        derivatives = np.zeros((*base.shape, len(self.parameters)))
-        for k, parameter in enumerate(self.parameters):
-            step = parameter.step if values[k] + parameter.step <= parameter.high else -parameter.step
-            moved = values.copy()
-            moved[k] += step
-            derivatives[..., k] = (self.predict(moved, states, effects) - base) / step
         return derivatives

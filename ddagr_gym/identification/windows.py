@@ -82,29 +82,31 @@ class WindowSet:
         """Of a window [s]."""
         return self.samples * self.period
 
-    def drive(self, delay: float = 0.0) -> Array:
-        """(W, T, 2) commands as they act after ``delay`` [s]; a negative one takes them from later rows.
+    def drive(self, delay: float | Array = 0.0) -> Array:
+        """(W, T, 2) commands as they act after ``delay`` [s], one or (W,); a negative one takes them from later rows.
 
         Between samples of the period they are interpolated; before and after what was kept, held.
         """
         return self._commands(np.arange(self.samples), delay)
 
-    def past(self, delay: float = 0.0) -> Array:
+    def past(self, delay: float | Array = 0.0) -> Array:
         """(W, H, 2) commands that acted in the same way before the start, the latest last; NaN where unknown."""
-        oldest = np.arange(self.history) - int(np.ceil(delay / self.period - 1e-9))
-        known = oldest >= self.unknown[:, None]
+        late = np.broadcast_to(np.ceil(np.asarray(delay) / self.period - 1e-9).astype(np.int64), (self.count,))
+        known = np.arange(self.history) - late[:, None] >= self.unknown[:, None]
         return np.where(known[..., None], self._commands(np.arange(-self.history, 0), delay), np.nan)
 
-    def _commands(self, samples: NDArray[np.int64], delay: float) -> Array:
+    def _commands(self, samples: NDArray[np.int64], delay: float | Array) -> Array:
         """Commands that act in samples counted from the start."""
-        whole = int(np.floor(delay / self.period))
-        part = delay / self.period - whole
-        rows = self.history + samples - whole
+        periods = np.broadcast_to(np.asarray(delay, dtype=np.float64) / self.period, (self.count,))
+        whole = np.floor(periods).astype(np.int64)
+        part = (periods - whole)[:, None, None]
+        rows = self.history + samples - whole[:, None]
         last = self.commands.shape[1] - 1
-        newer, older = np.clip(rows, 0, last), np.clip(rows - 1, 0, last)
-        if part == 0.0:
-            return np.ascontiguousarray(self.commands[:, newer])
-        return np.ascontiguousarray((1.0 - part) * self.commands[:, newer] + part * self.commands[:, older])
+        window = np.arange(self.count)[:, None]
+        newer = self.commands[window, np.clip(rows, 0, last)]
+        if not part.any():
+            return newer
+        return np.asarray((1.0 - part) * newer + part * self.commands[window, np.clip(rows - 1, 0, last)])
 
     def subset(self, chosen: NDArray[np.int64] | NDArray[np.bool_]) -> WindowSet:
         """Only the chosen windows."""

@@ -174,7 +174,7 @@ def replay_arm(
         _speed(simulators.values()),
         tuple(_notes(settings, seen, judged, baselines, found)),
     )
-    values = {} if fit is None else dict(zip((p.name for p in fit.parameters), fit.fit.values.tolist(), strict=True))
+    values = {} if fit is None else dict(zip((p.name for p in fit.parameters), fit.values.tolist(), strict=True))
     in_training = training(windows, prepared.splits)
     return ArmResult(report, windows, in_training, residual, found, rolled), values
 
@@ -346,14 +346,14 @@ def _rollouts(rolled: Sequence[tuple[WindowSet, Mapping[str, Array]]], drive_by:
 
 
 def _refit_report(fit: ArmFit, window: float, cpu: float) -> RefitReport:
-    found = fit.fit
+    found = fit.fitted
     parameters = tuple(
         FittedParameter(
             p.name, p.unit, float(value), float(deviation), float(spread), p.prior, float(value) / p.prior,
-            p.name in found.at_bound,
+            p.name in fit.at_bound,
         )
         for p, value, deviation, spread in zip(
-            fit.parameters, found.values, found.deviations, found.window_deviations, strict=True
+            fit.parameters, fit.values, fit.deviations, fit.window_deviations, strict=True
         )
     )  # fmt: skip
     return RefitReport(parameters, fit.windows, window, found.iterations, found.converged, found.cost, cpu)

@@ -8,7 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ddagr_gym.identification.block_means import sample_windows
 from ddagr_gym.identification.fit_numerics import field_numerics
+from ddagr_gym.identification.gauss_newton import Fitted, fit, linearised
+from ddagr_gym.identification.nuisances import Nuisances
 from ddagr_gym.identification.parameters import (
     KIND_STIFFNESS_DEVIATION,
     ModelParameter,
@@ -18,9 +21,8 @@ from ddagr_gym.identification.parameters import (
     soil_parameters,
     wheel_speed_shift,
 )
+from ddagr_gym.identification.problem import Point, Problem
 from ddagr_gym.identification.recording_noise import RecordingNoise
-from ddagr_gym.identification.window_fit import Refit, Refitter
-from ddagr_gym.identification.window_model import WindowModel
 from ddagr_gym.identification.windows import CHANNELS, WindowSet
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.physics.effects import Effect
@@ -32,25 +34,43 @@ Array = NDArray[np.float64]
 UNFITTED = ("specific_force_x", "specific_force_y")
 """Not fitted: tilt of the ground, lever arm and vibration are all in them, and not in the nominal model."""
 MOTOR_PARAMETERS = ("motor_rate", "maximum_wheel_speed")
+"""Not fitted where recorded wheel speeds drive."""
+
 LATEST_CLOCK = 0.5
 """Drive kept before and after every window, and so the largest lateness of a clock that a fit can find [s]."""
+
 ROBUST = 2.0
-"""Weighted residual from which the loss is linear: what the model cannot explain must not bend it."""
+"""Weighted residual from which the loss is linear (ours): what the model cannot explain must not bend it."""
+
 MOST_WINDOWS = 150
 """Training windows that a fit uses, evenly chosen: 5 min of 2 s windows."""
+
 UNKNOWN_GYRO_BIAS = 0.005
-"""Prior where a robot never stood [rad/s]."""
+"""Prior where a robot never stood [rad/s]: that of a MEMS gyro (ours)."""
+
 LEAST_GYRO_BIAS = 2e-4
-"""Prior at least [rad/s] (ours): a bias that was seen at rest wanders by so much over a drive."""
+"""Least prior [rad/s]: the bias of a gyro wanders by so much in a drive (ours)."""
+
 PASSES = 2
-"""Of a fit: the second one weighs channels by the residuals of the first."""
+"""Fits: the first weighs by the sensors' noise, the second by what the first leaves unexplained."""
+
 ITERATIONS = 8
-"""Gauss-Newton steps of a pass at most (ours)."""
+"""Most Gauss-Newton steps of a pass (ours): field drives take 3 to 8."""
+
 TOLERANCE = 5e-4
-"""Relative fall of the cost that ends a pass (ours)."""
-_NORMAL = 1.4826  # standard deviation of a normal variable over its median absolute deviation
-_STRONGEST = 0.98  # correlation that counts at most (ours): of 99 samples one is left
-_FEWEST = 20  # residuals that a robust size needs (ours)
+"""Relative gain of a step that ends a pass (ours): far below the deviations of the parameters."""
+
+_NORMAL = 1.4826
+"""Standard deviation of a normal variable over the median of its size."""
+
+_STRONGEST = 0.98
+"""Correlation of successive samples beyond which they are not weighed down further (ours): a hundred are worth one."""
+
+_AT_BOUND = 1e-9
+"""Distance from a bound that is none, in the unit of the parameter."""
+
+_FEWEST = 20
+"""Samples of a channel below which its residuals change no weight (ours)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,15 +96,34 @@ class ArmFit:
 
     Attributes:
         parameters: (P,).
-        fit: their values and deviations.
+        fitted: the last pass.
+        deviations: (P,) Gauss-Newton standard deviations; resampled intervals are wider and more honest.
+        window_deviations: (P,) the same from the scatter of the windows (sandwich), which allows for correlated
+            residuals inside a window.
         weights: of the last pass.
-        windows: number that it used.
     """
 
     parameters: tuple[ModelParameter, ...]
-    fit: Refit
+    fitted: Fitted
+    deviations: Array
+    window_deviations: Array
     weights: Weights
-    windows: int
+
+    @property
+    def values(self) -> Array:
+        """(P,) fitted values."""
+        return self.fitted.point.values
+
+    @property
+    def windows(self) -> int:
+        """Number of windows that it used."""
+        return len(self.fitted.window_cost)
+
+    @property
+    def at_bound(self) -> tuple[str, ...]:
+        """Names of the parameters that sit at a bound."""
+        pairs = zip(self.parameters, self.values, strict=True)
+        return tuple(p.name for p, value in pairs if value <= p.low + _AT_BOUND or value >= p.high - _AT_BOUND)
 
 
 def noise_weights(
@@ -186,18 +225,21 @@ def fit_arm(
         threads: of the simulator.
         progress: called after each of at most PASSES * ITERATIONS iterations.
     """
-    model = WindowModel(robot, soil, windows, parameters, imposed=imposed, numerics=field_numerics(), threads=threads)
     given = start or {}
     low, high = ([getattr(p, bound) for p in parameters] for bound in ("low", "high"))
     values = np.clip([given.get(p.name, 0.0) for p in parameters], low, high)
-    states = None
+    point = Point(values, windows.initial)
     for number in range(PASSES):
-        refitter = Refitter(model, weights.sigma, effects, progress, robust=weights.robust)
-        fit = refitter.fit(values, states, iterations=ITERATIONS, tolerance=TOLERANCE)
-        values, states = fit.values, fit.states
+        problem = Problem(
+            robot, soil, sample_windows(windows, weights.sigma), Nuisances(tuple(parameters)), imposed=imposed,
+            known=effects, robust=weights.robust, threads=threads, numerics=field_numerics(),
+        )  # fmt: skip
+        # field data are far from the model: derivatives of a step before are worth less than they cost
+        fitted = fit(problem, point, iterations=ITERATIONS, tolerance=TOLERANCE, renewals=ITERATIONS, progress=progress)
+        point = fitted.point
         if number < PASSES - 1:
-            weights = misfit_weights(windows, fit.prediction, weights)
-    return ArmFit(tuple(parameters), fit, weights, windows.count)
+            weights = misfit_weights(windows, fitted.prediction, weights)
+    return ArmFit(tuple(parameters), fitted, *linearised(problem, fitted).deviations(), weights)
 
 
 def motor_start(robot: Robot, motor: Motor) -> dict[str, float]:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.frames import wrap_angle
+from ddagr_gym.identification.least_squares import huber_loss
 from ddagr_gym.identification.windows import CHANNELS, WindowSet
 
 Array = NDArray[np.float64]
@@ -115,8 +116,7 @@ def fit_track(
         half_track: geometric [m].
         motor: that follows the commands, for windows driven by commands.
         sigma: of the gyro [rad/s], for the loss.
-        robust: weighted residual from which the loss is linear, as for
-            :class:`~ddagr_gym.identification.window_fit.Refitter`.
+        robust: weighted residual from which the loss is linear.
 
     Returns:
         None where nothing measures a turn that goes with the wheel speeds.
@@ -160,9 +160,7 @@ def _robust_share(measured: Array, model: Array, sigma: float, robust: float) ->
     for _ in range(_REWEIGHTINGS if np.isfinite(limit) else 0):
         weight = limit / np.maximum(np.abs(measured - share * model), limit)
         share = float((weight * model) @ measured) / float((weight * model) @ model)
-    size = np.abs(measured - share * model)
-    loss = np.where(size <= limit, size**2, limit * (2.0 * np.minimum(size, 1e300) - limit) if limit < np.inf else 0.0)
-    return share, float(loss.sum())
+    return share, float(huber_loss(measured - share * model, limit).sum())
 
 
 def fit_motor(windows: WindowSet, rate: float, maximum_speed: float, noise: float) -> Motor:

@@ -9,8 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ddagr_gym.identification.block_means import sample_windows
 from ddagr_gym.identification.fit_numerics import field_numerics
-from ddagr_gym.identification.window_fit import Refitter
+from ddagr_gym.identification.gauss_newton import fit_states
+from ddagr_gym.identification.nuisances import Nuisances
+from ddagr_gym.identification.problem import Problem
 from ddagr_gym.identification.window_model import WindowModel
 from ddagr_gym.identification.windows import CHANNELS, WindowSet
 from ddagr_gym.parameters import Numerics, Robot, Soil
@@ -55,7 +58,7 @@ class SimulatorOfArm:
         self._imposed, self._threads = imposed, threads
         self._delay = delay if fit is None else 0.0
         self._parameters = () if fit is None else fit.parameters
-        self.values = np.zeros(0) if fit is None else fit.fit.values
+        self.values = np.zeros(0) if fit is None else fit.values
         self.simulated, self.cpu = 0.0, 0.0
 
     def model(self, windows: WindowSet, numerics: Numerics) -> WindowModel:
@@ -81,9 +84,13 @@ class SimulatorOfArm:
 
     def with_free_states(self, windows: WindowSet, sigma: Array, entries: Sequence[int]) -> tuple[Array, Array]:
         """Channels (W, T, 8) from fitted initial states, and row entries (W, T, K); sigma (W, 1, 8)."""
-        model = self.model(windows, field_numerics())
-        states, _ = Refitter(model, sigma, self._effects, robust=ROBUST).fit_states(self.values)
-        return model.predict_recorded(self.values, states, entries, self._effects)
+        problem = Problem(
+            self._robot, self._soil, sample_windows(windows, sigma), Nuisances(self._parameters), imposed=self._imposed,
+            known=self._effects, robust=np.full(len(CHANNELS), ROBUST), threads=self._threads,
+            numerics=field_numerics(), delay=self._delay,
+        )  # fmt: skip
+        states, _ = fit_states(problem, self.values)
+        return problem.model.predict_recorded(self.values, states, entries, self._effects)
 
     def speed(self) -> Speed:
         """What :meth:`predict` has cost so far."""

@@ -46,7 +46,7 @@ def test_predictions_with_the_file_are_as_good_as_certified(sloping: Sloping, ef
     that was not seen are not known: they are zero, as in the certification.
     """
     problem = sloping.problem
-    own = np.array([p.recording is not None for p in problem.nuisances.parameters])
+    own = np.array([p.scope is not None for p in problem.nuisances.parameters])
     values = np.where(own, 0.0, sloping.chosen.point.values)
     forecasts = cut_forecasts(problem, get_robot("ddagr"), sloping.recordings, 5.0, 2.0)
     assert forecasts is not None

@@ -33,7 +33,8 @@ from ddagr_gym.diagnosis.certification.forecast import (
 from ddagr_gym.diagnosis.certification.residual_model import ResidualModel, Rollout, corrected, fit_residual_model
 from ddagr_gym.diagnosis.result.certificate import Certificate, Folds
 from ddagr_gym.identification.gauss_newton import Fitted, fit
-from ddagr_gym.identification.problem import Elimination, Point, Problem
+from ddagr_gym.identification.least_squares import Elimination
+from ddagr_gym.identification.problem import Point, Problem
 from ddagr_gym.parameters import Robot
 from ddagr_gym.recordings.schema import Recording
 
@@ -109,7 +110,8 @@ def refitted_on(problem: Problem, fitted: Fitted, fold: Fold, iterations: int = 
     values = fitted.point.values.copy()
     for k, parameter in enumerate(problem.nuisances.parameters):
         # how a drive began is a state and no size: it comes from the fit to all drives
-        if parameter.recording in fold.unseen and not parameter.heading:
+        unseen = parameter.scope is not None and parameter.scope <= fold.unseen
+        if unseen and not parameter.heading:
             values[k] = 0.0
     start = Point(values, fitted.point.states[chosen], fitted.point.effects)
     reuse = replace(

@@ -17,8 +17,9 @@ from ddagr_gym.errors import InputError
 from ddagr_gym.frames import wrap_angle
 from ddagr_gym.identification.block_means import block_windows, located
 from ddagr_gym.identification.data_split import evenly
+from ddagr_gym.identification.least_squares import Elimination
 from ddagr_gym.identification.noise import noise_from_differences
-from ddagr_gym.identification.problem import Elimination, Point, Problem
+from ddagr_gym.identification.problem import Point, Problem
 from ddagr_gym.identification.windows import CHANNELS, STATE, WindowSet, cut_windows
 from ddagr_gym.parameters import Robot
 from ddagr_gym.physics import layout
@@ -124,13 +125,7 @@ def past_elimination(forecasts: Forecasts, point: Point) -> Elimination:
     past = forecasts.past
     point = replace(point, states=past.starts(point.values))
     base = past.predict(point)
-    columns = np.zeros((*past.blocked.mask.shape, len(past.prior)))
-    for index, _ in past.nuisances.local:
-        moved = point.values.copy()
-        moved[index] += past.nuisances.parameters[index].step
-        change = past.blocked.change(past.predict(replace(point, values=moved)), base)
-        columns[..., index] = change / past.nuisances.parameters[index].step
-    return past.eliminate(point, base, columns)
+    return past.eliminate(point, base, past.local_columns(point, base))
 
 
 def start_states(forecasts: Forecasts, point: Point, elimination: Elimination, steps: int = 2) -> Array:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.errors import InputError
-from ddagr_gym.identification.misfit import LOCAL
+from ddagr_gym.identification.nuisances import LOCAL
 
 LEVEL = 0.05
 """False alarms that a gate lets through, over the whole library (theory: diagnosis, eq. (6); ours)."""

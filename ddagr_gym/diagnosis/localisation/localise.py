@@ -33,7 +33,8 @@ from ddagr_gym.diagnosis.result.location import (
 from ddagr_gym.diagnosis.search.scanned_model import SearchResult
 from ddagr_gym.frames import wrap_angle
 from ddagr_gym.identification.gauss_newton import Fitted
-from ddagr_gym.identification.misfit import LOCAL, explained_share
+from ddagr_gym.identification.misfit import explained_share
+from ddagr_gym.identification.nuisances import LOCAL
 from ddagr_gym.identification.problem import Problem
 from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.physics import layout

@@ -18,7 +18,8 @@ from ddagr_gym.diagnosis.result.uncertainty import intervals, least_detectable, 
 from ddagr_gym.diagnosis.result.verdict import NONE, UNKNOWN, DataSource, Diagnosis, Estimate, Finding, GatesUsed
 from ddagr_gym.diagnosis.search.scanned_model import ScannedModel, SearchResult
 from ddagr_gym.diagnosis.search.stepwise import MOST_EFFECTS, further_gates
-from ddagr_gym.identification.misfit import LOCAL, explained_share, roughest
+from ddagr_gym.identification.misfit import explained_share, roughest
+from ddagr_gym.identification.nuisances import LOCAL
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.effects.gyro_sign import GyroSign
 from ddagr_gym.recordings.schema import Recording

@@ -10,14 +10,9 @@ from numpy.typing import NDArray
 from ddagr_gym.diagnosis.gates.thresholds import Thresholds
 from ddagr_gym.diagnosis.search.candidates import Candidate, moved_field
 from ddagr_gym.diagnosis.search.scan import Terms, reduce
-from ddagr_gym.identification.gauss_newton import (
-    EffectParameter,
-    Fitted,
-    bounded_step,
-    effect_columns,
-    effect_parameters,
-    read,
-)
+from ddagr_gym.identification.effect_parameters import EffectParameter, effect_parameters
+from ddagr_gym.identification.gauss_newton import Fitted, linearised
+from ddagr_gym.identification.least_squares import bounded_step
 from ddagr_gym.identification.problem import Problem
 from ddagr_gym.physics.effects import Effect, effect_kind
 
@@ -55,25 +50,18 @@ def resampled_parameters(
         draws: how often.
     """
     parameters = effect_parameters(fitted.point.effects)
-    free = np.flatnonzero(problem.free)
-    by_effect = effect_columns(problem, fitted.point, fitted.prediction, parameters)
-    sensitivities = np.concatenate([fitted.by_parameter[..., free], by_effect], axis=2)
-    residual = problem.residual(fitted.point, fitted.prediction)[..., None]
-    columns = fitted.elimination.project(np.concatenate([residual, problem.padded(sensitivities)], axis=2))
+    linear = linearised(problem, fitted)
+    columns = np.concatenate([linear.residual[..., None], linear.sensitivity], axis=2)
     normals = np.matmul(columns.transpose(0, 2, 1), columns)
-    here = np.concatenate([fitted.point.values[free], read(fitted.point.effects, parameters)])
-    low = np.concatenate([problem.low[free], [p.low for p in parameters]])
-    high = np.concatenate([problem.high[free], [p.high for p in parameters]])
-    deviation = np.concatenate([problem.prior[free], [p.scale for p in parameters]])
-    middle = np.concatenate([np.zeros(len(free)), [p.neutral for p in parameters]])
-    count, found = len(normals), []
+    here, deviation, low, high = linear.here, linear.deviation, linear.low, linear.high
+    count, effects, found = len(normals), slice(len(here) - len(parameters), None), []
     for _ in range(draws):
         weights = np.bincount(rng.integers(count, size=count), minlength=count).astype(float)
         total = np.tensordot(weights, normals, axes=1)
         # a shape's deviation is infinite: nothing is expected of it
-        gradient = total[1:, 0] - ((here - middle) / deviation - rng.normal(size=len(middle))) / deviation
+        gradient = total[1:, 0] - ((here - linear.expected) / deviation - rng.normal(size=len(here))) / deviation
         step = bounded_step(total[1:, 1:] + np.diag(deviation**-2.0), gradient, low - here, high - here)
-        found.append(np.clip(here + step, low, high)[len(free) :])
+        found.append(np.clip(here + step, low, high)[effects])
     return parameters, np.array(found).reshape(draws, len(parameters))
 
 

@@ -29,7 +29,7 @@ from ddagr_gym.diagnosis.unnamed.stability_selection import (
     intervals,
     select,
 )
-from ddagr_gym.identification.gauss_newton import effect_columns, effect_parameters
+from ddagr_gym.identification.effect_parameters import effect_columns, effect_parameters
 from ddagr_gym.identification.problem import Problem
 from ddagr_gym.identification.windows import CHANNELS
 

@@ -27,7 +27,7 @@ from ddagr_gym.diagnosis.gates.thresholds import (
     thresholds_from,
 )
 from ddagr_gym.errors import InputError
-from ddagr_gym.identification.misfit import LOCAL
+from ddagr_gym.identification.nuisances import LOCAL
 from ddagr_gym.physics.effects.registry import effect_kinds
 
 NAMES = ("slope", "payload", "motor_lag", "gyro_bias")

@@ -24,7 +24,8 @@ from ddagr_gym.diagnosis.search.scan import dispersion_of
 from ddagr_gym.diagnosis.search.scanned_model import ScannedModel, SearchResult
 from ddagr_gym.diagnosis.wording import EVERYWHERE, range_in_words
 from ddagr_gym.identification.gauss_newton import fit
-from ddagr_gym.identification.misfit import LOCAL, channel_misfit
+from ddagr_gym.identification.misfit import channel_misfit
+from ddagr_gym.identification.nuisances import LOCAL
 from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.physics.effects.registry import parse_effect
 

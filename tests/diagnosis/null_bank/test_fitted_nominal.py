@@ -17,7 +17,7 @@ from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.simulator import build_row
 
 ROBOT, SOIL = get_robot("ddagr"), get_soil("thesis_a1")
-GLOBAL = [p for p in nuisances(ROBOT, 1, 0.02).parameters if p.entries and p.recording is None and p.prior > 0.0]
+GLOBAL = [p for p in nuisances(ROBOT, 1, 0.02).parameters if p.entries and p.scope is None and p.prior > 0.0]
 
 
 @pytest.mark.parametrize("parameter", GLOBAL, ids=lambda parameter: parameter.name)

@@ -18,7 +18,8 @@ from ddagr_gym.diagnosis.search.starting_models import StartingModels, starting_
 from ddagr_gym.diagnosis.search.stepwise import search
 from ddagr_gym.diagnosis.store import StepStore
 from ddagr_gym.errors import InputError
-from ddagr_gym.identification.gauss_newton import cost_of, effect_columns, effect_parameters, fit
+from ddagr_gym.identification.effect_parameters import effect_columns, effect_parameters
+from ddagr_gym.identification.gauss_newton import cost_of, fit
 from ddagr_gym.identification.problem import Point, Problem
 from ddagr_gym.physics.effects.registry import effect_kind, parse_effect
 from ddagr_gym.recordings.schema import Recording

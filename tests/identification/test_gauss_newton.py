@@ -1,0 +1,206 @@
+"""Fits to simulated drives of known physics: one drive, and many drives with shared and own parameters."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ddagr_gym.control.manoeuvres import MANOEUVRES
+from ddagr_gym.errors import InputError
+from ddagr_gym.identification.block_means import sample_windows
+from ddagr_gym.identification.fit_numerics import field_numerics
+from ddagr_gym.identification.gauss_newton import cost_of, fit, fit_states, linearised
+from ddagr_gym.identification.nuisances import Nuisances
+from ddagr_gym.identification.parameters import (
+    ModelParameter,
+    disjoint_scopes,
+    per_group,
+    robot_parameters,
+    soil_parameters,
+)
+from ddagr_gym.identification.problem import Point, Problem
+from ddagr_gym.identification.windows import CHANNELS, cut_windows
+from ddagr_gym.parameters import Imu, PoseReceiver, Sensors
+from ddagr_gym.recordings.schema import RobotGeometry
+from ddagr_gym.simulator import simulate
+from tests.replay_analysis.conftest import MOTOR_RATE, STRENGTH, as_recording
+
+SENSORS = Sensors(imu=Imu(sample_rate=50.0, gyro_noise=0.002, accelerometer_noise=0.05), pose=PoseReceiver(5.0))
+SIGMA = np.array([np.inf, np.inf, 0.002, 0.01, 0.01, 0.012, 0.012, 0.008])
+ROBUST = np.full(len(CHANNELS), 2.0)
+GROUNDS = {"firm": (1.2, (0, 1)), "loose": (0.75, (2, 3))}
+"""Strength over the preset's, and the drives that were made there."""
+
+
+def parameters_of(robot, soil) -> dict[str, ModelParameter]:
+    return {p.name: p for p in (*soil_parameters(soil), *robot_parameters(robot))}
+
+
+def windows_of(recordings, robot):
+    geometry = RobotGeometry.of(robot)
+    return cut_windows(recordings, 2.0, wheel_radius=geometry.wheel_radius, half_track=geometry.half_track)
+
+
+@pytest.fixture(scope="module")
+def one_drive(make_drive, robot, soil):
+    """Soil and motor to be found from eight windows of arcs."""
+    windows = windows_of([make_drive(("arcs",), SENSORS)], robot).subset(np.arange(1, 17, 2))
+    known = parameters_of(robot, soil)
+    chosen = Nuisances((known["soil_strength"], known["motor_rate"]))
+
+    def make(sigma=SIGMA, robust=None) -> Problem:
+        return Problem(robot, soil, sample_windows(windows, sigma), chosen, robust=robust, numerics=field_numerics())
+
+    return make
+
+
+def test_the_known_soil_and_motor_are_found(one_drive):
+    problem = one_drive(robust=ROBUST)
+    fitted = fit(problem, iterations=12, renewals=12, tolerance=1e-4)
+    assert fitted.converged
+    _, spread = linearised(problem, fitted).deviations()
+    errors = np.abs(fitted.point.values - np.log([STRENGTH, MOTOR_RATE]))
+    assert (errors <= np.maximum(3.0 * spread, [0.02, 0.01])).all()
+    start = problem.start()
+    assert fitted.cost < cost_of(problem, start, problem.predict(start), fitted.elimination)[0]
+
+
+def test_wrong_initial_states_are_found_again(one_drive):
+    problem = one_drive()
+    truth = np.log([STRENGTH, MOTOR_RATE])
+    states, prediction = fit_states(problem, truth, iterations=4)
+    initial = problem.blocked.windows.initial.copy()
+    initial[:, 5] += 0.05
+    blocked = replace(problem.blocked, windows=replace(problem.blocked.windows, initial=initial))
+    again, other = fit_states(problem.on(blocked), truth, iterations=4)
+    # a window whose linear step fails keeps its first guess
+    assert np.median(np.abs(again[:, 5] - states[:, 5])) < 0.005
+    gyro = CHANNELS.index("yaw_rate")
+    assert np.median(np.abs(prediction - other)[..., gyro].max(axis=1)) < 0.005
+
+
+def test_a_step_of_the_states_never_raises_the_cost_of_a_window(one_drive):
+    problem = one_drive()
+    nominal = problem.start()
+    before = problem.losses(problem.residual(nominal, problem.predict(nominal)))
+    states, prediction = fit_states(problem, nominal.values)
+    after = problem.losses(problem.residual(Point(nominal.values, states), prediction))
+    assert (after <= before + 1e-9).all()
+    assert after.sum() < 0.9 * before.sum()
+
+
+def test_headings_are_compared_on_the_circle(one_drive):
+    problem = one_drive(np.ones(8))
+    prediction = problem.predict(problem.start())
+    turned = prediction.copy()
+    turned[..., CHANNELS.index("pose_yaw")] += 2.0 * np.pi
+    np.testing.assert_allclose(problem.blocked.residual(turned), problem.blocked.residual(prediction), atol=1e-12)
+
+
+def test_a_channel_without_weight_says_nothing(one_drive):
+    problem = one_drive(np.where(np.arange(8) == CHANNELS.index("yaw_rate"), np.inf, SIGMA))
+    prediction = problem.predict(problem.start())
+    shape = problem.blocked.windows.measured.shape
+    for name in ("yaw_rate", "specific_force_x"):
+        assert not problem.blocked.residual(prediction).reshape(shape)[..., CHANNELS.index(name)].any()
+        assert not problem.blocked.mask.reshape(shape)[..., CHANNELS.index(name)].any()
+
+
+def test_the_robust_cost_grows_linearly(one_drive):
+    gyro = CHANNELS.index("yaw_rate")
+    ratios = []
+    for problem in (one_drive(), one_drive(robust=ROBUST)):
+        start = problem.start()
+        prediction = problem.predict(start)
+        costs = []
+        for error in (0.0, 1.0, 2.0):
+            wrong = prediction.copy()
+            wrong[0, 0, gyro] += error
+            costs.append(problem.losses(problem.residual(start, wrong))[0])
+        ratios.append((costs[2] - costs[0]) / (costs[1] - costs[0]))
+    assert ratios == pytest.approx([4.0, 2.0], rel=0.05)
+
+
+@pytest.fixture(scope="module")
+def four_drives(robot, soil):
+    """Two drives on each of two grounds, one robot with slow motors."""
+    manoeuvres = ("arcs", "spin", "arcs", "spin")
+    made = []
+    for strength, numbers in GROUNDS.values():
+        ground = replace(
+            soil,
+            cohesion=strength * soil.cohesion,
+            friction_angle=float(np.arctan(strength * np.tan(soil.friction_angle))),
+        )
+        slow = replace(robot, motor_rate=MOTOR_RATE * robot.motor_rate)
+        for number in numbers:
+            commands = MANOEUVRES[manoeuvres[number]].commands(50.0)
+            made.append(as_recording(simulate(slow, ground, commands, sensors=SENSORS, seed=number)))
+    windows = windows_of(made, robot)
+    return windows.subset(np.arange(0, windows.count, 2))
+
+
+def test_a_joint_fit_finds_one_motor_and_a_strength_for_each_ground(four_drives, robot, soil):
+    known = parameters_of(robot, soil)
+    grounds = {label: numbers for label, (_, numbers) in GROUNDS.items()}
+    uncertain = Nuisances((known["motor_rate"], *per_group(known["soil_strength"], grounds)))
+    assert [p.name for p in uncertain.parameters] == ["motor_rate", "soil_strength_firm", "soil_strength_loose"]
+    problem = Problem(robot, soil, sample_windows(four_drives, SIGMA), uncertain, numerics=field_numerics())
+    fitted = fit(problem, iterations=12, renewals=12)
+    plain, spread = linearised(problem, fitted).deviations()
+    truth = np.log([MOTOR_RATE, *(strength for strength, _ in GROUNDS.values())])
+    # sure enough to tell the grounds apart by far, and not surer than right
+    deviations = np.maximum(plain, spread)
+    assert (deviations < 0.02).all()
+    assert (np.abs(fitted.point.values - truth) < 3.0 * deviations + 0.003).all()
+
+
+def test_a_parameter_acts_in_its_scope_only_and_one_simulation_serves_all_grounds(
+    four_drives, robot, soil, monkeypatch
+):
+    strength = parameters_of(robot, soil)["soil_strength"]
+    own = per_group(strength, {label: numbers for label, (_, numbers) in GROUNDS.items()})
+    blocked = sample_windows(four_drives.subset(np.arange(0, four_drives.count, 6)), SIGMA)
+    together = Problem(robot, soil, blocked, Nuisances(own), numerics=field_numerics())
+    shared = Problem(robot, soil, blocked, Nuisances((strength,)), numerics=field_numerics())
+    point = together.start()
+    base = together.predict(point)
+    whole = shared.parameter_columns(shared.start(), base)[..., 0]
+    simulated = []
+    predict = Problem.predict
+    monkeypatch.setattr(Problem, "predict", lambda self, at: simulated.append(at) or predict(self, at))
+    columns = together.parameter_columns(point, base)
+    assert len(simulated) == 1
+    on_firm = np.isin(blocked.windows.recording, GROUNDS["firm"][1])
+    assert on_firm.any()
+    assert not on_firm.all()
+    assert not columns[~on_firm, :, 0].any()
+    np.testing.assert_allclose(columns.sum(axis=2), whole, rtol=1e-9, atol=1e-9)
+
+
+def test_a_clock_of_its_own_delays_one_drive_alone(four_drives, robot, soil):
+    shift = ModelParameter("late", "s", (), False, 0.1, 0.01, -0.3, 0.3, frozenset({1}), shift=True)
+    problem = Problem(robot, soil, sample_windows(four_drives, SIGMA), Nuisances((shift,)), numerics=field_numerics())
+    point = problem.start()
+    late = problem.predict(replace(point, values=np.array([0.1])))
+    differs = (late != problem.predict(point)).any(axis=(1, 2))
+    assert differs.any()
+    assert not differs[four_drives.recording != 1].any()
+
+
+def test_scopes_that_overlap_are_not_simulated_together(robot, soil):
+    strength = parameters_of(robot, soil)["soil_strength"]
+    a, b = per_group(strength, {"a": (0, 1), "b": (2,)})
+    (c,) = per_group(strength, {"c": (1, 2)})
+    assert disjoint_scopes((strength, a, b, c), (0, 1, 2, 3)) == [[0], [1, 2], [3]]
+
+
+@pytest.mark.parametrize(
+    ("groups", "words"),
+    [({"a": (0, 1), "b": (1,)}, "recording 1 is in two groups"), ({"a": ()}, "'a' has no recording")],
+)
+def test_groups_that_make_no_sense_are_refused(robot, soil, groups, words):
+    with pytest.raises(InputError, match=words):
+        per_group(parameters_of(robot, soil)["soil_strength"], groups)
