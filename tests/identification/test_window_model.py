@@ -7,8 +7,11 @@ import pytest
 
 from ddagr_gym.control.manoeuvres import MANOEUVRES
 from ddagr_gym.diagnosis.certification.forecast import part_of
+from ddagr_gym.identification.block_means import sample_windows
 from ddagr_gym.identification.fit_numerics import field_numerics
+from ddagr_gym.identification.nuisances import Nuisances
 from ddagr_gym.identification.parameters import command_shift, sensor_parameters, soil_parameters
+from ddagr_gym.identification.problem import Point, Problem
 from ddagr_gym.identification.window_model import WindowModel, ideal_sensors
 from ddagr_gym.identification.windows import CHANNELS, STATE, cut_windows
 from ddagr_gym.parameters import Numerics
@@ -156,7 +159,8 @@ def test_derivatives_agree_with_central_differences(robot, soil, windows):
         down[:, k] -= step
         central = (model.predict(values, up) - model.predict(values, down)) / (2.0 * step)
         np.testing.assert_allclose(by_state[..., k], central, atol=0.02 * max(1.0, np.abs(central).max()))
-    by_value = model.parameter_derivatives(values, states, base)
+    problem = Problem(robot, soil, sample_windows(few, np.ones(8)), Nuisances(parameters), numerics=Numerics.smooth())
+    by_value = problem.parameter_columns(Point(values, states), base).reshape(*base.shape, 4)
     up, down = (model.predict(np.array([s, 0.0, 0.0, 0.0]), states) for s in (0.02, -0.02))
     central = (up - down) / 0.04
     k = CHANNELS.index("yaw_rate")
