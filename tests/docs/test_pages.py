@@ -96,6 +96,7 @@ def test_commands_go_over_several_lines():
         ("0.01 m", "0.02 m", True),  # the last place
         ("4 of 20", "5 of 20", False),
         ("-0.5 m", "0.5 m", False),
+        ("replayed in 3.1 s of one core", "replayed in 9.8 s of one core", True),
     ],
 )
 def test_outputs_agree_within_the_tolerance(expected, found, same):

@@ -38,13 +38,25 @@ def test_pictures_and_links_exist(readme, repository):
     assert all((repository / picture).stat().st_size < LARGEST_PICTURE for picture in pictures)
 
 
-def test_python_examples_run(readme, tmp_path, monkeypatch, capsys):
+def run_example(readme, word, tmp_path, monkeypatch, capsys):
+    """What the one Python example that holds ``word`` prints."""
     monkeypatch.chdir(tmp_path)
-    examples = [block for block in blocks(readme) if block.language == "python"]
-    for block in examples:
-        exec(compile("\n" * (block.line - 1) + block.text, "README.md", "exec"), {})
-    assert examples
-    assert capsys.readouterr().out.startswith("True ")
+    (block,) = (block for block in blocks(readme) if block.language == "python" and word in block.text)
+    exec(compile("\n" * (block.line - 1) + block.text, "README.md", "exec"), {})
+    return capsys.readouterr().out.splitlines()
+
+
+def test_the_turn_succeeds(readme, tmp_path, monkeypatch, capsys):
+    (line,) = run_example(readme, "env.step", tmp_path, monkeypatch, capsys)
+    assert line.startswith("True ")
+
+
+@pytest.mark.slow
+def test_the_diagnosis_finds_the_slope(readme, tmp_path, monkeypatch, capsys):
+    _, line = run_example(readme, "diagnose", tmp_path, monkeypatch, capsys)
+    assert line.startswith("('slope',) True 0.0")
+    # the simulated slope, and a tenth of it: the interval of the size
+    assert float(line.split()[-1]) == pytest.approx(0.04, abs=0.004)
 
 
 def test_shell_examples_are_commands(readme):

@@ -63,8 +63,14 @@ def functions_page() -> str:
         "What `import ddagr_gym` offers beside the environments. Each function does what the command of its name does "
     )
     intro += "and returns a typed result, which prints as the command does and shows as a table in a notebook."
-    entries = [f"::: {item.__module__}.{item.__name__}" for item in (*functions, *classes)]
+    entries = [_entry(item) for item in (*functions, *classes)]
     return "\n\n".join(["# Python functions", intro, *entries]) + "\n"
+
+
+def _entry(item: Any) -> str:
+    """A function or class under the name by which it is imported."""
+    options = f"    options:\n      heading: ddagr_gym.{item.__name__}\n      toc_label: {item.__name__}"
+    return f"::: {item.__module__}.{item.__name__}\n{options}"
 
 
 def effects_page() -> str:
