@@ -9,7 +9,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from numbers import Real
-from typing import Any
+from typing import Any, Self
 
 from ddagr_gym.errors import InputError
 
@@ -70,7 +70,7 @@ class Validated:
     def _check(self) -> None:
         """Relations between fields; overridden where there are any."""
 
-    def with_values(self, **changes: Any) -> Any:
+    def with_values(self, **changes: Any) -> Self:
         """Copy with some fields changed, validated again."""
         return replace(self, **changes)  # type: ignore[type-var]
 

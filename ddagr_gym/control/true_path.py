@@ -55,6 +55,6 @@ class TruePath(TurnController):
         assert self._turn is not None
         distance, lateral = self._turn.project(info["true_x"], info["true_y"])
         ahead = distance + self.lead * seen.target_radius
-        heading = info["true_yaw"] - float(self._turn.heading(distance))
+        heading = float(info["true_yaw"]) - float(self._turn.heading(distance))
         feed_forward = float(self._turn.curvature(ahead))
         return feed_forward + self._pid.update(-float(lateral)) - self.heading_gain * heading

@@ -68,7 +68,7 @@ class Setting:
 
 def window_duration(recordings: Sequence[Recording], setting: Setting) -> float:
     """Length of windows [s]: as set, or shorter where short recordings or segments have no room for enough of them."""
-    lengths = [(s.stop - s.start - 1) * recording.period for recording in recordings for s in recording.segments()]
+    lengths: list[float] = [(s.stop - s.start - 1) * item.period for item in recordings for s in item.segments()]
     wanted = min(setting.duration, max(sum(lengths) / LEAST_WINDOWS, SHORT))
     usual = float(np.median(lengths)) if lengths else 0.0
     return min(wanted, usual) if usual >= SHORTEST else wanted

@@ -73,7 +73,8 @@ class StepStore:
         if self.folder is None:
             return work()
         if self.has(name):
-            return _load(self.folder, name)
+            kept: Result = _load(self.folder, name)
+            return kept
         made = work()
         _save(self.folder, name, made)
         return made

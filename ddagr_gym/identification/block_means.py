@@ -65,7 +65,7 @@ class BlockedWindows:
         shape = self.weights.shape + (1,) * (values.ndim - 3)
         mean = (self.weights.reshape(shape) * kept).sum(axis=2)
         sigma = self.sigma.reshape(self.sigma.shape + (1,) * (values.ndim - 3))
-        return (mean / sigma).reshape(count, blocks * channels, *values.shape[3:])
+        return np.asarray((mean / sigma).reshape(count, blocks * channels, *values.shape[3:]))
 
     def change(self, after: Array, before: Array) -> Array:
         """(W, M) block means over sigma of a change of predictions (W, T, 8); what breaks down says nothing."""

@@ -105,7 +105,8 @@ class ChannelNoise:
         powers = np.where(lags == 1, self.correlation, 0.0) if self.counter else self.correlation**lags
         factor = (1.0 + 2.0 * np.sum((1.0 - lags / samples) * powers)) / samples
         factor *= self.inflation**2 if samples > 1 else 1.0
-        return np.sqrt(np.maximum(factor, 0.0) * (self.sigma**2 + (self.per_speed * np.asarray(speed)) ** 2))
+        variance = self.sigma**2 + (self.per_speed * np.asarray(speed)) ** 2
+        return np.asarray(np.sqrt(np.maximum(factor, 0.0) * variance))
 
 
 def _central_square(differences: Array) -> float:

@@ -236,7 +236,7 @@ def _new_samples(
     """Rows that hold a new sample of a group of channels; the rule is that of :class:`HeldChannels`."""
     if group.flag_column:
         flag = table.numbers[group.flag_column]
-        return np.isfinite(flag) & (flag != 0)
+        return np.asarray(np.isfinite(flag) & (flag != 0))
     new = np.zeros(len(t), dtype=bool)
     for column in values:
         new[1:] |= (column[1:] != column[:-1]) & np.isfinite(column[1:])

@@ -74,7 +74,7 @@ def _draw_bars(panel: Any, names: Sequence[str], effects: Mapping[str, Any]) -> 
 
 def _size(item: Mapping[str, Any]) -> str:
     if item["size"] is None:
-        return item["field"].replace("_", " ")
+        return str(item["field"]).replace("_", " ")
     unit = "" if item["unit"] == "-" else f" {item['unit']}"
     return f"{item['field'].replace('_', ' ')} {item['size']:.2g}{unit}"
 

@@ -236,7 +236,7 @@ def agreement(variant: str, model: Turns, reference: Turns) -> Agreement:
 
 
 def _ratio(numerator: Array, denominator: Array, valid: NDArray[np.bool_]) -> Array:
-    return np.divide(numerator, denominator, out=np.full(numerator.shape, np.nan), where=valid)
+    return np.asarray(np.divide(numerator, denominator, out=np.full(numerator.shape, np.nan), where=valid))
 
 
 def compare(reference: Turns, variants: Sequence[str] = VARIANTS) -> tuple[dict[str, Turns], list[Agreement]]:

@@ -190,7 +190,7 @@ def _trust(inputs: Array, outputs: Array, group: Array, seed: int) -> Array:
             return np.zeros(outputs.shape[1])
         predicted[inside] = _both(*_fit(inputs[~inside], outputs[~inside], seed), inputs[inside], outputs.shape[1])
     power = np.maximum((predicted**2).sum(axis=0), 1e-30)
-    return np.clip((predicted * outputs).sum(axis=0) / power, 0.0, 1.0)
+    return np.asarray(np.clip((predicted * outputs).sum(axis=0) / power, 0.0, 1.0))
 
 
 def corrected(model: ResidualModel, rollout: Rollout) -> Array:

@@ -95,12 +95,12 @@ class Reading:
         if share > 0.0:
             shape = shape + share * _coloured(rng.standard_normal(len(clean) + 100), _SLOW)
         read = clean + shape * np.hypot(noise.sigma, noise.per_speed * speed) * max(noise.inflation, 1.0)
-        return np.round(read / noise.quantum) * noise.quantum if noise.quantum > 0.0 else read
+        return np.asarray(np.round(read / noise.quantum) * noise.quantum) if noise.quantum > 0.0 else read
 
     def _white(self, count: int, rng: np.random.Generator) -> Array:
         if self.tails <= 2.0:
             return rng.standard_normal(count)
-        return rng.standard_t(self.tails, count) * np.sqrt((self.tails - 2.0) / self.tails)
+        return np.asarray(rng.standard_t(self.tails, count) * np.sqrt((self.tails - 2.0) / self.tails))
 
 
 def _late(parts: Array, count: int) -> Array:

@@ -110,7 +110,7 @@ def _scale(probe: Effect) -> float:
     for name in probe.size_names():
         away = getattr(probe, name) - probe.parameter(name).metadata["neutral"]
         if away != 0.0 and probe.differentiable:
-            return size_scale(probe, name) / abs(away)
+            return float(size_scale(probe, name) / abs(away))
     return np.inf
 
 

@@ -299,7 +299,7 @@ def nuisance_answer(problem: Problem, fitted: Fitted, terms: Terms, gain: Gain) 
 
 def dispersion_of(problem: Problem, fitted: Fitted) -> float:
     """Mean square of the weighted residuals of the fit, at least 1 (theory: diagnosis, eq. (1))."""
-    unknowns = fitted.elimination.basis.shape[2] * problem.blocked.windows.count
+    unknowns: int = fitted.elimination.basis.shape[2] * problem.blocked.windows.count
     count = float(problem.blocked.mask.sum()) - unknowns - float(problem.free.sum())
     return max(2.0 * float(fitted.window_cost.sum()) / max(count, 1.0), 1.0)
 

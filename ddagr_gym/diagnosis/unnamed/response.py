@@ -107,7 +107,7 @@ def linearise(problem: Problem, fitted: Fitted, course: Course) -> Response:
     def mean(change: Array) -> Array:
         plain = change.reshape(*weights.shape).mean(axis=2)
         some = (weights * change.reshape(*weights.shape)).sum(axis=2)
-        return np.where(weights.sum(axis=2) > 0.0, some, plain)
+        return np.asarray(np.where(weights.sum(axis=2) > 0.0, some, plain))
 
     transition, output = np.zeros((*shape, 8, 8)), np.zeros((*shape, 8, 8))
     for k in range(3, len(STATE)):

@@ -11,7 +11,7 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import Field, dataclass, field, fields
 from functools import cache
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -142,7 +142,7 @@ class Effect(Validated):
         return " ".join(found.group(1).split()) if found else ""
 
     @classmethod
-    def neutral(cls, **shapes: float) -> Any:
+    def neutral(cls, **shapes: float) -> Self:
         """The effect that changes nothing: sizes at neutral, shapes at their default or as given."""
         return cls(**{name: cls.parameter(name).metadata["neutral"] for name in cls.size_names()}, **shapes)
 

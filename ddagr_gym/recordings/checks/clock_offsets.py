@@ -205,7 +205,7 @@ def _best_lag(totals: FloatArray) -> FloatArray:
     left, middle, right = square[rows, best - 1], square[rows, best], square[rows, best + 1]
     bend = left - 2 * middle + right
     shift = np.where(bend < 0, np.clip(0.5 * (left - right) / np.where(bend < 0, bend, 1.0), -1.0, 1.0), 0.0)
-    return (LAGS[best] + shift * (LAGS[1] - LAGS[0]))[:, None]
+    return np.asarray((LAGS[best] + shift * (LAGS[1] - LAGS[0]))[:, None])
 
 
 def _finding(

@@ -77,7 +77,7 @@ def blocks_in_spans(recording: Recording) -> Iterator[tuple[slice, slice]]:
 
 def inside(recording: Recording, span: slice, at: FloatArray) -> BoolArray:
     """Which of the times lie in a span."""
-    return (at >= recording.t[span.start]) & (at <= recording.t[span.stop - 1])
+    return np.asarray((at >= recording.t[span.start]) & (at <= recording.t[span.stop - 1]))
 
 
 def sampled(recording: Recording, span: slice, values: FloatArray, at: FloatArray) -> FloatArray:

@@ -23,7 +23,7 @@ def filled(recording: Recording, name: str) -> FloatArray:
 
 def new_rows(recording: Recording, *names: str) -> BoolArray:
     """Rows with a new sample of any of the channels."""
-    return np.any([np.isfinite(recording[name]) for name in names], axis=0)
+    return np.asarray(np.any([np.isfinite(recording[name]) for name in names], axis=0))
 
 
 def integral(recording: Recording, values: FloatArray) -> FloatArray:
