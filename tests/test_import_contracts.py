@@ -52,6 +52,11 @@ def test_contracts_hold(repository):
         ("diagnosis/broken.py", "import ddagr_gym.envs", "ddagr_gym.diagnosisisnotallowedtoimportddagr_gym.envs"),
         ("unknown_layer.py", "", "-ddagr_gym.unknown_layer"),
         (
+            "diagnosis/search/scan.py",
+            "import ddagr_gym.diagnosis.planning",
+            "ddagr_gym.diagnosis.search.scan->ddagr_gym.diagnosis.planning",
+        ),
+        (
             "identification/windows.py",
             "import ddagr_gym.identification.gauss_newton",
             "ddagr_gym.identification.windows->ddagr_gym.identification.gauss_newton",

@@ -105,7 +105,7 @@ class WindowSet:
         window = np.arange(self.count)[:, None]
         newer = self.commands[window, np.clip(rows, 0, last)]
         if not part.any():
-            return newer
+            return np.asarray(newer)
         return np.asarray((1.0 - part) * newer + part * self.commands[window, np.clip(rows - 1, 0, last)])
 
     def subset(self, chosen: NDArray[np.int64] | NDArray[np.bool_]) -> WindowSet:
