@@ -11,6 +11,8 @@ _INLINE = re.compile(r'<span class="arithmatex">\\\((.*?)\\\)</span>', re.DOTALL
 _DISPLAY = re.compile(r'<div class="arithmatex">\s*\\\[(.*?)\\\]\s*</div>', re.DOTALL)
 _TAG = re.compile(r"\\tag\{([^{}]*)\}")
 _LEFT_OVER = re.compile(r"\\[A-Za-z]+")
+_FUNCTION = re.compile(r"(<ms(?:ub|up|ubsup)>)?<mi>(arccos|arcsin|arctan|cos|cot|exp|ln|sin|tan|tanh)</mi>")
+_THIN = '<mspace width="0.17em"/>'
 
 
 class EquationError(ValueError):
@@ -49,4 +51,13 @@ def _mathml(latex: str, display: str) -> str:
     unknown = _LEFT_OVER.search(re.sub(r"<[^>]*>", "", unescape(mathml)))
     if unknown:
         raise EquationError(f"the equation {latex!r} holds {unknown[0]}, which has no MathML: write it otherwise.")
-    return mathml
+    # browsers follow styles, not the converter's attribute
+    for side in ("left", "right"):
+        mathml = mathml.replace(f'<mtd columnalign="{side}">', f'<mtd style="text-align:{side}">')
+    return _FUNCTION.sub(_spaced, mathml)
+
+
+def _spaced(found: re.Match[str]) -> str:
+    """A function's name set off from its neighbours, which the converter does not do; an index keeps to its name."""
+    opening, name = found[1] or "", found[2]
+    return f"{opening}<mrow>{_THIN}<mi>{name}</mi>{'' if opening else _THIN}</mrow>"
