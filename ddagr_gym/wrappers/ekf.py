@@ -10,9 +10,12 @@ from gymnasium import spaces
 from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import NDArray
 
+from ddagr_gym.deprecation import renamed
 from ddagr_gym.envs.ekf_features import FEATURE_COUNT, EkfFeatureBatch
 from ddagr_gym.envs.turn_kernel import OBSERVATION_LIMIT
 from ddagr_gym.errors import InputError
+
+__getattr__ = renamed(__name__, {"EkfFeatures": f"{__name__}:EKFObservation"}, goes="0.4.0")
 
 
 class EKFObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):

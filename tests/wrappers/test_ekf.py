@@ -72,3 +72,10 @@ def test_a_reset_forgets():
 def test_samples_are_needed():
     with pytest.raises(InputError, match="full"):
         EKFObservation(gymnasium.make(TURN_ID)).reset(seed=0)
+
+
+def test_the_old_name_says_the_new_one():
+    from ddagr_gym.wrappers import ekf
+
+    with pytest.warns(DeprecationWarning, match="EKFObservation"):
+        assert ekf.EkfFeatures is EKFObservation
