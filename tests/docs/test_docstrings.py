@@ -51,3 +51,21 @@ def test_shared_entries_are_told_apart():
         "        of the robot [m].",
         "    yaw: heading.",
     ]
+
+
+def test_terms_with_indented_texts_are_definitions():
+    text = to_markdown("Text of\ntwo lines.\n\nwindow\n    A piece\n    of a drive.\nArgs:\n    x: position.")
+    assert text == "Text of\ntwo lines.\n\n\nwindow\n:   A piece\n    of a drive.\n\nArgs:\n    x: position."
+
+
+def test_aligned_words_are_a_list():
+    text = to_markdown(
+        "Words\n    *gain*   fall of the cost\n             by an effect\n    *gate*   what it must exceed"
+    )
+    items = ["- *gain*: fall of the cost", "  by an effect", "- *gate*: what it must exceed"]
+    assert [line for line in text.splitlines() if line] == ["**Words**", *items]
+
+
+def test_what_stands_below_an_indented_table_goes_to_the_margin():
+    text = to_markdown("Stages\n    ==  ==\n    a   b\n    ==  ==\n\n    More of it.\n\nEnd.")
+    assert text.splitlines()[-3:] == ["More of it.", "", "End."]

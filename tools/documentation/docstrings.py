@@ -6,26 +6,40 @@ import re
 from itertools import pairwise, takewhile
 from typing import Any
 
-from griffe import Extension, Object
+from griffe import Extension, Module, Object
 
 _ROLE = re.compile(r":(?:class|func|mod|data|attr|meth):`(~?)([\w.]+)`")
 _LITERAL = re.compile(r"(?<!`)``([^`\n]+)``(?!`)")
 _SHARED_ENTRY = re.compile(r"^( +)([a-z]\w*(?:, [a-z]\w*)+): (.*)$")
+_TERM = re.compile(r"^[^\s`|#*-].*[^:\s]$")
+_ALIGNED = re.compile(r"^    (\*[^*]+\*) {2,}")
 _RULE = re.compile(r"^\s*=+(?: +=+)+\s*$")
 
 
 class PlainDocstrings(Extension):
     """Changes the docstring of every object to Markdown before it is parsed."""
 
+    def __init__(self) -> None:
+        super().__init__()
+        self._changed: set[str] = set()
+
     def on_object(self, *, obj: Object, **_: Any) -> None:
         """Called for each class, function, module and attribute that is read."""
-        if obj.docstring is not None:
+        self._change(obj)
+
+    def on_package(self, *, pkg: Module, **_: Any) -> None:
+        """Called for the package as a whole, whose own docstring is read before extensions see objects."""
+        self._change(pkg)
+
+    def _change(self, obj: Object) -> None:
+        if obj.docstring is not None and obj.docstring.value not in self._changed:
             obj.docstring.value = to_markdown(obj.docstring.value)
+            self._changed.add(obj.docstring.value)
 
 
 def to_markdown(text: str) -> str:
     """Docstring with Markdown tables, fenced literal blocks and links to what it names."""
-    lines = _with_single_names(_with_fences(_with_tables(text.splitlines())))
+    lines = _with_definitions(_with_single_names(_with_fences(_with_tables(text.splitlines()))))
     return "\n".join(_inline(line) for line in lines)
 
 
@@ -37,6 +51,31 @@ def _link(found: re.Match[str]) -> str:
     short, target = found[1], found[2]
     shown = target.rsplit(".", 1)[-1] if short else target
     return f'<autoref identifier="{target}" optional><code>{shown}</code></autoref>'
+
+
+def _with_definitions(lines: list[str]) -> list[str]:
+    """A term with an indented text below it as a definition; aligned ``*word*  meaning`` lines in it as a list."""
+    result: list[str] = []
+    fenced = False
+    number = 0
+    while number < len(lines):
+        line = lines[number]
+        fenced ^= line.lstrip().startswith("```")
+        block = [] if fenced or not _TERM.match(line) else list(takewhile(_is_indented, lines[number + 1 :]))
+        result += _definition(line, block) if block else [line]
+        number += 1 + len(block)
+    return result
+
+
+def _is_indented(line: str) -> bool:
+    return line.startswith("    ")
+
+
+def _definition(term: str, block: list[str]) -> list[str]:
+    if not any(_ALIGNED.match(line) for line in block):
+        return ["", term, f":   {block[0].strip()}", *block[1:], ""]
+    items = [_ALIGNED.sub(r"- \1: ", line) if _ALIGNED.match(line) else f"  {line.strip()}" for line in block]
+    return ["", f"**{term}**", "", *items, ""]
 
 
 def _with_single_names(lines: list[str]) -> list[str]:
@@ -66,8 +105,15 @@ def _with_tables(lines: list[str]) -> list[str]:
         rules = [number for number, line in enumerate(rest) if _RULE.match(line) and line.strip() == rest[0].strip()]
         last = _last_rule(rest, rules)
         result += ["", *_table(rest[: last + 1]), ""]
-        rest = rest[last + 1 :]
+        indent = rest[0][: len(rest[0]) - len(rest[0].lstrip())]
+        rest = _without_indent(rest[last + 1 :], indent) if indent else rest[last + 1 :]
     return result
+
+
+def _without_indent(lines: list[str], indent: str) -> list[str]:
+    """Lines with what stands below an indented table, which is drawn at the margin, moved to the margin too."""
+    below = list(takewhile(lambda line: not line or line.startswith(indent), lines))
+    return [line.removeprefix(indent) for line in below] + lines[len(below) :]
 
 
 def _last_rule(lines: list[str], rules: list[int]) -> int:
