@@ -32,7 +32,7 @@ from ddagr_gym import __version__
 from ddagr_gym.commands.output import write_text
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.load import load_recording
-from ddagr_gym.replay_analysis.arm import ArmResult, ArmSettings, HorizonResult, horizon_tables
+from ddagr_gym.replay_analysis.drive_mode import DriveModeResult, HorizonResult, ReplaySettings, horizon_tables
 from ddagr_gym.replay_analysis.horizons import METRICS
 from ddagr_gym.replay_analysis.report import EFFECTIVE_TRACK, NO_SLIP, REFITTED
 from ddagr_gym.replay_analysis.run import RunResult, replay_run
@@ -53,11 +53,11 @@ def both_folds(path: Path, soil: str, threads: int, seed: int) -> list[RunResult
     """Replays of one recording with the parts as they are, and changed."""
     robot = path.name.split("_", 1)[0]
     recording = load_recording(path, None, robot)
-    settings = [ArmSettings(WINDOW, True, threads=threads, seed=seed, swapped=swapped) for swapped in (False, True)]
+    settings = [ReplaySettings(WINDOW, True, threads=threads, seed=seed, swapped=swapped) for swapped in (False, True)]
     return [replay_run([recording], get_robot(robot), get_soil(soil), item) for item in settings]
 
 
-def pooled(folds: Sequence[ArmResult]) -> dict[float, HorizonResult]:
+def pooled(folds: Sequence[DriveModeResult]) -> dict[float, HorizonResult]:
     """Errors of both folds together, by horizon [s]."""
     joined = {}
     for horizon in sorted(set(folds[0].horizons) & set(folds[1].horizons)):
@@ -71,8 +71,8 @@ def pooled(folds: Sequence[ArmResult]) -> dict[float, HorizonResult]:
     return joined
 
 
-def arm_results(folds: Sequence[ArmResult], seed: int) -> dict[str, Any]:
-    """Errors, comparisons and what was fitted in one arm."""
+def drive_mode_results(folds: Sequence[DriveModeResult], seed: int) -> dict[str, Any]:
+    """Errors, comparisons and fitted parameters in one drive mode."""
     sizes, pairs = horizon_tables(pooled(folds), seed)
     return {
         "errors": [asdict(size) for size in sizes],
@@ -91,20 +91,20 @@ def arm_results(folds: Sequence[ArmResult], seed: int) -> dict[str, Any]:
 def recording_results(path: Path, soil: str, threads: int, seed: int) -> dict[str, Any]:
     """Everything about one recording."""
     folds = both_folds(path, soil, threads, seed)
-    arms = zip(*(fold.arms for fold in folds), strict=True)
+    modes = zip(*(fold.drive_modes for fold in folds), strict=True)
     return {
         "sha256": folds[0].report.sha256[0],
         "soil": soil,
         "split": folds[0].report.split,
         "notes": list(folds[0].report.notes),
-        "arms": {pair[0].report.drive: arm_results(pair, seed) for pair in arms},
+        "arms": {pair[0].report.drive: drive_mode_results(pair, seed) for pair in modes},
     }
 
 
 def acceptance(results: Mapping[str, Any]) -> dict[str, Any]:
-    """The three numbers of the acceptance for each recording and arm, and whether the judged one meets it."""
+    """The three numbers of the acceptance for each recording and drive mode, and whether the judged one meets it."""
     recording, horizon, metric = JUDGED
-    table = {name: {drive: _three(arm) for drive, arm in item["arms"].items()} for name, item in results.items()}
+    table = {name: {drive: _three(mode) for drive, mode in item["arms"].items()} for name, item in results.items()}
     verdict = {
         drive: {
             "below_half_of_no_slip": row[REFITTED] < 0.5 * row[NO_SLIP],
@@ -119,13 +119,13 @@ def acceptance(results: Mapping[str, Any]) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _three(arm: Mapping[str, Any]) -> dict[str, Any]:
-    """Root mean square errors of one arm, and the simulator's over the kinematic models' with intervals."""
+def _three(mode: Mapping[str, Any]) -> dict[str, Any]:
+    """Root mean square errors in one drive mode, and the simulator's over the kinematic models' with intervals."""
     _, horizon, metric = JUDGED
-    found = {e["model"]: e["error"] for e in arm["errors"] if (e["horizon"], e["metric"]) == (horizon, metric)}
+    found = {e["model"]: e["error"] for e in mode["errors"] if (e["horizon"], e["metric"]) == (horizon, metric)}
     row: dict[str, Any] = {"windows": found[REFITTED]["count"]}
     row |= {model: found[model]["rms"] for model in (REFITTED, NO_SLIP, EFFECTIVE_TRACK)}
-    for item in arm["comparisons"]:
+    for item in mode["comparisons"]:
         pair = item["comparison"]
         if (item["horizon"], item["metric"], pair["model"]) == (horizon, metric, REFITTED):
             row[f"ratio_to_{pair['baseline']}"] = [pair["rms_ratio"], *pair["rms_ratio_interval"]]

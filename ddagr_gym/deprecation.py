@@ -19,9 +19,18 @@ from types import ModuleType
 from typing import Any
 
 MOVED_MODULES: Mapping[str, tuple[str, str]] = {
+    "ddagr_gym.replay.arm": ("ddagr_gym.replay_analysis.drive_mode", "0.4.0"),
+    "ddagr_gym.replay.model": ("ddagr_gym.identification.window_model", "0.4.0"),
+    "ddagr_gym.replay.noise": ("ddagr_gym.identification.recording_noise", "0.4.0"),
+    "ddagr_gym.replay.parameters": ("ddagr_gym.identification.parameters", "0.4.0"),
+    "ddagr_gym.replay.pieces": ("ddagr_gym.identification.timing_repair", "0.4.0"),
+    "ddagr_gym.replay.split": ("ddagr_gym.identification.data_split", "0.4.0"),
+    "ddagr_gym.replay.windows": ("ddagr_gym.identification.windows", "0.4.0"),
     "ddagr_gym.replay": ("ddagr_gym.replay_analysis", "0.4.0"),
+    "ddagr_gym.replay_analysis.arm": ("ddagr_gym.replay_analysis.drive_mode", "0.4.0"),
+    "ddagr_gym.evaluation.arms": ("ddagr_gym.evaluation.policy_seeds", "0.4.0"),
 }
-"""Old name of a module or package -> its new name, and the release in which the old one goes."""
+"""Old name of a module or package -> its new name, and the release that removes the old one. The first match counts."""
 
 
 def renamed(module: str, names: Mapping[str, str], goes: str) -> Callable[[str], Any]:

@@ -39,6 +39,19 @@ def test_an_old_path_imports_the_module_that_moved():
     assert said.count("ddagr_gym.replay.report is ddagr_gym.replay_analysis.report now; the old name goes in") == 1
 
 
+def test_a_module_that_was_renamed_twice_has_its_classes_by_both_names():
+    said = run(
+        "from ddagr_gym.replay.arm import ArmSettings\n"
+        "from ddagr_gym.replay_analysis.report import ArmReport\n"
+        "from ddagr_gym.replay.windows import WindowSet\n"
+        "from ddagr_gym.replay_analysis.drive_mode import DriveModeReport, ReplaySettings\n"
+        "assert ArmSettings is ReplaySettings and ArmReport is DriveModeReport"
+    )
+    assert "ddagr_gym.replay.arm is ddagr_gym.replay_analysis.drive_mode now" in said
+    assert "report.ArmReport is ddagr_gym.replay_analysis.report.DriveModeReport now" in said
+    assert "ddagr_gym.replay.windows is ddagr_gym.identification.windows now" in said
+
+
 def test_the_function_of_the_same_name_can_still_be_called():
     said = run(
         "import ddagr_gym.replay.intervals, ddagr_gym\n"

@@ -68,12 +68,12 @@ def _recordings(given: Path | None) -> Path | None:
 
 
 def _table(document: dict[str, Any]) -> tuple[tuple[str, ...], list[tuple[object, ...]]]:
-    from benchmarks.filter_study.arms import ARMS
+    from benchmarks.filter_study.estimators import ESTIMATORS
 
     header = ("estimator", "soils", "radius error median", "95th percentile", "speed RMSE [mm/s]", "slip RMSE")
     rows: list[tuple[object, ...]] = []
-    for arm, spec in ARMS.items():
-        for name, item in document[arm].items():
+    for estimator, spec in ESTIMATORS.items():
+        for name, item in document[estimator].items():
             rows.append(
                 (
                     spec.title,

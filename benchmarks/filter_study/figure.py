@@ -1,4 +1,4 @@
-"""The figure of ``ddagr study filter``: errors of all arms, consistency, force laws, real drives."""
+"""The figure of ``ddagr study filter``: errors of all estimators, consistency, force laws, real drives."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ddagr_gym.reporting.figures import house_style
 
 Document = Mapping[str, Any]
 
-ARMS = {
+ESTIMATORS = {
     "encoders": "encoders\nalone",
     "closed_form": "closed\nform",
     "thesis_filter": "thesis\nfilter",
@@ -97,8 +97,8 @@ def _errors(
     axes: Any, document: Document, sets: Mapping[str, tuple[str, str]], keys: Sequence[str], unit: float
 ) -> None:
     for shift, (name, (label, colour)) in zip(_aside(len(sets)), sets.items(), strict=True):
-        for place, arm in enumerate(ARMS):
-            item = document[arm][name]
+        for place, estimator in enumerate(ESTIMATORS):
+            item = document[estimator][name]
             middle, high = (item.get(key, {"value": None})["value"] for key in keys)
             if middle is None:
                 continue
@@ -107,8 +107,8 @@ def _errors(
                 axes.plot([place + shift] * 2, [unit * middle, unit * high], "-", color=colour, lw=1.4)
                 axes.plot(place + shift, unit * high, "_", color=colour, ms=7, mew=1.6)
     _logarithmic(axes)
-    axes.set_xticks(range(len(ARMS)), list(ARMS.values()))
-    axes.set_xlim(-0.6, len(ARMS) - 0.4)
+    axes.set_xticks(range(len(ESTIMATORS)), list(ESTIMATORS.values()))
+    axes.set_xlim(-0.6, len(ESTIMATORS) - 0.4)
     axes.grid(axis="x", visible=False)
 
 

@@ -85,7 +85,7 @@ def real_drive(path: Path, robot_name: str, seed: int) -> dict[str, Any]:
             seen = fold.windows(FIT_WINDOW, drive, part=training, most=MOST_WINDOWS)
             baselines = fit_baselines(fold, robot, drive, seen)
             ratios += [] if baselines.effective_track is None else [baselines.effective_track.track_ratio]
-            for label, errors in _arms(fold, robot, set_up.model, run, drive, baselines).items():
+            for label, errors in _errors_by_label(fold, robot, set_up.model, run, drive, baselines).items():
                 found.setdefault(label, []).append(errors)
     return {
         "robot": robot_name,
@@ -99,11 +99,11 @@ def real_drive(path: Path, robot_name: str, seed: int) -> dict[str, Any]:
     }
 
 
-def _arms(
+def _errors_by_label(
     fold: Prepared, robot: Robot, model: FilterModel, run: FilterRun, drive: str, baselines: Baselines
 ) -> dict[str, dict[float, Errors]]:
     """Errors by label and horizon."""
-    arms: dict[str, dict[float, Errors]] = {}
+    found: dict[str, dict[float, Errors]] = {}
     for horizon in HORIZONS:
         windows = fold.windows(horizon, drive, stride=max(1.0, horizon / 6.0), part=held_out)
         if windows is None:
@@ -122,8 +122,8 @@ def _arms(
         together = clusters(windows, fold.splits)
         for label, by_model in predictions.items():
             errors = {name: prediction_errors(windows, item) for name, item in by_model.items()}
-            arms.setdefault(label, {})[horizon] = Errors(errors, together)
-    return arms
+            found.setdefault(label, {})[horizon] = Errors(errors, together)
+    return found
 
 
 def _rolled(windows: WindowSet, robot: Robot, model: FilterModel, run: FilterRun, baselines: Baselines) -> Array:

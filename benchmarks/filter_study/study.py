@@ -1,4 +1,4 @@
-"""The filter on soils that it does not know: errors of all arms, consistency, force laws, real drives.
+"""The filter on soils that it does not know: errors of all estimators, consistency, force laws, real drives.
 
 Every part is a line of a journal, so that an interrupted study goes on where it stopped.
 """
@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.filter_study.arms import ARMS, innovations, judge
 from benchmarks.filter_study.consistency import PRIORS, matched_drive, matched_model, row_turn_commands
+from benchmarks.filter_study.estimators import ESTIMATORS, innovations, judge
 from benchmarks.filter_study.force_law_costs import LAWS, draw_soils, soil_set_costs
 from benchmarks.filter_study.real_drives import real_drive
 from benchmarks.filter_study.settings import FilterStudySettings
@@ -115,11 +115,11 @@ def _run_drive(settings: FilterStudySettings, part: Part, recordings: Path | Non
     rng = np.random.default_rng([settings.seed, settings.soil_sets.index(part.name), part.number])
     episode = turn_settings.draw(rng)
     drive = drive_turn(nominal_constants(episode.turn), turn_settings, int(rng.integers(2**31)), episode)
-    robot, arms = ddagr(), {}
-    for name, arm in ARMS.items():
-        motion = arm.estimate(robot, turn_settings.sensors, drive.columns)
-        arms[name] = judge(motion, robot, drive.columns, episode.turn.side) | {"innovations": innovations(motion)}
-    return {"arms": arms, "laws": _law_errors(drive.columns)}
+    robot, judged = ddagr(), {}
+    for name, estimator in ESTIMATORS.items():
+        motion = estimator.estimate(robot, turn_settings.sensors, drive.columns)
+        judged[name] = judge(motion, robot, drive.columns, episode.turn.side) | {"innovations": innovations(motion)}
+    return {"arms": judged, "laws": _law_errors(drive.columns)}
 
 
 def _law_errors(columns: Mapping[str, Array]) -> dict[str, list[float]]:

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.filter_study.arms import ARMS
 from benchmarks.filter_study.consistency import PRIORS, nees_table, nis_bands
+from benchmarks.filter_study.estimators import ESTIMATORS
 from benchmarks.filter_study.force_law_costs import LAWS
 from benchmarks.filter_study.settings import FilterStudySettings
 from benchmarks.filter_study.study import DRIVE, FORCE_LAWS, MATCHED, REAL, Part
@@ -48,14 +48,16 @@ NOTES = (
 
 
 def summarise_study(settings: FilterStudySettings, results: Results) -> dict[str, Any]:
-    """The document: {arm: {soil set: figures}}, and beside the arms consistency, force laws and real drives."""
+    """The document: {estimator: {soil set: figures}}, and under keys of their own consistency, laws and real drives."""
     rng = np.random.default_rng([settings.seed, 1])
     drives = {name: [r for p, r in results.items() if (p.kind, p.name) == (DRIVE, name)] for name in settings.soil_sets}
     matched = {name: [r for p, r in results.items() if (p.kind, p.name) == (MATCHED, name)] for name in PRIORS}
     bands = nis_bands(matched[PRIORS[0]])
-    arms = {
-        arm: {name: _figures([drive["arms"][arm] for drive in found], bands, rng) for name, found in drives.items()}
-        for arm in ARMS
+    estimators = {
+        estimator: {
+            name: _figures([drive["arms"][estimator] for drive in found], bands, rng) for name, found in drives.items()
+        }
+        for estimator in ESTIMATORS
     }
     return {
         "schema": "ddagr-gym/filter-study",
@@ -65,8 +67,8 @@ def summarise_study(settings: FilterStudySettings, results: Results) -> dict[str
         "drives": settings.drives,
         "matched_drives": settings.matched_drives,
         "notes": list(NOTES),
-        "aims": _verdict(arms["filter"].get(IN_RANGE)),
-        **arms,
+        "aims": _verdict(estimators["filter"].get(IN_RANGE)),
+        **estimators,
         "nees": {name: nees_table(found) for name, found in matched.items()},
         "nis_of_matched_drives": {name: nis_bands(found) for name, found in matched.items()},
         "force_laws": _force_laws(results, drives),
@@ -75,7 +77,7 @@ def summarise_study(settings: FilterStudySettings, results: Results) -> dict[str
 
 
 def _figures(rows: list[dict[str, Any]], bands: Mapping[str, Any], rng: np.random.Generator) -> dict[str, Any]:
-    """Figures of one arm on one soil set; a drive on which it broke down counts as infinitely wrong."""
+    """Figures of one estimator on one soil set; a drive on which it broke down counts as infinitely wrong."""
     radius = np.array([np.inf if row["radius_error"] is None else abs(row["radius_error"]) for row in rows])
     kept = [row for row in rows if row["radius_error"] is not None]
     speed, slip, momentary = (

@@ -30,8 +30,8 @@ class ReplayResult(Result):
     """Residuals, error growth, refit and baselines of replayed drives.
 
     Attributes:
-        document: what ``replay.json`` holds (:mod:`ddagr_gym.replay_analysis.report`): by run and arm, errors at the
-            horizons, residuals, fitted parameters, speed.
+        document: what ``replay.json`` holds (:mod:`ddagr_gym.replay_analysis.report`): errors at the horizons,
+            residuals, fitted parameters and speed, by run and drive mode.
         runs: windows, predictions and residuals behind it, one per recording, or one for all together.
     """
 
@@ -46,8 +46,8 @@ class ReplayResult(Result):
             metric: of :data:`ddagr_gym.replay_analysis.horizons.METRICS`, such as position or heading.
             driven_by: commands or encoders.
         """
-        arms = [arm for run in self.document.runs for arm in run.arms if arm.drive == driven_by]
-        return [e for arm in arms for e in arm.horizons if (e.horizon, e.metric) == (horizon, metric)]
+        modes = [mode for run in self.document.runs for mode in run.arms if mode.drive == driven_by]
+        return [e for mode in modes for e in mode.horizons if (e.horizon, e.metric) == (horizon, metric)]
 
     @property
     def headline(self) -> str:
@@ -120,7 +120,7 @@ def replay(
 ) -> ReplayResult:
     """Drive recordings again in the simulator.
 
-    The simulator is driven by the recorded commands and, as a second arm, by the recorded wheel speeds: in short
+    The simulator is driven by the recorded commands and, in a second drive mode, by the recorded wheel speeds: in short
     windows with free initial states, and from the state at a start over 1, 5 and 30 s and over every whole stretch.
     Parameters and baselines are fitted on one part of each recording and judged on the other.
 
@@ -153,14 +153,14 @@ def replay(
         True
     """
     from ddagr_gym.physics.effects import load_effects
-    from ddagr_gym.replay_analysis.arm import ArmSettings
+    from ddagr_gym.replay_analysis.drive_mode import ReplaySettings
     from ddagr_gym.replay_analysis.run import make_report, replay_run, steps
 
     at_least(threads=(threads, 1), seed=(seed, 0))
     ground, added = soil_from(soil), load_effects(effects)
     found = recordings_from(recordings, robot, column_map)
     nominal = driven_robot(robot, found)
-    settings = ArmSettings(window, refit, added, threads=threads, seed=seed)
+    settings = ReplaySettings(window, refit, added, threads=threads, seed=seed)
     groups = [found] if together else [(recording,) for recording in found]
     with counting(steps(len(groups)), "replaying", progress) as count:
         runs = tuple(replay_run(group, nominal, ground, settings, count.advance) for group in groups)
@@ -188,14 +188,14 @@ def _draw(
     from ddagr_gym.reporting.replay_text import DRIVEN_BY
 
     figures: dict[tuple[int, str], list[Path]] = {}
-    with counting(sum(len(run.arms) for run in runs), "drawing", progress) as steps:
+    with counting(sum(len(run.drive_modes) for run in runs), "drawing", progress) as steps:
         for number, run in enumerate(runs):
             stem = _stem(run, number, len(runs))
-            for arm in run.arms:
-                title = f"{', '.join(run.report.sources)}, driven by {DRIVEN_BY[arm.report.drive]}"
-                overview, _ = replay_overview(arm, folder / f"{stem}_{arm.report.drive}", title)
-                detail, _ = replay_residuals(arm, folder / f"{stem}_{arm.report.drive}_residuals", title)
-                figures[number, arm.report.drive] = [overview, detail]
+            for mode in run.drive_modes:
+                title = f"{', '.join(run.report.sources)}, driven by {DRIVEN_BY[mode.report.drive]}"
+                overview, _ = replay_overview(mode, folder / f"{stem}_{mode.report.drive}", title)
+                detail, _ = replay_residuals(mode, folder / f"{stem}_{mode.report.drive}_residuals", title)
+                figures[number, mode.report.drive] = [overview, detail]
                 steps.advance()
     return figures
 

@@ -25,7 +25,7 @@ EXAMPLES = (
 class Arguments:
     """Drive recordings again in the simulator: residuals, error growth, refit, baselines.
 
-    The simulator is driven by the recorded commands and, as a second arm, by the recorded wheel speeds: in short
+    The simulator is driven by the recorded commands and, in a second drive mode, by the recorded wheel speeds: in short
     windows with free initial states, and from the state at a start over 1, 5 and 30 s and over every whole stretch.
     Parameters and baselines are fitted on one part of each recording (alternate steps, or blocks of time) and judged
     on the other.

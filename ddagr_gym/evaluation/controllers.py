@@ -27,8 +27,8 @@ from ddagr_gym.control.yaw_rate_pid import YawRatePid
 from ddagr_gym.errors import InputError, unknown_name
 from ddagr_gym.estimation import FilterModel
 from ddagr_gym.estimation.force_balance import arc_bank_speeds
-from ddagr_gym.evaluation.arms import policy_arm, policy_version
 from ddagr_gym.evaluation.calibration import calibrate_constant_speeds
+from ddagr_gym.evaluation.policy_seeds import arm_and_seed, policy_version
 from ddagr_gym.evaluation.runs import BatchController, Controller
 from ddagr_gym.parameters import Sensors, Validated, bounded
 from ddagr_gym.physics.soil_laws import NOMINAL_LAW
@@ -234,7 +234,7 @@ def drives_on(name: str, law: str) -> bool:
 
 def controller_arm(name: str) -> tuple[str, int]:
     """Arm and run: the training's seed of a policy, 0 of a controller that is not trained."""
-    return policy_arm(name) if _policy(name) else (name, 0)
+    return arm_and_seed(name) if _policy(name) else (name, 0)
 
 
 def controller_version(name: str) -> str:

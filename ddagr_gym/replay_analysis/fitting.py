@@ -1,4 +1,4 @@
-"""The refit of a replay: what may move in which arm, with which weights, on which windows."""
+"""The refit of a replay: which parameters are fitted in which drive mode, with which weights, on which windows."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ class Weights:
 
 
 @dataclass(frozen=True, eq=False)
-class ArmFit:
+class DriveModeFit:
     """A refit with the parameters that it moved.
 
     Attributes:
@@ -178,7 +178,7 @@ def _root(correlation: float) -> float:
     return float(np.sqrt((1.0 + kept) / (1.0 - kept)))
 
 
-def arm_parameters(
+def drive_mode_parameters(
     robot: Robot, soil: Soil, noise: Sequence[RecordingNoise], period: float, imposed: bool
 ) -> tuple[ModelParameter, ...]:
     """Soil, uncertain robot parameters, biases and the lateness of the drive.
@@ -198,7 +198,7 @@ def arm_parameters(
     return (*soil_parameters(soil, KIND_STIFFNESS_DEVIATION), *robots, *sensors, shift)
 
 
-def fit_arm(
+def fit_drive_mode(
     robot: Robot,
     soil: Soil,
     windows: WindowSet,
@@ -210,14 +210,14 @@ def fit_arm(
     effects: Sequence[Effect] = (),
     threads: int = 1,
     progress: Callable[[], None] = lambda: None,
-) -> ArmFit:
+) -> DriveModeFit:
     """Refit on training windows, first by the sensors' noise, then by what that fit leaves unexplained.
 
     Args:
         robot: nominal.
         soil: nominal.
         windows: training part.
-        parameters: see :func:`arm_parameters`.
+        parameters: see :func:`drive_mode_parameters`.
         weights: from the noise, see :func:`noise_weights`.
         imposed: whether recorded wheel speeds drive.
         start: values to start from by name; 0 for the others.
@@ -239,11 +239,11 @@ def fit_arm(
         point = fitted.point
         if number < PASSES - 1:
             weights = misfit_weights(windows, fitted.prediction, weights)
-    return ArmFit(tuple(parameters), fitted, *linearised(problem, fitted).deviations(), weights)
+    return DriveModeFit(tuple(parameters), fitted, *linearised(problem, fitted).deviations(), weights)
 
 
 def motor_start(robot: Robot, motor: Motor) -> dict[str, float]:
-    """Values of the command arm's parameters at which the simulator's motors are ``motor``."""
+    """Values of the parameters fitted when commands drive, at which the simulator's motors are ``motor``."""
     return {
         "motor_rate": float(np.log(motor.rate / robot.motor_rate)),
         "maximum_wheel_speed": float(np.log(motor.maximum_speed / robot.maximum_wheel_speed)),

@@ -18,7 +18,7 @@ from ddagr_gym.identification.window_model import WindowModel
 from ddagr_gym.identification.windows import CHANNELS, WindowSet
 from ddagr_gym.parameters import Numerics, Robot, Soil
 from ddagr_gym.physics.effects import Effect
-from ddagr_gym.replay_analysis.fitting import ROBUST, ArmFit, noise_weights
+from ddagr_gym.replay_analysis.fitting import ROBUST, DriveModeFit, noise_weights
 from ddagr_gym.replay_analysis.kinematic import KinematicModel, Motor, fit_motor, fit_track
 from ddagr_gym.replay_analysis.prepare import Prepared
 from ddagr_gym.replay_analysis.report import EFFECTIVE_TRACK, NO_SLIP, BaselineReport, Speed
@@ -26,8 +26,8 @@ from ddagr_gym.replay_analysis.report import EFFECTIVE_TRACK, NO_SLIP, BaselineR
 Array = NDArray[np.float64]
 
 
-class SimulatorOfArm:
-    """The simulator in one arm, nominal or refitted.
+class ReplaySimulator:
+    """The simulator in one drive mode, nominal or refitted.
 
     Args:
         robot: nominal.
@@ -51,7 +51,7 @@ class SimulatorOfArm:
         *,
         imposed: bool,
         delay: float,
-        fit: ArmFit | None = None,
+        fit: DriveModeFit | None = None,
         threads: int = 1,
     ) -> None:
         self._robot, self._soil, self._effects = robot, soil, tuple(effects)
@@ -69,7 +69,7 @@ class SimulatorOfArm:
         )  # fmt: skip
 
     def predict(self, windows: WindowSet) -> Array:
-        """Channels (W, T, 8) from the windows' first guess, with the default accuracy; the time is taken."""
+        """Channels (W, T, 8) from the windows' first guess with the default accuracy; adds to :meth:`speed`."""
         model = self.model(windows, Numerics())
         before = time.process_time()
         prediction = model.predict(self.values, windows.initial, self._effects)
@@ -78,7 +78,7 @@ class SimulatorOfArm:
         return prediction
 
     def warm_up(self, windows: WindowSet) -> None:
-        """Load the compiled kernels, which is not the simulator's time."""
+        """Compile or load the kernels, so that :meth:`speed` does not count it."""
         first = windows.subset(np.zeros(1, dtype=np.int64))
         self.model(first, Numerics()).predict(self.values, first.initial, self._effects)
 
@@ -93,18 +93,18 @@ class SimulatorOfArm:
         return problem.model.predict_recorded(self.values, states, entries, self._effects)
 
     def speed(self) -> Speed:
-        """What :meth:`predict` has cost so far."""
+        """Simulated time and processor time of :meth:`predict` so far."""
         return Speed(self.simulated, self.cpu, self.simulated / self.cpu if self.cpu > 0.0 else 0.0)
 
 
 @dataclass(frozen=True)
 class Baselines:
-    """Kinematic models of one arm.
+    """Kinematic models of one drive mode.
 
     Attributes:
         no_slip: geometric track.
         effective_track: fitted; None where no turn was measured.
-        motor: between commands and speeds; None in the encoders' arm.
+        motor: model from commands to bank speeds; None where recorded wheel speeds drive.
     """
 
     no_slip: KinematicModel
@@ -113,17 +113,17 @@ class Baselines:
 
     @property
     def delay(self) -> float:
-        """Of recorded wheel speeds [s]; 0 in the commands' arm, whose motor has its own."""
+        """Delay of the recorded wheel speeds [s]; 0 where commands drive, because the motor model has its own delay."""
         return self.no_slip.delay
 
     def models(self) -> dict[str, KinematicModel]:
-        """Those that there are, by name."""
+        """The fitted models by name."""
         return {NO_SLIP: self.no_slip} | (
             {} if self.effective_track is None else {EFFECTIVE_TRACK: self.effective_track}
         )
 
     def report(self) -> BaselineReport:
-        """For the document."""
+        """Their parameters for replay.json."""
         motor, track = self.motor, self.effective_track
         return BaselineReport(
             None if track is None else track.track_ratio,
@@ -164,7 +164,7 @@ def weights_of(prepared: Prepared, windows: WindowSet, imposed: bool) -> Array:
 
 
 def predict_all(
-    simulators: Mapping[str, SimulatorOfArm], kinematic: Mapping[str, KinematicModel], windows: WindowSet
+    simulators: Mapping[str, ReplaySimulator], kinematic: Mapping[str, KinematicModel], windows: WindowSet
 ) -> dict[str, Array]:
     """Predictions of all models by name."""
     simulated = {name: model.predict(windows) for name, model in simulators.items()}

@@ -11,12 +11,13 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from ddagr_gym.config import config_from
+from ddagr_gym.deprecation import renamed
 from ddagr_gym.errors import InputError
 from ddagr_gym.replay_analysis.intervals import Comparison, ErrorStatistics
-from ddagr_gym.replay_analysis.residuals import ChannelResidual, Regime
+from ddagr_gym.replay_analysis.residuals import ChannelResidual, ResidualBins
 
 SCHEMA = "ddagr-gym/replay"
 SCHEMA_VERSION = 1
@@ -70,12 +71,12 @@ class ModelResiduals:
     Attributes:
         model: of MODELS.
         channels: on the part that no fit has seen.
-        regimes: on the whole recording.
+        regimes: binned residuals over the whole recording, one item per channel and quantity.
     """
 
     model: str
     channels: tuple[ChannelResidual, ...]
-    regimes: tuple[Regime, ...]
+    regimes: tuple[ResidualBins, ...]
 
 
 @dataclass(frozen=True)
@@ -86,7 +87,7 @@ class Rollout:
         model: of MODELS.
         start: time of the recording [s].
         seconds: its length.
-        errors: at its end by metric, null where nothing measures them.
+        errors: at its end by metric; null where no sensor measures the quantity.
     """
 
     model: str
@@ -97,7 +98,7 @@ class Rollout:
 
 @dataclass(frozen=True)
 class FittedParameter:
-    """What a refit did to one parameter.
+    """Result of a refit for one parameter.
 
     Attributes:
         name: identifier.
@@ -106,8 +107,8 @@ class FittedParameter:
         deviation: Gauss-Newton standard deviation.
         window_deviation: the same from the scatter between windows.
         prior: standard deviation before the fit.
-        pull: value over prior; beyond 3 something that the model lacks has pulled it.
-        at_bound: whether it sits at a bound.
+        pull: value over prior; beyond 3 the parameter compensates for an effect that the model lacks.
+        at_bound: whether the fitted value is at a bound of its range.
     """
 
     name: str
@@ -150,7 +151,7 @@ class BaselineReport:
     Attributes:
         track_ratio: effective over geometric track; null where no turn was measured.
         drive_delay: by which wheel speeds act late [s], negative where their clock is late.
-        motor_rate: of the first-order motor between commands and bank speeds [1/s]; null in the encoders' arm.
+        motor_rate: of the first-order motor between commands and bank speeds [1/s]; null where wheel speeds drive.
         motor_speed: its ceiling [rad/s].
         motor_delay: its dead time [s].
     """
@@ -178,11 +179,11 @@ class Speed:
 
 
 @dataclass(frozen=True)
-class ArmReport:
-    """One way to drive the simulator.
+class DriveModeReport:
+    """Replay in one drive mode.
 
     Attributes:
-        drive: recorded commands, or recorded wheel speeds.
+        drive: what drove the simulator: recorded commands, or recorded wheel speeds ("encoders").
         training_windows: of the window length.
         evaluation_windows: the same, unseen by fits.
         residuals: per simulator.
@@ -216,15 +217,15 @@ class RunReport:
         sources: file names.
         sha256: of the files, "" for simulations.
         rows: of the recordings.
-        seconds: that they last.
+        seconds: duration of the recordings.
         period: between samples [s].
         split: rule by which the training part was chosen.
         noise: standard deviations by channel.
         pose_lateness: corrected before anything else [s], one per recording.
         pose_jitter: left in it [s].
         notes: sentences on what was left out and why.
-        arms: one per drive that the recordings hold.
-        cpu_seconds: processor time of all arms, with fits, baselines and intervals, without drawing.
+        arms: one for each drive mode that the recordings allow.
+        cpu_seconds: processor time of all drive modes, with fits, baselines and intervals, without drawing.
     """
 
     sources: tuple[str, ...]
@@ -237,7 +238,7 @@ class RunReport:
     pose_lateness: tuple[float, ...]
     pose_jitter: tuple[float, ...]
     notes: tuple[str, ...]
-    arms: tuple[ArmReport, ...]
+    arms: tuple[DriveModeReport, ...]
     cpu_seconds: float
 
 
@@ -277,10 +278,10 @@ class ReplayReport:
             )
 
 
-def lead_errors(arm: ArmReport, horizon: float = 5.0) -> dict[str, HorizonError]:
-    """Heading errors of an arm after a horizon [s] by model: by the gyro, else by the poses, else none."""
+def lead_errors(mode: DriveModeReport, horizon: float = 5.0) -> dict[str, HorizonError]:
+    """Heading errors by model after a horizon [s]: from the gyro, else from the poses; empty without either."""
     for metric in ("heading", "heading_pose"):
-        found = {e.model: e for e in arm.horizons if (e.horizon, e.metric) == (horizon, metric) and e.error.count}
+        found = {e.model: e for e in mode.horizons if (e.horizon, e.metric) == (horizon, metric) and e.error.count}
         if found:
             return found
     return {}
@@ -307,3 +308,7 @@ def load_report(path: Path) -> ReplayReport:
     except (OSError, ValueError) as error:
         raise InputError(f"{path} is not a replay report in JSON ({error}): write it with ddagr replay.") from None
     return config_from(content, ReplayReport, source=str(path))
+
+
+if not TYPE_CHECKING:  # a typed __getattr__ would hide misspelt names from the type checker
+    __getattr__ = renamed(__name__, {"ArmReport": f"{__name__}:DriveModeReport"}, goes="0.4.0")

@@ -1,4 +1,4 @@
-"""What a prediction leaves unexplained: per channel, and against slip, yaw rate, speed, heading and time."""
+"""Residuals of a prediction: per channel, and in bins of slip, yaw rate, speed, heading and time."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from ddagr_gym.recordings.schema import CHANNELS as SCHEMA
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-REGIMES = {
+BIN_QUANTITIES = {
     "slip": ("-", "mean size of the four wheels' slip ratios, predicted"),
     "yaw_rate": ("rad/s", "predicted"),
     "speed": ("m/s", "forward, predicted"),
     "heading": ("rad", "predicted, in the pose's frame"),
     "time": ("s", "of the recording"),
 }
-"""Unit and meaning of what residuals are drawn against."""
+"""Quantities in whose bins residuals are averaged: unit and meaning."""
 
 RECORDED = (*range(layout.SLIP_RATIO, layout.SLIP_RATIO + 4), layout.YAW_RATE, layout.V_X, layout.YAW)
-"""Entries of the simulator's row that :func:`regimes` needs, as :meth:`WindowModel.predict_recorded` records them."""
+"""Entries of the simulator's row that :func:`bin_values` needs from :meth:`WindowModel.predict_recorded`."""
 
 BINS = 12
-"""At most, of a quantity that residuals are drawn against (ours): as many as a small panel shows."""
+"""Most bins of a quantity (ours): as many as a small panel shows."""
 LEAST_IN_BIN = 20
-"""Residuals that a bin needs for its median and quartiles (ours)."""
+"""Fewest residuals in a bin (ours): the standard error of their mean needs about so many."""
 
 
 @dataclass(frozen=True)
@@ -60,17 +60,17 @@ class ChannelResidual:
 
 
 @dataclass(frozen=True)
-class Regime:
-    """Residual of a channel in bins of something that the robot did, each with about as many samples.
+class ResidualBins:
+    """Mean residual of a channel in bins of one quantity of the drive; all bins hold about as many samples.
 
     Attributes:
         channel: of CHANNELS.
-        against: of REGIMES.
+        against: the quantity, of BIN_QUANTITIES.
         unit: of ``against``.
-        centres: medians of the bins.
-        means: mean residuals.
-        deviations: their standard errors, samples of one window counted as one.
-        counts: samples.
+        centres: median of the quantity in each bin.
+        means: mean residual in each bin.
+        deviations: standard errors of the means, clustered by window.
+        counts: samples in each bin.
     """
 
     channel: str
@@ -95,7 +95,7 @@ def channel_residuals(residual: Array, sigma: Array, left_out: tuple[str, ...] =
     Args:
         residual: (W, T, 8), see :func:`residuals`.
         sigma: (8,) noise.
-        left_out: channels that say nothing about the prediction.
+        left_out: channels without information about the prediction.
     """
     table = []
     for k, name in enumerate(CHANNELS):
@@ -120,8 +120,8 @@ def successive_correlation(values: Array) -> float:
     return product / power if power > 0.0 else 0.0
 
 
-def regime_values(windows: WindowSet, record: Array) -> Mapping[str, Array]:
-    """What residuals are drawn against (W, T), by name of REGIMES; ``record`` (W, T, 7) of RECORDED."""
+def bin_values(windows: WindowSet, record: Array) -> Mapping[str, Array]:
+    """Values (W, T) of every quantity of BIN_QUANTITIES, from ``record`` (W, T, 7), the entries RECORDED."""
     has_heading = np.isfinite(windows.measured[..., CHANNELS.index("pose_yaw")]).any(axis=1, keepdims=True)
     return {
         "slip": np.abs(record[..., :4]).mean(axis=-1),
@@ -132,26 +132,28 @@ def regime_values(windows: WindowSet, record: Array) -> Mapping[str, Array]:
     }
 
 
-def regimes(residual: Array, values: Mapping[str, Array], left_out: tuple[str, ...] = ()) -> tuple[Regime, ...]:
-    """Binned residuals of the channels that are rates; positions depend on where a window starts.
+def binned_residuals(
+    residual: Array, values: Mapping[str, Array], left_out: tuple[str, ...] = ()
+) -> tuple[ResidualBins, ...]:
+    """Mean residuals in bins, without the pose channels, whose errors depend on where a window starts.
 
     Args:
         residual: (W, T, 8).
-        values: (W, T) by name of REGIMES.
-        left_out: channels that say nothing about the prediction.
+        values: (W, T) by name of BIN_QUANTITIES.
+        left_out: channels without information about the prediction.
     """
     made = []
     for k, name in enumerate(CHANNELS):
         if name.startswith("pose") or name in left_out or not np.isfinite(residual[..., k]).any():
             continue
-        for against in REGIMES:
-            regime = _regime(name, residual[..., k], against, values[against])
-            if regime is not None:
-                made.append(regime)
+        for against in BIN_QUANTITIES:
+            bins = _bins(name, residual[..., k], against, values[against])
+            if bins is not None:
+                made.append(bins)
     return tuple(made)
 
 
-def _regime(channel: str, residual: Array, against: str, values: Array) -> Regime | None:
+def _bins(channel: str, residual: Array, against: str, values: Array) -> ResidualBins | None:
     window, sample = np.nonzero(np.isfinite(residual) & np.isfinite(values))
     r, x = residual[window, sample], values[window, sample]
     if r.size < LEAST_IN_BIN or np.ptp(x) == 0.0:
@@ -160,10 +162,10 @@ def _regime(channel: str, residual: Array, against: str, values: Array) -> Regim
     edges = np.unique(np.quantile(x, np.linspace(0.0, 1.0, bins + 1)))
     index = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, max(len(edges) - 2, 0))
     rows = [index == b for b in range(max(len(edges) - 1, 1)) if (index == b).any()]
-    return Regime(
+    return ResidualBins(
         channel,
         against,
-        REGIMES[against][0],
+        BIN_QUANTITIES[against][0],
         tuple(float(np.median(x[b])) for b in rows),
         tuple(float(r[b].mean()) for b in rows),
         tuple(_standard_error(r[b], window[b]) for b in rows),
@@ -172,6 +174,6 @@ def _regime(channel: str, residual: Array, against: str, values: Array) -> Regim
 
 
 def _standard_error(values: Array, window: Integers) -> float:
-    """Of the mean of clustered values: the root of the summed squares of the clusters' totals, over the count."""
+    """Standard error of a mean clustered by window: root of the summed squared cluster totals, over the count."""
     totals = np.bincount(np.unique(window, return_inverse=True)[1], values - values.mean())
     return float(np.sqrt((totals**2).sum() * totals.size / max(totals.size - 1, 1)) / values.size)

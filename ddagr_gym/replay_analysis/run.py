@@ -1,4 +1,4 @@
-"""A whole replay: recordings in, results and report out."""
+"""Replay of recordings in both drive modes, and its report."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ddagr_gym.errors import InputError
 from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.recordings.schema import Recording
-from ddagr_gym.replay_analysis.arm import STEPS, ArmResult, ArmSettings, replay_arm
+from ddagr_gym.replay_analysis.drive_mode import STEPS, DriveModeResult, ReplaySettings, replay_drive_mode
 from ddagr_gym.replay_analysis.prepare import DRIVES, Prepared, prepare
 from ddagr_gym.replay_analysis.report import SCHEMA, SCHEMA_VERSION, ReplayReport, RunReport
 
@@ -28,12 +28,12 @@ class RunResult:
 
     Attributes:
         prepared: recordings as they were replayed.
-        arms: one per drive that they hold.
+        drive_modes: one result for each drive mode that the recordings allow.
         report: for the document.
     """
 
     prepared: Prepared
-    arms: tuple[ArmResult, ...]
+    drive_modes: tuple[DriveModeResult, ...]
     report: RunReport
 
 
@@ -42,26 +42,27 @@ def steps(groups: int) -> int:
     return groups * len(DRIVES) * STEPS
 
 
-DEFAULT_SETTINGS = ArmSettings()
+DEFAULT_SETTINGS = ReplaySettings()
 
 
 def replay_run(
     recordings: Sequence[Recording],
     robot: Robot,
     soil: Soil,
-    settings: ArmSettings = DEFAULT_SETTINGS,
+    settings: ReplaySettings = DEFAULT_SETTINGS,
     advance: Callable[[int], None] = lambda _: None,
 ) -> RunResult:
     """Replay recordings of one robot on one ground, driven by wheel speeds and by commands.
 
-    A refit starts with the wheel speeds, where motors do not matter; the commands' refit starts from its values.
+    With ``refit``, parameters are fitted first with wheel speeds imposed, where motors do not matter; the fit with
+    commands starts from those values.
 
     Args:
         recordings: one, or several that share one set of parameters; of one sample period.
-        robot: nominal.
-        soil: nominal.
-        settings: see there.
-        advance: told of progress, ``steps(1)`` in all.
+        robot: nominal robot.
+        soil: nominal soil.
+        settings: window, refit, effects, threads and seed.
+        advance: called with the number of steps done; they sum to ``steps(1)``.
 
     Raises:
         InputError: nothing can be replayed, with the reason.
@@ -70,10 +71,10 @@ def replay_run(
         raise InputError(f"the window is {settings.window:g} s: give {SHORTEST_WINDOW:g} to {LONGEST_WINDOW:g} s.")
     before = time.process_time()
     prepared = prepare(recordings, robot, np.random.default_rng(settings.seed), settings.swapped)
-    found: dict[str, ArmResult] = {}
+    found: dict[str, DriveModeResult] = {}
     values: dict[str, float] = {}
     for drive_by in reversed(DRIVES):
-        replayed = replay_arm(prepared, robot, soil, drive_by, settings, values, advance)
+        replayed = replay_drive_mode(prepared, robot, soil, drive_by, settings, values, advance)
         if replayed is not None:
             found[drive_by], values = replayed
     if not found:
@@ -82,16 +83,16 @@ def replay_run(
             f"{names}: no window of {settings.window:g} s has valid commands or wheel speeds: "
             "give a shorter --window or another recording."
         )
-    arms = tuple(found[d] for d in DRIVES if d in found)
+    drive_modes = tuple(found[d] for d in DRIVES if d in found)
     absent = tuple(f"no window of {settings.window:g} s has known {d}." for d in DRIVES if d not in found)
     cpu = time.process_time() - before
-    return RunResult(prepared, arms, _run_report(recordings, prepared, arms, absent, cpu))
+    return RunResult(prepared, drive_modes, _run_report(recordings, prepared, drive_modes, absent, cpu))
 
 
 def _run_report(
     recordings: Sequence[Recording],
     prepared: Prepared,
-    arms: Sequence[ArmResult],
+    drive_modes: Sequence[DriveModeResult],
     absent: Sequence[str],
     cpu: float,
 ) -> RunReport:
@@ -106,13 +107,13 @@ def _run_report(
         tuple(item.pose_lateness for item in prepared.noise),
         tuple(item.pose_jitter for item in prepared.noise),
         (*prepared.notes, *absent),
-        tuple(arm.report for arm in arms),
+        tuple(mode.report for mode in drive_modes),
         cpu,
     )
 
 
-def make_report(runs: Sequence[RunResult], robot: str, soil: str, settings: ArmSettings) -> ReplayReport:
-    """The document of several runs with the same settings; ``robot`` and ``soil`` by name."""
+def make_report(runs: Sequence[RunResult], robot: str, soil: str, settings: ReplaySettings) -> ReplayReport:
+    """Report of several runs with the same settings; ``robot`` and ``soil`` are names."""
     from ddagr_gym.version import __version__
 
     effects = tuple({"name": e.name, **e.as_mapping()["parameters"]} for e in settings.effects)

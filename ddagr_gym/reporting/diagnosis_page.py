@@ -173,7 +173,7 @@ def _scores(diagnosis: Diagnosis, evidence: Evidence, studio: _Studio) -> list[d
 def _conditions(evidence: Evidence, studio: _Studio) -> list[dict[str, Any]]:
     drawn = [(name, figures.condition_figure(evidence, name)) for name in evidence.regime_names]
     return [
-        studio.picture(figure, f"regime_{name}", f"Residual over noise against {name.replace('_', ' ')}")
+        studio.picture(figure, f"condition_{name}", f"Residual over noise against {name.replace('_', ' ')}")
         for name, figure in drawn
         if figure is not None
     ]

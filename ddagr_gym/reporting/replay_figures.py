@@ -13,10 +13,10 @@ from ddagr_gym.frames import rotation_matrix
 from ddagr_gym.identification.data_split import evenly
 from ddagr_gym.identification.windows import CHANNELS, WindowSet
 from ddagr_gym.rendering import palette
-from ddagr_gym.replay_analysis.arm import ArmResult
+from ddagr_gym.replay_analysis.drive_mode import DriveModeResult
 from ddagr_gym.replay_analysis.horizons import start_headings
 from ddagr_gym.replay_analysis.report import EFFECTIVE_TRACK, MODELS, NO_SLIP, NOMINAL, REFITTED, HorizonError
-from ddagr_gym.replay_analysis.residuals import REGIMES
+from ddagr_gym.replay_analysis.residuals import BIN_QUANTITIES
 from ddagr_gym.reporting.figures import DASHED, house_style, save_figure
 
 Array = NDArray[np.float64]
@@ -47,13 +47,13 @@ _LABELS = {
 }  # fmt: skip
 
 
-def replay_overview(arm: ArmResult, path: Path, title: str) -> tuple[Path, Path]:
+def replay_overview(mode: DriveModeResult, path: Path, title: str) -> tuple[Path, Path]:
     """Roll-outs on the measured path, residuals along it, and errors against the horizon.
 
     Args:
-        arm: one arm of a replay.
+        mode: replay in one drive mode.
         path: where, with or without a suffix.
-        title: names the recording and the arm.
+        title: of the figure; it names the recording and the drive mode.
 
     Returns:
         Paths of the PNG and of the SVG.
@@ -63,22 +63,22 @@ def replay_overview(arm: ArmResult, path: Path, title: str) -> tuple[Path, Path]
 
         figure = Figure(figsize=(10.0, 8.0))
         figure.text(0.045, 0.965, title, fontsize=11.0, fontweight="bold")
-        _legend(figure, arm)
-        _draw_rollouts(figure.add_axes((0.045, 0.465, 0.475, 0.41)), arm)
-        _draw_along_path(figure, figure.add_axes((0.045, 0.02, 0.395, 0.385)), arm)
-        _draw_growth(figure.add_axes((0.605, 0.655, 0.375, 0.22)), arm)
-        _draw_horizons(figure.add_axes((0.605, 0.345, 0.375, 0.2)), arm, "heading", "Heading error", "[rad]")
-        _draw_horizons(figure.add_axes((0.605, 0.045, 0.375, 0.2)), arm, "position", "Position error", "[m]")
+        _legend(figure, mode)
+        _draw_rollouts(figure.add_axes((0.045, 0.465, 0.475, 0.41)), mode)
+        _draw_along_path(figure, figure.add_axes((0.045, 0.02, 0.395, 0.385)), mode)
+        _draw_growth(figure.add_axes((0.605, 0.655, 0.375, 0.22)), mode)
+        _draw_horizons(figure.add_axes((0.605, 0.345, 0.375, 0.2)), mode, "heading", "Heading error", "[rad]")
+        _draw_horizons(figure.add_axes((0.605, 0.045, 0.375, 0.2)), mode, "position", "Position error", "[m]")
         return save_figure(figure, path)
 
 
-def replay_residuals(arm: ArmResult, path: Path, title: str) -> tuple[Path, Path]:
+def replay_residuals(mode: DriveModeResult, path: Path, title: str) -> tuple[Path, Path]:
     """Residuals over their noise by channel, and against slip, yaw rate, speed, heading and time.
 
     Args:
-        arm: one arm of a replay.
+        mode: replay in one drive mode.
         path: where, with or without a suffix.
-        title: names the recording and the arm.
+        title: of the figure; it names the recording and the drive mode.
 
     Returns:
         Paths of the PNG and of the SVG.
@@ -86,24 +86,24 @@ def replay_residuals(arm: ArmResult, path: Path, title: str) -> tuple[Path, Path
     with house_style():
         from matplotlib.figure import Figure
 
-        regimes = arm.report.residuals[0].regimes
-        channels = [name for name in _SHOWN if any(r.channel == name for r in regimes)]
+        binned = mode.report.residuals[0].regimes
+        channels = [name for name in _SHOWN if any(r.channel == name for r in binned)]
         height = 2.6 + 1.45 * len(channels)
         figure = Figure(figsize=(10.0, height))
         figure.text(0.045, 1.0 - 0.28 / height, title, fontsize=11.0, fontweight="bold")
-        _legend(figure, arm, (NOMINAL, REFITTED))
-        _draw_channels(figure.add_axes((0.115, 1.0 - 2.15 / height, 0.865, 1.2 / height)), arm)
+        _legend(figure, mode, (NOMINAL, REFITTED))
+        _draw_channels(figure.add_axes((0.115, 1.0 - 2.15 / height, 0.865, 1.2 / height)), mode)
         for row, channel in enumerate(channels):
             bottom = 1.0 - (3.6 + 1.45 * row) / height
-            _draw_regimes(figure, arm, channel, bottom, 1.05 / height, row == len(channels) - 1)
+            _draw_bins(figure, mode, channel, bottom, 1.05 / height, row == len(channels) - 1)
         return save_figure(figure, path)
 
 
-def _legend(figure: Any, arm: ArmResult, models: Sequence[str] = MODELS) -> None:
+def _legend(figure: Any, mode: DriveModeResult, models: Sequence[str] = MODELS) -> None:
     from matplotlib.lines import Line2D
 
-    present = {error.model for error in arm.report.horizons} | set(arm.residuals)
-    present |= {rollout.model for rollout in arm.report.rollouts}
+    present = {error.model for error in mode.report.horizons} | set(mode.residuals)
+    present |= {rollout.model for rollout in mode.report.rollouts}
     measured = [Line2D([], [], color=palette.INK, linewidth=1.6, label="measured")] if len(models) > 2 else []
     lines = [
         Line2D([], [], color=colour, linestyle=line, linewidth=1.6, label=label)
@@ -117,9 +117,9 @@ def _legend(figure: Any, arm: ArmResult, models: Sequence[str] = MODELS) -> None
     )  # fmt: skip
 
 
-def _chosen(arm: ArmResult) -> list[tuple[WindowSet, dict[str, Array], int]]:
+def _chosen(mode: DriveModeResult) -> list[tuple[WindowSet, dict[str, Array], int]]:
     """Roll-outs to draw, longest first."""
-    runs = [(w, dict(p), i) for w, p in reversed(arm.rollouts) for i in range(w.count)]
+    runs = [(w, dict(p), i) for w, p in reversed(mode.rollouts) for i in range(w.count)]
     return [runs[i] for i in evenly(len(runs), CELLS)]
 
 
@@ -165,9 +165,9 @@ def _as_map(axes: Any, cells: Sequence[tuple[float, float, float]]) -> None:
         axes.text(x, y + 0.015, f"{length:g} m", fontsize=6.5, color=palette.GREY)
 
 
-def _draw_rollouts(axes: Any, arm: ArmResult) -> None:
-    count = sum(w.count for w, _ in arm.rollouts)
-    chosen = _chosen(arm)
+def _draw_rollouts(axes: Any, mode: DriveModeResult) -> None:
+    count = sum(w.count for w, _ in mode.rollouts)
+    chosen = _chosen(mode)
     axes.set_title(f"Long roll-outs ({len(chosen)} of {count}), first heading to the right", pad=4.0)
     if not chosen:
         return _nothing(axes, "no stretch with a known drive")
@@ -187,13 +187,13 @@ def _draw_rollouts(axes: Any, arm: ArmResult) -> None:
     return _as_map(axes, cells)
 
 
-def _draw_along_path(figure: Any, axes: Any, arm: ArmResult) -> None:
+def _draw_along_path(figure: Any, axes: Any, mode: DriveModeResult) -> None:
     from matplotlib.collections import LineCollection
     from matplotlib.colors import LinearSegmentedColormap
 
-    name = REFITTED if REFITTED in arm.residuals else NOMINAL
+    name = REFITTED if REFITTED in mode.residuals else NOMINAL
     axes.set_title(f"Yaw rate residual along the path, {MODEL_STYLES[name][0]}", pad=4.0)
-    pieces = [_residual_pieces(arm, name, *run) for run in _chosen(arm)]
+    pieces = [_residual_pieces(mode, name, *run) for run in _chosen(mode)]
     pieces = [piece for piece in pieces if piece]
     if not pieces:
         return _nothing(axes, "no pose or no gyro")
@@ -212,16 +212,16 @@ def _draw_along_path(figure: Any, axes: Any, arm: ArmResult) -> None:
 
 
 def _residual_pieces(
-    arm: ArmResult, model: str, run: WindowSet, predictions: Mapping[str, Array], row: int
+    mode: DriveModeResult, model: str, run: WindowSet, predictions: Mapping[str, Array], row: int
 ) -> list[tuple[Array, float]]:
     """Paths (n, 2) of the windows inside a roll-out, seen from its start, with their mean yaw rate residual."""
     start, first = _start(run, row), run.time[row]
-    windows, pieces = arm.windows, []
+    windows, pieces = mode.windows, []
     near = (windows.recording == run.recording[row]) & (windows.time >= first - 1e-6)
     for k in np.flatnonzero(near & (windows.time < first + run.duration)):
         pose = windows.measured[k][:, _POSE]
         pose = pose[np.isfinite(pose).all(axis=1)]
-        residual = arm.residuals[model][k, :, _YAW_RATE]
+        residual = mode.residuals[model][k, :, _YAW_RATE]
         if len(pose) > 1 and np.isfinite(residual).any():
             pieces.append((_in_body_frame(pose, start), float(np.nanmean(residual))))
     return pieces
@@ -234,9 +234,9 @@ def _nothing(axes: Any, text: str) -> None:
     axes.grid(False)
 
 
-def _draw_growth(axes: Any, arm: ArmResult) -> None:
+def _draw_growth(axes: Any, mode: DriveModeResult) -> None:
     axes.set_title("Growth of the heading error", pad=5.0)
-    judged = {h: r for h, r in arm.horizons.items() if any("heading" in e for e in r.errors.values())}
+    judged = {h: r for h, r in mode.horizons.items() if any("heading" in e for e in r.errors.values())}
     if not judged:
         return _nothing(axes, "not judged: no unseen stretch, or no gyro")
     # the growth in one or two windows is their manoeuvres, not the models' error
@@ -255,9 +255,9 @@ def _draw_growth(axes: Any, arm: ArmResult) -> None:
     return None
 
 
-def _draw_horizons(axes: Any, arm: ArmResult, metric: str, title: str, unit: str) -> None:
+def _draw_horizons(axes: Any, mode: DriveModeResult, metric: str, title: str, unit: str) -> None:
     axes.set_title(f"{title}: median (dot), r.m.s. (bar), 95 %", pad=5.0)
-    shown = [e for e in arm.report.horizons if e.metric == metric and e.error.count]
+    shown = [e for e in mode.report.horizons if e.metric == metric and e.error.count]
     if not shown:
         return _nothing(axes, "not judged: no unseen stretch, or nothing measures it")
     horizons = sorted({e.horizon for e in shown})
@@ -297,14 +297,14 @@ def _draw_error(axes: Any, place: float, item: HorizonError) -> None:
         axes.plot(place + shift, value, marker, color=colour, markersize=size, markeredgewidth=1.6)
 
 
-def _draw_channels(axes: Any, arm: ArmResult) -> None:
+def _draw_channels(axes: Any, mode: DriveModeResult) -> None:
     axes.set_title("Residual over noise, windows with free initial states, unseen part (1: nothing left to explain)")
-    names = [c.channel for c in arm.report.residuals[0].channels]
+    names = [c.channel for c in mode.report.residuals[0].channels]
     if not names:
         return _nothing(axes, "no part of the recording is unseen")
-    for model, table in enumerate(arm.report.residuals):
+    for model, table in enumerate(mode.report.residuals):
         colour = MODEL_STYLES[table.model][1]
-        places = np.arange(len(names)) + 0.3 * (model - 0.5 * (len(arm.report.residuals) - 1))
+        places = np.arange(len(names)) + 0.3 * (model - 0.5 * (len(mode.report.residuals) - 1))
         axes.bar(places, [c.relative - 1.0 for c in table.channels], width=0.28, bottom=1.0, color=colour)
     axes.axhline(1.0, color=palette.INK, linewidth=0.8)
     _log_scale(axes)
@@ -315,18 +315,18 @@ def _draw_channels(axes: Any, arm: ArmResult) -> None:
     return None
 
 
-def _draw_regimes(figure: Any, arm: ArmResult, channel: str, bottom: float, height: float, last: bool) -> None:
+def _draw_bins(figure: Any, mode: DriveModeResult, channel: str, bottom: float, height: float, last: bool) -> None:
     limit = 0.0
     panels = []
-    for column, (against, (unit, _)) in enumerate(REGIMES.items()):
+    for column, (against, (unit, _)) in enumerate(BIN_QUANTITIES.items()):
         axes = figure.add_axes((0.115 + 0.1765 * column, bottom, 0.15, height))
         panels.append(axes)
         axes.axhline(0.0, color=palette.GREY, linewidth=0.6)
-        for table in arm.report.residuals:
-            for regime in table.regimes:
-                if regime.channel != channel or regime.against != against:
+        for table in mode.report.residuals:
+            for bins in table.regimes:
+                if bins.channel != channel or bins.against != against:
                     continue
-                centres, means, spread = (np.array(v) for v in (regime.centres, regime.means, regime.deviations))
+                centres, means, spread = (np.array(v) for v in (bins.centres, bins.means, bins.deviations))
                 colour = MODEL_STYLES[table.model][1]
                 axes.fill_between(centres, means - 2 * spread, means + 2 * spread, color=colour, alpha=0.2, linewidth=0)
                 axes.plot(centres, means, "o-", color=colour, markersize=2.5, linewidth=1.0)

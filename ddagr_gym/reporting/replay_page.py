@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ddagr_gym.replay_analysis.horizons import METRICS
 from ddagr_gym.replay_analysis.intervals import ErrorStatistics
-from ddagr_gym.replay_analysis.report import MODELS, ArmReport, ReplayReport, RunReport, lead_errors
+from ddagr_gym.replay_analysis.report import MODELS, DriveModeReport, ReplayReport, RunReport, lead_errors
 from ddagr_gym.reporting.replay_figures import MODEL_STYLES
 
 STYLE = """
@@ -34,7 +34,7 @@ def replay_page(report: ReplayReport, figures: Figures) -> str:
 
     Args:
         report: of the replay.
-        figures: PNG files by index of the run and drive of the arm.
+        figures: PNG files by index of the run and drive mode.
     """
     effects = "; effects: " + ", ".join(escape(str(e["name"])) for e in report.effects) if report.effects else ""
     lines = [
@@ -53,14 +53,14 @@ def replay_page(report: ReplayReport, figures: Figures) -> str:
 
 
 def _lead(report: ReplayReport) -> str:
-    """What most readers came for: one error of every model, per run and arm."""
+    """What most readers came for: one error of every model, per run and drive mode."""
     rows = []
     for number, run in enumerate(report.runs):
-        for arm in run.arms:
-            found = lead_errors(arm, LEAD)
+        for mode in run.arms:
+            found = lead_errors(mode, LEAD)
             name = f'<a href="#run{number + 1}">{escape(_names(run))}</a>'
             cells = [_size(found[m].error) if m in found else "–" for m in MODELS]
-            rows.append(_row([name, DRIVEN[arm.drive], *cells]))
+            rows.append(_row([name, DRIVEN[mode.drive], *cells]))
     head = [f"heading error after {LEAD:g} s [rad], r.m.s.", "driven by", *(MODEL_STYLES[m][0] for m in MODELS)]
     return _table(head, rows)
 
@@ -76,12 +76,12 @@ def _run(run: RunReport, number: int, figures: Figures) -> list[str]:
         f"Split for fits: {escape(run.split)}.</p>",
         *_notes(run.notes),
     ]
-    for arm in run.arms:
-        lines += [f"<h3>Driven by the recorded {DRIVEN[arm.drive]}</h3>", *_notes(arm.notes)]
-        lines += [_image(path) for path in figures.get((number, arm.drive), ())]
-        lines += [_horizon_table(arm), _residual_table(arm), _parameter_table(arm)]
+    for mode in run.arms:
+        lines += [f"<h3>Driven by the recorded {DRIVEN[mode.drive]}</h3>", *_notes(mode.notes)]
+        lines += [_image(path) for path in figures.get((number, mode.drive), ())]
+        lines += [_horizon_table(mode), _residual_table(mode), _parameter_table(mode)]
         lines.append(
-            f"<p>The simulator ran {arm.speed.times_real_time:.0f} times as fast as the robot on one core.</p>"
+            f"<p>The simulator ran {mode.speed.times_real_time:.0f} times as fast as the robot on one core.</p>"
         )
     return lines
 
@@ -105,11 +105,11 @@ def _row(cells: Sequence[str], new: bool = False) -> str:
     return start + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>"
 
 
-def _horizon_table(arm: ArmReport) -> str:
-    models = [m for m in MODELS if any(e.model == m for e in arm.horizons)]
+def _horizon_table(mode: DriveModeReport) -> str:
+    models = [m for m in MODELS if any(e.model == m for e in mode.horizons)]
     rows, before = [], 0.0
-    for horizon, metric in dict.fromkeys((e.horizon, e.metric) for e in arm.horizons if e.error.count):
-        found = {e.model: e for e in arm.horizons if (e.horizon, e.metric) == (horizon, metric)}
+    for horizon, metric in dict.fromkeys((e.horizon, e.metric) for e in mode.horizons if e.error.count):
+        found = {e.model: e for e in mode.horizons if (e.horizon, e.metric) == (horizon, metric)}
         unit, count = METRICS[metric][0], found[models[0]].error.count
         name = f"{metric.replace('_', ' ')} after {horizon:g} s [{unit}]"
         rows.append(_row([name, str(count), *(_size(found[m].error) for m in models)], horizon != before > 0.0))
@@ -124,8 +124,8 @@ def _size(error: ErrorStatistics) -> str:
     return f"{error.rms:.3g}" + ("" if interval is None else f" <small>({interval[0]:.2g}–{interval[1]:.2g})</small>")
 
 
-def _residual_table(arm: ArmReport) -> str:
-    tables = arm.residuals
+def _residual_table(mode: DriveModeReport) -> str:
+    tables = mode.residuals
     if not tables[0].channels:
         return ""
     head = ["residual, unseen windows", "noise"]
@@ -139,11 +139,11 @@ def _residual_table(arm: ArmReport) -> str:
     return _table(head, rows)
 
 
-def _parameter_table(arm: ArmReport) -> str:
-    if arm.refit is None:
+def _parameter_table(mode: DriveModeReport) -> str:
+    if mode.refit is None:
         return ""
     rows = []
-    for p in arm.refit.parameters:
+    for p in mode.refit.parameters:
         doubt = "at its bound" if p.at_bound else "pulled" if abs(p.pull) > 3.0 else ""
         unit = "ln factor" if p.unit == "-" else p.unit
         numbers = [f"{p.value:+.3g}", f"{p.window_deviation:.2g}", f"{p.prior:.2g}", f"{p.pull:+.1f}", doubt]

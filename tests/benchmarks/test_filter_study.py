@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks.filter_study import study as filter_study
-from benchmarks.filter_study.arms import ARMS
+from benchmarks.filter_study.estimators import ESTIMATORS
 from benchmarks.filter_study.settings import FilterStudySettings, load_filter_study
 from benchmarks.filter_study.study import DRIVE, FORCE_LAWS, MATCHED, Part, run_study, study_parts
 from benchmarks.filter_study.summary import interval, summarise_study
@@ -90,8 +90,8 @@ def test_parts_repeat_with_the_seed(results):
 def test_the_document_has_every_figure(document):
     text = json.dumps(document, allow_nan=False)
     assert json.loads(text)["schema"] == "ddagr-gym/filter-study"
-    for arm in ARMS:
-        item = document[arm]["thesis_a1_range"]
+    for estimator in ESTIMATORS:
+        item = document[estimator]["thesis_a1_range"]
         assert item["drives"] == 3
         for name in ("radius_error_median", "radius_error_p95", "speed_rmse", "slip_rmse"):
             low, high = item[name]["interval"]
@@ -110,11 +110,11 @@ def test_the_document_has_every_figure(document):
 def test_a_broken_down_drive_counts_as_worst(results):
     broken = dict(results)
     part = Part(DRIVE, "thesis_a1_range", 0)
-    arms = {name: dict(item) for name, item in results[part]["arms"].items()}
-    arms["filter"] |= dict.fromkeys(
+    estimators = {name: dict(item) for name, item in results[part]["arms"].items()}
+    estimators["filter"] |= dict.fromkeys(
         ("radius_error", "radius_error_momentary", "speed_square", "slip_square", "speed_coverage")
     )
-    broken[part] = {**results[part], "arms": arms}
+    broken[part] = {**results[part], "arms": estimators}
     item = summarise_study(SMALL, broken)["filter"]["thesis_a1_range"]
     assert item["broke_down"] == 1
     assert item["radius_error_p95"]["value"] is None

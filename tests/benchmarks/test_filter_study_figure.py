@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from benchmarks.filter_study.figure import ARMS, filter_study_figure
+from benchmarks.filter_study.figure import ESTIMATORS, filter_study_figure
 
 pytest.importorskip("matplotlib")
 
@@ -24,7 +24,7 @@ def document():
     laws = {law: {"peak_error_x": 0.1, "peak_error_y": 0.2} for law in ("thesis", "thesis_with_resistance", "coupled")}
     priors = ("soil_known_to_15_percent", "default_prior")
     return {
-        **{arm: {"my_soils": dict(item)} for arm in ARMS},
+        **{estimator: {"my_soils": dict(item)} for estimator in ESTIMATORS},
         "aims": {},
         "nees": {prior: {"velocity": block, "parameters": block} for prior in priors},
         "nis_of_matched_drives": {prior: {name: {"band": [0.5, 1.5]} for name in CHANNELS} for prior in priors},

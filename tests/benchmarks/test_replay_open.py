@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from benchmarks.replay_open import JUDGED, SOILS, acceptance, both_folds, pooled, recording_results
-from ddagr_gym.replay_analysis.arm import HorizonResult
+from ddagr_gym.replay_analysis.drive_mode import HorizonResult
 from ddagr_gym.replay_analysis.report import EFFECTIVE_TRACK, NO_SLIP, REFITTED
 
 
@@ -45,7 +45,7 @@ def test_folds_are_pooled_without_mixing_their_clusters():
     np.testing.assert_array_equal(joined.errors[REFITTED]["heading"], [1.0, 2.0, 3.0, 4.0, 5.0])
 
 
-def arm(ours, no_slip, track):
+def mode(ours, no_slip, track):
     recording, horizon, metric = JUDGED
     sizes = {REFITTED: ours, NO_SLIP: no_slip, EFFECTIVE_TRACK: track}
     errors = [
@@ -66,7 +66,7 @@ def arm(ours, no_slip, track):
     [((0.3, 1.0, 0.4), True, True), ((0.5, 1.0, 0.4), False, False), ((0.45, 1.0, 0.4), True, False)],
 )
 def test_both_conditions_are_judged_apart(sizes, half, track):
-    found = acceptance(arm(*sizes))
+    found = acceptance(mode(*sizes))
     assert found["met"]["commands"] == {"below_half_of_no_slip": half, "below_effective_track": track}
     row = found["root_mean_square"][JUDGED[0]]["commands"]
     assert (row[REFITTED], row["windows"]) == (sizes[0], 7)
@@ -99,6 +99,6 @@ def test_a_refitted_soil_beats_the_kinematic_models_on_sand(recordings_dir):
 @pytest.mark.slow
 def test_every_window_is_judged_by_the_fold_that_has_not_seen_it(recordings_dir):
     folds = both_folds(recordings_dir / "open" / "warthog_grass.csv.gz", SOILS["warthog_grass"], 1, 0)
-    for one, other in zip(*(fold.arms for fold in folds), strict=True):
+    for one, other in zip(*(fold.drive_modes for fold in folds), strict=True):
         assert not (one.in_training & other.in_training).any()
         assert one.report.refit.windows <= one.in_training.sum()

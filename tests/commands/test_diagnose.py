@@ -154,9 +154,9 @@ def _replayed(folder: Path) -> float:
     found = [
         item["error"]["rms"]
         for run in report["runs"]
-        for arm in run["arms"]
-        for item in arm["horizons"]
-        if arm["drive"] == "commands" and item["metric"] == "position" and item["horizon"] == 5.0
+        for mode in run["arms"]
+        for item in mode["horizons"]
+        if mode["drive"] == "commands" and item["metric"] == "position" and item["horizon"] == 5.0
         if item["model"] == REFITTED and item["error"]["rms"] is not None
     ]
     return float(np.mean(found))

@@ -87,10 +87,10 @@ def test_the_report_holds_both_runs_and_the_speed(replayed):
     report = load_report(replayed / "replay.json")
     assert [run.sources for run in report.runs] == [("one.sim",), ("two.sim",)]
     for run in report.runs:
-        for arm in run.arms:
-            assert arm.speed.times_real_time >= 100.0
-            assert {e.horizon for e in arm.horizons} <= {1.0, 5.0, 30.0}
-            assert arm.rollouts
+        for mode in run.arms:
+            assert mode.speed.times_real_time >= 100.0
+            assert {e.horizon for e in mode.horizons} <= {1.0, 5.0, 30.0}
+            assert mode.rollouts
 
 
 def test_tables_are_shown_in_text(replayed):

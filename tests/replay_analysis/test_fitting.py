@@ -13,7 +13,7 @@ from ddagr_gym.replay_analysis.fitting import (
     LATEST_CLOCK,
     ROBUST,
     UNKNOWN_GYRO_BIAS,
-    arm_parameters,
+    drive_mode_parameters,
     misfit_weights,
     motor_start,
     noise_weights,
@@ -65,14 +65,14 @@ def test_a_handful_of_samples_changes_no_weight(make_windows):
 
 def test_motors_do_not_matter_where_wheel_speeds_drive():
     robot, soil = get_robot("warthog"), get_soil("lete_sand_wong")
-    commands = {p.name for p in arm_parameters(robot, soil, [noise()], 0.05, imposed=False)}
-    imposed = {p.name for p in arm_parameters(robot, soil, [noise()], 0.05, imposed=True)}
+    commands = {p.name for p in drive_mode_parameters(robot, soil, [noise()], 0.05, imposed=False)}
+    imposed = {p.name for p in drive_mode_parameters(robot, soil, [noise()], 0.05, imposed=True)}
     assert commands - imposed == {"motor_rate", "maximum_wheel_speed", "command_shift"}
     assert imposed - commands == {"wheel_speed_shift"}
 
 
 def test_the_clocks_shift_stays_within_what_windows_keep():
-    made = arm_parameters(get_robot("warthog"), get_soil("lete_sand_wong"), [noise()], 0.05, imposed=True)
+    made = drive_mode_parameters(get_robot("warthog"), get_soil("lete_sand_wong"), [noise()], 0.05, imposed=True)
     shift = next(p for p in made if p.shift)
     assert -shift.low == shift.high == pytest.approx(LATEST_CLOCK - 0.05)
 
@@ -83,7 +83,7 @@ def test_the_clocks_shift_stays_within_what_windows_keep():
 )
 def test_a_gyro_bias_is_as_sure_as_the_rest_that_showed_it(biases, expected):
     items = [noise(bias=bias) for bias in biases]
-    made = arm_parameters(get_robot("ddagr"), get_soil("thesis_a1"), items, 0.02, imposed=False)
+    made = drive_mode_parameters(get_robot("ddagr"), get_soil("thesis_a1"), items, 0.02, imposed=False)
     assert [p.prior for p in made if p.name.startswith("gyro_bias")] == pytest.approx([expected] * len(biases))
 
 

@@ -8,7 +8,7 @@ import pytest
 from ddagr_gym.cli import main
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.load import load_recording
-from ddagr_gym.replay_analysis.arm import ArmSettings
+from ddagr_gym.replay_analysis.drive_mode import ReplaySettings
 from ddagr_gym.replay_analysis.report import NO_SLIP, NOMINAL, load_report, save_report
 from ddagr_gym.replay_analysis.run import make_report, replay_run
 
@@ -40,13 +40,13 @@ def test_every_file_is_replayed(recordings_dir, tmp_path, folder):
         result = replay_run([recording], get_robot(robot), get_soil("firm_ground"))
         report = tmp_path / "replay.json"
         # refuses numbers that are not finite
-        save_report(make_report([result], robot, "firm_ground", ArmSettings()), report)
+        save_report(make_report([result], robot, "firm_ground", ReplaySettings()), report)
         (run,) = load_report(report).runs
-        assert [arm.drive for arm in run.arms] == ["commands", "encoders"], path.name
-        for arm in run.arms:
-            assert {NOMINAL, NO_SLIP} <= {e.model for e in arm.horizons if e.error.count}, path.name
-            assert arm.residuals[0].channels, path.name
-            assert arm.speed.times_real_time >= 100.0
+        assert [mode.drive for mode in run.arms] == ["commands", "encoders"], path.name
+        for mode in run.arms:
+            assert {NOMINAL, NO_SLIP} <= {e.model for e in mode.horizons if e.error.count}, path.name
+            assert mode.residuals[0].channels, path.name
+            assert mode.speed.times_real_time >= 100.0
 
 
 @pytest.mark.slow
@@ -54,9 +54,9 @@ def test_a_drive_with_few_commands_is_judged_in_both_arms_with_a_refit(recording
     """Commands are known in 30 s of 363 s only, and encoders come at 4 Hz."""
     recording = load_recording(recordings_dir / "concealed" / "warthog_6.csv.gz", None, "warthog")
     assert np.mean(recording.command_valid) < 0.1
-    settings = ArmSettings(refit=True)
+    settings = ReplaySettings(refit=True)
     result = replay_run([recording], get_robot("warthog"), get_soil("firm_ground"), settings)
-    for arm in result.report.arms:
-        assert arm.training_windows > 0
-        assert arm.evaluation_windows > 0
-        assert all(np.isfinite(p.value) for p in arm.refit.parameters)
+    for mode in result.report.arms:
+        assert mode.training_windows > 0
+        assert mode.evaluation_windows > 0
+        assert all(np.isfinite(p.value) for p in mode.refit.parameters)

@@ -7,10 +7,10 @@ import pytest
 
 from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.replay_analysis.residuals import (
-    REGIMES,
+    BIN_QUANTITIES,
+    bin_values,
+    binned_residuals,
     channel_residuals,
-    regime_values,
-    regimes,
     residuals,
     successive_correlation,
 )
@@ -63,9 +63,9 @@ def dependent(make_windows):
 
 def test_a_residual_that_depends_on_the_yaw_rate_shows_it(dependent):
     windows, record, residual = dependent
-    values = regime_values(windows, record)
-    assert set(values) == set(REGIMES)
-    found = {(r.channel, r.against): r for r in regimes(residual, values, left_out=("encoder_left",))}
+    values = bin_values(windows, record)
+    assert set(values) == set(BIN_QUANTITIES)
+    found = {(r.channel, r.against): r for r in binned_residuals(residual, values, left_out=("encoder_left",))}
     rate = found["yaw_rate", "yaw_rate"]
     np.testing.assert_allclose(rate.means, 0.5 * np.array(rate.centres), atol=0.02)
     speed = found["yaw_rate", "speed"]
@@ -79,13 +79,13 @@ def test_samples_of_one_window_count_as_one_in_the_standard_error(dependent):
     level = np.random.default_rng(3).normal(0.0, 1.0, 60)
     residual = np.zeros((60, 40, 8))
     residual[..., GYRO] = level[:, None]
-    found = regimes(residual, regime_values(windows, record))
-    regime = next(r for r in found if (r.channel, r.against) == ("yaw_rate", "slip"))
+    found = binned_residuals(residual, bin_values(windows, record))
+    bins = next(r for r in found if (r.channel, r.against) == ("yaw_rate", "slip"))
     # every bin holds about three samples of each window: its mean is as sure as a mean of 60, not of 200 values
-    assert np.mean(regime.deviations) == pytest.approx(1.0 / np.sqrt(60.0), rel=0.25)
+    assert np.mean(bins.deviations) == pytest.approx(1.0 / np.sqrt(60.0), rel=0.25)
 
 
 def test_heading_is_left_out_without_poses(dependent):
     windows, record, residual = dependent
     blind = replace(windows, measured=np.full_like(windows.measured, np.nan))
-    assert not any(r.against == "heading" for r in regimes(residual, regime_values(blind, record)))
+    assert not any(r.against == "heading" for r in binned_residuals(residual, bin_values(blind, record)))

@@ -10,7 +10,7 @@ import pytest
 
 from ddagr_gym.errors import InputError
 from ddagr_gym.parameters import Imu, PoseReceiver, Sensors
-from ddagr_gym.replay_analysis.arm import STEPS, ArmSettings
+from ddagr_gym.replay_analysis.drive_mode import STEPS, ReplaySettings
 from ddagr_gym.replay_analysis.horizons import METRICS
 from ddagr_gym.replay_analysis.report import (
     EFFECTIVE_TRACK,
@@ -35,25 +35,25 @@ def told():
 
 @pytest.fixture(scope="module")
 def result(drive, robot, soil, told):
-    return replay_run([drive], robot, soil, ArmSettings(refit=True), told.append)
+    return replay_run([drive], robot, soil, ReplaySettings(refit=True), told.append)
 
 
 @pytest.fixture(scope="module")
 def report(result):
-    return make_report([result], "ddagr", "sandy_loam_lll_15", ArmSettings(refit=True))
+    return make_report([result], "ddagr", "sandy_loam_lll_15", ReplaySettings(refit=True))
 
 
-def arm_of(result, drive):
-    return next(arm for arm in result.arms if arm.report.drive == drive)
+def mode_of(result, drive):
+    return next(mode for mode in result.drive_modes if mode.report.drive == drive)
 
 
 def test_both_arms_are_there_and_all_progress_is_told(result, told):
-    assert [arm.report.drive for arm in result.arms] == ["commands", "encoders"]
+    assert [mode.report.drive for mode in result.drive_modes] == ["commands", "encoders"]
     assert sum(told) == steps(1) == 2 * STEPS
 
 
 def test_the_refit_finds_the_soil_and_the_motors(result):
-    found = {p.name: p for p in arm_of(result, "commands").report.refit.parameters}
+    found = {p.name: p for p in mode_of(result, "commands").report.refit.parameters}
     assert found["motor_rate"].value == pytest.approx(np.log(MOTOR_RATE), abs=0.02)
     strength = found["soil_strength"]
     assert strength.value == pytest.approx(np.log(STRENGTH), abs=max(3.0 * strength.window_deviation, 0.05))
@@ -63,15 +63,15 @@ def test_the_refit_finds_the_soil_and_the_motors(result):
 
 @pytest.mark.parametrize("drive_by", ["commands", "encoders"])
 def test_on_unseen_drives_the_refitted_simulator_beats_the_others(result, drive_by):
-    errors = {model: e.error.rms for model, e in lead_errors(arm_of(result, drive_by).report).items()}
+    errors = {model: e.error.rms for model, e in lead_errors(mode_of(result, drive_by).report).items()}
     assert errors[REFITTED] < 0.5 * errors[NOMINAL]
     assert errors[REFITTED] < 0.5 * errors[EFFECTIVE_TRACK]
     assert errors[REFITTED] < 0.1 * errors[NO_SLIP]
 
 
 def test_the_refitted_residuals_are_the_sensors_noise(result):
-    arm = arm_of(result, "commands").report
-    table = {t.model: {c.channel: c for c in t.channels} for t in arm.residuals}
+    mode = mode_of(result, "commands").report
+    table = {t.model: {c.channel: c for c in t.channels} for t in mode.residuals}
     assert table[REFITTED]["yaw_rate"].rms == pytest.approx(0.002, rel=0.2)
     assert table[REFITTED]["yaw_rate"].relative < 0.7 * table[NOMINAL]["yaw_rate"].relative
     assert table[REFITTED]["specific_force_x"].rms == pytest.approx(0.05, rel=0.15)
@@ -79,40 +79,40 @@ def test_the_refitted_residuals_are_the_sensors_noise(result):
 
 
 def test_wheel_speeds_that_drive_are_not_judged(result):
-    arm = arm_of(result, "encoders").report
-    assert not any(c.channel.startswith("encoder") for t in arm.residuals for c in t.channels)
-    assert not any(e.metric == "wheel_speed" for e in arm.horizons)
-    assert all(rollout.errors["wheel_speed"] is None for rollout in arm.rollouts)
+    mode = mode_of(result, "encoders").report
+    assert not any(c.channel.startswith("encoder") for t in mode.residuals for c in t.channels)
+    assert not any(e.metric == "wheel_speed" for e in mode.horizons)
+    assert all(rollout.errors["wheel_speed"] is None for rollout in mode.rollouts)
 
 
 def test_residuals_are_drawn_against_everything_asked_for(result):
-    regimes = arm_of(result, "commands").report.residuals[0].regimes
-    assert {r.against for r in regimes if r.channel == "yaw_rate"} == {"slip", "yaw_rate", "speed", "heading", "time"}
+    bins = mode_of(result, "commands").report.residuals[0].regimes
+    assert {r.against for r in bins if r.channel == "yaw_rate"} == {"slip", "yaw_rate", "speed", "heading", "time"}
 
 
 def test_long_roll_outs_go_over_the_whole_drive(result, drive):
-    rollouts = {r.model: r for r in arm_of(result, "commands").report.rollouts}
+    rollouts = {r.model: r for r in mode_of(result, "commands").report.rollouts}
     assert rollouts[REFITTED].seconds == pytest.approx(drive.t[-1] - drive.t[0], abs=0.05)
     assert rollouts[REFITTED].errors["position"] < 0.3 * rollouts[NO_SLIP].errors["position"]
 
 
 def test_the_simulator_is_a_hundred_times_faster_than_the_robot(result):
-    for arm in result.arms:
-        assert arm.report.speed.times_real_time == pytest.approx(
-            arm.report.speed.simulated_seconds / arm.report.speed.cpu_seconds
+    for mode in result.drive_modes:
+        assert mode.report.speed.times_real_time == pytest.approx(
+            mode.report.speed.simulated_seconds / mode.report.speed.cpu_seconds
         )
-        assert arm.report.speed.times_real_time >= 100.0
+        assert mode.report.speed.times_real_time >= 100.0
 
 
 def test_what_could_not_be_judged_is_said(result):
     # blocks of 13 s hold no unseen stretch of 30 s
-    assert any("lasts 30 s" in note for note in arm_of(result, "commands").report.notes)
+    assert any("lasts 30 s" in note for note in mode_of(result, "commands").report.notes)
 
 
 def test_windows_are_judged_that_no_fit_has_seen(result):
-    arm = arm_of(result, "commands")
-    assert 0 < arm.in_training.sum() < arm.windows.count
-    assert arm.report.training_windows == arm.in_training.sum()
+    mode = mode_of(result, "commands")
+    assert 0 < mode.in_training.sum() < mode.windows.count
+    assert mode.report.training_windows == mode.in_training.sum()
 
 
 def test_the_report_is_read_as_it_was_written(report, tmp_path):
@@ -161,35 +161,35 @@ def test_the_same_seed_gives_the_same_report(short, robot, soil):
 
 
 def test_swapped_parts_judge_each_others_windows(short, robot, soil):
-    plain, swapped = (replay_run([short], robot, soil, ArmSettings(swapped=s)) for s in (False, True))
-    assert not (plain.arms[0].in_training & swapped.arms[0].in_training).any()
-    assert plain.arms[0].report.training_windows == swapped.arms[0].report.evaluation_windows
-    assert plain.arms[0].report.evaluation_windows == swapped.arms[0].report.training_windows
+    plain, swapped = (replay_run([short], robot, soil, ReplaySettings(swapped=s)) for s in (False, True))
+    assert not (plain.drive_modes[0].in_training & swapped.drive_modes[0].in_training).any()
+    assert plain.drive_modes[0].report.training_windows == swapped.drive_modes[0].report.evaluation_windows
+    assert plain.drive_modes[0].report.evaluation_windows == swapped.drive_modes[0].report.training_windows
     assert plain.report.split != swapped.report.split
 
 
 def test_without_encoders_the_commands_arm_is_left(short, robot, soil):
     channels = {k: v for k, v in short.channels.items() if not k.startswith("encoder")}
     result = replay_run([replace(short, channels=channels)], robot, soil)
-    assert [arm.report.drive for arm in result.arms] == ["commands"]
+    assert [mode.report.drive for mode in result.drive_modes] == ["commands"]
     assert any("known encoders" in note for note in result.report.notes)
 
 
 def test_a_gyro_against_the_wheels_leaves_no_effective_track(short, robot, soil):
     channels = {**short.channels, "yaw_rate": -short["yaw_rate"]}
     result = replay_run([replace(short, channels=channels)], robot, soil)
-    arm = arm_of(result, "encoders").report
-    assert arm.baselines.track_ratio is None
-    assert any(note.startswith("no effective track could be fitted") for note in arm.notes)
-    assert {e.model for e in arm.horizons} == {NOMINAL, NO_SLIP}
+    mode = mode_of(result, "encoders").report
+    assert mode.baselines.track_ratio is None
+    assert any(note.startswith("no effective track could be fitted") for note in mode.notes)
+    assert {e.model for e in mode.horizons} == {NOMINAL, NO_SLIP}
 
 
 def test_added_effects_are_in_the_prediction(short, robot, soil):
     from ddagr_gym.physics.effects import load_effects
 
-    biased = ArmSettings(effects=tuple(load_effects("gyro_bias=0.05")))
-    runs = [replay_run([short], robot, soil, settings) for settings in (ArmSettings(), biased)]
-    errors = [lead_errors(arm_of(run, "commands").report, 1.0)[NOMINAL].error.bias for run in runs]
+    biased = ReplaySettings(effects=tuple(load_effects("gyro_bias=0.05")))
+    runs = [replay_run([short], robot, soil, settings) for settings in (ReplaySettings(), biased)]
+    errors = [lead_errors(mode_of(run, "commands").report, 1.0)[NOMINAL].error.bias for run in runs]
     assert errors[1] - errors[0] == pytest.approx(0.05 * 1.0)
     assert make_report(runs[1:], "ddagr", "x", biased).effects[0]["name"] == "gyro_bias"
 
@@ -197,9 +197,9 @@ def test_added_effects_are_in_the_prediction(short, robot, soil):
 @pytest.mark.parametrize("window", [0.1, 100.0, float("nan")])
 def test_a_senseless_window_is_refused(short, robot, soil, window):
     with pytest.raises(InputError, match=r"the window is .* s: give 0.2 to 60 s"):
-        replay_run([short], robot, soil, ArmSettings(window=window))
+        replay_run([short], robot, soil, ReplaySettings(window=window))
 
 
 def test_a_recording_shorter_than_the_window_is_refused(short, robot, soil):
     with pytest.raises(InputError, match="no window of 50 s has valid commands or wheel speeds"):
-        replay_run([short], robot, soil, ArmSettings(window=50.0))
+        replay_run([short], robot, soil, ReplaySettings(window=50.0))

@@ -7,7 +7,7 @@ from ddagr_gym.control.manoeuvres import MANOEUVRES
 from ddagr_gym.parameters import Imu, PoseReceiver, Sensors
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.schema import CHANNELS, Recording
-from ddagr_gym.replay_analysis.arm import ArmSettings
+from ddagr_gym.replay_analysis.drive_mode import ReplaySettings
 from ddagr_gym.replay_analysis.run import replay_run
 from ddagr_gym.reporting.replay_figures import (
     CELLS,
@@ -35,19 +35,19 @@ def simulate_columns(commands, sensors):
 
 
 def replayed(recording, window=2.0):
-    return replay_run([recording], get_robot("ddagr"), get_soil("thesis_a1"), ArmSettings(window)).arms
+    return replay_run([recording], get_robot("ddagr"), get_soil("thesis_a1"), ReplaySettings(window)).drive_modes
 
 
 @pytest.fixture(scope="module")
-def arm(drive):
+def mode(drive):
     return replayed(drive)[0]
 
 
 @pytest.mark.parametrize("draw", [replay_overview, replay_residuals])
-def test_figures_are_written_as_png_and_svg(arm, tmp_path, draw):
+def test_figures_are_written_as_png_and_svg(mode, tmp_path, draw):
     from matplotlib.image import imread
 
-    png, svg = draw(arm, tmp_path / "figure", "A title & more")
+    png, svg = draw(mode, tmp_path / "figure", "A title & more")
     image = imread(png)
     assert image.shape[1] == 2200
     assert image.std() > 0.02
@@ -57,8 +57,8 @@ def test_figures_are_written_as_png_and_svg(arm, tmp_path, draw):
 @pytest.mark.parametrize("lacking", [("pose_x", "pose_y", "pose_yaw"), ("yaw_rate",)])
 def test_what_is_lacking_leaves_the_other_panels(drive, tmp_path, lacking):
     channels = {name: values for name, values in drive.columns().items() if name not in lacking}
-    arms = replayed(Recording.from_columns(channels, get_robot("ddagr")))
-    png, _ = replay_overview(arms[0], tmp_path / "figure", "title")
+    modes = replayed(Recording.from_columns(channels, get_robot("ddagr")))
+    png, _ = replay_overview(modes[0], tmp_path / "figure", "title")
     assert png.stat().st_size > 20_000
 
 
@@ -82,7 +82,7 @@ def test_cells_hold_their_paths_at_their_scale():
 def test_at_most_twelve_roll_outs_are_chosen(drive):
     rows = [(k, k + 100) for k in range(0, 2000, 100)]
     columns = {name: values[:2000] for name, values in drive.columns().items()}
-    arms = replayed(Recording.from_columns(columns, get_robot("ddagr"), spans=rows, segments=rows), 1.0)
-    chosen = _chosen(arms[0])
+    modes = replayed(Recording.from_columns(columns, get_robot("ddagr"), spans=rows, segments=rows), 1.0)
+    chosen = _chosen(modes[0])
     assert len(chosen) == CELLS
-    assert sum(windows.count for windows, _ in arms[0].rollouts) == 20
+    assert sum(windows.count for windows, _ in modes[0].rollouts) == 20

@@ -1,14 +1,16 @@
-"""One arm of a replay: one way to drive the simulator, all models, all errors."""
+"""A replay in one drive mode: the simulator follows either the recorded commands or the recorded wheel speeds."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ddagr_gym.deprecation import renamed
 from ddagr_gym.identification.data_split import clusters, held_out, training
 from ddagr_gym.identification.windows import WindowSet
 from ddagr_gym.parameters import Robot, Soil
@@ -17,23 +19,23 @@ from ddagr_gym.replay_analysis.fitting import (
     ITERATIONS,
     MOST_WINDOWS,
     PASSES,
-    ArmFit,
-    arm_parameters,
-    fit_arm,
+    DriveModeFit,
+    drive_mode_parameters,
+    fit_drive_mode,
     motor_start,
     noise_weights,
 )
 from ddagr_gym.replay_analysis.horizons import HORIZONS, METRICS, heading_growth, horizon_errors
 from ddagr_gym.replay_analysis.intervals import compare, error_statistics
 from ddagr_gym.replay_analysis.kinematic import KinematicModel
-from ddagr_gym.replay_analysis.models import Baselines, SimulatorOfArm, fit_baselines, predict_all, weights_of
+from ddagr_gym.replay_analysis.models import Baselines, ReplaySimulator, fit_baselines, predict_all, weights_of
 from ddagr_gym.replay_analysis.prepare import Prepared
 from ddagr_gym.replay_analysis.report import (
     EFFECTIVE_TRACK,
     NO_SLIP,
     NOMINAL,
     REFITTED,
-    ArmReport,
+    DriveModeReport,
     FittedParameter,
     HorizonComparison,
     HorizonError,
@@ -42,24 +44,24 @@ from ddagr_gym.replay_analysis.report import (
     Rollout,
     Speed,
 )
-from ddagr_gym.replay_analysis.residuals import RECORDED, channel_residuals, regime_values, regimes, residuals
+from ddagr_gym.replay_analysis.residuals import RECORDED, bin_values, binned_residuals, channel_residuals, residuals
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 STEPS = PASSES * ITERATIONS + len(HORIZONS) + 3
-"""Steps of progress that one arm makes: its fit, its horizons, baselines, residuals, roll-outs."""
+"""Steps of progress in one drive mode: fit, horizons, baselines, residuals and roll-outs."""
 
 ENCODERS = ("encoder_right", "encoder_left")
 
 
 @dataclass(frozen=True, eq=False)
 class HorizonResult:
-    """Errors after one horizon on the part that no fit has seen.
+    """Errors after one horizon on the evaluation part, which no fit has used.
 
     Attributes:
-        clusters: (W,) windows that are resampled together share a number.
-        errors: (W,) by model and metric, NaN where nothing measures them.
+        clusters: (W,) cluster of each window; the bootstrap draws whole clusters.
+        errors: (W,) by model and metric; NaN where no sensor measures the quantity.
         growth: by model, root mean square heading error (T,) after each sample [rad].
         period: between samples [s].
     """
@@ -71,19 +73,19 @@ class HorizonResult:
 
 
 @dataclass(frozen=True, eq=False)
-class ArmResult:
-    """What figures need of an arm, besides its report.
+class DriveModeResult:
+    """Replay in one drive mode: its report, and the arrays that the figures are drawn from.
 
     Attributes:
-        report: for the document.
-        windows: with free initial states, of the whole recording.
-        in_training: (W,) which of them a fit may have seen.
-        residuals: (W, T, 8) by simulator.
-        horizons: by length [s].
-        rollouts: windows and predictions by model, one pair per length.
+        report: its part of replay.json.
+        windows: windows with free initial states over the whole recording.
+        in_training: (W,) True for windows that a fit may have used.
+        residuals: (W, T, 8) residuals of every simulator, by model name.
+        horizons: errors by horizon [s].
+        rollouts: windows and the predictions of every model, one pair for each length of window.
     """
 
-    report: ArmReport
+    report: DriveModeReport
     windows: WindowSet
     in_training: NDArray[np.bool_]
     residuals: Mapping[str, Array]
@@ -92,16 +94,16 @@ class ArmResult:
 
 
 @dataclass(frozen=True)
-class ArmSettings:
-    """How an arm is replayed.
+class ReplaySettings:
+    """Settings of a replay, the same for both drive modes.
 
     Attributes:
-        window: length of windows with free initial states [s].
-        refit: whether parameters are fitted.
-        effects: missing physics.
-        threads: of the simulator.
-        seed: of resampled intervals.
-        swapped: let training and judging part change their roles.
+        window: length of the windows with free initial states [s].
+        refit: whether to fit soil and robot parameters.
+        effects: effects to add to the nominal simulator.
+        threads: number of threads of the simulator.
+        seed: seed of the bootstrap intervals.
+        swapped: whether to fit on the evaluation part and evaluate on the training part.
     """
 
     window: float = 2.0
@@ -112,28 +114,28 @@ class ArmSettings:
     swapped: bool = False
 
 
-def replay_arm(
+def replay_drive_mode(
     prepared: Prepared,
     robot: Robot,
     soil: Soil,
     drive_by: str,
-    settings: ArmSettings,
+    settings: ReplaySettings,
     start: Mapping[str, float],
     advance: Callable[[int], None],
-) -> tuple[ArmResult, dict[str, float]] | None:
-    """Replay one arm.
+) -> tuple[DriveModeResult, dict[str, float]] | None:
+    """Replay recordings in one drive mode.
 
     Args:
-        prepared: recordings.
-        robot: nominal.
-        soil: nominal.
-        drive_by: "commands" or "encoders".
-        settings: see there.
-        start: parameter values to start a refit from, by name.
-        advance: told of every step of STEPS.
+        prepared: the recordings.
+        robot: nominal robot.
+        soil: nominal soil.
+        drive_by: "commands", or "encoders" for the recorded wheel speeds.
+        settings: window, refit, effects, threads and seed.
+        start: initial parameter values of a refit, by name.
+        advance: called with the number of steps done; they sum to STEPS.
 
     Returns:
-        The result and the fitted values by name; None where no window has a known drive.
+        The result and the fitted values by name; None if no window has valid commands or wheel speeds.
     """
     windows = prepared.windows(settings.window, drive_by)
     if windows is None:
@@ -161,7 +163,7 @@ def replay_arm(
     advance(1)
     sizes, pairs = horizon_tables(found, settings.seed)
     judged = prepared.windows(settings.window, drive_by, part=held_out)
-    report = ArmReport(
+    report = DriveModeReport(
         "encoders" if drive_by == "encoders" else "commands",
         0 if seen is None else seen.count,
         0 if judged is None else judged.count,
@@ -176,18 +178,18 @@ def replay_arm(
     )
     values = {} if fit is None else dict(zip((p.name for p in fit.parameters), fit.values.tolist(), strict=True))
     in_training = training(windows, prepared.splits)
-    return ArmResult(report, windows, in_training, residual, found, rolled), values
+    return DriveModeResult(report, windows, in_training, residual, found, rolled), values
 
 
-def _speed(simulators: Iterable[SimulatorOfArm]) -> Speed:
-    """Of all simulators of an arm together."""
+def _speed(simulators: Iterable[ReplaySimulator]) -> Speed:
+    """Speed of all simulators of a drive mode together."""
     speeds = [simulator.speed() for simulator in simulators]
     simulated, cpu = sum(s.simulated_seconds for s in speeds), sum(s.cpu_seconds for s in speeds)
     return Speed(simulated, cpu, simulated / cpu if cpu > 0.0 else 0.0)
 
 
 def _notes(
-    settings: ArmSettings,
+    settings: ReplaySettings,
     seen: WindowSet | None,
     judged: WindowSet | None,
     baselines: Baselines,
@@ -213,10 +215,10 @@ def _fit(
     soil: Soil,
     seen: WindowSet,
     baselines: Baselines,
-    settings: ArmSettings,
+    settings: ReplaySettings,
     start: Mapping[str, float],
     advance: Callable[[int], None],
-) -> tuple[ArmFit, RefitReport]:
+) -> tuple[DriveModeFit, RefitReport]:
     made = 0
     before = time.process_time()
     imposed = baselines.motor is None
@@ -227,11 +229,11 @@ def _fit(
         advance(1)
 
     own = {"wheel_speed_shift": baselines.delay} if baselines.motor is None else motor_start(robot, baselines.motor)
-    fit = fit_arm(
+    fit = fit_drive_mode(
         robot,
         soil,
         seen,
-        arm_parameters(robot, soil, prepared.noise, prepared.period, imposed),
+        drive_mode_parameters(robot, soil, prepared.noise, prepared.period, imposed),
         noise_weights(prepared.noise, seen, imposed, prepared.dead),
         imposed=imposed,
         start={**start, **own},
@@ -244,10 +246,10 @@ def _fit(
 
 
 def _simulators(
-    robot: Robot, soil: Soil, settings: ArmSettings, baselines: Baselines, fit: ArmFit | None
-) -> dict[str, SimulatorOfArm]:
-    def make(fitted: ArmFit | None) -> SimulatorOfArm:
-        return SimulatorOfArm(
+    robot: Robot, soil: Soil, settings: ReplaySettings, baselines: Baselines, fit: DriveModeFit | None
+) -> dict[str, ReplaySimulator]:
+    def make(fitted: DriveModeFit | None) -> ReplaySimulator:
+        return ReplaySimulator(
             robot, soil, settings.effects, imposed=baselines.motor is None, delay=baselines.delay, fit=fitted,
             threads=settings.threads,
         )  # fmt: skip
@@ -256,7 +258,7 @@ def _simulators(
 
 
 def _residuals(
-    prepared: Prepared, simulators: Mapping[str, SimulatorOfArm], windows: WindowSet, drive_by: str
+    prepared: Prepared, simulators: Mapping[str, ReplaySimulator], windows: WindowSet, drive_by: str
 ) -> tuple[tuple[ModelResiduals, ...], dict[str, Array]]:
     imposed = drive_by == "encoders"
     left_out = (*prepared.dead, *(ENCODERS if imposed else ()))
@@ -267,14 +269,14 @@ def _residuals(
         prediction, record = simulator.with_free_states(windows, sigma, RECORDED)
         residual = residuals(windows, prediction)
         table = channel_residuals(residual[judged], prepared.sigma, left_out)
-        tables.append(ModelResiduals(name, table, regimes(residual, regime_values(windows, record), left_out)))
+        tables.append(ModelResiduals(name, table, binned_residuals(residual, bin_values(windows, record), left_out)))
         arrays[name] = residual
     return tuple(tables), arrays
 
 
 def _horizon(
     prepared: Prepared,
-    simulators: Mapping[str, SimulatorOfArm],
+    simulators: Mapping[str, ReplaySimulator],
     kinematic: Mapping[str, KinematicModel],
     drive_by: str,
     horizon: float,
@@ -315,7 +317,7 @@ def horizon_tables(
 
 
 def _metrics(prepared: Prepared, drive_by: str) -> list[str]:
-    """Metrics that say something in this arm; a dead gyro judges nothing, imposed wheel speeds neither."""
+    """Metrics that can be evaluated: none of a dead gyro, and no wheel speed where wheel speeds are imposed."""
     by_gyro = ("heading", "yaw_rate") if "yaw_rate" in prepared.dead else ()
     return [m for m in METRICS if m not in by_gyro and not (m == "wheel_speed" and drive_by == "encoders")]
 
@@ -345,7 +347,7 @@ def _rollouts(rolled: Sequence[tuple[WindowSet, Mapping[str, Array]]], drive_by:
     return tuple(made)
 
 
-def _refit_report(fit: ArmFit, window: float, cpu: float) -> RefitReport:
+def _refit_report(fit: DriveModeFit, window: float, cpu: float) -> RefitReport:
     found = fit.fitted
     parameters = tuple(
         FittedParameter(
@@ -357,3 +359,15 @@ def _refit_report(fit: ArmFit, window: float, cpu: float) -> RefitReport:
         )
     )  # fmt: skip
     return RefitReport(parameters, fit.windows, window, found.iterations, found.converged, found.cost, cpu)
+
+
+if not TYPE_CHECKING:  # a typed __getattr__ would hide misspelt names from the type checker
+    __getattr__ = renamed(
+        __name__,
+        {
+            "ArmResult": f"{__name__}:DriveModeResult",
+            "ArmSettings": f"{__name__}:ReplaySettings",
+            "replay_arm": f"{__name__}:replay_drive_mode",
+        },
+        goes="0.4.0",
+    )

@@ -1,4 +1,4 @@
-"""Trained policies in a campaign: which seeds make one arm, and what a policy's rows were made of."""
+"""Names of trained policies in an evaluation: the arm and training seed of each, and the version of its file."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ _SUFFIX = ".npz"
 
 
 def _split(name: str) -> tuple[str, str]:
-    """Policy's own name or path, and what follows it: "@" and the estimate that it is told, or nothing."""
+    """A policy's name or path without its suffix, and the suffix: "@" and the estimate that it receives, or ""."""
     if _ESTIMATE not in name or name.endswith(_SUFFIX):
         return name, ""
     stem, _, estimate = name.rpartition(_ESTIMATE)
     return stem, _ESTIMATE + estimate
 
 
-def policy_arm(name: str) -> tuple[str, int]:
-    """Arm and training seed of a policy: seeds of one training belong to one arm.
+def arm_and_seed(name: str) -> tuple[str, int]:
+    """Arm and training seed of a policy. All training seeds of one configuration make one arm.
 
-    ``ppo_ekf_seed_3``, ``ppo_ekf_3`` and ``runs/ppo_ekf_seed_3/policy.npz`` are run 3 of ``ppo_ekf``, if 3 is the seed
-    that the policy's file names.
+    ``ppo_ekf_seed_3``, ``ppo_ekf_3`` and ``runs/ppo_ekf_seed_3/policy.npz`` are seed 3 of the arm ``ppo_ekf`` if the
+    policy's file names 3 as its seed.
     """
     from ddagr_gym.policies.shipped import find_policy
 
@@ -35,7 +35,7 @@ def policy_arm(name: str) -> tuple[str, int]:
 
 
 def policy_version(name: str) -> str:
-    """Text that changes when a policy's file or the estimate that it is told does."""
+    """Hash of a policy's file, followed by the estimate that the policy receives."""
     from ddagr_gym.policies.shipped import policy_file
 
     stem, estimate = _split(name)

@@ -1,10 +1,10 @@
-"""Names of arms, by stand-ins for trained policies."""
+"""Arm and seed from policy names, with substitutes for trained policies."""
 
 from types import SimpleNamespace
 
 import pytest
 
-from ddagr_gym.evaluation.arms import policy_arm, policy_version
+from ddagr_gym.evaluation.policy_seeds import arm_and_seed, policy_version
 from ddagr_gym.policies import shipped
 
 
@@ -33,7 +33,7 @@ def policy(monkeypatch, tmp_path):
     ],
 )
 def test_seeds_of_a_training_are_one_arm(policy, name, arm):
-    assert policy_arm(name) == (arm, 3)
+    assert arm_and_seed(name) == (arm, 3)
 
 
 def test_version_changes_with_file_and_estimate(policy):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.filter_study.arms import ARMS, Motion, innovations, judge
+from benchmarks.filter_study.estimators import ESTIMATORS, Motion, innovations, judge
 from ddagr_gym.errors import InputError
 from ddagr_gym.parameters import Sensors
 from ddagr_gym.presets import get_robot, get_soil
@@ -65,8 +65,8 @@ def test_a_drive_to_the_other_side_is_refused(robot, drive):
 
 def test_ours_beats_every_yardstick(robot, drive):
     errors = {}
-    for name, arm in ARMS.items():
-        motion = arm.estimate(robot, Sensors(), drive)
+    for name, estimator in ESTIMATORS.items():
+        motion = estimator.estimate(robot, Sensors(), drive)
         errors[name] = judge(motion, robot, drive, "left")
         assert bool(innovations(motion)) == (name not in ("encoders", "closed_form"))
     for other in ("encoders", "closed_form", "thesis_filter", "filter_thesis_law"):

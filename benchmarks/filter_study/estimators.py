@@ -59,7 +59,7 @@ class Motion(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Arm:
+class SpeedEstimator:
     """A named estimator.
 
     Attributes:
@@ -93,7 +93,7 @@ def _encoders(robot: Robot, sensors: Sensors, columns: Columns) -> Motion:
 
 
 def _closed_form(robot: Robot, sensors: Sensors, columns: Columns) -> Motion:
-    """Where the closed form has no answer, the encoders' speed stands in: the arm must say something everywhere."""
+    """The encoders' speed replaces the closed form where this has no solution, so that every sample has an estimate."""
     right, left, turning = (_smooth(columns[name]) for name in ("encoder_right", "encoder_left", "yaw_rate"))
     speed = symmetric_forward_speed(robot, turning, right, left)
     speed = np.where(np.isfinite(speed), speed, encoder_motion(robot, right, left).v_x)
@@ -125,15 +125,15 @@ def _filter_known_soil(robot: Robot, sensors: Sensors, columns: Columns) -> Moti
     return _of_states(run_filter(replace(model, prior=prior, noise=replace(model.noise, soil=0.0)), columns))
 
 
-ARMS: dict[str, Arm] = {
-    "encoders": Arm("encoders alone, no slip", _encoders),
-    "closed_form": Arm("gyro and encoders, symmetric closed form", _closed_form),
-    "thesis_filter": Arm("the thesis's filter, eight states", _thesis),
-    "filter_thesis_law": Arm("our filter with the thesis's force law", _filter_thesis_law),
-    "filter": Arm("our filter", _filter),
-    "filter_known_soil": Arm("our filter, soil law known", _filter_known_soil),
+ESTIMATORS: dict[str, SpeedEstimator] = {
+    "encoders": SpeedEstimator("encoders alone, no slip", _encoders),
+    "closed_form": SpeedEstimator("gyro and encoders, symmetric closed form", _closed_form),
+    "thesis_filter": SpeedEstimator("the thesis's filter, eight states", _thesis),
+    "filter_thesis_law": SpeedEstimator("our filter with the thesis's force law", _filter_thesis_law),
+    "filter": SpeedEstimator("our filter", _filter),
+    "filter_known_soil": SpeedEstimator("our filter, soil law known", _filter_known_soil),
 }
-"""The estimators that are compared, by name."""
+"""Compared estimators by name."""
 
 
 def judge(motion: Motion, robot: Robot, columns: Columns, side: str) -> dict[str, Any]:
