@@ -31,7 +31,7 @@ RECORDED = (*range(layout.SLIP_RATIO, layout.SLIP_RATIO + 4), layout.YAW_RATE, l
 BINS = 12
 """Most bins of a quantity (ours): as many as a small panel shows."""
 LEAST_IN_BIN = 20
-"""Fewest residuals in a bin (ours): the standard error of their mean needs about so many."""
+"""Fewest residuals in a bin (ours)."""
 
 
 @dataclass(frozen=True)
