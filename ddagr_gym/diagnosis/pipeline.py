@@ -148,7 +148,7 @@ def diagnose(
     accepted = accept(found, session.gates)
     diagnosis, effects = steps.run("verdict", conclude, session, found, accepted)
     fit = None if names_only else steps.run("certification", _certify, session, accepted)
-    located = steps.run("localisation", locate, session.problem, accepted, session.gates.misfit)
+    located = steps.run("localisation", locate, session.problem, accepted, session.gates.misfit, session.seed)
     repeats = where_readings_repeat(session.mended.given, session.mended.repeated)
     diagnosis = review(diagnosis, located, repeats, fit, checks)
     unnamed = None if names_only else steps.run("unnamed terms", _unnamed, session, accepted, diagnosis)

@@ -43,7 +43,7 @@ from ddagr_gym.physics.effects import Effect
 Array = NDArray[np.float64]
 
 _SEED = 20240
-"""Of the shifts in the tests of operating conditions, any number: the same recordings give the same phrases."""
+"""Seed of the shifts in the tests of operating conditions, added to that of the diagnosis (ours: any number would do)."""
 
 _ROUGH = 1.25
 """Mean square of the standardised residuals from which a channel's squares are located (ours: windows take 10 to 20
@@ -54,30 +54,31 @@ _PLACE = ("centre_x", "centre_y", "radius")
 _RECORDED = (*range(layout.SLIP_RATIO, layout.SLIP_RATIO + 4), layout.YAW_RATE, layout.V_X, layout.YAW)
 
 
-def locate(problem: Problem, found: SearchResult, limits: Mapping[str, float]) -> Localisation:
+def locate(problem: Problem, found: SearchResult, limits: Mapping[str, float], seed: int = 0) -> Localisation:
     """Locate what a search found, and what it left.
 
     Args:
         problem: windows and model.
         found: of the search; nominal and chosen model may be the same.
         limits: of the channels' misfit, of the null bank.
+        seed: of the diagnosis.
     """
     nominal, chosen = found.nominal, found.chosen
     channels = channel_shares(nominal.misfit, chosen.misfit, samples(problem))
     pieces = piece_values(problem, chosen.fitted)
     processes = score_processes(problem, chosen.fitted)
     located = {
-        process.name: _where(problem, process, effect, pieces, chosen.dispersion)
+        process.name: _where(problem, process, effect, pieces, chosen.dispersion, seed)
         for process, effect in zip(processes, chosen.fitted.point.effects, strict=True)
     }
     before, after = (in_blocks(problem, projected_residual(problem, model.fitted)) ** 2 for model in (nominal, chosen))
     return Localisation(
         channels,
         explained_share(nominal.misfit, chosen.misfit, limits),
-        _lying(by_piece(before - after, pieces_of(problem)).ravel(), pieces)
+        _lying(by_piece(before - after, pieces_of(problem)).ravel(), pieces, seed)
         if located
-        else _mismatch(problem, before, rough(nominal.misfit), pieces),
-        _mismatch(problem, after, rough(chosen.misfit), pieces),
+        else _mismatch(problem, before, rough(nominal.misfit), pieces, seed),
+        _mismatch(problem, after, rough(chosen.misfit), pieces, seed),
         located,
         _wrench(problem, found),
     )
@@ -167,9 +168,10 @@ def _where(
     effect: Effect,
     pieces: Pieces,
     dispersion: float,
+    seed: int,
 ) -> EffectLocation:
     """Where one effect of the chosen model acts."""
-    rng = np.random.default_rng(_SEED)
+    rng = np.random.default_rng(_SEED + seed)
     windows, piece = problem.blocked.windows, piece_length(problem)
     shown = spans(process, windows.recording, windows.time, piece, windows.duration, dispersion)
     lying = shares(process.gain.ravel(), pieces, rng)
@@ -199,19 +201,19 @@ def _standing_place(lying: Sequence[OperatingConditionShare]) -> tuple[Place, ..
     return (Place(x, y, radius, lying[0].weight_inside, lying[0].time_inside),)
 
 
-def _mismatch(problem: Problem, squares: Array, channels: Sequence[str], pieces: Pieces) -> EffectLocation:
+def _mismatch(problem: Problem, squares: Array, channels: Sequence[str], pieces: Pieces, seed: int) -> EffectLocation:
     """Where squared residuals (W, B, 8) exceed those of pure noise, in the channels that do so on the whole."""
     nothing = EffectLocation((), 0.0, (), (), None, "nothing above the noise")
     chosen = [CHANNELS.index(name) for name in channels]
     if not chosen:
         return nothing
     above = (squares - np.isfinite(problem.blocked.sigma))[..., chosen]
-    return _lying(by_piece(above, pieces_of(problem)).ravel(), pieces)
+    return _lying(by_piece(above, pieces_of(problem)).ravel(), pieces, seed)
 
 
-def _lying(weight: Array, pieces: Pieces) -> EffectLocation:
+def _lying(weight: Array, pieces: Pieces, seed: int) -> EffectLocation:
     """Where a weight of the pieces lies, without spans."""
-    lying = shares(weight, pieces, np.random.default_rng(_SEED))
+    lying = shares(weight, pieces, np.random.default_rng(_SEED + seed))
     return EffectLocation((), 0.0, lying, _standing_place(lying), None, phrase_of(lying))
 
 
