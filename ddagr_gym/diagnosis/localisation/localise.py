@@ -43,7 +43,7 @@ from ddagr_gym.physics.effects import Effect
 Array = NDArray[np.float64]
 
 _SEED = 20240
-"""Seed of the shifts in the tests of operating conditions, added to that of the diagnosis (ours: any number would do)."""
+"""Added to the seed of the diagnosis for the shifts in the tests of operating conditions (ours: any number does)."""
 
 _ROUGH = 1.25
 """Mean square of the standardised residuals from which a channel's squares are located (ours: windows take 10 to 20

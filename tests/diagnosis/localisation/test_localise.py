@@ -75,6 +75,14 @@ def test_a_localisation_is_plain_json(limited):
     assert [item["component"] for item in again["wrench"]] == ["F_x", "F_y", "M_z"]
 
 
+def test_the_seed_decides_the_shifts_and_nothing_else(limited):
+    first, again, other = (locate(*limited, LIMITS, seed=seed).findings["motor_saturation"] for seed in (0, 0, 1))
+    assert first == again
+    assert [item.p for item in first.regimes] != [item.p for item in other.regimes]
+    assert [item.excess for item in first.regimes] == [item.excess for item in other.regimes]
+    assert first.spans == other.spans
+
+
 def test_nothing_found_has_no_spans_and_no_phrase(limited):
     problem, found = limited
     located = locate(problem, SearchResult(found.models[1:], ()), LIMITS)
