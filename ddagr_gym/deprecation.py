@@ -10,6 +10,7 @@ A whole module, in the table :data:`MOVED_MODULES`; :func:`install` makes the im
 from __future__ import annotations
 
 import importlib
+import importlib.util
 import sys
 import warnings
 from collections.abc import Callable, Mapping, Sequence
@@ -27,10 +28,11 @@ MOVED_MODULES: Mapping[str, tuple[str, str]] = {
     "ddagr_gym.replay.split": ("ddagr_gym.identification.data_split", "0.4.0"),
     "ddagr_gym.replay.windows": ("ddagr_gym.identification.windows", "0.4.0"),
     "ddagr_gym.replay": ("ddagr_gym.replay_analysis", "0.4.0"),
-    "ddagr_gym.replay_analysis.arm": ("ddagr_gym.replay_analysis.drive_mode", "0.4.0"),
+    "ddagr_gym.diagnosis.verdict": ("ddagr_gym.diagnosis.result.files", "0.4.0"),
     "ddagr_gym.evaluation.arms": ("ddagr_gym.evaluation.policy_seeds", "0.4.0"),
 }
-"""Old name of a module or package -> its new name, and the release that removes the old one. The first match counts."""
+"""Old name of a module or package -> its new name, and the release that removes the old one. The longest match
+counts."""
 
 
 def renamed(module: str, names: Mapping[str, str], goes: str) -> Callable[[str], Any]:
@@ -74,8 +76,11 @@ class _MovedFinder(MetaPathFinder):
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        for old, (new, goes) in self._moved.items():
+        for old in sorted(self._moved, key=len, reverse=True):
             if fullname == old or fullname.startswith(f"{old}."):
+                new, goes = self._moved[old]
+                if importlib.util.find_spec(new + fullname.removeprefix(old)) is None:
+                    return None
                 return ModuleSpec(fullname, _MovedLoader(old, new, goes), is_package=fullname == old)
         return None
 

@@ -52,6 +52,24 @@ def test_a_module_that_was_renamed_twice_has_its_classes_by_both_names():
     assert "ddagr_gym.replay.windows is ddagr_gym.identification.windows now" in said
 
 
+def test_modules_that_went_elsewhere_are_found_there():
+    said = run(
+        "from ddagr_gym.replay.windows import cut_windows\n"
+        "from ddagr_gym.diagnosis.verdict import load\n"
+        "import ddagr_gym.identification.windows as windows, ddagr_gym.diagnosis.result.files as files\n"
+        "assert cut_windows is windows.cut_windows and load is files.load"
+    )
+    assert "ddagr_gym.replay.windows is ddagr_gym.identification.windows now" in said
+    assert "ddagr_gym.diagnosis.verdict is ddagr_gym.diagnosis.result.files now" in said
+
+
+def test_a_module_that_never_was_is_not_found():
+    said = run(
+        "try:\n    import ddagr_gym.replay.nonsense\nexcept ModuleNotFoundError as error:\n    print(error.name)"
+    )
+    assert "ddagr_gym.replay.nonsense" in said
+
+
 def test_the_function_of_the_same_name_can_still_be_called():
     said = run(
         "import ddagr_gym.replay.intervals, ddagr_gym\n"

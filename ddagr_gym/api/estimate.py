@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from ddagr_gym.api.inputs import RobotLike, Source, recording_from
 from ddagr_gym.api.nominal import SoilLike, robot_from, soil_from
 from ddagr_gym.api.results import Result, Table, at_least
-from ddagr_gym.errors import InputError
+from ddagr_gym.errors import InputError, unknown_name
 from ddagr_gym.files import atomic_path, output_folder, write_text
 from ddagr_gym.progress import counting
 
@@ -210,7 +210,8 @@ def estimate(
         raise InputError(
             "give either a recording or --thesis 6.2 or 6.3 (thesis=... in Python): one of them is what is estimated."
         )
-    chosen = ForceLaw[law]
+    chosen = ForceLaw[_known("force law", law, ForceLaw.__members__)]
+    _known("filter", filter, ("ours", "thesis"))
     if thesis is not None:
         _refuse_own(robot=(robot, "ddagr"), motor_rate=(motor_rate, None), map=(column_map, None))
         return EstimateResult(estimate_thesis_run(thesis, str(soil or ""), filter, chosen, seed), thesis)
@@ -221,6 +222,14 @@ def estimate(
     read = recording_from(recording, robot, column_map)
     expected = None if soil is None else soil_from(soil)
     return EstimateResult(estimate_recording(read, found, expected, filter, chosen, attitude, seed))
+
+
+def _known(kind: str, name: str, known: Iterable[str]) -> str:
+    """The name, where it is one of the known ones."""
+    names = tuple(known)
+    if name not in names:
+        raise unknown_name(kind, name, names)
+    return name
 
 
 def _refuse_own(**options: tuple[Any, Any]) -> None:

@@ -19,7 +19,7 @@ from ddagr_gym.api.nominal import (
     soil_name_of,
     thresholds_from,
 )
-from ddagr_gym.api.results import Result, Table, at_least
+from ddagr_gym.api.results import Result, Table, at_least, names_of
 from ddagr_gym.control.manoeuvres import Manoeuvre, find_manoeuvre
 from ddagr_gym.files import output_folder, write_text
 from ddagr_gym.progress import counting
@@ -96,7 +96,7 @@ class IsolabilityResult(Result):
 
 def isolability(
     manoeuvres: ManoeuvreLike | Sequence[ManoeuvreLike] = ("stops", "arcs", "spin", "s_weave"),
-    sensors: Sequence[str] = ("imu", "encoders", "pose"),
+    sensors: str | Sequence[str] = ("imu", "encoders", "pose"),
     robot: RobotLike = "ddagr",
     soil: SoilLike = "thesis_a1",
     *,
@@ -150,7 +150,7 @@ def isolability(
             nominal,
             ground,
             drives,
-            tuple(sensors),
+            names_of(sensors),
             thresholds=gates,
             seed=seed,
             soil_name=soil_label(soil),

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, TypeAlias, Union
 
 from ddagr_gym.api.inputs import RobotLike
 from ddagr_gym.api.nominal import SoilLike, robot_from, soil_from
-from ddagr_gym.api.results import Result, Table, at_least
+from ddagr_gym.api.results import Result, Table, at_least, names_of
 from ddagr_gym.errors import InputError
 from ddagr_gym.files import write_text
 
@@ -95,7 +95,7 @@ def next_drive(
     robot: RobotLike | None = None,
     soil: SoilLike | None = None,
     *,
-    sensors: Sequence[str] = (),
+    sensors: str | Sequence[str] = (),
     seed: int = 0,
     threads: int = 1,
     progress: Callable[[str], None] | None = None,
@@ -136,7 +136,7 @@ def next_drive(
         robot_from(question.robot if robot is None else robot),
         soil_from(question.soil if soil is None else soil),
         question.rivals,
-        sensors=tuple(sensors) or question.sensors,
+        sensors=names_of(sensors) or question.sensors,
         seed=seed,
         setting=replace(question.setting, threads=threads),
         progress=be_silent if progress is None else progress,

@@ -73,3 +73,8 @@ def at_least(**bounds: tuple[float | None, float]) -> None:
     for name, (given, least) in bounds.items():
         if given is not None and not given >= least:
             raise InputError(f"{name} is {given}: give at least {least}.")
+
+
+def names_of(given: str | Sequence[str]) -> tuple[str, ...]:
+    """One name or several, as a tuple."""
+    return (given,) if isinstance(given, str) else tuple(given)

@@ -160,12 +160,13 @@ def simulate(
     from ddagr_gym.simulator import simulate as simulated
 
     found = robot_from(robot)
+    sensors = _sensors(rate, pose_rate, noise)  # refuses a rate at which there are no commands
     commands, title = _commands(manoeuvre, rate)
     columns = simulated(
         found,
         soil_from(soil),
         commands,
-        sensors=_sensors(rate, pose_rate, noise),
+        sensors=sensors,
         effects=load_effects(effects),
         numerics=Numerics.finest() if fine else Numerics(),
         seed=seed,

@@ -53,7 +53,7 @@ def recording_of_table(table: Any, source: str) -> Recording:
         )
     if not set(names) & set(CHANNELS):
         raise InputError(f"{source} has no column of the schema, such as {', '.join(CHANNELS)}: rename its columns.")
-    columns, left_out = _columns(table, names, source)
+    columns, left_out = _columns(table, source)
     valid = columns.pop(VALID, None)
     notes = [f"the columns {', '.join(left_out)} hold no numbers and are left out."] if left_out else []
     return Recording.from_columns(
@@ -61,21 +61,27 @@ def recording_of_table(table: Any, source: str) -> Recording:
     )
 
 
+def _keys(table: Any) -> list[Any]:
+    """Names of the columns as the table has them, which need not be texts."""
+    return list(table) if isinstance(table, Mapping) else list(getattr(table, "column_names", table.columns))
+
+
 def _names(table: Any) -> list[str]:
-    names = list(table) if isinstance(table, Mapping) else list(getattr(table, "column_names", table.columns))
-    twice = sorted({str(name) for name in names if names.count(name) > 1})
+    names = [str(key) for key in _keys(table)]
+    twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise InputError(f"the table has the column {twice[0]!r} twice: leave one out.")
-    return [str(name) for name in names]
+    return names
 
 
-def _columns(table: Any, names: list[str], source: str) -> tuple[dict[str, NDArray[np.float64]], list[str]]:
+def _columns(table: Any, source: str) -> tuple[dict[str, NDArray[np.float64]], list[str]]:
     """Columns as floats, and the names of those outside the schema that hold no numbers."""
     found: dict[str, NDArray[np.float64]] = {}
     left_out: list[str] = []
-    for name in names:
+    for key in _keys(table):
+        name = str(key)
         try:
-            found[name] = _numbers(table[name])
+            found[name] = _numbers(table[key])
         except (TypeError, ValueError):
             if name in ("t", VALID, *CHANNELS):
                 unit = "s" if name == "t" else CHANNELS[name].unit if name in CHANNELS else "true or false"

@@ -55,6 +55,8 @@ def test_text_and_notebook(estimated, page_text):
         ({"recording": "nothing.parquet"}, "nothing.parquet"),
         ({"thesis": "6.2", "robot": "husky"}, "the thesis's runs have their own"),
         ({"thesis": "6.2", "soil": "mud"}, "unknown soil 'mud'"),
+        ({"thesis": "6.2", "law": "couple"}, "unknown force law 'couple'.*coupled"),
+        ({"thesis": "6.2", "filter": "our"}, "unknown filter 'our'.*ours"),
     ],
 )
 def test_bad_requests_are_one_sentence(options, message):

@@ -76,6 +76,11 @@ def test_a_table_that_is_no_drive_is_one_sentence(changes, message):
     assert message in str(caught.value)
 
 
+def test_columns_whose_names_are_no_texts_are_kept_under_their_texts():
+    recording = recording_from(pandas.DataFrame({**COLUMNS, 5: 1.5}))
+    assert recording.extras["5"].tolist() == [1.5] * 4
+
+
 def test_an_index_of_time_is_not_guessed():
     frame = pandas.DataFrame(COLUMNS).set_index("t")
     with pytest.raises(InputError, match="an index is not taken for the time"):

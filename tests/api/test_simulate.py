@@ -72,6 +72,7 @@ def test_files_are_written_and_wrong_endings_refused(drive, tmp_path):
         ({"soil": "mud"}, "unknown soil 'mud'"),
         ({"effects": "slop=0.1"}, "slope"),
         ({"rate": -1.0}, "rate"),
+        ({"rate": 0.0}, "rate"),
     ],
 )
 def test_bad_input_is_one_sentence(given, message):

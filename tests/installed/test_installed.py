@@ -70,6 +70,20 @@ def test_an_episode_runs():
     environment.close()
 
 
+def test_data_and_types_are_in_the_package():
+    package = Path(ddagr_gym.__file__).resolve().parent
+    names = ("py.typed", "data/null_bank_ddagr.json", "data/replay_demo.parquet", "configs/evaluation/thesis_runs.yaml")
+    assert [name for name in names if not (package / name).is_file()] == []
+
+
+def test_the_python_functions_work():
+    drive = ddagr_gym.simulate("arcs", effects="slope=0.05", rate=50.0, pose_rate=5.0)
+    assert ddagr_gym.check(drive).findings
+    estimated = ddagr_gym.estimate(drive)
+    assert abs(estimated.errors["radius_error"]) < 0.2
+    assert "<table" in estimated._repr_html_()
+
+
 def test_trained_policies_drive_without_torch():
     from ddagr_gym.policies.controller import policy_controller
     from ddagr_gym.policies.shipped import policies_dir, policy_names

@@ -22,9 +22,9 @@ _FILES = (
 _PROSE = (
     "diagnosis/wording.py",
     "diagnosis/result/sentences.py",
-    "diagnosis/localisation/operating_condition_words.py",
 )
-"""Modules that only turn results into words."""
+"""Modules that only turn results into words, at the end and anew each time. Phrases that finished steps keep, as those
+of a localisation, are not among them."""
 
 
 def source_digest() -> str:
