@@ -121,7 +121,7 @@ def run(arguments: Arguments) -> None:
 
 
 def _mended(loaded: Sequence[Recording]) -> Sequence[Recording]:
-    """Recordings as a diagnosis sees them; what had to be mended is told."""
+    """Recordings as a diagnosis sees them; what had to be mended is reported."""
     from ddagr_gym.diagnosis.preprocessing.mended_recordings import mend_recordings
 
     if not loaded:

@@ -17,7 +17,7 @@ EXAMPLES = (
     "ddagr replay run.parquet --robot ddagr --soil thesis_a1 --output replayed",
     "ddagr replay drive.csv.gz --map drive_steps --robot warthog --soil lete_sand_wong --refit --window 5 -o sand",
     "ddagr replay run_1.parquet run_2.parquet --robot ddagr --soil thesis_a1 --refit --together "
-    "--effects slope=0.05 --output both",
+    "--effect slope=0.05 --output both",
 )
 
 
@@ -53,7 +53,7 @@ class Arguments:
     soil: str
     robot: str = ""
     map: str = ""
-    effects: Annotated[tuple[str, ...], tyro.conf.UseAppendAction] = ()
+    effects: Annotated[tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(aliases=("--effect",))] = ()
     window: float = 2.0
     refit: bool = False
     together: bool = False

@@ -16,10 +16,10 @@ DEGREES = 180.0 / math.pi
 _LOPSIDED = 0.5
 """Distance of a value from the middle of its interval, over the half width, beyond which the interval is written."""
 _UNEVEN_BANKS = 0.3
-"""Share by which the banks' delays differ from their mean before both are told (ours)."""
+"""Share by which the banks' delays differ from their mean before both are reported (ours)."""
 
 _ASIDE = 0.05
-"""Distance of a hitch from the middle that is told [m] (ours)."""
+"""Distance of a hitch from the middle that is reported [m] (ours)."""
 
 _UNBOUNDED = 1e5
 """Onsets and limits beyond it mean always, and none."""

@@ -119,7 +119,7 @@ class Evaluation:
         headline: arm that the claims name.
         claims: :class:`ddagr_gym.evaluation.claims.CheckedClaim` as mappings; empty where none was decided.
         over_headline: probability of a smaller |e_R| than the headline's by learned arm, on the judged set; ablations
-            of the headline are held against its same training seeds.
+            of the headline are compared with its same training seeds.
         headline_alone: summary of the headline on the judged set by those seeds alone, by what to call it.
         drives: for pictures of paths.
         tracked: drives with the filter's estimate.

@@ -19,7 +19,7 @@ from ddagr_gym.recordings.schema import Recording
 Array = NDArray[np.float64]
 
 TIMING_PIECE = 10.0
-"""Length of the pieces in which poses are held against the integrated gyro [s] (ours)."""
+"""Length of the pieces in which poses are compared with the integrated gyro [s] (ours)."""
 
 LEAST_CORRELATION = 0.5
 """Correlation of gyro and poses below which nothing is known of their clocks (ours)."""

@@ -57,7 +57,7 @@ def _work(row: Array, defect: Array, change: Array) -> float:
 def _newton_step(
     row: Array, start: Array, defect: Array, change: Array, step: float, numerics: StepNumerics, actions: EffectActions
 ) -> None:
-    """Move by ``change`` times the length at which its defect does no more work (false position, Illinois).
+    """Move along ``change`` until the residual, ``defect``, is orthogonal to it (false position, Illinois).
 
     Args:
         row: the environment; moved.

@@ -12,8 +12,6 @@ from benchmarks import speed
 from benchmarks.speeds import accuracy, environments, kernel_share, kernel_time, memory, peers, tables, workloads
 from benchmarks.speeds.figure import speed_figure
 from benchmarks.speeds.timing import Contestant, Rates, race, ratio
-from ddagr_gym.commands import benchmark
-from ddagr_gym.errors import InputError
 from ddagr_gym.parameters import Numerics
 
 TINY = speed.Effort(repeats=2, steps=4, batches=(1, 2), evaluations=256, states=2, samples=20, resets=3)
@@ -147,9 +145,3 @@ def test_figure_is_written(results, tmp_path):
     pytest.importorskip("matplotlib")
     for path in speed_figure(results, tmp_path / "speed"):
         assert path.stat().st_size > 10_000
-
-
-def test_command_outside_a_checkout_says_so(monkeypatch, tmp_path):
-    monkeypatch.setattr(benchmark, "__file__", str(tmp_path / "site-packages/ddagr_gym/commands/benchmark.py"))
-    with pytest.raises(InputError, match="from a checkout"):
-        benchmark.run(benchmark.Arguments())

@@ -124,7 +124,7 @@ def test_runs_replayed_together_share_their_parameters(runs, tmp_path, capsys):
         (["RUNS/one.parquet", "--robot", "husky"], "'ddagr'"),
         (["RUNS/one.parquet", "--threads", "0"], "--threads is 0"),
         (["RUNS/one.parquet", "--window", "0.01"], "the window is 0.01 s"),
-        (["RUNS/one.parquet", "--effects", "magic=1"], "magic"),
+        (["RUNS/one.parquet", "--effect", "magic=1"], "magic"),
         (["RUNS/one.parquet", "--maximum-rows", "10"], "10"),
         (["RUNS/blink.parquet"], "no window of 2 s has valid commands or wheel speeds"),
     ],

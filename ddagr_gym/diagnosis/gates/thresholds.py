@@ -298,9 +298,9 @@ def thresholds_from(
     scale = np.maximum(_upper_mean(table), NOISE_GAIN)
     widest = max(float(np.quantile((table / scale)[own].max(axis=1), 1.0 - level)), 1.0)
     widening = widest * np.array([_margin(name) for name in names])
-    held = np.array([[run.held_out.get(name, 0.0) for name in names] for run in runs]) * share[:, None]
+    unseen_gains = np.array([[run.held_out.get(name, 0.0) for name in names] for run in runs]) * share[:, None]
     # the gain carries the level; the gain on left-out windows refuses what few of them carry, at the nulls' median
-    least = np.maximum(np.median(held, axis=0), 0.0)
+    least = np.maximum(np.median(unseen_gains, axis=0), 0.0)
     gates = {name: Gate(float(widening[k] * scale[k]), float(least[k])) for k, name in enumerate(names)}
     maxima = np.sort((table / (widening * scale))[own].max(axis=1))
     duration = float(np.median([run.duration for run in runs]))

@@ -4,7 +4,7 @@ What is tested is a list of pieces with a weight each (the gain of an effect, or
 an operating condition, the share of the weight runs ahead of the share of the time where the weight is concentrated;
 the largest excess over all ranges is N. Kuiper's statistic, over all discs for places. Its null distribution shifts the
 weights along each recording, which keeps their correlation; the largest standardised excess over all operating
-conditions is what a finding is held against (a max-statistic), so that noise makes no phrases.
+conditions is what a finding is compared with (a max-statistic), so that noise makes no phrases.
 """
 
 from __future__ import annotations
