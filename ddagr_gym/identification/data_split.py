@@ -18,7 +18,11 @@ Booleans = NDArray[np.bool_]
 MANY_SPANS = 8
 """From so many spans on, spans alternate; with fewer, blocks of time do."""
 LONGEST_BLOCK = 40.0
+"""Of time, at most [s] (ours: a horizon of 30 s fits, and a long drive has blocks of both parts all along it)."""
+
 SHORTEST_BLOCK = 3.0
+"""Of time, at least [s] (ours: a window of 2 s fits)."""
+
 BLOCKS = 4
 """A continuous drive falls into this many blocks at least, of at most LONGEST_BLOCK seconds (a 30 s horizon fits)."""
 LEAST_SHARE = 0.2

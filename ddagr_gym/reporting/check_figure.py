@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 COLOURS = {Status.PASS: palette.BLUE, Status.SUSPICIOUS: palette.VERMILLION, Status.NOT_TESTABLE: palette.GREY}
 RIGHT, LEFT, GYRO, POSE = palette.RIGHT, palette.LEFT, palette.INK, palette.GREEN
 _MOST_POINTS = 6000
+"""Drawn of a line, about (ours: several for each pixel of its width)."""
+
 _ABOVE: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0)}
 
 

@@ -47,10 +47,19 @@ MOST_PATHS = 150
 MOST_BARS = 720
 """Bars in one picture of a score, about one per point of its width."""
 BINS = 8
+"""Bins of a picture, with about as many values each (ours)."""
+
 _NARROWEST = 0.03
+"""Width of a bin over that of all below which it joins its neighbour (ours: narrower ones cannot be told apart)."""
+
 _LEAST_GAIN = 0.5
+"""Gain from which on an effect has a line in the picture of scores (ours: half a unit of log-likelihood is noise)."""
+
 _FEWEST_EFFECTS = 8
+"""Effects with a line at least, however small their gains (ours)."""
+
 _WIDTH = 5.4
+"""Of a figure [inches]: half of the page."""
 
 Figure = Any
 

@@ -22,6 +22,7 @@ from ddagr_gym.reporting.figures import house_style, svg_data
 PAGE = "report.html"
 PICTURES = "figures"
 _POINTS_PER_PIXEL = 72.0 / 96.0
+"""An inch has 72 points and, in CSS, 96 pixels."""
 
 Progress = Callable[[str], None]
 

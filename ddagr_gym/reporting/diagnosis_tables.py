@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from ddagr_gym.physics.effects import Effect
 
 _MOST_SPANS = 8
+"""Stretches that are listed for a finding, at most: those with most gain (ours: one line of text)."""
 
 _MIDDLE = 5.0  # [s] the horizon that stands for all
 
@@ -152,7 +153,7 @@ def _equivalents(name: str, weights: Mapping[str, float]) -> list[dict[str, Any]
 
 def _equivalence_note(name: str, equivalents: Sequence[Mapping[str, Any]], seen: bool) -> str:
     if seen:
-        return "Seen in the values themselves, before any model: no other effect was held against it."
+        return "Seen in the values themselves, before any model: no other effect was compared with it."
     if len(equivalents) > 1:
         others = " or ".join(in_sentence(item["name"]) for item in equivalents if not item["own"])
         return f"These recordings do not separate it from {others}: weights by resampling the windows."

@@ -18,6 +18,8 @@ from ddagr_gym.reporting.figures import DASHED, house_style
 Array = NDArray[np.float64]
 
 _MOST_POINTS = 4000
+"""Drawn of a line, about (ours: several for each pixel of its width)."""
+
 _HIGHEST_NIS = 4.0
 """Of the overview's panel; higher values leave it."""
 

@@ -24,6 +24,8 @@ TRANSFER = ("S1", "T")
 """Set and the same scenarios on another soil law."""
 
 _PIXELS_PER_INCH = 96
+"""Of CSS."""
+
 _DPI = 110
 """Of the points inside figures."""
 

@@ -24,9 +24,16 @@ from ddagr_gym.reporting.evaluation_figures import arm_colours
 from ddagr_gym.reporting.figures import DASHED
 
 _LATERAL_LIMIT = 0.30
+"""Of the axis of lateral errors [m]; larger ones stand on its edge (ours)."""
+
 _HEADING_LIMIT = math.radians(45.0)
+"""Of the axis of heading errors [rad]; larger ones stand on its edge (ours)."""
+
 _COLUMNS = 4
+"""Panels in a row, at most, where a figure asks for no other number (ours: the width of the page)."""
+
 _POINTS = 500
+"""Exits of a panel that are drawn, about (ours: more only cover each other)."""
 
 
 def _grid(count: int, panel: tuple[float, float], columns: int = _COLUMNS, top: float = 0.0) -> tuple[Any, list[Any]]:

@@ -55,6 +55,7 @@ _ENDINGS = {
     4: "time was up",
 }
 _CASES = 5
+"""Worst turns that are shown of the headline and of the best arm; of the others, one (ours)."""
 
 
 def percent(value: float | None, digits: int = 1) -> str:

@@ -77,6 +77,7 @@ WHEELS = (
 """Number, name, colour and line of the wheels; rear ones, dashed, show the front ones that they cover."""
 
 DASHED = (0, (4, 2.2))
+"""Dashes of matplotlib: offset, then lengths of stroke and gap [line widths]."""
 
 TURN_FIGURE_COLUMNS = (
     "t",

@@ -32,6 +32,8 @@ MODEL_STYLES: dict[str, tuple[str, str, Any]] = {
 CELLS = 12
 """Roll-outs that are drawn, evenly chosen."""
 ROW = 4
+"""Roll-outs drawn side by side, at most (ours)."""
+
 LEAST_WINDOWS = 3
 """Windows from which on a curve of their mean error is worth drawing."""
 LEAST_EXTENT = 0.5

@@ -273,7 +273,7 @@ def test_why_no_drive_would_help_is_said(tmp_path):
 def test_what_was_seen_in_the_values_was_held_against_nothing():
     (finding,) = diagnosis().findings
     card = finding_card(replace(finding, name="gyro_sign", gate=0.0, parameters={}, equivalence_set={}), ["a"])
-    assert "no other effect was held against it" in card["equivalence_note"]
+    assert "no other effect was compared with it" in card["equivalence_note"]
 
 
 def test_tables_by_hand():

@@ -59,6 +59,7 @@ SHORT_WINDOW = 2.0
 """Windows of banks that do not say how long theirs are [s]."""
 
 VERSION = 1
+"""Of the file of thresholds: raised when an entry goes or changes its meaning."""
 
 NullKind = Literal["simulated", "ordinary"]
 """What null drives are: simulated ones, or real drives in which nothing is wrong, in pieces and longer."""

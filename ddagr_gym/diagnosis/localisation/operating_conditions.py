@@ -36,6 +36,8 @@ LEAST_DIFFERENCE = 0.3
 """Difference between the sizes of an effect in two operating conditions, over the fitted size, worth naming (ours)."""
 
 BINS = 6
+"""Bins, with about as many pieces each, in which shares are listed (ours: few, so that each holds several pieces; with
+less than two pieces a bin nothing is tested)."""
 
 _NEAR_END = 0.05
 """Share of the pieces beyond a range up to which it counts as open (ours)."""
@@ -44,8 +46,13 @@ _TIED = 1e-9
 """Distance over the range of all values below which two count as equal."""
 
 _PERMUTATIONS = 300
+"""Draws of the null distribution (ours: at CONDITION_LEVEL the standard error of p is 0.013)."""
+
 _RADII = (0.5, 1.0, 1.5, 2.5, 4.0)
+"""Of the discs in which places are sought [m] (ours: from a spot under the robot to a patch several robots long)."""
+
 _MOST_CENTRES = 60
+"""Discs of each radius are centred on about so many pieces, evenly chosen along the drive (ours: limits the time)."""
 
 
 @dataclass(frozen=True, eq=False)

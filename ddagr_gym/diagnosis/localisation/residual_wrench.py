@@ -29,6 +29,8 @@ WIDEST = 1e4
 """Standard deviation before any data [N, N m]: what no window shows comes out at this."""
 
 _STEP = 5.0
+"""Wrench whose effect on the readings, divided by it, is the derivative [N, N m] (ours: well above rounding, and small
+beside the robot's weight)."""
 
 
 def push(row: Vector, parameters: Vector, memory: Vector) -> None:

@@ -44,7 +44,10 @@ MOST_MINUTES = 30.0
 """Driving that is asked of nobody to tell two names apart (ours)."""
 
 _ALTERNATIVES = 3
+"""Manoeuvres that are listed beside the best, at most (ours: a short list to choose from)."""
+
 _NOTHING = 1e-12
+"""Gain per minute, and information, below which there is nothing but rounding."""
 
 
 @dataclass(frozen=True, eq=False)

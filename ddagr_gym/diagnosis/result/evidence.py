@@ -22,6 +22,8 @@ from ddagr_gym.files import atomic_path
 Array = NDArray[np.float64]
 
 VERSION = 1
+"""Of the file: raised when an array goes or changes its meaning."""
+
 NAME = "evidence.npz"
 """Of the file beside ``diagnosis.json``."""
 

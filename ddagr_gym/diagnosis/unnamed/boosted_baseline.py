@@ -17,6 +17,8 @@ _FEATURES = (
     "c_right", "c_left", "c_dot_right", "c_dot_left", "torque_right", "torque_left",
 )  # fmt: skip
 _FEWEST = 40
+"""Blocks of a channel below which no trees are grown: with leaves of at least 20 no tree could split."""
+
 _PARTS = 4  # of a heading's circle
 
 

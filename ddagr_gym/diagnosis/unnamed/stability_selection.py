@@ -27,6 +27,8 @@ ALIKE = 0.9
 """Correlation from which columns count as one (ours)."""
 
 _PAIRS = 50
+"""Complementary pairs of halves: 100 halves, the number of Meinshausen and Buehlmann, 50 pairs of Shah and Samworth."""
+
 _LEAST_SHARE = 1e-6  # of a column's information beside the nuisances: less is rounding
 
 

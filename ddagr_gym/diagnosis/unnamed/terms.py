@@ -45,8 +45,14 @@ LEAST_SHARE = 0.01
 """Share of the left-out residual by which a further term must lower it (ours: below, it is of no use to anybody)."""
 
 _FOLDS = 4
+"""Parts of the pieces that are left out in turn (ours: each has four pieces at least, as there are 16)."""
+
 _RIDGES = (0.03, 0.3, 3.0)
+"""Penalties of the whole library, relative to each column's information, of which the best counts (ours: two decades
+about 0.3)."""
+
 _LEVEL = 0.9
+"""Of the intervals of coefficients: that of all intervals of a diagnosis."""
 
 
 def unnamed_terms(problem: Problem, model: ScannedModel, rng: np.random.Generator) -> UnnamedTerms:
