@@ -21,6 +21,10 @@ Robust loss: beyond a size k a weighted residual costs k (2|r| - k)/2 instead of
 Deviations: H^-1, which takes the rows' noise as independent, and the sandwich H^-1 (sum_w g_w g_w') H^-1 with the
 windows' shares g_w of the gradient, which allows for correlated residuals inside a window (P. J. Huber, 5th Berkeley
 Symp. (1967) 221; H. White, Econometrica 48 (1980) 817).                                                            (6)
+
+The numbers are this module's. The theory page derives them: (1) is theory: identification, eq. (6); (2) is theory:
+identification, eq. (7); (3) and (4) are theory: identification, eq. (8); (6) is theory: identification, eq. (9). That
+page writes B_w for the local and A_w for the shared sensitivities.
 """
 
 from __future__ import annotations
