@@ -4,9 +4,9 @@
 
 Drives :data:`PLAN` as ``ddagr evaluate`` does, with the same journal, page and files (about twenty minutes of one core;
 stopped and started again with the same folder, it goes on), then writes ``benchmarks/results/row_turns.json`` and the
-figure of the README, ``docs/radius_error.png``. The JSON file has the form of ``summary.json``, {controller: {set:
-{metric: {value, interval}}}}, and one entry more, ``_run``: command line, commits, who drove what, hashes of scenarios
-and policies, and what became of the claims.
+figure of the page of results, ``docs/radius_error.png``. The JSON file has the form of ``summary.json``, {controller:
+{set: {metric: {value, interval}}}}, and one entry more, ``_run``: command line, commits, who drove what, hashes of
+scenarios and policies, and what became of the claims.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ and B5, which takes half a second of CPU a turn, S0 and S1."""
 ORDER = ("B0", "B1", "B2", "B3", "B4", "B5", "ppo_ekf", "ppo_history", "ppo_raw", "sac_ekf")
 """Arms in the tables; others follow."""
 SHOWN = ("B0", "B1", "B2", "B3", "B4", "B5", "ppo_ekf", "ppo_history", "ppo_raw", "true_curvature", "true_path")
-"""Arms of the README's figure."""
+"""Arms of the figure on the page of results."""
 
 _DIGITS = 5
 
@@ -96,8 +96,8 @@ def record(
     return {"_run": rounded(run), **rounded(summary)}
 
 
-def readme_table(content: Mapping[str, Any], set_name: str = "S1") -> str:
-    """First table of the README: on one set, each shown arm with 95 % intervals, in Markdown."""
+def results_table(content: Mapping[str, Any], set_name: str = "S1") -> str:
+    """First table of the page of results: on one set, each shown arm with 95 % intervals, in Markdown."""
     lines = [
         "| controller | radius error, median | 95th percentile | success | closer than B1 | closer than B4 |",
         "|---|---|---|---|---|---|",

@@ -103,7 +103,7 @@ def readme_lines() -> list[str]:
 
 def test_readme_shows_command_lines():
     named = {words[1] for line in readme_lines() if len(words := line.split()) > 1}
-    assert {"demo", "diagnose", "isolability", "next-drive", "evaluate"} <= named
+    assert {"demo", "simulate", "check", "replay", "diagnose", "train", "evaluate"} <= named
 
 
 @pytest.mark.parametrize("line", readme_lines())

@@ -14,6 +14,7 @@ import pytest
 
 import ddagr_gym
 from ddagr_gym.diagnosis.result.files import load
+from ddagr_gym.diagnosis.result.next_drive_plan import NextDrivePlan
 from ddagr_gym.errors import InputError, InputWarning
 from ddagr_gym.physics.effects import load_effects
 from ddagr_gym.presets import get_robot, get_soil
@@ -130,7 +131,7 @@ def test_an_answer_knows_its_simulator_for_the_next_drive(found, monkeypatch):
 
     def plan(robot, soil, rivals, **rest):
         planned.append((robot, soil, [rival.name for rival in rivals]))
-        return {"manoeuvre": "", "why": "Nothing helps.", "separates": [], "minutes": None, "alternatives": []}
+        return NextDrivePlan.none("Nothing helps.")
 
     monkeypatch.setattr("ddagr_gym.diagnosis.planning.next_drive.next_drive", plan)
     own = replace(get_soil("thesis_a1"), cohesion=4000.0)

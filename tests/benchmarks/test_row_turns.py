@@ -84,7 +84,7 @@ def test_an_evaluation_is_driven_kept_and_not_driven_again(tmp_path, monkeypatch
     assert figure.read_bytes()[:4] == b"\x89PNG"
     for name in ("report.html", "summary.json", "claims.json", "episodes.parquet"):
         assert (folder / name).is_file()
-    assert "| B4 |" in row_turns.readme_table(content, "V")
+    assert "| B4 |" in row_turns.results_table(content, "V")
 
 
 def test_every_commit_is_remembered_once(tmp_path, monkeypatch):
@@ -123,5 +123,5 @@ def test_the_claims_of_the_record_are_those_of_today(committed):
     assert "not driven" not in verdicts
 
 
-def test_the_readme_says_what_the_record_says(committed, repository):
-    assert row_turns.readme_table(committed) in (repository / "README.md").read_text()
+def test_the_page_of_results_says_what_the_record_says(committed, repository):
+    assert row_turns.results_table(committed) in (repository / "docs" / "results.md").read_text()

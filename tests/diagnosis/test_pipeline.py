@@ -8,23 +8,38 @@ import pytest
 
 from ddagr_gym.diagnosis import diagnose, pipeline
 from ddagr_gym.diagnosis.gates.thresholds import Thresholds
-from ddagr_gym.diagnosis.localisation.localise import Localisation, Where
 from ddagr_gym.diagnosis.pipeline import LATER, STEPS
-from ddagr_gym.diagnosis.result.verdict import Diagnosis
+from ddagr_gym.diagnosis.result.certificate import Certificate
+from ddagr_gym.diagnosis.result.location import EffectLocation, Localisation
+from ddagr_gym.diagnosis.result.next_drive_plan import NextDrivePlan
+from ddagr_gym.diagnosis.result.unnamed_terms import UnnamedTerms
+from ddagr_gym.diagnosis.result.verdict import Diagnosis, GatesUsed
 from ddagr_gym.diagnosis.setting import Setting
 from ddagr_gym.presets import get_robot, get_soil
 
-_NOTHING = Where((), 0.0, (), (), None, "")
+_NOTHING = EffectLocation((), 0.0, (), (), None, "")
 LOCATED = Localisation({}, None, _NOTHING, _NOTHING, {}, ())
-ANSWER = Diagnosis(("none",), False, (), "", {"limit": {"yaw_rate": 1.2}}, {}, {}, ("a",), {}, 0.0, "0")
+ANSWER = Diagnosis(
+    ("none",),
+    False,
+    (),
+    "",
+    {"limit": {"yaw_rate": 1.2}},
+    {},
+    {},
+    ("a",),
+    GatesUsed(nulls=20, bank="a test", level=0.05),
+    0.0,
+    "0",
+)
 STAGES: dict[str, Any] = {
     "data_doubts": (),
     "search": "what was found",
     "conclude": (ANSWER, ()),
-    "_certify": {"gain": None},
+    "_certify": Certificate("by recording", "", (), 0.9, {}, {}, {}, {}, {}),
     "locate": LOCATED,
-    "_unnamed": {"terms": []},
-    "_next_drive": {"why": "nothing is left open"},
+    "_unnamed": UnnamedTerms("", (), 0.0, 0.0, ""),
+    "_next_drive": NextDrivePlan.none("nothing is left open"),
     "gather_evidence": "arrays",
 }
 """Stages by the name that the pipeline calls them by, and what they give here."""
@@ -77,9 +92,9 @@ def test_every_stage_is_called_once_in_its_order(stages: Stages) -> None:
     first, *later = STAGES
     assert stages.called == ["prepare", first, "starting_models", *later]
     diagnosis = outcome.diagnosis
-    assert (diagnosis.robot, diagnosis.soil, diagnosis.options["seed"]) == ("ddagr", "loam", 3)
+    assert (diagnosis.robot, diagnosis.soil, diagnosis.options.seed) == ("ddagr", "loam", 3)
     assert (diagnosis.fit, diagnosis.unnamed) == (STAGES["_certify"], STAGES["_unnamed"])
-    assert diagnosis.localisation["mismatch"]["time_share"] == 0.0
+    assert diagnosis.localisation.mismatch.time_share == 0.0
 
 
 def test_names_only_leaves_out_what_follows_the_verdict(stages: Stages) -> None:

@@ -55,10 +55,10 @@ def test_predictions_with_the_file_are_as_good_as_certified(sloping: Sloping, ef
     readings, _ = roll_out(forecasts, point, states)
     errors = errors_at(forecasts.future, readings, 5.0)
     for channel in ("position", "specific_force_x", "specific_force_y"):
-        certified = sloping.certificate["channels"][channel]["5"]
+        certified = sloping.certificate.channels[channel]["5"]
         again = float(np.sqrt(np.nanmean(errors[channel] ** 2)))
-        assert again == pytest.approx(certified["corrected"]["value"], rel=0.2), channel
-        assert again < 0.5 * certified["refitted"]["value"], channel
+        assert again == pytest.approx(certified.corrected.value, rel=0.2), channel
+        assert again < 0.5 * certified.refitted.value, channel
 
 
 def test_an_environment_takes_the_file(sloping: Sloping, effects_file: Path) -> None:
