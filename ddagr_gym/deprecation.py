@@ -29,6 +29,7 @@ MOVED_MODULES: Mapping[str, tuple[str, str]] = {
     "ddagr_gym.replay.windows": ("ddagr_gym.identification.windows", "0.4.0"),
     "ddagr_gym.replay": ("ddagr_gym.replay_analysis", "0.4.0"),
     "ddagr_gym.diagnosis.verdict": ("ddagr_gym.diagnosis.result.files", "0.4.0"),
+    "ddagr_gym.diagnosis.result.verdict": ("ddagr_gym.diagnosis.answer.verdict", "0.4.0"),
     "ddagr_gym.evaluation.arms": ("ddagr_gym.evaluation.policy_seeds", "0.4.0"),
 }
 """Old name of a module or package -> its new name, and the release that removes the old one. The longest match

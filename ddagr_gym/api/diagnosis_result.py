@@ -14,8 +14,8 @@ from ddagr_gym.errors import InputError
 from ddagr_gym.files import output_folder
 
 if TYPE_CHECKING:
+    from ddagr_gym.diagnosis.answer.verdict import Diagnosis, Finding
     from ddagr_gym.diagnosis.pipeline import Outcome
-    from ddagr_gym.diagnosis.result.verdict import Diagnosis, Finding
     from ddagr_gym.parameters import Robot, Soil
     from ddagr_gym.physics.effects import Effect
 
@@ -134,7 +134,7 @@ class DiagnosisResult(Result):
         Raises:
             InputError: the folder holds something else, or an earlier report without ``overwrite``.
         """
-        from ddagr_gym.diagnosis.result import evidence
+        from ddagr_gym.diagnosis.answer import evidence
         from ddagr_gym.reporting import diagnosis_page
 
         with output_folder(folder, overwrite=overwrite) as filled:

@@ -17,8 +17,8 @@ from ddagr_gym.files import write_text
 
 if TYPE_CHECKING:
     from ddagr_gym.api.diagnosis_result import DiagnosisResult
-    from ddagr_gym.diagnosis.result.next_drive_plan import NextDrivePlan
-    from ddagr_gym.diagnosis.result.verdict import Diagnosis
+    from ddagr_gym.diagnosis.answer.next_drive_plan import NextDrivePlan
+    from ddagr_gym.diagnosis.answer.verdict import Diagnosis
     from ddagr_gym.diagnosis.setting import Setting
     from ddagr_gym.physics.effects import Effect
 

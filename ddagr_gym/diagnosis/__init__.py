@@ -20,9 +20,9 @@ Stages
     ``evidence``       Gathers the arrays behind the pictures.
     =================  ===============================================================================================
 
-    ``setting`` has the choices, ``store`` keeps finished steps so that an interrupted diagnosis goes on, ``wording``
-    has the words of reports. Windows, noise, uncertain parameters and the fit itself are in
-    :mod:`ddagr_gym.identification`.
+    ``answer`` has the types of the answer, which every stage may know, ``setting`` the choices, ``store`` keeps
+    finished steps so that an interrupted diagnosis goes on, ``wording`` has the words of reports. Windows, noise,
+    uncertain parameters and the fit itself are in :mod:`ddagr_gym.identification`.
 
 Words
     *effect*           One kind of missing physics with sizes and shapes, of the library

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ddagr_gym.diagnosis.answer.evidence import NAME, Evidence
 from ddagr_gym.diagnosis.gates.thresholds import Thresholds
 from ddagr_gym.diagnosis.localisation.effect_timeline import (
     as_it_stands,
@@ -16,7 +17,6 @@ from ddagr_gym.diagnosis.localisation.effect_timeline import (
 )
 from ddagr_gym.diagnosis.localisation.localise import piece_values
 from ddagr_gym.diagnosis.localisation.residual_wrench import residual_wrench
-from ddagr_gym.diagnosis.result.evidence import NAME, Evidence
 from ddagr_gym.diagnosis.search.scanned_model import SearchResult
 from ddagr_gym.identification.gauss_newton import Fitted
 from ddagr_gym.identification.problem import Problem

@@ -12,6 +12,10 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import ParamSpec, TypeVar
 
+from ddagr_gym.diagnosis.answer.certificate import Certificate
+from ddagr_gym.diagnosis.answer.next_drive_plan import NextDrivePlan
+from ddagr_gym.diagnosis.answer.unnamed_terms import UnnamedTerms
+from ddagr_gym.diagnosis.answer.verdict import Diagnosis, Options
 from ddagr_gym.diagnosis.certification.certificate import of_mended_readings
 from ddagr_gym.diagnosis.certification.certify import certify
 from ddagr_gym.diagnosis.evidence import Evidence, gather_evidence
@@ -21,11 +25,7 @@ from ddagr_gym.diagnosis.localisation.repeat_spans import where_readings_repeat
 from ddagr_gym.diagnosis.planning.next_drive import next_drive, rivals_of_diagnosis, sensors_of_diagnosis
 from ddagr_gym.diagnosis.preprocessing.data_checks import data_doubts
 from ddagr_gym.diagnosis.preprocessing.session import DiagnosisSession, Progress, be_silent, prepare
-from ddagr_gym.diagnosis.result.certificate import Certificate
 from ddagr_gym.diagnosis.result.conclusion import accept, conclude
-from ddagr_gym.diagnosis.result.next_drive_plan import NextDrivePlan
-from ddagr_gym.diagnosis.result.unnamed_terms import UnnamedTerms
-from ddagr_gym.diagnosis.result.verdict import Diagnosis, Options
 from ddagr_gym.diagnosis.review import review
 from ddagr_gym.diagnosis.search.scanned_model import SearchResult
 from ddagr_gym.diagnosis.search.starting_models import starting_models

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from ddagr_gym.diagnosis.answer.certificate import Certificate
+from ddagr_gym.diagnosis.answer.location import EffectLocation, Localisation
+from ddagr_gym.diagnosis.answer.verdict import NONE, UNKNOWN, DataDoubt, Diagnosis
 from ddagr_gym.diagnosis.certification.certificate import worse_on_unseen
 from ddagr_gym.diagnosis.localisation.operating_condition_words import uneven_phrase
 from ddagr_gym.diagnosis.preprocessing.data_checks import dead_channels, suspects_of
-from ddagr_gym.diagnosis.result.certificate import Certificate
-from ddagr_gym.diagnosis.result.location import EffectLocation, Localisation
 from ddagr_gym.diagnosis.result.sentences import (
     dead_in_words,
     headline,
@@ -18,7 +19,6 @@ from ddagr_gym.diagnosis.result.sentences import (
     worse_in_words,
 )
 from ddagr_gym.diagnosis.result.size_bounds import pushed_to_bounds
-from ddagr_gym.diagnosis.result.verdict import NONE, UNKNOWN, DataDoubt, Diagnosis
 from ddagr_gym.diagnosis.wording import in_sentence
 
 WHOLE = 0.8

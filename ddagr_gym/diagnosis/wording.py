@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from ddagr_gym.diagnosis.result.verdict import Estimate
+from ddagr_gym.diagnosis.answer.verdict import Estimate
 from ddagr_gym.physics.effects.registry import effect_kinds
 
 DEGREES = 180.0 / math.pi

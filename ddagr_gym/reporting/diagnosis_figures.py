@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.diagnosis.result.certificate import Measured, ModelErrors
-from ddagr_gym.diagnosis.result.evidence import Evidence
-from ddagr_gym.diagnosis.result.location import EffectLocation
+from ddagr_gym.diagnosis.answer.certificate import Measured, ModelErrors
+from ddagr_gym.diagnosis.answer.evidence import Evidence
+from ddagr_gym.diagnosis.answer.location import EffectLocation
 from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.recordings.schema import CHANNELS as SCHEMA
 from ddagr_gym.rendering import palette

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.diagnosis.result.evidence import Evidence
-from ddagr_gym.diagnosis.result.verdict import Finding
+from ddagr_gym.diagnosis.answer.evidence import Evidence
+from ddagr_gym.diagnosis.answer.verdict import Finding
 from ddagr_gym.rendering import palette
 from ddagr_gym.reporting.diagnosis_figures import BEFORE, MODELS, MOST_PATHS, Figure, blank_figure, thinned
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from ddagr_gym.diagnosis.result.certificate import Certificate
-from ddagr_gym.diagnosis.result.evidence import Evidence
-from ddagr_gym.diagnosis.result.verdict import Diagnosis
+from ddagr_gym.diagnosis.answer.certificate import Certificate
+from ddagr_gym.diagnosis.answer.evidence import Evidence
+from ddagr_gym.diagnosis.answer.verdict import Diagnosis
 from ddagr_gym.diagnosis.wording import title
 from ddagr_gym.errors import InputError
 from ddagr_gym.files import atomic_path, make_folder

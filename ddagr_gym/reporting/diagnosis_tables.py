@@ -6,11 +6,11 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from ddagr_gym.diagnosis.result.certificate import Certificate, Measured
-from ddagr_gym.diagnosis.result.location import Localisation, OperatingConditionShare, Span
-from ddagr_gym.diagnosis.result.next_drive_plan import NextDrivePlan
-from ddagr_gym.diagnosis.result.unnamed_terms import UnnamedTerm, UnnamedTerms
-from ddagr_gym.diagnosis.result.verdict import NONE, UNKNOWN, DataDoubt, Diagnosis, Finding, GatesUsed
+from ddagr_gym.diagnosis.answer.certificate import Certificate, Measured
+from ddagr_gym.diagnosis.answer.location import Localisation, OperatingConditionShare, Span
+from ddagr_gym.diagnosis.answer.next_drive_plan import NextDrivePlan
+from ddagr_gym.diagnosis.answer.unnamed_terms import UnnamedTerm, UnnamedTerms
+from ddagr_gym.diagnosis.answer.verdict import NONE, UNKNOWN, DataDoubt, Diagnosis, Finding, GatesUsed
 from ddagr_gym.diagnosis.wording import (
     DEGREES,
     Amount,

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from ddagr_gym.reporting.text_table import format_table
 
 if TYPE_CHECKING:
-    from ddagr_gym.diagnosis.result.certificate import Certificate
-    from ddagr_gym.diagnosis.result.verdict import DataDoubt, Diagnosis, Finding
+    from ddagr_gym.diagnosis.answer.certificate import Certificate
+    from ddagr_gym.diagnosis.answer.verdict import DataDoubt, Diagnosis, Finding
 
 FINDING_HEADER = ("effect", "size", "90 % interval", "unit", "gain", "gate", "could also be")
 

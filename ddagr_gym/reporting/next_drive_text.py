@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from ddagr_gym.reporting.text_table import format_table
 
 if TYPE_CHECKING:
-    from ddagr_gym.diagnosis.result.next_drive_plan import NextDrivePlan
+    from ddagr_gym.diagnosis.answer.next_drive_plan import NextDrivePlan
 
 HEADER = ("manoeuvre", "gain per minute", "seconds needed")
 

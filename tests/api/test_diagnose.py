@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 import ddagr_gym
+from ddagr_gym.diagnosis.answer.next_drive_plan import NextDrivePlan
 from ddagr_gym.diagnosis.result.files import load
-from ddagr_gym.diagnosis.result.next_drive_plan import NextDrivePlan
 from ddagr_gym.errors import InputError, InputWarning
 from ddagr_gym.physics.effects import load_effects
 from ddagr_gym.presets import get_robot, get_soil

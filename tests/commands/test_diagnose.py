@@ -12,10 +12,10 @@ import pytest
 
 from ddagr_gym.cli import main
 from ddagr_gym.diagnosis import pipeline
+from ddagr_gym.diagnosis.answer.verdict import DataDoubt, Diagnosis, GatesUsed
 from ddagr_gym.diagnosis.gates.threshold_files import save_thresholds
 from ddagr_gym.diagnosis.gates.thresholds import Gate, Thresholds
 from ddagr_gym.diagnosis.result.files import as_mapping, load
-from ddagr_gym.diagnosis.result.verdict import DataDoubt, Diagnosis, GatesUsed
 from ddagr_gym.diagnosis.store import part_folder
 from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.parameters import Imu, PoseReceiver, Sensors

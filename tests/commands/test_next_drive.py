@@ -8,9 +8,9 @@ import pytest
 from ddagr_gym.cli import main
 from ddagr_gym.config import dump_config
 from ddagr_gym.control.manoeuvres import MANOEUVRES
+from ddagr_gym.diagnosis.answer.next_drive_plan import NextDrivePlan
+from ddagr_gym.diagnosis.answer.verdict import Diagnosis, Estimate, Finding, GatesUsed, Options
 from ddagr_gym.diagnosis.result.files import save
-from ddagr_gym.diagnosis.result.next_drive_plan import NextDrivePlan
-from ddagr_gym.diagnosis.result.verdict import Diagnosis, Estimate, Finding, GatesUsed, Options
 from ddagr_gym.identification.nuisances import NuisancePriors
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.reporting.next_drive_text import answer_text

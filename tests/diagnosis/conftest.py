@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
+from ddagr_gym.diagnosis.answer.certificate import Certificate
 from ddagr_gym.diagnosis.certification.certify import certify
 from ddagr_gym.diagnosis.gates.thresholds import Thresholds
 from ddagr_gym.diagnosis.preprocessing.mended_recordings import MendedRecordings
 from ddagr_gym.diagnosis.preprocessing.session import DiagnosisSession
-from ddagr_gym.diagnosis.result.certificate import Certificate
 from ddagr_gym.diagnosis.setting import Setting, make_problem
 from ddagr_gym.identification.gauss_newton import Fitted, fit
 from ddagr_gym.identification.problem import Problem

@@ -7,13 +7,13 @@ from typing import Any
 import pytest
 
 from ddagr_gym.diagnosis import diagnose, pipeline
+from ddagr_gym.diagnosis.answer.certificate import Certificate
+from ddagr_gym.diagnosis.answer.location import EffectLocation, Localisation
+from ddagr_gym.diagnosis.answer.next_drive_plan import NextDrivePlan
+from ddagr_gym.diagnosis.answer.unnamed_terms import UnnamedTerms
+from ddagr_gym.diagnosis.answer.verdict import Diagnosis, GatesUsed
 from ddagr_gym.diagnosis.gates.thresholds import Thresholds
 from ddagr_gym.diagnosis.pipeline import LATER, STEPS
-from ddagr_gym.diagnosis.result.certificate import Certificate
-from ddagr_gym.diagnosis.result.location import EffectLocation, Localisation
-from ddagr_gym.diagnosis.result.next_drive_plan import NextDrivePlan
-from ddagr_gym.diagnosis.result.unnamed_terms import UnnamedTerms
-from ddagr_gym.diagnosis.result.verdict import Diagnosis, GatesUsed
 from ddagr_gym.diagnosis.setting import Setting
 from ddagr_gym.presets import get_robot, get_soil
 

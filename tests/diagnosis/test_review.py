@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import pytest
 
-from ddagr_gym.diagnosis.result.certificate import Certificate, Gains, Measured
+from ddagr_gym.diagnosis.answer.certificate import Certificate, Gains, Measured
+from ddagr_gym.diagnosis.answer.location import EffectLocation, Localisation, Unevenness
+from ddagr_gym.diagnosis.answer.verdict import DataDoubt, Diagnosis, Estimate, Finding, GatesUsed
 from ddagr_gym.diagnosis.result.files import as_mapping, validate
-from ddagr_gym.diagnosis.result.location import EffectLocation, Localisation, Unevenness
-from ddagr_gym.diagnosis.result.verdict import DataDoubt, Diagnosis, Estimate, Finding, GatesUsed
 from ddagr_gym.diagnosis.review import review
 
 MISFIT = {"yaw_rate": 4.0}

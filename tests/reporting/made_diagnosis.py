@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from ddagr_gym.diagnosis.result.evidence import Evidence
+from ddagr_gym.diagnosis.answer.evidence import Evidence
+from ddagr_gym.diagnosis.answer.verdict import SCHEMA
 from ddagr_gym.diagnosis.result.files import validate
-from ddagr_gym.diagnosis.result.verdict import SCHEMA
 from ddagr_gym.identification.windows import CHANNELS
 
 HOSTILE = "<script>alert('$x_1$')</script>.csv"

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ddagr_gym.diagnosis.result.verdict import DataDoubt, GatesUsed
+from ddagr_gym.diagnosis.answer.verdict import DataDoubt, GatesUsed
 from ddagr_gym.physics.effects.registry import effect_kinds
 from ddagr_gym.reporting.diagnosis_figures import MOST_BARS, MOST_POINTS, _bars, channel_figure, thinned
 from ddagr_gym.reporting.diagnosis_page import PAGE, PICTURES, _Studio, write_report

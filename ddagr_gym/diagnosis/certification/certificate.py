@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ddagr_gym.diagnosis.answer.certificate import Certificate, Folds, Gains, Measured, ModelErrors
 from ddagr_gym.diagnosis.certification.forecast import MOTION, UNITS
-from ddagr_gym.diagnosis.result.certificate import Certificate, Folds, Gains, Measured, ModelErrors
 from ddagr_gym.diagnosis.result.uncertainty import LEVEL
 from ddagr_gym.identification.windows import CHANNELS
 

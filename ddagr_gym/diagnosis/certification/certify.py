@@ -20,6 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ddagr_gym.diagnosis.answer.certificate import Certificate, Folds
 from ddagr_gym.diagnosis.certification.certificate import BY_RECORDING, BY_TIME, HORIZONS, Errors, certificate
 from ddagr_gym.diagnosis.certification.forecast import (
     PAST,
@@ -31,7 +32,6 @@ from ddagr_gym.diagnosis.certification.forecast import (
     start_states,
 )
 from ddagr_gym.diagnosis.certification.residual_model import ResidualModel, Rollout, corrected, fit_residual_model
-from ddagr_gym.diagnosis.result.certificate import Certificate, Folds
 from ddagr_gym.identification.gauss_newton import Fitted, fit
 from ddagr_gym.identification.least_squares import Elimination
 from ddagr_gym.identification.problem import Point, Problem

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.diagnosis.result.location import Span
+from ddagr_gym.diagnosis.answer.location import Span
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.gauss_newton import Fitted
 from ddagr_gym.identification.problem import Problem

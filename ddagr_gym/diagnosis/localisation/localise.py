@@ -7,6 +7,14 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ddagr_gym.diagnosis.answer.location import (
+    ChannelShare,
+    EffectLocation,
+    Localisation,
+    OperatingConditionShare,
+    Place,
+    WrenchSummary,
+)
 from ddagr_gym.diagnosis.localisation.effect_timeline import (
     ScoreProcess,
     as_it_stands,
@@ -22,14 +30,6 @@ from ddagr_gym.diagnosis.localisation.effect_timeline import (
 from ddagr_gym.diagnosis.localisation.operating_condition_words import phrase_of, uneven_phrase
 from ddagr_gym.diagnosis.localisation.operating_conditions import Pieces, shares, uneven
 from ddagr_gym.diagnosis.localisation.residual_wrench import COMPONENTS, residual_wrench
-from ddagr_gym.diagnosis.result.location import (
-    ChannelShare,
-    EffectLocation,
-    Localisation,
-    OperatingConditionShare,
-    Place,
-    WrenchSummary,
-)
 from ddagr_gym.diagnosis.search.scanned_model import SearchResult
 from ddagr_gym.frames import wrap_angle
 from ddagr_gym.identification.gauss_newton import Fitted

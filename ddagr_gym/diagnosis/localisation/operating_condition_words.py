@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Protocol
 
-from ddagr_gym.diagnosis.result.location import OperatingConditionShare, Unevenness
+from ddagr_gym.diagnosis.answer.location import OperatingConditionShare, Unevenness
 from ddagr_gym.diagnosis.wording import EVERYWHERE, number, range_in_words
 
 NOWHERE_MORE = "no motion, place or time stands out"

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.diagnosis.result.location import CONDITION_LEVEL, OperatingConditionShare, Unevenness
+from ddagr_gym.diagnosis.answer.location import CONDITION_LEVEL, OperatingConditionShare, Unevenness
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ddagr_gym.diagnosis.answer.location import EffectLocation, Span
 from ddagr_gym.diagnosis.preprocessing.repeated_readings import (
     LEAST_SHARE,
     SENSORS,
@@ -14,7 +15,6 @@ from ddagr_gym.diagnosis.preprocessing.repeated_readings import (
     repeat_runs,
     repeated_rows,
 )
-from ddagr_gym.diagnosis.result.location import EffectLocation, Span
 from ddagr_gym.diagnosis.wording import EVERYWHERE
 from ddagr_gym.recordings.schema import Recording
 

@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.control.manoeuvres import MANOEUVRES, Manoeuvre
+from ddagr_gym.diagnosis.answer.next_drive_plan import DriveProposal, NextDrivePlan
+from ddagr_gym.diagnosis.answer.verdict import Diagnosis, Finding, Options
 from ddagr_gym.diagnosis.planning.isolability import APART
 from ddagr_gym.diagnosis.planning.planned_drive import RATE, SENSORS, Plan, free_of_nuisances, plan, with_room
-from ddagr_gym.diagnosis.result.next_drive_plan import DriveProposal, NextDrivePlan
-from ddagr_gym.diagnosis.result.verdict import Diagnosis, Finding, Options
 from ddagr_gym.diagnosis.search.candidates import Candidate, candidates_of
 from ddagr_gym.diagnosis.search.initial_guess import looped
 from ddagr_gym.diagnosis.search.scan import drive_extent, probe_column

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ddagr_gym.diagnosis.result.verdict import DataDoubt
+from ddagr_gym.diagnosis.answer.verdict import DataDoubt
 from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.recordings.checks.across import across_runs
 from ddagr_gym.recordings.checks.findings import CheckFinding, Status

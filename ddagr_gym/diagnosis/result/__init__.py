@@ -1,1 +1,1 @@
-"""The answer of a diagnosis: findings with intervals, equivalents, verdict, sentences, JSON."""
+"""From a search to the answer: findings with intervals, equivalents, verdict, sentences, JSON."""

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 
+from ddagr_gym.diagnosis.answer.verdict import NONE, UNKNOWN, DataSource, Diagnosis, Estimate, Finding, GatesUsed
 from ddagr_gym.diagnosis.gates.thresholds import Thresholds
 from ddagr_gym.diagnosis.preprocessing.input_requirements import content_hash
 from ddagr_gym.diagnosis.preprocessing.mended_recordings import MendedRecordings
@@ -15,7 +16,6 @@ from ddagr_gym.diagnosis.preprocessing.session import DiagnosisSession
 from ddagr_gym.diagnosis.result.equivalence import equivalents
 from ddagr_gym.diagnosis.result.sentences import headline
 from ddagr_gym.diagnosis.result.uncertainty import intervals, least_detectable, resampled_parameters, with_structure
-from ddagr_gym.diagnosis.result.verdict import NONE, UNKNOWN, DataSource, Diagnosis, Estimate, Finding, GatesUsed
 from ddagr_gym.diagnosis.search.scanned_model import ScannedModel, SearchResult
 from ddagr_gym.diagnosis.search.stepwise import MOST_EFFECTS, further_gates
 from ddagr_gym.identification.misfit import explained_share, roughest

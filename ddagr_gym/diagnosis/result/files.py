@@ -13,7 +13,7 @@ from typing import Any
 import msgspec
 from msgspec import inspect
 
-from ddagr_gym.diagnosis.result.verdict import NONE, SCHEMA, UNKNOWN, Diagnosis
+from ddagr_gym.diagnosis.answer.verdict import NONE, SCHEMA, UNKNOWN, Diagnosis
 from ddagr_gym.errors import InputError
 from ddagr_gym.files import atomic_path
 

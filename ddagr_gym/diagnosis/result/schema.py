@@ -11,12 +11,12 @@ from typing import Any, get_args, get_type_hints
 
 import msgspec
 
-from ddagr_gym.diagnosis.result.verdict import SCHEMA, Diagnosis
+from ddagr_gym.diagnosis.answer.verdict import SCHEMA, Diagnosis
 
 _HEAD = f"""# diagnosis.json
 
 What `ddagr diagnose` writes, schema `{SCHEMA}`. SI units and radians. This page and the JSON Schema in
-`diagnosis.schema.json` are made of the docstrings and types of `ddagr_gym.diagnosis.result` by
+`diagnosis.schema.json` are made of the docstrings and types of `ddagr_gym.diagnosis.answer` by
 `python -m tools diagnosis-schema`. `ddagr_gym.diagnosis.result.files` reads a file into these types and refuses one of
 another form or version. null stands for what is not known, and for a number that is not finite.
 """

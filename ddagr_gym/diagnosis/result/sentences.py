@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ddagr_gym.diagnosis.result.verdict import NONE, UNKNOWN, Finding
+from ddagr_gym.diagnosis.answer.verdict import NONE, UNKNOWN, Finding
 from ddagr_gym.diagnosis.wording import amounts, describe, in_sentence
 
 RIVAL_WEIGHT = 0.2

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ddagr_gym.diagnosis.result.verdict import Estimate, Finding
+from ddagr_gym.diagnosis.answer.verdict import Estimate, Finding
 from ddagr_gym.physics.effects.registry import effect_kind
 
 _NEAR = 1e-3

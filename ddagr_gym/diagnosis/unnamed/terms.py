@@ -16,7 +16,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.diagnosis.result.unnamed_terms import UnnamedTerm, UnnamedTerms
+from ddagr_gym.diagnosis.answer.unnamed_terms import UnnamedTerm, UnnamedTerms
 from ddagr_gym.diagnosis.search.scanned_model import ScannedModel
 from ddagr_gym.diagnosis.unnamed.boosted_baseline import boosted_share, concentration_of
 from ddagr_gym.diagnosis.unnamed.regressors import Motion, Term, library, motion_of

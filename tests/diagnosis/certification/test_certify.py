@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ddagr_gym.diagnosis.answer.certificate import Certificate, Gains, Measured
 from ddagr_gym.diagnosis.certification.certificate import (
     BY_RECORDING,
     BY_TIME,
@@ -25,7 +26,6 @@ from ddagr_gym.diagnosis.certification.forecast import (
     past_elimination,
     start_states,
 )
-from ddagr_gym.diagnosis.result.certificate import Certificate, Gains, Measured
 from ddagr_gym.identification.problem import Problem
 from ddagr_gym.identification.windows import CHANNELS, WindowSet
 from ddagr_gym.presets import get_robot

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from ddagr_gym.diagnosis.answer.location import Unevenness
 from ddagr_gym.diagnosis.localisation.operating_conditions import CONDITIONS, Pieces, _ordered, uneven
-from ddagr_gym.diagnosis.result.location import Unevenness
 
 NAME = next(name for name in CONDITIONS if name != "heading")
 

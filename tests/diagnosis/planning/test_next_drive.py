@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from ddagr_gym.control.manoeuvres import Manoeuvre
+from ddagr_gym.diagnosis.answer.verdict import Diagnosis, Estimate, Finding, GatesUsed, Options
 from ddagr_gym.diagnosis.planning.isolability import APART
 from ddagr_gym.diagnosis.planning.next_drive import (
     MOST_MINUTES,
@@ -15,7 +16,6 @@ from ddagr_gym.diagnosis.planning.next_drive import (
     sensors_of_diagnosis,
     setting_of_diagnosis,
 )
-from ddagr_gym.diagnosis.result.verdict import Diagnosis, Estimate, Finding, GatesUsed, Options
 from ddagr_gym.diagnosis.setting import Setting
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.nuisances import NuisancePriors

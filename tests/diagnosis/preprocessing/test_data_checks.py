@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ddagr_gym.diagnosis.answer.location import EffectLocation, Localisation
+from ddagr_gym.diagnosis.answer.verdict import DataDoubt, Diagnosis, GatesUsed
 from ddagr_gym.diagnosis.preprocessing.data_checks import data_doubts, dead_channels
-from ddagr_gym.diagnosis.result.location import EffectLocation, Localisation
 from ddagr_gym.diagnosis.result.sentences import dead_in_words
-from ddagr_gym.diagnosis.result.verdict import DataDoubt, Diagnosis, GatesUsed
 from ddagr_gym.diagnosis.review import review
 from ddagr_gym.recordings.schema import Recording
 

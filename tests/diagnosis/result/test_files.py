@@ -9,12 +9,11 @@ from typing import Any
 
 import pytest
 
-from ddagr_gym.diagnosis.result.certificate import Measured
-from ddagr_gym.diagnosis.result.files import as_mapping, load, save, validate
-from ddagr_gym.diagnosis.result.location import EffectLocation
-from ddagr_gym.diagnosis.result.next_drive_plan import NextDrivePlan
-from ddagr_gym.diagnosis.result.unnamed_terms import UnnamedTerms
-from ddagr_gym.diagnosis.result.verdict import (
+from ddagr_gym.diagnosis.answer.certificate import Measured
+from ddagr_gym.diagnosis.answer.location import EffectLocation
+from ddagr_gym.diagnosis.answer.next_drive_plan import NextDrivePlan
+from ddagr_gym.diagnosis.answer.unnamed_terms import UnnamedTerms
+from ddagr_gym.diagnosis.answer.verdict import (
     DataDoubt,
     DataSource,
     Diagnosis,
@@ -23,6 +22,7 @@ from ddagr_gym.diagnosis.result.verdict import (
     GatesUsed,
     Options,
 )
+from ddagr_gym.diagnosis.result.files import as_mapping, load, save, validate
 from ddagr_gym.errors import InputError
 
 BEFORE = Path(__file__).parents[2] / "golden" / "diagnosis" / "diagnosis_4.json.gz"

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from ddagr_gym.diagnosis.result.certificate import Certificate
-from ddagr_gym.diagnosis.result.location import EffectLocation, Localisation
-from ddagr_gym.diagnosis.result.next_drive_plan import NextDrivePlan
-from ddagr_gym.diagnosis.result.unnamed_terms import UnnamedTerms
+from ddagr_gym.diagnosis.answer.certificate import Certificate
+from ddagr_gym.diagnosis.answer.location import EffectLocation, Localisation
+from ddagr_gym.diagnosis.answer.next_drive_plan import NextDrivePlan
+from ddagr_gym.diagnosis.answer.unnamed_terms import UnnamedTerms
 
 SCHEMA = "ddagr-diagnosis/4"
 """Name and version: raised whenever an entry is renamed, removed or changes its meaning."""
