@@ -32,9 +32,9 @@ def test_a_renamed_name_is_the_new_one_and_says_so():
 
 def test_an_old_path_imports_the_module_that_moved():
     said = run(
-        "from ddagr_gym.replay.report import load_report\n"
+        "from ddagr_gym.replay.report import save_report\n"
         "import ddagr_gym.replay.report, ddagr_gym.replay_analysis.report as new\n"
-        "assert ddagr_gym.replay.report is new and load_report is new.load_report"
+        "assert ddagr_gym.replay.report is new and save_report is new.save_report"
     )
     assert said.count("ddagr_gym.replay.report is ddagr_gym.replay_analysis.report now; the old name goes in") == 1
 

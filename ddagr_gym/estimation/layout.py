@@ -19,7 +19,6 @@ STATE = (
 """Entries of the state, see :mod:`ddagr_gym.estimation` for units."""
 
 STATE_SIZE = 12  # entries of STATE
-VELOCITY = 0  # v_x, v_y, yaw_rate
 OMEGA = 3  # right, left
 PARAMETER = 5  # ln a1, ln a2, ln b, ln Rc
 GYRO_BIAS = 9  # as in STATE

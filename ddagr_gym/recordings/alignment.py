@@ -78,9 +78,8 @@ def regular_base(start: float, stop: float, rate: float, most_rows: int) -> Floa
     count = (stop - start) * rate + 1
     if not count <= most_rows:
         raise InputError(
-            f"{stop - start:.3g} s at {rate:g} Hz are {count:.3g} rows, above {most_rows:,}: lower the rate, "
-            "cut the drive, "
-            "or raise --maximum-rows."
+            f"{stop - start:.3g} s at {rate:g} Hz are {count:.3g} rows, above {most_rows:,}: lower the rate, cut the "
+            "drive, or raise --maximum-rows."
         )
     return start + np.arange(int(count)) / rate
 

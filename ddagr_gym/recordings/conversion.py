@@ -136,9 +136,8 @@ def _time_base(table: RawTable, column_map: ColumnMap, notes: list[str]) -> tupl
     back = np.flatnonzero((np.diff(clock) < 0) & ~(new_span[1:] & (not absolute)))
     if back.size:
         raise InputError(
-            f"time goes back from {clock[back[0]]:g} s to {clock[back[0] + 1]:g} s after row {back[0] + 1}: "
-            "sort the rows, "
-            "or name the column that numbers the pieces under span_columns in the map."
+            f"time goes back from {clock[back[0]]:g} s to {clock[back[0] + 1]:g} s after row {back[0] + 1}: sort the "
+            "rows, or name the column that numbers the pieces under span_columns in the map."
         )
     spans = _ranges(new_span)
     joined = _changes(table, pieces.segment_columns)

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from ddagr_gym.errors import InputError, unknown_name
 from ddagr_gym.recordings.column_map import ColumnMap
 from ddagr_gym.recordings.conversion import RawTable
-from ddagr_gym.recordings.files import DEFAULT_LIMITS, Limits, open_text
+from ddagr_gym.recordings.files import DEFAULT_LIMITS, Limits, damaged, open_text
 from ddagr_gym.recordings.schema import FloatArray
 
 if TYPE_CHECKING:
@@ -111,8 +111,7 @@ def _batches(
             )
             yield from reader
     except pa.ArrowException as error:
-        reason = " ".join(str(error).split())[:160]
-        raise InputError(f"{path.name} is not a sound CSV file ({reason}): correct or delete that place.") from None
+        raise damaged(path, error, "is not a sound CSV file", "correct or delete that place") from None
 
 
 class Collector:
@@ -156,10 +155,7 @@ class Collector:
                 column = column.cast(pa.float64(), safe=False)
                 values = column.to_numpy(zero_copy_only=False)
         except pa.ArrowException as error:
-            reason = " ".join(str(error).split())[:120]
-            raise InputError(
-                f"{self._path.name}, column {name}, does not hold numbers ({reason}): correct it."
-            ) from None
+            raise damaged(self._path, error, f", column {name}, does not hold numbers", "correct it") from None
         return np.array(values, dtype=np.float64)
 
     def _coded(self, name: str, column: Any) -> npt.NDArray[np.int64]:

@@ -116,6 +116,13 @@ def sha256_of(path: Path) -> str:
     return digest.hexdigest()
 
 
+def damaged(path: Path, error: BaseException, complaint: str, remedy: str) -> InputError:
+    """What a library's error says of a file, in one sentence: file, complaint, the error's first words, remedy."""
+    reason = " ".join(str(error).split())[:160] or type(error).__name__
+    joint = "" if complaint.startswith(",") else " "
+    return InputError(f"{path.name}{joint}{complaint} ({reason}): {remedy}.")
+
+
 class BoundedStream(io.RawIOBase):
     """Read-only stream that refuses to give more than a number of bytes, against decompression bombs."""
 

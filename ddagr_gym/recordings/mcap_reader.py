@@ -4,36 +4,19 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Callable, Iterator
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from ddagr_gym.errors import InputError
-from ddagr_gym.recordings.files import DEFAULT_LIMITS, Limits, open_source, sha256_of
+from ddagr_gym.recordings.files import DEFAULT_LIMITS, Limits, damaged, open_source
 from ddagr_gym.recordings.schema import Recording, RobotGeometry
-from ddagr_gym.recordings.streams import StreamCollector
-from ddagr_gym.recordings.topic_map import Topic, TopicMap, choose_topics
+from ddagr_gym.recordings.streams import recording_of
+from ddagr_gym.recordings.topic_map import Topic, TopicMap
 
 Decoder = Callable[[bytes], Any]
-
-
-def mcap_topics(path: Path, limits: Limits = DEFAULT_LIMITS) -> tuple[Topic, ...]:
-    """Topics of an MCAP file with their message types and counts.
-
-    Raises:
-        InputError: damaged or too large.
-    """
-    counts: dict[int, int] = {}
-    contents = _Contents()
-    for record in _records(path, limits):
-        message = contents.take(record)
-        if message is not None:
-            counts[message.channel_id] = counts.get(message.channel_id, 0) + 1
-    totals: dict[tuple[str, str], int] = {}
-    for number, channel in contents.channels.items():
-        key = (channel.topic, contents.message_type(channel))
-        totals[key] = totals.get(key, 0) + counts.get(number, 0)
-    return tuple(Topic(name, kind, count) for (name, kind), count in sorted(totals.items()))
 
 
 def read_mcap(
@@ -53,17 +36,27 @@ def read_mcap(
     Raises:
         InputError: damaged file, missing topics, or an encoding other than JSON and CDR.
     """
-    chosen = choose_topics(topic_map, mcap_topics(path, limits), path.name)
-    collector = StreamCollector(topic_map, chosen, geometry, limits, path)
-    names = {topic.name for topic in chosen.values()}
+    return recording_of(path, _topics(path, limits), partial(_messages, path, limits), topic_map, geometry, limits)
+
+
+def _topics(path: Path, limits: Limits) -> tuple[Topic, ...]:
+    """Topics with their message types and counts."""
+    contents = _Contents()
+    counts = Counter(message.channel_id for message in contents.messages(path, limits))
+    totals: Counter[tuple[str, str]] = Counter()
+    for number, channel in contents.channels.items():
+        totals[channel.topic, contents.message_type(channel)] += counts[number]
+    return tuple(Topic(name, kind, count) for (name, kind), count in sorted(totals.items()))
+
+
+def _messages(path: Path, limits: Limits, names: Collection[str]) -> Iterator[tuple[str, float, Any]]:
+    """Topic, time of receipt [s] and decoded message of every message of the named topics."""
     contents, decoders = _Contents(), _Decoders(path)
-    for record in _records(path, limits):
-        message = contents.take(record)
-        channel = contents.channels.get(message.channel_id) if message is not None else None
+    for message in contents.messages(path, limits):
+        channel = contents.channels.get(message.channel_id)
         if channel is not None and channel.topic in names:
             decoded = decoders.decode(channel, contents.schemas.get(channel.schema_id), message.data)
-            collector.add(channel.topic, message.log_time * 1e-9, decoded)
-    return collector.recording(sha256_of(path))
+            yield channel.topic, message.log_time * 1e-9, decoded
 
 
 class _Contents:
@@ -73,15 +66,17 @@ class _Contents:
         self.schemas: dict[int, Any] = {}
         self.channels: dict[int, Any] = {}
 
-    def take(self, record: Any) -> Any:
-        """Remember a schema or channel; give back a message."""
+    def messages(self, path: Path, limits: Limits) -> Iterator[Any]:
+        """Messages of a file from front to back; schemas and channels before a message are known when it comes."""
         from mcap.records import Channel, Message, Schema
 
-        if isinstance(record, Schema):
-            self.schemas[record.id] = record
-        elif isinstance(record, Channel):
-            self.channels[record.id] = record
-        return record if isinstance(record, Message) else None
+        for record in _records(path, limits):
+            if isinstance(record, Schema):
+                self.schemas[record.id] = record
+            elif isinstance(record, Channel):
+                self.channels[record.id] = record
+            elif isinstance(record, Message):
+                yield record
 
     def message_type(self, channel: Any) -> str:
         """Type's name without its package, as in sensor_msgs/msg/Imu, sensor_msgs.Imu or Imu."""
@@ -110,10 +105,8 @@ class _Decoders:
         except InputError:
             raise
         except Exception as error:  # decoders of generated types raise whatever the bytes lead them to
-            reason = " ".join(str(error).split())[:120] or type(error).__name__
-            raise InputError(
-                f"{self._path.name}, topic {channel.topic}: a message does not decode ({reason}); record it again."
-            ) from None
+            complaint = f", topic {channel.topic}: a message does not decode"
+            raise damaged(self._path, error, complaint, "record it again") from None
 
     def _make(self, channel: Any, schema: Any) -> Decoder:
         if channel.message_encoding == "json":
@@ -122,9 +115,8 @@ class _Decoders:
             return _cdr_decoder(schema)
         encoding = schema.encoding if schema is not None else "no schema"
         raise InputError(
-            f"{self._path.name}, topic {channel.topic}, is encoded as {channel.message_encoding!r} "
-            f"({encoding!r}): convert it "
-            "to JSON or to ROS 2 (cdr with ros2msg)."
+            f"{self._path.name}, topic {channel.topic}, is encoded as {channel.message_encoding!r} ({encoding!r}): "
+            "convert it to JSON or to ROS 2 (cdr with ros2msg)."
         )
 
 
@@ -139,7 +131,6 @@ def _cdr_decoder(schema: Any) -> Decoder:
 
 def _records(path: Path, limits: Limits) -> Iterator[Any]:
     """Records of the file and of its chunks; chunks unpack to no more than the limit."""
-    from mcap.exceptions import McapError
     from mcap.records import Chunk
     from mcap.stream_reader import StreamReader
 
@@ -155,15 +146,8 @@ def _records(path: Path, limits: Limits) -> Iterator[Any]:
                 yield from _inner(data)
     except (InputError, GeneratorExit):
         raise
-    except McapError as error:
-        raise _damaged(path, error) from None
-    except Exception as error:  # struct, unicode and codec errors of damaged files
-        raise _damaged(path, error) from None
-
-
-def _damaged(path: Path, error: BaseException) -> InputError:
-    reason = " ".join(str(error).split())[:160] or type(error).__name__
-    return InputError(f"{path.name} is damaged or truncated ({reason}): run `mcap recover` or record it again.")
+    except Exception as error:  # McapError, and struct, unicode and codec errors of damaged files
+        raise damaged(path, error, "is damaged or truncated", "run `mcap recover` or record it again") from None
 
 
 def _inner(data: bytes) -> Iterator[Any]:

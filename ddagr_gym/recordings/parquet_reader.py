@@ -11,7 +11,7 @@ from ddagr_gym.errors import InputError
 from ddagr_gym.recordings.column_map import ColumnMap
 from ddagr_gym.recordings.conversion import RawTable
 from ddagr_gym.recordings.csv_reader import Collector, wanted_columns
-from ddagr_gym.recordings.files import DEFAULT_LIMITS, Limits, open_source
+from ddagr_gym.recordings.files import DEFAULT_LIMITS, Limits, damaged, open_source
 
 if TYPE_CHECKING:
     import pyarrow.parquet as pq
@@ -41,14 +41,12 @@ def open_parquet(path: Path, limits: Limits) -> Iterator[pq.ParquetFile]:
             unpacked = sum(file.metadata.row_group(i).total_byte_size for i in range(file.metadata.num_row_groups))
             if unpacked > limits.bytes:
                 raise InputError(
-                    f"{path.name} unpacks to {unpacked:,} bytes, above {limits.bytes:,}: cut it into drives, "
-                    "or raise "
+                    f"{path.name} unpacks to {unpacked:,} bytes, above {limits.bytes:,}: cut it into drives, or raise "
                     "--maximum-bytes."
                 )
             yield file
     except (pa.ArrowException, OSError, MemoryError, UnicodeDecodeError) as error:
-        reason = " ".join(str(error).split())[:160]
-        raise InputError(f"{path.name} is a damaged Parquet file ({reason}): write it again.") from None
+        raise damaged(path, error, "is a damaged Parquet file", "write it again") from None
 
 
 def parquet_columns(path: Path, limits: Limits = DEFAULT_LIMITS) -> tuple[str, ...]:

@@ -76,9 +76,8 @@ def joint_state(source: TopicSource) -> Extractor:
         speeds = field_of(message, "velocity")
         if speeds is None or len(speeds) != len(names):
             raise InputError(
-                f"a JointState message has {len(names)} joints and {0 if speeds is None else len(speeds)} "
-                "speeds: record the "
-                "wheel joints' velocity."
+                f"a JointState message has {len(names)} joints and {0 if speeds is None else len(speeds)} speeds: "
+                "record the wheel joints' velocity."
             )
         return {
             "encoder_right": _bank_mean("right", names, speeds, source.right),
@@ -182,9 +181,8 @@ def extractor(message_type: str, source: TopicSource, geometry: RobotGeometry | 
     if message_type in ("Twist", "TwistStamped"):
         if geometry is None:
             raise InputError(
-                f"{file_name} holds body-speed commands: name the robot (--robot) whose wheel radius and track "
-                "turn them "
-                "into bank speeds."
+                f"{file_name} holds body-speed commands: name the robot (--robot) whose wheel radius and track turn "
+                "them into bank speeds."
             )
         return twist("twist." if message_type == "TwistStamped" else "", geometry)
     makers: dict[str, Callable[[], Extractor]] = {

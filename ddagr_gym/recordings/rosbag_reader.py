@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from ddagr_gym.errors import InputError
-from ddagr_gym.recordings.files import DEFAULT_LIMITS, Limits, kind_of, open_source, sha256_of
+from ddagr_gym.recordings.files import DEFAULT_LIMITS, Limits, damaged, kind_of, open_source, sha256_of
 from ddagr_gym.recordings.mcap_reader import read_mcap
 from ddagr_gym.recordings.schema import Recording, RobotGeometry
-from ddagr_gym.recordings.streams import StreamCollector
-from ddagr_gym.recordings.topic_map import Topic, TopicMap, choose_topics
+from ddagr_gym.recordings.streams import recording_of
+from ddagr_gym.recordings.topic_map import Topic, TopicMap
 
 _LARGEST_METADATA = 4 * 2**20  # bytes (ours): about ten thousand topics; more is no metadata
 
@@ -38,13 +39,14 @@ def read_rosbag(
     if inner is not None:
         return read_mcap(inner, topic_map, geometry, limits).with_meta(source=path.name, source_sha256=sha256_of(path))
     with _open(path, limits) as reader:
-        chosen = choose_topics(topic_map, _topics(reader), path.name)
-        collector = StreamCollector(topic_map, chosen, geometry, limits, path)
-        names = {topic.name for topic in chosen.values()}
-        connections = [c for c in reader.connections if c.topic in names]
-        for connection, receive, data in reader.messages(connections=connections):
-            collector.add(connection.topic, receive * 1e-9, reader.deserialize(data, connection.msgtype))
-    return collector.recording(sha256_of(path))
+        return recording_of(path, _topics(reader), partial(_messages, reader), topic_map, geometry, limits)
+
+
+def _messages(reader: Any, names: Collection[str]) -> Iterator[tuple[str, float, Any]]:
+    """Topic, time of receipt [s] and decoded message of every message of the named topics."""
+    connections = [c for c in reader.connections if c.topic in names]
+    for connection, receive, data in reader.messages(connections=connections):
+        yield connection.topic, receive * 1e-9, reader.deserialize(data, connection.msgtype)
 
 
 def _storage(path: Path) -> Path | None:
@@ -86,8 +88,6 @@ def _information(path: Path) -> dict[str, Any]:
 @contextmanager
 def _open(path: Path, limits: Limits) -> Iterator[Any]:
     """An open ``rosbags`` reader; whatever a damaged bag makes it raise becomes one sentence."""
-    import sqlite3
-
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
 
@@ -105,15 +105,8 @@ def _open(path: Path, limits: Limits) -> Iterator[Any]:
             yield reader
     except InputError:
         raise
-    except (sqlite3.Error, OSError, MemoryError, RecursionError) as error:
-        raise _damaged(path, error) from None
     except Exception as error:  # rosbags lets struct, unicode, key and assertion errors of damaged bags through
-        raise _damaged(path, error) from None
-
-
-def _damaged(path: Path, error: BaseException) -> InputError:
-    reason = " ".join(str(error).split())[:160] or type(error).__name__
-    return InputError(f"{path.name} is damaged or not a bag ({reason}): reindex it or record it again.")
+        raise damaged(path, error, "is damaged or not a bag", "reindex it or record it again") from None
 
 
 def _topics(reader: Any) -> tuple[Topic, ...]:
@@ -134,9 +127,8 @@ def _bound_chunks(reader: Any, limits: Limits, path: Path) -> None:
             unpacked: bytes = make().decompress(data, limits.bytes + 1)
             if len(unpacked) > limits.bytes:
                 raise InputError(
-                    f"{path.name} has a chunk that unpacks to more than {limits.bytes:,} bytes: raise "
-                    "--maximum-bytes if "
-                    "that is right."
+                    f"{path.name} has a chunk that unpacks to more than {limits.bytes:,} bytes: raise --maximum-bytes "
+                    "if that is right."
                 )
             return unpacked
 

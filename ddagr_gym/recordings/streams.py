@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from array import array
-from collections.abc import Iterable
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -12,10 +12,10 @@ import numpy as np
 
 from ddagr_gym.errors import InputError
 from ddagr_gym.recordings.alignment import Stream, align, regular_base
-from ddagr_gym.recordings.files import Limits
+from ddagr_gym.recordings.files import Limits, sha256_of
 from ddagr_gym.recordings.ros_messages import Extractor, extractor, header_stamp
 from ddagr_gym.recordings.schema import COMMANDS, FloatArray, Recording, RobotGeometry
-from ddagr_gym.recordings.topic_map import Topic, TopicMap
+from ddagr_gym.recordings.topic_map import Topic, TopicMap, choose_topics
 
 
 @dataclass
@@ -36,16 +36,36 @@ class _Samples:
             self.values.setdefault(name, array("d")).append(value)
 
 
-class StreamCollector:
-    """Takes messages one by one and gives the recording at the end.
+def recording_of(
+    path: Path,
+    topics: tuple[Topic, ...],
+    messages: Callable[[Collection[str]], Iterable[tuple[str, float, Any]]],
+    topic_map: TopicMap,
+    geometry: RobotGeometry | None,
+    limits: Limits,
+) -> Recording:
+    """Recording of the messages of a bag.
 
     Args:
-        topic_map: roles, signs and time base.
-        chosen: topic by role.
-        geometry: robot's, None where unknown.
+        path: of the bag.
+        topics: that it holds.
+        messages: takes names of topics and gives topic, time of receipt [s] and decoded message of each message.
+        topic_map: which topics hold what.
+        geometry: robot's wheel radius and track, for Twist commands.
         limits: on the number of messages.
-        path: of the bag, for messages.
+
+    Raises:
+        InputError: missing topics, too many messages, or none in the role that gives the time base.
     """
+    chosen = choose_topics(topic_map, topics, path.name)
+    collector = _StreamCollector(topic_map, chosen, geometry, limits, path)
+    for topic, receive, message in messages({topic.name for topic in chosen.values()}):
+        collector.add(topic, receive, message)
+    return collector.recording(sha256_of(path))
+
+
+class _StreamCollector:
+    """Takes messages one by one and gives the recording at the end; ``chosen`` is the topic of each role."""
 
     def __init__(
         self,
@@ -95,9 +115,8 @@ class StreamCollector:
         # Receive times and header stamps may come from two clocks: never mix them inside one stream.
         if 0 < samples.stamped < len(samples.t):
             raise InputError(
-                f"{self._path.name}, {self._chosen[role].name}: only {samples.stamped} of {len(samples.t)} "
-                "messages have a "
-                "header stamp; set stamps: receive in the topic map."
+                f"{self._path.name}, {self._chosen[role].name}: only {samples.stamped} of {len(samples.t)} messages "
+                "have a header stamp; set stamps: receive in the topic map."
             )
         return Stream(np.array(samples.t), {name: np.array(v) for name, v in samples.values.items()})
 
@@ -105,9 +124,8 @@ class StreamCollector:
         base = streams[self._map.base].sorted().t if self._map.base in streams else np.empty(0)
         if base.size < 2:
             raise InputError(
-                f"{self._path.name} has {base.size} messages for {self._map.base}, which gives the time base: "
-                "name another "
-                "role under base in the topic map."
+                f"{self._path.name} has {base.size} messages for {self._map.base}, which gives the time base: name "
+                "another role under base in the topic map."
             )
         if self._map.rate:
             base = regular_base(float(base[0]), float(base[-1]), self._map.rate, self._limits.rows)
@@ -121,14 +139,12 @@ class StreamCollector:
             repeats = len(streams[role].t) - len(streams[role].sorted().t)
             yield (
                 f"{role} is {topic.name} ({topic.message_type}) by {clock}: {len(streams[role].t)} messages, "
-                f"{repeats} with a "
-                f"repeated stamp, {lost[role]} without a row of their own."
+                f"{repeats} with a repeated stamp, {lost[role]} without a row of their own."
             )
         where = f"a regular {self._map.rate:g} Hz grid" if self._map.rate else f"the stamps of {self._map.base}"
         yield (
             f"rows are {where}; the other samples stand at their nearest row within "
-            f"{self._map.tolerance * period:.4g} s, "
-            "none is interpolated."
+            f"{self._map.tolerance * period:.4g} s, none is interpolated."
         )
         for name, sign in self._map.signs.items():
             if sign < 0:

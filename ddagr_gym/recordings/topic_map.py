@@ -137,9 +137,8 @@ def _named(role: str, source: TopicSource, topics: tuple[Topic, ...], file_name:
         if topic.name == source.topic:
             if topic.message_type not in ROLE_TYPES[role]:
                 raise InputError(
-                    f"{file_name}: the topic {topic.name} for {role} is of type {topic.message_type}; name one "
-                    "of type "
-                    f"{' or '.join(ROLE_TYPES[role])}, the bag holds {listing(topics)}."
+                    f"{file_name}: the topic {topic.name} for {role} is of type {topic.message_type}; name one of "
+                    f"type {' or '.join(ROLE_TYPES[role])}, the bag holds {listing(topics)}."
                 )
             return topic
     if source.optional:
@@ -156,14 +155,12 @@ def _by_type(role: str, source: TopicSource, topics: tuple[Topic, ...], file_nam
             return found[0]
         if found:
             raise InputError(
-                f"{file_name} has several topics of type {message_type} for {role}, {listing(found)}: name one "
-                "in a topic "
-                f"map under topics, {role}, topic."
+                f"{file_name} has several topics of type {message_type} for {role}, {listing(found)}: name one in a "
+                f"topic map under topics, {role}, topic."
             )
     if source.optional:
         return None
     raise InputError(
-        f"{file_name} has no topic of type {' or '.join(ROLE_TYPES[role])} for {role}; it holds "
-        f"{listing(topics)}: name one "
-        "in a topic map or mark the role optional."
+        f"{file_name} has no topic of type {' or '.join(ROLE_TYPES[role])} for {role}; it holds {listing(topics)}: "
+        "name one in a topic map or mark the role optional."
     )

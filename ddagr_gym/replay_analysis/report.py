@@ -13,9 +13,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from ddagr_gym.config import config_from
 from ddagr_gym.deprecation import renamed
-from ddagr_gym.errors import InputError
 from ddagr_gym.replay_analysis.intervals import Comparison, ErrorStatistics
 from ddagr_gym.replay_analysis.residuals import ChannelResidual, ResidualBins
 
@@ -270,13 +268,6 @@ class ReplayReport:
     seed: int
     runs: tuple[RunReport, ...]
 
-    def __post_init__(self) -> None:
-        if self.schema != SCHEMA or self.schema_version != SCHEMA_VERSION:
-            raise InputError(
-                f"the report is of the format {self.schema!r}, version {self.schema_version}: this program reads "
-                f"{SCHEMA!r}, version {SCHEMA_VERSION}."
-            )
-
 
 def lead_errors(mode: DriveModeReport, horizon: float = 5.0) -> dict[str, HorizonError]:
     """Heading errors by model after a horizon [s]: from the gyro, else from the poses; empty without either."""
@@ -295,19 +286,6 @@ def to_json(report: ReplayReport) -> dict[str, Any]:
 def save_report(report: ReplayReport, path: Path) -> None:
     """Write the report as JSON; numbers that are not finite are refused."""
     path.write_text(json.dumps(to_json(report), indent=1, allow_nan=False) + "\n", encoding="utf-8")
-
-
-def load_report(path: Path) -> ReplayReport:
-    """Read a report strictly.
-
-    Raises:
-        InputError: not JSON, a field that is missing, unknown or of the wrong type, or another version.
-    """
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path} is not a replay report in JSON ({error}): write it with ddagr replay.") from None
-    return config_from(content, ReplayReport, source=str(path))
 
 
 if not TYPE_CHECKING:  # a typed __getattr__ would hide misspelt names from the type checker

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import json
+
 import pytest
 
 import ddagr_gym
+from ddagr_gym.config import config_from
 from ddagr_gym.control.manoeuvres import Manoeuvre
 from ddagr_gym.errors import InputError
-from ddagr_gym.replay_analysis.report import load_report
+from ddagr_gym.replay_analysis.report import ReplayReport
 
 TURNS = Manoeuvre("turns", ((4.0, 1.0, 0.5), (4.0, 0.5, 1.0), (4.0, 0.9, 0.9)))
 
@@ -46,7 +49,7 @@ def test_text_notebook_and_name(level, page_text):
 
 def test_the_document_is_that_of_the_command(level, tmp_path):
     level.to_json(tmp_path / "replay.json")
-    assert load_report(tmp_path / "replay.json") == level.document
+    assert config_from(json.loads((tmp_path / "replay.json").read_text()), ReplayReport) == level.document
 
 
 def test_page_and_figures_are_written_whole_or_not_at_all(level, tmp_path, monkeypatch):

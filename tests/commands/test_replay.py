@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from ddagr_gym.cli import main
+from ddagr_gym.config import config_from
 from ddagr_gym.parameters import Imu, PoseReceiver, Sensors
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.schema import CHANNELS, Recording
 from ddagr_gym.recordings.storage import save_parquet
-from ddagr_gym.replay_analysis.report import load_report
+from ddagr_gym.replay_analysis.report import ReplayReport
 from ddagr_gym.reporting.replay_text import summary
 from ddagr_gym.simulator import simulate
 
@@ -83,8 +84,12 @@ def test_the_page_is_sound_and_names_only_files_that_are_there(replayed):
     assert "times as fast as the robot" in text
 
 
+def report_in(folder):
+    return config_from(json.loads((folder / "replay.json").read_text()), ReplayReport)
+
+
 def test_the_report_holds_both_runs_and_the_speed(replayed):
-    report = load_report(replayed / "replay.json")
+    report = report_in(replayed)
     assert [run.sources for run in report.runs] == [("one.sim",), ("two.sim",)]
     for run in report.runs:
         for mode in run.arms:
@@ -94,7 +99,7 @@ def test_the_report_holds_both_runs_and_the_speed(replayed):
 
 
 def test_tables_are_shown_in_text(replayed):
-    text = "\n".join(summary(load_report(replayed / "replay.json")))
+    text = "\n".join(summary(report_in(replayed)))
     assert text.count("driven by commands") == text.count("driven by wheel speeds") == 2
     assert "heading after 1 s" in text
     assert "times real time on one core" in text

@@ -10,7 +10,7 @@ from mcap.writer import CompressionType, Writer
 from ddagr_gym.errors import InputError
 from ddagr_gym.recordings.files import Limits
 from ddagr_gym.recordings.load import load_recording
-from ddagr_gym.recordings.mcap_reader import mcap_topics, read_mcap
+from ddagr_gym.recordings.mcap_reader import read_mcap
 from ddagr_gym.recordings.topic_map import load_topic_map
 
 DEFAULT = "topics_default"
@@ -72,16 +72,6 @@ def test_json_messages_are_read(tmp_path, messages, warthog, compression):
 def test_files_without_chunks_or_summary_are_read(tmp_path, messages, warthog):
     path = write_json(tmp_path / "run.mcap", messages, use_chunking=False)
     assert len(read_mcap(path, load_topic_map(DEFAULT), warthog)) == 200
-
-
-def test_the_topics_of_a_file(tmp_path, messages):
-    topics = mcap_topics(write_json(tmp_path / "run.mcap", messages))
-    assert [(t.name, t.message_type, t.count) for t in topics] == [
-        ("/cmd_vel", "Twist", 80),
-        ("/imu/data", "Imu", 200),
-        ("/joint_states", "JointState", 40),
-        ("/odom", "Odometry", 20),
-    ]
 
 
 def test_messages_out_of_order_are_sorted_by_their_stamps(tmp_path, messages, warthog):

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
 from ddagr_gym.cli import main
+from ddagr_gym.config import config_from
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.load import load_recording
 from ddagr_gym.replay_analysis.drive_mode import ReplaySettings
-from ddagr_gym.replay_analysis.report import NO_SLIP, NOMINAL, load_report, save_report
+from ddagr_gym.replay_analysis.report import NO_SLIP, NOMINAL, ReplayReport, save_report
 from ddagr_gym.replay_analysis.run import make_report, replay_run
 
 FOLDERS = {"open": 3, "concealed": 9}
@@ -41,7 +44,7 @@ def test_every_file_is_replayed(recordings_dir, tmp_path, folder):
         report = tmp_path / "replay.json"
         # refuses numbers that are not finite
         save_report(make_report([result], robot, "firm_ground", ReplaySettings()), report)
-        (run,) = load_report(report).runs
+        (run,) = config_from(json.loads(report.read_text()), ReplayReport).runs
         assert [mode.drive for mode in run.arms] == ["commands", "encoders"], path.name
         for mode in run.arms:
             assert {NOMINAL, NO_SLIP} <= {e.model for e in mode.horizons if e.error.count}, path.name

@@ -15,9 +15,6 @@ from ddagr_gym.jit import kernel
 
 Array = NDArray[np.float64]
 
-BOOKKEEPING = 3
-"""Memory entries behind the nodes: newest node, samples since it was stored, 1 when filled."""
-
 
 @kernel(inline=True)
 def ring_stride(span: float, period: float, nodes: int) -> int:

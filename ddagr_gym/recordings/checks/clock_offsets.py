@@ -104,8 +104,7 @@ def pose_offset(recording: Recording, rng: np.random.Generator) -> Offset | None
 
 
 def gyro_direction(recording: Recording) -> float:
-    """Sign (+1 or -1) by which heading and integrated gyro go together, from heading changes of less than a "
-    "radian."""
+    """Sign (+1 or -1) by which heading and integrated gyro go together, from changes of less than a radian."""
     turned = integral(recording, recording["yaw_rate"])
     product = 0.0
     for span in recording.spans():

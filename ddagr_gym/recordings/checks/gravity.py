@@ -33,8 +33,7 @@ HEADING_SPREAD = 0.8
 
 @dataclass(frozen=True)
 class Rest:
-    """One standstill: mean specific force (3,) [m/s^2], heading, roll, pitch [rad], NaN where unknown, and "
-    "its span."""
+    """One standstill: mean specific force (3,) [m/s^2], heading, roll, pitch [rad], NaN where unknown, and its span."""
 
     force: FloatArray
     heading: float
@@ -115,8 +114,7 @@ def offset_by_attitude(found: list[Rest]) -> tuple[FloatArray, list[Interval]]:
 
 
 def offset_by_heading(found: list[Rest]) -> tuple[FloatArray, list[Interval]] | None:
-    """Body-fixed offset (x, y) [m/s^2] apart from a slope common to all rests of a span; None where headings "
-    "are alike."""
+    """Body-fixed offset (x, y) [m/s^2] apart from a slope common to all rests; None where headings are alike."""
     spans = [r.span for r in found if np.isfinite(r.heading)]
     usable = [r for r in found if np.isfinite(r.heading) and r.span == max(set(spans), key=spans.count)]
     if len(usable) < 4:
@@ -172,9 +170,8 @@ def _single_heading(found: list[Rest]) -> CheckFinding:
         TILT_RANGE,
         "m/s^2",
         meaning=(
-            f"At rest {tilt:.3f} m/s^2 lie in the horizontal axes; without rests at several headings a slope, "
-            "a tilted "
-            "sensor and a bias cannot be told apart."
+            f"At rest {tilt:.3f} m/s^2 lie in the horizontal axes; without rests at several headings a slope, a "
+            "tilted sensor and a bias cannot be told apart."
         ),
         remedy="Let the robot stand at four headings on one spot.",
         suspects=("imu_tilt", "accelerometer_bias", "slope"),
