@@ -26,3 +26,17 @@ def unknown_name(kind: str, name: object, known: Iterable[str]) -> InputError:
     close = difflib.get_close_matches(str(name), names, n=3, cutoff=0.4)
     hint = f"did you mean {', '.join(repr(c) for c in close)}" if close else f"choose one of {', '.join(names)}"
     return InputError(f"unknown {kind} {name!r}: {hint}.")
+
+
+def at_least(**bounds: tuple[float | None, float]) -> None:
+    """Refuse numbers below their least value; those that are None pass.
+
+    Args:
+        bounds: value and least value by name.
+
+    Raises:
+        InputError: with the first one that is below, or no number.
+    """
+    for name, (given, least) in bounds.items():
+        if given is not None and not given >= least:
+            raise InputError(f"{name} is {given}: give at least {least}.")

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ddagr_gym.api.inputs import RobotLike, Sources, recordings_from
-from ddagr_gym.api.results import Result, Table, at_least
-from ddagr_gym.errors import InputError
-from ddagr_gym.files import output_folder, write_text
+from ddagr_gym.api.results import Report, Table
+from ddagr_gym.errors import InputError, at_least
+from ddagr_gym.files import write_json
 from ddagr_gym.progress import counting
 
 if TYPE_CHECKING:
@@ -24,8 +23,8 @@ SCHEMA_VERSION = 1
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class CheckResult(Result):
-    """What the checks of recordings say.
+class CheckResult(Report):
+    """What the checks of recordings say; ``report`` writes one figure and one JSON file for each recording.
 
     Attributes:
         reports: one per recording; each has ``findings``, ``suspicious`` and ``sentences``.
@@ -88,31 +87,7 @@ class CheckResult(Result):
     def to_json(self, path: str | os.PathLike[str]) -> None:
         """Write all findings as one JSON file: ``schema_version``, ``runs`` (reports) and ``together`` (findings)."""
         runs, together = [report.to_json() for report in self.reports], [f.to_json() for f in self.together]
-        _write_json(Path(path), {"schema_version": SCHEMA_VERSION, "runs": runs, "together": together})
-
-    def report(
-        self,
-        folder: str | os.PathLike[str],
-        *,
-        overwrite: bool = False,
-        progress: Callable[[str], None] | None = None,
-    ) -> Path:
-        """Write one figure and one JSON report for each recording, whole or not at all; needs matplotlib.
-
-        Args:
-            folder: to make.
-            overwrite: replace a folder that an earlier report wrote.
-            progress: called with a line of text as figures are drawn.
-
-        Returns:
-            The folder.
-
-        Raises:
-            InputError: the folder holds something else, or an earlier report without ``overwrite``.
-        """
-        with output_folder(folder, overwrite=overwrite) as filled:
-            self._fill(filled, progress)
-        return Path(folder)
+        write_json(Path(path), {"schema_version": SCHEMA_VERSION, "runs": runs, "together": together})
 
     def _fill(self, folder: Path, progress: Callable[[str], None] | None) -> None:
         import numpy as np
@@ -124,11 +99,11 @@ class CheckResult(Result):
         with counting(len(self.reports), "drawing", progress) as steps:
             for name, recording, report in zip(names, self.recordings, self.reports, strict=True):
                 save_check_figure(recording, report, np.random.default_rng(self.seed), folder / f"{name}.png")
-                _write_json(folder / f"{name}.json", report.to_json())
+                write_json(folder / f"{name}.json", report.to_json())
                 steps.advance()
         if self.together:
             findings = [finding.to_json() for finding in self.together]
-            _write_json(folder / "together.json", {"schema_version": SCHEMA_VERSION, "findings": findings})
+            write_json(folder / "together.json", {"schema_version": SCHEMA_VERSION, "findings": findings})
 
 
 def check(
@@ -181,7 +156,3 @@ def check(
 def _unique(names: list[str]) -> list[str]:
     """Names with a number where one occurs again."""
     return [f"{n}_{names[:i].count(n) + 1}" if names.count(n) > 1 else n for i, n in enumerate(names)]
-
-
-def _write_json(path: Path, content: dict[str, Any]) -> None:
-    write_text(path, json.dumps(content, indent=1, allow_nan=False) + "\n")

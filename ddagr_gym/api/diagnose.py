@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING
 from ddagr_gym.api.diagnosis_result import DiagnosisResult
 from ddagr_gym.api.inputs import RobotLike, Sources, recordings_from
 from ddagr_gym.api.nominal import Nominal, SoilLike, ThresholdsLike, nominal_from, thresholds_from
-from ddagr_gym.api.results import at_least
-from ddagr_gym.errors import InputWarning
+from ddagr_gym.errors import InputWarning, at_least
 from ddagr_gym.extras import need
 from ddagr_gym.progress import counting
 

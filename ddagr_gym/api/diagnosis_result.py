@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ddagr_gym.api.results import Result, Table
+from ddagr_gym.api.results import Report, Table
 from ddagr_gym.errors import InputError
-from ddagr_gym.files import output_folder
 
 if TYPE_CHECKING:
     from ddagr_gym.diagnosis.answer.verdict import Diagnosis, Finding
@@ -23,11 +22,15 @@ PAGE = "index.html"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class DiagnosisResult(Result):
+class DiagnosisResult(Report):
     """Which physics the nominal simulator leaves out, how big and how sure.
 
     ``findings[0].parameters["angle"]`` is an estimate with ``value``, ``unit`` and a 90 % ``interval``; ``float()`` of
     it is its value.
+
+    ``report`` writes diagnosis.json, evidence.npz, and what the simulator loads: effects.json and effects.yaml with the
+    named effects, robot.yaml and soil.yaml with the refitted nominal parameters (left out where ``robot`` is None).
+    Unless ``names_only`` it adds the page, index.html, and its figures, which need matplotlib and jinja2.
 
     Attributes:
         outcome: answer, session and search behind it (:mod:`ddagr_gym.diagnosis.pipeline`).
@@ -118,34 +121,17 @@ class DiagnosisResult(Result):
 
         save(self.diagnosis, Path(path))
 
-    def report(self, folder: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
-        """Write diagnosis.json, evidence.npz, and what the simulator loads; with a page unless ``names_only``.
-
-        effects.json and effects.yaml hold the named effects, robot.yaml and soil.yaml the refitted nominal parameters
-        (left out where ``robot`` is None). The page, index.html, and its figures need matplotlib and jinja2.
-
-        Args:
-            folder: to make, whole or not at all.
-            overwrite: replace a folder that an earlier report wrote.
-
-        Returns:
-            The folder.
-
-        Raises:
-            InputError: the folder holds something else, or an earlier report without ``overwrite``.
-        """
+    def _fill(self, folder: Path, progress: Callable[[str], None] | None) -> None:
         from ddagr_gym.diagnosis.answer import evidence
         from ddagr_gym.reporting import diagnosis_page
 
-        with output_folder(folder, overwrite=overwrite) as filled:
-            self._save_effects(filled)
-            self._save_refitted(filled)
-            self.to_json(filled / "diagnosis.json")
-            self.outcome.evidence.save(filled / evidence.NAME)
-            if not self.diagnosis.options.names_only:
-                diagnosis_page.write_report(filled, self.diagnosis, self.outcome.evidence)
-                (filled / diagnosis_page.PAGE).rename(filled / PAGE)
-        return Path(folder)
+        self._save_effects(folder)
+        self._save_refitted(folder)
+        self.to_json(folder / "diagnosis.json")
+        self.outcome.evidence.save(folder / evidence.NAME)
+        if not self.diagnosis.options.names_only:
+            diagnosis_page.write_report(folder, self.diagnosis, self.outcome.evidence)
+            (folder / diagnosis_page.PAGE).rename(folder / PAGE)
 
     def _save_effects(self, folder: Path) -> None:
         from ddagr_gym.diagnosis.pipeline import data_hash, effect_intervals

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -12,9 +11,9 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from ddagr_gym.api.inputs import RobotLike, Source, recording_from
 from ddagr_gym.api.nominal import SoilLike, robot_from, soil_from
-from ddagr_gym.api.results import Result, Table, at_least
-from ddagr_gym.errors import InputError, unknown_name
-from ddagr_gym.files import atomic_path, output_folder, write_text
+from ddagr_gym.api.results import Report, Table
+from ddagr_gym.errors import InputError, at_least, unknown_name
+from ddagr_gym.files import atomic_path, write_json
 from ddagr_gym.progress import counting
 
 if TYPE_CHECKING:
@@ -49,8 +48,11 @@ class SoilParameter:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class EstimateResult(Result):
+class EstimateResult(Report):
     """Estimates over a recording.
+
+    ``report`` writes estimates.parquet, summary.json and the figures; it needs pyarrow. Figures stand in the order of
+    the thesis's chapter 6, with bands of two standard deviations, and the truth where the recording has it.
 
     Attributes:
         run: states, covariances, innovations and the recording behind them.
@@ -116,41 +118,17 @@ class EstimateResult(Result):
 
     def to_json(self, path: str | os.PathLike[str]) -> None:
         """Write the summary as JSON, whole or not at all."""
-        write_text(path, json.dumps(self.summary, indent=1, allow_nan=False) + "\n")
+        write_json(path, self.summary)
 
-    def report(
-        self,
-        folder: str | os.PathLike[str],
-        *,
-        overwrite: bool = False,
-        progress: Callable[[str], None] | None = None,
-    ) -> Path:
-        """Write estimates.parquet, summary.json and the figures; needs matplotlib and pyarrow.
-
-        Figures stand in the order of the thesis's chapter 6, with bands of two standard deviations, and the truth where
-        the recording holds it.
-
-        Args:
-            folder: to make, whole or not at all.
-            overwrite: replace a folder that an earlier report wrote.
-            progress: called with a line of text as figures are drawn.
-
-        Returns:
-            The folder.
-
-        Raises:
-            InputError: the folder holds something else, or an earlier report without ``overwrite``.
-        """
+    def _fill(self, folder: Path, progress: Callable[[str], None] | None) -> None:
         from ddagr_gym.evaluation.estimate_view import estimate_view, path_file
         from ddagr_gym.reporting.estimate_figures import figure_count, save_estimate_figures
 
         view = estimate_view(self.run, self.thesis)
-        with output_folder(folder, overwrite=overwrite) as filled:
-            self._write_table(filled / "estimates.parquet")
-            self.to_json(filled / "summary.json")
-            with counting(figure_count(view), "figures", progress) as steps:
-                save_estimate_figures(view, filled, path_file(self.thesis), steps.advance)
-        return Path(folder)
+        self._write_table(folder / "estimates.parquet")
+        self.to_json(folder / "summary.json")
+        with counting(figure_count(view), "figures", progress) as steps:
+            save_estimate_figures(view, folder, path_file(self.thesis), steps.advance)
 
     def _write_table(self, path: Path) -> None:
         import pyarrow as pa

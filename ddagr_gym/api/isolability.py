@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -19,9 +18,10 @@ from ddagr_gym.api.nominal import (
     soil_name_of,
     thresholds_from,
 )
-from ddagr_gym.api.results import Result, Table, at_least, names_of
+from ddagr_gym.api.results import Report, Table, names_of
 from ddagr_gym.control.manoeuvres import Manoeuvre, find_manoeuvre
-from ddagr_gym.files import output_folder, write_text
+from ddagr_gym.errors import at_least
+from ddagr_gym.files import write_json, write_text
 from ddagr_gym.progress import counting
 
 if TYPE_CHECKING:
@@ -32,8 +32,10 @@ ManoeuvreLike: TypeAlias = str | os.PathLike[str] | Manoeuvre
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class IsolabilityResult(Result):
+class IsolabilityResult(Report):
     """Which effects planned drives could show, how small, and which they could tell apart.
+
+    ``report`` writes isolability.json, isolability.txt and the figure.
 
     Attributes:
         table: sizes and pairs (:class:`ddagr_gym.diagnosis.planning.isolability.Isolability`).
@@ -70,28 +72,14 @@ class IsolabilityResult(Result):
 
     def to_json(self, path: str | os.PathLike[str]) -> None:
         """Write the table as JSON, whole or not at all; what cannot be seen or told apart is null."""
-        write_text(path, json.dumps(self.table.as_mapping(), indent=1, allow_nan=False) + "\n")
+        write_json(path, self.table.as_mapping())
 
-    def report(self, folder: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
-        """Write isolability.json, isolability.txt and the figure; needs matplotlib.
-
-        Args:
-            folder: to make, whole or not at all.
-            overwrite: replace a folder that an earlier report wrote.
-
-        Returns:
-            The folder.
-
-        Raises:
-            InputError: the folder holds something else, or an earlier report without ``overwrite``.
-        """
+    def _fill(self, folder: Path, progress: Callable[[str], None] | None) -> None:
         from ddagr_gym.reporting.isolability_figure import isolability_figure
 
-        with output_folder(folder, overwrite=overwrite) as filled:
-            self.to_json(filled / "isolability.json")
-            write_text(filled / "isolability.txt", f"{self}\n")
-            isolability_figure(self.table.as_mapping(), filled / "isolability.png")
-        return Path(folder)
+        self.to_json(folder / "isolability.json")
+        write_text(folder / "isolability.txt", f"{self}\n")
+        isolability_figure(self.table.as_mapping(), folder / "isolability.png")
 
 
 def isolability(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -11,9 +10,9 @@ from typing import TYPE_CHECKING, TypeAlias, Union
 
 from ddagr_gym.api.inputs import RobotLike
 from ddagr_gym.api.nominal import SoilLike, robot_from, soil_from
-from ddagr_gym.api.results import Result, Table, at_least, names_of
-from ddagr_gym.errors import InputError
-from ddagr_gym.files import write_text
+from ddagr_gym.api.results import Result, Table, names_of
+from ddagr_gym.errors import InputError, at_least
+from ddagr_gym.files import write_json
 
 if TYPE_CHECKING:
     from ddagr_gym.api.diagnosis_result import DiagnosisResult
@@ -87,7 +86,7 @@ class NextDriveResult(Result):
         """Write the answer as JSON, whole or not at all."""
         from ddagr_gym.diagnosis.result.files import plain
 
-        write_text(path, json.dumps(plain(self.answer), indent=1, allow_nan=False) + "\n")
+        write_json(path, plain(self.answer))
 
 
 def next_drive(

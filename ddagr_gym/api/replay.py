@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 
 from ddagr_gym.api.inputs import RobotLike, Sources, recordings_from
 from ddagr_gym.api.nominal import SoilLike, robot_from, soil_from, soil_label
-from ddagr_gym.api.results import Result, Table, at_least
+from ddagr_gym.api.results import Report, Table
 from ddagr_gym.api.simulate import EffectsLike
-from ddagr_gym.errors import InputError
-from ddagr_gym.files import atomic_path, output_folder, write_text
+from ddagr_gym.errors import InputError, at_least
+from ddagr_gym.files import atomic_path, write_text
 from ddagr_gym.parameters import Robot
 from ddagr_gym.progress import counting
 from ddagr_gym.recordings.schema import Recording
@@ -26,8 +26,10 @@ NAME = "replay.json"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ReplayResult(Result):
+class ReplayResult(Report):
     """Residuals, error growth, refit and baselines of replayed drives.
+
+    ``report`` writes replay.json, figures as PNG and SVG, and a page, index.html.
 
     Attributes:
         document: what ``replay.json`` holds (:mod:`ddagr_gym.replay_analysis.report`): errors at the horizons,
@@ -75,33 +77,12 @@ class ReplayResult(Result):
         with atomic_path(path) as part:
             save_report(self.document, part)
 
-    def report(
-        self,
-        folder: str | os.PathLike[str],
-        *,
-        overwrite: bool = False,
-        progress: Callable[[str], None] | None = None,
-    ) -> Path:
-        """Write replay.json, figures as PNG and SVG, and a page, index.html; needs matplotlib.
-
-        Args:
-            folder: to make, whole or not at all.
-            overwrite: replace a folder that an earlier report wrote.
-            progress: called with a line of text as figures are drawn.
-
-        Returns:
-            The folder.
-
-        Raises:
-            InputError: the folder holds something else, or an earlier report without ``overwrite``.
-        """
+    def _fill(self, folder: Path, progress: Callable[[str], None] | None) -> None:
         from ddagr_gym.reporting.replay_page import replay_page
 
-        with output_folder(folder, overwrite=overwrite) as filled:
-            figures = _draw(self.runs, filled, progress)
-            self.to_json(filled / NAME)
-            write_text(filled / "index.html", replay_page(self.document, figures))
-        return Path(folder)
+        figures = _draw(self.runs, folder, progress)
+        self.to_json(folder / NAME)
+        write_text(folder / "index.html", replay_page(self.document, figures))
 
 
 def replay(

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from html import escape
+from pathlib import Path
 
-from ddagr_gym.errors import InputError
+from ddagr_gym.files import output_folder
 from ddagr_gym.reporting.text_table import format_value
 
 _STYLE = "text-align:left;padding:0 .8em 0 0"
@@ -61,18 +63,36 @@ def _cell(value: object) -> str:
     return f'<td style="{style}">{escape(format_value(value))}</td>'
 
 
-def at_least(**bounds: tuple[float | None, float]) -> None:
-    """Refuse numbers below their least value; those that are None pass.
+class Report(Result):
+    """A result that also writes a folder of files and figures."""
 
-    Args:
-        bounds: value and least value by name.
+    def report(
+        self,
+        folder: str | os.PathLike[str],
+        *,
+        overwrite: bool = False,
+        progress: Callable[[str], None] | None = None,
+    ) -> Path:
+        """Write files and figures, whole or not at all; the class says which. Figures need matplotlib.
 
-    Raises:
-        InputError: with the first one that is below, or no number.
-    """
-    for name, (given, least) in bounds.items():
-        if given is not None and not given >= least:
-            raise InputError(f"{name} is {given}: give at least {least}.")
+        Args:
+            folder: to make.
+            overwrite: replace a folder that an earlier report wrote.
+            progress: called with a line of text as figures are drawn, where there are many.
+
+        Returns:
+            The folder.
+
+        Raises:
+            InputError: the folder holds something else, or an earlier report without ``overwrite``.
+        """
+        with output_folder(folder, overwrite=overwrite) as filled:
+            self._fill(filled, progress)
+        return Path(folder)
+
+    @abstractmethod
+    def _fill(self, folder: Path, progress: Callable[[str], None] | None) -> None:
+        """Write everything into an empty folder."""
 
 
 def names_of(given: str | Sequence[str]) -> tuple[str, ...]:

@@ -12,7 +12,6 @@ import tyro
 from tyro.conf import Positional
 
 from ddagr_gym.commands.output import check_output_folder
-from ddagr_gym.commands.ranges import check_at_least
 from ddagr_gym.extras import need
 from ddagr_gym.progress import LinePrinter
 
@@ -76,7 +75,6 @@ def run(arguments: Arguments) -> int | None:
     from ddagr_gym.diagnosis.store import part_folder
     from ddagr_gym.recordings.files import Limits
 
-    check_at_least(arguments, threads=1, window=1.0, stride=0.1, seed=0)
     check_output_folder(arguments.output, overwrite=arguments.overwrite)
     need(*(() if arguments.names_only else ("jinja2", "matplotlib")))
     limits = Limits(arguments.maximum_rows, arguments.maximum_bytes)

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import fnmatch
-import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from ddagr_gym.commands.output import format_table, make_folder, write_text
+from ddagr_gym.commands.output import format_table, make_folder, write_json
 from ddagr_gym.errors import InputError, unknown_name
 from ddagr_gym.progress import Progress
 
@@ -118,7 +117,7 @@ def _check_claims(folder: Path, summary: dict[str, Any]) -> list[dict[str, Any]]
 
     checked = check_claims(load_claims(), summary)
     written = [asdict(item) for item in checked]
-    write_text(folder / "claims.json", json.dumps(written, indent=1) + "\n")
+    write_json(folder / "claims.json", written)
     driven = [item for item in checked if item.verdict != "not driven"]
     if driven:
         print("\nClaims (configs/evaluation/claims.yaml)\n")

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 
-from ddagr_gym.commands.output import atomic_path, format_table, make_folder, write_text
+from ddagr_gym.commands.output import atomic_path, format_table, make_folder, write_json
 from ddagr_gym.progress import Progress
 
 if TYPE_CHECKING:
@@ -206,8 +206,6 @@ def replay_scenario(text: str, folder: Path) -> None:
     Raises:
         InputError: the text names nothing.
     """
-    import json
-
     from ddagr_gym.evaluation.controllers import needs_filter
     from ddagr_gym.evaluation.shown import parse_replay, replayed
     from ddagr_gym.recordings.storage import save_drive
@@ -222,7 +220,7 @@ def replay_scenario(text: str, folder: Path) -> None:
     name, turn, robot = f"{set_name} {number}", run.episode.turn, run.episode.robot
     turn_figure(seen.columns, turn, folder / f"{stem}.png", robot=robot, soil_name=f"soil {name}")
     save_drive(folder / f"{stem}.parquet", run.columns, robot)
-    write_text(folder / f"{stem}.json", json.dumps(row, indent=1) + "\n")
+    write_json(folder / f"{stem}.json", row)
     film_turn(seen.columns, turn, robot, folder / f"{stem}.mp4", f"soil {name}")
     print(format_table((f"{controller} on {name}", "value"), _replay_rows(row)))
     print(f"\nFigure, video, recording and metrics are in {folder.resolve()}")
@@ -246,11 +244,9 @@ def _replay_rows(row: Mapping[str, Any]) -> list[tuple[str, object]]:
 
 def write_files(folder: Path, rows: Sequence[Mapping[str, Any]], summary: Mapping[str, Any]) -> None:
     """Write ``episodes.parquet`` and ``summary.json``."""
-    import json
-
     import pyarrow as pa
     from pyarrow import parquet
 
     with atomic_path(folder / "episodes.parquet") as temporary:
         parquet.write_table(pa.Table.from_pylist([dict(row) for row in rows]), temporary)
-    write_text(folder / "summary.json", json.dumps(summary, indent=1) + "\n")
+    write_json(folder / "summary.json", summary)

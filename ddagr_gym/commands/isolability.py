@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ddagr_gym.commands.output import check_output_folder
-from ddagr_gym.commands.ranges import check_at_least
 from ddagr_gym.progress import LinePrinter
 
 EXAMPLES = (
@@ -51,7 +50,6 @@ def run(arguments: Arguments) -> None:
     """Make the table, print it, write it."""
     import ddagr_gym
 
-    check_at_least(arguments, seed=0)
     if arguments.output is not None:
         check_output_folder(arguments.output, overwrite=arguments.overwrite)
     result = ddagr_gym.isolability(

@@ -9,7 +9,6 @@ from typing import Annotated
 import tyro
 from tyro.conf import Positional
 
-from ddagr_gym.commands.ranges import check_at_least
 from ddagr_gym.errors import InputError
 
 EXAMPLES = (
@@ -50,7 +49,6 @@ def run(arguments: Arguments) -> None:
     """Rank the manoeuvres and print the best."""
     import ddagr_gym
 
-    check_at_least(arguments, threads=1, seed=0)
     if (arguments.diagnosis is None) == (not arguments.rival):
         raise InputError("give either a diagnosis or some --rival name=size, not both.")
     result = ddagr_gym.next_drive(

@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING
 from tyro.conf import Positional
 
 from ddagr_gym.commands.output import atomic_path
-from ddagr_gym.commands.ranges import check_at_least
-from ddagr_gym.errors import InputError
+from ddagr_gym.errors import InputError, at_least
 from ddagr_gym.progress import Progress
 
 if TYPE_CHECKING:
@@ -142,7 +141,7 @@ def _check_options(arguments: Arguments) -> None:
         given = getattr(arguments, name)
         if given is not None and not least <= given < math.inf:
             raise InputError(f"--{name} is {given:g}: give a finite time of at least {least:g} s.")
-    check_at_least(arguments, seed=0, processes=1)
+    at_least(**{"--seed": (arguments.seed, 0), "--processes": (arguments.processes, 1)})
     if arguments.ordinary and not arguments.runs:
         raise InputError("--ordinary takes recordings for null drives and none is given: name some, or leave it out.")
     if not arguments.ordinary and arguments.count < least_nulls():

@@ -16,6 +16,7 @@ from ddagr_gym.files import (
     make_folder,
     output_folder,
     write_bytes,
+    write_json,
     write_text,
 )
 from ddagr_gym.reporting.text_table import format_table, format_value
@@ -30,6 +31,7 @@ __all__ = [
     "make_folder",
     "output_folder",
     "write_bytes",
+    "write_json",
     "write_text",
 ]
 

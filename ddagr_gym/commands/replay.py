@@ -10,7 +10,6 @@ import tyro
 from tyro.conf import Positional
 
 from ddagr_gym.commands.output import check_output_folder
-from ddagr_gym.commands.ranges import check_at_least
 from ddagr_gym.progress import LinePrinter
 
 EXAMPLES = (
@@ -70,7 +69,6 @@ def run(arguments: Arguments) -> None:
     from ddagr_gym.api.inputs import recordings_from
     from ddagr_gym.recordings.files import Limits
 
-    check_at_least(arguments, threads=1)
     check_output_folder(arguments.output, overwrite=arguments.overwrite)
     robot, limits = arguments.robot or None, Limits(arguments.maximum_rows, arguments.maximum_bytes)
     result = ddagr_gym.replay(

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ddagr_gym import __version__
-from ddagr_gym.commands.output import format_table, output_folder, write_text
+from ddagr_gym.commands.output import format_table, output_folder, write_json
 
 if TYPE_CHECKING:
     from ddagr_gym.validation.chrono import Agreement
@@ -46,7 +45,7 @@ def run(arguments: Arguments) -> None:
             "single_wheel": _single_wheel(arguments.data, folder),
             "chrono": _chrono(arguments.data, folder),
         }
-        write_text(folder / "validation.json", json.dumps(results, indent=1, allow_nan=False) + "\n")
+        write_json(folder / "validation.json", results)
     print(f"\nwritten to {arguments.output}")
 
 

@@ -12,17 +12,15 @@ from ddagr_gym.diagnosis.answer.certificate import Certificate
 from ddagr_gym.diagnosis.answer.evidence import Evidence
 from ddagr_gym.diagnosis.answer.verdict import Diagnosis
 from ddagr_gym.diagnosis.wording import title
-from ddagr_gym.errors import InputError
 from ddagr_gym.files import atomic_path, make_folder
 from ddagr_gym.reporting import diagnosis_figures as figures
 from ddagr_gym.reporting import diagnosis_maps as maps
 from ddagr_gym.reporting import diagnosis_tables as tables
-from ddagr_gym.reporting.figures import house_style, svg_data
+from ddagr_gym.reporting.figures import house_style
+from ddagr_gym.reporting.page_template import embedded, page_template
 
 PAGE = "report.html"
 PICTURES = "figures"
-_POINTS_PER_PIXEL = 72.0 / 96.0
-"""An inch has 72 points and, in CSS, 96 pixels."""
 
 Progress = Callable[[str], None]
 
@@ -37,12 +35,10 @@ class _Studio:
     def picture(self, figure: Any, name: str, alt: str, **more: Any) -> dict[str, Any]:
         """Data of an SVG for the page; the PNG is written."""
         self._progress(name)
-        data = svg_data(figure)
+        shown = embedded(figure, alt)
         with atomic_path(self._folder / f"{name}.png") as path:
             figure.savefig(path, format="png", dpi=160, facecolor="white", metadata={"Software": None})
-        width, height = figure.get_size_inches()
-        pixels = {"width": round(72 * width / _POINTS_PER_PIXEL), "height": round(72 * height / _POINTS_PER_PIXEL)}
-        return {"data": data, "alt": alt, **pixels, **more}
+        return shown | more
 
 
 def write_report(
@@ -59,24 +55,12 @@ def write_report(
     Raises:
         InputError: matplotlib or jinja2 is not installed, or the folder cannot be one.
     """
-    page = _template()
+    page = page_template("diagnosis.html")
     pictures = make_folder(make_folder(folder) / PICTURES)
     with house_style():
         context = _context(diagnosis, evidence, _Studio(pictures, progress))
     with atomic_path(folder / PAGE) as path:
         path.write_text(page.render(context), encoding="utf-8")
-
-
-def _template() -> Any:
-    try:
-        from jinja2 import Environment, PackageLoader, StrictUndefined
-    except ImportError:
-        raise InputError('reports need jinja2, which is not installed: run pip install "ddagr-gym[report]".') from None
-    loader = PackageLoader("ddagr_gym.reporting", "templates")
-    environment = Environment(
-        loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    return environment.get_template("diagnosis.html")
 
 
 def _context(diagnosis: Diagnosis, evidence: Evidence, studio: _Studio) -> dict[str, Any]:

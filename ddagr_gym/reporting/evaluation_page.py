@@ -14,7 +14,8 @@ from ddagr_gym.parameters import Robot
 from ddagr_gym.reporting import evaluation_figures as figures
 from ddagr_gym.reporting import evaluation_paths as paths
 from ddagr_gym.reporting import evaluation_tables as tables
-from ddagr_gym.reporting.figures import house_style, svg_data
+from ddagr_gym.reporting.figures import house_style
+from ddagr_gym.reporting.page_template import embedded, page_template
 
 PAGE = "report.html"
 PICTURE = "radius_error"
@@ -22,9 +23,6 @@ PICTURE = "radius_error"
 
 TRANSFER = ("S1", "T")
 """Set and the same scenarios on another soil law."""
-
-_PIXELS_PER_INCH = 96
-"""Of CSS."""
 
 _DPI = 110
 """Of the points inside figures."""
@@ -47,7 +45,7 @@ def write_page(folder: Path, evaluation: Evaluation, robot: Robot, progress: Cal
     """
     if not evaluation.rows:
         raise InputError("no episodes were driven: a page needs at least one.")
-    template = _template()
+    template = page_template("evaluation.html")
     make_folder(folder)
     figures.radius_error_figure(evaluation, folder / f"{PICTURE}.png")
     with house_style():
@@ -56,25 +54,6 @@ def write_page(folder: Path, evaluation: Evaluation, robot: Robot, progress: Cal
     with atomic_path(target) as path:
         path.write_text(template.render(context), encoding="utf-8")
     return target
-
-
-def _template() -> Any:
-    try:
-        from jinja2 import Environment, PackageLoader, StrictUndefined
-    except ImportError:
-        raise InputError('reports need jinja2, which is not installed: run pip install "ddagr-gym[report]".') from None
-    loader = PackageLoader("ddagr_gym.reporting", "templates")
-    environment = Environment(
-        loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    return environment.get_template("evaluation.html")
-
-
-def embedded(figure: Any, alt: str) -> dict[str, Any]:
-    """A figure as data of an SVG, with its size on the page."""
-    data = svg_data(figure, _DPI)
-    width, height = (round(_PIXELS_PER_INCH * side) for side in figure.get_size_inches())
-    return {"data": data, "alt": alt, "width": width, "height": height}
 
 
 def _context(evaluation: Evaluation, robot: Robot, progress: Callable[[], None]) -> dict[str, Any]:
@@ -144,6 +123,6 @@ FIGURES = 9
 def _pictures(evaluation: Evaluation, robot: Robot, progress: Callable[[], None]) -> Mapping[str, dict[str, Any]]:
     drawn = {}
     for name, (make, alt) in _makers(evaluation, robot).items():
-        drawn[name] = embedded(make(), alt)
+        drawn[name] = embedded(make(), alt, _DPI)
         progress()
     return drawn

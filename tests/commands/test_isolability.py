@@ -59,7 +59,7 @@ def test_without_output_the_table_is_printed_and_nothing_written(tmp_path, capsy
 
 def test_negative_seed_is_one_sentence(tmp_path, capsys):
     assert main(["isolability", "--seed", "-1", "--output", str(tmp_path / "out")]) == 2
-    assert "--seed is -1: give at least 0." in capsys.readouterr().err
+    assert "seed is -1: give at least 0." in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
 
 

@@ -37,7 +37,7 @@ def test_rivals_by_hand(tmp_path, capsys, small_bank):
     [
         ([], "either a diagnosis or"),
         (["nowhere"], "ddagr diagnose"),
-        (["--rival", "slope=0.1", "--seed", "-1"], "--seed is -1: give at least 0"),
+        (["--rival", "slope=0.1", "--seed", "-1"], "seed is -1: give at least 0"),
         (["--rival", "slop=0.1"], "slope"),
         (["--rival", "slope=0.1", "--sensors", "lidar"], "imu"),
     ],

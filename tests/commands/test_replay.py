@@ -127,7 +127,7 @@ def test_runs_replayed_together_share_their_parameters(runs, tmp_path, capsys):
         ([], "name one or more files"),
         (["absent.parquet"], "absent.parquet"),
         (["RUNS/one.parquet", "--robot", "husky"], "'ddagr'"),
-        (["RUNS/one.parquet", "--threads", "0"], "--threads is 0"),
+        (["RUNS/one.parquet", "--threads", "0"], "threads is 0"),
         (["RUNS/one.parquet", "--window", "0.01"], "the window is 0.01 s"),
         (["RUNS/one.parquet", "--effect", "magic=1"], "magic"),
         (["RUNS/one.parquet", "--maximum-rows", "10"], "10"),

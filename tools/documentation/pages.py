@@ -40,7 +40,7 @@ NOTHING = 1e-9
 _BLOCK = re.compile(r"^```(?P<head>[^\n`]*)\n(?P<body>.*?)^```[ ]*$", re.DOTALL | re.MULTILINE)
 _TITLE = re.compile(r'title="([^"]+)"')
 _NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
-_RUN_TIME = re.compile(r"\d+(?:\.\d+)? s of one core")
+_RUN_TIME = re.compile(r"\d+(?:\.\d+)? (?:s of|times real time on) one core")
 _PICTURE = re.compile(r"!\[[^\]]*\]\(([^)\s]+)\)")
 
 
