@@ -5,9 +5,15 @@ from __future__ import annotations
 import ast
 import hashlib
 import inspect
-from functools import cache
+import os
+import sys
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from functools import cache, partial
 from pathlib import Path
 
+from ddagr_gym.errors import InputError
+from ddagr_gym.files import atomic_path
 from ddagr_gym.physics.effects.registry import effect_kinds
 
 _PACKAGE = Path(__file__).resolve().parents[2]
@@ -37,7 +43,7 @@ def source_digest() -> str:
     return digest.hexdigest()
 
 
-def code_digest(source: str) -> str:
+def code_digest(source: str | bytes) -> str:
     """SHA-256 of a module's syntax tree without docstrings, the texts below constants, comments and layout.
 
     Args:
@@ -62,10 +68,41 @@ def _is_text(statement: ast.AST) -> bool:
 
 @cache
 def _own_digest() -> str:
+    """Of this package; parsing takes seconds, so that the digest of the sources as they stand is remembered."""
     prose = {_PACKAGE / name for name in _PROSE}
     files = {path for folder in _FOLDERS for path in (_PACKAGE / folder).rglob("*.py")} - prose
+    paths = sorted([*files, *(_PACKAGE / name for name in _FILES)])
+    sources = [(path.relative_to(_PACKAGE).as_posix().encode(), path.read_bytes()) for path in paths]
+    state = hashlib.sha256(sys.version.encode())
+    for name, source in sources:
+        state.update(b"%s %d " % (name, len(source)) + source)
+    return _remembered(state.hexdigest(), partial(_digest_of, sources))
+
+
+def _digest_of(sources: Sequence[tuple[bytes, bytes]]) -> str:
     digest = hashlib.sha256()
-    for path in sorted([*files, *(_PACKAGE / name for name in _FILES)]):
-        digest.update(path.relative_to(_PACKAGE).as_posix().encode())
-        digest.update(code_digest(path.read_text()).encode())
+    for name, source in sources:
+        digest.update(name)
+        digest.update(code_digest(source).encode())
     return digest.hexdigest()
+
+
+def _remembered(state: str, digest_of_it: Callable[[], str]) -> str:
+    """Digest of a state of the sources, in one file of the user's cache folder for each place of this package.
+
+    Args:
+        state: hash of every byte that the digest depends on.
+        digest_of_it: computes it; where the folder cannot be used, each time.
+    """
+    try:
+        folder = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "ddagr-gym"
+        file = folder / f"source_digest_{hashlib.sha256(str(_PACKAGE).encode()).hexdigest()[:16]}.txt"
+        known = file.read_text().split() if file.is_file() else []
+    except (OSError, RuntimeError, UnicodeDecodeError):
+        return digest_of_it()
+    if len(known) == 2 and known[0] == state:
+        return known[1]
+    digest = digest_of_it()
+    with suppress(OSError, InputError), atomic_path(file) as part:
+        part.write_text(f"{state} {digest}\n")
+    return digest

@@ -45,6 +45,13 @@ def test_a_text_that_is_used_counts() -> None:
     assert code_digest('NAME = "slope"') != code_digest('NAME = "payload"')
 
 
+@pytest.fixture(autouse=True)
+def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder of its own for what is remembered."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
 def package_with(folder: Path, **modules: str) -> Path:
     """A package with a diagnosis and the files that the digest wants."""
     for name in module._FILES:
@@ -73,6 +80,35 @@ def test_prose_modules_do_not_count(
         monkeypatch.setattr(module, "_PACKAGE", package_with(tmp_path / str(number), **modules))
         digests.append(module._own_digest.__wrapped__())
     assert (digests[0] != digests[1]) == counts
+
+
+def test_sources_are_parsed_once_for_each_of_their_states(
+    tmp_path: Path, own_cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    parsed: list[bytes] = []
+    monkeypatch.setattr(module, "_PACKAGE", package_with(tmp_path))
+    monkeypatch.setattr(module, "code_digest", lambda source: parsed.append(source) or code_digest(source))
+    digest = module._own_digest.__wrapped__()
+    assert len(parsed) == 1 + len(module._FILES)
+    assert module._own_digest.__wrapped__() == digest
+    assert len(parsed) == 1 + len(module._FILES)
+    (tmp_path / "diagnosis" / "scan.py").write_text("LEVEL = 2")
+    assert module._own_digest.__wrapped__() != digest
+    # as many bytes at the same time of day: the content counts
+    (tmp_path / "diagnosis" / "scan.py").write_text("LEVEL = 1")
+    assert module._own_digest.__wrapped__() == digest
+    (remembered,) = (own_cache / "ddagr-gym").iterdir()
+    for damage in ("", "no digest", "\x00"):
+        remembered.write_text(damage)
+        assert module._own_digest.__wrapped__() == digest
+
+
+def test_without_a_cache_folder_the_digest_is_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "_PACKAGE", package_with(tmp_path))
+    digest = module._own_digest.__wrapped__()
+    (tmp_path / "a_file").write_text("")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "a_file"))
+    assert module._own_digest.__wrapped__() == digest
 
 
 def test_prose_modules_are_there() -> None:
