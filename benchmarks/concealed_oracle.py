@@ -27,10 +27,11 @@ from benchmarks.ablations.examine import ROBOT, SOIL, read_runs
 from benchmarks.concealed_truth import Sizes, detectable
 from benchmarks.score_concealed import RESULT, figure_line, mean, read_equivalents, right
 from ddagr_gym.diagnosis.certification.certificate import LEAST_EXPLAINABLE
-from ddagr_gym.diagnosis.certification.certify import certify
+from ddagr_gym.diagnosis.certification.certify import certify_models
 from ddagr_gym.diagnosis.gates.threshold_files import default_thresholds
 from ddagr_gym.diagnosis.gates.thresholds import Gate, Thresholds
 from ddagr_gym.diagnosis.preprocessing.session import prepare
+from ddagr_gym.diagnosis.result.files import plain
 from ddagr_gym.diagnosis.search.rivals import rivals_of
 from ddagr_gym.diagnosis.search.scanned_model import scan_model
 from ddagr_gym.diagnosis.search.starting_models import StartingModels, starting_models
@@ -82,8 +83,7 @@ def oracle(folder: Path, names: Sequence[str]) -> dict[str, Any] | None:
     fitted = fit_named_effects(first, names)
     if fitted is None:
         return None
-    session, rng = first.session, np.random.default_rng(0)
-    return certify(session.problem, first.refitted, fitted, robot, session.mended.recordings, rng)
+    return plain(certify_models(first.session, first.refitted, fitted, np.random.default_rng(0)))
 
 
 def gain(fit: Mapping[str, Any] | None, name: str) -> Mapping[str, Any] | None:

@@ -5,45 +5,30 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.diagnosis.answer.evidence import NAME, Evidence
-from ddagr_gym.diagnosis.gates.thresholds import Thresholds
-from ddagr_gym.diagnosis.localisation.effect_timeline import (
-    as_it_stands,
-    in_blocks,
-    piece_length,
-    pieces_of,
-    projected_residual,
-    score_processes,
-)
-from ddagr_gym.diagnosis.localisation.localise import piece_values
-from ddagr_gym.diagnosis.localisation.residual_wrench import residual_wrench
+from ddagr_gym.diagnosis.answer.evidence import Evidence
+from ddagr_gym.diagnosis.localisation.effect_timeline import piece_length, pieces_of
+from ddagr_gym.diagnosis.localisation.mismatch_traces import MismatchTraces
+from ddagr_gym.diagnosis.preprocessing.session import DiagnosisSession
 from ddagr_gym.diagnosis.search.scanned_model import SearchResult
-from ddagr_gym.identification.gauss_newton import Fitted
 from ddagr_gym.identification.problem import Problem
-
-__all__ = ["NAME", "Evidence", "gather_evidence"]
 
 Array = NDArray[np.float64]
 
 
-def gather_evidence(problem: Problem, found: SearchResult, thresholds: Thresholds | None = None) -> Evidence:
-    """Collect what the page draws; a handful of simulations.
+def gather_evidence(session: DiagnosisSession, found: SearchResult, traces: MismatchTraces) -> Evidence:
+    """Collect what the page draws.
 
     Args:
-        problem: windows and model.
+        session: of the diagnosis.
         found: of the search.
-        thresholds: whose gates end the null band; without them it is not drawn.
+        traces: of its models along the drives.
     """
-    windows, chosen = problem.blocked.windows, found.chosen.fitted
-    pieces = piece_values(problem, chosen)
+    problem, chosen, pieces, processes = session.problem, found.chosen.fitted, traces.pieces, traces.processes
+    windows = problem.blocked.windows
     shape = (windows.count, int(pieces_of(problem)[-1]) + 1)
-    processes = score_processes(problem, chosen)
-    raw = as_it_stands(problem, found.nominal.fitted)
-    wrench = residual_wrench(problem, raw, chosen, found.chosen.dispersion)
     measured = _means(problem, np.nan_to_num(windows.measured))
     gains = {item.name: item.gain for item in found.nominal.gains}
     left = {item.name: item.gain for item in found.chosen.gains}
-    gates = [np.nan if thresholds is None else thresholds.of(name).gain for name in gains]
 
     def stacked(field: str) -> Array:
         return np.array([getattr(item, field) for item in processes]).reshape(len(processes), *shape)
@@ -55,14 +40,14 @@ def gather_evidence(problem: Problem, found: SearchResult, thresholds: Threshold
         windows.time,
         _means(problem, chosen.prediction)[..., 5:8],
         np.where(np.isfinite(problem.blocked.sigma), measured, np.nan),
-        _shown(problem, raw, measured),
-        _shown(problem, found.nominal.fitted, measured),
-        _shown(problem, chosen, measured),
+        _shown(problem, traces.raw, measured),
+        _shown(problem, traces.nominal, measured),
+        _shown(problem, traces.chosen, measured),
         problem.blocked.sigma,
         tuple(gains),
         np.array(list(gains.values())),
         np.array([left.get(name, np.nan) for name in gains]),
-        np.array(gates),
+        np.array([session.gates.of(name).gain for name in gains]),
         tuple(pieces.values),
         np.array([item.reshape(shape) for item in pieces.values.values()]),
         np.stack([pieces.x.reshape(shape), pieces.y.reshape(shape)], axis=2),
@@ -70,9 +55,9 @@ def gather_evidence(problem: Problem, found: SearchResult, thresholds: Threshold
         stacked("score"),
         stacked("information"),
         stacked("gain"),
-        wrench.before,
-        wrench.after,
-        wrench.deviation,
+        traces.wrench.before,
+        traces.wrench.after,
+        traces.wrench.deviation,
     )
 
 
@@ -85,8 +70,7 @@ def _means(problem: Problem, values: Array) -> Array:
     return np.asarray((np.where(weights.sum(axis=2, keepdims=True) > 0.0, weights, plain) * kept).sum(axis=2))
 
 
-def _shown(problem: Problem, fitted: Fitted, measured: Array) -> Array:
+def _shown(problem: Problem, residual: Array, measured: Array) -> Array:
     """What a model says at the best of what is unknown in each window: measured less the projected residual."""
-    residual = in_blocks(problem, projected_residual(problem, fitted))
     known = np.isfinite(problem.blocked.sigma)
     return np.where(known, measured - np.where(known, problem.blocked.sigma, 0.0) * residual, np.nan)

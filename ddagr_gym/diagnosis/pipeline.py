@@ -12,17 +12,15 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import ParamSpec, TypeVar
 
-from ddagr_gym.diagnosis.answer.certificate import Certificate
-from ddagr_gym.diagnosis.answer.next_drive_plan import NextDrivePlan
-from ddagr_gym.diagnosis.answer.unnamed_terms import UnnamedTerms
+from ddagr_gym.diagnosis.answer.evidence import Evidence
 from ddagr_gym.diagnosis.answer.verdict import Diagnosis, Options
-from ddagr_gym.diagnosis.certification.certificate import of_mended_readings
 from ddagr_gym.diagnosis.certification.certify import certify
-from ddagr_gym.diagnosis.evidence import Evidence, gather_evidence
+from ddagr_gym.diagnosis.evidence import gather_evidence
 from ddagr_gym.diagnosis.gates.thresholds import Thresholds
 from ddagr_gym.diagnosis.localisation.localise import locate
+from ddagr_gym.diagnosis.localisation.mismatch_traces import trace_mismatch
 from ddagr_gym.diagnosis.localisation.repeat_spans import where_readings_repeat
-from ddagr_gym.diagnosis.planning.next_drive import next_drive, rivals_of_diagnosis, sensors_of_diagnosis
+from ddagr_gym.diagnosis.planning.next_drive import plan_next_drive
 from ddagr_gym.diagnosis.preprocessing.data_checks import data_doubts
 from ddagr_gym.diagnosis.preprocessing.session import DiagnosisSession, Progress, be_silent, prepare
 from ddagr_gym.diagnosis.result.conclusion import accept, conclude
@@ -33,7 +31,6 @@ from ddagr_gym.diagnosis.search.stepwise import search
 from ddagr_gym.diagnosis.setting import Setting
 from ddagr_gym.diagnosis.store import StepStore
 from ddagr_gym.diagnosis.unnamed.terms import unnamed_terms
-from ddagr_gym.errors import InputError
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.recordings.schema import Recording
@@ -91,10 +88,14 @@ class Steps:
         """Say that a step begins."""
         self.on_step(name, self.store.has(name))
 
-    def run(self, name: str, stage: Callable[Inputs, Result], *inputs: Inputs.args, **named: Inputs.kwargs) -> Result:
+    def keep(self, name: str, stage: Callable[Inputs, Result], *inputs: Inputs.args, **named: Inputs.kwargs) -> Result:
         """Result of a stage: the kept one, or that of ``stage(*inputs, **named)``, which is kept."""
-        self.begin(name)
         return self.store.step(name, lambda: stage(*inputs, **named))
+
+    def run(self, name: str, stage: Callable[Inputs, Result], *inputs: Inputs.args, **named: Inputs.kwargs) -> Result:
+        """The same for a step that is a single stage: says that it begins."""
+        self.begin(name)
+        return self.keep(name, stage, *inputs, **named)
 
 
 def steps_of(names_only: bool) -> tuple[str, ...]:
@@ -144,16 +145,18 @@ def diagnose(
     steps.begin("search")
     start = starting_models(session, steps.store.step)
     session = start.session
-    found = steps.store.step("search", lambda: search(session, start, steps.store.step))
+    found = steps.keep("search", search, session, start, steps.store.step)
     accepted = accept(found, session.gates)
     diagnosis, effects = steps.run("verdict", conclude, session, found, accepted)
-    fit = None if names_only else steps.run("certification", _certify, session, accepted)
-    located = steps.run("localisation", locate, session.problem, accepted, session.gates.misfit, session.seed)
+    fit = None if names_only else steps.run("certification", certify, session, accepted)
+    steps.begin("localisation")
+    traces = steps.keep("localisation traces", trace_mismatch, session, accepted)
+    located = steps.keep("localisation", locate, session, accepted, traces)
     repeats = where_readings_repeat(session.mended.given, session.mended.repeated)
     diagnosis = review(diagnosis, located, repeats, fit, checks)
-    unnamed = None if names_only else steps.run("unnamed terms", _unnamed, session, accepted, diagnosis)
-    following = None if names_only else steps.run("next drive", _next_drive, session, diagnosis)
-    evidence = steps.run("evidence", gather_evidence, session.problem, accepted, session.gates)
+    unnamed = None if names_only else steps.run("unnamed terms", unnamed_terms, session, accepted, diagnosis)
+    following = None if names_only else steps.run("next drive", plan_next_drive, session, diagnosis)
+    evidence = steps.run("evidence", gather_evidence, session, accepted, traces)
     diagnosis = replace(
         diagnosis,
         fit=fit,
@@ -167,43 +170,6 @@ def diagnose(
         seconds=time.monotonic() - began,
     )
     return Outcome(diagnosis, effects, session, accepted, evidence)
-
-
-def _certify(session: DiagnosisSession, found: SearchResult) -> Certificate:
-    """Errors of the models; one that names nothing has no corrected model of its own."""
-    fit = certify(
-        session.problem,
-        found.nominal.fitted,
-        found.chosen.fitted,
-        session.robot,
-        session.mended.recordings,
-        session.rng("certification"),
-        session.progress,
-    )
-    return of_mended_readings(fit, named=bool(found.chosen.names)) if session.mended.names else fit
-
-
-def _unnamed(session: DiagnosisSession, found: SearchResult, diagnosis: Diagnosis) -> UnnamedTerms | None:
-    """Terms without a name, where names do not explain everything."""
-    if diagnosis.complete:
-        return None
-    return unnamed_terms(session.problem, found.chosen, session.rng("unnamed terms"))
-
-
-def _next_drive(session: DiagnosisSession, diagnosis: Diagnosis) -> NextDrivePlan:
-    """The drive that would separate the explanations that are left; without one, why there is none."""
-    try:
-        return next_drive(
-            session.robot,
-            session.soil,
-            rivals_of_diagnosis(diagnosis),
-            sensors=sensors_of_diagnosis(diagnosis),
-            seed=session.seed,
-            setting=session.setting,
-            progress=session.progress,
-        )
-    except InputError as error:
-        return NextDrivePlan.none(str(error))
 
 
 def _options(session: DiagnosisSession, names_only: bool, robot_file: str) -> Options:

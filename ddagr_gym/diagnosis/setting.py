@@ -10,7 +10,7 @@ import numpy as np
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.block_means import BLOCK, block_windows, located
 from ddagr_gym.identification.headings import without_poses
-from ddagr_gym.identification.noise import ChannelNoise, noise_from_differences
+from ddagr_gym.identification.noise import noise_from_differences
 from ddagr_gym.identification.nuisances import NuisancePriors, nuisances
 from ddagr_gym.identification.problem import Problem
 from ddagr_gym.identification.windows import cut_windows
@@ -79,7 +79,6 @@ def make_problem(
     soil: Soil,
     recordings: Sequence[Recording],
     setting: Setting = Setting(),
-    noise: Sequence[ChannelNoise | None] | None = None,
 ) -> Problem:
     """Windows of recordings with their noise, and what is uncertain about them.
 
@@ -88,7 +87,6 @@ def make_problem(
         soil: nominal.
         recordings: of one robot and period.
         setting: choices.
-        noise: of the channels, where it is known; estimated by default.
 
     Raises:
         InputError: see :func:`ddagr_gym.identification.windows.cut_windows`.
@@ -103,8 +101,8 @@ def make_problem(
         half_track=robot.half_track,
         history=HISTORY,
     )
-    found = noise_from_differences(recordings, radius) if noise is None else noise
-    blocked = block_windows(located(windows, recordings, radius), found, radius, setting.block)
+    noise = noise_from_differences(recordings, radius)
+    blocked = block_windows(located(windows, recordings, radius), noise, radius, setting.block)
     reckoned = without_poses(recordings)
     # where none has poses the first one begins along the world's x axis
     unplaced = reckoned[1:] if len(reckoned) == len(recordings) else reckoned

@@ -42,6 +42,9 @@ _LEAST_CURVATURE = 1e-30
 _RIDGE = 1e-9
 """Added to the correlation matrix of the parameters, so that rounding cannot make it singular; far below any prior."""
 
+_LEAST_INFORMATION = 1e-12
+"""Of a parameter, before a relative ridge is taken of it."""
+
 _OPEN = 1e-12
 """Half the width of the interval of a parameter that is held, in standard deviations: the solver refuses empty ones."""
 
@@ -147,6 +150,21 @@ class Linearised:
         covariance = np.linalg.inv(self.information)
         scores = np.einsum("wmp,wm->wp", self.sensitivity, self.residual) @ covariance
         return np.sqrt(np.diag(covariance)), np.sqrt((scores**2).sum(axis=0))
+
+
+def explained_by(inner: Array, precision: Array, right: Array, ridge: float = 0.0) -> Array:
+    """Changes of parameters that explain columns best: the minimum of (1) without bounds, one column at a time.
+
+    Args:
+        inner: (P, P) inner products of the parameters' sensitivities.
+        precision: (P,) s^-2.
+        right: (P,) or (P, N) inner products of these sensitivities with the columns.
+        ridge: added to the information, relative to it, where parameters without a prior may say the same.
+    """
+    information = inner + np.diag(precision)
+    if ridge > 0.0:
+        information = information + np.diag(ridge * np.maximum(np.diag(information), _LEAST_INFORMATION))
+    return np.asarray(np.linalg.solve(information, right), dtype=np.float64)
 
 
 def huber_loss(residual: Array, limit: Array | float) -> Array:

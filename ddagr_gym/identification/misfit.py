@@ -1,4 +1,4 @@
-"""What a model leaves of each channel, in units of its noise."""
+"""What a model leaves of the readings and of each channel, in units of the noise."""
 
 from __future__ import annotations
 
@@ -26,6 +26,13 @@ def channel_misfit(problem: Problem, fitted: Fitted) -> dict[str, float]:
     local = (residual[:, rows + len(STATE) :, 0] ** 2).mean(axis=0)
     names = [unknown.name for unknown in problem.nuisances.local]
     return found | {name: float(value) for name, value in zip(names, local, strict=True)}
+
+
+def dispersion_of(problem: Problem, fitted: Fitted) -> float:
+    """Mean square of the weighted residuals of the fit, at least 1 (theory: diagnosis, eq. (1))."""
+    unknowns: int = fitted.elimination.basis.shape[2] * problem.blocked.windows.count
+    count = float(problem.blocked.mask.sum()) - unknowns - float(problem.free.sum())
+    return max(2.0 * float(fitted.window_cost.sum()) / max(count, 1.0), 1.0)
 
 
 def roughest(misfit: dict[str, float], limits: dict[str, float]) -> tuple[str, float]:

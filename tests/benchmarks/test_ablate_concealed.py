@@ -35,7 +35,7 @@ from ddagr_gym.diagnosis.preprocessing.mended_recordings import MendedRecordings
 from ddagr_gym.diagnosis.preprocessing.repeated_readings import RepeatedReadings
 from ddagr_gym.diagnosis.preprocessing.reversed_gyro import ReversedGyro
 from ddagr_gym.diagnosis.search.candidates import candidates_of
-from ddagr_gym.diagnosis.search.scan import Gain
+from ddagr_gym.diagnosis.search.gains import Gain
 from ddagr_gym.diagnosis.search.scanned_model import scan_model
 from ddagr_gym.diagnosis.setting import Setting, make_problem
 from ddagr_gym.errors import InputError

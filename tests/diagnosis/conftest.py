@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from ddagr_gym.diagnosis.answer.certificate import Certificate
-from ddagr_gym.diagnosis.certification.certify import certify
+from ddagr_gym.diagnosis.certification.certify import certify_models
 from ddagr_gym.diagnosis.gates.thresholds import Thresholds
 from ddagr_gym.diagnosis.preprocessing.mended_recordings import MendedRecordings
 from ddagr_gym.diagnosis.preprocessing.session import DiagnosisSession
@@ -77,10 +77,15 @@ class Sloping:
     certificate: Certificate
 
 
-def session_of(problem: Problem, recordings: Sequence[Recording], gates: Thresholds) -> DiagnosisSession:
+NO_GATES = Thresholds({}, {}, 20, "a test")
+
+
+def session_of(
+    problem: Problem, recordings: Sequence[Recording] = (), gates: Thresholds = NO_GATES, seed: int = 0
+) -> DiagnosisSession:
     """Session of a problem that is made already, with gates that hold for any length."""
     mended = MendedRecordings(tuple(recordings), tuple(recordings))
-    return DiagnosisSession(get_robot("ddagr"), get_soil("thesis_a1"), mended, Setting(), problem, gates, gates)
+    return DiagnosisSession(get_robot("ddagr"), get_soil("thesis_a1"), mended, Setting(), problem, gates, gates, seed)
 
 
 SLOPE = "slope=0.06,direction=0.8"
@@ -94,7 +99,6 @@ def sloping(drive: Callable[..., Recording], problem_of: Callable[..., Problem])
     nominal = fit(problem, iterations=2, renewals=1)
     start = replace(nominal.point, effects=load_effects("slope=0.05,direction=0.7"))
     chosen = fit(problem, start, iterations=15, renewals=5, first=nominal)
-    rng = np.random.default_rng(0)
-    return Sloping(
-        recordings, problem, nominal, chosen, certify(problem, nominal, chosen, get_robot("ddagr"), recordings, rng)
-    )
+    session = session_of(problem, recordings)
+    certificate = certify_models(session, nominal, chosen, np.random.default_rng(0))
+    return Sloping(recordings, problem, nominal, chosen, certificate)

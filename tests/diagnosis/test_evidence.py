@@ -5,15 +5,18 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from ddagr_gym.diagnosis.evidence import Evidence, gather_evidence
+from ddagr_gym.diagnosis.answer.evidence import Evidence
+from ddagr_gym.diagnosis.evidence import gather_evidence
 from ddagr_gym.diagnosis.gates.thresholds import Gate, Thresholds
-from ddagr_gym.diagnosis.search.scan import Gain, dispersion_of
+from ddagr_gym.diagnosis.localisation.mismatch_traces import trace_mismatch
+from ddagr_gym.diagnosis.search.gains import Gain
 from ddagr_gym.diagnosis.search.scanned_model import ScannedModel, SearchResult
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.gauss_newton import fit
-from ddagr_gym.identification.misfit import channel_misfit
+from ddagr_gym.identification.misfit import channel_misfit, dispersion_of
 from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.physics.effects.registry import parse_effect
+from tests.diagnosis.conftest import session_of
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +33,8 @@ def gathered(drive, problem_of):
     gains = (Gain(0, "gyro_scale", 50.0, (1.0,)), Gain(1, "slope", 2.0, (1.0,)))
     found = SearchResult((scanned(nominal, gains), scanned(chosen, (Gain(1, "slope", 1.5, (1.0,)),))), ())
     thresholds = Thresholds({"gyro_scale": Gate(5.0, 0.0), "slope": Gate(7.0, 0.0)}, {}, 20, "bank")
-    return problem, found, gather_evidence(problem, found, thresholds)
+    session = session_of(problem, gates=thresholds)
+    return problem, found, gather_evidence(session, found, trace_mismatch(session, found))
 
 
 def test_shown_residuals_have_the_misfit_of_the_models(gathered):

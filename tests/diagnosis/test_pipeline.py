@@ -36,10 +36,11 @@ STAGES: dict[str, Any] = {
     "data_doubts": (),
     "search": "what was found",
     "conclude": (ANSWER, ()),
-    "_certify": Certificate("by recording", "", (), 0.9, {}, {}, {}, {}, {}),
+    "certify": Certificate("by recording", "", (), 0.9, {}, {}, {}, {}, {}),
+    "trace_mismatch": "traces",
     "locate": LOCATED,
-    "_unnamed": UnnamedTerms("", (), 0.0, 0.0, ""),
-    "_next_drive": NextDrivePlan.none("nothing is left open"),
+    "unnamed_terms": UnnamedTerms("", (), 0.0, 0.0, ""),
+    "plan_next_drive": NextDrivePlan.none("nothing is left open"),
     "gather_evidence": "arrays",
 }
 """Stages by the name that the pipeline calls them by, and what they give here."""
@@ -93,7 +94,7 @@ def test_every_stage_is_called_once_in_its_order(stages: Stages) -> None:
     assert stages.called == ["prepare", first, "starting_models", *later]
     diagnosis = outcome.diagnosis
     assert (diagnosis.robot, diagnosis.soil, diagnosis.options.seed) == ("ddagr", "loam", 3)
-    assert (diagnosis.fit, diagnosis.unnamed) == (STAGES["_certify"], STAGES["_unnamed"])
+    assert (diagnosis.fit, diagnosis.unnamed) == (STAGES["certify"], STAGES["unnamed_terms"])
     assert diagnosis.localisation.mismatch.time_share == 0.0
 
 
@@ -111,6 +112,7 @@ def test_a_stopped_diagnosis_goes_on_behind_its_last_step(stages: Stages, tmp_pa
     _, began = stages.run(cache=tmp_path / "steps")
     kept = [name for name, was_kept in began if was_kept]
     assert kept == ["checks", "search", "verdict", "certification"]
-    assert stages.called == ["prepare", "starting_models", "locate", "_unnamed", "_next_drive", "gather_evidence"]
+    later = ["locate", "unnamed_terms", "plan_next_drive", "gather_evidence"]
+    assert stages.called == ["prepare", "starting_models", *later]
     stages.run(cache=tmp_path / "steps")
     assert stages.called == ["prepare", "starting_models"]

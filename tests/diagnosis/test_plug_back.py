@@ -48,7 +48,7 @@ def test_predictions_with_the_file_are_as_good_as_certified(sloping: Sloping, ef
     problem = sloping.problem
     own = np.array([p.scope is not None for p in problem.nuisances.parameters])
     values = np.where(own, 0.0, sloping.chosen.point.values)
-    forecasts = cut_forecasts(problem, get_robot("ddagr"), sloping.recordings, 5.0, 2.0)
+    forecasts = cut_forecasts(problem, sloping.recordings, 5.0, 2.0)
     assert forecasts is not None
     point = Point(values, sloping.chosen.point.states, load_effects(effects_file))
     states = start_states(forecasts, point, past_elimination(forecasts, point))

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ddagr_gym.diagnosis.search.scan import gains, scan
+from ddagr_gym.diagnosis.search.gains import gains
+from ddagr_gym.diagnosis.search.scan import scan
 from ddagr_gym.diagnosis.search.scanned_model import ScannedModel, SearchResult
 from ddagr_gym.diagnosis.store import StepStore
 from ddagr_gym.errors import InputError

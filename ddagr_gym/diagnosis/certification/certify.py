@@ -21,7 +21,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.diagnosis.answer.certificate import Certificate, Folds
-from ddagr_gym.diagnosis.certification.certificate import BY_RECORDING, BY_TIME, HORIZONS, Errors, certificate
+from ddagr_gym.diagnosis.certification.certificate import (
+    BY_RECORDING,
+    BY_TIME,
+    HORIZONS,
+    Errors,
+    certificate,
+    of_mended_readings,
+)
 from ddagr_gym.diagnosis.certification.forecast import (
     PAST,
     Forecasts,
@@ -32,10 +39,11 @@ from ddagr_gym.diagnosis.certification.forecast import (
     start_states,
 )
 from ddagr_gym.diagnosis.certification.residual_model import ResidualModel, Rollout, corrected, fit_residual_model
+from ddagr_gym.diagnosis.preprocessing.session import DiagnosisSession
+from ddagr_gym.diagnosis.search.scanned_model import SearchResult
 from ddagr_gym.identification.gauss_newton import Fitted, fit
 from ddagr_gym.identification.least_squares import Elimination
 from ddagr_gym.identification.problem import Point, Problem
-from ddagr_gym.parameters import Robot
 from ddagr_gym.recordings.schema import Recording
 
 Array = NDArray[np.float64]
@@ -140,30 +148,31 @@ class Arm:
     learnt: str = ""
 
 
-def certify(
-    problem: Problem,
-    nominal: Fitted,
-    chosen: Fitted,
-    robot: Robot,
-    recordings: Sequence[Recording],
-    rng: np.random.Generator,
-    progress: Callable[[str], None] = lambda text: None,
-) -> Certificate:
-    """Errors of the models at the horizons.
+def certify(session: DiagnosisSession, found: SearchResult) -> Certificate:
+    """Errors of the models of a search; one that names nothing has no corrected model of its own.
 
     Args:
-        problem: of all windows.
+        session: of the diagnosis.
+        found: of the search, without names that were not accepted.
+    """
+    fit = certify_models(session, found.nominal.fitted, found.chosen.fitted, session.rng("certification"))
+    return of_mended_readings(fit, named=bool(found.chosen.names)) if session.mended.names else fit
+
+
+def certify_models(session: DiagnosisSession, nominal: Fitted, chosen: Fitted, rng: np.random.Generator) -> Certificate:
+    """Errors of two models at the horizons.
+
+    Args:
+        session: whose recordings are predicted.
         nominal: the refitted nominal model.
         chosen: the model with the named effects; the nominal one where there are none.
-        robot: nominal.
-        recordings: as the problem has them.
         rng: of the resampling and the forest.
-        progress: called with each step.
     """
+    problem, progress = session.problem, session.progress
     rule, folds = folds_of(problem)
     progress("certification: sizes from the other drives")
     arms = _arms(problem, nominal, chosen, folds)
-    sets = _forecast_sets(problem, robot, recordings)
+    sets = _forecast_sets(problem, session.mended.recordings)
     seed = int(rng.integers(2**31))
     learnt: Learnt = {}
     found: dict[float, Errors] = {}
@@ -189,17 +198,15 @@ def _arms(problem: Problem, nominal: Fitted, chosen: Fitted, folds: Sequence[Fol
     return arms
 
 
-def _forecast_sets(
-    problem: Problem, robot: Robot, recordings: Sequence[Recording]
-) -> list[tuple[Forecasts, tuple[float, ...]]]:
+def _forecast_sets(problem: Problem, recordings: Sequence[Recording]) -> list[tuple[Forecasts, tuple[float, ...]]]:
     """Forecasts that serve several horizons: short ones often, the longest seldom; those that fit into the drives."""
-    short = cut_forecasts(problem, robot, recordings, HORIZONS[1], STRIDE)
+    short = cut_forecasts(problem, recordings, HORIZONS[1], STRIDE)
     served: list[tuple[Forecasts, tuple[float, ...]]] = []
     if short is None:
-        short = cut_forecasts(problem, robot, recordings, HORIZONS[0], STRIDE)
+        short = cut_forecasts(problem, recordings, HORIZONS[0], STRIDE)
         return served if short is None else [(short, HORIZONS[:1])]
     served.append((short, HORIZONS[:2]))
-    long = cut_forecasts(problem, robot, recordings, HORIZONS[2], 2.5 * STRIDE, most=60)
+    long = cut_forecasts(problem, recordings, HORIZONS[2], 2.5 * STRIDE, most=60)
     return served if long is None else [*served, (long, HORIZONS[2:])]
 
 

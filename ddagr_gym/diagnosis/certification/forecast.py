@@ -21,7 +21,6 @@ from ddagr_gym.identification.least_squares import Elimination
 from ddagr_gym.identification.noise import noise_from_differences
 from ddagr_gym.identification.problem import Point, Problem
 from ddagr_gym.identification.windows import CHANNELS, STATE, WindowSet, cut_windows
-from ddagr_gym.parameters import Robot
 from ddagr_gym.physics import layout
 from ddagr_gym.recordings.schema import CHANNELS as SCHEMA
 from ddagr_gym.recordings.schema import Recording, RobotGeometry
@@ -93,19 +92,18 @@ def part_of(windows: WindowSet, first: int, samples: int) -> WindowSet:
 
 
 def cut_forecasts(
-    problem: Problem, robot: Robot, recordings: Sequence[Recording], horizon: float, stride: float, most: int = 240
+    problem: Problem, recordings: Sequence[Recording], horizon: float, stride: float, most: int = 240
 ) -> Forecasts | None:
     """Forecasts of one horizon, every ``stride`` seconds but at most ``most``; None where no drive is long enough.
 
     Args:
         problem: whose model and uncertainties are used.
-        robot: nominal.
         recordings: those of the problem, in its order.
         horizon: [s].
         stride: between starts [s].
         most: forecasts, evenly chosen.
     """
-    shape = RobotGeometry.of(robot)
+    shape = RobotGeometry.of(problem.robot)
     try:
         whole = cut_windows(
             recordings, PAST + horizon, stride=stride, wheel_radius=shape.wheel_radius,

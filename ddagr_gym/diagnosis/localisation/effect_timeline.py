@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ddagr_gym.diagnosis.answer.location import Span
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.gauss_newton import Fitted
+from ddagr_gym.identification.least_squares import explained_by
 from ddagr_gym.identification.problem import Problem
 
 Array = NDArray[np.float64]
@@ -146,10 +147,10 @@ def _without_nuisances(problem: Problem, fitted: Fitted) -> Callable[[Array], Ar
     """Function that takes from a column (W, M + S), projected already, what the nuisances explain of it."""
     free = np.flatnonzero(problem.free)
     columns = fitted.elimination.project(problem.padded(fitted.by_parameter[..., free]))
-    inside = np.einsum("wmp,wmq->pq", columns, columns, optimize=True) + np.diag(1.0 / problem.prior[free] ** 2)
+    inner, precision = np.einsum("wmp,wmq->pq", columns, columns, optimize=True), 1.0 / problem.prior[free] ** 2
 
     def without(own: Array) -> Array:
-        change = np.linalg.solve(inside, np.einsum("wmp,wm->p", columns, own))
+        change = explained_by(inner, precision, np.einsum("wmp,wm->p", columns, own))
         return np.asarray(own - columns @ change)
 
     return without

@@ -17,27 +17,22 @@ from ddagr_gym.diagnosis.answer.location import (
 )
 from ddagr_gym.diagnosis.localisation.effect_timeline import (
     ScoreProcess,
-    as_it_stands,
     by_piece,
-    in_blocks,
     piece_length,
     pieces_of,
-    projected_residual,
-    score_processes,
     spans,
     time_share,
 )
+from ddagr_gym.diagnosis.localisation.mismatch_traces import MismatchTraces
 from ddagr_gym.diagnosis.localisation.operating_condition_words import phrase_of, uneven_phrase
 from ddagr_gym.diagnosis.localisation.operating_conditions import Pieces, shares, uneven
-from ddagr_gym.diagnosis.localisation.residual_wrench import COMPONENTS, residual_wrench
+from ddagr_gym.diagnosis.localisation.residual_wrench import COMPONENTS, ResidualWrench
+from ddagr_gym.diagnosis.preprocessing.session import DiagnosisSession
 from ddagr_gym.diagnosis.search.scanned_model import SearchResult
-from ddagr_gym.frames import wrap_angle
-from ddagr_gym.identification.gauss_newton import Fitted
 from ddagr_gym.identification.misfit import explained_share
 from ddagr_gym.identification.nuisances import LOCAL
 from ddagr_gym.identification.problem import Problem
 from ddagr_gym.identification.windows import CHANNELS
-from ddagr_gym.physics import layout
 from ddagr_gym.physics.effects import Effect
 
 Array = NDArray[np.float64]
@@ -51,36 +46,31 @@ percent of the squares away, and noise is known to about as much)."""
 
 _PLACE = ("centre_x", "centre_y", "radius")
 
-_RECORDED = (*range(layout.SLIP_RATIO, layout.SLIP_RATIO + 4), layout.YAW_RATE, layout.V_X, layout.YAW)
 
-
-def locate(problem: Problem, found: SearchResult, limits: Mapping[str, float], seed: int = 0) -> Localisation:
+def locate(session: DiagnosisSession, found: SearchResult, traces: MismatchTraces) -> Localisation:
     """Locate what a search found, and what it left.
 
     Args:
-        problem: windows and model.
+        session: of the diagnosis.
         found: of the search; nominal and chosen model may be the same.
-        limits: of the channels' misfit, of the null bank.
-        seed: of the diagnosis.
+        traces: of its models along the drives.
     """
-    nominal, chosen = found.nominal, found.chosen
+    problem, pieces, seed, nominal, chosen = session.problem, traces.pieces, session.seed, found.nominal, found.chosen
     channels = channel_shares(nominal.misfit, chosen.misfit, samples(problem))
-    pieces = piece_values(problem, chosen.fitted)
-    processes = score_processes(problem, chosen.fitted)
     located = {
         process.name: _where(problem, process, effect, pieces, chosen.dispersion, seed)
-        for process, effect in zip(processes, chosen.fitted.point.effects, strict=True)
+        for process, effect in zip(traces.processes, chosen.fitted.point.effects, strict=True)
     }
-    before, after = (in_blocks(problem, projected_residual(problem, model.fitted)) ** 2 for model in (nominal, chosen))
+    before, after = traces.nominal**2, traces.chosen**2
     return Localisation(
         channels,
-        explained_share(nominal.misfit, chosen.misfit, limits),
+        explained_share(nominal.misfit, chosen.misfit, session.gates.misfit),
         _lying(by_piece(before - after, pieces_of(problem)).ravel(), pieces, seed)
         if located
         else _mismatch(problem, before, rough(nominal.misfit), pieces, seed),
         _mismatch(problem, after, rough(chosen.misfit), pieces, seed),
         located,
-        _wrench(problem, found),
+        _summaries(traces.wrench),
     )
 
 
@@ -114,52 +104,6 @@ def channel_shares(
     total = sum(above.values())
     share = {name: above[name] / total if total > 0.0 else 0.0 for name in nominal}
     return {name: ChannelShare(nominal[name], chosen[name], floors[name], share[name]) for name in nominal}
-
-
-def piece_values(problem: Problem, fitted: Fitted) -> Pieces:
-    """What the robot did in each piece of each window, (W * Q,), by the fitted model; one simulation."""
-    windows, pieces = problem.blocked.windows, pieces_of(problem)
-    prediction, record = problem.model.predict_recorded(
-        fitted.point.values, fitted.point.states, _RECORDED, fitted.point.effects
-    )
-    length = problem.blocked.weights.shape[2]
-    sample_piece = np.repeat(pieces, length)
-    kept = len(sample_piece)
-
-    def mean(values: Array) -> Array:
-        return by_piece(values[:, :kept], sample_piece) / np.bincount(sample_piece)
-
-    heading = np.arctan2(mean(np.sin(record[..., 6])), mean(np.cos(record[..., 6])))
-    commands = windows.commands[:, windows.history : windows.history + kept]
-    start = windows.time[:, None] + piece_length(problem) * np.arange(int(pieces[-1]) + 1)
-    values = {
-        "speed": mean(record[..., 5]),
-        "slip": mean(np.abs(record[..., :4]).mean(axis=-1)),
-        "turning": mean(np.abs(record[..., 4])),
-        "yaw_rate": mean(record[..., 4]),
-        "heading": wrap_angle(heading),
-        "command": mean(np.abs(commands).max(axis=2)),
-        "command_change": _command_change(problem, sample_piece),
-        "time": start,
-    }
-    shape = values["speed"].shape
-    recording = np.repeat(windows.recording[:, None], shape[1], axis=1).ravel()
-    x, y = mean(prediction[..., 5]), mean(prediction[..., 6])
-    return Pieces(recording, {name: item.ravel() for name, item in values.items()}, x.ravel(), y.ravel())
-
-
-def _command_change(problem: Problem, sample_piece: NDArray[np.int64]) -> Array:
-    """(W, Q) largest less smallest command of either bank in each piece and the one before [rad/s]."""
-    windows = problem.blocked.windows
-    count = int(sample_piece[-1]) + 1
-    first = windows.history + np.searchsorted(sample_piece, np.arange(count))
-    last = windows.history + np.searchsorted(sample_piece, np.arange(count), side="right")
-    length = int(np.bincount(sample_piece)[0])
-    ranges = [
-        np.ptp(windows.commands[:, max(a - length, 0) : b], axis=1).max(axis=1)
-        for a, b in zip(first.tolist(), last.tolist(), strict=True)
-    ]
-    return np.stack(ranges, axis=1)
 
 
 def _where(
@@ -217,9 +161,8 @@ def _lying(weight: Array, pieces: Pieces, seed: int) -> EffectLocation:
     return EffectLocation((), 0.0, lying, _standing_place(lying), None, phrase_of(lying))
 
 
-def _wrench(problem: Problem, found: SearchResult) -> tuple[WrenchSummary, ...]:
-    raw = as_it_stands(problem, found.nominal.fitted)
-    wrench = residual_wrench(problem, raw, found.chosen.fitted, found.chosen.dispersion)
+def _summaries(wrench: ResidualWrench) -> tuple[WrenchSummary, ...]:
+    """Means over all windows."""
     summaries = []
     for k, (component, unit) in enumerate(COMPONENTS):
         precision = wrench.deviation[:, k] ** -2

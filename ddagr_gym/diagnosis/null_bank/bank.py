@@ -19,9 +19,10 @@ from ddagr_gym.diagnosis.gates.thresholds import NullRun
 from ddagr_gym.diagnosis.null_bank.drives import Template, null_recordings
 from ddagr_gym.diagnosis.null_bank.standard_drives import standard_template
 from ddagr_gym.diagnosis.preprocessing.input_requirements import content_hash
+from ddagr_gym.diagnosis.search.gains import Gain
 from ddagr_gym.diagnosis.search.initial_guess import first_guess
 from ddagr_gym.diagnosis.search.rivals import best_gains, scans_of
-from ddagr_gym.diagnosis.search.scan import Gain, drive_extent
+from ddagr_gym.diagnosis.search.scan import drive_extent
 from ddagr_gym.diagnosis.search.scanned_model import ScannedModel, scan_model
 from ddagr_gym.diagnosis.search.starting_models import refit_nominal
 from ddagr_gym.diagnosis.setting import Setting, make_problem

@@ -23,9 +23,11 @@ from numpy.typing import NDArray
 
 from ddagr_gym.control.manoeuvres import Manoeuvre
 from ddagr_gym.diagnosis.gates.thresholds import LEVEL, Gate, Thresholds
-from ddagr_gym.diagnosis.planning.planned_drive import information, plan, with_room
-from ddagr_gym.diagnosis.search.candidates import Candidate, moved_field
-from ddagr_gym.diagnosis.search.scan import Terms, scan
+from ddagr_gym.diagnosis.planning.planned_drive import plan, with_room
+from ddagr_gym.diagnosis.result.detectable import Detectable, detectable, least_multiple
+from ddagr_gym.diagnosis.search.candidates import Candidate
+from ddagr_gym.diagnosis.search.inner_products import Terms
+from ddagr_gym.diagnosis.search.scan import scan
 from ddagr_gym.diagnosis.setting import Setting
 from ddagr_gym.identification.nuisances import NuisancePriors
 from ddagr_gym.identification.size_prior import TYPICAL_MULTIPLE
@@ -44,28 +46,6 @@ ALIKE = 0.2
 
 CHANCE = "chi-square"
 """Source of gates that come from no null bank."""
-
-
-@dataclass(frozen=True)
-class Detectable:
-    """How small one size of an effect may be and still show.
-
-    Attributes:
-        effect: name.
-        field: of the effect.
-        unit: of the sizes.
-        least_meaningful: distance from neutral below which nobody would care; of an effect that acts beyond a limit
-            only, the limit that was tried.
-        size: least detectable distance from neutral, infinite where nothing shows; a limit is given as it is.
-        multiples: of the least meaningful size, by the square root of the gain.
-    """
-
-    effect: str
-    field: str
-    unit: str
-    least_meaningful: float
-    size: float
-    multiples: float
 
 
 @dataclass(frozen=True)
@@ -188,7 +168,7 @@ def isolability(
     planned = plan(robot, soil, manoeuvres, sensors, seed=seed, setting=setting)
     terms = scan(planned.problem, planned.fitted, kinds, progress)
     gates = chance_gates(terms) if thresholds is None else thresholds.for_length(planned.problem.covered)
-    matrix = information(terms)
+    matrix = terms.reduced().information
     names = tuple(dict.fromkeys(c.name for c in terms.candidates))
     sizes = {name: _directions(name, terms, matrix, gates.of(name).detectable) for name in names}
     share = np.full((len(names), len(names)), np.nan)
@@ -239,35 +219,19 @@ class _Direction:
 def _directions(name: str, terms: Terms, matrix: Array, gate: float) -> list[_Direction]:
     """Probes of an effect's best-placed candidate; of limits and flips those that the table states."""
     own = [c for c in terms.candidates if c.name == name]
+    absorbed = terms.absorbed.get(name, 0.0)
     found = [
-        [_direction(c, k, matrix, gate, terms.absorbed.get(name, 0.0)) for k in range(len(c.columns))] for c in own
+        [
+            _Direction(c, column, least_multiple(c, k), detectable(c, k, float(matrix[column, column]), gate, absorbed))
+            for k, column in enumerate(c.columns)
+        ]
+        for c in own
     ]
     if not own[0].has_sizes:
         every = [item for group in found for item in group]
         stated = _best_by_field([item.size for item in every])
         return [item for item in every if item.size in stated]
     return min(found, key=lambda group: min(item.size.multiples for item in group))
-
-
-def _direction(candidate: Candidate, k: int, matrix: Array, gate: float, absorbed: float) -> _Direction:
-    """A probe's size that shows: beyond what a nuisance would take over."""
-    probe, column = candidate.probes[k], candidate.columns[k]
-    name, data, away = moved_field(probe)
-    if candidate.whole is not None:
-        least, distance = candidate.whole, abs(candidate.whole * away)
-    elif probe.differentiable:
-        least, distance = data["least"] / abs(away), float(data["least"])
-    else:
-        least, distance = 1.0, abs(float(getattr(probe, name)))
-    gain = 0.5 * least**2 * max(float(matrix[column, column]), 0.0)
-    multiples = (math.sqrt(gate / gain) if gain > 1e-12 else math.inf) + absorbed / distance
-    if probe.differentiable and candidate.whole is None:
-        size = distance * multiples if distance * multiples <= probe.reach(name) else math.inf
-    else:  # a limit or a flip is there or not
-        size = distance if multiples <= 1.0 else math.inf
-    return _Direction(
-        candidate, column, least, Detectable(candidate.name, name, str(data["unit"]), distance, size, multiples)
-    )
 
 
 def _best_by_field(sizes: Sequence[Detectable]) -> list[Detectable]:

@@ -19,12 +19,14 @@ from ddagr_gym.control.manoeuvres import MANOEUVRES, Manoeuvre
 from ddagr_gym.diagnosis.answer.next_drive_plan import DriveProposal, NextDrivePlan
 from ddagr_gym.diagnosis.answer.verdict import Diagnosis, Finding, Options
 from ddagr_gym.diagnosis.planning.isolability import APART
-from ddagr_gym.diagnosis.planning.planned_drive import RATE, SENSORS, Plan, free_of_nuisances, plan, with_room
+from ddagr_gym.diagnosis.planning.planned_drive import RATE, SENSORS, Plan, plan, with_room
+from ddagr_gym.diagnosis.preprocessing.session import DiagnosisSession
 from ddagr_gym.diagnosis.search.candidates import Candidate, candidates_of
 from ddagr_gym.diagnosis.search.initial_guess import looped
 from ddagr_gym.diagnosis.search.scan import drive_extent, probe_column
 from ddagr_gym.diagnosis.setting import Setting
 from ddagr_gym.errors import InputError
+from ddagr_gym.identification.least_squares import explained_by
 from ddagr_gym.identification.nuisances import NuisancePriors
 from ddagr_gym.identification.size_prior import TYPICAL_MULTIPLE
 from ddagr_gym.identification.windows import CHANNELS
@@ -120,6 +122,27 @@ def next_drive(
     return _answer(manoeuvres, planned, found)
 
 
+def plan_next_drive(session: DiagnosisSession, diagnosis: Diagnosis) -> NextDrivePlan:
+    """The drive that would separate the explanations that a diagnosis leaves; without one, why there is none.
+
+    Args:
+        session: of the diagnosis.
+        diagnosis: its verdict.
+    """
+    try:
+        return next_drive(
+            session.robot,
+            session.soil,
+            rivals_of_diagnosis(diagnosis),
+            sensors=sensors_of_diagnosis(diagnosis),
+            seed=session.seed,
+            setting=session.setting,
+            progress=session.progress,
+        )
+    except InputError as error:
+        return NextDrivePlan.none(str(error))
+
+
 def _check(rivals: Sequence[Effect]) -> None:
     names = [rival.name for rival in rivals]
     if not names:
@@ -211,8 +234,8 @@ def _left_over(
     inside = total[np.ix_(index, index)]
     weights = np.concatenate([columns.precision, precision])
     ridge = weights + 1e-9 * np.maximum(np.diag(inside)[:-1], _NOTHING)
-    gain = 0.5 * max(float(free_of_nuisances(inside, ridge)[0, 0]), 0.0)
-    answer = np.linalg.solve(inside[:-1, :-1] + np.diag(ridge), inside[:-1, -1])
+    answer = explained_by(inside[:-1, :-1], ridge, inside[:-1, -1])
+    gain = 0.5 * max(float(inside[-1, -1] - inside[-1, :-1] @ answer), 0.0)
     rest = table[..., truth] - table[..., index[:-1]] @ answer
     rows = rest.shape[1] // len(CHANNELS) * len(CHANNELS)
     # the rows of the priors lie below the block means

@@ -13,11 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.control.manoeuvres import Manoeuvre
-from ddagr_gym.diagnosis.search.scan import Terms
 from ddagr_gym.diagnosis.setting import SHORT, Setting, make_problem
 from ddagr_gym.errors import InputError, unknown_name
 from ddagr_gym.identification.gauss_newton import Fitted, fit
-from ddagr_gym.identification.noise import noise_from_differences
 from ddagr_gym.identification.problem import Problem
 from ddagr_gym.identification.windows import STATE
 from ddagr_gym.parameters import Imu, PoseReceiver, Robot, Sensors, Soil, WheelEncoder
@@ -88,7 +86,7 @@ def plan(
         _drive(robot, soil, manoeuvre, sensors, place, seed + number)
         for number, (manoeuvre, place) in enumerate(zip(manoeuvres, places, strict=True))
     ]
-    problem = make_problem(robot, soil, recordings, setting, noise_from_differences(recordings, robot.outer_radius))
+    problem = make_problem(robot, soil, recordings, setting)
     problem = _at_truth(problem, recordings)
     # the nominal value may be a bound, but no data have pushed a parameter there
     problem.low, problem.high = np.full_like(problem.low, -np.inf), np.full_like(problem.high, np.inf)
@@ -141,22 +139,3 @@ def _at_truth(problem: Problem, recordings: Sequence[Recording]) -> Problem:
     table = [np.stack([r.extras[f"true_{name}"] for name in STATE], axis=1) for r in recordings]
     initial = np.stack([table[n][row] for n, row in zip(windows.recording, windows.start, strict=True)])
     return problem.on(replace(problem.blocked, windows=replace(windows, initial=initial)))
-
-
-def information(terms: Terms, chosen: NDArray[np.bool_] | None = None) -> Array:
-    """(K, K) information of all probes from some of the windows, the nuisances with their priors projected out.
-
-    Args:
-        terms: of a scan.
-        chosen: (W,) windows, all by default.
-    """
-    normals = terms.normals if chosen is None else terms.normals[chosen]
-    return free_of_nuisances(normals.sum(axis=0)[1:, 1:], terms.precision)
-
-
-def free_of_nuisances(total: Array, precision: Array) -> Array:
-    """(K, K) rest of inner products (P + K, P + K) when P nuisances with priors explain what they can."""
-    p = len(precision)
-    answer = np.linalg.solve(total[:p, :p] + np.diag(precision), total[:p, p:])
-    rest = total[p:, p:] - total[p:, :p] @ answer
-    return np.asarray(0.5 * (rest + rest.T), dtype=np.float64)

@@ -13,9 +13,10 @@ from ddagr_gym.diagnosis.preprocessing.mended_recordings import MendedRecordings
 from ddagr_gym.diagnosis.preprocessing.repeated_readings import RepeatedReadings, hold_effect
 from ddagr_gym.diagnosis.preprocessing.reversed_gyro import ReversedGyro
 from ddagr_gym.diagnosis.preprocessing.session import DiagnosisSession
+from ddagr_gym.diagnosis.result.detectable import least_detectable
 from ddagr_gym.diagnosis.result.equivalence import equivalents
 from ddagr_gym.diagnosis.result.sentences import headline
-from ddagr_gym.diagnosis.result.uncertainty import intervals, least_detectable, resampled_parameters, with_structure
+from ddagr_gym.diagnosis.result.uncertainty import intervals, resampled_parameters, with_structure
 from ddagr_gym.diagnosis.search.scanned_model import ScannedModel, SearchResult
 from ddagr_gym.diagnosis.search.stepwise import MOST_EFFECTS, further_gates
 from ddagr_gym.identification.misfit import explained_share, roughest

@@ -1,20 +1,15 @@
-"""How sure: resampled intervals of the parameters of named effects, and the least sizes that a drive could show."""
+"""How sure: resampled intervals of the parameters of named effects."""
 
 from __future__ import annotations
-
-from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.diagnosis.gates.thresholds import Thresholds
-from ddagr_gym.diagnosis.search.candidates import Candidate, moved_field
-from ddagr_gym.diagnosis.search.scan import Terms, reduce
 from ddagr_gym.identification.effect_parameters import EffectParameter, effect_parameters
 from ddagr_gym.identification.gauss_newton import Fitted, linearised
 from ddagr_gym.identification.least_squares import bounded_step
 from ddagr_gym.identification.problem import Problem
-from ddagr_gym.physics.effects import Effect, effect_kind
+from ddagr_gym.physics.effects import Effect
 
 Array = NDArray[np.float64]
 
@@ -93,65 +88,3 @@ def with_structure(interval: tuple[float, float], effect: Effect, field: str) ->
     low, high = max(middle - wide, min(data["low"], interval[0])), min(middle + wide, max(data["high"], interval[1]))
     # few windows carry the fit where their resampling leaves its value out
     return min(low, value), max(high, value)
-
-
-def least_detectable(terms: Terms, thresholds: Thresholds, dispersion: float) -> Mapping[str, dict[str, float]]:
-    """Distance of each size from neutral that passes the gate nine times in ten, by effect and field.
-
-    Theory: diagnosis, eq. (11).
-
-    The gain of a size s is s^2 I / 2 with the information I that is left beside the nuisances; infinite where there is
-    none, or where the size lies beyond the bound of what exists. Of an effect that may act at any time or in any way,
-    the usual one counts, which is its default (a change of soil from the beginning on); of one that has a place, the
-    median over the places that the drives touch. Of a limit stands the mildest of the tried ones that shows, as it is,
-    and of a reversed sign 1. What a nuisance can take over (see :attr:`Terms.absorbed`) comes on top.
-    """
-    information = np.diag(reduce(terms).information)
-    found: dict[str, dict[str, list[tuple[bool, float]]]] = {}
-    whole: dict[str, dict[str, list[float]]] = {}
-    for candidate in terms.candidates:
-        gate = thresholds.of(candidate.name).detectable * dispersion
-        if not candidate.has_sizes:
-            name, shown = _shown_whole(candidate, information[candidate.columns[0]], gate)
-            whole.setdefault(candidate.name, {}).setdefault(name, []).extend(shown)
-            continue
-        sizes = [
-            _needed(probe, information[k], gate) for k, probe in zip(candidate.columns, candidate.probes, strict=True)
-        ]
-        if candidate.is_direction:
-            # any direction is as usual as another: the one that shows worst counts
-            sizes = [max(sizes, key=lambda item: item[2])]
-        for usual, name, size in sizes:
-            found.setdefault(candidate.name, {}).setdefault(name, []).append((usual or candidate.is_direction, size))
-    return {
-        effect: {
-            name: float(np.median(_that_count(effect, name, sizes))) + terms.absorbed.get(effect, 0.0)
-            for name, sizes in fields.items()
-        }
-        for effect, fields in found.items()
-    } | {
-        effect: {name: max(shown, default=np.inf) for name, shown in fields.items()} for effect, fields in whole.items()
-    }
-
-
-def _shown_whole(candidate: Candidate, information: float, gate: float) -> tuple[str, list[float]]:
-    """The field of a limit or a reversed sign, which is there or not, and its value where its gain reaches a gate."""
-    probe = candidate.probes[0]
-    name, _, away = moved_field(probe)
-    multiple = 1.0 if candidate.whole is None else candidate.whole
-    value = float(getattr(probe, name)) if candidate.whole is None else abs(multiple * away)
-    return name, [value] if 0.5 * multiple**2 * information >= gate else []
-
-
-def _needed(probe: Effect, information: float, gate: float) -> tuple[bool, str, float]:
-    """Whether a probe has the default shapes, the field that it moves, and the size of it that reaches a gate."""
-    usual = all(getattr(probe, name) == probe.parameter(name).default for name in probe.shape_names())
-    name, _, away = moved_field(probe)
-    return usual, name, abs(away) * float(np.sqrt(2.0 * gate / information)) if information > 0.0 else np.inf
-
-
-def _that_count(effect: str, field: str, sizes: Sequence[tuple[bool, float]]) -> list[float]:
-    """Those of the usual shape, or where none is usual all; what the effect can never have is infinite, or left out."""
-    reach = effect_kind(effect).reach(field)
-    usual = [size if size <= reach else np.inf for is_usual, size in sizes if is_usual]
-    return usual or [size for _, size in sizes if size <= reach] or [np.inf]

@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.diagnosis.search.candidates import Candidate
-from ddagr_gym.diagnosis.search.scan import Gain, Terms, best_multiples, reduce
+from ddagr_gym.diagnosis.search.gains import Gain, best_multiples
+from ddagr_gym.diagnosis.search.inner_products import Terms
 from ddagr_gym.frames import wrap_angle
+from ddagr_gym.identification.gauss_newton import Fitted
 from ddagr_gym.identification.problem import Point, Problem
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.effects.command_delay import CommandDelay
@@ -81,6 +83,25 @@ def _directed(candidate: Candidate, multiples: Sequence[float]) -> Effect:
     return probe.with_values(**{size: length, "direction": math.atan2(y, x)})
 
 
+def nuisance_answer(problem: Problem, fitted: Fitted, terms: Terms, gain: Gain) -> NDArray[np.float64]:
+    """(P,) change of all nuisances that goes with a candidate's multiples in the scan's linear model.
+
+    Args:
+        problem: what was fitted.
+        fitted: the model that was scanned.
+        terms: of that scan.
+        gain: of the candidate; a categorical or a limiting effect keeps its probe's size whatever its multiple.
+    """
+    candidate = terms.candidates[gain.candidate]
+    change = np.zeros(len(fitted.point.values))
+    if candidate.has_sizes:
+        nuisance = terms.reduced().nuisance
+        change[problem.open_at(fitted.point)] = (
+            nuisance[:, 0] - nuisance[:, 1 + np.array(candidate.columns)] @ gain.multiples
+        )
+    return change
+
+
 def turned_to_agree(problem: Problem, terms: Terms, gain: Gain, point: Point, share: float = 1.0) -> Point:
     """A point where recordings without poses are turned so that the direction of its last effect, a slope, agrees.
 
@@ -114,7 +135,7 @@ def turned_to_agree(problem: Problem, terms: Terms, gain: Gain, point: Point, sh
 
 def _shown_by(terms: Terms, candidate: Candidate, chosen: NDArray[np.bool_]) -> tuple[float, float]:
     """Size and direction that some of the windows show."""
-    _, multiples = best_multiples(reduce(terms, chosen.astype(float)), candidate)
+    _, multiples = best_multiples(terms.reduced(chosen.astype(float)), candidate)
     parameters = _directed(candidate, multiples.tolist()).as_mapping()["parameters"]
     return parameters[candidate.probes[0].size_names()[0]], parameters["direction"]
 

@@ -9,8 +9,10 @@ import numpy as np
 
 from ddagr_gym.diagnosis.gates.thresholds import UNMISTAKABLE, Thresholds
 from ddagr_gym.diagnosis.search.equivalents import TRIAL_STEPS, with_looped_encoders, with_slower_loop
-from ddagr_gym.diagnosis.search.initial_guess import first_guess, turned_to_agree
-from ddagr_gym.diagnosis.search.scan import Gain, Terms, drive_extent, nuisance_answer
+from ddagr_gym.diagnosis.search.gains import Gain
+from ddagr_gym.diagnosis.search.initial_guess import first_guess, nuisance_answer, turned_to_agree
+from ddagr_gym.diagnosis.search.inner_products import Terms
+from ddagr_gym.diagnosis.search.scan import drive_extent
 from ddagr_gym.diagnosis.search.scanned_model import Rival, ScannedModel, rival_of, scan_model
 from ddagr_gym.diagnosis.search.starting_models import FAR_OFF
 from ddagr_gym.identification.gauss_newton import DAMPING, Fitted, cost_of, fit

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from ddagr_gym.diagnosis.search.scan import Gain, Terms, dispersion_of, gains, held_out_gains, scan, scores
+from ddagr_gym.diagnosis.search.gains import Gain, gains, held_out_gains, scores
+from ddagr_gym.diagnosis.search.inner_products import Terms
+from ddagr_gym.diagnosis.search.scan import scan
 from ddagr_gym.identification.gauss_newton import Fitted
-from ddagr_gym.identification.misfit import channel_misfit
+from ddagr_gym.identification.misfit import channel_misfit, dispersion_of
 from ddagr_gym.identification.problem import Problem
 
 

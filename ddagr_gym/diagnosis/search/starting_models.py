@@ -9,11 +9,11 @@ from functools import partial
 import numpy as np
 
 from ddagr_gym.diagnosis.preprocessing.session import DiagnosisSession, be_silent
-from ddagr_gym.diagnosis.search.scan import dispersion_of
 from ddagr_gym.diagnosis.setting import SHORT
 from ddagr_gym.diagnosis.store import StepCache, compute_without_cache
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.gauss_newton import Fitted, fit
+from ddagr_gym.identification.misfit import dispersion_of
 from ddagr_gym.identification.problem import Problem
 
 FAR_OFF = 4.0

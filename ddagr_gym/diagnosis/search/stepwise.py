@@ -10,12 +10,11 @@ from ddagr_gym.diagnosis.gates.thresholds import Thresholds
 from ddagr_gym.diagnosis.preprocessing.session import DiagnosisSession
 from ddagr_gym.diagnosis.search.initial_guess import with_whole_delay
 from ddagr_gym.diagnosis.search.rivals import CLOSE, rivals_of
-from ddagr_gym.diagnosis.search.scan import dispersion_of
 from ddagr_gym.diagnosis.search.scanned_model import Rival, ScannedModel, SearchResult, scan_model
 from ddagr_gym.diagnosis.search.starting_models import StartingModels
 from ddagr_gym.diagnosis.store import StepCache, compute_without_cache
 from ddagr_gym.identification.gauss_newton import Fitted, fit
-from ddagr_gym.identification.misfit import channel_misfit
+from ddagr_gym.identification.misfit import channel_misfit, dispersion_of
 from ddagr_gym.identification.problem import Problem
 from ddagr_gym.identification.size_prior import implausibility
 
@@ -76,8 +75,8 @@ def further_gates(thresholds: Thresholds, models: Sequence[ScannedModel]) -> Thr
     """Gates of further effects: higher by shares of what the named ones explain.
 
     What is left of another form of an effect lies in the windows and channels in which it acts: a further effect that
-    acts elsewhere (:attr:`~ddagr_gym.diagnosis.search.scan.Terms.overlap`) need not explain it. Of a named one the
-    overlap with those before it counts.
+    acts elsewhere (:attr:`~ddagr_gym.diagnosis.search.inner_products.Terms.overlap`) need not explain it. Of a
+    named one the overlap with those before it counts.
 
     Args:
         thresholds: of the null bank.

@@ -11,9 +11,13 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ddagr_gym.diagnosis.search.inner_products import InnerProducts, Reduced
+from ddagr_gym.identification.least_squares import explained_by
 
 Array = NDArray[np.float64]
 
@@ -33,23 +37,10 @@ _LEAST_SHARE = 1e-6  # of a column's information beside the nuisances: less is r
 
 
 @dataclass(frozen=True, eq=False)
-class Sums:
-    """Inner products by group (a stretch of a recording), unknowns of the windows eliminated.
+class Sums(InnerProducts):
+    """Inner products by group (a stretch of a recording), of which columns may join the nuisances."""
 
-    Attributes:
-        normals: (G, 1 + P + K, 1 + P + K) of residual, nuisances and columns, in this order.
-        precision: (P,) of the nuisances' priors.
-        values: (P,) where the nuisances stand, from their priors' middle.
-    """
-
-    normals: Array
-    precision: Array
-    values: Array
-
-    @property
-    def nuisances(self) -> int:
-        """P."""
-        return len(self.precision)
+    ridge: ClassVar[float] = 1e-9
 
     def chosen(self, columns: Sequence[int], joined: Sequence[int] = ()) -> Sums:
         """Only some columns; ``joined`` become nuisances without a prior."""
@@ -61,20 +52,6 @@ class Sums:
             np.concatenate([self.precision, none]),
             np.concatenate([self.values, none]),
         )
-
-    def reduced(self, weights: Array | None = None) -> tuple[Array, Array, Array]:
-        """Gradient (K,) and information (K, K) with the nuisances projected out, and their answer (P, 1 + K)."""
-        weight = np.ones(len(self.normals)) if weights is None else weights
-        total = np.tensordot(weight, self.normals, axes=1)
-        share, p = float(weight.mean()), self.nuisances
-        inside = total[1 : 1 + p, 1 : 1 + p] + np.diag(self.precision * share)
-        inside = inside + np.diag(1e-9 * np.maximum(np.diag(inside), 1e-12))
-        right = np.concatenate([total[1 : 1 + p, :1], total[1 : 1 + p, 1 + p :]], axis=1)
-        right[:, 0] -= self.precision * share * self.values
-        answer = np.linalg.solve(inside, right)
-        cross = total[1 + p :, 1 : 1 + p]
-        information = total[1 + p :, 1 + p :] - cross @ answer[:, 1:]
-        return total[1 + p :, 0] - cross @ answer[:, 0], 0.5 * (information + information.T), answer
 
 
 @dataclass(frozen=True)
@@ -190,16 +167,16 @@ def _search(
     count = sums.normals.shape[1] - 1 - sums.nuisances
     rest = [k for k in range(count) if k not in taken]
     beside = sums.chosen(rest, taken)
-    _, information, _ = beside.reduced()
+    information = beside.reduced().information
     total = np.diagonal(beside.normals.sum(axis=0))[1 + beside.nuisances :]
     live = np.flatnonzero(np.diag(information) > _LEAST_SHARE * np.maximum(total, 1e-12))
     if len(live) < 2:
         return []
     columns = [rest[k] for k in live]
     beside = sums.chosen(columns, taken)
-    gradient, information, _ = beside.reduced()
-    member = clusters(information)
-    front = _fronts(gradient, information, member, [plainness[k] for k in columns])
+    reduced = beside.reduced()
+    member = clusters(reduced.information)
+    front = _fronts(reduced, member, [plainness[k] for k in columns])
     shares = _shares(sums.chosen([columns[k] for k in front], taken), rng, stable, bound)
     found = []
     for k in np.argsort(-shares, kind="stable"):
@@ -209,9 +186,9 @@ def _search(
     return found
 
 
-def _fronts(gradient: Array, information: Array, member: NDArray[np.int64], plainness: Sequence[int]) -> list[int]:
+def _fronts(reduced: Reduced, member: NDArray[np.int64], plainness: Sequence[int]) -> list[int]:
     """One column of each cluster: the plainest of those that explain nearly as much as the best."""
-    gain = 0.5 * gradient**2 / np.diag(information)
+    gain = 0.5 * reduced.gradient**2 / np.diag(reduced.information)
     front = []
     for cluster in range(int(member.max()) + 1):
         inside = np.flatnonzero(member == cluster)
@@ -230,8 +207,8 @@ def _shares(sums: Sums, rng: np.random.Generator, stable: float, bound: float) -
         for half in (order[: groups // 2], order[groups // 2 : 2 * (groups // 2)]):
             weights = np.zeros(groups)
             weights[half] = 1.0
-            gradient, information, _ = sums.reduced(weights)
-            votes[lasso_takes(gradient, information, take)] += 1.0
+            half_sums = sums.reduced(weights)
+            votes[lasso_takes(half_sums.gradient, half_sums.information, take)] += 1.0
     return votes / (2.0 * _PAIRS)
 
 
@@ -250,9 +227,8 @@ def held_out_share(sums: Sums, columns: Sequence[int], fold: NDArray[np.int64], 
     before = after = 0.0
     for number in np.unique(fold):
         outside = (fold != number).astype(float)
-        gradient, information, answer = part.reduced(outside)
-        extra = (ridge + 1e-9) * np.maximum(np.diag(information), 1e-12)
-        theta = np.linalg.solve(information + np.diag(extra), gradient)
+        reduced = part.reduced(outside)
+        theta, answer = _shrunk(reduced, ridge), reduced.nuisance
         inside = part.normals[fold == number].sum(axis=0)
         base = np.concatenate([[1.0], -answer[:, 0], np.zeros(len(theta))])
         full = np.concatenate([[1.0], -answer[:, 0] + answer[:, 1:] @ theta, -theta])
@@ -263,9 +239,13 @@ def held_out_share(sums: Sums, columns: Sequence[int], fold: NDArray[np.int64], 
 
 def coefficients(sums: Sums, columns: Sequence[int], weights: Array | None = None) -> Array:
     """(len(columns),) least squares beside the nuisances."""
-    gradient, information, _ = sums.chosen(columns).reduced(weights)
-    ridge = 1e-9 * np.diag(np.maximum(np.diag(information), 1e-12))
-    return np.asarray(np.linalg.solve(information + ridge, gradient), dtype=np.float64)
+    return _shrunk(sums.chosen(columns).reduced(weights))
+
+
+def _shrunk(reduced: Reduced, ridge: float = 0.0) -> Array:
+    """(K,) coefficients at a penalty relative to each column's information."""
+    none = np.zeros(len(reduced.gradient))
+    return explained_by(reduced.information, none, reduced.gradient, ridge + Sums.ridge)
 
 
 def intervals(sums: Sums, columns: Sequence[int], level: float) -> tuple[Array, Array]:

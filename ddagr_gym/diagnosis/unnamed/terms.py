@@ -17,7 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.diagnosis.answer.unnamed_terms import UnnamedTerm, UnnamedTerms
-from ddagr_gym.diagnosis.search.scanned_model import ScannedModel
+from ddagr_gym.diagnosis.answer.verdict import Diagnosis
+from ddagr_gym.diagnosis.preprocessing.session import DiagnosisSession
+from ddagr_gym.diagnosis.search.scanned_model import ScannedModel, SearchResult
 from ddagr_gym.diagnosis.unnamed.boosted_baseline import boosted_share, concentration_of
 from ddagr_gym.diagnosis.unnamed.regressors import Motion, Term, library, motion_of
 from ddagr_gym.diagnosis.unnamed.response import INPUTS, Response, course_of, linearise
@@ -55,7 +57,20 @@ _LEVEL = 0.9
 """Of the intervals of coefficients: that of all intervals of a diagnosis."""
 
 
-def unnamed_terms(problem: Problem, model: ScannedModel, rng: np.random.Generator) -> UnnamedTerms:
+def unnamed_terms(session: DiagnosisSession, found: SearchResult, diagnosis: Diagnosis) -> UnnamedTerms | None:
+    """Terms that explain what the names leave; None where these explain everything.
+
+    Args:
+        session: of the diagnosis.
+        found: of the search.
+        diagnosis: its verdict.
+    """
+    if diagnosis.complete:
+        return None
+    return find_terms(session.problem, found.chosen, session.rng("unnamed terms"))
+
+
+def find_terms(problem: Problem, model: ScannedModel, rng: np.random.Generator) -> UnnamedTerms:
     """Search for terms that explain what a model leaves.
 
     Args:
@@ -70,7 +85,7 @@ def unnamed_terms(problem: Problem, model: ScannedModel, rng: np.random.Generato
     columns = term_columns(problem, terms, linearise(problem, fitted, course))
     projected = fitted.elimination.project(_raw(problem, model, columns))
     group = stretches(problem)
-    sums, terms = _sums(problem, model, projected, group, terms)
+    sums = _sums(problem, model, projected, group)
     fold = np.arange(int(group.max()) + 1) % _FOLDS
 
     found = select(
@@ -134,10 +149,8 @@ def stretches(problem: Problem) -> NDArray[np.int64]:
     return np.unique(key, return_inverse=True)[1].astype(np.int64)
 
 
-def _sums(
-    problem: Problem, model: ScannedModel, projected: Array, group: NDArray[np.int64], terms: Sequence[Term]
-) -> tuple[Sums, list[Term]]:
-    """Inner products by stretch, and the terms that they are of."""
+def _sums(problem: Problem, model: ScannedModel, projected: Array, group: NDArray[np.int64]) -> Sums:
+    """Inner products by stretch."""
     point = model.fitted.point
     free = problem.open_at(point)
     parameters = effect_parameters(point.effects)
@@ -149,7 +162,7 @@ def _sums(
         normals[g] = rows.T @ rows
     here = [getattr(point.effects[p.effect], p.field) - p.neutral if np.isfinite(p.scale) else 0.0 for p in parameters]
     precision = np.concatenate([1.0 / problem.prior[free] ** 2, [p.scale**-2 for p in parameters]])
-    return Sums(normals, precision, np.concatenate([point.values[free], here])), list(terms)
+    return Sums(normals, precision, np.concatenate([point.values[free], here]))
 
 
 def _ceiling(

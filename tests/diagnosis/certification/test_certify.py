@@ -17,7 +17,7 @@ from ddagr_gym.diagnosis.certification.certificate import (
     resampled,
     worse_on_unseen,
 )
-from ddagr_gym.diagnosis.certification.certify import certify, folds_of, refitted_on
+from ddagr_gym.diagnosis.certification.certify import certify_models, folds_of, refitted_on
 from ddagr_gym.diagnosis.certification.forecast import (
     MOTION,
     PAST,
@@ -28,10 +28,7 @@ from ddagr_gym.diagnosis.certification.forecast import (
 )
 from ddagr_gym.identification.problem import Problem
 from ddagr_gym.identification.windows import CHANNELS, WindowSet
-from ddagr_gym.presets import get_robot
-from tests.diagnosis.conftest import Sloping
-
-ROBOT = get_robot("ddagr")
+from tests.diagnosis.conftest import Sloping, session_of
 
 
 def test_the_planted_effect_predicts_unseen_drives(sloping: Sloping) -> None:
@@ -70,16 +67,14 @@ def test_sizes_do_not_see_the_recording_that_judges(sloping: Sloping) -> None:
 
 def test_starts_do_not_see_what_follows(sloping: Sloping) -> None:
     recordings = sloping.recordings
-    forecasts = cut_forecasts(sloping.problem, ROBOT, recordings, 5.0, 4.0)
+    forecasts = cut_forecasts(sloping.problem, recordings, 5.0, 4.0)
     assert forecasts is not None
     rows = [int(start) for r, start in zip(forecasts.future.recording, forecasts.future.start, strict=True) if r == 0]
     cut = rows[1] + 1
     channels = {name: values.copy() for name, values in recordings[0].channels.items()}
     for name in ("yaw_rate", "encoder_right", "pose_x", "pose_yaw", "specific_force_x"):
         channels[name][cut:] += 1.0
-    changed = cut_forecasts(
-        sloping.problem, ROBOT, (replace(recordings[0], channels=channels), recordings[1]), 5.0, 4.0
-    )
+    changed = cut_forecasts(sloping.problem, (replace(recordings[0], channels=channels), recordings[1]), 5.0, 4.0)
     assert changed is not None
     # the noise of the readings is told from all of them: it is kept the same here
     changed = replace(changed, past=changed.past.on(replace(changed.past.blocked, sigma=forecasts.past.blocked.sigma)))
@@ -91,7 +86,7 @@ def test_starts_do_not_see_what_follows(sloping: Sloping) -> None:
 
 def test_starts_are_where_the_robot_was(sloping: Sloping) -> None:
     """Speeds to a centimetre per second; the truth comes with the simulated drive."""
-    forecasts = cut_forecasts(sloping.problem, ROBOT, sloping.recordings, 5.0, 4.0)
+    forecasts = cut_forecasts(sloping.problem, sloping.recordings, 5.0, 4.0)
     assert forecasts is not None
     point = sloping.chosen.point
     states = start_states(forecasts, point, past_elimination(forecasts, point))
@@ -108,7 +103,7 @@ def test_one_recording_is_judged_by_halves(problem_of: Callable[..., Problem], s
     problem = problem_of(recording)
     rule, folds = folds_of(problem)
     assert rule == BY_TIME
-    forecasts = cut_forecasts(problem, ROBOT, (recording,), 5.0, 1.0)
+    forecasts = cut_forecasts(problem, (recording,), 5.0, 1.0)
     assert forecasts is not None
     windows = problem.blocked.windows
     for fold in folds:
@@ -134,8 +129,8 @@ def test_halves_are_named_as_the_weaker_proof(problem_of: Callable[..., Problem]
         prediction=sloping.nominal.prediction[:first],
         window_cost=sloping.nominal.window_cost[:first],
     )
-    rng = np.random.default_rng(0)
-    found = certify(problem, part, part, ROBOT, sloping.recordings[:1], rng)
+    session = session_of(problem, sloping.recordings[:1])
+    found = certify_models(session, part, part, np.random.default_rng(0))
     assert found.folds == BY_TIME
     assert "one recording" in found.note
     errors = found.channels["position"]["1"]

@@ -6,6 +6,7 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
+from ddagr_gym.diagnosis.gates.thresholds import Thresholds
 from ddagr_gym.diagnosis.localisation.effect_timeline import (
     ScoreProcess,
     as_it_stands,
@@ -16,18 +17,19 @@ from ddagr_gym.diagnosis.localisation.effect_timeline import (
     spans,
     time_share,
 )
-from ddagr_gym.diagnosis.localisation.localise import channel_shares, locate, piece_values
+from ddagr_gym.diagnosis.localisation.localise import channel_shares, locate
+from ddagr_gym.diagnosis.localisation.mismatch_traces import piece_values, trace_mismatch
 from ddagr_gym.diagnosis.localisation.operating_condition_words import NOWHERE_MORE, phrase_of, uneven_phrase
 from ddagr_gym.diagnosis.localisation.operating_conditions import Pieces, shares, uneven
 from ddagr_gym.diagnosis.localisation.residual_wrench import HeldWrench, residual_wrench
-from ddagr_gym.diagnosis.search.scan import dispersion_of
 from ddagr_gym.diagnosis.search.scanned_model import ScannedModel, SearchResult
 from ddagr_gym.diagnosis.wording import EVERYWHERE, range_in_words
 from ddagr_gym.identification.gauss_newton import fit
-from ddagr_gym.identification.misfit import channel_misfit
+from ddagr_gym.identification.misfit import channel_misfit, dispersion_of
 from ddagr_gym.identification.nuisances import LOCAL
 from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.physics.effects.registry import parse_effect
+from tests.diagnosis.conftest import session_of
 
 LIMITS = dict.fromkeys((*CHANNELS, *LOCAL), 1.2)
 
@@ -37,6 +39,11 @@ pytest.importorskip("ruptures", reason="needs the extra diagnosis")
 def scanned(problem, fitted):
     misfit = channel_misfit(problem, fitted)
     return ScannedModel(fitted, None, (), {}, {}, dispersion_of(problem, fitted), misfit)
+
+
+def located(problem, found, seed=0):
+    session = session_of(problem, gates=Thresholds({}, LIMITS, 20, "a test"), seed=seed)
+    return locate(session, found, trace_mismatch(session, found))
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +58,7 @@ def limited(drive, problem_of):
 
 def test_a_limit_shows_only_while_it_is_reached(limited):
     problem, found = limited
-    (where,) = locate(problem, found, LIMITS).findings.values()
+    (where,) = located(problem, found).findings.values()
     # commands of the fixture beyond 0.75 rad/s: 4 to 8 s, 12 to 16 s, and from 20 s on
     assert where.spans
     for span in where.spans:
@@ -66,17 +73,17 @@ def test_a_limit_shows_only_while_it_is_reached(limited):
 
 
 def test_a_localisation_is_plain_json(limited):
-    located = locate(*limited, LIMITS)
-    again = json.loads(json.dumps(asdict(located)))
+    found = located(*limited)
+    again = json.loads(json.dumps(asdict(found)))
     assert set(again["findings"]) == {"motor_saturation"}
     assert set(again["channels"]) == set(limited[1].nominal.misfit)
     assert sum(item["share"] for item in again["channels"].values()) == pytest.approx(1.0)
-    assert 0.5 < located.explained <= 1.0
+    assert 0.5 < found.explained <= 1.0
     assert [item["component"] for item in again["wrench"]] == ["F_x", "F_y", "M_z"]
 
 
 def test_the_seed_decides_the_shifts_and_nothing_else(limited):
-    first, again, other = (locate(*limited, LIMITS, seed=seed).findings["motor_saturation"] for seed in (0, 0, 1))
+    first, again, other = (located(*limited, seed=seed).findings["motor_saturation"] for seed in (0, 0, 1))
     assert first == again
     assert [item.p for item in first.regimes] != [item.p for item in other.regimes]
     assert [item.excess for item in first.regimes] == [item.excess for item in other.regimes]
@@ -85,10 +92,10 @@ def test_the_seed_decides_the_shifts_and_nothing_else(limited):
 
 def test_nothing_found_has_no_spans_and_no_phrase(limited):
     problem, found = limited
-    located = locate(problem, SearchResult(found.models[1:], ()), LIMITS)
+    alone = located(problem, SearchResult(found.models[1:], ()))
     raw = SearchResult((scanned(problem, as_it_stands(problem, found.nominal.fitted)),), ())
-    nothing = locate(problem, raw, LIMITS)
-    assert located.remaining.phrase == "nothing above the noise"
+    nothing = located(problem, raw)
+    assert alone.remaining.phrase == "nothing above the noise"
     assert nothing.findings == {}
     assert nothing.mismatch.spans == ()
 

@@ -10,7 +10,8 @@ import pytest
 from ddagr_gym.control.manoeuvres import Manoeuvre
 from ddagr_gym.diagnosis.gates.thresholds import Gate, Thresholds
 from ddagr_gym.diagnosis.planning.isolability import APART, SCHEMA, chance_gates, isolability
-from ddagr_gym.diagnosis.planning.planned_drive import free_of_nuisances, plan
+from ddagr_gym.diagnosis.planning.planned_drive import plan
+from ddagr_gym.diagnosis.search.inner_products import InnerProducts
 from ddagr_gym.diagnosis.search.scan import scan
 from ddagr_gym.errors import InputError
 from ddagr_gym.physics.effects.registry import effect_kinds
@@ -109,8 +110,8 @@ def test_told_apart_never_below_detected(turn) -> None:
 
 def test_nuisances_with_priors_take_their_share() -> None:
     # one nuisance equal to the column: with precision q against information 1 it leaves q / (1 + q)
-    total = np.ones((2, 2))
-    assert free_of_nuisances(total, np.array([0.25]))[0, 0] == pytest.approx(0.2)
+    inner = InnerProducts(np.ones((1, 3, 3)), np.array([0.25]), np.zeros(1))
+    assert inner.reduced().information[0, 0] == pytest.approx(0.2)
 
 
 def test_json_form(turn) -> None:

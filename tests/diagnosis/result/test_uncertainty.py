@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 
 from ddagr_gym.diagnosis.gates.thresholds import Gate, Thresholds
+from ddagr_gym.diagnosis.result.detectable import least_detectable
 from ddagr_gym.diagnosis.result.uncertainty import (
     FORM,
     STRUCTURE,
     STRUCTURE_OF_LIMIT,
-    least_detectable,
     resampled_parameters,
     with_structure,
 )
 from ddagr_gym.diagnosis.search.candidates import Candidate, candidates_of, moved_field
-from ddagr_gym.diagnosis.search.scan import Terms
+from ddagr_gym.diagnosis.search.inner_products import Terms
 from ddagr_gym.identification.gauss_newton import fit
 from ddagr_gym.identification.nuisances import NuisancePriors, absorbed_sizes, nuisances
 from ddagr_gym.identification.size_prior import size_scale
@@ -78,7 +78,7 @@ def least_of(
     for column, value in (explained or {}).items():
         normals[0, 1, 2 + column] = normals[0, 2 + column, 1] = math.sqrt(value)
     none = np.zeros(1, dtype=np.int64)
-    terms = Terms(normals, 1, np.zeros(1), np.zeros(1), tuple(candidates), none, np.zeros(1), absorbed=absorbed or {})
+    terms = Terms(normals, np.zeros(1), np.zeros(1), tuple(candidates), none, np.zeros(1), absorbed=absorbed or {})
     name = candidates[0].name
     return least_detectable(terms, Thresholds({name: Gate(GATE, 0.0)}, {}, 20, "a test"), DISPERSION)[name]
 

@@ -11,6 +11,7 @@ import pytest
 
 from ddagr_gym.diagnosis.certification.certify import _recording_fold, refitted_on
 from ddagr_gym.diagnosis.search.candidates import candidates_of
+from ddagr_gym.diagnosis.search.gains import Gain, gains
 from ddagr_gym.diagnosis.search.initial_guess import (
     first_guess,
     looped_encoders,
@@ -18,7 +19,8 @@ from ddagr_gym.diagnosis.search.initial_guess import (
     turned_to_agree,
     with_whole_delay,
 )
-from ddagr_gym.diagnosis.search.scan import Gain, Terms, gains, scan
+from ddagr_gym.diagnosis.search.inner_products import Terms
+from ddagr_gym.diagnosis.search.scan import scan
 from ddagr_gym.identification.gauss_newton import Fitted, fit
 from ddagr_gym.identification.problem import Point, Problem
 from ddagr_gym.physics.effects import load_effects

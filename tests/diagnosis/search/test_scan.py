@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from ddagr_gym.diagnosis.result.uncertainty import intervals, resampled_parameters
+from ddagr_gym.diagnosis.search.gains import gains, held_out_gains
 from ddagr_gym.diagnosis.search.initial_guess import first_guess
-from ddagr_gym.diagnosis.search.scan import gains, held_out_gains, scan
+from ddagr_gym.diagnosis.search.scan import scan
 from ddagr_gym.identification.gauss_newton import fit
 from ddagr_gym.identification.misfit import channel_misfit
 from ddagr_gym.physics.effects.registry import effect_kinds, parse_effect

@@ -12,7 +12,9 @@ import pytest
 from ddagr_gym.diagnosis.gates.thresholds import Gate, Thresholds
 from ddagr_gym.diagnosis.search import rivals
 from ddagr_gym.diagnosis.search import stepwise as module
-from ddagr_gym.diagnosis.search.scan import Gain, gains, nuisance_answer, scan
+from ddagr_gym.diagnosis.search.gains import Gain, gains
+from ddagr_gym.diagnosis.search.initial_guess import nuisance_answer
+from ddagr_gym.diagnosis.search.scan import scan
 from ddagr_gym.diagnosis.search.scanned_model import Rival, ScannedModel
 from ddagr_gym.diagnosis.search.starting_models import StartingModels, starting_models
 from ddagr_gym.diagnosis.search.stepwise import search

@@ -11,7 +11,7 @@ from ddagr_gym.diagnosis.result.files import plain
 from ddagr_gym.diagnosis.unnamed.boosted_baseline import concentration_of
 from ddagr_gym.diagnosis.unnamed.regressors import TARGETS, library, motion_of
 from ddagr_gym.diagnosis.unnamed.response import INPUTS, course_of, linearise
-from ddagr_gym.diagnosis.unnamed.terms import stretches, unnamed_terms
+from ddagr_gym.diagnosis.unnamed.terms import find_terms, stretches
 from ddagr_gym.identification.gauss_newton import fit
 
 PUSH = 60.0
@@ -53,7 +53,7 @@ def test_linear_response_agrees_with_a_simulation(nominal, target: str) -> None:
 
 def test_a_push_is_found_with_its_size_unit_and_interval(pushed) -> None:
     problem, fitted = pushed
-    found = unnamed_terms(problem, scanned(fitted), np.random.default_rng(1))
+    found = find_terms(problem, scanned(fitted), np.random.default_rng(1))
     term = next(item for item in found.terms if item.target == "F_y")
     assert (term.regressor, term.unit) == ("1", "N")
     # the nominal refit has bent the soil towards it before: what is left is a little less
@@ -76,7 +76,7 @@ def test_nothing_is_found_where_nothing_is_missing(nominal) -> None:
     measured[:, : blocks * length] += np.repeat(noise, length, axis=1)
     measured = np.where(np.isfinite(blocked.windows.measured), measured, np.nan)
     white = problem.on(replace(blocked, windows=replace(blocked.windows, measured=measured)))
-    found = unnamed_terms(white, scanned(fitted), rng)
+    found = find_terms(white, scanned(fitted), rng)
     assert found.terms == ()
     assert found.equation == ""
     assert found.ceiling_share < 0.05
