@@ -10,10 +10,11 @@ from typing import Any, Literal
 from ddagr_gym.envs.settings import Randomisation, RewardWeights
 from ddagr_gym.errors import InputError
 from ddagr_gym.estimation import FilterModel
-from ddagr_gym.parameters import Sensors, Validated, bounded
+from ddagr_gym.parameters import Sensors
 from ddagr_gym.physics.effects import load_effects
 from ddagr_gym.policies.design import PolicyDesign
 from ddagr_gym.presets import ddagr
+from ddagr_gym.validated import Validated, bounded
 
 
 @dataclass(frozen=True)

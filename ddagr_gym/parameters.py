@@ -7,72 +7,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
-from numbers import Real
-from typing import Any, Self
+from dataclasses import dataclass, field
 
 from ddagr_gym.errors import InputError
+from ddagr_gym.validated import Validated, bounded, check_number
 
 STANDARD_GRAVITY = 9.80665
 """Standard acceleration of gravity [m/s^2]."""
 
 
-def bounded(
-    unit: str,
-    low: float = -math.inf,
-    high: float = math.inf,
-    *,
-    default: Any = None,
-    open_low: bool = False,
-    length: int = 0,
-) -> Any:
-    """Dataclass field that carries its unit and the interval in which it is valid; ``length`` > 0 for a tuple."""
-    metadata = {"unit": unit, "low": low, "high": high, "open_low": open_low, "length": length}
-    return field(metadata=metadata) if default is None else field(default=default, metadata=metadata)
-
-
-def _check_field(owner: object, name: str, metadata: Mapping[str, Any]) -> None:
-    value = getattr(owner, name)
-    place = f"{type(owner).__name__}.{name}"
-    length = metadata.get("length", 0)
-    if not length:
-        _check_number(place, value, metadata)
-        return
-    if not isinstance(value, tuple | list) or len(value) != length:
-        raise InputError(f"{place} is {value!r}: give {length} numbers in {metadata['unit']}.")
-    for number in value:
-        _check_number(place, number, metadata)
-
-
-def _check_number(place: str, value: object, metadata: Mapping[str, Any]) -> None:
-    if isinstance(value, bool) or not isinstance(value, Real):
-        raise InputError(f"{place} is {value!r}: give a number in {metadata['unit']}.")
-    number = float(value)
-    below = number <= metadata["low"] if metadata["open_low"] else number < metadata["low"]
-    if not math.isfinite(number) or below or number > metadata["high"]:
-        bracket = "(" if metadata["open_low"] else "["
-        interval = f"{bracket}{metadata['low']:g}, {metadata['high']:g}]"
-        raise InputError(f"{place} is {number:g}: give a finite value in {interval} {metadata['unit']}.")
-
-
 _DEVIATION = {"unit": "the unit of the field", "low": 0.0, "high": math.inf, "open_low": False}
-
-
-class Validated:
-    """Mixin: checks every field declared with :func:`bounded` after construction."""
-
-    def __post_init__(self) -> None:
-        for item in fields(self):  # type: ignore[arg-type]
-            if "unit" in item.metadata:
-                _check_field(self, item.name, item.metadata)
-        self._check()
-
-    def _check(self) -> None:
-        """Relations between fields; overridden where there are any."""
-
-    def with_values(self, **changes: Any) -> Self:
-        """Copy with some fields changed, validated again."""
-        return replace(self, **changes)  # type: ignore[type-var]
 
 
 @dataclass(frozen=True)
@@ -136,6 +80,39 @@ class Soil(Validated):
 
 
 @dataclass(frozen=True)
+class Drivetrain(Validated):
+    """What stands between a bank's speed command and its wheels (theory: drivetrain, section 1).
+
+    With the defaults the bank follows its command by the first-order loop of ``Robot.motor_rate`` alone, whatever the
+    ground does: the thesis's motors. A number of 1e6 (1e3 for a speed) stands for no limit.
+
+    Attributes:
+        command_delay: dead time between a command and the set point of the loop [s].
+        command_deadband: smallest command that moves the bank; smaller ones count as zero [rad/s].
+        command_ramp: largest change of the set point per time [rad/s^2].
+        integral_rate: k_i, growth of the loop's integral part per speed error [1/s^2].
+        load_compliance: 1/J, one over the rotating inertia of a bank seen at its wheels [1/(kg m^2)]: how much a torque
+            of the ground speeds it up or slows it down; 0 where the ground has no influence.
+        acceleration_limit: largest acceleration that the motor's torque gives the unloaded bank [rad/s^2].
+        no_load_speed: at which the torque limit has fallen to zero, in a straight line [rad/s].
+        limit_imbalance: share by which the right bank's limit is above the mean of both, and the left one's below [-].
+        viscous_rate: friction of motor and gear per speed [1/s].
+        friction: Coulomb friction of motor and gear, as the acceleration that it takes [rad/s^2].
+    """
+
+    command_delay: float = bounded("s", 0.0, 1.0, default=0.0)
+    command_deadband: float = bounded("rad/s", 0.0, 100.0, default=0.0)
+    command_ramp: float = bounded("rad/s^2", 0.0, 1e6, default=1e6, open_low=True)
+    integral_rate: float = bounded("1/s^2", 0.0, 1e4, default=0.0)
+    load_compliance: float = bounded("1/(kg m^2)", 0.0, 1e3, default=0.0)
+    acceleration_limit: float = bounded("rad/s^2", 0.0, 1e6, default=1e6, open_low=True)
+    no_load_speed: float = bounded("rad/s", 0.0, 1e3, default=1e3, open_low=True)
+    limit_imbalance: float = bounded("-", -0.9, 0.9, default=0.0)
+    viscous_rate: float = bounded("1/s", 0.0, 1e3, default=0.0)
+    friction: float = bounded("rad/s^2", 0.0, 1e3, default=0.0)
+
+
+@dataclass(frozen=True)
 class Robot(Validated):
     """Four-wheel skid-steer robot. Wheels 1 front right, 2 front left, 3 rear right, 4 rear left.
 
@@ -151,6 +128,7 @@ class Robot(Validated):
         centre_of_mass: (x, y) from the body origin and height above ground [m].
         motor_rate: k_omega of the first-order bank speed loop [1/s] (thesis 4.11).
         maximum_wheel_speed: largest bank speed command that the motors follow [rad/s].
+        drivetrain: what else stands between commands and wheels; nothing by default.
         standard_deviations: uncertainty of fields by name, in their units; absent means taken as exact.
         source: where the values come from.
     """
@@ -164,6 +142,7 @@ class Robot(Validated):
     centre_of_mass: tuple[float, float, float] = bounded("m", -100.0, 100.0, default=(0.0, 0.0, 0.5), length=3)
     motor_rate: float = bounded("1/s", 0.0, 1e4, default=4.5, open_low=True)
     maximum_wheel_speed: float = bounded("rad/s", 0.0, 1e3, default=2.0, open_low=True)
+    drivetrain: Drivetrain = Drivetrain()
     standard_deviations: Mapping[str, float] = field(default_factory=dict)
     source: str = ""
 
@@ -175,7 +154,7 @@ class Robot(Validated):
         if len(self.wheels) != 4:
             raise InputError(f"Robot.wheels has {len(self.wheels)} wheels: give one wheel for all, or four.")
         for name, deviation in self.standard_deviations.items():
-            _check_number(f"Robot.standard_deviations[{name!r}]", deviation, _DEVIATION)
+            check_number(f"Robot.standard_deviations[{name!r}]", deviation, _DEVIATION)
         x, y, height = self.centre_of_mass
         if abs(x) >= self.half_wheelbase or abs(y) >= self.half_track or height < 0:
             raise InputError(

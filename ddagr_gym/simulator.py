@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from ddagr_gym.errors import InputError
 from ddagr_gym.parameters import Numerics, Robot, Sensors, Soil
 from ddagr_gym.physics import layout
+from ddagr_gym.physics.drivetrain import NO_LIMIT
 from ddagr_gym.physics.effects import Effect, effect_table, load_effects
 from ddagr_gym.physics.numerics import step_numerics
 from ddagr_gym.physics.terrain import SoilField
@@ -53,6 +54,15 @@ for _name, _first in (
 """Truth columns of a simulated drive and where they stand in a row."""
 
 Soils = Soil | Sequence[Soil]
+
+_FORGOTTEN = (
+    (layout.WHEEL_ANGLE, 2),
+    (layout.LAST_COUNT, 2),
+    (layout.SINKAGE, 4),
+    (layout.INTEGRAL, 3),
+    (layout.COMMAND_RING, layout.SIZE - layout.COMMAND_RING),
+)
+"""First entries and sizes of what a reset sets to zero."""
 
 _PARTS_PER_THREAD = 6
 _LONG = 100  # samples from which handing out parts costs less than waiting for the slower thread
@@ -104,6 +114,10 @@ def build_row(robot: Robot, soil: Soils, sensors: Sensors) -> Array:
         layout.HALF_TRACK: robot.half_track,
         layout.BASE_MOTOR_RATE: robot.motor_rate,
         layout.MAXIMUM_WHEEL_SPEED: robot.maximum_wheel_speed,
+        layout.BASE_DRIVETRAIN: [getattr(robot.drivetrain, name) for name in layout.DRIVETRAIN_PARAMETERS],
+        layout.COMMAND_DELAY: robot.drivetrain.command_delay,
+        layout.COMMAND_DEADBAND: robot.drivetrain.command_deadband,
+        layout.COMMAND_RAMP: robot.drivetrain.command_ramp,
         layout.BASE_SOIL: _soils(soil),
         **_sensor_entries(sensors),
     }
@@ -219,22 +233,34 @@ class Simulator:
             self.rows[indices, index] = values
         self.rows[indices, layout.TIME] = time
         self.rows[indices, layout.NEXT_POSE_TIME] = time
-        for index, size in ((layout.WHEEL_ANGLE, 2), (layout.LAST_COUNT, 2), (layout.SINKAGE, 4)):
+        for index, size in _FORGOTTEN:
             self.rows[np.ix_(indices, np.arange(index, index + size))] = 0.0
+        for bank in range(2):
+            self.rows[indices, layout.SET_POINT + bank] = self.rows[indices, layout.OMEGA + bank]
         self.effect_memory[indices] = 0.0
         settle_rows(self.rows, indices, self._grids(), self._actions(), self._numerics)
 
-    def remember(self, past: Array) -> None:
-        """Tell effects on commands and motors what was commanded before the present motion, which stays as it is.
+    def remember(self, past: Array, speeds: Array | None = None) -> None:
+        """Tell drivetrains and effects on motors what was commanded before the present motion, which stays as it is.
 
         A delay or a lag that is told nothing takes the motors to have settled at their speeds of the start. One that is
         told takes this for the time before what it is told.
 
         Args:
             past: (N, H, 2) commands of the samples before, the latest last [rad/s]; NaN where unknown.
+            speeds: (N, H, 2) bank speeds at the ends of these samples [rad/s], NaN where unknown: the integral parts of
+                speed loops grow by their errors. Without them the loops are taken to have settled at the start.
         """
-        if np.isin(self._points, (layout.POINT_COMMANDS, layout.POINT_MOTORS)).any():
-            remember_rows(self.rows, np.ascontiguousarray(past), self._actions())
+        on_motors = np.isin(self._points, (layout.POINT_COMMANDS, layout.POINT_MOTORS)).any()
+        if on_motors or self._remembers():
+            known = np.full(past.shape, np.nan) if speeds is None else speeds
+            remember_rows(self.rows, np.ascontiguousarray(past), np.ascontiguousarray(known), self._actions())
+
+    def _remembers(self) -> bool:
+        """Whether any drivetrain depends on commands of the past."""
+        ramps = self.rows[:, layout.COMMAND_RAMP] < NO_LIMIT
+        integral = self.rows[:, layout.BASE_DRIVETRAIN + layout.INTEGRAL_RATE] > 0.0
+        return bool((ramps | integral | (self.rows[:, layout.COMMAND_DELAY] > 0.0)).any())
 
     def _grids(self) -> tuple[Any, ...]:
         return self._fields, self._field_geometry, self.field_index

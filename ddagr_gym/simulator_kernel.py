@@ -16,13 +16,22 @@ from numpy.typing import NDArray
 from ddagr_gym.jit import kernel
 from ddagr_gym.physics.body_dynamics import evaluate_forces, place_wheels, restore_body
 from ddagr_gym.physics.callbacks import EffectActions, actions_on, apply_effects
+from ddagr_gym.physics.drivetrain import (
+    bank_acceleration,
+    delay_commands,
+    follows_past,
+    mark_dynamic_banks,
+    set_targets,
+    turn_banks,
+    wind_up,
+)
 from ddagr_gym.physics.integrators import advance_body
 from ddagr_gym.physics.layout import (
-    BASE_MOTOR_RATE,
     COMMAND,
+    COMMAND_DELAY,
     DERIVATIVE_VALID,
+    DYNAMIC_BANKS,
     GRAVITY,
-    MAXIMUM_WHEEL_SPEED,
     MEAN_SPECIFIC_FORCE,
     MEAN_YAW_ACCELERATION,
     MOTOR_RATE,
@@ -76,13 +85,20 @@ def _drive(row: Array, command: Array, actions: EffectActions) -> None:
     """Commands and motor loops for the coming sample."""
     row[COMMAND] = command[0]
     row[COMMAND + 1] = command[1]
+    if row[COMMAND_DELAY] > 0.0:
+        delay_commands(row)
     apply_effects(POINT_COMMANDS, row, actions)
-    for bank in range(2):
-        limit = row[MAXIMUM_WHEEL_SPEED]
-        row[COMMAND + bank] = min(max(row[COMMAND + bank], -limit), limit)
-        row[MOTOR_TARGET + bank] = row[COMMAND + bank]
-        row[MOTOR_RATE + bank] = row[BASE_MOTOR_RATE]
+    set_targets(row)
     apply_effects(POINT_MOTORS, row, actions)
+    mark_dynamic_banks(row)
+
+
+@kernel(inline=True)
+def _speed_change(row: Array, bank: int, step: float) -> float:
+    """About how much a bank's speed changes in the coming ``step`` [s]."""
+    if row[DYNAMIC_BANKS] != 0.0:
+        return bank_acceleration(row, bank) * step
+    return (row[MOTOR_TARGET + bank] - row[OMEGA + bank]) * (1.0 - math.exp(-row[MOTOR_RATE + bank] * step))
 
 
 @kernel()
@@ -92,7 +108,7 @@ def _division(row: Array, numerics: StepNumerics) -> int:
     step = row[SAMPLE_PERIOD] / steps
     for bank in range(2):
         rim = row[WHEEL + bank] + row[WHEEL + 8 + bank]
-        change = (row[MOTOR_TARGET + bank] - row[OMEGA + bank]) * (1.0 - math.exp(-row[MOTOR_RATE + bank] * step))
+        change = _speed_change(row, bank, step)
         speed = max(abs(rim * row[OMEGA + bank]), abs(row[V_X]))
         if abs(rim * change) > numerics.launch_change * speed and change != 0.0:
             return steps * numerics.launch_substeps
@@ -136,23 +152,30 @@ def settle_rows(rows: Array, chosen: Integers, grids: Bundle, actions: Bundle, n
 
 
 @kernel()
-def remember_rows(rows: Array, past: Array, actions: Bundle) -> None:
-    """Let effects on commands and motors see what was commanded before the rows' present motion, which stays.
+def remember_rows(rows: Array, past: Array, speeds: Array, actions: Bundle) -> None:
+    """Let drivetrains, and effects on commands and motors, see what was before the rows' present motion, which stays.
 
     Args:
         rows: (N, layout.SIZE).
         past: (N, H, 2) commands of the samples before, the latest last; NaN where unknown.
+        speeds: (N, H, 2) bank speeds at the ends of these samples, for the speed loops' integral parts; NaN: unknown.
         actions: of N environments.
     """
     count = past.shape[1]
     for n in range(rows.shape[0]):
         row, now, own = rows[n], rows[n, TIME], actions_on(EffectActions(*actions), n)
+        right, left = row[OMEGA], row[OMEGA + 1]
         for k in range(count):
             if math.isnan(past[n, k, 0]):
                 continue
             row[TIME] = now - (count - k) * row[SAMPLE_PERIOD]
+            if follows_past(row):
+                turn_banks(row, speeds[n, k])  # where the speed before this sample is unknown
+                turn_banks(row, speeds[n, max(k - 1, 0)])
             _drive(row, past[n, k], own)
-        row[TIME] = now
+            if row[DYNAMIC_BANKS] != 0.0:
+                wind_up(row, speeds[n, k])
+        row[TIME], row[OMEGA], row[OMEGA + 1] = now, right, left
 
 
 @kernel()

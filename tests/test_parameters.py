@@ -9,8 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ddagr_gym.errors import InputError
-from ddagr_gym.parameters import Imu, Numerics, PoseReceiver, Robot, Sensors, Soil, TorusWheel, Validated, WheelEncoder
+from ddagr_gym.parameters import Imu, Numerics, PoseReceiver, Robot, Sensors, Soil, TorusWheel, WheelEncoder
 from ddagr_gym.presets import get_robot, get_soil
+from ddagr_gym.validated import Validated
 
 ROBOT, SOIL = get_robot("ddagr"), get_soil("thesis_a1")
 VALID: tuple[Validated, ...] = (

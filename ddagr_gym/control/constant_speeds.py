@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ddagr_gym.control.observation import decode
-from ddagr_gym.parameters import Validated, bounded
+from ddagr_gym.validated import Validated, bounded
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from ddagr_gym.control.predictive_model import (
 )
 from ddagr_gym.control.turn_controller import commanded_turn
 from ddagr_gym.errors import InputError
-from ddagr_gym.parameters import Validated, bounded
+from ddagr_gym.validated import Validated, bounded
 
 Array = NDArray[np.float64]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ddagr_gym.parameters import Validated, bounded
+from ddagr_gym.validated import Validated, bounded
 
 
 @dataclass(frozen=True)

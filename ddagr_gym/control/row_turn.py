@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ddagr_gym.errors import InputError, unknown_name
 from ddagr_gym.frames import wrap_angle
-from ddagr_gym.parameters import Validated, bounded
+from ddagr_gym.validated import Validated, bounded
 
 Array = NDArray[np.float64]
 

@@ -8,11 +8,12 @@ import numpy as np
 
 from ddagr_gym.control.row_turn import SIDES, RowTurn
 from ddagr_gym.errors import InputError, unknown_name
-from ddagr_gym.parameters import Imu, Numerics, Robot, Sensors, Soil, Validated, bounded
+from ddagr_gym.parameters import Imu, Numerics, Robot, Sensors, Soil
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.soil_draws import SoilDistribution, draw_soil, get_distribution, soil_field
 from ddagr_gym.physics.terrain import SoilField
 from ddagr_gym.presets import ddagr
+from ddagr_gym.validated import Validated, bounded
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from ddagr_gym.errors import InputError
 from ddagr_gym.estimation import layout
 from ddagr_gym.estimation.force_laws import ForceLaw
-from ddagr_gym.parameters import STANDARD_GRAVITY, Robot, Sensors, Validated, bounded
+from ddagr_gym.parameters import STANDARD_GRAVITY, Robot, Sensors
+from ddagr_gym.validated import Validated, bounded
 
 Array = NDArray[np.float64]
 

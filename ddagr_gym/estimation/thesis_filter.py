@@ -37,7 +37,8 @@ from ddagr_gym.estimation.layout import (
 )
 from ddagr_gym.estimation.process_model import body_forces
 from ddagr_gym.jit import kernel
-from ddagr_gym.parameters import Robot, Validated, bounded
+from ddagr_gym.parameters import Robot
+from ddagr_gym.validated import Validated, bounded
 
 Array = NDArray[np.float64]
 

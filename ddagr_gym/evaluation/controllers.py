@@ -30,10 +30,11 @@ from ddagr_gym.estimation.force_balance import arc_bank_speeds
 from ddagr_gym.evaluation.calibration import calibrate_constant_speeds
 from ddagr_gym.evaluation.policy_seeds import arm_and_seed, policy_version
 from ddagr_gym.evaluation.runs import BatchController, Controller
-from ddagr_gym.parameters import Sensors, Validated, bounded
+from ddagr_gym.parameters import Sensors
 from ddagr_gym.physics.soil_laws import NOMINAL_LAW
 from ddagr_gym.physics.steady_arc import soil_of, steady_bank_speeds
 from ddagr_gym.presets import ddagr, get_soil
+from ddagr_gym.validated import Validated, bounded
 
 
 @dataclass(frozen=True)

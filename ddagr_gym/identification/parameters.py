@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.errors import InputError
-from ddagr_gym.parameters import Robot, Soil
+from ddagr_gym.parameters import Drivetrain, Robot, Soil
 from ddagr_gym.physics import layout
 
 Array = NDArray[np.float64]
@@ -164,7 +164,10 @@ _ROBOT_ENTRIES = {
 
 
 def robot_parameters(robot: Robot) -> tuple[ModelParameter, ...]:
-    """What the robot states as uncertain, as logarithms of factors with its relative standard deviations."""
+    """What the robot states as uncertain, as logarithms of factors with its relative standard deviations.
+
+    Parts of its drivetrain that may be nothing (a delay, a compliance) are changes in their units, within its bounds.
+    """
     nominal = {
         "mass": robot.mass,
         "yaw_inertia": robot.yaw_inertia,
@@ -175,11 +178,39 @@ def robot_parameters(robot: Robot) -> tuple[ModelParameter, ...]:
         "half_width": robot.wheels[0].half_width,
         "outer_radius": robot.wheels[0].major_radius,
     }
-    return tuple(
+    body = tuple(
         _log(name, _ROBOT_ENTRIES[name], deviation / nominal[name], max(1.6, 4.0 * deviation / nominal[name]))
         for name, deviation in robot.standard_deviations.items()
         if name in nominal and deviation > 0.0
     )
+    return body + _drivetrain_parameters(robot)
+
+
+_DRIVETRAIN_ENTRIES = {
+    "command_delay": layout.COMMAND_DELAY,
+    "command_deadband": layout.COMMAND_DEADBAND,
+    "command_ramp": layout.COMMAND_RAMP,
+    **{name: layout.BASE_DRIVETRAIN + k for k, name in enumerate(layout.DRIVETRAIN_PARAMETERS)},
+}
+_LIMITS = ("command_ramp", "acceleration_limit", "no_load_speed")
+_DRIVETRAIN_STEP = 0.02  # of the standard deviation, for finite differences (ours)
+
+
+def _drivetrain_parameters(robot: Robot) -> tuple[ModelParameter, ...]:
+    """The same of its drivetrain: limits as factors, what may be nothing as a sum."""
+    made = []
+    for name, deviation in robot.standard_deviations.items():
+        if name not in _DRIVETRAIN_ENTRIES or deviation <= 0.0:
+            continue
+        value, entry = getattr(robot.drivetrain, name), (_DRIVETRAIN_ENTRIES[name],)
+        if name in _LIMITS:
+            made.append(_log(name, entry, deviation / value))
+            continue
+        field = next(item for item in fields(Drivetrain) if item.name == name)
+        low, high = field.metadata["low"] - value, field.metadata["high"] - value
+        step = _DRIVETRAIN_STEP * deviation
+        made.append(ModelParameter(name, field.metadata["unit"], entry, False, deviation, step, low, high))
+    return tuple(made)
 
 
 def sensor_parameters(recordings: int, gyro_bias: float, accelerometer_bias: float) -> tuple[ModelParameter, ...]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ddagr_gym.identification.parameters import ModelParameter
 from ddagr_gym.identification.windows import CHANNELS, STATE, WindowSet
-from ddagr_gym.parameters import Imu, Numerics, PoseReceiver, Robot, Sensors, Soil, WheelEncoder
+from ddagr_gym.parameters import Drivetrain, Imu, Numerics, PoseReceiver, Robot, Sensors, Soil, WheelEncoder
 from ddagr_gym.physics import layout
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.effects.base import GROUPS
@@ -78,7 +78,10 @@ class WindowModel:
         self._delay = delay
         self._imposed = imposed
         if imposed:
-            robot = replace(robot, motor_rate=IMPOSED_RATE_PERIODS / windows.period, maximum_wheel_speed=1e3)
+            robot = replace(
+                robot, motor_rate=IMPOSED_RATE_PERIODS / windows.period, maximum_wheel_speed=1e3,
+                drivetrain=Drivetrain(),
+            )  # fmt: skip
         self._row = build_row(robot, soil, ideal_sensors(windows.period))
         self._no_noise = np.zeros((windows.count, windows.samples, layout.NOISE_CHANNELS))
 
@@ -119,7 +122,7 @@ class WindowModel:
         simulator.rows[:, layout.TIME] = self.windows.time
         simulator.rows[:, layout.NEXT_POSE_TIME] = self.windows.time
         if not self._imposed:
-            simulator.remember(self.windows.past(delay))
+            simulator.remember(self.windows.past(delay), self.windows.past_speeds)
         recorded = np.asarray(entries, dtype=np.int64).reshape(-1)
         readings = np.empty((self.windows.count, self.windows.samples, len(CHANNELS)))
         record = np.empty((self.windows.count, self.windows.samples, recorded.size))

@@ -50,6 +50,8 @@ class WindowSet:
         ahead: A.
         unknown: (W,) how many of the first commands nobody recorded: before a recording, or a stretch of it, the first
             one stands for them.
+        speeds: (W, H + T, 2) recorded bank speeds between their samples [rad/s], NaN where unknown; the first H belong
+            to the past.
     """
 
     period: float
@@ -62,10 +64,13 @@ class WindowSet:
     initial: Array
     ahead: int = 0
     unknown: NDArray[np.int64] = field(default_factory=lambda: np.zeros(1, dtype=np.int64))
+    speeds: Array = field(default_factory=lambda: np.full((1, 1, 2), np.nan))
 
     def __post_init__(self) -> None:
-        """One count for all windows, by default none, stands for each of them."""
+        """One count for all windows, by default none, stands for each of them, and so do unknown speeds."""
         object.__setattr__(self, "unknown", np.broadcast_to(self.unknown, self.start.shape))
+        speeds = np.broadcast_to(self.speeds, (len(self.start), self.history + self.samples, 2))
+        object.__setattr__(self, "speeds", speeds)
 
     @property
     def count(self) -> int:
@@ -95,6 +100,11 @@ class WindowSet:
         known = np.arange(self.history) - late[:, None] >= self.unknown[:, None]
         return np.where(known[..., None], self._commands(np.arange(-self.history, 0), delay), np.nan)
 
+    @property
+    def past_speeds(self) -> Array:
+        """(W, H, 2) recorded bank speeds before the start, the latest last [rad/s]; NaN where unknown."""
+        return self.speeds[:, : self.history]
+
     def _commands(self, samples: NDArray[np.int64], delay: float | Array) -> Array:
         """Commands that act in samples counted from the start."""
         periods = np.broadcast_to(np.asarray(delay, dtype=np.float64) / self.period, (self.count,))
@@ -110,7 +120,7 @@ class WindowSet:
 
     def subset(self, chosen: NDArray[np.int64] | NDArray[np.bool_]) -> WindowSet:
         """Only the chosen windows."""
-        names = ("recording", "start", "time", "commands", "measured", "initial", "unknown")
+        names = ("recording", "start", "time", "commands", "measured", "initial", "unknown", "speeds")
         return replace(self, **{name: getattr(self, name)[chosen] for name in names})
 
 
@@ -146,11 +156,11 @@ def cut_windows(
     past, later = round(history / period), round(ahead / period)
     parts = []
     for number, recording in enumerate(recordings):
-        drive = _drive(recording, drive_by)
+        drive, speeds = _drive(recording, drive_by), _bank_speeds(recording)
         due = 0
         for segment in recording.segments():
             for first in range(max(segment.start, due), segment.stop - samples, step):
-                part = _window(recording, number, drive, first, samples, (past, later), segment)
+                part = _window(recording, number, (drive, speeds), first, samples, (past, later), segment)
                 if part is not None:
                     parts.append(part)
                     due = first + step
@@ -188,7 +198,7 @@ def cut_runs(
     past, later = round(history / period), round(ahead / period)
     by_length: dict[int, list[_Part]] = {}
     for number, recording in enumerate(recordings):
-        drive = _drive(recording, drive_by)
+        drive, speeds = _drive(recording, drive_by), _bank_speeds(recording)
         for segment in recording.segments():
             known = np.isfinite(drive[segment]).all(axis=1)
             edges = segment.start + np.flatnonzero(np.diff(np.concatenate([[False], known, [False]]).astype(int)))
@@ -196,7 +206,7 @@ def cut_runs(
                 samples = stop - first - 1
                 if samples <= 1:
                     continue
-                part = _window(recording, number, drive, first, samples, (past, later), segment)
+                part = _window(recording, number, (drive, speeds), first, samples, (past, later), segment)
                 if part is not None and samples * period >= shortest - 0.5 * period:
                     by_length.setdefault(samples, []).append(part)
     return tuple(
@@ -204,7 +214,7 @@ def cut_runs(
     )
 
 
-_Part = tuple[int, int, float, Array, Array, int]
+_Part = tuple[int, int, float, Array, Array, int, Array]
 
 
 def _stack(
@@ -215,12 +225,14 @@ def _stack(
     wheel_radius: float,
     half_track: float,
 ) -> WindowSet:
-    number, start, time, commands, measured, unknown = (np.array(column) for column in zip(*parts, strict=True))
+    number, start, time, commands, measured, unknown, speeds = (np.array(column) for column in zip(*parts, strict=True))
     guesses = [
         _guess(recordings[n], int(s), drive, wheel_radius, half_track)
         for n, s, drive in zip(number, start, commands[:, max(kept[0] - 1, 0)], strict=True)
     ]
-    return WindowSet(period, number, start, time, commands, kept[0], measured, np.stack(guesses), kept[1], unknown)
+    return WindowSet(
+        period, number, start, time, commands, kept[0], measured, np.stack(guesses), kept[1], unknown, speeds
+    )
 
 
 def _common_period(recordings: Sequence[Recording]) -> float:
@@ -238,6 +250,11 @@ def _drive(recording: Recording, drive_by: str) -> Array:
         return np.stack(recording.held_commands(), axis=1)
     if drive_by != "encoders":
         raise InputError(f"drive_by is {drive_by!r}: give 'commands' or 'encoders'.")
+    return _bank_speeds(recording)
+
+
+def _bank_speeds(recording: Recording) -> Array:
+    """(n, 2) recorded speeds between their samples; NaN where unknown."""
     return np.stack([_interpolated(recording, name) for name in ("encoder_right", "encoder_left")], axis=1)
 
 
@@ -256,9 +273,16 @@ def _interpolated(recording: Recording, name: str, gap: float = 0.6) -> Array:
 
 
 def _window(
-    recording: Recording, number: int, drive: Array, first: int, samples: int, kept: tuple[int, int], segment: slice
+    recording: Recording,
+    number: int,
+    driven: tuple[Array, Array],
+    first: int,
+    samples: int,
+    kept: tuple[int, int],
+    segment: slice,
 ) -> _Part | None:
     past, later = kept
+    drive, speeds = driven
     rows = np.arange(first + 1 - past, first + 1 + samples + later)
     commands = drive[np.clip(rows, segment.start, segment.stop - 1)]
     if not np.isfinite(commands[past : past + samples]).all():
@@ -270,7 +294,9 @@ def _window(
     unknown = max(int((rows < segment.start).sum()), first_known)
     inside = slice(first + 1, first + 1 + samples)
     measured = np.stack([recording[name][inside] for name in CHANNELS], axis=1)
-    return number, first, float(recording.t[first]), commands, measured, unknown
+    rows = rows[: past + samples]
+    turned = np.where((rows >= segment.start)[:, None], speeds[np.maximum(rows, 0)], np.nan)
+    return number, first, float(recording.t[first]), commands, measured, unknown, turned
 
 
 def _guess(recording: Recording, row: int, drive: Array, wheel_radius: float, half_track: float) -> Array:

@@ -14,15 +14,25 @@ from numpy.typing import NDArray
 
 from ddagr_gym.jit import kernel, stack_array
 from ddagr_gym.physics.body_dynamics import evaluate_forces, world_rates
-from ddagr_gym.physics.body_jacobian import damping_inverse, solve
+from ddagr_gym.physics.body_jacobian import BANKS, damping_inverse, solve
 from ddagr_gym.physics.callbacks import EffectActions
-from ddagr_gym.physics.drivetrain import advance_motors
+from ddagr_gym.physics.drivetrain import (
+    advance_motors,
+    bank_acceleration,
+    bank_inertia,
+    integral_growth,
+    moving_entries,
+)
 from ddagr_gym.physics.layout import (
     ACCELERATION,
     HALF_TRACK,
+    INTEGRAL,
     MASS,
+    OMEGA,
     TIME,
     V_X,
+    WHEEL,
+    WHEEL_ANGLE,
     YAW,
     YAW_INERTIA,
     YAW_RATE,
@@ -44,13 +54,22 @@ def _defect(row: Array, start: Array, step: float, defect: Array) -> float:
     """v - v_n - h f(v) of backward Euler, and its size [m/s]."""
     for j in range(3):
         defect[j] = row[V_X + j] - start[j] - step * row[ACCELERATION + j]
-    return max(max(abs(defect[0]), abs(defect[1])), row[HALF_TRACK] * abs(defect[2]))
+    size = max(max(abs(defect[0]), abs(defect[1])), row[HALF_TRACK] * abs(defect[2]))
+    if moving_entries(row) == 5:
+        for bank in range(2):
+            defect[3 + bank] = row[OMEGA + bank] - start[3 + bank] - step * bank_acceleration(row, bank)
+            size = max(size, (row[WHEEL + bank] + row[WHEEL + 8 + bank]) * abs(defect[3 + bank]))
+    return size
 
 
 @kernel(inline=True)
 def _work(row: Array, defect: Array, change: Array) -> float:
-    """Mass times velocity of the defect along a change of the motion."""
-    return row[MASS] * (defect[0] * change[0] + defect[1] * change[1]) + row[YAW_INERTIA] * defect[2] * change[2]
+    """Inertia times velocity of the defect along a change of the motion."""
+    work = row[MASS] * (defect[0] * change[0] + defect[1] * change[1]) + row[YAW_INERTIA] * defect[2] * change[2]
+    if moving_entries(row) == 5:
+        for bank in range(2):
+            work += bank_inertia(row, bank) * defect[3 + bank] * change[3 + bank]
+    return work
 
 
 @kernel()
@@ -61,20 +80,20 @@ def _newton_step(
 
     Args:
         row: the environment; moved.
-        start: (3,) motion at the start of the time step.
-        defect: (3,) at the present motion, overwritten.
-        change: (3,) what is taken off the motion; the defect does work along it.
+        start: (5,) motion at the start of the time step, the bank speeds last.
+        defect: (5,) at the present motion, overwritten.
+        change: (5,) what is taken off the motion; the defect does work along it.
         step: h [s].
         numerics: accuracy.
         actions: effects on this environment.
     """
-    before = stack_array(3)
-    for j in range(3):
+    before, moving = stack_array(5), moving_entries(row)
+    for j in range(moving):
         before[j] = row[V_X + j]
     whole = _work(row, defect, change)
     low, at_low, high, at_high, length, work = 0.0, whole, 0.0, 0.0, 1.0, whole
     for _ in range(LENGTHS):
-        for j in range(3):
+        for j in range(moving):
             row[V_X + j] = before[j] - length * change[j]
         evaluate_forces(row, -1.0, numerics, actions)
         _defect(row, start, step, defect)
@@ -96,7 +115,7 @@ def _newton_step(
             high, at_high, at_low = length, work, 0.5 * at_low
         length = (low * at_high - high * at_low) / (at_high - at_low)
     if not math.isfinite(work):
-        for j in range(3):
+        for j in range(moving):
             row[V_X + j] = before[j]
 
 
@@ -113,24 +132,32 @@ def backward_euler_step(
         numerics: accuracy.
         actions: effects on this environment.
     """
-    inverse, drive = stack_array(9), stack_array(6)
-    start, defect, change = stack_array(3), stack_array(3), stack_array(3)
-    for j in range(3):
+    inverse, drive, banks = stack_array(9), stack_array(6), stack_array(BANKS)
+    start, defect, right, change = stack_array(5), stack_array(5), stack_array(5), stack_array(5)
+    moving = moving_entries(row)
+    for j in range(5):
         start[j] = row[V_X + j]
-    advance_motors(row, step)
+    if moving == 3:
+        advance_motors(row, step)
     row[TIME] += step
     for _ in range(NEWTON_ITERATIONS):
         evaluate_forces(row, 0.0, numerics, actions)
         if _defect(row, start, step, defect) <= tolerance:
             break
-        damping_inverse(row, step, inverse, drive, actions)
-        solve(inverse, defect, change)
+        damping_inverse(row, step, inverse, drive, banks, actions)
+        for j in range(moving):
+            right[j] = defect[j]
+        solve(row, step, inverse, drive, banks, right, change)
         if not _work(row, defect, change) > 0.0:
-            for j in range(3):
+            for j in range(moving):
                 change[j] = defect[j]  # which does work whatever the derivative says
         _newton_step(row, start, defect, change, step, numerics, actions)
     rate_x, rate_y = world_rates(row)
     row[X] += step * rate_x
     row[Y] += step * rate_y
     row[YAW] += step * row[YAW_RATE]
+    if moving == 5:
+        for bank in range(2):
+            row[WHEEL_ANGLE + bank] += step * row[OMEGA + bank]
+            row[INTEGRAL + bank] += step * integral_growth(row, bank)
     evaluate_forces(row, 0.0, numerics, actions)

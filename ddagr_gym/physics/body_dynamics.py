@@ -319,8 +319,9 @@ def _may_extrapolate(row: Array, limit: float) -> bool:
         change = limit * max(abs(v_x), abs(rim)) * speed
         d_x = row[V_X] - row[YAW_RATE] * hub_y(row, i) - row[WHEEL_V_X + i]
         d_y = row[V_Y] + row[YAW_RATE] * hub_x(row, i) - row[WHEEL_V_Y + i]
+        d_rim = (row[WHEEL + i] + row[WHEEL + 8 + i]) * (row[OMEGA + i % 2] - row[WHEEL_OMEGA + i])
         carried = row[LOAD + i] > 0.0 and row[BOGGED + i] == 0.0 and stiffness_of(row, i) > 0.0
-        if not (carried and abs(d_x) < change and abs(d_y) < change):
+        if not (carried and abs(d_x) < change and abs(d_y) < change and abs(d_rim) < change):
             return False
     return True
 

@@ -1,6 +1,8 @@
-"""Damping of the body's three velocities by its wheels' forces: the linear systems of the implicit time step.
+"""Damping of the body's velocities and the bank speeds by the wheels' forces: the linear systems of the time step.
 
-Theory: wheel model, section 6.3.
+Where the bank speeds depend on the ground (:func:`moving_entries` is 5), they are eliminated: each bank's speed is
+damped by itself and by the body's three velocities only, so that a 3 x 3 system is left (theory: wheel model, section
+6.3; theory: drivetrain, eq. (6)).
 """
 
 from __future__ import annotations
@@ -11,8 +13,11 @@ from numpy.typing import NDArray
 from ddagr_gym.jit import kernel, stack_array
 from ddagr_gym.physics.body_dynamics import extra_forces, hub_x, hub_y, set_kinematics, sum_extra
 from ddagr_gym.physics.callbacks import EffectActions
+from ddagr_gym.physics.drivetrain import bank_damping, moving_entries
 from ddagr_gym.physics.layout import (
+    DRIVETRAIN,
     LOAD,
+    LOAD_COMPLIANCE,
     MASS,
     POINT_BODY_FORCES,
     POINT_WHEEL_FORCES,
@@ -25,6 +30,54 @@ from ddagr_gym.physics.layout import (
 from ddagr_gym.physics.wheel_derivatives import change_of, relative_motion, stiffness_of
 
 Array = NDArray[np.float64]
+
+BANKS = 8
+"""Of :func:`damping_inverse`'s ``banks``: d(bank acceleration)/d(v_x, v_y, yaw rate) right, left; own damping of both
+(after the elimination 1/(1 - step damping))."""
+
+
+@kernel()
+def _add_torque_jacobian(row: Array, i: int, banks: Array) -> None:
+    """Add how the torque of wheel ``i`` changes with the velocities and with its bank's speed [N m per their unit]."""
+    x, y, bank = hub_x(row, i), hub_y(row, i), i % 2
+    stiffness, speed = stiffness_of(row, i), relative_motion(row, i)[3]
+    for direction in range(3):
+        d_x = 1.0 / speed if direction == 0 else 0.0
+        d_y = 1.0 / speed if direction == 1 else 0.0
+        d_rim = (row[WHEEL + i] + row[WHEEL + 8 + i]) / speed if direction == 2 else 0.0
+        settle = -change_of(row, i, 2, d_x, d_y, d_rim, 0.0) / stiffness
+        torque = change_of(row, i, 4, d_x, d_y, d_rim, settle)
+        if direction == 2:
+            banks[6 + bank] += torque
+            continue
+        banks[3 * bank + direction] += torque
+        banks[3 * bank + 2] += (x if direction == 1 else -y) * torque
+
+
+@kernel()
+def _eliminate_banks(row: Array, step: float, system: Array, drive: Array, banks: Array) -> None:
+    """Take the bank speeds' part into the body's system ``I - step A`` (9,), and leave ``banks`` ready for use.
+
+    Args:
+        row: the environment.
+        step: [s].
+        system: (9,) row by row, changed.
+        drive: (6,) accelerations by bank speed.
+        banks: (BANKS,), written.
+    """
+    for j in range(BANKS):
+        banks[j] = 0.0
+    for i in range(4):
+        if row[LOAD + i] > 0.0 and stiffness_of(row, i) > 0.0:
+            _add_torque_jacobian(row, i, banks)
+    for j in range(BANKS):
+        banks[j] *= row[DRIVETRAIN + LOAD_COMPLIANCE]
+    for bank in range(2):
+        damping = min(banks[6 + bank], 0.0) + bank_damping(row, bank)
+        banks[6 + bank] = 1.0 / (1.0 - step * damping)
+        for j in range(3):
+            for k in range(3):
+                system[3 * j + k] -= step * step * drive[2 * j + bank] * banks[6 + bank] * banks[3 * bank + k]
 
 
 @kernel()
@@ -110,21 +163,51 @@ def _invert(matrix: Array, inverse: Array) -> None:
 
 
 @kernel(inline=True)
-def solve(inverse: Array, right: Array, solution: Array) -> None:
+def _solve_body(inverse: Array, right: Array, solution: Array) -> None:
     """Inverse (9,), row by row, times a right side (3,), written to ``solution`` (3,)."""
     for j in range(3):
         solution[j] = inverse[3 * j] * right[0] + inverse[3 * j + 1] * right[1] + inverse[3 * j + 2] * right[2]
 
 
 @kernel()
-def damping_inverse(row: Array, step: float, inverse: Array, drive: Array, actions: EffectActions) -> None:
-    """(I - step A)^-1, A from the forces' Jacobian and the Coriolis terms, and the accelerations by bank speed.
+def solve(row: Array, step: float, inverse: Array, drive: Array, banks: Array, right: Array, solution: Array) -> None:
+    """Solve (I - step A) solution = right for the velocities of the body and, where they are dynamic, the bank speeds.
+
+    Args:
+        row: the environment.
+        step: that of :func:`damping_inverse` [s].
+        inverse: (9,) from there.
+        drive: (6,) from there.
+        banks: (BANKS,) from there.
+        right: (5,); of the first three, the banks' part is taken in.
+        solution: (5,), the first 3 or all written.
+    """
+    if moving_entries(row) == 3:
+        _solve_body(inverse, right, solution)
+        return
+    for bank in range(2):
+        for j in range(3):
+            right[j] += step * drive[2 * j + bank] * banks[6 + bank] * right[3 + bank]
+    _solve_body(inverse, right, solution)
+    for bank in range(2):
+        coupled = right[3 + bank]
+        for j in range(3):
+            coupled += step * banks[3 * bank + j] * solution[j]
+        solution[3 + bank] = banks[6 + bank] * coupled
+
+
+@kernel()
+def damping_inverse(
+    row: Array, step: float, inverse: Array, drive: Array, banks: Array, actions: EffectActions
+) -> None:
+    """(I - step A)^-1 of the body, A from the forces' Jacobian and the Coriolis terms, dynamic banks eliminated.
 
     Args:
         row: the environment.
         step: [s].
         inverse: (9,) row by row, written.
         drive: (6,) d(acceleration)/d(right, left bank speed), row by row, written.
+        banks: (BANKS,), written where the banks are dynamic.
         actions: effects on this environment.
     """
     jacobian = stack_array(9)
@@ -144,4 +227,6 @@ def damping_inverse(row: Array, step: float, inverse: Array, drive: Array, actio
         jacobian[j] *= -step
     for j in range(3):
         jacobian[4 * j] += 1.0
+    if moving_entries(row) == 5:
+        _eliminate_banks(row, step, jacobian, drive, banks)
     _invert(jacobian, inverse)

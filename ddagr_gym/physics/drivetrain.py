@@ -1,4 +1,12 @@
-"""Bank speed loops: first order, solved exactly (theory: wheel model, eq. (28); thesis 4.11)."""
+"""From a bank's speed command to its acceleration (theory: drivetrain, section 1).
+
+    r = ramp(deadband(u(t - delay)))
+    d omega/dt = limit(k_omega (r - omega) + z) + T/J - viscous omega - friction sgn(omega),  dz/dt = k_i (r - omega)
+
+T is the torque of the ground on the bank's wheels. With the defaults of :class:`ddagr_gym.parameters.Drivetrain` only
+the first-order loop d omega/dt = k_omega (r - omega) is left, which is solved exactly and does not depend on the body;
+otherwise the bank speeds are advanced together with the body's velocities.
+"""
 
 from __future__ import annotations
 
@@ -8,12 +16,130 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.jit import kernel
-from ddagr_gym.physics.layout import MOTOR_RATE, MOTOR_TARGET, OMEGA, WHEEL_ANGLE
+from ddagr_gym.physics.history import fill_node, push, recall, ring_is_empty, ring_stride
+from ddagr_gym.physics.layout import (
+    ACCELERATION_LIMIT,
+    AXLE_TORQUE,
+    BASE_DRIVETRAIN,
+    BASE_MOTOR_RATE,
+    COMMAND,
+    COMMAND_DEADBAND,
+    COMMAND_DELAY,
+    COMMAND_NODES,
+    COMMAND_RAMP,
+    COMMAND_RING,
+    DRIVETRAIN,
+    DYNAMIC_BANKS,
+    FRICTION,
+    INTEGRAL,
+    INTEGRAL_KNOWN,
+    INTEGRAL_RATE,
+    LIMIT_IMBALANCE,
+    LOAD_COMPLIANCE,
+    MASS,
+    MAXIMUM_WHEEL_SPEED,
+    MOTOR_RATE,
+    MOTOR_TARGET,
+    NO_LOAD_SPEED,
+    OMEGA,
+    SAMPLE_PERIOD,
+    SET_POINT,
+    SIZE,
+    VISCOUS_RATE,
+    WHEEL,
+    WHEEL_ANGLE,
+)
+
+Array = NDArray[np.float64]
+
+LONGEST_DELAY = 1.0  # [s] of a command, ours: as long as commands are remembered
+NO_LIMIT = 1e6  # [rad/s^2] far beyond any wheel's
+NO_SPEED_LIMIT = 1e3  # [rad/s] likewise
+_STANDING = 0.05  # [rad/s] below which a bank counts as standing, ours: 15 mm/s of a 0.3 m wheel
+_STICTION_SPEED = 0.02  # [rad/s] over which Coulomb friction builds up, ours: a fortieth of a row turn's wheel speed
 
 
 @kernel()
-def advance_motors(row: NDArray[np.float64], duration: float) -> None:
-    """Bank speeds and wheel angles after ``duration`` [s] of d omega/dt = k_omega (target - omega)."""
+def delay_commands(row: Array) -> None:
+    """Put the commands of ``COMMAND_DELAY`` [s] ago in place of the present ones, interpolated between samples."""
+    period = row[SAMPLE_PERIOD]
+    ring = row[COMMAND_RING:SIZE]
+    stride = ring_stride(LONGEST_DELAY, period, COMMAND_NODES)
+    if ring_is_empty(ring, 2, COMMAND_NODES):
+        # before the first sample the commands are taken to have equalled the bank speeds
+        for k in range(1, COMMAND_NODES):
+            for bank in range(2):
+                fill_node(ring, 2, COMMAND_NODES, k, stride, bank, row[OMEGA + bank])
+    push(ring, 2, COMMAND_NODES, stride, row[COMMAND : COMMAND + 2])
+    for bank in range(2):
+        samples = min(row[COMMAND_DELAY], LONGEST_DELAY) / period
+        row[COMMAND + bank] = recall(ring, 2, COMMAND_NODES, stride, bank, samples, row[COMMAND + bank])
+
+
+@kernel()
+def set_targets(row: Array) -> None:
+    """Set points of the coming sample from the commands, and the drivetrain as the robot has it."""
+    for bank in range(2):
+        limit = row[MAXIMUM_WHEEL_SPEED]
+        row[COMMAND + bank] = min(max(row[COMMAND + bank], -limit), limit)
+        target = row[COMMAND + bank] if abs(row[COMMAND + bank]) >= row[COMMAND_DEADBAND] else 0.0
+        if row[COMMAND_RAMP] < NO_LIMIT:
+            most = row[COMMAND_RAMP] * row[SAMPLE_PERIOD]
+            target = row[SET_POINT + bank] + min(max(target - row[SET_POINT + bank], -most), most)
+        row[SET_POINT + bank] = target
+        row[MOTOR_TARGET + bank] = target
+        row[MOTOR_RATE + bank] = row[BASE_MOTOR_RATE]
+    for j in range(7):
+        row[DRIVETRAIN + j] = row[BASE_DRIVETRAIN + j]
+
+
+@kernel(inline=True)
+def _resistance(row: Array, bank: int) -> float:
+    """Deceleration by the friction of motor and gear [rad/s^2]."""
+    speed = row[OMEGA + bank]
+    coulomb = row[DRIVETRAIN + FRICTION] * speed / (abs(speed) + _STICTION_SPEED)
+    return row[DRIVETRAIN + VISCOUS_RATE] * speed + coulomb
+
+
+@kernel(inline=True)
+def _load(row: Array, bank: int) -> float:
+    """Acceleration by the ground's torque of the last evaluation [rad/s^2]; negative while it brakes."""
+    torque = row[AXLE_TORQUE + bank] + row[AXLE_TORQUE + 2 + bank]
+    return row[DRIVETRAIN + LOAD_COMPLIANCE] * torque
+
+
+@kernel()
+def _settle_integrals(row: Array) -> None:
+    """Integral parts after a reset: those that carry the present load, or nothing where a bank stands."""
+    for bank in range(2):
+        if abs(row[OMEGA + bank]) > _STANDING:
+            row[INTEGRAL + bank] = _resistance(row, bank) - _load(row, bank)
+    row[INTEGRAL_KNOWN] = 1.0
+
+
+@kernel()
+def mark_dynamic_banks(row: Array) -> None:
+    """Note whether the banks need more than the exact solution of the first-order loop."""
+    ideal = row[DRIVETRAIN + INTEGRAL_RATE] == 0.0 and row[DRIVETRAIN + LOAD_COMPLIANCE] == 0.0
+    ideal = ideal and row[DRIVETRAIN + ACCELERATION_LIMIT] >= NO_LIMIT
+    ideal = ideal and row[DRIVETRAIN + VISCOUS_RATE] == 0.0 and row[DRIVETRAIN + FRICTION] == 0.0
+    row[DYNAMIC_BANKS] = 0.0 if ideal else 1.0
+    if row[DRIVETRAIN + INTEGRAL_RATE] > 0.0 and row[INTEGRAL_KNOWN] == 0.0:
+        _settle_integrals(row)
+
+
+@kernel(inline=True)
+def moving_entries(row: Array) -> int:
+    """Entries from ``V_X`` on that are advanced together: the body's 3 velocities, and both bank speeds if dynamic."""
+    return 5 if row[DYNAMIC_BANKS] != 0.0 else 3
+
+
+@kernel()
+def advance_motors(row: Array, duration: float) -> None:
+    """Bank speeds and wheel angles after ``duration`` [s] of d omega/dt = k_omega (target - omega).
+
+    Theory: wheel model, eq. (28); thesis 4.11.
+    """
     for bank in range(2):
         target = row[MOTOR_TARGET + bank]
         rate = row[MOTOR_RATE + bank]
@@ -21,3 +147,91 @@ def advance_motors(row: NDArray[np.float64], duration: float) -> None:
         decay = math.exp(-rate * duration)
         row[WHEEL_ANGLE + bank] += target * duration + difference * (1.0 - decay) / rate
         row[OMEGA + bank] = target + difference * decay
+
+
+@kernel(inline=True)
+def _wanted(row: Array, bank: int) -> float:
+    """Acceleration that the speed loop asks for [rad/s^2]."""
+    return row[MOTOR_RATE + bank] * (row[MOTOR_TARGET + bank] - row[OMEGA + bank]) + row[INTEGRAL + bank]
+
+
+@kernel(inline=True)
+def _strength(row: Array, bank: int) -> float:
+    """Most that the motor of a bank gives while it stands [rad/s^2]."""
+    imbalance = row[DRIVETRAIN + LIMIT_IMBALANCE]
+    return row[DRIVETRAIN + ACCELERATION_LIMIT] * (1.0 + imbalance if bank == 0 else 1.0 - imbalance)
+
+
+@kernel(inline=True)
+def _limit(row: Array, bank: int, wanted: float) -> float:
+    """Most that it gives in the direction that is asked for [rad/s^2]: less the faster it turns that way."""
+    if row[DRIVETRAIN + NO_LOAD_SPEED] >= NO_SPEED_LIMIT:
+        return _strength(row, bank)
+    along = row[OMEGA + bank] if wanted > 0.0 else -row[OMEGA + bank]
+    share = 1.0 - along / row[DRIVETRAIN + NO_LOAD_SPEED]
+    return _strength(row, bank) * min(max(share, 0.0), 1.0)
+
+
+@kernel()
+def bank_acceleration(row: Array, bank: int) -> float:
+    """d omega/dt of a bank with the ground's torque of the last evaluation [rad/s^2] (theory: drivetrain, eq. (4))."""
+    wanted = _wanted(row, bank)
+    limit = _limit(row, bank, wanted)
+    return min(max(wanted, -limit), limit) + _load(row, bank) - _resistance(row, bank)
+
+
+@kernel()
+def bank_damping(row: Array, bank: int) -> float:
+    """Derivative of :func:`bank_acceleration` by the bank's own speed, the ground's torque left out [1/s]."""
+    wanted = _wanted(row, bank)
+    limit = _limit(row, bank, wanted)
+    width = abs(row[OMEGA + bank]) + _STICTION_SPEED
+    damping = -row[DRIVETRAIN + VISCOUS_RATE] - row[DRIVETRAIN + FRICTION] * _STICTION_SPEED / (width * width)
+    if abs(wanted) <= limit:
+        return damping - row[MOTOR_RATE + bank]
+    falls = 0.0 < limit < _strength(row, bank)  # no share is lost where there is no such speed
+    return damping - (_strength(row, bank) / row[DRIVETRAIN + NO_LOAD_SPEED] if falls else 0.0)
+
+
+@kernel()
+def integral_growth(row: Array, bank: int) -> float:
+    """dz/dt of the loop's integral part [rad/s^3] (theory: drivetrain, eq. (3))."""
+    error = row[MOTOR_TARGET + bank] - row[OMEGA + bank]
+    wanted = _wanted(row, bank)
+    if abs(wanted) > _limit(row, bank, wanted) and wanted * error > 0.0:
+        return 0.0
+    return row[DRIVETRAIN + INTEGRAL_RATE] * error
+
+
+@kernel(inline=True)
+def bank_inertia(row: Array, bank: int) -> float:
+    """J [kg m^2]; where the ground has no influence, any will do: that of the robot's mass at the rim."""
+    compliance = row[DRIVETRAIN + LOAD_COMPLIANCE]
+    rim = row[WHEEL + bank] + row[WHEEL + 8 + bank]
+    return 1.0 / compliance if compliance > 0.0 else row[MASS] * rim * rim
+
+
+@kernel()
+def follows_past(row: Array) -> bool:
+    """Whether the drivetrain depends on the bank speeds of earlier samples."""
+    return row[COMMAND_DELAY] > 0.0 or row[COMMAND_RAMP] < NO_LIMIT or row[DYNAMIC_BANKS] != 0.0
+
+
+@kernel()
+def turn_banks(row: Array, speeds: Array) -> None:
+    """Give the banks ``speeds`` (2,) [rad/s] where they are known."""
+    for bank in range(2):
+        if not math.isnan(speeds[bank]):
+            row[OMEGA + bank] = speeds[bank]
+
+
+@kernel()
+def wind_up(row: Array, speeds: Array) -> None:
+    """Let the integral part follow one earlier sample, to whose end the banks had ``speeds`` (2,) [rad/s]."""
+    half = 0.5 * row[SAMPLE_PERIOD]
+    for bank in range(2):
+        if math.isnan(speeds[bank]):
+            continue
+        row[INTEGRAL + bank] += half * integral_growth(row, bank)
+        row[OMEGA + bank] = speeds[bank]
+        row[INTEGRAL + bank] += half * integral_growth(row, bank)

@@ -31,18 +31,20 @@ from ddagr_gym.physics.body_dynamics import (
     extrapolate_forces,
     world_rates,
 )
-from ddagr_gym.physics.body_jacobian import damping_inverse, solve
+from ddagr_gym.physics.body_jacobian import BANKS, damping_inverse, solve
 from ddagr_gym.physics.callbacks import EffectActions
-from ddagr_gym.physics.drivetrain import advance_motors
+from ddagr_gym.physics.drivetrain import advance_motors, bank_acceleration, integral_growth, moving_entries
 from ddagr_gym.physics.layout import (
     ACCELERATION,
     HALF_TRACK,
+    INTEGRAL,
     OMEGA,
-    SIZE,
+    STEPPED,
     TIME,
     V_X,
     V_Y,
     WHEEL,
+    WHEEL_ANGLE,
     YAW,
     YAW_RATE,
     X,
@@ -62,24 +64,58 @@ OVERSHOOT = 4.0  # times the accepted error: the linearised step has failed, and
 
 
 @kernel()
-def _w_step(row: Array, step: float, numerics: StepNumerics, actions: EffectActions) -> float:
-    """One W-step; returns the size of the embedded error estimate [m/s]. Arguments as :func:`advance_body`."""
-    inverse, drive, drift = stack_array(9), stack_array(6), stack_array(3)
-    start, first, second, right = stack_array(3), stack_array(3), stack_array(3), stack_array(3)
-    damping_inverse(row, GAMMA * step, inverse, drive, actions)
-    x, y, yaw, yaw_rate = row[X], row[Y], row[YAW], row[YAW_RATE]
-    rate_x, rate_y = world_rates(row)
-    right_omega, left_omega = row[OMEGA], row[OMEGA + 1]
-    advance_motors(row, step)
-    # gamma h^2 f_t, h omega_t being the exact change of the bank speeds
-    right_change = GAMMA * step * (row[OMEGA] - right_omega)
-    left_change = GAMMA * step * (row[OMEGA + 1] - left_omega)
+def _start_banks(row: Array, step: float, drive: Array, start: Array, right: Array, drift: Array) -> None:
+    """The banks' part of the first stage: the exact change of ideal ones, or what dynamic ones put on the right side.
+
+    Args:
+        row: the environment.
+        step: [s].
+        drive: (6,) accelerations by bank speed.
+        start: (9,) motion, and behind it the integral parts and their growth, written.
+        right: (5,) its last two are written for dynamic banks.
+        drift: (3,) gamma h^2 f_t, written.
+    """
+    dynamic = moving_entries(row) == 5
+    for j in range(5):
+        start[j] = row[V_X + j]
+    if not dynamic:
+        advance_motors(row, step)
+    # gamma h^2 f_t, h omega_t being the exact change of the bank speeds; none where they are part of the system
+    right_change = GAMMA * step * (row[OMEGA] - start[3])
+    left_change = GAMMA * step * (row[OMEGA + 1] - start[4])
     for j in range(3):
         drift[j] = drive[2 * j] * right_change + drive[2 * j + 1] * left_change
-        start[j] = row[V_X + j]
-        right[j] = step * row[ACCELERATION + j] + drift[j]
-    solve(inverse, right, first)
+    if dynamic:
+        for bank in range(2):
+            start[5 + bank] = row[INTEGRAL + bank]
+            start[7 + bank] = integral_growth(row, bank)
+            right[3 + bank] = step * bank_acceleration(row, bank)
+            row[INTEGRAL + bank] += step * start[7 + bank]
+
+
+@kernel()
+def _finish_banks(row: Array, step: float, start: Array) -> None:
+    """Heun's step for wheel angles and integral parts of dynamic banks, ``row`` being at the second stage."""
+    for bank in range(2):
+        row[WHEEL_ANGLE + bank] += 0.5 * step * (start[3 + bank] + row[OMEGA + bank])
+        growth = integral_growth(row, bank)
+        row[INTEGRAL + bank] = start[5 + bank] + 0.5 * step * (start[7 + bank] + growth)
+
+
+@kernel()
+def _w_step(row: Array, step: float, numerics: StepNumerics, actions: EffectActions) -> float:
+    """One W-step; returns the size of the embedded error estimate [m/s]. Arguments as :func:`advance_body`."""
+    inverse, drive, banks, drift = stack_array(9), stack_array(6), stack_array(BANKS), stack_array(3)
+    start, first, second, right = stack_array(9), stack_array(5), stack_array(5), stack_array(5)
+    damping_inverse(row, GAMMA * step, inverse, drive, banks, actions)
+    x, y, yaw, yaw_rate = row[X], row[Y], row[YAW], row[YAW_RATE]
+    rate_x, rate_y = world_rates(row)
+    moving = moving_entries(row)
+    _start_banks(row, step, drive, start, right, drift)
     for j in range(3):
+        right[j] = step * row[ACCELERATION + j] + drift[j]
+    solve(row, GAMMA * step, inverse, drive, banks, right, first)
+    for j in range(moving):
         row[V_X + j] = start[j] + first[j]
     row[YAW] = yaw + step * yaw_rate
     row[TIME] += step
@@ -87,16 +123,22 @@ def _w_step(row: Array, step: float, numerics: StepNumerics, actions: EffectActi
     evaluate_forces(row, refresh, numerics, actions)
     for j in range(3):
         right[j] = step * row[ACCELERATION + j] - 2.0 * first[j] - drift[j]
-    solve(inverse, right, second)
+    if moving == 5:
+        for bank in range(2):
+            right[3 + bank] = step * bank_acceleration(row, bank) - 2.0 * first[3 + bank]
+        _finish_banks(row, step, start)
+    solve(row, GAMMA * step, inverse, drive, banks, right, second)
     # with A = 0 the method is Heun's
     end_x, end_y = world_rates(row)
     row[X] = x + 0.5 * step * (rate_x + end_x)
     row[Y] = y + 0.5 * step * (rate_y + end_y)
     row[YAW] = yaw + 0.5 * step * (yaw_rate + row[YAW_RATE])
     estimate = 0.0
-    for j in range(3):
+    for j in range(moving):
         row[V_X + j] = start[j] + 1.5 * first[j] + 0.5 * second[j]
         weight = row[HALF_TRACK] if j == 2 else 1.0
+        if j > 2:
+            weight = row[WHEEL + j - 3] + row[WHEEL + 8 + j - 3]
         estimate = max(estimate, 0.5 * weight * abs(first[j] + second[j]))
     if not extrapolate_forces(row, numerics.force_extrapolation, actions):
         evaluate_forces(row, numerics.jacobian_refresh, numerics, actions)
@@ -121,7 +163,7 @@ def _accepted(row: Array, accepted_error: float) -> float:
 
 @kernel(inline=True)
 def _copy(source: Array, target: Array) -> None:
-    for j in range(SIZE):
+    for j in range(STEPPED):
         target[j] = source[j]
 
 
@@ -135,7 +177,7 @@ def advance_body(row: Array, step: float, numerics: StepNumerics, actions: Effec
         numerics: accuracy.
         actions: effects on this environment.
     """
-    saved = stack_array(SIZE)
+    saved = stack_array(STEPPED)
     _copy(row, saved)
     tolerance = NEWTON_TOLERANCE + NEWTON_SHARE * _accepted(row, numerics.accepted_error)
     divisions = 1

@@ -34,6 +34,11 @@ WHEEL_ANGLE = _block(2)  # bank angles rolled [rad]
 COMMAND = _block(2)  # bank speed commands after the command effects [rad/s]
 MOTOR_TARGET = _block(2)  # speed that the motor loop aims at [rad/s]
 MOTOR_RATE = _block(2)  # its rate k_omega [1/s]
+SET_POINT = _block(2)  # command after the ramp [rad/s]
+INTEGRAL = _block(2)  # integral part of the speed loop [rad/s^2]
+INTEGRAL_KNOWN = _block()  # 0 after a reset, until the first sample has settled it
+DRIVETRAIN = _block(7)  # as the motor effects leave it, in the order of DRIVETRAIN_PARAMETERS
+DYNAMIC_BANKS = _block()  # 1 where any of these differs from that of the ideal loop
 
 # Body, as the load effects leave it
 MASS = _block()  # [kg]
@@ -49,6 +54,10 @@ BASE_WHEEL = _block(12)
 HALF_WHEELBASE = _block()  # [m]
 HALF_TRACK = _block()
 BASE_MOTOR_RATE = _block()
+BASE_DRIVETRAIN = _block(7)
+COMMAND_DELAY = _block()  # [s]
+COMMAND_DEADBAND = _block()  # [rad/s]
+COMMAND_RAMP = _block()  # [rad/s^2]
 MAXIMUM_WHEEL_SPEED = _block()  # [rad/s]
 
 # Ground under each wheel
@@ -114,8 +123,26 @@ DERIVATIVE = _block(4 * DERIVATIVE_SIZE)
 DERIVATIVE_AT = _block(16)  # per wheel: v_x, v_y, rim speed over the wheel's speed, sinkage
 DERIVATIVE_VALID = _block()
 
+STEPPED = _next
+"""Entries that a step of the integrator may change; those behind are changed once a sample."""
+
+COMMAND_NODES = 128  # every sample of the longest delay at 125 Hz and below
+COMMAND_RING = _block(2 * COMMAND_NODES + 3)  # past commands, see :mod:`ddagr_gym.physics.history`
+
 SIZE = _next
 """Entries of a row."""
+
+DRIVETRAIN_PARAMETERS = (
+    "integral_rate",
+    "load_compliance",
+    "acceleration_limit",
+    "no_load_speed",
+    "limit_imbalance",
+    "viscous_rate",
+    "friction",
+)
+"""Order of the drivetrain's entries; see :class:`ddagr_gym.parameters.Drivetrain`."""
+INTEGRAL_RATE, LOAD_COMPLIANCE, ACCELERATION_LIMIT, NO_LOAD_SPEED, LIMIT_IMBALANCE, VISCOUS_RATE, FRICTION = range(7)
 
 SOIL_PARAMETERS = (
     "cohesion",

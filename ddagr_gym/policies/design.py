@@ -7,7 +7,7 @@ from typing import Literal
 
 from ddagr_gym.control.observation import EKF_FEATURES, OBSERVATION
 from ddagr_gym.errors import InputError
-from ddagr_gym.parameters import Validated, bounded
+from ddagr_gym.validated import Validated, bounded
 
 TASK_INPUTS = ("turning", "leaving", "heading_to_go", "run_in_to_go", "target_radius", "target_speed")
 SENSOR_INPUTS = ("specific_force_x", "specific_force_y", "yaw_rate", "encoder_outer", "encoder_inner")

@@ -14,7 +14,7 @@ from ddagr_gym.identification.parameters import command_shift, sensor_parameters
 from ddagr_gym.identification.problem import Point, Problem
 from ddagr_gym.identification.window_model import WindowModel, ideal_sensors
 from ddagr_gym.identification.windows import CHANNELS, STATE, cut_windows
-from ddagr_gym.parameters import Numerics
+from ddagr_gym.parameters import Drivetrain, Numerics
 from ddagr_gym.physics import layout
 from ddagr_gym.physics.effects import load_effects
 from ddagr_gym.recordings.schema import RobotGeometry
@@ -91,10 +91,38 @@ def test_effects_on_commands_know_what_was_commanded_before_a_window(robot, soil
     for bank, name in enumerate(("true_omega_right", "true_omega_left")):
         np.testing.assert_allclose(record[..., bank], columns[name][rows], atol=tolerance)
     # told nothing, the effect takes the motors to have settled
-    _, forgetful = WindowModel(
-        robot, soil, replace(cut, commands=cut.commands[:, cut.history :], history=0)
-    ).predict_recorded(np.zeros(0), states, entries, load_effects(effect))
+    without = replace(cut, commands=cut.commands[:, cut.history :], history=0, speeds=cut.speeds[:, cut.history :])
+    _, forgetful = WindowModel(robot, soil, without).predict_recorded(
+        np.zeros(0), states, entries, load_effects(effect)
+    )
     assert np.abs(forgetful - record).max() > 0.05
+
+
+def test_a_speed_loop_goes_on_where_a_window_begins(robot, soil):
+    """Its integral part is that of the recorded speeds before, and a robot's own delay is the effect's."""
+    from ddagr_gym.recordings.schema import Recording
+
+    slow = replace(robot, drivetrain=Drivetrain(command_delay=0.3, load_compliance=0.02, integral_rate=3.0))
+    commands = np.repeat(np.tile([(0.9, 0.4), (0.4, 0.3), (0.0, 0.4), (0.7, 0.9)], (4, 1)), 45, axis=0)
+    sensors = ideal_sensors(1.0 / RATE)
+    columns = simulate(slow, soil, commands, sensors=sensors, numerics=Numerics.smooth())
+    recording = Recording.from_columns({name: columns[name] for name in CHANNELS_OF_COMMANDS}, robot)
+    geometry = RobotGeometry.of(robot)
+    cut = cut_windows(
+        [recording], 1.0, wheel_radius=geometry.wheel_radius, half_track=geometry.half_track, history=15.0
+    )
+    states = np.stack([columns[TRUTH[name]][cut.start] for name in STATE], axis=1)
+    entries = (layout.OMEGA, layout.OMEGA + 1)
+    rows = cut.start[:, None] + 1 + np.arange(cut.samples)
+    truth = np.stack([columns[name][rows] for name in ("true_omega_right", "true_omega_left")], axis=-1)
+
+    def errors(windows):
+        _, record = WindowModel(slow, soil, windows).predict_recorded(np.zeros(0), states, entries)
+        return np.sqrt(np.mean((record - truth) ** 2, axis=(1, 2)))
+
+    told, untold = errors(cut), errors(replace(cut, speeds=np.full(cut.speeds.shape, np.nan)))
+    assert told.max() < 0.02  # all since the robot stood is known
+    assert np.sqrt(np.mean(told**2)) < 0.3 * np.sqrt(np.mean(untold**2))
 
 
 def test_the_past_is_delayed_as_the_commands_are(windows):

@@ -88,6 +88,7 @@ def part_of(windows: WindowSet, first: int, samples: int) -> WindowSet:
         commands=windows.commands[:, first:stop],
         measured=windows.measured[:, first : first + samples],
         unknown=np.maximum(windows.unknown - first, 0),
+        speeds=windows.speeds[:, first : windows.history + first + samples],
     )
 
 

@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.errors import InputError
-from ddagr_gym.parameters import Validated
 from ddagr_gym.physics.callbacks import compile_effect
 from ddagr_gym.physics.layout import EFFECT_PARAMETERS
+from ddagr_gym.validated import Validated
 
 Vector = NDArray[np.float64]
 Action = Callable[[Vector, Vector, Vector], None]

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from ddagr_gym.physics.effects.base import DriveExtent, Effect, Vector, shape, size
-from ddagr_gym.physics.effects.history import fill_node, push, recall, ring_is_empty, ring_stride
+from ddagr_gym.physics.history import fill_node, push, recall, ring_is_empty, ring_stride
 from ddagr_gym.physics.layout import COMMAND, OMEGA, POINT_COMMANDS, SAMPLE_PERIOD
 
 _LONGEST = 0.49  # [s]

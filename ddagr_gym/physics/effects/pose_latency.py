@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 
 from ddagr_gym.physics.effects.base import Effect, Vector, size
-from ddagr_gym.physics.effects.history import fill_node, push, recall, ring_is_empty, ring_stride
+from ddagr_gym.physics.history import fill_node, push, recall, ring_is_empty, ring_stride
 from ddagr_gym.physics.layout import POINT_READINGS, READING, SAMPLE_PERIOD, V_X, V_Y, YAW, YAW_RATE, X
 
 _LONGEST = 1.0  # [s]

@@ -1,0 +1,222 @@
+"""The drivetrain between command and wheel: steady states, limits, order of the time step, energy, and the past."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ddagr_gym.parameters import Drivetrain, Imu, Numerics, Sensors
+from ddagr_gym.physics import layout
+from ddagr_gym.presets import get_robot, get_soil
+from ddagr_gym.simulator import Simulator, simulate
+
+DDAGR, WARTHOG = get_robot("ddagr"), get_robot("warthog")
+CLAY, FIRM = get_soil("thesis_a1"), get_soil("firm_ground")
+NOISELESS = Sensors(imu=Imu(accelerometer_noise=0.0, gyro_noise=0.0, accelerometer_resolution=0.0, gyro_resolution=0.0))
+MOTION = (
+    "true_v_x", "true_v_y", "true_yaw_rate", "true_x", "true_y", "true_yaw", "true_omega_right", "true_omega_left",
+)  # fmt: skip
+
+
+def _with(robot, **drivetrain):
+    return replace(robot, drivetrain=Drivetrain(**drivetrain))
+
+
+def _drive(robot, commands, soil=CLAY, **options):
+    return simulate(robot, soil, commands, sensors=NOISELESS, **options)
+
+
+def _steps(*pieces):
+    """(T, 2) from (seconds, right, left) at 125 Hz."""
+    return np.concatenate([np.tile(pair, (round(125 * seconds), 1)) for seconds, *pair in pieces])
+
+
+def _settled(robot, right, left, soil=CLAY):
+    """Row after 12 s of a command."""
+    simulator = Simulator(1)
+    simulator.configure(0, robot, soil, NOISELESS)
+    simulator.reset(state={"omega_right": right, "omega_left": left, "v_x": 0.9 * robot.outer_radius * right})
+    simulator.step(np.array([[right, left]]), samples=1500)
+    return simulator.rows[0]
+
+
+# Steady states
+
+
+def _torques(row):
+    torque = row[layout.AXLE_TORQUE : layout.AXLE_TORQUE + 4]
+    return torque[0] + torque[2], torque[1] + torque[3]
+
+
+def test_proportional_loop_droops_by_the_torque_of_the_ground():
+    compliance = 0.02
+    row = _settled(_with(DDAGR, load_compliance=compliance), 1.2, 0.6)
+    for bank, command in enumerate((1.2, 0.6)):
+        droop = compliance * _torques(row)[bank] / DDAGR.motor_rate
+        assert row[layout.OMEGA + bank] == pytest.approx(command + droop, rel=1e-6)
+        assert abs(droop) > 0.01
+
+
+def test_integral_part_brings_the_commanded_speed_back():
+    row = _settled(_with(DDAGR, load_compliance=0.02, integral_rate=3.0, viscous_rate=0.2, friction=0.1), 1.2, 0.6)
+    np.testing.assert_allclose(row[layout.OMEGA : layout.OMEGA + 2], [1.2, 0.6], rtol=5e-4)
+
+
+def test_viscous_friction_lowers_the_gain():
+    row = _settled(_with(DDAGR, viscous_rate=0.5), 1.0, 1.0)
+    gain = DDAGR.motor_rate / (DDAGR.motor_rate + 0.5)
+    np.testing.assert_allclose(row[layout.OMEGA : layout.OMEGA + 2], gain, rtol=1e-9)
+
+
+def test_coulomb_friction_takes_its_share_of_the_drive():
+    row = _settled(_with(DDAGR, friction=0.3), 1.0, 1.0)
+    speed = row[layout.OMEGA]
+    assert DDAGR.motor_rate * (1.0 - speed) == pytest.approx(0.3 * speed / (speed + 0.02), rel=1e-6)
+
+
+def test_speed_ends_where_the_falling_torque_limit_meets_the_load():
+    row = _settled(_with(DDAGR, load_compliance=0.02, acceleration_limit=4.0, no_load_speed=1.6), 1.9, 1.9)
+    speed = row[layout.OMEGA]
+    assert 4.0 * (1.0 - speed / 1.6) == pytest.approx(-0.02 * _torques(row)[0], rel=1e-6)
+
+
+# Commands on their way
+
+
+def test_commands_act_after_the_delay_and_the_ramp_and_outside_the_deadband():
+    late = _drive(_with(DDAGR, command_delay=0.4), _steps((1.0, 1.0, 0.5)))
+    prompt = _drive(DDAGR, _steps((1.0, 1.0, 0.5)))
+    assert not late["true_omega_right"][:50].any()
+    np.testing.assert_allclose(late["true_omega_right"][50:], prompt["true_omega_right"][:-50], atol=1e-12)
+    ramped = _drive(_with(DDAGR, command_ramp=0.5), _steps((4.0, 1.0, 0.05)))["true_omega_right"]
+    slope = np.diff(ramped)[150:240] * 125.0
+    np.testing.assert_allclose(slope, 0.5, rtol=0.02)
+    assert ramped[-1] == pytest.approx(1.0, abs=1e-3)
+    dead = _drive(_with(DDAGR, command_deadband=0.1), _steps((1.0, 1.0, 0.05)))
+    assert not dead["true_omega_left"].any()
+    np.testing.assert_allclose(dead["true_omega_right"], prompt["true_omega_right"], atol=1e-12)
+
+
+@pytest.mark.parametrize("limit", [2.0, 0.5])
+def test_bank_speeds_up_no_faster_than_its_torque_allows(limit):
+    speed = _drive(_with(DDAGR, acceleration_limit=limit), _steps((1.0, 1.5, -1.5)))["true_omega_right"]
+    assert np.diff(speed).max() * 125.0 <= limit * (1.0 + 1e-9)
+    assert speed[10] == pytest.approx(11 * 0.008 * limit, rel=1e-6)
+
+
+def test_weaker_bank_speeds_up_more_slowly():
+    drive = _drive(_with(DDAGR, acceleration_limit=1.0, limit_imbalance=0.3), _steps((0.4, 1.5, 1.5)))
+    assert drive["true_omega_right"][-1] / drive["true_omega_left"][-1] == pytest.approx(1.3 / 0.7, rel=1e-9)
+
+
+def test_integral_part_does_not_wind_up_behind_a_limit():
+    robot = _with(DDAGR, integral_rate=10.0, acceleration_limit=1.0)
+    speed = _drive(robot, _steps((3.0, 1.5, 1.5)))["true_omega_right"]
+    assert 1.4 < speed.max() < 1.7
+
+
+# The time step
+
+
+@pytest.mark.parametrize("integral_rate", [0.0, 2.0])
+def test_order_is_two_with_dynamic_banks(integral_rate):
+    robot = _with(DDAGR, load_compliance=0.3, integral_rate=integral_rate, viscous_rate=0.2)
+    state = {"v_x": 0.5, "v_y": 0.05, "yaw_rate": 0.1, "omega_right": 1.8, "omega_left": 1.8}
+
+    def end(substeps):
+        numerics = Numerics(
+            section_nodes=16, contact_nodes=16, jacobian_contact_nodes=8, substeps=substeps, launch_substeps=1,
+            launch_change=1e9, accepted_error=1e9, jacobian_refresh=0.0, sinkage_tolerance=1e-12,
+        )  # fmt: skip
+        drive = _drive(robot, np.tile((1.8, 1.2), (40, 1)), initial_state=state, numerics=numerics)
+        return np.array([drive[name][-1] for name in MOTION])
+
+    exact = end(64)
+    errors = [np.linalg.norm(end(substeps) - exact) for substeps in (1, 2, 4, 8)]
+    assert -np.polyfit(np.log2([1, 2, 4, 8]), np.log2(errors), 1)[0] == pytest.approx(2.15, abs=0.35)
+    assert errors[0] < 1e-4
+
+
+@pytest.mark.parametrize(("robot", "soil", "inertia", "scale"), [(DDAGR, CLAY, 30.0, 1.0), (WARTHOG, FIRM, 40.0, 4.0)])
+def test_default_numerics_follow_the_converged_solution(robot, soil, inertia, scale):
+    built = _with(
+        robot, command_delay=0.2, load_compliance=1.0 / inertia, integral_rate=2.0, friction=0.2,
+        acceleration_limit=10.0 * scale,
+    )  # fmt: skip
+    commands = scale * _steps((1.0, 0.7, 0.7), (1.5, 0.0, 1.2), (1.0, 0.0, 0.0), (1.0, -0.7, 0.7))
+    drives = [_drive(built, commands, soil, numerics=numerics) for numerics in (Numerics(), Numerics.finest())]
+    error = np.array([np.abs(drives[0][name] - drives[1][name]) for name in MOTION])
+    assert error[:3].max() < 5e-3 * scale
+    assert error[6:].max() < 5e-3 * scale
+    assert np.sqrt(np.mean(error**2, axis=1)).max() < 1e-3 * scale
+
+
+def test_no_drive_takes_energy_from_the_ground_or_gives_any():
+    """Banks that are told to stand only lose energy, as the body does (passivity)."""
+    robot = _with(replace(DDAGR, motor_rate=0.05), load_compliance=0.1, viscous_rate=0.01, friction=0.05)
+    state = {"v_x": 0.6, "v_y": 0.1, "yaw_rate": 0.4, "omega_right": 1.9, "omega_left": -0.5}
+    drive = _drive(robot, np.zeros((500, 2)), initial_state=state)
+    body = (
+        robot.mass * (drive["true_v_x"] ** 2 + drive["true_v_y"] ** 2) + robot.yaw_inertia * drive["true_yaw_rate"] ** 2
+    )
+    banks = (drive["true_omega_right"] ** 2 + drive["true_omega_left"] ** 2) / robot.drivetrain.load_compliance
+    energy = 0.5 * (body + banks)
+    assert (np.diff(energy) < 1e-9 * energy[0]).all()
+    assert energy[-1] < 0.05 * energy[0]
+
+
+SPEEDS = st.floats(-2.0, 2.0)
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    st.lists(st.tuples(SPEEDS, SPEEDS), min_size=2, max_size=5),
+    st.floats(1.0, 200.0), st.floats(0.0, 10.0), st.floats(0.5, 50.0), st.floats(0.0, 1.0),
+)  # fmt: skip
+def test_any_drive_stays_finite_and_below_what_drives_it(pieces, inertia, integral_rate, limit, friction):
+    robot = _with(
+        DDAGR, load_compliance=1.0 / inertia, integral_rate=integral_rate, acceleration_limit=limit, friction=friction
+    )
+    drive = _drive(robot, np.concatenate([np.tile(pair, (60, 1)) for pair in pieces]))
+    for name in MOTION:
+        assert np.isfinite(drive[name]).all()
+    assert np.abs(drive["true_omega_right"]).max() < 10.0
+    assert np.abs(drive["true_v_x"]).max() < 10.0 * DDAGR.outer_radius
+
+
+def test_mirrored_commands_mirror_the_motion():
+    robot = _with(
+        DDAGR, command_delay=0.1, load_compliance=0.02, integral_rate=2.0, acceleration_limit=5.0, friction=0.2
+    )
+    commands = _steps((1.0, 1.2, 0.4), (1.0, -0.3, 0.8))
+    one, other = _drive(robot, commands), _drive(robot, commands[:, ::-1])
+    np.testing.assert_allclose(one["true_omega_right"], other["true_omega_left"], atol=1e-6)
+    np.testing.assert_allclose(one["true_yaw"], -other["true_yaw"], atol=1e-6)
+
+
+# The past
+
+
+def test_told_past_gives_the_integral_part_and_the_commands_on_their_way():
+    """A window that begins in motion goes on as the drive did, where past commands and speeds are told."""
+    robot = _with(DDAGR, command_delay=0.2, load_compliance=0.02, integral_rate=3.0)
+    commands = _steps((0.5, 0.0, 0.0), (1.0, 1.2, 0.3), (2.0, 0.5, 0.9))
+    whole = _drive(robot, commands)
+    start, count = 200, 120
+    state = {name.removeprefix("true_"): whole[name][start - 1] for name in MOTION}
+    past = commands[None, :start]
+    speeds = np.stack([whole["true_omega_right"], whole["true_omega_left"]], axis=1)[None, :start]
+
+    def error(known):
+        simulator = Simulator(1)
+        simulator.configure(0, robot, CLAY, NOISELESS)
+        simulator.reset(state=state)
+        simulator.remember(past, speeds if known else None)
+        _, record = simulator.step(commands[None, start : start + count], recorded=[layout.OMEGA, layout.OMEGA + 1])
+        truth = np.stack([whole["true_omega_right"], whole["true_omega_left"]], axis=1)
+        return np.abs(record[0] - truth[start : start + count]).max()
+
+    assert error(known=True) < 0.01
+    assert error(known=False) > 0.05
