@@ -84,7 +84,7 @@ def load_config(path: str | os.PathLike[str], kind: type[Config]) -> Config:
 
 
 def parse_config(text: str, kind: type[Config], *, source: str = "configuration") -> Config:
-    """The same as :func:`load_config` for a text; ``source`` stands first in error messages."""
+    """The same as :func:`load_config` for a text; ``source`` comes first in error messages."""
     content = _parse_yaml(text, source)
     return config_from({} if content is None else content, kind, source=source)
 
@@ -147,7 +147,7 @@ def _refuse_repeated_keys(node: yaml.Node | None, source: str) -> None:
 
 
 def _convert(value: Any, hint: Any, place: str) -> Any:
-    """``value`` as the type ``hint``; ``place`` says where it stands."""
+    """``value`` as the type ``hint``; ``place`` says where it is in the file."""
     origin = typing.get_origin(hint)
     if origin in (Union, types.UnionType):
         return _convert_union(value, typing.get_args(hint), place)

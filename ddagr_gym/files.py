@@ -22,7 +22,7 @@ FOLDER_MARK = ".ddagr-output"
 def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Path to write to in place of ``path``, moved there when the block ends without an error.
 
-    The temporary file stands in the same folder and keeps the suffix (writers choose a format by it); parent folders
+    The temporary file is in the same folder and keeps the suffix (writers choose a format by it); parent folders
     are made. After an error it is removed and ``path`` is as it was.
 
     Raises:
@@ -56,23 +56,23 @@ def _mode_of(path: Path) -> int:
 
 
 def make_folder(path: str | os.PathLike[str]) -> Path:
-    """Folder at ``path`` with its parents, made where absent; InputError when a file stands in the way."""
+    """Folder at ``path`` with its parents, made where absent; InputError when a file is in the way."""
     folder = Path(path).expanduser()
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except (FileExistsError, NotADirectoryError):
-        raise InputError(f"{folder} cannot be a folder, a file stands in the way: choose another path.") from None
+        raise InputError(f"{folder} cannot be a folder, a file is in the way: choose another path.") from None
     return folder
 
 
 def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
-    """Write ``data`` so that ``path`` holds all of it or what it held before."""
+    """Write ``data`` so that ``path`` has all of it, or still its old content."""
     with atomic_path(path) as temporary:
         temporary.write_bytes(data)
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> None:
-    """Write ``text`` (UTF-8, its line ends as they are) so that ``path`` holds all of it or what it held before."""
+    """Write ``text`` (UTF-8, line ends unchanged) so that ``path`` has all of it, or still its old content."""
     write_bytes(path, text.encode())
 
 

@@ -1,105 +1,38 @@
-"""Named robots and soils, each set with its source, and those of YAML files, returned fresh."""
+"""Named robots and soils, each set with its source, and those of YAML files, returned fresh.
+
+Robots are in ``configs/robots``, published soils in ``configs/soils/published.csv``.
+"""
 
 from __future__ import annotations
 
+import csv
 import math
 from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
-from ddagr_gym.config import load_config
+from ddagr_gym.config import configs_dir, load_config
 from ddagr_gym.errors import unknown_name
-from ddagr_gym.parameters import Robot, Soil, TorusWheel
-from ddagr_gym.published_soils import PUBLISHED_SOILS
+from ddagr_gym.parameters import Robot, Soil
 
-PROTOTYPE_PEAK_COEFFICIENTS = (0.4, 0.15)
-PROTOTYPE_EXIT_ANGLE_RATIO = 0.3
+PROTOTYPE_PEAK_COEFFICIENTS, PROTOTYPE_EXIT_ANGLE_RATIO = (0.4, 0.15), 0.3
 """Published soils state no stress-peak or exit-angle coefficients; these fit measured wheels (a fit, not a source)."""
 
 
 def ddagr() -> Robot:
-    """The thesis's robot: Table 6.1 and, for the tyre, Table A.1 (whose a and c labels are swapped)."""
-    return Robot(
-        name="ddagr",
-        mass=168.0,
-        yaw_inertia=100.0,
-        half_wheelbase=0.33,
-        half_track=0.58,
-        wheels=(TorusWheel(minor_radius=0.05, half_width=0.1016, major_radius=0.2294),),
-        centre_of_mass=(0.0, 0.0, 0.45),
-        motor_rate=4.5,
-        maximum_wheel_speed=2.0,
-        standard_deviations={"mass": 5.0, "yaw_inertia": 15.0, "motor_rate": 0.3},
-        source="thesis Tables 6.1, A.1; height of the centre of mass and standard deviations are estimates",
-    )
+    """The thesis's robot."""
+    return get_robot("ddagr")
 
 
 def warthog() -> Robot:
-    """Clearpath Warthog as NorLab drove it.
-
-    Wheel radius, track (that of its speed controller) and mass are stated with the recordings. The controller's track
-    is not quite the wheels': the manual's width of 1.38 m less the tyre gives 1.13 m, the maker's robot description
-    1.165 m; the deviation of the half track covers them. The maximum speed is the manual's 18 km/h without load.
-    """
-    return Robot(
-        name="warthog",
-        mass=470.0,
-        yaw_inertia=150.0,
-        half_wheelbase=0.457,
-        half_track=0.54,
-        wheels=(TorusWheel(minor_radius=0.12, half_width=0.125, major_radius=0.18),),
-        centre_of_mass=(0.0, 0.0, 0.45),
-        motor_rate=6.0,
-        maximum_wheel_speed=16.7,
-        standard_deviations={
-            "mass": 40.0,
-            "yaw_inertia": 40.0,
-            "half_wheelbase": 0.01,
-            "half_track": 0.03,
-            "motor_rate": 4.0,
-            "maximum_wheel_speed": 2.0,
-            "half_width": 0.015,
-            "outer_radius": 0.01,
-        },
-        source=(
-            "Clearpath user manual (1.52 x 1.38 m, 280 kg bare, 272 kg payload, 18 km/h, 24 inch tyres) and "
-            "warthog_description (axles at 0.457 m, wheels 0.25 m wide); inertia: its bodies, with the further 210 kg "
-            "as a box of the chassis's sides; motor rate, height of the centre of mass and deviations are estimates"
-        ),
-    )
+    """Clearpath Warthog as NorLab drove it."""
+    return get_robot("warthog")
 
 
 def husky() -> Robot:
-    """Clearpath Husky A200 with sensors.
-
-    Wheel radius, track and mass are stated with the recordings; the maker's robot description has 0.1651 m and
-    0.5708 m, which the deviations cover. The maximum speed is the manual's 1.0 m/s.
-    """
-    return Robot(
-        name="husky",
-        mass=75.0,
-        yaw_inertia=5.0,
-        half_wheelbase=0.256,
-        half_track=0.26925,
-        wheels=(TorusWheel(minor_radius=0.05, half_width=0.05715, major_radius=0.10875),),
-        centre_of_mass=(0.0, 0.0, 0.2),
-        motor_rate=8.0,
-        maximum_wheel_speed=6.3,
-        standard_deviations={
-            "mass": 8.0,
-            "yaw_inertia": 2.0,
-            "half_wheelbase": 0.005,
-            "half_track": 0.015,
-            "motor_rate": 5.0,
-            "maximum_wheel_speed": 0.6,
-            "half_width": 0.005,
-            "outer_radius": 0.006,
-        },
-        source=(
-            "Clearpath user manual (0.99 x 0.67 m, 50 kg bare, 75 kg payload, 1.0 m/s) and husky_description (wheel "
-            "base 0.512 m, tyres 0.1143 m wide, body 46 kg and 2.03 kg m^2, wheels 2.64 kg); inertia: their sum, with "
-            "the further 18 kg 0.25 m from the centre; motor rate, centre of mass and deviations are estimates"
-        ),
-    )
+    """Clearpath Husky A200 with sensors."""
+    return get_robot("husky")
 
 
 def thesis_a1() -> Soil:
@@ -136,7 +69,9 @@ def firm_ground() -> Soil:
     )
 
 
-def _published(n: float, k_c: float, k_phi: float, cohesion: float, friction: float, shear: float) -> Soil:
+def _published(name: str) -> Soil:
+    """A soil of the table of published ones."""
+    n, k_c, k_phi, cohesion, friction, shear = (float(text) for text in _published_rows()[name][2:])
     peak_0, peak_1 = PROTOTYPE_PEAK_COEFFICIENTS
     return Soil(
         cohesion=1e3 * cohesion,
@@ -151,22 +86,34 @@ def _published(n: float, k_c: float, k_phi: float, cohesion: float, friction: fl
     )
 
 
-_ROBOTS: dict[str, Callable[[], Robot]] = {"ddagr": ddagr, "warthog": warthog, "husky": husky}
+@cache
+def _published_rows() -> dict[str, list[str]]:
+    """Rows of ``configs/soils/published.csv`` by name."""
+    with (configs_dir() / "soils" / "published.csv").open(newline="", encoding="utf-8") as file:
+        _, *rows = csv.reader(line for line in file if not line.startswith("#"))
+    return {row[0]: row for row in rows}
+
+
+@cache
+def _robot(name: str) -> Robot:
+    return load_config(configs_dir() / "robots" / f"{name}.yaml", Robot)
+
+
+_ROBOTS = ("ddagr", "warthog", "husky")
 _SOILS: dict[str, tuple[Callable[[], Soil], str]] = {
     "thesis_a1": (thesis_a1, "thesis Table A.1 (clayey soil, Thailand, 38 % moisture)"),
     "firm_ground": (firm_ground, "hard ground as a stiff frictional soil (ours)"),
 }
-_SOILS |= {row[0]: (lambda row=row: _published(*row[2:]), row[1]) for row in PUBLISHED_SOILS}  # type: ignore[misc]
 
 
 def robot_names() -> tuple[str, ...]:
     """Names that :func:`get_robot` takes."""
-    return tuple(_ROBOTS)
+    return _ROBOTS
 
 
 def soil_names() -> tuple[str, ...]:
     """Names that :func:`get_soil` takes."""
-    return tuple(_SOILS)
+    return (*_SOILS, *_published_rows())
 
 
 def is_file(name: object) -> bool:
@@ -184,7 +131,7 @@ def soil_source(name: str) -> str:
     get_soil(name)
     if is_file(name):
         return name
-    return _SOILS[name][1]
+    return _SOILS[name][1] if name in _SOILS else _published_rows()[name][1]
 
 
 def get_robot(name: str) -> Robot:
@@ -197,7 +144,8 @@ def get_robot(name: str) -> Robot:
         return load_config(name, Robot)
     if name not in _ROBOTS:
         raise unknown_name("robot", name, _ROBOTS)
-    return _ROBOTS[name]()
+    stored = _robot(name)
+    return replace(stored, standard_deviations=dict(stored.standard_deviations))
 
 
 def get_soil(name: str) -> Soil:
@@ -208,6 +156,6 @@ def get_soil(name: str) -> Soil:
     """
     if is_file(name):
         return load_config(name, Soil)
-    if name not in _SOILS:
-        raise unknown_name("soil", name, _SOILS)
-    return _SOILS[name][0]()
+    if name not in soil_names():
+        raise unknown_name("soil", name, soil_names())
+    return _SOILS[name][0]() if name in _SOILS else _published(name)

@@ -51,7 +51,7 @@ for _name, _first in (
     ("bogged", layout.BOGGED),
 ):
     TRUTH |= {f"true_{_name}_{wheel + 1}": _first + wheel for wheel in range(4)}
-"""Truth columns of a simulated drive and where they stand in a row."""
+"""Truth columns of a simulated drive and their places in a row."""
 
 Soils = Soil | Sequence[Soil]
 
@@ -64,7 +64,7 @@ _FORGOTTEN = (
 )
 """First entries and sizes of what a reset sets to zero."""
 
-_PARTS_PER_THREAD = 6
+_PARTS_PER_THREAD = 6  # (ours) small enough that no thread waits long for the last part of another
 _LONG = 100  # samples from which handing out parts costs less than waiting for the slower thread
 
 
@@ -241,10 +241,10 @@ class Simulator:
         settle_rows(self.rows, indices, self._grids(), self._actions(), self._numerics)
 
     def remember(self, past: Array, speeds: Array | None = None) -> None:
-        """Tell drivetrains and effects on motors what was commanded before the present motion, which stays as it is.
+        """Give drivetrains and effects on motors what was commanded before the present motion, which stays as it is.
 
-        A delay or a lag that is told nothing takes the motors to have settled at their speeds of the start. One that is
-        told takes this for the time before what it is told.
+        A delay or a lag without past commands assumes that the motors have settled at their speeds of the start; with
+        past commands it assumes the same of the time before them.
 
         Args:
             past: (N, H, 2) commands of the samples before, the latest last [rad/s]; NaN where unknown.
@@ -303,10 +303,10 @@ class Simulator:
         """Advance by ``samples`` sensor samples, or by as many as ``commands`` has.
 
         Args:
-            commands: (N, 2) held, or (N, T, 2) one per sample [rad/s].
+            commands: (N, 2) constant, or (N, T, 2) one per sample [rad/s].
             noise: (N, T, layout.NOISE_CHANNELS) standard normal draws; none by default.
             recorded: row entries to record.
-            samples: T for held commands.
+            samples: T, for constant commands.
 
         Returns:
             readings (N, T, 8) and record (N, T, len(recorded)).

@@ -66,7 +66,7 @@ class Stretch(NamedTuple):
     """Samples to drive over: what N environments are given, and what is written of them.
 
     Attributes:
-        commands: (N, samples or 1, 2) bank speed commands; one is held over all samples [rad/s].
+        commands: (N, samples or 1, 2) bank speed commands; a single one for all samples [rad/s].
         noise: (N, samples, NOISE_CHANNELS) standard normal draws.
         recorded: (K,) row entries to record.
         readings: (N, samples, 8), written.

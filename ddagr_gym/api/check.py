@@ -113,7 +113,7 @@ def check(
     *,
     column_map: str | os.PathLike[str] | None = None,
 ) -> CheckResult:
-    """Check recordings: rates, gaps, clocks, signs, scales, stuck and held channels, noise.
+    """Check recordings: rates, gaps, clocks, signs, scales, stuck channels, repeated readings, noise.
 
     Every question is answered with pass, suspicious or not testable, and what to do. Values carry 99 % intervals; one
     is suspicious only when its whole interval lies outside its sound range. Several recordings of one robot are also

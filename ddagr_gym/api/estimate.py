@@ -51,7 +51,7 @@ class SoilParameter:
 class EstimateResult(Report):
     """Estimates over a recording.
 
-    ``report`` writes estimates.parquet, summary.json and the figures; it needs pyarrow. Figures stand in the order of
+    ``report`` writes estimates.parquet, summary.json and the figures; it needs pyarrow. Figures come in the order of
     the thesis's chapter 6, with bands of two standard deviations, and the truth where the recording has it.
 
     Attributes:

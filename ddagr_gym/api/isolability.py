@@ -49,7 +49,7 @@ class IsolabilityResult(Report):
         return {name: self.table.of(name).size for name in self.table.effects}
 
     def confused_with(self, effect: str) -> tuple[str, ...]:
-        """Effects that could not be told from one, the closest first."""
+        """Effects that could not be distinguished from one, the closest first."""
         return self.table.confused(effect)
 
     @property

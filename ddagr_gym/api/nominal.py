@@ -23,7 +23,7 @@ ThresholdsLike: TypeAlias = Union["Thresholds", str, os.PathLike[str]]
 """Thresholds, or the path of a file that ``ddagr null-bank`` wrote."""
 
 OWN = "given in Python"
-"""Stands in reports for the name of a soil or the file of a robot that is an object and no preset: nothing loads it."""
+"""In reports the name of a soil, or the file of a robot, that is an object and no preset: nothing loads it."""
 
 
 @dataclass(frozen=True)

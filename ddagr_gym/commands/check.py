@@ -18,7 +18,7 @@ EXAMPLES = (
 
 @dataclass(frozen=True)
 class Arguments:
-    """Check recordings: rates, gaps, clocks, signs, scales, stuck and held channels, noise.
+    """Check recordings: rates, gaps, clocks, signs, scales, stuck channels, repeated readings, noise.
 
     Every question is answered with pass, suspicious or not testable, and what to do. Values carry 99 % intervals; one
     is suspicious only when its whole interval lies outside its sound range. The exit code is 1 when anything is

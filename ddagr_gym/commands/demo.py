@@ -36,7 +36,7 @@ SAMPLE_SOIL = "sandy_loam_lll_15"
 HARD_GROUND = "firm_ground"
 """Nominal soil of a given recording, unless another is named: the refit moves it."""
 
-_SPEED = 0.20  # [m/s]
+_SPEED = 0.20  # [m/s], the reference speed of the row turn (theory: control)
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,7 @@ class DriveToReplay:
 
 
 def _drive_to_replay(arguments: Arguments) -> DriveToReplay:
-    """Read first, so that a wrong path or name ends the demonstration before it has begun."""
+    """Read first, so that a wrong path or name ends the demonstration at its start."""
     from ddagr_gym.api.replay import driven_robot
     from ddagr_gym.presets import get_soil
     from ddagr_gym.recordings.load import load_recording

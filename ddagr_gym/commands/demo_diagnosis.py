@@ -26,7 +26,8 @@ MISSING = "slope=0.04,direction=2.0"
 WORLD = "pressure law"
 """Structure of the simulator that made them, of :data:`ddagr_gym.diagnosis.null_bank.structural_variants.KINDS`."""
 
-_RATE, _POSE_RATE, _REACH = 50.0, 5.0, 20.0
+_RATE, _POSE_RATE = 50.0, 5.0  # [Hz], of sensors and poses (ours): usual for a field robot
+_REACH = 20.0  # [m], of the varying ground from the start (ours): a drive goes 10 m at most
 
 
 def drives(seed: int) -> tuple[Recording, ...]:
@@ -88,7 +89,7 @@ def diagnosis_step(folder: Path, seed: int = 1, thresholds: Thresholds | None = 
     )
     result.report(folder / "diagnosis")
     html = f"""<p>The drives were simulated on ground that slopes ({escape(MISSING)}), by a simulator with another
-soil law ({escape(WORLD)}); the diagnosis was told neither.</p>
+soil law ({escape(WORLD)}); the diagnosis knew neither.</p>
 <p>Everything about it: <a href="diagnosis/{PAGE}">page</a>, <a href="diagnosis/diagnosis.json">JSON</a>, and the
 <a href="diagnosis/effects.yaml">effects file</a> that <code>gym.make</code>, <code>ddagr simulate</code> and
 <code>ddagr replay</code> load.</p>"""

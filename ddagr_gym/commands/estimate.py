@@ -22,7 +22,7 @@ EXAMPLES = (
 class Arguments:
     """Estimate speeds and soil over a recording, with figures.
 
-    Figures stand in the order of the thesis's chapter 6. They show estimates with bands of two standard deviations, and
+    Figures come in the order of the thesis's chapter 6. They show estimates with bands of two standard deviations, and
     the truth where the recording holds it.
 
     Attributes:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 VIDEOS = "videos"
 
-_HASH_DIGITS = 16
+_HASH_DIGITS = 16  # shown of a SHA-256 (ours): enough to tell files apart by eye
 
 
 def write_report(
@@ -83,7 +83,7 @@ def assemble(
 
 
 def _with_headline(evaluation: Evaluation) -> Evaluation:
-    """With the learned arms held against the headline; what is told something else against the same training seeds."""
+    """With the learned arms compared with the headline; its ablations with the same training seeds of it."""
     from ddagr_gym.evaluation.summary import improvement, summarise
 
     headline, judged = evaluation.headline, evaluation.judged

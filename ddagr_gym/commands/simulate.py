@@ -27,7 +27,7 @@ class Arguments:
         robot: name of a robot (ddagr robots), or the path of a YAML file with one's own.
         effect: missing physics, name=size or name=size,parameter=value, or an effects file; may be repeated.
         output: recording to write, .parquet or .csv.
-        figure: figure to write, .png (an .svg stands beside it).
+        figure: figure to write, .png (an .svg is written beside it).
         video: video to write, .mp4.
         rate: sensor samples per second [Hz].
         pose_rate: fixes of a pose receiver per second [Hz]; 0 for none.

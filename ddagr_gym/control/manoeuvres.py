@@ -15,7 +15,7 @@ from ddagr_gym.errors import InputError, unknown_name
 LARGEST_SPEED = 100.0
 """Commands beyond this are a mistake of units [rad/s]."""
 LONGEST_DRIVE = 36_000.0
-"""[s]"""
+"""[s], ten hours: more is a mistake of units (ours)."""
 
 
 @dataclass(frozen=True)
@@ -161,7 +161,7 @@ def find_manoeuvre(name_or_path: str) -> Manoeuvre:
 def read_manoeuvre(path: Path) -> Manoeuvre:
     """Manoeuvre from a CSV with columns ``t, command_right, command_left`` [s, rad/s]; each row holds until the next.
 
-    The last row's command is held as long as the one before it.
+    The last row's command lasts as long as the one before it.
 
     Raises:
         InputError: absent file, missing column, or values that are not numbers in increasing time.

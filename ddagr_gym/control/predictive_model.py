@@ -112,7 +112,7 @@ def _implicit_step(ca: Any, model: PredictiveModel, velocity: Any, omega: Any, s
 def transition(ca: Any, model: PredictiveModel) -> Any:
     """CasADi function (state (7,), input (2,), parameters (7,)) -> state one control period later.
 
-    The commands are held, the banks follow them exactly with their lag; body and position errors take two steps.
+    The commands stay constant, the banks follow them exactly with their lag; body and position errors take two steps.
     """
     x, u, p = ca.SX.sym("x", STATE_SIZE), ca.SX.sym("u", INPUT_SIZE), ca.SX.sym("p", PARAMETER_SIZE)
     step = model.period / _STEPS

@@ -148,7 +148,7 @@ class RowTurn(Validated):
         return self.speed * self.curvature(distance)
 
     def distance_at(self, time: ArrayLike) -> Array:
-        """Distance (...) [m] at ``time`` (...) [s] after a start at the commanded speed, held at the path's end."""
+        """Distance (...) [m] at ``time`` (...) [s] after a start at the commanded speed, at most the path's length."""
         return np.clip(self.speed * np.asarray(time, dtype=float), 0.0, self.length)
 
     def position(self, distance: ArrayLike) -> Array:

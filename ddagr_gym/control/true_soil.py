@@ -3,42 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ddagr_gym.control.force_balance import ForceBalance
 from ddagr_gym.control.observation import TurnObservation, decode
-from ddagr_gym.control.pid import PidGains
 from ddagr_gym.control.row_turn import Phase
-from ddagr_gym.control.turn_controller import FeedbackController
 from ddagr_gym.errors import InputError
-from ddagr_gym.parameters import Robot
-
-TrueFeedForward = Callable[[NDArray[np.float64], float, float], tuple[float, float] | None]
-"""(soil (9,) in the simulator's order, speed, curvature) -> bank speeds [rad/s] or None."""
 
 
-class TrueSoil(FeedbackController):
+class TrueSoil(ForceBalance):
     """B4 with the truth for its estimate: bank speeds by the true soil's own force law, PI on the true curvature.
 
-    Needs ``info_level="full"``. Where the soil has no steady solution the kinematic bank speeds with ``track_ratio``
-    serve.
-
-    Args:
-        robot: nominal robot.
-        gains: of the loop, whose output and error are curvatures [1/m].
-        feed_forward: steady bank speeds on a soil.
-        track_ratio: effective over geometric track [-].
-        lead: heading before the end of the turn at which it straightens [rad].
+    Needs ``info_level="full"``. ``feed_forward`` takes the soil (9,) in the simulator's order, speed and curvature.
     """
-
-    def __init__(
-        self, robot: Robot, gains: PidGains, feed_forward: TrueFeedForward, track_ratio: float = 1.0, lead: float = 0.0
-    ) -> None:
-        super().__init__(robot, gains, track_ratio, lead)
-        self._feed_forward = feed_forward
 
     def __call__(self, observation: ArrayLike, info: Any = None) -> NDArray[np.float32]:
         """Action (2,), right and left bank speed over the robot's maximum."""

@@ -58,14 +58,14 @@ class EkfFeatureBatch:
         self._half_track = robot.half_track
 
     def reset(self, chosen: Sequence[int] | NDArray[np.int64]) -> None:
-        """Forget the episodes of the ``chosen`` environments; the robot stands."""
+        """Forget the episodes of the ``chosen`` environments; the robot is at rest."""
         self.filter.reset(np.asarray(chosen, dtype=np.int64))
 
     def update(self, commands: Array, readings: Array) -> None:
         """Filter the samples of one control interval.
 
         Args:
-            commands: (N, 2) held over the interval [rad/s].
+            commands: (N, 2) constant over the interval [rad/s].
             readings: (N, samples, 5 or more) raw sensor block.
         """
         self.filter.step(commands, readings[..., :CHANNEL_SIZE])

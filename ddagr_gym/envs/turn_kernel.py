@@ -85,6 +85,7 @@ NO_ENDING, EXIT_REACHED, BOGGED_DOWN, LEFT_HEADLAND, TIME_OUT = range(5)
 """Numbered endings: 1 to 3 terminate, 4 truncates."""
 
 OBSERVATION_LIMIT = 10.0
+"""Bound of the scaled observations [-] (ours): their scales are those of a usual turn, so that only faults reach it."""
 
 CORRIDOR = 0.35
 """Beyond this distance from its row's line a robot between the rows stands on a bed [m] (ours)."""
@@ -92,7 +93,7 @@ HEADLAND_DEPTH = 3.0
 """Depth of the headland from the boundary, to a ditch or road [m] (ours)."""
 HEADLAND_MARGIN = 1.5
 """Room beside the two rows [m] (ours)."""
-_LARGEST_EXIT_RATIO = 10.0
+_LARGEST_EXIT_RATIO = 10.0  # (ours) more than ten furrows off is no worse an exit, and the reward stays bounded
 _LEAST_WAY = 0.02  # [s], a quarter of a step: below it the direction of travel means little
 
 

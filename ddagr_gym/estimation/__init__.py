@@ -18,7 +18,7 @@ entry  name                        unit       meaning
 10,11  accelerometer_bias_x, _y    m/s^2
 =====  ==========================  =========  ==============================================================
 
-**Inputs**: bank speed commands (right, left) [rad/s], held until the sample; roll and pitch [rad] where known.
+**Inputs**: bank speed commands (right, left) [rad/s], constant until the sample; roll and pitch [rad] where known.
 **Measurements** (``layout.CHANNELS``): specific force x, y [m/s^2], yaw rate [rad/s], encoders right, left [rad/s];
 NaN: no sample. Order of things: predict with the command up to the time of a sample, then correct with the sample.
 

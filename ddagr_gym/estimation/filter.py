@@ -70,7 +70,7 @@ class BatchFilter:
         """Predict and correct through one sample or several.
 
         Args:
-            commands: (N, 2) held, or (N, K, 2) right and left bank speed commands [rad/s]; NaN: unknown.
+            commands: (N, 2) constant, or (N, K, 2) right and left bank speed commands [rad/s]; NaN: unknown.
             readings: (N, 5) or (N, K, 5) in the order of ``CHANNELS``; NaN where a channel has no sample.
             attitude: (N, 2) or (N, K, 2) roll and pitch [rad] where known.
             duration: between samples [s]; the model's sample period by default.

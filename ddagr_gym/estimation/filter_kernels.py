@@ -70,7 +70,7 @@ def filter_rows(
         states: (N, 12), updated.
         covariances: (N, 12, 12), updated.
         counts: (N,) samples seen, updated; sets which samples use the accelerometer.
-        commands: (N, K or 1, 2) [rad/s]; one is held over all samples.
+        commands: (N, K or 1, 2) [rad/s]; a single one for all samples.
         readings: (N, K, 5).
         slopes: (N or 1, K or 1, 2) gravity along the body [m/s^2].
         durations: (K or 1,) since the sample before [s].

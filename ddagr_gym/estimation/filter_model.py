@@ -1,4 +1,4 @@
-"""Everything the filter is told: robot, noise, prior knowledge of the soil, limits. Frozen, validated, packable."""
+"""Everything the filter is given: robot, noise, prior knowledge of the soil, limits. Frozen, validated, packable."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ COMMANDS = ("command_right", "command_left")
 
 CHANNEL_SIZE = 5  # entries of CHANNELS
 FORCE_CHANNEL = 0  # x, y
-GYRO_CHANNEL = 2
+GYRO_CHANNEL = 2  # of CHANNELS
 ENCODER_CHANNEL = 3  # right, left
 
 _next = 0

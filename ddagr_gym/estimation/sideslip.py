@@ -25,7 +25,7 @@ CENTRE_AHEAD = 0.037
 
 _TIME = 60.0  # of the Ornstein-Uhlenbeck process [s]
 _TURNING_DEVIATION = 0.02  # of delta in a turn [m/s]; over the 10 s of a turn it spreads by about a third of that
-_STRAIGHT_DEVIATION = 1e-3  # [m/s]
+_STRAIGHT_DEVIATION = 1e-3  # of delta on a straight [m/s] (ours): a twentieth of a turn's
 _BIAS_DEVIATION = 0.3  # [m/s^2]: several times what calibration leaves
 
 
@@ -53,7 +53,7 @@ class SideslipFilter:
         self.reset(np.arange(count))
 
     def reset(self, chosen: NDArray[np.int64]) -> None:
-        """Forget everything about ``chosen`` robots; they stand."""
+        """Forget everything about ``chosen`` robots, which are at rest."""
         self.states[chosen] = 0.0
         self.covariances[chosen] = np.diag([_STRAIGHT_DEVIATION**2, _BIAS_DEVIATION**2])
         self.last_rates[chosen] = 0.0

@@ -4,8 +4,8 @@ States v_x, v_y, yaw rate, omega_right, omega_left, a1, a2, b: linear parameters
 Put right: signs of the force law and rows of the model (theory: wheel model, eq. (37)), specific force F/m as the
 accelerometer's reading instead of the body velocity's derivative (5.5), innovation y - h(x) (5.12 prints y - Hx), the
 transpose in the Joseph form (5.11). Kept: fourth-order Runge-Kutta of state and covariance (5.7), (5.8), the vector
-update (5.10), noise of (6.2). Ours, because the thesis says nothing: initial parameters and their
-variances, the least value at which parameters are held positive, and Runge-Kutta steps that follow the stiffness.
+update (5.10), noise of (6.2). Ours, because the thesis says nothing: initial parameters and their variances, the least
+value of the parameters, which keeps them positive, and Runge-Kutta steps that follow the stiffness.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class ThesisModel(Validated):
         measurement: diagonal of R, in the order of CHANNELS (6.2).
         initial_variance: diagonal of P0; (6.2) for the parameters, ours for a1 and b, whose unit is the newton.
         parameters: initial a1 [N], a2 [-], b [N/rad].
-        least_parameter: a1, a2, b are held at or above it.
+        least_parameter: least value of a1, a2 and b.
         sample_period: [s].
         stability: Runge-Kutta step times largest row sum of the model's derivative, which reaches 1e4 1/s near rest;
             the method is stable up to 2.78, a positive covariance needs less.

@@ -16,7 +16,7 @@ from ddagr_gym.parameters import Numerics, Robot, Soil
 from ddagr_gym.physics import layout
 from ddagr_gym.simulator import Simulator
 
-_NEARLY_AT_REST = 0.05  # [rad/s]
+_NEARLY_AT_REST = 0.05  # [rad/s] (ours): beyond the kink that the force has at rest
 _SHARES = tuple(round(1.0 - 0.02 * k, 2) for k in range(26))
 _SETTLING_SAMPLES = 500  # 4 s at 125 Hz: more than ten time constants of body and motors
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
@@ -100,7 +99,8 @@ def _places_by_grid(scenarios: Sequence[Scenario]) -> dict[Any, list[int]]:
 
 
 @lru_cache(maxsize=1)
-def _nominal_filter() -> FilterModel:
+def nominal_filter() -> FilterModel:
+    """The filter that knows the nominal robot and sensors."""
     return FilterModel.of(ddagr(), Sensors())
 
 
@@ -109,7 +109,7 @@ def episode_row(controller: str, scenario: Scenario, run: TurnRun) -> dict[str, 
     episode = run.episode
     metrics = turn_metrics(run.columns, episode.turn, episode.robot)
     start = (-episode.turn.run_in, episode.lateral_offset, episode.heading_offset)
-    estimator = estimator_errors(_nominal_filter(), run.columns, episode.turn, start)
+    estimator = estimator_errors(nominal_filter(), run.columns, episode.turn, start)
     turn, leave = metrics.turn, metrics.exit
     arm, repeat = controller_arm(controller)
     row = {
@@ -145,7 +145,7 @@ def episode_row(controller: str, scenario: Scenario, run: TurnRun) -> dict[str, 
 
 def provenance(controller: str, set_name: str) -> str:
     """What a row was made of, shortened: scenarios, controller, filter; a row of others is driven again."""
-    parts = (set_hash(set_name), controller_version(controller), repr(_nominal_filter()))
+    parts = (set_hash(set_name), controller_version(controller), repr(nominal_filter()))
     return hashlib.sha256(" ".join(parts).encode()).hexdigest()[:12]
 
 
@@ -287,8 +287,3 @@ def _results(tasks: list[Task], processes: int) -> Iterator[list[dict[str, Any]]
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
-
-
-def absolute_errors(rows: Sequence[dict[str, Any]]) -> list[float]:
-    """|e_R| of each row; a turn without a defined radius is infinitely wrong."""
-    return [math.inf if row["radius_error"] is None else abs(row["radius_error"]) for row in rows]

@@ -20,7 +20,7 @@ RELATIONS = {
     "less than": lambda value, bound: value < bound,
     "more than": lambda value, bound: value > bound,
 }
-"""How a value stands to its bound."""
+"""Comparisons of a value with its bound."""
 
 _NUMBERS = ("value", "low", "high")
 

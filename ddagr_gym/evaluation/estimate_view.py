@@ -125,7 +125,7 @@ def _parameter_panels(estimated: EstimatedRun, numbers: Mapping[str, str]) -> li
 
 
 def _trace_panel(estimated: EstimatedRun, numbers: Mapping[str, str]) -> Panel:
-    """The thesis's filter has one trace over all states; ours is told apart by block, because units differ."""
+    """The thesis's filter has one trace over all states; ours has one for each block, because units differ."""
     variances = np.square(estimated.run.deviations)
     if estimated.model is None:
         lines = [Line("tr P", variances.sum(axis=1))]

@@ -132,20 +132,20 @@ def _columns(set_up: FilterSetUp, recording: Recording) -> dict[str, Array]:
     if set_up.use_commands:
         columns |= dict(zip(COMMANDS, recording.held_commands(), strict=True))
     if set_up.attitude:
-        columns |= {name: _held(recording, recording[name]) for name in ("roll", "pitch")}
+        columns |= {name: _carried_forward(recording, recording[name]) for name in ("roll", "pitch")}
     return columns
 
 
-def _held(recording: Recording, values: Array) -> Array:
-    """Last sample of the span; the first one before it, 0 without any."""
-    held = np.zeros(len(recording))
+def _carried_forward(recording: Recording, values: Array) -> Array:
+    """Last reading of the span, before the first one that one; 0 without any."""
+    carried = np.zeros(len(recording))
     for span in recording.spans():
         part = values[span]
         known = np.flatnonzero(np.isfinite(part))
         if known.size:
             last = np.searchsorted(known, np.arange(part.size), side="right") - 1
-            held[span] = part[known[np.maximum(last, 0)]]
-    return held
+            carried[span] = part[known[np.maximum(last, 0)]]
+    return carried
 
 
 def _first(recording: Recording, name: str, span: slice) -> float:

@@ -40,7 +40,7 @@ class Arm:
 
     @property
     def ablation(self) -> bool:
-        """Whether it is a policy that is told something else than it was trained with, to see what that changes."""
+        """Whether it is a policy whose estimates are replaced by others than in training, to see what that changes."""
         return "@" in self.name.rsplit("/", 1)[-1]
 
 
@@ -173,7 +173,7 @@ def judged_set(names: Sequence[str]) -> str:
 
 
 def arm_name(row: Row) -> str:
-    """Arm of an episode."""
+    """Arm of an episode: its controller where there is none."""
     return str(row.get("arm", row["controller"]))
 
 

@@ -32,6 +32,7 @@ from ddagr_gym.physics.terrain import SoilField
 from ddagr_gym.presets import get_robot
 
 FORMAT = 1
+"""Of the files; another number is refused."""
 SUFFIX = ".json.gz"
 
 _GRID_TOLERANCE = 1e-9
@@ -119,7 +120,7 @@ def _with_change(field: SoilField, recipe: GroundRecipe) -> SoilField:
 
 
 def _fingerprint(law: str, items: Sequence[Mapping[str, Any]]) -> str:
-    """SHA-256 over a law and scenarios as they stand in a file."""
+    """SHA-256 over a law and scenarios as a file has them."""
     return hashlib.sha256(json.dumps([law, *items], sort_keys=True).encode()).hexdigest()
 
 

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from functools import lru_cache, partial
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.errors import InputError, unknown_name
-from ddagr_gym.estimation import FilterModel, run_filter
-from ddagr_gym.evaluation.campaign import drive_scenario, episode_row
+from ddagr_gym.estimation import run_filter
+from ddagr_gym.evaluation.campaign import drive_scenario, episode_row, nominal_filter
 from ddagr_gym.evaluation.controllers import find_controller, needs_filter
 from ddagr_gym.evaluation.estimator_metrics import integrate_track
 from ddagr_gym.evaluation.metrics import headland_samples
@@ -28,8 +28,6 @@ from ddagr_gym.evaluation.report_data import (
 from ddagr_gym.evaluation.runs import TurnRun
 from ddagr_gym.evaluation.scenarios import Scenario, load_scenarios, scenario_names
 from ddagr_gym.frames import body_to_world
-from ddagr_gym.parameters import Sensors
-from ddagr_gym.presets import ddagr
 
 Array = NDArray[np.float64]
 
@@ -62,19 +60,14 @@ def parse_replay(text: str) -> tuple[str, str, int]:
     return controller, set_name, number
 
 
-@lru_cache(maxsize=1)
-def _model() -> FilterModel:
-    return FilterModel.of(ddagr(), Sensors())
-
-
 def estimated_track(run: TurnRun) -> Array:
     """Where the filter believes the robot to be after each sample (T, 3): x, y [m], yaw [rad], from the known start.
 
     The filter is run over the drive's readings anew; its speeds and yaw rate are integrated.
     """
     episode = run.episode
-    states = run_filter(_model(), run.columns).states
-    track = integrate_track(states[:, 0], states[:, 1], states[:, 2], _model().sample_period)
+    states = run_filter(nominal_filter(), run.columns).states
+    track = integrate_track(states[:, 0], states[:, 1], states[:, 2], nominal_filter().sample_period)
     start = (-episode.turn.run_in, episode.lateral_offset, episode.heading_offset)
     return np.column_stack([body_to_world(track[:, :2], *start), track[:, 2] + start[2]])
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -146,6 +146,23 @@ def _percentiles(samples: Array, confidence: float) -> tuple[Array, Array]:
     return low, high
 
 
+def _resampled(
+    scores: ArrayLike,
+    statistic: Callable[[Array], Any],
+    rng: np.random.Generator,
+    resampling: Resampling,
+    resamples: int,
+    confidence: float,
+) -> tuple[Any, Any, Any]:
+    """A statistic of a score matrix with the ends of its percentile interval."""
+    matrix = score_matrix(scores)
+    shape = (matrix.shape[0], matrix.shape[1])
+    _check_confidence(confidence)
+    _check_resampling(shape, resampling, resamples)
+    samples = np.array([statistic(matrix[_draw(shape, resampling, rng)]) for _ in range(resamples)])
+    return (statistic(matrix), *_percentiles(samples, confidence))
+
+
 def bootstrap(
     scores: ArrayLike,
     statistic: Statistic,
@@ -171,13 +188,8 @@ def bootstrap(
         resamples: number of resamples.
         confidence: two-sided level.
     """
-    matrix = score_matrix(scores)
-    _check_confidence(confidence)
-    _check_resampling((matrix.shape[0], matrix.shape[1]), resampling, resamples)
-    shape = (matrix.shape[0], matrix.shape[1])
-    samples = np.array([statistic(matrix[_draw(shape, resampling, rng)]) for _ in range(resamples)])
-    low, high = _percentiles(samples, confidence)
-    return Interval(float(statistic(matrix)), float(low), float(high), confidence)
+    estimate, low, high = _resampled(scores, statistic, rng, resampling, resamples, confidence)
+    return Interval(float(estimate), float(low), float(high), confidence)
 
 
 def improvement_share(candidate: ArrayLike, baseline: ArrayLike) -> float:
@@ -212,7 +224,7 @@ def probability_of_improvement(
     """:func:`improvement_share` with a bootstrap interval; runs of the two are not paired, tasks are.
 
     Where all resamples agree (every run wins every task) the percentile interval has no width. Wilson's interval
-    for as many trials as the smaller side has runs then stands in (ours).
+    for as many trials as the smaller side has runs is used then (ours).
 
     Args:
         candidate, baseline: (runs, tasks), lower is better; a baseline without training has one run.
@@ -273,16 +285,11 @@ def performance_profile(
         thresholds: (K,) in the scores' unit.
         rng, resampling, resamples, confidence: as in :func:`bootstrap`.
     """
-    matrix, levels = score_matrix(scores), np.asarray(thresholds, dtype=float)
+    levels = np.asarray(thresholds, dtype=float)
     if levels.ndim != 1 or not levels.size or not np.isfinite(levels).all():
         raise InputError(f"thresholds has shape {levels.shape} or values that are not finite: give numbers (K,).")
-    shape = (matrix.shape[0], matrix.shape[1])
-    _check_confidence(confidence)
-    _check_resampling(shape, resampling, resamples)
 
     def share(sample: Array) -> Array:
         return np.searchsorted(np.sort(sample, axis=None), levels, side="right") / sample.size
 
-    samples = np.array([share(matrix[_draw(shape, resampling, rng)]) for _ in range(resamples)])
-    low, high = _percentiles(samples, confidence)
-    return Profile(levels, share(matrix), low, high, confidence)
+    return Profile(levels, *_resampled(scores, share, rng, resampling, resamples, confidence), confidence)

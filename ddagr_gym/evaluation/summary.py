@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.errors import InputError
-from ddagr_gym.evaluation.campaign import absolute_errors
+from ddagr_gym.evaluation.report_data import arm_name, size_of
 from ddagr_gym.evaluation.statistics import (
     Interval,
     Resampling,
@@ -118,7 +118,7 @@ class _Table:
         return [row for run in self._runs for row in run]
 
     def errors(self) -> Array:
-        return np.array([absolute_errors(run) for run in self._runs])
+        return np.array([[size_of(row) for row in run] for run in self._runs])
 
     def sizes(self, key: str) -> Array:
         """|value|, infinite where it is undefined."""
@@ -189,16 +189,11 @@ def _profile(errors: Array) -> dict[str, list[float]] | None:
     return {name: getattr(found, name).tolist() for name in ("thresholds", "share", "low", "high")}
 
 
-def arm_of(row: dict[str, Any]) -> str:
-    """Arm of a row: its controller where there is none."""
-    return str(row.get("arm", row["controller"]))
-
-
 def summaries(rows: Rows) -> dict[str, dict[str, Any]]:
     """``{arm: {set: summary}}``, with ``improvement_over_B1`` and ``_B4`` where those were driven on the set too."""
     result: dict[str, dict[str, Any]] = {}
-    for arm in dict.fromkeys(arm_of(row) for row in rows):
-        mine = [row for row in rows if arm_of(row) == arm]
+    for arm in dict.fromkeys(arm_name(row) for row in rows):
+        mine = [row for row in rows if arm_name(row) == arm]
         result[arm] = {
             name: summarise([row for row in mine if row["set"] == name])
             for name in dict.fromkeys(row["set"] for row in mine)
@@ -218,7 +213,7 @@ def improvement(rows: Rows, candidate: str, baseline: str, set_name: str) -> Val
     runs and scenarios. None where one of them has no such scenario.
     """
     chosen = {
-        arm: [row for row in rows if arm_of(row) == arm and row["set"] == set_name and row["feasible"]]
+        arm: [row for row in rows if arm_name(row) == arm and row["set"] == set_name and row["feasible"]]
         for arm in (candidate, baseline)
     }
     if not all(chosen.values()):

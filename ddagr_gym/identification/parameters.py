@@ -128,7 +128,7 @@ FIELD_STIFFNESS_DEVIATION = 0.4
 """Spread of the soil's stiffness within a field, as the deviation of its logarithm (ours)."""
 
 KIND_STIFFNESS_DEVIATION = 1.2
-"""The same over soils of one kind: 1.19 for the pressure at 3 cm over the nine sands of ``published_soils``."""
+"""The same over soils of one kind: 1.19 for the pressure at 3 cm over the nine published sands."""
 
 
 def soil_parameters(

@@ -24,11 +24,13 @@ from ddagr_gym.files import atomic_path
 from ddagr_gym.policies.design import PolicyDesign
 
 FORMAT = 1
+"""Of the files; another number is refused."""
 MAXIMUM_BYTES = 1_000_000
 """Largest file that is read."""
 MAXIMUM_UNPACKED = 8_000_000
 """Largest sum of its members, unpacked."""
 MAXIMUM_LAYERS = 8
+"""Most layers of a network (ours): published ones have three."""
 
 Weights = NDArray[np.float32]
 

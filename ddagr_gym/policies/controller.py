@@ -141,9 +141,9 @@ def policy_title(name: str) -> str:
     design = find_policy(stem).design
     sees = "the filter's features" if design.needs_filter else "raw sensors"
     history = f" and {design.frames} instants" if design.frames > 1 else ""
-    told = "" if estimate == "live" else f", {ESTIMATES[estimate][1]}"
+    replaced = "" if estimate == "live" else f", {ESTIMATES[estimate][1]}"
     acts = "bank speeds" if design.action == "absolute" else "a correction of the feed-forward"
-    return f"learned policy: {sees}{history} to {acts}{told}"
+    return f"learned policy: {sees}{history} to {acts}{replaced}"
 
 
 def is_deployable_policy(name: str) -> bool:

@@ -1,4 +1,4 @@
-"""What a policy is told of the soil instead of the filter's estimate, for ablations: frozen, wrong, true.
+"""Estimates of the soil that replace the filter's in a policy's observation, for ablations: frozen, wrong, true.
 
 They need the raw samples or the true state (``info_level="full"``), so they are for evaluation only.
 """
@@ -54,20 +54,20 @@ class TrueMotion:
         """The observation with the true motion of ``info_level="full"``."""
         given = _full(info, "true_v_x")
         slip = given["true_slip_ratio"]
-        told = observation.copy()
+        changed = observation.copy()
         values = np.array([given["true_v_x"], given["true_yaw_rate"]])
-        told[_BASE : _BASE + 2] = values / FEATURE_SCALES[:2]
-        told[_BASE + 6 : _BASE + 8] = [0.5 * (slip[0] + slip[2]), 0.5 * (slip[1] + slip[3])]
-        return np.clip(told, -OBSERVATION_LIMIT, OBSERVATION_LIMIT)
+        changed[_BASE : _BASE + 2] = values / FEATURE_SCALES[:2]
+        changed[_BASE + 6 : _BASE + 8] = [0.5 * (slip[0] + slip[2]), 0.5 * (slip[1] + slip[3])]
+        return np.clip(changed, -OBSERVATION_LIMIT, OBSERVATION_LIMIT)
 
 
-class HeldSoil:
+class FixedSoil:
     """A filter of its own that never learns the soil: it stays what ``prior`` says, and so do its deviations.
 
     Args:
         robot: nominal robot.
         sensors: nominal sensors.
-        prior: soil that is held; the filter's own by default.
+        prior: the fixed soil; the filter's own by default.
     """
 
     def __init__(self, robot: Robot, sensors: Sensors, prior: SoilPrior | None = None) -> None:
@@ -101,14 +101,14 @@ def _full(info: Any, key: str) -> Any:
     return info
 
 
-Estimate = LiveEstimate | TrueMotion | HeldSoil
+Estimate = LiveEstimate | TrueMotion | FixedSoil
 
 ESTIMATES: dict[str, tuple[Callable[[Robot, Sensors], Estimate], str]] = {
     "live": (lambda robot, sensors: LiveEstimate(), "the filter's estimate"),
-    "frozen": (HeldSoil, "the soil frozen at the filter's prior"),
+    "frozen": (FixedSoil, "the soil frozen at the filter's prior"),
     "wrong": (
-        lambda robot, sensors: HeldSoil(robot, sensors, wrong_prior()),
-        "the soil held at deliberately wrong values",
+        lambda robot, sensors: FixedSoil(robot, sensors, wrong_prior()),
+        "the soil fixed at deliberately wrong values",
     ),
     "feed_forward": (lambda robot, sensors: LiveEstimate(), "its network silenced, only feed-forward and loop"),
     "true": (lambda robot, sensors: TrueMotion(), "the true speed, yaw rate and slip"),

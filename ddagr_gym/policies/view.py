@@ -29,15 +29,15 @@ INPUT_LIMIT = 10.0
 _LEAST_SPEED = 0.25
 """Share of the reference speed below which an estimated speed is not divided by [-] (ours)."""
 
-_LEAST_COMMAND = 0.1  # [rad/s]
-_LONGEST_RESPONSE = 1.5  # [s]
+_LEAST_COMMAND = 0.1  # [rad/s] (ours): a seventh of what the reference speed takes
+_LONGEST_RESPONSE = 1.5  # [s] (ours): twice that of motors with the thesis's slower loop, 1/1.4 s
 
 _LARGEST_STEERING = 0.8
 """Curvature with which the loop steers back to the reference at most, over 1/R* [-] (ours)."""
 
 _BASE = len(OBSERVATION)
-_FORCE_SCALE = 1.0  # [m/s^2]
-_SPEED_SCALE = 0.25  # [m/s]
+_FORCE_SCALE = 1.0  # [m/s^2] (ours): inputs are then of the order of 1
+_SPEED_SCALE = 0.25  # [m/s] (ours): likewise
 
 
 class PolicyView:

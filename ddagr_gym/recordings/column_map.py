@@ -100,8 +100,8 @@ class HeldChannels:
 
     A new sample is a row whose ``flag_column`` is not 0 where one is named, else a row in which any of the
     channels differs from the row before. Limit of the second rule: a sensor that truly reports the same value
-    twice looks held. Where ``zero_period`` is given, an exact zero counts as new again after that time, because a
-    wheel at standstill legitimately repeats 0. The first row of a span is never new: its age is unknown.
+    twice looks like a repeat. Where ``zero_period`` is given, an exact zero counts as new again after that time,
+    because a wheel at standstill legitimately repeats 0. The first row of a span is never new: its age is unknown.
 
     Attributes:
         channels: schema names that are updated together.
@@ -142,7 +142,7 @@ class ColumnMap:
         channels: source column by schema name.
         body_commands: instead of command_right and command_left among the channels.
         pieces: spans and segments.
-        held: groups of held channels.
+        held: groups of channels that the file repeats between updates.
         command_valid: where commands count; everywhere if absent.
         robot: robot to assume where none is named.
         delimiter: between the fields of a CSV line.
@@ -174,7 +174,7 @@ class ColumnMap:
         for group in self.held:
             for channel in group.channels:
                 if channel not in self.channels:
-                    raise unknown_name("held channel (it must stand under channels)", channel, self.channels)
+                    raise unknown_name("channel under held (it must be under channels, too)", channel, self.channels)
         if len(self.delimiter) != 1 or self.delimiter in '"\r\n\0' or ord(self.delimiter) > 126:
             raise InputError(f"delimiter is {self.delimiter!r}: give one character such as ',', ';' or a tab.")
 

@@ -1,4 +1,4 @@
-"""From the columns of a table to a recording: time, pieces, units, commands, held channels.
+"""From the columns of a table to a recording: time, pieces, units, commands, repeated readings.
 
 Every assumption leaves a sentence in the recording's notes.
 """

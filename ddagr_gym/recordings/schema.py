@@ -326,14 +326,14 @@ def _check_ranges(kind: str, ranges: Ranges, n: int) -> None:
 def _hold(recording: Recording, name: str, maximum_age: float) -> FloatArray:
     values = recording[name]
     known = np.isfinite(values) & recording.command_valid
-    held = np.full(len(recording), np.nan)
+    carried = np.full(len(recording), np.nan)
     for span in recording.spans():
         rows = np.arange(span.start, span.stop)
         last = np.maximum.accumulate(np.where(known[span], rows, -1))
         fresh = (last >= 0) & (recording.t[span] - recording.t[last] <= maximum_age)
-        held[span] = np.where(fresh, values[last], np.nan)
-    held[~recording.command_valid] = np.nan
-    return held
+        carried[span] = np.where(fresh, values[last], np.nan)
+    carried[~recording.command_valid] = np.nan
+    return carried
 
 
 def _doubts(recording: Recording) -> Iterator[str]:

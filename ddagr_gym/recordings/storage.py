@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,7 +22,7 @@ from ddagr_gym.files import atomic_path
 from ddagr_gym.parameters import Robot
 from ddagr_gym.recordings.files import DEFAULT_LIMITS, Limits, write_atomically
 from ddagr_gym.recordings.parquet_reader import open_parquet
-from ddagr_gym.recordings.schema import CHANNELS, Ranges, Recording, RecordingMeta, RobotGeometry
+from ddagr_gym.recordings.schema import CHANNELS, Recording, RecordingMeta
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -134,24 +135,11 @@ def _meta_json(name: str, metadata: Mapping[bytes, bytes] | None) -> dict[str, A
 
 
 def _from_json(label: str, content: Mapping[str, Any]) -> RecordingMeta:
+    absent = [item.name for item in fields(RecordingMeta) if item.name not in content]
     try:
-        geometry = content["geometry"]
-        return RecordingMeta(
-            robot=str(content["robot"]),
-            source=str(content["source"]),
-            source_sha256=str(content["source_sha256"]),
-            column_map=str(content["column_map"]),
-            geometry=None if geometry is None else RobotGeometry(**geometry),
-            start_time=float(content["start_time"]),
-            segments=_ranges(content["segments"]),
-            spans=_ranges(content["spans"]),
-            held={str(name): float(period) for name, period in content["held"].items()},
-            duplicates_dropped=int(content["duplicates_dropped"]),
-            notes=tuple(str(note) for note in content["notes"]),
-        )
-    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
+        found = msgspec.convert(content, RecordingMeta)
+    except msgspec.ValidationError as error:
         raise InputError(f"{label} has incomplete meta data ({error}): import the drive again.") from None
-
-
-def _ranges(content: Any) -> Ranges:
-    return tuple((int(start), int(stop)) for start, stop in content)
+    if absent:
+        raise InputError(f"{label} has incomplete meta data (without {absent[0]!r}): import the drive again.")
+    return found

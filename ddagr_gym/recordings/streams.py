@@ -143,7 +143,7 @@ class _StreamCollector:
             )
         where = f"a regular {self._map.rate:g} Hz grid" if self._map.rate else f"the stamps of {self._map.base}"
         yield (
-            f"rows are {where}; the other samples stand at their nearest row within "
+            f"rows are {where}; the other samples are at their nearest row within "
             f"{self._map.tolerance * period:.4g} s, none is interpolated."
         )
         for name, sign in self._map.signs.items():

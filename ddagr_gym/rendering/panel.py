@@ -15,10 +15,8 @@ Align = Literal["left", "right", "centre"]
 WIDTH = 264.0
 """Width of the panel at a picture height of 720; all measures below are for that height."""
 
-MARGIN = 22.0
-HEIGHT = 720.0
-LINE = 20.0
-LEGEND_TOP = 632.0
+MARGIN, LINE, LEGEND_TOP, HEIGHT = 22.0, 20.0, 632.0, 720.0
+"""Left margin, distance of lines, top of the legend and whole height [pixels] (ours: the layout)."""
 
 RADIUS_SPAN = 0.25
 """Relative radius error at the ends of its gauge."""

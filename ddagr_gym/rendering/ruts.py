@@ -139,7 +139,7 @@ class RutMap:
 
 
 def _widened(window: tuple[slice, slice], shape: tuple[int, ...]) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
-    """The window one pixel larger on each side where the image goes on, and where the window stands in that."""
+    """The window one pixel larger on each side where the image goes on, and the place of the window in that."""
     wide = tuple(slice(max(0, w.start - 1), min(size, w.stop + 1)) for w, size in zip(window, shape, strict=True))
     inner = tuple(slice(w.start - v.start, w.stop - v.start) for w, v in zip(window, wide, strict=True))
     return wide, inner

@@ -16,7 +16,7 @@ from ddagr_gym.identification.windows import CHANNELS, WindowSet
 Array = NDArray[np.float64]
 
 HORIZONS = (1.0, 5.0, 30.0)
-"""[s]"""
+"""[s] (ours): a manoeuvre's beginning, a turn, and a row; each about five times the one before."""
 
 METRICS = {
     "heading": ("rad", "change of heading, by the integrated gyro"),

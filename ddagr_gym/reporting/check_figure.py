@@ -14,7 +14,7 @@ from ddagr_gym.recordings.checks.signals import filled
 from ddagr_gym.recordings.files import write_atomically
 from ddagr_gym.recordings.schema import FloatArray, Recording
 from ddagr_gym.rendering import palette
-from ddagr_gym.reporting.figures import house_style
+from ddagr_gym.reporting.figures import house_style, nothing_to_draw
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -104,7 +104,7 @@ def _turn_rate(axes: Any, recording: Recording) -> None:
 def _path(axes: Any, recording: Recording) -> None:
     axes.set_title("path")
     if not recording.has("pose_x", "pose_y"):
-        _nothing(axes, "no pose")
+        nothing_to_draw(axes, "no pose")
         return
     for span in recording.spans():
         known = np.isfinite(recording["pose_x"][span]) & np.isfinite(recording["pose_y"][span])
@@ -118,11 +118,11 @@ def _path(axes: Any, recording: Recording) -> None:
 
 def _clocks(axes: Any, found: dict[str, Offset | None]) -> None:
     axes.set_title("clock offsets, 99 % intervals")
-    told = {pair: offset for pair, offset in found.items() if offset is not None}
-    if not told:
-        _nothing(axes, "no motion to compare")
+    known = {pair: offset for pair, offset in found.items() if offset is not None}
+    if not known:
+        nothing_to_draw(axes, "no motion to compare")
         return
-    for (pair, offset), colour in zip(told.items(), (RIGHT, LEFT, POSE), strict=False):
+    for (pair, offset), colour in zip(known.items(), (RIGHT, LEFT, POSE), strict=False):
         axes.plot(LAGS, offset.profile, color=colour, lw=1.2, label=f"{pair}: {offset.lag:+.2f} s")
         axes.axvspan(
             max(offset.interval[0], LAGS[0]), min(offset.interval[1], LAGS[-1]), color=colour, alpha=0.15, lw=0
@@ -137,7 +137,7 @@ def _gravity(axes: Any, recording: Recording) -> None:
     axes.set_title("specific force at rest")
     found = rests(recording)
     if not found:
-        _nothing(axes, "the robot never stands")
+        nothing_to_draw(axes, "the robot never stands")
         return
     headings = np.array([rest.heading for rest in found])
     # Headings of different spans have no common zero.
@@ -155,12 +155,6 @@ def _gravity(axes: Any, recording: Recording) -> None:
 def _shown(finding: CheckFinding) -> str:
     unit = "" if finding.unit in ("-", "SI") else f" {finding.unit}"
     return f"{finding.value:.3g}{unit}"
-
-
-def _nothing(axes: Any, text: str) -> None:
-    axes.text(0.5, 0.5, text, ha="center", va="center", color=palette.GREY, transform=axes.transAxes)
-    axes.set_xticks([])
-    axes.set_yticks([])
 
 
 def position(value: float, expected: tuple[float, float]) -> float:

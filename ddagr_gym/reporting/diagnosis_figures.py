@@ -50,7 +50,7 @@ BINS = 8
 """Bins of a picture, with about as many values each (ours)."""
 
 _NARROWEST = 0.03
-"""Width of a bin over that of all below which it joins its neighbour (ours: narrower ones cannot be told apart)."""
+"""Width of a bin over that of all below which it joins its neighbour (ours: narrower ones cannot be distinguished)."""
 
 _LEAST_GAIN = 0.5
 """Gain from which on an effect has a line in the picture of scores (ours: half a unit of log-likelihood is noise)."""

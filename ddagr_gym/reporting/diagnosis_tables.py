@@ -201,7 +201,7 @@ def gate_note(gates: GatesUsed, robot: str = "", soil: str = "") -> str:
         soil: of the diagnosis; "" where unknown.
     """
     if not gates.nulls:
-        return "no null drives stand behind it here."
+        return "no null drives were used for it here."
     drives = _NULLS.get(gates.kind or "", "null drives")
     made = f"set by {gates.nulls} {drives} at a level of {percent(gates.level)} false alarms over the whole library."
     pairs = ((gates.robot, robot), (gates.soil, soil))

@@ -49,7 +49,7 @@ def finding_rows(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
 
 
 def _finding_rows(finding: Finding) -> Iterator[tuple[str, ...]]:
-    """One row per parameter; what the finding as a whole has stands in the first."""
+    """One row per parameter; what belongs to the whole finding is in the first."""
     others = [f"{name} {weight:.2f}" for name, weight in finding.equivalence_set.items() if name != finding.name]
     none = "nothing else" if finding.gate > 0.0 else "seen in the values"
     whole = (f"{finding.gain:.1f}", f"{finding.gate:.1f}", ", ".join(others) or none)

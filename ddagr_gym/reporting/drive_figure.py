@@ -9,27 +9,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ddagr_gym.errors import InputError
 from ddagr_gym.parameters import Robot
 from ddagr_gym.rendering import palette
-from ddagr_gym.reporting.figures import DASHED, WHEELS, draw_robot, house_style, save_figure
-
-DRIVE_FIGURE_COLUMNS = (
-    "t",
-    "command_right",
-    "command_left",
-    "true_omega_right",
-    "true_omega_left",
-    "true_x",
-    "true_y",
-    "true_yaw",
-    "true_v_x",
-    "true_v_y",
-    "yaw_rate",
-    "true_yaw_rate",
-    *(f"true_slip_ratio_{i}" for i in (1, 2, 3, 4)),
-    *(f"true_sinkage_{i}" for i in (1, 2, 3, 4)),
+from ddagr_gym.reporting.figures import (
+    TURN_FIGURE_COLUMNS,
+    draw_motion,
+    draw_robot,
+    drawn_columns,
+    house_style,
+    save_figure,
 )
+
+DRIVE_FIGURE_COLUMNS = (*TURN_FIGURE_COLUMNS, "true_v_x", "true_v_y")
 """Columns of a simulated drive that :func:`drive_figure` draws."""
 
 
@@ -51,10 +42,7 @@ def drive_figure(
     Raises:
         InputError: a column is missing, or matplotlib is not installed.
     """
-    missing = [name for name in DRIVE_FIGURE_COLUMNS if name not in columns]
-    if missing:
-        raise InputError(f"column {missing[0]!r} is missing: this figure needs {', '.join(DRIVE_FIGURE_COLUMNS)}.")
-    data = {name: np.asarray(columns[name], dtype=float) for name in DRIVE_FIGURE_COLUMNS}
+    data = drawn_columns(columns, DRIVE_FIGURE_COLUMNS)
     with house_style():
         from matplotlib.figure import Figure
 
@@ -81,18 +69,9 @@ def _draw_path(axes: Any, data: Mapping[str, Any], robot: Robot, title: str) -> 
 def _draw_time_series(axes: list[Any], data: Mapping[str, Any]) -> None:
     t = data["t"]
     speeds, body, yaw_rate, slip, sinkage = axes
-    for bank, colour in (("right", palette.RIGHT), ("left", palette.LEFT)):
-        speeds.plot(t, data[f"true_omega_{bank}"], color=colour, label=bank)
-        speeds.plot(t, data[f"command_{bank}"], color=palette.INK, linewidth=0.8, linestyle=DASHED)
-    speeds.plot([], [], color=palette.INK, linewidth=0.8, linestyle=DASHED, label="command")
+    draw_motion(speeds, yaw_rate, slip, sinkage, data)
     body.plot(t, data["true_v_x"], color=palette.TRUE, label="forward")
     body.plot(t, data["true_v_y"], color=palette.TARGET, label="to the left")
-    measured = np.isfinite(data["yaw_rate"])
-    yaw_rate.plot(t[measured], data["yaw_rate"][measured], color=palette.PALE, linewidth=0.8, label="gyro")
-    yaw_rate.plot(t, data["true_yaw_rate"], color=palette.TRUE, label="true")
-    for index, _, colour, line in WHEELS:
-        slip.plot(t, data[f"true_slip_ratio_{index}"], color=colour, linestyle=line)
-        sinkage.plot(t, 1000.0 * data[f"true_sinkage_{index}"], color=colour, linestyle=line)
     titles = (
         (speeds, "Bank speed", "[rad/s]", 3),
         (body, "Body speed", "[m/s]", 2),
@@ -111,4 +90,3 @@ def _draw_time_series(axes: list[Any], data: Mapping[str, Any]) -> None:
         else:
             panel.text(1.0, 1.07, "front solid, rear dashed", transform=panel.transAxes, fontsize=7.0, ha="right")
     sinkage.set_xlabel("time [s]")
-    sinkage.set_ylim(bottom=0.0)

@@ -17,18 +17,18 @@ ROW_HEIGHT = 0.2
 
 BASELINE_COLOURS = {"B1": palette.BLUE, "B4": palette.ORANGE}
 _LEAST, _MOST, _FAILED = 0.1, 100.0, 170.0
-"""Ends of the axis of |e_R|, and where a failure stands [%]."""
+"""Ends of the axis of |e_R|, and the place of a failure [%]."""
 _QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 """Of the bars: the thin one spans the outer two, the thick one the quartiles, the mark is the median."""
 
 _SIGNED_LIMIT = 0.30
-"""Of the axis of the signed radius error [-]; larger errors stand at its ends (ours)."""
+"""Of the axis of the signed radius error [-]; larger errors are drawn at its ends (ours)."""
 
 _POINTS = 400
 """Episodes of an arm that are drawn as points, about (ours: more only cover each other)."""
 
 _MOST_LINES = 9
-"""Curves in one picture, at most (ours: more cannot be told apart by colour)."""
+"""Curves in one picture, at most (ours: more cannot be distinguished by colour)."""
 
 
 def arm_colours(evaluation: Evaluation) -> dict[str, str]:

@@ -9,6 +9,7 @@ from typing import Any
 
 from ddagr_gym.errors import InputError
 from ddagr_gym.evaluation.report_data import Evaluation, Film
+from ddagr_gym.evaluation.summary import BASELINES
 from ddagr_gym.files import atomic_path, make_folder
 from ddagr_gym.parameters import Robot
 from ddagr_gym.reporting import evaluation_figures as figures
@@ -66,7 +67,7 @@ def _context(evaluation: Evaluation, robot: Robot, progress: Callable[[], None])
         "note": evaluation.note,
         "answers": tables.answer_rows(evaluation, True),
         "bounds": tables.answer_rows(evaluation, False),
-        "baselines": tables.BASELINES,
+        "baselines": BASELINES,
         "sets": evaluation.sets,
         "medians": tables.set_matrix(evaluation, "radius_error_median"),
         "worst_medians": tables.set_matrix(evaluation, "radius_error_p95"),

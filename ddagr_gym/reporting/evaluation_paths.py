@@ -24,10 +24,10 @@ from ddagr_gym.reporting.evaluation_figures import arm_colours
 from ddagr_gym.reporting.figures import DASHED
 
 _LATERAL_LIMIT = 0.30
-"""Of the axis of lateral errors [m]; larger ones stand on its edge (ours)."""
+"""Of the axis of lateral errors [m]; larger ones are drawn on its edge (ours)."""
 
 _HEADING_LIMIT = math.radians(45.0)
-"""Of the axis of heading errors [rad]; larger ones stand on its edge (ours)."""
+"""Of the axis of heading errors [rad]; larger ones are drawn on its edge (ours)."""
 
 _COLUMNS = 4
 """Panels in a row, at most, where a figure asks for no other number (ours: the width of the page)."""

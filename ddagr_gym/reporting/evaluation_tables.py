@@ -19,10 +19,10 @@ from ddagr_gym.evaluation.report_data import (
     replay_name,
     size_of,
 )
+from ddagr_gym.evaluation.summary import BASELINES
 
 NONE = "–"
 FAILED = "failed"
-BASELINES = ("B1", "B4")
 
 ESTIMATOR = (
     ("estimator_speed_rms", "speed, r.m.s. [mm/s]", 1e3),

@@ -9,7 +9,7 @@ from __future__ import annotations
 import base64
 import io
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -95,6 +95,9 @@ TURN_FIGURE_COLUMNS = (
 )
 """Columns of a simulated drive that :func:`turn_figure` draws."""
 
+_MOST_READINGS = 800
+"""Of a line of readings, about (ours: two for each pixel of its width)."""
+
 
 @contextmanager
 def house_style() -> Iterator[None]:
@@ -164,10 +167,7 @@ def turn_figure(
     Raises:
         InputError: a column is missing, or matplotlib is not installed.
     """
-    missing = [name for name in TURN_FIGURE_COLUMNS if name not in columns]
-    if missing:
-        raise InputError(f"column {missing[0]!r} is missing: this figure needs {', '.join(TURN_FIGURE_COLUMNS)}.")
-    data = {name: np.asarray(values, dtype=float) for name, values in columns.items()}
+    data = drawn_columns(columns, TURN_FIGURE_COLUMNS)
     with house_style():
         from matplotlib.figure import Figure
 
@@ -177,6 +177,22 @@ def turn_figure(
         _draw_time_series(axes, data, turn)
         figure.align_ylabels(axes)
         return save_figure(figure, path)
+
+
+def drawn_columns(columns: Mapping[str, ArrayLike], needed: Sequence[str]) -> dict[str, Array]:
+    """Columns as arrays; InputError where a needed one is missing."""
+    missing = [name for name in needed if name not in columns]
+    if missing:
+        raise InputError(f"column {missing[0]!r} is missing: this figure needs {', '.join(needed)}.")
+    return {name: np.asarray(values, dtype=float) for name, values in columns.items()}
+
+
+def nothing_to_draw(axes: Any, text: str) -> None:
+    """Say in empty axes why there is nothing in them."""
+    axes.text(0.5, 0.5, text, ha="center", va="center", color=palette.GREY, transform=axes.transAxes)
+    axes.set_xticks([])
+    axes.set_yticks([])
+    axes.grid(False)
 
 
 def _draw_path(axes: Any, data: Mapping[str, Array], turn: RowTurn, robot: Robot, soil_name: str) -> None:
@@ -229,23 +245,27 @@ def draw_robot(axes: Any, robot: Robot, pose: list[float]) -> None:
 
 
 def _draw_time_series(axes: list[Any], data: Mapping[str, Array], turn: RowTurn) -> None:
+    draw_motion(axes[0], axes[1], axes[2], axes[3], data)
+    asked = turn.sign * turn.speed / turn.radius
+    axes[1].axhline(asked, color=palette.TARGET, linewidth=0.9, linestyle=DASHED, label="commanded")
+    _label_time_series(axes, data)
+
+
+def draw_motion(speeds: Any, yaw_rate: Any, slip: Any, sinkage: Any, data: Mapping[str, Array]) -> None:
+    """Bank speeds with commands, yaw rate with the gyro, slip and sinkage of the wheels over time, each in its axes."""
     t = data["t"]
-    speeds, yaw_rate, slip, sinkage = axes
     for bank, colour in (("right", palette.RIGHT), ("left", palette.LEFT)):
         speeds.plot(t, data[f"true_omega_{bank}"], color=colour, label=bank)
         speeds.plot(t, data[f"command_{bank}"], color=palette.INK, linewidth=0.8, linestyle=DASHED)
     speeds.plot([], [], color=palette.INK, linewidth=0.8, linestyle=DASHED, label="command")
     measured = np.flatnonzero(np.isfinite(data["yaw_rate"]))
-    measured = measured[:: max(1, len(measured) // 800)]
+    measured = measured[:: max(1, len(measured) // _MOST_READINGS)]
     yaw_rate.plot(t[measured], data["yaw_rate"][measured], color=palette.PALE, linewidth=0.8, label="gyro")
     yaw_rate.plot(t, data["true_yaw_rate"], color=palette.TRUE, label="true")
-    asked = turn.sign * turn.speed / turn.radius
-    yaw_rate.axhline(asked, color=palette.TARGET, linewidth=0.9, linestyle=DASHED, label="commanded")
     for index, _, colour, line in WHEELS:
         slip.plot(t, data[f"true_slip_ratio_{index}"], color=colour, linestyle=line)
         sinkage.plot(t, 1000.0 * data[f"true_sinkage_{index}"], color=colour, linestyle=line)
     sinkage.set_ylim(bottom=0.0)
-    _label_time_series(axes, data)
 
 
 def headland_times(t: Array, x: Array) -> list[tuple[float, float]]:

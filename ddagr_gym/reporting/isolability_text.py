@@ -10,7 +10,7 @@ from ddagr_gym.reporting.text_table import format_table
 if TYPE_CHECKING:
     from ddagr_gym.diagnosis.planning.isolability import Isolability
 
-HEADER = ("effect", "size", "least detectable", "unit", "/ least meaningful", "not told from (share of its own)")
+HEADER = ("effect", "size", "least detectable", "unit", "/ least meaningful", "confused with (share of its own)")
 
 _NOT_SEEN = 1e3
 """Multiple of the least meaningful size from which an effect counts as not seen."""

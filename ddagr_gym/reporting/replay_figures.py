@@ -17,7 +17,7 @@ from ddagr_gym.replay_analysis.drive_mode import DriveModeResult
 from ddagr_gym.replay_analysis.horizons import start_headings
 from ddagr_gym.replay_analysis.report import EFFECTIVE_TRACK, MODELS, NO_SLIP, NOMINAL, REFITTED, HorizonError
 from ddagr_gym.replay_analysis.residuals import BIN_QUANTITIES
-from ddagr_gym.reporting.figures import DASHED, house_style, save_figure
+from ddagr_gym.reporting.figures import DASHED, house_style, nothing_to_draw, save_figure
 
 Array = NDArray[np.float64]
 
@@ -77,13 +77,7 @@ def replay_overview(mode: DriveModeResult, path: Path, title: str) -> tuple[Path
 def replay_residuals(mode: DriveModeResult, path: Path, title: str) -> tuple[Path, Path]:
     """Residuals over their noise by channel, and against slip, yaw rate, speed, heading and time.
 
-    Args:
-        mode: replay in one drive mode.
-        path: where, with or without a suffix.
-        title: of the figure; it names the recording and the drive mode.
-
-    Returns:
-        Paths of the PNG and of the SVG.
+    Arguments and returned paths are those of :func:`replay_overview`.
     """
     with house_style():
         from matplotlib.figure import Figure
@@ -172,7 +166,7 @@ def _draw_rollouts(axes: Any, mode: DriveModeResult) -> None:
     chosen = _chosen(mode)
     axes.set_title(f"Long roll-outs ({len(chosen)} of {count}), first heading to the right", pad=4.0)
     if not chosen:
-        return _nothing(axes, "no stretch with a known drive")
+        return nothing_to_draw(axes, "no stretch with a known drive")
     groups = []
     for windows, predictions, w in chosen:
         start, guess = _start(windows, w), windows.initial[w, :3]
@@ -198,7 +192,7 @@ def _draw_along_path(figure: Any, axes: Any, mode: DriveModeResult) -> None:
     pieces = [_residual_pieces(mode, name, *run) for run in _chosen(mode)]
     pieces = [piece for piece in pieces if piece]
     if not pieces:
-        return _nothing(axes, "no pose or no gyro")
+        return nothing_to_draw(axes, "no pose or no gyro")
     fitted, cells = _fitted_to_cells([[path for path, _ in piece] for piece in pieces])
     values = np.array([value for piece in pieces for _, value in piece])
     limit = float(np.quantile(np.abs(values), 0.95)) or 1.0
@@ -229,18 +223,11 @@ def _residual_pieces(
     return pieces
 
 
-def _nothing(axes: Any, text: str) -> None:
-    axes.text(0.5, 0.5, text, ha="center", va="center", color=palette.GREY, transform=axes.transAxes)
-    axes.set_xticks([])
-    axes.set_yticks([])
-    axes.grid(False)
-
-
 def _draw_growth(axes: Any, mode: DriveModeResult) -> None:
     axes.set_title("Growth of the heading error", pad=5.0)
     judged = {h: r for h, r in mode.horizons.items() if any("heading" in e for e in r.errors.values())}
     if not judged:
-        return _nothing(axes, "not judged: no unseen stretch, or no gyro")
+        return nothing_to_draw(axes, "not judged: no unseen stretch, or no gyro")
     # the growth in one or two windows is their manoeuvres, not the models' error
     many = [horizon for horizon, result in judged.items() if len(result.clusters) >= LEAST_WINDOWS]
     longest = max(many or judged)
@@ -261,7 +248,7 @@ def _draw_horizons(axes: Any, mode: DriveModeResult, metric: str, title: str, un
     axes.set_title(f"{title}: median (dot), r.m.s. (bar), 95 %", pad=5.0)
     shown = [e for e in mode.report.horizons if e.metric == metric and e.error.count]
     if not shown:
-        return _nothing(axes, "not judged: no unseen stretch, or nothing measures it")
+        return nothing_to_draw(axes, "not judged: no unseen stretch, or nothing measures it")
     horizons = sorted({e.horizon for e in shown})
     for error in shown:
         place = horizons.index(error.horizon) + 0.16 * (MODELS.index(error.model) - 1.5)
@@ -303,7 +290,7 @@ def _draw_channels(axes: Any, mode: DriveModeResult) -> None:
     axes.set_title("Residual over noise, windows with free initial states, unseen part (1: nothing left to explain)")
     names = [c.channel for c in mode.report.residuals[0].channels]
     if not names:
-        return _nothing(axes, "no part of the recording is unseen")
+        return nothing_to_draw(axes, "no part of the recording is unseen")
     for model, table in enumerate(mode.report.residuals):
         colour = MODEL_STYLES[table.model][1]
         places = np.arange(len(names)) + 0.3 * (model - 0.5 * (len(mode.report.residuals) - 1))

@@ -19,6 +19,7 @@ _WHEEL_ROWS = (
     ("lateral", "lateral / load [-]", (-0.3, 3.4)),
     ("sinkage", "sinkage [mm]", (0.0, 80.0)),
 )
+"""Quantity, label and limits (ours, the same for all angles) of each row of panels."""
 
 
 def single_wheel_figure(

@@ -46,8 +46,8 @@ FILE = "chrono_scm_skid.csv"
 DURATION = 12.0
 """Time to reach a steady turn [s]; the yaw rate then changes by less than 1e-6 rad/s over the last second."""
 
-_PLATFORM_MASS, _WHEEL_MASS = 60.0, 5.0  # [kg]
-_PLATFORM_YAW_INERTIA = 5.9  # [kg m^2]
+_PLATFORM_MASS, _WHEEL_MASS = 60.0, 5.0  # [kg], of the reference data
+_PLATFORM_YAW_INERTIA = 5.9  # [kg m^2], of the reference data
 _STRAIGHT = 1e-3  # [rad/s], yaw rate below which a row is no turn
 _STANDING = 1e-2  # [m/s], speed below which a row turns on the spot
 

@@ -4,7 +4,7 @@ The data are 189 steady trials of a smooth wheel of 58 mm radius and 50 mm width
 robomechanics/3d-terramechanics, MIT licence): nine rim speeds, seven slip angles, three repeats each, the vertical
 axis free under 13 to 30 N. The soil is the authors' own (density 1330 kg/m^3, friction 29 degrees, cohesion about
 1 kPa, K 21 mm, n about 1.46, k about 8e6 N/m^(n+2)). Nothing is fitted for the headline: where the source gives no
-number (stress peak, exit angle) the presets' values for published soils stand.
+number (stress peak, exit angle) the presets' values for published soils are used.
 
 Where the model fails in kind, because it leaves the mechanism out:
 
@@ -46,7 +46,7 @@ PUBLISHED_SOIL = "soil_direct_90_sand_cmu"
 
 
 FIT_ANGLES = (0.0, 30.0, 60.0)
-"""Slip angles [deg] that the fitted variant sees; the others are held out."""
+"""Slip angles [deg] that the fitted variant sees; the others only judge it."""
 
 _FREE_ROLLING = -0.01  # measured slip of the trials whose rim and carriage speeds are set equal
 

@@ -81,7 +81,7 @@ def test_folders_devices_and_files_in_the_way_are_refused(tmp_path):
     for path, words in (
         (tmp_path, "is a folder"),
         (Path("/dev/null"), "not a regular file"),
-        (tmp_path / "file" / "x", "a file stands in the way"),
+        (tmp_path / "file" / "x", "a file is in the way"),
     ):
         with pytest.raises(InputError, match=words):
             write_text(path, "x")

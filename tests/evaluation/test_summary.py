@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ddagr_gym.errors import InputError
-from ddagr_gym.evaluation.campaign import absolute_errors
+from ddagr_gym.evaluation.report_data import size_of
 from ddagr_gym.evaluation.statistics import wilson_interval
 from ddagr_gym.evaluation.summary import BASELINES, PROFILE_THRESHOLDS, improvement, summaries
 
@@ -30,7 +30,7 @@ def rows_of(controller, errors, success=True, run=0, set_name="V"):
 
 def test_failures_count_as_worst():
     rows = rows_of("B1", [0.01, -0.02, None, 0.03])
-    assert absolute_errors(rows) == [0.01, 0.02, math.inf, 0.03]
+    assert [size_of(row) for row in rows] == [0.01, 0.02, math.inf, 0.03]
     summary = summaries(rows)["B1"]["V"]
     assert summary["undefined_radius"] == 1
     assert summary["radius_error_p95"]["value"] is None  # the worst scenario is a failure

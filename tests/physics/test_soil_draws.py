@@ -22,11 +22,10 @@ from ddagr_gym.physics.soil_draws import (
     immobilises,
     soil_field,
 )
-from ddagr_gym.presets import get_robot, get_soil
-from ddagr_gym.published_soils import PUBLISHED_SOILS
+from ddagr_gym.presets import get_robot, get_soil, soil_names
 from ddagr_gym.simulator import Simulator
 
-FIELD_SOILS = PUBLISHED_SOILS[:18]  # Wong's table without snow
+FIELD_SOILS = [get_soil(name) for name in soil_names()[2:20]]  # Wong's table without snow
 SIDES = {"weaker": -1, "stiffer": 1}
 
 
@@ -35,15 +34,8 @@ def robot():
     return get_robot("ddagr")
 
 
-def published_values():
-    """(18, 5) n, ln p(3 cm), ln c, ln K, phi."""
-    n, k_c, k_phi, cohesion, friction, shear = np.array([row[2:] for row in FIELD_SOILS], dtype=float).T
-    pressure = (k_c / 0.1 + k_phi) * 0.03**n
-    return np.stack([n, np.log(pressure), np.log(cohesion), np.log(shear), friction], axis=1)
-
-
 def values_of(soils):
-    """The same of soils."""
+    """(N, 5) n, ln p(3 cm), ln c, ln K, phi of soils."""
     return np.array(
         [
             [
@@ -59,7 +51,7 @@ def values_of(soils):
 
 
 def test_correlations_are_those_of_the_published_field_soils():
-    np.testing.assert_allclose(CORRELATIONS, np.corrcoef(published_values().T), atol=0.006)
+    np.testing.assert_allclose(CORRELATIONS, np.corrcoef(values_of(FIELD_SOILS).T), atol=0.006)
     assert CORRELATIONS[0, CORRELATED.index("cohesion")] == -0.68
 
 
@@ -135,10 +127,8 @@ def test_the_other_two_lie_outside_the_thesis_range(name, side):
 def test_field_range_covers_most_published_field_soils():
     distribution = get_distribution("field")
     bounds = [getattr(distribution, field) for field in CORRELATED]
-    values = published_values()
+    values = values_of(FIELD_SOILS)
     values[:, 1:4] = np.exp(values[:, 1:4])
-    values[:, 1:3] *= 1e3
-    values[:, 4] = np.radians(values[:, 4])
     covered = [
         all(low * 0.99 <= v <= high * 1.01 for v, (low, high) in zip(row, bounds, strict=True)) for row in values
     ]

@@ -25,7 +25,7 @@ from ddagr_gym.policies.controller import (
     policy_title,
 )
 from ddagr_gym.policies.design import PolicyDesign
-from ddagr_gym.policies.estimates import WRONG_LIMIT, WRONG_RATE, HeldSoil, TrueMotion, wrong_prior
+from ddagr_gym.policies.estimates import WRONG_LIMIT, WRONG_RATE, FixedSoil, TrueMotion, wrong_prior
 from ddagr_gym.policies.view import PolicyView
 from ddagr_gym.presets import ddagr
 
@@ -156,7 +156,7 @@ def test_a_silenced_policy_is_the_feed_forward(drive):
 
 def test_the_live_filter_learns_and_the_held_one_does_not(drive):
     live = dict(zip(NAMES, (np.array([observation for observation, _ in drive]) * SCALES).T, strict=True))
-    frozen = told(HeldSoil(ddagr(), Sensors()), drive)
+    frozen = told(FixedSoil(ddagr(), Sensors()), drive)
     logs = [name for name in NAMES if name.startswith("log_")]
     deviations = [f"deviation_{name}" for name in logs]
     for name in logs:
@@ -172,7 +172,7 @@ def test_the_live_filter_learns_and_the_held_one_does_not(drive):
 
 
 def test_the_wrong_soil_is_wrong_and_held(drive):
-    wrong = told(HeldSoil(ddagr(), Sensors(), wrong_prior()), drive)
+    wrong = told(FixedSoil(ddagr(), Sensors(), wrong_prior()), drive)
     np.testing.assert_allclose(wrong["log_traction_limit"], math.log(WRONG_LIMIT), atol=1e-3)
     np.testing.assert_allclose(wrong["log_traction_rate"], math.log(WRONG_RATE), atol=1e-3)
 
@@ -189,7 +189,7 @@ def test_the_true_motion_is_the_simulators(drive):
 
 
 def test_ablations_say_what_they_need(drive):
-    for estimate in (HeldSoil(ddagr(), Sensors()), TrueMotion()):
+    for estimate in (FixedSoil(ddagr(), Sensors()), TrueMotion()):
         for info in (None, {"ending": 0}):
             with pytest.raises(InputError, match="full"):
                 estimate(drive[0][0], info)

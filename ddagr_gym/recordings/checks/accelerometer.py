@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ddagr_gym.recordings.checks.clock_offsets import encoder_offset
-from ddagr_gym.recordings.checks.findings import CheckFinding, Interval, judge, not_testable
+from ddagr_gym.recordings.checks.findings import CheckFinding, Interval, Question, judge, not_testable
 from ddagr_gym.recordings.checks.regression import Estimate, blocks_in_spans, estimate, sampled, solve
 from ddagr_gym.recordings.checks.signals import filled, slope, smoothed
 from ddagr_gym.recordings.schema import FloatArray, Recording
@@ -21,9 +21,21 @@ FORWARD_RANGE = (0.2, 1.6)
 """Coefficient of dv/dt in f_x [-]; slip while accelerating lowers it (1.0 to 1.2 on the open recordings)."""
 SIDEWAYS_RANGE = (0.2, 1.6)
 """Coefficient of v w in f_y [-]; slip lowers it (0.8 to 1.0 on the open recordings)."""
-MOUNTING_RANGE = (-0.1, 0.1)
+MOUNTING = Question(
+    "mounting",
+    (-0.1, 0.1),
+    "rad",
+    "Rotate the accelerometer's axes by this angle, or fit imu_misalignment.",
+    ("imu_misalignment", "accelerometer_sign"),
+)
 """Mounting angle about z [rad] (6 degrees)."""
-OFFSET_RANGE = (-0.9, 0.9)
+OFFSET = Question(
+    "offset",
+    (-0.9, 0.9),
+    "m/s^2",
+    "A slope, a tilted sensor or a bias: compare rests at several headings.",
+    ("imu_tilt", "accelerometer_bias", "slope"),
+)
 """Mean of a horizontal axis while driving that no motion explains [m/s^2]: 5 degrees; up to 0.5 on the open sand."""
 WIDEST = 1.0
 """Half width of an interval [-] beyond which a coefficient counts as not testable."""
@@ -90,7 +102,7 @@ def _regressors_and_forces(recording: Recording, wheel_radius: float, rng: np.ra
 
 
 def _advanced(recording: Recording, values: FloatArray, lag: float) -> FloatArray:
-    """Values read ``lag`` later, so that a late channel stands at its true time; the last value holds."""
+    """Values read ``lag`` later, so that a late channel is at its true time; the last value is repeated."""
     out = np.full(len(recording), np.nan)
     for span in recording.spans():
         out[span] = sampled(recording, span, values, recording.t[span] + lag)
@@ -126,28 +138,15 @@ def _mounting(angle: float, interval: Interval) -> CheckFinding:
     if not interval[1] - interval[0] <= 2 * WIDEST_ANGLE:
         why = f"The mounting angle is uncertain by {interval[1] - interval[0]:.2g} rad."
         return not_testable("mounting", "specific_force", why, "Drive arcs at speed, with starts and stops.")
-    return judge(
-        "mounting",
-        "specific_force",
-        angle,
-        interval,
-        MOUNTING_RANGE,
-        "rad",
-        meaning=f"The accelerometer looks {angle:.3f} rad to the left of forward.",
-        remedy="Rotate the accelerometer's axes by this angle, or fit imu_misalignment.",
-        suspects=("imu_misalignment", "accelerometer_sign"),
+    return MOUNTING.answer(
+        "specific_force", angle, interval, meaning=f"The accelerometer looks {angle:.3f} rad to the left of forward."
     )
 
 
 def _offset(channel: str, offset: float, interval: Interval) -> CheckFinding:
-    return judge(
-        "offset",
+    return OFFSET.answer(
         channel,
         offset,
         interval,
-        OFFSET_RANGE,
-        "m/s^2",
         meaning=f"While driving it is off by {offset:.3f} m/s^2 beyond what the motion explains.",
-        remedy="A slope, a tilted sensor or a bias: compare rests at several headings.",
-        suspects=("imu_tilt", "accelerometer_bias", "slope"),
     )

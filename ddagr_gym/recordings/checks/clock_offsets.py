@@ -49,7 +49,7 @@ class Offset:
         interval: its 99 % interval [s].
         correlation: at that lag, with its sign.
         profile: correlation at every lag of :data:`LAGS`.
-        blocks: blocks that held information.
+        blocks: blocks with information.
     """
 
     lag: float
@@ -218,7 +218,7 @@ def _finding(
 ) -> CheckFinding:
     if offset is None or abs(offset.correlation) < LEAST_CORRELATION:
         found = "they share too little motion" if offset is None else f"they correlate by {offset.correlation:.2f} only"
-        return not_testable(CHECK, pair, f"The offset cannot be told: {found}.", drive)
+        return not_testable(CHECK, pair, f"The offset cannot be determined: {found}.", drive)
     width = offset.interval[1] - offset.interval[0]
     if not width <= WIDEST_INTERVAL:
         return not_testable(CHECK, pair, f"The offset is uncertain by {width:.2g} s.", drive)

@@ -4,16 +4,27 @@ from __future__ import annotations
 
 import numpy as np
 
-from ddagr_gym.recordings.checks.findings import CheckFinding, judge
+from ddagr_gym.recordings.checks.findings import CheckFinding, Question, judge
 from ddagr_gym.recordings.checks.signals import moving_mask
 from ddagr_gym.recordings.schema import FloatArray, Recording
 
 INERTIAL = ("specific_force_x", "specific_force_y", "specific_force_z", "yaw_rate")
 CHECKED = ("encoder_right", "encoder_left", *INERTIAL, "pose_x", "pose_y", "pose_yaw")
 
-SATURATED_RANGE = (0.0, 0.002)
+SATURATED = Question(
+    "saturation",
+    (0.0, 0.002),
+    "-",
+    "The sensor's range is too small for this drive: raise it, or leave the clipped samples out.",
+)
 """Share of samples at the very largest or smallest value [-]."""
-ZERO_RANGE = (0.0, 0.001)
+ZERO = Question(
+    "zeros",
+    (0.0, 0.001),
+    "-",
+    "Zeros were logged where there was no measurement: make them empty fields.",
+    ("sensor_hold",),
+)
 """Share of samples that are exactly 0 though their neighbours rule it out [-]."""
 TIES = 5
 """Samples at one exact value that count as a heap, and how many times its neighbours' count it must be (ours)."""
@@ -68,15 +79,10 @@ def saturated_share(values: FloatArray) -> float:
 
 def _saturated(name: str, values: FloatArray) -> CheckFinding:
     share = saturated_share(values)
-    return judge(
-        "saturation",
+    return SATURATED.answer(
         name,
         share,
-        (share, share),
-        SATURATED_RANGE,
-        "-",
         meaning=f"{100 * share:.2g} % of its samples sit exactly at its largest or smallest value, beyond chance.",
-        remedy="The sensor's range is too small for this drive: raise it, or leave the clipped samples out.",
     )
 
 
@@ -117,14 +123,6 @@ def _zeros(recording: Recording, name: str) -> CheckFinding:
     values = np.concatenate(parts)
     longest = max(1, round(LONGEST_RUN * recording.rate(name)))
     share = false_zeros(values, longest, name in INERTIAL) / values.size
-    return judge(
-        "zeros",
-        name,
-        share,
-        (share, share),
-        ZERO_RANGE,
-        "-",
-        meaning=f"{100 * share:.2g} % of its samples are exact zeros that their neighbours rule out.",
-        remedy="Zeros were logged where there was no measurement: make them empty fields.",
-        suspects=("sensor_hold",),
+    return ZERO.answer(
+        name, share, meaning=f"{100 * share:.2g} % of its samples are exact zeros that their neighbours rule out."
     )

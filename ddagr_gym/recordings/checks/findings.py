@@ -23,6 +23,7 @@ from typing import Any
 from ddagr_gym.recordings.schema import Recording
 
 REPORT_VERSION = 1
+"""Of the JSON above; it changes whenever a field changes its meaning or goes."""
 
 Interval = tuple[float, float]
 
@@ -117,6 +118,40 @@ def judge(
         unit=unit,
         suspects=suspects if outside else (),
     )
+
+
+@dataclass(frozen=True)
+class Question:
+    """What a check asks of a channel.
+
+    Attributes:
+        check: family.
+        expected: sound range [unit]; a side may be infinite.
+        unit: of value and range.
+        remedy: sentence for a suspicious value.
+        suspects: effects behind a suspicious value.
+    """
+
+    check: str
+    expected: Interval
+    unit: str
+    remedy: str
+    suspects: tuple[str, ...] = ()
+
+    def answer(
+        self,
+        channel: str,
+        value: float,
+        interval: Interval | None = None,
+        *,
+        meaning: str,
+        suspects: tuple[str, ...] | None = None,
+    ) -> CheckFinding:
+        """The finding: see :func:`judge`. A value without an interval was counted and has no error."""
+        return judge(
+            self.check, channel, value, (value, value) if interval is None else interval, self.expected, self.unit,
+            meaning=meaning, remedy=self.remedy, suspects=self.suspects if suspects is None else suspects,
+        )  # fmt: skip
 
 
 def not_testable(check: str, channel: str, why: str, remedy: str) -> CheckFinding:

@@ -14,18 +14,30 @@ from scipy.special import stdtrit
 
 from ddagr_gym.parameters import STANDARD_GRAVITY
 from ddagr_gym.recordings.checks.blocks import CONFIDENCE, mean_interval
-from ddagr_gym.recordings.checks.findings import CheckFinding, Interval, judge, not_testable
-from ddagr_gym.recordings.checks.signals import filled, standing
+from ddagr_gym.recordings.checks.findings import CheckFinding, Interval, Question, not_testable
+from ddagr_gym.recordings.checks.signals import filled, standstills
 from ddagr_gym.recordings.schema import FloatArray, Recording
 
 CHECK = "gravity"
 
-NORM_RANGE = (9.5, 10.1)
+NORM = Question(CHECK, (9.5, 10.1), "m/s^2", "Check the accelerometer's unit and scale.", ("accelerometer_bias",))
 """Size of the specific force at rest [m/s^2]: 9.76 to 9.83 on Earth, 2 % for the sensor's scale."""
-OFFSET_RANGE = (-0.25, 0.25)
+OFFSET = Question(
+    CHECK,
+    (-0.25, 0.25),
+    "m/s^2",
+    "Subtract the offset, or fit accelerometer_bias or imu_tilt.",
+    ("accelerometer_bias", "imu_tilt"),
+)
 """Offset of a horizontal axis that does not turn with heading [m/s^2]: 1.5 degrees of mounting; 0.1 on the
 open recordings."""
-TILT_RANGE = (0.0, 1.2)
+TILT = Question(
+    CHECK,
+    (0.0, 1.2),
+    "m/s^2",
+    "Let the robot stand at four headings on one spot.",
+    ("imu_tilt", "accelerometer_bias", "slope"),
+)
 """Horizontal specific force at a single heading [m/s^2]: 7 degrees of slope and mounting together."""
 HEADING_SPREAD = 0.8
 """Length of the mean heading vector [-] above which headings count as one."""
@@ -47,7 +59,7 @@ def rests(recording: Recording) -> list[Rest]:
     starts = [s.start for s in recording.spans()]
     attitude = {name: filled(recording, name) for name in ("pose_yaw", "roll", "pitch")}
     found = []
-    for piece in standing(recording):
+    for piece in standstills(recording):
         force = np.array([_mean(recording[f"specific_force_{axis}"][piece]) for axis in "xyz"])
         # A heading may not be averaged across its jump; the robot stands, so its last value serves.
         heading, roll, pitch = (float(attitude[name][piece.stop - 1]) for name in ("pose_yaw", "roll", "pitch"))
@@ -78,16 +90,8 @@ def _norm(norms: FloatArray) -> CheckFinding:
     size, interval = mean_interval(norms)
     if norms.size < 2:
         interval = (size, size)
-    return judge(
-        CHECK,
-        "specific_force, size",
-        size,
-        interval,
-        NORM_RANGE,
-        "m/s^2",
-        meaning=f"At rest the specific force is {size:.3f} m/s^2.",
-        remedy="Check the accelerometer's unit and scale.",
-        suspects=("accelerometer_bias",),
+    return NORM.answer(
+        "specific_force, size", size, interval, meaning=f"At rest the specific force is {size:.3f} m/s^2."
     )
 
 
@@ -142,16 +146,11 @@ def offset_findings(values: FloatArray, intervals: list[Interval], how: str, cou
         count: number of rests.
     """
     return [
-        judge(
-            CHECK,
+        OFFSET.answer(
             f"specific_force_{axis}",
             float(value),
             interval,
-            OFFSET_RANGE,
-            "m/s^2",
             meaning=f"At rest it is off by {value:.3f} m/s^2 {how} ({count} rests).",
-            remedy="Subtract the offset, or fit accelerometer_bias or imu_tilt.",
-            suspects=("accelerometer_bias", "imu_tilt"),
         )
         for axis, value, interval in zip("xy", values, intervals, strict=True)
     ]
@@ -162,17 +161,10 @@ def _single_heading(found: list[Rest]) -> CheckFinding:
     tilt, interval = mean_interval(tilts)
     if tilts.size < 2:
         interval = (tilt, tilt)
-    return judge(
-        CHECK,
+    return TILT.answer(
         "specific_force, direction",
         tilt,
         interval,
-        TILT_RANGE,
-        "m/s^2",
-        meaning=(
-            f"At rest {tilt:.3f} m/s^2 lie in the horizontal axes; without rests at several headings a slope, a "
-            "tilted sensor and a bias cannot be told apart."
-        ),
-        remedy="Let the robot stand at four headings on one spot.",
-        suspects=("imu_tilt", "accelerometer_bias", "slope"),
+        meaning=f"At rest {tilt:.3f} m/s^2 lie in the horizontal axes; without rests at several headings a slope, a "
+        "tilted sensor and a bias cannot be distinguished.",
     )

@@ -9,8 +9,8 @@ import numpy as np
 from scipy.special import ndtri
 
 from ddagr_gym.recordings.checks.blocks import CONFIDENCE, mean_interval
-from ddagr_gym.recordings.checks.findings import CheckFinding, Interval, judge, not_testable
-from ddagr_gym.recordings.checks.signals import standing
+from ddagr_gym.recordings.checks.findings import CheckFinding, Interval, Question, judge, not_testable
+from ddagr_gym.recordings.checks.signals import standstills
 from ddagr_gym.recordings.schema import FloatArray, Recording
 
 NOISE_RANGES = {
@@ -20,9 +20,15 @@ NOISE_RANGES = {
     "specific_force_z": (1e-4, 0.5),
 }
 """Standard deviation of one sample at rest, in SI: from the quietest to the poorest of sensors (data sheets)."""
-CORRELATION_RANGE = (-0.5, 0.95)
-"""AR(1) coefficient at rest [-]: beyond it the channel is filtered, held or oscillates."""
-BIAS_RANGE = (-0.02, 0.02)
+CORRELATION = Question(
+    "correlation",
+    (-0.5, 0.95),
+    "-",
+    "The channel is filtered or repeats old readings: use fewer samples, or model its correlation.",
+    ("sensor_hold",),
+)
+"""AR(1) coefficient at rest [-]: beyond it the channel is filtered, repeats old readings or oscillates."""
+BIAS = Question("bias", (-0.02, 0.02), "rad/s", "Subtract the bias, or fit gyro_bias.", ("gyro_bias",))
 """Gyro reading at rest [rad/s]."""
 
 
@@ -51,7 +57,7 @@ class Noise:
 
 def noise_at_rest(recording: Recording, name: str) -> Noise | None:
     """Noise of a channel over all pieces in which the robot stands; None where there are fewer than 20 samples."""
-    pieces = [recording[name][s][np.isfinite(recording[name][s])] for s in standing(recording)]
+    pieces = [recording[name][s][np.isfinite(recording[name][s])] for s in standstills(recording)]
     pieces = [p for p in pieces if p.size >= 8]
     samples = sum(p.size for p in pieces)
     if samples < 20:
@@ -106,22 +112,17 @@ def _level(name: str, found: Noise, expected: Interval) -> CheckFinding:
             f"At rest one sample scatters by {found.sigma:.3g} {unit} "
             f"({found.samples} samples, quantum {found.quantum:.2g})."
         ),
-        remedy="No noise at all means a dead, filtered or held channel; very much means vibration or a wrong unit.",
+        remedy="No noise at all means a dead, filtered or repeated channel; very much means vibration or a wrong unit.",
         suspects=("sensor_hold",) if found.sigma < expected[0] else (),
     )
 
 
 def _correlation(name: str, found: Noise) -> CheckFinding:
-    return judge(
-        "correlation",
+    return CORRELATION.answer(
         name,
         found.correlation,
         found.correlation_interval,
-        CORRELATION_RANGE,
-        "-",
         meaning=f"At rest successive samples correlate by {found.correlation:.2f}.",
-        remedy="The channel is filtered or held: use fewer samples, or model its correlation.",
-        suspects=("sensor_hold",),
     )
 
 
@@ -131,14 +132,4 @@ def _bias(found: Noise) -> CheckFinding:
         scatter = found.sigma * math.sqrt((1 + found.correlation) / (1 - min(found.correlation, 0.99)) / found.samples)
         half = float(ndtri((1 + CONFIDENCE) / 2)) * scatter
         interval = (bias - half, bias + half)
-    return judge(
-        "bias",
-        "yaw_rate",
-        bias,
-        interval,
-        BIAS_RANGE,
-        "rad/s",
-        meaning=f"The gyro reads {bias:.2g} rad/s at rest.",
-        remedy="Subtract the bias, or fit gyro_bias.",
-        suspects=("gyro_bias",),
-    )
+    return BIAS.answer("yaw_rate", bias, interval, meaning=f"The gyro reads {bias:.2g} rad/s at rest.")

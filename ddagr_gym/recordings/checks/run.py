@@ -9,8 +9,8 @@ from ddagr_gym.recordings.checks.clock_offsets import clock_offsets
 from ddagr_gym.recordings.checks.extremes import extremes
 from ddagr_gym.recordings.checks.findings import CheckFinding, CheckReport
 from ddagr_gym.recordings.checks.gravity import gravity
-from ddagr_gym.recordings.checks.held import held
 from ddagr_gym.recordings.checks.noise import noise
+from ddagr_gym.recordings.checks.repeated_readings import repeated_readings
 from ddagr_gym.recordings.checks.timing import timing
 from ddagr_gym.recordings.checks.travel import travel
 from ddagr_gym.recordings.checks.turning import turning
@@ -26,7 +26,7 @@ def check_recording(recording: Recording, rng: np.random.Generator) -> CheckRepo
     """
     findings: list[CheckFinding] = []
     if len(recording) >= 3:
-        findings += timing(recording) + held(recording) + extremes(recording)
+        findings += timing(recording) + repeated_readings(recording) + extremes(recording)
         findings += clock_offsets(recording, rng) + turning(recording, rng) + travel(recording, rng)
         findings += accelerometer(recording, rng) + noise(recording) + gravity(recording)
     return CheckReport.of(recording, findings)

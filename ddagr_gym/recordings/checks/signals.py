@@ -1,4 +1,4 @@
-"""Signals that several checks share: held values, integrals, unwrapped headings, standstill."""
+"""Signals that several checks share: readings carried forward, integrals, unwrapped headings, standstill."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ import numpy as np
 from ddagr_gym.recordings.schema import BoolArray, FloatArray, Recording
 
 STILL_SPEED = 0.02
-"""Bank speed below which a wheel counts as standing [rad/s] (6 mm/s at the rim of a 0.3 m wheel)."""
+"""Bank speed below which a wheel counts as at rest [rad/s] (6 mm/s at the rim of a 0.3 m wheel)."""
 
 
 def filled(recording: Recording, name: str) -> FloatArray:
-    """Channel with the last sample held inside each span, NaN before the first."""
+    """Channel with the last reading carried forward inside each span, NaN before the first."""
     values = recording[name]
     out = np.full(len(recording), np.nan)
     for span in recording.spans():
@@ -65,7 +65,7 @@ def wrap(angle: FloatArray) -> FloatArray:
     return (angle + np.pi) % (2 * np.pi) - np.pi
 
 
-def standing(recording: Recording, margin: float = 0.5, shortest: float = 1.0) -> list[slice]:
+def standstills(recording: Recording, margin: float = 0.5, shortest: float = 1.0) -> list[slice]:
     """Pieces of segments in which both banks stand still.
 
     Args:

@@ -6,19 +6,23 @@ import itertools
 
 import numpy as np
 
-from ddagr_gym.recordings.checks.findings import CheckFinding, Interval, judge, not_testable
+from ddagr_gym.recordings.checks.findings import CheckFinding, Question, judge, not_testable
 from ddagr_gym.recordings.checks.signals import moving_mask
 from ddagr_gym.recordings.schema import CHANNELS, COMMANDS, BoolArray, FloatArray, Recording
 
 CHECK = "timing"
 
-JITTER_RANGE = (0.0, 0.3)
+JITTER = Question(CHECK, (0.0, 0.3), "-", "Use the sensor's own stamps instead of the logger's.")
 """95 % quantile of |time step - median| over the median [-]."""
-GAP_RANGE = (0.0, 0.02)
+GAP = Question(
+    CHECK, (0.0, 0.02), "-", "Look for a logger that lost messages; segments around the gaps are used apart."
+)
 """Share of the spans' time that gaps of more than 2.5 periods take [-]."""
-DUPLICATE_RANGE = (0.0, 0.001)
+DUPLICATE = Question(CHECK, (0.0, 0.001), "-", "Look for rows that were logged twice.")
 """Share of rows whose time repeats the row before [-]."""
-HOLD_RANGE = (0.0, 0.15)
+HOLD = Question(
+    "wait", (0.0, 0.15), "-", "Look for a sensor that stops or a logger that drops its messages.", ("sensor_hold",)
+)
 """Share of the driving time in which a channel waits more than five of its periods for a sample [-]; 0.07 at most on
 the open recordings, whose poses come irregularly."""
 LONGEST_WAIT = 2.0
@@ -27,17 +31,12 @@ recordings."""
 SLOWEST = {"encoder": 2.0, "specific_force": 10.0, "yaw_rate": 10.0, "pose": 1.0}
 """Rate below which a channel cannot follow a robot's motion [Hz] (ours), by the beginning of its name."""
 LONG_HOLD = 5.0
-"""Wait, in median periods, from which a channel counts as held."""
+"""Wait, in median periods, from which a channel counts as not renewed (ours)."""
 
 
 def timing(recording: Recording) -> list[CheckFinding]:
     """Findings on the rows' times and on each channel's rate."""
     return [*_row_findings(recording), *_rate_findings(recording)]
-
-
-def _fixed(value: float) -> Interval:
-    """Interval of a quantity that is counted, not estimated."""
-    return (value, value)
 
 
 def _row_findings(recording: Recording) -> list[CheckFinding]:
@@ -51,35 +50,18 @@ def _row_findings(recording: Recording) -> list[CheckFinding]:
     count = recording.meta.duplicates_dropped
     duplicates = count / (count + len(recording))
     return [
-        judge(
-            CHECK,
+        JITTER.answer(
             "t, jitter",
             jitter,
-            _fixed(jitter),
-            JITTER_RANGE,
-            "-",
             meaning=f"Rows come at {1 / period:.4g} Hz; 19 of 20 steps lie within {100 * jitter:.2g} % of the period.",
-            remedy="Use the sensor's own stamps instead of the logger's.",
         ),
-        judge(
-            CHECK,
+        GAP.answer(
             "t, gaps",
             lost,
-            _fixed(lost),
-            GAP_RANGE,
-            "-",
             meaning=f"{100 * lost:.2g} % of the time is lost in gaps; {len(recording.meta.segments)} segments.",
-            remedy="Look for a logger that lost messages; segments around the gaps are used apart.",
         ),
-        judge(
-            CHECK,
-            "t, duplicates",
-            duplicates,
-            _fixed(duplicates),
-            DUPLICATE_RANGE,
-            "-",
-            meaning=f"{count} rows repeated the time of the row before and were left out.",
-            remedy="Look for rows that were logged twice.",
+        DUPLICATE.answer(
+            "t, duplicates", duplicates, meaning=f"{count} rows repeated the time of the row before and were left out."
         ),
     ]
 
@@ -129,33 +111,27 @@ def _hold_findings(recording: Recording, name: str, driving: BoolArray) -> list[
             "rate",
             name,
             1 / median,
-            _fixed(1 / median),
+            (1 / median, 1 / median),
             (slowest, np.inf),
             "Hz",
             meaning=f"New samples come at {1 / median:.3g} Hz while driving.",
-            remedy="Raise the sensor's rate, or declare the channel as held if the logger repeats it.",
+            remedy="Raise the sensor's rate, or declare the channel under held in the map if the logger repeats it.",
             suspects=("sensor_hold",),
         ),
         judge(
             "wait",
             name,
             longest,
-            _fixed(longest),
+            (longest, longest),
             (0.0, max(LONGEST_WAIT, 12 * median)),
             "s",
             meaning=f"While driving it goes without a new sample for {longest:.2f} s at most.",
             remedy="Look for a sensor that stops or a logger that drops its messages.",
             suspects=("sensor_hold",),
         ),
-        judge(
-            "wait",
+        HOLD.answer(
             f"{name}, share",
             share,
-            _fixed(share),
-            HOLD_RANGE,
-            "-",
             meaning=f"Waits of more than {LONG_HOLD:g} periods take {100 * share:.2g} % of the driving time.",
-            remedy="Look for a sensor that stops or a logger that drops its messages.",
-            suspects=("sensor_hold",),
         ),
     ]

@@ -6,24 +6,54 @@ import numpy as np
 
 from ddagr_gym.recordings.checks.blocks import cut_blocks
 from ddagr_gym.recordings.checks.clock_offsets import gyro_direction, pose_offset, unwrapped_heading
-from ddagr_gym.recordings.checks.findings import CheckFinding, judge, not_testable
+from ddagr_gym.recordings.checks.findings import CheckFinding, Question, not_testable
 from ddagr_gym.recordings.checks.regression import Estimate, blocks_in_spans, estimate, inside, sampled
 from ddagr_gym.recordings.checks.signals import filled, integral
 from ddagr_gym.recordings.schema import BoolArray, FloatArray, Recording
 
 CHECK = "sign_and_scale"
 
-TRAVEL_RANGE = (0.2, 1.05)
+TRAVEL = Question(
+    CHECK,
+    (0.2, 1.05),
+    "-",
+    "Check the encoders' sign and unit, the wheel radius, and the pose's unit.",
+    ("encoder_scale",),
+)
 """Travelled over rolled distance [-]: 1 without slip, little on ice; more than 1 only when pushed or with a wrong
 radius or scale."""
-COHERENCE_RANGE = (0.6, 1.0)
+COHERENCE = Question(
+    "coherence",
+    (0.6, 1.0),
+    "-",
+    "Check the signs of the pose's axes and heading, the encoders' signs, and the clocks.",
+    ("encoder_scale", "gyro_sign", "pose_latency"),
+)
 """Cosine between rolled and travelled paths [-]: 0.95 to 0.99 on the open recordings, 0.3 at most with a
 mirrored axis."""
-DIRECTION_RANGE = (-0.12, 0.12)
+DIRECTION = Question(
+    "direction",
+    (-0.12, 0.12),
+    "rad",
+    "Check the heading's zero, sign and frame against REP 103; a steady side slope makes robots crab.",
+    ("slope",),
+)
 """Direction of travel against the pose's heading [rad] (7 degrees): skid-steer robots travel where they point."""
-GAIN_RANGE = (0.6, 1.15)
+GAIN = Question(
+    CHECK,
+    (0.6, 1.15),
+    "-",
+    "Check units and signs; if they are right, the motors droop or saturate.",
+    ("encoder_scale", "motor_droop", "motor_saturation"),
+)
 """Steady bank speed over its command [-]: motors droop under load and do not overshoot for long."""
-GAIN_BALANCE_RANGE = (0.9, 1.11)
+GAIN_BALANCE = Question(
+    "balance",
+    (0.9, 1.11),
+    "-",
+    "Compare the banks' encoder scales and loads.",
+    ("encoder_scale", "soil_split", "centre_of_mass_offset"),
+)
 """Right bank's gain over the left's [-]."""
 SETTLED = 2.0
 """Time after a command's change from which the bank counts as steady [s]."""
@@ -148,28 +178,15 @@ def _travel_findings(recording: Recording, rng: np.random.Generator) -> list[Che
         ]
     along, _, coherence = (float(v) for v in found.values)
     return [
-        judge(
-            CHECK,
-            pair,
-            along,
-            found.intervals[0],
-            TRAVEL_RANGE,
-            "-",
-            meaning=f"The pose travels {along:.3f} of what the wheels roll.",
-            remedy="Check the encoders' sign and unit, the wheel radius, and the pose's unit.",
-            suspects=("encoder_scale",),
+        TRAVEL.answer(
+            pair, along, found.intervals[0], meaning=f"The pose travels {along:.3f} of what the wheels roll."
         ),
         _direction_finding(found),
-        judge(
-            "coherence",
+        COHERENCE.answer(
             pair,
             coherence,
             found.intervals[2],
-            COHERENCE_RANGE,
-            "-",
             meaning=f"Rolled and travelled paths agree by {coherence:.2f}, 1 being along each other at all times.",
-            remedy="Check the signs of the pose's axes and heading, the encoders' signs, and the clocks.",
-            suspects=("encoder_scale", "gyro_sign", "pose_latency"),
         ),
     ]
 
@@ -180,16 +197,11 @@ def _direction_finding(found: Estimate) -> CheckFinding:
     angle = float(np.arctan2(across, along))
     low, high = found.intervals[1]
     spread = max(abs(along), 1e-3)
-    return judge(
-        "direction",
+    return DIRECTION.answer(
         "pose",
         angle,
         (angle + (low - across) / spread, angle + (high - across) / spread),
-        DIRECTION_RANGE,
-        "rad",
         meaning=f"The robot travels {angle:.3f} rad to the left of the pose's heading.",
-        remedy="Check the heading's zero, sign and frame against REP 103; a steady side slope makes robots crab.",
-        suspects=("slope",),
     )
 
 
@@ -202,30 +214,20 @@ def _gain_findings(recording: Recording, rng: np.random.Generator) -> list[Check
     for index, bank in enumerate(("right", "left")):
         gain = float(found.values[index])
         findings.append(
-            judge(
-                CHECK,
+            GAIN.answer(
                 f"command_{bank} to encoder_{bank}",
                 gain,
                 found.intervals[index],
-                GAIN_RANGE,
-                "-",
                 meaning=f"The {bank} bank settles at {gain:.3f} of its command.",
-                remedy="Check units and signs; if they are right, the motors droop or saturate.",
-                suspects=("encoder_scale", "motor_droop", "motor_saturation"),
             )
         )
     balance = float(found.values[2])
     findings.append(
-        judge(
-            "balance",
+        GAIN_BALANCE.answer(
             "command to encoder, right to left",
             balance,
             found.intervals[2],
-            GAIN_BALANCE_RANGE,
-            "-",
             meaning=f"The right bank reaches {balance:.3f} times the share of its command that the left reaches.",
-            remedy="Compare the banks' encoder scales and loads.",
-            suspects=("encoder_scale", "soil_split", "centre_of_mass_offset"),
         )
     )
     return findings

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ddagr_gym.recordings.checks.clock_offsets import encoder_offset, pose_offset, unwrapped_heading
-from ddagr_gym.recordings.checks.findings import CheckFinding, judge, not_testable
+from ddagr_gym.recordings.checks.findings import CheckFinding, Question, not_testable
 from ddagr_gym.recordings.checks.regression import (
     Estimate,
     blocks_in_spans,
@@ -20,14 +20,22 @@ from ddagr_gym.recordings.schema import FloatArray, Recording
 
 CHECK = "sign_and_scale"
 
-GYRO_SCALE_RANGE = (0.95, 1.05)
+GYRO_SCALE = Question(CHECK, (0.95, 1.05), "-", "Correct the gyro's sign or scale in the map, or fit gyro_scale.")
 """Gyro over pose [-]; data sheets promise 3 % for low-cost gyros."""
-GYRO_BIAS_RANGE = (-0.02, 0.02)
+GYRO_BIAS = Question("bias", (-0.02, 0.02), "rad/s", "Subtract the bias, or fit gyro_bias.", ("gyro_bias",))
 """Gyro bias against the pose [rad/s]: 70 degrees a minute is more than a zeroed low-cost gyro drifts."""
-TRACK_RANGE = (0.9, 6.0)
+TRACK = Question(
+    CHECK, (0.9, 6.0), "-", "Check the signs of gyro and encoders, whether the banks are swapped, and the units."
+)
 """Effective over geometric track [-]: 1.3 to 1.9 for fielded skid-steer robots, more on loose ground and on ice;
 never below 1."""
-BALANCE_RANGE = (0.95, 1.055)
+BALANCE = Question(
+    "balance",
+    (0.95, 1.055),
+    "-",
+    "Compare the banks' encoder scales and wheel radii; ground that differs by side does the same.",
+    ("encoder_scale", "wheel_radius_mismatch", "soil_split", "centre_of_mass_offset"),
+)
 """Right over left bank's share in the yaw rate [-]; 1 for equal radii, scales and ground, 1.02 to 1.04 on the open
 recordings."""
 LEAST_TURN = 0.05
@@ -120,27 +128,15 @@ def _gyro_findings(recording: Recording, rng: np.random.Generator) -> list[Check
     scale, bias = (float(v) for v in found.values)
     sign = "the wrong way" if scale < 0 else f"{scale:.3f} times what the pose turns"
     return [
-        judge(
-            CHECK,
+        GYRO_SCALE.answer(
             pair,
             scale,
             found.intervals[0],
-            GYRO_SCALE_RANGE,
-            "-",
             meaning=f"The gyro turns {sign}.",
-            remedy="Correct the gyro's sign or scale in the map, or fit gyro_scale.",
             suspects=("gyro_sign",) if scale < 0 else ("gyro_scale",),
         ),
-        judge(
-            "bias",
-            pair,
-            bias,
-            found.intervals[1],
-            GYRO_BIAS_RANGE,
-            "rad/s",
-            meaning=f"The gyro drifts by {bias:.4f} rad/s against the pose.",
-            remedy="Subtract the bias, or fit gyro_bias.",
-            suspects=("gyro_bias",),
+        GYRO_BIAS.answer(
+            pair, bias, found.intervals[1], meaning=f"The gyro drifts by {bias:.4f} rad/s against the pose."
         ),
     ]
 
@@ -154,27 +150,18 @@ def _track_findings(recording: Recording, rng: np.random.Generator) -> list[Chec
         return [not_testable(CHECK, pair, why, "Name the robot with --robot." if missing else _DRIVE)]
     chi, share = (float(v) for v in found.values)
     return [
-        judge(
-            CHECK,
+        TRACK.answer(
             pair,
             chi,
             found.intervals[0],
-            TRACK_RANGE,
-            "-",
             meaning=_track_sentence(chi),
-            remedy="Check the signs of gyro and encoders, whether the banks are swapped, and the units.",
             suspects=("gyro_sign",) if chi < 0 else ("gyro_scale", "encoder_scale"),
         ),
-        judge(
-            "balance",
+        BALANCE.answer(
             "encoder_right to encoder_left",
             share,
             found.intervals[1],
-            BALANCE_RANGE,
-            "-",
             meaning=f"A turn of the right wheels turns the robot {share:.3f} times as much as one of the left.",
-            remedy="Compare the banks' encoder scales and wheel radii; ground that differs by side does the same.",
-            suspects=("encoder_scale", "wheel_radius_mismatch", "soil_split", "centre_of_mass_offset"),
         ),
     ]
 

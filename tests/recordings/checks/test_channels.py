@@ -1,4 +1,4 @@
-"""Timing, held, stuck, saturated and zeroed channels."""
+"""Timing, repeated, stuck, saturated and zeroed channels."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 
 from ddagr_gym.recordings.checks.extremes import extremes, false_zeros, saturated_share
 from ddagr_gym.recordings.checks.findings import Status
-from ddagr_gym.recordings.checks.held import held, longest_freeze, natural_repeats
+from ddagr_gym.recordings.checks.repeated_readings import longest_freeze, natural_repeats, repeated_readings
 from ddagr_gym.recordings.checks.timing import timing
 from ddagr_gym.recordings.schema import Recording
 
@@ -29,7 +29,7 @@ def status_of(findings, check, channel):
 
 def test_a_sound_drive_passes(make_drive):
     drive = make_drive()
-    for check in (timing, held, extremes):
+    for check in (timing, repeated_readings, extremes):
         assert {f.status for f in check(drive)} == {Status.PASS}
 
 
@@ -71,8 +71,8 @@ def test_a_sensor_that_hangs_once(make_drive):
         return v
 
     drive = changed(make_drive(), yaw_rate=hanging)
-    assert status_of(held(drive), "frozen", "yaw_rate") is Status.SUSPICIOUS
-    assert status_of(held(drive), "held", "yaw_rate") is Status.PASS
+    assert status_of(repeated_readings(drive), "frozen", "yaw_rate") is Status.SUSPICIOUS
+    assert status_of(repeated_readings(drive), "held", "yaw_rate") is Status.PASS
     assert longest_freeze(drive, "yaw_rate", np.ones(len(drive), dtype=bool)) == pytest.approx(99 * 0.02)
 
 
@@ -93,7 +93,7 @@ def test_a_core_channel_without_samples_is_not_testable(make_drive):
 @pytest.mark.parametrize("count", [2, 5])
 def test_undeclared_repeats_are_suspicious(make_drive, count):
     drive = changed(make_drive(), yaw_rate=repeated(count))
-    findings = {f.channel: f for f in held(drive) if f.check == "held"}
+    findings = {f.channel: f for f in repeated_readings(drive) if f.check == "held"}
     assert findings["yaw_rate"].status is Status.SUSPICIOUS
     assert findings["yaw_rate"].value == pytest.approx(1 - 1 / count, abs=0.01)
     assert findings["specific_force_x"].status is Status.PASS
@@ -101,18 +101,18 @@ def test_undeclared_repeats_are_suspicious(make_drive, count):
 
 def test_declared_channels_are_left_out(make_drive):
     drive = changed(make_drive(), yaw_rate=repeated(5)).with_meta(held={"yaw_rate": 0.1})
-    assert "yaw_rate" not in {f.channel for f in held(drive)}
+    assert "yaw_rate" not in {f.channel for f in repeated_readings(drive)}
 
 
 @pytest.mark.parametrize("quantum", [1e-4, 1e-3, 5e-3])
-def test_a_coarse_gyro_is_not_taken_for_a_held_one(make_drive, quantum):
+def test_a_coarse_gyro_is_not_taken_for_a_repeated_one(make_drive, quantum):
     drive = changed(make_drive(), yaw_rate=lambda v: quantum * np.round(v / quantum))
-    assert status_of(held(drive), "held", "yaw_rate") is Status.PASS
+    assert status_of(repeated_readings(drive), "held", "yaw_rate") is Status.PASS
 
 
-def test_a_coarse_gyro_that_is_held_is_found(make_drive):
+def test_a_coarse_gyro_that_repeats_is_found(make_drive):
     drive = changed(make_drive(), yaw_rate=lambda v: repeated(4)(1.3e-4 * np.round(v / 1.3e-4)))
-    assert status_of(held(drive), "held", "yaw_rate") is Status.SUSPICIOUS
+    assert status_of(repeated_readings(drive), "held", "yaw_rate") is Status.SUSPICIOUS
 
 
 @pytest.mark.parametrize("quantum", [0.3, 1.0, 2.0])

@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 from ddagr_gym.recordings.checks.findings import Status
 from ddagr_gym.recordings.checks.gravity import gravity, offset_by_attitude, offset_by_heading, rests
 from ddagr_gym.recordings.checks.noise import noise, noise_at_rest
-from ddagr_gym.recordings.checks.signals import standing
+from ddagr_gym.recordings.checks.signals import standstills
 from ddagr_gym.recordings.schema import Recording
 
 
@@ -47,7 +47,7 @@ ROUND = (0.0, 1.5, 3.0, -1.5, 0.7)
 
 
 def test_rests_are_found_with_their_margins():
-    pieces = standing(stops(ROUND))
+    pieces = standstills(stops(ROUND))
     assert len(pieces) == 5
     lengths = [(p.stop - p.start) * 0.02 for p in pieces]
     # The first has no motion before it; the others lose half a second at each end.
@@ -110,7 +110,7 @@ def test_one_heading_cannot_tell_them_apart():
     assert offset_by_heading(rests(stops((0.1, 0.2, 0.15, 0.1)))) is None
     (finding,) = [f for f in gravity(stops((0.1,) * 4, offset=(0.5, 0.0))) if "direction" in f.channel]
     assert finding.status is Status.PASS
-    assert "cannot be told apart" in finding.meaning
+    assert "cannot be distinguished" in finding.meaning
 
 
 def test_roll_and_pitch_give_the_slope():

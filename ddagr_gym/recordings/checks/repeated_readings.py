@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from ddagr_gym.recordings.checks.findings import CheckFinding, judge, not_testable
+from ddagr_gym.recordings.checks.findings import CheckFinding, Question, not_testable
 from ddagr_gym.recordings.checks.signals import moving_mask
 from ddagr_gym.recordings.schema import BoolArray, FloatArray, Recording
 
 CHECK = "held"
+"""Of the findings in reports, whose schema has it."""
 
 CHECKED = (
     "encoder_right",
@@ -21,16 +22,22 @@ CHECKED = (
     "pose_y",
     "pose_yaw",
 )
-REPEAT_RANGE = (0.0, 0.05)
+REPEAT = Question(
+    CHECK,
+    (0.0, 0.05),
+    "-",
+    "If the logger repeats this channel, declare it under held in the map; else look at the sensor.",
+    ("sensor_hold",),
+)
 """Share of repeats while driving beyond what the resolution explains [-]; 0.002 at most on the open recordings."""
-FROZEN_RANGE = (0.0, 1.0)
+FROZEN = Question("frozen", (0.0, 1.0), "s", "Look for a sensor that hangs; leave that piece out.", ("sensor_hold",))
 """Longest time for which a fine-grained channel may show one value while driving [s] (ours)."""
 QUANTA = 3.0
 """A channel whose changes are mostly this many quanta or fewer repeats itself naturally (ours)."""
 
 
-def held(recording: Recording) -> list[CheckFinding]:
-    """Findings on repeated samples, one for each channel that the map does not declare as held.
+def repeated_readings(recording: Recording) -> list[CheckFinding]:
+    """Findings on repeated samples, one for each channel that is not under ``held`` in the map.
 
     Exact zeros are left out: a locked bank repeats them, and :mod:`.extremes` looks at them.
     """
@@ -84,19 +91,11 @@ def _repeats(name: str, steps: FloatArray) -> CheckFinding:
         return not_testable(CHECK, name, "The channel has too few samples while driving.", "Record a longer drive.")
     share, natural = float(np.mean(steps == 0)), natural_repeats(steps)
     excess = max(0.0, share - natural)
-    return judge(
-        CHECK,
+    return REPEAT.answer(
         name,
         excess,
-        (excess, excess),
-        REPEAT_RANGE,
-        "-",
-        meaning=(
-            f"{100 * share:.2g} % of its samples repeat the one before while driving; "
-            f"its resolution explains {100 * min(natural, share):.2g} %."
-        ),
-        remedy="If the logger holds this channel, declare it under held in the map; else look at the sensor.",
-        suspects=("sensor_hold",),
+        meaning=f"{100 * share:.2g} % of its samples repeat the one before while driving; "
+        f"its resolution explains {100 * min(natural, share):.2g} %.",
     )
 
 
@@ -123,14 +122,4 @@ def longest_freeze(recording: Recording, name: str, driving: BoolArray) -> float
 
 def _frozen(recording: Recording, name: str, driving: BoolArray) -> CheckFinding:
     longest = longest_freeze(recording, name, driving)
-    return judge(
-        "frozen",
-        name,
-        longest,
-        (longest, longest),
-        FROZEN_RANGE,
-        "s",
-        meaning=f"While driving it shows one value for {longest:.2f} s at most.",
-        remedy="Look for a sensor that hangs; leave that piece out.",
-        suspects=("sensor_hold",),
-    )
+    return FROZEN.answer(name, longest, meaning=f"While driving it shows one value for {longest:.2f} s at most.")
