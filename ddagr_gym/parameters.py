@@ -95,7 +95,8 @@ class Drivetrain(Validated):
             of the ground speeds it up or slows it down; 0 where the ground has no influence.
         acceleration_limit: largest acceleration that the motor's torque gives the unloaded bank [rad/s^2].
         no_load_speed: at which the torque limit has fallen to zero, in a straight line [rad/s].
-        limit_imbalance: share by which the right bank's limit is above the mean of both, and the left one's below [-].
+        power_limit: largest product of that acceleration and the speed [rad^2/s^3]: power over the bank's inertia.
+        limit_imbalance: share by which the right bank's limits are above the mean of both, the left one's below [-].
         viscous_rate: friction of motor and gear per speed [1/s].
         friction: Coulomb friction of motor and gear, as the acceleration that it takes [rad/s^2].
     """
@@ -107,6 +108,7 @@ class Drivetrain(Validated):
     load_compliance: float = bounded("1/(kg m^2)", 0.0, 1e3, default=0.0)
     acceleration_limit: float = bounded("rad/s^2", 0.0, 1e6, default=1e6, open_low=True)
     no_load_speed: float = bounded("rad/s", 0.0, 1e3, default=1e3, open_low=True)
+    power_limit: float = bounded("rad^2/s^3", 0.0, 1e6, default=1e6, open_low=True)
     limit_imbalance: float = bounded("-", -0.9, 0.9, default=0.0)
     viscous_rate: float = bounded("1/s", 0.0, 1e3, default=0.0)
     friction: float = bounded("rad/s^2", 0.0, 1e3, default=0.0)

@@ -192,7 +192,7 @@ _DRIVETRAIN_ENTRIES = {
     "command_ramp": layout.COMMAND_RAMP,
     **{name: layout.BASE_DRIVETRAIN + k for k, name in enumerate(layout.DRIVETRAIN_PARAMETERS)},
 }
-_LIMITS = ("command_ramp", "acceleration_limit", "no_load_speed")
+_LIMITS = ("command_ramp", "acceleration_limit", "no_load_speed", "power_limit")
 _DRIVETRAIN_STEP = 0.02  # of the standard deviation, for finite differences (ours)
 
 

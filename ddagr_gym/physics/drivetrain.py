@@ -42,6 +42,7 @@ from ddagr_gym.physics.layout import (
     MOTOR_TARGET,
     NO_LOAD_SPEED,
     OMEGA,
+    POWER_LIMIT,
     SAMPLE_PERIOD,
     SET_POINT,
     SIZE,
@@ -55,6 +56,7 @@ Array = NDArray[np.float64]
 LONGEST_DELAY = 1.0  # [s] of a command, ours: as long as commands are remembered
 NO_LIMIT = 1e6  # [rad/s^2] far beyond any wheel's
 NO_SPEED_LIMIT = 1e3  # [rad/s] likewise
+NO_POWER_LIMIT = 1e6  # [rad^2/s^3] likewise
 _STANDING = 0.05  # [rad/s] below which a bank counts as standing, ours: 15 mm/s of a 0.3 m wheel
 _STICTION_SPEED = 0.02  # [rad/s] over which Coulomb friction builds up, ours: a fortieth of a row turn's wheel speed
 
@@ -89,7 +91,7 @@ def set_targets(row: Array) -> None:
         row[SET_POINT + bank] = target
         row[MOTOR_TARGET + bank] = target
         row[MOTOR_RATE + bank] = row[BASE_MOTOR_RATE]
-    for j in range(7):
+    for j in range(8):
         row[DRIVETRAIN + j] = row[BASE_DRIVETRAIN + j]
 
 
@@ -122,6 +124,7 @@ def mark_dynamic_banks(row: Array) -> None:
     """Note whether the banks need more than the exact solution of the first-order loop."""
     ideal = row[DRIVETRAIN + INTEGRAL_RATE] == 0.0 and row[DRIVETRAIN + LOAD_COMPLIANCE] == 0.0
     ideal = ideal and row[DRIVETRAIN + ACCELERATION_LIMIT] >= NO_LIMIT
+    ideal = ideal and row[DRIVETRAIN + POWER_LIMIT] >= NO_POWER_LIMIT
     ideal = ideal and row[DRIVETRAIN + VISCOUS_RATE] == 0.0 and row[DRIVETRAIN + FRICTION] == 0.0
     row[DYNAMIC_BANKS] = 0.0 if ideal else 1.0
     if row[DRIVETRAIN + INTEGRAL_RATE] > 0.0 and row[INTEGRAL_KNOWN] == 0.0:
@@ -156,20 +159,35 @@ def _wanted(row: Array, bank: int) -> float:
 
 
 @kernel(inline=True)
-def _strength(row: Array, bank: int) -> float:
-    """Most that the motor of a bank gives while it stands [rad/s^2]."""
+def _share(row: Array, bank: int) -> float:
+    """Share of the limits that the motor of a bank has."""
     imbalance = row[DRIVETRAIN + LIMIT_IMBALANCE]
-    return row[DRIVETRAIN + ACCELERATION_LIMIT] * (1.0 + imbalance if bank == 0 else 1.0 - imbalance)
+    return 1.0 + imbalance if bank == 0 else 1.0 - imbalance
+
+
+@kernel(inline=True)
+def _falling_limit(row: Array, bank: int, wanted: float) -> tuple[float, float]:
+    """Most that the motor gives in the direction that is asked for [rad/s^2], and how it changes with that speed [1/s].
+
+    Less the faster the bank turns that way: along the line to the no-load speed, and by its power.
+    """
+    along = row[OMEGA + bank] if wanted > 0.0 else -row[OMEGA + bank]
+    limit, slope = row[DRIVETRAIN + ACCELERATION_LIMIT], 0.0
+    if row[DRIVETRAIN + NO_LOAD_SPEED] < NO_SPEED_LIMIT:
+        share = 1.0 - along / row[DRIVETRAIN + NO_LOAD_SPEED]
+        slope = -limit / row[DRIVETRAIN + NO_LOAD_SPEED] if 0.0 < share < 1.0 else 0.0
+        limit *= min(max(share, 0.0), 1.0)
+    if row[DRIVETRAIN + POWER_LIMIT] < NO_POWER_LIMIT and along * limit > row[DRIVETRAIN + POWER_LIMIT]:
+        limit = row[DRIVETRAIN + POWER_LIMIT] / along
+        slope = -limit / along
+    return _share(row, bank) * limit, _share(row, bank) * slope
 
 
 @kernel(inline=True)
 def _limit(row: Array, bank: int, wanted: float) -> float:
-    """Most that it gives in the direction that is asked for [rad/s^2]: less the faster it turns that way."""
-    if row[DRIVETRAIN + NO_LOAD_SPEED] >= NO_SPEED_LIMIT:
-        return _strength(row, bank)
-    along = row[OMEGA + bank] if wanted > 0.0 else -row[OMEGA + bank]
-    share = 1.0 - along / row[DRIVETRAIN + NO_LOAD_SPEED]
-    return _strength(row, bank) * min(max(share, 0.0), 1.0)
+    """Most that the motor gives in the direction that is asked for [rad/s^2]."""
+    limit, _ = _falling_limit(row, bank, wanted)
+    return limit
 
 
 @kernel()
@@ -184,21 +202,18 @@ def bank_acceleration(row: Array, bank: int) -> float:
 def bank_damping(row: Array, bank: int) -> float:
     """Derivative of :func:`bank_acceleration` by the bank's own speed, the ground's torque left out [1/s]."""
     wanted = _wanted(row, bank)
-    limit = _limit(row, bank, wanted)
+    limit, slope = _falling_limit(row, bank, wanted)
     width = abs(row[OMEGA + bank]) + _STICTION_SPEED
     damping = -row[DRIVETRAIN + VISCOUS_RATE] - row[DRIVETRAIN + FRICTION] * _STICTION_SPEED / (width * width)
-    if abs(wanted) <= limit:
-        return damping - row[MOTOR_RATE + bank]
-    falls = 0.0 < limit < _strength(row, bank)  # no share is lost where there is no such speed
-    return damping - (_strength(row, bank) / row[DRIVETRAIN + NO_LOAD_SPEED] if falls else 0.0)
+    return damping + (slope if abs(wanted) > limit else -row[MOTOR_RATE + bank])
 
 
 @kernel()
 def integral_growth(row: Array, bank: int) -> float:
     """dz/dt of the loop's integral part [rad/s^3] (theory: drivetrain, eq. (3))."""
     error = row[MOTOR_TARGET + bank] - row[OMEGA + bank]
-    wanted = _wanted(row, bank)
-    if abs(wanted) > _limit(row, bank, wanted) and wanted * error > 0.0:
+    integral = row[INTEGRAL + bank]
+    if integral * error > 0.0 and abs(integral) >= _limit(row, bank, integral):
         return 0.0
     return row[DRIVETRAIN + INTEGRAL_RATE] * error
 

@@ -37,7 +37,7 @@ MOTOR_RATE = _block(2)  # its rate k_omega [1/s]
 SET_POINT = _block(2)  # command after the ramp [rad/s]
 INTEGRAL = _block(2)  # integral part of the speed loop [rad/s^2]
 INTEGRAL_KNOWN = _block()  # 0 after a reset, until the first sample has settled it
-DRIVETRAIN = _block(7)  # as the motor effects leave it, in the order of DRIVETRAIN_PARAMETERS
+DRIVETRAIN = _block(8)  # as the motor effects leave it, in the order of DRIVETRAIN_PARAMETERS
 DYNAMIC_BANKS = _block()  # 1 where any of these differs from that of the ideal loop
 
 # Body, as the load effects leave it
@@ -54,7 +54,7 @@ BASE_WHEEL = _block(12)
 HALF_WHEELBASE = _block()  # [m]
 HALF_TRACK = _block()
 BASE_MOTOR_RATE = _block()
-BASE_DRIVETRAIN = _block(7)
+BASE_DRIVETRAIN = _block(8)
 COMMAND_DELAY = _block()  # [s]
 COMMAND_DEADBAND = _block()  # [rad/s]
 COMMAND_RAMP = _block()  # [rad/s^2]
@@ -137,12 +137,22 @@ DRIVETRAIN_PARAMETERS = (
     "load_compliance",
     "acceleration_limit",
     "no_load_speed",
+    "power_limit",
     "limit_imbalance",
     "viscous_rate",
     "friction",
 )
 """Order of the drivetrain's entries; see :class:`ddagr_gym.parameters.Drivetrain`."""
-INTEGRAL_RATE, LOAD_COMPLIANCE, ACCELERATION_LIMIT, NO_LOAD_SPEED, LIMIT_IMBALANCE, VISCOUS_RATE, FRICTION = range(7)
+(
+    INTEGRAL_RATE,
+    LOAD_COMPLIANCE,
+    ACCELERATION_LIMIT,
+    NO_LOAD_SPEED,
+    POWER_LIMIT,
+    LIMIT_IMBALANCE,
+    VISCOUS_RATE,
+    FRICTION,
+) = range(8)
 
 SOIL_PARAMETERS = (
     "cohesion",

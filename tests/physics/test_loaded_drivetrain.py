@@ -82,6 +82,12 @@ def test_speed_ends_where_the_falling_torque_limit_meets_the_load():
     assert 4.0 * (1.0 - speed / 1.6) == pytest.approx(-0.02 * _torques(row)[0], rel=1e-6)
 
 
+def test_speed_ends_where_the_power_is_spent():
+    row = _settled(_with(DDAGR, load_compliance=0.02, power_limit=0.18), 1.9, 1.9)
+    assert 0.18 / row[layout.OMEGA] == pytest.approx(-0.02 * _torques(row)[0], rel=1e-6)
+    assert row[layout.OMEGA] < 1.6
+
+
 # Commands on their way
 
 
