@@ -17,14 +17,15 @@ from ddagr_gym.errors import InputError, at_least
 from ddagr_gym.progress import Progress
 
 if TYPE_CHECKING:
-    from ddagr_gym.diagnosis.gates.thresholds import NullKind, NullRun, Origin
+    from ddagr_gym.diagnosis.gates.thresholds import NullKind, Origin
+    from ddagr_gym.diagnosis.null_bank.bank import NullBank
     from ddagr_gym.diagnosis.null_bank.drives import Template
     from ddagr_gym.diagnosis.setting import Setting
     from ddagr_gym.parameters import Robot, Soil
     from ddagr_gym.recordings.schema import Recording
 
     _Centre = tuple[Robot, Soil] | None
-    _Task = tuple[Robot, Soil, Template | Recording | None, Setting, int, int, Path, _Centre]
+    _Task = tuple[NullBank, int, Path]
 
 EXAMPLES = (
     "ddagr null-bank --robot ddagr --soil thesis_a1 --output thresholds.json",
@@ -78,7 +79,7 @@ def run(arguments: Arguments) -> None:
     """Make what is missing of the bank, then write the thresholds."""
     from ddagr_gym.diagnosis.gates.threshold_files import save_thresholds
     from ddagr_gym.diagnosis.gates.thresholds import NullRun, thresholds_from
-    from ddagr_gym.diagnosis.null_bank.bank import bank_hash
+    from ddagr_gym.diagnosis.null_bank.bank import NullBank
     from ddagr_gym.diagnosis.null_bank.drives import template_of
     from ddagr_gym.diagnosis.null_bank.fitted_nominal import fitted_nominal
     from ddagr_gym.diagnosis.preprocessing.input_requirements import check_recordings
@@ -105,12 +106,12 @@ def run(arguments: Arguments) -> None:
         template = template_of(recordings, noise_from_differences(recordings, robot.outer_radius))
         centre = fitted_nominal(robot, soil, recordings, setting)
     drives: list[Template | Recording | None] = [*pieces, *longer] or [template] * arguments.count
-    bank = bank_hash(robot, soil, template, setting, len(drives), arguments.seed, centre, (*pieces, *longer))
+    made_of = NullBank(robot, soil, setting, tuple(drives), arguments.seed, centre)
+    bank = made_of.key()
     folder = arguments.output.with_suffix(".bank")
     folder.mkdir(parents=True, exist_ok=True)
     paths = [_part(folder, bank, number) for number in range(len(drives))]
-    tasks = [(robot, soil, d, setting, arguments.seed, n, paths[n], centre) for n, d in enumerate(drives)]
-    _make([task for task in tasks if not paths[task[5]].exists()], arguments.processes)
+    _make([(made_of, n, path) for n, path in enumerate(paths) if not path.exists()], arguments.processes)
     made = [NullRun(**json.loads(path.read_text())) for path in paths]
     runs = [replace(run, own=number < len(drives) - len(longer)) for number, run in enumerate(made)]
     found = thresholds_from(runs, bank, origin=_origin(arguments, robot))
@@ -197,15 +198,6 @@ def _make(tasks: list[_Task], processes: int) -> None:
 
 
 def _one(task: _Task) -> None:
-    from ddagr_gym.diagnosis.null_bank.bank import null_run, scan_null_drives
-    from ddagr_gym.diagnosis.null_bank.structural_variants import KINDS
-    from ddagr_gym.recordings.schema import Recording
-
-    robot, soil, drives, setting, seed, number, path, centre = task
-    made: NullRun
-    if isinstance(drives, Recording):
-        made = scan_null_drives(robot, soil, [drives], f"real {Path(drives.meta.source).name}", setting)
-    else:
-        made = null_run(robot, soil, drives, KINDS[number % len(KINDS)], setting, (seed, number), centre)
+    bank, number, path = task
     with atomic_path(path) as part:
-        part.write_text(json.dumps(asdict(made)))
+        part.write_text(json.dumps(asdict(bank.run(number))))

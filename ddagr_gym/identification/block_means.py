@@ -77,6 +77,10 @@ class BlockedWindows:
         difference[..., YAW] = np.angle(np.exp(1j * difference[..., YAW]))
         return self.means(np.nan_to_num(difference))
 
+    def by_channel(self, values: Array) -> Array:
+        """(W, B, 8) of rows (W, M + S): without those of the local unknowns' priors."""
+        return values[:, : self.sigma.shape[1] * self.sigma.shape[2]].reshape(self.sigma.shape)
+
     def subset(self, chosen: NDArray[np.int64] | NDArray[np.bool_]) -> BlockedWindows:
         """Only the chosen windows."""
         return BlockedWindows(self.windows.subset(chosen), self.weights[chosen], self.sigma[chosen])

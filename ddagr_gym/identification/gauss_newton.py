@@ -119,53 +119,83 @@ def fit(
         fixed: names of effect parameters to leave alone.
         progress: called after each step.
     """
-    point = problem.start() if start is None else start
-    parameters = effect_parameters(point.effects, fixed)
     known = reuse or first
+    parameters = effect_parameters(() if start is None else start.effects, fixed)
+    here = _begun(problem, problem.start() if start is None else start, parameters, known)
+    converged, done, fresh = False, 0, known is None
+    while done < iterations and not converged:
+        done += 1
+        before = here.cost
+        here = _step(problem, here, parameters, tolerance)
+        progress()
+        small = before - here.cost < tolerance * here.cost
+        # a step that fails with sensitivities of another point says nothing about this one
+        converged = small and (fresh or reuse is not None)
+        fresh = reuse is None and not converged and (done < renewals or small)
+        if fresh:
+            here = _renewed(problem, here)
+        if parameters and done < max(renewals, _EFFECT_RENEWALS) and not converged:
+            if done < iterations:
+                here = replace(here, by_effect=effect_columns(problem, here.point, here.prediction, parameters))
+            if not fresh:
+                by_parameter = problem.heading_columns(here.point, here.prediction, here.by_parameter)
+                here = replace(here, by_parameter=by_parameter)
+    if reuse is None and done and not converged and not fresh:
+        here = _renewed(problem, here)
+    cost, shares = cost_of(problem, here.point, here.prediction, here.elimination)
+    return Fitted(here.point, here.prediction, cost, here.elimination, here.by_parameter, done, converged, shares)
+
+
+@dataclass(frozen=True, eq=False)
+class _Iterate:
+    """Where an iteration stands, with the derivatives of the next step, which may be of an earlier point.
+
+    Attributes:
+        point: parameters, initial states and effects.
+        prediction: (W, T, 8) there.
+        cost: there, with the local unknowns of the elimination.
+        elimination: of the local unknowns.
+        by_parameter: (W, M, P) weighted nuisance sensitivities.
+        by_effect: (W, M, E) the same of the effects' parameters.
+    """
+
+    point: Point
+    prediction: Array
+    cost: float
+    elimination: Elimination
+    by_parameter: Array
+    by_effect: Array
+
+
+def _begun(problem: Problem, point: Point, parameters: Sequence[EffectParameter], known: Fitted | None) -> _Iterate:
+    """The first point, with the nuisances' sensitivities of a known fit where there is one."""
     prediction = known.prediction if known is not None and known.point is point else problem.predict(point)
     if not np.isfinite(prediction).all():
         point = replace(point, states=problem.starts(point.values))
         prediction = problem.predict(point)
-    if known:
+    if known is not None:
         by_parameter = problem.heading_columns(point, prediction, known.by_parameter)
         elimination = known.elimination
     else:
         by_parameter, elimination = _sensitivities(problem, point, prediction)
     by_effect = effect_columns(problem, point, prediction, parameters)
     cost, _ = cost_of(problem, point, prediction, elimination)
-    converged, done, fresh = False, 0, known is None
-    while done < iterations and not converged:
-        done += 1
-        before = cost
-        point, prediction, cost = _step(
-            problem, point, prediction, cost, elimination, by_parameter, by_effect, parameters, tolerance * cost
-        )
-        progress()
-        small = before - cost < tolerance * cost
-        # a step that fails with sensitivities of another point says nothing about this one
-        converged = small and (fresh or reuse is not None)
-        fresh = False
-        if reuse is None and not converged and (done < renewals or small):
-            by_parameter, elimination = _sensitivities(problem, point, prediction)
-            cost, _ = cost_of(problem, point, prediction, elimination)
-            fresh = True
-        if parameters and done < max(renewals, _EFFECT_RENEWALS) and not converged:
-            if done < iterations:
-                by_effect = effect_columns(problem, point, prediction, parameters)
-            if not fresh:
-                by_parameter = problem.heading_columns(point, prediction, by_parameter)
-    if reuse is None and done and not converged and not fresh:
-        by_parameter, elimination = _sensitivities(problem, point, prediction)
-    cost, shares = cost_of(problem, point, prediction, elimination)
-    return Fitted(point, prediction, cost, elimination, by_parameter, done, converged, shares)
+    return _Iterate(point, prediction, cost, elimination, by_parameter, by_effect)
+
+
+def _renewed(problem: Problem, here: _Iterate) -> _Iterate:
+    """The same point with its own sensitivities to the nuisances."""
+    by_parameter, elimination = _sensitivities(problem, here.point, here.prediction)
+    cost, _ = cost_of(problem, here.point, here.prediction, elimination)
+    return replace(here, cost=cost, elimination=elimination, by_parameter=by_parameter)
 
 
 def linearised(problem: Problem, fitted: Fitted) -> Linearised:
     """The linearised problem at a fit: its free nuisances, then the parameters of its effects."""
     parameters = effect_parameters(fitted.point.effects)
     by_effect = effect_columns(problem, fitted.point, fitted.prediction, parameters)
-    raw = _raw_columns(problem, fitted.point, fitted.prediction, fitted.by_parameter, by_effect)
-    return _linearised(problem, fitted.point, fitted.elimination.project(raw), parameters)
+    here = _Iterate(fitted.point, fitted.prediction, fitted.cost, fitted.elimination, fitted.by_parameter, by_effect)
+    return _linearised(problem, here, _raw_columns(problem, here), parameters)
 
 
 def fit_states(problem: Problem, values: Array, iterations: int = 2) -> tuple[Array, Array]:
@@ -197,15 +227,17 @@ def _sensitivities(problem: Problem, point: Point, prediction: Array) -> tuple[A
     return by_parameter, problem.eliminate(point, prediction, by_parameter)
 
 
-def _raw_columns(problem: Problem, point: Point, prediction: Array, by_parameter: Array, by_effect: Array) -> Array:
+def _raw_columns(problem: Problem, here: _Iterate) -> Array:
     """Residual and sensitivities as columns (W, R, 1 + P)."""
-    sensitivities = np.concatenate([by_parameter[..., problem.free], by_effect], axis=2)
-    return np.concatenate([problem.residual(point, prediction)[..., None], problem.padded(sensitivities)], axis=2)
+    sensitivities = np.concatenate([here.by_parameter[..., problem.free], here.by_effect], axis=2)
+    residual = problem.residual(here.point, here.prediction)[..., None]
+    return np.concatenate([residual, problem.padded(sensitivities)], axis=2)
 
 
-def _linearised(problem: Problem, point: Point, columns: Array, parameters: Sequence[EffectParameter]) -> Linearised:
-    """Of projected columns: residual first, then the free nuisances, then effect parameters."""
-    free = problem.free
+def _linearised(problem: Problem, here: _Iterate, raw: Array, parameters: Sequence[EffectParameter]) -> Linearised:
+    """Of raw columns: residual first, then the free nuisances, then effect parameters."""
+    free, point = problem.free, here.point
+    columns = here.elimination.project(raw)
     return Linearised(
         columns[..., 0],
         columns[..., 1:],
@@ -217,23 +249,14 @@ def _linearised(problem: Problem, point: Point, columns: Array, parameters: Sequ
     )
 
 
-def _step(
-    problem: Problem,
-    point: Point,
-    prediction: Array,
-    cost: float,
-    elimination: Elimination,
-    by_parameter: Array,
-    by_effect: Array,
-    parameters: Sequence[EffectParameter],
-    least: float,
-) -> tuple[Point, Array, float]:
+def _step(problem: Problem, here: _Iterate, parameters: Sequence[EffectParameter], tolerance: float) -> _Iterate:
     """One damped Gauss-Newton step; the point itself where none lowers the cost.
 
-    Shares of it that promise less than ``least`` are not tried.
+    Shares of it that promise a relative gain below ``tolerance`` are not tried.
     """
-    raw = _raw_columns(problem, point, prediction, by_parameter, by_effect)
-    linear = _linearised(problem, point, elimination.project(raw), parameters)
+    point, elimination, least = here.point, here.elimination, tolerance * here.cost
+    raw = _raw_columns(problem, here)
+    linear = _linearised(problem, here, raw, parameters)
     gradient = linear.gradient
     change = linear.step(linear.information, gradient, _LONGEST)
     explained = elimination.explain(raw)
@@ -256,9 +279,9 @@ def _step(
         else:
             tried, predicted = stepped, problem.predict(stepped)
             after = cost_of(problem, tried, predicted, elimination)[0]
-        if after < cost:
-            return tried, predicted, after
-    return point, prediction, cost
+        if after < here.cost:
+            return replace(here, point=tried, prediction=predicted, cost=after)
+    return here
 
 
 def _best_by_window(

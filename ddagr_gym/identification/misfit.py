@@ -5,10 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ddagr_gym.identification.gauss_newton import Fitted
 from ddagr_gym.identification.problem import Problem
 from ddagr_gym.identification.windows import CHANNELS, STATE
+
+Array = NDArray[np.float64]
+
+
+def projected_residual(problem: Problem, fitted: Fitted) -> Array:
+    """(W, M + S) weighted residual without what the windows' unknowns explain."""
+    raw = problem.residual(fitted.point, fitted.prediction)[..., None]
+    return np.asarray(fitted.elimination.project(raw)[..., 0])
 
 
 def channel_misfit(problem: Problem, fitted: Fitted) -> dict[str, float]:
@@ -18,12 +27,11 @@ def channel_misfit(problem: Problem, fitted: Fitted) -> dict[str, float]:
     local unknowns count as channels of their own: what they have to make up for is misfit too.
     """
     blocked = problem.blocked
-    rows = blocked.mask.shape[1]
-    residual = fitted.elimination.project(problem.residual(fitted.point, fitted.prediction)[..., None])
-    squares = (residual[:, :rows, 0] ** 2).reshape(blocked.sigma.shape).sum(axis=(0, 1))
-    counts = blocked.mask.reshape(blocked.sigma.shape).sum(axis=(0, 1))
+    residual = projected_residual(problem, fitted)
+    squares = (blocked.by_channel(residual) ** 2).sum(axis=(0, 1))
+    counts = blocked.by_channel(blocked.mask).sum(axis=(0, 1))
     found = {name: float(squares[k] / counts[k]) for k, name in enumerate(CHANNELS) if counts[k] > 0}
-    local = (residual[:, rows + len(STATE) :, 0] ** 2).mean(axis=0)
+    local = (residual[:, blocked.mask.shape[1] + len(STATE) :] ** 2).mean(axis=0)
     names = [unknown.name for unknown in problem.nuisances.local]
     return found | {name: float(value) for name, value in zip(names, local, strict=True)}
 

@@ -239,11 +239,15 @@ def command_shift(period: float) -> ModelParameter:
     return ModelParameter("command_shift", "s", (), False, period, 0.1 * period, 0.0, 2.0 * period, shift=True)
 
 
-def wheel_speed_shift(limit: float, prior: float = 0.1) -> ModelParameter:
+WHEEL_SPEED_LATENESS = 0.1
+"""Standard deviation of the lateness of wheel speeds [s]: encoder messages come at a few hertz and are stamped on
+arrival."""
+
+
+def wheel_speed_shift(limit: float) -> ModelParameter:
     """Lateness of imposed wheel speeds behind the inertial sensors, as a delay (negative where they come late).
 
     Args:
         limit: largest size [s]; the windows must keep as much drive before and after them.
-        prior: standard deviation [s]; encoder messages come at a few hertz and are stamped on arrival.
     """
-    return ModelParameter("wheel_speed_shift", "s", (), False, prior, 0.005, -limit, limit, shift=True)
+    return ModelParameter("wheel_speed_shift", "s", (), False, WHEEL_SPEED_LATENESS, 0.005, -limit, limit, shift=True)

@@ -15,7 +15,6 @@ from ddagr_gym.parameters import Drivetrain, Imu, Numerics, PoseReceiver, Robot,
 from ddagr_gym.physics import layout
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.effects.base import GROUPS
-from ddagr_gym.physics.terrain import SoilField
 from ddagr_gym.simulator import Simulator, build_row
 
 Array = NDArray[np.float64]
@@ -53,7 +52,6 @@ class WindowModel:
             samples, whatever the initial state says, and effects on commands and motors are left out.
         numerics: accuracy; ``Numerics.smooth()`` by default.
         threads: see :class:`Simulator`.
-        field: soil by place in world coordinates, instead of ``soil``.
         delay: by which the commands act late, besides the shift parameters [s]; negative where their clock is late.
     """
 
@@ -67,14 +65,12 @@ class WindowModel:
         imposed: bool = False,
         numerics: Numerics | None = None,
         threads: int = 1,
-        field: SoilField | None = None,
         delay: float = 0.0,
     ) -> None:
         self.windows = windows
         self.parameters = tuple(parameters)
         self._numerics = Numerics.smooth() if numerics is None else numerics
         self._threads = threads
-        self._field = field
         self._delay = delay
         self._imposed = imposed
         if imposed:
@@ -106,14 +102,9 @@ class WindowModel:
             entries: (K,) of :mod:`ddagr_gym.physics.layout`.
             effects: see there.
         """
-        fields = () if self._field is None else (self._field,)
         chosen = tuple(e for e in effects if not (self._imposed and e.group == _MOTORS))
-        simulator = Simulator(
-            self.windows.count, numerics=self._numerics, effects=chosen, threads=self._threads, fields=fields
-        )
+        simulator = Simulator(self.windows.count, numerics=self._numerics, effects=chosen, threads=self._threads)
         simulator.rows[:] = self._row
-        if self._field is not None:
-            simulator.field_index[:] = 0
         for parameter, value in zip(self.parameters, values, strict=True):
             parameter.apply(simulator.rows, float(value), self.windows.recording)
         delay = self._delays(values)

@@ -29,6 +29,12 @@ CHANNELS = (
 STATE = ("x", "y", "yaw", "v_x", "v_y", "yaw_rate", "omega_right", "omega_left")
 """Initial state of a window; the first three only shift the pose while the ground is the same everywhere."""
 
+_FARTHEST_SAMPLE = 0.6
+"""Time to the next wheel speed up to which one in between is interpolated [s] (ours: encoders that come at 1 Hz)."""
+
+_GUESS_ROWS = 12
+"""Rows to either side of a start from which its state is guessed (ours: poses at 5 Hz come every ten rows at 50 Hz)."""
+
 PERIOD_TOLERANCE = 0.02
 """Relative difference of sample periods that still counts as equal."""
 
@@ -258,8 +264,8 @@ def _bank_speeds(recording: Recording) -> Array:
     return np.stack([_interpolated(recording, name) for name in ("encoder_right", "encoder_left")], axis=1)
 
 
-def _interpolated(recording: Recording, name: str, gap: float = 0.6) -> Array:
-    """Channel with missing samples filled linearly inside spans; NaN beyond ``gap`` [s] from a sample."""
+def _interpolated(recording: Recording, name: str) -> Array:
+    """Channel with missing samples filled linearly inside spans; NaN far from a sample."""
     filled = np.full(len(recording), np.nan)
     for span in recording.spans():
         values, t = recording[name][span], recording.t[span]
@@ -268,7 +274,7 @@ def _interpolated(recording: Recording, name: str, gap: float = 0.6) -> Array:
             continue
         near = np.abs(t[:, None] - t[known][np.searchsorted(t[known], t).clip(1, known.sum() - 1)[:, None] + [-1, 0]])
         line = np.interp(t, t[known], values[known])
-        filled[span] = np.where(near.min(axis=1) <= gap, line, np.nan)
+        filled[span] = np.where(near.min(axis=1) <= _FARTHEST_SAMPLE, line, np.nan)
     return filled
 
 
@@ -318,9 +324,9 @@ def _guess(recording: Recording, row: int, drive: Array, wheel_radius: float, ha
     return np.nan_to_num(state)
 
 
-def _rows_near(row: int, span: tuple[int, int], reach: int = 12) -> slice:
-    """Rows of the span within ``reach`` of ``row``."""
-    return slice(max(span[0], row - reach), min(span[1], row + reach + 1))
+def _rows_near(row: int, span: tuple[int, int]) -> slice:
+    """Rows of the span near ``row``."""
+    return slice(max(span[0], row - _GUESS_ROWS), min(span[1], row + _GUESS_ROWS + 1))
 
 
 def _near(recording: Recording, name: str, row: int, rows: slice) -> float:

@@ -14,7 +14,8 @@ from ddagr_gym.api.nominal import nominal_from
 from ddagr_gym.cli import main, warnings_as_lines
 from ddagr_gym.diagnosis.gates.threshold_files import load_thresholds
 from ddagr_gym.diagnosis.gates.thresholds import NullRun, Origin, Thresholds
-from ddagr_gym.diagnosis.null_bank import bank as null_bank
+from ddagr_gym.diagnosis.null_bank.bank import NullBank
+from ddagr_gym.diagnosis.null_bank.structural_variants import KINDS
 from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.schema import Recording
@@ -26,16 +27,11 @@ def quick_nulls(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """Null runs that are drawn instead of simulated; the list grows by the number of each."""
     made: list[int] = []
 
-    def null_run(robot, soil, template, kind, setting, seed, *more, **options):  # type: ignore[no-untyped-def]
-        made.append(seed[-1])
-        return drawn(kind, list(seed), setting.duration)
+    def run(bank: NullBank, number: int) -> NullRun:
+        made.append(number)
+        return drawn(KINDS[number % len(KINDS)], [bank.seed, number], bank.setting.duration)
 
-    def scan_null_drives(robot, soil, recordings, kind, setting):  # type: ignore[no-untyped-def]
-        made.append(0)
-        return drawn(kind, [len(recordings)], setting.duration)
-
-    monkeypatch.setattr(null_bank, "null_run", null_run)
-    monkeypatch.setattr(null_bank, "scan_null_drives", scan_null_drives)
+    monkeypatch.setattr(NullBank, "run", run)
     return made
 
 
@@ -96,7 +92,7 @@ def test_thresholds_know_their_windows(quick_nulls: list[int], tmp_path: Path) -
 def test_windows_that_were_cut_shorter_are_those_that_are_kept(
     quick_nulls: list[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(null_bank, "null_run", lambda *given: drawn(given[3], list(given[5]), 5.0))
+    monkeypatch.setattr(NullBank, "run", lambda bank, number: drawn("plain", [number], 5.0))
     assert main([*words(tmp_path), "--window", "6"]) == 0
     found = load_thresholds(tmp_path / "thresholds.json")
     assert (found.duration, found.windows) == (5.0, 10.0)
@@ -232,11 +228,11 @@ def test_banks_of_given_drives_are_drawn_about_the_nominal_model_that_fits_them(
     about: list[Any] = []
     centre = (get_robot("ddagr"), get_soil("firm_ground"))
 
-    def null_run(robot, soil, template, kind, setting, seed, middle):  # type: ignore[no-untyped-def]
-        about.append(middle)
-        return drawn(kind, list(seed))
+    def run(bank: NullBank, number: int) -> NullRun:
+        about.append(bank.centre)
+        return drawn("plain", [number])
 
-    monkeypatch.setattr(null_bank, "null_run", null_run)
+    monkeypatch.setattr(NullBank, "run", run)
     monkeypatch.setattr("ddagr_gym.diagnosis.null_bank.fitted_nominal.fitted_nominal", lambda *given: centre)
     columns = {name: np.linspace(0.0, 1.0, 3000) for name in ("command_right", "command_left", "yaw_rate")}
     columns["t"] = 0.01 * np.arange(1, 3001)

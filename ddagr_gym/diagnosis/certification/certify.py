@@ -52,6 +52,9 @@ Flags = NDArray[np.bool_]
 STRIDE = 2.0
 """Between the starts of short forecasts [s]; those of the longest are 5 s apart."""
 
+_REFIT_STEPS = 2
+"""Gauss-Newton steps from the fit to all drives to that of some of them (ours: they lie close together)."""
+
 CLUSTER = 10.0
 """Time within which errors count as one when intervals are resampled [s], or the horizon where it is longer."""
 
@@ -105,14 +108,13 @@ def _time_fold(problem: Problem, middle: float, late: bool) -> Fold:
     return Fold(training, lambda f: of(f, late), lambda f: of(f, not late), frozenset())
 
 
-def refitted_on(problem: Problem, fitted: Fitted, fold: Fold, iterations: int = 2) -> Point:
+def refitted_on(problem: Problem, fitted: Fitted, fold: Fold) -> Point:
     """Nuisances and sizes from the fold's training windows, by steps from the fit to all of them.
 
     Args:
         problem: of all windows.
         fitted: to all of them; its sensitivities are kept.
         fold: what may be seen.
-        iterations: Gauss-Newton steps.
     """
     chosen = fold.training
     values = fitted.point.values.copy()
@@ -130,7 +132,7 @@ def refitted_on(problem: Problem, fitted: Fitted, fold: Fold, iterations: int = 
         window_cost=fitted.window_cost[chosen],
     )
     part = problem.subset(chosen).with_held_headings()
-    return fit(part, start, iterations=iterations, renewals=1, reuse=reuse).point
+    return fit(part, start, iterations=_REFIT_STEPS, renewals=1, reuse=reuse).point
 
 
 @dataclass(frozen=True, eq=False)

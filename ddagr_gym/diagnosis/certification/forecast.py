@@ -34,6 +34,9 @@ PAST = 2.0
 LAST = 0.5
 """Time before a horizon over which errors are averaged [s]: two poses at 5 Hz, and vibration averages out."""
 
+_STATE_STEPS = 2
+"""Gauss-Newton steps from the first guess of a state (ours: states act nearly linearly)."""
+
 SPEED_TIME = 1.0
 """Time over which a speed is taken from poses [s]."""
 
@@ -127,21 +130,22 @@ def past_elimination(forecasts: Forecasts, point: Point) -> Elimination:
     return past.eliminate(point, base, past.local_columns(point, base))
 
 
-def start_states(forecasts: Forecasts, point: Point, elimination: Elimination, steps: int = 2) -> Array:
+def start_states(forecasts: Forecasts, point: Point, elimination: Elimination) -> Array:
     """(W, 8) states at the starts, by Gauss-Newton on the readings before them.
+
+    A step that does not lower a window's cost is not taken there.
 
     Args:
         forecasts: where to start.
         point: model; its states do not count.
         elimination: of :func:`past_elimination` at this model or one like it.
-        steps: of Gauss-Newton; one that does not lower a window's cost is not taken.
     """
     past = forecasts.past
     here = replace(point, states=past.starts(point.values))
     readings, record = past.model.predict_recorded(here.values, here.states, STATE_ENTRIES, here.effects)
     residual = past.residual(here, readings)[..., None]
     cost, ends = _window_cost(elimination, residual), record[:, -1]
-    for _ in range(steps):
+    for _ in range(_STATE_STEPS):
         tried = replace(here, states=here.states + elimination.explain(residual)[:, : len(STATE), 0])
         readings, record = past.model.predict_recorded(tried.values, tried.states, STATE_ENTRIES, tried.effects)
         after = past.residual(tried, readings)[..., None]

@@ -18,6 +18,7 @@ from ddagr_gym.diagnosis.answer.location import Span
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.gauss_newton import Fitted
 from ddagr_gym.identification.least_squares import explained_by
+from ddagr_gym.identification.misfit import projected_residual
 from ddagr_gym.identification.problem import Problem
 
 Array = NDArray[np.float64]
@@ -95,21 +96,10 @@ def piece_length(problem: Problem) -> float:
     return float(np.count_nonzero(pieces_of(problem) == 0) * length * problem.blocked.windows.period)
 
 
-def projected_residual(problem: Problem, fitted: Fitted) -> Array:
-    """(W, M + S) weighted residual without what the windows' unknowns explain."""
-    raw = problem.residual(fitted.point, fitted.prediction)[..., None]
-    return np.asarray(fitted.elimination.project(raw)[..., 0])
-
-
 def as_it_stands(problem: Problem, nominal: Fitted) -> Fitted:
     """The nominal model before any refit, from the initial states that suit the refitted one."""
     point = replace(nominal.point, values=np.zeros(len(problem.prior)))
     return replace(nominal, point=point, prediction=problem.predict(point))
-
-
-def in_blocks(problem: Problem, values: Array) -> Array:
-    """(W, B, 8) of (W, M + S): without the rows of the priors."""
-    return values[:, : problem.blocked.mask.shape[1]].reshape(problem.blocked.sigma.shape)
 
 
 def score_processes(problem: Problem, fitted: Fitted) -> tuple[ScoreProcess, ...]:
@@ -122,16 +112,16 @@ def score_processes(problem: Problem, fitted: Fitted) -> tuple[ScoreProcess, ...
     if not fitted.point.effects:
         return ()
     pieces = pieces_of(problem)
-    left = in_blocks(problem, projected_residual(problem, fitted))
+    left = problem.blocked.by_channel(projected_residual(problem, fitted))
     without = _without_nuisances(problem, fitted)
     found = []
     for number, effect in enumerate(fitted.point.effects):
         column = _effect_column(problem, fitted, number)
         own = fitted.elimination.project(problem.padded(column[..., None]))[..., 0]
-        moved = in_blocks(problem, without(own))
+        moved = problem.blocked.by_channel(without(own))
         information = by_piece(moved**2, pieces)
         beside = by_piece(left * moved, pieces)
-        gain, acts = beside + 0.5 * information, by_piece(in_blocks(problem, own) ** 2, pieces)
+        gain, acts = beside + 0.5 * information, by_piece(problem.blocked.by_channel(own) ** 2, pieces)
         found.append(ScoreProcess(effect.name, beside + information, information, gain, beside, acts))
     return tuple(found)
 

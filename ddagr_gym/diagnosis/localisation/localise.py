@@ -81,7 +81,7 @@ def rough(misfit: Mapping[str, float]) -> list[str]:
 
 def samples(problem: Problem) -> dict[str, float]:
     """Block means of each channel, and windows of each local variation."""
-    count = problem.blocked.mask.reshape(problem.blocked.sigma.shape).sum(axis=(0, 1))
+    count = problem.blocked.by_channel(problem.blocked.mask).sum(axis=(0, 1))
     found = {name: float(count[k]) for k, name in enumerate(CHANNELS) if count[k] > 0}
     return found | dict.fromkeys(LOCAL, float(problem.blocked.windows.count))
 

@@ -11,10 +11,8 @@ from ddagr_gym.diagnosis.localisation.effect_timeline import (
     ScoreProcess,
     as_it_stands,
     by_piece,
-    in_blocks,
     piece_length,
     pieces_of,
-    projected_residual,
     score_processes,
 )
 from ddagr_gym.diagnosis.localisation.operating_conditions import Pieces
@@ -23,6 +21,7 @@ from ddagr_gym.diagnosis.preprocessing.session import DiagnosisSession
 from ddagr_gym.diagnosis.search.scanned_model import SearchResult
 from ddagr_gym.frames import wrap_angle
 from ddagr_gym.identification.gauss_newton import Fitted
+from ddagr_gym.identification.misfit import projected_residual
 from ddagr_gym.identification.problem import Problem
 from ddagr_gym.physics import layout
 
@@ -65,7 +64,7 @@ def trace_mismatch(session: DiagnosisSession, found: SearchResult) -> MismatchTr
         piece_values(problem, chosen),
         score_processes(problem, chosen),
         residual_wrench(problem, raw, chosen, found.chosen.dispersion),
-        *(in_blocks(problem, projected_residual(problem, model)) for model in (raw, nominal, chosen)),
+        *(problem.blocked.by_channel(projected_residual(problem, model)) for model in (raw, nominal, chosen)),
     )
 
 

@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.diagnosis.localisation.effect_timeline import projected_residual
 from ddagr_gym.identification.gauss_newton import Fitted
+from ddagr_gym.identification.misfit import projected_residual
 from ddagr_gym.identification.problem import Problem
 from ddagr_gym.physics.effects.base import Effect, Vector, size
 from ddagr_gym.physics.layout import BODY_FORCE, POINT_BODY_FORCES

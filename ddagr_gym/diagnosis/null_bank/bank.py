@@ -10,14 +10,17 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ddagr_gym.diagnosis.gates.source_digest import source_digest
 from ddagr_gym.diagnosis.gates.thresholds import NullRun
 from ddagr_gym.diagnosis.null_bank.drives import Template, null_recordings
 from ddagr_gym.diagnosis.null_bank.standard_drives import standard_template
+from ddagr_gym.diagnosis.null_bank.structural_variants import KINDS
 from ddagr_gym.diagnosis.preprocessing.input_requirements import content_hash
 from ddagr_gym.diagnosis.search.gains import Gain
 from ddagr_gym.diagnosis.search.initial_guess import first_guess
@@ -33,99 +36,83 @@ from ddagr_gym.recordings.schema import Recording
 Array = NDArray[np.float64]
 
 
-def null_run(
-    robot: Robot,
-    soil: Soil,
-    template: Template | None,
-    kind: str,
-    setting: Setting,
-    seed: Sequence[int],
-    centre: tuple[Robot, Soil] | None = None,
-) -> NullRun:
-    """Refit and scan of one null world.
+@dataclass(frozen=True, eq=False)
+class NullBank:
+    """Drives in which nothing is missing, and how they are scanned: one null run each.
 
-    Args:
+    Attributes:
         robot: nominal.
         soil: nominal.
-        template: see :func:`null_recordings`; None draws drives of its own
-            (:mod:`ddagr_gym.diagnosis.null_bank.standard_drives`).
-        kind: of KINDS.
         setting: of the diagnosis.
-        seed: of this run alone.
+        drives: what each run drives: the template of simulated drives, None for drives that are drawn
+            (:mod:`ddagr_gym.diagnosis.null_bank.standard_drives`), or a real drive that is known to be ordinary.
+        seed: of all runs.
         centre: robot and soil about which worlds are drawn: the nominal ones by default, those fitted to the recordings
             for a bootstrap of the fitted nominal simulator.
     """
-    rng = np.random.default_rng(list(seed))
-    if template is None:
-        template = standard_template(robot, rng)
-    drives = null_recordings(*((robot, soil) if centre is None else centre), template, kind, rng)
-    return scan_null_drives(robot, soil, drives, kind, setting)
 
+    robot: Robot
+    soil: Soil
+    setting: Setting
+    drives: tuple[Template | Recording | None, ...]
+    seed: int = 0
+    centre: tuple[Robot, Soil] | None = None
 
-def scan_null_drives(robot: Robot, soil: Soil, recordings: Sequence[Recording], kind: str, setting: Setting) -> NullRun:
-    """Refit and scan of drives in which nothing is missing.
+    def run(self, number: int) -> NullRun:
+        """Refit and scan of one null world, or of one ordinary drive.
 
-    Args:
-        robot: nominal.
-        soil: nominal.
-        recordings: null drives of one world, or (pieces of) real drives that are known to be ordinary.
-        kind: of KINDS, or the name of the real drive.
-        setting: of the diagnosis.
-    """
-    problem = make_problem(robot, soil, recordings, setting)
-    raw, refitted = refit_nominal(problem)
-    model = scan_model(problem, refitted)
-    best = best_gains(scans_of(problem, model, raw))
-    return NullRun(
-        kind,
-        {name: gain.gain for name, (gain, _) in best.items()},
-        {name: scan_.scores[name] for name, (_, scan_) in best.items()},
-        {name: scan_.held_out[name] for name, (_, scan_) in best.items()},
-        model.misfit,
-        problem.blocked.windows.count,
-        tuple(name for name, (gain, scan_) in best.items() if not _is_meaningful(problem, gain, scan_)),
-        problem.blocked.windows.duration,
-    )
+        Args:
+            number: of the drive; simulated worlds go through all kinds in turn.
+        """
+        drive = self.drives[number]
+        if isinstance(drive, Recording):
+            return self.scan([drive], f"real {Path(drive.meta.source).name}")
+        kind, rng = KINDS[number % len(KINDS)], np.random.default_rng([self.seed, number])
+        template = standard_template(self.robot, rng) if drive is None else drive
+        robot, soil = (self.robot, self.soil) if self.centre is None else self.centre
+        return self.scan(null_recordings(robot, soil, template, kind, rng), kind)
+
+    def scan(self, recordings: Sequence[Recording], kind: str) -> NullRun:
+        """Refit and scan of drives of one world.
+
+        Args:
+            recordings: null drives of one world, or (pieces of) real drives that are known to be ordinary.
+            kind: of KINDS, or the name of the real drive.
+        """
+        problem = make_problem(self.robot, self.soil, recordings, self.setting)
+        raw, refitted = refit_nominal(problem)
+        model = scan_model(problem, refitted)
+        best = best_gains(scans_of(problem, model, raw))
+        return NullRun(
+            kind,
+            {name: gain.gain for name, (gain, _) in best.items()},
+            {name: scan_.scores[name] for name, (_, scan_) in best.items()},
+            {name: scan_.held_out[name] for name, (_, scan_) in best.items()},
+            model.misfit,
+            problem.blocked.windows.count,
+            tuple(name for name, (gain, scan_) in best.items() if not _is_meaningful(problem, gain, scan_)),
+            problem.blocked.windows.duration,
+        )
+
+    def key(self) -> str:
+        """Hash of everything that the bank depends on, the sources of the diagnosis and the simulator included."""
+        template = next((drive for drive in self.drives if isinstance(drive, Template)), None)
+        digest = hashlib.sha256(source_digest().encode())
+        noise = [None if n is None else asdict(n) for n in template.noise] if template else []
+        period, starts = (template.period, template.starts) if template else (0.0, ())
+        nominal = [repr(self.robot), repr(self.soil), repr(self.setting)]
+        texts = [*nominal, noise, period, starts, len(self.drives), self.seed]
+        digest.update(json.dumps(texts, sort_keys=True).encode())
+        digest.update(b"" if self.centre is None else repr(self.centre).encode())
+        for values in (*template.commands, *template.present) if template else ():
+            digest.update(np.ascontiguousarray(values).tobytes())
+        for drive in self.drives:
+            if isinstance(drive, Recording):
+                digest.update(f"{content_hash(drive)}{drive.meta.segments}{drive.meta.spans}".encode())
+        return digest.hexdigest()
 
 
 def _is_meaningful(problem: Problem, gain: Gain, scan_: ScannedModel) -> bool:
     """Whether a scan puts an effect at its least meaningful size or above."""
     guess = first_guess(scan_.terms.candidates[gain.candidate], gain.multiples)
     return guess.is_meaningful(drive_extent(problem, scan_.fitted.prediction))
-
-
-def bank_hash(
-    robot: Robot,
-    soil: Soil,
-    template: Template | None,
-    setting: Setting,
-    count: int,
-    seed: int,
-    centre: tuple[Robot, Soil] | None = None,
-    pieces: Sequence[Recording] = (),
-) -> str:
-    """Hash of everything that a bank depends on, the sources of the diagnosis and the simulator included.
-
-    Args:
-        robot: nominal.
-        soil: nominal.
-        template: of the null drives; None where they are drawn or real.
-        setting: of the diagnosis.
-        count: of null runs.
-        seed: of the bank.
-        centre: see :func:`null_run`.
-        pieces: of real drives that are known to be ordinary, where they are the null runs.
-    """
-    from ddagr_gym.diagnosis.gates.source_digest import source_digest
-
-    digest = hashlib.sha256(source_digest().encode())
-    noise = [None if n is None else asdict(n) for n in template.noise] if template else []
-    period, starts = (template.period, template.starts) if template else (0.0, ())
-    text = json.dumps([repr(robot), repr(soil), repr(setting), noise, period, starts, count, seed], sort_keys=True)
-    digest.update(text.encode())
-    digest.update(b"" if centre is None else repr(centre).encode())
-    for values in (*template.commands, *template.present) if template else ():
-        digest.update(np.ascontiguousarray(values).tobytes())
-    for piece in pieces:
-        digest.update(f"{content_hash(piece)}{piece.meta.segments}{piece.meta.spans}".encode())
-    return digest.hexdigest()

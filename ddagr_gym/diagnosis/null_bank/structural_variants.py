@@ -153,6 +153,10 @@ KINDS = (
 """Structural kinds, in the order in which a bank goes through them."""
 
 
+_SPACING = 0.25
+"""Of the nodes of a field [m] (ours: half the shortest correlation length)."""
+
+
 @dataclass(frozen=True, eq=False)
 class NullWorld:
     """A simulator in which nothing is missing that has a name.
@@ -223,14 +227,14 @@ def _other(soil: Soil, rng: np.random.Generator) -> Soil:
     )
 
 
-def _field(soil: Soil, reach: float, spread: float, rng: np.random.Generator, spacing: float = 0.25) -> SoilField:
+def _field(soil: Soil, reach: float, spread: float, rng: np.random.Generator) -> SoilField:
     """Strength and stiffness as smooth random fields, correlated over 0.5 to 3 m."""
     from scipy.ndimage import gaussian_filter
 
-    nodes = int(2.0 * reach / spacing) + 2
+    nodes = int(2.0 * reach / _SPACING) + 2
     values = np.broadcast_to(soil_vector(soil), (nodes, nodes, 9)).copy()
     for entries, times in (((0, 1), 1.0), ((3, 4), 1.5)):
-        smooth = gaussian_filter(rng.standard_normal((nodes, nodes)), rng.uniform(0.5, 3.0) / spacing)
+        smooth = gaussian_filter(rng.standard_normal((nodes, nodes)), rng.uniform(0.5, 3.0) / _SPACING)
         factor = np.exp(times * spread * smooth / smooth.std())
         values[..., list(entries)] *= factor[..., None]
-    return SoilField((-reach, -reach), (spacing, spacing), values)
+    return SoilField((-reach, -reach), (_SPACING, _SPACING), values)

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -25,6 +25,7 @@ from ddagr_gym.control.manoeuvres import Manoeuvre
 from ddagr_gym.diagnosis.gates.thresholds import LEVEL, Gate, Thresholds
 from ddagr_gym.diagnosis.planning.planned_drive import plan, with_room
 from ddagr_gym.diagnosis.result.detectable import Detectable, detectable, least_multiple
+from ddagr_gym.diagnosis.result.files import finite_or_null
 from ddagr_gym.diagnosis.search.candidates import Candidate
 from ddagr_gym.diagnosis.search.inner_products import Terms
 from ddagr_gym.diagnosis.search.scan import scan
@@ -88,7 +89,7 @@ class Isolability:
 
     def as_mapping(self) -> dict[str, Any]:
         """As it stands in ``isolability.json``; what cannot be seen or told apart is null."""
-        return {
+        mapping = {
             "schema": SCHEMA,
             "robot": self.robot,
             "soil": self.soil,
@@ -98,17 +99,7 @@ class Isolability:
             "gates": self.gates,
             "effects": {
                 name: {
-                    "detectable": [
-                        {
-                            "field": item.field,
-                            "unit": item.unit,
-                            "least_meaningful": item.least_meaningful,
-                            "size": _finite(item.size),
-                            "multiples": _finite(item.multiples),
-                        }
-                        for item in self.detectable
-                        if item.effect == name
-                    ],
+                    "detectable": [_entry(item) for item in self.detectable if item.effect == name],
                     "confused_with": list(self.confused(name)),
                 }
                 for name in self.effects
@@ -116,15 +107,17 @@ class Isolability:
             "isolability": _pairs(self.effects, self.share),
             "told_apart_from_multiples": _pairs(self.effects, self.apart),
         }
+        return {key: finite_or_null(value) for key, value in mapping.items()}
 
 
-def _finite(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None
+def _entry(item: Detectable) -> dict[str, Any]:
+    """A size without the effect that it belongs to."""
+    return {key: value for key, value in asdict(item).items() if key != "effect"}
 
 
-def _pairs(names: Sequence[str], table: Sequence[Sequence[float]]) -> dict[str, dict[str, float | None]]:
+def _pairs(names: Sequence[str], table: Sequence[Sequence[float]]) -> dict[str, dict[str, float]]:
     return {
-        row: {column: _finite(value) for column, value in zip(names, values, strict=True) if column != row}
+        row: {column: value for column, value in zip(names, values, strict=True) if column != row}
         for row, values in zip(names, table, strict=True)
     }
 
@@ -191,8 +184,8 @@ def isolability(
     )
 
 
-def chance_gates(terms: Terms, level: float = LEVEL) -> Thresholds:
-    """Gates that pure normal noise passes in any effect with probability ``level``, no null bank needed.
+def chance_gates(terms: Terms) -> Thresholds:
+    """Gates that pure normal noise passes in any effect with probability :data:`LEVEL`, no null bank needed.
 
     Twice the gain of an effect with k probes is at most chi-square distributed with k degrees of freedom; the level is
     divided among the effects by Sidak's rule. Real drives need the wider gates of a null bank.
@@ -201,9 +194,9 @@ def chance_gates(terms: Terms, level: float = LEVEL) -> Thresholds:
 
     names = list(dict.fromkeys(c.name for c in terms.candidates))
     probes = {name: sum(len(c.columns) for c in terms.candidates if c.name == name) for name in names}
-    quantile = (1.0 - level) ** (1.0 / len(names))
+    quantile = (1.0 - LEVEL) ** (1.0 / len(names))
     gates = {name: Gate(0.5 * float(chi2.ppf(quantile, probes[name])), 0.0) for name in names}
-    return Thresholds(gates, {}, 0, CHANCE, level)
+    return Thresholds(gates, {}, 0, CHANCE)
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ddagr_gym.diagnosis.result.uncertainty import DRAWS
 from ddagr_gym.diagnosis.search.scanned_model import Rival, SearchResult
 from ddagr_gym.identification.size_prior import implausibility
 
@@ -20,9 +21,7 @@ FORM = 0.08
 """Share of its gain that an effect may lose because the library's form of it is not the robot's (ours)."""
 
 
-def equivalence_weights(
-    rivals: Sequence[Rival], dispersion: float, rng: np.random.Generator, draws: int = 400
-) -> dict[str, float]:
+def equivalence_weights(rivals: Sequence[Rival], dispersion: float, rng: np.random.Generator) -> dict[str, float]:
     """Weight of each rival as the better explanation, averaged over resamplings of the windows.
 
     Theory: diagnosis, eq. (9).
@@ -35,7 +34,6 @@ def equivalence_weights(
         rivals: joint refits of one step of the search, best first.
         dispersion: of the model before.
         rng: of the resampling.
-        draws: how often.
 
     Returns:
         Weights that add up to 1, of the first rival and of all with :data:`LEAST_WEIGHT`.
@@ -44,7 +42,7 @@ def equivalence_weights(
     priors = np.array([rival.fitted.cost for rival in rivals]) - windows.sum(axis=1)
     unusual = np.array([implausibility(rival.fitted.point.effects[-1]) for rival in rivals])
     count = windows.shape[1]
-    counts = rng.multinomial(count, np.full(count, 1.0 / count), size=draws).astype(float)
+    counts = rng.multinomial(count, np.full(count, 1.0 / count), size=DRAWS).astype(float)
     form = max(FORM * rivals[0].gain, 1.0)
     costs = (counts @ windows.T + priors) / dispersion / form + unusual
     relative = np.exp(costs.min(axis=1, keepdims=True) - costs)

@@ -31,18 +31,18 @@ def as_mapping(diagnosis: Diagnosis) -> dict[str, Any]:
 
 def plain(value: Any) -> dict[str, Any]:
     """Frozen dataclass of a diagnosis as JSON knows it: mappings, lists, texts and finite numbers."""
-    mapping: dict[str, Any] = json.loads(json.dumps(_finite(asdict(value))))
+    mapping: dict[str, Any] = json.loads(json.dumps(finite_or_null(asdict(value))))
     return mapping
 
 
-def _finite(value: Any) -> Any:
+def finite_or_null(value: Any) -> Any:
     """Infinite and undefined numbers as None, which JSON can hold."""
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, Mapping):
-        return {str(key): _finite(item) for key, item in value.items()}
+        return {str(key): finite_or_null(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
+        return [finite_or_null(item) for item in value]
     return value
 
 

@@ -98,27 +98,17 @@ def moved_field(probe: Effect) -> tuple[str, Mapping[str, Any], float]:
 
 def _one_sided(probe: Effect) -> bool:
     """Whether neutral lies at a bound of the size that the probe moves."""
-    for name in probe.size_names():
-        data = probe.parameter(name).metadata
-        if getattr(probe, name) != data["neutral"]:
-            return bool(data["neutral"] in (data["low"], data["high"]) or not probe.differentiable)
-    return False
+    _, data, _ = moved_field(probe)
+    return bool(data["neutral"] in (data["low"], data["high"]) or not probe.differentiable)
 
 
 def _scale(probe: Effect) -> float:
     """Standard deviation of a probe's multiple; infinite for an effect without a derivative."""
-    for name in probe.size_names():
-        away = getattr(probe, name) - probe.parameter(name).metadata["neutral"]
-        if away != 0.0 and probe.differentiable:
-            return float(size_scale(probe, name) / abs(away))
-    return np.inf
+    name, _, away = moved_field(probe)
+    return float(size_scale(probe, name) / abs(away)) if probe.differentiable else np.inf
 
 
 def _whole(probe: Effect) -> float:
     """Multiple that takes a categorical probe to its bound."""
-    for name in probe.size_names():
-        data = probe.parameter(name).metadata
-        moved = getattr(probe, name) - data["neutral"]
-        if moved != 0.0:
-            return float((data["high"] - data["neutral"]) / moved)
-    return 1.0
+    _, data, away = moved_field(probe)
+    return float((data["high"] - data["neutral"]) / away)

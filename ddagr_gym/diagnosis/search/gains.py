@@ -13,6 +13,13 @@ from ddagr_gym.diagnosis.search.inner_products import Reduced, Terms
 
 Array = NDArray[np.float64]
 
+_FOLDS = 4
+"""Parts of the drives that are left out in turn (ours: three quarters of a drive show nearly what all of it does)."""
+
+_STRETCH = 6.0
+"""Length of the stretches that are dealt out to the parts [s] (ours: three short windows, so that a part that is left
+out is not known from its neighbours)."""
+
 
 @dataclass(frozen=True)
 class Gain:
@@ -113,13 +120,13 @@ def scores(terms: Terms, gains_: Sequence[Gain]) -> dict[str, float]:
     return result
 
 
-def fold_of(terms: Terms, folds: int, length: float) -> NDArray[np.int64]:
-    """(W,) fold of each window: stretches of ``length`` [s] of every recording are dealt out in turn."""
-    stretch = np.floor(terms.time / length).astype(np.int64)
-    return np.asarray((stretch + terms.recording) % folds)
+def _fold_of(terms: Terms) -> NDArray[np.int64]:
+    """(W,) fold of each window: stretches of every recording are dealt out in turn."""
+    stretch = np.floor(terms.time / _STRETCH).astype(np.int64)
+    return np.asarray((stretch + terms.recording) % _FOLDS)
 
 
-def held_out_gains(terms: Terms, dispersion: float = 1.0, folds: int = 4, length: float = 6.0) -> dict[str, float]:
+def held_out_gains(terms: Terms, dispersion: float = 1.0) -> dict[str, float]:
     """Fall of the cost on windows that were left out while multiples and nuisances were fitted, by effect.
 
     Theory: diagnosis, section 4.
@@ -127,19 +134,17 @@ def held_out_gains(terms: Terms, dispersion: float = 1.0, folds: int = 4, length
     Args:
         terms: of a scan.
         dispersion: see :func:`best_multiples`.
-        folds: parts.
-        length: of the stretches that are dealt out to the parts [s].
     """
-    fold = fold_of(terms, folds, length)
+    fold = _fold_of(terms)
     total: dict[str, float] = {}
-    for part in range(folds):
+    for part in range(_FOLDS):
         outside = (fold != part).astype(float)
         if not outside.any() or outside.all():
             continue
         reduced = terms.reduced(outside)
         inside = terms.normals[fold == part].sum(axis=0)
         for gain in gains(terms, outside):
-            change = _held_out(terms, reduced, inside, gain, 1.0 / folds)
+            change = _held_out(terms, reduced, inside, gain, 1.0 / _FOLDS)
             total[gain.name] = total.get(gain.name, 0.0) + change / dispersion
     return total
 

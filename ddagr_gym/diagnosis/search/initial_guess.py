@@ -61,11 +61,8 @@ def first_guess(candidate: Candidate, multiples: Sequence[float]) -> Effect:
 def _whole(candidate: Candidate) -> Effect:
     """A categorical probe taken to its bound."""
     probe = candidate.probes[0]
-    moved = {}
-    for name in probe.size_names():
-        data = probe.parameter(name).metadata
-        if getattr(probe, name) != data["neutral"]:
-            moved[name] = data["high"]
+    fields = {name: probe.parameter(name).metadata for name in probe.size_names()}
+    moved = {name: data["high"] for name, data in fields.items() if getattr(probe, name) != data["neutral"]}
     return probe.with_values(**moved)
 
 

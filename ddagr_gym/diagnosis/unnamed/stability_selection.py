@@ -110,8 +110,6 @@ def select(
     worth: Callable[[Sequence[int]], float] | None = None,
     least: float = 0.0,
     most: int = 4,
-    stable: float = STABLE,
-    bound: float = FALSE_SELECTIONS,
 ) -> list[Stable]:
     """Stable columns, one after the other: of those that are stable the one that is worth most.
 
@@ -124,13 +122,11 @@ def select(
         worth: of columns together; without it all stable ones are kept.
         least: by which each column must raise the worth, when it is found and beside those found later.
         most: columns to find.
-        stable: share of the halves.
-        bound: of the expected number of false selections of each search.
     """
     found: list[Stable] = []
     while len(found) < most:
         taken = [item.column for item in found]
-        near = _search(sums, taken, plainness, rng, stable, bound)
+        near = _search(sums, taken, plainness, rng)
         if worth is not None:
             rise = {item.column: worth([*taken, item.column]) - worth(taken) for item in near}
             near = sorted((item for item in near if rise[item.column] >= least), key=lambda item: -rise[item.column])
@@ -160,9 +156,7 @@ def _settled(
     return found
 
 
-def _search(
-    sums: Sums, taken: list[int], plainness: Sequence[int], rng: np.random.Generator, stable: float, bound: float
-) -> list[Stable]:
+def _search(sums: Sums, taken: list[int], plainness: Sequence[int], rng: np.random.Generator) -> list[Stable]:
     """Stable clusters beside columns that were taken before, the most stable first."""
     count = sums.normals.shape[1] - 1 - sums.nuisances
     rest = [k for k in range(count) if k not in taken]
@@ -177,10 +171,10 @@ def _search(
     reduced = beside.reduced()
     member = clusters(reduced.information)
     front = _fronts(reduced, member, [plainness[k] for k in columns])
-    shares = _shares(sums.chosen([columns[k] for k in front], taken), rng, stable, bound)
+    shares = _shares(sums.chosen([columns[k] for k in front], taken), rng)
     found = []
     for k in np.argsort(-shares, kind="stable"):
-        if shares[k] >= stable:
+        if shares[k] >= STABLE:
             alike = tuple(columns[m] for m in np.flatnonzero(member == member[front[k]]))
             found.append(Stable(columns[front[k]], alike, float(shares[k])))
     return found
@@ -197,10 +191,10 @@ def _fronts(reduced: Reduced, member: NDArray[np.int64], plainness: Sequence[int
     return front
 
 
-def _shares(sums: Sums, rng: np.random.Generator, stable: float, bound: float) -> Array:
+def _shares(sums: Sums, rng: np.random.Generator) -> Array:
     """(K,) share of the halves in which each column is among the first that the Lasso takes."""
     groups, count = len(sums.normals), sums.normals.shape[1] - 1 - sums.nuisances
-    take = max(int(np.sqrt(bound * (2.0 * stable - 1.0) * count)), 1)
+    take = max(int(np.sqrt(FALSE_SELECTIONS * (2.0 * STABLE - 1.0) * count)), 1)
     votes = np.zeros(count)
     for _ in range(_PAIRS):
         order = rng.permutation(groups)

@@ -171,21 +171,16 @@ def _ceiling(
     """The better of the whole library at once, shrunk, and boosted trees on each channel."""
     everything = list(range(sums.normals.shape[1] - 1 - sums.nuisances))
     ridge = max(held_out_share(sums, everything, by_group, ridge=r) for r in _RIDGES)
-    sigma = problem.blocked.sigma
-    residual = projected[:, : sigma.shape[1] * sigma.shape[2], 0].reshape(sigma.shape)
-    return max(ridge, boosted_share(residual, np.isfinite(sigma), motion, fold), 0.0)
+    residual = problem.blocked.by_channel(projected[..., 0])
+    return max(ridge, boosted_share(residual, np.isfinite(problem.blocked.sigma), motion, fold), 0.0)
 
 
 def _where(
     problem: Problem, sums: Sums, projected: Array, columns: Array, motion: Motion, chosen: Sequence[int]
 ) -> str:
     """Operating condition in which the terms act most, or in which most is left where there is none."""
-    shape = problem.blocked.sigma.shape
-    if chosen:
-        acting = columns[..., np.asarray(chosen)] @ coefficients(sums, chosen)
-    else:
-        acting = projected[:, : shape[1] * shape[2], 0]
-    energy = (acting.reshape(shape) ** 2).sum(axis=2)
+    acting = columns[..., np.asarray(chosen)] @ coefficients(sums, chosen) if chosen else projected[..., 0]
+    energy = (problem.blocked.by_channel(acting) ** 2).sum(axis=2)
     return concentration_of(energy, motion, problem.blocked.windows.recording).words
 
 

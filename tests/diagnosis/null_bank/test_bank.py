@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from ddagr_gym.diagnosis.null_bank import bank as null_bank
-from ddagr_gym.diagnosis.null_bank.bank import bank_hash, scan_null_drives
+from ddagr_gym.diagnosis.null_bank.bank import NullBank
 from ddagr_gym.diagnosis.null_bank.drives import Template
 from ddagr_gym.diagnosis.null_bank.ordinary_drives import pieces_of
 from ddagr_gym.diagnosis.search import rivals
@@ -30,7 +30,7 @@ def drive(seconds: float, yaw_rate: float = 0.1) -> Recording:
 
 
 def hash_of(template: Template | None = None, pieces: Sequence[Recording] = ()) -> str:
-    return bank_hash(ROBOT, SOIL, template, Setting(), 20, 0, None, pieces)
+    return NullBank(ROBOT, SOIL, Setting(), tuple(pieces) or (template,) * 20).key()
 
 
 def test_ordinary_pieces_are_hashed_with_their_readings_and_segments() -> None:
@@ -85,7 +85,7 @@ def test_a_null_run_keeps_the_length_of_the_windows_that_were_cut(
     quick_scan: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     nominal_is(monkeypatch, model_of(1.0))
-    run = scan_null_drives(ROBOT, SOIL, [drive(40.0)], "plain", Setting().with_windows(6.0))
+    run = NullBank(ROBOT, SOIL, Setting().with_windows(6.0), (drive(40.0),)).run(0)
     assert run.duration == pytest.approx(5.0)
     assert run.windows * run.duration == pytest.approx(40.0, rel=0.15)
 
@@ -97,8 +97,8 @@ def test_a_null_run_that_bends_the_nominal_model_counts_the_raw_one_too(
     bent = model_of(3.0, meaningful=False, dispersion=2.0 * FAR_OFF)
     nominal_is(monkeypatch, bent)
     monkeypatch.setattr(rivals, "scan_model", lambda problem, raw: model_of(70.0))
-    run = scan_null_drives(ROBOT, SOIL, [drive(40.0)], "plain", Setting())
+    run = NullBank(ROBOT, SOIL, Setting(), (drive(40.0),)).run(0)
     assert (run.gains, run.held_out, run.meaningless) == ({"slope": 70.0}, {"slope": 7.0}, ())
     monkeypatch.setattr(rivals, "scan_model", lambda problem, raw: model_of(2.0))
-    run = scan_null_drives(ROBOT, SOIL, [drive(40.0)], "plain", Setting())
+    run = NullBank(ROBOT, SOIL, Setting(), (drive(40.0),)).run(0)
     assert (run.gains, run.meaningless) == ({"slope": 3.0}, ("slope",))

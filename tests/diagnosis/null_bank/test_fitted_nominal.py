@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ddagr_gym.diagnosis.null_bank import fitted_nominal as module
-from ddagr_gym.diagnosis.null_bank.bank import bank_hash
+from ddagr_gym.diagnosis.null_bank.bank import NullBank
 from ddagr_gym.diagnosis.null_bank.drives import null_recordings, template_of
 from ddagr_gym.diagnosis.null_bank.fitted_nominal import fitted_nominal, with_values
 from ddagr_gym.diagnosis.setting import Setting
@@ -50,6 +50,8 @@ def test_null_drives_are_drawn_about_the_fit(drive: Callable[..., Recording], mo
     )
     first = int(0.2 / recording.period)
     assert slow["encoder_right"][first] < 0.95 * usual["encoder_right"][first]
-    hashes = {bank_hash(ROBOT, SOIL, template, setting, 20, 0, about) for about in (None, centre, (ROBOT, SOIL))}
+    hashes = {
+        NullBank(ROBOT, SOIL, setting, (template,) * 20, 0, about).key() for about in (None, centre, (ROBOT, SOIL))
+    }
     assert len(hashes) == 3
     assert module.with_values(ROBOT, SOIL, {}) == (ROBOT, SOIL)
