@@ -41,6 +41,7 @@ from ddagr_gym.envs.registration import register_environments
 from ddagr_gym.version import __version__
 
 if TYPE_CHECKING:
+    from ddagr_gym.api.calibrate import CalibrationResult, calibrate
     from ddagr_gym.api.check import CheckResult, check
     from ddagr_gym.api.diagnose import diagnose
     from ddagr_gym.api.diagnosis_result import DiagnosisResult
@@ -52,6 +53,7 @@ if TYPE_CHECKING:
     from ddagr_gym.api.simulate import SimulationResult, simulate
 
 __all__ = [
+    "CalibrationResult",
     "CheckResult",
     "DiagnosisResult",
     "EstimateResult",
@@ -60,6 +62,7 @@ __all__ = [
     "ReplayResult",
     "SimulationResult",
     "__version__",
+    "calibrate",
     "check",
     "diagnose",
     "estimate",
@@ -72,6 +75,7 @@ __all__ = [
 ]
 
 _MODULES = {
+    "CalibrationResult": "calibrate",
     "CheckResult": "check",
     "DiagnosisResult": "diagnosis_result",
     "EstimateResult": "estimate",
@@ -79,6 +83,7 @@ _MODULES = {
     "NextDriveResult": "next_drive",
     "ReplayResult": "replay",
     "SimulationResult": "simulate",
+    "calibrate": "calibrate",
     "check": "check",
     "diagnose": "diagnose",
     "estimate": "estimate",

@@ -19,6 +19,7 @@ from ddagr_gym.progress import counting
 from ddagr_gym.recordings.schema import Recording
 
 if TYPE_CHECKING:
+    from ddagr_gym.physics.effects import Effect
     from ddagr_gym.replay_analysis.report import HorizonError, ReplayReport
     from ddagr_gym.replay_analysis.run import RunResult
 
@@ -88,9 +89,11 @@ class ReplayResult(Report):
 def replay(
     recordings: Sources,
     robot: RobotLike | None = None,
-    soil: SoilLike = "thesis_a1",
+    soil: SoilLike | None = None,
     *,
     effects: EffectsLike = (),
+    calibration: str | os.PathLike[str] | None = None,
+    ground: str = "",
     window: float = 2.0,
     refit: bool = False,
     together: bool = False,
@@ -108,8 +111,10 @@ def replay(
     Args:
         recordings: one or several recordings, tables with the schema's columns, paths of files or folders.
         robot: that drove: name, YAML file or object; the recordings' own when it is None.
-        soil: nominal: name, YAML file or object.
+        soil: nominal: name, YAML file or object; thesis_a1 when it is None and there is no calibration.
         effects: missing physics to add: ``name=size`` texts, objects (``result.effects`` of a diagnosis) or a file.
+        calibration: folder that ``ddagr calibrate`` wrote, whose robot, soil and sensors are taken as they are.
+        ground: of the calibration; may be left out where it has only one.
         window: length of the windows with free initial states [s].
         refit: fit soil and uncertain robot parameters.
         together: let all recordings share one set of fitted parameters; otherwise each is fitted on its own.
@@ -138,14 +143,34 @@ def replay(
     from ddagr_gym.replay_analysis.run import make_report, replay_run, steps
 
     at_least(threads=(threads, 1), seed=(seed, 0))
-    ground, added = soil_from(soil), load_effects(effects)
+    if calibration is not None:
+        robot, soil, known = _calibrated(Path(calibration), ground, robot, soil)
+        effects = (*known, *load_effects(effects))
+    elif ground:
+        raise InputError(f"the ground is {ground!r} and there is no calibration: name its folder with --calibration.")
+    soil = "thesis_a1" if soil is None else soil
+    added = load_effects(effects)
     found = recordings_from(recordings, robot, column_map)
     nominal = driven_robot(robot, found)
     settings = ReplaySettings(window, refit, added, threads=threads, seed=seed)
     groups = [found] if together else [(recording,) for recording in found]
     with counting(steps(len(groups)), "replaying", progress) as count:
-        runs = tuple(replay_run(group, nominal, ground, settings, count.advance) for group in groups)
+        runs = tuple(replay_run(group, nominal, soil_from(soil), settings, count.advance) for group in groups)
     return ReplayResult(make_report(runs, nominal.name, soil_label(soil), settings), runs)
+
+
+def _calibrated(
+    folder: Path, ground: str, robot: RobotLike | None, soil: SoilLike | None
+) -> tuple[Robot, Path, tuple[Effect, ...]]:
+    """Robot, soil file and sensors of a calibration; InputError where robot or soil are given besides."""
+    from ddagr_gym.calibration.files import EFFECTS, load_robot, load_soil, soil_file
+    from ddagr_gym.physics.effects import load_effects
+
+    if robot is not None or soil is not None:
+        given = "robot" if robot is not None else "soil"
+        raise InputError(f"a calibration and a {given} are given: leave out one of them, {folder} has both.")
+    chosen, _ = load_soil(folder, ground)
+    return load_robot(folder), folder / soil_file(chosen), load_effects(folder / EFFECTS)
 
 
 def driven_robot(robot: RobotLike | None, recordings: Sequence[Recording]) -> Robot:

@@ -38,6 +38,7 @@ NAMES = (
     "import",
     "check",
     "replay",
+    "calibrate",
     "diagnose",
     "estimate",
     "null-bank",

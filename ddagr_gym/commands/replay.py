@@ -10,6 +10,7 @@ import tyro
 from tyro.conf import Positional
 
 from ddagr_gym.commands.output import check_output_folder
+from ddagr_gym.errors import InputError
 from ddagr_gym.progress import LinePrinter
 
 EXAMPLES = (
@@ -17,6 +18,7 @@ EXAMPLES = (
     "ddagr replay drive.csv.gz --map drive_steps --robot warthog --soil lete_sand_wong --refit --window 5 -o sand",
     "ddagr replay run_1.parquet run_2.parquet --robot ddagr --soil thesis_a1 --refit --together "
     "--effect slope=0.05 --output both",
+    "ddagr replay drive.csv.gz --calibration calibration --ground sand --output replayed",
 )
 
 
@@ -32,9 +34,11 @@ class Arguments:
     Attributes:
         runs: recordings: Parquet of `ddagr import`, or any source that it takes.
         output: folder to write: replay.json, figures as PNG and SVG, and one page, index.html.
-        soil: nominal soil (see `ddagr soils`), or the path of a YAML file with one's own.
+        soil: nominal soil (see `ddagr soils`), or the path of a YAML file with one's own; needed without --calibration.
         robot: robot that drove (see `ddagr robots`), or a YAML file with one's own; that of the recordings when it is
             left out.
+        calibration: folder that `ddagr calibrate` wrote, whose robot, soil and sensors are taken as they are.
+        ground: of the calibration; may be left out where it has only one.
         map: shipped map by name or the path of one's own YAML file, for sources that are not imported yet.
         effects: missing physics to add, name=size or an effects file; may be repeated.
         window: length of the windows with free initial states [s]; fit with windows as long as the horizon that counts.
@@ -49,8 +53,10 @@ class Arguments:
 
     runs: Positional[tuple[Path, ...]]
     output: Annotated[Path, tyro.conf.arg(aliases=("-o",))]
-    soil: str
+    soil: str = ""
     robot: str = ""
+    calibration: Path | None = None
+    ground: str = ""
     map: str = ""
     effects: Annotated[tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(aliases=("--effect",))] = ()
     window: float = 2.0
@@ -67,15 +73,21 @@ def run(arguments: Arguments) -> None:
     """Replay, print the tables, write report, figures and page."""
     import ddagr_gym
     from ddagr_gym.api.inputs import recordings_from
+    from ddagr_gym.calibration.files import ROBOT
     from ddagr_gym.recordings.files import Limits
 
+    if not arguments.soil and arguments.calibration is None:
+        raise InputError("no ground is given: name a --soil, or the folder of a --calibration.")
     check_output_folder(arguments.output, overwrite=arguments.overwrite)
     robot, limits = arguments.robot or None, Limits(arguments.maximum_rows, arguments.maximum_bytes)
+    drove = robot if arguments.calibration is None else str(arguments.calibration / ROBOT)
     result = ddagr_gym.replay(
-        recordings_from(arguments.runs, robot, arguments.map or None, limits),
+        recordings_from(arguments.runs, drove, arguments.map or None, limits),
         robot,
-        arguments.soil,
+        arguments.soil or None,
         effects=arguments.effects,
+        calibration=arguments.calibration,
+        ground=arguments.ground,
         window=arguments.window,
         refit=arguments.refit,
         together=arguments.together,

@@ -193,7 +193,7 @@ class Problem:
         """Weighted sensitivity to every nuisance parameter, (W, M, P).
 
         One simulation serves all parameters of scopes that do not overlap: a window sees one of them. So do headings,
-        see :meth:`heading_columns`, and biases need none.
+        see :meth:`heading_columns`, and biases need none. What is held and has no local unknown is left out.
         """
         columns = np.zeros((*self.blocked.mask.shape, len(self.prior)))
         simulated = []
@@ -201,7 +201,7 @@ class Problem:
             channel = _BIAS_CHANNEL.get(parameter.entries[0]) if len(parameter.entries) == 1 else None
             if channel is not None and not parameter.factor:
                 columns[..., k] = self._bias_column(channel, parameter.acts_in(self.blocked.windows.recording))
-            elif not parameter.heading:
+            elif not parameter.heading and (self.prior[k] > 0.0 or k in self._varied):
                 simulated.append(k)
         for together in disjoint_scopes(self.nuisances.parameters, simulated):
             steps = [self._difference(k, point.values[k]) for k in together]

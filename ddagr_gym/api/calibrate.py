@@ -1,0 +1,228 @@
+"""``ddagr_gym.calibrate``: a robot's parameters from its ordinary drives."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeAlias
+
+from ddagr_gym.api.inputs import RobotLike, Source, Sources, recordings_from
+from ddagr_gym.api.nominal import OWN, SoilLike, robot_from, soil_from, soil_name_of
+from ddagr_gym.api.results import Report, Table
+from ddagr_gym.errors import InputError, at_least
+
+if TYPE_CHECKING:
+    from ddagr_gym.calibration.result import CalibratedParameter, Calibration
+    from ddagr_gym.calibration.run import Outcome
+    from ddagr_gym.parameters import Robot, Soil
+    from ddagr_gym.physics.effects import Effect
+    from ddagr_gym.recordings.schema import Recording
+
+DriveLike: TypeAlias = int | Source
+"""A drive among those that are calibrated: its number, its path or file name, or the object itself."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CalibrationResult(Report):
+    """A robot as its drives show it.
+
+    ``report(folder)`` writes robot.yaml, a soil file for each ground, effects.yaml, calibration.json, and a page,
+    calibration.html.
+
+    Attributes:
+        outcome: answer, calibrated robot and soils, and the forecasts behind them (:mod:`ddagr_gym.calibration.run`).
+    """
+
+    outcome: Outcome
+
+    @property
+    def calibration(self) -> Calibration:
+        """The whole answer, as ``calibration.json`` holds it."""
+        return self.outcome.calibration
+
+    @property
+    def robot(self) -> Robot:
+        """Calibrated robot."""
+        return self.outcome.robot
+
+    @property
+    def soils(self) -> Mapping[str, Soil]:
+        """Calibrated soils by ground."""
+        return self.outcome.soils
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """What belongs to the sensors and to no robot, as ``gym.make(effects=...)`` and simulate take it."""
+        from ddagr_gym.calibration.simulator_values import calibrated_effects
+
+        return calibrated_effects(self.calibration)
+
+    @property
+    def parameters(self) -> tuple[CalibratedParameter, ...]:
+        """Of the robot, then of the grounds."""
+        return self.calibration.parameters
+
+    @property
+    def headline(self) -> str:
+        """What was calibrated, with what, and what it is worth."""
+        from ddagr_gym.reporting.calibration_text import headline
+
+        return headline(self.calibration)
+
+    def tables(self) -> Sequence[Table]:
+        """Parameters, and errors on left-out drives."""
+        from ddagr_gym.reporting.calibration_text import (
+            FORECAST_HEADER,
+            PARAMETER_HEADER,
+            forecast_rows,
+            parameter_rows,
+        )
+
+        return [
+            Table(PARAMETER_HEADER, parameter_rows(self.calibration)),
+            Table(FORECAST_HEADER, forecast_rows(self.calibration)),
+        ]
+
+    def __str__(self) -> str:
+        from ddagr_gym.reporting.calibration_text import summary
+
+        return summary(self.calibration)
+
+    def to_json(self, path: str | os.PathLike[str]) -> None:
+        """Write calibration.json, whole or not at all."""
+        from ddagr_gym.calibration.files import save
+
+        save(self.calibration, Path(path))
+
+    def _fill(self, folder: Path, progress: Callable[[str], None] | None) -> None:
+        from ddagr_gym.calibration.files import EFFECTS, NAME, ROBOT, soil_file
+        from ddagr_gym.config import dump_config
+        from ddagr_gym.physics.effects.files import save_effects
+        from ddagr_gym.reporting.calibration_page import write_page
+
+        (folder / ROBOT).write_text(dump_config(self.robot), encoding="utf-8")
+        for ground, soil in self.soils.items():
+            (folder / soil_file(ground)).write_text(dump_config(soil), encoding="utf-8")
+        save_effects(folder / EFFECTS, self.effects, source=self.headline)
+        self.to_json(folder / NAME)
+        write_page(folder, self.calibration, self.outcome.forecasts)
+
+
+def calibrate(
+    recordings: Sources,
+    robot: RobotLike,
+    soil: SoilLike | Mapping[str, SoilLike] = "firm_ground",
+    grounds: Mapping[str, Sequence[DriveLike]] | None = None,
+    *,
+    seed: int = 0,
+    threads: int = 1,
+    column_map: str | os.PathLike[str] | None = None,
+    progress: Callable[[str], None] | None = None,
+    cache: str | os.PathLike[str] | None = None,
+) -> CalibrationResult:
+    """Fit a robot to its ordinary drives, all together.
+
+    The robot's parameters are shared by all drives, the soil by those on one ground, a gyro's bias belongs to a drive.
+    Which parts of the robot are fitted is decided by forecasts of drives that are left out. What the drives do not
+    identify keeps the data sheet's value.
+
+    Args:
+        recordings: ordinary drives of one robot: recordings, tables, paths of files or folders.
+        robot: its data sheet: name, YAML file or object.
+        soil: nominal one: name, YAML file or object, or one of these for each ground by its name.
+        grounds: drives on each ground by its name, as numbers, paths or objects; all on one where it is None.
+        seed: of the resampled intervals.
+        threads: of the simulator.
+        column_map: shipped map by name or the path of one's own, for files that are not imported yet.
+        progress: called with a line of text at each step; ``print`` will do.
+        cache: folder in which finished steps are kept. After an interruption (KeyboardInterrupt) the same call goes on
+            from it; it stays when all is done, and is emptied when it is of another calibration.
+
+    Returns:
+        Parameters with intervals, robot and soils for the simulator, errors on left-out drives.
+
+    Raises:
+        InputError: drives of another robot or of two, too short, without commands, encoders or gyro; grounds that do
+            not fit the drives; unknown names.
+
+    Examples:
+        >>> import ddagr_gym
+        >>> drives = [ddagr_gym.simulate(name, rate=25.0, pose_rate=5.0, seed=seed)
+        ...           for seed, name in enumerate(["arcs", "s_weave"])]
+        >>> result = ddagr_gym.calibrate(drives, "ddagr", "thesis_a1")
+        >>> low, high = result.calibration.parameter("motor_rate").interval
+        >>> low < 4.5 < high  # that of the data sheet [1/s]
+        True
+    """
+    from ddagr_gym.calibration.files import check_ground_name
+    from ddagr_gym.calibration.input_requirements import check_drives, grounds_of
+    from ddagr_gym.calibration.run import calibrate_drives
+    from ddagr_gym.calibration.settings import CalibrationSettings
+
+    at_least(threads=(threads, 1), seed=(seed, 0))
+    data_sheet = robot_from(robot)
+    given = _listed(recordings)
+    found = recordings_from(given, robot, column_map) if given else ()
+    check_drives(found, data_sheet)
+    names = [recording.meta.source for recording in found]
+    numbers = {ground: [_number(drive, given, found) for drive in drives] for ground, drives in (grounds or {}).items()}
+    by_drive = grounds_of(names, numbers)
+    for ground in dict.fromkeys(by_drive):
+        check_ground_name(ground)
+    soils = _soils(soil, by_drive)
+    outcome = calibrate_drives(
+        found,
+        by_drive,
+        data_sheet,
+        {ground: soil_from(item) for ground, item in soils.items()},
+        CalibrationSettings(threads=threads, seed=seed),
+        data_sheet=OWN if not isinstance(robot, str | os.PathLike) else str(robot),
+        soil_names={ground: soil_name_of(item) for ground, item in soils.items()},
+        cache=None if cache is None else Path(cache),
+        progress=(lambda line: None) if progress is None else progress,
+    )
+    return CalibrationResult(outcome)
+
+
+def _listed(recordings: Sources) -> list[Source]:
+    several = isinstance(recordings, Sequence) and not isinstance(recordings, str)
+    return list(recordings) if several else [recordings]  # type: ignore[arg-type]
+
+
+def _number(drive: DriveLike, given: Sequence[Source], found: Sequence[Recording]) -> int:
+    """Number of a drive among the recordings."""
+    if isinstance(drive, int) and not isinstance(drive, bool):
+        if not 0 <= drive < len(found):
+            raise InputError(f"drive number {drive} has a ground: give numbers from 0 to {len(found) - 1}.")
+        return drive
+    if isinstance(drive, str | os.PathLike):
+        name = Path(drive).name
+        matching = [n for n, recording in enumerate(found) if recording.meta.source in (str(drive), name)]
+    else:
+        matching = [
+            n
+            for n, item in enumerate(given)
+            if item is drive or (found[n] is drive if len(given) == len(found) else False)
+        ]
+    if not matching:
+        raise InputError(
+            f"{drive} has a ground and is not among the drives: {', '.join(r.meta.source for r in found)}."
+        )
+    if len(matching) > 1:
+        raise InputError(f"{drive} is the name of {len(matching)} drives: give grounds by their numbers.")
+    return matching[0]
+
+
+def _soils(soil: SoilLike | Mapping[str, SoilLike], by_drive: Sequence[str]) -> dict[str, SoilLike]:
+    """Nominal soil of each ground."""
+    grounds = list(dict.fromkeys(by_drive))
+    if not isinstance(soil, Mapping):
+        return dict.fromkeys(grounds, soil)
+    unknown = [name for name in soil if name not in grounds]
+    absent = [name for name in grounds if name not in soil]
+    if unknown or absent:
+        wrong = f"no drive is on the ground {unknown[0]!r}" if unknown else f"the ground {absent[0]!r} has none"
+        raise InputError(f"soils are given by ground and {wrong}: give one for each of {', '.join(grounds)}.")
+    return dict(soil)

@@ -1,0 +1,140 @@
+"""Drives made ready for a joint fit: faults that show in their values mended, clocks matched, windows cut."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ddagr_gym.calibration.settings import HISTORY, CalibrationSettings
+from ddagr_gym.diagnosis.preprocessing.mended_recordings import mend_recordings
+from ddagr_gym.errors import InputError
+from ddagr_gym.identification.data_split import evenly
+from ddagr_gym.identification.windows import STATE, WindowSet, cut_windows
+from ddagr_gym.parameters import Robot, Soil
+from ddagr_gym.recordings.schema import Recording
+from ddagr_gym.replay_analysis.prepare import Prepared, prepare
+
+Integers = NDArray[np.int64]
+
+FEWEST_WINDOWS = 8
+"""Windows of a drive below which neither its noise nor its estimates have a meaning (ours)."""
+
+SHORTEST_WINDOW = 2.0
+"""[s], ours: ten time constants of a bank."""
+
+_OMEGA = slice(STATE.index("omega_right"), STATE.index("omega_left") + 1)
+
+
+@dataclass(frozen=True, eq=False)
+class CalibrationData:
+    """Drives of one robot, ready to be fitted.
+
+    Attributes:
+        robot: of the data sheet.
+        soils: nominal soil of each ground.
+        prepared: drives with poses at their own time, and their noise.
+        grounds: ground of each drive.
+        windows: all of them, in the order of the drives and of time.
+        notes: of each drive, sentences on what was mended.
+    """
+
+    robot: Robot
+    soils: Mapping[str, Soil]
+    prepared: Prepared
+    grounds: tuple[str, ...]
+    windows: WindowSet
+    notes: tuple[tuple[str, ...], ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the drives."""
+        return tuple(recording.meta.source for recording in self.prepared.recordings)
+
+    @property
+    def count(self) -> int:
+        """Number of drives."""
+        return len(self.grounds)
+
+    @property
+    def drives_on(self) -> dict[str, tuple[int, ...]]:
+        """Numbers of the drives by ground."""
+        return {
+            ground: tuple(n for n, other in enumerate(self.grounds) if other == ground)
+            for ground in dict.fromkeys(self.grounds)
+        }
+
+    def spread(self, most: int) -> WindowSet:
+        """At most ``most`` windows of each drive, evenly over it."""
+        chosen = []
+        for drive in range(self.count):
+            rows = np.flatnonzero(self.windows.recording == drive)
+            chosen.append(rows[evenly(rows.size, most)])
+        return self.windows.subset(np.concatenate(chosen))
+
+
+def prepare_drives(
+    recordings: Sequence[Recording],
+    grounds: Sequence[str],
+    robot: Robot,
+    soils: Mapping[str, Soil],
+    settings: CalibrationSettings,
+) -> CalibrationData:
+    """Mend drives, match their clocks, estimate their noise, cut their windows.
+
+    Args:
+        recordings: checked by :func:`~ddagr_gym.calibration.input_requirements.check_drives`.
+        grounds: ground of each.
+        robot: of the data sheet.
+        soils: nominal soil of each ground.
+        settings: length of the windows.
+
+    Raises:
+        InputError: a drive with too few windows.
+    """
+    mended, notes = zip(*(_mended(recording) for recording in recordings), strict=True)
+    prepared = prepare(mended, robot, np.random.default_rng(settings.seed))
+    windows = cut_windows(
+        prepared.recordings,
+        _duration(prepared.recordings, settings.window),
+        wheel_radius=robot.outer_radius,
+        half_track=robot.half_track,
+        history=HISTORY,
+    )
+    for number, recording in enumerate(prepared.recordings):
+        count = int(np.count_nonzero(windows.recording == number))
+        if count < FEWEST_WINDOWS:
+            raise InputError(
+                f"{recording.meta.source} has {count} windows of {windows.duration:.3g} s without a gap and with "
+                f"commands, a calibration needs {FEWEST_WINDOWS} of each drive: give a longer drive, or leave it out."
+            )
+    return CalibrationData(robot, dict(soils), prepared, tuple(grounds), with_presumed_past(windows), notes)
+
+
+def _mended(recording: Recording) -> tuple[Recording, tuple[str, ...]]:
+    """A drive without the faults that show in its values, and sentences on them."""
+    found = mend_recordings([recording])
+    said = [f"the {item.sensor} repeats its readings: repeats are left out." for item in found.repeated]
+    said += ["the gyro turns the wrong way: its sign was turned."] if found.reversed_gyro is not None else []
+    return found.recordings[0], tuple(said)
+
+
+def _duration(recordings: Sequence[Recording], wanted: float) -> float:
+    """Length of the windows [s]: as wanted, or shorter where most segments are."""
+    lengths = [(s.stop - s.start - 1) * r.period for r in recordings for s in r.segments()]
+    usual = float(np.median(lengths))
+    return wanted if usual < SHORTEST_WINDOW else min(wanted, usual)
+
+
+def with_presumed_past(windows: WindowSet) -> WindowSet:
+    """Windows in which the commands that nobody recorded are the bank speeds at the start.
+
+    Before a recorded stretch the first command is no better guess: a step begins with a new one, and a robot that is
+    late goes on as it was.
+    """
+    rows = np.arange(windows.commands.shape[1])
+    unknown = rows[None, :, None] < windows.unknown[:, None, None]
+    commands = np.where(unknown, windows.initial[:, None, _OMEGA], windows.commands)
+    return replace(windows, commands=commands, unknown=np.zeros(windows.count, dtype=np.int64))

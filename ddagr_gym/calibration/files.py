@@ -1,0 +1,105 @@
+"""``calibration.json``: written and read by its types."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from ddagr_gym.calibration.result import SCHEMA, SCHEMA_VERSION, Calibration
+from ddagr_gym.config import load_config
+from ddagr_gym.errors import InputError
+from ddagr_gym.files import write_text
+from ddagr_gym.parameters import Robot, Soil
+
+NAME = "calibration.json"
+ROBOT = "robot.yaml"
+EFFECTS = "effects.yaml"
+PAGE = "calibration.html"
+
+_PAST_FILE_NAMES = "/\\\0"
+"""Characters that a file's name cannot hold."""
+
+
+def soil_file(ground: str) -> str:
+    """Name of the file of a ground's soil."""
+    return f"soil_{ground}.yaml"
+
+
+def check_ground_name(ground: str) -> None:
+    """Refuse names of grounds that cannot be part of a file's name; InputError."""
+    if not ground or any(character in ground for character in _PAST_FILE_NAMES):
+        raise InputError(f"the ground {ground!r} becomes the name of a file: give one without slashes.")
+
+
+def as_text(calibration: Calibration) -> str:
+    """JSON of a calibration; null stands for numbers that are not finite."""
+    return json.dumps(_finite(asdict(calibration)), indent=1, allow_nan=False) + "\n"
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, Mapping):
+        return {str(key): _finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    return value
+
+
+def save(calibration: Calibration, path: Path) -> None:
+    """Write ``calibration.json``, whole or not at all."""
+    write_text(path, as_text(calibration))
+
+
+def load(folder: Path) -> Calibration:
+    """The calibration of a folder that ``ddagr calibrate`` wrote.
+
+    Raises:
+        InputError: no such folder or file, no JSON, or not of this schema.
+    """
+    path = folder / NAME if folder.is_dir() else folder
+    try:
+        mapping = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path} cannot be read as a calibration ({error}): make it with `ddagr calibrate`.") from None
+    if not isinstance(mapping, dict) or mapping.get("schema") != SCHEMA:
+        raise InputError(f"{path} holds no calibration: make it with `ddagr calibrate`.")
+    if mapping.get("schema_version") != SCHEMA_VERSION:
+        raise InputError(
+            f"{path} has version {mapping.get('schema_version')!r} of its format, this program reads "
+            f"{SCHEMA_VERSION}: calibrate again."
+        )
+    try:
+        return msgspec.convert(mapping, Calibration)
+    except msgspec.ValidationError as error:
+        raise InputError(f"{path}: {error}: make it again with `ddagr calibrate`.") from None
+
+
+def load_robot(folder: Path) -> Robot:
+    """Calibrated robot of a folder; InputError where it is missing or wrong."""
+    return load_config(folder / ROBOT, Robot)
+
+
+def load_soil(folder: Path, ground: str = "") -> tuple[str, Soil]:
+    """Calibrated soil of a ground, and the ground.
+
+    Args:
+        folder: that ``ddagr calibrate`` wrote.
+        ground: may be left out where there is only one.
+
+    Raises:
+        InputError: an unknown ground, or none named of several.
+    """
+    grounds = load(folder).grounds
+    if not ground and len(grounds) > 1:
+        raise InputError(f"{folder} is calibrated on {', '.join(grounds)}: name one of them with --ground.")
+    chosen = ground or grounds[0]
+    if chosen not in grounds:
+        raise InputError(f"{folder} is not calibrated on {chosen!r}: choose from {', '.join(grounds)}.")
+    return chosen, load_config(folder / soil_file(chosen), Soil)

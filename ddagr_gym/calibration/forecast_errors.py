@@ -1,0 +1,135 @@
+"""Errors of forecasts of left-out drives by data sheet, calibration, and a kinematic model with the same chances."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ddagr_gym.calibration.calibration_data import CalibrationData
+from ddagr_gym.calibration.joint_fit import FittedModel
+from ddagr_gym.calibration.left_out import ENCODERS, Forecast, fold_name, folds
+from ddagr_gym.calibration.result import CALIBRATED, DATA_SHEET, KINEMATIC, ForecastError
+from ddagr_gym.identification.windows import CHANNELS, WindowSet
+from ddagr_gym.replay_analysis.fitting import ROBUST
+from ddagr_gym.replay_analysis.horizons import METRICS, horizon_errors
+from ddagr_gym.replay_analysis.intervals import error_statistics
+from ddagr_gym.replay_analysis.kinematic import KinematicModel, fit_motor, fit_track
+
+Array = NDArray[np.float64]
+
+HORIZONS = (1.0, 5.0)
+"""[s]: what a controller plans over, and what a turn takes."""
+
+SHOWN = ("heading", "position", "wheel_speed")
+"""Metrics that are written down of each horizon."""
+
+_GYRO = CHANNELS.index("yaw_rate")
+
+
+@dataclass(frozen=True, eq=False)
+class Forecasts:
+    """Forecasts of one left-out drive by all models.
+
+    Attributes:
+        drive: name of the drive, or of its half.
+        ground: that it was on.
+        soil_from: where its soil was fitted.
+        windows: that were forecast.
+        predictions: (W, T, 8) by model.
+    """
+
+    drive: str
+    ground: str
+    soil_from: str
+    windows: WindowSet
+    predictions: dict[str, Array]
+
+
+OTHER_DRIVES = "other drives"
+ITSELF = "its first half"
+
+
+def all_forecasts(
+    data: CalibrationData, model: FittedModel, made: Sequence[Forecast], held: dict[str, float]
+) -> tuple[Forecasts, ...]:
+    """Forecasts of every left-out drive by the calibrated model, the data sheet and a kinematic one.
+
+    Args:
+        data: drives.
+        model: calibrated.
+        made: its forecasts.
+        held: values of the model's parameters that make it the data sheet.
+    """
+    fitted = model.problem.blocked.windows
+    by_window = folds(data, fitted)
+    nominal = np.array([held.get(p.name, 0.0) for p in model.parameters])
+    found = []
+    for forecast in made:
+        windows = forecast.windows
+        before = model.problem.model_of(windows).predict(nominal, windows.initial)
+        predictions = {DATA_SHEET: before, CALIBRATED: forecast.prediction}
+        kinematic = _kinematic(data, fitted.subset(np.asarray(by_window != forecast.fold)))
+        if kinematic is not None:
+            predictions[KINEMATIC] = kinematic.predict(windows)
+        ground = data.grounds[int(windows.recording[0])]
+        alone = data.count > 1 and len(data.drives_on[ground]) == 1
+        found.append(
+            Forecasts(fold_name(data, forecast.fold), ground, ITSELF if alone else OTHER_DRIVES, windows, predictions)
+        )
+    return tuple(found)
+
+
+def _kinematic(data: CalibrationData, windows: WindowSet) -> KinematicModel | None:
+    """Effective track behind a first-order motor with a delay, fitted to the other drives; None without turns."""
+    sigma = data.prepared.sigma
+    robot = data.robot
+    motor = fit_motor(windows, robot.motor_rate, robot.maximum_wheel_speed, float(sigma[ENCODERS[0]]))
+    return fit_track(windows, robot.outer_radius, robot.half_track, motor, sigma=float(sigma[_GYRO]), robust=ROBUST)
+
+
+def forecast_errors(forecasts: Sequence[Forecasts], seed: int) -> tuple[ForecastError, ...]:
+    """Table of errors by drive, model, metric and horizon, with 95 % intervals."""
+    found = []
+    for item in forecasts:
+        for model, prediction in item.predictions.items():
+            for horizon in (h for h in HORIZONS if h <= item.windows.duration + 1e-9):
+                samples = round(horizon / item.windows.period)
+                short = replace(item.windows, measured=item.windows.measured[:, :samples])
+                errors = horizon_errors(short, prediction[:, :samples])
+                clusters = np.arange(short.count)
+                found += [_error(item, model, m, horizon, METRICS[m][0], errors[m], clusters, seed) for m in SHOWN]
+            found += _samples(item, model, prediction, seed)
+    return tuple(found)
+
+
+def _samples(item: Forecasts, model: str, prediction: Array, seed: int) -> list[ForecastError]:
+    """Errors of all samples of the encoders and of the gyro."""
+    difference = prediction - item.windows.measured
+    made = []
+    for metric, channels, unit in (("wheel_speed", list(ENCODERS), "rad/s"), ("yaw_rate", [_GYRO], "rad/s")):
+        errors = difference[..., channels].reshape(item.windows.count, -1)
+        clusters = np.repeat(np.arange(item.windows.count), errors.shape[1])
+        known = np.isfinite(errors.ravel())
+        made.append(_error(item, model, metric, None, unit, errors.ravel()[known], clusters[known], seed))
+    return made
+
+
+def _error(
+    item: Forecasts,
+    model: str,
+    metric: str,
+    horizon: float | None,
+    unit: str,
+    errors: Array,
+    clusters: NDArray[np.integer[Any]],
+    seed: int,
+) -> ForecastError:
+    size = error_statistics(errors, np.asarray(clusters, dtype=np.int64), np.random.default_rng(seed))
+    return ForecastError(
+        item.drive, item.ground, item.soil_from, model, metric, horizon, unit, size.count, size.rms,
+        size.rms_interval, size.median, size.median_interval,
+    )  # fmt: skip

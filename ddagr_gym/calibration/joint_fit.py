@@ -1,0 +1,253 @@
+"""One fit over all drives: the robot's parameters shared, soil by ground, gyro bias by drive."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ddagr_gym.calibration.calibration_data import CalibrationData
+from ddagr_gym.calibration.parts import shared_parameters
+from ddagr_gym.calibration.settings import LONGEST_DELAY
+from ddagr_gym.identification.block_means import sample_windows
+from ddagr_gym.identification.fit_numerics import field_numerics
+from ddagr_gym.identification.gauss_newton import Fitted, fit
+from ddagr_gym.identification.nuisances import Nuisances
+from ddagr_gym.identification.parameters import (
+    KIND_STIFFNESS_DEVIATION,
+    ModelParameter,
+    per_group,
+    sensor_parameters,
+    soil_entries,
+    soil_parameters,
+)
+from ddagr_gym.identification.problem import Point, Problem
+from ddagr_gym.identification.windows import CHANNELS, WindowSet
+from ddagr_gym.parameters import Soil
+from ddagr_gym.physics.wheel_forces import soil_vector
+from ddagr_gym.replay_analysis.fitting import (
+    LEAST_GYRO_BIAS,
+    TOLERANCE,
+    UNKNOWN_GYRO_BIAS,
+    Weights,
+    misfit_weights,
+    noise_weights,
+)
+from ddagr_gym.replay_analysis.kinematic import Motor
+
+Array = NDArray[np.float64]
+Progress = Callable[[str], None]
+
+ITERATIONS = 8
+"""Most Gauss-Newton steps of a fit (ours): field drives take 4 to 8."""
+
+FIRST_ITERATIONS = 4
+"""Steps of the fit that only serves to weigh residuals (ours)."""
+
+START_DELAYS = np.arange(0.0, LONGEST_DELAY + 1e-9, 0.05)
+"""Delays from which a fit may start [s]: a fit finds one within half of the robot's reaction, no farther."""
+
+START_FACTORS = (0.25, 0.5, 1.0, 2.0, 4.0)
+"""Factors on the data sheet's motor rate from which it may start (ours)."""
+
+OFFSET = "offset_"
+"""Begins the names of parameters that carry the nominal soil of a ground; they are always held."""
+
+_ROBUST_SPEED = 0.5
+"""Error of a bank speed from which the loss of the start is linear [rad/s] (ours)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """Where a fit stands, small enough to be kept.
+
+    Attributes:
+        values: of all parameters by name.
+        states: (W, 8) initial states of the windows.
+        converged: whether the last step lowered the cost by less than the tolerance.
+    """
+
+    values: dict[str, float]
+    states: Array
+    converged: bool
+
+
+@dataclass(frozen=True, eq=False)
+class FittedModel:
+    """Parameters fitted to some windows.
+
+    Attributes:
+        problem: windows, parameters and weights.
+        fitted: where the fit stands.
+    """
+
+    problem: Problem
+    fitted: Fitted
+
+    @property
+    def parameters(self) -> tuple[ModelParameter, ...]:
+        """(P,), held ones included."""
+        return self.problem.nuisances.parameters
+
+    @property
+    def values(self) -> dict[str, float]:
+        """By name."""
+        pairs = zip(self.parameters, self.fitted.point.values.tolist(), strict=True)
+        return {parameter.name: value for parameter, value in pairs}
+
+    @property
+    def standing(self) -> Standing:
+        """Where it stands."""
+        return Standing(self.values, self.fitted.point.states, self.fitted.converged)
+
+    @property
+    def free(self) -> tuple[str, ...]:
+        """Names of the parameters that the fit moved."""
+        return tuple(parameter.name for parameter in self.parameters if parameter.prior > 0.0)
+
+
+def model_parameters(data: CalibrationData) -> tuple[tuple[ModelParameter, ...], dict[str, float]]:
+    """All parameters of the joint model, and the values at which those that never move are held.
+
+    Soils of the grounds differ from the first one's by offsets that are held; what is fitted of a ground acts on top.
+    """
+    offsets, held = _soil_offsets(data)
+    nominal = next(iter(data.soils.values()))
+    soil = [made for p in soil_parameters(nominal, KIND_STIFFNESS_DEVIATION) for made in per_group(p, data.drives_on)]
+    noise = data.prepared.noise
+    known = [float(np.hypot(*item.gyro_bias)) for item in noise if item.gyro_bias is not None]
+    bias = max(*known, LEAST_GYRO_BIAS) if len(known) == len(noise) else UNKNOWN_GYRO_BIAS
+    biases = [p for p in sensor_parameters(data.count, bias, 1.0) if p.name.startswith("gyro_bias")]
+    return (*offsets, *soil, *shared_parameters(data.robot), *biases), held
+
+
+def _soil_offsets(data: CalibrationData) -> tuple[list[ModelParameter], dict[str, float]]:
+    first = soil_vector(next(iter(data.soils.values())))
+    parameters, values = [], {}
+    for ground, drives in data.drives_on.items():
+        for index, difference in enumerate(soil_vector(data.soils[ground]) - first):
+            if difference != 0.0:
+                name = f"{OFFSET}{index}_{ground}"
+                entry = soil_entries(index)
+                scope = frozenset(drives)
+                parameters.append(ModelParameter(name, "", entry, False, 0.0, 1.0, -np.inf, np.inf, scope))
+                values[name] = float(difference)
+    return parameters, values
+
+
+def make_problem(
+    data: CalibrationData, windows: WindowSet, parameters: Sequence[ModelParameter], weights: Weights, threads: int
+) -> Problem:
+    """The fit of some windows with some weights."""
+    soil: Soil = next(iter(data.soils.values()))
+    return Problem(
+        data.robot, soil, sample_windows(windows, weights.sigma), Nuisances(tuple(parameters)), robust=weights.robust,
+        threads=threads, numerics=field_numerics(),
+    )  # fmt: skip
+
+
+def point_at(problem: Problem, values: Mapping[str, float], states: Array | None = None) -> Point:
+    """Point at values by name, 0 for the others, inside the bounds."""
+    parameters = problem.nuisances.parameters
+    listed = np.array([values.get(p.name, 0.0) for p in parameters], dtype=np.float64)
+    return Point(
+        np.clip(listed, problem.low, problem.high), problem.blocked.windows.initial if states is None else states
+    )
+
+
+def first_weights(data: CalibrationData, windows: WindowSet) -> Weights:
+    """Weights by the sensors' noise."""
+    return noise_weights(data.prepared.noise, windows, False, data.prepared.dead)
+
+
+def weights_by_drive(windows: WindowSet, prediction: Array, before: Weights) -> Weights:
+    """Weights by what a fit left of each drive: grounds and days shake a robot differently."""
+    sigma, robust = before.sigma.copy(), before.robust.copy()
+    for drive in np.unique(windows.recording):
+        rows = windows.recording == drive
+        found = misfit_weights(windows.subset(rows), prediction[rows], Weights(before.sigma[rows], before.robust))
+        sigma[rows] = found.sigma
+        robust = np.minimum(robust, found.robust)
+    return Weights(sigma, robust)
+
+
+def start_values(data: CalibrationData, windows: WindowSet) -> dict[str, float]:
+    """Delay and motor rate from which a fit starts: the best of many, by a first-order loop without load."""
+    columns = [CHANNELS.index("encoder_right"), CHANNELS.index("encoder_left")]
+    measured = windows.measured[..., columns]
+    known = np.isfinite(measured)
+    best = (np.inf, 0.0, 1.0)
+    for delay in START_DELAYS:
+        for factor in START_FACTORS:
+            motor = Motor(factor * data.robot.motor_rate, data.robot.maximum_wheel_speed, float(delay))
+            error = (motor.speeds(windows)[:, 1:] - measured)[known] / _ROBUST_SPEED
+            best = min(best, (float(np.mean(np.sqrt(1.0 + error**2))), float(delay), factor))
+    return {"command_delay": best[1], "motor_rate": float(np.log(best[2]))}
+
+
+def model_at(
+    data: CalibrationData,
+    windows: WindowSet,
+    parameters: Sequence[ModelParameter],
+    weights: Weights,
+    standing: Standing,
+    threads: int,
+) -> FittedModel:
+    """Model where a fit stands, with its derivatives there."""
+    return fit_model(data, windows, parameters, weights, standing.values, threads, states=standing.states, iterations=0)
+
+
+def fit_model(
+    data: CalibrationData,
+    windows: WindowSet,
+    parameters: Sequence[ModelParameter],
+    weights: Weights,
+    start: Mapping[str, float],
+    threads: int,
+    *,
+    states: Array | None = None,
+    iterations: int = ITERATIONS,
+) -> FittedModel:
+    """Fit parameters to windows with given weights.
+
+    Args:
+        data: drives.
+        windows: to fit.
+        parameters: held ones have a prior of 0.
+        weights: of the residuals.
+        start: values by name.
+        threads: of the simulator.
+        states: (W, 8) initial states to start from; the windows' first guess by default.
+        iterations: most steps.
+    """
+    problem = make_problem(data, windows, parameters, weights, threads)
+    point = point_at(problem, start, states)
+    found = fit(problem, point, iterations=iterations, tolerance=TOLERANCE, renewals=iterations)
+    return FittedModel(problem, found)
+
+
+def weigh_and_fit(
+    data: CalibrationData,
+    windows: WindowSet,
+    parameters: Sequence[ModelParameter],
+    start: Mapping[str, float],
+    threads: int,
+) -> tuple[FittedModel, Weights]:
+    """Fit by what the start leaves unexplained of each drive, then by what that fit leaves.
+
+    The noise of good sensors is no measure of a model that is still far off: its weights would bend every parameter to
+    its bound.
+
+    Returns:
+        The second fit, and its weights.
+    """
+    weights = first_weights(data, windows)
+    problem = make_problem(data, windows, parameters, weights, threads)
+    prediction, values, states = problem.predict(point_at(problem, start)), dict(start), None
+    for iterations in (FIRST_ITERATIONS, ITERATIONS):
+        weights = weights_by_drive(windows, prediction, first_weights(data, windows))
+        model = fit_model(data, windows, parameters, weights, values, threads, states=states, iterations=iterations)
+        values, states, prediction = model.values, model.fitted.point.states, model.fitted.prediction
+    return model, weights

@@ -1,0 +1,149 @@
+"""Forecasts of drives that were left out of the fit.
+
+A fit to the other drives is one Gauss-Newton step from the joint one: their residuals and sensitivities are known
+there, and leaving one drive of several out moves the parameters little. What belongs to the left-out drive alone (the
+soil of a ground that no other drive is on, its gyro bias) is fitted to the first half of it, and the second half is
+forecast.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ddagr_gym.calibration.calibration_data import CalibrationData
+from ddagr_gym.calibration.joint_fit import FittedModel
+from ddagr_gym.identification.gauss_newton import linearised
+from ddagr_gym.identification.least_squares import Linearised, huber_loss
+from ddagr_gym.identification.windows import CHANNELS, WindowSet
+from ddagr_gym.replay_analysis.fitting import Weights
+from ddagr_gym.replay_analysis.residuals import residuals
+
+Array = NDArray[np.float64]
+Booleans = NDArray[np.bool_]
+Integers = NDArray[np.int64]
+
+LONGEST = 3.0
+"""Prior deviations that a parameter moves at most when a drive is left out: that of the joint fit's steps."""
+
+
+@dataclass(frozen=True, eq=False)
+class Forecast:
+    """Prediction of windows that no fit has seen, from the state at their start.
+
+    Attributes:
+        fold: which of the folds was left out.
+        windows: that are forecast.
+        values: (P,) of the parameters, fitted without them.
+        prediction: (W, T, 8).
+    """
+
+    fold: int
+    windows: WindowSet
+    values: Array
+    prediction: Array
+
+
+def folds(data: CalibrationData, windows: WindowSet) -> Integers:
+    """(W,) fold of each window: its drive, or of a single drive its first or second half."""
+    if data.count > 1:
+        return windows.recording
+    whole = data.windows.time
+    return np.asarray(windows.time > 0.5 * (whole.min() + whole.max()), dtype=np.int64)
+
+
+def fold_name(data: CalibrationData, fold: int) -> str:
+    """What a fold is called."""
+    return data.names[fold] if data.count > 1 else f"{data.names[0]}, {('first', 'second')[fold]} half"
+
+
+def first_half(windows: WindowSet, chosen: Booleans) -> Booleans:
+    """(W,) windows of the first half, in time, of the chosen ones."""
+    middle = np.median(windows.time[chosen])
+    return np.asarray(chosen & (windows.time < middle))
+
+
+def values_without(model: FittedModel, linear: Linearised, out: Booleans, seen: Booleans) -> tuple[Array, bool]:
+    """Values (P,) of a model's parameters as fitted without some windows.
+
+    Args:
+        model: fitted to all windows.
+        linear: problem there.
+        out: (W,) windows that are left out.
+        seen: (W,) those among them that what is theirs alone is fitted to.
+
+    Returns:
+        The values, and whether any were fitted to seen windows.
+    """
+    free = [k for k, p in enumerate(model.parameters) if p.prior > 0.0]
+    recording = model.problem.blocked.windows.recording
+    others = np.array([model.parameters[k].acts_in(recording[~out]).any() for k in free], dtype=bool)
+    common, own = np.flatnonzero(others), np.flatnonzero(~others)
+    change = np.zeros(len(free))
+    change[common] = _step(linear, ~out, common, linear.residual)
+    if own.size:
+        left = linear.residual - linear.sensitivity[..., common] @ change[common]
+        change[own] = _step(linear, seen, own, left)
+    values = model.fitted.point.values.copy()
+    values[free] += change
+    ground = any(not model.parameters[free[k]].name.startswith("gyro_bias") for k in own)
+    return values, ground
+
+
+def _step(linear: Linearised, rows: Booleans, columns: Integers, residual: Array) -> Array:
+    part = Linearised(
+        residual[rows], linear.sensitivity[rows][..., columns], linear.here[columns], linear.expected[columns],
+        linear.deviation[columns], linear.low[columns], linear.high[columns],
+    )  # fmt: skip
+    return part.step(part.information, part.gradient, LONGEST)
+
+
+def forecasts(data: CalibrationData, model: FittedModel, judged: WindowSet) -> Iterator[Forecast]:
+    """Forecast of every fold by the model fitted without it.
+
+    Args:
+        data: drives.
+        model: fitted to windows of all drives.
+        judged: windows to forecast.
+    """
+    linear = linearised(model.problem, model.fitted)
+    fitted = model.problem.blocked.windows
+    by_window, by_judged = folds(data, fitted), folds(data, judged)
+    for fold in np.unique(by_judged):
+        out, inside = by_window == fold, by_judged == fold
+        seen = first_half(fitted, out)
+        values, ground = values_without(model, linear, out, seen)
+        # what was fitted to the first half judges the second only
+        middle = float(np.median(fitted.time[out]))
+        chosen = judged.subset(np.asarray(inside & (judged.time >= middle)) if ground else np.asarray(inside))
+        yield Forecast(int(fold), chosen, values, model.problem.model_of(chosen).predict(values, chosen.initial))
+
+
+def forecast_loss(forecast: Forecast, sigma: Array, robust: Array) -> float:
+    """Mean robust loss of a forecast's samples.
+
+    Args:
+        forecast: of one fold.
+        sigma: (8,) of the channels, infinite for those that do not count.
+        robust: (8,) weighted residual from which the loss is linear.
+    """
+    weighted = residuals(forecast.windows, forecast.prediction) / sigma
+    weighted = np.where(np.isfinite(forecast.prediction), weighted, BROKEN)
+    known = np.isfinite(forecast.windows.measured) & np.isfinite(sigma)
+    return float(np.mean(huber_loss(weighted, np.broadcast_to(robust, weighted.shape))[known]))
+
+
+BROKEN = 100.0
+"""Weighted residual that stands for a prediction that failed (ours): far beyond any other."""
+
+
+def fold_sigma(data: CalibrationData, windows: WindowSet, weights: Weights) -> dict[int, Array]:
+    """(8,) standard deviations of the channels by fold."""
+    by_window = folds(data, windows)
+    return {int(fold): weights.sigma[by_window == fold][0, 0] for fold in np.unique(by_window)}
+
+
+ENCODERS = (CHANNELS.index("encoder_right"), CHANNELS.index("encoder_left"))

@@ -1,0 +1,229 @@
+"""All stages of a calibration in their order, each kept when it is finished."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from ddagr_gym.calibration.calibration_data import CalibrationData, prepare_drives
+from ddagr_gym.calibration.drive_scatter import drive_estimates
+from ddagr_gym.calibration.forecast_errors import Forecasts, all_forecasts, forecast_errors
+from ddagr_gym.calibration.identifiability import covariance, unidentified
+from ddagr_gym.calibration.input_requirements import check_drives, check_scales, drive_scale, with_gyro_forward
+from ddagr_gym.calibration.joint_fit import (
+    Standing,
+    fit_model,
+    model_at,
+    model_parameters,
+    start_values,
+    weigh_and_fit,
+)
+from ddagr_gym.calibration.left_out import forecasts
+from ddagr_gym.calibration.part_selection import Comparison, Selection, select_parts
+from ddagr_gym.calibration.parts import held_parameters, without_parts
+from ddagr_gym.calibration.residual_tables import spectra, unexplained
+from ddagr_gym.calibration.result import SCHEMA, SCHEMA_VERSION, Calibration, Covariance
+from ddagr_gym.calibration.settings import CalibrationSettings
+from ddagr_gym.calibration.simulator_values import calibrated_robot, calibrated_soil
+from ddagr_gym.calibration.summary import drive_summaries, parameter_results
+from ddagr_gym.diagnosis.gates.source_digest import code_digest, source_digest
+from ddagr_gym.diagnosis.preprocessing.input_requirements import content_hash
+from ddagr_gym.diagnosis.store import StepStore
+from ddagr_gym.identification.parameters import ModelParameter
+from ddagr_gym.identification.windows import WindowSet
+from ddagr_gym.parameters import Robot, Soil
+from ddagr_gym.recordings.schema import Recording
+from ddagr_gym.replay_analysis.fitting import Weights
+from ddagr_gym.version import __version__
+
+Progress = Callable[[str], None]
+
+_SOURCES = ("calibration", "replay_analysis")
+"""Folders of the package whose code results depend on besides those of a diagnosis."""
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """Result of a calibration.
+
+    Attributes:
+        calibration: the answer.
+        robot: calibrated.
+        soils: calibrated, by ground.
+        data: drives as they were fitted.
+        forecasts: of the left-out drives.
+    """
+
+    calibration: Calibration
+    robot: Robot
+    soils: Mapping[str, Soil]
+    data: CalibrationData
+    forecasts: tuple[Forecasts, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class FinalFit:
+    """Joint fit of the parts that are kept.
+
+    Attributes:
+        standing: where it stands.
+        weights: of the residuals.
+        refused: parameters that the drives do not identify, with deviation after over before.
+    """
+
+    standing: Standing
+    weights: Weights
+    refused: dict[str, float]
+
+
+def calibrate_drives(
+    recordings: Sequence[Recording],
+    grounds: Sequence[str],
+    robot: Robot,
+    soils: Mapping[str, Soil],
+    settings: CalibrationSettings,
+    *,
+    data_sheet: str = "",
+    soil_names: Mapping[str, str] | None = None,
+    cache: Path | None = None,
+    progress: Progress = lambda line: None,
+) -> Outcome:
+    """Calibrate a robot with its ordinary drives.
+
+    Args:
+        recordings: of one robot and period.
+        grounds: ground of each.
+        robot: of the data sheet.
+        soils: nominal soil of each ground.
+        settings: windows, threads and seed.
+        data_sheet: name or file of the robot.
+        soil_names: of the soils by ground.
+        cache: folder of finished steps, from which the same calibration goes on after an interruption; None keeps
+            nothing.
+        progress: called with what is being done.
+
+    Raises:
+        InputError: drives that cannot be calibrated, or a cache that holds something else.
+    """
+    began = time.monotonic()
+    check_drives(recordings, robot)
+    progress("what the sensors say about the robot's size")
+    forward, turned = zip(*(with_gyro_forward(item, _rng(settings)) for item in recordings), strict=True)
+    scales = [drive_scale(item, _rng(settings)) for item in forward]
+    check_scales([recording.meta.source for recording in recordings], scales, robot)
+    data = prepare_drives(forward, grounds, robot, soils, settings)
+    data = replace(data, notes=tuple((*a, *b) for a, b in zip(turned, data.notes, strict=True)))
+    store = StepStore(cache, "" if cache is None else _key(recordings, grounds, robot, soils, settings))
+    parameters, held = model_parameters(data)
+    selection = _select(data, parameters, held, settings, store, progress)
+    kept = without_parts(parameters, selection.left_out)
+    progress("joint fit")
+    final = store.step("joint fit", partial(_final_fit, data, kept, selection.standing.values, settings))
+    windows = data.spread(settings.fitted)
+    kept = held_parameters(kept, frozenset(final.refused))
+    model = model_at(data, windows, kept, final.weights, final.standing, settings.threads)
+    progress("every drive by itself")
+    estimates = store.step("drives", partial(drive_estimates, data, model, final.weights, settings.threads))
+    progress("forecasts of left-out drives")
+    made = tuple(forecasts(data, model, data.spread(settings.judged)))
+    compared = all_forecasts(data, model, made, held)
+    calibration = Calibration(
+        schema=SCHEMA,
+        schema_version=SCHEMA_VERSION,
+        program=__version__,
+        robot=robot.name,
+        data_sheet=data_sheet or robot.name,
+        soils={ground: (soil_names or {}).get(ground, "") for ground in data.drives_on},
+        drives=drive_summaries(data, recordings, windows, compared),
+        window=windows.duration,
+        parts=selection.decisions,
+        parameters=parameter_results(data, parameters, model, selection.left_out, final.refused, estimates),
+        covariance=Covariance(model.free, tuple(tuple(row) for row in covariance(model).tolist())),
+        forecasts=forecast_errors(compared, settings.seed),
+        spectra=spectra(compared),
+        unexplained=unexplained(compared, data.prepared.sigma),
+        converged=final.standing.converged,
+        seed=settings.seed,
+        seconds=time.monotonic() - began,
+    )
+    found = {ground: calibrated_soil(data, ground, model.values) for ground in data.drives_on}
+    return Outcome(calibration, calibrated_robot(data, model.values, calibration), found, data, compared)
+
+
+def _rng(settings: CalibrationSettings) -> np.random.Generator:
+    """Random numbers of the checks of one drive, the same whatever the others are."""
+    return np.random.default_rng(settings.seed)
+
+
+def _select(
+    data: CalibrationData,
+    parameters: tuple[ModelParameter, ...],
+    held: Mapping[str, float],
+    settings: CalibrationSettings,
+    store: StepStore,
+    progress: Progress,
+) -> Selection:
+    """Parts that forecasts of left-out drives ask for, by fits to some of the windows."""
+    windows, judged = data.spread(settings.compared), data.spread(settings.judged)
+    progress("fit of all parts")
+    start = {**held, **start_values(data, windows)}
+    rough = store.step("all parts", partial(_weigh, data, windows, parameters, start, settings.threads))
+    comparison = Comparison(data, windows, judged, rough.weights, settings.threads)
+    full = store.step("all parts forecast", partial(comparison.candidate, parameters, rough.standing, 0))
+    return select_parts(comparison, parameters, full, store.step, progress)
+
+
+def _weigh(
+    data: CalibrationData,
+    windows: WindowSet,
+    parameters: tuple[ModelParameter, ...],
+    start: Mapping[str, float],
+    threads: int,
+) -> FinalFit:
+    model, weights = weigh_and_fit(data, windows, parameters, start, threads)
+    return FinalFit(model.standing, weights, {})
+
+
+def _final_fit(
+    data: CalibrationData,
+    parameters: tuple[ModelParameter, ...],
+    start: Mapping[str, float],
+    settings: CalibrationSettings,
+) -> FinalFit:
+    """Fit of the parts that are kept; then again with the data sheet's values where the drives identify nothing."""
+    windows = data.spread(settings.fitted)
+    model, weights = weigh_and_fit(data, windows, parameters, start, settings.threads)
+    refused = unidentified(model)
+    if refused:
+        values = {name: 0.0 if name in refused else value for name, value in model.values.items()}
+        held = held_parameters(parameters, frozenset(refused))
+        states = model.fitted.point.states
+        model = fit_model(data, windows, held, weights, values, settings.threads, states=states)
+    return FinalFit(model.standing, weights, refused)
+
+
+def _key(
+    recordings: Sequence[Recording],
+    grounds: Sequence[str],
+    robot: Robot,
+    soils: Mapping[str, Soil],
+    settings: CalibrationSettings,
+) -> str:
+    """SHA-256 of all that results depend on; the number of threads is not among it."""
+    digest = hashlib.sha256(source_digest().encode())
+    package = Path(__file__).resolve().parents[1]
+    for path in sorted(path for folder in _SOURCES for path in (package / folder).rglob("*.py")):
+        digest.update(code_digest(path.read_text()).encode())
+    for recording in recordings:
+        digest.update(content_hash(recording).encode())
+        digest.update(repr((recording.meta.source, recording.meta.segments, recording.meta.spans)).encode())
+    texts = [list(grounds), repr(robot), repr(soils), repr(replace(settings, threads=1))]
+    digest.update(json.dumps(texts).encode())
+    return digest.hexdigest()

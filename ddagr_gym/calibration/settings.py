@@ -1,0 +1,33 @@
+"""Choices of a calibration."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+LONGEST_DELAY = 1.0
+"""Longest delay of the commands that a fit finds [s]: twice that of the slowest robot we know (0.43 s, a Warthog)."""
+
+HISTORY = 1.2
+"""Commands kept from before a window [s]: the longest delay and two samples at 10 Hz."""
+
+
+@dataclass(frozen=True)
+class CalibrationSettings:
+    """How drives are cut and how much of them is used.
+
+    Attributes:
+        window: length of the windows [s]: long enough for an integral part to wind up, and one step of the DRIVE
+            protocol.
+        fitted: windows of a drive that the joint fit uses, evenly spread over it.
+        compared: windows of a drive that the fits use which only decide on parts.
+        judged: windows of a left-out drive that are forecast.
+        threads: of the simulator.
+        seed: of resampled intervals.
+    """
+
+    window: float = 6.0
+    fitted: int = 40
+    compared: int = 20
+    judged: int = 100
+    threads: int = 1
+    seed: int = 0

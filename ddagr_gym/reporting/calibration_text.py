@@ -1,0 +1,192 @@
+"""A calibration as text: headline and tables."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ddagr_gym.calibration.parts import PARTS
+from ddagr_gym.calibration.result import (
+    CALIBRATED,
+    DATA_SHEET,
+    KINEMATIC,
+    MODELS,
+    CalibratedParameter,
+    Calibration,
+    ForecastError,
+)
+from ddagr_gym.reporting.text_table import format_table
+
+PARAMETER_HEADER = ("parameter", "unit", "data sheet", "calibrated", "90 %", "between drives", "")
+"""Of :func:`parameter_rows`."""
+
+MODEL_LABELS = {
+    DATA_SHEET: "data sheet",
+    CALIBRATED: "calibrated",
+    KINEMATIC: "effective track with delay and lag",
+}
+"""Models in words."""
+
+FORECAST_HEADER = ("left-out drive", "soil from", "error", "unit", *(MODEL_LABELS[name] for name in MODELS))
+"""Of :func:`forecast_rows`."""
+
+PART_HEADER = ("part", "kept", "forecasts without it are worse by", "standard error")
+"""Of :func:`part_rows`."""
+
+SHOWN = (("wheel_speed", None), ("heading", 5.0), ("position", 5.0))
+"""Errors of the short table: metric and horizon."""
+
+_TITLES = {part.name: part.title for part in PARTS}
+
+
+def headline(calibration: Calibration) -> str:
+    """What was calibrated with what, and what it is worth."""
+    drives, grounds = len(calibration.drives), len(calibration.grounds)
+    robot = [item for item in calibration.parameters if not item.ground]
+    found = sum(item.calibrated for item in robot)
+    first = (
+        f"{calibration.robot}: {found} of {len(robot)} parameters of the robot from {drives} "
+        f"drive{'s' * (drives > 1)} on {grounds} ground{'s' * (grounds > 1)}"
+    )
+    share = error_share(calibration, "wheel_speed", None)
+    return first + (
+        "." if share is None else f"; on left-out drives wheel speeds err by {100.0 * share:.0f} % of before."
+    )
+
+
+def error_share(calibration: Calibration, metric: str, horizon: float | None) -> float | None:
+    """Error of the calibrated simulator over the data sheet's, root mean square over left-out drives; None without."""
+    chosen = [e for e in calibration.forecasts if (e.metric, e.horizon) == (metric, horizon) and e.rms is not None]
+    sums = {
+        model: sum(e.rms**2 for e in chosen if e.model == model and e.rms is not None)
+        for model in (DATA_SHEET, CALIBRATED)
+    }
+    return (sums[CALIBRATED] / sums[DATA_SHEET]) ** 0.5 if sums[DATA_SHEET] > 0.0 else None
+
+
+def parameter_rows(calibration: Calibration) -> list[tuple[str, ...]]:
+    """Parameters under :data:`PARAMETER_HEADER`."""
+    return [parameter_row(item) for item in calibration.parameters]
+
+
+def parameter_row(item: CalibratedParameter) -> tuple[str, ...]:
+    """One parameter: data sheet, value, interval, scatter between drives, and why it is kept."""
+    sheet = f"{number(item.data_sheet)} ± {item.data_sheet_deviation:.2g}"
+    if item.interval is None:
+        return parameter_label(item), unit(item), sheet, "kept", "", "", item.reason
+    interval = f"{number(item.interval[0])} to {number(item.interval[1])}"
+    return parameter_label(item), unit(item), sheet, number(item.value), interval, scatter_text(item), ""
+
+
+def parameter_label(item: CalibratedParameter) -> str:
+    """Name of a parameter in words."""
+    base, _, ground = item.name.partition("/")
+    return base.replace("_", " ") + (f", {ground}" if ground else "")
+
+
+def scatter_text(item: CalibratedParameter) -> str:
+    """Deviation between drives, of a factor in percent."""
+    size = item.scatter.same_ground if item.ground else item.scatter.other_grounds
+    if size is None:
+        return "one drive"
+    return f"{size:.2g} {item.unit}" if is_difference(item) else f"{100.0 * size:.2g} %"
+
+
+def is_difference(item: CalibratedParameter) -> bool:
+    """Whether the fit adds to a parameter; it multiplies the others."""
+    return item.unit == "s" or item.name.startswith("exit_angle_ratio")
+
+
+def number(value: float) -> str:
+    """Three significant digits."""
+    return f"{value:.3g}"
+
+
+def unit(item: CalibratedParameter) -> str:
+    """Unit of a parameter as it is printed."""
+    return "" if item.unit == "-" else item.unit
+
+
+def part_rows(calibration: Calibration) -> list[tuple[str, ...]]:
+    """Decisions on parts under :data:`PART_HEADER`."""
+    return [
+        (
+            _TITLES[item.name],
+            "yes" if item.kept else "no",
+            f"{100.0 * item.growth:+.1f} %",
+            "" if item.error is None else f"{100.0 * item.error:.1f} %",
+        )
+        for item in calibration.parts
+    ]
+
+
+def forecast_rows(calibration: Calibration, shown: Sequence[tuple[str, float | None]] = SHOWN) -> list[tuple[str, ...]]:
+    """Errors on left-out drives under :data:`FORECAST_HEADER`; median of wheel speeds, else root mean square."""
+    rows = []
+    for drive in dict.fromkeys(item.drive for item in calibration.forecasts):
+        for metric, horizon in shown:
+            found = {
+                item.model: item
+                for item in calibration.forecasts
+                if (item.drive, item.metric, item.horizon) == (drive, metric, horizon)
+            }
+            if any(item.count for item in found.values()):
+                first = next(iter(found.values()))
+                cells = (error_text(found[model]) if model in found else "-" for model in MODELS)
+                rows.append((drive, first.soil_from, error_label(metric, horizon), first.unit, *cells))
+    return rows
+
+
+def error_label(metric: str, horizon: float | None) -> str:
+    """What an error is of, in words."""
+    name = metric.replace("_", " ")
+    return f"{name}, median" if horizon is None else f"{name} after {horizon:g} s"
+
+
+def error_text(item: ForecastError) -> str:
+    """Size of an error with its 95 % interval."""
+    size, interval = (item.median, item.median_interval) if item.horizon is None else (item.rms, item.rms_interval)
+    if size is None:
+        return "-"
+    return number(size) + ("" if interval is None else f" ({interval[0]:.2g}-{interval[1]:.2g})")
+
+
+def refused_lines(calibration: Calibration) -> list[str]:
+    """A sentence on each parameter that keeps the data sheet's value, and the drive that would help."""
+    return [
+        f"{parameter_label(item)}: {item.reason}" + (f" What would help: {item.helps}." if item.helps else "")
+        for item in calibration.parameters
+        if not item.calibrated
+    ]
+
+
+def unexplained_rows(calibration: Calibration) -> list[tuple[str, ...]]:
+    """Where the residuals of left-out drives are: channel, condition, share of the squares, of the time, size."""
+    return [
+        (
+            item.channel.replace("_", " "),
+            item.condition,
+            f"{100.0 * item.share:.0f} %",
+            f"{100.0 * item.time:.0f} %",
+            number(item.rms),
+            number(item.noise),
+        )
+        for item in calibration.unexplained
+    ]
+
+
+UNEXPLAINED_HEADER = ("channel", "where", "share of the squares", "of the samples", "r.m.s. [rad/s]", "noise [rad/s]")
+"""Of :func:`unexplained_rows`."""
+
+
+def summary(calibration: Calibration) -> str:
+    """All tables as the command prints them."""
+    parts = [headline(calibration)]
+    parts += [f"note: {drive.source}: {note}" for drive in calibration.drives for note in drive.notes]
+    parts += ["", format_table(PARAMETER_HEADER, parameter_rows(calibration))]
+    parts += ["", format_table(PART_HEADER, part_rows(calibration))]
+    parts += ["", format_table(FORECAST_HEADER, forecast_rows(calibration))]
+    parts += ["", format_table(UNEXPLAINED_HEADER, unexplained_rows(calibration))]
+    lines = refused_lines(calibration)
+    parts += ["", "Not calibrated:", *(f"- {line}" for line in lines)] if lines else []
+    parts += [] if calibration.converged else ["", "The joint fit did not settle: intervals are too narrow."]
+    return "\n".join(parts)

@@ -1,0 +1,116 @@
+"""What a calibration refuses, each in one sentence."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import ddagr_gym
+from ddagr_gym.calibration.input_requirements import (
+    DriveScale,
+    check_drives,
+    check_scales,
+    drive_scale,
+    grounds_of,
+    with_gyro_forward,
+)
+from ddagr_gym.errors import InputError
+from ddagr_gym.presets import get_robot
+from tests.calibration.conftest import drive
+
+
+def without(recording, *names):
+    kept = {name: values for name, values in recording.channels.items() if name not in names}
+    return replace(recording, channels=kept)
+
+
+@pytest.fixture(scope="module")
+def field_drive():
+    return drive("field", 11, 90.0)
+
+
+def test_no_drive_at_all_is_refused():
+    with pytest.raises(InputError, match="no ordinary drive"):
+        ddagr_gym.calibrate([], "ddagr")
+
+
+def test_a_drive_of_another_robot_is_refused_by_its_name(field_drive):
+    with pytest.raises(InputError, match="drive of the robot 'ddagr'"):
+        check_drives([field_drive], get_robot("husky"))
+
+
+def test_a_drive_without_encoders_is_refused(field_drive):
+    with pytest.raises(InputError, match="no encoder_right, encoder_left"):
+        check_drives([without(field_drive, "encoder_right", "encoder_left")], get_robot("ddagr"))
+
+
+def test_a_drive_given_twice_is_refused(field_drive):
+    with pytest.raises(InputError, match="hold the same values"):
+        check_drives([field_drive, field_drive.with_meta(source="again.csv")], get_robot("ddagr"))
+
+
+def test_a_short_drive_is_refused():
+    with pytest.raises(InputError, match="give drives of 60 s at least"):
+        check_drives([drive("field", 12, 20.0)], get_robot("ddagr"))
+
+
+def test_a_robot_that_stands_still_is_refused(field_drive):
+    still = {name: np.zeros(len(field_drive)) for name in ("command_right", "command_left")}
+    with pytest.raises(InputError, match="stand still 100 %"):
+        check_drives([replace(field_drive, channels={**field_drive.channels, **still})], get_robot("ddagr"))
+
+
+def test_wheels_of_another_size_are_refused_by_what_the_poses_travel(field_drive):
+    """Poses travel the true radius times the encoders: half of it with wheels taken to be twice as large."""
+    geometry = field_drive.meta.geometry
+    doubled = field_drive.with_meta(geometry=replace(geometry, wheel_radius=2.0 * geometry.wheel_radius))
+    scales = [drive_scale(r, np.random.default_rng(0)) for r in (field_drive, doubled)]
+    assert scales[1].travel == pytest.approx(0.5 * scales[0].travel, rel=1e-6)
+    with pytest.raises(InputError, match="are not of one robot"):
+        check_scales(["a", "b"], scales, get_robot("ddagr"))
+    with pytest.raises(InputError, match=r"b: the poses travel 0\.\d\d of what wheels"):
+        check_scales(["b"], scales[1:], get_robot("ddagr"))
+    check_scales(["a"], scales[:1], get_robot("ddagr"))
+
+
+def test_a_track_below_the_geometric_one_is_refused():
+    with pytest.raises(InputError, match=r"track were 0\.50 times"):
+        check_scales(["a"], [DriveScale(0.95, 0.5)], get_robot("ddagr"))
+
+
+def test_a_gyro_against_encoders_and_poses_is_turned(field_drive):
+    reversed_gyro = replace(field_drive, channels={**field_drive.channels, "yaw_rate": -field_drive["yaw_rate"]})
+    mended, said = with_gyro_forward(reversed_gyro, np.random.default_rng(0))
+    np.testing.assert_array_equal(mended["yaw_rate"], field_drive["yaw_rate"])
+    assert "its sign was turned" in said[0]
+    assert with_gyro_forward(field_drive, np.random.default_rng(0)) == (field_drive, ())
+
+
+def test_every_drive_has_one_ground():
+    names = ("a", "b", "c")
+    assert grounds_of(names, {}) == ("ground",) * 3
+    assert grounds_of(names, {"sand": [0, 2], "grass": [1]}) == ("sand", "grass", "sand")
+    with pytest.raises(InputError, match="b is on the grounds 'sand' and 'grass'"):
+        grounds_of(names, {"sand": [0, 1], "grass": [1, 2]})
+    with pytest.raises(InputError, match=r"c has no ground .* --ground NAME=c"):
+        grounds_of(names, {"sand": [0, 1]})
+
+
+@pytest.mark.parametrize(
+    ("grounds", "sentence"),
+    [
+        ({"sand": ["elsewhere.csv"]}, "elsewhere.csv has a ground and is not among the drives"),
+        ({"sand": [1]}, "drive number 1 has a ground: give numbers from 0 to 0"),
+        ({"a/b": [0]}, "becomes the name of a file"),
+    ],
+)
+def test_grounds_that_do_not_fit_the_drives_are_refused(field_drive, grounds, sentence):
+    with pytest.raises(InputError, match=sentence):
+        ddagr_gym.calibrate([field_drive], "ddagr", grounds=grounds)
+
+
+def test_soils_by_ground_need_one_for_each(field_drive):
+    with pytest.raises(InputError, match="no drive is on the ground 'sand'"):
+        ddagr_gym.calibrate([field_drive], "ddagr", {"sand": "lete_sand_wong"}, {"field": [0]})

@@ -1,0 +1,162 @@
+"""A joint fit over simulated drives finds what they were made with, and its files load everywhere."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import ddagr_gym
+from ddagr_gym import cli
+from ddagr_gym.api.calibrate import CalibrationResult
+from ddagr_gym.calibration import files
+from ddagr_gym.calibration.result import CALIBRATED, DATA_SHEET
+from ddagr_gym.calibration.run import calibrate_drives
+from ddagr_gym.calibration.settings import CalibrationSettings
+from ddagr_gym.config import load_config
+from ddagr_gym.errors import InputError
+from ddagr_gym.parameters import Robot
+from ddagr_gym.presets import get_robot, get_soil
+from tests.calibration.conftest import DELAY, MOTOR_RATE, STRENGTH, drive
+
+FEW = CalibrationSettings(fitted=10, compared=6, judged=12)
+"""Enough windows for three parameters and two grounds, at a fifth of the cost."""
+
+GROUNDS = ("field", "field", "track")
+
+
+def calibrated(drives, cache=None, lines=None):
+    soils = {ground: get_soil("thesis_a1") for ground in GROUNDS}
+    return calibrate_drives(
+        drives, GROUNDS, get_robot("ddagr"), soils, FEW, data_sheet="ddagr", cache=cache,
+        progress=(lambda line: None) if lines is None else lines.append,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def result(drives) -> CalibrationResult:
+    return CalibrationResult(calibrated(drives))
+
+
+@pytest.fixture(scope="module")
+def folder(result, tmp_path_factory) -> Path:
+    return result.report(tmp_path_factory.mktemp("calibrated") / "CAL")
+
+
+def holds(item, truth: float) -> bool:
+    return item.interval is not None and item.interval[0] <= truth <= item.interval[1]
+
+
+@pytest.mark.slow
+def test_shared_motor_rate_and_delay_are_found(result):
+    for name, truth in (("motor_rate", MOTOR_RATE), ("command_delay", DELAY)):
+        item = result.calibration.parameter(name)
+        assert item.value == pytest.approx(truth, rel=0.02), name
+        # the windows of three drives do not cover what the simulator's adaptive steps leave: 1 % of either
+        assert item.interval[0] * 0.99 <= truth <= item.interval[1] * 1.01, name
+
+
+@pytest.mark.slow
+def test_strength_is_found_by_ground(result):
+    for ground, truth in STRENGTH.items():
+        item = result.calibration.parameter(f"soil_strength/{ground}")
+        assert item.value == pytest.approx(truth, rel=0.1)
+        assert holds(item, truth), (ground, item.interval)
+
+
+@pytest.mark.slow
+def test_parts_that_are_right_on_the_data_sheet_are_kept_off(result):
+    kept = {part.name for part in result.calibration.parts if part.kept}
+    assert kept == {"speed_loop", "command_delay"}
+    assert result.robot.mass == get_robot("ddagr").mass
+    item = result.calibration.parameter("yaw_inertia")
+    assert not item.calibrated
+    assert item.reason
+    assert "quick reversals" in item.helps
+
+
+@pytest.mark.slow
+def test_left_out_drives_are_forecast_better(result):
+    """Ten times better: the data sheet's motor is twice as fast and not late."""
+    for drive_name in {item.drive for item in result.calibration.forecasts}:
+        size = {
+            e.model: e.rms
+            for e in result.calibration.forecasts
+            if (e.drive, e.metric, e.horizon) == (drive_name, "wheel_speed", None)
+        }
+        assert size[CALIBRATED] < 0.1 * size[DATA_SHEET]
+
+
+@pytest.mark.slow
+def test_a_drive_that_is_alone_on_its_ground_is_forecast_by_its_first_half(result):
+    found = {item.drive: item.soil_from for item in result.calibration.forecasts}
+    assert found == {"field_1.csv": "other drives", "field_2.csv": "other drives", "track_3.csv": "its first half"}
+
+
+@pytest.mark.slow
+def test_an_interrupted_calibration_goes_on_to_the_same_bits(drives, result, tmp_path):
+    class Stopped(Exception):
+        pass
+
+    def stop(line):
+        if line == "every drive by itself":
+            raise Stopped
+
+    soils = {ground: get_soil("thesis_a1") for ground in GROUNDS}
+    with pytest.raises(Stopped):
+        calibrate_drives(
+            drives, GROUNDS, get_robot("ddagr"), soils, FEW, data_sheet="ddagr", cache=tmp_path / "c", progress=stop
+        )
+    again = calibrated(drives, cache=tmp_path / "c").calibration
+    assert files.as_text(replace(again, seconds=0.0)) == files.as_text(replace(result.calibration, seconds=0.0))
+
+
+@pytest.mark.slow
+def test_the_file_reads_back_as_it_was(result, folder):
+    assert files.as_text(files.load(folder)) == files.as_text(result.calibration)
+    assert files.load_robot(folder) == result.robot
+    assert files.load_soil(folder, "track") == ("track", result.soils["track"])
+    with pytest.raises(InputError, match="name one of them with --ground"):
+        files.load_soil(folder)
+    with pytest.raises(InputError, match="not calibrated on 'mud'"):
+        files.load_soil(folder, "mud")
+
+
+@pytest.mark.slow
+def test_robot_and_soil_are_taken_by_the_other_commands(folder, tmp_path):
+    import gymnasium
+
+    robot, soil = str(folder / "robot.yaml"), str(folder / "soil_field.yaml")
+    output = tmp_path / "drive.parquet"
+    effects = ["--effects", str(folder / "effects.yaml")]
+    assert (
+        cli.main(
+            ["simulate", "--manoeuvre", "straight", "--robot", robot, "--soil", soil, *effects, "--output", str(output)]
+        )
+        == 0
+    )
+    environment = gymnasium.make("DDAGR-Turn-v0", robot=robot, soil=soil)
+    environment.reset(seed=0)
+    assert environment.unwrapped.settings.robot == load_config(robot, Robot)
+
+
+@pytest.mark.slow
+def test_replay_takes_the_calibration_without_a_fit(folder, drives, tmp_path):
+    fresh = drive("track", 31, 60.0)
+    before = ddagr_gym.replay(fresh, "ddagr", "thesis_a1")
+    after = ddagr_gym.replay(fresh, calibration=folder, ground="track")
+    sizes = [result.errors(5.0, "heading")[0].error.rms for result in (before, after)]
+    assert sizes[1] < 0.2 * sizes[0]
+    with pytest.raises(InputError, match="a calibration and a robot are given"):
+        ddagr_gym.replay(fresh, "ddagr", calibration=folder, ground="track")
+
+
+@pytest.mark.slow
+def test_the_page_stands_alone(folder):
+    page = (folder / files.PAGE).read_text()
+    assert 'src="data:image/svg+xml' in page
+    assert "http" not in page.replace("http-equiv", "")
+    for name in ("field_1.csv", "track_3.csv", "motor rate", "What would help"):
+        assert name in page
+    assert page.count("<figure>") == 3 + 4
