@@ -149,11 +149,14 @@ def calibrate(
 
     Examples:
         >>> import ddagr_gym
-        >>> drives = [ddagr_gym.simulate(name, rate=25.0, pose_rate=5.0, seed=seed)
-        ...           for seed, name in enumerate(["arcs", "s_weave"])]
+        >>> import numpy as np
+        >>> from ddagr_gym.presets import get_robot
+        >>> robot = get_robot("ddagr").with_values(motor_rate=3.0)  # slower than the data sheet's 4.5 1/s
+        >>> rng = np.random.default_rng(0)
+        >>> steps = [np.repeat(rng.uniform(-1.5, 1.5, (24, 2)), 60, axis=0) for _ in range(2)]  # 3 s each, at 20 Hz
+        >>> drives = [ddagr_gym.simulate(commands, robot, rate=20.0, pose_rate=5.0) for commands in steps]
         >>> result = ddagr_gym.calibrate(drives, "ddagr", "thesis_a1")
-        >>> low, high = result.calibration.parameter("motor_rate").interval
-        >>> low < 4.5 < high  # that of the data sheet [1/s]
+        >>> abs(result.robot.motor_rate - 3.0) < 0.05
         True
     """
     from ddagr_gym.calibration.files import check_ground_name
@@ -164,7 +167,7 @@ def calibrate(
     at_least(threads=(threads, 1), seed=(seed, 0))
     data_sheet = robot_from(robot)
     given = _listed(recordings)
-    found = recordings_from(given, robot, column_map) if given else ()
+    found = _named_apart(recordings_from(given, robot, column_map) if given else ())
     check_drives(found, data_sheet)
     names = [recording.meta.source for recording in found]
     numbers = {ground: [_number(drive, given, found) for drive in drives] for ground, drives in (grounds or {}).items()}
@@ -191,6 +194,15 @@ def _listed(recordings: Sources) -> list[Source]:
     return list(recordings) if several else [recordings]  # type: ignore[arg-type]
 
 
+def _named_apart(recordings: Sequence[Recording]) -> tuple[Recording, ...]:
+    """Recordings of which those with one name are numbered."""
+    names = [recording.meta.source for recording in recordings]
+    return tuple(
+        recording.with_meta(source=f"{name} ({1 + names[:number].count(name)})") if names.count(name) > 1 else recording
+        for number, (name, recording) in enumerate(zip(names, recordings, strict=True))
+    )
+
+
 def _number(drive: DriveLike, given: Sequence[Source], found: Sequence[Recording]) -> int:
     """Number of a drive among the recordings."""
     if isinstance(drive, int) and not isinstance(drive, bool):
@@ -201,11 +213,7 @@ def _number(drive: DriveLike, given: Sequence[Source], found: Sequence[Recording
         name = Path(drive).name
         matching = [n for n, recording in enumerate(found) if recording.meta.source in (str(drive), name)]
     else:
-        matching = [
-            n
-            for n, item in enumerate(given)
-            if item is drive or (found[n] is drive if len(given) == len(found) else False)
-        ]
+        matching = [n for n, item in enumerate(given) if item is drive and len(given) == len(found)]
     if not matching:
         raise InputError(
             f"{drive} has a ground and is not among the drives: {', '.join(r.meta.source for r in found)}."

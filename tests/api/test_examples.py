@@ -10,7 +10,7 @@ import pytest
 import ddagr_gym
 
 FAST = ("load_recording", "simulate", "check", "estimate")
-SLOW = ("replay", "isolability", "next_drive", "diagnose")
+SLOW = ("replay", "isolability", "next_drive", "diagnose", "calibrate")
 
 
 def run_example(name: str) -> None:
