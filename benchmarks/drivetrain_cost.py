@@ -1,0 +1,83 @@
+"""What a robot's drivetrain costs: time of a step with all of its parts over that of the first-order loop alone.
+
+    python -m benchmarks.drivetrain_cost [--repeats 15]
+
+Both robots get the same commands, redrawn every 0.8 s, and take turns (:mod:`benchmarks.speeds.timing`). The aim is a
+ratio of at most 1.15; the exact loop must cost what it did, which ``benchmarks.speed`` watches. Writes
+``results/drivetrain_cost.json``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.speeds.timing import Contestant, race, ratio
+from ddagr_gym.commands.output import write_text
+from ddagr_gym.parameters import Drivetrain, Imu, Robot, Sensors, Soil
+from ddagr_gym.presets import get_robot, get_soil
+from ddagr_gym.simulator import Simulator
+
+RESULTS = Path(__file__).with_name("results") / "drivetrain_cost.json"
+COUNT, SAMPLES, HOLD = 16, 600, 100
+CASES = (("ddagr", "thesis_a1", 1.0, 125.0, 100.0), ("warthog", "firm_ground", 4.0, 20.0, 40.0))
+"""Robot, soil, scale of the commands [rad/s], sample rate [Hz], inertia J of a bank [kg m^2]."""
+
+
+def full_drivetrain(scale: float, inertia: float) -> Drivetrain:
+    """Every part that costs time."""
+    return Drivetrain(
+        command_delay=0.2, command_deadband=0.05 * scale, command_ramp=20.0 * scale, integral_rate=2.0,
+        load_compliance=1.0 / inertia, acceleration_limit=20.0 * scale, no_load_speed=4.0 * scale,
+        power_limit=30.0 * scale**2, limit_imbalance=0.1, viscous_rate=0.1, friction=0.2,
+    )  # fmt: skip
+
+
+def contestant(name: str, robot: Robot, soil: Soil, scale: float, rate: float) -> Contestant:
+    """One robot in a batch of COUNT, from rest."""
+    commands = scale * np.random.default_rng(0).uniform(0.2, 1.2, (COUNT, SAMPLES // HOLD, 2))
+
+    def run() -> float:
+        simulator = Simulator(COUNT)
+        for n in range(COUNT):
+            simulator.configure(n, robot, soil, Sensors(imu=Imu(sample_rate=rate)))
+        simulator.reset()
+        simulator.step(np.repeat(commands, HOLD, axis=1))
+        return float(COUNT * SAMPLES)
+
+    return Contestant(name, run)
+
+
+def measure(repeats: int) -> list[dict[str, Any]]:
+    """Ratio of the times by case."""
+    found = []
+    for robot_name, soil_name, scale, rate, inertia in CASES:
+        robot, soil = get_robot(robot_name), get_soil(soil_name)
+        built = replace(robot, drivetrain=full_drivetrain(scale, inertia))
+        rates = race(
+            [contestant("loop", robot, soil, scale, rate), contestant("drivetrain", built, soil, scale, rate)], repeats
+        )
+        found.append({"robot": robot_name, "soil": soil_name, "times": ratio(rates, "loop", "drivetrain")})
+    return found
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Measure, print and write."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--repeats", type=int, default=15)
+    parser.add_argument("--output", type=Path, default=RESULTS)
+    given = parser.parse_args(arguments)
+    results = measure(given.repeats)
+    for item in results:
+        times = item["times"]
+        print(f"{item['robot']} on {item['soil']}: a step costs {times['median']} times one of the loop alone")
+    write_text(given.output, json.dumps(results, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()
