@@ -23,7 +23,7 @@ import importlib
 from dataclasses import dataclass
 from typing import Any
 
-from ddagr_gym.errors import InputError
+from ddagr_gym.extras import need
 from ddagr_gym.parameters import Robot
 
 STATE_SIZE, INPUT_SIZE, PARAMETER_SIZE = 7, 2, 7
@@ -56,12 +56,8 @@ class PredictiveModel:
 
 def import_casadi() -> Any:
     """The ``casadi`` module; InputError with the remedy where it is not installed."""
-    try:
-        return importlib.import_module("casadi")
-    except ImportError:
-        raise InputError(
-            "the model-predictive controller needs casadi, which is not installed: pip install 'ddagr-gym[mpc]'."
-        ) from None
+    need("casadi")
+    return importlib.import_module("casadi")
 
 
 def wheel_forces(ca: Any, model: PredictiveModel, v_x: Any, v_y: Any, rim: Any, soil: Any) -> tuple[Any, Any]:

@@ -6,17 +6,6 @@ import hashlib
 import re
 from pathlib import Path
 
-_ESTIMATE = "@"
-_SUFFIX = ".npz"
-
-
-def _split(name: str) -> tuple[str, str]:
-    """A policy's name or path without its suffix, and the suffix: "@" and the estimate that it receives, or ""."""
-    if _ESTIMATE not in name or name.endswith(_SUFFIX):
-        return name, ""
-    stem, _, estimate = name.rpartition(_ESTIMATE)
-    return stem, _ESTIMATE + estimate
-
 
 def arm_and_seed(name: str) -> tuple[str, int]:
     """Arm and training seed of a policy. All training seeds of one configuration make one arm.
@@ -24,19 +13,19 @@ def arm_and_seed(name: str) -> tuple[str, int]:
     ``ppo_ekf_seed_3``, ``ppo_ekf_3`` and ``runs/ppo_ekf_seed_3/policy.npz`` are seed 3 of the arm ``ppo_ekf`` if the
     policy's file names 3 as its seed.
     """
-    from ddagr_gym.policies.shipped import find_policy
+    from ddagr_gym.policies.shipped import SUFFIX, find_policy, split_estimate
 
-    stem, estimate = _split(name)
+    stem, _ = split_estimate(name)
     seed = int(find_policy(stem).training.get("seed", 0))
     path = Path(stem)
-    label = (path.parent.name if path.stem == "policy" else path.stem) if stem.endswith(_SUFFIX) else stem
+    label = (path.parent.name if path.stem == "policy" else path.stem) if stem.endswith(SUFFIX) else stem
     found = re.fullmatch(rf"(.+?)[_-](?:seed[_-]?|s)?{seed}", label)
-    return (found.group(1) if found else label) + estimate, seed
+    return (found.group(1) if found else label) + name.removeprefix(stem), seed
 
 
 def policy_version(name: str) -> str:
     """Hash of a policy's file, followed by the estimate that the policy receives."""
-    from ddagr_gym.policies.shipped import policy_file
+    from ddagr_gym.policies.shipped import policy_file, split_estimate
 
-    stem, estimate = _split(name)
-    return hashlib.sha256(policy_file(stem).read_bytes()).hexdigest() + estimate
+    stem, _ = split_estimate(name)
+    return hashlib.sha256(policy_file(stem).read_bytes()).hexdigest() + name.removeprefix(stem)

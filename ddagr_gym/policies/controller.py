@@ -11,11 +11,9 @@ from ddagr_gym.errors import InputError, unknown_name
 from ddagr_gym.parameters import Robot, Sensors
 from ddagr_gym.policies.archive import Policy
 from ddagr_gym.policies.estimates import ESTIMATES, OF_EVERY_POLICY
-from ddagr_gym.policies.shipped import SUFFIX, find_policy, policy_names
+from ddagr_gym.policies.shipped import SUFFIX, find_policy, policy_names, split_estimate
 from ddagr_gym.policies.view import PolicyView
 from ddagr_gym.presets import ddagr
-
-SEPARATOR = "@"
 
 
 class PolicyController:
@@ -95,7 +93,7 @@ def policy_batch(name: str, count: int) -> PolicyBatch | None:
     Raises:
         InputError: unknown policy or estimate, with the closest names.
     """
-    stem, estimate = _split(name)
+    stem, estimate = split_estimate(name)
     if estimate not in ESTIMATES:
         raise unknown_name("estimate", estimate, ESTIMATES)
     if estimate not in OF_EVERY_POLICY:
@@ -105,17 +103,8 @@ def policy_batch(name: str, count: int) -> PolicyBatch | None:
 
 def is_policy_name(name: str) -> bool:
     """Whether a controller's name means a policy: a trained one, or a path, with or without an estimate."""
-    stem = name.rpartition(SEPARATOR)[0] if _has_estimate(name) else name
+    stem, _ = split_estimate(name)
     return stem.endswith(SUFFIX) or stem in policy_names()
-
-
-def _has_estimate(name: str) -> bool:
-    return SEPARATOR in name and not name.endswith(SUFFIX)
-
-
-def _split(name: str) -> tuple[str, str]:
-    stem, _, estimate = name.rpartition(SEPARATOR) if _has_estimate(name) else (name, "", "live")
-    return stem, estimate
 
 
 def policy_controller(name: str) -> PolicyController:
@@ -124,18 +113,18 @@ def policy_controller(name: str) -> PolicyController:
     Raises:
         InputError: unknown policy or estimate, with the closest names.
     """
-    stem, estimate = _split(name)
+    stem, estimate = split_estimate(name)
     return PolicyController(find_policy(stem), estimate=estimate)
 
 
 def policy_needs_filter(name: str) -> bool:
     """Whether the environment must append the filter's features for this policy."""
-    return find_policy(_split(name)[0]).design.needs_filter
+    return find_policy(split_estimate(name)[0]).design.needs_filter
 
 
 def policy_title(name: str) -> str:
     """What a policy is, in a phrase."""
-    stem, estimate = _split(name)
+    stem, estimate = split_estimate(name)
     if estimate not in ESTIMATES:
         raise unknown_name("estimate", estimate, ESTIMATES)
     design = find_policy(stem).design
@@ -148,4 +137,4 @@ def policy_title(name: str) -> str:
 
 def is_deployable_policy(name: str) -> bool:
     """Whether it does without the true state."""
-    return _split(name)[1] != "true"
+    return split_estimate(name)[1] != "true"

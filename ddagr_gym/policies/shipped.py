@@ -8,7 +8,8 @@ from pathlib import Path
 from ddagr_gym.errors import InputError, unknown_name
 from ddagr_gym.policies.archive import Policy, load_policy
 
-SUFFIX = ".npz"
+SUFFIX, SEPARATOR = ".npz", "@"
+"""Of policies' files, and between a policy's name and the estimate that it receives."""
 
 
 def policies_dir() -> Path:
@@ -53,6 +54,14 @@ def policy_file(name: str) -> Path:
     if name not in files:
         raise unknown_name("policy", name, files)
     return files[name]
+
+
+def split_estimate(name: str) -> tuple[str, str]:
+    """A policy's name or path, and the estimate that it receives; "live" where none is named."""
+    if SEPARATOR not in name or name.endswith(SUFFIX):
+        return name, "live"
+    stem, _, estimate = name.rpartition(SEPARATOR)
+    return stem, estimate
 
 
 @lru_cache(maxsize=32)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.errors import InputError
+from ddagr_gym.extras import need
 from ddagr_gym.recordings.files import write_atomically
 
 Frame = NDArray[np.uint8]
@@ -20,12 +21,9 @@ Frame = NDArray[np.uint8]
 
 def ffmpeg_program() -> str:
     """Path of the ffmpeg program, or an InputError that names the extra."""
-    try:
-        import imageio_ffmpeg
-    except ImportError:
-        raise InputError(
-            'video needs imageio-ffmpeg, which is not installed: run pip install "ddagr-gym[render]".'
-        ) from None
+    need("imageio_ffmpeg")
+    import imageio_ffmpeg
+
     return str(imageio_ffmpeg.get_ffmpeg_exe())
 
 

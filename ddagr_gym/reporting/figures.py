@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from ddagr_gym.control.circle import taubin_circle, turn_window
 from ddagr_gym.control.row_turn import RowTurn
 from ddagr_gym.errors import InputError
+from ddagr_gym.extras import need
 from ddagr_gym.frames import body_to_world
 from ddagr_gym.parameters import Robot
 from ddagr_gym.recordings.files import write_atomically
@@ -102,13 +103,10 @@ _MOST_READINGS = 800
 @contextmanager
 def house_style() -> Iterator[None]:
     """Within this context matplotlib draws in the house style; afterwards it is as it was."""
-    try:
-        from cycler import cycler
-        from matplotlib import style
-    except ImportError:
-        raise InputError(
-            'figures need matplotlib, which is not installed: run pip install "ddagr-gym[report]".'
-        ) from None
+    need("matplotlib")
+    from cycler import cycler
+    from matplotlib import style
+
     with style.context(["default", HOUSE_STYLE | {"axes.prop_cycle": cycler(color=COLOURS)}]):
         yield
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ddagr_gym.errors import InputError
+from ddagr_gym.extras import need
 from ddagr_gym.reporting.figures import svg_data
 
 _PIXELS_PER_INCH = 96
@@ -17,10 +17,9 @@ def page_template(name: str) -> Any:
     Raises:
         InputError: jinja2 is not installed.
     """
-    try:
-        from jinja2 import Environment, PackageLoader, StrictUndefined
-    except ImportError:
-        raise InputError('reports need jinja2, which is not installed: run pip install "ddagr-gym[report]".') from None
+    need("jinja2")
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
     loader = PackageLoader("ddagr_gym.reporting", "templates")
     environment = Environment(
         loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
