@@ -98,7 +98,7 @@ class Drivetrain(Validated):
         power_limit: largest product of that acceleration and the speed [rad^2/s^3]: power over the bank's inertia.
         limit_imbalance: share by which the right bank's limits are above the mean of both, the left one's below [-].
         viscous_rate: friction of motor and gear per speed [1/s].
-        friction: Coulomb friction of motor and gear, as the acceleration that it takes [rad/s^2].
+        coulomb_friction: friction of motor and gear, as the acceleration that it takes [rad/s^2].
     """
 
     command_delay: float = bounded("s", 0.0, 1.0, default=0.0)
@@ -111,7 +111,7 @@ class Drivetrain(Validated):
     power_limit: float = bounded("rad^2/s^3", 0.0, 1e6, default=1e6, open_low=True)
     limit_imbalance: float = bounded("-", -0.9, 0.9, default=0.0)
     viscous_rate: float = bounded("1/s", 0.0, 1e3, default=0.0)
-    friction: float = bounded("rad/s^2", 0.0, 1e3, default=0.0)
+    coulomb_friction: float = bounded("rad/s^2", 0.0, 1e3, default=0.0)
 
 
 @dataclass(frozen=True)

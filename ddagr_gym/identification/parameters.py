@@ -193,6 +193,24 @@ _DRIVETRAIN_ENTRIES = {
     **{name: layout.BASE_DRIVETRAIN + k for k, name in enumerate(layout.DRIVETRAIN_PARAMETERS)},
 }
 _LIMITS = ("command_ramp", "acceleration_limit", "no_load_speed", "power_limit")
+
+
+def drivetrain_of(robot: Robot, values: Mapping[str, float]) -> Drivetrain:
+    """A robot's drivetrain with parameters of a fit at values, by name; those that are missing stay.
+
+    Args:
+        robot: nominal.
+        values: logarithms of factors of limits, changes of the others.
+    """
+    own = robot.drivetrain
+    found = {name: float(values[name]) for name in _DRIVETRAIN_ENTRIES if name in values}
+    changed = {
+        name: getattr(own, name) * math.exp(value) if name in _LIMITS else getattr(own, name) + value
+        for name, value in found.items()
+    }
+    return replace(own, **changed)
+
+
 _DRIVETRAIN_STEP = 0.02  # of the standard deviation, for finite differences (ours)
 
 

@@ -28,9 +28,9 @@ from ddagr_gym.physics.layout import (
     COMMAND_NODES,
     COMMAND_RAMP,
     COMMAND_RING,
+    COULOMB_FRICTION,
     DRIVETRAIN,
     DYNAMIC_BANKS,
-    FRICTION,
     INTEGRAL,
     INTEGRAL_KNOWN,
     INTEGRAL_RATE,
@@ -99,7 +99,7 @@ def set_targets(row: Array) -> None:
 def _resistance(row: Array, bank: int) -> float:
     """Deceleration by the friction of motor and gear [rad/s^2]."""
     speed = row[OMEGA + bank]
-    coulomb = row[DRIVETRAIN + FRICTION] * speed / (abs(speed) + _STICTION_SPEED)
+    coulomb = row[DRIVETRAIN + COULOMB_FRICTION] * speed / (abs(speed) + _STICTION_SPEED)
     return row[DRIVETRAIN + VISCOUS_RATE] * speed + coulomb
 
 
@@ -125,7 +125,7 @@ def mark_dynamic_banks(row: Array) -> None:
     ideal = row[DRIVETRAIN + INTEGRAL_RATE] == 0.0 and row[DRIVETRAIN + LOAD_COMPLIANCE] == 0.0
     ideal = ideal and row[DRIVETRAIN + ACCELERATION_LIMIT] >= NO_LIMIT
     ideal = ideal and row[DRIVETRAIN + POWER_LIMIT] >= NO_POWER_LIMIT
-    ideal = ideal and row[DRIVETRAIN + VISCOUS_RATE] == 0.0 and row[DRIVETRAIN + FRICTION] == 0.0
+    ideal = ideal and row[DRIVETRAIN + VISCOUS_RATE] == 0.0 and row[DRIVETRAIN + COULOMB_FRICTION] == 0.0
     row[DYNAMIC_BANKS] = 0.0 if ideal else 1.0
     if row[DRIVETRAIN + INTEGRAL_RATE] > 0.0 and row[INTEGRAL_KNOWN] == 0.0:
         _settle_integrals(row)
@@ -204,7 +204,7 @@ def bank_damping(row: Array, bank: int) -> float:
     wanted = _wanted(row, bank)
     limit, slope = _falling_limit(row, bank, wanted)
     width = abs(row[OMEGA + bank]) + _STICTION_SPEED
-    damping = -row[DRIVETRAIN + VISCOUS_RATE] - row[DRIVETRAIN + FRICTION] * _STICTION_SPEED / (width * width)
+    damping = -row[DRIVETRAIN + VISCOUS_RATE] - row[DRIVETRAIN + COULOMB_FRICTION] * _STICTION_SPEED / (width * width)
     return damping + (slope if abs(wanted) > limit else -row[MOTOR_RATE + bank])
 
 

@@ -140,7 +140,7 @@ DRIVETRAIN_PARAMETERS = (
     "power_limit",
     "limit_imbalance",
     "viscous_rate",
-    "friction",
+    "coulomb_friction",
 )
 """Order of the drivetrain's entries; see :class:`ddagr_gym.parameters.Drivetrain`."""
 (
@@ -151,7 +151,7 @@ DRIVETRAIN_PARAMETERS = (
     POWER_LIMIT,
     LIMIT_IMBALANCE,
     VISCOUS_RATE,
-    FRICTION,
+    COULOMB_FRICTION,
 ) = range(8)
 
 SOIL_PARAMETERS = (

@@ -3,11 +3,14 @@
 from dataclasses import replace
 from pathlib import Path
 
+import gymnasium
+import numpy as np
 import pytest
 
 from ddagr_gym.config import configs_dir, dump_config
 from ddagr_gym.envs.options import find_soil, make_settings
 from ddagr_gym.errors import InputError
+from ddagr_gym.parameters import Drivetrain
 from ddagr_gym.physics.soil_draws import get_distribution
 from ddagr_gym.presets import get_robot, get_soil
 
@@ -31,3 +34,18 @@ def test_paths_serve_as_well_as_texts(tmp_path: Path) -> None:
     own.write_text(dump_config(replace(get_robot("ddagr"), name="mine")))
     assert make_settings(robot=own).robot == make_settings(robot=str(own)).robot
     assert make_settings(robot=own).robot.name == "mine"
+
+
+def test_a_robot_with_a_drivetrain_comes_from_its_file_and_steps_alike_alone_and_in_a_batch(tmp_path: Path) -> None:
+    drivetrain = Drivetrain(command_delay=0.15, load_compliance=0.01, integral_rate=2.0, acceleration_limit=10.0)
+    own = tmp_path / "own.yaml"
+    own.write_text(dump_config(replace(get_robot("ddagr"), drivetrain=drivetrain)))
+    assert make_settings(robot=own).robot.drivetrain == drivetrain
+    alone = gymnasium.make("ddagr_gym:DDAGR-Turn-v0", robot=own)
+    batch = gymnasium.make_vec("ddagr_gym:DDAGR-Turn-v0", num_envs=2, robot=own)
+    usual = gymnasium.make("ddagr_gym:DDAGR-Turn-v0")
+    seen = [alone.reset(seed=3)[0], batch.reset(seed=[3, 4])[0][0], usual.reset(seed=3)[0]]
+    for action in np.random.default_rng(0).uniform(-1, 1, (20, 2)).astype(np.float32):
+        seen = [alone.step(action)[0], batch.step(np.stack([action, action]))[0][0], usual.step(action)[0]]
+        np.testing.assert_array_equal(seen[0], seen[1])
+    assert not np.array_equal(seen[0], seen[2])

@@ -66,7 +66,9 @@ def test_proportional_loop_droops_by_the_torque_of_the_ground():
 
 
 def test_integral_part_brings_the_commanded_speed_back():
-    row = _settled(_with(DDAGR, load_compliance=0.02, integral_rate=3.0, viscous_rate=0.2, friction=0.1), 1.2, 0.6)
+    row = _settled(
+        _with(DDAGR, load_compliance=0.02, integral_rate=3.0, viscous_rate=0.2, coulomb_friction=0.1), 1.2, 0.6
+    )
     np.testing.assert_allclose(row[layout.OMEGA : layout.OMEGA + 2], [1.2, 0.6], rtol=5e-4)
 
 
@@ -77,7 +79,7 @@ def test_viscous_friction_lowers_the_gain():
 
 
 def test_coulomb_friction_takes_its_share_of_the_drive():
-    row = _settled(_with(DDAGR, friction=0.3), 1.0, 1.0)
+    row = _settled(_with(DDAGR, coulomb_friction=0.3), 1.0, 1.0)
     speed = row[layout.OMEGA]
     assert DDAGR.motor_rate * (1.0 - speed) == pytest.approx(0.3 * speed / (speed + 0.02), rel=1e-6)
 
@@ -154,7 +156,7 @@ def test_order_is_two_with_dynamic_banks(integral_rate):
 @pytest.mark.parametrize(("robot", "soil", "inertia", "scale"), [(DDAGR, CLAY, 30.0, 1.0), (WARTHOG, FIRM, 40.0, 4.0)])
 def test_default_numerics_follow_the_converged_solution(robot, soil, inertia, scale):
     built = _with(
-        robot, command_delay=0.2, load_compliance=1.0 / inertia, integral_rate=2.0, friction=0.2,
+        robot, command_delay=0.2, load_compliance=1.0 / inertia, integral_rate=2.0, coulomb_friction=0.2,
         acceleration_limit=10.0 * scale,
     )  # fmt: skip
     commands = scale * _steps((1.0, 0.7, 0.7), (1.5, 0.0, 1.2), (1.0, 0.0, 0.0), (1.0, -0.7, 0.7))
@@ -167,7 +169,7 @@ def test_default_numerics_follow_the_converged_solution(robot, soil, inertia, sc
 
 def test_no_drive_takes_energy_from_the_ground_or_gives_any():
     """Banks that are told to stand only lose energy, as the body does (passivity)."""
-    robot = _with(replace(DDAGR, motor_rate=0.05), load_compliance=0.1, viscous_rate=0.01, friction=0.05)
+    robot = _with(replace(DDAGR, motor_rate=0.05), load_compliance=0.1, viscous_rate=0.01, coulomb_friction=0.05)
     state = {"v_x": 0.6, "v_y": 0.1, "yaw_rate": 0.4, "omega_right": 1.9, "omega_left": -0.5}
     drive = _drive(robot, np.zeros((500, 2)), initial_state=state)
     body = (
@@ -189,8 +191,12 @@ SPEEDS = st.floats(-2.0, 2.0)
 )  # fmt: skip
 def test_any_drive_stays_finite_and_below_what_drives_it(pieces, inertia, integral_rate, limit, friction):
     robot = _with(
-        DDAGR, load_compliance=1.0 / inertia, integral_rate=integral_rate, acceleration_limit=limit, friction=friction
-    )
+        DDAGR,
+        load_compliance=1.0 / inertia,
+        integral_rate=integral_rate,
+        acceleration_limit=limit,
+        coulomb_friction=friction,
+    )  # fmt: skip
     drive = _drive(robot, np.concatenate([np.tile(pair, (60, 1)) for pair in pieces]))
     for name in MOTION:
         assert np.isfinite(drive[name]).all()
@@ -200,7 +206,7 @@ def test_any_drive_stays_finite_and_below_what_drives_it(pieces, inertia, integr
 
 def test_mirrored_commands_mirror_the_motion():
     robot = _with(
-        DDAGR, command_delay=0.1, load_compliance=0.02, integral_rate=2.0, acceleration_limit=5.0, friction=0.2
+        DDAGR, command_delay=0.1, load_compliance=0.02, integral_rate=2.0, acceleration_limit=5.0, coulomb_friction=0.2
     )
     commands = _steps((1.0, 1.2, 0.4), (1.0, -0.3, 0.8))
     one, other = _drive(robot, commands), _drive(robot, commands[:, ::-1])

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from ddagr_gym.diagnosis.search.starting_models import refit_nominal
 from ddagr_gym.diagnosis.setting import Setting, make_problem
+from ddagr_gym.identification.parameters import drivetrain_of
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.recordings.schema import Recording
 
@@ -52,7 +53,7 @@ def _robot(robot: Robot, values: Mapping[str, float]) -> Robot:
         )
         for wheel in robot.wheels
     )
-    return replace(robot, wheels=wheels, **factors)
+    return replace(robot, wheels=wheels, drivetrain=drivetrain_of(robot, values), **factors)
 
 
 def _soil(soil: Soil, values: Mapping[str, float]) -> Soil:
