@@ -36,7 +36,7 @@ SAMPLE_SOIL = "sandy_loam_lll_15"
 HARD_GROUND = "firm_ground"
 """Nominal soil of a given recording, unless another is named: the refit moves it."""
 
-_SPEED = 0.20  # [m/s], the reference speed of the row turn (theory: control)
+_SPEED = 0.20  # [m/s], the reference speed of the row turn (theory: control, section 1)
 
 
 @dataclass(frozen=True)
