@@ -73,9 +73,13 @@ class WindowSet:
     speeds: Array = field(default_factory=lambda: np.full((1, 1, 2), np.nan))
 
     def __post_init__(self) -> None:
-        """One count for all windows, by default none, stands for each of them, and so do unknown speeds."""
+        """One count for all windows, by default none, stands for each of them, and so do unknown speeds.
+
+        Of windows that are made shorter the speeds of the rest go.
+        """
         object.__setattr__(self, "unknown", np.broadcast_to(self.unknown, self.start.shape))
-        speeds = np.broadcast_to(self.speeds, (len(self.start), self.history + self.samples, 2))
+        length = self.history + self.samples
+        speeds = np.broadcast_to(self.speeds[:, :length], (len(self.start), length, 2))
         object.__setattr__(self, "speeds", speeds)
 
     @property

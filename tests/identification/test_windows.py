@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -117,3 +119,14 @@ def test_an_unknown_drive_is_refused(counting):
 def test_a_drive_is_interpolated_between_samples(make_windows):
     windows = make_windows(np.arange(40.0)[None, :, None] * np.ones(2))
     np.testing.assert_allclose(windows.drive(0.0125)[0, :3, 0], [9.75, 10.75, 11.75])
+
+
+def test_speeds_are_those_of_the_rows_and_shorter_windows_keep_what_is_left(counting):
+    windows = cut_windows([counting(encoder_right=np.arange(2000.0), encoder_left=np.arange(2000.0))], 2.0, **GEOMETRY)
+    later = windows.subset(np.arange(windows.count) > 0)
+    rows = later.start[:, None] + 1 - later.history + np.arange(later.history + later.samples)
+    np.testing.assert_allclose(later.speeds[..., 0], rows)
+    assert np.isnan(windows.past_speeds[0, : windows.history - 1]).all()
+    short = replace(windows, measured=windows.measured[:, :10])
+    np.testing.assert_array_equal(short.speeds, windows.speeds[:, : windows.history + 10])
+    np.testing.assert_array_equal(short.past_speeds, windows.past_speeds)
