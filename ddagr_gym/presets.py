@@ -122,7 +122,7 @@ def is_file(name: object) -> bool:
 
 
 def full_name(name: str) -> str:
-    """A name as it is; of a file its whole path, which means the same in any folder."""
+    """A preset's name unchanged; for a file its absolute path, which is valid in any folder."""
     return str(Path(name).expanduser().resolve()) if is_file(name) else name
 
 

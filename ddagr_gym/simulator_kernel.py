@@ -142,7 +142,7 @@ def _average_motion(row: Array, v_x: float, v_y: float, yaw_rate: float) -> None
 
 @kernel()
 def settle_rows(rows: Array, chosen: Integers, grids: Bundle, actions: Bundle, numerics: Bundle) -> None:
-    """Sinkages and forces at the present motion of the rows ``chosen`` (K,), whatever they were before."""
+    """Sinkages and forces at the present motion of the rows ``chosen`` (K,), independent of earlier values."""
     accuracy = named_numerics(numerics)
     for n in chosen:
         row, own = rows[n], actions_on(EffectActions(*actions), n)

@@ -1,4 +1,4 @@
-"""The functions of ``import ddagr_gym``: one module each, beside what they share.
+"""The functions of ``import ddagr_gym``, one module each, and their shared helpers.
 
     given (paths, tables, recordings, names) -> inputs, nominal -> the package's own work -> a typed result
 

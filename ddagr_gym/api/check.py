@@ -24,7 +24,7 @@ SCHEMA_VERSION = 1
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CheckResult(Report):
-    """What the checks of recordings say; ``report`` writes one figure and one JSON file for each recording.
+    """Findings of the checks of recordings; ``report`` writes one figure and one JSON file for each recording.
 
     Attributes:
         reports: one per recording; each has ``findings``, ``suspicious`` and ``sentences``.
@@ -50,7 +50,7 @@ class CheckResult(Report):
 
     @property
     def sound(self) -> bool:
-        """Whether nothing is suspicious and no value is missing or hard to believe."""
+        """Whether nothing is suspicious and no value is missing or implausible."""
         return not self.suspicious and not any(report.sentences for report in self.reports)
 
     @property

@@ -75,12 +75,12 @@ class DiagnosisResult(Report):
 
     @property
     def robot(self) -> Robot | None:
-        """Robot with refitted parameters; None where the refitted values exist nowhere (see ``refit_note``)."""
+        """Robot with refitted parameters; None where the values make no valid one (see ``refit_note``)."""
         return self._refitted[0]
 
     @property
     def soil(self) -> Soil | None:
-        """Soil with refitted parameters; None where the refitted values exist nowhere (see ``refit_note``)."""
+        """Soil with refitted parameters; None where the values make no valid one (see ``refit_note``)."""
         return self._refitted[1]
 
     @property

@@ -23,7 +23,7 @@ EXAMPLES = (
 
 @dataclass(frozen=True)
 class Arguments:
-    """Drive controllers over frozen scenarios and say which, how far off, how sure.
+    """Compare controllers on frozen scenarios: turn radius errors, success rates and their intervals.
 
     An interrupted run continues where it stopped when it is started again with the same folder. The upper bounds
     true_curvature, true_soil and true_path see the true state: they are never deployable, are driven on every set to
@@ -151,7 +151,7 @@ def results_table(summary: dict[str, Any]) -> tuple[tuple[str, ...], list[tuple[
 
 
 def _mark(controller: str) -> str:
-    """What a table says of an arm that sees the truth."""
+    """Mark in the table of an arm that sees the true state."""
     from ddagr_gym.evaluation.controllers import BOUNDS
 
     return " (upper bound)" if controller in BOUNDS or controller.endswith("@true") else ""

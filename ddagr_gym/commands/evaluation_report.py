@@ -1,4 +1,4 @@
-"""What ``ddagr evaluate`` writes beside its tables: the page with its videos, and one scenario driven again."""
+"""Files that ``ddagr evaluate`` writes: the page with its videos, and those of one scenario driven again."""
 
 from __future__ import annotations
 
@@ -180,7 +180,7 @@ def _film(folder: Path, number: int, title: str, row: Mapping[str, Any], progres
 
 
 def _file_name(row: Mapping[str, Any]) -> str:
-    """Letters, digits and underscores only, whatever a policy's name holds; its training seed where that is not 0."""
+    """Name of a file: letters, digits and underscores, with the training seed where that is not 0."""
     from ddagr_gym.evaluation.report_data import arm_name, display_name
 
     name = display_name(arm_name(row)) + (f"_{row['run']}" if row["run"] else "")
@@ -189,7 +189,7 @@ def _file_name(row: Mapping[str, Any]) -> str:
 
 
 def _with_estimate(run: TurnRun) -> TurnRun:
-    """The run with the path that the filter believes in."""
+    """The run with the path that the filter estimates."""
     from ddagr_gym.evaluation.shown import estimated_track
 
     x, y, _ = estimated_track(run).T

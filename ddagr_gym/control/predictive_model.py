@@ -37,7 +37,7 @@ _STEPS = 2
 
 @dataclass(frozen=True)
 class PredictiveModel:
-    """What the prediction needs besides the soil.
+    """Constants of the prediction: everything but the soil.
 
     Attributes:
         robot: nominal robot.

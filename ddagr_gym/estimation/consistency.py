@@ -1,4 +1,4 @@
-"""Is a filter as good as it says? NEES, NIS, whiteness, each with the band that a consistent filter keeps.
+"""Consistency of a filter: NEES, NIS and whiteness, each with the band in which a consistent filter stays.
 
 Theory: filter, section 6.
 """

@@ -1,4 +1,4 @@
-"""What users want to know of a filter's state: speeds, soil, slip, turn radius, and how well each is known."""
+"""Speeds, soil parameters, slip and turn radius from a filter's state, with their standard deviations."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Estimates(NamedTuple):
 
 
 def estimates(model: FilterModel, states: ArrayLike, covariances: ArrayLike) -> Estimates:
-    """Derive what users want to know; deviations of derived values to first order.
+    """Speeds, soil parameters, slip and turn radius; deviations of derived values are to first order.
 
     Args:
         model: filter model.

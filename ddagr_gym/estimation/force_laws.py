@@ -33,7 +33,7 @@ Gradient = tuple[
 
 
 class LawParameters(NamedTuple):
-    """What a force law needs besides the wheel's motion.
+    """Parameters of a force law: its inputs besides the wheel's motion.
 
     Attributes:
         limit: a1 [N].

@@ -1,4 +1,4 @@
-"""Sideslip of N robots from the lateral accelerometer: what gyro and encoders cannot see (ours).
+"""Sideslip of N robots from the lateral accelerometer, because gyro and encoders do not measure it (ours).
 
 In a turn on uneven soil the point about which the body turns wanders along it, so that the course differs from the
 heading by some degrees that change along the turn. The lateral specific force tells of it,

@@ -144,7 +144,7 @@ def episode_row(controller: str, scenario: Scenario, run: TurnRun) -> dict[str, 
 
 
 def provenance(controller: str, set_name: str) -> str:
-    """What a row was made of, shortened: scenarios, controller, filter; a row of others is driven again."""
+    """Short hash of a row's scenarios, controller and filter; a row with another hash is driven again."""
     parts = (set_hash(set_name), controller_version(controller), repr(nominal_filter()))
     return hashlib.sha256(" ".join(parts).encode()).hexdigest()[:12]
 
@@ -174,7 +174,7 @@ def numbers_of(set_name: str, count: int | None = None) -> range:
 
 
 def wanted_episodes(controllers: Sequence[str], sets: Sequence[str], count: int | None = None) -> list[Key]:
-    """Episodes of controllers on sets; a bound that does not know a set's soil law is left out there."""
+    """Episodes of controllers on sets; a bound is left out on sets whose soil law it does not know."""
     return [
         (controller, name, number)
         for name in sets
@@ -249,7 +249,7 @@ def run_campaign(
 
 
 def _rows_to_keep(rows: Sequence[dict[str, Any]], wanted: set[Key]) -> list[dict[str, Any]]:
-    """One row an episode, and of those that are wanted only such as are made of what there is now."""
+    """One row an episode; wanted rows only where scenarios, controller and filter are still the same."""
     now = {pair: provenance(*pair) for pair in {(controller, name) for controller, name, _ in wanted}}
     kept: dict[Key, dict[str, Any]] = {}
     for row in rows:
@@ -260,7 +260,7 @@ def _rows_to_keep(rows: Sequence[dict[str, Any]], wanted: set[Key]) -> list[dict
 
 
 def _rewrite(journal: Path, rows: Sequence[dict[str, Any]]) -> None:
-    """Leave only whole and valid rows, so that the next one starts on a line of its own."""
+    """Rewrite the journal with whole and valid rows only, so that the next row starts on a new line."""
     if journal.is_file():
         with atomic_path(journal) as temporary:
             temporary.write_text("".join(json.dumps(row) + "\n" for row in rows), encoding="utf-8")

@@ -138,7 +138,7 @@ def estimator_errors(
     start: tuple[float, float, float],
     run: FilterRun | None = None,
 ) -> EstimatorErrors:
-    """Errors of the filter in a simulated drive, by filtering its readings anew.
+    """Errors of the filter in a simulated drive, by running the filter over its readings.
 
     Args:
         model: of the filter, from the nominal robot and sensors.

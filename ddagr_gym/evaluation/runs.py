@@ -80,7 +80,7 @@ def drive_turn(controller: Controller, settings: TurnSettings, seed: int, episod
 def drive_turns(
     controller: BatchController, settings: TurnSettings, seeds: Sequence[int], episodes: Sequence[Episode]
 ) -> list[TurnRun]:
-    """Drive N turns side by side, each to its end; each is to the bit what :func:`drive_turn` makes of it.
+    """Drive N turns side by side, each to its end; each run equals that of :func:`drive_turn` to the bit.
 
     Args:
         controller: drives all of them.

@@ -125,7 +125,7 @@ def _fingerprint(law: str, items: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _grid_sum(field: SoilField | None) -> float:
-    """Sum over a grid's nodes that every value enters with a weight of its own; 0 without a grid."""
+    """Weighted sum over a grid's nodes, each with another weight, as a checksum; 0 without a grid."""
     if field is None:
         return 0.0
     values = field.values.ravel()

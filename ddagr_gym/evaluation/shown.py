@@ -61,7 +61,7 @@ def parse_replay(text: str) -> tuple[str, str, int]:
 
 
 def estimated_track(run: TurnRun) -> Array:
-    """Where the filter believes the robot to be after each sample (T, 3): x, y [m], yaw [rad], from the known start.
+    """Pose by the filter after each sample (T, 3): x, y [m], yaw [rad], from the known start.
 
     The filter is run over the drive's readings anew; its speeds and yaw rate are integrated.
     """

@@ -116,7 +116,7 @@ class Policy:
         return np.tanh(outputs) if self.squashed else outputs
 
     def description(self) -> Description:
-        """What the file says besides its arrays."""
+        """The file's description: everything but its arrays."""
         return Description(
             format=FORMAT,
             design=self.design,

@@ -1,4 +1,4 @@
-"""What a policy sees and what its outputs mean: everything besides its weights that training and driving share."""
+"""Inputs of a policy and meaning of its outputs: all that training and driving share, but the weights."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ WRONG_LIMIT, WRONG_RATE = 2.0, 0.5
 
 
 class LiveEstimate:
-    """The filter as it is."""
+    """The filter's estimate, unchanged."""
 
     def reset(self) -> None:
         """Nothing to forget."""
@@ -62,7 +62,7 @@ class TrueMotion:
 
 
 class FixedSoil:
-    """A filter of its own that never learns the soil: it stays what ``prior`` says, and so do its deviations.
+    """A second filter that never learns the soil: parameters and deviations stay those of ``prior``.
 
     Args:
         robot: nominal robot.

@@ -117,7 +117,7 @@ def sha256_of(path: Path) -> str:
 
 
 def damaged(path: Path, error: BaseException, complaint: str, remedy: str) -> InputError:
-    """What a library's error says of a file, in one sentence: file, complaint, the error's first words, remedy."""
+    """Error of a library about a file as one sentence: file, complaint, first words of the error, remedy."""
     reason = " ".join(str(error).split())[:160] or type(error).__name__
     joint = "" if complaint.startswith(",") else " "
     return InputError(f"{path.name}{joint}{complaint} ({reason}): {remedy}.")

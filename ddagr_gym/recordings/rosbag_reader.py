@@ -87,7 +87,7 @@ def _information(path: Path) -> dict[str, Any]:
 
 @contextmanager
 def _open(path: Path, limits: Limits) -> Iterator[Any]:
-    """An open ``rosbags`` reader; whatever a damaged bag makes it raise becomes one sentence."""
+    """An open ``rosbags`` reader; every error that a damaged bag causes becomes an InputError."""
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
 

@@ -215,7 +215,7 @@ class Recording:
         return {"t": self.t, **self.channels, **self.extras}
 
     def validate(self) -> tuple[str, ...]:
-        """Sentences on what in the values is missing or hard to believe; empty for a sound recording."""
+        """Sentences on values that are missing or implausible; empty for a sound recording."""
         return tuple(_doubts(self))
 
     def held_commands(self, maximum_age: float = math.inf) -> tuple[FloatArray, FloatArray]:

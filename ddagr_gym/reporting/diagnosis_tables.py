@@ -1,4 +1,4 @@
-"""What the page of a diagnosis says in words and numbers."""
+"""Texts and tables of the page of a diagnosis."""
 
 from __future__ import annotations
 
@@ -193,7 +193,7 @@ def _range(item: OperatingConditionShare) -> str:
 
 
 def gate_note(gates: GatesUsed, robot: str = "", soil: str = "") -> str:
-    """What the gates are made of, and whether that was something else than what is diagnosed.
+    """Null drives behind the gates, and whether they are of another robot or soil than the diagnosis.
 
     Args:
         gates: of the diagnosis.

@@ -1,4 +1,4 @@
-"""Figures of ``ddagr estimate``: what the filter believes over a drive, how sure it is, and the truth where known."""
+"""Figures of ``ddagr estimate``: estimates over a drive with their deviations, and the truth where it is known."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a filter made of a recording, as text."""
+"""Estimates of a filter over a recording, as text."""
 
 from __future__ import annotations
 

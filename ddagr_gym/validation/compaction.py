@@ -43,7 +43,7 @@ def cancel_compaction(row: Vector, parameters: Vector, memory: Vector) -> None:
 
 @dataclass(frozen=True)
 class NoCompactionResistance(Effect):
-    """A what-if for comparing models, no physics of its own: it is not in the library of effects.
+    """For comparing models only: an artificial effect that is not in the library.
 
     Attributes:
         share: of the compaction resistance that is taken away.

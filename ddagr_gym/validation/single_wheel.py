@@ -226,7 +226,7 @@ def _deviation(trials: WheelTrials, values: Array) -> Array:
 
 
 def fit_contact(trials: WheelTrials, wheel: TorusWheel, soil: Soil) -> Soil:
-    """A FIT, shown beside the headline: stress peak and exit angle that suit the drawbar and lateral force best.
+    """A FIT, for comparison: stress peak and exit angle with the least errors of drawbar and lateral force.
 
     Only the three coefficients without a published value move, and only the trials of :data:`FIT_ANGLES` in the
     first region are seen.

@@ -15,7 +15,7 @@ from ddagr_gym.wrappers.sb3 import TurnVecEnv
 
 
 class PolicyViewVecEnv(VecEnvWrapper):
-    """A :class:`TurnVecEnv` as a policy of some design sees it and acts on it.
+    """A :class:`TurnVecEnv` with the inputs and actions of a policy design.
 
     Observations are the design's inputs, actions its two outputs in [-1, 1].
 

@@ -1,4 +1,4 @@
-"""What several runs of one robot say together: pooled values, and gravity over all their headings."""
+"""Findings from several runs of one robot: pooled values, and gravity over all their headings."""
 
 from __future__ import annotations
 

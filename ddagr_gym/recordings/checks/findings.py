@@ -1,4 +1,4 @@
-"""What a check says: one finding per question, in words and in numbers.
+"""Findings of the checks: one per question, in words and in numbers.
 
 JSON of a report (``schema_version`` 1)::
 
