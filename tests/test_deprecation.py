@@ -56,11 +56,14 @@ def test_modules_that_went_elsewhere_are_found_there():
     said = run(
         "from ddagr_gym.replay.windows import cut_windows\n"
         "from ddagr_gym.diagnosis.verdict import load\n"
+        "from ddagr_gym.diagnosis.result.verdict import Diagnosis\n"
         "import ddagr_gym.identification.windows as windows, ddagr_gym.diagnosis.result.files as files\n"
-        "assert cut_windows is windows.cut_windows and load is files.load"
+        "import ddagr_gym.diagnosis.answer.verdict as verdict\n"
+        "assert cut_windows is windows.cut_windows and load is files.load and Diagnosis is verdict.Diagnosis"
     )
     assert "ddagr_gym.replay.windows is ddagr_gym.identification.windows now" in said
     assert "ddagr_gym.diagnosis.verdict is ddagr_gym.diagnosis.result.files now" in said
+    assert "ddagr_gym.diagnosis.result.verdict is ddagr_gym.diagnosis.answer.verdict now" in said
 
 
 def test_a_module_that_never_was_is_not_found():

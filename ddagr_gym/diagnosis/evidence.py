@@ -26,7 +26,7 @@ def gather_evidence(session: DiagnosisSession, found: SearchResult, traces: Mism
     problem, chosen, pieces, processes = session.problem, found.chosen.fitted, traces.pieces, traces.processes
     windows = problem.blocked.windows
     shape = (windows.count, int(pieces_of(problem)[-1]) + 1)
-    measured = _means(problem, np.nan_to_num(windows.measured))
+    measured = problem.blocked.means_of_all(np.nan_to_num(windows.measured))
     gains = {item.name: item.gain for item in found.nominal.gains}
     left = {item.name: item.gain for item in found.chosen.gains}
 
@@ -38,7 +38,7 @@ def gather_evidence(session: DiagnosisSession, found: SearchResult, traces: Mism
         piece_length(problem),
         windows.recording,
         windows.time,
-        _means(problem, chosen.prediction)[..., 5:8],
+        problem.blocked.means_of_all(chosen.prediction)[..., 5:8],
         np.where(np.isfinite(problem.blocked.sigma), measured, np.nan),
         _shown(problem, traces.raw, measured),
         _shown(problem, traces.nominal, measured),
@@ -59,15 +59,6 @@ def gather_evidence(session: DiagnosisSession, found: SearchResult, traces: Mism
         traces.wrench.after,
         traces.wrench.deviation,
     )
-
-
-def _means(problem: Problem, values: Array) -> Array:
-    """(W, B, 8) block means of samples (W, T, 8): of all samples where a channel has none."""
-    weights = problem.blocked.weights
-    count, blocks, length, channels = weights.shape
-    kept = values[:, : blocks * length].reshape(count, blocks, length, channels)
-    plain = np.full(weights.shape, 1.0 / length)
-    return np.asarray((np.where(weights.sum(axis=2, keepdims=True) > 0.0, weights, plain) * kept).sum(axis=2))
 
 
 def _shown(problem: Problem, residual: Array, measured: Array) -> Array:

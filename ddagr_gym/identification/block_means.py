@@ -67,6 +67,13 @@ class BlockedWindows:
         sigma = self.sigma.reshape(self.sigma.shape + (1,) * (values.ndim - 3))
         return np.asarray((mean / sigma).reshape(count, blocks * channels, *values.shape[3:]))
 
+    def means_of_all(self, values: Array) -> Array:
+        """Block means (W, B, 8) of values (W, T, 8) in their unit; of all samples where a channel has none."""
+        _, blocks, length, _ = self.weights.shape
+        kept = values[:, : blocks * length].reshape(self.weights.shape)
+        known = (self.weights * kept).sum(axis=2)
+        return np.asarray(np.where(self.weights.sum(axis=2) > 0.0, known, kept.mean(axis=2)))
+
     def change(self, after: Array, before: Array) -> Array:
         """(W, M) block means over sigma of a change of predictions (W, T, 8); what breaks down says nothing."""
         return np.nan_to_num(self.means(after - before))

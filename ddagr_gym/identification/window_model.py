@@ -26,6 +26,11 @@ decays by exp(-2) in a sample."""
 STATE_STEPS = np.array([1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 2e-3, 2e-3])
 """Finite-difference steps of STATE [m, m, rad, m/s, m/s, rad/s, rad/s, rad/s]."""
 
+STATE_ENTRIES = (
+    layout.X, layout.Y, layout.YAW, layout.V_X, layout.V_Y, layout.YAW_RATE, layout.OMEGA, layout.OMEGA + 1,
+)  # fmt: skip
+"""Entries of the simulator's row that are STATE."""
+
 _MOVING_STATE = range(3, len(STATE))
 _OMEGA = slice(6, 8)
 _MOTORS = GROUPS[0]
@@ -38,6 +43,22 @@ def ideal_sensors(period: float) -> Sensors:
         gyro_resolution=0.0, accelerometer_range=1e4, gyro_range=1e3,
     )  # fmt: skip
     return Sensors(imu, WheelEncoder(counts_per_revolution=0.0), PoseReceiver(1.0 / period, 0.0, 0.0))
+
+
+def pose_derivatives(states: Array, base: Array) -> Array:
+    """d prediction / d x, y, yaw of the initial state, (W, T, 8, 3); exact where the ground is the same everywhere.
+
+    A shifted or turned start moves all of the path after it.
+
+    Args:
+        states: (W, 8) initial STATE.
+        base: (W, T, 8) prediction from there.
+    """
+    derivatives = np.zeros((*base.shape, 3))
+    derivatives[..., 5, 0] = derivatives[..., 6, 1] = derivatives[..., 7, 2] = 1.0
+    derivatives[..., 5, 2] = -(base[..., 6] - states[:, None, 1])
+    derivatives[..., 6, 2] = base[..., 5] - states[:, None, 0]
+    return derivatives
 
 
 class WindowModel:
@@ -150,9 +171,7 @@ class WindowModel:
     def state_derivatives(self, values: Array, states: Array, base: Array, effects: Sequence[Effect] = ()) -> Array:
         """d prediction / d STATE, (W, T, 8, 8), by forward differences; the pose's own part is exact."""
         derivatives = np.zeros((*base.shape, len(STATE)))
-        derivatives[..., 5, 0] = derivatives[..., 6, 1] = derivatives[..., 7, 2] = 1.0
-        derivatives[..., 5, 2] = -(base[..., 6] - states[:, None, 1])
-        derivatives[..., 6, 2] = base[..., 5] - states[:, None, 0]
+        derivatives[..., :3] = pose_derivatives(states, base)
         # imposed wheel speeds leave nothing of the initial ones
         for k in range(3, _OMEGA.start) if self._imposed else _MOVING_STATE:
             moved = states.copy()

@@ -20,8 +20,8 @@ from ddagr_gym.identification.data_split import evenly
 from ddagr_gym.identification.least_squares import Elimination
 from ddagr_gym.identification.noise import noise_from_differences
 from ddagr_gym.identification.problem import Point, Problem
+from ddagr_gym.identification.window_model import STATE_ENTRIES
 from ddagr_gym.identification.windows import CHANNELS, STATE, WindowSet, cut_windows
-from ddagr_gym.physics import layout
 from ddagr_gym.recordings.schema import CHANNELS as SCHEMA
 from ddagr_gym.recordings.schema import Recording, RobotGeometry
 
@@ -39,18 +39,6 @@ _STATE_STEPS = 2
 
 SPEED_TIME = 1.0
 """Time over which a speed is taken from poses [s]."""
-
-STATE_ENTRIES = (
-    layout.X,
-    layout.Y,
-    layout.YAW,
-    layout.V_X,
-    layout.V_Y,
-    layout.YAW_RATE,
-    layout.OMEGA,
-    layout.OMEGA + 1,
-)
-"""Entries of the simulator's row that are STATE of :mod:`ddagr_gym.identification.windows`."""
 
 UNITS = {name: SCHEMA[name].unit for name in CHANNELS} | {"position": "m", "speed": "m/s", "heading_by_gyro": "rad"}
 """What is compared at a horizon: every channel, the distance and the speed by the poses, the gyro's integral."""

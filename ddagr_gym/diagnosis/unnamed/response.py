@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ddagr_gym.diagnosis.localisation.residual_wrench import HeldWrench
 from ddagr_gym.identification.gauss_newton import Fitted
 from ddagr_gym.identification.problem import Problem
-from ddagr_gym.identification.window_model import STATE_STEPS
+from ddagr_gym.identification.window_model import STATE_ENTRIES, STATE_STEPS, pose_derivatives
 from ddagr_gym.identification.windows import CHANNELS, STATE, WindowSet
 from ddagr_gym.physics import layout
 from ddagr_gym.physics.effects import Effect
@@ -27,9 +27,6 @@ INPUTS = ("F_x", "F_y", "M_z", "command_right", "command_left")
 
 _WRENCH_STEP = 2.0  # [N, N m], ours: a fiftieth of the rolling resistance, far above the solver's tolerance
 _COMMAND_STEP = 2e-3  # [rad/s], as the steps of the bank speeds
-_ENTRIES = (
-    layout.X, layout.Y, layout.YAW, layout.V_X, layout.V_Y, layout.YAW_RATE, layout.OMEGA, layout.OMEGA + 1,
-)  # fmt: skip
 _TORQUES = tuple(layout.AXLE_TORQUE + wheel for wheel in range(4))
 _BEYOND = 1.1  # ours
 
@@ -84,10 +81,10 @@ class Response:
 def course_of(problem: Problem, fitted: Fitted) -> Course:
     """Motion and torques that a fitted model predicts."""
     point = fitted.point
-    _, record = problem.model.predict_recorded(point.values, point.states, (*_ENTRIES, *_TORQUES), point.effects)
-    torque = record[..., len(_ENTRIES) :]
+    _, record = problem.model.predict_recorded(point.values, point.states, (*STATE_ENTRIES, *_TORQUES), point.effects)
+    torque = record[..., len(STATE_ENTRIES) :]
     banks = np.stack([torque[..., 0] + torque[..., 2], torque[..., 1] + torque[..., 3]], axis=2)
-    return Course(record[..., : len(_ENTRIES)], banks)
+    return Course(record[..., : len(STATE_ENTRIES)], banks)
 
 
 def linearise(problem: Problem, fitted: Fitted, course: Course) -> Response:
@@ -97,17 +94,14 @@ def linearise(problem: Problem, fitted: Fitted, course: Course) -> Response:
     model = problem.model_of(pieces)
 
     def run(states: Array, effects: tuple[Effect, ...] = point.effects) -> tuple[Array, Array]:
-        readings, record = model.predict_recorded(point.values, states, _ENTRIES, effects)
+        readings, record = model.predict_recorded(point.values, states, STATE_ENTRIES, effects)
         return readings, record[:, -1]
 
     base, end = run(starts)
-    weights = problem.blocked.weights
-    shape = weights.shape[:2]
+    shape = problem.blocked.sigma.shape[:2]
 
     def mean(change: Array) -> Array:
-        plain = change.reshape(*weights.shape).mean(axis=2)
-        some = (weights * change.reshape(*weights.shape)).sum(axis=2)
-        return np.asarray(np.where(weights.sum(axis=2) > 0.0, some, plain))
+        return problem.blocked.means_of_all(change.reshape(shape[0], -1, len(CHANNELS)))
 
     transition, output = np.zeros((*shape, 8, 8)), np.zeros((*shape, 8, 8))
     for k in range(3, len(STATE)):
@@ -116,7 +110,10 @@ def linearise(problem: Problem, fitted: Fitted, course: Course) -> Response:
         readings, after = run(moved)
         transition[..., k] = ((after - end) / STATE_STEPS[k]).reshape(*shape, 8)
         output[..., k] = mean((readings - base) / STATE_STEPS[k])
-    _shift_pose(transition, output, base, end, starts, mean, shape)
+    by_pose = pose_derivatives(starts, base)
+    for k in range(3):
+        output[..., k] = mean(by_pose[..., k])
+    _shift_pose(transition, end, starts)
     drive, direct = np.zeros((*shape, 8, 5)), np.zeros((*shape, 8, 5))
     for k, pushed in enumerate(np.eye(3) * _WRENCH_STEP):
         readings, after = run(starts, (*point.effects, HeldWrench(*pushed)))
@@ -126,7 +123,7 @@ def linearise(problem: Problem, fitted: Fitted, course: Course) -> Response:
         commands = pieces.commands.copy()
         commands[:, pieces.history :, bank] += _COMMAND_STEP
         other = problem.model_of(replace(pieces, commands=commands))
-        readings, record = other.predict_recorded(point.values, starts, _ENTRIES, point.effects)
+        readings, record = other.predict_recorded(point.values, starts, STATE_ENTRIES, point.effects)
         drive[..., 3 + bank] = ((record[:, -1] - end) / _COMMAND_STEP).reshape(*shape, 8)
         direct[..., 3 + bank] = mean((readings - base) / _COMMAND_STEP)
     _mend(problem, (transition, drive, output, direct))
@@ -150,16 +147,10 @@ def _mend(problem: Problem, parts: tuple[Array, Array, Array, Array]) -> None:
             part[bad[:, b], b] = part[bad[:, b], b - 1]
 
 
-def _shift_pose(
-    transition: Array, output: Array, base: Array, end: Array, starts: Array, mean: object, shape: tuple[int, int]
-) -> None:
-    """A shifted or turned start moves all of the path after it; exact where the ground is the same everywhere."""
-    by_pose = np.zeros((*base.shape, 3))
-    by_pose[..., 5, 0] = by_pose[..., 6, 1] = by_pose[..., 7, 2] = 1.0
-    by_pose[..., 5, 2] = -(base[..., 6] - starts[:, None, 1])
-    by_pose[..., 6, 2] = base[..., 5] - starts[:, None, 0]
+def _shift_pose(transition: Array, end: Array, starts: Array) -> None:
+    """A shifted or turned start shifts and turns the end."""
+    shape = transition.shape[:2]
     for k in range(3):
-        output[..., k] = mean(by_pose[..., k])  # type: ignore[operator]
         transition[..., k, k] = 1.0
     transition[..., 0, 2] = -(end[:, 1] - starts[:, 1]).reshape(shape)
     transition[..., 1, 2] = (end[:, 0] - starts[:, 0]).reshape(shape)
