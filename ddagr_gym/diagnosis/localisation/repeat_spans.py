@@ -12,6 +12,7 @@ from ddagr_gym.diagnosis.preprocessing.repeated_readings import (
     SENSORS,
     Flags,
     RepeatedReadings,
+    channel_groups,
     repeat_runs,
     repeated_rows,
 )
@@ -57,7 +58,8 @@ def where_readings_repeat(
 
 def _spans(number: int, recording: Recording, item: RepeatedReadings) -> list[tuple[int, Span]]:
     """Stretches of one sensor in one recording with the number of repeats in each, whose shares come later."""
-    rows, repeat = repeated_rows(recording, SENSORS[item.sensor])
+    # channels that are read in turn are repeated alike: the first stands for both
+    rows, repeat = repeated_rows(recording, channel_groups(recording, item.sensor)[0])
     if len(rows) < 2:
         return []
     time = recording.t[rows]

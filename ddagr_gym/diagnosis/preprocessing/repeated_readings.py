@@ -41,6 +41,11 @@ _QUANTA = 20.0
 (ours)."""
 
 
+_TOGETHER = 0.1
+"""Share of the changes below which two channels do not change together (ours): 0.1 percent of them do where the wheels
+of a Warthog are read in turn, nearly all where both are read at once."""
+
+
 @dataclass(frozen=True)
 class RepeatedReadings:
     """A sensor that repeats its readings.
@@ -76,18 +81,32 @@ def _repeats(recording: Recording, names: Sequence[str]) -> tuple[Flags, Flags]:
     return repeat, informative
 
 
+def channel_groups(recording: Recording, sensor: str) -> tuple[tuple[str, ...], ...]:
+    """Channels of a sensor that are read together: all of them, or each by itself where they change in turn.
+
+    Args:
+        recording: with all of them.
+        sensor: of SENSORS.
+    """
+    names = SENSORS[sensor]
+    values = np.stack([recording[name] for name in names], axis=1)
+    changed = np.diff(values[np.isfinite(values).all(axis=1)], axis=0) != 0.0
+    at_once, at_all = int(changed.all(axis=1).sum()), int(changed.any(axis=1).sum())
+    return tuple((name,) for name in names) if at_once < _TOGETHER * at_all else (names,)
+
+
 def find_repeated_readings(recordings: Sequence[Recording]) -> tuple[RepeatedReadings, ...]:
     """Sensors that repeat their readings in more than :data:`LEAST_SHARE` of the samples that say something."""
     found = []
     for sensor, names in SENSORS.items():
-        read = [recording for recording in recordings if recording.has(*names)]
-        pairs = [_repeats(recording, names) for recording in read]
+        read = [(r, group) for r in recordings if r.has(*names) for group in channel_groups(r, sensor)]
+        pairs = [_repeats(recording, group) for recording, group in read]
         informative = sum(int(t.sum()) for _, t in pairs)
         if informative < FEWEST:
             continue
         share = sum(int((repeat & t).sum()) for repeat, t in pairs) / informative
         if share > LEAST_SHARE:
-            found.append(RepeatedReadings(sensor, share, _duration(read, names), informative))
+            found.append(RepeatedReadings(sensor, share, _duration(read), informative))
     return tuple(found)
 
 
@@ -101,14 +120,14 @@ def repeat_runs(repeat: Flags) -> tuple[Rows, Rows]:
     return edges[::2] - 1, edges[1::2] - 1
 
 
-def _duration(recordings: Sequence[Recording], names: Sequence[str]) -> float:
-    """Mean time over which runs of repeats last [s].
+def _duration(read: Sequence[tuple[Recording, Sequence[str]]]) -> float:
+    """Mean time over which runs of repeats last [s], of channels that are read together in each recording.
 
     Samples are informative only near a change, so that the share of repeats says nothing of longer holds. Runs
     without such a sample do not count: successive holds of a steady reading look like one.
     """
     found = []
-    for recording in recordings:
+    for recording, names in read:
         _, informative = _repeats(recording, names)
         if informative.any():
             rows, repeat = repeated_rows(recording, names)
@@ -117,7 +136,7 @@ def _duration(recordings: Sequence[Recording], names: Sequence[str]) -> float:
             found.append((recording.t[rows[last]] - recording.t[rows[first]])[hits[last] > hits[first]])
     lengths = np.concatenate(found)
     # where nothing but zeros repeats there are none
-    return float(lengths.mean() if len(lengths) else 1.0 / np.median([r.rate(names[0]) for r in recordings]))
+    return float(lengths.mean() if len(lengths) else 1.0 / np.median([r.rate(names[0]) for r, names in read]))
 
 
 def repeated_rows(recording: Recording, names: Sequence[str]) -> tuple[NDArray[np.int64], Flags]:
@@ -136,15 +155,21 @@ def without_repeats(recording: Recording, repeated: Sequence[RepeatedReadings]) 
     """Recording in which repeated readings of the given sensors are missing samples."""
     channels = dict(recording.channels)
     for item in repeated:
-        names = [name for name in SENSORS[item.sensor] if recording.has(name)]
-        if not names:
-            continue
-        rows, same = repeated_rows(recording, names)
-        for name in names:
-            changed = channels[name].copy()
-            changed[rows[same]] = np.nan
-            channels[name] = changed
+        for names in _groups_present(recording, item.sensor):
+            rows, same = repeated_rows(recording, names)
+            for name in names:
+                changed = channels[name].copy()
+                changed[rows[same]] = np.nan
+                channels[name] = changed
     return replace(recording, channels=channels)
+
+
+def _groups_present(recording: Recording, sensor: str) -> tuple[tuple[str, ...], ...]:
+    """Channels of a sensor that are read together, as far as the recording has them."""
+    names = tuple(name for name in SENSORS[sensor] if recording.has(name))
+    if names == SENSORS[sensor]:
+        return channel_groups(recording, sensor)
+    return (names,) if names else ()
 
 
 def hold_effect(repeated: Sequence[RepeatedReadings]) -> SensorHold:

@@ -7,6 +7,7 @@ import pytest
 
 from ddagr_gym.diagnosis.preprocessing.repeated_readings import (
     RepeatedReadings,
+    channel_groups,
     find_repeated_readings,
     hold_effect,
     without_repeats,
@@ -54,6 +55,23 @@ def test_repeats_become_missing_samples() -> None:
     cleaned = without_repeats(recording, find_repeated_readings([recording]))
     assert np.isfinite(cleaned["yaw_rate"]).mean() == pytest.approx(0.25, abs=0.01)
     assert np.isfinite(cleaned["encoder_right"]).all()
+
+
+def test_wheels_that_are_read_in_turn_keep_one_new_reading_of_each_hold() -> None:
+    recording = drive({"encoder_right": 6, "encoder_left": 6})
+    late = recording["encoder_left"].copy()
+    late[3:] = late[:-3]
+    late[:3] = 0.3
+    recording = Recording.from_columns({"t": recording.t, **recording.channels, "encoder_left": late})
+    assert channel_groups(recording, "encoders") == (("encoder_right",), ("encoder_left",))
+    found = find_repeated_readings([recording])
+    assert [item.sensor for item in found] == ["encoders"]
+    assert found[0].duration == pytest.approx(5 * PERIOD, rel=0.15)
+    cleaned = without_repeats(recording, found)
+    for name, first in (("encoder_right", 0), ("encoder_left", 3)):
+        rows = np.flatnonzero(np.isfinite(cleaned[name]))
+        assert ((rows[2:] - first) % 6 == 0).all()
+        assert len(rows) == pytest.approx(COUNT / 6, rel=0.05)
 
 
 @pytest.mark.parametrize("samples", [2, 14, 24, 50])
