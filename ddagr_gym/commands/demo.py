@@ -10,8 +10,7 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ddagr_gym.commands.demo_section import Section
-from ddagr_gym.commands.output import output_folder, write_text
+from ddagr_gym.commands.output import Section, output_folder, write_text
 from ddagr_gym.progress import LinePrinter
 
 if TYPE_CHECKING:

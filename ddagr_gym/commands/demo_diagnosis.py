@@ -6,7 +6,7 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ddagr_gym.commands.demo_section import Section
+from ddagr_gym.commands.output import Section
 from ddagr_gym.progress import LinePrinter
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from ddagr_gym.commands.demo_section import Section
+from ddagr_gym.commands.output import Section
 
 LADDER = ("B0", "B1", "B2", "B3", "B4")
 POLICIES = ("ppo_ekf", "ppo_history", "ppo_raw")

@@ -148,18 +148,13 @@ def _left_out(sets: Sequence[SetNote]) -> str:
 
 def _sources(arms: Sequence[Arm], sets: Sequence[SetNote]) -> list[tuple[str, str]]:
     from ddagr_gym.evaluation.controllers import gains_file
+    from ddagr_gym.recordings.files import sha256_of
     from ddagr_gym.version import __version__
 
-    found = [("ddagr-gym", __version__), ("gains of the ladder", f"sha256 {_digest(gains_file())}")]
+    found = [("ddagr-gym", __version__), ("gains of the ladder", f"sha256 {sha256_of(gains_file())[:_HASH_DIGITS]}")]
     found += [(f"scenarios {item.name}", f"sha256 {item.sha256[:_HASH_DIGITS]}") for item in sets]
     found += [(f"policy {arm.name}", f"sha256 {', '.join(arm.versions)}") for arm in arms if arm.learned]
     return [*found, ("every number", "summary.json, and every episode in episodes.parquet beside this page")]
-
-
-def _digest(path: Path) -> str:
-    import hashlib
-
-    return hashlib.sha256(path.read_bytes()).hexdigest()[:_HASH_DIGITS]
 
 
 def _film(folder: Path, number: int, title: str, row: Mapping[str, Any], progress: Progress) -> Film:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from ddagr_gym.files import (
     FOLDER_MARK,
@@ -23,6 +23,7 @@ from ddagr_gym.reporting.text_table import format_table, format_value
 
 __all__ = [
     "FOLDER_MARK",
+    "Section",
     "atomic_path",
     "check_output_folder",
     "format_fields",
@@ -34,6 +35,14 @@ __all__ = [
     "write_json",
     "write_text",
 ]
+
+
+class Section(NamedTuple):
+    """What one step of the demonstration shows: a title, a text that is printed too, and HTML below it."""
+
+    title: str
+    text: str
+    html: str
 
 
 def format_fields(instance: Any) -> str:

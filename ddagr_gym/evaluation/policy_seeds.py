@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import hashlib
 import re
 from pathlib import Path
+
+from ddagr_gym.recordings.files import sha256_of
 
 
 def arm_and_seed(name: str) -> tuple[str, int]:
@@ -28,4 +29,4 @@ def policy_version(name: str) -> str:
     from ddagr_gym.policies.shipped import policy_file, split_estimate
 
     stem, _ = split_estimate(name)
-    return hashlib.sha256(policy_file(stem).read_bytes()).hexdigest() + name.removeprefix(stem)
+    return sha256_of(policy_file(stem)) + name.removeprefix(stem)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from ddagr_gym.reporting.text_table import format_table
+from ddagr_gym.reporting.text_table import format_table, short
 
 HEADER = ("parameter", "estimate", "relative deviation", "best fit to the truth")
 
@@ -26,7 +26,7 @@ def estimate_text(summary: Mapping[str, Any]) -> str:
 def parameter_rows(summary: Mapping[str, Any]) -> list[tuple[str, ...]]:
     """Final soil parameters under :data:`HEADER`."""
     return [
-        (name.replace("_", " "), *(_cell(item[key]) for key in ("value", "log_deviation", "best_fit")))
+        (name.replace("_", " "), *(short(item[key]) for key in ("value", "log_deviation", "best_fit")))
         for name, item in summary["parameters"].items()
     ]
 
@@ -34,7 +34,3 @@ def parameter_rows(summary: Mapping[str, Any]) -> list[tuple[str, ...]]:
 def error_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Errors by name, where the truth is known."""
     return [(name, "broke down" if value is None else f"{value:.4g}") for name, value in summary["errors"].items()]
-
-
-def _cell(value: float | None) -> str:
-    return "-" if value is None else f"{value:.3g}"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ddagr_gym.replay_analysis.report import MODELS, DriveModeReport, ReplayReport, lead_errors
-from ddagr_gym.reporting.text_table import format_table
+from ddagr_gym.reporting.text_table import format_table, short
 
 DRIVEN_BY = {"commands": "commands", "encoders": "wheel speeds"}
 """What drove the simulator, in words."""
@@ -29,14 +29,14 @@ def drive_mode_text(mode: DriveModeReport) -> str:
     rows = []
     for horizon, metric in dict.fromkeys((e.horizon, e.metric) for e in mode.horizons if e.error.count):
         found = {e.model: e for e in mode.horizons if (e.horizon, e.metric) == (horizon, metric)}
-        sizes = [_number(found[m].error.rms) for m in models]
+        sizes = [short(found[m].error.rms) for m in models]
         first = found[models[0]]
         rows.append((f"{metric} after {horizon:g} s", first.unit, str(first.error.count), *sizes))
     errors = format_table(("root mean square error", "unit", "windows", *models), rows) if rows else "no unseen windows"
     names = [table.model for table in mode.residuals]
     channels = [
-        (c.channel, c.unit, _number(c.noise), *(_number(t.channels[k].rms) for t in mode.residuals),
-         *(_number(t.channels[k].bias) for t in mode.residuals), f"{mode.residuals[-1].channels[k].correlation:.2f}")
+        (c.channel, c.unit, short(c.noise), *(short(t.channels[k].rms) for t in mode.residuals),
+         *(short(t.channels[k].bias) for t in mode.residuals), f"{mode.residuals[-1].channels[k].correlation:.2f}")
         for k, c in enumerate(mode.residuals[0].channels)
     ]  # fmt: skip
     head = ("residual", "unit", "noise", *(f"rms {n}" for n in names), *(f"bias {n}" for n in names), "correlation")
@@ -59,13 +59,9 @@ def lead_rows(report: ReplayReport) -> list[tuple[str, ...]]:
     for item in report.runs:
         for mode in item.arms:
             found = lead_errors(mode)
-            errors = (_number(found[m].error.rms) if m in found else "-" for m in MODELS)
+            errors = (short(found[m].error.rms) if m in found else "-" for m in MODELS)
             rows.append((", ".join(item.sources), DRIVEN_BY[mode.drive], *errors))
     return rows
-
-
-def _number(value: float | None) -> str:
-    return "-" if value is None else f"{value:.3g}"
 
 
 def _fit_text(mode: DriveModeReport) -> str:

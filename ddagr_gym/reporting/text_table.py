@@ -16,6 +16,11 @@ def format_value(value: object) -> str:
     return str(value)
 
 
+def short(value: float | None) -> str:
+    """A number with three significant digits; "-" for none."""
+    return "-" if value is None else f"{value:.3g}"
+
+
 def format_table(header: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
     """Plain-text table: two spaces between columns, numbers to the right, text to the left.
 

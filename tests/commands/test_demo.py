@@ -9,7 +9,7 @@ import pytest
 from ddagr_gym.cli import main
 from ddagr_gym.commands import demo
 from ddagr_gym.commands.demo import Arguments
-from ddagr_gym.commands.demo_section import Section
+from ddagr_gym.commands.output import Section
 from ddagr_gym.control.row_turn import RowTurn
 from ddagr_gym.envs.options import make_settings
 from ddagr_gym.evaluation.controllers import find_controller
