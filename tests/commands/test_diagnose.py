@@ -192,7 +192,7 @@ def test_a_stopped_diagnosis_goes_on(
         (["--map", "no_such_map"], "no_such_map"),
         (["--robot", "husky"], "'ddagr'"),
         (["--soil", "mud"], "mud"),
-        (["--threads", "0"], "--threads"),
+        (["--threads", "0"], "threads is 0"),
         (["--thresholds", "missing.json"], "ddagr null-bank"),
     ],
 )
