@@ -10,7 +10,7 @@ from typing import Any, Literal
 from ddagr_gym.envs.settings import Randomisation, RewardWeights
 from ddagr_gym.errors import InputError
 from ddagr_gym.estimation import FilterModel
-from ddagr_gym.parameters import Sensors
+from ddagr_gym.parameters import Drivetrain, Sensors
 from ddagr_gym.physics.effects import load_effects
 from ddagr_gym.policies.design import PolicyDesign
 from ddagr_gym.presets import ddagr
@@ -144,6 +144,9 @@ class TrainingSettings:
             del content[name]
         # the policy is fitted to this filter: with another one it has to be trained anew
         content["filter"] = asdict(FilterModel.of(ddagr(), Sensors()))
+        if content["filter"]["robot"]["drivetrain"] == asdict(Drivetrain()):
+            # one without parts is no part: digests of before robots had one stay as they were
+            del content["filter"]["robot"]["drivetrain"]
         if self.task.effects:
             # what a file of effects says counts, not its path
             content["effects"] = [effect.as_mapping() for effect in load_effects(self.task.effects)]
