@@ -28,8 +28,9 @@ DriveLike: TypeAlias = int | Source
 class CalibrationResult(Report):
     """A robot as its drives show it.
 
-    ``report(folder)`` writes robot.yaml, a soil file for each ground, effects.yaml, calibration.json, and a page,
-    calibration.html.
+    ``report(folder)`` writes robot.yaml, a soil file for each ground, effects.yaml, draws.yaml (what
+    ``gym.make(calibration=folder)`` draws from), calibration.json, and a page, calibration.html; with
+    ``bank=True`` bank.json besides.
 
     Attributes:
         outcome: answer, calibrated robot and soils, and the forecasts behind them (:mod:`ddagr_gym.calibration.run`).
@@ -97,15 +98,23 @@ class CalibrationResult(Report):
         save(self.calibration, Path(path))
 
     def _fill(self, folder: Path, progress: Callable[[str], None] | None) -> None:
+        from ddagr_gym.calibration.effect_bank import NAME as BANK
+        from ddagr_gym.calibration.effect_bank import save_runs
         from ddagr_gym.calibration.files import EFFECTS, NAME, ROBOT, soil_file
+        from ddagr_gym.calibration.simulator_values import calibrated_draws
         from ddagr_gym.config import dump_config
+        from ddagr_gym.envs.calibrated_draws import NAME as DRAWS
         from ddagr_gym.physics.effects.files import save_effects
         from ddagr_gym.reporting.calibration_page import write_page
 
         (folder / ROBOT).write_text(dump_config(self.robot), encoding="utf-8")
         for ground, soil in self.soils.items():
             (folder / soil_file(ground)).write_text(dump_config(soil), encoding="utf-8")
+        draws = calibrated_draws(self.calibration, self.robot, self.soils)
+        (folder / DRAWS).write_text(dump_config(draws), encoding="utf-8")
         save_effects(folder / EFFECTS, self.effects, source=self.headline)
+        if self.outcome.bank:
+            save_runs(self.outcome.bank, folder / BANK)
         self.to_json(folder / NAME)
         write_page(folder, self.calibration, self.outcome.forecasts)
 
@@ -118,6 +127,7 @@ def calibrate(
     *,
     seed: int = 0,
     threads: int = 1,
+    bank: bool = False,
     column_map: str | os.PathLike[str] | None = None,
     progress: Callable[[str], None] | None = None,
     cache: str | os.PathLike[str] | None = None,
@@ -135,6 +145,8 @@ def calibrate(
         grounds: drives on each ground by its name, as numbers, paths or objects; all on one where it is None.
         seed: of the resampled intervals.
         threads: of the simulator.
+        bank: also diagnose every drive with the robot calibrated without it: what ordinary drives do to every effect of
+            the library, about a minute for each drive of 10 min.
         column_map: shipped map by name or the path of one's own, for files that are not imported yet.
         progress: called with a line of text at each step; ``print`` will do.
         cache: folder in which finished steps are kept. After an interruption (KeyboardInterrupt) the same call goes on
@@ -183,6 +195,7 @@ def calibrate(
         CalibrationSettings(threads=threads, seed=seed),
         data_sheet=OWN if not isinstance(robot, str | os.PathLike) else str(robot),
         soil_names={ground: soil_name_of(item) for ground, item in soils.items()},
+        with_bank=bank,
         cache=None if cache is None else Path(cache),
         progress=(lambda line: None) if progress is None else progress,
     )

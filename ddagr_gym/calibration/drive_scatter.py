@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from ddagr_gym.calibration.calibration_data import CalibrationData
 from ddagr_gym.calibration.joint_fit import FittedModel, fit_model
+from ddagr_gym.calibration.parts import RobotModel
 from ddagr_gym.calibration.result import Scatter
 from ddagr_gym.identification.gauss_newton import linearised
 from ddagr_gym.identification.parameters import ModelParameter, per_group
@@ -65,10 +66,9 @@ def drive_estimates(data: CalibrationData, model: FittedModel, weights: Weights,
     moved = [p for p in model.parameters if p.prior > 0.0 and not p.name.startswith("gyro_bias")]
     own = [made for p in moved for made in _by_drive(p, model.values[p.name], data.count)]
     joint = tuple(replace(p, prior=0.0) if p in moved else p for p in model.parameters)
+    by_drive = RobotModel(model.model.robot, (*joint, *own))
     windows, states = model.problem.blocked.windows, model.fitted.point.states
-    found = fit_model(
-        data, windows, (*joint, *own), weights, model.values, threads, states=states, iterations=ITERATIONS
-    )
+    found = fit_model(data, windows, by_drive, weights, model.values, threads, states=states, iterations=ITERATIONS)
     covariance = np.linalg.inv(linearised(found.problem, found.fitted).information)
     variance = dict(zip(found.free, np.diag(covariance), strict=True))
     values: dict[str, Array] = {}

@@ -13,6 +13,8 @@ from ddagr_gym.calibration.calibration_data import CalibrationData
 from ddagr_gym.calibration.joint_fit import FittedModel
 from ddagr_gym.calibration.left_out import ENCODERS, Forecast, fold_name, folds
 from ddagr_gym.calibration.result import CALIBRATED, DATA_SHEET, KINEMATIC, ForecastError
+from ddagr_gym.identification.fit_numerics import field_numerics
+from ddagr_gym.identification.window_model import WindowModel
 from ddagr_gym.identification.windows import CHANNELS, WindowSet
 from ddagr_gym.replay_analysis.fitting import ROBUST
 from ddagr_gym.replay_analysis.horizons import METRICS, horizon_errors
@@ -54,7 +56,7 @@ ITSELF = "its first half"
 
 
 def all_forecasts(
-    data: CalibrationData, model: FittedModel, made: Sequence[Forecast], held: dict[str, float]
+    data: CalibrationData, model: FittedModel, made: Sequence[Forecast], held: dict[str, float], threads: int
 ) -> tuple[Forecasts, ...]:
     """Forecasts of every left-out drive by the calibrated model, the data sheet and a kinematic one.
 
@@ -62,15 +64,19 @@ def all_forecasts(
         data: drives.
         model: calibrated.
         made: its forecasts.
-        held: values of the model's parameters that make it the data sheet.
+        held: values of the parameters that carry the nominal soils.
+        threads: of the simulator.
     """
     fitted = model.problem.blocked.windows
     by_window = folds(data, fitted)
-    nominal = np.array([held.get(p.name, 0.0) for p in model.parameters])
+    offsets = tuple(p for p in model.parameters if p.name in held)
+    nominal = np.array([held[p.name] for p in offsets])
+    soil = next(iter(data.soils.values()))
     found = []
     for forecast in made:
         windows = forecast.windows
-        before = model.problem.model_of(windows).predict(nominal, windows.initial)
+        sheet = WindowModel(data.robot, soil, windows, offsets, numerics=field_numerics(), threads=threads)
+        before = sheet.predict(nominal, windows.initial)
         predictions = {DATA_SHEET: before, CALIBRATED: forecast.prediction}
         kinematic = _kinematic(data, fitted.subset(np.asarray(by_window != forecast.fold)))
         if kinematic is not None:
@@ -98,12 +104,18 @@ def forecast_errors(forecasts: Sequence[Forecasts], seed: int) -> tuple[Forecast
         for model, prediction in item.predictions.items():
             for horizon in (h for h in HORIZONS if h <= item.windows.duration + 1e-9):
                 samples = round(horizon / item.windows.period)
-                short = replace(item.windows, measured=item.windows.measured[:, :samples])
+                short = _shortened(item.windows, samples)
                 errors = horizon_errors(short, prediction[:, :samples])
                 clusters = np.arange(short.count)
                 found += [_error(item, model, m, horizon, METRICS[m][0], errors[m], clusters, seed) for m in SHOWN]
             found += _samples(item, model, prediction, seed)
     return tuple(found)
+
+
+def _shortened(windows: WindowSet, samples: int) -> WindowSet:
+    """The first samples of every window."""
+    speeds = windows.speeds[:, : windows.history + samples]
+    return replace(windows, measured=windows.measured[:, :samples], speeds=speeds)
 
 
 def _samples(item: Forecasts, model: str, prediction: Array, seed: int) -> list[ForecastError]:

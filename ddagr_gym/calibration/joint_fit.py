@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.calibration.calibration_data import CalibrationData
-from ddagr_gym.calibration.parts import shared_parameters
+from ddagr_gym.calibration.parts import RobotModel, complete_robot, first_values, shared_parameters
 from ddagr_gym.calibration.settings import LONGEST_DELAY
 from ddagr_gym.identification.block_means import sample_windows
 from ddagr_gym.identification.fit_numerics import field_numerics
@@ -46,6 +46,9 @@ ITERATIONS = 8
 FIRST_ITERATIONS = 4
 """Steps of the fit that only serves to weigh residuals (ours)."""
 
+LAST_ITERATIONS = 8
+"""Steps of a fit that begins at the values of another one (ours)."""
+
 START_DELAYS = np.arange(0.0, LONGEST_DELAY + 1e-9, 0.05)
 """Delays from which a fit may start [s]: a fit finds one within half of the robot's reaction, no farther."""
 
@@ -79,10 +82,12 @@ class FittedModel:
     """Parameters fitted to some windows.
 
     Attributes:
+        model: robot and parameters.
         problem: windows, parameters and weights.
         fitted: where the fit stands.
     """
 
+    model: RobotModel
     problem: Problem
     fitted: Fitted
 
@@ -108,19 +113,24 @@ class FittedModel:
         return tuple(parameter.name for parameter in self.parameters if parameter.prior > 0.0)
 
 
-def model_parameters(data: CalibrationData) -> tuple[tuple[ModelParameter, ...], dict[str, float]]:
-    """All parameters of the joint model, and the values at which those that never move are held.
+def complete_model(data: CalibrationData) -> tuple[RobotModel, dict[str, float]]:
+    """The joint model with all parts, and the values at which parameters that never move are held.
 
     Soils of the grounds differ from the first one's by offsets that are held; what is fitted of a ground acts on top.
     """
     offsets, held = _soil_offsets(data)
-    nominal = next(iter(data.soils.values()))
-    soil = [made for p in soil_parameters(nominal, KIND_STIFFNESS_DEVIATION) for made in per_group(p, data.drives_on)]
+    by_ground = [
+        per_group(p, {ground: drives})
+        for ground, drives in data.drives_on.items()
+        for p in soil_parameters(data.soils[ground], KIND_STIFFNESS_DEVIATION)
+    ]
+    soil = [parameter for made in by_ground for parameter in made]
     noise = data.prepared.noise
     known = [float(np.hypot(*item.gyro_bias)) for item in noise if item.gyro_bias is not None]
     bias = max(*known, LEAST_GYRO_BIAS) if len(known) == len(noise) else UNKNOWN_GYRO_BIAS
     biases = [p for p in sensor_parameters(data.count, bias, 1.0) if p.name.startswith("gyro_bias")]
-    return (*offsets, *soil, *shared_parameters(data.robot), *biases), held
+    robot = complete_robot(data.robot)
+    return RobotModel(robot, (*offsets, *soil, *shared_parameters(robot), *biases)), held
 
 
 def _soil_offsets(data: CalibrationData) -> tuple[list[ModelParameter], dict[str, float]]:
@@ -138,12 +148,12 @@ def _soil_offsets(data: CalibrationData) -> tuple[list[ModelParameter], dict[str
 
 
 def make_problem(
-    data: CalibrationData, windows: WindowSet, parameters: Sequence[ModelParameter], weights: Weights, threads: int
+    data: CalibrationData, windows: WindowSet, model: RobotModel, weights: Weights, threads: int
 ) -> Problem:
     """The fit of some windows with some weights."""
     soil: Soil = next(iter(data.soils.values()))
     return Problem(
-        data.robot, soil, sample_windows(windows, weights.sigma), Nuisances(tuple(parameters)), robust=weights.robust,
+        model.robot, soil, sample_windows(windows, weights.sigma), Nuisances(model.parameters), robust=weights.robust,
         threads=threads, numerics=field_numerics(),
     )  # fmt: skip
 
@@ -173,8 +183,8 @@ def weights_by_drive(windows: WindowSet, prediction: Array, before: Weights) -> 
     return Weights(sigma, robust)
 
 
-def start_values(data: CalibrationData, windows: WindowSet) -> dict[str, float]:
-    """Delay and motor rate from which a fit starts: the best of many, by a first-order loop without load."""
+def start_values(data: CalibrationData, windows: WindowSet, parameters: tuple[ModelParameter, ...]) -> dict[str, float]:
+    """Values from which a fit starts; delay and motor rate are the best of many, by a first-order loop without load."""
     columns = [CHANNELS.index("encoder_right"), CHANNELS.index("encoder_left")]
     measured = windows.measured[..., columns]
     known = np.isfinite(measured)
@@ -184,25 +194,25 @@ def start_values(data: CalibrationData, windows: WindowSet) -> dict[str, float]:
             motor = Motor(factor * data.robot.motor_rate, data.robot.maximum_wheel_speed, float(delay))
             error = (motor.speeds(windows)[:, 1:] - measured)[known] / _ROBUST_SPEED
             best = min(best, (float(np.mean(np.sqrt(1.0 + error**2))), float(delay), factor))
-    return {"command_delay": best[1], "motor_rate": float(np.log(best[2]))}
+    return {**first_values(parameters), "command_delay": best[1], "motor_rate": float(np.log(best[2]))}
 
 
 def model_at(
     data: CalibrationData,
     windows: WindowSet,
-    parameters: Sequence[ModelParameter],
+    model: RobotModel,
     weights: Weights,
     standing: Standing,
     threads: int,
 ) -> FittedModel:
     """Model where a fit stands, with its derivatives there."""
-    return fit_model(data, windows, parameters, weights, standing.values, threads, states=standing.states, iterations=0)
+    return fit_model(data, windows, model, weights, standing.values, threads, states=standing.states, iterations=0)
 
 
 def fit_model(
     data: CalibrationData,
     windows: WindowSet,
-    parameters: Sequence[ModelParameter],
+    model: RobotModel,
     weights: Weights,
     start: Mapping[str, float],
     threads: int,
@@ -215,39 +225,48 @@ def fit_model(
     Args:
         data: drives.
         windows: to fit.
-        parameters: held ones have a prior of 0.
+        model: robot and parameters.
         weights: of the residuals.
         start: values by name.
         threads: of the simulator.
         states: (W, 8) initial states to start from; the windows' first guess by default.
         iterations: most steps.
     """
-    problem = make_problem(data, windows, parameters, weights, threads)
+    problem = make_problem(data, windows, model, weights, threads)
     point = point_at(problem, start, states)
     found = fit(problem, point, iterations=iterations, tolerance=TOLERANCE, renewals=iterations)
-    return FittedModel(problem, found)
+    return FittedModel(model, problem, found)
 
 
 def weigh_and_fit(
     data: CalibrationData,
     windows: WindowSet,
-    parameters: Sequence[ModelParameter],
+    model: RobotModel,
     start: Mapping[str, float],
     threads: int,
+    passes: Sequence[int] = (FIRST_ITERATIONS, ITERATIONS),
 ) -> tuple[FittedModel, Weights]:
-    """Fit by what the start leaves unexplained of each drive, then by what that fit leaves.
+    """Fit by what the start leaves unexplained of each drive, then by what that fit leaves, and so on.
 
     The noise of good sensors is no measure of a model that is still far off: its weights would bend every parameter to
     its bound.
 
+    Args:
+        data: drives.
+        windows: to fit.
+        model: robot and parameters.
+        start: values by name.
+        threads: of the simulator.
+        passes: most steps of each fit.
+
     Returns:
-        The second fit, and its weights.
+        The last fit, and its weights.
     """
     weights = first_weights(data, windows)
-    problem = make_problem(data, windows, parameters, weights, threads)
+    problem = make_problem(data, windows, model, weights, threads)
     prediction, values, states = problem.predict(point_at(problem, start)), dict(start), None
-    for iterations in (FIRST_ITERATIONS, ITERATIONS):
+    for iterations in passes:
         weights = weights_by_drive(windows, prediction, first_weights(data, windows))
-        model = fit_model(data, windows, parameters, weights, values, threads, states=states, iterations=iterations)
-        values, states, prediction = model.values, model.fitted.point.states, model.fitted.prediction
-    return model, weights
+        found = fit_model(data, windows, model, weights, values, threads, states=states, iterations=iterations)
+        values, states, prediction = found.values, found.fitted.point.states, found.fitted.prediction
+    return found, weights

@@ -9,13 +9,14 @@ forecast.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.calibration.calibration_data import CalibrationData
-from ddagr_gym.calibration.joint_fit import FittedModel
+from ddagr_gym.calibration.joint_fit import FittedModel, fit_model
+from ddagr_gym.calibration.parts import RobotModel
 from ddagr_gym.identification.gauss_newton import linearised
 from ddagr_gym.identification.least_squares import Linearised, huber_loss
 from ddagr_gym.identification.windows import CHANNELS, WindowSet
@@ -25,6 +26,9 @@ from ddagr_gym.replay_analysis.residuals import residuals
 Array = NDArray[np.float64]
 Booleans = NDArray[np.bool_]
 Integers = NDArray[np.int64]
+
+OWN_ITERATIONS = 5
+"""Steps of the fit of what belongs to a left-out drive alone (ours): few parameters, and few windows."""
 
 LONGEST = 3.0
 """Prior deviations that a parameter moves at most when a drive is left out: that of the joint fit's steps."""
@@ -66,59 +70,69 @@ def first_half(windows: WindowSet, chosen: Booleans) -> Booleans:
     return np.asarray(chosen & (windows.time < middle))
 
 
-def values_without(model: FittedModel, linear: Linearised, out: Booleans, seen: Booleans) -> tuple[Array, bool]:
-    """Values (P,) of a model's parameters as fitted without some windows.
+def values_without(model: FittedModel, linear: Linearised, out: Booleans) -> Array:
+    """Values (P,) of a model's parameters as fitted without some windows; what acts in those alone is left as it is.
 
     Args:
         model: fitted to all windows.
         linear: problem there.
         out: (W,) windows that are left out.
-        seen: (W,) those among them that what is theirs alone is fitted to.
-
-    Returns:
-        The values, and whether any were fitted to seen windows.
     """
-    free = [k for k, p in enumerate(model.parameters) if p.prior > 0.0]
-    recording = model.problem.blocked.windows.recording
-    others = np.array([model.parameters[k].acts_in(recording[~out]).any() for k in free], dtype=bool)
-    common, own = np.flatnonzero(others), np.flatnonzero(~others)
-    change = np.zeros(len(free))
-    change[common] = _step(linear, ~out, common, linear.residual)
-    if own.size:
-        left = linear.residual - linear.sensitivity[..., common] @ change[common]
-        change[own] = _step(linear, seen, own, left)
-    values = model.fitted.point.values.copy()
-    values[free] += change
-    ground = any(not model.parameters[free[k]].name.startswith("gyro_bias") for k in own)
-    return values, ground
-
-
-def _step(linear: Linearised, rows: Booleans, columns: Integers, residual: Array) -> Array:
+    free = np.array([k for k, p in enumerate(model.parameters) if p.prior > 0.0])
+    common = np.flatnonzero([_acts(model, k, ~out) for k in free])
     part = Linearised(
-        residual[rows], linear.sensitivity[rows][..., columns], linear.here[columns], linear.expected[columns],
-        linear.deviation[columns], linear.low[columns], linear.high[columns],
+        linear.residual[~out], linear.sensitivity[~out][..., common], linear.here[common], linear.expected[common],
+        linear.deviation[common], linear.low[common], linear.high[common],
     )  # fmt: skip
-    return part.step(part.information, part.gradient, LONGEST)
+    values = model.fitted.point.values.copy()
+    values[free[common]] += part.step(part.information, part.gradient, LONGEST)
+    return values
 
 
-def forecasts(data: CalibrationData, model: FittedModel, judged: WindowSet) -> Iterator[Forecast]:
+def _acts(model: FittedModel, parameter: int, rows: Booleans) -> bool:
+    """Whether a parameter acts in any of the windows."""
+    recording = model.problem.blocked.windows.recording[rows]
+    return bool(model.parameters[parameter].acts_in(recording).any())
+
+
+def _with_own(data: CalibrationData, model: FittedModel, values: Array, out: Booleans, weights: Weights) -> Array:
+    """Values (P,) with what belongs to a left-out drive alone fitted to the first half of it."""
+    names = [p.name for p in model.parameters]
+    own = frozenset(p.name for k, p in enumerate(model.parameters) if p.prior > 0.0 and not _acts(model, k, ~out))
+    alone = RobotModel(
+        model.model.robot, tuple(p if p.name in own else replace(p, prior=0.0) for p in model.parameters)
+    )
+    windows = model.problem.blocked.windows
+    rows = first_half(windows, out)
+    start = {name: 0.0 if name in own else value for name, value in zip(names, values.tolist(), strict=True)}
+    found = fit_model(
+        data, windows.subset(rows), alone, Weights(weights.sigma[rows], weights.robust), start, threads=1,
+        iterations=OWN_ITERATIONS,
+    )  # fmt: skip
+    return np.array([found.values[name] for name in names])
+
+
+def forecasts(data: CalibrationData, model: FittedModel, judged: WindowSet, weights: Weights) -> Iterator[Forecast]:
     """Forecast of every fold by the model fitted without it.
 
     Args:
         data: drives.
         model: fitted to windows of all drives.
         judged: windows to forecast.
+        weights: of the fit.
     """
     linear = linearised(model.problem, model.fitted)
     fitted = model.problem.blocked.windows
     by_window, by_judged = folds(data, fitted), folds(data, judged)
     for fold in np.unique(by_judged):
         out, inside = by_window == fold, by_judged == fold
-        seen = first_half(fitted, out)
-        values, ground = values_without(model, linear, out, seen)
-        # what was fitted to the first half judges the second only
-        middle = float(np.median(fitted.time[out]))
-        chosen = judged.subset(np.asarray(inside & (judged.time >= middle)) if ground else np.asarray(inside))
+        values = values_without(model, linear, out)
+        alone = data.count > 1 and len(data.drives_on[data.grounds[int(fold)]]) == 1
+        if alone:
+            values = _with_own(data, model, values, out, weights)
+            # what was fitted to the first half judges the second only
+            inside &= judged.time >= float(np.median(fitted.time[out]))
+        chosen = judged.subset(np.asarray(inside))
         yield Forecast(int(fold), chosen, values, model.problem.model_of(chosen).predict(values, chosen.initial))
 
 

@@ -2,7 +2,7 @@
 
 Every part is taken out in turn, what is fitted least often first. It stays out unless the forecasts of the left-out
 drives become worse by more than the standard error of that change between drives (the one-standard-error rule; L.
-Breiman et al., Classification and Regression Trees, 1984, section 3.4.3).
+Breiman et al., Classification and Regression Trees, 1984, section 3.4.3), with Student's t where there are few drives.
 """
 
 from __future__ import annotations
@@ -16,14 +16,16 @@ import numpy as np
 from ddagr_gym.calibration.calibration_data import CalibrationData
 from ddagr_gym.calibration.joint_fit import OFFSET, Standing, fit_model
 from ddagr_gym.calibration.left_out import fold_sigma, forecast_loss, forecasts
-from ddagr_gym.calibration.parts import PARTS, without_parts
+from ddagr_gym.calibration.parts import PARTS, RobotModel
 from ddagr_gym.calibration.result import PartDecision
 from ddagr_gym.diagnosis.store import StepCache
-from ddagr_gym.identification.parameters import ModelParameter
 from ddagr_gym.identification.windows import WindowSet
 from ddagr_gym.replay_analysis.fitting import Weights
 
-ITERATIONS = 4
+CONFIDENCE = 0.84
+"""One-sided, with which a part must help: one standard error where there are many drives."""
+
+ITERATIONS = 3
 """Steps of a fit without one part, from where the fit with it stands (ours)."""
 
 
@@ -34,10 +36,12 @@ class Candidate:
     Attributes:
         standing: where its fit stands.
         losses: of the forecasts of each fold.
+        counts: windows of each fold that were forecast.
     """
 
     standing: Standing
     losses: dict[int, float]
+    counts: dict[int, int]
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,32 +77,40 @@ class Comparison:
     weights: Weights
     threads: int
 
-    def candidate(
-        self, parameters: tuple[ModelParameter, ...], start: Standing, iterations: int = ITERATIONS
-    ) -> Candidate:
-        """Model with some parameters, fitted from where another one stands, and its forecasts."""
-        free = {p.name for p in parameters if p.prior > 0.0}
-        values = {
-            name: value if name in free or name.startswith(OFFSET) else 0.0 for name, value in start.values.items()
-        }
+    def candidate(self, model: RobotModel, start: Standing, iterations: int = ITERATIONS) -> Candidate:
+        """A model, fitted from where another one stands, and its forecasts."""
+        kept = {name: value for name, value in start.values.items() if name in model.free or name.startswith(OFFSET)}
         fitted = fit_model(
-            self.data, self.windows, parameters, self.weights, values, self.threads,
+            self.data, self.windows, model, self.weights, kept, self.threads,
             states=start.states, iterations=iterations,
         )  # fmt: skip
         sigma = fold_sigma(self.data, self.windows, self.weights)
-        made = forecasts(self.data, fitted, self.judged)
-        return Candidate(fitted.standing, {f.fold: forecast_loss(f, sigma[f.fold], self.weights.robust) for f in made})
+        made = tuple(forecasts(self.data, fitted, self.judged, self.weights))
+        losses = {f.fold: forecast_loss(f, sigma[f.fold], self.weights.robust) for f in made}
+        return Candidate(fitted.standing, losses, {f.fold: f.windows.count for f in made})
 
 
-def worse_by(before: dict[int, float], after: dict[int, float]) -> tuple[float, float]:
-    """Mean relative growth of the losses over folds, and its standard error."""
-    growth = np.array([after[fold] / before[fold] - 1.0 for fold in before])
-    return float(growth.mean()), float(np.std(growth, ddof=1) / np.sqrt(growth.size))
+def worse_by(before: Candidate, after: Candidate) -> tuple[float, float]:
+    """Mean relative growth of the losses over folds, weighted by the windows of each, and its standard error."""
+    folds = list(before.losses)
+    growth = np.array([after.losses[fold] / before.losses[fold] - 1.0 for fold in folds])
+    share = np.array([before.counts[fold] for fold in folds], dtype=np.float64)
+    share /= share.sum()
+    mean = float(share @ growth)
+    spread = float(share**2 @ (growth - mean) ** 2) * len(folds) / (len(folds) - 1)
+    return mean, float(np.sqrt(spread))
+
+
+def surely_above(folds: int) -> float:
+    """Standard errors by which a mean of so many folds must be above 0: Student's t, one-sided."""
+    from scipy.special import stdtrit
+
+    return float(stdtrit(folds - 1, CONFIDENCE))
 
 
 def select_parts(
     comparison: Comparison,
-    parameters: tuple[ModelParameter, ...],
+    model: RobotModel,
     full: Candidate,
     cache: StepCache,
     progress: Callable[[str], None],
@@ -107,21 +119,21 @@ def select_parts(
 
     Args:
         comparison: what models are fitted to and forecast.
-        parameters: of the model with all parts.
-        full: that model.
+        model: with all parts.
+        full: the same, fitted.
         cache: of models that are fitted already.
         progress: called with a line of text for each part.
     """
     best, left_out, decisions = full, frozenset[str](), []
     for part in PARTS:
-        if not {p.name for p in parameters if p.prior > 0.0} & set(part.parameters):
+        if not model.free & set(part.parameters):
             continue
         progress(f"forecasts of left-out drives without {part.title}")
-        without = without_parts(parameters, left_out | {part.name})
+        without = model.without(left_out | {part.name}, comparison.data.robot)
         name = f"without {' '.join(sorted(left_out | {part.name}))}"
         tried = cache(name, partial(comparison.candidate, without, best.standing))
-        growth, error = worse_by(best.losses, tried.losses)
-        kept = growth > error
+        growth, error = worse_by(best, tried)
+        kept = growth > surely_above(len(tried.losses)) * error
         decisions.append(PartDecision(part.name, kept, growth, error))
         if not kept:
             best, left_out = tried, left_out | {part.name}

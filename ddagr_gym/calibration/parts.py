@@ -2,18 +2,44 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
-from ddagr_gym.calibration.settings import LONGEST_DELAY
 from ddagr_gym.identification.parameters import ModelParameter, robot_parameters
-from ddagr_gym.parameters import Robot
+from ddagr_gym.parameters import Drivetrain, Robot
 from ddagr_gym.physics import layout
-
-DELAY_DEVIATION = 0.3
-"""Prior of the dead time between command and wheels [s] (ours): 0.3 to 0.43 s on a Husky and a Warthog."""
 
 GYRO_SCALE_DEVIATION = 0.03
 """Prior of the gyro's scale [-]: data sheets of low-cost gyros promise 3 %."""
+
+DELAY_DEVIATION = 0.3
+"""Prior of the dead time between command and wheels [s] (ours): 0.2 to 0.43 s on a Husky and a Warthog."""
+
+INTEGRAL_DEVIATION = 5.0
+"""Prior of the loop's integral rate [1/s^2] (ours): 0.7 to 4.5 1/s^2 on a Warthog."""
+
+VISCOUS_DEVIATION = 0.5
+"""Prior of the friction per speed [1/s] (ours): 0.3 1/s on a Warthog."""
+
+IMBALANCE_DEVIATION = 0.1
+"""Prior of the difference of the banks' limits [-] (ours): 0.11 on a Warthog."""
+
+TIME_TO_FULL_SPEED = 0.5
+"""In which a robot's motors reach its highest speed [s], which sets the scale of its limits (ours)."""
+
+FRICTION_TIME = 10.0
+"""In which Coulomb friction alone would stop a bank from its highest speed [s], which sets its scale (ours)."""
+
+STEADY_SHARE = 1.0 / 3.0
+"""Of the highest speed, at which the power limit takes over from the torque limit (ours)."""
+
+LIMIT_DEVIATION = 1.0
+"""Prior of a limit, as the deviation of its logarithm (ours): a factor of three either way."""
+
+NO_LOAD_DEVIATION = 0.3
+"""The same of the speed at which the torque limit is used up (ours); it cannot be far from the highest speed."""
+
+FIRST_SHARE = 0.2
+"""Of its prior deviation, at which the fit of a part that may be nothing starts (ours): its effect is then there."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +59,11 @@ class Part:
     helps: str
 
 
+_STEPS = "steps of the commands held for 3 s or more, with wheel speeds recorded at 10 Hz or more"
+_FULL = "straight pieces at the highest speed that the robot takes, commanded beyond it"
+_HARD = "full reversals of the commands on firm ground, with wheel speeds recorded at 10 Hz or more"
+_TURNS = "turns on the spot and wide arcs on firm ground, each held for 3 s or more"
+
 PARTS = (
     Part(
         "gyro_scale",
@@ -40,40 +71,39 @@ PARTS = (
         ("gyro_scale",),
         "a drive with poses in which the robot turns by several revolutions to both sides",
     ),
-    Part(
-        "inertia",
-        "mass and yaw inertia",
-        ("mass", "yaw_inertia"),
-        "quick reversals of turning on firm ground, with wheel speeds recorded at 20 Hz or more",
-    ),
+    Part("inertia", "mass and yaw inertia", ("mass", "yaw_inertia"), f"quick reversals of turning: {_HARD}"),
     Part(
         "geometry",
         "wheels and their places",
         ("half_wheelbase", "half_track", "half_width", "outer_radius"),
         "slow straight pieces and slow arcs to both sides on firm ground, with poses",
     ),
-    Part(
-        "speed_limit",
-        "highest wheel speed",
-        ("maximum_wheel_speed",),
-        "straight pieces at the highest speed that the robot takes, commanded beyond it",
-    ),
-    Part(
-        "speed_loop",
-        "speed loop",
-        ("motor_rate",),
-        "steps of the commands held for 3 s or more, with wheel speeds recorded at 10 Hz or more",
-    ),
+    Part("no_load_speed", "torque that falls with speed", ("no_load_speed",), _FULL),
+    Part("torque_limit", "torque limit", ("acceleration_limit",), _HARD),
+    Part("friction", "friction of motors and gears", ("viscous_rate", "friction"), f"coasting, and {_FULL}"),
+    Part("limit_imbalance", "banks of unequal strength", ("limit_imbalance",), _HARD),
+    Part("command_ramp", "ramp of the commands", ("command_ramp",), _HARD),
+    Part("power_limit", "power limit", ("power_limit",), _FULL),
+    Part("speed_limit", "highest wheel speed", ("maximum_wheel_speed",), _FULL),
+    Part("integral", "integral part of the speed loop", ("integral_rate",), _TURNS),
+    Part("load", "the ground's torque on the wheels", ("load_compliance",), _TURNS),
+    Part("speed_loop", "speed loop", ("motor_rate",), _STEPS),
     Part(
         "command_delay",
         "dead time of the commands",
         ("command_delay",),
-        "steps of the commands out of steady driving, with the time before each step recorded",
+        f"{_STEPS}, out of steady driving and with the time before each step recorded",
     ),
 )
 """In the order in which their removal is tried: what the fewest robots need comes first."""
 
-NAMES = tuple(part.name for part in PARTS)
+LIMITS = {
+    "command_ramp": "command_ramp",
+    "acceleration_limit": "torque_limit",
+    "no_load_speed": "no_load_speed",
+    "power_limit": "power_limit",
+}
+"""Fields of a drivetrain that no data sheet may state (a very large number stands for that), with their parts."""
 
 
 def part_of(parameter: str) -> Part:
@@ -81,24 +111,79 @@ def part_of(parameter: str) -> Part:
     return next(part for part in PARTS if parameter in part.parameters)
 
 
-def shared_parameters(robot: Robot) -> tuple[ModelParameter, ...]:
-    """Every parameter of the parts that the robot states as uncertain, and those of its timing and gyro."""
-    delay = ModelParameter("command_delay", "s", (), False, DELAY_DEVIATION, 0.01, 0.0, LONGEST_DELAY, shift=True)
-    scale = ModelParameter("gyro_scale", "-", (layout.GYRO_SCALE,), True, GYRO_SCALE_DEVIATION, 0.01, -0.3, 0.3)
-    return (*robot_parameters(robot), delay, scale)
+def is_stated(robot: Robot, name: str) -> bool:
+    """Whether a robot's drivetrain has a limit."""
+    default = next(item.default for item in fields(Drivetrain) if item.name == name)
+    return bool(getattr(robot.drivetrain, name) < default)
 
 
-def without_parts(parameters: tuple[ModelParameter, ...], left_out: frozenset[str]) -> tuple[ModelParameter, ...]:
-    """The same parameters, those of some parts held at the data sheet.
+def complete_robot(robot: Robot) -> Robot:
+    """A robot with every part: limits of a likely size where it states none, and how far each may be off.
 
-    Args:
-        parameters: shared ones and others.
-        left_out: names of parts.
+    What its data sheet states, values and deviations, stays.
     """
-    held = {name for part in PARTS if part.name in left_out for name in part.parameters}
-    return held_parameters(parameters, frozenset(held))
+    top = robot.maximum_wheel_speed
+    strongest = top / TIME_TO_FULL_SPEED
+    likely = {
+        "command_ramp": strongest,
+        "acceleration_limit": strongest,
+        "no_load_speed": top,
+        "power_limit": STEADY_SHARE * strongest * top,
+    }
+    limits = {name: value for name, value in likely.items() if not is_stated(robot, name)}
+    drivetrain = replace(robot.drivetrain, **limits)
+    deviations = {
+        "command_delay": DELAY_DEVIATION,
+        "integral_rate": INTEGRAL_DEVIATION,
+        # at most as heavy as if each bank had to turn half of the robot's mass at its rim
+        "load_compliance": 2.0 / (robot.mass * robot.outer_radius**2),
+        "viscous_rate": VISCOUS_DEVIATION,
+        "friction": top / FRICTION_TIME,
+        "limit_imbalance": IMBALANCE_DEVIATION,
+        **{
+            name: getattr(drivetrain, name) * (NO_LOAD_DEVIATION if name == "no_load_speed" else LIMIT_DEVIATION)
+            for name in likely
+        },
+    }
+    return replace(robot, drivetrain=drivetrain, standard_deviations={**deviations, **robot.standard_deviations})
 
 
-def held_parameters(parameters: tuple[ModelParameter, ...], names: frozenset[str]) -> tuple[ModelParameter, ...]:
-    """The same parameters, some of them held where they are."""
-    return tuple(replace(p, prior=0.0) if p.name in names else p for p in parameters)
+def shared_parameters(robot: Robot) -> tuple[ModelParameter, ...]:
+    """Every parameter of the parts of a complete robot that it states as uncertain, and the scale of its gyro."""
+    scale = ModelParameter("gyro_scale", "-", (layout.GYRO_SCALE,), True, GYRO_SCALE_DEVIATION, 0.01, -0.3, 0.3)
+    known = {name for part in PARTS for name in part.parameters}
+    return (*(p for p in robot_parameters(robot) if p.name in known), scale)
+
+
+def first_values(parameters: tuple[ModelParameter, ...]) -> dict[str, float]:
+    """Values at which a fit of all parts starts: what may be nothing is there, the rest as the data sheet has it."""
+    return {p.name: FIRST_SHARE * p.prior for p in parameters if not p.factor and p.low == 0.0 and p.scope is None}
+
+
+@dataclass(frozen=True)
+class RobotModel:
+    """A robot and what of it may move: some parts are fitted, the others are as the data sheet has them.
+
+    Attributes:
+        robot: in which limits of the parts that are left out are not there.
+        parameters: of all parts, of the soils and of the sensors; held ones have a prior of 0.
+    """
+
+    robot: Robot
+    parameters: tuple[ModelParameter, ...]
+
+    def without(self, parts: frozenset[str], data_sheet: Robot) -> RobotModel:
+        """The same without some parts."""
+        names = frozenset(name for part in PARTS if part.name in parts for name in part.parameters)
+        return self.held(names, data_sheet)
+
+    def held(self, names: frozenset[str], data_sheet: Robot) -> RobotModel:
+        """The same with some parameters as the data sheet has them."""
+        gone = {name: getattr(data_sheet.drivetrain, name) for name in names & LIMITS.keys()}
+        robot = replace(self.robot, drivetrain=replace(self.robot.drivetrain, **gone))
+        return RobotModel(robot, tuple(replace(p, prior=0.0) if p.name in names else p for p in self.parameters))
+
+    @property
+    def free(self) -> frozenset[str]:
+        """Names of the parameters that a fit moves."""
+        return frozenset(p.name for p in self.parameters if p.prior > 0.0)

@@ -106,9 +106,10 @@ class CalibratedParameter:
         part: of the robot that it belongs to; "soil" for soils.
         ground: that it belongs to; "" for the robot.
         unit: of the values; "-" for factors.
-        data_sheet: value before.
-        data_sheet_deviation: of it.
-        value: calibrated, the data sheet's where it is not calibrated.
+        data_sheet: value before; null where that says nothing, as of most limits.
+        expected: value that the fit began with: the data sheet's, or a likely one for a robot of this size.
+        expected_deviation: of that.
+        value: calibrated, the data sheet's where it is not calibrated; null where that says nothing.
         interval: 90 %, between drives where there are several; null where it is not calibrated.
         calibrated: whether the drives determine it.
         reason: why not, in a sentence; "" where it is.
@@ -123,9 +124,10 @@ class CalibratedParameter:
     part: str
     ground: str
     unit: str
-    data_sheet: float
-    data_sheet_deviation: float
-    value: float
+    data_sheet: float | None
+    expected: float
+    expected_deviation: float
+    value: float | None
     interval: tuple[float, float] | None
     calibrated: bool
     reason: str

@@ -14,29 +14,32 @@ import numpy as np
 
 from ddagr_gym.calibration.calibration_data import CalibrationData, prepare_drives
 from ddagr_gym.calibration.drive_scatter import drive_estimates
+from ddagr_gym.calibration.effect_bank import ordinary_runs
 from ddagr_gym.calibration.forecast_errors import Forecasts, all_forecasts, forecast_errors
 from ddagr_gym.calibration.identifiability import covariance, unidentified
 from ddagr_gym.calibration.input_requirements import check_drives, check_scales, drive_scale, with_gyro_forward
 from ddagr_gym.calibration.joint_fit import (
+    FIRST_ITERATIONS,
+    LAST_ITERATIONS,
     Standing,
+    complete_model,
     fit_model,
     model_at,
-    model_parameters,
     start_values,
     weigh_and_fit,
 )
 from ddagr_gym.calibration.left_out import forecasts
 from ddagr_gym.calibration.part_selection import Comparison, Selection, select_parts
-from ddagr_gym.calibration.parts import held_parameters, without_parts
+from ddagr_gym.calibration.parts import RobotModel
 from ddagr_gym.calibration.residual_tables import spectra, unexplained
 from ddagr_gym.calibration.result import SCHEMA, SCHEMA_VERSION, Calibration, Covariance
 from ddagr_gym.calibration.settings import CalibrationSettings
-from ddagr_gym.calibration.simulator_values import calibrated_robot, calibrated_soil
+from ddagr_gym.calibration.simulator_values import calibrated_robot, fitted_soil
 from ddagr_gym.calibration.summary import drive_summaries, parameter_results
 from ddagr_gym.diagnosis.gates.source_digest import code_digest, source_digest
+from ddagr_gym.diagnosis.gates.thresholds import NullRun
 from ddagr_gym.diagnosis.preprocessing.input_requirements import content_hash
 from ddagr_gym.diagnosis.store import StepStore
-from ddagr_gym.identification.parameters import ModelParameter
 from ddagr_gym.identification.windows import WindowSet
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.recordings.schema import Recording
@@ -59,6 +62,8 @@ class Outcome:
         soils: calibrated, by ground.
         data: drives as they were fitted.
         forecasts: of the left-out drives.
+        bank: what each drive does to every effect of the library beside the robot calibrated without it; empty where
+            that was not asked for.
     """
 
     calibration: Calibration
@@ -66,6 +71,7 @@ class Outcome:
     soils: Mapping[str, Soil]
     data: CalibrationData
     forecasts: tuple[Forecasts, ...]
+    bank: tuple[NullRun, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +98,7 @@ def calibrate_drives(
     *,
     data_sheet: str = "",
     soil_names: Mapping[str, str] | None = None,
+    with_bank: bool = False,
     cache: Path | None = None,
     progress: Progress = lambda line: None,
 ) -> Outcome:
@@ -105,6 +112,7 @@ def calibrate_drives(
         settings: windows, threads and seed.
         data_sheet: name or file of the robot.
         soil_names: of the soils by ground.
+        with_bank: also scan every drive for every effect of the library.
         cache: folder of finished steps, from which the same calibration goes on after an interruption; None keeps
             nothing.
         progress: called with what is being done.
@@ -121,19 +129,19 @@ def calibrate_drives(
     data = prepare_drives(forward, grounds, robot, soils, settings)
     data = replace(data, notes=tuple((*a, *b) for a, b in zip(turned, data.notes, strict=True)))
     store = StepStore(cache, "" if cache is None else _key(recordings, grounds, robot, soils, settings))
-    parameters, held = model_parameters(data)
-    selection = _select(data, parameters, held, settings, store, progress)
-    kept = without_parts(parameters, selection.left_out)
+    complete, held = complete_model(data)
+    selection = _select(data, complete, held, settings, store, progress)
+    kept = complete.without(selection.left_out, robot)
     progress("joint fit")
     final = store.step("joint fit", partial(_final_fit, data, kept, selection.standing.values, settings))
     windows = data.spread(settings.fitted)
-    kept = held_parameters(kept, frozenset(final.refused))
+    kept = kept.held(frozenset(final.refused), robot)
     model = model_at(data, windows, kept, final.weights, final.standing, settings.threads)
     progress("every drive by itself")
     estimates = store.step("drives", partial(drive_estimates, data, model, final.weights, settings.threads))
     progress("forecasts of left-out drives")
-    made = tuple(forecasts(data, model, data.spread(settings.judged)))
-    compared = all_forecasts(data, model, made, held)
+    made = tuple(forecasts(data, model, data.spread(settings.judged), final.weights))
+    compared = all_forecasts(data, model, made, held, settings.threads)
     calibration = Calibration(
         schema=SCHEMA,
         schema_version=SCHEMA_VERSION,
@@ -144,7 +152,7 @@ def calibrate_drives(
         drives=drive_summaries(data, recordings, windows, compared),
         window=windows.duration,
         parts=selection.decisions,
-        parameters=parameter_results(data, parameters, model, selection.left_out, final.refused, estimates),
+        parameters=parameter_results(data, complete, model, selection.left_out, final.refused, estimates),
         covariance=Covariance(model.free, tuple(tuple(row) for row in covariance(model).tolist())),
         forecasts=forecast_errors(compared, settings.seed),
         spectra=spectra(compared),
@@ -153,8 +161,9 @@ def calibrate_drives(
         seed=settings.seed,
         seconds=time.monotonic() - began,
     )
-    found = {ground: calibrated_soil(data, ground, model.values) for ground in data.drives_on}
-    return Outcome(calibration, calibrated_robot(data, model.values, calibration), found, data, compared)
+    found = {ground: fitted_soil(data, ground, model.values) for ground in data.drives_on}
+    bank = ordinary_runs(data, model, made, settings.threads, store.step, progress) if with_bank else ()
+    return Outcome(calibration, calibrated_robot(data, model, calibration), found, data, compared, bank)
 
 
 def _rng(settings: CalibrationSettings) -> np.random.Generator:
@@ -164,7 +173,7 @@ def _rng(settings: CalibrationSettings) -> np.random.Generator:
 
 def _select(
     data: CalibrationData,
-    parameters: tuple[ModelParameter, ...],
+    model: RobotModel,
     held: Mapping[str, float],
     settings: CalibrationSettings,
     store: StepStore,
@@ -173,40 +182,39 @@ def _select(
     """Parts that forecasts of left-out drives ask for, by fits to some of the windows."""
     windows, judged = data.spread(settings.compared), data.spread(settings.judged)
     progress("fit of all parts")
-    start = {**held, **start_values(data, windows)}
-    rough = store.step("all parts", partial(_weigh, data, windows, parameters, start, settings.threads))
+    start = {**held, **start_values(data, windows, model.parameters)}
+    rough = store.step("all parts", partial(_weigh, data, windows, model, start, settings.threads))
     comparison = Comparison(data, windows, judged, rough.weights, settings.threads)
-    full = store.step("all parts forecast", partial(comparison.candidate, parameters, rough.standing, 0))
-    return select_parts(comparison, parameters, full, store.step, progress)
+    full = store.step("all parts forecast", partial(comparison.candidate, model, rough.standing, 0))
+    return select_parts(comparison, model, full, store.step, progress)
 
 
 def _weigh(
     data: CalibrationData,
     windows: WindowSet,
-    parameters: tuple[ModelParameter, ...],
+    model: RobotModel,
     start: Mapping[str, float],
     threads: int,
 ) -> FinalFit:
-    model, weights = weigh_and_fit(data, windows, parameters, start, threads)
-    return FinalFit(model.standing, weights, {})
+    found, weights = weigh_and_fit(data, windows, model, start, threads)
+    return FinalFit(found.standing, weights, {})
 
 
 def _final_fit(
-    data: CalibrationData,
-    parameters: tuple[ModelParameter, ...],
-    start: Mapping[str, float],
-    settings: CalibrationSettings,
+    data: CalibrationData, model: RobotModel, start: Mapping[str, float], settings: CalibrationSettings
 ) -> FinalFit:
     """Fit of the parts that are kept; then again with the data sheet's values where the drives identify nothing."""
     windows = data.spread(settings.fitted)
-    model, weights = weigh_and_fit(data, windows, parameters, start, settings.threads)
-    refused = unidentified(model)
+    found, weights = weigh_and_fit(data, windows, model, start, settings.threads, (FIRST_ITERATIONS, LAST_ITERATIONS))
+    refused = unidentified(found)
     if refused:
-        values = {name: 0.0 if name in refused else value for name, value in model.values.items()}
-        held = held_parameters(parameters, frozenset(refused))
-        states = model.fitted.point.states
-        model = fit_model(data, windows, held, weights, values, settings.threads, states=states)
-    return FinalFit(model.standing, weights, refused)
+        values = {name: 0.0 if name in refused else value for name, value in found.values.items()}
+        held = model.held(frozenset(refused), data.robot)
+        states = found.fitted.point.states
+        found = fit_model(
+            data, windows, held, weights, values, settings.threads, states=states, iterations=LAST_ITERATIONS
+        )
+    return FinalFit(found.standing, weights, refused)
 
 
 def _key(

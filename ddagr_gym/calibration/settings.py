@@ -26,8 +26,8 @@ class CalibrationSettings:
     """
 
     window: float = 6.0
-    fitted: int = 40
-    compared: int = 20
+    fitted: int = 30
+    compared: int = 12
     judged: int = 100
     threads: int = 1
     seed: int = 0

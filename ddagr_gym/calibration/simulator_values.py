@@ -4,23 +4,28 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 from ddagr_gym.calibration.calibration_data import CalibrationData
-from ddagr_gym.calibration.parts import part_of
+from ddagr_gym.calibration.joint_fit import FittedModel
+from ddagr_gym.calibration.parts import LIMITS, RobotModel, is_stated, part_of
 from ddagr_gym.calibration.result import CalibratedParameter, Calibration
 from ddagr_gym.diagnosis.null_bank.fitted_nominal import with_values
+from ddagr_gym.envs.calibrated_draws import CalibratedDraws, GroundDraws
 from ddagr_gym.identification.parameters import ModelParameter
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.physics.effects import Effect
-from ddagr_gym.physics.effects.command_delay import CommandDelay
 from ddagr_gym.physics.effects.gyro_scale import GyroScale
+from ddagr_gym.presets import firm_ground
 
 SOIL_PARAMETERS = ("soil_strength", "soil_stiffness", "shear_modulus", "exit_angle_ratio")
 """Parameters that a ground has of its own; the first two are factors on two entries of a soil each."""
 
 SOIL = "soil"
 """Stands for a part of the robot with the parameters of a soil."""
+
+_ANY_SOIL = firm_ground()
+"""Goes through a function that changes a robot and a soil together, and is not used."""
 
 SOIL_HELPS = "turns on the spot and hard accelerations on this ground"
 """Drive that determines what a soil keeps."""
@@ -35,6 +40,15 @@ _UNITS = {
     "half_width": "m",
     "outer_radius": "m",
     "command_delay": "s",
+    "command_ramp": "rad/s^2",
+    "integral_rate": "1/s^2",
+    "load_compliance": "1/(kg m^2)",
+    "acceleration_limit": "rad/s^2",
+    "no_load_speed": "rad/s",
+    "power_limit": "rad^2/s^3",
+    "limit_imbalance": "-",
+    "viscous_rate": "1/s",
+    "friction": "rad/s^2",
     "gyro_scale": "-",
     "soil_strength": "-",
     "soil_stiffness": "-",
@@ -53,7 +67,8 @@ class Quantity:
         ground: "" for the robot.
         part: of the robot, or :data:`SOIL`.
         unit: of its value.
-        nominal: value of the data sheet.
+        stated: value of the data sheet; None where it says nothing.
+        nominal: value at no change: that, or a likely one.
         scale: what a factor acts on, which is less than the value for a radius; 0 for a difference.
         helps: drive that determines it.
     """
@@ -63,6 +78,7 @@ class Quantity:
     ground: str
     part: str
     unit: str
+    stated: float | None
     nominal: float
     scale: float
     helps: str
@@ -78,15 +94,21 @@ class Quantity:
         return deviation if self.scale == 0.0 else self.scale * math.exp(change) * deviation
 
 
-def quantity(data: CalibrationData, parameter: ModelParameter) -> Quantity:
-    """What a fitted parameter is."""
+def quantity(data: CalibrationData, model: RobotModel, parameter: ModelParameter) -> Quantity:
+    """What a fitted parameter is.
+
+    Args:
+        data: drives with the data sheet.
+        model: with all parts.
+        parameter: of it.
+    """
     base, ground = _split(data, parameter.name)
-    nominal, scale = _soil_scale(data.soils[ground], base) if ground else _robot_scale(data.robot, base)
+    nominal, scale = _soil_scale(data.soils[ground], base) if ground else _robot_scale(model.robot, base)
     part = None if ground else part_of(base)
-    name = f"{base}/{ground}" if ground else base
+    says_nothing = base in LIMITS and not is_stated(data.robot, base)
     return Quantity(
-        name, base, ground, SOIL if part is None else part.name, _UNITS[base], nominal, scale,
-        SOIL_HELPS if part is None else part.helps,
+        f"{base}/{ground}" if ground else base, base, ground, SOIL if part is None else part.name, _UNITS[base],
+        None if says_nothing else nominal, nominal, scale, SOIL_HELPS if part is None else part.helps,
     )  # fmt: skip
 
 
@@ -100,15 +122,18 @@ def _split(data: CalibrationData, name: str) -> tuple[str, str]:
 
 
 def _robot_scale(robot: Robot, name: str) -> tuple[float, float]:
+    """Value of a robot's parameter and what a factor on it acts on; 0 where the fit adds to it."""
     wheel = robot.wheels[0]
-    if name == "outer_radius":
-        return robot.outer_radius, wheel.major_radius
-    if name == "half_width":
-        return wheel.half_width, wheel.half_width
-    if name == "gyro_scale":
-        return 1.0, 1.0
-    if name == "command_delay":
-        return 0.0, 0.0
+    special = {
+        "outer_radius": (robot.outer_radius, wheel.major_radius),
+        "half_width": (wheel.half_width, wheel.half_width),
+        "gyro_scale": (1.0, 1.0),
+    }
+    if name in special:
+        return special[name]
+    if hasattr(robot.drivetrain, name):
+        value = float(getattr(robot.drivetrain, name))
+        return value, value if name in LIMITS else 0.0
     value = float(getattr(robot, name))
     return value, value
 
@@ -121,49 +146,81 @@ def _soil_scale(soil: Soil, name: str) -> tuple[float, float]:
     return soil.shear_modulus, soil.shear_modulus
 
 
-def calibrated_robot(data: CalibrationData, values: Mapping[str, float], calibration: Calibration) -> Robot:
-    """Robot of the data sheet with fitted values; deviations are what another drive may find.
+def fitted_robot(robot: Robot, values: Mapping[str, float]) -> Robot:
+    """Robot at values of the fit.
 
     Args:
-        data: drives.
-        values: of the fitted parameters.
-        calibration: for the deviations.
+        robot: that the values change.
+        values: by name of the parameters; what belongs to soils and sensors is left out.
     """
-    robot, _ = with_values(data.robot, next(iter(data.soils.values())), values)
-    found = [item for item in calibration.parameters if item.calibrated and item.name in robot.standard_deviations]
-    sizes = {item.name: _of_another_drive(item) for item in found}
-    sources = ", ".join(drive.source for drive in calibration.drives)
-    source = f"calibrated with {sources}; before: {robot.source}"
-    return replace(robot, standard_deviations={**robot.standard_deviations, **sizes}, source=source)
+    changed, _ = with_values(robot, _ANY_SOIL, values)
+    drivetrain = {
+        item.name: _after(robot, item.name, values[item.name])
+        for item in fields(robot.drivetrain)
+        if values.get(item.name, 0.0) != 0.0
+    }
+    return replace(changed, drivetrain=replace(robot.drivetrain, **drivetrain))
 
 
-def _of_another_drive(item: CalibratedParameter) -> float:
-    """Deviation of a value in a further drive: what is uncertain of the mean, and what differs between drives."""
-    change = math.hypot(item.deviation or 0.0, item.scatter.other_grounds or 0.0)
-    scale = item.value - item.data_sheet + _scale(item)
-    return change if item.unit == "s" else abs(scale) * change
+def _after(robot: Robot, name: str, change: float) -> float:
+    nominal, scale = _robot_scale(robot, name)
+    return nominal + change if scale == 0.0 else nominal * math.exp(change)
 
 
-def _scale(item: CalibratedParameter) -> float:
-    """What a factor acts on before the calibration."""
-    if item.change == 0.0:
-        return item.data_sheet
-    return (item.value - item.data_sheet) / math.expm1(item.change)
-
-
-def calibrated_soil(data: CalibrationData, ground: str, values: Mapping[str, float]) -> Soil:
-    """Nominal soil of a ground with fitted values."""
+def fitted_soil(data: CalibrationData, ground: str, values: Mapping[str, float]) -> Soil:
+    """Nominal soil of a ground at values of the fit."""
     own = {base: values.get(f"{base}_{ground}", 0.0) for base in SOIL_PARAMETERS}
     _, soil = with_values(data.robot, data.soils[ground], own)
     return soil
 
 
+def calibrated_robot(data: CalibrationData, model: FittedModel, calibration: Calibration) -> Robot:
+    """Robot with fitted values; deviations are what another drive may find.
+
+    Args:
+        data: drives with the data sheet.
+        model: joint fit.
+        calibration: for the deviations.
+    """
+    found = [i for i in calibration.parameters if i.calibrated and not i.ground and i.name != "gyro_scale"]
+    known = {p.name: quantity(data, model.model, p) for p in model.parameters if p.prior > 0.0 and p.scope is None}
+    sizes = {item.name: known[item.name].deviation(item.change, _of_another_drive(item)) for item in found}
+    sources = ", ".join(drive.source for drive in calibration.drives)
+    return replace(
+        fitted_robot(model.model.robot, model.values),
+        standard_deviations={**data.robot.standard_deviations, **sizes},
+        source=f"calibrated with {sources}; before: {data.robot.source}",
+    )
+
+
+def _of_another_drive(item: CalibratedParameter) -> float:
+    """Deviation of a change in a further drive: what is uncertain of the mean, and what differs between drives."""
+    return math.hypot(item.deviation or 0.0, item.scatter.other_grounds or 0.0)
+
+
 def calibrated_effects(calibration: Calibration) -> tuple[Effect, ...]:
     """What was calibrated and has no place in a robot or a soil: sensors."""
     named = {item.name: item for item in calibration.parameters if item.calibrated}
-    found: list[Effect] = []
-    if "gyro_scale" in named:
-        found.append(GyroScale(named["gyro_scale"].value))
-    if "command_delay" in named:
-        found.append(CommandDelay(named["command_delay"].value))
-    return tuple(found)
+    scale = named["gyro_scale"].value if "gyro_scale" in named else None
+    return () if scale is None else (GyroScale(scale),)
+
+
+def calibrated_draws(calibration: Calibration, robot: Robot, soils: Mapping[str, Soil]) -> CalibratedDraws:
+    """Robots and soils as they differ between drives, for episodes to draw from.
+
+    Args:
+        calibration: with the scatter.
+        robot: calibrated.
+        soils: calibrated, by ground.
+    """
+    found = [item for item in calibration.parameters if item.calibrated and item.name != "gyro_scale"]
+    grounds = tuple(
+        GroundDraws(ground, soil, {i.name.partition("/")[0]: _on_another_day(i) for i in found if i.ground == ground})
+        for ground, soil in soils.items()
+    )
+    return CalibratedDraws(robot, {i.name: _of_another_drive(i) for i in found if not i.ground}, grounds)
+
+
+def _on_another_day(item: CalibratedParameter) -> float:
+    """Deviation of a soil's change in a further drive on its ground."""
+    return math.hypot(item.deviation or 0.0, item.scatter.same_ground or 0.0)

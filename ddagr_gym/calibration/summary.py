@@ -11,12 +11,16 @@ from ddagr_gym.calibration.drive_scatter import DriveEstimates, half_width, scat
 from ddagr_gym.calibration.forecast_errors import Forecasts
 from ddagr_gym.calibration.identifiability import covariance
 from ddagr_gym.calibration.joint_fit import FittedModel
+from ddagr_gym.calibration.parts import RobotModel
 from ddagr_gym.calibration.result import CalibratedParameter, DriveEstimate, DriveSummary, Scatter
 from ddagr_gym.calibration.simulator_values import Quantity, quantity
 from ddagr_gym.diagnosis.preprocessing.input_requirements import content_hash
 from ddagr_gym.identification.parameters import ModelParameter
 from ddagr_gym.identification.windows import WindowSet
 from ddagr_gym.recordings.schema import Recording
+
+NOT_IDENTIFIED = "the drives do not identify it (it would be about as uncertain as before)."
+NOT_NEEDED = "forecasts of left-out drives are as good without it."
 
 NO_SCATTER = Scatter(0, None, None, 0, 0)
 
@@ -54,7 +58,7 @@ def drive_summaries(
 
 def parameter_results(
     data: CalibrationData,
-    parameters: Sequence[ModelParameter],
+    complete: RobotModel,
     model: FittedModel,
     left_out: frozenset[str],
     refused: Mapping[str, float],
@@ -64,7 +68,7 @@ def parameter_results(
 
     Args:
         data: drives.
-        parameters: all that could be fitted, with their priors.
+        complete: all that could be fitted, with their priors.
         model: joint fit.
         left_out: names of parts that forecasts do not ask for.
         refused: parameters that are not identified, with deviation after over before.
@@ -72,10 +76,10 @@ def parameter_results(
     """
     deviation = dict(zip(model.free, np.sqrt(np.diag(covariance(model))).tolist(), strict=True))
     found = []
-    for parameter in parameters:
+    for parameter in complete.parameters:
         if parameter.prior == 0.0 or parameter.name.startswith("gyro_bias"):
             continue
-        known = quantity(data, parameter)
+        known = quantity(data, complete, parameter)
         if parameter.name in deviation:
             change = model.values[parameter.name]
             found.append(_calibrated(data, parameter, known, change, deviation[parameter.name], estimates))
@@ -100,8 +104,9 @@ def _calibrated(
         part=known.part,
         ground=known.ground,
         unit=known.unit,
-        data_sheet=known.nominal,
-        data_sheet_deviation=known.deviation(0.0, parameter.prior),
+        data_sheet=known.stated,
+        expected=known.nominal,
+        expected_deviation=known.deviation(0.0, parameter.prior),
         value=known.value(change),
         interval=(known.value(low), known.value(high)),
         calibrated=True,
@@ -124,9 +129,10 @@ def _kept(parameter: ModelParameter, known: Quantity, reason: str) -> Calibrated
         part=known.part,
         ground=known.ground,
         unit=known.unit,
-        data_sheet=known.nominal,
-        data_sheet_deviation=known.deviation(0.0, parameter.prior),
-        value=known.nominal,
+        data_sheet=known.stated,
+        expected=known.nominal,
+        expected_deviation=known.deviation(0.0, parameter.prior),
+        value=known.stated,
         interval=None,
         calibrated=False,
         reason=reason,
@@ -140,8 +146,7 @@ def _kept(parameter: ModelParameter, known: Quantity, reason: str) -> Calibrated
 
 def _reason(parameter: ModelParameter, known: Quantity, left_out: frozenset[str], refused: Mapping[str, float]) -> str:
     if parameter.name in refused:
-        share = 100.0 * min(refused[parameter.name], 1.0)
-        return f"the drives leave {share:.0f} % of the uncertainty that it had before: they do not identify it."
+        return NOT_IDENTIFIED
     if known.part in left_out:
-        return "forecasts of left-out drives are as good without it."
+        return NOT_NEEDED
     return "it was not fitted."

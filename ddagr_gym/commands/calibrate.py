@@ -34,13 +34,15 @@ class Arguments:
     Attributes:
         drives: ordinary drives of one robot (Parquet of `ddagr import`, or any source that it takes), or folders.
         output: folder to write: robot.yaml and soil_GROUND.yaml for every --robot, --soil and gym.make, effects.yaml,
-            calibration.json, and one page, calibration.html.
+            draws.yaml, calibration.json, and one page, calibration.html.
         robot: its data sheet: a name (see `ddagr robots`), or the path of a YAML file with one's own.
         ground: NAME=DRIVE,DRIVE: drives on one ground; may be repeated. Without it all drives are on one ground.
         soil: nominal soil (see `ddagr soils`) of all grounds, or NAME=SOIL of one; may be repeated.
         map: shipped map by name or the path of one's own YAML file, for sources that are not imported yet.
         seed: of the resampled intervals.
         threads: of the simulator.
+        bank: also diagnose every drive with the robot calibrated without it, and write bank.json: what ordinary drives
+            do to every effect of the library.
         overwrite: replace an output folder that an earlier command wrote.
         maximum_rows: refuse a recording with more rows or messages.
         maximum_bytes: refuse a recording that unpacks to more bytes.
@@ -54,6 +56,7 @@ class Arguments:
     map: str = ""
     seed: int = 0
     threads: int = 2
+    bank: bool = False
     overwrite: bool = False
     maximum_rows: int = 2_000_000
     maximum_bytes: int = 4 * 2**30
@@ -79,6 +82,7 @@ def run(arguments: Arguments) -> int | None:
             grounds,
             seed=arguments.seed,
             threads=arguments.threads,
+            bank=arguments.bank,
             progress=LinePrinter("ddagr calibrate: "),
             cache=parts,
         )

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from gymnasium import spaces
 
+from ddagr_gym.envs.calibrated_draws import load_draws
 from ddagr_gym.envs.settings import Randomisation, RewardWeights, TurnSettings
 from ddagr_gym.errors import InputError, unknown_name
 from ddagr_gym.parameters import Numerics, Robot, Sensors, Soil
@@ -66,12 +67,29 @@ def make_settings(
     effects: Effects = (),
     numerics: Numerics = Numerics(),
     ekf_features: bool = False,
+    calibration: str | Path | None = None,
+    ground: str = "",
 ) -> TurnSettings:
     """Settings from what ``gym.make("DDAGR-Turn-v0", ...)`` takes; see :class:`ddagr_gym.envs.TurnEnv`.
+
+    With a ``calibration``, the folder that ``ddagr calibrate`` wrote, every episode draws a robot and a soil of one of
+    its grounds (or of ``ground``) from the scatter between its drives. They stand in place of ``robot``, ``soil`` and
+    the default randomisation's spread of mass, inertia, motor rate and delay; its sensors' effects are added.
 
     Raises:
         InputError: any value that is not valid, in one sentence.
     """
+    calibrated = None
+    if calibration is not None:
+        if robot != "ddagr" or soil != DEFAULT_SOIL:
+            raise InputError(f"a calibration and a robot or soil are given: {calibration} has both, leave them out.")
+        calibrated = load_draws(calibration, ground)
+        robot, soil = calibrated.robot, calibrated.grounds[0].soil
+        effects = (*load_effects(Path(calibration) / "effects.yaml"), *load_effects(effects))
+        if randomisation is True:
+            randomisation = Randomisation(mass=0.0, yaw_inertia=0.0, motor_rate=0.0, command_delay=0.0)
+    elif ground:
+        raise InputError(f"the ground is {ground!r} and there is no calibration: give its folder as calibration=.")
     if isinstance(randomisation, bool):
         randomisation = Randomisation() if randomisation else Randomisation.none()
     return TurnSettings(
@@ -88,6 +106,7 @@ def make_settings(
         effects=load_effects(effects),
         numerics=numerics,
         ekf_features=ekf_features,
+        calibrated=calibrated,
     )
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, fields, replace
 import numpy as np
 
 from ddagr_gym.control.row_turn import SIDES, RowTurn
+from ddagr_gym.envs.calibrated_draws import CalibratedDraws
 from ddagr_gym.errors import InputError, unknown_name
 from ddagr_gym.parameters import Imu, Numerics, Robot, Sensors, Soil
 from ddagr_gym.physics.effects import Effect
@@ -111,6 +112,7 @@ class TurnSettings(Validated):
         effects: missing physics.
         numerics: accuracy.
         ekf_features: append the filter's estimates to the observation.
+        calibrated: robots and soils of a calibration, drawn instead of ``robot`` and ``soil``.
     """
 
     robot: Robot = field(default_factory=ddagr)
@@ -126,6 +128,7 @@ class TurnSettings(Validated):
     effects: tuple[Effect, ...] = ()
     numerics: Numerics = Numerics()
     ekf_features: bool = False
+    calibrated: CalibratedDraws | None = None
 
     def _check(self) -> None:
         if self.side != "random" and self.side not in SIDES:
@@ -147,7 +150,7 @@ class TurnSettings(Validated):
         side = ("left", "right")[int(rng.integers(2))] if self.side == "random" else self.side
         radius = _drawn(self.radius, rng)
         robot = self._draw_robot(rng)
-        soil, rejected = (self.soil, 0) if isinstance(self.soil, Soil) else draw_soil(self.soil, rng, robot)
+        soil, rejected = self._draw_soil(rng, robot)
         turn = self.turn(radius, side, _drawn(self.speed, rng))
         return Episode(
             turn=turn,
@@ -161,13 +164,19 @@ class TurnSettings(Validated):
             rejected_soils=rejected,
         )
 
+    def _draw_soil(self, rng: np.random.Generator, robot: Robot) -> tuple[Soil, int]:
+        """Soil of an episode, and how many draws before it were rejected."""
+        if self.calibrated is not None:
+            return self.calibrated.draw_soil(rng), 0
+        return (self.soil, 0) if isinstance(self.soil, Soil) else draw_soil(self.soil, rng, robot)
+
     def _draw_robot(self, rng: np.random.Generator) -> Robot:
         spread = self.randomisation
         # truncated at three standard deviations so that nothing changes sign
         mass, inertia, rate = 1.0 + np.array([spread.mass, spread.yaw_inertia, spread.motor_rate]) * np.clip(
             rng.standard_normal(3), -3.0, 3.0
         )
-        robot = self.robot
+        robot = self.robot if self.calibrated is None else self.calibrated.draw_robot(rng)
         return replace(
             robot,
             mass=float(robot.mass * mass),

@@ -19,7 +19,7 @@ from ddagr_gym.calibration.result import (
 )
 from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.rendering import palette
-from ddagr_gym.reporting.calibration_text import MODEL_LABELS, error_label, parameter_label
+from ddagr_gym.reporting.calibration_text import MODEL_LABELS, error_label, is_difference, parameter_label
 from ddagr_gym.reporting.figures import DASHED
 
 Array = NDArray[np.float64]
@@ -96,27 +96,25 @@ def parameter_figure(items: Sequence[CalibratedParameter]) -> Figure:
     for row, item in enumerate(items):
         place = len(items) - 1 - row
         for estimate in item.estimates:
-            x = (_as_value(item, estimate.value) - item.data_sheet) / item.data_sheet_deviation
+            x = (_as_value(item, estimate.value) - item.expected) / item.expected_deviation
             axis.plot(_inside(x), place + 0.22, ".", ms=3.5, color=palette.PALE, zorder=2)
         if item.interval is not None:
-            ends = [_inside((v - item.data_sheet) / item.data_sheet_deviation) for v in item.interval]
+            ends = [_inside((v - item.expected) / item.expected_deviation) for v in item.interval]
             axis.plot(ends, [place, place], color=palette.BLUE, lw=2.2, solid_capstyle="butt", zorder=3)
-        here = _inside((item.value - item.data_sheet) / item.data_sheet_deviation)
+        here = _inside((_as_value(item, item.change) - item.expected) / item.expected_deviation)
         axis.plot(here, place, "o", ms=4.5, color=palette.BLUE, zorder=4)
     axis.set_yticks(range(len(items)), [parameter_label(item) for item in reversed(items)])
     axis.set_ylim(-0.6, len(items) - 0.4)
     axis.set_xlim(-_FARTHEST - 0.3, _FARTHEST + 0.3)
-    axis.set_xlabel(f"from the data sheet's value, in its standard deviations (beyond {_FARTHEST:g}: at the edge)")
+    axis.set_xlabel(f"from the value expected, in its standard deviations (beyond {_FARTHEST:g}: at the edge)")
     return figure
 
 
 def _as_value(item: CalibratedParameter, change: float) -> float:
-    """Value of a change that the fit would make, along the line or the exponential through its own."""
-    if item.change == 0.0:
-        return item.data_sheet + change * item.data_sheet_deviation
-    if abs(item.value - item.data_sheet - item.change) < 1e-9 * max(abs(item.change), 1e-9):
-        return item.data_sheet + change
-    return float(item.data_sheet + (item.value - item.data_sheet) * np.expm1(change) / np.expm1(item.change))
+    """Value of a change that the fit would make: a sum, or a factor through the parameter's own."""
+    if is_difference(item) or item.value is None or item.change == 0.0:
+        return item.expected + change
+    return float(item.expected + (item.value - item.expected) * np.expm1(change) / np.expm1(item.change))
 
 
 def _inside(x: float) -> float:
@@ -133,7 +131,7 @@ def error_figure(calibration: Calibration) -> Figure:
         for item in chosen:
             _draw_error(axis, len(drives) - 1 - drives.index(item.drive), item)
         unit = chosen[0].unit if chosen else ""
-        axis.set_xscale("log")
+        _log_scale(axis)
         axis.set_xlabel(f"{error_label(metric, horizon)} [{unit}]")
         axis.set_ylim(-0.6, len(drives) - 0.4)
     panels[0].set_yticks(range(len(drives)), [_short(name) for name in reversed(drives)])
@@ -141,6 +139,16 @@ def error_figure(calibration: Calibration) -> Figure:
     found = dict(zip(labels, handles, strict=True))
     figure.legend(found.values(), found.keys(), ncols=3, loc="outside upper left")
     return figure
+
+
+def _log_scale(axis: Any) -> None:
+    """Logarithmic axis with plain numbers at 1, 2 and 5."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    axis.set_xscale("log")
+    axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.xaxis.set_minor_formatter(NullFormatter())
 
 
 def _short(name: str) -> str:

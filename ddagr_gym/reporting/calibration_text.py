@@ -70,8 +70,8 @@ def parameter_rows(calibration: Calibration) -> list[tuple[str, ...]]:
 
 def parameter_row(item: CalibratedParameter) -> tuple[str, ...]:
     """One parameter: data sheet, value, interval, scatter between drives, and why it is kept."""
-    sheet = f"{number(item.data_sheet)} ± {item.data_sheet_deviation:.2g}"
-    if item.interval is None:
+    sheet = "none" if item.data_sheet is None else f"{number(item.data_sheet)} ± {item.expected_deviation:.2g}"
+    if item.interval is None or item.value is None:
         return parameter_label(item), unit(item), sheet, "kept", "", "", item.reason
     interval = f"{number(item.interval[0])} to {number(item.interval[1])}"
     return parameter_label(item), unit(item), sheet, number(item.value), interval, scatter_text(item), ""
@@ -93,7 +93,7 @@ def scatter_text(item: CalibratedParameter) -> str:
 
 def is_difference(item: CalibratedParameter) -> bool:
     """Whether the fit adds to a parameter; it multiplies the others."""
-    return item.unit == "s" or item.name.startswith("exit_angle_ratio")
+    return item.value is not None and abs(item.value - item.expected - item.change) <= 1e-9 * max(abs(item.change), 1.0)
 
 
 def number(value: float) -> str:
@@ -151,12 +151,12 @@ def error_text(item: ForecastError) -> str:
 
 
 def refused_lines(calibration: Calibration) -> list[str]:
-    """A sentence on each parameter that keeps the data sheet's value, and the drive that would help."""
-    return [
-        f"{parameter_label(item)}: {item.reason}" + (f" What would help: {item.helps}." if item.helps else "")
-        for item in calibration.parameters
-        if not item.calibrated
-    ]
+    """A sentence on the parameters that keep the data sheet's value for one reason, and the drive that would help."""
+    groups: dict[tuple[str, str], list[str]] = {}
+    for item in calibration.parameters:
+        if not item.calibrated:
+            groups.setdefault((item.reason, item.helps), []).append(parameter_label(item))
+    return [f"{'; '.join(names)}: {reason} What would help: {helps}." for (reason, helps), names in groups.items()]
 
 
 def unexplained_rows(calibration: Calibration) -> list[tuple[str, ...]]:

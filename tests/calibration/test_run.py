@@ -142,6 +142,27 @@ def test_robot_and_soil_are_taken_by_the_other_commands(folder, tmp_path):
 
 
 @pytest.mark.slow
+def test_episodes_draw_robots_and_soils_from_a_calibration(folder, result):
+    import gymnasium
+
+    environment = gymnasium.make("DDAGR-Turn-v0", calibration=folder, ground="track")
+    draws = []
+    for seed in range(3):
+        environment.reset(seed=seed)
+        draws.append(environment.unwrapped.episode)
+    # what was not calibrated has no spread, and neither has the default randomisation beside a calibration
+    assert {episode.robot.mass for episode in draws} == {result.robot.mass}
+    assert len({episode.robot.motor_rate for episode in draws}) == 3
+    assert len({episode.soils.cohesion for episode in draws}) == 3
+    for episode in draws:
+        assert episode.soils.cohesion == pytest.approx(result.soils["track"].cohesion, rel=0.5)
+    with pytest.raises(InputError, match="leave them out"):
+        gymnasium.make("DDAGR-Turn-v0", calibration=folder, robot="warthog")
+    with pytest.raises(InputError, match="unknown ground 'mud'"):
+        gymnasium.make("DDAGR-Turn-v0", calibration=folder, ground="mud")
+
+
+@pytest.mark.slow
 def test_replay_takes_the_calibration_without_a_fit(folder, drives, tmp_path):
     fresh = drive("track", 31, 60.0)
     before = ddagr_gym.replay(fresh, "ddagr", "thesis_a1")

@@ -1,0 +1,83 @@
+"""What ordinary drives do to every effect of the library: each is diagnosed with a robot calibrated without it.
+
+The calibrated simulator is not right either. How much an effect seems to gain on a drive in which it is not there,
+with a robot that was calibrated on the other drives, is what a diagnosis with this calibration has to exceed.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from functools import partial
+from pathlib import Path
+
+from ddagr_gym.calibration.calibration_data import CalibrationData
+from ddagr_gym.calibration.joint_fit import FittedModel
+from ddagr_gym.calibration.left_out import Forecast
+from ddagr_gym.calibration.simulator_values import fitted_robot, fitted_soil
+from ddagr_gym.diagnosis.gates.thresholds import NullRun
+from ddagr_gym.diagnosis.null_bank.bank import NullBank
+from ddagr_gym.diagnosis.setting import Setting
+from ddagr_gym.diagnosis.store import StepCache
+from ddagr_gym.errors import InputError
+
+NAME = "bank.json"
+VERSION = 1
+
+STRIDE = 18.0
+"""Seconds between windows of 6 s (ours): a third of a drive, so that its scan takes about a minute."""
+
+
+def ordinary_runs(
+    data: CalibrationData,
+    model: FittedModel,
+    made: Sequence[Forecast],
+    threads: int,
+    cache: StepCache,
+    progress: Callable[[str], None],
+) -> tuple[NullRun, ...]:
+    """One run for each drive: gains of all effects beside the robot that was calibrated without it.
+
+    Args:
+        data: drives.
+        model: joint fit.
+        made: forecasts of the left-out drives, with the values of the fit without each.
+        threads: of the simulator.
+        cache: of runs that are done.
+        progress: called with a line of text for each drive.
+    """
+    setting = Setting(threads=threads).with_windows(data.windows.duration, STRIDE)
+    found = []
+    for forecast in made:
+        number = int(forecast.windows.recording[0])
+        values = dict(zip((p.name for p in model.parameters), forecast.values.tolist(), strict=True))
+        robot = fitted_robot(model.model.robot, values)
+        soil = fitted_soil(data, data.grounds[number], values)
+        recording, name = data.prepared.recordings[number], f"{data.names[number]} {forecast.fold}"
+        progress(f"every effect of the library on {data.names[number]}")
+        bank = NullBank(robot, soil, setting, (recording,))
+        found.append(cache(f"bank {forecast.fold}", partial(bank.scan, [recording], f"real {name}")))
+    return tuple(found)
+
+
+def save_runs(runs: Sequence[NullRun], path: Path) -> None:
+    """Write the runs as JSON."""
+    body = {"version": VERSION, "runs": [asdict(run) for run in runs]}
+    path.write_text(json.dumps(body, indent=1) + "\n", encoding="utf-8")
+
+
+def load_runs(path: Path) -> tuple[NullRun, ...]:
+    """Read runs.
+
+    Raises:
+        InputError: no such file, or another format.
+    """
+    try:
+        body = json.loads(path.read_text(encoding="utf-8"))
+        runs = tuple(NullRun(**{**run, "meaningless": tuple(run["meaningless"])}) for run in body["runs"])
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise InputError(f"{path} is no bank of drives ({error}): make it with `ddagr calibrate --bank`.") from None
+    if body["version"] != VERSION:
+        raise InputError(f"{path} has version {body['version']!r}, this program reads {VERSION}: calibrate again.")
+    return runs
