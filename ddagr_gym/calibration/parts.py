@@ -80,7 +80,7 @@ PARTS = (
     ),
     Part("no_load_speed", "torque that falls with speed", ("no_load_speed",), _FULL),
     Part("torque_limit", "torque limit", ("acceleration_limit",), _HARD),
-    Part("friction", "friction of motors and gears", ("viscous_rate", "friction"), f"coasting, and {_FULL}"),
+    Part("friction", "friction of motors and gears", ("viscous_rate", "coulomb_friction"), f"coasting, and {_FULL}"),
     Part("limit_imbalance", "banks of unequal strength", ("limit_imbalance",), _HARD),
     Part("command_ramp", "ramp of the commands", ("command_ramp",), _HARD),
     Part("power_limit", "power limit", ("power_limit",), _FULL),
@@ -138,7 +138,7 @@ def complete_robot(robot: Robot) -> Robot:
         # at most as heavy as if each bank had to turn half of the robot's mass at its rim
         "load_compliance": 2.0 / (robot.mass * robot.outer_radius**2),
         "viscous_rate": VISCOUS_DEVIATION,
-        "friction": top / FRICTION_TIME,
+        "coulomb_friction": top / FRICTION_TIME,
         "limit_imbalance": IMBALANCE_DEVIATION,
         **{
             name: getattr(drivetrain, name) * (NO_LOAD_DEVIATION if name == "no_load_speed" else LIMIT_DEVIATION)

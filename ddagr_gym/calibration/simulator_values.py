@@ -48,7 +48,7 @@ _UNITS = {
     "power_limit": "rad^2/s^3",
     "limit_imbalance": "-",
     "viscous_rate": "1/s",
-    "friction": "rad/s^2",
+    "coulomb_friction": "rad/s^2",
     "gyro_scale": "-",
     "soil_strength": "-",
     "soil_stiffness": "-",

@@ -26,7 +26,7 @@ _ADDED = (
     "load_compliance",
     "limit_imbalance",
     "viscous_rate",
-    "friction",
+    "coulomb_friction",
 )
 """Fields of a drivetrain that may be nothing: their deviations are differences, those of all others of logarithms."""
 
