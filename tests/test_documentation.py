@@ -16,6 +16,7 @@ from ddagr_gym.physics.effects.registry import effect_kinds
 PAGES = {
     "wheel model": "wheel_model.md",
     "drivetrain": "drivetrain.md",
+    "real drivetrains": "real_drivetrains.md",
     "effects": "effects.md",
     "filter": "filter.md",
     "control": "control.md",

@@ -192,7 +192,7 @@ _DRIVETRAIN_ENTRIES = {
     "command_ramp": layout.COMMAND_RAMP,
     **{name: layout.BASE_DRIVETRAIN + k for k, name in enumerate(layout.DRIVETRAIN_PARAMETERS)},
 }
-_LIMITS = ("command_ramp", "acceleration_limit", "no_load_speed", "power_limit")
+_LIMITS = ("command_ramp", "integral_limit", "acceleration_limit", "no_load_speed", "power_limit")
 
 
 def drivetrain_of(robot: Robot, values: Mapping[str, float]) -> Drivetrain:

@@ -33,6 +33,7 @@ from ddagr_gym.physics.layout import (
     DYNAMIC_BANKS,
     INTEGRAL,
     INTEGRAL_KNOWN,
+    INTEGRAL_LIMIT,
     INTEGRAL_RATE,
     LIMIT_IMBALANCE,
     LOAD_COMPLIANCE,
@@ -91,7 +92,7 @@ def set_targets(row: Array) -> None:
         row[SET_POINT + bank] = target
         row[MOTOR_TARGET + bank] = target
         row[MOTOR_RATE + bank] = row[BASE_MOTOR_RATE]
-    for j in range(8):
+    for j in range(9):
         row[DRIVETRAIN + j] = row[BASE_DRIVETRAIN + j]
 
 
@@ -115,7 +116,8 @@ def _settle_integrals(row: Array) -> None:
     """Integral parts after a reset: those that carry the present load, or nothing where a bank stands."""
     for bank in range(2):
         if abs(row[OMEGA + bank]) > _STANDING:
-            row[INTEGRAL + bank] = _resistance(row, bank) - _load(row, bank)
+            most = row[DRIVETRAIN + INTEGRAL_LIMIT]
+            row[INTEGRAL + bank] = min(max(_resistance(row, bank) - _load(row, bank), -most), most)
     row[INTEGRAL_KNOWN] = 1.0
 
 
@@ -213,7 +215,8 @@ def integral_growth(row: Array, bank: int) -> float:
     """dz/dt of the loop's integral part [rad/s^3] (theory: drivetrain, eq. (3))."""
     error = row[MOTOR_TARGET + bank] - row[OMEGA + bank]
     integral = row[INTEGRAL + bank]
-    if integral * error > 0.0 and abs(integral) >= _limit(row, bank, integral):
+    most = min(row[DRIVETRAIN + INTEGRAL_LIMIT], _limit(row, bank, integral))
+    if integral * error > 0.0 and abs(integral) >= most:
         return 0.0
     return row[DRIVETRAIN + INTEGRAL_RATE] * error
 

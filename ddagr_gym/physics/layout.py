@@ -37,7 +37,7 @@ MOTOR_RATE = _block(2)  # its rate k_omega [1/s]
 SET_POINT = _block(2)  # command after the ramp [rad/s]
 INTEGRAL = _block(2)  # integral part of the speed loop [rad/s^2]
 INTEGRAL_KNOWN = _block()  # 0 after a reset, until the first sample has settled it
-DRIVETRAIN = _block(8)  # as the motor effects leave it, in the order of DRIVETRAIN_PARAMETERS
+DRIVETRAIN = _block(9)  # as the motor effects leave it, in the order of DRIVETRAIN_PARAMETERS
 DYNAMIC_BANKS = _block()  # 1 where any of these differs from that of the ideal loop
 
 # Body, as the load effects leave it
@@ -54,7 +54,7 @@ BASE_WHEEL = _block(12)
 HALF_WHEELBASE = _block()  # [m]
 HALF_TRACK = _block()
 BASE_MOTOR_RATE = _block()
-BASE_DRIVETRAIN = _block(8)
+BASE_DRIVETRAIN = _block(9)
 COMMAND_DELAY = _block()  # [s]
 COMMAND_DEADBAND = _block()  # [rad/s]
 COMMAND_RAMP = _block()  # [rad/s^2]
@@ -134,6 +134,7 @@ SIZE = _next
 
 DRIVETRAIN_PARAMETERS = (
     "integral_rate",
+    "integral_limit",
     "load_compliance",
     "acceleration_limit",
     "no_load_speed",
@@ -145,6 +146,7 @@ DRIVETRAIN_PARAMETERS = (
 """Order of the drivetrain's entries; see :class:`ddagr_gym.parameters.Drivetrain`."""
 (
     INTEGRAL_RATE,
+    INTEGRAL_LIMIT,
     LOAD_COMPLIANCE,
     ACCELERATION_LIMIT,
     NO_LOAD_SPEED,
@@ -152,7 +154,7 @@ DRIVETRAIN_PARAMETERS = (
     LIMIT_IMBALANCE,
     VISCOUS_RATE,
     COULOMB_FRICTION,
-) = range(8)
+) = range(9)
 
 SOIL_PARAMETERS = (
     "cohesion",

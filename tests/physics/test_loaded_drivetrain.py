@@ -131,6 +131,13 @@ def test_integral_part_does_not_wind_up_behind_a_limit():
     assert 1.4 < speed.max() < 1.7
 
 
+def test_integral_part_with_a_limit_of_its_own_leaves_a_droop():
+    row = _settled(_with(DDAGR, load_compliance=0.05, integral_rate=3.0, integral_limit=0.1), 1.2, 1.2)
+    droop = (0.05 * _torques(row)[0] + 0.1) / DDAGR.motor_rate
+    assert row[layout.OMEGA] == pytest.approx(1.2 + droop, rel=2e-3)
+    assert droop < -0.02
+
+
 # The time step
 
 
