@@ -1,4 +1,6 @@
-"""``python -m benchmarks.drivetrain [--recordings FOLDER] [--output FILE] [--figures FOLDER]``: about 15 core-minutes.
+"""``python -m benchmarks.drivetrain [--recordings FOLDER] [--output FILE] [--figures FOLDER]``.
+
+It takes half an hour on a busy machine with two cores.
 
 With ``--only-figures`` the figures are drawn from the file that is there.
 """
