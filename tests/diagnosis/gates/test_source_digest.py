@@ -117,7 +117,7 @@ def test_prose_modules_are_there() -> None:
 
 def test_everything_that_a_diagnosis_computes_with_counts() -> None:
     """Whatever its packages import of this one, but for files, settings and messages."""
-    names = {"errors", "files", "config", "presets", "version"}
+    names = {"errors", "extras", "files", "config", "presets", "validated", "version"}
     counted = {*module._FOLDERS, *(name.removesuffix(".py") for name in module._FILES), *names}
     imported = {
         name.split(".")[1]
