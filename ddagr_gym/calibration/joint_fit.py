@@ -40,10 +40,10 @@ from ddagr_gym.replay_analysis.kinematic import Motor
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 
-ITERATIONS = 8
-"""Most Gauss-Newton steps of a fit (ours): field drives take 4 to 8."""
+ITERATIONS = 12
+"""Most Gauss-Newton steps of a fit (ours): field drives take 4 to 8, a robot with limits that it does not have more."""
 
-FIRST_ITERATIONS = 4
+FIRST_ITERATIONS = 8
 """Steps of the fit that only serves to weigh residuals (ours)."""
 
 LAST_ITERATIONS = 8
