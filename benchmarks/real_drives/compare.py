@@ -1,0 +1,192 @@
+"""Models beside the calibrated simulator on the same left-out windows, and the errors of all of them.
+
+By commands: the data sheet's simulator, the calibrated one, a kinematic model without slip, one with an effective track
+that is given a delay, a lag and a ceiling as well, and a learned one (:mod:`benchmarks.real_drives.learned`). By wheel
+speeds: the calibrated simulator and an effective track.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.real_drives.learned import learned_forecast, training_windows
+from ddagr_gym.calibration.forecast_errors import ITSELF, Forecasts
+from ddagr_gym.calibration.result import CALIBRATED, DATA_SHEET, KINEMATIC
+from ddagr_gym.calibration.run import Outcome
+from ddagr_gym.calibration.settings import HISTORY
+from ddagr_gym.identification.fit_numerics import field_numerics
+from ddagr_gym.identification.window_model import WindowModel
+from ddagr_gym.identification.windows import CHANNELS, WindowSet, cut_windows
+from ddagr_gym.replay_analysis.fitting import ROBUST
+from ddagr_gym.replay_analysis.horizons import METRICS, horizon_errors
+from ddagr_gym.replay_analysis.intervals import RESAMPLES, error_statistics
+from ddagr_gym.replay_analysis.kinematic import KinematicModel, fit_motor, fit_track
+
+Array = NDArray[np.float64]
+
+ROLLING = "kinematic without slip"
+LEARNED = "learned"
+CALIBRATED_BY_SPEEDS = "calibrated, by wheel speeds"
+TRACK_BY_SPEEDS = "effective track, by wheel speeds"
+HORIZONS = (1.0, 5.0)
+SHOWN = ("heading", "position", "wheel_speed")
+LATEST = 0.5  # [s] that wheel speeds may be late or early
+
+_ENCODERS = [CHANNELS.index("encoder_right"), CHANNELS.index("encoder_left")]
+
+
+@dataclass(frozen=True, eq=False)
+class Compared:
+    """All forecasts of one left-out drive.
+
+    Attributes:
+        drive: its name.
+        ground: that it was on.
+        soil_from: where its soil was fitted.
+        windows: that were forecast.
+        predictions: (W, T, 8) by model; those by wheel speeds have NaN in windows without them.
+    """
+
+    drive: str
+    ground: str
+    soil_from: str
+    windows: WindowSet
+    predictions: dict[str, Array]
+
+
+def compare(outcome: Outcome, item: Forecasts, seed: int) -> Compared:
+    """Forecasts of one drive by all models; none has seen what it forecasts.
+
+    Args:
+        outcome: of the calibration with all drives.
+        item: its forecasts of that drive.
+        seed: of the learned model.
+    """
+    data, windows = outcome.data, item.windows
+    drive = int(windows.recording[0])
+    training = training_windows(data.windows, drive, item.soil_from == ITSELF)
+    robot = data.robot
+    motor = fit_motor(training, robot.motor_rate, robot.maximum_wheel_speed, float(data.prepared.sigma[_ENCODERS[0]]))
+    predictions = dict(item.predictions)
+    predictions[ROLLING] = KinematicModel(robot.outer_radius, robot.half_track, 1.0, motor).predict(windows)
+    predictions[LEARNED] = learned_forecast(training, windows, robot.outer_radius, seed)
+    predictions |= _by_wheel_speeds(outcome, item, training)
+    return Compared(item.drive, item.ground, item.soil_from, windows, predictions)
+
+
+def _by_wheel_speeds(outcome: Outcome, item: Forecasts, training: WindowSet) -> dict[str, Array]:
+    """Forecasts from recorded wheel speeds: what is left when the drivetrain is taken out."""
+    data, windows = outcome.data, item.windows
+    driven = cut_windows(
+        data.prepared.recordings, windows.duration, wheel_radius=data.robot.outer_radius,
+        half_track=data.robot.half_track, drive_by="encoders", history=HISTORY, ahead=LATEST,
+    )  # fmt: skip
+    places = _places(windows, driven)
+    seen = driven.subset(np.flatnonzero(np.isin(_keys(driven), _keys(training))))
+    sigma = float(data.prepared.sigma[CHANNELS.index("yaw_rate")])
+    track = fit_track(seen, data.robot.outer_radius, data.robot.half_track, sigma=sigma, robust=ROBUST)
+    chosen = driven.subset(places[places >= 0])
+    late = 0.0 if track is None else track.delay
+    soil = outcome.soils[item.ground]
+    model = WindowModel(outcome.robot, soil, chosen, imposed=True, numerics=field_numerics(), delay=late)
+    found = {CALIBRATED_BY_SPEEDS: model.predict(np.zeros(0), chosen.initial)}
+    if track is not None:
+        found[TRACK_BY_SPEEDS] = track.predict(chosen)
+    return {name: _spread_out(prediction, places) for name, prediction in found.items()}
+
+
+def _keys(windows: WindowSet) -> NDArray[np.int64]:
+    """One number for recording and start."""
+    return np.asarray(windows.recording * 10_000_000 + windows.start, dtype=np.int64)
+
+
+def _places(windows: WindowSet, others: WindowSet) -> NDArray[np.int64]:
+    """Place of each window among others with the same start; -1 where there is none."""
+    at = {int(key): place for place, key in enumerate(_keys(others))}
+    return np.array([at.get(int(key), -1) for key in _keys(windows)], dtype=np.int64)
+
+
+def _spread_out(prediction: Array, places: NDArray[np.int64]) -> Array:
+    found = np.full((len(places), *prediction.shape[1:]), np.nan)
+    found[places >= 0] = prediction
+    return found
+
+
+def errors_of(item: Compared, seed: int) -> list[dict[str, Any]]:
+    """Rows of drive, model, metric, horizon, and the error with its 95 % interval."""
+    rows = []
+    for model, prediction in item.predictions.items():
+        for horizon in (h for h in HORIZONS if h <= item.windows.duration + 1e-9):
+            samples = round(horizon / item.windows.period)
+            short = replace(item.windows, measured=item.windows.measured[:, :samples])
+            errors = horizon_errors(short, prediction[:, :samples])
+            for metric in SHOWN:
+                rows.append(_row(item, model, metric, horizon, METRICS[metric][0], errors[metric], seed))
+        rows.append(_encoder_row(item, model, prediction, seed))
+    return [row for row in rows if row["count"]]
+
+
+def _encoder_row(item: Compared, model: str, prediction: Array, seed: int) -> dict[str, Any]:
+    """Residual of all encoder samples; by window, so that the interval knows that they belong together."""
+    difference = (prediction - item.windows.measured)[..., _ENCODERS].reshape(item.windows.count, -1)
+    clusters = np.repeat(np.arange(item.windows.count), difference.shape[1])
+    return _row(item, model, "encoder", None, "rad/s", difference.ravel(), seed, clusters)
+
+
+def _row(
+    item: Compared,
+    model: str,
+    metric: str,
+    horizon: float | None,
+    unit: str,
+    errors: Array,
+    seed: int,
+    clusters: NDArray[np.int64] | None = None,
+) -> dict[str, Any]:
+    known = np.isfinite(errors)
+    numbers = np.arange(len(errors)) if clusters is None else clusters
+    size = error_statistics(errors[known], numbers[known], np.random.default_rng(seed))
+    return {
+        "drive": item.drive, "ground": item.ground, "model": model, "metric": metric, "horizon": horizon,
+        "unit": unit, "count": size.count, "rms": size.rms, "rms_interval": size.rms_interval,
+        "median": size.median, "median_interval": size.median_interval,
+    }  # fmt: skip
+
+
+def ratio_of(item: Compared, model: str, baseline: str, horizon: float, seed: int) -> dict[str, float] | None:
+    """Root mean square heading error of one model over that of another after a horizon, with a 95 % interval.
+
+    Windows are resampled, the same ones for both. The ratio of the medians stands beside it.
+    """
+    if model not in item.predictions or baseline not in item.predictions:
+        return None
+    first, second = (heading_errors(item, name, horizon) for name in (model, baseline))
+    known = np.isfinite(first) & np.isfinite(second)
+    first, second = first[known], second[known]
+    draws = np.random.default_rng(seed).integers(len(first), size=(RESAMPLES, len(first)))
+    low, high = np.percentile(_rms(first[draws]) / _rms(second[draws]), [2.5, 97.5])
+    return {
+        "ratio": float(_rms(first) / _rms(second)),
+        "low": float(low),
+        "high": float(high),
+        "medians": float(np.median(np.abs(first)) / np.median(np.abs(second))),
+    }
+
+
+def heading_errors(item: Compared, model: str, horizon: float) -> Array:
+    """(W,) error of the heading's change after a horizon [rad], by the gyro; NaN where it cannot be measured."""
+    samples = round(horizon / item.windows.period)
+    short = replace(item.windows, measured=item.windows.measured[:, :samples])
+    return horizon_errors(short, item.predictions[model][:, :samples])["heading"]
+
+
+def _rms(errors: Array) -> Array:
+    return np.asarray(np.sqrt(np.mean(errors**2, axis=-1)))
+
+
+BY_COMMANDS = (DATA_SHEET, ROLLING, KINEMATIC, CALIBRATED, LEARNED)
+"""In the order of tables and figures."""
