@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ddagr_gym.diagnosis.preprocessing.input_requirements import content_hash
+from ddagr_gym.diagnosis.preprocessing.input_requirements import check_different
 from ddagr_gym.diagnosis.preprocessing.reversed_gyro import with_gyro_reversed
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.windows import PERIOD_TOLERANCE
@@ -75,7 +75,7 @@ def check_drives(recordings: Sequence[Recording], robot: Robot) -> None:
         _check_robot(recording, robot)
         _check_channels(recording)
         _check_length(recording)
-    _check_different(recordings)
+    check_different(recordings)
     periods = [recording.period for recording in recordings]
     if np.ptp(periods) > PERIOD_TOLERANCE * periods[0]:
         rates = ", ".join(f"{r.meta.source} {1.0 / p:.3g} Hz" for r, p in zip(recordings, periods, strict=True))
@@ -114,15 +114,6 @@ def _check_length(recording: Recording) -> None:
             f"{recording.meta.source}: the robot is commanded to stand still {100.0 * (1.0 - moving):.0f} % of the "
             "time: give a drive with straight pieces and arcs to both sides."
         )
-
-
-def _check_different(recordings: Sequence[Recording]) -> None:
-    seen: dict[str, str] = {}
-    for recording in recordings:
-        values = content_hash(recording)
-        if values in seen:
-            raise InputError(f"{seen[values]} and {recording.meta.source} hold the same values: give every drive once.")
-        seen[values] = recording.meta.source
 
 
 def with_gyro_forward(recording: Recording, rng: np.random.Generator) -> tuple[Recording, tuple[str, ...]]:

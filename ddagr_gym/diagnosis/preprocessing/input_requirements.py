@@ -50,7 +50,7 @@ def check_recordings(recordings: Sequence[Recording], robot: Robot, setting: Set
     if np.ptp(periods) > PERIOD_TOLERANCE * periods[0]:
         rates = ", ".join(f"{r.meta.source} {1.0 / p:.3g} Hz" for r, p in zip(recordings, periods, strict=True))
         raise InputError(f"the recordings have different rates ({rates}): diagnose those of one rate together.")
-    _check_different(recordings)
+    check_different(recordings)
     _check_length(recordings, setting)
     _check_motion(recordings)
 
@@ -79,8 +79,12 @@ def _check_channels(recording: Recording) -> None:
         )
 
 
-def _check_different(recordings: Sequence[Recording]) -> None:
-    """A drive that is there twice would be predicted by a model that was fitted to it."""
+def check_different(recordings: Sequence[Recording]) -> None:
+    """Refuse drives that are there twice: they would be predicted by a model that was fitted to them.
+
+    Raises:
+        InputError: two recordings with the same values.
+    """
     seen: dict[str, str] = {}
     for recording in recordings:
         values = content_hash(recording)
