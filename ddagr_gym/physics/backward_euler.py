@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ddagr_gym.jit import kernel, stack_array
 from ddagr_gym.physics.body_dynamics import evaluate_forces, world_rates
-from ddagr_gym.physics.body_jacobian import BANKS, damping_inverse, solve
+from ddagr_gym.physics.body_jacobian import BANKS, damping_inverse, solve_body, solve_with_banks
 from ddagr_gym.physics.callbacks import EffectActions
 from ddagr_gym.physics.drivetrain import (
     advance_motors,
@@ -147,7 +147,10 @@ def backward_euler_step(
         damping_inverse(row, step, inverse, drive, banks, actions)
         for j in range(moving):
             right[j] = defect[j]
-        solve(row, step, inverse, drive, banks, right, change)
+        if moving == 5:
+            solve_with_banks(step, inverse, drive, banks, right, change)
+        else:
+            solve_body(inverse, right, change)
         if not _work(row, defect, change) > 0.0:
             for j in range(moving):
                 change[j] = defect[j]  # which does work whatever the derivative says

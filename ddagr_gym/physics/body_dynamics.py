@@ -291,6 +291,7 @@ def evaluate_forces(row: Array, refresh: float, numerics: StepNumerics, actions:
         numerics: accuracy.
         actions: effects on this environment.
     """
+    forces, derivative = numerics.forces, numerics.derivative  # here, since taking arrays out costs
     tilt_gravity(row)
     share_load(row)
     wheel, soil, wrench = stack_array(3), stack_array(9), stack_array(WRENCH)
@@ -299,14 +300,14 @@ def evaluate_forces(row: Array, refresh: float, numerics: StepNumerics, actions:
         _set_wheel_kinematics(row, i)
         predict_sinkage(row, i, v_x, v_y, rim)
         _load_wheel(row, i, wheel, soil)
-        _carry_load(row, i, wheel, soil, numerics.sinkage_tolerance, numerics.forces, wrench)
+        _carry_load(row, i, wheel, soil, numerics.sinkage_tolerance, forces, wrench)
         row[FORCE_X + i] = wrench[0]
         row[FORCE_Y + i] = wrench[1]
         row[FORCE_Z + i] = wrench[2]
         row[YAW_MOMENT + i] = wrench[3]
         row[AXLE_TORQUE + i] = wrench[4]
         if refresh >= 0.0 and row[LOAD + i] > 0.0 and is_stale(row, i, refresh):
-            refresh_derivative(row, i, wheel, soil, numerics.derivative)
+            refresh_derivative(row, i, wheel, soil, derivative)
     if refresh >= 0.0:
         row[DERIVATIVE_VALID] = 1.0
     _gather_forces(row, actions)

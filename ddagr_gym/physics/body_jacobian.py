@@ -163,32 +163,28 @@ def _invert(matrix: Array, inverse: Array) -> None:
 
 
 @kernel(inline=True)
-def _solve_body(inverse: Array, right: Array, solution: Array) -> None:
+def solve_body(inverse: Array, right: Array, solution: Array) -> None:
     """Inverse (9,), row by row, times a right side (3,), written to ``solution`` (3,)."""
     for j in range(3):
         solution[j] = inverse[3 * j] * right[0] + inverse[3 * j + 1] * right[1] + inverse[3 * j + 2] * right[2]
 
 
 @kernel()
-def solve(row: Array, step: float, inverse: Array, drive: Array, banks: Array, right: Array, solution: Array) -> None:
-    """Solve (I - step A) solution = right for the velocities of the body and, where they are dynamic, the bank speeds.
+def solve_with_banks(step: float, inverse: Array, drive: Array, banks: Array, right: Array, solution: Array) -> None:
+    """Solve (I - step A) solution = right for the velocities of the body and the speeds of dynamic banks.
 
     Args:
-        row: the environment.
         step: that of :func:`damping_inverse` [s].
         inverse: (9,) from there.
         drive: (6,) from there.
         banks: (BANKS,) from there.
         right: (5,); of the first three, the banks' part is taken in.
-        solution: (5,), the first 3 or all written.
+        solution: (5,), written.
     """
-    if moving_entries(row) == 3:
-        _solve_body(inverse, right, solution)
-        return
     for bank in range(2):
         for j in range(3):
             right[j] += step * drive[2 * j + bank] * banks[6 + bank] * right[3 + bank]
-    _solve_body(inverse, right, solution)
+    solve_body(inverse, right, solution)
     for bank in range(2):
         coupled = right[3 + bank]
         for j in range(3):

@@ -31,7 +31,7 @@ from ddagr_gym.physics.body_dynamics import (
     extrapolate_forces,
     world_rates,
 )
-from ddagr_gym.physics.body_jacobian import BANKS, damping_inverse, solve
+from ddagr_gym.physics.body_jacobian import BANKS, damping_inverse, solve_body, solve_with_banks
 from ddagr_gym.physics.callbacks import EffectActions
 from ddagr_gym.physics.drivetrain import advance_motors, bank_acceleration, integral_growth, moving_entries
 from ddagr_gym.physics.layout import (
@@ -110,12 +110,16 @@ def _w_step(row: Array, step: float, numerics: StepNumerics, actions: EffectActi
     damping_inverse(row, GAMMA * step, inverse, drive, banks, actions)
     x, y, yaw, yaw_rate = row[X], row[Y], row[YAW], row[YAW_RATE]
     rate_x, rate_y = world_rates(row)
-    moving = moving_entries(row)
+    dynamic = moving_entries(row) == 5
     _start_banks(row, step, drive, start, right, drift)
     for j in range(3):
         right[j] = step * row[ACCELERATION + j] + drift[j]
-    solve(row, GAMMA * step, inverse, drive, banks, right, first)
-    for j in range(moving):
+    if dynamic:
+        solve_with_banks(GAMMA * step, inverse, drive, banks, right, first)
+        row[OMEGA], row[OMEGA + 1] = start[3] + first[3], start[4] + first[4]
+    else:
+        solve_body(inverse, right, first)
+    for j in range(3):
         row[V_X + j] = start[j] + first[j]
     row[YAW] = yaw + step * yaw_rate
     row[TIME] += step
@@ -123,23 +127,28 @@ def _w_step(row: Array, step: float, numerics: StepNumerics, actions: EffectActi
     evaluate_forces(row, refresh, numerics, actions)
     for j in range(3):
         right[j] = step * row[ACCELERATION + j] - 2.0 * first[j] - drift[j]
-    if moving == 5:
+    if dynamic:
         for bank in range(2):
             right[3 + bank] = step * bank_acceleration(row, bank) - 2.0 * first[3 + bank]
         _finish_banks(row, step, start)
-    solve(row, GAMMA * step, inverse, drive, banks, right, second)
+        solve_with_banks(GAMMA * step, inverse, drive, banks, right, second)
+    else:
+        solve_body(inverse, right, second)
     # with A = 0 the method is Heun's
     end_x, end_y = world_rates(row)
     row[X] = x + 0.5 * step * (rate_x + end_x)
     row[Y] = y + 0.5 * step * (rate_y + end_y)
     row[YAW] = yaw + 0.5 * step * (yaw_rate + row[YAW_RATE])
     estimate = 0.0
-    for j in range(moving):
+    for j in range(3):
         row[V_X + j] = start[j] + 1.5 * first[j] + 0.5 * second[j]
         weight = row[HALF_TRACK] if j == 2 else 1.0
-        if j > 2:
-            weight = row[WHEEL + j - 3] + row[WHEEL + 8 + j - 3]
         estimate = max(estimate, 0.5 * weight * abs(first[j] + second[j]))
+    if dynamic:
+        for bank in range(2):
+            row[OMEGA + bank] = start[3 + bank] + 1.5 * first[3 + bank] + 0.5 * second[3 + bank]
+            rim = row[WHEEL + bank] + row[WHEEL + 8 + bank]
+            estimate = max(estimate, 0.5 * rim * abs(first[3 + bank] + second[3 + bank]))
     if not extrapolate_forces(row, numerics.force_extrapolation, actions):
         evaluate_forces(row, numerics.jacobian_refresh, numerics, actions)
     return estimate
