@@ -9,13 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from ddagr_gym.recordings.checks.blocks import FEWEST_BLOCKS, cut_blocks, interval_of, resample
 from ddagr_gym.recordings.checks.findings import CheckFinding, Interval, judge, not_testable
 from ddagr_gym.recordings.checks.signals import filled, integral, new_rows, wrap
-from ddagr_gym.recordings.schema import FloatArray, Recording
+from ddagr_gym.recordings.schema import BoolArray, FloatArray, Recording
 
 CHECK = "clock_offset"
 RESPONSE, ENCODER, POSE = "command to encoder", "yaw_rate to encoder", "yaw_rate to pose"
@@ -59,6 +60,22 @@ class Offset:
     blocks: int
 
 
+@dataclass(frozen=True)
+class LagProfiles:
+    """Centred second moments of a pair at every lag of :data:`LAGS`.
+
+    Attributes:
+        t: middle of each block (blocks,) [s].
+        sums: xx, xy, yy of reference x and samples y (blocks, lags, 3).
+    """
+
+    t: FloatArray
+    sums: FloatArray
+
+
+_KNOWN: WeakKeyDictionary[Recording, dict[str, LagProfiles]] = WeakKeyDictionary()
+
+
 def clock_offsets(recording: Recording, rng: np.random.Generator) -> list[CheckFinding]:
     """Findings on the clocks of commands, encoders, gyro and pose.
 
@@ -81,26 +98,45 @@ def offsets(recording: Recording, rng: np.random.Generator) -> dict[str, Offset 
 
 def response_offset(recording: Recording, rng: np.random.Generator) -> Offset | None:
     """Time by which the banks follow their commands, both banks together."""
-    sums = []
-    for bank in ("right", "left"):
-        commands = np.stack(recording.held_commands())[0 if bank == "right" else 1]
-        encoder = recording[f"encoder_{bank}"]
-        sums.append(_lag_sums(recording, _command_reference(recording, commands, encoder), encoder, commands))
-    return _offset(np.concatenate(sums), rng)
+    return _offset(lag_profiles(recording, RESPONSE).sums, rng)
 
 
 def encoder_offset(recording: Recording, rng: np.random.Generator) -> Offset | None:
     """Lateness of the encoders' speed difference behind the gyro."""
-    difference = filled(recording, "encoder_right") - filled(recording, "encoder_left")
-    difference[~new_rows(recording, "encoder_right", "encoder_left")] = np.nan
-    return _offset(_lag_sums(recording, _interpolated(recording, recording["yaw_rate"]), difference), rng)
+    return _offset(lag_profiles(recording, ENCODER).sums, rng)
 
 
 def pose_offset(recording: Recording, rng: np.random.Generator) -> Offset | None:
     """Lateness of the pose's heading behind the integrated gyro."""
-    heading = unwrapped_heading(recording)
-    turned = integral(recording, recording["yaw_rate"])
-    return _offset(_lag_sums(recording, _interpolated(recording, turned), heading), rng)
+    return _offset(lag_profiles(recording, POSE).sums, rng)
+
+
+def lag_profiles(recording: Recording, pair: str) -> LagProfiles:
+    """Moments of a pair at every lag, block by block; remembered, since several checks ask for them.
+
+    Args:
+        recording: any.
+        pair: :data:`RESPONSE`, :data:`ENCODER` or :data:`POSE`.
+    """
+    known = _KNOWN.setdefault(recording, {})
+    if pair not in known:
+        known[pair] = _profiles(recording, pair)
+    return known[pair]
+
+
+def _profiles(recording: Recording, pair: str) -> LagProfiles:
+    if pair == POSE:
+        turned = integral(recording, recording["yaw_rate"])
+        return _lag_sums(recording, _interpolated(recording, turned), unwrapped_heading(recording))
+    if pair == ENCODER:
+        difference = filled(recording, "encoder_right") - filled(recording, "encoder_left")
+        difference[~new_rows(recording, "encoder_right", "encoder_left")] = np.nan
+        return _lag_sums(recording, _interpolated(recording, recording["yaw_rate"]), difference)
+    banks = []
+    for commands, bank in zip(recording.held_commands(), ("right", "left"), strict=True):
+        encoder = recording[f"encoder_{bank}"]
+        banks.append(_lag_sums(recording, _command_reference(recording, commands, encoder), encoder, commands))
+    return LagProfiles(*(np.concatenate(parts) for parts in zip(*((b.t, b.sums) for b in banks), strict=True)))
 
 
 def gyro_direction(recording: Recording) -> float:
@@ -158,8 +194,8 @@ def _command_reference(recording: Recording, commands: FloatArray, encoder: Floa
 
 def _lag_sums(
     recording: Recording, reference: Reference, samples: FloatArray, within: FloatArray | None = None
-) -> FloatArray:
-    """Centred second moments (blocks, lags, 3) of reference and samples: xx, xy, yy.
+) -> LagProfiles:
+    """Centred second moments of reference and samples.
 
     Args:
         recording: any.
@@ -168,7 +204,7 @@ def _lag_sums(
         within: only samples in rows where this is finite, None for all.
     """
     spans = list(recording.spans())
-    sums = []
+    sums, times = [], []
     usable = np.isfinite(samples) & (True if within is None else np.isfinite(within))
     for block in cut_blocks(recording):
         span = next(s for s in spans if s.start <= block.start < s.stop)
@@ -180,12 +216,13 @@ def _lag_sums(
             x = x - x.mean(axis=1, keepdims=True)
             y = y - y.mean()
             sums.append(np.stack([np.sum(x * x, axis=1), x @ y, np.full(len(LAGS), y @ y)], axis=1))
-    return np.array(sums) if sums else np.empty((0, len(LAGS), 3))
+            times.append(0.5 * float(recording.t[block.start] + recording.t[block.stop - 1]))
+    return LagProfiles(np.array(times), np.array(sums) if sums else np.empty((0, len(LAGS), 3)))
 
 
 def _offset(sums: FloatArray, rng: np.random.Generator) -> Offset | None:
     """Offset from lag sums; None where too few blocks hold any motion."""
-    sums = sums[np.all(sums[:, :, 0] > 0, axis=1) & (sums[:, 0, 2] > 0)] if len(sums) else sums
+    sums = sums[moving_blocks(sums)]
     if len(sums) < FEWEST_BLOCKS:
         return None
     estimate, resampled = resample(sums, _best_lag, rng)
@@ -194,6 +231,11 @@ def _offset(sums: FloatArray, rng: np.random.Generator) -> Offset | None:
     lag = float(estimate[0])
     correlation = float(np.interp(lag, LAGS, profile))
     return Offset(lag, interval_of(lag, resampled[:, 0], len(sums)), correlation, profile, len(sums))
+
+
+def moving_blocks(sums: FloatArray) -> BoolArray:
+    """Which blocks hold motion in the reference, at every lag, and in the samples (blocks,)."""
+    return np.asarray(np.all(sums[:, :, 0] > 0, axis=1) & (sums[:, 0, 2] > 0))
 
 
 def _best_lag(totals: FloatArray) -> FloatArray:

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
+
 import numpy as np
 
 from ddagr_gym.recordings.checks.accelerometer import accelerometer
+from ddagr_gym.recordings.checks.arbitration import arbitration
+from ddagr_gym.recordings.checks.bank_limits import bank_limits
+from ddagr_gym.recordings.checks.clock_drift import clock_drift
 from ddagr_gym.recordings.checks.clock_offsets import clock_offsets
 from ddagr_gym.recordings.checks.extremes import extremes
 from ddagr_gym.recordings.checks.findings import CheckFinding, CheckReport
@@ -26,6 +31,9 @@ def check_recording(recording: Recording, rng: np.random.Generator) -> CheckRepo
     """
     findings: list[CheckFinding] = []
     if len(recording) >= 3:
+        # Draws of their own, so that these checks leave the intervals of the others as they are.
+        apart = deepcopy(rng)
+        findings += arbitration(recording, apart) + clock_drift(recording, apart) + bank_limits(recording, apart)
         findings += timing(recording) + repeated_readings(recording) + extremes(recording)
         findings += clock_offsets(recording, rng) + turning(recording, rng) + travel(recording, rng)
         findings += accelerometer(recording, rng) + noise(recording) + gravity(recording)

@@ -137,12 +137,12 @@ def command_gains(recording: Recording, rng: np.random.Generator) -> Estimate | 
         None without steady driving by command.
     """
     commands = recording.held_commands()
-    settled = _settled(recording, commands)
+    steady = settled(recording, commands)
     sums = []
     for block in cut_blocks(recording):
         row = []
         for name, command in zip(("encoder_right", "encoder_left"), commands, strict=True):
-            rows = block.start + np.flatnonzero(settled[block] & np.isfinite(recording[name][block]))
+            rows = block.start + np.flatnonzero(steady[block] & np.isfinite(recording[name][block]))
             row += [float(command[rows] @ recording[name][rows]), float(command[rows] @ command[rows])]
         if row[1] > 0 and row[3] > 0:
             sums.append(np.array(row))
@@ -154,17 +154,17 @@ def command_gains(recording: Recording, rng: np.random.Generator) -> Estimate | 
     return estimate(sums, values, rng)
 
 
-def _settled(recording: Recording, commands: tuple[FloatArray, FloatArray]) -> BoolArray:
+def settled(recording: Recording, commands: tuple[FloatArray, FloatArray]) -> BoolArray:
     """Rows in which both commands have not changed for :data:`SETTLED` seconds inside the span."""
-    settled = np.zeros(len(recording), dtype=bool)
+    steady = np.zeros(len(recording), dtype=bool)
     for span in recording.spans():
         pair = np.stack([c[span] for c in commands])
         known = np.all(np.isfinite(pair), axis=0)
         changed = np.ones(pair.shape[1], dtype=bool)
         changed[1:] = np.any(pair[:, 1:] != pair[:, :-1], axis=0) | ~known[1:]
         since = recording.t[span][np.maximum.accumulate(np.where(changed, np.arange(changed.size), 0))]
-        settled[span] = known & (recording.t[span] - since >= SETTLED)
-    return settled
+        steady[span] = known & (recording.t[span] - since >= SETTLED)
+    return steady
 
 
 def _travel_findings(recording: Recording, rng: np.random.Generator) -> list[CheckFinding]:
