@@ -12,6 +12,7 @@ import enum
 import math
 import os
 import re
+import stat
 import types
 import typing
 from collections.abc import Mapping, Sequence
@@ -21,11 +22,20 @@ from typing import Any, Literal, TypeVar, Union
 import yaml
 
 from ddagr_gym.errors import InputError, unknown_name
+from ddagr_gym.files import expanded
 
 Config = TypeVar("Config")
 
 MAXIMUM_BYTES = 1_000_000
 """Largest configuration file that is read."""
+
+DEEPEST = 50
+"""Levels of lists and mappings in a configuration (ours): ten times what any has; parsers take ever longer beyond."""
+
+_OPENING = (
+    yaml.FlowSequenceStartToken, yaml.FlowMappingStartToken, yaml.BlockSequenceStartToken, yaml.BlockMappingStartToken,
+)  # fmt: skip
+_CLOSING = (yaml.FlowSequenceEndToken, yaml.FlowMappingEndToken, yaml.BlockEndToken)
 
 # YAML 1.1, which PyYAML speaks, takes 1e-3 for text; YAML 1.2 and everybody else for a number.
 _NUMBER = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d+)?")
@@ -55,7 +65,7 @@ def find_config(folder: str, name: str | os.PathLike[str]) -> Path:
     Raises:
         InputError: no such name (closest names listed) or file.
     """
-    path = Path(name).expanduser()
+    path = expanded(name)
     if path.suffix in (".yaml", ".yml"):
         if not path.is_file():
             raise InputError(f"{path}: no such configuration file.")
@@ -79,7 +89,7 @@ def load_config(path: str | os.PathLike[str], kind: type[Config]) -> Config:
     Raises:
         InputError: unreadable file, or content that does not fit; one sentence with file and place.
     """
-    file = Path(path).expanduser()
+    file = expanded(path)
     return parse_config(_read(file), kind, source=str(file))
 
 
@@ -101,7 +111,10 @@ def dump_config(config: Any) -> str:
 
 def _read(file: Path) -> str:
     try:
-        size = file.stat().st_size
+        status = file.stat()
+        size = status.st_size
+        if not stat.S_ISREG(status.st_mode):
+            raise InputError(f"{file} is not a regular file: give a configuration's file.")
         if size > MAXIMUM_BYTES:
             raise InputError(f"{file} has {size} bytes: a configuration may have {MAXIMUM_BYTES} at most.")
         return file.read_text(encoding="utf-8")
@@ -113,7 +126,11 @@ def _read(file: Path) -> str:
 
 def _parse_yaml(text: str, source: str) -> Any:
     try:
+        depth = 0
         for token in yaml.scan(text, Loader=yaml.SafeLoader):
+            depth += isinstance(token, _OPENING) - isinstance(token, _CLOSING)
+            if depth > DEEPEST:
+                raise InputError(f"{source}: nested deeper than {DEEPEST} levels, which no configuration is.")
             if isinstance(token, yaml.AliasToken | yaml.AnchorToken):
                 line = token.start_mark.line + 1
                 raise InputError(f"{source}, line {line}: anchors and aliases are not read, write the value out.")

@@ -18,6 +18,33 @@ FOLDER_MARK = ".ddagr-output"
 """Empty file in every folder that a command wrote; only such a folder is ever replaced."""
 
 
+def expanded(path: str | os.PathLike[str]) -> Path:
+    """Path with ``~`` and ``~user`` written out.
+
+    Raises:
+        InputError: a NUL byte, or a user without a home folder.
+    """
+    if "\0" in os.fspath(path):
+        raise InputError(f"the path {os.fspath(path)!r} holds a NUL byte: give the name of a file.")
+    try:
+        return Path(path).expanduser()
+    except RuntimeError:
+        raise InputError(f"{os.fspath(path)} names the home folder of no user: write the path out.") from None
+
+
+def check_output_file(path: str | os.PathLike[str]) -> None:
+    """Refuse what cannot be written as a file, before any work is done for it.
+
+    Raises:
+        InputError: ``path`` is a folder or a device.
+    """
+    final = expanded(path)
+    if final.is_dir():
+        raise InputError(f"{final} is a folder: give the path of a file.")
+    if final.exists() and not stat.S_ISREG(final.stat().st_mode):
+        raise InputError(f"{final} is not a regular file: give another path.")
+
+
 @contextmanager
 def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Path to write to in place of ``path``, moved there when the block ends without an error.
@@ -28,12 +55,9 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     Raises:
         InputError: ``path`` is a folder or a device, or a part of it is a file.
     """
-    final = Path(path).expanduser()
+    final = expanded(path)
     final = final.resolve() if final.is_symlink() else final
-    if final.is_dir():
-        raise InputError(f"{final} is a folder: give the path of a file.")
-    if final.exists() and not stat.S_ISREG(final.stat().st_mode):
-        raise InputError(f"{final} is not a regular file: give another path.")
+    check_output_file(final)
     make_folder(final.parent)
     handle, name = tempfile.mkstemp(prefix=f".{final.stem}-", suffix=final.suffix, dir=final.parent)
     os.close(handle)
@@ -57,7 +81,7 @@ def _mode_of(path: Path) -> int:
 
 def make_folder(path: str | os.PathLike[str]) -> Path:
     """Folder at ``path`` with its parents, made where absent; InputError when a file is in the way."""
-    folder = Path(path).expanduser()
+    folder = expanded(path)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except (FileExistsError, NotADirectoryError):
@@ -94,7 +118,7 @@ def output_folder(path: str | os.PathLike[str], *, overwrite: bool = False) -> I
     Raises:
         InputError: ``path`` is a file, holds the current folder, or has content that may not be replaced.
     """
-    final = Path(path).expanduser().resolve()
+    final = expanded(path).resolve()
     _check_replaceable(final, overwrite)
     make_folder(final.parent)
     temporary = Path(tempfile.mkdtemp(prefix=f".{final.name}-", dir=final.parent))
@@ -112,7 +136,7 @@ def output_folder(path: str | os.PathLike[str], *, overwrite: bool = False) -> I
 
 def check_output_folder(path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
     """Refuse before long work what :func:`output_folder` would refuse after it; the same InputError."""
-    _check_replaceable(Path(path).expanduser().resolve(), overwrite)
+    _check_replaceable(expanded(path).resolve(), overwrite)
 
 
 def _check_replaceable(folder: Path, overwrite: bool) -> None:

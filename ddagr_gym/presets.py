@@ -10,10 +10,10 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 from ddagr_gym.config import configs_dir, load_config
 from ddagr_gym.errors import unknown_name
+from ddagr_gym.files import expanded
 from ddagr_gym.parameters import Robot, Soil
 
 PROTOTYPE_PEAK_COEFFICIENTS, PROTOTYPE_EXIT_ANGLE_RATIO = (0.4, 0.15), 0.3
@@ -123,7 +123,7 @@ def is_file(name: object) -> bool:
 
 def full_name(name: str) -> str:
     """A preset's name unchanged; for a file its absolute path, which is valid in any folder."""
-    return str(Path(name).expanduser().resolve()) if is_file(name) else name
+    return str(expanded(name).resolve()) if is_file(name) else name
 
 
 def soil_source(name: str) -> str:

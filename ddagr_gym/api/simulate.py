@@ -16,7 +16,7 @@ from ddagr_gym.api.inputs import RobotLike
 from ddagr_gym.api.nominal import SoilLike, robot_from, soil_from, soil_label
 from ddagr_gym.api.results import Result, Table
 from ddagr_gym.control.manoeuvres import Manoeuvre, find_manoeuvre
-from ddagr_gym.errors import InputError
+from ddagr_gym.errors import InputError, at_least
 from ddagr_gym.parameters import Imu, Numerics, PoseReceiver, Robot, Sensors, WheelEncoder
 from ddagr_gym.recordings.schema import Recording
 
@@ -159,6 +159,7 @@ def simulate(
     from ddagr_gym.physics.effects import load_effects
     from ddagr_gym.simulator import simulate as simulated
 
+    at_least(seed=(seed, 0))
     found = robot_from(robot)
     sensors = _sensors(rate, pose_rate, noise)  # refuses a rate at which there are no commands
     commands, title = _commands(manoeuvre, rate)

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ddagr_gym.commands.output import Section, output_folder, write_text
+from ddagr_gym.errors import at_least
 from ddagr_gym.progress import LinePrinter
 
 if TYPE_CHECKING:
@@ -67,6 +68,7 @@ def run(arguments: Arguments) -> None:
     from ddagr_gym.commands.demo_diagnosis import diagnosis_step
     from ddagr_gym.commands.demo_evaluation import evaluation_step
 
+    at_least(**{"--seed": (arguments.seed, 0)})
     start = time.monotonic()
     drive = _drive_to_replay(arguments)
     with output_folder(arguments.output, overwrite=True) as folder:

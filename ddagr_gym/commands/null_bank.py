@@ -14,6 +14,7 @@ from tyro.conf import Positional
 
 from ddagr_gym.commands.output import atomic_path
 from ddagr_gym.errors import InputError, at_least
+from ddagr_gym.files import check_output_file, make_folder
 from ddagr_gym.progress import Progress
 
 if TYPE_CHECKING:
@@ -90,6 +91,8 @@ def run(arguments: Arguments) -> None:
     from ddagr_gym.recordings.load import load_recording
 
     _check_options(arguments)
+    check_output_file(arguments.output)
+    folder = make_folder(arguments.output.with_suffix(".bank"))
     robot, soil = get_robot(arguments.robot), get_soil(arguments.soil)
     loaded = [load_recording(path, arguments.map or None, arguments.robot) for path in arguments.runs]
     recordings = _mended(loaded)
@@ -108,8 +111,6 @@ def run(arguments: Arguments) -> None:
     drives: list[Template | Recording | None] = [*pieces, *longer] or [template] * arguments.count
     made_of = NullBank(robot, soil, setting, tuple(drives), arguments.seed, centre)
     bank = made_of.key()
-    folder = arguments.output.with_suffix(".bank")
-    folder.mkdir(parents=True, exist_ok=True)
     paths = [_part(folder, bank, number) for number in range(len(drives))]
     _make([(made_of, n, path) for n, path in enumerate(paths) if not path.exists()], arguments.processes)
     made = [NullRun(**json.loads(path.read_text())) for path in paths]

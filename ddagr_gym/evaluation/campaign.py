@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -30,6 +30,7 @@ from ddagr_gym.evaluation.estimator_metrics import estimator_errors
 from ddagr_gym.evaluation.metrics import turn_metrics
 from ddagr_gym.evaluation.runs import TurnRun, drive_turn, drive_turns
 from ddagr_gym.evaluation.scenarios import Scenario, load_scenarios, set_hash
+from ddagr_gym.evaluation.worker_pool import worker_pool
 from ddagr_gym.files import atomic_path
 from ddagr_gym.parameters import Sensors
 from ddagr_gym.physics.soil_laws import ground_effects
@@ -279,11 +280,6 @@ def _results(tasks: list[Task], processes: int) -> Iterator[list[dict[str, Any]]
     if processes <= 1 or len(tasks) <= 1:
         yield from map(_work, tasks)
         return
-    with ProcessPoolExecutor(processes) as pool:
-        futures = [pool.submit(_work, task) for task in tasks]
-        try:
-            for future in as_completed(futures):
-                yield future.result()
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+    with worker_pool(processes) as pool:
+        for future in as_completed([pool.submit(_work, task) for task in tasks]):
+            yield future.result()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from typing import Any
 
@@ -27,6 +26,7 @@ from ddagr_gym.evaluation.report_data import (
 )
 from ddagr_gym.evaluation.runs import TurnRun
 from ddagr_gym.evaluation.scenarios import Scenario, load_scenarios, scenario_names
+from ddagr_gym.evaluation.worker_pool import worker_pool
 from ddagr_gym.frames import body_to_world
 
 Array = NDArray[np.float64]
@@ -188,12 +188,8 @@ def _mapped(work: Callable[[Row], ShownDrive], rows: Sequence[Row], processes: i
     if processes <= 1 or len(rows) <= 1:
         yield from map(work, rows)
         return
-    with ProcessPoolExecutor(processes) as pool:
-        try:
-            yield from pool.map(work, rows)
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+    with worker_pool(processes) as pool:
+        yield from pool.map(work, rows)
 
 
 def infeasible_soils(rows: Sequence[Row]) -> list[dict[str, Any]]:

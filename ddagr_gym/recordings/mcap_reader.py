@@ -16,6 +16,11 @@ from ddagr_gym.recordings.schema import Recording, RobotGeometry
 from ddagr_gym.recordings.streams import recording_of
 from ddagr_gym.recordings.topic_map import Topic, TopicMap
 
+MOST_EXPANSION = 200
+"""Unpacked over packed bytes of a file [-] (ours): sensor messages shrink to a tenth at best, zeros to 1/10000."""
+LEAST_ALLOWED = 64 * 2**20
+"""Unpacked bytes that any file may have (ours)."""
+
 Decoder = Callable[[bytes], Any]
 
 
@@ -135,13 +140,14 @@ def _records(path: Path, limits: Limits) -> Iterator[Any]:
     from mcap.stream_reader import StreamReader
 
     unpacked = 0
+    allowed = min(limits.bytes, max(LEAST_ALLOWED, MOST_EXPANSION * path.stat().st_size))
     try:
         with open_source(path) as stream:
             for record in StreamReader(stream, emit_chunks=True, record_size_limit=limits.bytes).records:
                 if not isinstance(record, Chunk):
                     yield record
                     continue
-                data = _unpack(record, limits.bytes - unpacked, path)
+                data = _unpack(record, allowed - unpacked, path)
                 unpacked += len(data)
                 yield from _inner(data)
     except (InputError, GeneratorExit):
@@ -182,7 +188,10 @@ def _unpack(chunk: Any, limit: int, path: Path) -> bytes:
     else:
         raise InputError(f"{path.name} is compressed with {chunk.compression!r}: convert it to zstd, lz4 or none.")
     if len(data) > limit:
-        raise InputError(f"{path.name} unpacks to more bytes than allowed: cut it, or raise --maximum-bytes.")
+        raise InputError(
+            f"{path.name} unpacks to more than {MOST_EXPANSION} times its size or --maximum-bytes: record it again, or "
+            "cut it and raise the limit."
+        )
     if len(data) != chunk.uncompressed_size:
         raise ValueError(f"a chunk unpacks to {len(data)} bytes, not {chunk.uncompressed_size}")
     return data

@@ -28,6 +28,7 @@ import numpy.typing as npt
 
 from ddagr_gym.errors import InputError, unknown_name
 from ddagr_gym.parameters import Robot
+from ddagr_gym.recordings.plausible import check_extent, check_magnitude, slow_rows
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -304,12 +305,15 @@ def _check_arrays(recording: Recording) -> None:
     back = np.flatnonzero(np.diff(recording.t) <= 0)
     if back.size:
         raise InputError(f"the recording's time does not increase at row {back[0] + 1}: sort it or drop repeated rows.")
+    check_extent(recording.t)
     for name in recording.channels:
         if name not in CHANNELS:
             raise unknown_name("channel", name, CHANNELS)
     for name, value in {**recording.channels, **recording.extras, "command_valid": recording.command_valid}.items():
         if np.shape(value) != (n,):
             raise InputError(f"column {name} has the shape {np.shape(value)} where t has ({n},): make them equal.")
+    for name, value in recording.channels.items():
+        check_magnitude(name, value, CHANNELS[name].unit)
 
 
 def _check_ranges(kind: str, ranges: Ranges, n: int) -> None:
@@ -354,6 +358,7 @@ def _doubts(recording: Recording) -> Iterator[str]:
                 f"{name} reaches {high:.4g} {channel.unit}, beyond the {channel.limit:g} {channel.unit} of a ground "
                 f"robot: check its unit in the column map{_unit_hint(channel.unit)}."
             )
+    yield from slow_rows(recording.period)
     yield from _degrees(recording)
     yield from _gravity(recording)
     if not recording.command_valid.any():

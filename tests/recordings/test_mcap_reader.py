@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 import math
+import time
 
 import numpy as np
 import pytest
@@ -146,3 +147,20 @@ def test_fuzzed_and_truncated_files_never_end_in_another_error(tmp_path, message
             refused += 1
             assert "\n" not in str(error)  # noqa: PT017
     assert refused > 40
+
+
+def test_a_small_file_that_unpacks_to_gigabytes_is_refused_at_once(tmp_path, warthog):
+    path = tmp_path / "bomb.mcap"
+    with open(path, "wb") as stream:
+        writer = Writer(stream, compression=CompressionType.ZSTD, chunk_size=2**24)
+        writer.start()
+        schema = writer.register_schema(name="Imu", encoding="jsonschema", data=b"{}")
+        channel = writer.register_channel(topic="/imu", message_encoding="json", schema_id=schema)
+        for k in range(12):
+            writer.add_message(channel, log_time=k, publish_time=k, data=bytes(2**23))
+        writer.finish()
+    assert path.stat().st_size < 2**18
+    began = time.process_time()
+    with pytest.raises(InputError, match="more than 200 times its size"):
+        read_mcap(path, load_topic_map("topics_default"), warthog)
+    assert time.process_time() - began < 10.0

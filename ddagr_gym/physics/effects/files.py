@@ -26,7 +26,7 @@ import yaml
 
 from ddagr_gym.config import load_config
 from ddagr_gym.errors import InputError
-from ddagr_gym.files import atomic_path
+from ddagr_gym.files import atomic_path, expanded
 from ddagr_gym.physics.effects.base import Effect, build_effect
 from ddagr_gym.physics.effects.registry import effect_kind, parse_effect
 
@@ -102,7 +102,7 @@ def read_effects_file(path: str | os.PathLike[str]) -> EffectsFile:
     Raises:
         InputError: unreadable file, or content that does not fit; one sentence with file and place.
     """
-    file = Path(path).expanduser()
+    file = expanded(path)
     if not file.is_file():
         raise InputError(f"effects file {str(path)!r} does not exist: give a YAML or JSON file, or name=size.")
     return load_config(file, EffectsFile)
@@ -155,7 +155,7 @@ def save_effects(
     Raises:
         InputError: another ending, a path that cannot be a file, or intervals that do not belong to the effects.
     """
-    file = Path(path).expanduser()
+    file = expanded(path)
     if file.suffix not in _ENDINGS:
         raise InputError(f"effects file {str(path)!r} ends in {file.suffix!r}: end it in {', '.join(_ENDINGS)}.")
     chosen = tuple(effects)

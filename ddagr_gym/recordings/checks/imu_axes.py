@@ -30,8 +30,9 @@ GYRO_SPREAD = 0.2
 """Of the gyro's scale [-] (ours)."""
 COST_OF_A_FAULT = 15.0
 """Chi-square that another fault has to earn (ours): among 384 mountings 6 in 10^3 do so by chance."""
-CLEAR = 15.0
-"""Chi-square by which the best mounting has to lead (ours, as above)."""
+CLEAR = 10.0
+"""Chi-square by which the best mounting has to lead (ours): the cost of a fault, less what noise may give a mounting
+with one fault more."""
 WORST_FIT = 60.0
 """Chi-square of ten numbers beyond which no right angle fits (ours): an IMU at 45 degrees, a dead axis."""
 

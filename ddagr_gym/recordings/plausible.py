@@ -1,0 +1,88 @@
+"""What no log of a robot holds: stamps in another unit than seconds, gaps of years, readings beyond any sensor."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import numpy.typing as npt
+
+from ddagr_gym.errors import InputError
+
+FloatArray = npt.NDArray[np.float64]
+
+LONGEST = 1e6
+"""Longest recording that is taken [s] (ours): eleven days; beyond it a clock is wrong or several drives are in one
+file, and what counts blocks of a drive would fill the memory."""
+SLOWEST_PERIOD = 5.0
+"""Time between rows beyond which the unit of the stamps is doubted [s] (ours): no robot's log is that slow."""
+ABSURD = 1e12
+"""Magnitude of a reading beyond which it is no number of a sensor, in SI (ours): its powers would overflow."""
+
+
+def check_extent(t: FloatArray) -> None:
+    """Refuse times that are not seconds of one recording.
+
+    Args:
+        t: (n,), finite [s].
+
+    Raises:
+        InputError: longer than :data:`LONGEST`, with the unit that the stamps look like or the place of the gap.
+    """
+    if t.size < 2 or t[-1] - t[0] <= LONGEST:
+        return
+    steps = np.diff(t)
+    period, row = float(np.median(steps)), int(np.argmax(steps))
+    unit = likely_unit(period)
+    if unit:
+        raise InputError(
+            f"rows come every {period:.3g} s and the recording lasts {t[-1] - t[0]:.3g} s: the stamps look like "
+            f"{unit}, not seconds; say unit: {unit} under time in the column map, or divide them."
+        )
+    raise InputError(
+        f"between rows {row + 1} and {row + 2} lie {steps[row]:.3g} s, and a recording may last {LONGEST:g} s: correct "
+        "the time there, or cut the recording into drives."
+    )
+
+
+def likely_unit(period: float) -> str:
+    """Unit in which a time between rows that is too long for seconds would be usual; "" for none.
+
+    Args:
+        period: between rows, taken for seconds.
+    """
+    if period <= SLOWEST_PERIOD:
+        return ""
+    units = (("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9))
+    return next((unit for unit, factor in units if period * factor <= 1.0), "")
+
+
+def slow_rows(period: float) -> Iterator[str]:
+    """A sentence where rows come too slowly for seconds.
+
+    Args:
+        period: between rows [s].
+    """
+    if period > SLOWEST_PERIOD:
+        unit = likely_unit(period)
+        hint = f" ({unit}?)" if unit else ""
+        yield f"rows come every {period:.3g} s: check the unit of the time stamps in the column map{hint}."
+
+
+def check_magnitude(name: str, values: FloatArray, unit: str) -> None:
+    """Refuse readings beyond :data:`ABSURD`.
+
+    Args:
+        name: of the channel.
+        values: (n,), NaN where there is none.
+        unit: of the channel.
+
+    Raises:
+        InputError: with the first such reading.
+    """
+    wild = np.flatnonzero(np.abs(values) > ABSURD)
+    if wild.size:
+        raise InputError(
+            f"{name} is {values[wild[0]]:g} {unit} in row {wild[0] + 1}, which no sensor gives: correct it or leave "
+            "the field empty."
+        )
