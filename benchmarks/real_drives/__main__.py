@@ -1,6 +1,6 @@
 """Calibrate a Warthog with its ordinary drives and forecast each of them from the others, beside other models.
 
-    python -m benchmarks.real_drives [--threads 2] [--cache FOLDER] [--output FOLDER]
+    python -m benchmarks.real_drives [--threads 2] [--cache FOLDER] [--calibration FOLDER] [--output FOLDER]
 
 Six ordinary drives of NorLab's Warthog are read from ``shared/recordings``: two on asphalt, two on sand, one on grass
 and one on gravel (its gyro has the wrong sign, which the calibration finds and turns). The soil of grass and gravel is
@@ -30,6 +30,7 @@ from benchmarks.real_drives.compare import (
 )
 from benchmarks.real_drives.figure import draw
 from ddagr_gym import calibrate
+from ddagr_gym.api.calibrate import CalibrationResult
 from ddagr_gym.calibration.result import CALIBRATED, DATA_SHEET, KINEMATIC
 from ddagr_gym.commands.output import make_folder, write_text
 from ddagr_gym.version import __version__
@@ -94,10 +95,14 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--cache", type=Path, help="folder of finished steps, to go on after an interruption")
+    parser.add_argument("--calibration", type=Path, help="folder for the calibration itself, as of `ddagr calibrate`")
     parser.add_argument("--output", type=Path, default=RESULTS)
     given = parser.parse_args(arguments)
     folder = make_folder(given.output)
-    outcome = _calibrated(given.threads, given.seed, given.cache)
+    result = _calibrated(given.threads, given.seed, given.cache)
+    if given.calibration is not None:
+        result.report(given.calibration)
+    outcome = result.outcome
     compared = []
     for item in outcome.forecasts:
         print(f"models beside it: {item.drive}", flush=True)
@@ -122,7 +127,7 @@ def main(arguments: list[str] | None = None) -> None:
     print(f"written: {folder / 'real_drives.json'} and real_drives.png; models by commands: {', '.join(BY_COMMANDS)}")
 
 
-def _calibrated(threads: int, seed: int, cache: Path | None) -> Any:
+def _calibrated(threads: int, seed: int, cache: Path | None) -> CalibrationResult:
     from ddagr_gym import load_recording
 
     folder = recordings_folder()
@@ -131,11 +136,10 @@ def _calibrated(threads: int, seed: int, cache: Path | None) -> Any:
     for number, (name, (ground, column_map)) in enumerate(DRIVES.items()):
         loaded.append(load_recording(folder / f"{name}.csv.gz", column_map=column_map, robot="warthog"))
         grounds.setdefault(ground, []).append(number)
-    result = calibrate(
+    return calibrate(
         loaded, robot="warthog", soil=SOILS, grounds=grounds, seed=seed, threads=threads, cache=cache,
         progress=lambda line: print(line, flush=True),
     )  # fmt: skip
-    return result.outcome
 
 
 def _plain(value: object) -> object:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.real_drives.learned import learned_forecast, training_windows
+from ddagr_gym.calibration.calibration_data import CalibrationData
 from ddagr_gym.calibration.forecast_errors import ITSELF, Forecasts
 from ddagr_gym.calibration.result import CALIBRATED, DATA_SHEET, KINEMATIC
 from ddagr_gym.calibration.run import Outcome
@@ -74,13 +75,19 @@ def compare(outcome: Outcome, item: Forecasts, seed: int) -> Compared:
     predictions = dict(item.predictions)
     predictions[ROLLING] = KinematicModel(robot.outer_radius, robot.half_track, 1.0, motor).predict(windows)
     predictions[LEARNED] = learned_forecast(training, windows, robot.outer_radius, seed)
-    predictions |= _by_wheel_speeds(outcome, item, training)
+    predictions |= by_wheel_speeds(data, item, training)
     return Compared(item.drive, item.ground, item.soil_from, windows, predictions)
 
 
-def _by_wheel_speeds(outcome: Outcome, item: Forecasts, training: WindowSet) -> dict[str, Array]:
-    """Forecasts from recorded wheel speeds: what is left when the drivetrain is taken out."""
-    data, windows = outcome.data, item.windows
+def by_wheel_speeds(data: CalibrationData, item: Forecasts, training: WindowSet) -> dict[str, Array]:
+    """Forecasts from recorded wheel speeds, with the drivetrain taken out, by models that have not seen the drive.
+
+    Args:
+        data: all drives.
+        item: forecasts by commands, with robot, soil and sensors as calibrated without the drive.
+        training: windows of the other drives, to which the track is fitted.
+    """
+    windows = item.windows
     driven = cut_windows(
         data.prepared.recordings, windows.duration, wheel_radius=data.robot.outer_radius,
         half_track=data.robot.half_track, drive_by="encoders", history=HISTORY, ahead=LATEST,
@@ -91,9 +98,8 @@ def _by_wheel_speeds(outcome: Outcome, item: Forecasts, training: WindowSet) -> 
     track = fit_track(seen, data.robot.outer_radius, data.robot.half_track, sigma=sigma, robust=ROBUST)
     chosen = driven.subset(places[places >= 0])
     late = 0.0 if track is None else track.delay
-    soil = outcome.soils[item.ground]
-    model = WindowModel(outcome.robot, soil, chosen, imposed=True, numerics=field_numerics(), delay=late)
-    found = {CALIBRATED_BY_SPEEDS: model.predict(np.zeros(0), chosen.initial)}
+    model = WindowModel(item.robot, item.soil, chosen, imposed=True, numerics=field_numerics(), delay=late)
+    found = {CALIBRATED_BY_SPEEDS: model.predict(np.zeros(0), chosen.initial, item.sensors)}
     if track is not None:
         found[TRACK_BY_SPEEDS] = track.predict(chosen)
     return {name: _spread_out(prediction, places) for name, prediction in found.items()}

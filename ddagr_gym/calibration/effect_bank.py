@@ -51,7 +51,7 @@ def ordinary_runs(
     found = []
     for forecast in made:
         number = int(forecast.windows.recording[0])
-        values = dict(zip((p.name for p in model.parameters), forecast.values.tolist(), strict=True))
+        values = forecast.values_of(model)
         robot = fitted_robot(model.model.robot, values)
         soil = fitted_soil(data, data.grounds[number], values)
         recording, name = data.prepared.recordings[number], f"{data.names[number]} {forecast.fold}"

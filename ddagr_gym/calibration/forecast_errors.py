@@ -13,9 +13,12 @@ from ddagr_gym.calibration.calibration_data import CalibrationData
 from ddagr_gym.calibration.joint_fit import FittedModel
 from ddagr_gym.calibration.left_out import ENCODERS, Forecast, fold_name, folds
 from ddagr_gym.calibration.result import CALIBRATED, DATA_SHEET, KINEMATIC, ForecastError
+from ddagr_gym.calibration.simulator_values import fitted_robot, fitted_sensors, fitted_soil
 from ddagr_gym.identification.fit_numerics import field_numerics
 from ddagr_gym.identification.window_model import WindowModel
 from ddagr_gym.identification.windows import CHANNELS, WindowSet
+from ddagr_gym.parameters import Robot, Soil
+from ddagr_gym.physics.effects import Effect
 from ddagr_gym.replay_analysis.fitting import ROBUST
 from ddagr_gym.replay_analysis.horizons import METRICS, horizon_errors
 from ddagr_gym.replay_analysis.intervals import error_statistics
@@ -42,6 +45,9 @@ class Forecasts:
         soil_from: where its soil was fitted.
         windows: that were forecast.
         predictions: (W, T, 8) by model.
+        robot: as calibrated without the drive.
+        soil: of its ground, likewise.
+        sensors: what was calibrated of the sensors, likewise.
     """
 
     drive: str
@@ -49,6 +55,9 @@ class Forecasts:
     soil_from: str
     windows: WindowSet
     predictions: dict[str, Array]
+    robot: Robot
+    soil: Soil
+    sensors: tuple[Effect, ...]
 
 
 OTHER_DRIVES = "other drives"
@@ -83,9 +92,13 @@ def all_forecasts(
             predictions[KINEMATIC] = kinematic.predict(windows)
         ground = data.grounds[int(windows.recording[0])]
         alone = data.count > 1 and len(data.drives_on[ground]) == 1
+        values = forecast.values_of(model)
         found.append(
-            Forecasts(fold_name(data, forecast.fold), ground, ITSELF if alone else OTHER_DRIVES, windows, predictions)
-        )
+            Forecasts(
+                fold_name(data, forecast.fold), ground, ITSELF if alone else OTHER_DRIVES, windows, predictions,
+                fitted_robot(model.model.robot, values), fitted_soil(data, ground, values), fitted_sensors(values),
+            )
+        )  # fmt: skip
     return tuple(found)
 
 

@@ -46,6 +46,9 @@ ITERATIONS = 12
 FIRST_ITERATIONS = 8
 """Steps of the fit that only serves to weigh residuals (ours)."""
 
+FIRST_TOLERANCE = 5e-3
+"""Relative gain of a step that ends that fit (ours): medians of residuals move by half as much."""
+
 LAST_ITERATIONS = 8
 """Steps of a fit that begins at the values of another one (ours)."""
 
@@ -219,6 +222,7 @@ def fit_model(
     *,
     states: Array | None = None,
     iterations: int = ITERATIONS,
+    tolerance: float = TOLERANCE,
 ) -> FittedModel:
     """Fit parameters to windows with given weights.
 
@@ -231,10 +235,11 @@ def fit_model(
         threads: of the simulator.
         states: (W, 8) initial states to start from; the windows' first guess by default.
         iterations: most steps.
+        tolerance: relative gain of a step that ends the fit.
     """
     problem = make_problem(data, windows, model, weights, threads)
     point = point_at(problem, start, states)
-    found = fit(problem, point, iterations=iterations, tolerance=TOLERANCE, renewals=iterations)
+    found = fit(problem, point, iterations=iterations, tolerance=tolerance, renewals=iterations)
     return FittedModel(model, problem, found)
 
 
@@ -265,8 +270,11 @@ def weigh_and_fit(
     weights = first_weights(data, windows)
     problem = make_problem(data, windows, model, weights, threads)
     prediction, values, states = problem.predict(point_at(problem, start)), dict(start), None
-    for iterations in passes:
+    for number, iterations in enumerate(passes):
         weights = weights_by_drive(windows, prediction, first_weights(data, windows))
-        found = fit_model(data, windows, model, weights, values, threads, states=states, iterations=iterations)
+        found = fit_model(
+            data, windows, model, weights, values, threads, states=states, iterations=iterations,
+            tolerance=TOLERANCE if number == len(passes) - 1 else FIRST_TOLERANCE,
+        )  # fmt: skip
         values, states, prediction = found.values, found.fitted.point.states, found.fitted.prediction
     return found, weights

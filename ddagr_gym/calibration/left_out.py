@@ -50,6 +50,10 @@ class Forecast:
     values: Array
     prediction: Array
 
+    def values_of(self, model: FittedModel) -> dict[str, float]:
+        """Values by name of the parameters of the model that was forecast with."""
+        return dict(zip((p.name for p in model.parameters), self.values.tolist(), strict=True))
+
 
 def folds(data: CalibrationData, windows: WindowSet) -> Integers:
     """(W,) fold of each window: its drive, or of a single drive its first or second half."""
@@ -95,7 +99,9 @@ def _acts(model: FittedModel, parameter: int, rows: Booleans) -> bool:
     return bool(model.parameters[parameter].acts_in(recording).any())
 
 
-def _with_own(data: CalibrationData, model: FittedModel, values: Array, out: Booleans, weights: Weights) -> Array:
+def _with_own(
+    data: CalibrationData, model: FittedModel, values: Array, out: Booleans, weights: Weights, threads: int
+) -> Array:
     """Values (P,) with what belongs to a left-out drive alone fitted to the first half of it."""
     names = [p.name for p in model.parameters]
     own = frozenset(p.name for k, p in enumerate(model.parameters) if p.prior > 0.0 and not _acts(model, k, ~out))
@@ -106,13 +112,15 @@ def _with_own(data: CalibrationData, model: FittedModel, values: Array, out: Boo
     rows = first_half(windows, out)
     start = {name: 0.0 if name in own else value for name, value in zip(names, values.tolist(), strict=True)}
     found = fit_model(
-        data, windows.subset(rows), alone, Weights(weights.sigma[rows], weights.robust), start, threads=1,
+        data, windows.subset(rows), alone, Weights(weights.sigma[rows], weights.robust), start, threads,
         iterations=OWN_ITERATIONS,
     )  # fmt: skip
     return np.array([found.values[name] for name in names])
 
 
-def forecasts(data: CalibrationData, model: FittedModel, judged: WindowSet, weights: Weights) -> Iterator[Forecast]:
+def forecasts(
+    data: CalibrationData, model: FittedModel, judged: WindowSet, weights: Weights, threads: int
+) -> Iterator[Forecast]:
     """Forecast of every fold by the model fitted without it.
 
     Args:
@@ -120,6 +128,7 @@ def forecasts(data: CalibrationData, model: FittedModel, judged: WindowSet, weig
         model: fitted to windows of all drives.
         judged: windows to forecast.
         weights: of the fit.
+        threads: of the simulator.
     """
     linear = linearised(model.problem, model.fitted)
     fitted = model.problem.blocked.windows
@@ -129,7 +138,7 @@ def forecasts(data: CalibrationData, model: FittedModel, judged: WindowSet, weig
         values = values_without(model, linear, out)
         alone = data.count > 1 and len(data.drives_on[data.grounds[int(fold)]]) == 1
         if alone:
-            values = _with_own(data, model, values, out, weights)
+            values = _with_own(data, model, values, out, weights, threads)
             # what was fitted to the first half judges the second only
             inside &= judged.time >= float(np.median(fitted.time[out]))
         chosen = judged.subset(np.asarray(inside))

@@ -86,7 +86,7 @@ class Comparison:
             states=start.states, iterations=iterations,
         )  # fmt: skip
         sigma = fold_sigma(self.data, self.windows, self.weights)
-        made = tuple(forecasts(self.data, fitted, self.judged, self.weights))
+        made = tuple(forecasts(self.data, fitted, self.judged, self.weights, self.threads))
         losses = {f.fold: forecast_loss(f, sigma[f.fold], self.weights.robust) for f in made}
         return Candidate(fitted.standing, losses, {f.fold: f.windows.count for f in made})
 

@@ -26,6 +26,9 @@ IMBALANCE_DEVIATION = 0.1
 TIME_TO_FULL_SPEED = 0.5
 """In which a robot's motors reach its highest speed [s], which sets the scale of its limits (ours)."""
 
+INTEGRAL_SHARE = 1.0 / 3.0
+"""Of the largest acceleration, that the integral part asks for at most (ours): 11.5 of 31 rad/s^2 on a Warthog."""
+
 FRICTION_TIME = 10.0
 """In which Coulomb friction alone would stop a bank from its highest speed [s], which sets its scale (ours)."""
 
@@ -81,6 +84,7 @@ PARTS = (
     Part("no_load_speed", "torque that falls with speed", ("no_load_speed",), _FULL),
     Part("torque_limit", "torque limit", ("acceleration_limit",), _HARD),
     Part("friction", "friction of motors and gears", ("viscous_rate", "coulomb_friction"), f"coasting, and {_FULL}"),
+    Part("integral_limit", "limit of the integral part", ("integral_limit",), f"{_TURNS}, and {_FULL}"),
     Part("limit_imbalance", "banks of unequal strength", ("limit_imbalance",), _HARD),
     Part("command_ramp", "ramp of the commands", ("command_ramp",), _HARD),
     Part("power_limit", "power limit", ("power_limit",), _FULL),
@@ -99,6 +103,7 @@ PARTS = (
 
 LIMITS = {
     "command_ramp": "command_ramp",
+    "integral_limit": "integral_limit",
     "acceleration_limit": "torque_limit",
     "no_load_speed": "no_load_speed",
     "power_limit": "power_limit",
@@ -126,6 +131,7 @@ def complete_robot(robot: Robot) -> Robot:
     strongest = top / TIME_TO_FULL_SPEED
     likely = {
         "command_ramp": strongest,
+        "integral_limit": INTEGRAL_SHARE * strongest,
         "acceleration_limit": strongest,
         "no_load_speed": top,
         "power_limit": STEADY_SHARE * strongest * top,

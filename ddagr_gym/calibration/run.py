@@ -140,7 +140,7 @@ def calibrate_drives(
     progress("every drive by itself")
     estimates = store.step("drives", partial(drive_estimates, data, model, final.weights, settings.threads))
     progress("forecasts of left-out drives")
-    made = tuple(forecasts(data, model, data.spread(settings.judged), final.weights))
+    made = tuple(forecasts(data, model, data.spread(settings.judged), final.weights, settings.threads))
     compared = all_forecasts(data, model, made, held, settings.threads)
     calibration = Calibration(
         schema=SCHEMA,

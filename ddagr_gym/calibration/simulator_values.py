@@ -42,6 +42,7 @@ _UNITS = {
     "command_delay": "s",
     "command_ramp": "rad/s^2",
     "integral_rate": "1/s^2",
+    "integral_limit": "rad/s^2",
     "load_compliance": "1/(kg m^2)",
     "acceleration_limit": "rad/s^2",
     "no_load_speed": "rad/s",
@@ -172,6 +173,12 @@ def fitted_soil(data: CalibrationData, ground: str, values: Mapping[str, float])
     own = {base: values.get(f"{base}_{ground}", 0.0) for base in SOIL_PARAMETERS}
     _, soil = with_values(data.robot, data.soils[ground], own)
     return soil
+
+
+def fitted_sensors(values: Mapping[str, float]) -> tuple[Effect, ...]:
+    """What has no place in a robot or a soil, at values of the fit."""
+    change = values.get("gyro_scale", 0.0)
+    return () if change == 0.0 else (GyroScale(math.exp(change)),)
 
 
 def calibrated_robot(data: CalibrationData, model: FittedModel, calibration: Calibration) -> Robot:

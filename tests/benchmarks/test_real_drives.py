@@ -4,17 +4,20 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from benchmarks.real_drives.__main__ import aims_of
-from benchmarks.real_drives.compare import CALIBRATED_BY_SPEEDS, LEARNED, Compared, errors_of, ratio_of
+from benchmarks.real_drives.compare import CALIBRATED_BY_SPEEDS, LEARNED, Compared, by_wheel_speeds, errors_of, ratio_of
 from benchmarks.real_drives.figure import draw
 from benchmarks.real_drives.learned import examples, learned_forecast, scales_of, training_windows
+from ddagr_gym.calibration.forecast_errors import Forecasts
 from ddagr_gym.calibration.result import CALIBRATED, DATA_SHEET, KINEMATIC
 from ddagr_gym.identification.windows import CHANNELS, STATE, WindowSet, cut_windows
 from ddagr_gym.parameters import Drivetrain, Imu, PoseReceiver, Sensors
+from ddagr_gym.physics.effects.gyro_scale import GyroScale
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.schema import CHANNELS as SCHEMA
 from ddagr_gym.recordings.schema import Recording
@@ -24,8 +27,8 @@ ROBOT = replace(get_robot("ddagr"), drivetrain=Drivetrain(command_delay=0.3, loa
 
 
 @pytest.fixture(scope="module")
-def windows() -> WindowSet:
-    """Two drives of 160 s with steps of 4 s."""
+def drives() -> list[Recording]:
+    """Two of 160 s with steps of 4 s."""
     sensors = Sensors(Imu(sample_rate=20.0), pose=PoseReceiver(rate=4.0))
     drives = []
     for seed in (1, 2):
@@ -33,6 +36,12 @@ def windows() -> WindowSet:
         columns = simulate(ROBOT, get_soil("thesis_a1"), np.repeat(steps, 80, axis=0), sensors=sensors, seed=seed)
         kept = {name: values for name, values in columns.items() if name == "t" or name in SCHEMA}
         drives.append(Recording.from_columns(kept, ROBOT))
+    return drives
+
+
+@pytest.fixture(scope="module")
+def windows(drives: list[Recording]) -> WindowSet:
+    """Of 4 s, every 2 s."""
     return cut_windows(
         drives, 4.0, wheel_radius=ROBOT.outer_radius, half_track=ROBOT.half_track, history=1.2, stride=2.0
     )
@@ -78,6 +87,21 @@ def test_errors_are_drawn_and_held_against_the_aims(windows: WindowSet, tmp_path
     assert aims["share of the learned model's gain"]["ratio"] == pytest.approx(0.75 / 0.875)
     draw(rows, tmp_path / "real_drives.png")
     assert (tmp_path / "real_drives.png").stat().st_size > 10_000
+
+
+def test_forecasts_by_wheel_speeds_use_the_values_without_the_drive(drives: list[Recording], windows: WindowSet):
+    """A simulated drive is forecast by its own robot and soil, and badly by others, whatever fits it best with all."""
+    data = SimpleNamespace(prepared=SimpleNamespace(recordings=drives, sigma=np.full(len(CHANNELS), 0.01)), robot=ROBOT)
+    judged, training = windows.subset(windows.recording == 0), training_windows(windows, 0, first_half=False)
+    gyro = judged.measured[..., CHANNELS.index("yaw_rate")]
+    sizes = []
+    for soil, sensors in (("thesis_a1", ()), ("firm_ground", ()), ("thesis_a1", (GyroScale(1.2),))):
+        item = Forecasts("a.csv", "clay", "other drives", judged, {}, ROBOT, get_soil(soil), sensors)
+        found = by_wheel_speeds(data, item, training)[CALIBRATED_BY_SPEEDS]
+        assert np.isfinite(found).any()
+        sizes.append(float(np.sqrt(np.nanmean((found[..., CHANNELS.index("yaw_rate")] - gyro) ** 2))))
+    right, other_soil, other_gyro = sizes
+    assert right < 0.7 * min(other_soil, other_gyro)
 
 
 def test_learned_model_predicts_a_drive_that_it_has_not_seen(windows: WindowSet):
