@@ -12,7 +12,7 @@ from ddagr_gym.calibration.calibration_data import CalibrationData
 from ddagr_gym.calibration.parts import RobotModel, complete_robot, first_values, shared_parameters
 from ddagr_gym.calibration.settings import LONGEST_DELAY
 from ddagr_gym.identification.block_means import sample_windows
-from ddagr_gym.identification.fit_numerics import field_numerics
+from ddagr_gym.identification.fit_numerics import field_numerics, field_slope_numerics
 from ddagr_gym.identification.gauss_newton import Fitted, fit
 from ddagr_gym.identification.nuisances import Nuisances
 from ddagr_gym.identification.parameters import (
@@ -25,7 +25,7 @@ from ddagr_gym.identification.parameters import (
 )
 from ddagr_gym.identification.problem import Point, Problem
 from ddagr_gym.identification.windows import CHANNELS, WindowSet
-from ddagr_gym.parameters import Soil
+from ddagr_gym.parameters import Numerics, Soil
 from ddagr_gym.physics.wheel_forces import soil_vector
 from ddagr_gym.replay_analysis.fitting import (
     LEAST_GYRO_BIAS,
@@ -151,13 +151,18 @@ def _soil_offsets(data: CalibrationData) -> tuple[list[ModelParameter], dict[str
 
 
 def make_problem(
-    data: CalibrationData, windows: WindowSet, model: RobotModel, weights: Weights, threads: int
+    data: CalibrationData,
+    windows: WindowSet,
+    model: RobotModel,
+    weights: Weights,
+    threads: int,
+    slopes: Numerics | None = None,
 ) -> Problem:
-    """The fit of some windows with some weights."""
+    """The fit of some windows with some weights, and with sensitivities by their own numerics where that is wanted."""
     soil: Soil = next(iter(data.soils.values()))
     return Problem(
         model.robot, soil, sample_windows(windows, weights.sigma), Nuisances(model.parameters), robust=weights.robust,
-        threads=threads, numerics=field_numerics(),
+        threads=threads, numerics=field_numerics(), slopes=slopes,
     )  # fmt: skip
 
 
@@ -234,10 +239,11 @@ def fit_model(
         start: values by name.
         threads: of the simulator.
         states: (W, 8) initial states to start from; the windows' first guess by default.
-        iterations: most steps.
+        iterations: most steps, with coarse sensitivities; 0 only computes fine ones at the start.
         tolerance: relative gain of a step that ends the fit.
     """
-    problem = make_problem(data, windows, model, weights, threads)
+    slopes = field_slope_numerics() if iterations > 0 else None
+    problem = make_problem(data, windows, model, weights, threads, slopes)
     point = point_at(problem, start, states)
     found = fit(problem, point, iterations=iterations, tolerance=tolerance, renewals=iterations)
     return FittedModel(model, problem, found)

@@ -1,6 +1,6 @@
-"""Accuracy of the simulator inside a fit: two settings, each as coarse as what its residuals leave unexplained allows.
+"""Accuracy of the simulator inside a fit: settings each as coarse as what its residuals leave unexplained allows.
 
-Both are smooth (no decision of the integrator jumps with a parameter), because sensitivities are finite differences.
+All are smooth (no decision of the integrator jumps with a parameter), because sensitivities are finite differences.
 """
 
 from __future__ import annotations
@@ -17,6 +17,15 @@ def field_numerics() -> Numerics:
     drives leave unexplained, at a quarter of the cost of ``Numerics.smooth()``.
     """
     return replace(Numerics.smooth(), maximum_step=0.025, jacobian_refresh=0.05, launch_change=0.1)
+
+
+def field_slope_numerics() -> Numerics:
+    """For the sensitivities of fits to many field drives (a calibration): one step of 50 ms, fewer nodes in a contact.
+
+    On drives of a Warthog sensitivities differ from those of :func:`field_numerics` by 5 % in the median, by 21 % at
+    most, and a Gauss-Newton step by 0.03 and 0.17 deviations of a parameter, at 0.55 times the cost.
+    """
+    return replace(field_numerics(), maximum_step=0.05, contact_nodes=5)
 
 
 def block_mean_numerics() -> Numerics:

@@ -76,6 +76,7 @@ class Problem:
         delay: by which the commands act late besides the shift parameters [s].
         threads: of the simulator.
         numerics: of the simulator.
+        slopes: of the simulator where it only serves sensitivities to nuisances and states; the same by default.
     """
 
     def __init__(
@@ -91,6 +92,7 @@ class Problem:
         delay: float = 0.0,
         threads: int = 1,
         numerics: Numerics | None = None,
+        slopes: Numerics | None = None,
     ) -> None:
         self.robot = robot
         self.blocked = blocked
@@ -98,6 +100,10 @@ class Problem:
         self.model = WindowModel(
             robot, soil, blocked.windows, nuisances.parameters, imposed=imposed,
             numerics=block_mean_numerics() if numerics is None else numerics, threads=threads,
+            delay=delay,
+        )  # fmt: skip
+        self._slopes = None if slopes is None else WindowModel(
+            robot, soil, blocked.windows, nuisances.parameters, imposed=imposed, numerics=slopes, threads=threads,
             delay=delay,
         )  # fmt: skip
         self.prior = np.array([p.prior for p in nuisances.parameters])
@@ -121,6 +127,7 @@ class Problem:
         """The same problem on other windows of the same recordings."""
         other = copy(self)
         other.blocked, other.model = blocked, self.model.on(blocked.windows)
+        other._slopes = None if self._slopes is None else self._slopes.on(blocked.windows)
         return other
 
     def model_of(self, windows: WindowSet) -> WindowModel:
@@ -164,6 +171,15 @@ class Problem:
         """(W, T, 8)."""
         return self.model.predict(point.values, point.states, (*self._known, *point.effects))
 
+    def _varied_prediction(self, point: Point) -> Array:
+        """The same where it only serves a sensitivity."""
+        model = self._slopes or self.model
+        return model.predict(point.values, point.states, (*self._known, *point.effects))
+
+    def _varied_from(self, point: Point, base: Array) -> Array:
+        """What such a prediction is held against: the prediction at a point, by the same numerics."""
+        return base if self._slopes is None else self._varied_prediction(point)
+
     def residual(self, point: Point, prediction: Array) -> Array:
         """Weighted block residuals with the priors of the local unknowns below, (W, M + S)."""
         offset = np.zeros((self.blocked.windows.count, len(self.local_prior)))
@@ -203,11 +219,12 @@ class Problem:
                 columns[..., k] = self._bias_column(channel, parameter.acts_in(self.blocked.windows.recording))
             elif not parameter.heading and (self.prior[k] > 0.0 or k in self._varied):
                 simulated.append(k)
+        unmoved = self._varied_from(point, base)
         for together in disjoint_scopes(self.nuisances.parameters, simulated):
             steps = [self._difference(k, point.values[k]) for k in together]
             moved = point.values.copy()
             moved[together] += steps
-            change = self.blocked.change(self.predict(replace(point, values=moved)), base)
+            change = self.blocked.change(self._varied_prediction(replace(point, values=moved)), unmoved)
             for k, step in zip(together, steps, strict=True):
                 acts = self.nuisances.parameters[k].acts_in(self.blocked.windows.recording)
                 columns[acts, :, k] = change[acts] / step
@@ -221,10 +238,11 @@ class Problem:
     def local_columns(self, point: Point, base: Array) -> Array:
         """The sensitivities (W, M, P) to the parameters that have a local unknown; 0 for all others."""
         columns = np.zeros((*self.blocked.mask.shape, len(self.prior)))
+        unmoved = self._varied_from(point, base) if self._varied else base
         for index in self._varied:
             moved = point.values.copy()
             moved[index] += self.nuisances.parameters[index].step
-            change = self.blocked.change(self.predict(replace(point, values=moved)), base)
+            change = self.blocked.change(self._varied_prediction(replace(point, values=moved)), unmoved)
             columns[..., index] = change / self.nuisances.parameters[index].step
         return columns
 
@@ -248,7 +266,8 @@ class Problem:
         step = self.nuisances.parameters[own[0]].step
         values = point.values.copy()
         values[own] += step
-        change = self.blocked.change(self.predict(self.moved(point, values)), base) / step
+        unmoved = self._varied_from(point, base)
+        change = self.blocked.change(self._varied_prediction(self.moved(point, values)), unmoved) / step
         for k in own:
             chosen = self.nuisances.parameters[k].acts_in(self.blocked.windows.recording)
             found[..., k] = np.where(chosen[:, None], change, 0.0)
@@ -268,7 +287,9 @@ class Problem:
             base: (W, T, 8) prediction there.
             by_parameter: (W, M, P) sensitivities, of which those with a local unknown count.
         """
-        changes = self.model.state_derivatives(point.values, point.states, base, (*self._known, *point.effects))
+        model, effects = self._slopes or self.model, (*self._known, *point.effects)
+        unmoved = self._varied_from(point, base)
+        changes = model.state_derivatives(point.values, point.states, unmoved, effects)
         by_state = np.nan_to_num(self.blocked.means(changes))
         local = [
             by_parameter[..., unknown.parameter] if unknown.channel is None else self._bias_column(unknown.channel)
