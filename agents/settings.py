@@ -5,8 +5,10 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import asdict, dataclass, field
+from pathlib import Path
 from typing import Any, Literal
 
+from ddagr_gym.envs.calibrated_draws import EFFECTS, load_draws
 from ddagr_gym.envs.settings import Randomisation, RewardWeights
 from ddagr_gym.errors import InputError
 from ddagr_gym.estimation import FilterModel
@@ -28,6 +30,9 @@ class TaskSettings(Validated):
         randomisation: what differs from episode to episode besides the soil.
         reward: weights of the terms.
         effects: missing physics, name=size or the path of an effects file such as `ddagr diagnose` writes.
+        calibration: folder that `ddagr calibrate` wrote: its robot and soils, drawn as they differ between drives, in
+            place of ``soil``; "" for the DDAGR of its data sheet.
+        ground: one of its grounds; "" for all of them.
     """
 
     soil: str = "thesis_a1_range"
@@ -36,18 +41,26 @@ class TaskSettings(Validated):
     randomisation: Randomisation = field(default_factory=Randomisation)
     reward: RewardWeights = field(default_factory=RewardWeights)
     effects: tuple[str, ...] = ()
+    calibration: str = ""
+    ground: str = ""
 
     def environment(self, design: PolicyDesign) -> dict[str, Any]:
         """Keyword arguments of the environment."""
         return {
-            "soil": self.soil,
+            **self._robot_and_soil(),
             "radius": self.radius,
             "speed": self.speed,
-            "randomisation": self.randomisation,
             "reward": self.reward,
             "effects": self.effects,
             "ekf_features": design.needs_filter,
         }
+
+    def _robot_and_soil(self) -> dict[str, Any]:
+        if not self.calibration:
+            return {"soil": self.soil, "randomisation": self.randomisation}
+        # a calibration has a spread of its own in place of the default one
+        chosen = True if self.randomisation == Randomisation() else self.randomisation
+        return {"calibration": self.calibration, "ground": self.ground, "randomisation": chosen}
 
 
 @dataclass(frozen=True)
@@ -147,6 +160,11 @@ class TrainingSettings:
         if content["filter"]["robot"]["drivetrain"] == asdict(Drivetrain()):
             # one without parts is no part: digests of before robots had one stay as they were
             del content["filter"]["robot"]["drivetrain"]
+        calibration, ground = (content["task"].pop(name) for name in ("calibration", "ground"))
+        if calibration:
+            # what a calibration says counts, not its path
+            content["calibration"] = asdict(load_draws(calibration, ground))
+            content["sensors"] = [effect.as_mapping() for effect in load_effects(Path(calibration) / EFFECTS)]
         if self.task.effects:
             # what a file of effects says counts, not its path
             content["effects"] = [effect.as_mapping() for effect in load_effects(self.task.effects)]

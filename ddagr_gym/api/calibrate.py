@@ -100,9 +100,10 @@ class CalibrationResult(Report):
     def _fill(self, folder: Path, progress: Callable[[str], None] | None) -> None:
         from ddagr_gym.calibration.effect_bank import NAME as BANK
         from ddagr_gym.calibration.effect_bank import save_runs
-        from ddagr_gym.calibration.files import EFFECTS, NAME, ROBOT, soil_file
+        from ddagr_gym.calibration.files import NAME, ROBOT, soil_file
         from ddagr_gym.calibration.simulator_values import calibrated_draws
         from ddagr_gym.config import dump_config
+        from ddagr_gym.envs.calibrated_draws import EFFECTS
         from ddagr_gym.envs.calibrated_draws import NAME as DRAWS
         from ddagr_gym.physics.effects.files import save_effects
         from ddagr_gym.reporting.calibration_page import write_page

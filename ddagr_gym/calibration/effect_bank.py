@@ -47,7 +47,7 @@ def ordinary_runs(
         cache: of runs that are done.
         progress: called with a line of text for each drive.
     """
-    setting = Setting(threads=threads).with_windows(data.windows.duration, STRIDE)
+    setting = setting_of(data, threads)
     found = []
     for forecast in made:
         number = int(forecast.windows.recording[0])
@@ -59,6 +59,11 @@ def ordinary_runs(
         bank = NullBank(robot, soil, setting, (recording,))
         found.append(cache(f"bank {forecast.fold}", partial(bank.scan, [recording], f"real {name}")))
     return tuple(found)
+
+
+def setting_of(data: CalibrationData, threads: int) -> Setting:
+    """Of the scans: windows as long as those of the fit, and fewer of them."""
+    return Setting(threads=threads).with_windows(data.windows.duration, STRIDE)
 
 
 def save_runs(runs: Sequence[NullRun], path: Path) -> None:
@@ -75,9 +80,9 @@ def load_runs(path: Path) -> tuple[NullRun, ...]:
     """
     try:
         body = json.loads(path.read_text(encoding="utf-8"))
-        runs = tuple(NullRun(**{**run, "meaningless": tuple(run["meaningless"])}) for run in body["runs"])
+        version = body["version"]
+        if version == VERSION:
+            return tuple(NullRun(**{**run, "meaningless": tuple(run["meaningless"])}) for run in body["runs"])
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise InputError(f"{path} is no bank of drives ({error}): make it with `ddagr calibrate --bank`.") from None
-    if body["version"] != VERSION:
-        raise InputError(f"{path} has version {body['version']!r}, this program reads {VERSION}: calibrate again.")
-    return runs
+    raise InputError(f"{path} has version {version!r}, this program reads {VERSION}: calibrate again.")

@@ -19,7 +19,6 @@ from ddagr_gym.parameters import Robot, Soil
 
 NAME = "calibration.json"
 ROBOT = "robot.yaml"
-EFFECTS = "effects.yaml"
 PAGE = "calibration.html"
 
 _PAST_FILE_NAMES = "/\\\0"

@@ -16,6 +16,7 @@ EXAMPLES = (
     "ddagr train ppo --config ppo_ekf --seed 0 --output runs",
     "ddagr train ppo --config ppo_raw --set steps=200000 ppo.learning_rate=3e-4",
     "ddagr train ppo --config ppo_ekf --set task.effects=[diagnosis/effects.yaml]",
+    "ddagr train ppo --config ppo_ekf --set task.calibration=calibration",
     "ddagr train all --output runs",
 )
 

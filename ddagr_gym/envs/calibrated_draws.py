@@ -16,6 +16,9 @@ from ddagr_gym.parameters import Drivetrain, Robot, Soil
 NAME = "draws.yaml"
 """Of the file in the folder that ``ddagr calibrate`` writes."""
 
+EFFECTS = "effects.yaml"
+"""Likewise, with what was calibrated of the sensors."""
+
 MOST_DEVIATIONS = 3.0
 """At which draws are cut off (ours), so that nothing changes sign."""
 

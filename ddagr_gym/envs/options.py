@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from gymnasium import spaces
 
-from ddagr_gym.envs.calibrated_draws import load_draws
+from ddagr_gym.envs.calibrated_draws import EFFECTS, load_draws
 from ddagr_gym.envs.settings import Randomisation, RewardWeights, TurnSettings
 from ddagr_gym.errors import InputError, unknown_name
 from ddagr_gym.parameters import Numerics, Robot, Sensors, Soil
@@ -85,7 +85,7 @@ def make_settings(
             raise InputError(f"a calibration and a robot or soil are given: {calibration} has both, leave them out.")
         calibrated = load_draws(calibration, ground)
         robot, soil = calibrated.robot, calibrated.grounds[0].soil
-        effects = (*load_effects(Path(calibration) / "effects.yaml"), *load_effects(effects))
+        effects = (*load_effects(Path(calibration) / EFFECTS), *load_effects(effects))
         if randomisation is True:
             randomisation = Randomisation(mass=0.0, yaw_inertia=0.0, motor_rate=0.0, command_delay=0.0)
     elif ground:

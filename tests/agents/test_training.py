@@ -6,6 +6,7 @@ import json
 import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -24,17 +25,22 @@ from agents.settings import PpoSettings, SacSettings, TrainingSettings
 from agents.train_ppo import make_ppo
 from agents.train_sac import make_sac
 from agents.validation import ValidationResult, drive_all
-from ddagr_gym.config import config_names
+from ddagr_gym.config import config_names, dump_config
+from ddagr_gym.envs.calibrated_draws import EFFECTS, CalibratedDraws, GroundDraws
+from ddagr_gym.envs.calibrated_draws import NAME as DRAWS
 from ddagr_gym.envs.options import make_settings
 from ddagr_gym.errors import InputError
 from ddagr_gym.evaluation.metrics import turn_metrics
 from ddagr_gym.evaluation.runs import drive_turn
+from ddagr_gym.parameters import Drivetrain
 from ddagr_gym.physics import layout
 from ddagr_gym.physics.effects import save_effects
+from ddagr_gym.physics.effects.gyro_scale import GyroScale
 from ddagr_gym.physics.effects.slope import Slope
 from ddagr_gym.policies.archive import load_policy
 from ddagr_gym.policies.controller import PolicyController
 from ddagr_gym.policies.design import PolicyDesign
+from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.wrappers.policy_view import PolicyViewVecEnv
 from ddagr_gym.wrappers.sb3 import TurnVecEnv
 
@@ -192,6 +198,44 @@ def test_configurations_are_read_and_overridden():
     changed = load_settings("ppo_ekf", ["ppo.learning_rate=1e-5", "steps=7", "design.frames=2"])
     assert (changed.ppo.learning_rate, changed.steps, changed.design.frames) == (1e-5, 7, 2)
     assert changed.digest() != load_settings("ppo_ekf").digest()
+
+
+@pytest.fixture
+def calibration(tmp_path) -> Path:
+    """A folder with what training takes of a calibration: two grounds, and a delay that differs between drives."""
+    grounds = tuple(GroundDraws(name, get_soil("thesis_a1"), {"soil_strength": 0.1}) for name in ("field", "track"))
+    robot = replace(get_robot("ddagr"), motor_rate=2.5, drivetrain=Drivetrain(command_delay=0.2))
+    (tmp_path / DRAWS).write_text(dump_config(CalibratedDraws(robot, {"command_delay": 0.02}, grounds)))
+    save_effects(tmp_path / EFFECTS, [])
+    return tmp_path
+
+
+def test_a_calibrated_robot_is_trained_on(calibration):
+    changes = [f"task.calibration={calibration}", "task.ground=track", "environments=4"]
+    settings = load_settings("ppo_ekf", changes)
+    environment = make_environment(settings)
+    environment.reset()
+    environment.step(np.zeros((4, environment.action_space.shape[0])))
+    found = environment.unwrapped.env.settings
+    assert found.calibrated is not None
+    assert [item.name for item in found.calibrated.grounds] == ["track"]
+    assert found.randomisation.command_delay == 0.0
+
+
+def test_a_calibration_counts_by_what_it_says(calibration):
+    before = load_settings("ppo_ekf")
+    after, field = (
+        load_settings("ppo_ekf", [f"task.calibration={calibration}", f"task.ground={g}"]) for g in ("''", "field")
+    )
+    digest = after.digest()
+    assert len({before.digest(), digest, field.digest()}) == 3
+    moved = calibration.with_name("moved")
+    calibration.rename(moved)
+    assert load_settings("ppo_ekf", [f"task.calibration={moved}"]).digest() == digest
+    save_effects(moved / EFFECTS, [GyroScale(0.98)])
+    assert load_settings("ppo_ekf", [f"task.calibration={moved}"]).digest() != digest
+    with pytest.raises(InputError, match="give a folder that `ddagr calibrate` wrote"):
+        make_environment(after)
 
 
 def test_a_file_of_effects_counts_by_what_it_says(tmp_path):

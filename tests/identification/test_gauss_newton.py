@@ -10,7 +10,7 @@ import pytest
 from ddagr_gym.control.manoeuvres import MANOEUVRES
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.block_means import sample_windows
-from ddagr_gym.identification.fit_numerics import field_numerics
+from ddagr_gym.identification.fit_numerics import field_numerics, field_slope_numerics
 from ddagr_gym.identification.gauss_newton import cost_of, fit, fit_states, linearised
 from ddagr_gym.identification.nuisances import Nuisances
 from ddagr_gym.identification.parameters import (
@@ -50,8 +50,10 @@ def one_drive(make_drive, robot, soil):
     known = parameters_of(robot, soil)
     chosen = Nuisances((known["soil_strength"], known["motor_rate"]))
 
-    def make(sigma=SIGMA, robust=None) -> Problem:
-        return Problem(robot, soil, sample_windows(windows, sigma), chosen, robust=robust, numerics=field_numerics())
+    def make(sigma=SIGMA, robust=None, slopes=None) -> Problem:
+        return Problem(
+            robot, soil, sample_windows(windows, sigma), chosen, robust=robust, numerics=field_numerics(), slopes=slopes
+        )
 
     return make
 
@@ -65,6 +67,20 @@ def test_the_known_soil_and_motor_are_found(one_drive):
     assert (errors <= np.maximum(3.0 * spread, [0.02, 0.01])).all()
     start = problem.start()
     assert fitted.cost < cost_of(problem, start, problem.predict(start), fitted.elimination)[0]
+
+
+def test_coarse_sensitivities_find_the_same_values(one_drive):
+    """They are differences of predictions by their own numerics: those of the fit's own give its bits."""
+    fine, same, coarse = (
+        fit(one_drive(robust=ROBUST, slopes=slopes), iterations=12, renewals=12, tolerance=1e-4)
+        for slopes in (None, field_numerics(), field_slope_numerics())
+    )
+    np.testing.assert_array_equal(same.by_parameter, fine.by_parameter)
+    np.testing.assert_array_equal(same.elimination.basis, fine.elimination.basis)
+    assert not np.array_equal(coarse.by_parameter, fine.by_parameter)
+    _, spread = linearised(one_drive(robust=ROBUST), fine).deviations()
+    assert (np.abs(coarse.point.values - fine.point.values) <= 0.2 * spread).all()
+    assert coarse.cost <= 1.001 * fine.cost
 
 
 def test_wrong_initial_states_are_found_again(one_drive):
