@@ -163,7 +163,8 @@ def _calibrated(
     folder: Path, ground: str, robot: RobotLike | None, soil: SoilLike | None
 ) -> tuple[Robot, Path, tuple[Effect, ...]]:
     """Robot, soil file and sensors of a calibration; InputError where robot or soil are given besides."""
-    from ddagr_gym.calibration.files import EFFECTS, load_robot, load_soil, soil_file
+    from ddagr_gym.calibration.files import load_robot, load_soil, soil_file
+    from ddagr_gym.envs.calibrated_draws import EFFECTS
     from ddagr_gym.physics.effects import load_effects
 
     if robot is not None or soil is not None:
