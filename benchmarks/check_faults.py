@@ -113,7 +113,7 @@ def draw(result: dict[str, Any], path: Path) -> None:
     rows = result["faults"]
     names, columns = list(rows), list(next(iter(rows.values())))
     with house_style():
-        figure = Figure(figsize=(2.5 + 0.45 * len(columns), 2.0 + 0.33 * len(names)), layout="constrained")
+        figure = Figure(figsize=(max(7.0, 2.5 + 0.45 * len(columns)), 2.0 + 0.33 * len(names)), layout="constrained")
         axes = figure.subplots()
         for y, name in enumerate(names):
             for x, drive in enumerate(columns):
