@@ -42,6 +42,7 @@ from ddagr_gym.version import __version__
 
 if TYPE_CHECKING:
     from ddagr_gym.api.calibrate import CalibrationResult, calibrate
+    from ddagr_gym.api.change import ChangeResult
     from ddagr_gym.api.check import CheckResult, check
     from ddagr_gym.api.diagnose import diagnose
     from ddagr_gym.api.diagnosis_result import DiagnosisResult
@@ -54,6 +55,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "CalibrationResult",
+    "ChangeResult",
     "CheckResult",
     "DiagnosisResult",
     "EstimateResult",
@@ -76,6 +78,7 @@ __all__ = [
 
 _MODULES = {
     "CalibrationResult": "calibrate",
+    "ChangeResult": "change",
     "CheckResult": "check",
     "DiagnosisResult": "diagnosis_result",
     "EstimateResult": "estimate",

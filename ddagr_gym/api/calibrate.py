@@ -115,7 +115,7 @@ class CalibrationResult(Report):
         (folder / DRAWS).write_text(dump_config(draws), encoding="utf-8")
         save_effects(folder / EFFECTS, self.effects, source=self.headline)
         if self.outcome.bank:
-            save_runs(self.outcome.bank, folder / BANK)
+            save_runs(self.outcome.bank, folder / BANK, self.outcome.ordinary)
         self.to_json(folder / NAME)
         write_page(folder, self.calibration, self.outcome.forecasts)
 

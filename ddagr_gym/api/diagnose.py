@@ -7,29 +7,37 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, overload
 
+from ddagr_gym.api.change import ChangeResult, changed
 from ddagr_gym.api.diagnosis_result import DiagnosisResult
 from ddagr_gym.api.inputs import RobotLike, Sources, recordings_from
 from ddagr_gym.api.nominal import Nominal, SoilLike, ThresholdsLike, nominal_from, thresholds_from
-from ddagr_gym.errors import InputWarning, at_least
+from ddagr_gym.errors import InputError, InputWarning, at_least
 from ddagr_gym.extras import need
 from ddagr_gym.progress import counting
 
 if TYPE_CHECKING:
     from ddagr_gym.diagnosis.gates.thresholds import Thresholds
 
-__all__ = ["DiagnosisResult", "diagnose"]
+__all__ = ["ChangeResult", "DiagnosisResult", "diagnose"]
 
 _SAME_WINDOW = 0.5
 """Difference of lengths of windows up to which gates are taken to hold [s] (ours; short segments shorten windows)."""
 
 
+_ROBOT, _SOIL = "ddagr", "thesis_a1"
+"""Nominal ones where none are given, which say nothing beside a calibration."""
+
+
+@overload
 def diagnose(
     recordings: Sources,
-    robot: RobotLike = "ddagr",
-    soil: SoilLike = "thesis_a1",
+    robot: RobotLike = _ROBOT,
+    soil: SoilLike = _SOIL,
     *,
+    calibration: None = None,
+    ground: str = "",
     thresholds: ThresholdsLike | None = None,
     soil_uncertainty: float = 1.0,
     window: float | None = None,
@@ -40,17 +48,65 @@ def diagnose(
     column_map: str | os.PathLike[str] | None = None,
     progress: Callable[[str], None] | None = None,
     cache: str | os.PathLike[str] | None = None,
-) -> DiagnosisResult:
+) -> DiagnosisResult: ...
+
+
+@overload
+def diagnose(
+    recordings: Sources,
+    robot: RobotLike = _ROBOT,
+    soil: SoilLike = _SOIL,
+    *,
+    calibration: str | os.PathLike[str],
+    ground: str = "",
+    thresholds: ThresholdsLike | None = None,
+    soil_uncertainty: float = 1.0,
+    window: float | None = None,
+    stride: float | None = None,
+    seed: int = 0,
+    threads: int = 1,
+    names_only: bool = False,
+    column_map: str | os.PathLike[str] | None = None,
+    progress: Callable[[str], None] | None = None,
+    cache: str | os.PathLike[str] | None = None,
+) -> ChangeResult: ...
+
+
+def diagnose(
+    recordings: Sources,
+    robot: RobotLike = _ROBOT,
+    soil: SoilLike = _SOIL,
+    *,
+    calibration: str | os.PathLike[str] | None = None,
+    ground: str = "",
+    thresholds: ThresholdsLike | None = None,
+    soil_uncertainty: float = 1.0,
+    window: float | None = None,
+    stride: float | None = None,
+    seed: int = 0,
+    threads: int = 1,
+    names_only: bool = False,
+    column_map: str | os.PathLike[str] | None = None,
+    progress: Callable[[str], None] | None = None,
+    cache: str | os.PathLike[str] | None = None,
+) -> DiagnosisResult | ChangeResult:
     """Find the physics that a nominal simulator leaves out: where, what, how big, how sure.
 
     Several recordings of one robot on one ground are diagnosed together; each is then predicted by a model whose sizes
     were fitted to the others. With a single one its halves judge each other, which is weaker: place, day and biases are
     the same.
 
+    With a calibration the question is what changed against the ordinary drives of that robot, which tells far smaller
+    effects: a wrong simulator is wrong in the same way in all of them.
+
     Args:
         recordings: one or several recordings, tables with the schema's columns, paths of files or folders.
         robot: nominal: name, YAML file or object.
         soil: nominal: name, YAML file or object.
+        calibration: folder that ``ddagr calibrate --bank`` wrote: the robot, its grounds and its ordinary drives stand
+            for robot, soil, thresholds and windows, which are left out then.
+        ground: of the calibration that the recordings are on; "" for one of which only the kind is known, where far
+            larger changes are hidden.
         thresholds: of ``ddagr null-bank``, made with these or similar drives; those that ship with the package when it
             is None.
         soil_uncertainty: factor on how far the soil may be from the nominal one; larger where it is only guessed. The
@@ -66,7 +122,8 @@ def diagnose(
             from it; it stays when all is done, and is emptied when it is of another diagnosis.
 
     Returns:
-        Verdict, findings with sizes and intervals, effects and refitted robot and soil for the simulator.
+        Verdict, findings with sizes and intervals, effects and refitted robot and soil for the simulator; with a
+        calibration what changed, and the least change of every effect that would have been found.
 
     Raises:
         InputError: recordings that cannot be diagnosed, unknown names, no thresholds for the robot.
@@ -88,6 +145,15 @@ def diagnose(
     from ddagr_gym.identification.nuisances import NuisancePriors
 
     at_least(threads=(threads, 1), window=(window, 1.0), stride=(stride, 0.1), seed=(seed, 0))
+    if calibration is not None:
+        folder = Path(calibration)
+        _check_left_out(folder, robot, soil, thresholds=thresholds, window=window, stride=stride)
+        _check_known_soil(folder, soil_uncertainty)
+        given = recordings_from(recordings, _robot_of(folder), column_map)
+        say = (lambda line: None) if progress is None else progress
+        return changed(given, folder, ground, seed=seed, threads=threads, with_page=not names_only, progress=say)
+    if ground:
+        raise InputError(f"the ground is {ground!r} and there is no calibration: name its folder with --calibration.")
     need("ruptures", *(() if names_only else ("sklearn",)))
     nominal = nominal_from(robot, soil)
     found = recordings_from(recordings, robot, column_map)
@@ -110,6 +176,30 @@ def diagnose(
             progress=lambda line: None if progress is None else progress(f"  {line}"),
         )
     return DiagnosisResult(outcome)
+
+
+def _check_left_out(folder: Path, robot: RobotLike, soil: SoilLike, **options: object) -> None:
+    """Refuse what a calibration already says; InputError."""
+    beside = {"robot": None if robot == _ROBOT else robot, "soil": None if soil == _SOIL else soil, **options}
+    given = [name for name, value in beside.items() if value is not None]
+    if given:
+        raise InputError(f"a calibration and {given[0]} are given: leave out one of them, {folder} has both.")
+
+
+def _check_known_soil(folder: Path, soil_uncertainty: float) -> None:
+    if soil_uncertainty != 1.0:
+        raise InputError(
+            f"the soil uncertainty is {soil_uncertainty:g} and there is a calibration: leave it out, {folder} says how "
+            "much soils differ; for another ground leave out the ground."
+        )
+
+
+def _robot_of(folder: Path) -> str:
+    """File of a calibration's robot; InputError where the folder is none."""
+    from ddagr_gym.calibration.files import ROBOT, load
+
+    load(folder)
+    return str(folder / ROBOT)
 
 
 def _gates(given: ThresholdsLike | None, nominal: Nominal, soil_uncertainty: float) -> Thresholds:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from ddagr_gym.calibration.settings import HISTORY, CalibrationSettings
 from ddagr_gym.diagnosis.preprocessing.mended_recordings import mend_recordings
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.data_split import evenly
-from ddagr_gym.identification.windows import STATE, WindowSet, cut_windows
+from ddagr_gym.identification.windows import WindowSet, cut_windows, with_presumed_past
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.replay_analysis.prepare import Prepared, prepare
@@ -24,8 +24,6 @@ FEWEST_WINDOWS = 8
 
 SHORTEST_WINDOW = 2.0
 """[s], ours: ten time constants of a bank."""
-
-_OMEGA = slice(STATE.index("omega_right"), STATE.index("omega_left") + 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,15 +124,3 @@ def _duration(recordings: Sequence[Recording], wanted: float) -> float:
     lengths = [(s.stop - s.start - 1) * r.period for r in recordings for s in r.segments()]
     usual = float(np.median(lengths))
     return wanted if usual < SHORTEST_WINDOW else min(wanted, usual)
-
-
-def with_presumed_past(windows: WindowSet) -> WindowSet:
-    """Windows in which the commands that nobody recorded are the bank speeds at the start.
-
-    Before a recorded stretch the first command is no better guess: a step begins with a new one, and a robot that is
-    late goes on as it was.
-    """
-    rows = np.arange(windows.commands.shape[1])
-    unknown = rows[None, :, None] < windows.unknown[:, None, None]
-    commands = np.where(unknown, windows.initial[:, None, _OMEGA], windows.commands)
-    return replace(windows, commands=commands, unknown=np.zeros(windows.count, dtype=np.int64))

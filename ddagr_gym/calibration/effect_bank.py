@@ -11,19 +11,25 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from ddagr_gym.calibration.calibration_data import CalibrationData
 from ddagr_gym.calibration.joint_fit import FittedModel
 from ddagr_gym.calibration.left_out import Forecast
+from ddagr_gym.calibration.ordinary_drives import Ordinary
+from ddagr_gym.calibration.ordinary_files import ordinary_as_mapping, ordinary_from_mapping
 from ddagr_gym.calibration.simulator_values import fitted_robot, fitted_soil
 from ddagr_gym.diagnosis.gates.thresholds import NullRun
 from ddagr_gym.diagnosis.null_bank.bank import NullBank
 from ddagr_gym.diagnosis.setting import Setting
 from ddagr_gym.diagnosis.store import StepCache
 from ddagr_gym.errors import InputError
+from ddagr_gym.files import write_text
 
 NAME = "bank.json"
-VERSION = 1
+VERSION = 2
+READ = (1, 2)
+"""Versions that are read: the first one has no ordinary drives to compare others with."""
 
 STRIDE = 18.0
 """Seconds between windows of 6 s (ours): a third of a drive, so that its scan takes about a minute."""
@@ -66,10 +72,11 @@ def setting_of(data: CalibrationData, threads: int) -> Setting:
     return Setting(threads=threads).with_windows(data.windows.duration, STRIDE)
 
 
-def save_runs(runs: Sequence[NullRun], path: Path) -> None:
-    """Write the runs as JSON."""
-    body = {"version": VERSION, "runs": [asdict(run) for run in runs]}
-    path.write_text(json.dumps(body, indent=1) + "\n", encoding="utf-8")
+def save_runs(runs: Sequence[NullRun], path: Path, ordinary: Ordinary | None = None) -> None:
+    """Write runs, and what a comparison needs of the drives, as JSON."""
+    compared = None if ordinary is None else ordinary_as_mapping(ordinary)
+    body = {"version": VERSION, "runs": [asdict(run) for run in runs], "ordinary": compared}
+    write_text(path, json.dumps(body, allow_nan=False) + "\n")
 
 
 def load_runs(path: Path) -> tuple[NullRun, ...]:
@@ -78,11 +85,42 @@ def load_runs(path: Path) -> tuple[NullRun, ...]:
     Raises:
         InputError: no such file, or another format.
     """
+    body = _read(path)
+    try:
+        return tuple(NullRun(**{**run, "meaningless": tuple(run["meaningless"])}) for run in body["runs"])
+    except (KeyError, TypeError) as error:
+        raise _no_bank(path, error) from None
+
+
+def load_ordinary(path: Path) -> Ordinary:
+    """Read what a comparison needs of the drives.
+
+    Raises:
+        InputError: no such file, another format, or one without it.
+    """
+    body = _read(path)
+    if not body.get("ordinary"):
+        raise InputError(
+            f"{path} says nothing of the sizes of effects in ordinary drives: calibrate again with two drives or more "
+            "and --bank."
+        )
+    try:
+        return ordinary_from_mapping(body["ordinary"])
+    except (KeyError, TypeError, ValueError) as error:
+        raise _no_bank(path, error) from None
+
+
+def _read(path: Path) -> dict[str, Any]:
     try:
         body = json.loads(path.read_text(encoding="utf-8"))
         version = body["version"]
-        if version == VERSION:
-            return tuple(NullRun(**{**run, "meaningless": tuple(run["meaningless"])}) for run in body["runs"])
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise InputError(f"{path} is no bank of drives ({error}): make it with `ddagr calibrate --bank`.") from None
-    raise InputError(f"{path} has version {version!r}, this program reads {VERSION}: calibrate again.")
+        raise _no_bank(path, error) from None
+    if version not in READ:
+        raise InputError(f"{path} has version {version!r}, this program reads {VERSION}: calibrate again.")
+    found: dict[str, Any] = body
+    return found
+
+
+def _no_bank(path: Path, error: Exception) -> InputError:
+    return InputError(f"{path} is no bank of drives ({error}): make it with `ddagr calibrate --bank`.")

@@ -29,6 +29,7 @@ from ddagr_gym.calibration.joint_fit import (
     weigh_and_fit,
 )
 from ddagr_gym.calibration.left_out import forecasts
+from ddagr_gym.calibration.ordinary_drives import Ordinary, ordinary_drives
 from ddagr_gym.calibration.part_selection import Comparison, Selection, select_parts
 from ddagr_gym.calibration.parts import RobotModel
 from ddagr_gym.calibration.residual_tables import spectra, unexplained
@@ -64,6 +65,8 @@ class Outcome:
         forecasts: of the left-out drives.
         bank: what each drive does to every effect of the library beside the robot calibrated without it; empty where
             that was not asked for.
+        ordinary: what a comparison of other drives with these needs; None with a single drive, or where no bank was
+            asked for.
     """
 
     calibration: Calibration
@@ -72,6 +75,7 @@ class Outcome:
     data: CalibrationData
     forecasts: tuple[Forecasts, ...]
     bank: tuple[NullRun, ...] = ()
+    ordinary: Ordinary | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,8 +166,14 @@ def calibrate_drives(
         seconds=time.monotonic() - began,
     )
     found = {ground: fitted_soil(data, ground, model.values) for ground in data.drives_on}
+    calibrated = calibrated_robot(data, model, calibration)
     bank = ordinary_runs(data, model, made, settings.threads, store.step, progress) if with_bank else ()
-    return Outcome(calibration, calibrated_robot(data, model, calibration), found, data, compared, bank)
+    ordinary = (
+        ordinary_drives(data, model, made, calibration, calibrated, settings.threads, store.step, progress)
+        if with_bank and data.count > 1
+        else None
+    )
+    return Outcome(calibration, calibrated, found, data, compared, bank, ordinary)
 
 
 def _rng(settings: CalibrationSettings) -> np.random.Generator:

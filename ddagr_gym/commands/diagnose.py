@@ -17,6 +17,7 @@ from ddagr_gym.progress import LinePrinter
 
 EXAMPLES = (
     "ddagr diagnose run_1.csv.gz run_2.csv.gz run_3.csv.gz --output diagnosis",
+    "ddagr diagnose today.csv.gz --calibration calibration --ground sand --output changed",
     "ddagr diagnose drives --robot ddagr --soil thesis_a1 --thresholds thresholds.json --output diagnosis",
 )
 
@@ -29,6 +30,9 @@ class Arguments:
     were fitted to the others. With a single one its halves judge each other, which is weaker: place, day and biases are
     the same. A diagnosis that was stopped goes on after its last finished step when the command is given again.
 
+    With --calibration the question is what changed against the ordinary drives of that robot: the page shows every
+    effect against them, and from which size on a change would have been found.
+
     Attributes:
         runs: recordings (Parquet of `ddagr import`, or any source that it takes), or folders of them.
         output: folder to write: index.html with its figures, diagnosis.json, evidence.npz, and what `gym.make`,
@@ -36,6 +40,9 @@ class Arguments:
             robot.yaml and soil.yaml with the refitted nominal parameters.
         robot: nominal robot (see `ddagr robots`), or the path of a YAML file with one's own.
         soil: nominal soil (see `ddagr soils`), or the path of a YAML file with one's own.
+        calibration: folder that `ddagr calibrate --bank` wrote, whose robot, grounds and ordinary drives the recordings
+            are compared with; robot, soil, thresholds, window and stride are left out then.
+        ground: of the calibration that the recordings are on; left out for one that it does not know.
         map: shipped map by name or the path of one's own YAML file, for sources that are not imported yet.
         thresholds: of `ddagr null-bank`, made with these or similar drives; those that ship with the package when it is
             left out.
@@ -55,6 +62,8 @@ class Arguments:
     output: Annotated[Path, tyro.conf.arg(aliases=("-o",))]
     robot: str = "ddagr"
     soil: str = "thesis_a1"
+    calibration: Path | None = None
+    ground: str = ""
     map: str = ""
     thresholds: Path | None = None
     soil_uncertainty: float = 1.0
@@ -71,19 +80,24 @@ class Arguments:
 def run(arguments: Arguments) -> int | None:
     """Diagnose, write the folder, print the answer; 130 when interrupted."""
     import ddagr_gym
+    from ddagr_gym.api.diagnosis_result import DiagnosisResult
     from ddagr_gym.api.inputs import recordings_from
+    from ddagr_gym.calibration.files import ROBOT
     from ddagr_gym.diagnosis.store import part_folder
     from ddagr_gym.recordings.files import Limits
 
     check_output_folder(arguments.output, overwrite=arguments.overwrite)
     need(*(() if arguments.names_only else ("jinja2", "matplotlib")))
+    read_as = arguments.robot if arguments.calibration is None else str(arguments.calibration / ROBOT)
     limits = Limits(arguments.maximum_rows, arguments.maximum_bytes)
     parts = part_folder(arguments.output.expanduser().resolve())
     try:
         result = ddagr_gym.diagnose(
-            recordings_from(arguments.runs, arguments.robot, arguments.map or None, limits),
+            recordings_from(arguments.runs, read_as, arguments.map or None, limits),
             arguments.robot,
             arguments.soil,
+            calibration=arguments.calibration,
+            ground=arguments.ground,
             thresholds=arguments.thresholds,
             soil_uncertainty=arguments.soil_uncertainty,
             window=arguments.window,
@@ -99,7 +113,7 @@ def run(arguments: Arguments) -> int | None:
         print(f"ddagr: interrupted; the same command goes on from {parts}.", file=sys.stderr)
         return 130
     shutil.rmtree(parts, ignore_errors=True)
-    if result.robot is None:
+    if isinstance(result, DiagnosisResult) and result.robot is None:
         print(f"ddagr: robot.yaml and soil.yaml are left out, {result.refit_note}", file=sys.stderr)
     print(result)
     print(f"\n{'' if arguments.names_only else 'page, figures, '}diagnosis.json and effects.json: {arguments.output}")

@@ -119,8 +119,12 @@ class Problem:
 
     def with_held_headings(self) -> Problem:
         """The same problem whose headings stay where they are."""
+        return self.holding(np.array([p.heading for p in self.nuisances.parameters]))
+
+    def holding(self, chosen: Chosen) -> Problem:
+        """The same problem whose chosen parameters (P,) stay where they are."""
         held = copy(self)
-        held.prior = np.where([p.heading for p in self.nuisances.parameters], 0.0, self.prior)
+        held.prior = np.where(chosen, 0.0, self.prior)
         return held
 
     def on(self, blocked: BlockedWindows) -> Problem:

@@ -340,3 +340,16 @@ def _near(recording: Recording, name: str, row: int, rows: slice) -> float:
     values, t = recording.channels[name][rows], recording.t[rows]
     known = np.isfinite(values)
     return float(np.interp(recording.t[row], t[known], values[known])) if known.any() else np.nan
+
+
+def with_presumed_past(windows: WindowSet) -> WindowSet:
+    """Windows in which the commands that nobody recorded are the bank speeds at the start.
+
+    Before a recorded stretch the first command is no better guess: a step begins with a new one, and a robot that is
+    late goes on as it was.
+    """
+    rows = np.arange(windows.commands.shape[1])
+    unknown = rows[None, :, None] < windows.unknown[:, None, None]
+    banks = slice(STATE.index("omega_right"), STATE.index("omega_left") + 1)
+    commands = np.where(unknown, windows.initial[:, None, banks], windows.commands)
+    return replace(windows, commands=commands, unknown=np.zeros(windows.count, dtype=np.int64))

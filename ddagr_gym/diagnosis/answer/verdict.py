@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from ddagr_gym.diagnosis.answer.certificate import Certificate
+from ddagr_gym.diagnosis.answer.change import Change
 from ddagr_gym.diagnosis.answer.location import EffectLocation, Localisation
 from ddagr_gym.diagnosis.answer.next_drive_plan import NextDrivePlan
 from ddagr_gym.diagnosis.answer.unnamed_terms import UnnamedTerms
@@ -203,6 +204,11 @@ class Diagnosis:
             `fit` and `localisation`, and in no effects.yaml.
         detectable_alone: the same as `detectable` for all effects beside the nominal model, before any was named.
         schema: name and version of the file's form.
+        change: with `--calibration`, what changed against ordinary drives of the robot; else null. With it `gain` and
+            `gate` of a finding are half the squares of the distance and its limit in `change`, `score` is the distance,
+            `held_out` and `where` are null, `parameters` are what differs from ordinary drives, `calibrated_p` is the
+            probability over the whole library, `detectable` is the least detectable change, `misfit` has no limit,
+            and `complete` says that nothing else is out of the ordinary.
     """
 
     verdict: tuple[str, ...]
@@ -228,3 +234,4 @@ class Diagnosis:
     rejected: tuple[Finding, ...] = ()
     detectable_alone: Mapping[str, Mapping[str, float | None]] = field(default_factory=dict)
     schema: str = SCHEMA
+    change: Change | None = None

@@ -51,7 +51,7 @@ def conclude(
     """
     gates, mended, values = session.gates, session.mended, accepted.chosen.fitted.point.values
     verdict, complete = _verdict(accepted, mended.names, gates)
-    seen = [*_repeat_findings(mended.repeated), *_reversed_gyro_findings(mended.reversed_gyro)]
+    seen = [*_repeat_findings(mended.repeated), *reversed_gyro_findings(mended.reversed_gyro)]
     fitted = _findings(session, found)
     findings, rejected = ((*seen, *fitted), ()) if accepted is found else (tuple(seen), tuple(fitted))
     alone, beside = _detectable(accepted, gates)
@@ -100,7 +100,7 @@ def _repeat_findings(repeated: Sequence[RepeatedReadings]) -> list[Finding]:
     return [Finding("sensor_hold", parameters, repeats, 0.0, repeats**0.5, repeats, {}, {"sensor_hold": 1.0})]
 
 
-def _reversed_gyro_findings(reversed_gyro: ReversedGyro | None) -> list[Finding]:
+def reversed_gyro_findings(reversed_gyro: ReversedGyro | None) -> list[Finding]:
     """A reversed gyro needs no fit: the correlation is the evidence, as the gain of a line through the origin."""
     if reversed_gyro is None:
         return []

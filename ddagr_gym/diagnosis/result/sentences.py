@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from ddagr_gym.diagnosis.answer.change import Change
 from ddagr_gym.diagnosis.answer.verdict import NONE, UNKNOWN, Finding
 from ddagr_gym.diagnosis.wording import amounts, describe, in_sentence
 
@@ -35,6 +36,37 @@ def headline(
     share = "" if misfit_share is None else f"; {share_in_words(misfit_share)} of the mismatch"
     rest = "nothing else above what these data can show" if complete else "something more is left that has no name here"
     return "; ".join([f"{found[:1].upper()}{found[1:]}{share}", *doubts, rest]) + "."
+
+
+def change_headline(verdict: Sequence[str], complete: bool, findings: Sequence[Finding], change: Change) -> str:
+    """What changed against ordinary drives, how much, and what could not have been told.
+
+    Args:
+        verdict: names, or ("none",) or ("unknown",).
+        complete: whether nothing else is out of the ordinary.
+        findings: one per name.
+        change: shifts of all effects.
+    """
+    drives = f"{len(change.ordinary)} ordinary drives"
+    hidden = [in_sentence(name) for name in change.hidden]
+    blind = f"; of {_joined_names(hidden)} no size would have been told" if hidden else ""
+    if tuple(verdict) == (NONE,):
+        return (
+            f"Nothing changed against {drives} that this drive could show: what it would have shown "
+            f"{100.0 * change.power:.0f} times in 100 stands beside each effect{blind}."
+        )
+    if tuple(verdict) == (UNKNOWN,):
+        nearest = _joined_names([in_sentence(item.effect) for item in change.shifts[:3]])
+        return (
+            f"Something changed against {drives} that no effect of the library explains, nearest are {nearest}{blind}."
+        )
+    found = _joined([describe(item.name, amounts(item.parameters)) + _rivals(item) for item in findings])
+    rest = "nothing else is out of the ordinary" if complete else "something else is out of the ordinary"
+    return f"Against {drives}: {found}; {rest}."
+
+
+def _joined_names(names: Sequence[str]) -> str:
+    return " and ".join([", ".join(names[:-1]), names[-1]]) if len(names) > 1 else "".join(names)
 
 
 def _rivals(finding: Finding) -> str:

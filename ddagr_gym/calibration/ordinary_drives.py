@@ -1,0 +1,220 @@
+"""Ordinary drives as a comparison sees them: how all of them are weighed, and what effects seem to be in each.
+
+Each drive is fitted and scanned with the robot that was calibrated without it, so that what the calibration adapted to
+a drive is no part of what that drive says.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ddagr_gym.calibration.calibration_data import CalibrationData
+from ddagr_gym.calibration.joint_fit import FittedModel
+from ddagr_gym.calibration.left_out import Forecast
+from ddagr_gym.calibration.result import Calibration
+from ddagr_gym.calibration.settings import HISTORY
+from ddagr_gym.calibration.simulator_values import SOIL_PARAMETERS, fitted_robot, fitted_soil
+from ddagr_gym.diagnosis.change.drive_fit import change_problem, change_windows, fit_nominal
+from ddagr_gym.diagnosis.change.ordinary import (
+    LEAST_ACCELEROMETER_BIAS,
+    LEAST_GYRO_BIAS,
+    Reference,
+    Weighing,
+    field_deviations,
+    uncertain_parameters,
+)
+from ddagr_gym.diagnosis.change.reference import OrdinaryDrive, scan_ordinary
+from ddagr_gym.diagnosis.store import StepCache
+from ddagr_gym.identification.parameters import ModelParameter, robot_parameters
+from ddagr_gym.identification.timing_repair import aligned_poses
+from ddagr_gym.identification.windows import WindowSet
+from ddagr_gym.parameters import Robot
+from ddagr_gym.replay_analysis.fitting import UNKNOWN_GYRO_BIAS, Weights, misfit_weights, noise_weights
+
+Array = NDArray[np.float64]
+
+UNKNOWN_ACCELEROMETER_BIAS = 1.0
+"""Prior before any drive was fitted [m/s^2] (ours): an IMU that is tilted by 6 degrees."""
+
+MENDED_SIGN = "sign was turned"
+"""In a calibration's note on a drive whose gyro was reversed."""
+
+
+@dataclass(frozen=True, eq=False)
+class Ordinary:
+    """What a comparison needs of ordinary drives besides the calibration's own files.
+
+    Attributes:
+        weighing: of all drives.
+        references: one for each drive.
+    """
+
+    weighing: Weighing
+    references: tuple[Reference, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Left:
+    """What a first fit leaves of one drive.
+
+    Attributes:
+        sigma: (8,) of the channels' residuals.
+        robust: (8,) limits of the loss.
+        gyro_bias: fitted [rad/s].
+        accelerometer_bias: (2,) fitted [m/s^2].
+    """
+
+    sigma: Array
+    robust: Array
+    gyro_bias: float
+    accelerometer_bias: Array
+
+
+def robot_deviations(calibration: Calibration) -> dict[str, float]:
+    """By how much the calibrated parameters of the robot may be off in another drive, as the fit moves them."""
+    found = {item.name: item for item in calibration.parameters if item.calibrated and not item.ground}
+    return {
+        name: float(np.hypot(item.deviation or 0.0, item.scatter.other_grounds or item.deviation or 0.0))
+        for name, item in found.items()
+    }
+
+
+def soil_deviations(calibration: Calibration) -> dict[str, dict[str, float]]:
+    """The same of each ground's soil; as within one field where a single drive was on it."""
+    found = {ground: field_deviations() for ground in calibration.grounds}
+    for item in calibration.parameters:
+        base = item.name.partition("/")[0]
+        if item.calibrated and item.ground and base in SOIL_PARAMETERS and item.scatter.same_ground is not None:
+            found[item.ground][base] = float(np.hypot(item.deviation or 0.0, item.scatter.same_ground))
+    return found
+
+
+def uncertain_robot(robot: Robot, deviations: Mapping[str, float]) -> tuple[ModelParameter, ...]:
+    """Calibrated parameters of a robot with the priors of another drive; a gyro's scale is no part of the robot."""
+    return tuple(
+        replace(p, prior=max(deviations[p.name], LEAST_SHARE * p.step))
+        for p in robot_parameters(robot)
+        if p.name in deviations
+    )
+
+
+LEAST_SHARE = 0.1
+"""Of the step of its finite difference, below which a parameter's deviation means nothing (ours)."""
+
+
+def ordinary_drives(
+    data: CalibrationData,
+    model: FittedModel,
+    made: Sequence[Forecast],
+    calibration: Calibration,
+    robot: Robot,
+    threads: int,
+    cache: StepCache,
+    progress: Callable[[str], None],
+) -> Ordinary:
+    """Weigh and scan every drive with the robot that was calibrated without it.
+
+    Args:
+        data: drives.
+        model: joint fit.
+        made: forecasts of the left-out drives, with the values of the fit without each.
+        calibration: the answer.
+        robot: calibrated, with the deviations of another drive.
+        threads: of the simulator.
+        cache: of drives that are done.
+        progress: called with a line of text for each drive.
+    """
+    without = [_without(data, model, forecast, calibration, robot) for forecast in made]
+    noise = [data.prepared.noise[int(forecast.windows.recording[0])] for forecast in made]
+    blank = Weighing(data.windows.duration, HISTORY, _lateness(data), _gyro_scale(calibration), *_UNKNOWN)
+    left = []
+    for number, (item, own) in enumerate(zip(without, noise, strict=True)):
+        progress(f"what the calibrated robot leaves of {item.name}")
+        weights = partial(noise_weights, [own], imposed=False, dead=data.prepared.dead, unfitted=())
+        left.append(cache(f"ordinary {number} left", partial(_left_of, item, blank, weights, threads)))
+    weighing = pooled(blank, left)
+    references = []
+    for number, item in enumerate(without):
+        progress(f"every effect of the library in {item.name}")
+        references.append(cache(f"ordinary {number}", partial(scan_ordinary, item, weighing, threads)))
+    return Ordinary(weighing, tuple(references))
+
+
+_UNKNOWN = (np.ones(8), np.ones(8), UNKNOWN_GYRO_BIAS, UNKNOWN_ACCELEROMETER_BIAS)
+
+
+def _without(
+    data: CalibrationData, model: FittedModel, forecast: Forecast, calibration: Calibration, robot: Robot
+) -> OrdinaryDrive:
+    """The left-out drive of a forecast and the robot that was fitted to the others."""
+    number = int(forecast.windows.recording[0])
+    ground = data.grounds[number]
+    values = forecast.values_of(model)
+    own = replace(fitted_robot(model.model.robot, values), standard_deviations=robot.standard_deviations)
+    return OrdinaryDrive(
+        name=data.names[number],
+        ground=ground,
+        alone=len(data.drives_on[ground]) == 1,
+        # the drive's own lateness was taken out of its poses
+        recording=aligned_poses(data.prepared.recordings[number], -data.prepared.noise[number].pose_lateness),
+        robot=own,
+        soil=fitted_soil(data, ground, values),
+        parameters=uncertain_robot(own, robot_deviations(calibration)),
+        deviations=soil_deviations(calibration)[ground],
+        reversed_gyro=any(MENDED_SIGN in note for note in data.notes[number]),
+    )
+
+
+def _lateness(data: CalibrationData) -> float:
+    """Mean of the drives in which it is known."""
+    known = [item.pose_lateness for item in data.prepared.noise if item.pose_lateness > 0.0]
+    return float(np.mean(known)) if known else 0.0
+
+
+def _gyro_scale(calibration: Calibration) -> float:
+    found = [item.value for item in calibration.parameters if item.name == "gyro_scale" and item.calibrated]
+    return 1.0 if not found or found[0] is None else found[0]
+
+
+def _left_of(item: OrdinaryDrive, blank: Weighing, noise: Callable[[WindowSet], Weights], threads: int) -> _Left:
+    """Weights and biases by a first fit with those of the sensors' noise."""
+    windows = change_windows([item.recording], item.robot, blank)
+    weights = noise(windows)
+    parameters = uncertain_parameters(item.soil, item.parameters, item.deviations, blank, 1)
+    first = replace(blank, sigma=weights.sigma, robust=weights.robust)
+    problem = change_problem(item.robot, item.soil, windows, parameters, first, threads)
+    rough = misfit_weights(windows, problem.predict(problem.start()), weights)
+    second = replace(blank, sigma=rough.sigma, robust=rough.robust)
+    problem = change_problem(item.robot, item.soil, windows, parameters, second, threads)
+    fitted = fit_nominal(problem)
+    left = misfit_weights(windows, fitted.prediction, weights)
+    biases = fitted.point.values[-3:]
+    return _Left(left.sigma[0, 0], left.robust, float(biases[0]), biases[1:])
+
+
+def pooled(blank: Weighing, left: Sequence[_Left]) -> Weighing:
+    """Weights of all drives, and how much biases differ between them, the accelerometer's from level ground's.
+
+    Args:
+        blank: how drives are cut.
+        left: of each drive.
+    """
+    sigma = np.stack([item.sigma for item in left])
+    known = np.isfinite(sigma)
+    square = np.where(known, sigma, 0.0) ** 2
+    with np.errstate(divide="ignore", invalid="ignore"):
+        mean = np.where(known.any(axis=0), np.sqrt(square.sum(axis=0) / known.sum(axis=0)), np.inf)
+    gyro = np.array([item.gyro_bias for item in left])
+    accelerometer = np.concatenate([item.accelerometer_bias for item in left])
+    return replace(
+        blank,
+        sigma=mean,
+        robust=np.min([item.robust for item in left], axis=0),
+        gyro_bias=max(LEAST_GYRO_BIAS, float(np.sqrt(np.mean(gyro**2)))),
+        accelerometer_bias=max(LEAST_ACCELEROMETER_BIAS, float(np.sqrt(np.mean(accelerometer**2)))),
+    )

@@ -1,0 +1,94 @@
+"""What a comparison needs of ordinary drives as JSON knows it: null stands for what is infinite."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ddagr_gym.calibration.ordinary_drives import Ordinary
+from ddagr_gym.diagnosis.change.ordinary import Reference, Scores, Weighing
+
+Array = NDArray[np.float64]
+
+DIGITS = 9
+"""Of a number in the file (ours): estimates are known to a few."""
+
+
+def ordinary_as_mapping(ordinary: Ordinary) -> dict[str, Any]:
+    """Plain mapping of weights and references."""
+    weighing = {item.name: _plain(getattr(ordinary.weighing, item.name)) for item in fields(Weighing)}
+    return {"weighing": weighing, "references": [_reference(item) for item in ordinary.references]}
+
+
+def ordinary_from_mapping(mapping: Mapping[str, Any]) -> Ordinary:
+    """Weights and references of a mapping.
+
+    Raises:
+        KeyError, TypeError, ValueError: an entry is missing or wrong.
+    """
+    given = mapping["weighing"]
+    weighing = Weighing(
+        window=float(given["window"]),
+        history=float(given["history"]),
+        lateness=float(given["lateness"]),
+        gyro_scale=float(given["gyro_scale"]),
+        sigma=_array(given["sigma"]),
+        robust=_array(given["robust"]),
+        gyro_bias=float(given["gyro_bias"]),
+        accelerometer_bias=float(given["accelerometer_bias"]),
+    )
+    return Ordinary(weighing, tuple(_reference_of(item) for item in mapping["references"]))
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return [_plain(item) for item in value]
+    number = float(value)
+    return float(f"{number:.{DIGITS}g}") if np.isfinite(number) else None
+
+
+def _array(values: Sequence[float | None]) -> Array:
+    return np.array([np.inf if value is None else value for value in values], dtype=np.float64)
+
+
+def _reference(item: Reference) -> dict[str, Any]:
+    return {
+        "drive": item.drive,
+        "ground": item.ground,
+        "reversed_gyro": item.reversed_gyro,
+        "known_ground": _scores(item.known_ground),
+        "other_ground": _scores(item.other_ground),
+    }
+
+
+def _reference_of(mapping: Mapping[str, Any]) -> Reference:
+    return Reference(
+        str(mapping["drive"]),
+        str(mapping["ground"]),
+        bool(mapping["reversed_gyro"]),
+        _scores_of(mapping["known_ground"]),
+        _scores_of(mapping["other_ground"]),
+    )
+
+
+def _scores(item: Scores) -> dict[str, Any]:
+    """Symmetric matrices by their upper triangles, row by row."""
+    upper = np.triu_indices(len(item.keys))
+    matrices = {name: _plain(getattr(item, name)[upper]) for name in ("information", "within", "between")}
+    return {"keys": list(item.keys), "gradient": _plain(item.gradient), **matrices}
+
+
+def _scores_of(mapping: Mapping[str, Any]) -> Scores:
+    keys = tuple(str(key) for key in mapping["keys"])
+    upper = np.triu_indices(len(keys))
+
+    def matrix(name: str) -> Array:
+        found = np.zeros((len(keys), len(keys)))
+        found[upper] = _array(mapping[name])
+        return np.asarray(found + np.triu(found, 1).T)
+
+    return Scores(keys, _array(mapping["gradient"]), matrix("information"), matrix("within"), matrix("between"))

@@ -1,0 +1,35 @@
+"""A calibration's folder as a comparison takes it."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+from ddagr_gym.calibration.effect_bank import NAME, load_ordinary
+from ddagr_gym.calibration.files import load, load_robot, load_soil
+from ddagr_gym.calibration.ordinary_drives import robot_deviations, soil_deviations, uncertain_robot
+from ddagr_gym.diagnosis.change.ordinary import OrdinaryRobot
+
+
+def load_ordinary_robot(folder: Path) -> OrdinaryRobot:
+    """The calibrated robot of a folder with what its ordinary drives are like.
+
+    Args:
+        folder: that ``ddagr calibrate --bank`` wrote.
+
+    Raises:
+        InputError: no such folder, no bank in it, or one that an earlier version wrote.
+    """
+    calibration = load(folder)
+    ordinary = load_ordinary(folder / NAME)
+    robot = load_robot(folder)
+    return OrdinaryRobot(
+        robot,
+        {ground: load_soil(folder, ground)[1] for ground in calibration.grounds},
+        uncertain_robot(robot, robot_deviations(calibration)),
+        soil_deviations(calibration),
+        ordinary.weighing,
+        ordinary.references,
+        folder.name,
+        hashlib.sha256((folder / NAME).read_bytes()).hexdigest(),
+    )

@@ -1,0 +1,91 @@
+"""What changed against a robot's ordinary drives: the part of an answer that a calibration adds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class SizeShift:
+    """How far one size of an effect is from what it is in ordinary drives.
+
+    Attributes:
+        value: shift of the estimate, with all effects but this one at nothing, in unit.
+        deviation: of the shift: within the drive, between ordinary drives, and of their mean.
+        unit: SI.
+        least_detectable: shift that would be found in 80 % of such drives with 5 % false alarms over the whole library;
+            null where none that exists would be.
+    """
+
+    value: float
+    deviation: float
+    unit: str
+    least_detectable: float | None
+
+
+@dataclass(frozen=True)
+class EffectShift:
+    """One effect of the library, compared with ordinary drives.
+
+    Attributes:
+        effect: name.
+        distance: of its sizes from those of ordinary drives, in standard deviations of all that makes them differ.
+        limit: distance that ordinary drives exceed for any effect of the library in 5 % of the cases.
+        probability: that an ordinary drive shows such a distance in any effect of the library.
+        degrees: of freedom of the scatter between ordinary drives.
+        sizes: by field.
+    """
+
+    effect: str
+    distance: float
+    limit: float
+    probability: float
+    degrees: float
+    sizes: Mapping[str, SizeShift]
+
+
+@dataclass(frozen=True)
+class ParameterShift:
+    """A parameter of the calibrated robot or of its ground, and its estimate in this drive.
+
+    Attributes:
+        name: of the parameter.
+        unit: of both; "-" stands for the logarithm of a factor.
+        change: from the calibrated value, fitted without any effect.
+        with_effects: the same beside the named effects.
+        expected_deviation: by which ordinary drives differ from the calibrated value.
+    """
+
+    name: str
+    unit: str
+    change: float
+    with_effects: float
+    expected_deviation: float
+
+
+@dataclass(frozen=True)
+class Change:
+    """What changed against the ordinary drives of a calibrated robot.
+
+    Attributes:
+        ground: of the calibration that the drive was taken to be on; "" where it was not known.
+        ordinary: names of the ordinary drives that it was compared with.
+        level: of false alarms over the whole library.
+        power: with which a least detectable shift is found.
+        windows: that were compared.
+        shifts: of every effect, the most conspicuous first.
+        parameters: of robot and ground.
+        hidden: effects of which no size that exists would have been found in such drives.
+        not_compared: effects that were not looked for, with the reason.
+    """
+
+    ground: str
+    ordinary: tuple[str, ...]
+    level: float
+    power: float
+    windows: int
+    shifts: tuple[EffectShift, ...]
+    parameters: tuple[ParameterShift, ...]
+    hidden: tuple[str, ...]
+    not_compared: Mapping[str, str]

@@ -1,0 +1,225 @@
+"""The answer of a comparison: verdict, findings with intervals, shifts and least detectable changes of every effect."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from ddagr_gym.diagnosis.answer.change import Change, EffectShift, ParameterShift, SizeShift
+from ddagr_gym.diagnosis.answer.verdict import NONE, UNKNOWN, Diagnosis, Estimate, Finding, GatesUsed, Options
+from ddagr_gym.diagnosis.change.drive_scan import NAMED, NOT_COMPARED
+from ddagr_gym.diagnosis.change.naming import Model, Named, Step
+from ddagr_gym.diagnosis.change.ordinary import OrdinaryRobot
+from ddagr_gym.diagnosis.change.shifts import LEVEL, POWER, Pull, Shift, sizes_of
+from ddagr_gym.diagnosis.preprocessing.mended_recordings import MendedRecordings
+from ddagr_gym.diagnosis.result.conclusion import data_source, reversed_gyro_findings
+from ddagr_gym.diagnosis.result.sentences import change_headline
+from ddagr_gym.diagnosis.result.uncertainty import LEVEL as INTERVAL
+from ddagr_gym.diagnosis.search.candidates import moved_field
+from ddagr_gym.identification.effect_parameters import effect_parameters
+from ddagr_gym.identification.misfit import channel_misfit
+from ddagr_gym.identification.problem import Problem
+from ddagr_gym.physics.effects import Effect
+from ddagr_gym.physics.effects.gyro_sign import GyroSign
+from ddagr_gym.version import __version__
+
+
+def conclude_change(
+    problem: Problem, mended: MendedRecordings, ordinary: OrdinaryRobot, ground: str, named: Named
+) -> tuple[Diagnosis, tuple[Effect, ...]]:
+    """The answer, without checks of the data and time, and the effects that it names.
+
+    Args:
+        problem: of the drives.
+        mended: the drives.
+        ordinary: calibrated robot.
+        ground: that they were taken to be on; "" where it was not known.
+        named: what changed.
+    """
+    turned = mended.reversed_gyro is not None and not _usually_reversed(ordinary)
+    seen = tuple(reversed_gyro_findings(mended.reversed_gyro)) if turned else ()
+    findings = (*seen, *(_finding(named, k) for k in range(len(named.steps))))
+    complete = not (named.models[-1].conspicuous or named.models[-1].pulled)
+    verdict = tuple(item.name for item in findings) or ((NONE,) if complete else (UNKNOWN,))
+    change = _change(problem, ordinary, ground, named)
+    diagnosis = Diagnosis(
+        verdict,
+        complete,
+        findings,
+        change_headline(verdict, complete, findings, change),
+        {
+            "nominal": channel_misfit(problem, named.models[0].fitted),
+            "corrected": channel_misfit(problem, named.models[-1].fitted),
+            "limit": {},
+        },
+        {item.effect: {name: size.least_detectable for name, size in item.sizes.items()} for item in change.shifts},
+        {item.name: item.with_effects for item in change.parameters},
+        tuple(recording.meta.source for recording in mended.recordings),
+        GatesUsed(
+            nulls=len(ordinary.references), bank=ordinary.digest, level=LEVEL, robot=ordinary.robot.name,
+            soil=ground or None, kind="ordinary",
+        ),
+        0.0,
+        __version__,
+        data=tuple(data_source(recording) for recording in mended.recordings),
+        robot=ordinary.robot.name,
+        soil=ground,
+        options=Options(window=ordinary.weighing.window, robot_file=ordinary.source or None),
+        change=change,
+    )  # fmt: skip
+    return diagnosis, (*((GyroSign(1.0),) if turned else ()), *named.models[-1].fitted.point.effects)
+
+
+def _usually_reversed(ordinary: OrdinaryRobot) -> bool:
+    """Whether most ordinary drives have a reversed gyro."""
+    return 2 * sum(item.reversed_gyro for item in ordinary.references) > len(ordinary.references)
+
+
+def _finding(named: Named, number: int) -> Finding:
+    """The finding of one step; its sizes are those of the last model."""
+    step, before, last = named.steps[number], named.models[number], named.models[-1]
+    effect = last.fitted.point.effects[number]
+    evidence = _evidence(before, step)
+    return Finding(
+        effect.name,
+        _estimates(last, number, step),
+        0.5 * evidence.distance**2,
+        0.5 * evidence.limit(before.tests) ** 2,
+        evidence.distance,
+        math.nan,
+        {},
+        dict(step.weights),
+        calibrated_p=before.probability(evidence),
+    )
+
+
+def _evidence(before: Model, step: Step) -> Shift | Pull:
+    """What spoke for an effect: its shift, or that of the parameter that had taken it over."""
+    if before.probability(step.shift) < LEVEL or not before.pulled:
+        return step.shift
+    return max(before.pulled, key=lambda pull: pull.distance)
+
+
+def _estimates(model: Model, number: int, step: Step) -> dict[str, Estimate]:
+    """Sizes and shapes of a named effect, as changes against ordinary drives, with 90 % intervals."""
+    effect = model.fitted.point.effects[number]
+    ordinary, between = _in_ordinary(step.shift)
+    within = _within(model)
+    quantile = _quantile(step.shift.degrees)
+    found = {}
+    for name in (*effect.size_names(), *effect.shape_names()):
+        value = float(getattr(effect, name)) - ordinary.get(name, 0.0)
+        variance = within.get((number, name), math.nan) + between.get(name, 0.0)
+        half = quantile * math.sqrt(variance) if variance >= 0.0 else math.nan
+        interval = (value - half, value + half) if math.isfinite(half) and effect.differentiable else None
+        found[name] = Estimate(value, str(effect.parameter(name).metadata["unit"]), interval)
+    return found
+
+
+def _quantile(degrees: float) -> float:
+    from scipy.special import stdtrit
+
+    return float(stdtrit(degrees, 0.5 + 0.5 * INTERVAL))
+
+
+def _in_ordinary(shift: Shift) -> tuple[dict[str, float], dict[str, float]]:
+    """By field, what ordinary drives show of an effect, and the variance between them."""
+    candidate = shift.compared.candidate
+    if not candidate.has_sizes or candidate.is_direction:
+        return {}, {}
+    mean: dict[str, float] = {}
+    variance: dict[str, float] = {}
+    for k, probe in enumerate(candidate.probes):
+        name, _, away = moved_field(probe)
+        mean[name] = mean.get(name, 0.0) + float(shift.mean[k] * away)
+        variance[name] = variance.get(name, 0.0) + float(shift.between[k, k] * away**2)
+    return mean, variance
+
+
+def _within(model: Model) -> dict[tuple[int, str], float]:
+    """Variances of the fitted fields of named effects within the drive, beside each other."""
+    parameters = effect_parameters(model.fitted.point.effects)
+    keys = [f"{NAMED}{k}" for k in range(len(parameters))]
+    if not keys:
+        return {}
+    scores = model.scan.scores()
+    found: dict[tuple[int, str], float] = {}
+    for k, item in enumerate(parameters):
+        others = [key for key in keys if key != keys[k]]
+        size = sizes_of(scores, [keys[k]], np.zeros(1), others)
+        if size is not None:
+            found[item.effect, item.field] = float(size.within[0, 0])
+    return found
+
+
+def _change(problem: Problem, ordinary: OrdinaryRobot, ground: str, named: Named) -> Change:
+    first, last = named.models[0], named.models[-1]
+    shifts = _effect_shifts(first)
+    parameters = tuple(
+        ParameterShift(p.name, p.unit, float(a), float(b), p.prior)
+        for p, a, b in zip(
+            problem.nuisances.parameters, first.fitted.point.values, last.fitted.point.values, strict=True
+        )
+    )
+    hidden = tuple(item.effect for item in shifts if all(size.least_detectable is None for size in item.sizes.values()))
+    return Change(
+        ground,
+        tuple(item.drive for item in ordinary.references),
+        LEVEL,
+        POWER,
+        problem.blocked.windows.count,
+        shifts,
+        parameters,
+        hidden,
+        dict(NOT_COMPARED),
+    )
+
+
+def _effect_shifts(model: Model) -> tuple[EffectShift, ...]:
+    """Shift of every effect, the most conspicuous first; the usual form stands for what is not conspicuous."""
+    usual: dict[str, Shift] = {}
+    known = {id(shift.compared): shift for shift in model.shifts}
+    for item in model.scan.compared:
+        if id(item) in known:
+            usual.setdefault(item.name, known[id(item)])
+    found = []
+    for best in model.best:
+        probability = model.probability(best)
+        shown = best if probability < LEVEL else usual[best.compared.name]
+        limit = best.limit(model.tests)
+        sizes = _size_shifts(shown, model.tests)
+        found.append(EffectShift(best.compared.name, best.distance, limit, probability, best.degrees, sizes))
+    return tuple(found)
+
+
+def _size_shifts(shift: Shift, tests: int) -> Mapping[str, SizeShift]:
+    """By field; of a direction that which shows worst."""
+    candidate, reach = shift.compared.candidate, shift.detectable(tests)
+    found: dict[str, SizeShift] = {}
+    for k, probe in enumerate(candidate.probes):
+        name, data, away = moved_field(probe)
+        scale = abs(away) if probe.differentiable else 1.0
+        deviation = float(np.sqrt(shift.covariance[k, k])) * scale
+        value = float(shift.value[k]) * away if probe.differentiable else math.nan
+        item = SizeShift(value, deviation, str(data["unit"]), _stated(shift, k, float(reach[k])))
+        before = found.get(name)
+        if before is None or _worse(item, before):
+            found[name] = item
+    return found
+
+
+def _worse(item: SizeShift, other: SizeShift) -> bool:
+    return other.least_detectable is not None and (item.least_detectable or math.inf) > other.least_detectable
+
+
+def _stated(shift: Shift, k: int, multiple: float) -> float | None:
+    """Least detectable size of a probe; None where none that exists would be found."""
+    candidate, probe = shift.compared.candidate, shift.compared.candidate.probes[k]
+    name, _, away = moved_field(probe)
+    if candidate.whole is not None:
+        return 1.0 if multiple <= candidate.whole else None
+    if not probe.differentiable:
+        return float(getattr(probe, name)) if multiple <= 1.0 else None
+    return multiple * abs(away) if multiple * abs(away) <= probe.reach(name) else None

@@ -1,0 +1,98 @@
+"""Drives cut into windows and fitted by the calibrated robot, all that may differ between ordinary drives left free."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ddagr_gym.diagnosis.change.ordinary import Weighing
+from ddagr_gym.errors import InputError
+from ddagr_gym.identification.block_means import sample_windows
+from ddagr_gym.identification.data_split import evenly
+from ddagr_gym.identification.fit_numerics import field_numerics
+from ddagr_gym.identification.gauss_newton import Fitted, fit
+from ddagr_gym.identification.nuisances import Nuisances
+from ddagr_gym.identification.parameters import ModelParameter
+from ddagr_gym.identification.problem import Problem
+from ddagr_gym.identification.timing_repair import aligned_poses, bridged
+from ddagr_gym.identification.windows import WindowSet, cut_windows, with_presumed_past
+from ddagr_gym.parameters import Robot, Soil
+from ddagr_gym.recordings.schema import Recording
+from ddagr_gym.replay_analysis.fitting import TOLERANCE
+
+MOST_WINDOWS = 40
+"""Windows of a drive that are compared, evenly chosen (ours): 4 min of it, whose scan takes about a minute."""
+
+FEWEST_WINDOWS = 8
+"""Windows below which their scatter has no meaning: that of a calibration."""
+
+ITERATIONS = 6
+"""Most Gauss-Newton steps of a fit (ours): ordinary drives start near their end."""
+
+SHORTEST_SHARE = 0.5
+"""Of the calibration's windows, to which those of short segments may be cut (ours): other effects show in shorter
+ones."""
+
+
+def change_windows(recordings: Sequence[Recording], robot: Robot, weighing: Weighing) -> WindowSet:
+    """Windows of drives, poses and gyro as ordinary drives have them.
+
+    Args:
+        recordings: mended, of one robot and period.
+        robot: calibrated.
+        weighing: of its ordinary drives.
+
+    Raises:
+        InputError: too few windows of the calibration's length.
+    """
+    even = [_with_gyro_scaled(aligned_poses(bridged(r), weighing.lateness), weighing.gyro_scale) for r in recordings]
+    windows = cut_windows(
+        even, weighing.window, wheel_radius=robot.outer_radius, half_track=robot.half_track, history=weighing.history
+    )
+    if windows.count < FEWEST_WINDOWS:
+        names = ", ".join(recording.meta.source for recording in recordings)
+        raise InputError(
+            f"{names}: {windows.count} windows of {weighing.window:.3g} s without a gap and with commands are too few "
+            f"to compare with ordinary drives: give {FEWEST_WINDOWS * weighing.window:.0f} s at least."
+        )
+    rows = [np.flatnonzero(windows.recording == number) for number in range(len(recordings))]
+    chosen = np.concatenate([found[evenly(found.size, MOST_WINDOWS)] for found in rows if found.size])
+    return with_presumed_past(windows.subset(chosen))
+
+
+def _with_gyro_scaled(recording: Recording, scale: float) -> Recording:
+    """The drive with the readings of a gyro of sensitivity 1."""
+    if scale == 1.0 or not recording.has("yaw_rate"):
+        return recording
+    return replace(recording, channels={**recording.channels, "yaw_rate": recording["yaw_rate"] / scale})
+
+
+def change_problem(
+    robot: Robot,
+    soil: Soil,
+    windows: WindowSet,
+    parameters: tuple[ModelParameter, ...],
+    weighing: Weighing,
+    threads: int,
+) -> Problem:
+    """The fit of windows with the weights of ordinary drives.
+
+    Args:
+        robot: calibrated.
+        soil: to start from.
+        windows: of the drives.
+        parameters: that may move.
+        weighing: of ordinary drives.
+        threads: of the simulator.
+    """
+    return Problem(
+        robot, soil, sample_windows(windows, weighing.sigma), Nuisances(parameters), robust=weighing.robust,
+        threads=threads, numerics=field_numerics(),
+    )  # fmt: skip
+
+
+def fit_nominal(problem: Problem) -> Fitted:
+    """Fit of a problem without effects."""
+    return fit(problem, iterations=ITERATIONS, tolerance=TOLERANCE, renewals=ITERATIONS)

@@ -1,0 +1,171 @@
+"""One scan of the library on a drive: what each effect would change, and what the drive says of its size.
+
+As the scan of a diagnosis (:mod:`ddagr_gym.diagnosis.search.scan`), but only of probes that mean the same in every
+drive, so that drives can be compared.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ddagr_gym.diagnosis.change.ordinary import Scores
+from ddagr_gym.diagnosis.search.candidates import Candidate, candidates_of, moved_field
+from ddagr_gym.diagnosis.search.inner_products import InnerProducts
+from ddagr_gym.diagnosis.search.scan import drive_extent, probe_column
+from ddagr_gym.diagnosis.search.sensor_effects import record_drives
+from ddagr_gym.identification.effect_parameters import effect_columns, effect_parameters
+from ddagr_gym.identification.gauss_newton import Fitted
+from ddagr_gym.identification.problem import Problem
+from ddagr_gym.physics.effects import Effect
+from ddagr_gym.physics.effects.registry import effect_kinds
+
+Array = NDArray[np.float64]
+
+NOT_COMPARED: Mapping[str, str] = {
+    "sensor_hold": "repeated readings are found in the values themselves, by a diagnosis without a calibration",
+    "soil_patch": "a place of one drive has no counterpart in others",
+}
+"""Effects that have no size which two drives share."""
+
+NAMED = "named "
+"""Begins the keys of the fitted parameters of named effects."""
+
+
+@dataclass(frozen=True, eq=False)
+class Compared:
+    """A candidate of the library whose probes mean the same in every drive.
+
+    Attributes:
+        candidate: the probes.
+        keys: (k,) of them.
+    """
+
+    candidate: Candidate
+    keys: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        """Of the effect."""
+        return self.candidate.name
+
+    @property
+    def ridge(self) -> Array:
+        """(k,) information on the probes' multiples before any data: none exists beyond the reach of its size."""
+        return np.array([_least_information(probe) for probe in self.candidate.probes])
+
+
+def _least_information(probe: Effect) -> float:
+    if not probe.differentiable:
+        return 0.0
+    name, _, away = moved_field(probe)
+    return float((away / probe.reach(name)) ** 2)
+
+
+def _compared(candidate: Candidate, number: int) -> Compared | None:
+    """A candidate with its keys; None for one that belongs to a time of the drive."""
+    for probe in candidate.probes:
+        onset = probe.as_mapping()["parameters"].get("onset")
+        if onset is not None and onset != probe.parameter("onset").default:
+            return None
+    keys = tuple(f"{candidate.name} {number + k}" for k in range(len(candidate.probes)))
+    return Compared(candidate, keys)
+
+
+def library(problem: Problem, fitted: Fitted) -> tuple[Compared, ...]:
+    """Candidates of all effects that are compared, but for those that the fit has.
+
+    Args:
+        problem: what was fitted.
+        fitted: with or without effects.
+    """
+    extent = drive_extent(problem, fitted.prediction)
+    assumed = {effect.name for effect in fitted.point.effects}
+    found: list[Compared] = []
+    for name, kind in effect_kinds().items():
+        if name in NOT_COMPARED or name in assumed:
+            continue
+        number = 0
+        for candidate in candidates_of(kind, extent, 0):
+            item = _compared(candidate, number)
+            number += len(candidate.probes)
+            found += [] if item is None else [item]
+    return tuple(found)
+
+
+@dataclass(frozen=True, eq=False)
+class DriveScan:
+    """Scan of drives at a fit.
+
+    Attributes:
+        compared: candidates.
+        keys: (K,) of the columns: parameters of the fit's effects, then probes.
+        products: inner products by window of residual, what may differ between drives, and these columns.
+        free: (P,) indices of the fit's parameters among those of the problem.
+    """
+
+    compared: tuple[Compared, ...]
+    keys: tuple[str, ...]
+    products: InnerProducts
+    free: NDArray[np.int64]
+
+    def scores(self, deviations: Array | None = None) -> Scores:
+        """Gradient and information of the columns, with their covariances.
+
+        Args:
+            deviations: (P,) priors of what may differ between drives; those of the fit by default.
+        """
+        products = self.products
+        if deviations is not None:
+            products = InnerProducts(products.normals, deviations**-2.0, products.values)
+        reduced = products.reduced()
+        answer = reduced.nuisance[:, 1:]
+        # columns without what parameters explain of them
+        left = np.concatenate([-answer, np.eye(answer.shape[1])])
+        gradients = products.normals[:, 0, 1:] @ left
+        informations = left.T @ products.normals[:, 1:, 1:] @ left
+        # a parameter that is off by d moves the gradient by answer' precision d
+        moved = answer * np.sqrt(products.precision)[:, None]
+        between = moved.T @ moved
+        within = scattered(gradients)
+        return Scores(self.keys, reduced.gradient, reduced.information, within, between, gradients, informations)
+
+
+def scattered(gradients: Array) -> Array:
+    """(K, K) covariance of a sum of gradients (W, K) by the scatter of the windows."""
+    count = len(gradients)
+    away = gradients - gradients.mean(axis=0)
+    return np.asarray(away.T @ away * count / (count - 1))
+
+
+def scan_drive(problem: Problem, fitted: Fitted) -> DriveScan:
+    """Scan the library at a fit; parameters of its effects are columns of their own.
+
+    Args:
+        problem: what was fitted.
+        fitted: with or without effects.
+    """
+    compared = library(problem, fitted)
+    drives = record_drives(problem, fitted.point)
+    named = effect_parameters(fitted.point.effects)
+    columns = [probe_column(problem, fitted, probe, drives) for item in compared for probe in item.candidate.probes]
+    by_effect = effect_columns(problem, fitted.point, fitted.prediction, named)
+    free = problem.open_at(fitted.point)
+    raw = np.concatenate(
+        [
+            problem.residual(fitted.point, fitted.prediction)[..., None],
+            problem.padded(
+                np.concatenate([fitted.by_parameter[..., free], by_effect, np.stack(columns, axis=2)], axis=2)
+            ),
+        ],
+        axis=2,
+    )
+    projected = fitted.elimination.project(raw)
+    products = InnerProducts(
+        np.matmul(projected.transpose(0, 2, 1), projected), problem.prior[free] ** -2.0, fitted.point.values[free]
+    )
+    keys = (*(f"{NAMED}{k}" for k in range(len(named))), *(key for item in compared for key in item.keys))
+    return DriveScan(compared, keys, products, free)

@@ -1,0 +1,285 @@
+"""Names for what changed: the effect beside which nothing else is out of the ordinary, one after the other.
+
+An effect that is not the one that changed leaves shifts of others behind when it is fitted; the right one takes all of
+them away. Of those that do, the joint refits decide, and what they do not tell apart stays an equivalence set.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ddagr_gym.diagnosis.change.drive_fit import ITERATIONS
+from ddagr_gym.diagnosis.change.drive_scan import NAMED, DriveScan, scan_drive
+from ddagr_gym.diagnosis.change.ordinary import Scores
+from ddagr_gym.diagnosis.change.shifts import (
+    EXPECTED_DRIVES,
+    LEVEL,
+    Pull,
+    Shift,
+    explained,
+    family_probability,
+    shift_of,
+    sizes_of,
+)
+from ddagr_gym.diagnosis.result.equivalence import equivalence_weights
+from ddagr_gym.diagnosis.search.initial_guess import first_guess
+from ddagr_gym.diagnosis.search.scanned_model import Rival
+from ddagr_gym.identification.gauss_newton import Fitted, fit
+from ddagr_gym.identification.misfit import dispersion_of
+from ddagr_gym.identification.problem import Point, Problem
+from ddagr_gym.replay_analysis.fitting import TOLERANCE
+
+MOST_NAMES = 3
+"""Effects that may be named together: as in a diagnosis."""
+
+MOST_RIVALS = 4
+"""Effects that are refitted at each step (ours): a refit with its scan costs a minute on a long drive."""
+
+FORM = 0.1
+"""Share of the distance of a named effect that a further one needs (ours, as for intervals): the library's form of an
+effect is not the robot's, and the rest of it looks like other effects."""
+
+CLOSE = 0.8
+"""Share of the best refit's gain below which another is no rival of one that leaves nothing out of the ordinary (ours:
+further than any weight of an equivalence set)."""
+
+NEARLY = 1.1
+"""Factor on what the best name leaves out of the ordinary up to which another leaves nearly as little (ours)."""
+
+
+BIASES = ("gyro_bias", "accelerometer_bias")
+"""Begin the names of what stays free where robot and ground are held."""
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A fit, and how far every effect that it lacks is from ordinary drives.
+
+    Attributes:
+        fitted: with or without effects.
+        scan: of the library there.
+        shifts: of all candidates, the least probable first.
+        pulls: of all parameters that may differ between drives.
+        named: candidates of the fit's effects, as they were shifted when each was added.
+    """
+
+    fitted: Fitted
+    scan: DriveScan
+    shifts: tuple[Shift, ...]
+    pulls: tuple[Pull, ...]
+    named: tuple[Shift, ...] = ()
+
+    @property
+    def tests(self) -> int:
+        """Number of candidates and parameters."""
+        return len(self.shifts) + len(self.pulls)
+
+    def probability(self, shift: Shift | Pull) -> float:
+        """Of an ordinary drive to show as much in any candidate or parameter."""
+        return family_probability(shift.probability, self.tests)
+
+    @property
+    def best(self) -> tuple[Shift, ...]:
+        """The least probable candidate of each effect, in their order."""
+        found: dict[str, Shift] = {}
+        for shift in self.shifts:
+            found.setdefault(shift.compared.name, shift)
+        return tuple(found.values())
+
+    @property
+    def conspicuous(self) -> tuple[Shift, ...]:
+        """Those of :attr:`best` that ordinary drives hardly show."""
+        least = FORM * max((shift.distance for shift in self.named), default=0.0)
+        return tuple(s for s in self.best if self.probability(s) < LEVEL and s.distance > least)
+
+    @property
+    def pulled(self) -> tuple[Pull, ...]:
+        """Parameters that ordinary drives hardly move as far."""
+        return tuple(pull for pull in self.pulls if self.probability(pull) < LEVEL)
+
+    @property
+    def left(self) -> float:
+        """Largest distance over its limit of any effect or parameter."""
+        parameters = (pull.distance / pull.limit(self.tests) for pull in self.pulls)
+        return max(_farthest(self.best, self.tests), max(parameters, default=0.0))
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One name with what else it could be.
+
+    Attributes:
+        shift: of the named effect when it was added.
+        weights: of the names that the same windows may mean.
+        rivals: joint refits, the named one first.
+        dispersion: of the model before.
+    """
+
+    shift: Shift
+    weights: dict[str, float]
+    rivals: tuple[Rival, ...]
+    dispersion: float
+
+
+@dataclass(frozen=True, eq=False)
+class Named:
+    """Result of the naming.
+
+    Attributes:
+        models: from the one without effects to the last.
+        steps: that led from each to the next.
+    """
+
+    models: tuple[Model, ...]
+    steps: tuple[Step, ...]
+
+
+def model_of(problem: Problem, fitted: Fitted, ordinary: Sequence[Scores], named: Sequence[Shift] = ()) -> Model:
+    """Scan a fit and compare it with ordinary drives.
+
+    Args:
+        problem: of the drive.
+        fitted: to it.
+        ordinary: scores of ordinary drives.
+        named: candidates of the fit's effects.
+    """
+    scan = scan_drive(problem, fitted)
+    scores = scan.scores()
+    beside = [key for key in scan.keys if key.startswith(NAMED)]
+    in_ordinary = [key for shift in named for key in shift.compared.keys]
+    found = [shift_of(item, scores, ordinary, beside, in_ordinary) for item in scan.compared]
+    shifts = sorted((item for item in found if item is not None), key=lambda item: (item.probability, -item.distance))
+    degrees = EXPECTED_DRIVES + len(ordinary) - 1.0
+    pulls = tuple(
+        Pull(p.name, abs(float(value)) / p.prior, degrees)
+        for p, value in zip(problem.nuisances.parameters, fitted.point.values, strict=True)
+        if p.prior > 0.0
+    )
+    return Model(fitted, scan, tuple(shifts), pulls, tuple(named))
+
+
+def name_changes(
+    problem: Problem,
+    fitted: Fitted,
+    ordinary: Sequence[Scores],
+    rng: np.random.Generator,
+    progress: Callable[[str], None] = lambda line: None,
+) -> Named:
+    """Names of what changed.
+
+    Args:
+        problem: of the drive.
+        fitted: without effects.
+        ordinary: scores of ordinary drives.
+        rng: of resampled windows.
+        progress: called with what is being done.
+    """
+    progress("comparing every effect with ordinary drives")
+    models, steps = [model_of(problem, fitted, ordinary)], list[Step]()
+    while len(steps) < MOST_NAMES and (models[-1].conspicuous or models[-1].pulled):
+        found = _next(problem, models[-1], ordinary, rng, progress)
+        if found is None:
+            break
+        models.append(found[0])
+        steps.append(found[1])
+    return Named(tuple(models), tuple(steps))
+
+
+def _next(
+    problem: Problem,
+    model: Model,
+    ordinary: Sequence[Scores],
+    rng: np.random.Generator,
+    progress: Callable[[str], None],
+) -> tuple[Model, Step] | None:
+    """The model with the next name; None where no effect that exists has the shift."""
+    dispersion = dispersion_of(problem, model.fitted)
+    refitted: list[tuple[Shift, Rival]] = []
+    for shift, start in _starts(problem, model, ordinary):
+        progress(f"refitting with {shift.compared.name}")
+        fitted = fit(problem, start, iterations=ITERATIONS + 2, tolerance=TOLERANCE)
+        gain = (model.fitted.cost - fitted.cost) / dispersion
+        if gain > 0.0:
+            refitted.append((shift, Rival(shift.compared.name, fitted, gain)))
+    refitted.sort(key=lambda item: -item[1].gain)
+    tried: list[tuple[Model, Rival]] = []
+    for shift, rival in refitted:
+        if any(after.left <= 1.0 for after, _ in tried) and rival.gain < CLOSE * refitted[0][1].gain:
+            break
+        progress(f"comparing every effect beside {rival.name}")
+        tried.append((model_of(problem, rival.fitted, ordinary, (*model.named, shift)), rival))
+    if not tried:
+        return None
+    allowed = max(1.0, NEARLY * min(after.left for after, _ in tried))
+    kept = [item for item in tried if item[0].left <= allowed]
+    weights = equivalence_weights([rival for _, rival in kept], dispersion, rng)
+    name = max(weights, key=weights.__getitem__)
+    chosen = next(item for item in kept if item[1].name == name)
+    rivals = (chosen[1], *(rival for _, rival in kept if rival is not chosen[1]))
+    return chosen[0], Step(chosen[0].named[-1], weights, rivals, dispersion)
+
+
+def _starts(problem: Problem, model: Model, ordinary: Sequence[Scores]) -> list[tuple[Shift, Point]]:
+    """Effects that may be what changed, with the points from which they are fitted."""
+    found: dict[str, tuple[Shift, Point]] = {}
+    moved = [pull for pull in model.pulled if not pull.name.startswith(BIASES)]
+    if moved or not model.conspicuous:
+        found = {item[0].compared.name: item for item in _where_parameters_stay(problem, model)}
+    for shift in _preselected(model, ordinary):
+        effect = first_guess(shift.compared.candidate, (shift.value + shift.mean).tolist())
+        if not effect.is_neutral and shift.compared.name not in found:
+            start = replace(model.fitted.point, effects=(*model.fitted.point.effects, effect))
+            found[shift.compared.name] = (shift, start)
+    return list(found.values())
+
+
+def _where_parameters_stay(problem: Problem, model: Model) -> list[tuple[Shift, Point]]:
+    """Effects that explain most where robot and ground stay as they were calibrated.
+
+    What a parameter has taken over, to first order no effect asks back: their columns are alike, but for what is
+    nonlinear in them.
+    """
+    own = np.array([not p.name.startswith(BIASES) for p in problem.nuisances.parameters])
+    held = problem.holding(own)
+    point = replace(model.fitted.point, values=np.where(own, 0.0, model.fitted.point.values))
+    fitted = fit(held, point, iterations=ITERATIONS, tolerance=TOLERANCE, renewals=2)
+    scan = scan_drive(held, fitted)
+    scores = scan.scores()
+    beside = [key for key in scan.keys if key.startswith(NAMED)]
+    shifts = {shift.compared.keys: shift for shift in model.shifts}
+    found: dict[str, tuple[float, Shift, Point]] = {}
+    for item in scan.compared:
+        sizes = sizes_of(scores, item.keys, item.ridge, beside)
+        if sizes is None or item.keys not in shifts:
+            continue
+        effect = first_guess(item.candidate, sizes.value.tolist())
+        gain = explained(scores, item.keys, item.ridge, beside)
+        if not effect.is_neutral and gain > found.get(item.name, (0.0,))[0]:
+            start = replace(fitted.point, effects=(*fitted.point.effects, effect))
+            found[item.name] = (gain, shifts[item.keys], start)
+    best = sorted(found.values(), key=lambda item: -item[0])[:MOST_RIVALS]
+    return [(shift, start) for _, shift, start in best]
+
+
+def _preselected(model: Model, ordinary: Sequence[Scores]) -> list[Shift]:
+    """The effects beside which, to first order, least is out of the ordinary."""
+    scores = model.scan.scores()
+    listed = sorted(model.conspicuous, key=lambda shift: _left_beside(shift, model, scores, ordinary))
+    return listed[:MOST_RIVALS]
+
+
+def _left_beside(shift: Shift, model: Model, scores: Scores, ordinary: Sequence[Scores]) -> float:
+    """Largest distance over its limit of any other effect beside one, to first order."""
+    own = [key for key in scores.keys if key.startswith(NAMED)]
+    before = [key for item in model.named for key in item.compared.keys]
+    keys = shift.compared.keys
+    others = [item.compared for item in model.best if item.compared.name != shift.compared.name]
+    found = [shift_of(item, scores, ordinary, [*own, *keys], [*before, *keys]) for item in others]
+    return _farthest([item for item in found if item is not None], model.tests)
+
+
+def _farthest(shifts: Sequence[Shift], tests: int) -> float:
+    return max((s.distance / s.limit(tests) for s in shifts if s.probability < 1.0), default=0.0)

@@ -1,0 +1,60 @@
+"""An ordinary drive as others are compared with it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ddagr_gym.diagnosis.change.drive_fit import change_problem, change_windows, fit_nominal
+from ddagr_gym.diagnosis.change.drive_scan import scan_drive
+from ddagr_gym.diagnosis.change.ordinary import Reference, Weighing, uncertain_parameters
+from ddagr_gym.identification.parameters import ModelParameter
+from ddagr_gym.parameters import Robot, Soil
+from ddagr_gym.recordings.schema import Recording
+
+
+@dataclass(frozen=True, eq=False)
+class OrdinaryDrive:
+    """An ordinary drive and the robot that was calibrated without it.
+
+    Attributes:
+        name: of its file.
+        ground: that it was on.
+        alone: whether no other ordinary drive was on that ground.
+        recording: mended, poses where they came.
+        robot: calibrated without the drive.
+        soil: of its ground, without the drive.
+        parameters: of the robot that may differ between drives.
+        deviations: of the soil on its ground, by parameter.
+        reversed_gyro: whether its gyro turned the wrong way, which was mended.
+    """
+
+    name: str
+    ground: str
+    alone: bool
+    recording: Recording
+    robot: Robot
+    soil: Soil
+    parameters: tuple[ModelParameter, ...]
+    deviations: Mapping[str, float]
+    reversed_gyro: bool = False
+
+
+def scan_ordinary(drive: OrdinaryDrive, weighing: Weighing, threads: int = 1) -> Reference:
+    """What an ordinary drive says of every effect, with its ground known and not.
+
+    Args:
+        drive: with its robot.
+        weighing: of all ordinary drives.
+        threads: of the simulator.
+    """
+    windows = change_windows([drive.recording], drive.robot, weighing)
+    deviations = None if drive.alone else drive.deviations
+    parameters = uncertain_parameters(drive.soil, drive.parameters, deviations, weighing, 1)
+    problem = change_problem(drive.robot, drive.soil, windows, parameters, weighing, threads)
+    scan = scan_drive(problem, fit_nominal(problem))
+    wide = uncertain_parameters(drive.soil, drive.parameters, None, weighing, 1)
+    other = scan.scores(np.array([wide[k].prior for k in scan.free]))
+    return Reference(drive.name, drive.ground, drive.reversed_gyro, scan.scores(), other)

@@ -1,0 +1,282 @@
+"""Shifts of the sizes of effects from what they are in ordinary drives, in standard deviations of all that varies.
+
+With the gradient g and the information H of a drive's columns, the sizes t of an effect beside those of named ones are
+
+    t = A g,    A = (H + R)^-1,    V = A W A    (within the drive),    B = A C A    (expected between drives),      (1)
+
+with the windows' scatter W of the gradient, what the priors of robot, soil and biases move it by, C, and the reach R of
+sizes that exist. The same sizes t_i of n ordinary drives scatter by T_r about their mean m besides their own V_i
+(method of moments). Few drives say little of T_r: it is drawn towards what is expected, with the weight of a few
+further drives (G. K. Smyth, Stat. Appl. Genet. Mol. Biol. 3 (2004) 3),
+
+    T = (d0 (B + F) + d_r T_r)/(d0 + d_r),    S = V + T + (T + V_m)/n,                                              (2)
+
+and (t - m)' S^-1 (t - m)/k is compared with F(k, d0 + d_r). F is the square of a fifth of the least meaningful size, of
+signs and limits of a fiftieth of the whole: simulators of another structure differ by so much.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ddagr_gym.diagnosis.change.drive_scan import Compared, scattered
+from ddagr_gym.diagnosis.change.ordinary import Scores
+from ddagr_gym.diagnosis.result.detectable import least_multiple
+from ddagr_gym.diagnosis.result.uncertainty import STRUCTURE, STRUCTURE_OF_LIMIT
+
+Array = NDArray[np.float64]
+
+EXPECTED_DRIVES = 4.0
+"""Degrees of freedom d0 of the expected scatter (ours): as if the calibration's scatter came from five drives."""
+
+LEVEL = 0.05
+"""Of false alarms over the whole library."""
+
+POWER = 0.8
+"""With which a least detectable shift is found."""
+
+MOST_LIMITS = 4.0
+"""Multiples of its limit at which a change is found for sure, for the search of where it is (ours): five degrees of
+freedom need one and a half."""
+
+_NOTHING = 1e-9
+"""Share of the information before projection below which there is nothing but rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sizes:
+    """Sizes of an effect in one drive, as multiples of its probes.
+
+    Attributes:
+        value: (k,).
+        within: (k, k) covariance within the drive.
+        between: (k, k) expected covariance between drives.
+    """
+
+    value: Array
+    within: Array
+    between: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Shift:
+    """Sizes of an effect against ordinary drives, as multiples of its probes.
+
+    Attributes:
+        compared: the probes.
+        value: (k,) from the mean of ordinary drives.
+        mean: (k,) of ordinary drives.
+        covariance: (k, k) of the value, equation (2).
+        between: (k, k) share of ordinary drives in it.
+        degrees: of freedom.
+        probability: of an ordinary drive to show as much, for this candidate alone.
+    """
+
+    compared: Compared
+    value: Array
+    mean: Array
+    covariance: Array
+    between: Array
+    degrees: float
+    probability: float
+
+    @property
+    def distance(self) -> float:
+        """In standard deviations."""
+        return float(np.sqrt(self.value @ np.linalg.solve(self.covariance, self.value)))
+
+    def limit(self, tests: int) -> float:
+        """Distance that ordinary drives exceed for any of so many candidates at the level."""
+        return distance_at(single_level(tests), len(self.value), self.degrees)
+
+    def detectable(self, tests: int) -> Array:
+        """(k,) multiples of each probe alone that pass the limit with the power."""
+        reach = distance_found(self.limit(tests), len(self.value), self.degrees)
+        return np.asarray(reach / np.sqrt(np.diag(np.linalg.inv(self.covariance))))
+
+
+def single_level(tests: int) -> float:
+    """Level of one of several tests whose family has :data:`LEVEL` (Z. Sidak, JASA 62 (1967) 626)."""
+    return float(-np.expm1(np.log1p(-LEVEL) / tests))
+
+
+def family_probability(single: float, tests: int) -> float:
+    """Probability of the smallest of several tests, by the same."""
+    return float(-np.expm1(tests * np.log1p(-min(single, 1.0 - 1e-16))))
+
+
+def distance_at(level: float, dimension: int, degrees: float) -> float:
+    """Distance that is exceeded with a probability."""
+    from scipy.special import fdtri
+
+    return float(np.sqrt(dimension * fdtri(dimension, degrees, 1.0 - level)))
+
+
+def distance_found(limit: float, dimension: int, degrees: float) -> float:
+    """Distance of a change that passes a limit with :data:`POWER`, by the noncentral F distribution."""
+    from scipy.optimize import brentq
+    from scipy.special import ncfdtr
+
+    def missed(distance: float) -> float:
+        return float(ncfdtr(dimension, degrees, distance**2, limit**2 / dimension)) - (1.0 - POWER)
+
+    return float(brentq(missed, 0.0, MOST_LIMITS * limit))
+
+
+def sizes_of(scores: Scores, keys: Sequence[str], ridge: Array, beside: Sequence[str] = ()) -> Sizes | None:
+    """Sizes of some probes, equation (1); None where the drive shows nothing of one of them.
+
+    Args:
+        scores: of a drive.
+        keys: of the probes.
+        ridge: (k,) information on their multiples before any data.
+        beside: keys of columns that are estimated with them.
+    """
+    known = _shown(scores, beside)
+    rows = [scores.keys.index(key) for key in (*keys, *known)]
+    inner = scores.information[np.ix_(rows, rows)]
+    k = len(keys)
+    if not (np.diag(inner)[:k] > _NOTHING).all():
+        return None
+    prior = np.concatenate([ridge, np.zeros(len(known))]) + _NOTHING * np.diag(inner)
+    inverse = np.asarray(np.linalg.inv(inner + np.diag(prior))[:k], dtype=np.float64)
+    gradient = scores.gradient[rows]
+    within = (
+        inverse
+        @ _within(scores, rows, np.asarray(np.linalg.solve(inner + np.diag(prior), gradient), dtype=np.float64))
+        @ inverse.T
+    )
+    between = inverse @ scores.between[np.ix_(rows, rows)] @ inverse.T
+    return Sizes(inverse @ gradient, _at_least(within, inverse[:, :k]), between)
+
+
+def _shown(scores: Scores, keys: Sequence[str]) -> tuple[str, ...]:
+    """Those of some columns of which a drive shows anything: a limit that it does not reach has none."""
+    return tuple(key for key in keys if scores.information[(scores.keys.index(key),) * 2] > _NOTHING)
+
+
+def explained(scores: Scores, keys: Sequence[str], ridge: Array, beside: Sequence[str] = ()) -> float:
+    """Fall of the cost by an effect at the best of its sizes, to first order; arguments as of :func:`sizes_of`."""
+    known = _shown(scores, beside)
+    falls = []
+    for chosen, prior in (((*keys, *known), ridge), (known, np.zeros(0))):
+        rows = [scores.keys.index(key) for key in chosen]
+        inner, right = scores.information[np.ix_(rows, rows)], scores.gradient[rows]
+        whole = np.concatenate([prior, np.zeros(len(known))]) + _NOTHING * np.diag(inner)
+        falls.append(0.5 * float(right @ np.linalg.solve(inner + np.diag(whole), right)) if rows else 0.0)
+    return falls[0] - falls[1]
+
+
+def _within(scores: Scores, rows: Sequence[int], sizes: Array) -> Array:
+    """Covariance of the gradient by the windows' scatter, at the sizes where the windows are known.
+
+    At nothing a large size would count as scatter of the windows that show it.
+    """
+    if scores.gradients is None or scores.informations is None:
+        return np.asarray(scores.within[np.ix_(rows, rows)])
+    return scattered(scores.gradients[:, rows] - scores.informations[:, rows][:, :, rows] @ sizes)
+
+
+def _at_least(scattered: Array, independent: Array) -> Array:
+    """The windows' covariance, with deviations that are at least those of independent rows."""
+    size = np.diag(scattered)
+    wide = np.sqrt(np.maximum(size, np.diag(independent)) / np.where(size > 0.0, size, 1.0))
+    return np.asarray(scattered * np.outer(wide, wide) + np.diag(np.where(size > 0.0, 0.0, np.diag(independent))))
+
+
+def shift_of(
+    compared: Compared,
+    drive: Scores,
+    ordinary: Sequence[Scores],
+    beside: Sequence[str] = (),
+    beside_ordinary: Sequence[str] = (),
+) -> Shift | None:
+    """Shift of a candidate's sizes, equation (2); None where the drive, or ordinary ones, show nothing of it.
+
+    Args:
+        compared: the candidate.
+        drive: its scores.
+        ordinary: those of ordinary drives.
+        beside: keys of the drive's columns of named effects.
+        beside_ordinary: keys of the same effects in ordinary drives.
+    """
+    here = sizes_of(drive, compared.keys, compared.ridge, beside)
+    found = [sizes_of(item, compared.keys, compared.ridge, beside_ordinary) for item in ordinary]
+    others = [item for item in found if item is not None]
+    if here is None or len(others) < 2:
+        return None
+    least = np.array([least_multiple(compared.candidate, k) for k in range(len(compared.keys))])
+    structure = STRUCTURE if compared.candidate.has_sizes else STRUCTURE_OF_LIMIT
+    expected = here.between + np.diag((structure * least) ** 2)
+    mean, spread, of_mean, degrees = _ordinary_scatter(others, expected, least)
+    scatter = (EXPECTED_DRIVES * expected + degrees * spread) / (EXPECTED_DRIVES + degrees)
+    between = scatter + (scatter + of_mean) / (degrees + 1.0)
+    covariance = here.within + between
+    value, degrees = here.value - mean, EXPECTED_DRIVES + degrees
+    probability = _probability(compared, value, covariance, degrees)
+    return Shift(compared, value, mean, covariance, between, degrees, probability)
+
+
+def _ordinary_scatter(found: Sequence[Sizes], expected: Array, least: Array) -> tuple[Array, Array, Array, float]:
+    """Mean of ordinary drives, their scatter besides their own covariances, the mean of these, degrees of freedom.
+
+    A drive that says little counts for little.
+    """
+    scale = least**-2.0
+    size = np.array([float(scale @ np.diag(item.within + expected)) for item in found])
+    weight = (1.0 / size) / float((1.0 / size).sum())
+    count = 1.0 / float((weight**2).sum())
+    values = np.stack([item.value for item in found])
+    mean = weight @ values
+    away = values - mean
+    inside = np.tensordot(weight, np.stack([item.within for item in found]), axes=1)
+    # of two drives or more the weighted scatter has n/(n - 1) of its expected size missing
+    whole = np.einsum("n,nk,nl->kl", weight, away, away) * count / max(count - 1.0, 0.5)
+    return mean, _positive(whole - inside), inside, count - 1.0
+
+
+def _positive(matrix: Array) -> Array:
+    """The nearest covariance: negative variances are none."""
+    values, vectors = np.linalg.eigh(0.5 * (matrix + matrix.T))
+    return np.asarray((vectors * np.maximum(values, 0.0)) @ vectors.T)
+
+
+def _probability(compared: Compared, value: Array, covariance: Array, degrees: float) -> float:
+    """Of an ordinary drive to show as much."""
+    from scipy.special import fdtrc
+
+    # what is there or not has no less than nothing
+    if not compared.candidate.has_sizes and value[0] <= 0.0:
+        return 1.0
+    k = len(value)
+    return float(fdtrc(k, degrees, float(value @ np.linalg.solve(covariance, value)) / k))
+
+
+@dataclass(frozen=True)
+class Pull:
+    """A parameter of robot, ground or sensors that a fit moved from its calibrated value.
+
+    Attributes:
+        name: of the parameter.
+        distance: in the deviations that ordinary drives have.
+        degrees: of freedom.
+    """
+
+    name: str
+    distance: float
+    degrees: float
+
+    @property
+    def probability(self) -> float:
+        """Of an ordinary drive to move this parameter as much."""
+        from scipy.special import stdtr
+
+        return float(2.0 * stdtr(self.degrees, -self.distance))
+
+    def limit(self, tests: int) -> float:
+        """Distance that ordinary drives exceed in any of so many tests at the level."""
+        return distance_at(single_level(tests), 1, self.degrees)

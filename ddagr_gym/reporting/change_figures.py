@@ -1,0 +1,84 @@
+"""Figures of what changed: shifts of all effects beside their limit, and what would have been found."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from ddagr_gym.diagnosis.wording import title
+from ddagr_gym.physics.effects.registry import effect_kind
+from ddagr_gym.rendering import palette
+from ddagr_gym.reporting.calibration_figures import blank
+
+if TYPE_CHECKING:
+    from ddagr_gym.diagnosis.answer.change import Change, EffectShift
+
+_WIDTH = 10.8
+"""Of a figure [inches]: the page."""
+
+_FARTHEST = 4.0
+"""Multiples of the limit beyond which a shift is drawn at the edge (ours)."""
+
+
+def shift_figure(change: Change, named: tuple[str, ...]) -> Any:
+    """Distance of every effect over its limit; least detectable changes over the least sizes that matter beside it.
+
+    Args:
+        change: of a drive.
+        named: effects of the verdict.
+    """
+    shifts = list(reversed(change.shifts))
+    figure = blank(1.1 + 0.24 * len(shifts), _WIDTH)
+    left, right = figure.subplots(1, 2, sharey=True, width_ratios=(3.0, 2.0))
+    for place, item in enumerate(shifts):
+        over = item.distance / item.limit
+        colour = palette.VERMILLION if item.effect in named else palette.BLUE
+        left.barh(place, min(over, _FARTHEST), 0.62, color=colour, zorder=2)
+        if over > _FARTHEST:
+            left.text(_FARTHEST, place, f" {over:.0f} x", va="center", fontsize=7, color=palette.INK)
+        multiples = least_multiples(item)
+        if multiples:
+            right.plot(multiples, [place] * len(multiples), "o-", ms=4, lw=1.0, color=palette.BLUE, zorder=2)
+        else:
+            right.text(1.0, place, "no size that exists", va="center", fontsize=7, color=palette.GREY)
+    left.axvline(1.0, color=palette.INK, lw=0.9, zorder=3)
+    left.set_xlim(0.0, _FARTHEST * 1.12)
+    left.set_yticks(range(len(shifts)), [title(item.effect) for item in shifts])
+    left.set_ylim(-0.6, len(shifts) - 0.4)
+    percent = f"{100.0 * change.level:g} %"
+    left.set_xlabel(f"shift, in standard deviations over the limit of {percent} false alarms over all effects")
+    right.set_xscale("log")
+    right.axvline(1.0, color=palette.GREY, lw=0.8)
+    right.set_xlabel(f"change found {100.0 * change.power:g} times in 100,\nin least sizes that matter")
+    return figure
+
+
+def least_multiples(item: EffectShift) -> list[float]:
+    """Least detectable changes of an effect's sizes in least sizes that matter; a limit or a sign is there or not."""
+    kind = effect_kind(item.effect)
+    if kind.categorical or not kind.differentiable:
+        return [1.0 for size in item.sizes.values() if size.least_detectable is not None]
+    known = [(name, size.least_detectable) for name, size in item.sizes.items() if size.least_detectable is not None]
+    return [value / float(kind.parameter(name).metadata["least"]) for name, value in known]
+
+
+def parameter_figure(change: Change) -> Any:
+    """Parameters of robot and ground before and after the named effects, in deviations of ordinary drives."""
+    items = [item for item in reversed(change.parameters) if item.expected_deviation > 0.0]
+    figure = blank(1.0 + 0.25 * len(items), _WIDTH)
+    axis = figure.subplots()
+    axis.axvspan(-2.0, 2.0, color=palette.SHADE, zorder=0)
+    axis.axvline(0.0, color=palette.GREY, lw=0.8, zorder=1)
+    for place, item in enumerate(items):
+        before, after = (value / item.expected_deviation for value in (item.change, item.with_effects))
+        axis.plot([before, after], [place, place], color=palette.PALE, lw=1.4, zorder=2)
+        axis.plot(before, place, "o", ms=5, mfc="none", color=palette.VERMILLION, zorder=3,
+                  label="without effects" if place == 0 else None)  # fmt: skip
+        axis.plot(
+            after, place, "o", ms=4, color=palette.BLUE, zorder=4, label="with what changed" if place == 0 else None
+        )
+    axis.set_xscale("symlog", linthresh=4.0)
+    axis.set_yticks(range(len(items)), [item.name.replace("_", " ") for item in items])
+    axis.set_ylim(-0.6, len(items) - 0.4)
+    axis.set_xlabel("from the calibrated value, in standard deviations of ordinary drives (band: two)")
+    axis.legend(ncols=2, loc="lower left", bbox_to_anchor=(0.0, 1.0))
+    return figure

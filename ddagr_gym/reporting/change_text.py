@@ -1,0 +1,86 @@
+"""What changed, as text."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ddagr_gym.diagnosis.wording import number, title
+from ddagr_gym.reporting.diagnosis_text import FINDING_HEADER, finding_rows
+from ddagr_gym.reporting.text_table import format_table
+
+if TYPE_CHECKING:
+    from ddagr_gym.diagnosis.answer.change import Change, EffectShift, SizeShift
+    from ddagr_gym.diagnosis.answer.verdict import Diagnosis
+
+SHIFT_HEADER = ("effect", "size", "shift", "deviation", "unit", "distance", "limit", "would be found from")
+"""Columns of :func:`shift_rows`; distance and limit in standard deviations."""
+
+PARAMETER_HEADER = ("parameter", "without effects", "with what changed", "ordinary drives", "unit")
+"""Columns of :func:`parameter_rows`."""
+
+SHOWN = 8
+"""Effects in the text, the most conspicuous (ours); the page has all of them."""
+
+
+def change_text(diagnosis: Diagnosis) -> str:
+    """Answer, findings, and the most conspicuous effects."""
+    change = _of(diagnosis)
+    parts = [diagnosis.sentence]
+    if diagnosis.findings:
+        parts.append(format_table(FINDING_HEADER, finding_rows(diagnosis)))
+    rows = [row for item in change.shifts[:SHOWN] for row in _rows(item)]
+    parts.append(format_table(SHIFT_HEADER, rows))
+    further = len(change.shifts) - SHOWN
+    if further > 0:
+        parts.append(f"{further} effects more are less conspicuous; the page and diagnosis.json have all of them.")
+    parts.append("\n".join(["Not looked for:", *(f"  {line}" for line in not_compared(change))]))
+    return "\n\n".join(parts)
+
+
+def shift_rows(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
+    """One row per size of every effect, under :data:`SHIFT_HEADER`."""
+    return [row for item in _of(diagnosis).shifts for row in _rows(item)]
+
+
+def parameter_rows(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
+    """Changes of the parameters from their calibrated values, under :data:`PARAMETER_HEADER`."""
+    return [
+        (
+            item.name.replace("_", " "),
+            number(item.change),
+            number(item.with_effects),
+            f"± {number(item.expected_deviation)}",
+            "log of a factor" if item.unit == "-" else item.unit,
+        )
+        for item in _of(diagnosis).parameters
+    ]
+
+
+def not_compared(change: Change) -> list[str]:
+    """Effects that were not looked for, with the reason, and those of which no size would have been found."""
+    lines = [f"{title(name)}: {reason}." for name, reason in change.not_compared.items()]
+    return [*lines, *(f"{title(name)}: such a drive would show no size of it." for name in change.hidden)]
+
+
+def _of(diagnosis: Diagnosis) -> Change:
+    if diagnosis.change is None:
+        raise ValueError("the diagnosis was made without a calibration")
+    return diagnosis.change
+
+
+def _rows(item: EffectShift) -> list[tuple[str, ...]]:
+    rows: list[tuple[str, ...]] = []
+    for place, (name, size) in enumerate(item.sizes.items()):
+        first = place == 0
+        whole = (f"{item.distance:.1f}", f"{item.limit:.1f}") if first else ("", "")
+        label = title(item.effect) if first else ""
+        unit = size.unit if size.unit != "-" else ""
+        rows.append(
+            (label, name.replace("_", " "), number(size.value), number(size.deviation), unit, *whole, least(size))
+        )
+    return rows
+
+
+def least(size: SizeShift) -> str:
+    """Least detectable change in words."""
+    return "no size" if size.least_detectable is None else number(size.least_detectable)

@@ -1,0 +1,74 @@
+"""What a comparison needs of ordinary drives is read as it was written."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ddagr_gym.calibration.effect_bank import load_ordinary, load_runs, save_runs
+from ddagr_gym.calibration.ordinary_drives import Ordinary, pooled
+from ddagr_gym.calibration.ordinary_drives import _Left as Left
+from ddagr_gym.diagnosis.change.ordinary import Reference, Scores, Weighing
+from ddagr_gym.errors import InputError
+
+
+def scores() -> Scores:
+    rng = np.random.default_rng(0)
+    root = rng.normal(size=(3, 3))
+    return Scores(("a 0", "a 1", "b 0"), rng.normal(size=3), root @ root.T, 2.0 * root @ root.T, 0.1 * root @ root.T)
+
+
+WEIGHING = Weighing(6.0, 1.2, 0.1, 1.0, np.array([1.0, np.inf, *np.ones(6)]), np.full(8, 2.0), 1e-3, 0.05)
+ORDINARY = Ordinary(WEIGHING, (Reference("one.csv", "sand", False, scores(), scores()),) * 2)
+
+
+def test_weights_and_scores_read_back(tmp_path):
+    save_runs((), tmp_path / "bank.json", ORDINARY)
+    found = load_ordinary(tmp_path / "bank.json")
+    assert found.weighing.sigma.tolist() == WEIGHING.sigma.tolist()
+    assert found.weighing.lateness == 0.1
+    first = found.references[0]
+    assert (first.drive, first.ground, first.reversed_gyro) == ("one.csv", "sand", False)
+    for name in ("gradient", "information", "within", "between"):
+        np.testing.assert_allclose(getattr(first.known_ground, name), getattr(scores(), name), rtol=1e-8)
+    assert load_runs(tmp_path / "bank.json") == ()
+
+
+def test_a_bank_of_the_first_version_is_read_and_has_no_ordinary_drives(tmp_path):
+    path = tmp_path / "bank.json"
+    path.write_text(json.dumps({"version": 1, "runs": []}))
+    assert load_runs(path) == ()
+    with pytest.raises(InputError, match="says nothing of the sizes of effects in ordinary drives: calibrate again"):
+        load_ordinary(path)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("{", "is no bank of drives"),
+        ('{"version": 9}', "has version 9, this program reads 2"),
+        ('{"version": 2, "runs": [], "ordinary": {"weighing": {}}}', "is no bank of drives"),
+    ],
+)
+def test_what_is_no_bank_is_refused(text, said, tmp_path):
+    path = tmp_path / "bank.json"
+    path.write_text(text)
+    with pytest.raises(InputError, match=said):
+        load_ordinary(path)
+
+
+def test_weights_are_those_of_all_drives_and_a_channel_that_one_lacks_is_weighed_by_the_others():
+    blank = replace(WEIGHING, sigma=np.ones(8), robust=np.ones(8))
+    left = [
+        Left(np.array([3.0, np.inf, *np.ones(6)]), np.full(8, 2.0), 0.003, np.array([0.1, 0.0])),
+        Left(np.array([4.0, 2.0, *np.ones(6)]), np.full(8, 1.5), -0.004, np.array([0.0, -0.1])),
+    ]
+    found = pooled(blank, left)
+    assert found.sigma[0] == pytest.approx(np.sqrt(12.5))
+    assert found.sigma[1] == 2.0
+    assert found.robust.tolist() == [1.5] * 8
+    assert found.gyro_bias == pytest.approx(np.sqrt(12.5e-6))
+    assert found.accelerometer_bias == pytest.approx(np.sqrt(0.005))
