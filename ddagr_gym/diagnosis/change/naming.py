@@ -38,6 +38,9 @@ MOST_NAMES = 3
 MOST_RIVALS = 4
 """Effects that are refitted at each step (ours): a refit with its scan costs a minute on a long drive."""
 
+RENEWALS = 4
+"""Steps of a refit with new derivatives (ours): it may begin many deviations from where it ends."""
+
 FORM = 0.1
 """Share of the distance of a named effect that a further one needs (ours, as for intervals): the library's form of an
 effect is not the robot's, and the rest of it looks like other effects."""
@@ -200,7 +203,7 @@ def _next(
     refitted: list[tuple[Shift, Rival]] = []
     for shift, start in _starts(problem, model, ordinary):
         progress(f"refitting with {shift.compared.name}")
-        fitted = fit(problem, start, iterations=ITERATIONS + 2, tolerance=TOLERANCE)
+        fitted = fit(problem, start, iterations=ITERATIONS + 2, tolerance=TOLERANCE, renewals=RENEWALS)
         gain = (model.fitted.cost - fitted.cost) / dispersion
         if gain > 0.0:
             refitted.append((shift, Rival(shift.compared.name, fitted, gain)))
@@ -225,14 +228,16 @@ def _next(
 def _starts(problem: Problem, model: Model, ordinary: Sequence[Scores]) -> list[tuple[Shift, Point]]:
     """Effects that may be what changed, with the points from which they are fitted."""
     found: dict[str, tuple[Shift, Point]] = {}
+    at = model.fitted.point
     moved = [pull for pull in model.pulled if not pull.name.startswith(BIASES)]
     if moved or not model.conspicuous:
-        found = {item[0].compared.name: item for item in _where_parameters_stay(problem, model)}
+        listed = _where_parameters_stay(problem, model)
+        found = {shift.compared.name: (shift, start) for shift, start in listed}
+        at = replace(listed[0][1], effects=at.effects) if listed else at
     for shift in _preselected(model, ordinary):
         effect = first_guess(shift.compared.candidate, (shift.value + shift.mean).tolist())
         if not effect.is_neutral and shift.compared.name not in found:
-            start = replace(model.fitted.point, effects=(*model.fitted.point.effects, effect))
-            found[shift.compared.name] = (shift, start)
+            found[shift.compared.name] = (shift, replace(at, effects=(*at.effects, effect)))
     return list(found.values())
 
 
@@ -250,6 +255,8 @@ def _where_parameters_stay(problem: Problem, model: Model) -> list[tuple[Shift, 
     scores = scan.scores()
     beside = [key for key in scan.keys if key.startswith(NAMED)]
     shifts = {shift.compared.keys: shift for shift in model.shifts}
+    # a step goes three deviations at most, and what has been taken over may be many
+    calibrated = replace(fitted.point, values=np.zeros(len(own)))
     found: dict[str, tuple[float, Shift, Point]] = {}
     for item in scan.compared:
         sizes = sizes_of(scores, item.keys, item.ridge, beside)
@@ -258,7 +265,7 @@ def _where_parameters_stay(problem: Problem, model: Model) -> list[tuple[Shift, 
         effect = first_guess(item.candidate, sizes.value.tolist())
         gain = explained(scores, item.keys, item.ridge, beside)
         if not effect.is_neutral and gain > found.get(item.name, (0.0,))[0]:
-            start = replace(fitted.point, effects=(*fitted.point.effects, effect))
+            start = replace(calibrated, effects=(*calibrated.effects, effect))
             found[item.name] = (gain, shifts[item.keys], start)
     best = sorted(found.values(), key=lambda item: -item[0])[:MOST_RIVALS]
     return [(shift, start) for _, shift, start in best]
