@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, overload
 
@@ -18,9 +19,22 @@ from ddagr_gym.extras import need
 from ddagr_gym.progress import counting
 
 if TYPE_CHECKING:
+    from ddagr_gym.calibration.run import Outcome as CalibrationOutcome
     from ddagr_gym.diagnosis.gates.thresholds import Thresholds
+    from ddagr_gym.diagnosis.result.drivetrain_names import CompletedNominal
+    from ddagr_gym.recordings.schema import Recording
 
 __all__ = ["ChangeResult", "DiagnosisResult", "diagnose"]
+
+_GROUND = "ground"
+"""Name of the one that all recordings of a diagnosis are on."""
+
+_SIMULATED = "ddagr"
+"""Robot with a shipped bank of simulated drives."""
+
+_ONE_DRIVE = {"fitted": 48, "compared": 32}
+"""Windows of a single drive that a fit of its drivetrain uses, and those that decide on parts (ours): a quarter of them
+is left out at a time."""
 
 _SAME_WINDOW = 0.5
 """Difference of lengths of windows up to which gates are taken to hold [s] (ours; short segments shorten windows)."""
@@ -160,6 +174,7 @@ def diagnose(
     priors = NuisancePriors().with_soil(soil_uncertainty)
     gates = _gates(thresholds, nominal, soil_uncertainty)
     setting = Setting(priors=priors, threads=threads).with_windows(_window(window, gates), stride)
+    drivetrain = _Drivetrain(found, nominal, threads, seed, cache, progress)
     with _steps(len(steps_of(names_only)), progress) as on_step:
         outcome = diagnosed(
             found,
@@ -171,11 +186,67 @@ def diagnose(
             names_only=names_only,
             soil_name=nominal.soil_name,
             robot_file=nominal.robot_file,
+            complete_nominal=None if _of_ordinary_drives(gates) else drivetrain.complete,
             cache=None if cache is None else Path(cache),
             on_step=on_step,
             progress=lambda line: None if progress is None else progress(f"  {line}"),
         )
-    return DiagnosisResult(outcome)
+    return DiagnosisResult(outcome, drivetrain.made if outcome.diagnosis.drivetrain is not None else None)
+
+
+def _of_ordinary_drives(gates: Thresholds) -> bool:
+    """Whether the question is what differs from ordinary drives, not what the simulator lacks."""
+    return gates.origin is not None and gates.origin.kind == "ordinary"
+
+
+@dataclass
+class _Drivetrain:
+    """Fits the drivetrain to the recordings that are diagnosed, where that is asked for.
+
+    Attributes:
+        recordings: that are diagnosed.
+        nominal: simulator.
+        threads: of the simulator.
+        seed: of resampled intervals.
+        cache: of the diagnosis; the fit's own is a folder in it.
+        progress: of the diagnosis.
+        made: the calibration behind the fit; None before it.
+    """
+
+    recordings: Sequence[Recording]
+    nominal: Nominal
+    threads: int
+    seed: int
+    cache: str | os.PathLike[str] | None
+    progress: Callable[[str], None] | None
+    made: CalibrationOutcome | None = None
+
+    def complete(self, misfit: Mapping[str, float]) -> CompletedNominal | None:
+        """The nominal simulator with the drivetrain that the recordings ask for; None where they cannot tell it."""
+        from ddagr_gym.calibration.drivetrain_answer import drivetrain_answer, drivetrain_findings
+        from ddagr_gym.calibration.run import calibrate_drives
+        from ddagr_gym.calibration.settings import CalibrationSettings
+        from ddagr_gym.diagnosis.result.drivetrain_names import CompletedNominal
+
+        settings = CalibrationSettings(threads=self.threads, seed=self.seed)
+        settings = replace(settings, **_ONE_DRIVE) if len(self.recordings) == 1 else settings
+        self._say("the wheels do not follow their commands as the simulator says: fitting its drivetrain")
+        try:
+            self.made = calibrate_drives(
+                self.recordings, [_GROUND] * len(self.recordings), self.nominal.robot, {_GROUND: self.nominal.soil},
+                settings, soil_names={_GROUND: self.nominal.soil_name},
+                cache=None if self.cache is None else Path(self.cache) / _GROUND, progress=self._say,
+            )  # fmt: skip
+        except InputError as error:
+            warnings.warn(f"the drivetrain cannot be fitted: {error}", InputWarning, stacklevel=2)
+            return None
+        found = self.made.calibration
+        answer = drivetrain_answer(found, misfit)
+        return CompletedNominal(self.made.robot, self.made.soils[_GROUND], answer, drivetrain_findings(found))
+
+    def _say(self, line: str) -> None:
+        if self.progress is not None:
+            self.progress(f"  {line}")
 
 
 def _check_left_out(folder: Path, robot: RobotLike, soil: SoilLike, **options: object) -> None:
@@ -203,10 +274,17 @@ def _robot_of(folder: Path) -> str:
 
 
 def _gates(given: ThresholdsLike | None, nominal: Nominal, soil_uncertainty: float) -> Thresholds:
+    """Thresholds as given; else those that ship for simulated drives of the robot, or of the DDAGR with a warning.
+
+    What a simulator lacks is not judged by real drives of which it may lack the same.
+    """
     from ddagr_gym.diagnosis.gates.threshold_files import default_thresholds
 
     found = thresholds_from(given, nominal.robot, nominal.soil_name, soil_uncertainty)
-    return default_thresholds(nominal.robot.name) if found is None else found
+    if found is not None and (given is not None or not _of_ordinary_drives(found)):
+        return found
+    simulated = default_thresholds(_SIMULATED)
+    return thresholds_from(simulated, nominal.robot, nominal.soil_name, soil_uncertainty) or simulated
 
 
 def _window(window: float | None, gates: Thresholds) -> float:

@@ -13,6 +13,7 @@ from ddagr_gym.api.results import Report, Table
 from ddagr_gym.errors import InputError
 
 if TYPE_CHECKING:
+    from ddagr_gym.calibration.run import Outcome as CalibrationOutcome
     from ddagr_gym.diagnosis.answer.verdict import Diagnosis, Finding
     from ddagr_gym.diagnosis.pipeline import Outcome
     from ddagr_gym.parameters import Robot, Soil
@@ -34,9 +35,11 @@ class DiagnosisResult(Report):
 
     Attributes:
         outcome: answer, session and search behind it (:mod:`ddagr_gym.diagnosis.pipeline`).
+        drivetrain: calibration with the recordings, where the whole drivetrain was asked for; else None.
     """
 
     outcome: Outcome
+    drivetrain: CalibrationOutcome | None = None
 
     @property
     def diagnosis(self) -> Diagnosis:
@@ -132,6 +135,16 @@ class DiagnosisResult(Report):
         if not self.diagnosis.options.names_only:
             diagnosis_page.write_report(folder, self.diagnosis, self.outcome.evidence)
             (folder / diagnosis_page.PAGE).rename(folder / PAGE)
+            self._save_drivetrain(folder)
+
+    def _save_drivetrain(self, folder: Path) -> None:
+        """The page of the calibration that found the drivetrain, which the diagnosis's page links to."""
+        from ddagr_gym.reporting.calibration_page import write_page
+        from ddagr_gym.reporting.drivetrain_section import DRIVETRAIN_FOLDER
+
+        if self.drivetrain is not None:
+            (folder / DRIVETRAIN_FOLDER).mkdir(exist_ok=True)
+            write_page(folder / DRIVETRAIN_FOLDER, self.drivetrain.calibration, self.drivetrain.forecasts)
 
     def _save_effects(self, folder: Path) -> None:
         from ddagr_gym.diagnosis.pipeline import data_hash, effect_intervals

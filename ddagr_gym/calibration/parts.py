@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 
+from ddagr_gym.diagnosis.answer.drivetrain import PART_TITLES
 from ddagr_gym.identification.parameters import ModelParameter, robot_parameters
 from ddagr_gym.parameters import Drivetrain, Robot
 from ddagr_gym.physics import layout
@@ -81,20 +82,20 @@ PARTS = (
         ("half_wheelbase", "half_track", "half_width", "outer_radius"),
         "slow straight pieces and slow arcs to both sides on firm ground, with poses",
     ),
-    Part("no_load_speed", "torque that falls with speed", ("no_load_speed",), _FULL),
-    Part("torque_limit", "torque limit", ("acceleration_limit",), _HARD),
-    Part("friction", "friction of motors and gears", ("viscous_rate", "coulomb_friction"), f"coasting, and {_FULL}"),
-    Part("integral_limit", "limit of the integral part", ("integral_limit",), f"{_TURNS}, and {_FULL}"),
-    Part("limit_imbalance", "banks of unequal strength", ("limit_imbalance",), _HARD),
-    Part("command_ramp", "ramp of the commands", ("command_ramp",), _HARD),
-    Part("power_limit", "power limit", ("power_limit",), _FULL),
-    Part("speed_limit", "highest wheel speed", ("maximum_wheel_speed",), _FULL),
-    Part("integral", "integral part of the speed loop", ("integral_rate",), _TURNS),
-    Part("load", "the ground's torque on the wheels", ("load_compliance",), _TURNS),
-    Part("speed_loop", "speed loop", ("motor_rate",), _STEPS),
+    Part("no_load_speed", PART_TITLES["no_load_speed"], ("no_load_speed",), _FULL),
+    Part("torque_limit", PART_TITLES["torque_limit"], ("acceleration_limit",), _HARD),
+    Part("friction", PART_TITLES["friction"], ("viscous_rate", "coulomb_friction"), f"coasting, and {_FULL}"),
+    Part("integral_limit", PART_TITLES["integral_limit"], ("integral_limit",), f"{_TURNS}, and {_FULL}"),
+    Part("limit_imbalance", PART_TITLES["limit_imbalance"], ("limit_imbalance",), _HARD),
+    Part("command_ramp", PART_TITLES["command_ramp"], ("command_ramp",), _HARD),
+    Part("power_limit", PART_TITLES["power_limit"], ("power_limit",), _FULL),
+    Part("speed_limit", PART_TITLES["speed_limit"], ("maximum_wheel_speed",), _FULL),
+    Part("integral", PART_TITLES["integral"], ("integral_rate",), _TURNS),
+    Part("load", PART_TITLES["load"], ("load_compliance",), _TURNS),
+    Part("speed_loop", PART_TITLES["speed_loop"], ("motor_rate",), _STEPS),
     Part(
         "command_delay",
-        "dead time of the commands",
+        PART_TITLES["command_delay"],
         ("command_delay",),
         f"{_STEPS}, out of steady driving and with the time before each step recorded",
     ),

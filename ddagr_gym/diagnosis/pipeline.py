@@ -24,9 +24,10 @@ from ddagr_gym.diagnosis.planning.next_drive import plan_next_drive
 from ddagr_gym.diagnosis.preprocessing.data_checks import data_doubts
 from ddagr_gym.diagnosis.preprocessing.session import DiagnosisSession, Progress, be_silent, prepare
 from ddagr_gym.diagnosis.result.conclusion import accept, conclude
+from ddagr_gym.diagnosis.result.drivetrain_names import CompletedNominal, unlike_commands, with_drivetrain
 from ddagr_gym.diagnosis.review import review
-from ddagr_gym.diagnosis.search.scanned_model import SearchResult
-from ddagr_gym.diagnosis.search.starting_models import starting_models
+from ddagr_gym.diagnosis.search.scanned_model import SearchResult, scan_model
+from ddagr_gym.diagnosis.search.starting_models import refit_nominal, starting_models
 from ddagr_gym.diagnosis.search.stepwise import search
 from ddagr_gym.diagnosis.setting import Setting
 from ddagr_gym.diagnosis.store import StepStore
@@ -43,6 +44,12 @@ LATER = ("certification", "unnamed terms", "next drive")
 
 OnStep = Callable[[str, bool], None]
 """Function that takes the name of a step that begins, and whether its result was kept from before."""
+
+CompleteNominal = Callable[[Mapping[str, float]], CompletedNominal | None]
+"""Function that fits the drivetrain of the nominal robot to the recordings; takes the encoders' misfit over its limit.
+
+None where the recordings cannot tell it. It is given from outside, since a calibration knows the stages of a diagnosis
+and not the other way round."""
 
 Inputs = ParamSpec("Inputs")
 Result = TypeVar("Result")
@@ -114,6 +121,7 @@ def diagnose(
     names_only: bool = False,
     soil_name: str = "",
     robot_file: str = "",
+    complete_nominal: CompleteNominal | None = None,
     cache: Path | None = None,
     on_step: OnStep = lambda name, kept: None,
     progress: Progress = be_silent,
@@ -130,6 +138,8 @@ def diagnose(
         names_only: leave out certification, unnamed terms and the next drive.
         soil_name: of the nominal soil, for the report.
         robot_file: where the nominal robot came from, where that was a file.
+        complete_nominal: fits the drivetrain where the wheels do not follow their commands as the nominal simulator
+            says; None searches the library whatever they do.
         cache: folder of finished steps, from which the same diagnosis goes on after an interruption; it stays when
             all is done. None keeps nothing.
         on_step: called when a step begins.
@@ -147,6 +157,19 @@ def diagnose(
     session = start.session
     found = steps.keep("search", search, session, start, steps.store.step)
     accepted = accept(found, session.gates)
+    unlike = {} if complete_nominal is None else unlike_commands(found, accepted, session.gates)
+    nominal = complete_nominal(unlike) if complete_nominal is not None and unlike else None
+    if nominal is not None:
+        made = _beside_drivetrain(session, found, nominal, steps)
+        answer = replace(
+            made.diagnosis,
+            checks=checks,
+            robot=robot.name,
+            soil=soil_name,
+            options=_options(session, True, robot_file),
+            seconds=time.monotonic() - began,
+        )
+        return replace(made, diagnosis=answer)
     diagnosis, effects = steps.run("verdict", conclude, session, found, accepted)
     fit = None if names_only else steps.run("certification", certify, session, accepted)
     steps.begin("localisation")
@@ -170,6 +193,29 @@ def diagnose(
         seconds=time.monotonic() - began,
     )
     return Outcome(diagnosis, effects, session, accepted, evidence)
+
+
+def _beside_drivetrain(
+    given: DiagnosisSession, before: SearchResult, nominal: CompletedNominal, steps: Steps
+) -> Outcome:
+    """The answer beside a nominal simulator whose drivetrain was fitted: its parts, and where something is left.
+
+    Args:
+        given: session with the nominal simulator as it was given.
+        before: what was found beside that one.
+        nominal: the completed one.
+        steps: of the diagnosis.
+    """
+    session = given.with_nominal(nominal.robot, nominal.soil)
+    refitted = steps.keep("completed refit", refit_nominal, session.problem, session.progress)[1]
+    found = SearchResult((steps.keep("completed scan", scan_model, session.problem, refitted, session.progress),))
+    diagnosis, effects = steps.run("verdict", conclude, session, found, found)
+    diagnosis = with_drivetrain(diagnosis, nominal, before.nominal.misfit)
+    steps.begin("localisation")
+    traces = steps.keep("localisation traces", trace_mismatch, session, found)
+    located = steps.keep("localisation", locate, session, found, traces)
+    evidence = steps.run("evidence", gather_evidence, session, found, traces)
+    return Outcome(replace(diagnosis, localisation=located), effects, session, found, evidence)
 
 
 def _options(session: DiagnosisSession, names_only: bool, robot_file: str) -> Options:

@@ -9,6 +9,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from ddagr_gym.diagnosis.answer.drivetrain import PART_TITLES
 from ddagr_gym.diagnosis.answer.verdict import Estimate
 from ddagr_gym.physics.effects.registry import effect_kinds
 
@@ -319,7 +320,9 @@ def describe(name: str, parameters: Amounts) -> str:
     try:
         return SENTENCES[name](parameters)
     except KeyError:
-        units = {key: item.unit.replace("^2", "²").strip("-") for key, item in parameters.items()}
+        units = {key: item.unit.replace("^2", "²").replace("^3", "³").strip("-") for key, item in parameters.items()}
+    if name in PART_TITLES:
+        return f"{PART_TITLES[name]} ({', '.join(quantity(item, units[key]) for key, item in parameters.items())})"
     sizes = [f"{key.replace('_', ' ')} {quantity(item, units[key], signed=True)}" for key, item in parameters.items()]
     return f"{in_sentence(name)} ({', '.join(sizes)})" if sizes else in_sentence(name)
 
@@ -327,7 +330,10 @@ def describe(name: str, parameters: Amounts) -> str:
 def title(name: str) -> str:
     """An effect's title; the name itself, spelt out, for one that is not installed here."""
     kind = effect_kinds().get(name)
-    return kind.title if kind is not None else name.replace("_", " ").capitalize()
+    if kind is not None:
+        return kind.title
+    words = PART_TITLES.get(name, name.replace("_", " "))
+    return words[:1].upper() + words[1:]
 
 
 def in_sentence(name: str) -> str:

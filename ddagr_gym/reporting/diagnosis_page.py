@@ -16,6 +16,7 @@ from ddagr_gym.files import atomic_path, make_folder
 from ddagr_gym.reporting import diagnosis_figures as figures
 from ddagr_gym.reporting import diagnosis_maps as maps
 from ddagr_gym.reporting import diagnosis_tables as tables
+from ddagr_gym.reporting.drivetrain_section import drivetrain_section
 from ddagr_gym.reporting.figures import house_style
 from ddagr_gym.reporting.page_template import embedded, page_template
 
@@ -76,6 +77,7 @@ def _context(diagnosis: Diagnosis, evidence: Evidence, studio: _Studio) -> dict[
         "checks": tables.checks(diagnosis.checks),
         "findings": [tables.finding_card(item, diagnosis.recordings) for item in findings],
         "rejected": tables.rejected(diagnosis.rejected),
+        "drivetrain": drivetrain_section(diagnosis.drivetrain),
         "mismatch": localisation.mismatch.phrase if localisation and findings else "",
         "remaining": localisation.remaining.phrase if localisation else "",
         "window": f"{evidence.duration:.3g}",

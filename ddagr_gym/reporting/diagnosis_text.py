@@ -5,6 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from ddagr_gym.reporting.drivetrain_section import (
+    FORECAST_HEADER,
+    PART_HEADER,
+    forecast_rows,
+    part_rows,
+    remaining_in_words,
+)
 from ddagr_gym.reporting.text_table import format_table
 
 if TYPE_CHECKING:
@@ -27,6 +34,10 @@ def outcome_text(diagnosis: Diagnosis) -> str:
         parts.append("\n".join(["The recordings themselves are suspicious (`ddagr check` says more):", *lines]))
     if diagnosis.findings:
         parts.append(format_table(FINDING_HEADER, finding_rows(diagnosis)))
+    if diagnosis.drivetrain is not None:
+        parts.append(format_table(PART_HEADER, part_rows(diagnosis.drivetrain)))
+        parts.append(format_table(FORECAST_HEADER, forecast_rows(diagnosis.drivetrain)))
+        parts.append(f"Squared error of the wheel speeds, corrected: {remaining_in_words(diagnosis.drivetrain)}.")
     if diagnosis.rejected:
         nearest = ", ".join(f"{item.name} (gain {item.gain:.1f})" for item in diagnosis.rejected)
         parts.append(f"What comes nearest leaves too much to be named: {nearest}.")

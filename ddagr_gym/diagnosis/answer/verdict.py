@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from ddagr_gym.diagnosis.answer.certificate import Certificate
 from ddagr_gym.diagnosis.answer.change import Change
+from ddagr_gym.diagnosis.answer.drivetrain import DrivetrainAnswer
 from ddagr_gym.diagnosis.answer.location import EffectLocation, Localisation
 from ddagr_gym.diagnosis.answer.next_drive_plan import NextDrivePlan
 from ddagr_gym.diagnosis.answer.unnamed_terms import UnnamedTerms
@@ -46,12 +47,13 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Finding:
-    """One named effect.
+    """One named effect, or part of the drivetrain.
 
     Attributes:
-        name: of the effect (`ddagr effects`).
+        name: of the effect (`ddagr effects`), or of the part (`drivetrain`).
         parameters: by field.
-        gain: fall of the cost over the dispersion when it was added.
+        gain: fall of the cost over the dispersion when it was added; of a part of the drivetrain the relative growth of
+            the forecasts' loss without it.
         gate: what the gain had to pass: beside other names more than alone (`thresholds` has the gates of first names);
             0 where it was seen in the values themselves.
         score: cluster-robust, along the fitted direction.
@@ -168,8 +170,8 @@ class Diagnosis:
     """What recordings say about the physics that the nominal simulator leaves out.
 
     Attributes:
-        verdict: names of effects (`ddagr effects`), or `["none"]`: nothing that these data can show, or `["unknown"]`:
-            something that no effect explains.
+        verdict: names of effects (`ddagr effects`) and of parts of the drivetrain, or `["none"]`: nothing that these
+            data can show, or `["unknown"]`: something that no effect explains.
         complete: whether no more is left than in drives with nothing missing, the names explain at least 80 % of the
             mismatch, every size is the same everywhere, none reaches the bound of what exists, no drive that nothing
             was fitted to is certainly predicted worse, and no channel is dead. Rivals in an equivalence set and what
@@ -202,6 +204,8 @@ class Diagnosis:
         checks: what the recordings say against themselves.
         rejected: what fits best where that leaves too much in the channels to be a name; it is in no model of `misfit`,
             `fit` and `localisation`, and in no effects.yaml.
+        drivetrain: what the nominal simulator lacks between command and wheel; null where the wheels follow their
+            commands about as it says. Where it is there, robot and soil of all other entries have it.
         detectable_alone: the same as `detectable` for all effects beside the nominal model, before any was named.
         schema: name and version of the file's form.
         change: with `--calibration`, what changed against ordinary drives of the robot; else null. With it `gain` and
@@ -232,6 +236,7 @@ class Diagnosis:
     options: Options = field(default_factory=Options)
     checks: tuple[DataDoubt, ...] = ()
     rejected: tuple[Finding, ...] = ()
+    drivetrain: DrivetrainAnswer | None = None
     detectable_alone: Mapping[str, Mapping[str, float | None]] = field(default_factory=dict)
     schema: str = SCHEMA
     change: Change | None = None

@@ -67,6 +67,12 @@ class DiagnosisSession:
         problem = make_problem(self.robot, self.soil, self.mended.recordings, setting)
         return replace(self, setting=setting, problem=problem, gates=self.bank.for_length(problem.covered))
 
+    def with_nominal(self, robot: Robot, soil: Soil) -> DiagnosisSession:
+        """The same recordings beside another nominal simulator."""
+        problem = make_problem(robot, soil, self.mended.recordings, self.setting)
+        gates = self.bank.for_length(problem.covered)
+        return replace(self, robot=robot, soil=soil, problem=problem, gates=gates)
+
     def key(self) -> str:
         """SHA-256 of all that results depend on; the number of threads is not among it."""
         digest = hashlib.sha256(source_digest().encode())

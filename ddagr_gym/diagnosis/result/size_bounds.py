@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ddagr_gym.diagnosis.answer.verdict import Estimate, Finding
-from ddagr_gym.physics.effects.registry import effect_kind
+from ddagr_gym.physics.effects.registry import effect_kinds
 
 _NEAR = 1e-3
 """Distance from a bound, in its distance from neutral, that counts as there (rounding of a bounded fit)."""
@@ -38,8 +38,8 @@ def pushed_to_bounds(findings: Sequence[Finding]) -> list[Pushed]:
     """
     found = []
     for finding in findings:
-        kind = effect_kind(finding.name)
-        if kind.categorical or not kind.differentiable:
+        kind = effect_kinds().get(finding.name)
+        if kind is None or kind.categorical or not kind.differentiable:
             continue
         for field in kind.size_names():
             estimate = finding.parameters.get(field)

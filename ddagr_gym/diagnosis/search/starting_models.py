@@ -21,6 +21,11 @@ FAR_OFF = 4.0
 model is scanned too (ours: residuals of twice the noise)."""
 
 
+MOST_WINDOWS = 120
+"""Short windows that are searched where the refitted nominal model is far off (ours): what is large shows in a few, and
+the time of a search does not grow with the length of the drives (three drives of 60 s have 90)."""
+
+
 @dataclass(frozen=True, eq=False)
 class StartingModels:
     """Nominal models before any effect is assumed.
@@ -51,11 +56,19 @@ def starting_models(session: DiagnosisSession, cache: StepCache = compute_withou
     raw, refitted = cache("search refit", partial(refit_nominal, session.problem, session.progress))
     if dispersion_of(session.problem, refitted) > FAR_OFF and session.setting.duration > SHORT:
         session.progress("far off: again in short windows")
-        session = session.with_windows(SHORT, SHORT * session.setting.stride / session.setting.duration)
+        session = _thinned(session.with_windows(SHORT, SHORT * session.setting.stride / session.setting.duration))
         again = partial(refit_nominal, session.problem, session.progress)
         raw, refitted = cache("search refit, short windows", again)
     _check_predicted(session, refitted)
     return StartingModels(session, raw, refitted)
+
+
+def _thinned(session: DiagnosisSession) -> DiagnosisSession:
+    """The same with windows farther apart, where there are more than :data:`MOST_WINDOWS`."""
+    count = session.problem.blocked.windows.count
+    if count <= MOST_WINDOWS:
+        return session
+    return session.with_windows(session.setting.duration, session.setting.stride * count / MOST_WINDOWS)
 
 
 def refit_nominal(problem: Problem, progress: Callable[[str], None] = be_silent) -> tuple[Fitted, Fitted]:

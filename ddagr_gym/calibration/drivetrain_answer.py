@@ -1,0 +1,116 @@
+"""What a calibration says of the drivetrain, in the words of a diagnosis."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from ddagr_gym.calibration.part_selection import surely_above
+from ddagr_gym.calibration.result import (
+    CALIBRATED,
+    DATA_SHEET,
+    KINEMATIC,
+    CalibratedParameter,
+    Calibration,
+    ForecastError,
+    PartDecision,
+)
+from ddagr_gym.diagnosis.answer.drivetrain import (
+    PART_TITLES,
+    DrivetrainAnswer,
+    ForecastComparison,
+    PartEvidence,
+    Remaining,
+)
+from ddagr_gym.diagnosis.answer.verdict import Estimate, Finding
+from ddagr_gym.physics.effects.pose_latency import PoseLatency
+
+WHEEL_SPEED = "wheel_speed"
+
+_Key = tuple[str, str, float | None]
+
+
+def drivetrain_answer(calibration: Calibration, misfit: Mapping[str, float]) -> DrivetrainAnswer:
+    """Parts of the drivetrain, and what they are worth on what was left out.
+
+    Args:
+        calibration: of the recordings that are diagnosed.
+        misfit: of the encoders over their limits, for which the drivetrain was asked.
+    """
+    parts = {item.name: item for item in calibration.parts if item.name in PART_TITLES}
+    made = tuple(
+        PartEvidence(name, name in named_parts(calibration), parts[name].growth, parts[name].error)
+        for name in PART_TITLES
+        if name in parts
+    )
+    other = (p.name for p in calibration.parameters if p.calibrated and p.part not in PART_TITLES)
+    remaining = (Remaining(u.condition, u.share, u.time) for u in calibration.unexplained if u.channel == WHEEL_SPEED)
+    forecasts = tuple(_comparisons(calibration))
+    return DrivetrainAnswer(made, forecasts, tuple(remaining), _explained(forecasts), tuple(other), dict(misfit))
+
+
+def named_parts(calibration: Calibration) -> dict[str, list[CalibratedParameter]]:
+    """Parts of the drivetrain that were kept and of which some parameter was determined, with these parameters."""
+    kept = {part.name for part in calibration.parts if part.kept}
+    found: dict[str, list[CalibratedParameter]] = {}
+    for item in calibration.parameters:
+        if item.calibrated and item.part in kept and item.part in PART_TITLES:
+            found.setdefault(item.part, []).append(item)
+    return {name: found[name] for name in PART_TITLES if name in found}
+
+
+def drivetrain_findings(calibration: Calibration) -> tuple[Finding, ...]:
+    """One finding per part that the recordings ask for, in the order of the signal; then late poses."""
+    decisions = {item.name: item for item in calibration.parts}
+    folds = len({item.drive for item in calibration.forecasts})
+    parts = tuple(_finding(decisions[name], found, folds) for name, found in named_parts(calibration).items())
+    late = max((drive.pose_lateness for drive in calibration.drives), default=0.0)
+    return (*parts, _late_poses(late)) if late >= PoseLatency.parameter("latency").metadata["least"] else parts
+
+
+def _late_poses(lateness: float) -> Finding:
+    """Poses that come behind the gyro: seen in the values, by which their headings agree best."""
+    return Finding(
+        PoseLatency.name, {"latency": Estimate(lateness, "s")}, 0.0, 0.0, 0.0, 0.0, {}, {PoseLatency.name: 1.0}
+    )
+
+
+def _finding(part: PartDecision, parameters: list[CalibratedParameter], folds: int) -> Finding:
+    """A part as a finding: its gain is the growth of the forecasts' loss without it."""
+    error = part.error or 0.0
+    estimates = {p.name: Estimate(p.value, p.unit, p.interval) for p in parameters if p.value is not None}
+    score = part.growth / error if error > 0.0 else 0.0
+    return Finding(
+        part.name, estimates, part.growth, surely_above(folds) * error, score, part.growth,
+        {}, {part.name: 1.0},
+    )  # fmt: skip
+
+
+def _comparisons(calibration: Calibration) -> list[ForecastComparison]:
+    """Errors of the three models side by side, where all of them were measured."""
+    by_model: dict[_Key, dict[str, ForecastError]] = {}
+    for item in calibration.forecasts:
+        by_model.setdefault((item.drive, item.metric, item.horizon), {})[item.model] = item
+    found = []
+    for (drive, metric, horizon), models in by_model.items():
+        rms = {name: item.rms for name, item in models.items() if item.rms is not None}
+        if {DATA_SHEET, CALIBRATED, KINEMATIC} <= set(rms):
+            found.append(
+                ForecastComparison(
+                    drive,
+                    metric,
+                    horizon,
+                    models[CALIBRATED].unit,
+                    rms[DATA_SHEET],
+                    rms[CALIBRATED],
+                    rms[KINEMATIC],
+                    models[CALIBRATED].rms_interval,
+                )
+            )
+    return found
+
+
+def _explained(forecasts: tuple[ForecastComparison, ...]) -> float:
+    """Share of the nominal simulator's squared error of the wheel speeds that the correction takes away."""
+    wheels = [item for item in forecasts if item.metric == WHEEL_SPEED and item.horizon is None]
+    before = sum(item.nominal**2 for item in wheels)
+    return 1.0 - sum(item.corrected**2 for item in wheels) / before if before > 0.0 else 0.0

@@ -1,0 +1,78 @@
+"""The verdict of a diagnosis in which the drivetrain was asked for as a whole."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from ddagr_gym.diagnosis.answer.drivetrain import DrivetrainAnswer
+from ddagr_gym.diagnosis.answer.verdict import UNKNOWN, Diagnosis, Finding
+from ddagr_gym.diagnosis.gates.thresholds import Thresholds
+from ddagr_gym.diagnosis.result.sentences import headline, share_in_words
+from ddagr_gym.diagnosis.search.scanned_model import SearchResult
+from ddagr_gym.identification.windows import CHANNELS
+from ddagr_gym.parameters import Robot, Soil
+
+UNLIKE = 3.0
+"""Misfit of an encoder over its limit from which the whole drivetrain is asked for, where the library's names leave too
+much (ours: twice what leaves a complete verdict open; the data sheet of a real robot leaves 9 and more)."""
+
+ENCODERS = tuple(name for name in CHANNELS if name.startswith("encoder"))
+
+
+def unlike_commands(found: SearchResult, accepted: SearchResult, gates: Thresholds) -> dict[str, float]:
+    """Misfit of the encoders over their limits, by channel; empty where names of the library are accepted.
+
+    Args:
+        found: by the search.
+        accepted: the same, or its nominal model where the names are refused.
+        gates: with the limits.
+    """
+    misfit = found.chosen.misfit
+    shares = {name: misfit[name] / gates.misfit[name] for name in ENCODERS if gates.misfit.get(name, 0.0) > 0.0}
+    return {} if accepted.chosen.names or max(shares.values(), default=0.0) <= UNLIKE else shares
+
+
+@dataclass(frozen=True, eq=False)
+class CompletedNominal:
+    """A nominal simulator with the drivetrain that recordings ask for.
+
+    Attributes:
+        robot: with the parts that it needs.
+        soil: as it was fitted along.
+        answer: parts, and what they are worth on what was left out.
+        findings: one per part that is named.
+    """
+
+    robot: Robot
+    soil: Soil
+    answer: DrivetrainAnswer
+    findings: tuple[Finding, ...]
+
+
+def with_drivetrain(diagnosis: Diagnosis, nominal: CompletedNominal, misfit: Mapping[str, float]) -> Diagnosis:
+    """A diagnosis beside a completed nominal simulator, with the names of what that one has more.
+
+    What is left beside it has no name: its gates are those of simulated drives, which real ground and sensors exceed
+    everywhere.
+
+    Args:
+        diagnosis: beside the completed simulator; only what was seen in the values is named.
+        nominal: the completed simulator.
+        misfit: of the channels beside the simulator as it was given, refitted.
+    """
+    seen = diagnosis.findings
+    findings = (*seen, *nominal.findings)
+    names = tuple(finding.name for finding in findings) or (UNKNOWN,)
+    complete = diagnosis.complete and bool(findings)
+    share = share_in_words(max(nominal.answer.explained, 0.0))
+    worth = f"on stretches that were left out of the fit this explains {share} of the squared error of the wheel speeds"
+    return replace(
+        diagnosis,
+        verdict=names,
+        complete=complete,
+        findings=findings,
+        sentence=headline(names, complete, findings, doubts=[worth] if nominal.findings else ()),
+        misfit={**diagnosis.misfit, "nominal": dict(misfit)},
+        drivetrain=nominal.answer,
+    )
