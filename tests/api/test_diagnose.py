@@ -149,7 +149,6 @@ def test_an_answer_knows_its_simulator_for_the_next_drive(found, monkeypatch):
         ({"window": 0.5}, "window is 0.5: give at least 1"),
         ({"robot": "husky", "soil": "mud"}, "unknown soil 'mud'"),
         ({"thresholds": "missing.json"}, "missing.json cannot be read as thresholds"),
-        ({"robot": "husky"}, "no null bank ships for robot 'husky'"),
     ],
 )
 def test_bad_options_are_one_sentence(tables, options, message):

@@ -1,5 +1,6 @@
 """The stages of a diagnosis: in their order, each once, and behind the last finished one after an interruption."""
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -102,6 +103,33 @@ def test_names_only_leaves_out_what_follows_the_verdict(stages: Stages) -> None:
     outcome, began = stages.run(names_only=True)
     assert [name for name, _ in began] == [name for name in STEPS if name not in LATER]
     assert (outcome.diagnosis.fit, outcome.diagnosis.unnamed, outcome.diagnosis.next_drive) == (None, None, None)
+
+
+@pytest.mark.parametrize("told", [True, False])
+def test_the_drivetrain_is_fitted_where_the_library_leaves_too_much_in_the_encoders(
+    stages: Stages, monkeypatch: pytest.MonkeyPatch, told: bool
+) -> None:
+    nominal = SimpleNamespace(robot=get_robot("warthog"), soil=get_soil("thesis_a1"))
+    stages.session.with_nominal = lambda robot, soil: SimpleNamespace(**{**vars(stages.session), "robot": robot})
+    stages.session.progress = lambda line: None
+    monkeypatch.setattr(pipeline, "unlike_commands", lambda found, accepted, gates: {"encoder_left": 9.0})
+    monkeypatch.setattr(pipeline, "refit_nominal", lambda problem, progress: ("raw", "refitted"))
+    monkeypatch.setattr(pipeline, "scan_model", lambda problem, fitted, progress: f"scan of {fitted}")
+    monkeypatch.setattr(pipeline, "with_drivetrain", lambda answer, made, misfit: replace(answer, verdict=("load",)))
+    monkeypatch.setattr(
+        pipeline, "search", lambda *inputs: SimpleNamespace(nominal=SimpleNamespace(misfit={"yaw_rate": 2.0}))
+    )
+    asked: list[Any] = []
+
+    def complete(misfit: Any) -> Any:
+        asked.append(misfit)
+        return nominal if told else None
+
+    outcome, _ = stages.run(complete_nominal=complete)
+    assert asked == [{"encoder_left": 9.0}]
+    assert outcome.diagnosis.verdict == (("load",) if told else ("none",))
+    assert outcome.nominal[0].name == ("warthog" if told else "ddagr")
+    assert ("certify" in stages.called) is not told
 
 
 def test_a_stopped_diagnosis_goes_on_behind_its_last_step(stages: Stages, tmp_path: Path) -> None:

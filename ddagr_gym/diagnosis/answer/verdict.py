@@ -204,8 +204,8 @@ class Diagnosis:
         checks: what the recordings say against themselves.
         rejected: what fits best where that leaves too much in the channels to be a name; it is in no model of `misfit`,
             `fit` and `localisation`, and in no effects.yaml.
-        drivetrain: what the nominal simulator lacks between command and wheel; null where the wheels follow their
-            commands about as it says. Where it is there, robot and soil of all other entries have it.
+        drivetrain: what the nominal simulator lacks between command and wheel; absent where the wheels follow
+            their commands about as it says. Where it is there, robot and soil of all other entries have it.
         detectable_alone: the same as `detectable` for all effects beside the nominal model, before any was named.
         schema: name and version of the file's form.
         change: with `--calibration`, what changed against ordinary drives of the robot; else null. With it `gain` and

@@ -27,6 +27,8 @@ def as_mapping(diagnosis: Diagnosis) -> dict[str, Any]:
     mapping = plain(diagnosis)
     for name in _ABSENT_WHERE_UNKNOWN:
         mapping[name] = {key: value for key, value in mapping[name].items() if value is not None}
+    if mapping["drivetrain"] is None:
+        del mapping["drivetrain"]
     return mapping
 
 

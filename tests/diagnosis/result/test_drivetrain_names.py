@@ -1,0 +1,67 @@
+"""When the drivetrain is asked for as a whole, and what the verdict is then."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from ddagr_gym.diagnosis.answer.drivetrain import PART_TITLES, DrivetrainAnswer, PartEvidence
+from ddagr_gym.diagnosis.answer.verdict import Diagnosis, Estimate, Finding, GatesUsed
+from ddagr_gym.diagnosis.gates.thresholds import Thresholds
+from ddagr_gym.diagnosis.result.drivetrain_names import UNLIKE, CompletedNominal, unlike_commands, with_drivetrain
+from ddagr_gym.diagnosis.result.files import as_mapping, validate
+from ddagr_gym.diagnosis.wording import describe, title
+from ddagr_gym.presets import get_robot, get_soil
+
+GATES = Thresholds({}, {"encoder_right": 2.0, "encoder_left": 2.0, "yaw_rate": 1.0}, 20, "a test")
+LEFT = Diagnosis(
+    ("unknown",), False, (), "", {"nominal": {"yaw_rate": 1.0}, "corrected": {"yaw_rate": 1.0}, "limit": {}}, {}, {},
+    ("a",), GatesUsed(nulls=20, bank="a test", level=0.05), 0.0, "0",
+)  # fmt: skip
+
+
+def search(names: tuple[str, ...], misfit: float) -> Any:
+    chosen = SimpleNamespace(names=names, misfit={"encoder_right": misfit, "encoder_left": 1.0, "yaw_rate": 99.0})
+    return SimpleNamespace(chosen=chosen)
+
+
+def completed(*findings: Finding) -> CompletedNominal:
+    parts = tuple(PartEvidence(name, True, 0.2, 0.05) for name in ("command_delay", "load"))
+    return CompletedNominal(
+        get_robot("warthog"), get_soil("thesis_a1"), DrivetrainAnswer(parts, (), (), 0.93), findings
+    )
+
+
+@pytest.mark.parametrize(("misfit", "asked"), [(2.0 * UNLIKE + 0.1, True), (2.0 * UNLIKE - 0.1, False)])
+def test_it_is_asked_for_where_refused_names_leave_too_much_in_an_encoder(misfit, asked):
+    found = search(("motor_lag",), misfit)
+    assert bool(unlike_commands(found, search((), 50.0), GATES)) is asked
+    assert unlike_commands(found, found, GATES) == {}
+
+
+def test_parts_are_the_verdict_with_what_was_seen_and_it_is_never_complete_without_a_name():
+    delay = Finding("command_delay", {"command_delay": Estimate(0.2, "s", (0.19, 0.21))}, 0.2, 0.1, 4.0, 0.2)
+    load = Finding("load", {"load_compliance": Estimate(0.01, "1/(kg m^2)")}, 0.2, 0.1, 4.0, 0.2)
+    seen = Finding("sensor_hold", {}, 9.0, 0.0, 3.0, 9.0)
+    beside = replace(LEFT, verdict=("sensor_hold",), findings=(seen,))
+    answer = with_drivetrain(beside, completed(delay, load), {"yaw_rate": 7.0})
+    assert answer.verdict == ("sensor_hold", "command_delay", "load")
+    assert not answer.complete
+    assert "93 % of the squared error of the wheel speeds" in answer.sentence
+    assert "the ground's torque on the wheels (0.010 1/(kg m²))" in answer.sentence
+    assert answer.misfit["nominal"] == {"yaw_rate": 7.0}
+    assert with_drivetrain(replace(LEFT, complete=True), completed(), {}).verdict == ("unknown",)
+    assert not with_drivetrain(replace(LEFT, complete=True), completed(), {}).complete
+
+
+def test_an_answer_with_parts_is_read_back_as_it_was_written():
+    load = Finding("load", {"load_compliance": Estimate(0.01, "1/(kg m^2)")}, 0.2, 0.1, 4.0, 0.2)
+    answer = with_drivetrain(LEFT, completed(load), {})
+    assert validate(as_mapping(answer)).drivetrain == answer.drivetrain
+
+
+def test_parts_have_words_and_effects_keep_theirs():
+    assert title("load") == "The ground's torque on the wheels"
+    assert title("command_delay") == "Command delay"
+    assert all(describe(name, {}).startswith(words) for name, words in PART_TITLES.items() if name != "command_delay")
