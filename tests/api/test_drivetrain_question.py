@@ -1,0 +1,76 @@
+"""A simulated robot with a drivetrain that its data sheet does not have: the diagnosis names its parts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+import ddagr_gym
+from ddagr_gym.api import diagnose as door
+from ddagr_gym.diagnosis import pipeline
+from ddagr_gym.diagnosis.search.scanned_model import SearchResult, scan_model
+from ddagr_gym.errors import InputError, InputWarning
+from ddagr_gym.presets import get_robot
+from ddagr_gym.recordings.schema import Recording
+from ddagr_gym.reporting.drivetrain_section import DRIVETRAIN_FOLDER
+from tests.calibration.conftest import RATE, steps
+
+DELAY = 0.3
+LOAD = 0.06  # 1/(kg m^2): the turning torque of the soil takes a tenth of the bank speeds until the integral part is up
+
+
+def driven(seconds: float) -> Recording:
+    robot = get_robot("ddagr")
+    own = replace(robot.drivetrain, command_delay=DELAY, load_compliance=LOAD, integral_rate=2.0)
+    made = ddagr_gym.simulate(
+        steps(5, seconds), replace(robot, drivetrain=own), "thesis_a1", rate=RATE, pose_rate=5.0, seed=5
+    )
+    return made.recording.with_meta(source="yard.csv")
+
+
+def search_nothing(session, start, cache):
+    """A search that finds no name: what it does on a real drive takes minutes."""
+    return SearchResult((scan_model(session.problem, start.refitted),))
+
+
+@pytest.fixture
+def asked(monkeypatch):
+    monkeypatch.setattr(pipeline, "search", search_nothing)
+    monkeypatch.setattr(pipeline, "unlike_commands", lambda found, accepted, gates: {"encoder_left": 9.0})
+    monkeypatch.setattr(door, "_ONE_DRIVE", {"fitted": 16, "compared": 12})
+
+
+@pytest.mark.slow
+def test_parts_are_named_and_the_pages_say_so(asked, tmp_path):
+    result = ddagr_gym.diagnose(driven(180.0), cache=tmp_path / "cache")
+    assert {"command_delay", "load"} <= set(result.verdict)
+    found = {finding.name: finding for finding in result.findings}
+    assert float(found["command_delay"].parameters["command_delay"]) == pytest.approx(DELAY, abs=0.03)
+    # with one drive a heavier load and a softer soil do nearly the same: the size is known to a factor
+    assert LOAD / 3.0 < float(found["load"].parameters["load_compliance"]) < 3.0 * LOAD
+    assert result.diagnosis.drivetrain.explained > 0.8
+    assert result.robot.drivetrain.command_delay == pytest.approx(DELAY, abs=0.03)
+    folder = result.report(tmp_path / "answer")
+    page = (folder / "index.html").read_text()
+    assert "Between command and wheel" in page
+    assert f'href="{DRIVETRAIN_FOLDER}/calibration.html"' in page
+    assert (folder / DRIVETRAIN_FOLDER / "calibration.html").is_file()
+    assert "dead time of the commands" in str(result)
+
+
+def test_a_recording_that_cannot_tell_its_drivetrain_keeps_its_answer_and_says_why(asked, monkeypatch):
+    def refuse(*inputs, **named):
+        raise InputError("yard.csv has 3 windows: give a longer drive.")
+
+    monkeypatch.setattr("ddagr_gym.calibration.run.calibrate_drives", refuse)
+    with pytest.warns(InputWarning, match="the drivetrain cannot be fitted: yard.csv has 3 windows"):
+        result = ddagr_gym.diagnose(driven(40.0), names_only=True)
+    assert result.diagnosis.drivetrain is None
+
+
+def test_thresholds_of_ordinary_drives_ask_what_differs_from_them():
+    from ddagr_gym.diagnosis.gates.threshold_files import default_thresholds
+
+    assert door._of_ordinary_drives(default_thresholds("warthog"))
+    assert not door._of_ordinary_drives(default_thresholds("ddagr"))
