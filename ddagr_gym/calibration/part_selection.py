@@ -3,12 +3,13 @@
 Every part is taken out in turn, what is fitted least often first. It stays out unless the forecasts of the left-out
 drives become worse by more than the standard error of that change between drives (the one-standard-error rule; L.
 Breiman et al., Classification and Regression Trees, 1984, section 3.4.3), with Student's t where there are few drives.
+What acts through parts that have all gone goes with them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -16,7 +17,7 @@ import numpy as np
 from ddagr_gym.calibration.calibration_data import CalibrationData
 from ddagr_gym.calibration.joint_fit import OFFSET, Standing, fit_model
 from ddagr_gym.calibration.left_out import fold_sigma, forecast_loss, forecasts
-from ddagr_gym.calibration.parts import PARTS, RobotModel
+from ddagr_gym.calibration.parts import PARTS, RobotModel, idle_parts
 from ddagr_gym.calibration.result import PartDecision
 from ddagr_gym.diagnosis.store import StepCache
 from ddagr_gym.identification.windows import WindowSet
@@ -138,4 +139,11 @@ def select_parts(
         decisions.append(PartDecision(part.name, kept, growth, error))
         if not kept:
             best, left_out = tried, left_out | {part.name}
+    idle = idle_parts(left_out, comparison.data.robot)
+    if idle:
+        left_out |= idle
+        without = model.without(left_out, comparison.data.robot)
+        name = f"without {' '.join(sorted(left_out))}"
+        best = cache(name, partial(comparison.candidate, without, best.standing))
+        decisions = [replace(item, kept=item.kept and item.name not in idle) for item in decisions]
     return Selection(left_out, tuple(decisions), best.standing)

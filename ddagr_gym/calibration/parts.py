@@ -55,12 +55,14 @@ class Part:
         title: in tables.
         parameters: names of its parameters.
         helps: drive from which they can be identified, for a reader.
+        needs: names of parts without any of which it does nothing; empty where it needs none.
     """
 
     name: str
     title: str
     parameters: tuple[str, ...]
     helps: str
+    needs: tuple[str, ...] = ()
 
 
 _STEPS = "steps of the commands held for 3 s or more, with wheel speeds recorded at 10 Hz or more"
@@ -85,8 +87,14 @@ PARTS = (
     Part("no_load_speed", PART_TITLES["no_load_speed"], ("no_load_speed",), _FULL),
     Part("torque_limit", PART_TITLES["torque_limit"], ("acceleration_limit",), _HARD),
     Part("friction", PART_TITLES["friction"], ("viscous_rate", "coulomb_friction"), f"coasting, and {_FULL}"),
-    Part("integral_limit", PART_TITLES["integral_limit"], ("integral_limit",), f"{_TURNS}, and {_FULL}"),
-    Part("limit_imbalance", PART_TITLES["limit_imbalance"], ("limit_imbalance",), _HARD),
+    Part("integral_limit", PART_TITLES["integral_limit"], ("integral_limit",), f"{_TURNS}, and {_FULL}", ("integral",)),
+    Part(
+        "limit_imbalance",
+        PART_TITLES["limit_imbalance"],
+        ("limit_imbalance",),
+        _HARD,
+        ("torque_limit", "no_load_speed", "power_limit"),
+    ),
     Part("command_ramp", PART_TITLES["command_ramp"], ("command_ramp",), _HARD),
     Part("power_limit", PART_TITLES["power_limit"], ("power_limit",), _FULL),
     Part("speed_limit", PART_TITLES["speed_limit"], ("maximum_wheel_speed",), _FULL),
@@ -110,6 +118,19 @@ LIMITS = {
     "power_limit": "power_limit",
 }
 """Fields of a drivetrain that no data sheet may state (a very large number stands for that), with their parts."""
+
+
+def idle_parts(left_out: frozenset[str], robot: Robot) -> frozenset[str]:
+    """Parts that do nothing, because a robot has none of those that they act through.
+
+    Args:
+        left_out: names of parts that its drives do not support.
+        robot: of the data sheet, which may state such a part itself.
+    """
+    stated = {part for name, part in LIMITS.items() if is_stated(robot, name)}
+    stated |= {"integral"} if robot.drivetrain.integral_rate > 0.0 else set()
+    absent = left_out - stated
+    return frozenset(part.name for part in PARTS if part.needs and set(part.needs) <= absent) - left_out
 
 
 def part_of(parameter: str) -> Part:

@@ -12,6 +12,7 @@ from ddagr_gym.calibration.parts import (
     RobotModel,
     complete_robot,
     first_values,
+    idle_parts,
     part_of,
     shared_parameters,
 )
@@ -70,3 +71,14 @@ def test_every_parameter_of_a_part_is_one_of_the_robot():
     """A field that is renamed must not leave its part empty."""
     known = {p.name for p in shared_parameters(complete_robot(get_robot("warthog")))}
     assert {parameter for part in PARTS for parameter in part.parameters} == known
+
+
+def test_what_acts_through_parts_that_have_all_gone_is_idle():
+    robot = get_robot("warthog")
+    limits = frozenset({"torque_limit", "no_load_speed", "power_limit"})
+    assert idle_parts(limits, robot) == {"limit_imbalance"}
+    assert idle_parts(limits - {"power_limit"}, robot) == frozenset()
+    assert idle_parts(frozenset({"integral"}), robot) == {"integral_limit"}
+    assert idle_parts(frozenset({"integral", "integral_limit"}), robot) == frozenset()
+    stated = replace(robot, drivetrain=replace(robot.drivetrain, power_limit=100.0, integral_rate=1.0))
+    assert idle_parts(limits | {"integral"}, stated) == frozenset()
