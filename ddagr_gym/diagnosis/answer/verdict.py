@@ -208,7 +208,7 @@ class Diagnosis:
             their commands about as it says. Where it is there, robot and soil of all other entries have it.
         detectable_alone: the same as `detectable` for all effects beside the nominal model, before any was named.
         schema: name and version of the file's form.
-        change: with `--calibration`, what changed against ordinary drives of the robot; else null. With it `gain` and
+        change: with `--calibration`, what changed against ordinary drives of the robot; else absent. With it `gain` and
             `gate` of a finding are half the squares of the distance and its limit in `change`, `score` is the distance,
             `held_out` and `where` are null, `parameters` are what differs from ordinary drives, `calibrated_p` is the
             probability over the whole library, `detectable` is the least detectable change, `misfit` has no limit,

@@ -22,14 +22,16 @@ _ABSENT_WHERE_UNKNOWN = ("options", "thresholds")
 """Entries whose own entries are left out instead of null."""
 
 
+_ABSENT_WHERE_NOT_ASKED = ("drivetrain", "change")
+"""Entries that are left out instead of null: files of before have none."""
+
+
 def as_mapping(diagnosis: Diagnosis) -> dict[str, Any]:
     """Plain mapping as it stands in ``diagnosis.json``; null stands for numbers that are not finite."""
     mapping = plain(diagnosis)
     for name in _ABSENT_WHERE_UNKNOWN:
         mapping[name] = {key: value for key, value in mapping[name].items() if value is not None}
-    if mapping["drivetrain"] is None:
-        del mapping["drivetrain"]
-    return mapping
+    return {name: value for name, value in mapping.items() if value is not None or name not in _ABSENT_WHERE_NOT_ASKED}
 
 
 def plain(value: Any) -> dict[str, Any]:
