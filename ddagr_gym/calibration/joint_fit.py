@@ -12,7 +12,7 @@ from ddagr_gym.calibration.calibration_data import CalibrationData
 from ddagr_gym.calibration.parts import RobotModel, complete_robot, first_values, shared_parameters
 from ddagr_gym.calibration.settings import LONGEST_DELAY
 from ddagr_gym.identification.block_means import sample_windows
-from ddagr_gym.identification.fit_numerics import field_numerics, field_slope_numerics
+from ddagr_gym.identification.fit_numerics import FIELD_TOLERANCE, field_numerics, field_slope_numerics
 from ddagr_gym.identification.gauss_newton import Fitted, fit
 from ddagr_gym.identification.nuisances import Nuisances
 from ddagr_gym.identification.parameters import (
@@ -29,7 +29,6 @@ from ddagr_gym.parameters import Numerics, Soil
 from ddagr_gym.physics.wheel_forces import soil_vector
 from ddagr_gym.replay_analysis.fitting import (
     LEAST_GYRO_BIAS,
-    TOLERANCE,
     UNKNOWN_GYRO_BIAS,
     Weights,
     misfit_weights,
@@ -227,7 +226,7 @@ def fit_model(
     *,
     states: Array | None = None,
     iterations: int = ITERATIONS,
-    tolerance: float = TOLERANCE,
+    tolerance: float = FIELD_TOLERANCE,
 ) -> FittedModel:
     """Fit parameters to windows with given weights.
 
@@ -280,7 +279,7 @@ def weigh_and_fit(
         weights = weights_by_drive(windows, prediction, first_weights(data, windows))
         found = fit_model(
             data, windows, model, weights, values, threads, states=states, iterations=iterations,
-            tolerance=TOLERANCE if number == len(passes) - 1 else FIRST_TOLERANCE,
+            tolerance=FIELD_TOLERANCE if number == len(passes) - 1 else FIRST_TOLERANCE,
         )  # fmt: skip
         values, states, prediction = found.values, found.fitted.point.states, found.fitted.prediction
     return found, weights

@@ -9,6 +9,9 @@ from dataclasses import replace
 
 from ddagr_gym.parameters import Numerics
 
+FIELD_TOLERANCE = 5e-4
+"""Relative gain of a step that ends a fit to field drives (ours): far below the deviations of the parameters."""
+
 
 def field_numerics() -> Numerics:
     """For fits to samples of field drives (a replay): smooth, with steps of up to 25 ms.

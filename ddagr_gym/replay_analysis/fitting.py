@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.identification.block_means import sample_windows
-from ddagr_gym.identification.fit_numerics import field_numerics
+from ddagr_gym.identification.fit_numerics import FIELD_TOLERANCE, field_numerics
 from ddagr_gym.identification.gauss_newton import Fitted, fit, linearised
 from ddagr_gym.identification.nuisances import Nuisances
 from ddagr_gym.identification.parameters import (
@@ -56,9 +56,6 @@ PASSES = 2
 
 ITERATIONS = 8
 """Most Gauss-Newton steps of a pass (ours): field drives take 3 to 8."""
-
-TOLERANCE = 5e-4
-"""Relative gain of a step that ends a pass (ours): far below the deviations of the parameters."""
 
 _NORMAL = 1.4826
 """Standard deviation of a normal variable over the median of its size."""
@@ -235,7 +232,9 @@ def fit_drive_mode(
             known=effects, robust=weights.robust, threads=threads, numerics=field_numerics(),
         )  # fmt: skip
         # field data are far from the model: derivatives of a step before are worth less than they cost
-        fitted = fit(problem, point, iterations=ITERATIONS, tolerance=TOLERANCE, renewals=ITERATIONS, progress=progress)
+        fitted = fit(
+            problem, point, iterations=ITERATIONS, tolerance=FIELD_TOLERANCE, renewals=ITERATIONS, progress=progress
+        )
         point = fitted.point
         if number < PASSES - 1:
             weights = misfit_weights(windows, fitted.prediction, weights)

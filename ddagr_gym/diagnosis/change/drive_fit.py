@@ -11,7 +11,7 @@ from ddagr_gym.diagnosis.change.ordinary import Weighing
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.block_means import sample_windows
 from ddagr_gym.identification.data_split import evenly
-from ddagr_gym.identification.fit_numerics import field_numerics
+from ddagr_gym.identification.fit_numerics import FIELD_TOLERANCE, field_numerics
 from ddagr_gym.identification.gauss_newton import Fitted, fit
 from ddagr_gym.identification.nuisances import Nuisances
 from ddagr_gym.identification.parameters import ModelParameter
@@ -20,7 +20,6 @@ from ddagr_gym.identification.timing_repair import aligned_poses, bridged
 from ddagr_gym.identification.windows import WindowSet, cut_windows, with_presumed_past
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.recordings.schema import Recording
-from ddagr_gym.replay_analysis.fitting import TOLERANCE
 
 MOST_WINDOWS = 40
 """Windows of a drive that are compared, evenly chosen (ours): 4 min of it, whose scan takes about a minute."""
@@ -95,4 +94,4 @@ def change_problem(
 
 def fit_nominal(problem: Problem) -> Fitted:
     """Fit of a problem without effects."""
-    return fit(problem, iterations=ITERATIONS, tolerance=TOLERANCE, renewals=ITERATIONS)
+    return fit(problem, iterations=ITERATIONS, tolerance=FIELD_TOLERANCE, renewals=ITERATIONS)

@@ -27,10 +27,10 @@ from ddagr_gym.diagnosis.change.shifts import (
 from ddagr_gym.diagnosis.result.equivalence import equivalence_weights
 from ddagr_gym.diagnosis.search.initial_guess import first_guess
 from ddagr_gym.diagnosis.search.scanned_model import Rival
+from ddagr_gym.identification.fit_numerics import FIELD_TOLERANCE
 from ddagr_gym.identification.gauss_newton import Fitted, fit
 from ddagr_gym.identification.misfit import dispersion_of
 from ddagr_gym.identification.problem import Point, Problem
-from ddagr_gym.replay_analysis.fitting import TOLERANCE
 
 MOST_NAMES = 3
 """Effects that may be named together: as in a diagnosis."""
@@ -203,7 +203,7 @@ def _next(
     refitted: list[tuple[Shift, Rival]] = []
     for shift, start in _starts(problem, model, ordinary):
         progress(f"refitting with {shift.compared.name}")
-        fitted = fit(problem, start, iterations=ITERATIONS + 2, tolerance=TOLERANCE, renewals=RENEWALS)
+        fitted = fit(problem, start, iterations=ITERATIONS + 2, tolerance=FIELD_TOLERANCE, renewals=RENEWALS)
         gain = (model.fitted.cost - fitted.cost) / dispersion
         if gain > 0.0:
             refitted.append((shift, Rival(shift.compared.name, fitted, gain)))
@@ -250,7 +250,7 @@ def _where_parameters_stay(problem: Problem, model: Model) -> list[tuple[Shift, 
     own = np.array([not p.name.startswith(BIASES) for p in problem.nuisances.parameters])
     held = problem.holding(own)
     point = replace(model.fitted.point, values=np.where(own, 0.0, model.fitted.point.values))
-    fitted = fit(held, point, iterations=ITERATIONS, tolerance=TOLERANCE, renewals=2)
+    fitted = fit(held, point, iterations=ITERATIONS, tolerance=FIELD_TOLERANCE, renewals=2)
     scan = scan_drive(held, fitted)
     scores = scan.scores()
     beside = [key for key in scan.keys if key.startswith(NAMED)]
