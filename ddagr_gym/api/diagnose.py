@@ -32,7 +32,7 @@ _GROUND = "ground"
 _SIMULATED = "ddagr"
 """Robot with a shipped bank of simulated drives."""
 
-_ONE_DRIVE = {"fitted": 48, "compared": 32}
+_ONE_DRIVE = {"fitted": 36, "compared": 20}
 """Windows of a single drive that a fit of its drivetrain uses, and those that decide on parts (ours): a quarter of them
 is left out at a time."""
 
