@@ -92,7 +92,6 @@ def run(arguments: Arguments) -> None:
 
     _check_options(arguments)
     check_output_file(arguments.output)
-    folder = make_folder(arguments.output.with_suffix(".bank"))
     robot, soil = get_robot(arguments.robot), get_soil(arguments.soil)
     loaded = [load_recording(path, arguments.map or None, arguments.robot) for path in arguments.runs]
     recordings = _mended(loaded)
@@ -110,7 +109,7 @@ def run(arguments: Arguments) -> None:
         centre = fitted_nominal(robot, soil, recordings, setting)
     drives: list[Template | Recording | None] = [*pieces, *longer] or [template] * arguments.count
     made_of = NullBank(robot, soil, setting, tuple(drives), arguments.seed, centre)
-    bank = made_of.key()
+    bank, folder = made_of.key(), make_folder(arguments.output.with_suffix(".bank"))
     paths = [_part(folder, bank, number) for number in range(len(drives))]
     _make([(made_of, n, path) for n, path in enumerate(paths) if not path.exists()], arguments.processes)
     made = [NullRun(**json.loads(path.read_text())) for path in paths]

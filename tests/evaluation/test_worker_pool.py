@@ -13,7 +13,7 @@ import pytest
 from ddagr_gym.evaluation.worker_pool import STOPPED, worker_pool
 
 SCRIPT = """
-import os, sys, time
+import os, signal, sys, time
 from concurrent.futures import as_completed
 from ddagr_gym.evaluation.worker_pool import worker_pool
 
@@ -22,6 +22,7 @@ def work(folder):
     time.sleep(120)
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a parent in the background ignores it
     with worker_pool(2) as pool:
         for future in as_completed([pool.submit(work, sys.argv[1]) for _ in range(4)]):
             future.result()

@@ -185,8 +185,8 @@ def test_a_parameter_acts_in_its_scope_only_and_one_simulation_serves_all_ground
     base = together.predict(point)
     whole = shared.parameter_columns(shared.start(), base)[..., 0]
     simulated = []
-    predict = Problem.predict
-    monkeypatch.setattr(Problem, "predict", lambda self, at: simulated.append(at) or predict(self, at))
+    predict = Problem._varied_prediction
+    monkeypatch.setattr(Problem, "_varied_prediction", lambda self, at: simulated.append(at) or predict(self, at))
     columns = together.parameter_columns(point, base)
     assert len(simulated) == 1
     on_firm = np.isin(blocked.windows.recording, GROUNDS["firm"][1])
