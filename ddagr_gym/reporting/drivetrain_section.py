@@ -50,7 +50,7 @@ def _forecast_row(item: ForecastComparison) -> tuple[str, ...]:
     spread = item.corrected_interval
     between = "" if spread is None else f" ({number(spread[0])} to {number(spread[1])})"
     corrected = f"{number(item.corrected)}{between}"
-    label = error_label(item.metric, item.horizon)
+    label = item.metric.replace("_", " ") if item.horizon is None else error_label(item.metric, item.horizon)
     return item.drive, label, item.unit, number(item.nominal), corrected, number(item.kinematic)
 
 

@@ -23,6 +23,7 @@ def test_the_page_has_parts_errors_and_what_is_left(tmp_path):
     assert "<td>dead time of the commands</td><td>yes</td><td>+8.4 %</td><td>1.7 %</td>" in page
     assert "<td>integral part of the speed loop</td><td>no</td><td>-1.5 %</td><td>–</td>" in page
     assert "heading after 5 s" in page
+    assert "<td>wheel speed</td>" in page
     assert "71 % turning, 29 % going straight" in page
     assert 'href="drivetrain/calibration.html"' in page
 
