@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ddagr_gym.api.results import Report, Table
+from ddagr_gym.api.diagnosis_report import DiagnosisReport
+from ddagr_gym.api.results import Table
 
 if TYPE_CHECKING:
-    from ddagr_gym.diagnosis.answer.verdict import Diagnosis, Finding
     from ddagr_gym.diagnosis.change.run import Outcome
-    from ddagr_gym.physics.effects import Effect
     from ddagr_gym.recordings.schema import Recording
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ChangeResult(Report):
+class ChangeResult(DiagnosisReport):
     """What changed against the ordinary drives of a calibrated robot, how much and how sure.
 
     ``report`` writes diagnosis.json, effects.json and effects.yaml with the named effects at their fitted sizes, for
@@ -31,41 +29,6 @@ class ChangeResult(Report):
 
     outcome: Outcome
     with_page: bool = True
-
-    @property
-    def diagnosis(self) -> Diagnosis:
-        """The whole answer, as ``diagnosis.json`` holds it."""
-        return self.outcome.diagnosis
-
-    @property
-    def verdict(self) -> tuple[str, ...]:
-        """Names of effects, or ("none",), or ("unknown",)."""
-        return self.diagnosis.verdict
-
-    @property
-    def complete(self) -> bool:
-        """Whether nothing else is out of the ordinary."""
-        return self.diagnosis.complete
-
-    @property
-    def sentence(self) -> str:
-        """The answer in words."""
-        return self.diagnosis.sentence
-
-    @property
-    def findings(self) -> tuple[Finding, ...]:
-        """One per named effect, in the order in which they were found."""
-        return self.diagnosis.findings
-
-    @property
-    def effects(self) -> tuple[Effect, ...]:
-        """Named effects at their fitted sizes, for the calibrated robot."""
-        return self.outcome.effects
-
-    @property
-    def headline(self) -> str:
-        """The answer in words."""
-        return self.sentence
 
     def tables(self) -> Sequence[Table]:
         """Findings with sizes, and shifts of all effects."""
@@ -80,25 +43,10 @@ class ChangeResult(Report):
 
         return change_text(self.diagnosis)
 
-    def to_json(self, path: str | os.PathLike[str]) -> None:
-        """Write diagnosis.json (``docs/diagnosis_schema.md``), whole or not at all."""
-        from ddagr_gym.diagnosis.result.files import save
-
-        save(self.diagnosis, Path(path))
-
     def _fill(self, folder: Path, progress: Callable[[str], None] | None) -> None:
-        from ddagr_gym.diagnosis.pipeline import data_hash, effect_intervals
-        from ddagr_gym.physics.effects.files import save_effects
         from ddagr_gym.reporting.change_page import write_page
 
-        for name in ("effects.json", "effects.yaml"):
-            save_effects(
-                folder / name,
-                self.effects,
-                intervals=effect_intervals(self.diagnosis) if self.effects else (),
-                data_hash=data_hash(self.diagnosis),
-                source=self.sentence,
-            )
+        self._save_effects(folder)
         self.to_json(folder / "diagnosis.json")
         if self.with_page:
             write_page(folder, self.diagnosis)

@@ -2,28 +2,26 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ddagr_gym.api.results import Report, Table
+from ddagr_gym.api.diagnosis_report import DiagnosisReport
+from ddagr_gym.api.results import Table
 from ddagr_gym.errors import InputError
 
 if TYPE_CHECKING:
     from ddagr_gym.calibration.run import Outcome as CalibrationOutcome
-    from ddagr_gym.diagnosis.answer.verdict import Diagnosis, Finding
     from ddagr_gym.diagnosis.pipeline import Outcome
     from ddagr_gym.parameters import Robot, Soil
-    from ddagr_gym.physics.effects import Effect
 
 PAGE = "index.html"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class DiagnosisResult(Report):
+class DiagnosisResult(DiagnosisReport):
     """Which physics the nominal simulator leaves out, how big and how sure.
 
     ``findings[0].parameters["angle"]`` is an estimate with ``value``, ``unit`` and a 90 % ``interval``; ``float()`` of
@@ -40,36 +38,6 @@ class DiagnosisResult(Report):
 
     outcome: Outcome
     drivetrain: CalibrationOutcome | None = None
-
-    @property
-    def diagnosis(self) -> Diagnosis:
-        """The whole answer, as ``diagnosis.json`` holds it."""
-        return self.outcome.diagnosis
-
-    @property
-    def verdict(self) -> tuple[str, ...]:
-        """Names of effects, or ("none",), or ("unknown",)."""
-        return self.diagnosis.verdict
-
-    @property
-    def complete(self) -> bool:
-        """Whether nothing more is left than in drives in which nothing is missing."""
-        return self.diagnosis.complete
-
-    @property
-    def sentence(self) -> str:
-        """The answer in words."""
-        return self.diagnosis.sentence
-
-    @property
-    def findings(self) -> tuple[Finding, ...]:
-        """One per named effect, in the order in which they were found."""
-        return self.diagnosis.findings
-
-    @property
-    def effects(self) -> tuple[Effect, ...]:
-        """Named effects at their fitted sizes, as ``gym.make(effects=...)``, simulate and replay take them."""
-        return self.outcome.effects
 
     @property
     def nominal(self) -> tuple[Robot, Soil]:
@@ -100,11 +68,6 @@ class DiagnosisResult(Report):
         except InputError as error:
             return None, None, f"the refitted values are no soil: {error}"
 
-    @property
-    def headline(self) -> str:
-        """The answer in words."""
-        return self.sentence
-
     def tables(self) -> Sequence[Table]:
         """Findings with sizes, and errors on unseen drives."""
         from ddagr_gym.reporting.diagnosis_text import FINDING_HEADER, FIT_HEADER, finding_rows, fit_rows
@@ -117,12 +80,6 @@ class DiagnosisResult(Report):
         from ddagr_gym.reporting.diagnosis_text import outcome_text
 
         return outcome_text(self.diagnosis)
-
-    def to_json(self, path: str | os.PathLike[str]) -> None:
-        """Write diagnosis.json (``docs/diagnosis_schema.md``), whole or not at all."""
-        from ddagr_gym.diagnosis.result.files import save
-
-        save(self.diagnosis, Path(path))
 
     def _fill(self, folder: Path, progress: Callable[[str], None] | None) -> None:
         from ddagr_gym.diagnosis.answer import evidence
@@ -145,19 +102,6 @@ class DiagnosisResult(Report):
         if self.drivetrain is not None:
             (folder / DRIVETRAIN_FOLDER).mkdir(exist_ok=True)
             write_page(folder / DRIVETRAIN_FOLDER, self.drivetrain.calibration, self.drivetrain.forecasts)
-
-    def _save_effects(self, folder: Path) -> None:
-        from ddagr_gym.diagnosis.pipeline import data_hash, effect_intervals
-        from ddagr_gym.physics.effects.files import save_effects
-
-        for name in ("effects.json", "effects.yaml"):
-            save_effects(
-                folder / name,
-                self.effects,
-                intervals=effect_intervals(self.diagnosis) if self.effects else (),
-                data_hash=data_hash(self.diagnosis),
-                source=self.sentence,
-            )
 
     def _save_refitted(self, folder: Path) -> None:
         from ddagr_gym.config import dump_config

@@ -232,11 +232,16 @@ def _options(session: DiagnosisSession, names_only: bool, robot_file: str) -> Op
     )
 
 
-def effect_intervals(diagnosis: Diagnosis) -> Sequence[Mapping[str, tuple[float, float]]]:
-    """Intervals of the named effects' parameters, in the order of the findings."""
+def effect_intervals(diagnosis: Diagnosis, effects: Sequence[Effect]) -> list[Mapping[str, tuple[float, float]]]:
+    """Intervals of the parameters of effects that a diagnosis names, in their order; parts of a drivetrain have none.
+
+    Args:
+        diagnosis: with its findings.
+        effects: that it names.
+    """
+    found = {finding.name: finding.parameters for finding in diagnosis.findings}
     return [
-        {name: e.interval for name, e in finding.parameters.items() if e.interval is not None}
-        for finding in diagnosis.findings
+        {name: e.interval for name, e in found[effect.name].items() if e.interval is not None} for effect in effects
     ]
 
 

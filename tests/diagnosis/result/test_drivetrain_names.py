@@ -9,9 +9,11 @@ import pytest
 from ddagr_gym.diagnosis.answer.drivetrain import PART_TITLES, DrivetrainAnswer, PartEvidence
 from ddagr_gym.diagnosis.answer.verdict import Diagnosis, Estimate, Finding, GatesUsed
 from ddagr_gym.diagnosis.gates.thresholds import Thresholds
+from ddagr_gym.diagnosis.pipeline import effect_intervals
 from ddagr_gym.diagnosis.result.drivetrain_names import UNLIKE, CompletedNominal, unlike_commands, with_drivetrain
 from ddagr_gym.diagnosis.result.files import as_mapping, validate
 from ddagr_gym.diagnosis.wording import describe, title
+from ddagr_gym.physics.effects.gyro_sign import GyroSign
 from ddagr_gym.presets import get_robot, get_soil
 
 GATES = Thresholds({}, {"encoder_right": 2.0, "encoder_left": 2.0, "yaw_rate": 1.0}, 20, "a test")
@@ -65,3 +67,11 @@ def test_parts_have_words_and_effects_keep_theirs():
     assert title("load") == "The ground's torque on the wheels"
     assert title("command_delay") == "Command delay"
     assert all(describe(name, {}).startswith(words) for name, words in PART_TITLES.items() if name != "command_delay")
+
+
+def test_parts_of_a_drivetrain_take_no_place_among_the_intervals_of_effects():
+    load = Finding("load", {"load_compliance": Estimate(0.01, "1/(kg m^2)", (0.0, 0.02))}, 0.2, 0.1, 4.0, 0.2)
+    seen = Finding("gyro_sign", {"flip": Estimate(1.0, "-")}, 9.0, 0.0, 3.0, 9.0)
+    answer = with_drivetrain(replace(LEFT, findings=(seen,)), completed(load), {})
+    assert effect_intervals(answer, (GyroSign(1.0),)) == [{}]
+    assert effect_intervals(answer, ()) == []
