@@ -224,22 +224,24 @@ class _Drivetrain:
     def complete(self, misfit: Mapping[str, float]) -> CompletedNominal | None:
         """The nominal simulator with the drivetrain that the recordings ask for; None where they cannot tell it."""
         from ddagr_gym.calibration.drivetrain_answer import drivetrain_answer, drivetrain_findings
-        from ddagr_gym.calibration.run import calibrate_drives
+        from ddagr_gym.calibration.run import calibrate_drives, ready_drives
         from ddagr_gym.calibration.settings import CalibrationSettings
         from ddagr_gym.diagnosis.result.drivetrain_names import CompletedNominal
 
         settings = CalibrationSettings(threads=self.threads, seed=self.seed)
         settings = replace(settings, **_ONE_DRIVE) if len(self.recordings) == 1 else settings
         self._say("the wheels do not follow their commands as the simulator says: fitting its drivetrain")
+        grounds, soils = [_GROUND] * len(self.recordings), {_GROUND: self.nominal.soil}
+        drives = (self.recordings, grounds, self.nominal.robot, soils, settings)
         try:
-            self.made = calibrate_drives(
-                self.recordings, [_GROUND] * len(self.recordings), self.nominal.robot, {_GROUND: self.nominal.soil},
-                settings, soil_names={_GROUND: self.nominal.soil_name},
-                cache=None if self.cache is None else Path(self.cache) / _GROUND, progress=self._say,
-            )  # fmt: skip
+            ready = ready_drives(*drives, self._say)
         except InputError as error:
             warnings.warn(f"the drivetrain cannot be fitted: {error}", InputWarning, stacklevel=2)
             return None
+        self.made = calibrate_drives(
+            *drives, soil_names={_GROUND: self.nominal.soil_name}, ready=ready,
+            cache=None if self.cache is None else Path(self.cache) / _GROUND, progress=self._say,
+        )  # fmt: skip
         found = self.made.calibration
         answer = drivetrain_answer(found, misfit)
         return CompletedNominal(self.made.robot, self.made.soils[_GROUND], answer, drivetrain_findings(found))

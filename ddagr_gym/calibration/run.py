@@ -93,6 +93,28 @@ class FinalFit:
     refused: dict[str, float]
 
 
+def ready_drives(
+    recordings: Sequence[Recording],
+    grounds: Sequence[str],
+    robot: Robot,
+    soils: Mapping[str, Soil],
+    settings: CalibrationSettings,
+    progress: Progress = lambda line: None,
+) -> CalibrationData:
+    """Drives that a calibration can be made with, mended and cut into windows. Arguments as :func:`calibrate_drives`.
+
+    Raises:
+        InputError: drives that cannot be calibrated.
+    """
+    check_drives(recordings, robot)
+    progress("what the sensors say about the robot's size")
+    forward, turned = zip(*(with_gyro_forward(item, _rng(settings)) for item in recordings), strict=True)
+    scales = [drive_scale(item, _rng(settings)) for item in forward]
+    check_scales([recording.meta.source for recording in recordings], scales, robot)
+    data = prepare_drives(forward, grounds, robot, soils, settings)
+    return replace(data, notes=tuple((*a, *b) for a, b in zip(turned, data.notes, strict=True)))
+
+
 def calibrate_drives(
     recordings: Sequence[Recording],
     grounds: Sequence[str],
@@ -103,6 +125,7 @@ def calibrate_drives(
     data_sheet: str = "",
     soil_names: Mapping[str, str] | None = None,
     with_bank: bool = False,
+    ready: CalibrationData | None = None,
     cache: Path | None = None,
     progress: Progress = lambda line: None,
 ) -> Outcome:
@@ -117,6 +140,7 @@ def calibrate_drives(
         data_sheet: name or file of the robot.
         soil_names: of the soils by ground.
         with_bank: also scan every drive for every effect of the library.
+        ready: the same drives as :func:`ready_drives` leaves them; made of them where it is None.
         cache: folder of finished steps, from which the same calibration goes on after an interruption; None keeps
             nothing.
         progress: called with what is being done.
@@ -125,13 +149,7 @@ def calibrate_drives(
         InputError: drives that cannot be calibrated, or a cache that holds something else.
     """
     began = time.monotonic()
-    check_drives(recordings, robot)
-    progress("what the sensors say about the robot's size")
-    forward, turned = zip(*(with_gyro_forward(item, _rng(settings)) for item in recordings), strict=True)
-    scales = [drive_scale(item, _rng(settings)) for item in forward]
-    check_scales([recording.meta.source for recording in recordings], scales, robot)
-    data = prepare_drives(forward, grounds, robot, soils, settings)
-    data = replace(data, notes=tuple((*a, *b) for a, b in zip(turned, data.notes, strict=True)))
+    data = ready_drives(recordings, grounds, robot, soils, settings, progress) if ready is None else ready
     store = StepStore(cache, "" if cache is None else _key(recordings, grounds, robot, soils, settings))
     complete, held = complete_model(data)
     selection = _select(data, complete, held, settings, store, progress)

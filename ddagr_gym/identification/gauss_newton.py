@@ -271,6 +271,7 @@ def _step(problem: Problem, here: _Iterate, parameters: Sequence[EffectParameter
             break
         values = point.values.copy()
         values[free] += damping * change[: len(free)]
+        values = np.clip(values, problem.low, problem.high)  # a step to a bound rounds
         effects = moved(point.effects, parameters, linear.here[len(free) :] + damping * change[len(free) :])
         start = problem.moved(replace(point, effects=effects), values)
         stepped = replace(start, states=start.states + damping * states)

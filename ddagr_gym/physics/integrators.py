@@ -203,4 +203,5 @@ def advance_body(row: Array, step: float, numerics: StepNumerics, actions: Effec
             _copy(saved, row)
             backward_euler_step(row, step / divisions, tolerance, numerics, actions)
         done += 1
-        _copy(row, saved)
+        if done < divisions:
+            _copy(row, saved)

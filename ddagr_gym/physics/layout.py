@@ -18,9 +18,8 @@ def _block(size: int = 1) -> int:
     return first
 
 
-# Time and motion
+# What a step of the integrator changes: time and motion
 TIME = _block()  # [s]
-SAMPLE_PERIOD = _block()  # between sensor samples [s]
 X = _block()  # body origin, world [m]
 Y = _block()
 YAW = _block()  # [rad], not wrapped
@@ -29,14 +28,50 @@ V_Y = _block()
 YAW_RATE = _block()  # [rad/s]
 OMEGA = _block(2)  # bank speeds [rad/s]
 WHEEL_ANGLE = _block(2)  # bank angles rolled [rad]
+INTEGRAL = _block(2)  # integral part of the speed loop [rad/s^2]
+INTEGRAL_KNOWN = _block()  # 0 after a reset, until the first sample has settled it
+GRAVITY = _block(3)  # gravity in body axes [m/s^2]
+
+# Wheel kinematics and forces of the last evaluation, body axes
+LOAD = _block(4)  # normal load [N]
+WHEEL_V_X = _block(4)  # hub velocity [m/s]
+WHEEL_V_Y = _block(4)
+WHEEL_OMEGA = _block(4)  # [rad/s]
+SLIP_RATIO = _block(4)
+SINKAGE = _block(4)  # [m]
+FORCE_X = _block(4)  # soil on wheel [N]
+FORCE_Y = _block(4)
+FORCE_Z = _block(4)
+YAW_MOMENT = _block(4)  # [N m]
+AXLE_TORQUE = _block(4)  # soil's moment about the hub's y axis [N m]
+BOGGED = _block(4)  # 1 where no sinkage carries the load
+EXTRA_FORCE_X = _block(4)  # added by wheel force effects
+EXTRA_FORCE_Y = _block(4)
+EXTRA_YAW_MOMENT = _block(4)
+EXTRA_AXLE_TORQUE = _block(4)
+BODY_FORCE = _block(3)  # added by body force effects: F_x, F_y at the body origin, M_z
+
+# Results
+ACCELERATION = _block(3)  # d/dt of V_X, V_Y, YAW_RATE
+SPECIFIC_FORCE = _block(2)  # non-gravitational force per mass at the body origin [m/s^2]
+
+# The integrator's memory: derivatives of the wheels' wrenches and the motion at which they were taken
+DERIVATIVE_SIZE = 20  # per wheel: F_x, F_y, F_z, M_z, torque, each by four things
+BY_V_X, BY_V_Y, BY_RIM, BY_SINKAGE = 0, 5, 10, 15  # velocities over the wheel's speed, sinkage [m]
+DERIVATIVE = _block(4 * DERIVATIVE_SIZE)
+DERIVATIVE_AT = _block(16)  # per wheel: v_x, v_y, rim speed over the wheel's speed, sinkage
+DERIVATIVE_VALID = _block()
+
+STEPPED = _next
+"""Entries that a step of the integrator may change; those behind are changed once a sample."""
+
+SAMPLE_PERIOD = _block()  # between sensor samples [s]
 
 # Commands and motors
 COMMAND = _block(2)  # bank speed commands after the command effects [rad/s]
 MOTOR_TARGET = _block(2)  # speed that the motor loop aims at [rad/s]
 MOTOR_RATE = _block(2)  # its rate k_omega [1/s]
 SET_POINT = _block(2)  # command after the ramp [rad/s]
-INTEGRAL = _block(2)  # integral part of the speed loop [rad/s^2]
-INTEGRAL_KNOWN = _block()  # 0 after a reset, until the first sample has settled it
 DRIVETRAIN = _block(9)  # as the motor effects leave it, in the order of DRIVETRAIN_PARAMETERS
 DYNAMIC_BANKS = _block()  # 1 where any of these differs from that of the ideal loop
 
@@ -45,7 +80,6 @@ MASS = _block()  # [kg]
 YAW_INERTIA = _block()  # about the centre of mass [kg m^2]
 CENTRE_OF_MASS = _block(3)  # x, y from the body origin, height above ground [m]
 SLOPE = _block(2)  # gradient of the ground, world dz/dx and dz/dy [-]
-GRAVITY = _block(3)  # gravity in body axes [m/s^2]
 WHEEL = _block(12)  # minor radius x 4, half width x 4, major radius x 4 [m]
 
 # Body, as built: copied to the entries above at each sample, before the load effects
@@ -65,30 +99,9 @@ WHEEL_X = _block(4)  # hub, world [m]
 WHEEL_Y = _block(4)
 SOIL = _block(36)  # nine parameters x 4, in the order of SOIL_PARAMETERS
 BASE_SOIL = _block(36)
-LOAD = _block(4)  # normal load [N]
-
-# Wheel kinematics and forces of the last evaluation, body axes
-WHEEL_V_X = _block(4)  # hub velocity [m/s]
-WHEEL_V_Y = _block(4)
-WHEEL_OMEGA = _block(4)  # [rad/s]
-SLIP_RATIO = _block(4)
-SINKAGE = _block(4)  # [m]
-FORCE_X = _block(4)  # soil on wheel [N]
-FORCE_Y = _block(4)
-FORCE_Z = _block(4)
-YAW_MOMENT = _block(4)  # [N m]
-AXLE_TORQUE = _block(4)  # soil's moment about the hub's y axis [N m]
-BOGGED = _block(4)  # 1 where no sinkage carries the load
-EXTRA_FORCE_X = _block(4)  # added by wheel force effects
-EXTRA_FORCE_Y = _block(4)
-EXTRA_YAW_MOMENT = _block(4)
-EXTRA_AXLE_TORQUE = _block(4)
-BODY_FORCE = _block(3)  # added by body force effects: F_x, F_y at the body origin, M_z
 TOWED = _block(2)  # where a load on a rope lies, world [m]: left by a load effect to the body force effect
 
-# Results
-ACCELERATION = _block(3)  # d/dt of V_X, V_Y, YAW_RATE
-SPECIFIC_FORCE = _block(2)  # non-gravitational force per mass at the body origin [m/s^2]
+# Means over a sample, and readings
 MEAN_SPECIFIC_FORCE = _block(2)  # over the last sample period, body axes [m/s^2]
 MEAN_YAW_ACCELERATION = _block()
 READING = _block(8)  # specific force x, y; yaw rate; encoder right, left; pose x, y, yaw
@@ -115,16 +128,6 @@ POSE_PERIOD = _block()  # [s]; 0 for no receiver
 POSE_POSITION_NOISE = _block()
 POSE_YAW_NOISE = _block()
 NEXT_POSE_TIME = _block()
-
-# The integrator's memory: derivatives of the wheels' wrenches and the motion at which they were taken
-DERIVATIVE_SIZE = 20  # per wheel: F_x, F_y, F_z, M_z, torque, each by four things
-BY_V_X, BY_V_Y, BY_RIM, BY_SINKAGE = 0, 5, 10, 15  # velocities over the wheel's speed, sinkage [m]
-DERIVATIVE = _block(4 * DERIVATIVE_SIZE)
-DERIVATIVE_AT = _block(16)  # per wheel: v_x, v_y, rim speed over the wheel's speed, sinkage
-DERIVATIVE_VALID = _block()
-
-STEPPED = _next
-"""Entries that a step of the integrator may change; those behind are changed once a sample."""
 
 COMMAND_NODES = 128  # every sample of the longest delay at 125 Hz and below
 COMMAND_RING = _block(2 * COMMAND_NODES + 3)  # past commands, see :mod:`ddagr_gym.physics.history`
