@@ -63,10 +63,19 @@ def test_a_recording_that_cannot_tell_its_drivetrain_keeps_its_answer_and_says_w
     def refuse(*inputs, **named):
         raise InputError("yard.csv has 3 windows: give a longer drive.")
 
-    monkeypatch.setattr("ddagr_gym.calibration.run.calibrate_drives", refuse)
+    monkeypatch.setattr("ddagr_gym.calibration.run.ready_drives", refuse)
     with pytest.warns(InputWarning, match="the drivetrain cannot be fitted: yard.csv has 3 windows"):
         result = ddagr_gym.diagnose(driven(40.0), names_only=True)
     assert result.diagnosis.drivetrain is None
+
+
+def test_an_error_inside_the_fit_is_no_property_of_the_recording(asked, monkeypatch):
+    def fail(*inputs, **named):
+        raise InputError("Drivetrain.coulomb_friction is -2e-13.")
+
+    monkeypatch.setattr("ddagr_gym.calibration.run.calibrate_drives", fail)
+    with pytest.raises(InputError, match="coulomb_friction"):
+        ddagr_gym.diagnose(driven(70.0), names_only=True)
 
 
 def test_thresholds_of_ordinary_drives_ask_what_differs_from_them():

@@ -12,6 +12,7 @@ from ddagr_gym.errors import InputError
 from ddagr_gym.identification.block_means import sample_windows
 from ddagr_gym.identification.fit_numerics import field_numerics, field_slope_numerics
 from ddagr_gym.identification.gauss_newton import cost_of, fit, fit_states, linearised
+from ddagr_gym.identification.least_squares import Linearised
 from ddagr_gym.identification.nuisances import Nuisances
 from ddagr_gym.identification.parameters import (
     ModelParameter,
@@ -81,6 +82,21 @@ def test_coarse_sensitivities_find_the_same_values(one_drive):
     _, spread = linearised(one_drive(robust=ROBUST), fine).deviations()
     assert (np.abs(coarse.point.values - fine.point.values) <= 0.2 * spread).all()
     assert coarse.cost <= 1.001 * fine.cost
+
+
+def test_a_step_that_rounds_over_a_bound_ends_on_it(one_drive, robot, soil, monkeypatch):
+    """A robot at 1e-13 below nothing would be refused."""
+    made = one_drive(robust=ROBUST)
+    strength, motor = made.nuisances.parameters
+    lowest = float(np.log(STRENGTH)) + 0.1
+    problem = Problem(
+        robot, soil, made.blocked, Nuisances((replace(strength, low=lowest), motor)), robust=ROBUST,
+        numerics=field_numerics(),
+    )  # fmt: skip
+    exact = Linearised.step
+    monkeypatch.setattr(Linearised, "step", lambda self, *given: exact(self, *given) - 1e-9)
+    fitted = fit(problem, iterations=3, renewals=3, tolerance=1e-6)
+    assert fitted.point.values[0] == lowest
 
 
 def test_wrong_initial_states_are_found_again(one_drive):
