@@ -95,7 +95,7 @@ def values_without(model: FittedModel, linear: Linearised, out: Booleans) -> Arr
         linear.deviation[common], linear.low[common], linear.high[common],
     )  # fmt: skip
     values = model.fitted.point.values.copy()
-    values[free[common]] += part.step(part.information, part.gradient, LONGEST)
+    values[free[common]] = part.after(part.step(part.information, part.gradient, LONGEST))
     return values
 
 

@@ -270,9 +270,9 @@ def _step(problem: Problem, here: _Iterate, parameters: Sequence[EffectParameter
         if damping < 1.0 and damping * promised < least:
             break
         values = point.values.copy()
-        values[free] += damping * change[: len(free)]
-        values = np.clip(values, problem.low, problem.high)  # a step to a bound rounds
-        effects = moved(point.effects, parameters, linear.here[len(free) :] + damping * change[len(free) :])
+        after_step = linear.after(damping * change)
+        values[free] = after_step[: len(free)]
+        effects = moved(point.effects, parameters, after_step[len(free) :])
         start = problem.moved(replace(point, effects=effects), values)
         stepped = replace(start, states=start.states + damping * states)
         if problem.nuisances.local:

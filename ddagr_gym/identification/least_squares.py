@@ -145,6 +145,10 @@ class Linearised:
         low, high = np.maximum(self.low - self.here, -reach), np.minimum(self.high - self.here, reach)
         return bounded_step(information, gradient, low, high)
 
+    def after(self, change: Array) -> Array:
+        """(P,) values after a step, which rounding does not carry over a bound."""
+        return np.clip(self.here + change, self.low, self.high)
+
     def deviations(self) -> tuple[Array, Array]:
         """Standard deviations (P,) by H^-1 and by the sandwich, equation (6)."""
         covariance = np.linalg.inv(self.information)
