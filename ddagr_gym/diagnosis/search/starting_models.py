@@ -25,6 +25,10 @@ MOST_WINDOWS = 120
 """Short windows that are searched where the refitted nominal model is far off (ours): what is large shows in a few, and
 the time of a search does not grow with the length of the drives (three drives of 60 s have 90)."""
 
+MANY_WINDOWS = 2 * MOST_WINDOWS
+"""Windows of the set length above which some of them say first whether the nominal model is far off (ours): with fewer
+that would take longer than it saves."""
+
 
 @dataclass(frozen=True, eq=False)
 class StartingModels:
@@ -44,7 +48,8 @@ class StartingModels:
 def starting_models(session: DiagnosisSession, cache: StepCache = compute_without_cache) -> StartingModels:
     """Nominal models on windows of the set length; on short ones where the refitted one is far off.
 
-    What is large bends long predictions so much that no small step leads to it, and shows in short ones as well.
+    What is large bends long predictions so much that no small step leads to it, and shows in short ones as well. Of
+    long drives some of the windows say whether it is there.
 
     Args:
         session: of the diagnosis.
@@ -53,20 +58,27 @@ def starting_models(session: DiagnosisSession, cache: StepCache = compute_withou
     Raises:
         InputError: the nominal simulator breaks down on some window.
     """
-    raw, refitted = cache("search refit", partial(refit_nominal, session.problem, session.progress))
-    if dispersion_of(session.problem, refitted) > FAR_OFF and session.setting.duration > SHORT:
+    some = _thinned(session, MANY_WINDOWS)
+    raw, refitted = _refitted(some, "search refit" if some is session else "search refit, some windows", cache)
+    if dispersion_of(some.problem, refitted) > FAR_OFF and session.setting.duration > SHORT:
         session.progress("far off: again in short windows")
-        session = _thinned(session.with_windows(SHORT, SHORT * session.setting.stride / session.setting.duration))
-        again = partial(refit_nominal, session.problem, session.progress)
-        raw, refitted = cache("search refit, short windows", again)
+        short = session.with_windows(SHORT, SHORT * session.setting.stride / session.setting.duration)
+        session = _thinned(short, MOST_WINDOWS)
+        raw, refitted = _refitted(session, "search refit, short windows", cache)
+    elif some is not session:
+        raw, refitted = _refitted(session, "search refit", cache)
     _check_predicted(session, refitted)
     return StartingModels(session, raw, refitted)
 
 
-def _thinned(session: DiagnosisSession) -> DiagnosisSession:
-    """The same with windows farther apart, where there are more than :data:`MOST_WINDOWS`."""
+def _refitted(session: DiagnosisSession, name: str, cache: StepCache) -> tuple[Fitted, Fitted]:
+    return cache(name, partial(refit_nominal, session.problem, session.progress))
+
+
+def _thinned(session: DiagnosisSession, most: int) -> DiagnosisSession:
+    """The same with :data:`MOST_WINDOWS`, farther apart, where there are more than ``most``."""
     count = session.problem.blocked.windows.count
-    if count <= MOST_WINDOWS:
+    if count <= most:
         return session
     return session.with_windows(session.setting.duration, session.setting.stride * count / MOST_WINDOWS)
 

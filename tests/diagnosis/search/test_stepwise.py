@@ -11,6 +11,7 @@ import pytest
 
 from ddagr_gym.diagnosis.gates.thresholds import Gate, Thresholds
 from ddagr_gym.diagnosis.search import rivals
+from ddagr_gym.diagnosis.search import starting_models as starts
 from ddagr_gym.diagnosis.search import stepwise as module
 from ddagr_gym.diagnosis.search.gains import Gain, gains
 from ddagr_gym.diagnosis.search.initial_guess import nuisance_answer
@@ -18,10 +19,11 @@ from ddagr_gym.diagnosis.search.scan import scan
 from ddagr_gym.diagnosis.search.scanned_model import Rival, ScannedModel
 from ddagr_gym.diagnosis.search.starting_models import StartingModels, starting_models
 from ddagr_gym.diagnosis.search.stepwise import search
+from ddagr_gym.diagnosis.setting import SHORT
 from ddagr_gym.diagnosis.store import StepStore
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.effect_parameters import effect_columns, effect_parameters
-from ddagr_gym.identification.gauss_newton import cost_of, fit
+from ddagr_gym.identification.gauss_newton import Fitted, cost_of, fit
 from ddagr_gym.identification.problem import Point, Problem
 from ddagr_gym.physics.effects.registry import effect_kind, parse_effect
 from ddagr_gym.recordings.schema import Recording
@@ -175,6 +177,38 @@ def test_a_window_that_no_model_predicts_is_refused_in_a_sentence(
     monkeypatch.setattr(Problem, "predict", broken)
     with pytest.raises(InputError, match=r"breaks down in 1 of 3 windows, first at 4\.0 s"):
         starting_models(session)
+
+
+@pytest.mark.parametrize("far_off", [False, True])
+def test_some_windows_of_long_drives_say_whether_the_nominal_model_is_far_off(
+    drive: Callable[..., Recording],
+    problem_of: Callable[..., Problem],
+    monkeypatch: pytest.MonkeyPatch,
+    far_off: bool,
+) -> None:
+    recordings = (drive(seconds=20.0),)
+    session = session_of(problem_of(*recordings), recordings, THRESHOLDS).with_windows(3.0, 3.0)
+    refitted: list[Problem] = []
+
+    def refit(problem: Problem, progress: object) -> tuple[Fitted, Fitted]:
+        refitted.append(problem)
+        found = fit(problem, iterations=0)
+        return found, found
+
+    monkeypatch.setattr(starts, "refit_nominal", refit)
+    monkeypatch.setattr(starts, "FAR_OFF", 0.0 if far_off else np.inf)
+    monkeypatch.setattr(starts, "MOST_WINDOWS", 3)
+    monkeypatch.setattr(starts, "MANY_WINDOWS", 4)
+    start = starting_models(session)
+    counts = [problem.blocked.windows.count for problem in refitted]
+    whole = session.problem.blocked.windows.count
+    assert whole > 4
+    if far_off:
+        assert start.session.setting.duration == SHORT
+        assert max(counts) < whole
+    else:
+        assert start.session is session
+        assert counts[0] < counts[1] == whole
 
 
 def test_a_second_effect_keeps_the_overlap_it_had_before_it_was_named() -> None:
