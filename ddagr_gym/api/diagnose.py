@@ -223,7 +223,7 @@ class _Drivetrain:
 
     def complete(self, misfit: Mapping[str, float]) -> CompletedNominal | None:
         """The nominal simulator with the drivetrain that the recordings ask for; None where they cannot tell it."""
-        from ddagr_gym.calibration.drivetrain_answer import drivetrain_answer, drivetrain_findings
+        from ddagr_gym.calibration.drivetrain_answer import drivetrain_answer, drivetrain_findings, late_poses
         from ddagr_gym.calibration.run import calibrate_drives, ready_drives
         from ddagr_gym.calibration.settings import CalibrationSettings
         from ddagr_gym.diagnosis.result.drivetrain_names import CompletedNominal
@@ -244,7 +244,8 @@ class _Drivetrain:
         )  # fmt: skip
         found = self.made.calibration
         answer = drivetrain_answer(found, misfit)
-        return CompletedNominal(self.made.robot, self.made.soils[_GROUND], answer, drivetrain_findings(found))
+        robot, soil = self.made.robot, self.made.soils[_GROUND]
+        return CompletedNominal(robot, soil, answer, drivetrain_findings(found), late_poses(found))
 
     def _say(self, line: str) -> None:
         if self.progress is not None:

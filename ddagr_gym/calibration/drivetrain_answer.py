@@ -63,15 +63,19 @@ def drivetrain_findings(calibration: Calibration) -> tuple[Finding, ...]:
     decisions = {item.name: item for item in calibration.parts}
     folds = len({item.drive for item in calibration.forecasts})
     parts = tuple(_finding(decisions[name], found, folds) for name, found in named_parts(calibration).items())
+    late = tuple(_late_poses(effect) for effect in late_poses(calibration))
+    return (*parts, *late)
+
+
+def late_poses(calibration: Calibration) -> tuple[PoseLatency, ...]:
+    """The effect of poses that come behind the gyro, by as much as makes their headings agree best; none where soon."""
     late = max((drive.pose_lateness for drive in calibration.drives), default=0.0)
-    return (*parts, _late_poses(late)) if late >= PoseLatency.parameter("latency").metadata["least"] else parts
+    return (PoseLatency(late),) if late >= PoseLatency.parameter("latency").metadata["least"] else ()
 
 
-def _late_poses(lateness: float) -> Finding:
-    """Poses that come behind the gyro: seen in the values, by which their headings agree best."""
-    return Finding(
-        PoseLatency.name, {"latency": Estimate(lateness, "s")}, 0.0, 0.0, 0.0, 0.0, {}, {PoseLatency.name: 1.0}
-    )
+def _late_poses(effect: PoseLatency) -> Finding:
+    latency = Estimate(effect.latency, "s")
+    return Finding(effect.name, {"latency": latency}, 0.0, 0.0, 0.0, 0.0, {}, {effect.name: 1.0})
 
 
 def _finding(part: PartDecision, parameters: list[CalibratedParameter], folds: int) -> Finding:

@@ -215,7 +215,8 @@ def _beside_drivetrain(
     traces = steps.keep("localisation traces", trace_mismatch, session, found)
     located = steps.keep("localisation", locate, session, found, traces)
     evidence = steps.run("evidence", gather_evidence, session, found, traces)
-    return Outcome(replace(diagnosis, localisation=located), effects, session, found, evidence)
+    every = (*effects, *nominal.effects)
+    return Outcome(replace(diagnosis, localisation=located), every, session, found, evidence)
 
 
 def _options(session: DiagnosisSession, names_only: bool, robot_file: str) -> Options:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from ddagr_gym.calibration.drivetrain_answer import drivetrain_answer, drivetrain_findings
+from ddagr_gym.calibration.drivetrain_answer import drivetrain_answer, drivetrain_findings, late_poses
 from ddagr_gym.calibration.part_selection import surely_above
 from ddagr_gym.calibration.result import (
     CALIBRATED,
@@ -93,3 +93,4 @@ def test_the_gain_of_a_part_is_what_forecasts_lose_without_it_and_its_gate_what_
 def test_late_poses_are_named_from_the_least_latency_that_matters(lateness, named):
     names = [finding.name for finding in drivetrain_findings(calibration(lateness))]
     assert ("pose_latency" in names) is named
+    assert [effect.latency for effect in late_poses(calibration(lateness))] == ([lateness] if named else [])

@@ -109,7 +109,7 @@ def test_names_only_leaves_out_what_follows_the_verdict(stages: Stages) -> None:
 def test_the_drivetrain_is_fitted_where_the_library_leaves_too_much_in_the_encoders(
     stages: Stages, monkeypatch: pytest.MonkeyPatch, told: bool
 ) -> None:
-    nominal = SimpleNamespace(robot=get_robot("warthog"), soil=get_soil("thesis_a1"))
+    nominal = SimpleNamespace(robot=get_robot("warthog"), soil=get_soil("thesis_a1"), effects=("late poses",))
     stages.session.with_nominal = lambda robot, soil: SimpleNamespace(**{**vars(stages.session), "robot": robot})
     stages.session.progress = lambda line: None
     monkeypatch.setattr(pipeline, "unlike_commands", lambda found, accepted, gates: {"encoder_left": 9.0})
@@ -130,6 +130,7 @@ def test_the_drivetrain_is_fitted_where_the_library_leaves_too_much_in_the_encod
     assert outcome.diagnosis.verdict == (("load",) if told else ("none",))
     assert outcome.nominal[0].name == ("warthog" if told else "ddagr")
     assert ("certify" in stages.called) is not told
+    assert ("late poses" in outcome.effects) is told
 
 
 def test_a_stopped_diagnosis_goes_on_behind_its_last_step(stages: Stages, tmp_path: Path) -> None:

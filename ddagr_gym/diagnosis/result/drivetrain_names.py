@@ -12,6 +12,7 @@ from ddagr_gym.diagnosis.result.sentences import headline, share_in_words
 from ddagr_gym.diagnosis.search.scanned_model import SearchResult
 from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.parameters import Robot, Soil
+from ddagr_gym.physics.effects import Effect
 
 UNLIKE = 3.0
 """Misfit of an encoder over its limit from which the whole drivetrain is asked for, where the library's names leave too
@@ -42,12 +43,14 @@ class CompletedNominal:
         soil: as it was fitted along.
         answer: parts, and what they are worth on what was left out.
         findings: one per part that is named.
+        effects: of those findings that have no place in a robot.
     """
 
     robot: Robot
     soil: Soil
     answer: DrivetrainAnswer
     findings: tuple[Finding, ...]
+    effects: tuple[Effect, ...] = ()
 
 
 def with_drivetrain(diagnosis: Diagnosis, nominal: CompletedNominal, misfit: Mapping[str, float]) -> Diagnosis:
