@@ -69,12 +69,17 @@ class DiagnosisResult(DiagnosisReport):
             return None, None, f"the refitted values are no soil: {error}"
 
     def tables(self) -> Sequence[Table]:
-        """Findings with sizes, and errors on unseen drives."""
+        """Findings and parts of the drivetrain with sizes, and errors on unseen drives."""
         from ddagr_gym.reporting.diagnosis_text import FINDING_HEADER, FIT_HEADER, finding_rows, fit_rows
+        from ddagr_gym.reporting.drivetrain_section import PART_HEADER, part_rows
 
-        found = [Table(FINDING_HEADER, finding_rows(self.diagnosis))] if self.findings else []
-        rows = [] if self.diagnosis.fit is None else fit_rows(self.diagnosis.fit)
-        return [*found, *([Table(FIT_HEADER, rows)] if rows else [])]
+        fit = self.diagnosis.fit
+        found = (
+            Table(FINDING_HEADER, finding_rows(self.diagnosis)),
+            Table(PART_HEADER, part_rows(self.diagnosis)),
+            Table(FIT_HEADER, [] if fit is None else fit_rows(fit)),
+        )
+        return [table for table in found if table.rows]
 
     def __str__(self) -> str:
         from ddagr_gym.reporting.diagnosis_text import outcome_text

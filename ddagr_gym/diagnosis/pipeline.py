@@ -166,7 +166,7 @@ def diagnose(
             checks=checks,
             robot=robot.name,
             soil=soil_name,
-            options=_options(session, True, robot_file),
+            options=_options(session, names_only, robot_file),
             seconds=time.monotonic() - began,
         )
         return replace(made, diagnosis=answer)

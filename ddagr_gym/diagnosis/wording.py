@@ -96,6 +96,18 @@ def quantity(amount: Amount, unit: str = "", signed: bool = False) -> str:
     return f"{plus}{_fixed(value, places)} ± {_fixed(half, places)}{after}"
 
 
+def unit_in_words(unit: str) -> str:
+    """A unit as it is printed; "" for one of a mere number."""
+    return unit.replace("^2", "²").replace("^3", "³").strip("-")
+
+
+def size(amount: Amount) -> str:
+    """A parameter with its interval and unit; angles in degrees."""
+    if amount.unit == "rad":
+        return quantity(amount.scaled(DEGREES), "degrees", signed=amount.value < 0.0)
+    return quantity(amount, unit_in_words(amount.unit), signed=amount.value < 0.0)
+
+
 def _fixed(value: float, places: int) -> str:
     return f"{value:.{places}f}".replace("-", "−")
 
@@ -320,7 +332,7 @@ def describe(name: str, parameters: Amounts) -> str:
     try:
         return SENTENCES[name](parameters)
     except KeyError:
-        units = {key: item.unit.replace("^2", "²").replace("^3", "³").strip("-") for key, item in parameters.items()}
+        units = {key: unit_in_words(item.unit) for key, item in parameters.items()}
     if name in PART_TITLES:
         return f"{PART_TITLES[name]} ({', '.join(quantity(item, units[key]) for key, item in parameters.items())})"
     sizes = [f"{key.replace('_', ' ')} {quantity(item, units[key], signed=True)}" for key, item in parameters.items()]

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ddagr_gym.diagnosis.answer.certificate import Certificate
+from ddagr_gym.diagnosis.answer.drivetrain import DrivetrainAnswer
 from ddagr_gym.diagnosis.answer.evidence import Evidence
 from ddagr_gym.diagnosis.answer.verdict import Diagnosis
 from ddagr_gym.diagnosis.wording import title
@@ -16,7 +17,8 @@ from ddagr_gym.files import atomic_path, make_folder
 from ddagr_gym.reporting import diagnosis_figures as figures
 from ddagr_gym.reporting import diagnosis_maps as maps
 from ddagr_gym.reporting import diagnosis_tables as tables
-from ddagr_gym.reporting.drivetrain_section import drivetrain_section
+from ddagr_gym.reporting.drivetrain_figure import forecast_figure, part_figure
+from ddagr_gym.reporting.drivetrain_section import drivetrain_section, other_findings
 from ddagr_gym.reporting.figures import house_style
 from ddagr_gym.reporting.page_template import embedded, page_template
 
@@ -75,9 +77,10 @@ def _context(diagnosis: Diagnosis, evidence: Evidence, studio: _Studio) -> dict[
         "recordings": diagnosis.recordings,
         "tiles": tables.tiles(diagnosis, _seconds(evidence)),
         "checks": tables.checks(diagnosis.checks),
-        "findings": [tables.finding_card(item, diagnosis.recordings) for item in findings],
+        "findings": [tables.finding_card(item, diagnosis.recordings) for item in other_findings(diagnosis)],
         "rejected": tables.rejected(diagnosis.rejected),
-        "drivetrain": drivetrain_section(diagnosis.drivetrain),
+        "drivetrain": drivetrain_section(diagnosis),
+        "drivetrain_pictures": _drivetrain_pictures(diagnosis.drivetrain, studio),
         "mismatch": localisation.mismatch.phrase if localisation and findings else "",
         "remaining": localisation.remaining.phrase if localisation else "",
         "window": f"{evidence.duration:.3g}",
@@ -93,6 +96,15 @@ def _context(diagnosis: Diagnosis, evidence: Evidence, studio: _Studio) -> dict[
         "fit": _fit(diagnosis.fit, studio),
         **_pictures(diagnosis, evidence, studio),
     }
+
+
+def _drivetrain_pictures(answer: DrivetrainAnswer | None, studio: _Studio) -> list[dict[str, Any]]:
+    if answer is None or not answer.parts or not answer.forecasts:
+        return []
+    return [
+        studio.picture(part_figure(answer), "drivetrain_parts", "What forecasts lose without each part"),
+        studio.picture(forecast_figure(answer), "drivetrain_errors", "Errors over those of the simulator as given"),
+    ]
 
 
 def _seconds(evidence: Evidence) -> float:

@@ -12,17 +12,17 @@ from ddagr_gym.diagnosis.answer.next_drive_plan import NextDrivePlan
 from ddagr_gym.diagnosis.answer.unnamed_terms import UnnamedTerm, UnnamedTerms
 from ddagr_gym.diagnosis.answer.verdict import NONE, UNKNOWN, DataDoubt, Diagnosis, Finding, GatesUsed
 from ddagr_gym.diagnosis.wording import (
-    DEGREES,
     Amount,
     amounts,
     describe,
     in_sentence,
     number,
-    quantity,
     range_in_words,
+    size,
     title,
 )
 from ddagr_gym.reporting.diagnosis_figures import LABELS
+from ddagr_gym.reporting.drivetrain_section import drivetrain_tiles
 
 if TYPE_CHECKING:
     from ddagr_gym.physics.effects import Effect
@@ -50,16 +50,20 @@ def tiles(diagnosis: Diagnosis, seconds: float) -> list[dict[str, str]]:
         diagnosis: the answer.
         seconds: of drive.
     """
-    verdict = ", ".join(title(name) if name not in (NONE, UNKNOWN) else name for name in diagnosis.verdict)
+    parts = () if diagnosis.drivetrain is None else diagnosis.drivetrain.names
+    names = [title(name) if name not in (NONE, UNKNOWN) else name for name in diagnosis.verdict if name not in parts]
+    verdict = ", ".join(["Drivetrain", *names] if parts else names)
     left = "something is left" if diagnosis.verdict != (NONE,) else "not every channel speaks"
     status = "complete: nothing else shows" if diagnosis.complete else f"incomplete: {left}"
     explained = None if diagnosis.localisation is None else diagnosis.localisation.explained
     shares = [] if diagnosis.fit is None else _gain_shares(diagnosis.fit)
     found = [
         {"value": verdict, "label": status},
-        {"value": f"{seconds:.0f} s", "label": f"of drive in {len(diagnosis.recordings)} recordings"},
+        {"value": f"{seconds:.0f} s", "label": f"of drive in {_recordings(len(diagnosis.recordings))}"},
         {"value": str(diagnosis.thresholds.nulls), "label": "null drives behind the gates"},
     ]
+    if diagnosis.drivetrain is not None:
+        return [*found[:1], *drivetrain_tiles(diagnosis.drivetrain), found[1]]
     if explained is not None and any(finding.gate > 0.0 for finding in diagnosis.findings):
         found.insert(1, {"value": percent(explained), "label": "of the mismatch above the noise explained"})
     if shares:
@@ -67,6 +71,10 @@ def tiles(diagnosis: Diagnosis, seconds: float) -> list[dict[str, str]]:
         label = f"of what is explicable where no size was fitted, {horizon:g} s ahead"
         found.insert(2, {"value": percent(share.value), "label": label})
     return found
+
+
+def _recordings(count: int) -> str:
+    return "1 recording" if count == 1 else f"{count} recordings"
 
 
 def percent(share: float) -> str:
@@ -112,15 +120,9 @@ def rejected(items: Sequence[Finding]) -> list[dict[str, str]]:
     return [{"title": title(item.name), "evidence": _evidence(item)} for item in items]
 
 
-def size(amount: Amount) -> str:
-    """A parameter with its interval and unit; angles in degrees."""
-    unit = amount.unit.replace("^2", "²")
-    if unit == "rad":
-        return quantity(amount.scaled(DEGREES), "degrees", signed=amount.value < 0.0)
-    return quantity(amount, "" if unit == "-" else unit, signed=amount.value < 0.0)
-
-
 def _evidence(finding: Finding) -> str:
+    if finding.gain == finding.gate == 0.0:
+        return "seen in the values"
     parts = [f"gain {number(finding.gain, 3)}"]
     if finding.gate > 0.0:
         parts.append(f"{number(finding.gain / finding.gate)} times its gate of {number(finding.gate, 3)}")

@@ -6,9 +6,10 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from ddagr_gym.reporting.drivetrain_section import (
-    FORECAST_HEADER,
+    ERROR_HEADER,
     PART_HEADER,
-    forecast_rows,
+    error_rows,
+    other_findings,
     part_rows,
     remaining_in_words,
 )
@@ -32,11 +33,11 @@ def outcome_text(diagnosis: Diagnosis) -> str:
     if diagnosis.checks:
         lines = [_doubt_line(doubt) for doubt in diagnosis.checks]
         parts.append("\n".join(["The recordings themselves are suspicious (`ddagr check` says more):", *lines]))
-    if diagnosis.findings:
+    if other_findings(diagnosis):
         parts.append(format_table(FINDING_HEADER, finding_rows(diagnosis)))
     if diagnosis.drivetrain is not None:
-        parts.append(format_table(PART_HEADER, part_rows(diagnosis.drivetrain)))
-        parts.append(format_table(FORECAST_HEADER, forecast_rows(diagnosis.drivetrain)))
+        parts.append(format_table(PART_HEADER, part_rows(diagnosis)))
+        parts.append(format_table(ERROR_HEADER, error_rows(diagnosis.drivetrain)))
         parts.append(f"Squared error of the wheel speeds, corrected: {remaining_in_words(diagnosis.drivetrain)}.")
     if diagnosis.rejected:
         nearest = ", ".join(f"{item.name} (gain {item.gain:.1f})" for item in diagnosis.rejected)
@@ -55,15 +56,16 @@ def _doubt_line(doubt: DataDoubt) -> str:
 
 
 def finding_rows(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
-    """One row per parameter of each finding, under :data:`FINDING_HEADER`."""
-    return [row for finding in diagnosis.findings for row in _finding_rows(finding)]
+    """One row per parameter of each finding that is no part of the drivetrain, under :data:`FINDING_HEADER`."""
+    return [row for finding in other_findings(diagnosis) for row in _finding_rows(finding)]
 
 
 def _finding_rows(finding: Finding) -> Iterator[tuple[str, ...]]:
     """One row per parameter; what belongs to the whole finding is in the first."""
     others = [f"{name} {weight:.2f}" for name, weight in finding.equivalence_set.items() if name != finding.name]
     none = "nothing else" if finding.gate > 0.0 else "seen in the values"
-    whole = (f"{finding.gain:.1f}", f"{finding.gate:.1f}", ", ".join(others) or none)
+    gated = (f"{finding.gain:.1f}", f"{finding.gate:.1f}") if max(finding.gain, finding.gate) > 0.0 else ("–", "–")
+    whole = (*gated, ", ".join(others) or none)
     for number, (name, estimate) in enumerate(finding.parameters.items()):
         interval = "" if estimate.interval is None else f"{estimate.interval[0]:.3g} to {estimate.interval[1]:.3g}"
         first = number == 0

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from ddagr_gym.diagnosis.answer.drivetrain import DrivetrainAnswer
+from ddagr_gym.diagnosis.answer.drivetrain import PART_TITLES, DrivetrainAnswer
 from ddagr_gym.diagnosis.answer.verdict import UNKNOWN, Diagnosis, Finding
 from ddagr_gym.diagnosis.gates.thresholds import Thresholds
-from ddagr_gym.diagnosis.result.sentences import headline, share_in_words
+from ddagr_gym.diagnosis.result.sentences import drivetrain_headline, headline
 from ddagr_gym.diagnosis.search.scanned_model import SearchResult
 from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.parameters import Robot, Soil
@@ -64,18 +64,22 @@ def with_drivetrain(diagnosis: Diagnosis, nominal: CompletedNominal, misfit: Map
         nominal: the completed simulator.
         misfit: of the channels beside the simulator as it was given, refitted.
     """
-    seen = diagnosis.findings
-    findings = (*seen, *nominal.findings)
+    findings = (*diagnosis.findings, *nominal.findings)
     names = tuple(finding.name for finding in findings) or (UNKNOWN,)
     complete = diagnosis.complete and bool(findings)
-    share = share_in_words(max(nominal.answer.explained, 0.0))
-    worth = f"on stretches that were left out of the fit this explains {share} of the squared error of the wheel speeds"
+    parts = [PART_TITLES[name] for name in nominal.answer.names]
+    others = [finding for finding in findings if finding.name not in nominal.answer.names]
+    sentence = (
+        drivetrain_headline(parts, others, nominal.answer.explained, complete)
+        if parts
+        else headline(names, complete, findings)
+    )
     return replace(
         diagnosis,
         verdict=names,
         complete=complete,
         findings=findings,
-        sentence=headline(names, complete, findings, doubts=[worth] if nominal.findings else ()),
+        sentence=sentence,
         misfit={**diagnosis.misfit, "nominal": dict(misfit)},
         drivetrain=nominal.answer,
     )

@@ -34,8 +34,28 @@ def headline(
         return "; ".join(["Something is missing that no effect of the library explains", *doubts]) + "."
     found = _joined([describe(item.name, amounts(item.parameters)) + _rivals(item) for item in findings])
     share = "" if misfit_share is None else f"; {share_in_words(misfit_share)} of the mismatch"
-    rest = "nothing else above what these data can show" if complete else "something more is left that has no name here"
-    return "; ".join([f"{found[:1].upper()}{found[1:]}{share}", *doubts, rest]) + "."
+    return "; ".join([f"{found[:1].upper()}{found[1:]}{share}", *doubts, _rest(complete)]) + "."
+
+
+def drivetrain_headline(parts: Sequence[str], findings: Sequence[Finding], explained: float, complete: bool) -> str:
+    """That the drivetrain is missing, what else is, and how much of the wheel speeds' error that is.
+
+    Args:
+        parts: of the drivetrain that are named, in words; at least one.
+        findings: beside them.
+        explained: share of the squared error of the wheel speeds on what was left out of the fit [-].
+        complete: whether nothing more is left than in drives with nothing missing.
+    """
+    lacks = f"the simulator lacks the robot's drivetrain ({_joined_names(parts)})"
+    others = [describe(item.name, amounts(item.parameters)) + _rivals(item) for item in findings]
+    found = _joined([lacks, *others])
+    share = share_in_words(max(explained, 0.0))
+    worth = f"on stretches that were left out of the fit this explains {share} of the squared error of the wheel speeds"
+    return f"{found[:1].upper()}{found[1:]}; {worth}; {_rest(complete)}."
+
+
+def _rest(complete: bool) -> str:
+    return "nothing else above what these data can show" if complete else "something more is left that has no name here"
 
 
 def change_headline(verdict: Sequence[str], complete: bool, findings: Sequence[Finding], change: Change) -> str:
