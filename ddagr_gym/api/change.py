@@ -1,4 +1,4 @@
-"""``ddagr_gym.diagnose(..., calibration=...)``: what changed against a robot's ordinary drives."""
+"""``ddagr_gym.diagnose(..., calibration=...)`` and ``before=...``: what changed against ordinary drives."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from ddagr_gym.api.results import Table
 
 if TYPE_CHECKING:
     from ddagr_gym.diagnosis.change.run import Outcome
+    from ddagr_gym.parameters import Robot, Soil
     from ddagr_gym.recordings.schema import Recording
 
 
@@ -20,15 +21,18 @@ class ChangeResult(DiagnosisReport):
     """What changed against the ordinary drives of a calibrated robot, how much and how sure.
 
     ``report`` writes diagnosis.json, effects.json and effects.yaml with the named effects at their fitted sizes, for
-    the calibrated robot, and the page, index.html.
+    the calibrated robot, and the page, index.html; against drives from before also robot.yaml and soil.yaml as fitted
+    to these.
 
     Attributes:
         outcome: the answer and the models behind it (:mod:`ddagr_gym.diagnosis.change.run`).
         with_page: whether ``report`` writes the page, which needs matplotlib and jinja2.
+        nominal: robot and soil as fitted to drives from before; None with a calibration, which has them.
     """
 
     outcome: Outcome
     with_page: bool = True
+    nominal: tuple[Robot, Soil] | None = None
 
     def tables(self) -> Sequence[Table]:
         """Findings with sizes, and shifts of all effects."""
@@ -44,10 +48,13 @@ class ChangeResult(DiagnosisReport):
         return change_text(self.diagnosis)
 
     def _fill(self, folder: Path, progress: Callable[[str], None] | None) -> None:
+        from ddagr_gym.config import dump_config
         from ddagr_gym.reporting.change_page import write_page
 
         self._save_effects(folder)
         self.to_json(folder / "diagnosis.json")
+        for name, fitted in zip(("robot.yaml", "soil.yaml"), self.nominal or (), strict=False):
+            (folder / name).write_text(f"# fitted to the drives before: {self.sentence}\n{dump_config(fitted)}")
         if self.with_page:
             write_page(folder, self.diagnosis)
 
@@ -69,3 +76,27 @@ def changed(
     ordinary = load_ordinary_robot(calibration)
     outcome = what_changed(recordings, ordinary, ground, seed=seed, threads=threads, progress=progress)
     return ChangeResult(outcome, with_page)
+
+
+def changed_since(
+    recordings: Sequence[Recording],
+    before: Sequence[Recording],
+    robot: Robot,
+    soil: Soil,
+    *,
+    same_ground: bool,
+    window: float | None,
+    seed: int,
+    threads: int,
+    with_page: bool,
+    progress: Callable[[str], None],
+) -> ChangeResult:
+    """Compare drives with those from before; see :func:`ddagr_gym.diagnose`."""
+    from ddagr_gym.diagnosis.change.before_drives import GROUND, WINDOW
+    from ddagr_gym.diagnosis.change.run import what_changed_since
+
+    outcome, known = what_changed_since(
+        recordings, before, robot, soil, same_ground=same_ground, window=WINDOW if window is None else window,
+        seed=seed, threads=threads, progress=progress,
+    )  # fmt: skip
+    return ChangeResult(outcome, with_page, (known.robot, known.soils[GROUND]))

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, overload
 
-from ddagr_gym.api.change import ChangeResult, changed
+from ddagr_gym.api.change import ChangeResult, changed, changed_since
 from ddagr_gym.api.diagnosis_result import DiagnosisResult
 from ddagr_gym.api.inputs import RobotLike, Sources, recordings_from
 from ddagr_gym.api.nominal import Nominal, SoilLike, ThresholdsLike, nominal_from, thresholds_from
@@ -52,6 +52,8 @@ def diagnose(
     *,
     calibration: None = None,
     ground: str = "",
+    before: None = None,
+    same_ground: bool | None = None,
     thresholds: ThresholdsLike | None = None,
     soil_uncertainty: float = 1.0,
     window: float | None = None,
@@ -73,6 +75,31 @@ def diagnose(
     *,
     calibration: str | os.PathLike[str],
     ground: str = "",
+    before: None = None,
+    same_ground: bool | None = None,
+    thresholds: ThresholdsLike | None = None,
+    soil_uncertainty: float = 1.0,
+    window: float | None = None,
+    stride: float | None = None,
+    seed: int = 0,
+    threads: int = 1,
+    names_only: bool = False,
+    column_map: str | os.PathLike[str] | None = None,
+    progress: Callable[[str], None] | None = None,
+    cache: str | os.PathLike[str] | None = None,
+) -> ChangeResult: ...
+
+
+@overload
+def diagnose(
+    recordings: Sources,
+    robot: RobotLike = _ROBOT,
+    soil: SoilLike = _SOIL,
+    *,
+    calibration: None = None,
+    ground: str = "",
+    before: Sources,
+    same_ground: bool | None = None,
     thresholds: ThresholdsLike | None = None,
     soil_uncertainty: float = 1.0,
     window: float | None = None,
@@ -93,6 +120,8 @@ def diagnose(
     *,
     calibration: str | os.PathLike[str] | None = None,
     ground: str = "",
+    before: Sources | None = None,
+    same_ground: bool | None = None,
     thresholds: ThresholdsLike | None = None,
     soil_uncertainty: float = 1.0,
     window: float | None = None,
@@ -111,7 +140,8 @@ def diagnose(
     the same.
 
     With a calibration the question is what changed against the ordinary drives of that robot, which tells far smaller
-    effects: a wrong simulator is wrong in the same way in all of them.
+    effects: a wrong simulator is wrong in the same way in all of them. With drives from before the same is asked
+    without a calibration: one robot and one soil are fitted to these.
 
     Args:
         recordings: one or several recordings, tables with the schema's columns, paths of files or folders.
@@ -121,11 +151,15 @@ def diagnose(
             for robot, soil, thresholds and windows, which are left out then.
         ground: of the calibration that the recordings are on; "" for one of which only the kind is known, where far
             larger changes are hidden.
+        before: drives of the same robot when it was ordinary, on one ground; robot and soil are where the fit to them
+            begins. Thresholds, soil uncertainty and stride are left out then.
+        same_ground: whether the recordings are on the ground of the drives before; else, and where nobody knows (None),
+            its soil is free and no change of soil has a name.
         thresholds: of ``ddagr null-bank``, made with these or similar drives; those that ship with the package when it
             is None.
         soil_uncertainty: factor on how far the soil may be from the nominal one; larger where it is only guessed. The
             thresholds must be of the same.
-        window: length of the windows [s]; that of the thresholds when it is None.
+        window: length of the windows [s]; that of the thresholds when it is None, against drives before 4 s.
         stride: seconds between the starts of windows; their length, which uses all samples, when it is None.
         seed: of the resampling.
         threads: of the simulator.
@@ -137,7 +171,7 @@ def diagnose(
 
     Returns:
         Verdict, findings with sizes and intervals, effects and refitted robot and soil for the simulator; with a
-        calibration what changed, and the least change of every effect that would have been found.
+        calibration or drives from before what changed, and the least change of every effect that would have been found.
 
     Raises:
         InputError: recordings that cannot be diagnosed, unknown names, no thresholds for the robot.
@@ -159,6 +193,17 @@ def diagnose(
     from ddagr_gym.identification.nuisances import NuisancePriors
 
     at_least(threads=(threads, 1), window=(window, 1.0), stride=(stride, 0.1), seed=(seed, 0))
+    if before is not None:
+        _check_only_before(calibration, ground, thresholds=thresholds, stride=stride, soil_uncertainty=soil_uncertainty)
+        nominal = nominal_from(robot, soil)
+        given, earlier = (recordings_from(drives, robot, column_map) for drives in (recordings, _some(before)))
+        say = (lambda line: None) if progress is None else progress
+        return changed_since(
+            given, earlier, nominal.robot, nominal.soil, same_ground=bool(same_ground), window=window, seed=seed,
+            threads=threads, with_page=not names_only, progress=say,
+        )  # fmt: skip
+    if same_ground is not None:
+        raise InputError("whether the ground is the same is said, and no drive from before: name one with --before.")
     if calibration is not None:
         folder = Path(calibration)
         _check_left_out(folder, robot, soil, thresholds=thresholds, window=window, stride=stride)
@@ -258,6 +303,27 @@ def _check_left_out(folder: Path, robot: RobotLike, soil: SoilLike, **options: o
     given = [name for name, value in beside.items() if value is not None]
     if given:
         raise InputError(f"a calibration and {given[0]} are given: leave out one of them, {folder} has both.")
+
+
+def _check_only_before(calibration: object, ground: str, **options: object) -> None:
+    """Refuse what drives from before already say; InputError."""
+    if calibration is not None:
+        raise InputError(
+            "a calibration and drives from before are given: leave out one of them, either says what is ordinary."
+        )
+    if ground:
+        raise InputError(f"the ground is {ground!r} and there is no calibration: say --same-ground or --other-ground.")
+    usual: dict[str, object] = {"soil_uncertainty": 1.0}
+    given = [name for name, value in options.items() if value != usual.get(name)]
+    if given:
+        raise InputError(f"{given[0]} is given with drives from before: leave it out, these say what is ordinary.")
+
+
+def _some(before: Sources) -> Sources:
+    """Drives from before; InputError where there is none."""
+    if isinstance(before, Sequence) and not isinstance(before, str) and not before:
+        raise InputError("no drive from before is given: name one or more ordinary ones behind --before.")
+    return before
 
 
 def _check_known_soil(folder: Path, soil_uncertainty: float) -> None:

@@ -61,7 +61,7 @@ class DiagnosisResult(DiagnosisReport):
 
     @cached_property
     def _refitted(self) -> tuple[Robot | None, Soil | None, str]:
-        from ddagr_gym.diagnosis.null_bank.fitted_nominal import with_values
+        from ddagr_gym.identification.fitted_values import with_values
 
         try:
             return *with_values(*self.nominal, self.diagnosis.nuisances), ""

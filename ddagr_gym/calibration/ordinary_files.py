@@ -40,6 +40,7 @@ def ordinary_from_mapping(mapping: Mapping[str, Any]) -> Ordinary:
         robust=_array(given["robust"]),
         gyro_bias=float(given["gyro_bias"]),
         accelerometer_bias=float(given["accelerometer_bias"]),
+        offsets=_array(given.get("offsets", [0.0, 0.0, 0.0])),
     )
     return Ordinary(weighing, tuple(_reference_of(item) for item in mapping["references"]))
 
@@ -62,6 +63,7 @@ def _reference(item: Reference) -> dict[str, Any]:
         "reversed_gyro": item.reversed_gyro,
         "known_ground": _scores(item.known_ground),
         "other_ground": _scores(item.other_ground),
+        "losses": _plain(item.losses),
     }
 
 
@@ -72,6 +74,7 @@ def _reference_of(mapping: Mapping[str, Any]) -> Reference:
         bool(mapping["reversed_gyro"]),
         _scores_of(mapping["known_ground"]),
         _scores_of(mapping["other_ground"]),
+        _array(mapping.get("losses", [])),
     )
 
 

@@ -10,8 +10,8 @@ from ddagr_gym.calibration.calibration_data import CalibrationData
 from ddagr_gym.calibration.joint_fit import FittedModel
 from ddagr_gym.calibration.parts import LIMITS, RobotModel, is_stated, part_of
 from ddagr_gym.calibration.result import CalibratedParameter, Calibration
-from ddagr_gym.diagnosis.null_bank.fitted_nominal import with_values
 from ddagr_gym.envs.calibrated_draws import CalibratedDraws, GroundDraws
+from ddagr_gym.identification.fitted_values import with_values
 from ddagr_gym.identification.parameters import ModelParameter
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.physics.effects import Effect

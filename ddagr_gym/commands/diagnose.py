@@ -6,18 +6,23 @@ import shutil
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 from tyro.conf import Positional
 
 from ddagr_gym.commands.output import check_output_folder
+from ddagr_gym.errors import InputError
 from ddagr_gym.extras import need
 from ddagr_gym.progress import LinePrinter
+
+if TYPE_CHECKING:
+    from ddagr_gym.recordings.files import Limits
 
 EXAMPLES = (
     "ddagr diagnose run_1.csv.gz run_2.csv.gz run_3.csv.gz --output diagnosis",
     "ddagr diagnose today.csv.gz --calibration calibration --ground sand --output changed",
+    "ddagr diagnose today.csv.gz --before monday.csv.gz tuesday.csv.gz --same-ground --output changed",
     "ddagr diagnose drives --robot ddagr --soil thesis_a1 --thresholds thresholds.json --output diagnosis",
 )
 
@@ -31,7 +36,8 @@ class Arguments:
     the same. A diagnosis that was stopped goes on after its last finished step when the command is given again.
 
     With --calibration the question is what changed against the ordinary drives of that robot: the page shows every
-    effect against them, and from which size on a change would have been found.
+    effect against them, and from which size on a change would have been found. With --before the same is asked against
+    drives from before, without a calibration.
 
     Attributes:
         runs: recordings (Parquet of `ddagr import`, or any source that it takes), or folders of them.
@@ -43,12 +49,17 @@ class Arguments:
         calibration: folder that `ddagr calibrate --bank` wrote, whose robot, grounds and ordinary drives the recordings
             are compared with; robot, soil, thresholds, window and stride are left out then.
         ground: of the calibration that the recordings are on; left out for one that it does not know.
+        before: drives of the same robot from before, when it was ordinary, all on one ground; with them robot and soil
+            are where a fit to them begins.
+        same_ground: the recordings are on the ground of the drives before.
+        other_ground: they are on another one: its soil is free, and no change of soil has a name; so it is when neither
+            is said.
         map: shipped map by name or the path of one's own YAML file, for sources that are not imported yet.
         thresholds: of `ddagr null-bank`, made with these or similar drives; those that ship with the package when it is
             left out.
         soil_uncertainty: factor on how far the soil may be from the nominal one; larger where it is only guessed. The
             thresholds must be of the same.
-        window: length of the windows [s]; that of the thresholds when it is left out.
+        window: length of the windows [s]; that of the thresholds when it is left out, with --before 4 s.
         stride: seconds between the starts of windows; their length, which uses all samples, when it is left out.
         seed: of the resampling.
         threads: of the simulator.
@@ -64,6 +75,9 @@ class Arguments:
     soil: str = "thesis_a1"
     calibration: Path | None = None
     ground: str = ""
+    before: tuple[Path, ...] = ()
+    same_ground: bool = False
+    other_ground: bool = False
     map: str = ""
     thresholds: Path | None = None
     soil_uncertainty: float = 1.0
@@ -96,8 +110,7 @@ def run(arguments: Arguments) -> int | None:
             recordings_from(arguments.runs, read_as, arguments.map or None, limits),
             arguments.robot,
             arguments.soil,
-            calibration=arguments.calibration,
-            ground=arguments.ground,
+            **_compared_with(arguments, read_as, limits),
             thresholds=arguments.thresholds,
             soil_uncertainty=arguments.soil_uncertainty,
             window=arguments.window,
@@ -118,3 +131,19 @@ def run(arguments: Arguments) -> int | None:
     print(result)
     print(f"\n{'' if arguments.names_only else 'page, figures, '}diagnosis.json and effects.json: {arguments.output}")
     return None
+
+
+def _compared_with(arguments: Arguments, read_as: str, limits: Limits) -> dict[str, Any]:
+    """What the recordings are compared with, as `diagnose` takes it; InputError where the ground is said twice."""
+    from ddagr_gym.api.inputs import recordings_from
+
+    if arguments.same_ground and arguments.other_ground:
+        raise InputError("the ground is said to be the same and another one: give --same-ground or --other-ground.")
+    before = recordings_from(arguments.before, read_as, arguments.map or None, limits) if arguments.before else None
+    said = arguments.same_ground or arguments.other_ground
+    return {
+        "calibration": arguments.calibration,
+        "ground": arguments.ground,
+        "before": before,
+        "same_ground": arguments.same_ground if said else None,
+    }

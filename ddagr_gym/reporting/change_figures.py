@@ -4,16 +4,20 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from ddagr_gym.diagnosis.answer.change import BEFORE
 from ddagr_gym.diagnosis.wording import title
 from ddagr_gym.physics.effects.registry import effect_kind
 from ddagr_gym.rendering import palette
 from ddagr_gym.reporting.calibration_figures import blank
 
 if TYPE_CHECKING:
-    from ddagr_gym.diagnosis.answer.change import Change, EffectShift
+    from ddagr_gym.diagnosis.answer.change import Change, ChangeCertificate, EffectShift
 
 _WIDTH = 10.8
 """Of a figure [inches]: the page."""
+
+_NINETY = 1.645
+"""Normal quantile of a 90 % interval."""
 
 _FARTHEST = 4.0
 """Multiples of the limit beyond which a shift is drawn at the edge (ours)."""
@@ -59,6 +63,72 @@ def least_multiples(item: EffectShift) -> list[float]:
         return [1.0 for size in item.sizes.values() if size.least_detectable is not None]
     known = [(name, size.least_detectable) for name, size in item.sizes.items() if size.least_detectable is not None]
     return [value / float(kind.parameter(name).metadata["least"]) for name, value in known]
+
+
+def size_figure(change: Change, named: tuple[str, ...]) -> Any:
+    """Sizes of every effect before and after, side by side, in least sizes that matter.
+
+    Args:
+        change: of a drive.
+        named: effects of the verdict.
+    """
+    rows = [row for item in reversed(change.shifts) for row in _sizes_of(item)]
+    figure = blank(1.2 + 0.22 * len(rows), _WIDTH)
+    axes = figure.subplots(1, 2, sharey=True, sharex=True)
+    for place, (_, effect, before, after, half) in enumerate(rows):
+        colour = palette.VERMILLION if effect in named else palette.BLUE
+        axes[0].plot(before, place, "o", ms=4, color=colour)
+        axes[1].plot([before, before], [place - 0.3, place + 0.3], color=palette.GREY, lw=1.2)
+        axes[1].errorbar(after, place, xerr=half, fmt="o", ms=4, lw=1.0, color=colour)
+    sides = ("before", "after") if change.against == BEFORE else ("ordinary drives", "the drives compared")
+    for axis, side in zip(axes, sides, strict=True):
+        axis.axvline(0.0, color=palette.GREY, lw=0.8, zorder=0)
+        axis.set_title(side)
+        axis.set_xscale("symlog", linthresh=2.0)
+        axis.set_xlabel("size, in least sizes that matter")
+    axes[0].set_yticks(range(len(rows)), [row[0] for row in rows])
+    axes[0].set_ylim(-0.6, len(rows) - 0.4)
+    return figure
+
+
+def _sizes_of(item: EffectShift) -> list[tuple[str, str, float, float, float]]:
+    """Label, effect, size before and after, and half the interval of the difference, of each size."""
+    kind = effect_kind(item.effect)
+    if kind.categorical or not kind.differentiable:
+        return []
+    rows = []
+    for name, size in item.sizes.items():
+        least = float(kind.parameter(name).metadata["least"])
+        label = title(item.effect) if len(item.sizes) == 1 else f"{title(item.effect)}, {name.replace('_', ' ')}"
+        values = (size.before / least, (size.before + size.value) / least, _NINETY * size.deviation / least)
+        rows.append((label, item.effect, *values))
+    return rows
+
+
+def forecast_figure(certificate: ChangeCertificate, named: bool) -> Any:
+    """Quartiles of the losses of left-out windows: before, after without what changed, and with it.
+
+    Args:
+        certificate: of the drives.
+        named: whether anything changed that has a name.
+    """
+    rows = [
+        ("after, with what changed", certificate.losses, palette.BLUE),
+        ("after, without it" if named else "after", certificate.losses_without, palette.VERMILLION),
+        ("before", certificate.losses_of_ordinary, palette.GREY),
+    ]
+    shown = rows if named else rows[1:]
+    figure = blank(1.0 + 0.35 * len(shown), _WIDTH)
+    axis = figure.subplots()
+    for place, (_, (low, middle, high), colour) in enumerate(shown):
+        axis.plot([low, high], [place, place], color=colour, lw=5.0, alpha=0.5, solid_capstyle="butt")
+        axis.plot(middle, place, "o", ms=6, color=colour)
+    axis.axvline(certificate.limit, color=palette.INK, lw=0.9)
+    axis.set_xscale("log")
+    axis.set_yticks(range(len(shown)), [row[0] for row in shown])
+    axis.set_ylim(-0.6, len(shown) - 0.4)
+    axis.set_xlabel("mean loss of a sample, forecast by a fit without it")
+    return figure
 
 
 def parameter_figure(change: Change) -> Any:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ddagr_gym.diagnosis.answer.change import BEFORE
 from ddagr_gym.files import write_text
 from ddagr_gym.reporting import change_figures as figures
 from ddagr_gym.reporting import change_text as text
@@ -13,6 +14,7 @@ from ddagr_gym.reporting.figures import house_style
 from ddagr_gym.reporting.page_template import embedded, page_template
 
 if TYPE_CHECKING:
+    from ddagr_gym.diagnosis.answer.change import Change
     from ddagr_gym.diagnosis.answer.verdict import Diagnosis
 
 PAGE = "index.html"
@@ -34,6 +36,13 @@ def write_page(folder: Path, diagnosis: Diagnosis) -> None:
     write_text(folder / PAGE, page.render(context))
 
 
+def _sides(diagnosis: Diagnosis, change: Change) -> list[tuple[str, str]]:
+    """Names of the drives before, or of ordinary ones, and of those that are asked about, side by side."""
+    known, asked = list(change.ordinary), list(diagnosis.recordings)
+    rows = max(len(known), len(asked))
+    return [(known[k] if k < len(known) else "", asked[k] if k < len(asked) else "") for k in range(rows)]
+
+
 def _context(diagnosis: Diagnosis) -> dict[str, Any]:
     change = diagnosis.change
     if change is None:
@@ -41,14 +50,25 @@ def _context(diagnosis: Diagnosis) -> dict[str, Any]:
     return {
         "headline": diagnosis.sentence,
         "robot": diagnosis.robot,
-        "drives": list(diagnosis.recordings),
-        "ordinary": list(change.ordinary),
+        "sides": _sides(diagnosis, change),
+        "before": change.against == BEFORE,
+        "certificate": text.certified(diagnosis),
         "ground": change.ground,
         "windows": change.windows,
+        "usual": "" if change.certificate is None else f"{100.0 * change.certificate.expected:.0f}",
         "level": f"{100.0 * change.level:g}",
         "power": f"{100.0 * change.power:g}",
         "shift_picture": embedded(
             figures.shift_figure(change, diagnosis.verdict), "Shift of every effect over its limit, and what would show"
+        ),
+        "size_picture": embedded(
+            figures.size_figure(change, diagnosis.verdict), "Size of every effect before and after, side by side"
+        ),
+        "forecast_picture": None
+        if change.certificate is None
+        else embedded(
+            figures.forecast_figure(change.certificate, bool(diagnosis.findings)),
+            "Losses of forecasts before and after, side by side",
         ),
         "parameter_picture": embedded(
             figures.parameter_figure(change), "Parameters of robot and ground without and with what changed"

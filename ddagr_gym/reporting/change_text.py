@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from ddagr_gym.diagnosis.result.sentences import certificate_in_words
 from ddagr_gym.diagnosis.wording import number, title
 from ddagr_gym.reporting.diagnosis_text import FINDING_HEADER, finding_rows
 from ddagr_gym.reporting.text_table import format_table
@@ -12,7 +13,7 @@ if TYPE_CHECKING:
     from ddagr_gym.diagnosis.answer.change import Change, EffectShift, SizeShift
     from ddagr_gym.diagnosis.answer.verdict import Diagnosis
 
-SHIFT_HEADER = ("effect", "size", "shift", "deviation", "unit", "distance", "limit", "would be found from")
+SHIFT_HEADER = ("effect", "size", "before", "shift", "deviation", "unit", "distance", "limit", "would be found from")
 """Columns of :func:`shift_rows`; distance and limit in standard deviations."""
 
 PARAMETER_HEADER = ("parameter", "without effects", "with what changed", "ordinary drives", "unit")
@@ -28,6 +29,7 @@ def change_text(diagnosis: Diagnosis) -> str:
     parts = [diagnosis.sentence]
     if diagnosis.findings:
         parts.append(format_table(FINDING_HEADER, finding_rows(diagnosis)))
+    parts += [line for line in (certified(diagnosis),) if line]
     rows = [row for item in change.shifts[:SHOWN] for row in _rows(item)]
     parts.append(format_table(SHIFT_HEADER, rows))
     further = len(change.shifts) - SHOWN
@@ -62,6 +64,14 @@ def not_compared(change: Change) -> list[str]:
     return [*lines, *(f"{title(name)}: such a drive would show no size of it." for name in change.hidden)]
 
 
+def certified(diagnosis: Diagnosis) -> str:
+    """How well left-out windows are forecast; "" where that is not known."""
+    change = _of(diagnosis)
+    if change.certificate is None:
+        return ""
+    return certificate_in_words(change.certificate, change.against, bool(diagnosis.findings))
+
+
 def _of(diagnosis: Diagnosis) -> Change:
     if diagnosis.change is None:
         raise ValueError("the diagnosis was made without a calibration")
@@ -75,9 +85,8 @@ def _rows(item: EffectShift) -> list[tuple[str, ...]]:
         whole = (f"{item.distance:.1f}", f"{item.limit:.1f}") if first else ("", "")
         label = title(item.effect) if first else ""
         unit = size.unit if size.unit != "-" else ""
-        rows.append(
-            (label, name.replace("_", " "), number(size.value), number(size.deviation), unit, *whole, least(size))
-        )
+        values = (number(value) for value in (size.before, size.value, size.deviation))
+        rows.append((label, name.replace("_", " "), *values, unit, *whole, least(size)))
     return rows
 
 

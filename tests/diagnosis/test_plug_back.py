@@ -17,7 +17,7 @@ from ddagr_gym.diagnosis.certification.forecast import (
     roll_out,
     start_states,
 )
-from ddagr_gym.diagnosis.null_bank.fitted_nominal import with_values
+from ddagr_gym.identification.fitted_values import with_values
 from ddagr_gym.identification.problem import Point
 from ddagr_gym.physics.effects import load_effects
 from ddagr_gym.physics.effects.files import read_effects_file, save_effects

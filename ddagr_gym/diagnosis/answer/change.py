@@ -16,12 +16,14 @@ class SizeShift:
         unit: SI.
         least_detectable: shift that would be found in 80 % of such drives with 5 % false alarms over the whole library;
             null where none that exists would be.
+        before: estimate in ordinary drives, as a distance from neutral; what their simulator has wrong is in it.
     """
 
     value: float
     deviation: float
     unit: str
     least_detectable: float | None
+    before: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -65,11 +67,45 @@ class ParameterShift:
 
 
 @dataclass(frozen=True)
-class Change:
-    """What changed against the ordinary drives of a calibrated robot.
+class ChangeCertificate:
+    """How well the drives are forecast with what changed, beside how well ordinary ones are.
+
+    Windows are forecast from the readings at their start by fits to the other half of the windows. A loss is the mean
+    over the samples of a window of half the square of the residual over its usual size, linear for large ones.
 
     Attributes:
-        ground: of the calibration that the drive was taken to be on; "" where it was not known.
+        windows: that were forecast.
+        as_well: of them, that are forecast as well as `expected` of the ordinary drives' windows are.
+        as_well_without: the same without what changed.
+        expected: share of ordinary windows that counts as well.
+        ordinary_windows: of ordinary drives, forecast by the same rule.
+        limit: largest loss of `expected` of them.
+        losses: quartiles with what changed.
+        losses_without: the same without it.
+        losses_of_ordinary: the same of ordinary drives.
+    """
+
+    windows: int
+    as_well: int
+    as_well_without: int
+    expected: float
+    ordinary_windows: int
+    limit: float
+    losses: tuple[float, float, float]
+    losses_without: tuple[float, float, float]
+    losses_of_ordinary: tuple[float, float, float]
+
+
+CALIBRATION = "calibration"
+BEFORE = "before"
+
+
+@dataclass(frozen=True)
+class Change:
+    """What changed against the ordinary drives of a calibrated robot, or against drives from before.
+
+    Attributes:
+        ground: of the calibration that the drive was taken to be on, or "same" as before; "" where it was not known.
         ordinary: names of the ordinary drives that it was compared with.
         level: of false alarms over the whole library.
         power: with which a least detectable shift is found.
@@ -78,6 +114,9 @@ class Change:
         parameters: of robot and ground.
         hidden: effects of which no size that exists would have been found in such drives.
         not_compared: effects that were not looked for, with the reason.
+        against: "calibration", or "before" for drives that were given with `--before`.
+        certificate: whether the drives are forecast as well with what changed as ordinary ones are; null where the
+            calibration was made before that was kept.
     """
 
     ground: str
@@ -89,3 +128,5 @@ class Change:
     parameters: tuple[ParameterShift, ...]
     hidden: tuple[str, ...]
     not_compared: Mapping[str, str]
+    against: str = CALIBRATION
+    certificate: ChangeCertificate | None = None

@@ -7,7 +7,15 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ddagr_gym.diagnosis.answer.change import Change, EffectShift, ParameterShift, SizeShift
+from ddagr_gym.diagnosis.answer.change import (
+    BEFORE,
+    CALIBRATION,
+    Change,
+    ChangeCertificate,
+    EffectShift,
+    ParameterShift,
+    SizeShift,
+)
 from ddagr_gym.diagnosis.answer.verdict import NONE, UNKNOWN, Diagnosis, Estimate, Finding, GatesUsed, Options
 from ddagr_gym.diagnosis.change.drive_scan import NAMED, NOT_COMPARED
 from ddagr_gym.diagnosis.change.naming import Model, Named, Step
@@ -27,7 +35,12 @@ from ddagr_gym.version import __version__
 
 
 def conclude_change(
-    problem: Problem, mended: MendedRecordings, ordinary: OrdinaryRobot, ground: str, named: Named
+    problem: Problem,
+    mended: MendedRecordings,
+    ordinary: OrdinaryRobot,
+    ground: str,
+    named: Named,
+    certified: ChangeCertificate | None = None,
 ) -> tuple[Diagnosis, tuple[Effect, ...]]:
     """The answer, without checks of the data and time, and the effects that it names.
 
@@ -37,13 +50,14 @@ def conclude_change(
         ordinary: calibrated robot.
         ground: that they were taken to be on; "" where it was not known.
         named: what changed.
+        certified: forecasts of windows that were left out.
     """
     turned = mended.reversed_gyro is not None and not _usually_reversed(ordinary)
     seen = tuple(reversed_gyro_findings(mended.reversed_gyro)) if turned else ()
     findings = (*seen, *(_finding(named, k) for k in range(len(named.steps))))
     complete = not (named.models[-1].conspicuous or named.models[-1].pulled)
     verdict = tuple(item.name for item in findings) or ((NONE,) if complete else (UNKNOWN,))
-    change = _change(problem, ordinary, ground, named)
+    change = _change(problem, ordinary, ground, named, certified)
     diagnosis = Diagnosis(
         verdict,
         complete,
@@ -154,7 +168,9 @@ def _within(model: Model) -> dict[tuple[int, str], float]:
     return found
 
 
-def _change(problem: Problem, ordinary: OrdinaryRobot, ground: str, named: Named) -> Change:
+def _change(
+    problem: Problem, ordinary: OrdinaryRobot, ground: str, named: Named, certified: ChangeCertificate | None
+) -> Change:
     first, last = named.models[0], named.models[-1]
     shifts = _effect_shifts(first)
     parameters = tuple(
@@ -173,7 +189,9 @@ def _change(problem: Problem, ordinary: OrdinaryRobot, ground: str, named: Named
         shifts,
         parameters,
         hidden,
-        dict(NOT_COMPARED),
+        {**NOT_COMPARED, **ordinary.comparison(ground).unnamed},
+        BEFORE if ordinary.given else CALIBRATION,
+        certified,
     )
 
 
@@ -203,7 +221,9 @@ def _size_shifts(shift: Shift, tests: int) -> Mapping[str, SizeShift]:
         scale = abs(away) if probe.differentiable else 1.0
         deviation = float(np.sqrt(shift.covariance[k, k])) * scale
         value = float(shift.value[k]) * away if probe.differentiable else math.nan
-        item = SizeShift(value, deviation, str(data["unit"]), _stated(shift, k, float(reach[k])))
+        stated = _stated(shift, k, float(reach[k]))
+        usual = float(shift.mean[k]) * away if probe.differentiable else math.nan
+        item = SizeShift(value, deviation, str(data["unit"]), stated, usual)
         before = found.get(name)
         if before is None or _worse(item, before):
             found[name] = item

@@ -30,6 +30,9 @@ FEWEST_WINDOWS = 8
 ITERATIONS = 6
 """Most Gauss-Newton steps of a fit (ours): ordinary drives start near their end."""
 
+OFFSET_CHANNELS = ("yaw_rate", "specific_force_x", "specific_force_y")
+"""Whose biases belong to a drive."""
+
 SHORTEST_SHARE = 0.5
 """Of the calibration's windows, to which those of short segments may be cut (ours): other effects show in shorter
 ones."""
@@ -46,7 +49,7 @@ def change_windows(recordings: Sequence[Recording], robot: Robot, weighing: Weig
     Raises:
         InputError: too few windows of the calibration's length.
     """
-    even = [_with_gyro_scaled(aligned_poses(bridged(r), weighing.lateness), weighing.gyro_scale) for r in recordings]
+    even = [_as_ordinary(aligned_poses(bridged(r), weighing.lateness), weighing) for r in recordings]
     windows = cut_windows(
         even, weighing.window, wheel_radius=robot.outer_radius, half_track=robot.half_track, history=weighing.history
     )
@@ -61,11 +64,15 @@ def change_windows(recordings: Sequence[Recording], robot: Robot, weighing: Weig
     return with_presumed_past(windows.subset(chosen))
 
 
-def _with_gyro_scaled(recording: Recording, scale: float) -> Recording:
-    """The drive with the readings of a gyro of sensitivity 1."""
-    if scale == 1.0 or not recording.has("yaw_rate"):
-        return recording
-    return replace(recording, channels={**recording.channels, "yaw_rate": recording["yaw_rate"] / scale})
+def _as_ordinary(recording: Recording, weighing: Weighing) -> Recording:
+    """The drive with the readings of a gyro of sensitivity 1, and without what sensors always read too much."""
+    scales = dict.fromkeys(OFFSET_CHANNELS, 1.0) | {"yaw_rate": weighing.gyro_scale}
+    changed = {
+        name: (recording[name] - offset) / scales[name]
+        for name, offset in zip(OFFSET_CHANNELS, weighing.offsets.tolist(), strict=True)
+        if recording.has(name) and (offset, scales[name]) != (0.0, 1.0)
+    }
+    return replace(recording, channels={**recording.channels, **changed}) if changed else recording
 
 
 def change_problem(

@@ -7,7 +7,8 @@ drive, so that drives can be compared.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +34,9 @@ NOT_COMPARED: Mapping[str, str] = {
 
 NAMED = "named "
 """Begins the keys of the fitted parameters of named effects."""
+
+FEWEST_IN_PIECE = 5
+"""Windows of a piece of a drive, whose scatter is known from them (ours)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,6 +115,16 @@ class DriveScan:
     keys: tuple[str, ...]
     products: InnerProducts
     free: NDArray[np.int64]
+
+    def pieces(self, most: int) -> tuple[DriveScan, ...]:
+        """The same of parts of equal length, at most so many, of :data:`FEWEST_IN_PIECE` windows at least."""
+        count = len(self.products.normals)
+        ends = np.linspace(0, count, min(most, max(count // FEWEST_IN_PIECE, 1)) + 1).round().astype(np.int64)
+        products = self.products
+        return tuple(
+            replace(self, products=InnerProducts(products.normals[a:b], products.precision, products.values))
+            for a, b in pairwise(ends.tolist())
+        )
 
     def scores(self, deviations: Array | None = None) -> Scores:
         """Gradient and information of the columns, with their covariances.

@@ -13,9 +13,8 @@ import numpy as np
 
 from ddagr_gym.diagnosis.change.drive_fit import ITERATIONS
 from ddagr_gym.diagnosis.change.drive_scan import NAMED, DriveScan, scan_drive
-from ddagr_gym.diagnosis.change.ordinary import Scores
+from ddagr_gym.diagnosis.change.ordinary import Comparison, Scores
 from ddagr_gym.diagnosis.change.shifts import (
-    EXPECTED_DRIVES,
     LEVEL,
     Pull,
     Shift,
@@ -140,24 +139,24 @@ class Named:
     steps: tuple[Step, ...]
 
 
-def model_of(problem: Problem, fitted: Fitted, ordinary: Sequence[Scores], named: Sequence[Shift] = ()) -> Model:
+def model_of(problem: Problem, fitted: Fitted, ordinary: Comparison, named: Sequence[Shift] = ()) -> Model:
     """Scan a fit and compare it with ordinary drives.
 
     Args:
         problem: of the drive.
         fitted: to it.
-        ordinary: scores of ordinary drives.
+        ordinary: what the drive is compared with.
         named: candidates of the fit's effects.
     """
     scan = scan_drive(problem, fitted)
     scores = scan.scores()
     beside = [key for key in scan.keys if key.startswith(NAMED)]
     in_ordinary = [key for shift in named for key in shift.compared.keys]
-    found = [shift_of(item, scores, ordinary, beside, in_ordinary) for item in scan.compared]
+    compared = [item for item in scan.compared if item.name not in ordinary.unnamed]
+    found = [shift_of(item, scores, ordinary, beside, in_ordinary) for item in compared]
     shifts = sorted((item for item in found if item is not None), key=lambda item: (item.probability, -item.distance))
-    degrees = EXPECTED_DRIVES + len(ordinary) - 1.0
     pulls = tuple(
-        Pull(p.name, abs(float(value)) / p.prior, degrees)
+        Pull(p.name, abs(float(value)) / p.prior, ordinary.degrees)
         for p, value in zip(problem.nuisances.parameters, fitted.point.values, strict=True)
         if p.prior > 0.0
     )
@@ -167,7 +166,7 @@ def model_of(problem: Problem, fitted: Fitted, ordinary: Sequence[Scores], named
 def name_changes(
     problem: Problem,
     fitted: Fitted,
-    ordinary: Sequence[Scores],
+    ordinary: Comparison,
     rng: np.random.Generator,
     progress: Callable[[str], None] = lambda line: None,
 ) -> Named:
@@ -176,7 +175,7 @@ def name_changes(
     Args:
         problem: of the drive.
         fitted: without effects.
-        ordinary: scores of ordinary drives.
+        ordinary: what the drive is compared with.
         rng: of resampled windows.
         progress: called with what is being done.
     """
@@ -194,7 +193,7 @@ def name_changes(
 def _next(
     problem: Problem,
     model: Model,
-    ordinary: Sequence[Scores],
+    ordinary: Comparison,
     rng: np.random.Generator,
     progress: Callable[[str], None],
 ) -> tuple[Model, Step] | None:
@@ -225,7 +224,7 @@ def _next(
     return chosen[0], Step(chosen[0].named[-1], weights, rivals, dispersion)
 
 
-def _starts(problem: Problem, model: Model, ordinary: Sequence[Scores]) -> list[tuple[Shift, Point]]:
+def _starts(problem: Problem, model: Model, ordinary: Comparison) -> list[tuple[Shift, Point]]:
     """Effects that may be what changed, with the points from which they are fitted."""
     found: dict[str, tuple[Shift, Point]] = {}
     at = model.fitted.point
@@ -271,14 +270,14 @@ def _where_parameters_stay(problem: Problem, model: Model) -> list[tuple[Shift, 
     return [(shift, start) for _, shift, start in best]
 
 
-def _preselected(model: Model, ordinary: Sequence[Scores]) -> list[Shift]:
+def _preselected(model: Model, ordinary: Comparison) -> list[Shift]:
     """The effects beside which, to first order, least is out of the ordinary."""
     scores = model.scan.scores()
     listed = sorted(model.conspicuous, key=lambda shift: _left_beside(shift, model, scores, ordinary))
     return listed[:MOST_RIVALS]
 
 
-def _left_beside(shift: Shift, model: Model, scores: Scores, ordinary: Sequence[Scores]) -> float:
+def _left_beside(shift: Shift, model: Model, scores: Scores, ordinary: Comparison) -> float:
     """Largest distance over its limit of any other effect beside one, to first order."""
     own = [key for key in scores.keys if key.startswith(NAMED)]
     before = [key for item in model.named for key in item.compared.keys]

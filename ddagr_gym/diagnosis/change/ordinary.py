@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ddagr_gym.diagnosis.result.uncertainty import STRUCTURE, STRUCTURE_OF_LIMIT
+from ddagr_gym.diagnosis.search.candidates import Candidate
 from ddagr_gym.identification.nuisances import NuisancePriors
 from ddagr_gym.identification.parameters import (
     KIND_STIFFNESS_DEVIATION,
@@ -25,6 +27,9 @@ LEAST_GYRO_BIAS = 2e-4
 LEAST_ACCELEROMETER_BIAS = 0.02
 """Least prior [m/s^2] (ours): a tenth of a degree of slope under a drive."""
 
+EXPECTED_DRIVES = 4.0
+"""Degrees of freedom of the expected scatter where nothing was measured (ours): as if it came from five drives."""
+
 
 @dataclass(frozen=True, eq=False)
 class Weighing:
@@ -39,6 +44,7 @@ class Weighing:
         robust: (8,) weighted residuals from which the loss is linear.
         gyro_bias: between ordinary drives [rad/s].
         accelerometer_bias: the same, slopes included [m/s^2].
+        offsets: (3,) what gyro [rad/s] and accelerometers [m/s^2] read too much in ordinary drives, which is taken off.
     """
 
     window: float
@@ -49,6 +55,7 @@ class Weighing:
     robust: Array
     gyro_bias: float
     accelerometer_bias: float
+    offsets: Array = field(default_factory=lambda: np.zeros(3))
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +81,47 @@ class Scores:
     informations: Array | None = None
 
 
+@dataclass(frozen=True)
+class ExpectedScatter:
+    """By how much the sizes of effects differ between ordinary drives because simulators differ in structure.
+
+    Attributes:
+        deviations: by effect, in least sizes that matter, of limits and signs in the whole of them; those that are
+            missing have what intervals are widened by.
+        degrees: of freedom with which that is known.
+    """
+
+    deviations: Mapping[str, float] = field(default_factory=dict)
+    degrees: float = EXPECTED_DRIVES
+
+    def of(self, candidate: Candidate) -> float:
+        """Deviation of a candidate's sizes, in least sizes that matter."""
+        usual = STRUCTURE if candidate.has_sizes else STRUCTURE_OF_LIMIT
+        return self.deviations.get(candidate.name, usual)
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """What drives are compared with.
+
+    Attributes:
+        drives: scores of ordinary drives.
+        pieces: scores of parts of the only one, where there is one.
+        expected: scatter between drives before any data.
+        unnamed: effects that cannot be what changed, with the reason.
+    """
+
+    drives: tuple[Scores, ...]
+    pieces: tuple[Scores, ...] = ()
+    expected: ExpectedScatter = ExpectedScatter()
+    unnamed: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def degrees(self) -> float:
+        """Of freedom of the scatter between drives."""
+        return self.expected.degrees + len(self.drives) - 1.0
+
+
 @dataclass(frozen=True, eq=False)
 class Reference:
     """An ordinary drive, scanned with the robot that was calibrated without it.
@@ -84,6 +132,7 @@ class Reference:
         reversed_gyro: whether its gyro turned the wrong way, which was mended.
         known_ground: with the soil of its ground; that of an unknown one where no other drive was on it.
         other_ground: with a soil of which only the kind is known.
+        losses: (W,) of windows as forecast by fits without them, by the known ground; none in files of before.
     """
 
     drive: str
@@ -91,6 +140,7 @@ class Reference:
     reversed_gyro: bool
     known_ground: Scores
     other_ground: Scores
+    losses: Array = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,6 +156,11 @@ class OrdinaryRobot:
         references: ordinary drives.
         source: name of the calibration.
         digest: of what it says of ordinary drives.
+        pieces: parts of the only drive, where there is one.
+        known_scatter: expected between drives on the same ground.
+        other_scatter: expected between drives on two grounds.
+        unnamed: effects that cannot be named on an unknown ground, with the reason.
+        given: whether the drives were given as those from before, without a calibration.
     """
 
     robot: Robot
@@ -116,6 +171,11 @@ class OrdinaryRobot:
     references: tuple[Reference, ...]
     source: str = ""
     digest: str = ""
+    pieces: tuple[Reference, ...] = ()
+    known_scatter: ExpectedScatter = ExpectedScatter()
+    other_scatter: ExpectedScatter = ExpectedScatter()
+    unnamed: Mapping[str, str] = field(default_factory=dict)
+    given: bool = False
 
     def uncertain(self, ground: str, recordings: int) -> tuple[ModelParameter, ...]:
         """All that may differ between ordinary drives, for drives on one ground ("" for an unknown one)."""
@@ -124,9 +184,18 @@ class OrdinaryRobot:
             soil, self.parameters, self.soil_deviations.get(ground) if ground else None, self.weighing, recordings
         )
 
-    def scores(self, ground: str) -> tuple[Scores, ...]:
-        """Of the ordinary drives, with a ground that is known or ("") not."""
-        return tuple(item.known_ground if ground else item.other_ground for item in self.references)
+    def comparison(self, ground: str) -> Comparison:
+        """What drives on a ground that is known or ("") not are compared with."""
+        if ground:
+            drives, pieces = ([item.known_ground for item in found] for found in (self.references, self.pieces))
+            return Comparison(tuple(drives), tuple(pieces), self.known_scatter)
+        drives, pieces = ([item.other_ground for item in found] for found in (self.references, self.pieces))
+        return Comparison(tuple(drives), tuple(pieces), self.other_scatter, self.unnamed)
+
+    @property
+    def losses(self) -> Array:
+        """(W,) of the ordinary drives' windows as forecast by fits without them."""
+        return np.concatenate([item.losses for item in self.references])
 
 
 def uncertain_parameters(

@@ -6,9 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ddagr_gym.diagnosis.change.drive_fit import change_problem, change_windows, fit_nominal
-from ddagr_gym.diagnosis.change.drive_scan import scan_drive
+from ddagr_gym.diagnosis.change.drive_scan import DriveScan, scan_drive
+from ddagr_gym.diagnosis.change.left_out import left_out_losses
 from ddagr_gym.diagnosis.change.ordinary import Reference, Weighing, uncertain_parameters
 from ddagr_gym.identification.parameters import ModelParameter
 from ddagr_gym.parameters import Robot, Soil
@@ -50,11 +52,32 @@ def scan_ordinary(drive: OrdinaryDrive, weighing: Weighing, threads: int = 1) ->
         weighing: of all ordinary drives.
         threads: of the simulator.
     """
+    return scan_pieces(drive, weighing, 1, threads)[0]
+
+
+def scan_pieces(drive: OrdinaryDrive, weighing: Weighing, most: int, threads: int = 1) -> list[Reference]:
+    """The same, and after it that of parts of the drive, at most so many; none where it is too short for two.
+
+    Args:
+        drive: with its robot.
+        weighing: of all ordinary drives.
+        most: parts.
+        threads: of the simulator.
+    """
     windows = change_windows([drive.recording], drive.robot, weighing)
     deviations = None if drive.alone else drive.deviations
     parameters = uncertain_parameters(drive.soil, drive.parameters, deviations, weighing, 1)
     problem = change_problem(drive.robot, drive.soil, windows, parameters, weighing, threads)
-    scan = scan_drive(problem, fit_nominal(problem))
+    fitted = fit_nominal(problem)
+    scan = scan_drive(problem, fitted)
     wide = uncertain_parameters(drive.soil, drive.parameters, None, weighing, 1)
-    other = scan.scores(np.array([wide[k].prior for k in scan.free]))
-    return Reference(drive.name, drive.ground, drive.reversed_gyro, scan.scores(), other)
+    other = np.array([wide[k].prior for k in scan.free])
+    whole = _reference(drive, scan, other, left_out_losses(problem, fitted))
+    pieces = scan.pieces(most)
+    return [whole, *(_reference(drive, piece, other, np.zeros(0)) for piece in pieces if len(pieces) > 1)]
+
+
+def _reference(
+    drive: OrdinaryDrive, scan: DriveScan, other: NDArray[np.float64], losses: NDArray[np.float64]
+) -> Reference:
+    return Reference(drive.name, drive.ground, drive.reversed_gyro, scan.scores(), scan.scores(other), losses)

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ddagr_gym.diagnosis.change.ordinary import OrdinaryRobot
-from ddagr_gym.diagnosis.preprocessing.input_requirements import check_recordings
+from ddagr_gym.diagnosis.preprocessing.input_requirements import check_recordings, content_hash
 from ddagr_gym.diagnosis.setting import Setting
 from ddagr_gym.errors import InputError
+from ddagr_gym.identification.windows import PERIOD_TOLERANCE
+from ddagr_gym.parameters import Robot
 from ddagr_gym.recordings.schema import Recording
 
 NEEDED = ("command_right", "command_left", "encoder_right", "encoder_left", "yaw_rate")
@@ -37,10 +39,60 @@ def check_comparable(recordings: Sequence[Recording], ordinary: OrdinaryRobot, g
                 f"{recording.meta.source} is a drive of the robot {recording.meta.robot!r} and the calibration is of "
                 f"{ordinary.robot.name!r}: compare it with ordinary drives of its own robot."
             )
+    _check_channels(recordings)
+    check_recordings(recordings, ordinary.robot, Setting().with_windows(ordinary.weighing.window))
+
+
+def check_before(after: Sequence[Recording], before: Sequence[Recording], robot: Robot, window: float) -> None:
+    """Refuse drives that cannot be compared with those from before.
+
+    Args:
+        after: of one robot on one ground.
+        before: from before, on one ground.
+        robot: nominal.
+        window: length of the windows [s].
+
+    Raises:
+        InputError: none from before, drives of two robots or periods, one that is in both, a missing channel, and what
+            no diagnosis takes.
+    """
+    if not before:
+        raise InputError("no drive from before is given: name one or more ordinary ones behind --before.")
+    for recording in (*before, *after):
+        if recording.meta.robot not in ("", robot.name):
+            raise InputError(
+                f"{recording.meta.source} is a drive of the robot {recording.meta.robot!r}, compared with --robot "
+                f"{robot.name}: give drives of one robot, and its name."
+            )
+    first, later = before[0], after[0]
+    if abs(later.period - first.period) > PERIOD_TOLERANCE * first.period:
+        raise InputError(
+            f"{later.meta.source} has {1.0 / later.period:.3g} Hz and {first.meta.source} from before "
+            f"{1.0 / first.period:.3g} Hz: compare drives of one rate (`ddagr import --rate` makes others)."
+        )
+    _check_apart(after, before)
+    _check_channels((*before, *after))
+    for drives in (before, after):
+        check_recordings(drives, robot, Setting().with_windows(window))
+
+
+def _check_apart(after: Sequence[Recording], before: Sequence[Recording]) -> None:
+    """Refuse a drive that is on both sides: nothing can have changed in it."""
+    known = {content_hash(recording): recording.meta.source for recording in before}
+    for recording in after:
+        values = content_hash(recording)
+        if values in known:
+            raise InputError(
+                f"{recording.meta.source} and {known[values]} from before hold the same values: leave it out on one "
+                "side."
+            )
+
+
+def _check_channels(recordings: Sequence[Recording]) -> None:
+    for recording in recordings:
         absent = [name for name in NEEDED if not recording.has(name)]
         if absent:
             raise InputError(
-                f"{recording.meta.source} has no {', '.join(absent)}, which its ordinary drives have: without it "
+                f"{recording.meta.source} has no {', '.join(absent)}, which ordinary drives have: without it "
                 "changes cannot be told apart; name the columns in a --map."
             )
-    check_recordings(recordings, ordinary.robot, Setting().with_windows(ordinary.weighing.window))

@@ -8,16 +8,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ddagr_gym.diagnosis.answer.change import ChangeCertificate
 from ddagr_gym.diagnosis.answer.verdict import Diagnosis
+from ddagr_gym.diagnosis.change.before_drives import GROUND, WINDOW, robot_of_before
 from ddagr_gym.diagnosis.change.conclusion import conclude_change
 from ddagr_gym.diagnosis.change.drive_fit import change_problem, change_windows, fit_nominal
+from ddagr_gym.diagnosis.change.left_out import certificate, left_out_losses
 from ddagr_gym.diagnosis.change.naming import Named, name_changes
 from ddagr_gym.diagnosis.change.ordinary import OrdinaryRobot
-from ddagr_gym.diagnosis.change.requirements import check_comparable
+from ddagr_gym.diagnosis.change.requirements import check_before, check_comparable
 from ddagr_gym.diagnosis.preprocessing.data_checks import data_doubts
 from ddagr_gym.diagnosis.preprocessing.mended_recordings import MendedRecordings, mend_recordings
 from ddagr_gym.identification.gauss_newton import Fitted
 from ddagr_gym.identification.problem import Problem
+from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.recordings.schema import Recording
 
@@ -64,14 +68,52 @@ def what_changed(
     began = time.monotonic()
     check_comparable(recordings, ordinary, ground)
     mended = mend_recordings(recordings)
-    progress("fitting the calibrated robot")
+    progress("fitting the robot of the ordinary drives")
     problem, fitted = _fitted(mended, ordinary, ground, threads)
     rng = np.random.default_rng(seed)
-    named = name_changes(problem, fitted, ordinary.scores(ground), rng, progress)
+    named = name_changes(problem, fitted, ordinary.comparison(ground), rng, progress)
     doubts = data_doubts(mended.given, rng)
-    diagnosis, effects = conclude_change(problem, mended, ordinary, ground, named)
+    progress("forecasting windows that were left out")
+    certified = _certified(problem, ordinary, named)
+    diagnosis, effects = conclude_change(problem, mended, ordinary, ground, named, certified)
     diagnosis = replace(diagnosis, checks=doubts, seconds=time.monotonic() - began)
     return Outcome(diagnosis, effects, problem, named)
+
+
+def what_changed_since(
+    after: Sequence[Recording],
+    before: Sequence[Recording],
+    robot: Robot,
+    soil: Soil,
+    *,
+    same_ground: bool = False,
+    window: float = WINDOW,
+    seed: int = 0,
+    threads: int = 1,
+    progress: Callable[[str], None] = lambda line: None,
+) -> tuple[Outcome, OrdinaryRobot]:
+    """What changed since drives from before, and the robot that was fitted to these.
+
+    Args:
+        after: of one robot on one ground.
+        before: of the same robot on one ground, when it was ordinary.
+        robot: nominal, from which the fit to the drives from before begins.
+        soil: nominal, likewise.
+        same_ground: whether the ground is the same after as before; else its soil is free, and no change of soil named.
+        window: length of the windows [s].
+        seed: of everything random.
+        threads: of the simulator.
+        progress: called with what is being done.
+
+    Raises:
+        InputError: drives that cannot be compared.
+    """
+    began = time.monotonic()
+    check_before(after, before, robot, window)
+    known = robot_of_before(before, robot, soil, window=window, seed=seed, threads=threads, progress=progress)
+    outcome = what_changed(after, known, GROUND if same_ground else "", seed=seed, threads=threads, progress=progress)
+    diagnosis = replace(outcome.diagnosis, seconds=time.monotonic() - began)
+    return replace(outcome, diagnosis=diagnosis), known
 
 
 def _fitted(mended: MendedRecordings, ordinary: OrdinaryRobot, ground: str, threads: int) -> tuple[Problem, Fitted]:
@@ -84,3 +126,12 @@ def _fitted(mended: MendedRecordings, ordinary: OrdinaryRobot, ground: str, thre
     ]
     found = [(problem, fit_nominal(problem)) for problem in problems]
     return min(found, key=lambda item: item[1].cost)
+
+
+def _certified(problem: Problem, ordinary: OrdinaryRobot, named: Named) -> ChangeCertificate | None:
+    """Forecasts with what changed and without it; None where those of ordinary drives are not known."""
+    if not ordinary.losses.size:
+        return None
+    without = left_out_losses(problem, named.models[0].fitted)
+    corrected = left_out_losses(problem, named.models[-1].fitted) if named.steps else without
+    return certificate(without, corrected, ordinary.losses)

@@ -11,8 +11,12 @@ further drives (G. K. Smyth, Stat. Appl. Genet. Mol. Biol. 3 (2004) 3),
 
     T = (d0 (B + F) + d_r T_r)/(d0 + d_r),    S = V + T + (T + V_m)/n,                                              (2)
 
-and (t - m)' S^-1 (t - m)/k is compared with F(k, d0 + d_r). F is the square of a fifth of the least meaningful size, of
-signs and limits of a fiftieth of the whole: simulators of another structure differ by so much.
+and (t - m)' S^-1 (t - m)/k is compared with F(k, d0 + d_r). F is what simulators of another structure differ by:
+measured for drives from before (:mod:`ddagr_gym.diagnosis.change.measured_scatter`), for calibrations the square of a
+fifth of the least meaningful size, of signs and limits of a fiftieth of the whole.
+
+Of a single ordinary drive T is B + F, and wider where its pieces scatter more than that: they say nothing of what all
+of them share.
 """
 
 from __future__ import annotations
@@ -24,14 +28,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.diagnosis.change.drive_scan import Compared, scattered
-from ddagr_gym.diagnosis.change.ordinary import Scores
+from ddagr_gym.diagnosis.change.ordinary import Comparison, Scores
 from ddagr_gym.diagnosis.result.detectable import least_multiple
-from ddagr_gym.diagnosis.result.uncertainty import STRUCTURE, STRUCTURE_OF_LIMIT
 
 Array = NDArray[np.float64]
-
-EXPECTED_DRIVES = 4.0
-"""Degrees of freedom d0 of the expected scatter (ours): as if the calibration's scatter came from five drives."""
 
 LEVEL = 0.05
 """Of false alarms over the whole library."""
@@ -191,7 +191,7 @@ def _at_least(scattered: Array, independent: Array) -> Array:
 def shift_of(
     compared: Compared,
     drive: Scores,
-    ordinary: Sequence[Scores],
+    ordinary: Comparison,
     beside: Sequence[str] = (),
     beside_ordinary: Sequence[str] = (),
 ) -> Shift | None:
@@ -200,25 +200,39 @@ def shift_of(
     Args:
         compared: the candidate.
         drive: its scores.
-        ordinary: those of ordinary drives.
+        ordinary: what it is compared with.
         beside: keys of the drive's columns of named effects.
         beside_ordinary: keys of the same effects in ordinary drives.
     """
     here = sizes_of(drive, compared.keys, compared.ridge, beside)
-    found = [sizes_of(item, compared.keys, compared.ridge, beside_ordinary) for item in ordinary]
-    others = [item for item in found if item is not None]
-    if here is None or len(others) < 2:
+    others = _sizes_in(compared, ordinary.drives, beside_ordinary)
+    if here is None or len(others) < min(2, len(ordinary.drives)):
         return None
     least = np.array([least_multiple(compared.candidate, k) for k in range(len(compared.keys))])
-    structure = STRUCTURE if compared.candidate.has_sizes else STRUCTURE_OF_LIMIT
-    expected = here.between + np.diag((structure * least) ** 2)
+    expected = here.between + np.diag((ordinary.expected.of(compared.candidate) * least) ** 2)
     mean, spread, of_mean, degrees = _ordinary_scatter(others, expected, least)
-    scatter = (EXPECTED_DRIVES * expected + degrees * spread) / (EXPECTED_DRIVES + degrees)
+    known = ordinary.expected.degrees
+    scatter = (known * expected + degrees * spread) / (known + degrees)
+    if len(others) == 1:
+        scatter = _widened(scatter, _sizes_in(compared, ordinary.pieces, beside_ordinary), least, known)
     between = scatter + (scatter + of_mean) / (degrees + 1.0)
     covariance = here.within + between
-    value, degrees = here.value - mean, EXPECTED_DRIVES + degrees
+    value, degrees = here.value - mean, known + degrees
     probability = _probability(compared, value, covariance, degrees)
     return Shift(compared, value, mean, covariance, between, degrees, probability)
+
+
+def _sizes_in(compared: Compared, drives: Sequence[Scores], beside: Sequence[str]) -> list[Sizes]:
+    found = [sizes_of(item, compared.keys, compared.ridge, beside) for item in drives]
+    return [item for item in found if item is not None]
+
+
+def _widened(expected: Array, pieces: Sequence[Sizes], least: Array, known: float) -> Array:
+    """Expected scatter, shrunk together with that of the pieces of a drive where these scatter more."""
+    if len(pieces) < 2:
+        return expected
+    _, spread, _, degrees = _ordinary_scatter(pieces, expected, least)
+    return expected + degrees / (known + degrees) * _positive(spread - expected)
 
 
 def _ordinary_scatter(found: Sequence[Sizes], expected: Array, least: Array) -> tuple[Array, Array, Array, float]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ddagr_gym.diagnosis.answer.change import Change
+from ddagr_gym.diagnosis.answer.change import BEFORE, Change, ChangeCertificate
 from ddagr_gym.diagnosis.answer.verdict import NONE, UNKNOWN, Finding
 from ddagr_gym.diagnosis.wording import amounts, describe, in_sentence
 
@@ -67,22 +67,56 @@ def change_headline(verdict: Sequence[str], complete: bool, findings: Sequence[F
         findings: one per name.
         change: shifts of all effects.
     """
-    drives = f"{len(change.ordinary)} ordinary drives"
+    drives = _reference(change)
     hidden = [in_sentence(name) for name in change.hidden]
     blind = f"; of {_joined_names(hidden)} no size would have been told" if hidden else ""
+    ground = _soil_unnamed(change)
     if tuple(verdict) == (NONE,):
         return (
             f"Nothing changed against {drives} that this drive could show: what it would have shown "
-            f"{100.0 * change.power:.0f} times in 100 stands beside each effect{blind}."
+            f"{100.0 * change.power:.0f} times in 100 stands beside each effect{blind}{ground}."
         )
     if tuple(verdict) == (UNKNOWN,):
         nearest = _joined_names([in_sentence(item.effect) for item in change.shifts[:3]])
         return (
-            f"Something changed against {drives} that no effect of the library explains, nearest are {nearest}{blind}."
+            f"Something changed against {drives} that no effect of the library explains, nearest are "
+            f"{nearest}{blind}{ground}."
         )
     found = _joined([describe(item.name, amounts(item.parameters)) + _rivals(item) for item in findings])
     rest = "nothing else is out of the ordinary" if complete else "something else is out of the ordinary"
-    return f"Against {drives}: {found}; {rest}."
+    return f"Against {drives}: {found}; {rest}{ground}."
+
+
+def _reference(change: Change) -> str:
+    """What drives were compared with, in words."""
+    count = len(change.ordinary)
+    if change.against == BEFORE:
+        return f"the {count} drives before" if count > 1 else "the drive before"
+    return f"{count} ordinary drives"
+
+
+def _soil_unnamed(change: Change) -> str:
+    """That another ground hides what changes in the soil; "" where it was the same or known to a calibration."""
+    if change.against != BEFORE or change.ground:
+        return ""
+    return "; the ground may be another one, so that no change of the soil has a name"
+
+
+def certificate_in_words(certificate: ChangeCertificate, against: str, named: bool) -> str:
+    """How many windows are forecast as well as those of ordinary drives.
+
+    Args:
+        certificate: of the drives.
+        against: what they were compared with.
+        named: whether anything changed that has a name.
+    """
+    percent = f"{100.0 * certificate.expected:.0f} %"
+    whose = "drives before" if against == BEFORE else "ordinary drives"
+    count = f"{certificate.as_well} of {certificate.windows}"
+    ending = f"windows are forecast as well as {percent} of those of the {whose}"
+    if not named:
+        return f"Left-out windows: {count} {ending}."
+    return f"Left-out windows with what changed: {count} {ending} (without it {certificate.as_well_without})."
 
 
 def _joined_names(names: Sequence[str]) -> str:

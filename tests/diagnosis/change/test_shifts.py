@@ -7,15 +7,15 @@ import pytest
 from scipy import stats
 
 from ddagr_gym.diagnosis.change.drive_scan import Compared, scattered
-from ddagr_gym.diagnosis.change.ordinary import Scores
+from ddagr_gym.diagnosis.change.ordinary import EXPECTED_DRIVES, Comparison, ExpectedScatter, Scores
 from ddagr_gym.diagnosis.change.shifts import (
-    EXPECTED_DRIVES,
     LEVEL,
     family_probability,
     shift_of,
     single_level,
     sizes_of,
 )
+from ddagr_gym.diagnosis.result.detectable import least_multiple
 from ddagr_gym.diagnosis.search.candidates import candidates_of
 from ddagr_gym.physics.effects.base import DriveExtent
 from ddagr_gym.physics.effects.gyro_bias import GyroBias
@@ -24,12 +24,23 @@ from ddagr_gym.physics.effects.gyro_sign import GyroSign
 BIAS = Compared(candidates_of(GyroBias, DriveExtent(), 0)[0], ("gyro_bias 0",))
 SIGN = Compared(candidates_of(GyroSign, DriveExtent(), 0)[0], ("gyro_sign 0",))
 
+LEAST = least_multiple(BIAS.candidate, 0)
+"""The least bias that matters, as a multiple of the probe."""
+
 
 def scores(key: str, size: float, deviation: float, between: float = 0.0) -> Scores:
     """A drive that finds a size with a deviation, in multiples of the probe; ``between`` drives it may differ."""
     information = np.array([[deviation**-2.0]])
     spread = np.array([[between**2]]) * information**2
     return Scores((key,), information[0] * size, information, information, spread)
+
+
+def against(*drives: Scores) -> Comparison:
+    return Comparison(drives)
+
+
+ALIKE = against(*(scores(BIAS.keys[0], size, 0.5) for size in (0.9, 1.0, 1.1)))
+"""Ordinary drives that hardly differ."""
 
 
 def test_the_size_and_its_deviations_come_back():
@@ -41,8 +52,8 @@ def test_the_size_and_its_deviations_come_back():
 
 def test_ordinary_drives_that_scatter_widen_a_shift():
     drive = scores(BIAS.keys[0], 10.0, 0.5)
-    alike = shift_of(BIAS, drive, [scores(BIAS.keys[0], size, 0.5) for size in (0.9, 1.0, 1.1)])
-    scattering = shift_of(BIAS, drive, [scores(BIAS.keys[0], size, 0.5) for size in (-4.0, 1.0, 6.0)])
+    alike = shift_of(BIAS, drive, against(*(scores(BIAS.keys[0], size, 0.5) for size in (0.9, 1.0, 1.1))))
+    scattering = shift_of(BIAS, drive, against(*(scores(BIAS.keys[0], size, 0.5) for size in (-4.0, 1.0, 6.0))))
     assert alike.mean[0] == pytest.approx(1.0, rel=1e-3)
     assert alike.value[0] == pytest.approx(9.0, rel=1e-3)
     assert scattering.distance < 0.5 * alike.distance
@@ -50,14 +61,14 @@ def test_ordinary_drives_that_scatter_widen_a_shift():
 
 
 def test_one_size_has_the_two_sided_probability_of_a_t_distribution():
-    shift = shift_of(BIAS, scores(BIAS.keys[0], 10.0, 0.5), [scores(BIAS.keys[0], s, 0.5) for s in (0.9, 1.0, 1.1)])
+    shift = shift_of(BIAS, scores(BIAS.keys[0], 10.0, 0.5), ALIKE)
     assert shift.probability == pytest.approx(2.0 * stats.t.sf(shift.distance, shift.degrees), rel=1e-6)
     assert shift.limit(30) == pytest.approx(stats.t.isf(0.5 * single_level(30), shift.degrees), rel=1e-6)
     assert family_probability(single_level(30), 30) == pytest.approx(LEVEL)
 
 
 def test_the_least_detectable_size_passes_its_limit_four_times_in_five():
-    shift = shift_of(BIAS, scores(BIAS.keys[0], 0.0, 0.5), [scores(BIAS.keys[0], s, 0.5) for s in (0.9, 1.0, 1.1)])
+    shift = shift_of(BIAS, scores(BIAS.keys[0], 0.0, 0.5), ALIKE)
     away = shift.detectable(30)[0] / np.sqrt(shift.covariance[0, 0])
     assert stats.nct.sf(shift.limit(30), shift.degrees, away) == pytest.approx(0.8, abs=0.03)
 
@@ -69,21 +80,21 @@ def test_false_alarms_over_ordinary_drives_keep_the_level():
     for _ in range(2000):
         sizes = rng.normal(0.0, np.hypot(4.0, 0.5), 7)
         drives = [scores(BIAS.keys[0], size, 0.5, 4.0) for size in sizes]
-        alarms += shift_of(BIAS, drives[0], drives[1:]).probability < LEVEL
+        alarms += shift_of(BIAS, drives[0], against(*drives[1:])).probability < LEVEL
     assert alarms / 2000 <= LEVEL + 3.0 * np.sqrt(LEVEL * (1.0 - LEVEL) / 2000)
 
 
 def test_less_than_no_sign_change_is_no_shift():
     ordinary = [scores(SIGN.keys[0], size, 0.5) for size in (-0.1, 0.0, 0.1)]
-    assert shift_of(SIGN, scores(SIGN.keys[0], -15.0, 0.5), ordinary).probability == 1.0
-    assert shift_of(SIGN, scores(SIGN.keys[0], 20.0, 0.5), ordinary).probability < 1e-3
+    assert shift_of(SIGN, scores(SIGN.keys[0], -15.0, 0.5), against(*ordinary)).probability == 1.0
+    assert shift_of(SIGN, scores(SIGN.keys[0], 20.0, 0.5), against(*ordinary)).probability < 1e-3
 
 
 def test_a_drive_that_shows_nothing_has_no_shift():
     blind = Scores(BIAS.keys, np.zeros(1), np.zeros((1, 1)), np.zeros((1, 1)), np.zeros((1, 1)))
     ordinary = [scores(BIAS.keys[0], size, 0.5) for size in (-0.1, 0.0, 0.1)]
-    assert shift_of(BIAS, blind, ordinary) is None
-    assert shift_of(BIAS, ordinary[0], [blind, ordinary[1]]) is None
+    assert shift_of(BIAS, blind, against(*ordinary)) is None
+    assert shift_of(BIAS, ordinary[0], against(blind, ordinary[1])) is None
 
 
 def test_a_large_size_does_not_count_as_scatter_of_the_windows_that_show_it():
@@ -100,3 +111,30 @@ def test_a_large_size_does_not_count_as_scatter_of_the_windows_that_show_it():
     wide, narrow = (sizes_of(item, BIAS.keys, BIAS.ridge).within[0, 0] for item in (sums, whole))
     assert narrow == pytest.approx(1.0 / 40.0, rel=0.6)
     assert wide > 10.0 * narrow
+
+
+MEASURED = ExpectedScatter({"gyro_bias": 2.0}, 9.0)
+"""As measured in simulated pairs."""
+
+
+def test_one_drive_from_before_has_the_scatter_that_was_measured():
+    """Both drives scatter by two least sizes, and are known to a tenth of one."""
+    before, after = (scores(BIAS.keys[0], size * LEAST, 0.1 * LEAST) for size in (1.0, 11.0))
+    shift = shift_of(BIAS, after, Comparison((before,), expected=MEASURED))
+    assert shift.degrees == 9.0
+    assert shift.value[0] == pytest.approx(10.0 * LEAST, rel=1e-3)
+    assert np.sqrt(shift.covariance[0, 0]) == pytest.approx(np.sqrt(2.0 * (2.0**2 + 0.1**2)) * LEAST, rel=1e-3)
+
+
+def test_pieces_widen_the_scatter_of_one_drive_and_never_narrow_it():
+    before, after = (scores(BIAS.keys[0], size * LEAST, 0.1 * LEAST) for size in (1.0, 11.0))
+
+    def deviation(*sizes: float) -> float:
+        pieces = tuple(scores(BIAS.keys[0], size * LEAST, 0.1 * LEAST) for size in sizes)
+        return float(np.sqrt(shift_of(BIAS, after, Comparison((before,), pieces, MEASURED)).covariance[0, 0]))
+
+    assert deviation(1.0, 1.0, 1.0, 1.0) == pytest.approx(deviation(), rel=1e-6)
+    # four pieces that scatter by 9 least sizes: three degrees of freedom beside the nine of what is expected
+    scatter = np.var([-9.0, 9.0, -9.0, 9.0], ddof=1) - 0.1**2
+    expected = 2.0**2 + 3.0 / 12.0 * (scatter - 2.0**2)
+    assert deviation(-9.0, 9.0, -9.0, 9.0) == pytest.approx(np.sqrt(2.0 * (expected + 0.1**2)) * LEAST, rel=1e-2)

@@ -9,8 +9,9 @@ import pytest
 from ddagr_gym.diagnosis.null_bank import fitted_nominal as module
 from ddagr_gym.diagnosis.null_bank.bank import NullBank
 from ddagr_gym.diagnosis.null_bank.drives import null_recordings, template_of
-from ddagr_gym.diagnosis.null_bank.fitted_nominal import fitted_nominal, with_values
+from ddagr_gym.diagnosis.null_bank.fitted_nominal import fitted_nominal
 from ddagr_gym.diagnosis.setting import Setting
+from ddagr_gym.identification.fitted_values import with_values
 from ddagr_gym.identification.nuisances import nuisances
 from ddagr_gym.identification.parameters import ModelParameter, robot_parameters
 from ddagr_gym.identification.window_model import ideal_sensors

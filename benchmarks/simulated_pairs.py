@@ -1,0 +1,285 @@
+"""How much the sizes of effects differ between two drives in which nothing changed: pairs of simulated ones.
+
+    python -m benchmarks.simulated_pairs [--pairs N] [--summary]
+
+Every pair has a world of its own (:mod:`ddagr_gym.diagnosis.null_bank.structural_variants`: other pressure and shear
+laws, speed loops, relief, rough and patchy ground, readings and noise), in which the robot drives twice, and a second
+world of another kind in which it drives once; its motors differ from one day to another. One robot and soil are fitted
+to the first drive, as ``ddagr diagnose --before`` does, and all three are scanned with them. From the differences
+between drives on the same ground and on two grounds equation (1) of
+:mod:`ddagr_gym.diagnosis.change.measured_scatter` gives the scatter of each effect, never less than a fifth of the
+least size that matters; degrees of freedom are the most with which no more than 5 % of the pairs raise an alarm.
+
+Written are the differences and a picture (``benchmarks/results/simulated_pairs.json``, ``.png``) and what the package
+ships (``ddagr_gym/data/change_scatter.json``). ``--summary`` only makes the latter two of the former. A run goes on
+after the pairs that the file holds.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ddagr_gym.diagnosis.change.before_drives import DAY, SAME_GROUND, WINDOW, JointFit, day_parameters, joint_fit
+from ddagr_gym.diagnosis.change.drive_fit import change_problem, change_windows, fit_nominal
+from ddagr_gym.diagnosis.change.drive_scan import DriveScan, scan_drive
+from ddagr_gym.diagnosis.change.measured_scatter import PATH
+from ddagr_gym.diagnosis.change.ordinary import Scores, uncertain_parameters
+from ddagr_gym.diagnosis.change.shifts import LEVEL, family_probability, sizes_of
+from ddagr_gym.diagnosis.null_bank.drives import Template, null_recordings
+from ddagr_gym.diagnosis.null_bank.standard_drives import standard_template
+from ddagr_gym.diagnosis.null_bank.structural_variants import KINDS
+from ddagr_gym.diagnosis.preprocessing.mended_recordings import mend_recordings
+from ddagr_gym.diagnosis.result.detectable import least_multiple
+from ddagr_gym.diagnosis.result.uncertainty import STRUCTURE, STRUCTURE_OF_LIMIT
+from ddagr_gym.diagnosis.wording import title
+from ddagr_gym.files import write_json
+from ddagr_gym.parameters import Robot, Soil
+from ddagr_gym.presets import get_robot, get_soil
+from ddagr_gym.recordings.schema import Recording
+from ddagr_gym.rendering import palette
+from ddagr_gym.reporting.figures import house_style
+
+Array = NDArray[np.float64]
+
+RESULT = Path(__file__).resolve().parent / "results" / "simulated_pairs.json"
+SEED = 7
+SAME, OTHER = "same_ground", "other_ground"
+DEGREES = (24.0, 16.0, 12.0, 10.0, 8.0, 6.0, 5.0, 4.0, 3.0)
+"""Degrees of freedom that are tried, the most first."""
+MOST = 30.0
+"""Largest scatter that is tried, in least sizes that matter."""
+
+
+@dataclass(frozen=True, eq=False)
+class Difference:
+    """Sizes of one candidate in two drives, one less the other, in least sizes that matter.
+
+    Attributes:
+        pair: number.
+        effect: name.
+        has_sizes: False for a limit or a sign.
+        value: (k,).
+        covariance: (k, k) within both drives, and expected of robot and soil.
+    """
+
+    pair: int
+    effect: str
+    has_sizes: bool
+    value: Array
+    covariance: Array
+
+    @property
+    def least(self) -> float:
+        """Scatter below which none counts."""
+        return STRUCTURE if self.has_sizes else STRUCTURE_OF_LIMIT
+
+    def probability(self, scatter: float, degrees: float) -> float:
+        """Of such a difference or a larger one."""
+        from scipy.special import fdtrc
+
+        # what is there or not has no less than nothing
+        if not self.has_sizes and self.value[0] <= 0.0:
+            return 1.0
+        k = len(self.value)
+        return float(fdtrc(k, degrees, self._square(scatter)[0] / k))
+
+    def log_density(self, scatter: float, degrees: float) -> float:
+        """Of the multivariate t distribution."""
+        k = len(self.value)
+        square, log_determinant = self._square(scatter)
+        constant = math.lgamma(0.5 * (degrees + k)) - math.lgamma(0.5 * degrees) - 0.5 * k * math.log(degrees * math.pi)
+        return constant - 0.5 * log_determinant - 0.5 * (degrees + k) * math.log1p(square / degrees)
+
+    def _square(self, scatter: float) -> tuple[float, float]:
+        whole = self.covariance + 2.0 * scatter**2 * np.eye(len(self.value))
+        return float(self.value @ np.linalg.solve(whole, self.value)), float(np.linalg.slogdet(whole)[1])
+
+
+def drives_of(number: int, robot: Robot, soil: Soil) -> tuple[Recording, Recording, Recording]:
+    """Two drives in one world, and one in a world of another kind."""
+    rng = np.random.default_rng([SEED, number])
+    first, second, third = (standard_template(robot, rng) for _ in range(3))
+    chosen = (first.commands[2], second.commands[1 + number % 2], third.commands[1 + (number + 1) % 2])
+    here, other = (KINDS[k % len(KINDS)] for k in (number, 3 * number + 5))
+    before, after = null_recordings(robot, soil, _driving(first, chosen[:2]), here, rng)
+    (elsewhere,) = null_recordings(_another_day(robot, rng), soil, _driving(first, chosen[2:]), other, rng)
+    named = [r.with_meta(source=f"pair {number}, {name}") for r, name in ((before, "before"), (after, "after"))]
+    return named[0], named[1], elsewhere.with_meta(source=f"pair {number}, elsewhere")
+
+
+def _driving(template: Template, commands: Sequence[Array]) -> Template:
+    count = len(commands)
+    return replace(template, commands=tuple(commands), present=template.present[:count], starts=template.starts[:count])
+
+
+def _another_day(robot: Robot, rng: np.random.Generator) -> Robot:
+    return replace(robot, motor_rate=robot.motor_rate * float(np.exp(DAY["motor_rate"] * rng.normal())))
+
+
+def pair_of(number: int, robot: Robot, soil: Soil) -> dict[str, Any]:
+    """Differences of a pair of drives on the same ground, and on two."""
+    before, after, elsewhere = drives_of(number, robot, soil)
+    joint = joint_fit(mend_recordings([before]), robot, soil, WINDOW, np.random.default_rng(number), 1)
+    scans = [_scan(joint, drive) for drive in (before, after, elsewhere)]
+    same = _differences(scans[0], scans[1], None)
+    wide = uncertain_parameters(joint.soil, day_parameters(joint.robot), None, joint.weighing, 1)
+    other = _differences(scans[0], scans[2], np.array([p.prior for p in wide]))
+    return {"pair": number, "kind": KINDS[number % len(KINDS)], SAME: same, OTHER: other}
+
+
+def _scan(joint: JointFit, drive: Recording) -> DriveScan:
+    windows = change_windows(mend_recordings([drive]).recordings, joint.robot, joint.weighing)
+    parameters = uncertain_parameters(joint.soil, day_parameters(joint.robot), SAME_GROUND, joint.weighing, 1)
+    problem = change_problem(joint.robot, joint.soil, windows, parameters, joint.weighing, 1)
+    return scan_drive(problem, fit_nominal(problem))
+
+
+def _differences(one: DriveScan, two: DriveScan, deviations: Array | None) -> list[dict[str, Any]]:
+    """Differences of all candidates that both drives show, as JSON has them."""
+    scores: list[Scores] = [scan.scores(None if deviations is None else deviations[scan.free]) for scan in (one, two)]
+    found = []
+    for item in two.compared:
+        if not set(item.keys) <= set(scores[0].keys):
+            continue
+        first, second = (sizes_of(drive, item.keys, item.ridge) for drive in scores)
+        if first is None or second is None:
+            continue
+        least = np.array([least_multiple(item.candidate, k) for k in range(len(item.keys))])
+        covariance = first.within + second.within + first.between + second.between
+        found.append(
+            {
+                "effect": item.name,
+                "has_sizes": item.candidate.has_sizes,
+                "value": _rounded((second.value - first.value) / least),
+                "covariance": [_rounded(row) for row in covariance / np.outer(least, least)],
+            }
+        )
+    return found
+
+
+def _rounded(values: Array) -> list[float]:
+    return [float(f"{value:.5g}") for value in values]
+
+
+def differences(pairs: Iterable[dict[str, Any]], ground: str) -> list[Difference]:
+    """All differences of pairs on the same ground, or on two."""
+    return [
+        Difference(
+            pair["pair"], item["effect"], item["has_sizes"], np.array(item["value"]), np.array(item["covariance"])
+        )
+        for pair in pairs
+        for item in pair[ground]
+    ]
+
+
+def fitted_scatter(found: Sequence[Difference]) -> tuple[dict[str, float], float]:
+    """Scatter of each effect by maximum likelihood, and the most degrees of freedom that keep the level of alarms."""
+    by_effect: dict[str, list[Difference]] = {}
+    for item in found:
+        by_effect.setdefault(item.effect, []).append(item)
+    for degrees in DEGREES:
+        deviations = {name: _best_scatter(items, degrees) for name, items in by_effect.items()}
+        if alarms(found, deviations, degrees) <= LEVEL:
+            break
+    return deviations, degrees
+
+
+def _best_scatter(items: Sequence[Difference], degrees: float) -> float:
+    """Scatter of one effect."""
+    tried: list[float] = np.geomspace(items[0].least, MOST, 60).tolist()
+    return max(tried, key=lambda scatter: sum(item.log_density(scatter, degrees) for item in items))
+
+
+def alarms(found: Sequence[Difference], deviations: dict[str, float], degrees: float) -> float:
+    """Share of pairs of which any candidate is out of the ordinary."""
+    smallest: dict[int, tuple[float, int]] = {}
+    for item in found:
+        probability, tests = smallest.get(item.pair, (1.0, 0))
+        own = item.probability(deviations.get(item.effect, item.least), degrees)
+        smallest[item.pair] = (min(probability, own), tests + 1)
+    raised = [family_probability(probability, tests) < LEVEL for probability, tests in smallest.values()]
+    return float(np.mean(raised))
+
+
+def summary(pairs: Sequence[dict[str, Any]], ground: str) -> dict[str, Any]:
+    """What the package ships of one kind of pairs; alarms of each half of them with the scatter of the other."""
+    found = differences(pairs, ground)
+    deviations, degrees = fitted_scatter(found)
+    crossed = []
+    for half in (0, 1):
+        mine = [item for item in found if item.pair % 4 // 2 == half]
+        others = fitted_scatter([item for item in found if item.pair % 4 // 2 != half])
+        crossed.append(alarms(mine, *others))
+    return {
+        "degrees": degrees,
+        "deviations": {name: float(f"{value:.3g}") for name, value in sorted(deviations.items())},
+        "false_alarms": alarms(found, deviations, degrees),
+        "false_alarms_crossed": float(np.mean(crossed)),
+    }
+
+
+def draw(shipped: dict[str, Any], path: Path) -> None:
+    """Scatter of every effect on the same ground and on two, in least sizes that matter."""
+    from matplotlib.figure import Figure
+
+    names = sorted(shipped[SAME]["deviations"], key=lambda name: shipped[SAME]["deviations"][name])
+    with house_style():
+        figure = Figure(figsize=(7.5, 0.6 + 0.23 * len(names)), layout="constrained")
+        axis = figure.subplots()
+        for place, name in enumerate(names):
+            same, other = shipped[SAME]["deviations"][name], shipped[OTHER]["deviations"].get(name, math.nan)
+            axis.plot([same, other], [place, place], color=palette.PALE, lw=1.2, zorder=1)
+            axis.plot(same, place, "o", color=palette.BLUE, label="same ground" if place == 0 else None)
+            axis.plot(
+                other, place, "o", mfc="none", color=palette.VERMILLION, label="two grounds" if place == 0 else None
+            )
+        axis.set_xscale("log")
+        axis.axvline(1.0, color=palette.GREY, lw=0.8)
+        axis.set_yticks(range(len(names)), [title(name) for name in names])
+        axis.set_xlabel("scatter between drives in which nothing changed, in least sizes that matter")
+        axis.legend(loc="lower right")
+        figure.savefig(path, dpi=130)
+
+
+def write_summary(pairs: Sequence[dict[str, Any]]) -> None:
+    """Write what the package ships, and the picture."""
+    shipped = {
+        "command": "python -m benchmarks.simulated_pairs",
+        "robot": "ddagr",
+        "soil": "thesis_a1",
+        "window": WINDOW,
+        "pairs": len(pairs),
+        **{ground: summary(pairs, ground) for ground in (SAME, OTHER)},
+    }
+    write_json(PATH, shipped)
+    draw(shipped, RESULT.with_suffix(".png"))
+    for ground in (SAME, OTHER):
+        print(ground, {name: shipped[ground][name] for name in ("degrees", "false_alarms", "false_alarms_crossed")})
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Drive, scan and write."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--pairs", type=int, default=40, help="number of pairs")
+    parser.add_argument("--summary", action="store_true", help="only of the pairs that are written already")
+    given = parser.parse_args(arguments)
+    pairs: list[dict[str, Any]] = json.loads(RESULT.read_text())["pairs"] if RESULT.exists() else []
+    robot, soil = get_robot("ddagr"), get_soil("thesis_a1")
+    for number in range(len(pairs), 0 if given.summary else given.pairs):
+        pairs.append(pair_of(number, robot, soil))
+        write_json(RESULT, {"command": "python -m benchmarks.simulated_pairs", "pairs": pairs})
+        print(f"pair {number + 1} of {given.pairs}", flush=True)
+    write_summary(pairs)
+
+
+if __name__ == "__main__":
+    main()

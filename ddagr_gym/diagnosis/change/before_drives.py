@@ -1,0 +1,197 @@
+"""Drives from before as what later ones are compared with: one robot and one soil are fitted to all of them.
+
+As the ordinary drives of a calibration, but with the parameters that the data sheet calls uncertain alone, and without
+leaving drives out: what the robot has wrong is the same in drives from before and after, and falls out of their
+difference.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ddagr_gym.diagnosis.change.drive_fit import change_problem, change_windows, fit_nominal
+from ddagr_gym.diagnosis.change.measured_scatter import measured_scatter
+from ddagr_gym.diagnosis.change.ordinary import (
+    LEAST_ACCELEROMETER_BIAS,
+    LEAST_GYRO_BIAS,
+    OrdinaryRobot,
+    Reference,
+    Weighing,
+    uncertain_parameters,
+)
+from ddagr_gym.diagnosis.change.reference import OrdinaryDrive, scan_pieces
+from ddagr_gym.diagnosis.preprocessing.input_requirements import content_hash
+from ddagr_gym.diagnosis.preprocessing.mended_recordings import MendedRecordings, mend_recordings
+from ddagr_gym.diagnosis.setting import HISTORY
+from ddagr_gym.identification.fitted_values import with_values
+from ddagr_gym.identification.gauss_newton import Fitted
+from ddagr_gym.identification.parameters import ModelParameter, robot_parameters
+from ddagr_gym.identification.problem import Problem
+from ddagr_gym.identification.recording_noise import recording_noise
+from ddagr_gym.identification.windows import CHANNELS
+from ddagr_gym.parameters import Robot, Soil
+from ddagr_gym.recordings.schema import Recording
+from ddagr_gym.replay_analysis.fitting import UNKNOWN_GYRO_BIAS, Weights, misfit_weights, noise_weights
+
+Array = NDArray[np.float64]
+
+GROUND = "same"
+"""Name of the ground of drives from before, for drives that are on it too."""
+
+WINDOW = 4.0
+"""Length of the windows [s] (ours): a turn, and twelve of them in a drive of 50 s."""
+
+PIECES = 4
+"""Most parts of a single drive from before whose scatter counts (ours)."""
+
+UNKNOWN_ACCELEROMETER_BIAS = 1.0
+"""Prior before any drive was fitted [m/s^2] (ours): an IMU that is tilted by 6 degrees."""
+
+DAY = {"motor_rate": 0.03, "maximum_wheel_speed": 0.03}
+"""Deviations of the logarithms of a robot's parameters from one day to another (ours: a battery's charge, temperature);
+the others are the same, and what changes in them is an effect."""
+
+SAME_GROUND = {"soil_strength": 0.05, "soil_stiffness": 0.1, "shear_modulus": 0.1, "exit_angle_ratio": 0.03}
+"""Deviations of a ground's parameters from one drive on it to another: those of one window against its field in
+:class:`~ddagr_gym.identification.nuisances.NuisancePriors`, and of a surveyed one's shear."""
+
+OF_ANOTHER_GROUND = "on another ground it is another one in any case"
+SOIL_EFFECTS = ("soil_change", "soil_split", "slip_sinkage", "multipass", "lateral_bulldozing")
+"""Effects that say how a ground gives way."""
+
+
+@dataclass(frozen=True, eq=False)
+class JointFit:
+    """Robot and soil of all drives from before.
+
+    Attributes:
+        robot: with fitted parameters.
+        soil: the same.
+        weighing: of the drives.
+    """
+
+    robot: Robot
+    soil: Soil
+    weighing: Weighing
+
+
+def robot_of_before(
+    recordings: Sequence[Recording],
+    robot: Robot,
+    soil: Soil,
+    *,
+    window: float = WINDOW,
+    seed: int = 0,
+    threads: int = 1,
+    progress: Callable[[str], None] = lambda line: None,
+) -> OrdinaryRobot:
+    """The robot as drives from before show it, with what each of them says of every effect.
+
+    Args:
+        recordings: from before, of one robot on one ground.
+        robot: nominal.
+        soil: nominal.
+        window: length of the windows [s].
+        seed: of everything random.
+        threads: of the simulator.
+        progress: called with what is being done.
+
+    Raises:
+        InputError: too few windows.
+    """
+    mended = mend_recordings(recordings)
+    progress("fitting robot and soil to the drives from before")
+    joint = joint_fit(mended, robot, soil, window, np.random.default_rng(seed), threads)
+    parameters = day_parameters(joint.robot)
+    most = PIECES if len(recordings) == 1 else 1
+    scanned: list[list[Reference]] = []
+    for recording in mended.recordings:
+        progress(f"every effect of the library in {recording.meta.source}")
+        drive = OrdinaryDrive(
+            recording.meta.source, GROUND, False, recording, joint.robot, joint.soil, parameters, SAME_GROUND,
+            mended.reversed_gyro is not None,
+        )  # fmt: skip
+        scanned.append(scan_pieces(drive, joint.weighing, most, threads))
+    scatter = measured_scatter()
+    return OrdinaryRobot(
+        joint.robot,
+        {GROUND: joint.soil},
+        parameters,
+        {GROUND: SAME_GROUND},
+        joint.weighing,
+        tuple(found[0] for found in scanned),
+        digest=hashlib.sha256("".join(content_hash(item) for item in recordings).encode()).hexdigest(),
+        pieces=tuple(piece for found in scanned for piece in found[1:]),
+        known_scatter=scatter.same_ground,
+        other_scatter=scatter.other_ground,
+        unnamed=dict.fromkeys(SOIL_EFFECTS, OF_ANOTHER_GROUND),
+        given=True,
+    )
+
+
+def day_parameters(robot: Robot) -> tuple[ModelParameter, ...]:
+    """Parameters of a robot that differ from one day to another, with what that makes of them as priors."""
+    return tuple(replace(p, prior=min(p.prior, DAY[p.name])) for p in robot_parameters(robot) if p.name in DAY)
+
+
+def joint_fit(
+    mended: MendedRecordings, robot: Robot, soil: Soil, window: float, rng: np.random.Generator, threads: int
+) -> JointFit:
+    """One robot and one soil fitted to drives, first by the sensors' noise, then by what that leaves.
+
+    Args:
+        mended: drives.
+        robot: nominal.
+        soil: nominal.
+        window: length of the windows [s].
+        rng: of the interval of the poses' lateness.
+        threads: of the simulator.
+    """
+    noise = [recording_noise(recording, rng) for recording in mended.recordings]
+    late = [item.pose_lateness for item in noise if item.pose_lateness > 0.0]
+    lateness = float(np.mean(late)) if late else 0.0
+    blank = Weighing(
+        window, HISTORY, lateness, 1.0, np.ones(8), np.ones(8), UNKNOWN_GYRO_BIAS, UNKNOWN_ACCELEROMETER_BIAS
+    )
+    windows = change_windows(mended.recordings, robot, blank)
+    parameters = uncertain_parameters(soil, robot_parameters(robot), None, blank, len(noise))
+    of_noise = noise_weights(noise, windows, imposed=False, dead=(), unfitted=())
+
+    def problem_of(weights: Weights) -> Problem:
+        weighing = replace(blank, sigma=weights.sigma, robust=weights.robust)
+        return change_problem(robot, soil, windows, parameters, weighing, threads)
+
+    first = problem_of(of_noise)
+    problem = problem_of(misfit_weights(windows, first.predict(first.start()), of_noise))
+    fitted = fit_nominal(problem)
+    values = {p.name: float(value) for p, value in zip(parameters, fitted.point.values, strict=True)}
+    left = misfit_weights(windows, fitted.prediction, of_noise)
+    return JointFit(*with_values(robot, soil, values), _weighing(blank, left, _biases(fitted, len(noise))))
+
+
+def _biases(fitted: Fitted, recordings: int) -> Array:
+    """(R, 3) of gyro and accelerometers, which are the last parameters."""
+    return fitted.point.values[-3 * recordings :].reshape(recordings, 3)
+
+
+def _weighing(blank: Weighing, left: Weights, biases: Array) -> Weighing:
+    """Weights by what a fit leaves, pooled over the windows; the mean bias of the drives is taken off."""
+    sigma = left.sigma.reshape(-1, len(CHANNELS))
+    known = np.isfinite(sigma)
+    square = np.where(known, sigma, 0.0) ** 2
+    with np.errstate(divide="ignore", invalid="ignore"):
+        mean = np.where(known.any(axis=0), np.sqrt(square.sum(axis=0) / known.sum(axis=0)), np.inf)
+    scatter = biases.std(axis=0, ddof=1) if len(biases) > 1 else np.zeros(3)
+    return replace(
+        blank,
+        sigma=mean,
+        robust=left.robust,
+        gyro_bias=max(LEAST_GYRO_BIAS, float(scatter[0])),
+        accelerometer_bias=max(LEAST_ACCELEROMETER_BIAS, float(np.sqrt(np.mean(scatter[1:] ** 2)))),
+        offsets=biases.mean(axis=0),
+    )

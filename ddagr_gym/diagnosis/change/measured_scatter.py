@@ -1,0 +1,46 @@
+"""How much the sizes of effects differ between ordinary drives, as measured in pairs of simulated ones.
+
+``python -m benchmarks.simulated_pairs`` drives pairs of worlds that differ in structure, scans both drives of each with
+the robot of the first one, and fits to the differences d of a size in multiples of the least that matters
+
+    d/sqrt(V_1 + V_2 + B_1 + B_2 + 2 F^2) ~ t(d0)                                                                  (1)
+
+with what each drive knows, V, what robot and soil are expected to do, B, and the scatter F of each effect; degrees of
+freedom d0 are the most with which no more than 5 % of the pairs raise an alarm over the whole library.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from ddagr_gym.diagnosis.change.ordinary import ExpectedScatter
+
+PATH = Path(__file__).resolve().parents[2] / "data" / "change_scatter.json"
+"""That the package ships."""
+
+
+@dataclass(frozen=True)
+class MeasuredScatter:
+    """Scatter between ordinary drives.
+
+    Attributes:
+        same_ground: between drives on one ground.
+        other_ground: between drives on two grounds.
+    """
+
+    same_ground: ExpectedScatter
+    other_ground: ExpectedScatter
+
+
+@cache
+def measured_scatter(path: Path = PATH) -> MeasuredScatter:
+    """What a file says, by default that of the package."""
+    body = json.loads(path.read_text(encoding="utf-8"))
+    same, other = (
+        ExpectedScatter({str(k): float(v) for k, v in body[name]["deviations"].items()}, float(body[name]["degrees"]))
+        for name in ("same_ground", "other_ground")
+    )
+    return MeasuredScatter(same, other)
