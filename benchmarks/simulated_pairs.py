@@ -33,7 +33,7 @@ from ddagr_gym.diagnosis.change.drive_fit import change_problem, change_windows,
 from ddagr_gym.diagnosis.change.drive_scan import DriveScan, scan_drive
 from ddagr_gym.diagnosis.change.measured_scatter import PATH
 from ddagr_gym.diagnosis.change.ordinary import Scores, uncertain_parameters
-from ddagr_gym.diagnosis.change.shifts import LEVEL, family_probability, sizes_of
+from ddagr_gym.diagnosis.change.shifts import LEVEL, distance_at, family_probability, single_level, sizes_of
 from ddagr_gym.diagnosis.null_bank.drives import Template, null_recordings
 from ddagr_gym.diagnosis.null_bank.standard_drives import standard_template
 from ddagr_gym.diagnosis.null_bank.structural_variants import KINDS
@@ -81,6 +81,11 @@ class Difference:
     def least(self) -> float:
         """Scatter below which none counts."""
         return STRUCTURE if self.has_sizes else STRUCTURE_OF_LIMIT
+
+    def distance(self, scatter: float) -> float:
+        """In standard deviations of all that is expected; of what is there or not none below nothing."""
+        one_sided = not self.has_sizes and self.value[0] <= 0.0
+        return 0.0 if one_sided else math.sqrt(self._square(scatter)[0])
 
     def probability(self, scatter: float, degrees: float) -> float:
         """Of such a difference or a larger one."""
@@ -227,27 +232,27 @@ def summary(pairs: Sequence[dict[str, Any]], ground: str) -> dict[str, Any]:
     }
 
 
-def draw(shipped: dict[str, Any], path: Path) -> None:
-    """Scatter of every effect on the same ground and on two, in least sizes that matter."""
+def draw(pairs: Sequence[dict[str, Any]], shipped: dict[str, Any], path: Path) -> None:
+    """Differences of every effect as they were measured, over the deviations that are expected of them."""
     from matplotlib.figure import Figure
 
-    names = sorted(shipped[SAME]["deviations"], key=lambda name: shipped[SAME]["deviations"][name])
+    names = sorted(shipped[SAME]["deviations"], key=title, reverse=True)
     with house_style():
-        figure = Figure(figsize=(7.5, 0.6 + 0.23 * len(names)), layout="constrained")
-        axis = figure.subplots()
-        for place, name in enumerate(names):
-            same, other = shipped[SAME]["deviations"][name], shipped[OTHER]["deviations"].get(name, math.nan)
-            axis.plot([same, other], [place, place], color=palette.PALE, lw=1.2, zorder=1)
-            axis.plot(same, place, "o", color=palette.BLUE, label="same ground" if place == 0 else None)
-            axis.plot(
-                other, place, "o", mfc="none", color=palette.VERMILLION, label="two grounds" if place == 0 else None
-            )
-        axis.set_xscale("log")
-        axis.axvline(1.0, color=palette.GREY, lw=0.8)
-        axis.set_yticks(range(len(names)), [title(name) for name in names])
-        axis.set_xlabel("scatter between drives in which nothing changed, in least sizes that matter")
-        axis.legend(loc="lower right")
-        figure.savefig(path, dpi=130)
+        figure = Figure(figsize=(10.0, 1.0 + 0.26 * len(names)), layout="constrained")
+        for axis, ground in zip(figure.subplots(1, 2, sharey=True), (SAME, OTHER), strict=True):
+            deviations, limit = shipped[ground]["deviations"], _limit(shipped[ground]["degrees"], len(names))
+            for item in differences(pairs, ground):
+                distance = item.distance(deviations.get(item.effect, item.least))
+                axis.plot(distance, names.index(item.effect), "o", ms=3, color=palette.BLUE, alpha=0.4)
+            axis.axvline(limit, color=palette.INK, lw=0.9)
+            axis.set_title(f"{ground.replace('_', ' ')}: {shipped[ground]['degrees']:g} degrees of freedom")
+            axis.set_yticks(range(len(names)), [title(name) for name in names])
+            axis.set_xlabel("difference, in expected deviations (line: limit)")
+        figure.savefig(path, dpi=110)
+
+
+def _limit(degrees: float, tests: int) -> float:
+    return distance_at(single_level(tests), 1, degrees)
 
 
 def write_summary(pairs: Sequence[dict[str, Any]]) -> None:
@@ -261,7 +266,7 @@ def write_summary(pairs: Sequence[dict[str, Any]]) -> None:
         **{ground: summary(pairs, ground) for ground in (SAME, OTHER)},
     }
     write_json(PATH, shipped)
-    draw(shipped, RESULT.with_suffix(".png"))
+    draw(pairs, shipped, RESULT.with_suffix(".png"))
     for ground in (SAME, OTHER):
         print(ground, {name: shipped[ground][name] for name in ("degrees", "false_alarms", "false_alarms_crossed")})
 

@@ -25,6 +25,7 @@ from ddagr_gym.diagnosis.change.shifts import (
 )
 from ddagr_gym.diagnosis.result.equivalence import equivalence_weights
 from ddagr_gym.diagnosis.search.initial_guess import first_guess
+from ddagr_gym.diagnosis.search.scan import drive_extent
 from ddagr_gym.diagnosis.search.scanned_model import Rival
 from ddagr_gym.identification.fit_numerics import FIELD_TOLERANCE
 from ddagr_gym.identification.gauss_newton import Fitted, fit
@@ -204,7 +205,8 @@ def _next(
         progress(f"refitting with {shift.compared.name}")
         fitted = fit(problem, start, iterations=ITERATIONS + 2, tolerance=FIELD_TOLERANCE, renewals=RENEWALS)
         gain = (model.fitted.cost - fitted.cost) / dispersion
-        if gain > 0.0:
+        meaningful = fitted.point.effects[-1].is_meaningful(drive_extent(problem, fitted.prediction))
+        if gain > 0.0 and meaningful:
             refitted.append((shift, Rival(shift.compared.name, fitted, gain)))
     refitted.sort(key=lambda item: -item[1].gain)
     tried: list[tuple[Model, Rival]] = []

@@ -22,16 +22,16 @@ ENCODERS = tuple(name for name in CHANNELS if name.startswith("encoder"))
 
 
 def unlike_commands(found: SearchResult, accepted: SearchResult, gates: Thresholds) -> dict[str, float]:
-    """Misfit of the encoders over their limits, by channel; empty where all names of the library are accepted.
+    """Misfit of the encoders over their limits, by channel; empty where names of the library are accepted.
 
     Args:
         found: by the search.
-        accepted: the same, or as far as its names stand although too much is left.
+        accepted: the same, or its nominal model where the names are refused.
         gates: with the limits.
     """
     misfit = found.chosen.misfit
     shares = {name: misfit[name] / gates.misfit[name] for name in ENCODERS if gates.misfit.get(name, 0.0) > 0.0}
-    return {} if (accepted is found and found.chosen.names) or max(shares.values(), default=0.0) <= UNLIKE else shares
+    return {} if accepted.chosen.names or max(shares.values(), default=0.0) <= UNLIKE else shares
 
 
 @dataclass(frozen=True, eq=False)
