@@ -240,8 +240,9 @@ def draw(pairs: Sequence[dict[str, Any]], shipped: dict[str, Any], path: Path) -
     with house_style():
         figure = Figure(figsize=(10.0, 1.0 + 0.26 * len(names)), layout="constrained")
         for axis, ground in zip(figure.subplots(1, 2, sharey=True), (SAME, OTHER), strict=True):
-            deviations, limit = shipped[ground]["deviations"], _limit(shipped[ground]["degrees"], len(names))
-            for item in differences(pairs, ground):
+            found, deviations = differences(pairs, ground), shipped[ground]["deviations"]
+            limit = distance_at(single_level(len(found) // len(pairs)), 1, shipped[ground]["degrees"])
+            for item in found:
                 distance = item.distance(deviations.get(item.effect, item.least))
                 axis.plot(distance, names.index(item.effect), "o", ms=3, color=palette.BLUE, alpha=0.4)
             axis.axvline(limit, color=palette.INK, lw=0.9)
@@ -249,10 +250,6 @@ def draw(pairs: Sequence[dict[str, Any]], shipped: dict[str, Any], path: Path) -
             axis.set_yticks(range(len(names)), [title(name) for name in names])
             axis.set_xlabel("difference, in expected deviations (line: limit)")
         figure.savefig(path, dpi=110)
-
-
-def _limit(degrees: float, tests: int) -> float:
-    return distance_at(single_level(tests), 1, degrees)
 
 
 def write_summary(pairs: Sequence[dict[str, Any]]) -> None:

@@ -112,11 +112,11 @@ def certificate_in_words(certificate: ChangeCertificate, against: str, named: bo
     """
     percent = f"{100.0 * certificate.expected:.0f} %"
     whose = "drives before" if against == BEFORE else "ordinary drives"
-    count = f"{certificate.as_well} of {certificate.windows}"
-    ending = f"windows are forecast as well as {percent} of those of the {whose}"
+    count = f"{certificate.as_well} of {certificate.windows} left-out windows are forecast"
     if not named:
-        return f"Left-out windows: {count} {ending}."
-    return f"Left-out windows with what changed: {count} {ending} (without it {certificate.as_well_without})."
+        return f"{count} as well as {percent} of those of the {whose}."
+    without = f"(without it {certificate.as_well_without})"
+    return f"With what changed {count} as well as {percent} of those of the {whose} {without}."
 
 
 def _joined_names(names: Sequence[str]) -> str:

@@ -96,7 +96,7 @@ def test_three_drives_before_and_two_after_on_another_ground(tmp_path):
     again = validate(as_mapping(diagnosis))
     assert again.change.certificate == change.certificate
     text = change_text(diagnosis)
-    assert "Left-out windows with what changed: " in text
+    assert "left-out windows are forecast as well as 90 % of those of the drives before" in text
     write_page(tmp_path, diagnosis)
     page = (tmp_path / "index.html").read_text()
     assert page.count("<figure>") == 4
@@ -145,12 +145,14 @@ def refused(match: str, after, before, **options) -> None:
 def test_drives_that_cannot_be_compared_are_refused_with_a_sentence(tmp_path):
     fresh, known = drive(41, seconds=45.0), drive(42, seconds=45.0)
     refused("no drive from before is given", fresh, [])
-    refused("of the robot 'husky', compared with --robot ddagr", fresh.with_meta(robot="husky"), known)
+    refused("was imported for the robot 'husky'", fresh, known.with_meta(robot="husky"))
+    with pytest.raises(InputError, match="of the robot 'husky', compared with --robot ddagr"):
+        since([fresh.with_meta(robot="husky")], [known])
     refused("hold the same values: leave it out on one side", [fresh, known], known)
     refused("a calibration and drives from before are given", fresh, known, calibration=tmp_path)
     refused("the ground is 'sand' and there is no calibration", fresh, known, ground="sand")
     refused("thresholds is given with drives from before", fresh, known, thresholds=tmp_path / "thresholds.json")
-    refused("are too few: give drives of 32 s at least", drive(43, seconds=20.0), known)
+    refused("are too few to compare with ordinary drives: give 32 s at least", drive(43, seconds=20.0), known)
     refused("has no yaw_rate", without(fresh, "yaw_rate"), known)
     still = ddagr_gym.simulate(np.zeros((900, 2)), ROBOT, SOIL, rate=20.0, seed=1).recording
     refused("commanded to stand still", fresh, still)
