@@ -62,7 +62,7 @@ def test_an_unknown_ground_hides_the_soil_and_not_the_sensors(ordinary_robot, tm
     assert math.isclose(again.findings[0].gain, diagnosis.findings[0].gain)
     write_page(tmp_path, diagnosis)
     page = (tmp_path / "index.html").read_text()
-    assert page.count("<figure>") == 2
+    assert page.count("<figure>") == 4
     assert "http" not in page.replace("http-equiv", "")
     assert "Gyro bias" in change_text(diagnosis)
 
