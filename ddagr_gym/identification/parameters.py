@@ -38,6 +38,7 @@ class ModelParameter:
         scope: numbers of the recordings in which it acts; None for all of them.
         shift: the value is a delay of the commands [s] instead of a row entry.
         heading: the value turns the recording's starts [rad] instead of changing a row entry.
+        centred: its finite differences go to both sides.
     """
 
     name: str
@@ -51,6 +52,7 @@ class ModelParameter:
     scope: frozenset[int] | None = None
     shift: bool = False
     heading: bool = False
+    centred: bool = False
 
     @property
     def recording(self) -> int | None:
@@ -213,6 +215,10 @@ def drivetrain_of(robot: Robot, values: Mapping[str, float]) -> Drivetrain:
 
 _DRIVETRAIN_STEP = 0.02  # of the standard deviation, for finite differences (ours)
 
+DELAY_STEP = 0.05
+"""Step to both sides of the finite difference to a delay [s] (ours: a sample at 20 Hz). Commands are interpolated
+between samples, where the derivative jumps: with a small step a fit ends at the nearest sample."""
+
 
 def _drivetrain_parameters(robot: Robot) -> tuple[ModelParameter, ...]:
     """The same of its drivetrain: limits as factors, what may be nothing as a sum."""
@@ -226,8 +232,10 @@ def _drivetrain_parameters(robot: Robot) -> tuple[ModelParameter, ...]:
             continue
         field = next(item for item in fields(Drivetrain) if item.name == name)
         low, high = field.metadata["low"] - value, field.metadata["high"] - value
-        step = _DRIVETRAIN_STEP * deviation
-        made.append(ModelParameter(name, field.metadata["unit"], entry, False, deviation, step, low, high))
+        centred = name == "command_delay"
+        step = DELAY_STEP if centred else _DRIVETRAIN_STEP * deviation
+        unit = field.metadata["unit"]
+        made.append(ModelParameter(name, unit, entry, False, deviation, step, low, high, centred=centred))
     return tuple(made)
 
 

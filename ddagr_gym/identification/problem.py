@@ -225,19 +225,30 @@ class Problem:
                 simulated.append(k)
         unmoved = self._varied_from(point, base)
         for together in disjoint_scopes(self.nuisances.parameters, simulated):
-            steps = [self._difference(k, point.values[k]) for k in together]
-            moved = point.values.copy()
-            moved[together] += steps
-            change = self.blocked.change(self._varied_prediction(replace(point, values=moved)), unmoved)
-            for k, step in zip(together, steps, strict=True):
+            spans = np.array([self._difference(k, point.values[k]) for k in together])
+            begin = self._beside(point, together, spans[:, 0]) if spans[:, 0].any() else unmoved
+            change = self.blocked.change(self._beside(point, together, spans[:, 1]), begin)
+            for k, (start, end) in zip(together, spans, strict=True):
                 acts = self.nuisances.parameters[k].acts_in(self.blocked.windows.recording)
-                columns[acts, :, k] = change[acts] / step
+                columns[acts, :, k] = change[acts] / (end - start)
         return self.heading_columns(point, base, columns)
 
-    def _difference(self, k: int, value: float) -> float:
-        """Step of the finite difference to parameter k: back from an upper bound, but for one that is next to 0."""
-        step = self.nuisances.parameters[k].step
-        return step if value + step <= max(self.high[k], _NEAR_BOUND) else -step
+    def _beside(self, point: Point, chosen: Sequence[int], steps: Array) -> Array:
+        """Prediction with some parameters beside a point."""
+        moved = point.values.copy()
+        moved[chosen] += steps
+        return self._varied_prediction(replace(point, values=moved))
+
+    def _difference(self, k: int, value: float) -> tuple[float, float]:
+        """Begin and end of the finite difference to parameter k, from its value.
+
+        Back from an upper bound, but for one that is next to 0; to both sides inside the bounds where it is centred.
+        """
+        parameter = self.nuisances.parameters[k]
+        step = parameter.step
+        if parameter.centred:
+            return max(-step, self.low[k] - value), min(step, self.high[k] - value)
+        return 0.0, step if value + step <= max(self.high[k], _NEAR_BOUND) else -step
 
     def local_columns(self, point: Point, base: Array) -> Array:
         """The sensitivities (W, M, P) to the parameters that have a local unknown; 0 for all others."""
