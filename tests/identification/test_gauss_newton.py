@@ -123,6 +123,24 @@ def test_a_step_of_the_states_never_raises_the_cost_of_a_window(one_drive):
     assert after.sum() < 0.9 * before.sum()
 
 
+@pytest.mark.parametrize(("delay", "begin", "end"), [(0.12, 0.07, 0.17), (0.0, 0.0, 0.05)])
+def test_the_derivative_to_a_delay_spans_a_sample_to_both_sides_inside_its_bounds(
+    one_drive, robot, soil, delay, begin, end
+):
+    late = replace(robot, standard_deviations={**robot.standard_deviations, "command_delay": 0.3})
+    chosen = Nuisances((parameters_of(late, soil)["command_delay"],))
+    problem = Problem(late, soil, one_drive().blocked, chosen, numerics=field_numerics())
+    states = problem.start().states
+
+    def at(value: float) -> np.ndarray:
+        return problem.predict(Point(np.array([value]), states))
+
+    point = Point(np.array([delay]), states)
+    expected = problem.blocked.change(at(end), at(begin)) / (end - begin)
+    np.testing.assert_allclose(problem.parameter_columns(point, at(delay))[..., 0], expected, rtol=1e-9)
+    assert np.abs(expected).max() > 1.0
+
+
 def test_headings_are_compared_on_the_circle(one_drive):
     problem = one_drive(np.ones(8))
     prediction = problem.predict(problem.start())
