@@ -24,9 +24,14 @@ from ddagr_gym.diagnosis.planning.next_drive import plan_next_drive
 from ddagr_gym.diagnosis.preprocessing.data_checks import data_doubts
 from ddagr_gym.diagnosis.preprocessing.session import DiagnosisSession, Progress, be_silent, prepare
 from ddagr_gym.diagnosis.result.conclusion import accept, conclude
-from ddagr_gym.diagnosis.result.drivetrain_names import CompletedNominal, unlike_commands, with_drivetrain
+from ddagr_gym.diagnosis.result.drivetrain_names import (
+    CompletedNominal,
+    beside_completed,
+    unlike_commands,
+    with_drivetrain,
+)
 from ddagr_gym.diagnosis.review import review
-from ddagr_gym.diagnosis.search.scanned_model import SearchResult, scan_model
+from ddagr_gym.diagnosis.search.scanned_model import SearchResult
 from ddagr_gym.diagnosis.search.starting_models import refit_nominal, starting_models
 from ddagr_gym.diagnosis.search.stepwise import search
 from ddagr_gym.diagnosis.setting import Setting
@@ -160,7 +165,7 @@ def diagnose(
     unlike = {} if complete_nominal is None else unlike_commands(found, accepted, session.gates)
     nominal = complete_nominal(unlike) if complete_nominal is not None and unlike else None
     if nominal is not None:
-        made = _beside_drivetrain(session, found, nominal, steps)
+        made = _beside_drivetrain(session, accepted, nominal, steps)
         answer = replace(
             made.diagnosis,
             checks=checks,
@@ -202,20 +207,21 @@ def _beside_drivetrain(
 
     Args:
         given: session with the nominal simulator as it was given.
-        before: what was found beside that one.
+        before: what was accepted beside that one.
         nominal: the completed one.
         steps: of the diagnosis.
     """
     session = given.with_nominal(nominal.robot, nominal.soil)
     refitted = steps.keep("completed refit", refit_nominal, session.problem, session.progress)[1]
-    found = SearchResult((steps.keep("completed scan", scan_model, session.problem, refitted, session.progress),))
+    found = steps.keep("completed scan", beside_completed, session, refitted, before.chosen.fitted.point.effects)
     diagnosis, effects = steps.run("verdict", conclude, session, found, found)
     diagnosis = with_drivetrain(diagnosis, nominal, before.nominal.misfit)
     steps.begin("localisation")
     traces = steps.keep("localisation traces", trace_mismatch, session, found)
     located = steps.keep("localisation", locate, session, found, traces)
     evidence = steps.run("evidence", gather_evidence, session, found, traces)
-    every = (*effects, *nominal.effects)
+    own = {effect.name for effect in nominal.effects}
+    every = (*(effect for effect in effects if effect.name not in own), *nominal.effects)
     return Outcome(replace(diagnosis, localisation=located), every, session, found, evidence)
 
 

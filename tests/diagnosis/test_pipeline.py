@@ -16,6 +16,7 @@ from ddagr_gym.diagnosis.answer.verdict import Diagnosis, GatesUsed
 from ddagr_gym.diagnosis.gates.thresholds import Thresholds
 from ddagr_gym.diagnosis.pipeline import LATER, STEPS
 from ddagr_gym.diagnosis.setting import Setting
+from ddagr_gym.physics.effects.pose_latency import PoseLatency
 from ddagr_gym.presets import get_robot, get_soil
 
 _NOTHING = EffectLocation((), 0.0, (), (), None, "")
@@ -109,15 +110,21 @@ def test_names_only_leaves_out_what_follows_the_verdict(stages: Stages) -> None:
 def test_the_drivetrain_is_fitted_where_the_library_leaves_too_much_in_the_encoders(
     stages: Stages, monkeypatch: pytest.MonkeyPatch, told: bool
 ) -> None:
-    nominal = SimpleNamespace(robot=get_robot("warthog"), soil=get_soil("thesis_a1"), effects=("late poses",))
+    late = PoseLatency(0.2)
+    nominal = SimpleNamespace(robot=get_robot("warthog"), soil=get_soil("thesis_a1"), effects=(late,))
     stages.session.with_nominal = lambda robot, soil: SimpleNamespace(**{**vars(stages.session), "robot": robot})
     stages.session.progress = lambda line: None
     monkeypatch.setattr(pipeline, "unlike_commands", lambda found, accepted, gates: {"encoder_left": 9.0})
     monkeypatch.setattr(pipeline, "refit_nominal", lambda problem, progress: ("raw", "refitted"))
-    monkeypatch.setattr(pipeline, "scan_model", lambda problem, fitted, progress: f"scan of {fitted}")
+    monkeypatch.setattr(pipeline, "beside_completed", lambda session, refitted, effects: f"{effects} beside {refitted}")
     monkeypatch.setattr(pipeline, "with_drivetrain", lambda answer, made, misfit: replace(answer, verdict=("load",)))
     monkeypatch.setattr(
-        pipeline, "search", lambda *inputs: SimpleNamespace(nominal=SimpleNamespace(misfit={"yaw_rate": 2.0}))
+        pipeline,
+        "search",
+        lambda *inputs: SimpleNamespace(
+            nominal=SimpleNamespace(misfit={"yaw_rate": 2.0}),
+            chosen=SimpleNamespace(fitted=SimpleNamespace(point=SimpleNamespace(effects=()))),
+        ),
     )
     asked: list[Any] = []
 
@@ -130,7 +137,7 @@ def test_the_drivetrain_is_fitted_where_the_library_leaves_too_much_in_the_encod
     assert outcome.diagnosis.verdict == (("load",) if told else ("none",))
     assert outcome.nominal[0].name == ("warthog" if told else "ddagr")
     assert ("certify" in stages.called) is not told
-    assert ("late poses" in outcome.effects) is told
+    assert (late in outcome.effects) is told
 
 
 def test_a_stopped_diagnosis_goes_on_behind_its_last_step(stages: Stages, tmp_path: Path) -> None:

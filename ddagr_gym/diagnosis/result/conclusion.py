@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
+from itertools import pairwise
 
 from ddagr_gym.diagnosis.answer.verdict import NONE, UNKNOWN, DataSource, Diagnosis, Estimate, Finding, GatesUsed
 from ddagr_gym.diagnosis.gates.thresholds import Thresholds
@@ -35,6 +36,15 @@ leaves up to seven times the limit, one that no library has and that borrows a n
 _MUCH = 1.5
 """The same where the names explain less than half of the channels' misfit."""
 
+_MANY = 10.0
+"""Gain over the gate from which a name stands although too much is left (ours)."""
+
+_HOLDS = 0.8
+"""Share of its gain that it has on left-out windows at least (ours)."""
+
+_OWN = 0.5
+"""Share of what it explains that lies in channels in which hardly anything is left (ours)."""
+
 
 def conclude(
     session: DiagnosisSession, found: SearchResult, accepted: SearchResult
@@ -44,7 +54,7 @@ def conclude(
     Args:
         session: of the diagnosis.
         found: by the search.
-        accepted: the same, or only its nominal model where :func:`accept` refuses the names.
+        accepted: the same, or only as far as :func:`accept` accepts its names.
 
     Returns:
         The diagnosis (its time is 0), and the effects that it names with their fitted sizes.
@@ -53,13 +63,14 @@ def conclude(
     verdict, complete = _verdict(accepted, mended.names, gates)
     seen = [*_repeat_findings(mended.repeated), *reversed_gyro_findings(mended.reversed_gyro)]
     fitted = _findings(session, found)
-    findings, rejected = ((*seen, *fitted), ()) if accepted is found else (tuple(seen), tuple(fitted))
+    kept = fitted if accepted is found else _findings(session, accepted)
+    rejected = tuple(item for item in fitted if item.name not in accepted.chosen.names)
     alone, beside = _detectable(accepted, gates)
     diagnosis = Diagnosis(
         verdict,
         complete,
-        findings,
-        headline(verdict, complete, findings),
+        (*seen, *kept),
+        headline(verdict, complete, (*seen, *kept)),
         {"nominal": accepted.nominal.misfit, "corrected": accepted.chosen.misfit, "limit": dict(gates.misfit)},
         {**alone, **beside},
         {p.name: float(v) for p, v in zip(session.problem.nuisances.parameters, values, strict=True) if p.prior > 0.0},
@@ -180,7 +191,7 @@ def _channel_shares(before: ScannedModel, after: ScannedModel) -> dict[str, floa
 
 
 def accept(found: SearchResult, thresholds: Thresholds) -> SearchResult:
-    """What was found; without names where these leave too much of what the channels show."""
+    """What was found; where that leaves too much of what the channels show, only the names that stand by themselves."""
     if not found.chosen.names:
         return found
     limits = dict(thresholds.misfit)
@@ -188,7 +199,45 @@ def accept(found: SearchResult, thresholds: Thresholds) -> SearchResult:
     _, left = roughest(channels, limits)
     explained = explained_share({name: found.nominal.misfit[name] for name in channels}, channels, limits)
     too_much = left > _TOO_MUCH or (left > _MUCH and explained is not None and explained < 0.5)
-    return replace(found, models=found.models[:1]) if too_much else found
+    return standing(found, thresholds) if too_much else found
+
+
+def standing(found: SearchResult, thresholds: Thresholds) -> SearchResult:
+    """What was found as far as its names stand by themselves, whatever else is left."""
+    return replace(found, models=found.models[: 1 + _standing(found, thresholds)])
+
+
+def _standing(found: SearchResult, thresholds: Thresholds) -> int:
+    """Number of first steps of a search whose names stand whatever else is left."""
+    count = 0
+    for before, after in pairwise(found.models):
+        added = set(after.names) - set(before.names)
+        if len(after.names) != count + 1 or not added <= set(found.chosen.names):
+            break
+        if not all(_stands(found, thresholds, count + 1, name) for name in added):
+            break
+        count += 1
+    return count
+
+
+def _stands(found: SearchResult, thresholds: Thresholds, step: int, name: str) -> bool:
+    """Whether a name is many times beyond its gate, holds on left-out windows, and leaves its own channels quiet.
+
+    What borrows the name of something else leaves the rest of it in the channels in which it acts.
+
+    Args:
+        found: by the search.
+        thresholds: of the null bank.
+        step: that added the name, from 1.
+        name: of an effect.
+    """
+    before, after = found.models[step - 1 : step + 1]
+    gain, gate = _gain(found, before, name), further_gates(thresholds, found.models[:step]).of(name).gain
+    if gain < _MANY * gate or before.held_out.get(name, 0.0) < _HOLDS * gain:
+        return False
+    limits = {channel: _MUCH * limit for channel, limit in thresholds.misfit.items()}
+    shares = _channel_shares(before, after)
+    return sum(v for channel, v in shares.items() if after.misfit[channel] <= limits.get(channel, math.inf)) > _OWN
 
 
 def _verdict(found: SearchResult, seen: Sequence[str], thresholds: Thresholds) -> tuple[tuple[str, ...], bool]:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from ddagr_gym.diagnosis.answer.drivetrain import PART_TITLES, DrivetrainAnswer
 from ddagr_gym.diagnosis.answer.verdict import UNKNOWN, Diagnosis, Finding
 from ddagr_gym.diagnosis.gates.thresholds import Thresholds
+from ddagr_gym.diagnosis.preprocessing.session import DiagnosisSession
+from ddagr_gym.diagnosis.result.conclusion import standing
 from ddagr_gym.diagnosis.result.sentences import drivetrain_headline, headline
-from ddagr_gym.diagnosis.search.scanned_model import SearchResult
+from ddagr_gym.diagnosis.search.scanned_model import SearchResult, scan_model
+from ddagr_gym.identification.gauss_newton import Fitted, fit
 from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.physics.effects import Effect
@@ -22,16 +25,16 @@ ENCODERS = tuple(name for name in CHANNELS if name.startswith("encoder"))
 
 
 def unlike_commands(found: SearchResult, accepted: SearchResult, gates: Thresholds) -> dict[str, float]:
-    """Misfit of the encoders over their limits, by channel; empty where names of the library are accepted.
+    """Misfit of the encoders over their limits, by channel; empty where all names of the library are accepted.
 
     Args:
         found: by the search.
-        accepted: the same, or its nominal model where the names are refused.
+        accepted: the same, or as far as its names stand although too much is left.
         gates: with the limits.
     """
     misfit = found.chosen.misfit
     shares = {name: misfit[name] / gates.misfit[name] for name in ENCODERS if gates.misfit.get(name, 0.0) > 0.0}
-    return {} if accepted.chosen.names or max(shares.values(), default=0.0) <= UNLIKE else shares
+    return {} if (accepted is found and found.chosen.names) or max(shares.values(), default=0.0) <= UNLIKE else shares
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +56,23 @@ class CompletedNominal:
     effects: tuple[Effect, ...] = ()
 
 
+def beside_completed(session: DiagnosisSession, refitted: Fitted, effects: Sequence[Effect]) -> SearchResult:
+    """The completed simulator with those names that stood beside the one as it was given and stand beside this too.
+
+    Args:
+        session: with the completed simulator.
+        refitted: to the drives.
+        effects: that stood before, in their order.
+    """
+    models = [scan_model(session.problem, refitted, session.progress)]
+    for effect in effects:
+        here = models[-1].fitted
+        point = replace(here.point, effects=(*here.point.effects, effect))
+        fitted = fit(session.problem, point, iterations=8, renewals=2, first=here)
+        models.append(scan_model(session.problem, fitted, session.progress))
+    return standing(SearchResult(tuple(models)), session.gates)
+
+
 def with_drivetrain(diagnosis: Diagnosis, nominal: CompletedNominal, misfit: Mapping[str, float]) -> Diagnosis:
     """A diagnosis beside a completed nominal simulator, with the names of what that one has more.
 
@@ -60,11 +80,12 @@ def with_drivetrain(diagnosis: Diagnosis, nominal: CompletedNominal, misfit: Map
     everywhere.
 
     Args:
-        diagnosis: beside the completed simulator; only what was seen in the values is named.
+        diagnosis: beside the completed simulator; what was seen in the values is named, and what stands by itself.
         nominal: the completed simulator.
         misfit: of the channels beside the simulator as it was given, refitted.
     """
-    findings = (*diagnosis.findings, *nominal.findings)
+    own = {finding.name for finding in nominal.findings}
+    findings = (*(item for item in diagnosis.findings if item.name not in own), *nominal.findings)
     names = tuple(finding.name for finding in findings) or (UNKNOWN,)
     complete = diagnosis.complete and bool(findings)
     parts = [PART_TITLES[name] for name in nominal.answer.names]
