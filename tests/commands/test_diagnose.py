@@ -232,3 +232,28 @@ def test_what_is_wrong_with_the_recordings_is_printed_first() -> None:
     assert lines[0] == "Nothing is missing."
     assert lines[2].startswith("The recordings themselves are suspicious")
     assert lines[3:] == ["  run_1.csv yaw_rate: It never changes.", "  Times go back."]
+
+
+@pytest.mark.slow
+def test_drives_from_before_are_taken_by_the_command(work: Path, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    """The second drive is on the slope of the first one: nothing changed."""
+    runs = work / "drives"
+    words = ["diagnose", str(runs / "run_2.parquet"), "--before", str(runs / "run_1.parquet"), "--window", "2"]
+    assert main([*words, "--same-ground", "--output", str(tmp_path / "changed")]) == 0
+    told = capsys.readouterr().out
+    assert "Nothing changed against the drive before" in told
+    assert "left-out windows are forecast as well as 90 % of those of the drives before" in told
+    diagnosis = load(tmp_path / "changed" / "diagnosis.json")
+    assert (diagnosis.change.against, diagnosis.change.ground) == ("before", "same")
+    names = {path.name for path in (tmp_path / "changed").iterdir()}
+    assert {"index.html", "robot.yaml", "soil.yaml", "effects.yaml"} <= names
+    assert get_robot(str(tmp_path / "changed" / "robot.yaml")).name == "ddagr"
+
+
+def test_a_ground_that_is_the_same_and_another_is_refused(
+    work: Path, tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    runs = work / "drives"
+    words = ["diagnose", str(runs / "run_2.parquet"), "--before", str(runs / "run_1.parquet")]
+    assert main([*words, "--same-ground", "--other-ground", "--output", str(tmp_path / "changed")]) == 2
+    assert "give --same-ground or --other-ground" in capsys.readouterr().err

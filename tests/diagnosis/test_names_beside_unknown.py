@@ -8,10 +8,17 @@ from dataclasses import dataclass
 import pytest
 
 import ddagr_gym
+from ddagr_gym.diagnosis.gates.threshold_files import default_thresholds
+from ddagr_gym.diagnosis.preprocessing.session import prepare
+from ddagr_gym.diagnosis.result.drivetrain_names import beside_completed
+from ddagr_gym.diagnosis.search.starting_models import refit_nominal
+from ddagr_gym.diagnosis.setting import Setting
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.effects.base import Vector, size
 from ddagr_gym.physics.effects.gyro_bias import GyroBias
+from ddagr_gym.physics.effects.gyro_scale import GyroScale
 from ddagr_gym.physics.layout import OMEGA, POINT_READINGS, READING, WHEEL_ANGLE
+from ddagr_gym.presets import get_robot, get_soil
 
 
 def wobble(row: Vector, parameters: Vector, memory: Vector) -> None:
@@ -64,3 +71,16 @@ def test_a_gyro_bias_is_said_beside_an_encoder_that_no_effect_explains():
 @pytest.mark.slow
 def test_that_encoder_alone_borrows_no_name():
     assert names(EccentricEncoder(0.1)).verdict == ("unknown",)
+
+
+@pytest.mark.slow
+def test_beside_another_simulator_stays_only_what_stands_there_too():
+    """As where the drivetrain was fitted in between: the bias is in the drives, a scale of the gyro is not."""
+    effects = (GyroBias(BIAS), EccentricEncoder(0.1))
+    drive = ddagr_gym.simulate("s_weave", effects=effects, rate=25.0, pose_rate=5.0, seed=1).recording
+    gates = default_thresholds("ddagr")
+    setting = Setting().with_windows(gates.duration)
+    session = prepare([drive], get_robot("ddagr"), get_soil("thesis_a1"), gates, setting)
+    refitted = refit_nominal(session.problem)[1]
+    assert beside_completed(session, refitted, (GyroBias(0.01),)).chosen.names == ("gyro_bias",)
+    assert beside_completed(session, refitted, (GyroScale(1.01),)).chosen.names == ()
