@@ -19,6 +19,7 @@ from ddagr_gym.physics.effects.gyro_bias import GyroBias
 from ddagr_gym.physics.effects.gyro_scale import GyroScale
 from ddagr_gym.physics.layout import OMEGA, POINT_READINGS, READING, WHEEL_ANGLE
 from ddagr_gym.presets import get_robot, get_soil
+from ddagr_gym.recordings.schema import Recording
 
 
 def wobble(row: Vector, parameters: Vector, memory: Vector) -> None:
@@ -49,12 +50,15 @@ BIAS = 0.0122
 """0.7 degrees/s [rad/s]."""
 
 
-def names(*effects: Effect) -> ddagr_gym.DiagnosisResult:
-    drives = [
-        ddagr_gym.simulate(name, effects=effects, rate=25.0, pose_rate=5.0, seed=seed)
+def drives(*effects: Effect) -> list[Recording]:
+    return [
+        ddagr_gym.simulate(name, effects=effects, rate=25.0, pose_rate=5.0, seed=seed).recording
         for seed, name in enumerate(("arcs", "s_weave"))
     ]
-    return ddagr_gym.diagnose(drives, names_only=True)
+
+
+def names(*effects: Effect) -> ddagr_gym.DiagnosisResult:
+    return ddagr_gym.diagnose(drives(*effects), names_only=True)
 
 
 @pytest.mark.slow
@@ -76,11 +80,10 @@ def test_that_encoder_alone_borrows_no_name():
 @pytest.mark.slow
 def test_beside_another_simulator_stays_only_what_stands_there_too():
     """As where the drivetrain was fitted in between: the bias is in the drives, a scale of the gyro is not."""
-    effects = (GyroBias(BIAS), EccentricEncoder(0.1))
-    drive = ddagr_gym.simulate("s_weave", effects=effects, rate=25.0, pose_rate=5.0, seed=1).recording
     gates = default_thresholds("ddagr")
     setting = Setting().with_windows(gates.duration)
-    session = prepare([drive], get_robot("ddagr"), get_soil("thesis_a1"), gates, setting)
+    driven = drives(GyroBias(BIAS), EccentricEncoder(0.1))
+    session = prepare(driven, get_robot("ddagr"), get_soil("thesis_a1"), gates, setting)
     refitted = refit_nominal(session.problem)[1]
     assert beside_completed(session, refitted, (GyroBias(0.01),)).chosen.names == ("gyro_bias",)
     assert beside_completed(session, refitted, (GyroScale(1.01),)).chosen.names == ()
