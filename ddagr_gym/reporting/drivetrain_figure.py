@@ -18,7 +18,7 @@ _ROW = 0.22
 
 def part_figure(answer: DrivetrainAnswer) -> Figure:
     """By how much forecasts of what was left out become worse without each part, with standard errors."""
-    figure = blank_figure(0.9 + _ROW * len(answer.parts))
+    figure: Figure = blank_figure(0.9 + _ROW * len(answer.parts))
     axes = figure.subplots()
     for row, part in enumerate(answer.parts):
         colour = AFTER if part.kept else RAW
@@ -38,7 +38,7 @@ def part_figure(answer: DrivetrainAnswer) -> Figure:
 def forecast_figure(answer: DrivetrainAnswer) -> Figure:
     """Errors over those of the simulator as given, by metric and horizon; small dots: each stretch."""
     groups = grouped_forecasts(answer)
-    figure = blank_figure(0.9 + _ROW * len(groups))
+    figure: Figure = blank_figure(0.9 + _ROW * len(groups))
     axes = figure.subplots()
     for row, items in enumerate(groups):
         given = root_mean_square([item.nominal for item in items])
