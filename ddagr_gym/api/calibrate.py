@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
-from ddagr_gym.api.inputs import RobotLike, Source, Sources, recordings_from
-from ddagr_gym.api.nominal import OWN, SoilLike, robot_from, soil_from, soil_name_of
+from ddagr_gym.api.inputs import Source, Sources, recordings_from
+from ddagr_gym.api.nominal import OWN, RobotLike, SoilLike, robot_from, soil_from, soil_name_of
 from ddagr_gym.api.results import Report, Table
 from ddagr_gym.errors import InputError, at_least
 

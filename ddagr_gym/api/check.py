@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ddagr_gym.api.inputs import RobotLike, Sources, recordings_from
+from ddagr_gym.api.inputs import Sources, recordings_from
+from ddagr_gym.api.nominal import RobotLike
 from ddagr_gym.api.results import Report, Table
 from ddagr_gym.errors import InputError, at_least
 from ddagr_gym.files import write_json

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, overload
 
 from ddagr_gym.api.change import ChangeResult, changed, changed_since
 from ddagr_gym.api.diagnosis_result import DiagnosisResult
-from ddagr_gym.api.inputs import RobotLike, Sources, recordings_from
-from ddagr_gym.api.nominal import Nominal, SoilLike, ThresholdsLike, nominal_from, thresholds_from
+from ddagr_gym.api.inputs import Sources, recordings_from
+from ddagr_gym.api.nominal import Nominal, RobotLike, SoilLike, ThresholdsLike, nominal_from, thresholds_from
 from ddagr_gym.errors import InputError, InputWarning, at_least
 from ddagr_gym.extras import need
 from ddagr_gym.progress import counting

@@ -9,8 +9,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from ddagr_gym.api.inputs import RobotLike, Source, recording_from
-from ddagr_gym.api.nominal import SoilLike, robot_from, soil_from
+from ddagr_gym.api.inputs import Source, recording_from
+from ddagr_gym.api.nominal import RobotLike, SoilLike, robot_from, soil_from
 from ddagr_gym.api.results import Report, Table
 from ddagr_gym.errors import InputError, at_least, unknown_name
 from ddagr_gym.files import atomic_path, write_json

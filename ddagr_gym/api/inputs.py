@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias, Union
 
+from ddagr_gym.api.nominal import RobotLike
 from ddagr_gym.api.tables import is_table, recording_of_table
 from ddagr_gym.errors import InputError
 from ddagr_gym.parameters import Robot
@@ -18,9 +19,6 @@ if TYPE_CHECKING:
     import pyarrow
 
     from ddagr_gym.api.simulate import SimulationResult
-
-RobotLike: TypeAlias = str | os.PathLike[str] | Robot
-"""Name of a robot, path of a YAML file, or a robot."""
 
 Source: TypeAlias = Union[
     Recording,

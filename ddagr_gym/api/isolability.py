@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
-from ddagr_gym.api.inputs import RobotLike
 from ddagr_gym.api.nominal import (
+    RobotLike,
     SoilLike,
     ThresholdsLike,
     robot_from,

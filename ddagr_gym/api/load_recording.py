@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 
-from ddagr_gym.api.inputs import RobotLike, recording_from
+from ddagr_gym.api.inputs import recording_from
+from ddagr_gym.api.nominal import RobotLike
 from ddagr_gym.recordings.files import DEFAULT_LIMITS, Limits
 from ddagr_gym.recordings.schema import Recording
 

@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias, Union
 
-from ddagr_gym.api.inputs import RobotLike
-from ddagr_gym.api.nominal import SoilLike, robot_from, soil_from
+from ddagr_gym.api.nominal import RobotLike, SoilLike, robot_from, soil_from
 from ddagr_gym.api.results import Result, Table, names_of
 from ddagr_gym.errors import InputError, at_least
 from ddagr_gym.files import write_json

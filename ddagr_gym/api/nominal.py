@@ -8,13 +8,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias, Union
 
-from ddagr_gym.api.inputs import RobotLike
 from ddagr_gym.errors import InputWarning
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.presets import full_name, get_robot, get_soil, is_file, robot_names, soil_names
 
 if TYPE_CHECKING:
     from ddagr_gym.diagnosis.gates.thresholds import Thresholds
+
+RobotLike: TypeAlias = str | os.PathLike[str] | Robot
+"""Name of a robot, path of a YAML file, or a robot."""
 
 SoilLike: TypeAlias = str | os.PathLike[str] | Soil
 """Name of a soil, path of a YAML file, or a soil."""

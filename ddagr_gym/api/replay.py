@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ddagr_gym.api.inputs import RobotLike, Sources, recordings_from
-from ddagr_gym.api.nominal import SoilLike, robot_from, soil_from, soil_label
+from ddagr_gym.api.inputs import Sources, recordings_from
+from ddagr_gym.api.nominal import RobotLike, SoilLike, robot_from, soil_from, soil_label
 from ddagr_gym.api.results import Report, Table
 from ddagr_gym.api.simulate import EffectsLike
 from ddagr_gym.errors import InputError, at_least

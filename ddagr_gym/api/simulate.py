@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from ddagr_gym.api.inputs import RobotLike
-from ddagr_gym.api.nominal import SoilLike, robot_from, soil_from, soil_label
+from ddagr_gym.api.nominal import RobotLike, SoilLike, robot_from, soil_from, soil_label
 from ddagr_gym.api.results import Result, Table
 from ddagr_gym.control.manoeuvres import Manoeuvre, find_manoeuvre
 from ddagr_gym.errors import InputError, at_least
