@@ -70,6 +70,8 @@ def _loop(field: str, limit: float) -> Callable[[LadderGains, dict[str, float]],
         changed: dict[str, Any] = {field: loop}
         if "heading" in values:
             changed["true_path_heading"] = values["heading"]
+        if "course" in values:
+            changed["path_tracker_course"] = values["course"]
         return replace(gains, **changed)
 
     return apply
@@ -103,6 +105,11 @@ SPACES = {
         ),
         (20.0, 2.0, 5.0, 0.05, 0.1),
         lambda gains, values: replace(gains, predictive=replace(gains.predictive, **values)),  # type: ignore[arg-type]
+    ),
+    "B6": SearchSpace(
+        (("proportional", 20.0, 150.0), ("integral", 0.5, 50.0), ("course", 4.0, 15.0), _LEAD),
+        (73.0, 20.0, 12.0, 0.43),
+        _loop("path_tracker", 3.0),
     ),
     "true_curvature": SearchSpace(
         (("proportional", 0.02, 5.0), ("integral", 0.05, 40.0), ("derivative", 1e-4, 0.3), _LEAD),

@@ -30,7 +30,7 @@ class Arguments:
         seed: of the candidates.
     """
 
-    controllers: str = "B2,B3,B4,B5,true_curvature,true_soil,true_path"
+    controllers: str = "B2,B3,B4,B5,B6,true_curvature,true_soil,true_path"
     output: Path = Path("ddagr_gains")
     seed: int = 0
 

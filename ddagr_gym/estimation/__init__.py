@@ -37,6 +37,9 @@ four parameters, because a wheel that skids sideways in a turn has little longit
 
 Use: ``Filter(FilterModel(robot)).step(command, reading)``; ``BatchFilter`` for N robots; ``run_filter`` for a
 recording; ``estimates`` for speeds, soil, slip and turn radius with their standard deviations.
+
+``InertialFilter(InertialModel.of(robot, sensors))`` is for ground that slopes and soil that changes: its velocities
+follow the accelerometer, gravity is among its states (theory: filter, section 9).
 """
 
 from ddagr_gym.estimation.closed_form import PlanarMotion, encoder_motion, symmetric_forward_speed
@@ -49,10 +52,17 @@ from ddagr_gym.estimation.consistency import (
     chi_square_band,
     normalised_estimation_error,
 )
+from ddagr_gym.estimation.dead_reckoning import DeadReckoning, Reckoned
 from ddagr_gym.estimation.derived import Estimates, estimates, slip_ratio
 from ddagr_gym.estimation.filter import BatchFilter, Filter, FilterRun, roll_out, run_filter
 from ddagr_gym.estimation.filter_model import FilterModel, FilterNoise, SoilPrior
 from ddagr_gym.estimation.force_laws import ForceLaw
+from ddagr_gym.estimation.inertial_filter import (
+    InertialFilter,
+    InertialKnowledge,
+    InertialModel,
+    run_inertial_filter,
+)
 from ddagr_gym.estimation.layout import CHANNELS, STATE
 from ddagr_gym.estimation.matched_truth import draw_drive
 from ddagr_gym.estimation.steps import Correction, Prediction, correct, predict
@@ -67,14 +77,19 @@ __all__ = [
     "BatchFilter",
     "ChannelStatistics",
     "Correction",
+    "DeadReckoning",
     "Estimates",
     "Filter",
     "FilterModel",
     "FilterNoise",
     "FilterRun",
     "ForceLaw",
+    "InertialFilter",
+    "InertialKnowledge",
+    "InertialModel",
     "PlanarMotion",
     "Prediction",
+    "Reckoned",
     "SoilPrior",
     "ThesisModel",
     "autocorrelation",
@@ -88,6 +103,7 @@ __all__ = [
     "predict",
     "roll_out",
     "run_filter",
+    "run_inertial_filter",
     "run_thesis_filter",
     "slip_ratio",
     "symmetric_forward_speed",

@@ -28,6 +28,8 @@ class _Arc(NamedTuple):
         half_track: [m].
         law: number of the :class:`~ddagr_gym.estimation.force_laws.ForceLaw`.
         soil: parameters of the law.
+        pull_x: gravity along body x [m/s^2].
+        pull_y: gravity along body y [m/s^2].
     """
 
     speed: float
@@ -37,13 +39,15 @@ class _Arc(NamedTuple):
     half_track: float
     law: float
     soil: LawParameters
+    pull_x: float
+    pull_y: float
 
 
 @kernel()
 def _imbalance(arc: _Arc, unknown: Array, result: Array) -> None:
     """Sums of F_x, F_y and M_z less what the steady arc needs, at rim speeds and v_y (theory: control, eq. (4))."""
-    result[0] = arc.mass * arc.rate * unknown[2]
-    result[1] = -arc.mass * arc.rate * arc.speed
+    result[0] = arc.mass * arc.rate * unknown[2] + arc.mass * arc.pull_x
+    result[1] = -arc.mass * arc.rate * arc.speed + arc.mass * arc.pull_y
     result[2] = 0.0
     for wheel in range(4):
         x = arc.half_wheelbase if wheel < 2 else -arc.half_wheelbase
@@ -87,7 +91,7 @@ def _solve(arc: _Arc, unknown: Array) -> bool:
 
 
 def arc_bank_speeds(
-    model: FilterModel, parameters: ArrayLike, speed: float, curvature: float
+    model: FilterModel, parameters: ArrayLike, speed: float, curvature: float, gravity: tuple[float, float] = (0.0, 0.0)
 ) -> tuple[float, float] | None:
     """Right and left bank speeds [rad/s] that hold a steady arc by the law, or None where it has no such solution.
 
@@ -96,13 +100,15 @@ def arc_bank_speeds(
         parameters: (4,) a1 [N], a2 [-], b [N/rad], Rc [N].
         speed: v_x [m/s].
         curvature: yaw rate over speed [1/m], counter-clockwise positive.
+        gravity: its pull along body x and y [m/s^2], 0 on the level.
     """
     robot = model.robot
     spread = 1.3 * robot.half_track * curvature  # effective over geometric track of most soils
     unknown = np.array([speed * (1.0 + spread), speed * (1.0 - spread), 0.0])
     limit, rate, stiffness, resistance = np.asarray(parameters, dtype=np.float64)
     soil = LawParameters(limit, rate, stiffness, resistance, model.rest_speed, model.reversal_speed)
-    arc = _Arc(speed, speed * curvature, robot.mass, robot.half_wheelbase, robot.half_track, float(model.law), soil)
+    law, length, width = float(model.law), robot.half_wheelbase, robot.half_track
+    arc = _Arc(speed, speed * curvature, robot.mass, length, width, law, soil, float(gravity[0]), float(gravity[1]))
     if not _solve(arc, unknown):
         return None
     radius = model.outer_radius
@@ -126,7 +132,7 @@ def arc_speed_rows(
         unknown[2] = 0.0
         own = parameters[n]
         soil = LawParameters(own[0], own[1], own[2], own[3], rest_speed, reversal_speed)
-        arc = _Arc(speeds[n], speeds[n] * curvatures[n], robot[0], robot[1], robot[2], law, soil)
+        arc = _Arc(speeds[n], speeds[n] * curvatures[n], robot[0], robot[1], robot[2], law, soil, 0.0, 0.0)
         found = _solve(arc, unknown)
         banks[n, 0] = unknown[0] if found else speeds[n] * (1.0 + fallback * spread)
         banks[n, 1] = unknown[1] if found else speeds[n] * (1.0 - fallback * spread)

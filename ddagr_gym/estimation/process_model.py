@@ -159,13 +159,14 @@ def _respond(step: float, work: Array) -> None:
 
 
 @kernel(inline=True)
-def _half_decay(model: Array, command: float, step: float) -> float:
+def half_decay(model: Array, command: float, step: float) -> float:
     """Factor of a bank's deviation from its command over half a step; 1 where the command is not known."""
     return math.exp(-0.5 * model[MOTOR_RATE] * step) if math.isfinite(command) else 1.0
 
 
 @kernel(inline=True)
-def _advance_banks(work: Array, right: float, left: float, decay_right: float, decay_left: float) -> None:
+def advance_banks(work: Array, right: float, left: float, decay_right: float, decay_left: float) -> None:
+    """Bank speeds after a time over which their lag shrinks by the decays; 1 where the command is not known."""
     if decay_right < 1.0:
         work[X + OMEGA] = right + (work[X + OMEGA] - right) * decay_right
     if decay_left < 1.0:
@@ -191,8 +192,8 @@ def advance_state(
     Returns:
         Factors by which deviations of the bank speeds shrink over the step, right and left.
     """
-    half_right, half_left = _half_decay(model, right, step), _half_decay(model, left, step)
-    _advance_banks(work, right, left, half_right, half_left)
+    half_right, half_left = half_decay(model, right, step), half_decay(model, left, step)
+    advance_banks(work, right, left, half_right, half_left)
     body_forces(model, work)
     v_x, v_y, turn = work[X], work[X + 1], work[X + 2]
     f_x = work[FORCE] + turn * v_y + slope_x
@@ -215,5 +216,5 @@ def advance_state(
         work[base + i] += 1.0
         work[base + OMEGA] *= half_right
         work[base + OMEGA + 1] *= half_left
-    _advance_banks(work, right, left, half_right, half_left)
+    advance_banks(work, right, left, half_right, half_left)
     return half_right * half_right, half_left * half_left

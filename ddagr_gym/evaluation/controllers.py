@@ -14,6 +14,7 @@ from ddagr_gym.config import configs_dir, load_config
 from ddagr_gym.control.constant_speeds import ConstantSpeeds
 from ddagr_gym.control.force_balance import ForceBalance
 from ddagr_gym.control.model_predictive import ModelPredictive, PredictiveSettings
+from ddagr_gym.control.path_tracker import MotionEstimate, PathTracker
 from ddagr_gym.control.pid import PidGains
 from ddagr_gym.control.predictive_model import PredictiveModel
 from ddagr_gym.control.radial_pid import RadialPid
@@ -26,7 +27,9 @@ from ddagr_gym.control.true_soil import TrueSoil
 from ddagr_gym.control.yaw_rate_pid import YawRatePid
 from ddagr_gym.errors import InputError, unknown_name
 from ddagr_gym.estimation import FilterModel
+from ddagr_gym.estimation.dead_reckoning import DeadReckoning
 from ddagr_gym.estimation.force_balance import arc_bank_speeds
+from ddagr_gym.estimation.inertial_filter import InertialModel
 from ddagr_gym.evaluation.calibration import calibrate_constant_speeds
 from ddagr_gym.evaluation.policy_seeds import arm_and_seed, policy_version
 from ddagr_gym.evaluation.runs import BatchController, Controller
@@ -59,6 +62,8 @@ class LadderGains:
         radial: of B3, curvature per distance.
         force_balance: of B4.
         predictive: of B5.
+        path_tracker: of B6, curvature per cross-track error.
+        path_tracker_course: its curvature per course error [1/(m rad)].
         true_curvature: of the upper bound of that name.
         true_soil: likewise.
         true_path: likewise, curvature per lateral error.
@@ -72,7 +77,12 @@ class LadderGains:
     true_curvature: LoopSettings
     true_soil: LoopSettings
     true_path: LoopSettings
+    path_tracker: LoopSettings
     true_path_heading: float = 3.0
+    path_tracker_course: float = 4.0
+
+
+_Maker = Callable[[RowTurn, LadderGains], Controller]
 
 
 @lru_cache(maxsize=1)
@@ -136,6 +146,31 @@ def _predictive(settings: PredictiveSettings) -> ModelPredictive:
     return ModelPredictive(prediction, prior, settings)
 
 
+STANDING = 10
+"""Control periods for which the path tracker stands before it drives, 0.8 s: 100 samples tell gravity to 3 mm/s^2."""
+
+
+def inertial_model() -> InertialModel:
+    """The inertial filter that knows the nominal robot and sensors."""
+    return InertialModel.of(ddagr(), Sensors())
+
+
+def _make_path_tracker(model: FilterModel | InertialModel, standing: int) -> _Maker:
+    flat = model if isinstance(model, FilterModel) else model.flat
+
+    def steady_arc(at: MotionEstimate, speed: float, curvature: float) -> tuple[float, float] | None:
+        return arc_bank_speeds(flat, at.soil, speed, curvature, at.gravity)
+
+    def make(turn: RowTurn, gains: LadderGains) -> Controller:
+        constants, loop = nominal_constants(turn), gains.path_tracker
+        ratio, lead = _track_ratio(constants, turn), loop.lead_factor * constants.lead
+        return PathTracker(
+            ddagr(), loop.gains, gains.path_tracker_course, DeadReckoning(model), steady_arc, ratio, lead, standing
+        )
+
+    return make
+
+
 def _make_true_curvature(turn: RowTurn, gains: LadderGains) -> Controller:
     constants, loop = nominal_constants(turn), gains.true_curvature
     return TrueCurvature(ddagr(), loop.gains, _track_ratio(constants, turn), loop.lead_factor * constants.lead)
@@ -167,8 +202,6 @@ EKF_CONTROLLERS = ("B4", "B5")
 BOUNDS = ("true_curvature", "true_soil", "true_path")
 """Upper bounds, never deployable: they see the true state. A turn that none of them makes is infeasible."""
 
-_Maker = Callable[[RowTurn, LadderGains], Controller]
-
 _LADDER: dict[str, tuple[_Maker, str]] = {
     "B0": (lambda turn, gains: RollingWithoutSlip(ddagr()), "wheel speeds of a robot that rolls without slip"),
     "B1": (lambda turn, gains: nominal_constants(turn), "two constant speeds calibrated on the nominal soil"),
@@ -176,6 +209,14 @@ _LADDER: dict[str, tuple[_Maker, str]] = {
     "B3": (_make_radial, "feed-forward and PID on the radial error of dead reckoning"),
     "B4": (_make_force_balance, "force balance at the filter's estimate and PI on the estimated curvature"),
     "B5": (lambda turn, gains: _predictive(gains.predictive), "model-predictive control at the filter's estimate"),
+    "B6": (
+        lambda turn, gains: _make_path_tracker(inertial_model(), STANDING)(turn, gains),
+        "follows the path by the inertial filter's pose",
+    ),
+    "B6_flat": (
+        lambda turn, gains: _make_path_tracker(_filter_knowledge()[0], 0)(turn, gains),
+        "B6 by the pose of the filter that takes the ground for level",
+    ),
     "true_curvature": (_make_true_curvature, "upper bound, not deployable: PI on the true curvature"),
     "true_soil": (_make_true_soil, "upper bound, not deployable: B4 with the true soil and the true curvature"),
     "true_path": (_make_true_path, "upper bound, not deployable: follows the path by the true pose"),

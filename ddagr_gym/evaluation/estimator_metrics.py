@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from ddagr_gym.control.circle import turn_window
 from ddagr_gym.control.row_turn import RowTurn
 from ddagr_gym.estimation import FilterModel, FilterRun, roll_out, run_filter, slip_ratio
+from ddagr_gym.estimation.dead_reckoning import integrate_track
 from ddagr_gym.estimation.layout import CHANNELS, OMEGA
 from ddagr_gym.evaluation.costs import finite_series
 from ddagr_gym.evaluation.metrics import headland_samples
@@ -51,23 +52,6 @@ class EstimatorErrors:
     prediction_5s: float | None
     dead_reckoning: float
     innovation: float
-
-
-def integrate_track(v_x: ArrayLike, v_y: ArrayLike, yaw_rate: ArrayLike, period: float) -> Array:
-    """Pose (T, 3) x, y, yaw after each sample, from (0, 0, 0) at rest, by the trapezoidal rule.
-
-    Args:
-        v_x, v_y: velocity of the body origin after each sample (T,) [m/s].
-        yaw_rate: likewise [rad/s].
-        period: between samples [s].
-    """
-    motion = np.column_stack([v_x, v_y, yaw_rate]).astype(float)
-    middle = 0.5 * (motion + np.vstack([np.zeros(3), motion[:-1]]))
-    yaw = np.cumsum(middle[:, 2]) * period
-    half = yaw - 0.5 * middle[:, 2] * period
-    x = np.cumsum(middle[:, 0] * np.cos(half) - middle[:, 1] * np.sin(half)) * period
-    y = np.cumsum(middle[:, 0] * np.sin(half) + middle[:, 1] * np.cos(half)) * period
-    return np.column_stack([x, y, yaw])
 
 
 def _rms(values: Array) -> float:

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from ddagr_gym.errors import InputError, unknown_name
 from ddagr_gym.estimation import run_filter
+from ddagr_gym.estimation.dead_reckoning import integrate_track
 from ddagr_gym.evaluation.campaign import drive_scenario, episode_row, nominal_filter
 from ddagr_gym.evaluation.controllers import find_controller, needs_filter
-from ddagr_gym.evaluation.estimator_metrics import integrate_track
 from ddagr_gym.evaluation.metrics import headland_samples
 from ddagr_gym.evaluation.report_data import (
     Evaluation,

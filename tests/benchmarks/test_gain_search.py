@@ -51,9 +51,11 @@ def test_every_space_changes_its_own_controller_only(controller):
     before = ladder_gains()
     after = SPACES[controller].apply(before, SPACES[controller].values(np.full(len(SPACES[controller].axes), 0.37)))
     changed = {name for name in vars(before) if getattr(before, name) != getattr(after, name)}
-    expected = {"B2": "yaw_rate", "B3": "radial", "B4": "force_balance", "B5": "predictive"}.get(controller, controller)
-    assert changed - {"true_path_heading"} == {expected}
+    fields = {"B2": "yaw_rate", "B3": "radial", "B4": "force_balance", "B5": "predictive", "B6": "path_tracker"}
+    expected = fields.get(controller, controller)
+    assert changed - {"true_path_heading", "path_tracker_course"} == {expected}
     assert ("true_path_heading" in changed) == (controller == "true_path")
+    assert ("path_tracker_course" in changed) == (controller == "B6")
 
 
 def test_search_resumes_and_is_repeatable(tmp_path):

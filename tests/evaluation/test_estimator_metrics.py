@@ -8,8 +8,9 @@ import pytest
 
 from ddagr_gym.control.row_turn import RowTurn
 from ddagr_gym.estimation import FilterModel, FilterRun
+from ddagr_gym.estimation.dead_reckoning import integrate_track
 from ddagr_gym.estimation.layout import CHANNEL_SIZE, OMEGA, STATE_SIZE
-from ddagr_gym.evaluation.estimator_metrics import EstimatorErrors, estimator_errors, integrate_track
+from ddagr_gym.evaluation.estimator_metrics import EstimatorErrors, estimator_errors
 from ddagr_gym.parameters import Sensors
 from ddagr_gym.presets import get_robot
 

@@ -1,0 +1,217 @@
+"""Row turns on plants that the controllers were not made for: which estimator and which loop bears what.
+
+    python -m benchmarks.row_turn_plants [--scenarios 60] [--controllers B1,B4,B6_flat,B6,true_path] [--output FILE]
+
+The same soils in range, robots, sensors and noise on every plant: level ground, slopes in random directions, soil of
+less strength from half of the turn on, other lateral forces, late commands, more mass. The scenarios are for
+development: they have seeds of their own, and none of the frozen sets is read. About a quarter of an hour of one core
+with its defaults; writes ``benchmarks/results/row_turn_plants.json`` and a picture beside it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.lateral_scale import LateralScale
+from benchmarks.plants_figure import draw
+from ddagr_gym.envs.options import make_settings
+from ddagr_gym.envs.settings import Episode, TurnSettings
+from ddagr_gym.errors import InputError, unknown_name
+from ddagr_gym.evaluation.controllers import controller_names, find_controller, needs_filter
+from ddagr_gym.evaluation.metrics import turn_metrics
+from ddagr_gym.evaluation.runs import drive_turn
+from ddagr_gym.evaluation.statistics import Interval, bootstrap, median_interval, wilson_interval
+from ddagr_gym.files import atomic_path
+from ddagr_gym.physics.effects import Effect
+from ddagr_gym.physics.effects.slope import Slope
+from ddagr_gym.physics.effects.soil_change import SoilChange
+from ddagr_gym.progress import Progress
+
+RESULT = Path(__file__).parent / "results" / "row_turn_plants.json"
+CONTROLLERS = ("B1", "B4", "B6_flat", "B6", "true_path")
+_ROOT_SEED = 20_261_122
+_NOISE, _DRAW, _PLANT = range(3)  # last parts of the seeds
+
+Maker = Callable[[Episode, np.random.Generator], tuple[Episode, tuple[Effect, ...]]]
+
+
+@dataclass(frozen=True)
+class Plant:
+    """A robot and ground that differ from the nominal ones.
+
+    Attributes:
+        title: in tables and pictures.
+        change: (episode, rng) -> the episode and the effects in which it is driven.
+    """
+
+    title: str
+    change: Maker
+
+
+def _slope(degrees: float) -> Maker:
+    def change(episode: Episode, rng: np.random.Generator) -> tuple[Episode, tuple[Effect, ...]]:
+        return episode, (Slope(math.radians(degrees), float(rng.uniform(-math.pi, math.pi))),)
+
+    return change
+
+
+def _weaker(episode: Episode, rng: np.random.Generator) -> tuple[Episode, tuple[Effect, ...]]:
+    turn = episode.turn
+    half = (turn.run_in + 0.5 * turn.turn_length) / turn.speed
+    return episode, (SoilChange(0.7, 1.0, half),)
+
+
+def _late(episode: Episode, rng: np.random.Generator) -> tuple[Episode, tuple[Effect, ...]]:
+    return replace(episode, command_delay=episode.command_delay + 0.1), ()
+
+
+def _heavy(episode: Episode, rng: np.random.Generator) -> tuple[Episode, tuple[Effect, ...]]:
+    return replace(episode, robot=replace(episode.robot, mass=1.15 * episode.robot.mass)), ()
+
+
+PLANTS = {
+    "level": Plant("as modelled", lambda episode, rng: (episode, ())),
+    "slope_3": Plant("slope of 3 degrees", _slope(3.0)),
+    "slope_5": Plant("slope of 5 degrees", _slope(5.0)),
+    "weaker": Plant("strength x 0.7 from half of the turn on", _weaker),
+    "lateral_0.8": Plant("lateral forces x 0.8", lambda episode, rng: (episode, (LateralScale(0.8),))),
+    "lateral_1.2": Plant("lateral forces x 1.2", lambda episode, rng: (episode, (LateralScale(1.2),))),
+    "late": Plant("commands 0.1 s late", _late),
+    "heavy": Plant("mass + 15 %", _heavy),
+}
+"""The plants by name."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Of one turn: signed radius error [-], None where there is no circle, and success."""
+
+    error: float | None
+    success: bool
+
+
+def scenario(plant: str, number: int) -> tuple[TurnSettings, Episode, int]:
+    """Settings, episode and noise seed; soils, robots and sensors of a number are the same on every plant."""
+    drawn = make_settings().draw(np.random.default_rng([_ROOT_SEED, number, _DRAW]))
+    episode, effects = PLANTS[plant].change(drawn, np.random.default_rng([_ROOT_SEED, number, _PLANT]))
+    seed = int(np.random.default_rng([_ROOT_SEED, number, _NOISE]).integers(2**31))
+    return make_settings(effects=effects), episode, seed
+
+
+def drive(controller: str, plant: str, number: int) -> Outcome:
+    """One turn."""
+    settings, episode, seed = scenario(plant, number)
+    settings = replace(settings, ekf_features=needs_filter(controller))
+    run = drive_turn(find_controller(controller, episode.turn), settings, seed, episode)
+    return Outcome(turn_metrics(run.columns, episode.turn, episode.robot).turn.error, run.success)
+
+
+def _rounded(found: Interval) -> dict[str, Any]:
+    return {
+        "value": float(f"{found.estimate:.5g}"),
+        "interval": [float(f"{found.low:.5g}"), float(f"{found.high:.5g}")],
+    }
+
+
+def summary(outcomes: Sequence[Outcome]) -> dict[str, Any]:
+    """Median and 95th percentile of |e_R| (a turn without circle counts as 1) and success, with 95 % intervals."""
+    sizes = np.array([1.0 if item.error is None else min(abs(item.error), 1.0) for item in outcomes])
+
+    def p95(scores: np.ndarray) -> float:
+        return float(np.quantile(scores, 0.95, method="inverted_cdf"))
+
+    return {
+        "scenarios": len(outcomes),
+        "radius_error_median": _rounded(median_interval(sizes)),
+        "radius_error_p95": _rounded(
+            bootstrap(sizes, p95, np.random.default_rng(0), resampling="crossed", resamples=1000)
+        ),
+        "success_rate": _rounded(wilson_interval(sum(item.success for item in outcomes), len(outcomes))),
+    }
+
+
+def compared(outcomes: Mapping[str, Sequence[Outcome]]) -> dict[str, Any]:
+    """:func:`summary` of each controller, and its success where ``true_path`` makes the turn."""
+    found = {name: summary(own) for name, own in outcomes.items()}
+    if "true_path" in outcomes:
+        feasible = [number for number, item in enumerate(outcomes["true_path"]) if item.success]
+        for name, own in outcomes.items():
+            made = sum(own[number].success for number in feasible)
+            if feasible:
+                found[name]["success_where_true_path"] = _rounded(wilson_interval(made, len(feasible)))
+    return found
+
+
+def table(result: Mapping[str, Any]) -> str:
+    """Markdown: a row a plant, a column a controller; median / 95th percentile of |e_R|, success, all in percent."""
+    names = list(next(iter(result["plants"].values())))
+    lines = [f"| plant | {' | '.join(names)} |", "|---" * (len(names) + 1) + "|"]
+    for plant, found in result["plants"].items():
+        cells = []
+        for name in names:
+            low, high = found[name]["success_rate"]["interval"]
+            values = [found[name][key]["value"] for key in ("radius_error_median", "radius_error_p95", "success_rate")]
+            cells.append(
+                f"{100 * values[0]:.1f} / {100 * values[1]:.1f} / {100 * values[2]:.0f} "
+                f"({100 * low:.0f} to {100 * high:.0f})"
+            )
+        lines.append(f"| {PLANTS[plant].title} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def study(controllers: Sequence[str], plants: Sequence[str], scenarios: int) -> dict[str, Any]:
+    """Every controller on every plant, the same scenarios."""
+    result: dict[str, Any] = {"scenarios": scenarios, "root_seed": _ROOT_SEED, "plants": {}}
+    with Progress(len(controllers) * len(plants) * scenarios, "driving") as progress:
+        for plant in plants:
+            outcomes: dict[str, list[Outcome]] = {name: [] for name in controllers}
+            for name in controllers:
+                for number in range(scenarios):
+                    outcomes[name].append(drive(name, plant, number))
+                    progress.advance(1)
+            result["plants"][plant] = compared(outcomes)
+    return result
+
+
+def _names(text: str, known: Sequence[str], what: str) -> list[str]:
+    names = [name.strip() for name in text.split(",") if name.strip()]
+    for name in names:
+        if name not in known:
+            raise unknown_name(what, name, known)
+    if not names:
+        raise InputError(f"no {what} is named: give some of {', '.join(known)}.")
+    return names
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--controllers", default=",".join(CONTROLLERS), help="names, separated by commas")
+    parser.add_argument("--plants", default=",".join(PLANTS), help="names, separated by commas")
+    parser.add_argument("--scenarios", type=int, default=60, help="turns of each controller on each plant")
+    parser.add_argument("--output", type=Path, default=RESULT, help="JSON file; the picture lies beside it")
+    given = parser.parse_args(arguments)
+    try:
+        controllers = _names(given.controllers, controller_names(), "controller")
+        plants = _names(given.plants, list(PLANTS), "plant")
+        if given.scenarios < 2:
+            raise InputError(f"scenarios is {given.scenarios}: give at least 2.")
+    except InputError as error:
+        parser.error(str(error))
+    result = study(controllers, plants, given.scenarios)
+    with atomic_path(given.output) as temporary:
+        temporary.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    draw(result["plants"], {name: PLANTS[name].title for name in plants}, given.output.with_suffix(".png"))
+    print(table(result))
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,108 @@
+"""Where a robot is by its own filter: the estimated velocity, integrated from a known start."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ddagr_gym.estimation.filter import Filter
+from ddagr_gym.estimation.filter_model import FilterModel
+from ddagr_gym.estimation.inertial_filter import InertialFilter, InertialModel
+from ddagr_gym.estimation.inertial_layout import GRAVITY
+from ddagr_gym.estimation.layout import PARAMETER, PARAMETER_SIZE
+
+Array = NDArray[np.float64]
+
+
+class Reckoned(NamedTuple):
+    """What dead reckoning tells.
+
+    Attributes:
+        x, y: position of the body origin [m].
+        yaw: heading, continuous [rad].
+        v_x, v_y: velocity of the body origin [m/s].
+        yaw_rate: [rad/s].
+        soil: (4,) a1 [N], a2 [-], b [N/rad], Rc [N].
+        gravity: its pull along body x and y [m/s^2]; 0 by a filter that takes the ground for level.
+    """
+
+    x: float
+    y: float
+    yaw: float
+    v_x: float
+    v_y: float
+    yaw_rate: float
+    soil: Array
+    gravity: tuple[float, float] = (0.0, 0.0)
+
+
+def integrate_track(
+    v_x: ArrayLike, v_y: ArrayLike, yaw_rate: ArrayLike, period: float, before: ArrayLike = (0.0, 0.0, 0.0)
+) -> Array:
+    """Pose (T, 3) x, y, yaw after each sample, from (0, 0, 0), by the trapezoidal rule.
+
+    Args:
+        v_x, v_y: velocity of the body origin after each sample (T,) [m/s].
+        yaw_rate: likewise [rad/s].
+        period: between samples [s].
+        before: v_x, v_y, yaw rate at the start; at rest by default.
+    """
+    motion = np.column_stack([v_x, v_y, yaw_rate]).astype(float)
+    middle = 0.5 * (motion + np.vstack([before, motion[:-1]]))
+    yaw = np.cumsum(middle[:, 2]) * period
+    half = yaw - 0.5 * middle[:, 2] * period
+    x = np.cumsum(middle[:, 0] * np.cos(half) - middle[:, 1] * np.sin(half)) * period
+    y = np.cumsum(middle[:, 0] * np.sin(half) + middle[:, 1] * np.cos(half)) * period
+    return np.column_stack([x, y, yaw])
+
+
+class DeadReckoning:
+    """A filter of one robot and the pose that its velocities lead to; deployable, it sees samples and commands alone.
+
+    Args:
+        model: what the filter knows; its kind chooses the filter.
+    """
+
+    def __init__(self, model: FilterModel | InertialModel) -> None:
+        flat = model if isinstance(model, FilterModel) else model.flat
+        self._filter = Filter(model) if isinstance(model, FilterModel) else InertialFilter(model)
+        self._period = flat.sample_period
+        self.reset(0.0, 0.0, 0.0)
+
+    def reset(self, x: float, y: float, yaw: float) -> None:
+        """Forget everything; the robot is at rest at a place [m] with a heading [rad]."""
+        self._filter.reset()
+        self._pose = np.array([x, y, yaw])
+
+    def update(self, command: ArrayLike, samples: ArrayLike) -> Reckoned:
+        """Through samples (K, 5) in the order of ``CHANNELS`` under one command (2,) [rad/s]."""
+        before = self._filter.state[:3].copy()
+        motion = self._motion(np.asarray(command, dtype=np.float64), np.asarray(samples, dtype=np.float64))
+        x, y, turned = integrate_track(motion[:, 0], motion[:, 1], motion[:, 2], self._period, before)[-1]
+        cosine, sine = math.cos(self._pose[2]), math.sin(self._pose[2])
+        self._pose += [cosine * x - sine * y, sine * x + cosine * y, turned]
+        return self.present()
+
+    def _motion(self, command: Array, samples: Array) -> Array:
+        """Estimated velocities (K, 3) after each sample."""
+        if isinstance(self._filter, InertialFilter):
+            return self._filter.run(command[None], np.ascontiguousarray(samples))[0][:, :3]
+        motion = np.empty((len(samples), 3))
+        for k, sample in enumerate(samples):
+            self._filter.step(command, sample)
+            motion[k] = self._filter.state[:3]
+        return motion
+
+    def present(self) -> Reckoned:
+        """What is known now."""
+        state = self._filter.state
+        soil = np.exp(state[PARAMETER : PARAMETER + PARAMETER_SIZE])
+        pull = (0.0, 0.0)
+        if isinstance(self._filter, InertialFilter):
+            pull = (float(state[GRAVITY]), float(state[GRAVITY + 1]))
+        x, y, yaw = self._pose.tolist()
+        v_x, v_y, yaw_rate = state[:3].tolist()
+        return Reckoned(x, y, yaw, v_x, v_y, yaw_rate, soil, pull)

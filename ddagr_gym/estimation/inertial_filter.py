@@ -1,0 +1,181 @@
+"""The inertial filter: velocities by the accelerometer, gravity as a state, the force law as a measurement.
+
+Theory: filter, section 9.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ddagr_gym.errors import InputError
+from ddagr_gym.estimation import inertial_layout as layout
+from ddagr_gym.estimation.columns import sample_times, stack_columns
+from ddagr_gym.estimation.filter_model import FilterModel, FilterNoise, SoilPrior
+from ddagr_gym.estimation.inertial_kernels import inertial_series
+from ddagr_gym.estimation.layout import CHANNELS, COMMANDS, X
+from ddagr_gym.parameters import Robot, Sensors
+from ddagr_gym.validated import Validated, bounded
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class InertialKnowledge(Validated):
+    """What the inertial filter is given beyond a :class:`~ddagr_gym.estimation.FilterModel`.
+
+    Attributes:
+        balance_x: what the force law misses of F_x/m, standard deviation of one balance [m/s^2].
+        balance_y: of F_y/m [m/s^2].
+        balance_turn: of M/I [rad/s^2].
+        balance_learning: further variance that only the gain of the soil's parameters sees, over that of a balance.
+        balance_interval: forces are balanced at every how-manieth sample.
+        launch_speed: mean speed of the rims below which the robot is taken to roll instead [m/s]: near rest the law's
+            forces depend too steeply on the velocities.
+        launch_slip: standard deviation of slip and slip angle there [-].
+        launch_floor: that of the velocities at rest [m/s].
+        largest_acceleration: of the robot; a reading of the accelerometer that says more counts as missing [m/s^2].
+        unknown_acceleration: random walk of the velocities where the accelerometer is missing [m/s^2/sqrt(Hz)].
+        gravity_deviation: initial, of either component of gravity along the ground [m/s^2].
+        gravity_walk: how the ground's slope changes along the drive [m/s^2/sqrt(s)].
+        patch_ahead: mean distance ahead of the hubs at which lateral forces act [m].
+        patch_deviation: of it [m], from soil to soil and along a turn.
+        patch_time: in which it is forgotten [s].
+    """
+
+    balance_x: float = bounded("m/s^2", 0.0, 1e3, default=0.1, open_low=True)
+    balance_y: float = bounded("m/s^2", 0.0, 1e3, default=0.1, open_low=True)
+    balance_turn: float = bounded("rad/s^2", 0.0, 1e3, default=0.1, open_low=True)
+    balance_learning: float = bounded("-", 0.0, 1e9, default=10.0)
+    balance_interval: int = 10
+    launch_speed: float = bounded("m/s", 0.0, 10.0, default=0.1)
+    launch_slip: float = bounded("-", 0.0, 10.0, default=0.3)
+    launch_floor: float = bounded("m/s", 0.0, 10.0, default=2e-3, open_low=True)
+    largest_acceleration: float = bounded("m/s^2", 0.0, 1e3, default=5.0, open_low=True)
+    unknown_acceleration: float = bounded("m/s^2/sqrt(Hz)", 0.0, 1e3, default=0.1)
+    gravity_deviation: float = bounded("m/s^2", 0.0, 10.0, default=0.6, open_low=True)
+    gravity_walk: float = bounded("m/s^2/sqrt(s)", 0.0, 10.0, default=3e-4)
+    patch_ahead: float = bounded("m", -1.0, 1.0, default=0.031)
+    patch_deviation: float = bounded("m", 0.0, 1.0, default=0.02, open_low=True)
+    patch_time: float = bounded("s", 0.0, 1e3, default=5.0, open_low=True)
+
+    def _check(self) -> None:
+        if self.balance_interval < 1:
+            raise InputError(f"InertialKnowledge.balance_interval is {self.balance_interval}: give 1 or more.")
+
+
+@dataclass(frozen=True)
+class InertialModel:
+    """Model of the inertial filter.
+
+    Attributes:
+        flat: robot, sensors and soil, as for the filter that takes the ground for level.
+        knowledge: the rest.
+    """
+
+    flat: FilterModel
+    knowledge: InertialKnowledge = InertialKnowledge()
+
+    @classmethod
+    def of(cls, robot: Robot, sensors: Sensors) -> InertialModel:
+        """Model of a robot with its instruments, and what turns on simulated plants chose of the rest.
+
+        The lateral law is not taken as known (``coupling_deviation``): bulldozing and side walls change it by a fifth.
+        """
+        noise = FilterNoise.from_sensors(sensors, acceleration=5e-4, yaw_acceleration=0.03, soil=0.05)
+        prior = SoilPrior(coupling_deviation=0.10)
+        return cls(FilterModel.of(robot, sensors, noise=noise, prior=prior))
+
+    def initial(self) -> tuple[Array, Array]:
+        """State (15,) at rest and covariance (15, 15) before any sample."""
+        state, covariance = self.flat.initial()
+        own = self.knowledge
+        added = [own.gravity_deviation] * 2 + [own.patch_deviation]
+        whole = np.diag(np.concatenate([np.zeros(len(state)), np.square(added)]))
+        whole[: len(state), : len(state)] = covariance
+        return np.concatenate([state, [0.0, 0.0, own.patch_ahead]]), whole
+
+    def pack(self) -> Array:
+        """The model as the kernels read it, (inertial_layout.MODEL_SIZE,)."""
+        own = self.knowledge
+        packed = np.zeros(layout.MODEL_SIZE)
+        flat = self.flat.pack()
+        packed[: len(flat)] = flat
+        packed[layout.BALANCE : layout.BALANCE + 3] = np.square([own.balance_x, own.balance_y, own.balance_turn])
+        packed[layout.BALANCE_LEARNING] = own.balance_learning
+        packed[layout.BALANCE_INTERVAL] = own.balance_interval
+        packed[layout.LAUNCH_SPEED] = own.launch_speed
+        packed[layout.LAUNCH_SLIP] = own.launch_slip
+        packed[layout.LAUNCH_FLOOR] = own.launch_floor
+        packed[layout.LARGEST_ACCELERATION] = own.largest_acceleration
+        packed[layout.UNKNOWN_ACCELERATION] = own.unknown_acceleration**2
+        packed[layout.GRAVITY_WALK] = own.gravity_walk**2
+        packed[layout.PATCH_MEAN] = own.patch_ahead
+        packed[layout.PATCH_VARIANCE] = own.patch_deviation**2
+        packed[layout.PATCH_RATE] = 1.0 / own.patch_time
+        packed[layout.ADDED_FLOOR : layout.ADDED_FLOOR + 3] = 1e-8
+        packed[layout.ADDED_CEILING : layout.ADDED_CEILING + 3] = np.square([3.0, 3.0, 0.2])
+        packed[layout.ADDED_LIMIT : layout.ADDED_LIMIT + 3] = [5.0, 5.0, 0.3]
+        return packed
+
+
+class InertialFilter:
+    """Extended Kalman filter of one robot on ground that may slope.
+
+    Args:
+        model: what the filter knows.
+    """
+
+    def __init__(self, model: InertialModel) -> None:
+        self.model = model
+        self._packed = model.pack()
+        self._work = np.zeros(layout.WORK_SIZE)
+        self._period = np.array([model.flat.sample_period])
+        self.reset()
+
+    @property
+    def state(self) -> Array:
+        """(15,), see :data:`~ddagr_gym.estimation.inertial_layout.INERTIAL_STATE`; a view."""
+        return self._work[X : X + layout.INERTIAL_STATE_SIZE]
+
+    @property
+    def covariance(self) -> Array:
+        """(15, 15); a view."""
+        size = layout.INERTIAL_STATE_SIZE
+        whole = self._work[layout.Q : layout.Q + 16 * layout.STRIDE].reshape(16, layout.STRIDE)
+        return whole[:size, :size]
+
+    def reset(self) -> None:
+        """Start again from the prior, at rest."""
+        self._work[:] = 0.0
+        self.state[:], self.covariance[:] = self.model.initial()
+        self._count = 0
+
+    def run(self, commands: Array, readings: Array, durations: Array | None = None) -> tuple[Array, Array]:
+        """Predict and correct through samples.
+
+        Args:
+            commands: (T or 1, 2) right and left bank speed commands [rad/s]; NaN: unknown.
+            readings: (T, 5) in the order of ``CHANNELS``; NaN where a channel has no sample.
+            durations: (T,) since the sample before [s]; the model's sample period by default.
+
+        Returns:
+            States after each sample (T, 15), and standardised innovations (T, 5).
+        """
+        states, standardised = np.empty((len(readings), layout.INERTIAL_STATE_SIZE)), np.empty(readings.shape)
+        inertial_series(
+            self._packed, self._count, commands, readings, self._period if durations is None else durations, states,
+            standardised, self._work,
+        )  # fmt: skip
+        self._count += len(readings)
+        return states, standardised
+
+
+def run_inertial_filter(model: InertialModel, columns: Mapping[str, ArrayLike]) -> tuple[Array, Array]:
+    """Filter a recording as :func:`~ddagr_gym.estimation.run_filter` does; states (T, 15), innovations (T, 5)."""
+    _, durations = sample_times(columns, model.flat.sample_period)
+    commands, readings = stack_columns(columns, COMMANDS, np.nan), stack_columns(columns, CHANNELS, np.nan)
+    return InertialFilter(model).run(commands, readings, durations)

@@ -1,0 +1,358 @@
+"""Predict and correct of the inertial filter, in place on its workspace (theory: filter, section 9).
+
+The velocities follow the accelerometer, not the force law: what it reads, less its bias, plus gravity, which is a
+state that is fixed in the world. The force law is a measurement, every few samples: the wheels' forces by the law are
+those that the accelerometer felt since, up to what the law misses. So the blend of both is that of their covariances,
+gravity is told from motion, and a soil that changes may move the law's parameters without moving the velocities.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ddagr_gym.estimation.ekf import at_rest, bank_noise, limit_state
+from ddagr_gym.estimation.inertial_covariance import (
+    joseph_update_inertial,
+    limit_inertial_covariance,
+    propagate_inertial,
+)
+from ddagr_gym.estimation.inertial_layout import (
+    ADDED_LIMIT,
+    BALANCE,
+    BALANCE_INTERVAL,
+    BALANCE_LEARNING,
+    GRAVITY,
+    GRAVITY_WALK,
+    INERTIAL_STATE_SIZE,
+    LARGEST_ACCELERATION,
+    LAST_RATE,
+    LAUNCH_FLOOR,
+    LAUNCH_SLIP,
+    LAUNCH_SPEED,
+    MEAN_FORCE,
+    PATCH_AHEAD,
+    PATCH_MEAN,
+    PATCH_RATE,
+    PATCH_VARIANCE,
+    SUMMED,
+    UNKNOWN_ACCELERATION,
+    Q,
+)
+from ddagr_gym.estimation.layout import (
+    ACCELEROMETER_BIAS,
+    CHANNEL_SIZE,
+    COLUMN,
+    ENCODER_CHANNEL,
+    FORCE,
+    FORCE_CHANNEL,
+    GAIN,
+    GATE,
+    GRADIENT,
+    GYRO_BIAS,
+    GYRO_CHANNEL,
+    IMU_POSITION,
+    MEASUREMENT,
+    MOTION_SIZE,
+    OMEGA,
+    OUTER_RADIUS,
+    PARAMETER,
+    PARAMETER_SIZE,
+    PROCESS,
+    READING,
+    ROW,
+    SOIL_COVARIANCE,
+    SOIL_RATE,
+    STANDARDISED,
+    STANDSTILL_VARIANCE,
+    STATE_SIZE,
+    STRIDE,
+    X,
+)
+from ddagr_gym.estimation.process_model import advance_banks, body_forces, half_decay
+from ddagr_gym.jit import kernel
+
+Array = NDArray[np.float64]
+
+_ABSURD = 1e12  # standardised innovations from here on are no readings: their squares would overflow
+
+
+@kernel()
+def _felt(model: Array, work: Array, axis: int) -> float:
+    """Specific force at the body origin [m/s^2], by the sample in READING; of the lever arm the centripetal part."""
+    turn = work[X + 2]
+    return work[READING + FORCE_CHANNEL + axis] + turn * turn * model[IMU_POSITION + axis]
+
+
+@kernel()
+def _believed(model: Array, work: Array) -> bool:
+    """Whether both axes of the accelerometer have a reading that a robot can feel."""
+    along = work[READING + FORCE_CHANNEL] - work[X + ACCELEROMETER_BIAS] + work[X + GRAVITY]
+    across = work[READING + FORCE_CHANNEL + 1] - work[X + ACCELEROMETER_BIAS + 1] + work[X + GRAVITY + 1]
+    return abs(along) < model[LARGEST_ACCELERATION] and abs(across) < model[LARGEST_ACCELERATION]
+
+
+@kernel()
+def _advance(model: Array, work: Array, right: float, left: float, f_x: float, f_y: float, step: float) -> None:
+    """One step of state and covariance under a specific force, without process noise."""
+    half_right, half_left = half_decay(model, right, step), half_decay(model, left, step)
+    kept_right, kept_left = half_right * half_right, half_left * half_left
+    advance_banks(work, right, left, kept_right, kept_left)
+    angle = step * work[X + 2]
+    sine, cosine = math.sin(angle), math.cos(angle)
+    along, across = work[X + GRAVITY], work[X + GRAVITY + 1]
+    v_x = work[X] + step * (f_x - work[X + ACCELEROMETER_BIAS] + along)
+    v_y = work[X + 1] + step * (f_y - work[X + ACCELEROMETER_BIAS + 1] + across)
+    work[X], work[X + 1] = cosine * v_x + sine * v_y, cosine * v_y - sine * v_x
+    work[X + GRAVITY], work[X + GRAVITY + 1] = cosine * along + sine * across, cosine * across - sine * along
+    kept = math.exp(-model[PATCH_RATE] * step)
+    work[X + PATCH_AHEAD] = model[PATCH_MEAN] + kept * (work[X + PATCH_AHEAD] - model[PATCH_MEAN])
+    propagate_inertial(
+        work, (work[X], work[X + 1]), (work[X + GRAVITY], work[X + GRAVITY + 1]), (cosine, sine),
+        (kept_right, kept_left, kept), step,
+    )  # fmt: skip
+
+
+@kernel()
+def _add_noise(model: Array, work: Array, lag_right: float, lag_left: float, acceleration: float, step: float) -> None:
+    for i in range(2):
+        work[Q + (STRIDE + 1) * i] += acceleration
+        work[Q + (STRIDE + 1) * (GRAVITY + i)] += step * model[GRAVITY_WALK]
+    work[Q + (STRIDE + 1) * 2] += step * model[PROCESS + 2]
+    work[Q + (STRIDE + 1) * OMEGA] += bank_noise(model, 0, lag_right, step)
+    work[Q + (STRIDE + 1) * (OMEGA + 1)] += bank_noise(model, 1, lag_left, step)
+    share = step * model[SOIL_RATE]
+    for i in range(PARAMETER_SIZE):
+        for j in range(PARAMETER_SIZE):
+            work[Q + STRIDE * (PARAMETER + i) + PARAMETER + j] += (
+                share * model[SOIL_COVARIANCE + PARAMETER_SIZE * i + j]
+            )
+    for i in range(GYRO_BIAS, STATE_SIZE):
+        work[Q + (STRIDE + 1) * i] += step * model[PROCESS + i]
+    work[Q + (STRIDE + 1) * PATCH_AHEAD] += model[PATCH_VARIANCE] * (1.0 - math.exp(-2.0 * model[PATCH_RATE] * step))
+
+
+@kernel()
+def _limit(model: Array, work: Array) -> None:
+    limit_state(model, work)
+    for i in range(INERTIAL_STATE_SIZE - STATE_SIZE):
+        high = model[ADDED_LIMIT + i]
+        work[X + STATE_SIZE + i] = min(max(work[X + STATE_SIZE + i], -high), high)
+
+
+@kernel()
+def predict_inertial(model: Array, work: Array, right: float, left: float, duration: float) -> None:
+    """Advance state and covariance by ``duration`` [s] up to the sample in READING, which says how it accelerated.
+
+    Args:
+        model: packed model.
+        work: workspace, updated.
+        right: speed command of the right bank [rad/s]; not finite: unknown, the bank may drift from its speed.
+        left: of the left bank.
+        duration: [s].
+    """
+    lag_right, lag_left = right - work[X + OMEGA], left - work[X + OMEGA + 1]
+    if _believed(model, work):
+        f_x, f_y = _felt(model, work, 0), _felt(model, work, 1)
+        work[MEAN_FORCE] += f_x
+        work[MEAN_FORCE + 1] += f_y
+        work[SUMMED] += 1.0
+        noise = model[MEASUREMENT + FORCE_CHANNEL] * duration * duration + model[PROCESS] * duration
+    else:
+        f_x = work[X + ACCELEROMETER_BIAS] - work[X + GRAVITY]
+        f_y = work[X + ACCELEROMETER_BIAS + 1] - work[X + GRAVITY + 1] + work[X + 2] * work[X]
+        noise = model[UNKNOWN_ACCELERATION] * duration
+    _advance(model, work, right, left, f_x, f_y, duration)
+    _add_noise(model, work, lag_right, lag_left, noise, duration)
+    _limit(model, work)
+
+
+@kernel()
+def _update(
+    model: Array, work: Array, innovation: float, expected: float, variance: float, learning: float = 0.0
+) -> float:
+    """Use one innovation with ``P h^T`` in COLUMN; the gate is that of :func:`~ddagr_gym.estimation.ekf.update`."""
+    total = max(expected, 0.0) + variance
+    standardised = innovation / math.sqrt(total)
+    if not abs(standardised) < _ABSURD:
+        return math.nan
+    excess = abs(standardised) / model[GATE]
+    if excess > 1.0:
+        variance += total * (excess - 1.0)
+        total *= excess
+    for i in range(STRIDE):
+        work[GAIN + i] = work[COLUMN + i] / total
+    slower = total / (total + learning * variance)
+    for i in range(PARAMETER, PARAMETER + PARAMETER_SIZE):
+        work[GAIN + i] *= slower
+    for i in range(INERTIAL_STATE_SIZE):
+        work[X + i] += work[GAIN + i] * innovation
+    joseph_update_inertial(work, expected, variance)
+    return standardised
+
+
+@kernel(inline=True)
+def _entry_column(work: Array, entry: int) -> float:
+    for i in range(STRIDE):
+        work[COLUMN + i] = work[Q + entry * STRIDE + i]
+    return work[COLUMN + entry]
+
+
+@kernel(inline=True)
+def _gyro_column(work: Array) -> float:
+    for i in range(STRIDE):
+        work[COLUMN + i] = work[Q + 2 * STRIDE + i] + work[Q + GYRO_BIAS * STRIDE + i]
+    return work[COLUMN + 2] + work[COLUMN + GYRO_BIAS]
+
+
+@kernel(inline=True)
+def _row_column(work: Array) -> float:
+    """``P h^T`` of the row in ROW."""
+    for i in range(STRIDE):
+        work[COLUMN + i] = 0.0
+    for k in range(INERTIAL_STATE_SIZE):
+        weight = work[ROW + k]
+        for i in range(STRIDE):
+            work[COLUMN + i] += weight * work[Q + STRIDE * k + i]
+    expected = 0.0
+    for k in range(INERTIAL_STATE_SIZE):
+        expected += work[ROW + k] * work[COLUMN + k]
+    return expected
+
+
+@kernel()
+def shifted_forces(model: Array, work: Array) -> None:
+    """:func:`~process_model.body_forces` with lateral forces ahead of the hubs, and the derivative by that distance."""
+    ahead, turn, v_y = work[X + PATCH_AHEAD], work[X + 2], work[X + 1]
+    work[X + 1] = v_y + ahead * turn
+    body_forces(model, work)
+    work[X + 1] = v_y
+    for i in range(3):
+        base = GRADIENT + STRIDE * i
+        for j in range(MOTION_SIZE, STRIDE):
+            work[base + j] = 0.0
+        work[base + PATCH_AHEAD] = turn * work[base + 1]
+        work[base + 2] += ahead * work[base + 1]
+
+
+@kernel()
+def balance_forces(model: Array, work: Array, duration: float) -> None:
+    """Measure that the wheels' forces are those that were felt since the last time (``duration`` [s] ago)."""
+    count = work[SUMMED]
+    turned = (work[X + 2] - work[LAST_RATE]) / duration
+    for axis in range(3):
+        if axis < 2 and count == 0.0:
+            continue
+        shifted_forces(model, work)
+        for j in range(STRIDE):
+            work[ROW + j] = work[GRADIENT + STRIDE * axis + j]
+        felt = turned
+        if axis < 2:
+            work[ROW + ACCELEROMETER_BIAS + axis] = 1.0
+            felt = work[MEAN_FORCE + axis] / count - work[X + ACCELEROMETER_BIAS + axis]
+        variance = model[BALANCE + axis]
+        _update(model, work, felt - work[FORCE + axis], _row_column(work), variance, model[BALANCE_LEARNING])
+    work[MEAN_FORCE] = work[MEAN_FORCE + 1] = work[SUMMED] = 0.0
+    work[LAST_RATE] = work[X + 2]
+
+
+@kernel()
+def _roll(model: Array, work: Array, speed: float) -> None:
+    """Measure that the robot rolls with little slip at a mean rim speed [m/s]: the law's forces are stiff near rest."""
+    deviation = model[LAUNCH_FLOOR] + model[LAUNCH_SLIP] * abs(speed)
+    half = 0.5 * model[OUTER_RADIUS]
+    for j in range(STRIDE):
+        work[ROW + j] = 0.0
+    work[ROW] = 1.0
+    work[ROW + OMEGA] = work[ROW + OMEGA + 1] = -half
+    _update(model, work, speed - work[X], _row_column(work), deviation * deviation)
+    _update(model, work, -work[X + 1], _entry_column(work, 1), deviation * deviation)
+    work[MEAN_FORCE] = work[MEAN_FORCE + 1] = work[SUMMED] = 0.0
+    work[LAST_RATE] = work[X + 2]
+
+
+@kernel()
+def correct_inertial(model: Array, work: Array, standing: bool) -> None:
+    """Use gyro and encoders of the sample in READING; innovations go to STANDARDISED, NaN where there are none.
+
+    Args:
+        model: packed model.
+        work: workspace, updated.
+        standing: whether the robot is known to stand.
+    """
+    for channel in range(CHANNEL_SIZE):
+        work[STANDARDISED + channel] = math.nan
+    if math.isfinite(work[READING + GYRO_CHANNEL]):
+        innovation = work[READING + GYRO_CHANNEL] - work[X + 2] - work[X + GYRO_BIAS]
+        work[STANDARDISED + GYRO_CHANNEL] = _update(
+            model, work, innovation, _gyro_column(work), model[MEASUREMENT + GYRO_CHANNEL]
+        )
+    for bank in range(2):
+        channel = ENCODER_CHANNEL + bank
+        if math.isfinite(work[READING + channel]):
+            innovation = work[READING + channel] - work[X + OMEGA + bank]
+            expected = _entry_column(work, OMEGA + bank)
+            work[STANDARDISED + channel] = _update(model, work, innovation, expected, model[MEASUREMENT + channel])
+    if standing:
+        for axis in range(3):
+            _update(model, work, -work[X + axis], _entry_column(work, axis), model[STANDSTILL_VARIANCE + axis])
+
+
+@kernel()
+def inertial_sample(
+    model: Array, work: Array, command: Array, reading: Array, number: int, duration: float, standardised: Array
+) -> None:
+    """Predict up to one sample and correct by it.
+
+    Args:
+        model: packed model.
+        work: workspace, updated.
+        command: (2,) [rad/s].
+        reading: (5,).
+        number: of the sample since the start, from 1; sets when forces are balanced.
+        duration: since the sample before [s].
+        standardised: (5,) innovations, written.
+    """
+    for channel in range(CHANNEL_SIZE):
+        work[READING + channel] = reading[channel]
+    predict_inertial(model, work, command[0], command[1], duration)
+    correct_inertial(model, work, at_rest(model, work, command[0], command[1]))
+    interval = int(model[BALANCE_INTERVAL])
+    if number % interval == 0:
+        speed = 0.5 * model[OUTER_RADIUS] * (work[X + OMEGA] + work[X + OMEGA + 1])
+        if abs(speed) < model[LAUNCH_SPEED]:
+            _roll(model, work, speed)
+        else:
+            balance_forces(model, work, interval * duration)
+    _limit(model, work)
+    limit_inertial_covariance(model, work)
+    for channel in range(CHANNEL_SIZE):
+        standardised[channel] = work[STANDARDISED + channel]
+
+
+@kernel()
+def inertial_series(
+    model: Array, first: int, commands: Array, readings: Array, durations: Array, states: Array, standardised: Array,
+    work: Array,
+) -> None:  # fmt: skip
+    """One robot through a series, from the state and covariance in its workspace.
+
+    Args:
+        model: packed model.
+        first: samples seen before.
+        commands: (T or 1, 2) [rad/s]; a single one for all samples.
+        readings: (T, 5).
+        durations: (T or 1,) since the sample before [s].
+        states: (T, 15), written.
+        standardised: (T, 5), written.
+        work: (WORK_SIZE,), updated.
+    """
+    for k in range(readings.shape[0]):
+        inertial_sample(
+            model, work, commands[min(k, commands.shape[0] - 1)], readings[k], first + k + 1,
+            durations[min(k, durations.shape[0] - 1)], standardised[k],
+        )  # fmt: skip
+        for i in range(INERTIAL_STATE_SIZE):
+            states[k, i] = work[X + i]

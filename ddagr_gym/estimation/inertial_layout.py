@@ -1,0 +1,53 @@
+"""Entries of the inertial filter: state, packed model, workspace (theory: filter, section 9)."""
+
+from __future__ import annotations
+
+from ddagr_gym.estimation import layout
+
+INERTIAL_STATE = (*layout.STATE, "gravity_x", "gravity_y", "patch_ahead")
+"""Entries of the state: those of :data:`~ddagr_gym.estimation.layout.STATE`, then the pull of gravity along body x
+and y [m/s^2] and how far ahead of the hubs the wheels' lateral forces act [m]."""
+
+INERTIAL_STATE_SIZE = len(INERTIAL_STATE)  # 15
+GRAVITY = layout.STATE_SIZE  # x, y
+PATCH_AHEAD = GRAVITY + 2  # as in INERTIAL_STATE
+
+STRIDE = layout.STRIDE  # of matrices: the sixteenth row and column stay zero
+
+_next = layout.MODEL_SIZE
+
+
+def _block(size: int = 1) -> int:
+    global _next
+    first = _next
+    _next += size
+    return first
+
+
+# The packed model goes on after that of the flat filter
+BALANCE = _block(3)  # variances of what the force law misses: F_x/m, F_y/m [m^2/s^4], M/I [rad^2/s^4]
+BALANCE_LEARNING = _block()  # share of those variances that the gain of the soil's parameters sees besides
+BALANCE_INTERVAL = _block()  # samples
+LAUNCH_SPEED = _block()  # [m/s]
+LAUNCH_SLIP = _block()  # share of the speed
+LAUNCH_FLOOR = _block()  # [m/s]
+LARGEST_ACCELERATION = _block()  # beyond which a reading of the accelerometer is none [m/s^2]
+UNKNOWN_ACCELERATION = _block()  # random walk of the velocities without accelerometer [m^2/s^3]
+GRAVITY_WALK = _block()  # variance that a second adds to either component [m^2/s^5]
+PATCH_MEAN = _block()  # [m]
+PATCH_VARIANCE = _block()  # [m^2]
+PATCH_RATE = _block()  # 1/time in which it is forgotten [1/s]
+ADDED_FLOOR = _block(3)  # least variances of the added entries
+ADDED_CEILING = _block(3)  # largest ones
+ADDED_LIMIT = _block(3)  # largest sizes of the added entries
+MODEL_SIZE = _next
+
+# The workspace too; its own covariance lies behind, that of the flat filter is not used
+_next = layout.WORK_SIZE
+Q = _block(16 * STRIDE)  # covariance
+MEAN_FORCE = _block(2)  # sums of the specific force since the last balance [m/s^2]
+SUMMED = _block()  # samples in them
+LAST_RATE = _block()  # yaw rate at the last balance [rad/s]
+WORK_SIZE = _next
+MEMORY = slice(MEAN_FORCE, WORK_SIZE)
+"""What the workspace remembers between samples besides state and covariance."""

@@ -1,0 +1,157 @@
+"""The inertial filter: gravity on slopes, none on the level, covariance, bits, cost."""
+
+import math
+import time
+
+import numpy as np
+import pytest
+
+from ddagr_gym.envs.options import make_settings
+from ddagr_gym.errors import InputError
+from ddagr_gym.estimation import (
+    CHANNELS,
+    BatchFilter,
+    DeadReckoning,
+    FilterModel,
+    InertialFilter,
+    InertialKnowledge,
+    InertialModel,
+    run_filter,
+    run_inertial_filter,
+)
+from ddagr_gym.estimation.inertial_layout import GRAVITY, INERTIAL_STATE, PATCH_AHEAD
+from ddagr_gym.evaluation.controllers import find_controller
+from ddagr_gym.evaluation.runs import drive_turn
+from ddagr_gym.parameters import STANDARD_GRAVITY, Sensors
+from ddagr_gym.physics.effects.slope import Slope
+from ddagr_gym.presets import get_robot
+
+ROBOT = get_robot("ddagr")
+MODEL = InertialModel.of(ROBOT, Sensors())
+ANGLE, DIRECTION = math.radians(3.0), 0.7
+
+
+def driven(effects=()):
+    """A turn of the nominal robot, which stands for 0.8 s first."""
+    settings = make_settings(randomisation=False, side="left", soil="thesis_a1", effects=effects)
+    tracker = find_controller("B6", settings.draw(np.random.default_rng(0)).turn)
+    return drive_turn(tracker, settings, 5)
+
+
+@pytest.fixture(scope="module")
+def level():
+    return driven()
+
+
+@pytest.fixture(scope="module")
+def sloping():
+    return driven((Slope(ANGLE, DIRECTION),))
+
+
+def body_gravity(yaw):
+    """Pull of gravity along the body on the slope, (T, 2) [m/s^2], by wheel model, eq. (23)."""
+    pull = STANDARD_GRAVITY * math.sin(ANGLE)
+    return pull * np.stack([-np.cos(yaw - DIRECTION), np.sin(yaw - DIRECTION)], axis=-1)
+
+
+def test_gravity_converges_on_a_slope_and_turns_with_the_body(sloping):
+    states, _ = run_inertial_filter(MODEL, sloping.columns)
+    error = states[:, GRAVITY : GRAVITY + 2] - body_gravity(sloping.columns["true_yaw"])
+    # 0.8 s of standing: 100 samples of 0.031 m/s^2; a bias of 0.05 m/s^2 cannot be told from gravity yet
+    assert np.abs(error[100]).max() < 0.02
+    assert np.abs(error[100:]).max() < 0.08
+    assert np.ptp(states[100:, GRAVITY]) > 0.5
+
+
+def test_gravity_is_none_on_the_level(level):
+    states, _ = run_inertial_filter(MODEL, level.columns)
+    assert np.abs(states[100:, GRAVITY : GRAVITY + 2]).max() < 0.05
+
+
+def test_side_slip_on_a_slope_is_that_of_the_robot(sloping):
+    truth = sloping.columns["true_v_y"]
+    states, _ = run_inertial_filter(MODEL, sloping.columns)
+    flat = run_filter(FilterModel.of(ROBOT, Sensors()), sloping.columns).states
+    ours, theirs = (np.sqrt(np.mean((found[:, 1] - truth) ** 2)) for found in (states, flat))
+    assert ours < 0.008
+    assert ours < 0.4 * theirs
+
+
+def test_speed_on_the_level_is_no_worse_than_the_flat_filters(level):
+    truth = level.columns["true_v_x"]
+    ours = run_inertial_filter(MODEL, level.columns)[0][:, 0] - truth
+    theirs = run_filter(FilterModel.of(ROBOT, Sensors()), level.columns).states[:, 0] - truth
+    assert np.sqrt(np.mean(ours**2)) < 1.1 * np.sqrt(np.mean(theirs**2))
+
+
+def readings_of(columns):
+    commands = np.column_stack([columns["command_right"], columns["command_left"]])
+    return commands, np.column_stack([columns[name] for name in CHANNELS])
+
+
+def test_covariance_stays_a_covariance(sloping):
+    commands, readings = readings_of(sloping.columns)
+    one = InertialFilter(MODEL)
+    for first in range(0, len(readings) - 100, 100):
+        one.run(commands[first : first + 100], readings[first : first + 100])
+        np.testing.assert_array_equal(one.covariance, one.covariance.T)
+        assert np.linalg.eigvalsh(one.covariance).min() > -1e-12
+
+
+def test_pieces_give_the_bits_of_the_whole(sloping):
+    commands, readings = readings_of(sloping.columns)
+    whole, _ = run_inertial_filter(MODEL, sloping.columns)
+    one = InertialFilter(MODEL)
+    one.run(commands[:50], readings[:50])
+    one.reset()
+    pieces = [one.run(commands[k : k + 7], readings[k : k + 7])[0] for k in range(0, len(readings), 7)]
+    # run_inertial_filter takes its steps from the column of times, whose last bits differ
+    np.testing.assert_allclose(np.concatenate(pieces), whole, rtol=1e-6, atol=1e-9)
+    again = InertialFilter(MODEL).run(commands, readings)[0]
+    np.testing.assert_array_equal(np.concatenate(pieces), again)
+
+
+def test_gaps_and_outliers_are_survived(level):
+    commands, readings = readings_of(level.columns)
+    readings[300:400, :2] = np.nan
+    readings[500:510, 2] = np.nan
+    readings[600, :] = 1e6
+    readings[700, :] = 1e300
+    states, standardised = InertialFilter(MODEL).run(commands, readings)
+    assert np.isfinite(states).all()
+    assert np.isnan(standardised[500:510, 2]).all()
+    assert np.abs(states[1200:, 0] - level.columns["true_v_x"][1200:]).max() < 0.03
+
+
+def test_initial_state_and_names():
+    state, covariance = MODEL.initial()
+    assert len(INERTIAL_STATE) == len(state) == len(covariance) == 15
+    assert state[PATCH_AHEAD] == MODEL.knowledge.patch_ahead
+    assert covariance[GRAVITY, GRAVITY] == pytest.approx(MODEL.knowledge.gravity_deviation**2)
+    with pytest.raises(InputError, match="balance_interval"):
+        InertialKnowledge(balance_interval=0)
+
+
+def test_dead_reckoning_follows_the_true_path(sloping):
+    columns = sloping.columns
+    reckoning = DeadReckoning(MODEL)
+    reckoning.reset(-0.5, 0.0, 0.0)
+    commands, readings = readings_of(columns)
+    for first in range(0, len(readings), 10):
+        found = reckoning.update(commands[first], readings[first : first + 10])
+    assert math.hypot(found.x - columns["true_x"][-1], found.y - columns["true_y"][-1]) < 0.12
+    assert found.yaw == pytest.approx(columns["true_yaw"][-1], abs=0.03)
+
+
+def test_a_sample_costs_at_most_twice_that_of_the_flat_filter(level):
+    commands, readings = readings_of(level.columns)
+    flat, inertial = BatchFilter(FilterModel.of(ROBOT, Sensors()), 1), InertialFilter(MODEL)
+
+    def cost(run):
+        start = time.process_time()
+        run()
+        return time.process_time() - start
+
+    runs = (lambda: flat.step(commands[None], readings[None]), lambda: inertial.run(commands, readings))
+    costs = np.array([[cost(run) for run in runs] for _ in range(15)])[3:]
+    assert np.median(costs[:, 1] / costs[:, 0]) < 2.0  # 1.1 where nothing else runs
