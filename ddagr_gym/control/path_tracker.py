@@ -81,7 +81,7 @@ class MotionEstimator(Protocol):
 
 
 class PathTracker(TurnController):
-    """Follows the commanded path by the estimated pose; theory: control, eq. (13).
+    """Follows the commanded path by the estimated pose; theory: control, eq. (7).
 
     Needs the raw samples (``info_level="full"``), of which it reads nothing but sensors and its own command.
 

@@ -195,7 +195,7 @@ def bootstrap(
 def improvement_share(candidate: ArrayLike, baseline: ArrayLike) -> float:
     """Probability that a random run of the candidate scores lower than one of the baseline, averaged over tasks.
 
-    Ties count one half (Mann-Whitney statistic over the number of pairs; theory: control, eq. (11)). Lower is better.
+    Ties count one half (Mann-Whitney statistic over the number of pairs; theory: control, eq. (12)). Lower is better.
 
     Args:
         candidate, baseline: (runs, tasks) with equal tasks; the runs may differ.
