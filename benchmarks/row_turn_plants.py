@@ -1,10 +1,10 @@
 """Row turns on plants that the controllers were not made for: which estimator and which loop bears what.
 
-    python -m benchmarks.row_turn_plants [--scenarios 60] [--controllers B1,B4,B6_flat,B6,true_path] [--output FILE]
+    python -m benchmarks.row_turn_plants [--scenarios 40] [--controllers B1,B4,B6_flat,B6,true_path] [--output FILE]
 
 The same soils in range, robots, sensors and noise on every plant: level ground, slopes in random directions, soil of
 less strength from half of the turn on, other lateral forces, late commands, more mass. The scenarios are for
-development: they have seeds of their own, and none of the frozen sets is read. About a quarter of an hour of one core
+development: they have seeds of their own, and none of the frozen sets is read. About three minutes of one core
 with its defaults; writes ``benchmarks/results/row_turn_plants.json`` and a picture beside it.
 """
 
@@ -195,7 +195,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--controllers", default=",".join(CONTROLLERS), help="names, separated by commas")
     parser.add_argument("--plants", default=",".join(PLANTS), help="names, separated by commas")
-    parser.add_argument("--scenarios", type=int, default=60, help="turns of each controller on each plant")
+    parser.add_argument("--scenarios", type=int, default=40, help="turns of each controller on each plant")
     parser.add_argument("--output", type=Path, default=RESULT, help="JSON file; the picture lies beside it")
     given = parser.parse_args(arguments)
     try:

@@ -283,7 +283,9 @@ def controller_version(name: str) -> str:
     """Text that changes when a controller's gains or weights do."""
     if _policy(name):
         return policy_version(name)
-    return f"{name} {ladder_gains()!r}" if name not in ("B0", "B1") else name
+    if name in ("B0", "B1"):
+        return name
+    return f"{name} {ladder_gains()!r}" + (f" {inertial_model()!r}" if name == "B6" else "")
 
 
 def find_controller(name: str, turn: RowTurn, gains: LadderGains | None = None) -> Controller:
