@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from ddagr_gym.calibration.files import PAGE
+from ddagr_gym.calibration.parts import PARTS
 from ddagr_gym.diagnosis.answer.drivetrain import PART_TITLES, DrivetrainAnswer, ForecastComparison, PartEvidence
 from ddagr_gym.diagnosis.answer.verdict import Diagnosis, Finding
 from ddagr_gym.diagnosis.wording import amounts, size
@@ -63,14 +64,16 @@ def part_rows(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
     """One row per part that was tried, under :data:`PART_HEADER`; none where the drivetrain was not asked for."""
     found = {finding.name: finding for finding in diagnosis.findings}
     answer = diagnosis.drivetrain
-    return [] if answer is None else [_part_row(part, found.get(part.name)) for part in answer.parts]
+    return [] if answer is None else [_part_row(part, found.get(part.name), answer.names) for part in answer.parts]
 
 
-def _part_row(part: PartEvidence, finding: Finding | None) -> tuple[str, ...]:
+def _part_row(part: PartEvidence, finding: Finding | None, kept: Sequence[str]) -> tuple[str, ...]:
     sizes = "" if finding is None else "; ".join(size(item) for item in amounts(finding.parameters).values())
+    idle = next((item.needs for item in PARTS if item.name == part.name), ())
+    absent = "nothing to act on" if idle and not set(idle) & set(kept) else "not needed"
     return (
         PART_TITLES[part.name],
-        sizes if part.kept else "not needed",
+        sizes if part.kept else absent,
         f"{100.0 * part.growth:+.1f} %",
         "–" if part.error is None else f"{100.0 * part.error:.1f} %",
     )

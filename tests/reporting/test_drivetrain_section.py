@@ -9,7 +9,11 @@ from ddagr_gym.reporting.diagnosis_text import outcome_text
 from tests.reporting.test_diagnosis_page import diagnosis, evidence
 
 ANSWER = DrivetrainAnswer(
-    (PartEvidence("command_delay", True, 0.084, 0.017), PartEvidence("integral", False, -0.015, None)),
+    (
+        PartEvidence("command_delay", True, 0.084, 0.017),
+        PartEvidence("integral", False, -0.015, None),
+        PartEvidence("integral_limit", False, 0.29, 0.06),
+    ),
     (
         ForecastComparison("yard.csv, first quarter", "heading", 5.0, "rad", 3.25, 1.21, 1.27, (0.78, 1.6)),
         ForecastComparison("yard.csv, first quarter", "wheel_speed", None, "rad/s", 3.27, 1.31, 1.44, None),
@@ -31,6 +35,7 @@ def test_the_page_has_parts_errors_and_what_is_left(tmp_path):
     assert "<h2>Between command and wheel</h2>" in page
     assert "<td>dead time of the commands</td><td>0.24 ± 0.02 s</td><td>+8.4 %</td><td>1.7 %</td>" in page
     assert "<td>integral part of the speed loop</td><td>not needed</td><td>-1.5 %</td><td>–</td>" in page
+    assert "<td>limit of the integral part</td><td>nothing to act on</td><td>+29.0 %</td><td>6.0 %</td>" in page
     assert '<div class="tile"><b>84 %</b><span>of the squared error of the wheel speeds explained' in page
     assert '<div class="tile"><b>1.21 rad</b><span>off in heading after 5 s there, instead of 3.25 rad' in page
     assert (tmp_path / PICTURES / "drivetrain_parts.png").is_file()
