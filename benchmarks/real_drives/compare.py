@@ -20,9 +20,9 @@ from ddagr_gym.calibration.result import CALIBRATED, DATA_SHEET, KINEMATIC
 from ddagr_gym.calibration.run import Outcome
 from ddagr_gym.calibration.settings import HISTORY
 from ddagr_gym.identification.fit_numerics import field_numerics
+from ddagr_gym.identification.residual_weights import ROBUST
 from ddagr_gym.identification.window_model import WindowModel
 from ddagr_gym.identification.windows import CHANNELS, WindowSet, cut_windows
-from ddagr_gym.replay_analysis.fitting import ROBUST
 from ddagr_gym.replay_analysis.horizons import METRICS, horizon_errors
 from ddagr_gym.replay_analysis.intervals import RESAMPLES, error_statistics
 from ddagr_gym.replay_analysis.kinematic import KinematicModel, fit_motor, fit_track

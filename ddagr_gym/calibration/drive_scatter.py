@@ -24,7 +24,7 @@ from ddagr_gym.calibration.parts import RobotModel
 from ddagr_gym.calibration.result import Scatter
 from ddagr_gym.identification.gauss_newton import linearised
 from ddagr_gym.identification.parameters import ModelParameter, per_group
-from ddagr_gym.replay_analysis.fitting import Weights
+from ddagr_gym.identification.residual_weights import Weights
 
 Array = NDArray[np.float64]
 

@@ -15,11 +15,11 @@ from ddagr_gym.calibration.left_out import ENCODERS, Forecast, fold_name, folds
 from ddagr_gym.calibration.result import CALIBRATED, DATA_SHEET, KINEMATIC, ForecastError
 from ddagr_gym.calibration.simulator_values import fitted_robot, fitted_sensors, fitted_soil
 from ddagr_gym.identification.fit_numerics import field_numerics
+from ddagr_gym.identification.residual_weights import ROBUST
 from ddagr_gym.identification.window_model import WindowModel
 from ddagr_gym.identification.windows import CHANNELS, WindowSet
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.physics.effects import Effect
-from ddagr_gym.replay_analysis.fitting import ROBUST
 from ddagr_gym.replay_analysis.horizons import METRICS, horizon_errors
 from ddagr_gym.replay_analysis.intervals import error_statistics
 from ddagr_gym.replay_analysis.kinematic import KinematicModel, fit_motor, fit_track

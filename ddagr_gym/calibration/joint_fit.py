@@ -24,16 +24,16 @@ from ddagr_gym.identification.parameters import (
     soil_parameters,
 )
 from ddagr_gym.identification.problem import Point, Problem
-from ddagr_gym.identification.windows import CHANNELS, WindowSet
-from ddagr_gym.parameters import Numerics, Soil
-from ddagr_gym.physics.wheel_forces import soil_vector
-from ddagr_gym.replay_analysis.fitting import (
+from ddagr_gym.identification.residual_weights import (
     LEAST_GYRO_BIAS,
     UNKNOWN_GYRO_BIAS,
     Weights,
     misfit_weights,
     noise_weights,
 )
+from ddagr_gym.identification.windows import CHANNELS, WindowSet
+from ddagr_gym.parameters import Numerics, Soil
+from ddagr_gym.physics.wheel_forces import soil_vector
 from ddagr_gym.replay_analysis.kinematic import Motor
 
 Array = NDArray[np.float64]

@@ -19,9 +19,8 @@ from ddagr_gym.calibration.joint_fit import FittedModel, fit_model
 from ddagr_gym.calibration.parts import RobotModel
 from ddagr_gym.identification.gauss_newton import linearised
 from ddagr_gym.identification.least_squares import Linearised, huber_loss
+from ddagr_gym.identification.residual_weights import Weights, residuals
 from ddagr_gym.identification.windows import CHANNELS, WindowSet
-from ddagr_gym.replay_analysis.fitting import Weights
-from ddagr_gym.replay_analysis.residuals import residuals
 
 Array = NDArray[np.float64]
 Booleans = NDArray[np.bool_]

@@ -31,10 +31,10 @@ from ddagr_gym.diagnosis.change.ordinary import (
 from ddagr_gym.diagnosis.change.reference import OrdinaryDrive, scan_ordinary
 from ddagr_gym.diagnosis.store import StepCache
 from ddagr_gym.identification.parameters import ModelParameter, robot_parameters
+from ddagr_gym.identification.residual_weights import UNKNOWN_GYRO_BIAS, Weights, misfit_weights, noise_weights
 from ddagr_gym.identification.timing_repair import aligned_poses
 from ddagr_gym.identification.windows import WindowSet
 from ddagr_gym.parameters import Robot
-from ddagr_gym.replay_analysis.fitting import UNKNOWN_GYRO_BIAS, Weights, misfit_weights, noise_weights
 
 Array = NDArray[np.float64]
 

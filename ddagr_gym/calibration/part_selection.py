@@ -20,8 +20,8 @@ from ddagr_gym.calibration.left_out import fold_sigma, forecast_loss, forecasts
 from ddagr_gym.calibration.parts import PARTS, RobotModel, idle_parts
 from ddagr_gym.calibration.result import PartDecision
 from ddagr_gym.diagnosis.store import StepCache
+from ddagr_gym.identification.residual_weights import Weights
 from ddagr_gym.identification.windows import WindowSet
-from ddagr_gym.replay_analysis.fitting import Weights
 
 CONFIDENCE = 0.84
 """One-sided, with which a part must help: one standard error where there are many drives."""

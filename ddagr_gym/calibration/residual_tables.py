@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from ddagr_gym.calibration.forecast_errors import Forecasts
 from ddagr_gym.calibration.result import CALIBRATED, DATA_SHEET, Spectrum, Unexplained
+from ddagr_gym.identification.residual_weights import residuals
 from ddagr_gym.identification.signals import on_lines
 from ddagr_gym.identification.windows import CHANNELS, WindowSet
 from ddagr_gym.recordings.schema import CHANNELS as SCHEMA
-from ddagr_gym.replay_analysis.residuals import residuals
 
 Array = NDArray[np.float64]
 Booleans = NDArray[np.bool_]

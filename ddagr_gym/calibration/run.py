@@ -41,10 +41,10 @@ from ddagr_gym.diagnosis.gates.source_digest import code_digest, source_digest
 from ddagr_gym.diagnosis.gates.thresholds import NullRun
 from ddagr_gym.diagnosis.preprocessing.input_requirements import content_hash
 from ddagr_gym.diagnosis.store import StepStore
+from ddagr_gym.identification.residual_weights import Weights
 from ddagr_gym.identification.windows import WindowSet
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.recordings.schema import Recording
-from ddagr_gym.replay_analysis.fitting import Weights
 from ddagr_gym.version import __version__
 
 Progress = Callable[[str], None]

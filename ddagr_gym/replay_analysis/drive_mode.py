@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ddagr_gym.deprecation import renamed
 from ddagr_gym.identification.data_split import clusters, held_out, training
+from ddagr_gym.identification.residual_weights import noise_weights, residuals
 from ddagr_gym.identification.windows import WindowSet
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.physics.effects import Effect
@@ -23,7 +24,6 @@ from ddagr_gym.replay_analysis.fitting import (
     drive_mode_parameters,
     fit_drive_mode,
     motor_start,
-    noise_weights,
 )
 from ddagr_gym.replay_analysis.horizons import HORIZONS, METRICS, heading_growth, horizon_errors
 from ddagr_gym.replay_analysis.intervals import compare, error_statistics
@@ -44,7 +44,7 @@ from ddagr_gym.replay_analysis.report import (
     Rollout,
     Speed,
 )
-from ddagr_gym.replay_analysis.residuals import RECORDED, bin_values, binned_residuals, channel_residuals, residuals
+from ddagr_gym.replay_analysis.residuals import RECORDED, bin_values, binned_residuals, channel_residuals
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]

@@ -23,33 +23,27 @@ from ddagr_gym.identification.parameters import (
 )
 from ddagr_gym.identification.problem import Point, Problem
 from ddagr_gym.identification.recording_noise import RecordingNoise
-from ddagr_gym.identification.windows import CHANNELS, WindowSet
+from ddagr_gym.identification.residual_weights import (
+    LEAST_GYRO_BIAS,
+    UNKNOWN_GYRO_BIAS,
+    Weights,
+    misfit_weights,
+)
+from ddagr_gym.identification.windows import WindowSet
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.replay_analysis.kinematic import Motor
-from ddagr_gym.replay_analysis.residuals import residuals, successive_correlation
 
 Array = NDArray[np.float64]
 
-UNFITTED = ("specific_force_x", "specific_force_y")
-"""Not fitted: tilt of the ground, lever arm and vibration are all in them, and not in the nominal model."""
 MOTOR_PARAMETERS = ("motor_rate", "maximum_wheel_speed")
 """Not fitted where recorded wheel speeds drive."""
 
 LATEST_CLOCK = 0.5
 """Drive kept before and after every window, and so the largest lateness of a clock that a fit can find [s]."""
 
-ROBUST = 2.0
-"""Weighted residual from which the loss is linear (ours): what the model cannot explain must not bend it."""
-
 MOST_WINDOWS = 150
 """Training windows that a fit uses, evenly chosen: 5 min of 2 s windows."""
-
-UNKNOWN_GYRO_BIAS = 0.005
-"""Prior where a robot never stood [rad/s]: that of a MEMS gyro (ours)."""
-
-LEAST_GYRO_BIAS = 2e-4
-"""Least prior [rad/s]: the bias of a gyro wanders by so much in a drive (ours)."""
 
 PASSES = 2
 """Fits: the first weighs by the sensors' noise, the second by what the first leaves unexplained."""
@@ -57,34 +51,8 @@ PASSES = 2
 ITERATIONS = 8
 """Most Gauss-Newton steps of a pass (ours): field drives take 3 to 8."""
 
-_NORMAL = 1.4826
-"""Standard deviation of a normal variable over the median of its size."""
-
-_STRONGEST = 0.98
-"""Correlation of successive samples beyond which they are not weighed down further (ours): a hundred are worth one."""
-
 _AT_BOUND = 1e-9
 """Distance from a bound that is none, in the unit of the parameter."""
-
-_FEWEST = 20
-"""Samples of a channel below which its residuals change no weight (ours)."""
-
-
-@dataclass(frozen=True, eq=False)
-class Weights:
-    """Weights of a fit.
-
-    Correlated samples count for less: with the correlation r of successive ones (1 + r)/(1 - r) of them are worth one
-    (M. S. Bartlett 1946). Their standard deviation is enlarged by the root of that, the size from which the loss is
-    linear reduced by it, so that outliers are judged by the size of single samples.
-
-    Attributes:
-        sigma: (W, 1, 8) enlarged standard deviations; infinite for channels that are left out.
-        robust: (8,) weighted residuals from which the loss is linear.
-    """
-
-    sigma: Array
-    robust: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,58 +89,6 @@ class DriveModeFit:
         """Names of the parameters that sit at a bound."""
         pairs = zip(self.parameters, self.values, strict=True)
         return tuple(p.name for p, value in pairs if value <= p.low + _AT_BOUND or value >= p.high - _AT_BOUND)
-
-
-def noise_weights(
-    noise: Sequence[RecordingNoise],
-    windows: WindowSet,
-    imposed: bool,
-    dead: Sequence[str],
-    unfitted: Sequence[str] = UNFITTED,
-) -> Weights:
-    """Weights by the recordings' noise.
-
-    Args:
-        noise: one per recording.
-        windows: to be fitted.
-        imposed: True where the encoders drive, and so cannot judge.
-        dead: channels to leave out.
-        unfitted: further ones; parameters are fitted without UNFITTED, initial states with all.
-    """
-    roots = np.stack([[_root(item.channels[name].correlation) for name in CHANNELS] for item in noise])
-    sigma = (np.stack([item.sigma for item in noise]) * roots)[windows.recording][:, None, :]
-    left_out = [*unfitted, *dead, *(("encoder_right", "encoder_left") if imposed else ())]
-    sigma[..., [CHANNELS.index(name) for name in left_out]] = np.inf
-    return Weights(sigma, ROBUST / roots.max(axis=0))
-
-
-def misfit_weights(windows: WindowSet, prediction: Array, before: Weights) -> Weights:
-    """Weights by the residuals of a fit: their robust size and their correlation, never below the noise's.
-
-    Args:
-        windows: that were fitted.
-        prediction: (W, T, 8) of the fit.
-        before: weights of the fit.
-    """
-    sigma, robust = before.sigma.copy(), before.robust.copy()
-    left = residuals(windows, prediction)
-    for k in range(len(CHANNELS)):
-        residual = left[..., k]
-        known = np.isfinite(residual)
-        if known.sum() < _FEWEST or not np.isfinite(sigma[..., k]).any():
-            continue
-        size = _NORMAL * float(np.median(np.abs(residual[known])))
-        limit = 3.0 * size
-        root = _root(successive_correlation(np.clip(residual, -limit, limit)))
-        sigma[..., k] = np.maximum(sigma[..., k], size * root)
-        robust[k] = min(robust[k], ROBUST / root)
-    return Weights(sigma, robust)
-
-
-def _root(correlation: float) -> float:
-    """Root of the samples that are worth one."""
-    kept = min(max(correlation, 0.0), _STRONGEST)
-    return float(np.sqrt((1.0 + kept) / (1.0 - kept)))
 
 
 def drive_mode_parameters(

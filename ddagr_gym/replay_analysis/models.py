@@ -14,11 +14,12 @@ from ddagr_gym.identification.fit_numerics import field_numerics
 from ddagr_gym.identification.gauss_newton import fit_states
 from ddagr_gym.identification.nuisances import Nuisances
 from ddagr_gym.identification.problem import Problem
+from ddagr_gym.identification.residual_weights import ROBUST, noise_weights
 from ddagr_gym.identification.window_model import WindowModel
 from ddagr_gym.identification.windows import CHANNELS, WindowSet
 from ddagr_gym.parameters import Numerics, Robot, Soil
 from ddagr_gym.physics.effects import Effect
-from ddagr_gym.replay_analysis.fitting import ROBUST, DriveModeFit, noise_weights
+from ddagr_gym.replay_analysis.fitting import DriveModeFit
 from ddagr_gym.replay_analysis.kinematic import KinematicModel, Motor, fit_motor, fit_track
 from ddagr_gym.replay_analysis.prepare import Prepared
 from ddagr_gym.replay_analysis.report import EFFECTIVE_TRACK, NO_SLIP, BaselineReport, Speed

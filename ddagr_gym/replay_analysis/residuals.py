@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.frames import wrap_angle
+from ddagr_gym.identification.residual_weights import successive_correlation
 from ddagr_gym.identification.windows import CHANNELS, WindowSet
 from ddagr_gym.physics import layout
 from ddagr_gym.recordings.schema import CHANNELS as SCHEMA
@@ -82,13 +83,6 @@ class ResidualBins:
     counts: tuple[int, ...]
 
 
-def residuals(windows: WindowSet, prediction: Array) -> Array:
-    """Measurement less prediction (W, T, 8), NaN where there is no sample; headings on the circle."""
-    difference = windows.measured - prediction
-    difference[..., CHANNELS.index("pose_yaw")] = wrap_angle(difference[..., CHANNELS.index("pose_yaw")])
-    return difference
-
-
 def channel_residuals(residual: Array, sigma: Array, left_out: tuple[str, ...] = ()) -> tuple[ChannelResidual, ...]:
     """Table of the channels that have samples.
 
@@ -108,16 +102,6 @@ def channel_residuals(residual: Array, sigma: Array, left_out: tuple[str, ...] =
         correlation, noise = successive_correlation(values), float(sigma[k])
         table.append(ChannelResidual(name, unit, int(known.sum()), size, bias, correlation, noise, size / noise))
     return tuple(table)
-
-
-def successive_correlation(values: Array) -> float:
-    """Correlation of successive known samples inside the windows (W, T); 0 for none."""
-    product, power = 0.0, 0.0
-    for row in values:
-        known = row[np.isfinite(row)]
-        product += float(known[1:] @ known[:-1])
-        power += 0.5 * float(known[1:] @ known[1:] + known[:-1] @ known[:-1])
-    return product / power if power > 0.0 else 0.0
 
 
 def bin_values(windows: WindowSet, record: Array) -> Mapping[str, Array]:

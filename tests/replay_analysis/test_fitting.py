@@ -7,17 +7,10 @@ import pytest
 
 from ddagr_gym.identification.noise import ChannelNoise
 from ddagr_gym.identification.recording_noise import RecordingNoise
+from ddagr_gym.identification.residual_weights import ROBUST, UNKNOWN_GYRO_BIAS, misfit_weights, noise_weights
 from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.presets import get_robot, get_soil
-from ddagr_gym.replay_analysis.fitting import (
-    LATEST_CLOCK,
-    ROBUST,
-    UNKNOWN_GYRO_BIAS,
-    drive_mode_parameters,
-    misfit_weights,
-    motor_start,
-    noise_weights,
-)
+from ddagr_gym.replay_analysis.fitting import LATEST_CLOCK, drive_mode_parameters, motor_start
 from ddagr_gym.replay_analysis.kinematic import Motor
 
 GYRO = CHANNELS.index("yaw_rate")

@@ -5,15 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ddagr_gym.identification.residual_weights import residuals, successive_correlation
 from ddagr_gym.identification.windows import CHANNELS
-from ddagr_gym.replay_analysis.residuals import (
-    BIN_QUANTITIES,
-    bin_values,
-    binned_residuals,
-    channel_residuals,
-    residuals,
-    successive_correlation,
-)
+from ddagr_gym.replay_analysis.residuals import BIN_QUANTITIES, bin_values, binned_residuals, channel_residuals
 
 GYRO, YAW = CHANNELS.index("yaw_rate"), CHANNELS.index("pose_yaw")
 

@@ -33,10 +33,10 @@ from ddagr_gym.identification.gauss_newton import Fitted
 from ddagr_gym.identification.parameters import ModelParameter, robot_parameters
 from ddagr_gym.identification.problem import Problem
 from ddagr_gym.identification.recording_noise import recording_noise
+from ddagr_gym.identification.residual_weights import UNKNOWN_GYRO_BIAS, Weights, misfit_weights, noise_weights
 from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.recordings.schema import Recording
-from ddagr_gym.replay_analysis.fitting import UNKNOWN_GYRO_BIAS, Weights, misfit_weights, noise_weights
 
 Array = NDArray[np.float64]
 
