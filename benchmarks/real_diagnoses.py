@@ -105,7 +105,7 @@ def draw(entries: Mapping[str, Mapping[str, Any]], path: Path) -> None:
 
 
 def _label(name: str) -> str:
-    return f"{name.rpartition('/')[2].removeprefix('warthog_')}\n{DRIVES[name][0]}"
+    return f"{name.rpartition('/')[2]}\n{DRIVES[name][0]}"
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
