@@ -225,7 +225,13 @@ class Recording:
         Args:
             maximum_age: age [s] beyond which a command counts as lapsed (NaN).
         """
-        return _hold(self, "command_right", maximum_age), _hold(self, "command_left", maximum_age)
+        valid = self.command_valid
+        return _hold(self, "command_right", maximum_age, valid), _hold(self, "command_left", maximum_age, valid)
+
+    def held_encoders(self, maximum_age: float = math.inf) -> tuple[FloatArray, FloatArray]:
+        """Bank speeds (right, left) as last read at every row, at most ``maximum_age`` [s] ago; else NaN."""
+        every = np.ones(len(self), dtype=bool)
+        return _hold(self, "encoder_right", maximum_age, every), _hold(self, "encoder_left", maximum_age, every)
 
     @classmethod
     def from_columns(
@@ -327,16 +333,16 @@ def _check_ranges(kind: str, ranges: Ranges, n: int) -> None:
         previous = stop
 
 
-def _hold(recording: Recording, name: str, maximum_age: float) -> FloatArray:
+def _hold(recording: Recording, name: str, maximum_age: float, valid: npt.NDArray[np.bool_]) -> FloatArray:
     values = recording[name]
-    known = np.isfinite(values) & recording.command_valid
+    known = np.isfinite(values) & valid
     carried = np.full(len(recording), np.nan)
     for span in recording.spans():
         rows = np.arange(span.start, span.stop)
         last = np.maximum.accumulate(np.where(known[span], rows, -1))
         fresh = (last >= 0) & (recording.t[span] - recording.t[last] <= maximum_age)
         carried[span] = np.where(fresh, values[last], np.nan)
-    carried[~recording.command_valid] = np.nan
+    carried[~valid] = np.nan
     return carried
 
 

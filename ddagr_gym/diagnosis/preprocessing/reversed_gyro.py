@@ -24,6 +24,11 @@ FEWEST = 200
 """Samples that a correlation needs (ours: its standard error is then 0.07)."""
 
 
+OLDEST = 0.5
+"""Age up to which a reading of one bank stands beside the other's, where they are read in turn [s] (ours: twice the
+period of encoders at 4 Hz)."""
+
+
 @dataclass(frozen=True)
 class ReversedGyro:
     """Evidence of a reversed gyro.
@@ -59,7 +64,9 @@ def _measured_banks(recording: Recording) -> Banks:
     """Bank speeds (right, left), or what they are asked to be where no encoder says."""
     if not recording.has("encoder_right", "encoder_left"):
         return recording.held_commands()
-    return recording["encoder_right"], recording["encoder_left"]
+    right, left = recording["encoder_right"], recording["encoder_left"]
+    together = np.isfinite(right) & np.isfinite(left)
+    return (right, left) if together.sum() >= FEWEST else recording.held_encoders(OLDEST)
 
 
 def _turning(recording: Recording, banks: Banks) -> NDArray[np.float64]:

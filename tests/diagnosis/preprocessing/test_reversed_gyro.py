@@ -28,6 +28,20 @@ def test_commands_serve_where_there_are_no_encoders(drive: Callable[..., Recordi
     assert find_reversed_gyro([replace(wrong, channels=kept)]) is not None
 
 
+@pytest.mark.parametrize(("effects", "reversed_"), [((), False), (("gyro_sign=1",), True)])
+def test_banks_that_are_read_in_turn_serve_too(
+    drive: Callable[..., Recording], effects: tuple, reversed_: bool
+) -> None:
+    found = drive(effects)
+    rows = np.arange(len(found))
+    in_turn = {
+        name: np.where(rows % 6 == start, found[name], np.nan)
+        for start, name in ((0, "encoder_right"), (3, "encoder_left"))
+    }
+    given = replace(found, channels={**found.channels, **in_turn})
+    assert (find_reversed_gyro([given]) is not None) is reversed_
+
+
 @pytest.mark.parametrize("level", [0.0, 0.003])
 def test_dead_gyro_is_not_a_reversed_one(drive: Callable[..., Recording], level: float) -> None:
     dead = drive()
