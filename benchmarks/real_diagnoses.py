@@ -105,7 +105,8 @@ def draw(entries: Mapping[str, Mapping[str, Any]], path: Path) -> None:
 
 
 def _label(name: str) -> str:
-    return f"{name.rpartition('/')[2]}\n{DRIVES[name][0]}"
+    folder, _, drive = name.rpartition("/")
+    return f"{DRIVES[name][0]}\n{folder if folder == 'open' else drive}"
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
