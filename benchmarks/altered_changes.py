@@ -44,6 +44,15 @@ TILTED = math.radians(3.0)
 DOUBLED = 2.0
 """Encoders of which both edges are counted where the driver expects one."""
 
+ONE_ENCODER = 1.2
+"""One encoder of two whose gear or count was exchanged."""
+
+BIASED = 0.05
+"""A gyro that was switched on cold [rad/s]."""
+
+WEAKENED = 0.85
+"""Commands of one side, as if its motor had another gain than the others."""
+
 QUARTER_TURN = math.pi / 2.0
 """An IMU whose axes were taken from the wrong drawing [rad]."""
 
@@ -174,6 +183,34 @@ def late_sensors(table: Table) -> Table:
 def scaled(table: Table, names: Sequence[str], factor: float) -> Table:
     """Columns times a factor."""
     return {**table, **{name: texts(factor * numbers(table, name)) for name in names}}
+
+
+def biased(table: Table) -> Table:
+    """A yaw rate that reads too much."""
+    (name,) = _yaw_rate(table)
+    return {**table, name: texts(numbers(table, name) + BIASED)}
+
+
+def one_side_commanded(table: Table, half_track: float) -> Table:
+    """Commands of the right side times a factor; those of the body are taken apart into sides and put together again.
+
+    Args:
+        table: of the drive.
+        half_track: of the robot, as the map takes it [m].
+    """
+    if "cmd_right" in table:
+        return scaled(table, ("cmd_right",), WEAKENED)
+    v, turn = numbers(table, "cmd_v"), half_track * numbers(table, "cmd_w")
+    right, left = WEAKENED * (v + turn), v - turn
+    return {
+        **table, "cmd_v": texts(0.5 * (right + left)), "cmd_w": texts(0.5 * (right - left) / half_track),
+    }  # fmt: skip
+
+
+def encoders_exchanged(table: Table) -> Table:
+    """Each encoder's readings in the column of the other."""
+    left, right = layout_of(table).encoders
+    return {**table, left: table[right], right: table[left]}
 
 
 def turned(table: Table, axes: Array) -> Table:

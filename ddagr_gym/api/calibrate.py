@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
-from ddagr_gym.api.inputs import Source, Sources, recordings_from
+from ddagr_gym.api.inputs import ENDINGS, Source, Sources, recordings_from
 from ddagr_gym.api.nominal import OWN, RobotLike, SoilLike, robot_from, soil_from, soil_name_of
 from ddagr_gym.api.results import Report, Table
 from ddagr_gym.errors import InputError, at_least
@@ -225,7 +225,10 @@ def _number(drive: DriveLike, given: Sequence[Source], found: Sequence[Recording
         return drive
     if isinstance(drive, str | os.PathLike):
         name = Path(drive).name
-        matching = [n for n, recording in enumerate(found) if recording.meta.source in (str(drive), name)]
+        sources = [recording.meta.source for recording in found]
+        matching = [n for n, source in enumerate(sources) if source in (str(drive), name)]
+        # an imported file still says what it was imported from
+        matching = matching or [n for n, source in enumerate(sources) if _stem(source) == _stem(name)]
     else:
         matching = [n for n, item in enumerate(given) if item is drive and len(given) == len(found)]
     if not matching:
@@ -235,6 +238,11 @@ def _number(drive: DriveLike, given: Sequence[Source], found: Sequence[Recording
     if len(matching) > 1:
         raise InputError(f"{drive} is the name of {len(matching)} drives: give grounds by their numbers.")
     return matching[0]
+
+
+def _stem(name: str) -> str:
+    """Name of a recording's file without its ending."""
+    return next((name.removesuffix(end) for end in sorted(ENDINGS, key=len, reverse=True) if name.endswith(end)), name)
 
 
 def _soils(soil: SoilLike | Mapping[str, SoilLike], by_drive: Sequence[str]) -> dict[str, SoilLike]:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.calibration.calibration_data import CalibrationData
-from ddagr_gym.calibration.parts import RobotModel, complete_robot, first_values, shared_parameters
-from ddagr_gym.calibration.settings import LONGEST_DELAY
+from ddagr_gym.calibration.parts import RobotModel, complete_robot, shared_parameters
 from ddagr_gym.identification.block_means import sample_windows
 from ddagr_gym.identification.fit_numerics import FIELD_TOLERANCE, field_numerics, field_slope_numerics
 from ddagr_gym.identification.gauss_newton import Fitted, fit
@@ -31,10 +30,9 @@ from ddagr_gym.identification.residual_weights import (
     misfit_weights,
     noise_weights,
 )
-from ddagr_gym.identification.windows import CHANNELS, WindowSet
+from ddagr_gym.identification.windows import WindowSet
 from ddagr_gym.parameters import Numerics, Soil
 from ddagr_gym.physics.wheel_forces import soil_vector
-from ddagr_gym.replay_analysis.kinematic import Motor
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
@@ -51,17 +49,8 @@ FIRST_TOLERANCE = 5e-3
 LAST_ITERATIONS = 8
 """Steps of a fit that begins at the values of another one (ours)."""
 
-START_DELAYS = np.arange(0.0, LONGEST_DELAY + 1e-9, 0.05)
-"""Delays from which a fit may start [s]: a fit finds one within half of the robot's reaction, no farther."""
-
-START_FACTORS = (0.25, 0.5, 1.0, 2.0, 4.0)
-"""Factors on the data sheet's motor rate from which it may start (ours)."""
-
 OFFSET = "offset_"
 """Begins the names of parameters that carry the nominal soil of a ground; they are always held."""
-
-_ROBUST_SPEED = 0.5
-"""Error of a bank speed from which the loss of the start is linear [rad/s] (ours)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,20 +179,6 @@ def weights_by_drive(windows: WindowSet, prediction: Array, before: Weights) -> 
     return Weights(sigma, robust)
 
 
-def start_values(data: CalibrationData, windows: WindowSet, parameters: tuple[ModelParameter, ...]) -> dict[str, float]:
-    """Values from which a fit starts; delay and motor rate are the best of many, by a first-order loop without load."""
-    columns = [CHANNELS.index("encoder_right"), CHANNELS.index("encoder_left")]
-    measured = windows.measured[..., columns]
-    known = np.isfinite(measured)
-    best = (np.inf, 0.0, 1.0)
-    for delay in START_DELAYS:
-        for factor in START_FACTORS:
-            motor = Motor(factor * data.robot.motor_rate, data.robot.maximum_wheel_speed, float(delay))
-            error = (motor.speeds(windows)[:, 1:] - measured)[known] / _ROBUST_SPEED
-            best = min(best, (float(np.mean(np.sqrt(1.0 + error**2))), float(delay), factor))
-    return {**first_values(parameters), "command_delay": best[1], "motor_rate": float(np.log(best[2]))}
-
-
 def model_at(
     data: CalibrationData,
     windows: WindowSet,
@@ -248,18 +223,32 @@ def fit_model(
     return FittedModel(model, problem, found)
 
 
+def rough_fit(
+    data: CalibrationData, windows: WindowSet, model: RobotModel, start: Mapping[str, float], threads: int
+) -> tuple[FittedModel, Weights]:
+    """Fit by what the start leaves unexplained of each drive, and the weights by what that fit leaves.
+
+    The noise of good sensors is no measure of a model that is still far off: its weights would bend every parameter to
+    its bound. Arguments as :func:`weigh_and_fit`.
+    """
+    noise = first_weights(data, windows)
+    problem = make_problem(data, windows, model, noise, threads)
+    weights = weights_by_drive(windows, problem.predict(point_at(problem, start)), noise)
+    found = fit_model(
+        data, windows, model, weights, start, threads, iterations=FIRST_ITERATIONS, tolerance=FIRST_TOLERANCE
+    )
+    return found, weights_by_drive(windows, found.fitted.prediction, noise)
+
+
 def weigh_and_fit(
     data: CalibrationData,
     windows: WindowSet,
     model: RobotModel,
     start: Mapping[str, float],
     threads: int,
-    passes: Sequence[int] = (FIRST_ITERATIONS, ITERATIONS),
+    iterations: int = ITERATIONS,
 ) -> tuple[FittedModel, Weights]:
-    """Fit by what the start leaves unexplained of each drive, then by what that fit leaves, and so on.
-
-    The noise of good sensors is no measure of a model that is still far off: its weights would bend every parameter to
-    its bound.
+    """Fit by what a rough fit leaves unexplained of each drive.
 
     Args:
         data: drives.
@@ -267,19 +256,12 @@ def weigh_and_fit(
         model: robot and parameters.
         start: values by name.
         threads: of the simulator.
-        passes: most steps of each fit.
+        iterations: most steps after the rough fit.
 
     Returns:
-        The last fit, and its weights.
+        The fit, and its weights.
     """
-    weights = first_weights(data, windows)
-    problem = make_problem(data, windows, model, weights, threads)
-    prediction, values, states = problem.predict(point_at(problem, start)), dict(start), None
-    for number, iterations in enumerate(passes):
-        weights = weights_by_drive(windows, prediction, first_weights(data, windows))
-        found = fit_model(
-            data, windows, model, weights, values, threads, states=states, iterations=iterations,
-            tolerance=FIELD_TOLERANCE if number == len(passes) - 1 else FIRST_TOLERANCE,
-        )  # fmt: skip
-        values, states, prediction = found.values, found.fitted.point.states, found.fitted.prediction
+    rough, weights = rough_fit(data, windows, model, start, threads)
+    states = rough.fitted.point.states
+    found = fit_model(data, windows, model, weights, rough.values, threads, states=states, iterations=iterations)
     return found, weights

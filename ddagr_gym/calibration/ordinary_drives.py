@@ -19,7 +19,7 @@ from ddagr_gym.calibration.left_out import Forecast
 from ddagr_gym.calibration.result import Calibration
 from ddagr_gym.calibration.settings import HISTORY
 from ddagr_gym.calibration.simulator_values import SOIL_PARAMETERS, fitted_robot, fitted_soil
-from ddagr_gym.diagnosis.change.drive_fit import change_problem, change_windows, fit_nominal
+from ddagr_gym.diagnosis.change.drive_fit import change_problem, change_windows, fit_nominal, misfit_of_compared
 from ddagr_gym.diagnosis.change.ordinary import (
     LEAST_ACCELEROMETER_BIAS,
     LEAST_GYRO_BIAS,
@@ -31,7 +31,8 @@ from ddagr_gym.diagnosis.change.ordinary import (
 from ddagr_gym.diagnosis.change.reference import OrdinaryDrive, scan_ordinary
 from ddagr_gym.diagnosis.store import StepCache
 from ddagr_gym.identification.parameters import ModelParameter, robot_parameters
-from ddagr_gym.identification.residual_weights import UNKNOWN_GYRO_BIAS, Weights, misfit_weights, noise_weights
+from ddagr_gym.identification.relative_readings import usual_turning
+from ddagr_gym.identification.residual_weights import UNKNOWN_GYRO_BIAS, Weights, noise_weights
 from ddagr_gym.identification.timing_repair import aligned_poses
 from ddagr_gym.identification.windows import WindowSet
 from ddagr_gym.parameters import Robot
@@ -131,7 +132,10 @@ def ordinary_drives(
     """
     without = [_without(data, model, forecast, calibration, robot) for forecast in made]
     noise = [data.prepared.noise[int(forecast.windows.recording[0])] for forecast in made]
-    blank = Weighing(data.windows.duration, HISTORY, _lateness(data), _gyro_scale(calibration), *_UNKNOWN)
+    blank = Weighing(
+        data.windows.duration, HISTORY, _lateness(data), _gyro_scale(calibration), *_UNKNOWN,
+        turning=usual_turning(data.windows),
+    )  # fmt: skip
     left = []
     for number, (item, own) in enumerate(zip(without, noise, strict=True)):
         progress(f"what the calibrated robot leaves of {item.name}")
@@ -188,17 +192,17 @@ def _left_of(item: OrdinaryDrive, blank: Weighing, noise: Callable[[WindowSet], 
     parameters = uncertain_parameters(item.soil, item.parameters, item.deviations, blank, 1)
     first = replace(blank, sigma=weights.sigma, robust=weights.robust)
     problem = change_problem(item.robot, item.soil, windows, parameters, first, threads)
-    rough = misfit_weights(windows, problem.predict(problem.start()), weights)
+    rough = misfit_of_compared(problem.blocked, problem.predict(problem.start()), weights)
     second = replace(blank, sigma=rough.sigma, robust=rough.robust)
     problem = change_problem(item.robot, item.soil, windows, parameters, second, threads)
     fitted = fit_nominal(problem)
-    left = misfit_weights(windows, fitted.prediction, weights)
+    left = misfit_of_compared(problem.blocked, fitted.prediction, weights)
     biases = fitted.point.values[-3:]
     return _Left(left.sigma[0, 0], left.robust, float(biases[0]), biases[1:])
 
 
 def pooled(blank: Weighing, left: Sequence[_Left]) -> Weighing:
-    """Weights of all drives, and how much biases differ between them, the accelerometer's from level ground's.
+    """Weights of all drives, what sensors read too much in all of them, and how much that differs between them.
 
     Args:
         blank: how drives are cut.
@@ -209,12 +213,13 @@ def pooled(blank: Weighing, left: Sequence[_Left]) -> Weighing:
     square = np.where(known, sigma, 0.0) ** 2
     with np.errstate(divide="ignore", invalid="ignore"):
         mean = np.where(known.any(axis=0), np.sqrt(square.sum(axis=0) / known.sum(axis=0)), np.inf)
-    gyro = np.array([item.gyro_bias for item in left])
-    accelerometer = np.concatenate([item.accelerometer_bias for item in left])
+    biases = np.array([[item.gyro_bias, *item.accelerometer_bias] for item in left])
+    scatter = biases.std(axis=0, ddof=1) if len(left) > 1 else np.abs(biases[0])
     return replace(
         blank,
         sigma=mean,
         robust=np.min([item.robust for item in left], axis=0),
-        gyro_bias=max(LEAST_GYRO_BIAS, float(np.sqrt(np.mean(gyro**2)))),
-        accelerometer_bias=max(LEAST_ACCELEROMETER_BIAS, float(np.sqrt(np.mean(accelerometer**2)))),
+        gyro_bias=max(LEAST_GYRO_BIAS, float(scatter[0])),
+        accelerometer_bias=max(LEAST_ACCELEROMETER_BIAS, float(np.sqrt(np.mean(scatter[1:] ** 2)))),
+        offsets=biases.mean(axis=0) if len(left) > 1 else np.zeros(3),
     )

@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.calibration.ordinary_drives import Ordinary
+from ddagr_gym.config import Config, dump_config, parse_config
 from ddagr_gym.diagnosis.change.ordinary import Reference, Scores, Weighing
+from ddagr_gym.parameters import Robot, Soil
 
 Array = NDArray[np.float64]
 
@@ -20,7 +22,8 @@ DIGITS = 9
 
 def ordinary_as_mapping(ordinary: Ordinary) -> dict[str, Any]:
     """Plain mapping of weights and references."""
-    weighing = {item.name: _plain(getattr(ordinary.weighing, item.name)) for item in fields(Weighing)}
+    given = {item.name: getattr(ordinary.weighing, item.name) for item in fields(Weighing)}
+    weighing = {name: None if value is None else _plain(value) for name, value in given.items()}
     return {"weighing": weighing, "references": [_reference(item) for item in ordinary.references]}
 
 
@@ -41,6 +44,7 @@ def ordinary_from_mapping(mapping: Mapping[str, Any]) -> Ordinary:
         gyro_bias=float(given["gyro_bias"]),
         accelerometer_bias=float(given["accelerometer_bias"]),
         offsets=_array(given.get("offsets", [0.0, 0.0, 0.0])),
+        turning=given.get("turning"),
     )
     return Ordinary(weighing, tuple(_reference_of(item) for item in mapping["references"]))
 
@@ -64,6 +68,9 @@ def _reference(item: Reference) -> dict[str, Any]:
         "known_ground": _scores(item.known_ground),
         "other_ground": _scores(item.other_ground),
         "losses": _plain(item.losses),
+        "robot": None if item.robot is None else dump_config(item.robot),
+        "soil": None if item.soil is None else dump_config(item.soil),
+        "moved": {name: _plain(value) for name, value in item.moved.items()},
     }
 
 
@@ -75,7 +82,14 @@ def _reference_of(mapping: Mapping[str, Any]) -> Reference:
         _scores_of(mapping["known_ground"]),
         _scores_of(mapping["other_ground"]),
         _array(mapping.get("losses", [])),
+        _config_of(mapping.get("robot"), Robot),
+        _config_of(mapping.get("soil"), Soil),
+        {str(name): float(value) for name, value in mapping.get("moved", {}).items()},
     )
+
+
+def _config_of(text: str | None, kind: type[Config]) -> Config | None:
+    return None if text is None else parse_config(text, kind)
 
 
 def _scores(item: Scores) -> dict[str, Any]:

@@ -15,17 +15,16 @@ import numpy as np
 from ddagr_gym.calibration.calibration_data import CalibrationData, prepare_drives
 from ddagr_gym.calibration.drive_scatter import drive_estimates
 from ddagr_gym.calibration.effect_bank import ordinary_runs
+from ddagr_gym.calibration.fit_starts import fit_from_several
 from ddagr_gym.calibration.forecast_errors import Forecasts, all_forecasts, forecast_errors
 from ddagr_gym.calibration.identifiability import covariance, unidentified
 from ddagr_gym.calibration.input_requirements import check_drives, check_scales, drive_scale, with_gyro_forward
 from ddagr_gym.calibration.joint_fit import (
-    FIRST_ITERATIONS,
     LAST_ITERATIONS,
     Standing,
     complete_model,
     fit_model,
     model_at,
-    start_values,
     weigh_and_fit,
 )
 from ddagr_gym.calibration.left_out import forecasts
@@ -209,9 +208,7 @@ def _select(
 ) -> Selection:
     """Parts that forecasts of left-out drives ask for, by fits to some of the windows."""
     windows, judged = data.spread(settings.compared), data.spread(settings.judged)
-    progress("fit of all parts")
-    start = {**held, **start_values(data, windows, model.parameters)}
-    rough = store.step("all parts", partial(_weigh, data, windows, model, start, settings.threads))
+    rough = store.step("all parts", partial(_weigh, data, windows, model, held, settings.threads, progress))
     comparison = Comparison(data, windows, judged, rough.weights, settings.threads)
     full = store.step("all parts forecast", partial(comparison.candidate, model, rough.standing, 0))
     return select_parts(comparison, model, full, store.step, progress)
@@ -221,10 +218,11 @@ def _weigh(
     data: CalibrationData,
     windows: WindowSet,
     model: RobotModel,
-    start: Mapping[str, float],
+    held: Mapping[str, float],
     threads: int,
+    progress: Progress,
 ) -> FinalFit:
-    found, weights = weigh_and_fit(data, windows, model, start, threads)
+    found, weights = fit_from_several(data, windows, model, held, threads, progress)
     return FinalFit(found.standing, weights, {})
 
 
@@ -233,7 +231,7 @@ def _final_fit(
 ) -> FinalFit:
     """Fit of the parts that are kept; then again with the data sheet's values where the drives identify nothing."""
     windows = data.spread(settings.fitted)
-    found, weights = weigh_and_fit(data, windows, model, start, settings.threads, (FIRST_ITERATIONS, LAST_ITERATIONS))
+    found, weights = weigh_and_fit(data, windows, model, start, settings.threads, LAST_ITERATIONS)
     refused = unidentified(found)
     if refused:
         values = {name: 0.0 if name in refused else value for name, value in found.values.items()}

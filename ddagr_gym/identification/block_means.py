@@ -78,6 +78,10 @@ class BlockedWindows:
         """(W, M) block means over sigma of a change of predictions (W, T, 8); what breaks down says nothing."""
         return np.nan_to_num(self.means(after - before))
 
+    def derivative(self, changes: Array, base: Array) -> Array:
+        """The same of small changes (W, T, 8) or (W, T, 8, K) of a prediction (W, T, 8), (W, M) or (W, M, K)."""
+        return self.means(changes)
+
     def residual(self, prediction: Array) -> Array:
         """(W, M) block means of measured less predicted over sigma; headings compared on the circle."""
         difference = self.windows.measured - prediction

@@ -220,7 +220,7 @@ class Problem:
         for k, parameter in enumerate(self.nuisances.parameters):
             channel = _BIAS_CHANNEL.get(parameter.entries[0]) if len(parameter.entries) == 1 else None
             if channel is not None and not parameter.factor:
-                columns[..., k] = self._bias_column(channel, parameter.acts_in(self.blocked.windows.recording))
+                columns[..., k] = self._bias_column(channel, base, parameter.acts_in(self.blocked.windows.recording))
             elif not parameter.heading and (self.prior[k] > 0.0 or k in self._varied):
                 simulated.append(k)
         unmoved = self._varied_from(point, base)
@@ -288,11 +288,11 @@ class Problem:
             found[..., k] = np.where(chosen[:, None], change, 0.0)
         return found
 
-    def _bias_column(self, channel: int, chosen: Chosen | slice = slice(None)) -> Array:
-        """(W, M) sensitivity to what adds to a channel in the chosen windows."""
+    def _bias_column(self, channel: int, base: Array, chosen: Chosen | slice = slice(None)) -> Array:
+        """(W, M) sensitivity of a prediction (W, T, 8) to what adds to a channel in the chosen windows."""
         ones = np.zeros(self.blocked.windows.measured.shape)
         ones[chosen, :, channel] = 1.0
-        return self.blocked.means(ones)
+        return self.blocked.derivative(ones, base)
 
     def eliminate(self, point: Point, base: Array, by_parameter: Array) -> Elimination:
         """Basis of the local unknowns of each window at a point (theory: identification, eq. (7)).
@@ -305,9 +305,11 @@ class Problem:
         model, effects = self._slopes or self.model, (*self._known, *point.effects)
         unmoved = self._varied_from(point, base)
         changes = model.state_derivatives(point.values, point.states, unmoved, effects)
-        by_state = np.nan_to_num(self.blocked.means(changes))
+        by_state = np.nan_to_num(self.blocked.derivative(changes, unmoved))
         local = [
-            by_parameter[..., unknown.parameter] if unknown.channel is None else self._bias_column(unknown.channel)
+            by_parameter[..., unknown.parameter]
+            if unknown.channel is None
+            else self._bias_column(unknown.channel, base)
             for unknown in self.nuisances.local
         ]
         columns = np.concatenate([by_state, *(column[..., None] for column in local)], axis=2)

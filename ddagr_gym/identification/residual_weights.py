@@ -101,8 +101,12 @@ def misfit_weights(windows: WindowSet, prediction: Array, before: Weights) -> We
         prediction: (W, T, 8) of the fit.
         before: weights of the fit.
     """
+    return weights_by_residuals(residuals(windows, prediction), before)
+
+
+def weights_by_residuals(left: Array, before: Weights) -> Weights:
+    """The same by residuals (W, T, 8), NaN where there is no sample."""
     sigma, robust = before.sigma.copy(), before.robust.copy()
-    left = residuals(windows, prediction)
     for k in range(len(CHANNELS)):
         residual = left[..., k]
         known = np.isfinite(residual)

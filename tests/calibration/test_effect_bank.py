@@ -6,7 +6,8 @@ import pytest
 
 from ddagr_gym.calibration.calibration_data import prepare_drives
 from ddagr_gym.calibration.effect_bank import NAME, load_runs, ordinary_runs, save_runs, setting_of
-from ddagr_gym.calibration.joint_fit import complete_model, start_values, weigh_and_fit
+from ddagr_gym.calibration.fit_starts import start_values
+from ddagr_gym.calibration.joint_fit import complete_model, weigh_and_fit
 from ddagr_gym.calibration.left_out import forecasts
 from ddagr_gym.calibration.parts import PARTS
 from ddagr_gym.calibration.settings import CalibrationSettings

@@ -114,3 +114,17 @@ def test_grounds_that_do_not_fit_the_drives_are_refused(field_drive, grounds, se
 def test_soils_by_ground_need_one_for_each(field_drive):
     with pytest.raises(InputError, match="no drive is on the ground 'sand'"):
         ddagr_gym.calibrate([field_drive], "ddagr", {"sand": "lete_sand_wong"}, {"field": [0]})
+
+
+def test_an_imported_drive_is_known_by_the_name_of_its_file(field_drive):
+    """The Parquet file of an import still says what it was imported from."""
+    from ddagr_gym.api.calibrate import _number
+
+    found = [field_drive.with_meta(source="monday.csv.gz"), field_drive.with_meta(source="tuesday.bag")]
+    assert [_number(name, found, found) for name in ("monday.parquet", "data/tuesday.parquet", "tuesday.bag")] == [
+        0,
+        1,
+        1,
+    ]
+    with pytest.raises(InputError, match=r"wednesday.parquet has a ground and is not among the drives"):
+        _number("wednesday.parquet", found, found)

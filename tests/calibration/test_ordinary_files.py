@@ -13,6 +13,7 @@ from ddagr_gym.calibration.ordinary_drives import Ordinary, pooled
 from ddagr_gym.calibration.ordinary_drives import _Left as Left
 from ddagr_gym.diagnosis.change.ordinary import Reference, Scores, Weighing
 from ddagr_gym.errors import InputError
+from ddagr_gym.presets import get_robot, get_soil
 
 
 def scores() -> Scores:
@@ -22,18 +23,28 @@ def scores() -> Scores:
 
 
 WEIGHING = Weighing(6.0, 1.2, 0.1, 1.0, np.array([1.0, np.inf, *np.ones(6)]), np.full(8, 2.0), 1e-3, 0.05)
-ORDINARY = Ordinary(WEIGHING, (Reference("one.csv", "sand", False, scores(), scores()),) * 2)
+ROBOT, SOIL = get_robot("ddagr"), get_soil("thesis_a1")
+ORDINARY = Ordinary(
+    replace(WEIGHING, turning=0.2),
+    (
+        Reference("one.csv", "sand", False, scores(), scores(), robot=ROBOT, soil=SOIL, moved={"mass": 1.5}),
+        Reference("two.csv", "sand", False, scores(), scores()),
+    ),
+)
 
 
 def test_weights_and_scores_read_back(tmp_path):
     save_runs((), tmp_path / "bank.json", ORDINARY)
     found = load_ordinary(tmp_path / "bank.json")
     assert found.weighing.sigma.tolist() == WEIGHING.sigma.tolist()
-    assert found.weighing.lateness == 0.1
+    assert (found.weighing.lateness, found.weighing.turning) == (0.1, 0.2)
     first = found.references[0]
     assert (first.drive, first.ground, first.reversed_gyro) == ("one.csv", "sand", False)
     for name in ("gradient", "information", "within", "between"):
         np.testing.assert_allclose(getattr(first.known_ground, name), getattr(scores(), name), rtol=1e-8)
+    assert (first.robot, first.soil) == (ROBOT, SOIL)
+    assert first.moved == {"mass": 1.5}
+    assert (found.references[1].robot, found.references[1].soil) == (None, None)
     assert load_runs(tmp_path / "bank.json") == ()
 
 
@@ -70,5 +81,13 @@ def test_weights_are_those_of_all_drives_and_a_channel_that_one_lacks_is_weighed
     assert found.sigma[0] == pytest.approx(np.sqrt(12.5))
     assert found.sigma[1] == 2.0
     assert found.robust.tolist() == [1.5] * 8
-    assert found.gyro_bias == pytest.approx(np.sqrt(12.5e-6))
+    assert found.gyro_bias == pytest.approx(0.007 / np.sqrt(2.0))
     assert found.accelerometer_bias == pytest.approx(np.sqrt(0.005))
+    assert found.offsets.tolist() == pytest.approx([-0.0005, 0.05, -0.05])
+
+
+def test_a_single_drive_says_nothing_of_what_sensors_always_read_too_much():
+    left = [Left(np.ones(8), np.full(8, 2.0), 0.003, np.array([0.1, 0.0]))]
+    found = pooled(replace(WEIGHING, sigma=np.ones(8), robust=np.ones(8)), left)
+    assert found.offsets.tolist() == [0.0, 0.0, 0.0]
+    assert found.gyro_bias == 0.003

@@ -120,12 +120,13 @@ def _estimates(model: Model, number: int, step: Step) -> dict[str, Estimate]:
     """Sizes and shapes of a named effect, as changes against ordinary drives, with 90 % intervals."""
     effect = model.fitted.point.effects[number]
     ordinary, between = _in_ordinary(step.shift)
-    within = _within(model)
+    beyond = _without_size_prior(model)
     quantile = _quantile(step.shift.degrees)
     found = {}
     for name in (*effect.size_names(), *effect.shape_names()):
-        value = float(getattr(effect, name)) - ordinary.get(name, 0.0)
-        variance = within.get((number, name), math.nan) + between.get(name, 0.0)
+        further, within = beyond.get((number, name), (0.0, math.nan))
+        value = float(getattr(effect, name)) + further - ordinary.get(name, 0.0)
+        variance = within + between.get(name, 0.0)
         half = quantile * math.sqrt(variance) if variance >= 0.0 else math.nan
         interval = (value - half, value + half) if math.isfinite(half) and effect.differentiable else None
         found[name] = Estimate(value, str(effect.parameter(name).metadata["unit"]), interval)
@@ -152,19 +153,24 @@ def _in_ordinary(shift: Shift) -> tuple[dict[str, float], dict[str, float]]:
     return mean, variance
 
 
-def _within(model: Model) -> dict[tuple[int, str], float]:
-    """Variances of the fitted fields of named effects within the drive, beside each other."""
+def _without_size_prior(model: Model) -> dict[tuple[int, str], tuple[float, float]]:
+    """How much further the drive alone moves fields of named effects, and their variances within it.
+
+    A fit draws sizes to what is likely of them, which a change that the drive knows is not to be judged by.
+    """
     parameters = effect_parameters(model.fitted.point.effects)
     keys = [f"{NAMED}{k}" for k in range(len(parameters))]
     if not keys:
         return {}
     scores = model.scan.scores()
-    found: dict[tuple[int, str], float] = {}
+    found: dict[tuple[int, str], tuple[float, float]] = {}
     for k, item in enumerate(parameters):
         others = [key for key in keys if key != keys[k]]
         size = sizes_of(scores, [keys[k]], np.zeros(1), others)
         if size is not None:
-            found[item.effect, item.field] = float(size.within[0, 0])
+            here = float(getattr(model.fitted.point.effects[item.effect], item.field))
+            further = float(np.clip(here + size.value[0], item.low, item.high)) - here
+            found[item.effect, item.field] = further, float(size.within[0, 0])
     return found
 
 

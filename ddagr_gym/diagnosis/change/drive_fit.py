@@ -6,20 +6,25 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ddagr_gym.diagnosis.change.ordinary import Weighing
 from ddagr_gym.errors import InputError
-from ddagr_gym.identification.block_means import sample_windows
+from ddagr_gym.identification.block_means import BlockedWindows, sample_windows
 from ddagr_gym.identification.data_split import evenly
 from ddagr_gym.identification.fit_numerics import FIELD_TOLERANCE, field_numerics
 from ddagr_gym.identification.gauss_newton import Fitted, fit
 from ddagr_gym.identification.nuisances import Nuisances
 from ddagr_gym.identification.parameters import ModelParameter
 from ddagr_gym.identification.problem import Problem
+from ddagr_gym.identification.relative_readings import RelativeWindows, relative_windows
+from ddagr_gym.identification.residual_weights import Weights, misfit_weights, weights_by_residuals
 from ddagr_gym.identification.timing_repair import aligned_poses, bridged
 from ddagr_gym.identification.windows import WindowSet, cut_windows, with_presumed_past
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.recordings.schema import Recording
+
+Array = NDArray[np.float64]
 
 MOST_WINDOWS = 40
 """Windows of a drive that are compared, evenly chosen (ours): 4 min of it, whose scan takes about a minute."""
@@ -94,9 +99,24 @@ def change_problem(
         threads: of the simulator.
     """
     return Problem(
-        robot, soil, sample_windows(windows, weighing.sigma), Nuisances(parameters), robust=weighing.robust,
+        robot, soil, compared_windows(windows, weighing, robot), Nuisances(parameters), robust=weighing.robust,
         threads=threads, numerics=field_numerics(),
     )  # fmt: skip
+
+
+def compared_windows(windows: WindowSet, weighing: Weighing, robot: Robot) -> BlockedWindows:
+    """Samples of windows as they are compared: relative to each other where the weighing says so, else one by one."""
+    if weighing.turning is None:
+        return sample_windows(windows, weighing.sigma)
+    return relative_windows(windows, weighing.sigma, robot.outer_radius, weighing.turning)
+
+
+def misfit_of_compared(windows: BlockedWindows, prediction: Array, before: Weights) -> Weights:
+    """Weights by what a prediction (W, T, 8) leaves of windows as they are compared."""
+    if not isinstance(windows, RelativeWindows):
+        return misfit_weights(windows.windows, prediction, before)
+    left = np.where(np.isfinite(windows.windows.measured), windows.differences(prediction), np.nan)
+    return weights_by_residuals(left, before)
 
 
 def fit_nominal(problem: Problem) -> Fitted:

@@ -20,6 +20,7 @@ from ddagr_gym.diagnosis.change.shifts import (
     Shift,
     explained,
     family_probability,
+    refitted_shift,
     shift_of,
     sizes_of,
 )
@@ -27,6 +28,7 @@ from ddagr_gym.diagnosis.result.equivalence import equivalence_weights
 from ddagr_gym.diagnosis.search.initial_guess import first_guess
 from ddagr_gym.diagnosis.search.scan import drive_extent
 from ddagr_gym.diagnosis.search.scanned_model import Rival
+from ddagr_gym.identification.effect_parameters import effect_parameters
 from ddagr_gym.identification.fit_numerics import FIELD_TOLERANCE
 from ddagr_gym.identification.gauss_newton import Fitted, fit
 from ddagr_gym.identification.misfit import dispersion_of
@@ -37,6 +39,13 @@ MOST_NAMES = 3
 
 MOST_RIVALS = 4
 """Effects that are refitted at each step (ours): a refit with its scan costs a minute on a long drive."""
+
+NEAR = 0.4
+"""Share of its limit at which an effect is refitted to see (ours): in a real drive poses that come half a second late
+stand at 0.7 of it before the refit."""
+
+MOST_NEAR = 2
+"""Effects that are refitted to see (ours)."""
 
 RENEWALS = 4
 """Steps of a refit with new derivatives (ours): it may begin many deviations from where it ends."""
@@ -99,6 +108,12 @@ class Model:
         return tuple(s for s in self.best if self.probability(s) < LEVEL and s.distance > least)
 
     @property
+    def near(self) -> tuple[Shift, ...]:
+        """Those of :attr:`best` that are worth a refit: what is large a first step finds only in part."""
+        listed = sorted(self.best, key=lambda s: -s.distance / s.limit(self.tests))
+        return tuple(s for s in listed[:MOST_NEAR] if s.probability < 1.0 and s.distance > NEAR * s.limit(self.tests))
+
+    @property
     def pulled(self) -> tuple[Pull, ...]:
         """Parameters that ordinary drives hardly move as far."""
         return tuple(pull for pull in self.pulls if self.probability(pull) < LEVEL)
@@ -157,7 +172,7 @@ def model_of(problem: Problem, fitted: Fitted, ordinary: Comparison, named: Sequ
     found = [shift_of(item, scores, ordinary, beside, in_ordinary) for item in compared]
     shifts = sorted((item for item in found if item is not None), key=lambda item: (item.probability, -item.distance))
     pulls = tuple(
-        Pull(p.name, abs(float(value)) / p.prior, ordinary.degrees)
+        Pull(p.name, abs(float(value)) / p.prior / ordinary.usual_move(p.name), ordinary.degrees)
         for p, value in zip(problem.nuisances.parameters, fitted.point.values, strict=True)
         if p.prior > 0.0
     )
@@ -182,7 +197,7 @@ def name_changes(
     """
     progress("comparing every effect with ordinary drives")
     models, steps = [model_of(problem, fitted, ordinary)], list[Step]()
-    while len(steps) < MOST_NAMES and (models[-1].conspicuous or models[-1].pulled):
+    while len(steps) < MOST_NAMES and (models[-1].conspicuous or models[-1].pulled or (not steps and models[-1].near)):
         found = _next(problem, models[-1], ordinary, rng, progress)
         if found is None:
             break
@@ -214,7 +229,11 @@ def _next(
         if any(after.left <= 1.0 for after, _ in tried) and rival.gain < CLOSE * refitted[0][1].gain:
             break
         progress(f"comparing every effect beside {rival.name}")
-        tried.append((model_of(problem, rival.fitted, ordinary, (*model.named, shift)), rival))
+        after = model_of(problem, rival.fitted, ordinary, (*model.named, shift))
+        evidence = _evidence_after(after, shift)
+        # what has no size is taken at the word of the parameter that had to make up for it
+        if model.probability(evidence or shift) < LEVEL or (evidence is None and model.pulled):
+            tried.append((replace(after, named=(*model.named, evidence or shift)), rival))
     if not tried:
         return None
     allowed = max(1.0, NEARLY * min(after.left for after, _ in tried))
@@ -226,12 +245,23 @@ def _next(
     return chosen[0], Step(chosen[0].named[-1], weights, rivals, dispersion)
 
 
+def _evidence_after(model: Model, shift: Shift) -> Shift | None:
+    """The shift of the last effect of a model as its fit finds it; None where the fit has no size of it."""
+    effects = model.fitted.point.effects
+    keys = {
+        item.field: f"{NAMED}{k}"
+        for k, item in enumerate(effect_parameters(effects))
+        if item.effect == len(effects) - 1 and f"{NAMED}{k}" in model.scan.keys
+    }
+    return refitted_shift(shift, effects[-1], keys, model.scan.scores())
+
+
 def _starts(problem: Problem, model: Model, ordinary: Comparison) -> list[tuple[Shift, Point]]:
     """Effects that may be what changed, with the points from which they are fitted."""
     found: dict[str, tuple[Shift, Point]] = {}
     at = model.fitted.point
     moved = [pull for pull in model.pulled if not pull.name.startswith(BIASES)]
-    if moved or not model.conspicuous:
+    if moved or not (model.conspicuous or model.near):
         listed = _where_parameters_stay(problem, model)
         found = {shift.compared.name: (shift, start) for shift, start in listed}
         at = replace(listed[0][1], effects=at.effects) if listed else at
@@ -275,7 +305,7 @@ def _where_parameters_stay(problem: Problem, model: Model) -> list[tuple[Shift, 
 def _preselected(model: Model, ordinary: Comparison) -> list[Shift]:
     """The effects beside which, to first order, least is out of the ordinary."""
     scores = model.scan.scores()
-    listed = sorted(model.conspicuous, key=lambda shift: _left_beside(shift, model, scores, ordinary))
+    listed = sorted(model.conspicuous or model.near, key=lambda shift: _left_beside(shift, model, scores, ordinary))
     return listed[:MOST_RIVALS]
 
 

@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 
 from ddagr_gym.diagnosis.result.uncertainty import STRUCTURE, STRUCTURE_OF_LIMIT
 from ddagr_gym.diagnosis.search.candidates import Candidate
+from ddagr_gym.errors import InputError
 from ddagr_gym.identification.nuisances import NuisancePriors
 from ddagr_gym.identification.parameters import (
     KIND_STIFFNESS_DEVIATION,
     ModelParameter,
+    robot_parameters,
     sensor_parameters,
     soil_parameters,
 )
@@ -45,6 +47,8 @@ class Weighing:
         gyro_bias: between ordinary drives [rad/s].
         accelerometer_bias: the same, slopes included [m/s^2].
         offsets: (3,) what gyro [rad/s] and accelerometers [m/s^2] read too much in ordinary drives, which is taken off.
+        turning: usual yaw rate per difference of the wheel speeds, by which readings are compared relative to each
+            other (:mod:`ddagr_gym.identification.relative_readings`); None where they are compared one by one.
     """
 
     window: float
@@ -56,6 +60,7 @@ class Weighing:
     gyro_bias: float
     accelerometer_bias: float
     offsets: Array = field(default_factory=lambda: np.zeros(3))
+    turning: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,17 +114,25 @@ class Comparison:
         pieces: scores of parts of the only one, where there is one.
         expected: scatter between drives before any data.
         unnamed: effects that cannot be what changed, with the reason.
+        moved: by how many of its prior deviations the fit to each ordinary drive moved every parameter.
     """
 
     drives: tuple[Scores, ...]
     pieces: tuple[Scores, ...] = ()
     expected: ExpectedScatter = ExpectedScatter()
     unnamed: Mapping[str, str] = field(default_factory=dict)
+    moved: tuple[Mapping[str, float], ...] = ()
 
     @property
     def degrees(self) -> float:
         """Of freedom of the scatter between drives."""
         return self.expected.degrees + len(self.drives) - 1.0
+
+    def usual_move(self, parameter: str) -> float:
+        """Prior deviations by which ordinary drives move a parameter (r.m.s., drawn towards 1), at least 1."""
+        known = [item[parameter] for item in self.moved if parameter in item]
+        square = self.expected.degrees + sum(value**2 for value in known)
+        return max(1.0, float(np.sqrt(square / (self.expected.degrees + len(known)))))
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,6 +146,9 @@ class Reference:
         known_ground: with the soil of its ground; that of an unknown one where no other drive was on it.
         other_ground: with a soil of which only the kind is known.
         losses: (W,) of windows as forecast by fits without them, by the known ground; none in files of before.
+        robot: that was calibrated without the drive; None in files of before.
+        soil: of its ground as calibrated without it, likewise.
+        moved: by how many of its prior deviations the fit moved every parameter; none in files of before.
     """
 
     drive: str
@@ -141,6 +157,9 @@ class Reference:
     known_ground: Scores
     other_ground: Scores
     losses: Array = field(default_factory=lambda: np.zeros(0))
+    robot: Robot | None = None
+    soil: Soil | None = None
+    moved: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,11 +205,45 @@ class OrdinaryRobot:
 
     def comparison(self, ground: str) -> Comparison:
         """What drives on a ground that is known or ("") not are compared with."""
+        moved = tuple(item.moved for item in self.references)
         if ground:
             drives, pieces = ([item.known_ground for item in found] for found in (self.references, self.pieces))
-            return Comparison(tuple(drives), tuple(pieces), self.known_scatter)
+            return Comparison(tuple(drives), tuple(pieces), self.known_scatter, moved=moved)
         drives, pieces = ([item.other_ground for item in found] for found in (self.references, self.pieces))
-        return Comparison(tuple(drives), tuple(pieces), self.other_scatter, self.unnamed)
+        return Comparison(tuple(drives), tuple(pieces), self.other_scatter, self.unnamed, moved)
+
+    def without(self, drive: str) -> OrdinaryRobot:
+        """The same from the other drives alone: robot and soil as calibrated without one, whose scan is left out.
+
+        Weights, priors and the scans of the others stay as they are with all drives.
+
+        Args:
+            drive: name of an ordinary drive.
+
+        Raises:
+            InputError: no such drive, a single one, or a calibration of before, which did not keep the robots.
+        """
+        own = next((item for item in self.references if item.drive == drive), None)
+        if own is None:
+            known = ", ".join(item.drive for item in self.references)
+            raise InputError(f"{drive} is not among the ordinary drives: {known}.")
+        others = tuple(item for item in self.references if item is not own)
+        if own.robot is None or own.soil is None or not others:
+            raise InputError(f"{self.source} cannot do without {drive}: calibrate again with two drives or more.")
+        beside = sum(item.ground == own.ground for item in others)
+        soils = {ground: soil for ground, soil in self.soils.items() if ground != own.ground}
+        deviations = dict(self.soil_deviations)
+        if beside == 1:
+            deviations[own.ground] = field_deviations()
+        priors = {p.name: p.prior for p in self.parameters}
+        return replace(
+            self,
+            robot=own.robot,
+            soils={**soils, own.ground: own.soil} if beside else soils,
+            parameters=tuple(replace(p, prior=priors[p.name]) for p in robot_parameters(own.robot) if p.name in priors),
+            soil_deviations=deviations,
+            references=others,
+        )
 
     @property
     def losses(self) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,7 +72,12 @@ def scan_pieces(drive: OrdinaryDrive, weighing: Weighing, most: int, threads: in
     scan = scan_drive(problem, fitted)
     wide = uncertain_parameters(drive.soil, drive.parameters, None, weighing, 1)
     other = np.array([wide[k].prior for k in scan.free])
-    whole = _reference(drive, scan, other, left_out_losses(problem, fitted))
+    moved = {
+        p.name: abs(float(value)) / p.prior
+        for p, value in zip(parameters, fitted.point.values, strict=True)
+        if p.prior > 0.0
+    }
+    whole = replace(_reference(drive, scan, other, left_out_losses(problem, fitted)), moved=moved)
     pieces = scan.pieces(most)
     return [whole, *(_reference(drive, piece, other, np.zeros(0)) for piece in pieces if len(pieces) > 1)]
 
@@ -80,4 +85,13 @@ def scan_pieces(drive: OrdinaryDrive, weighing: Weighing, most: int, threads: in
 def _reference(
     drive: OrdinaryDrive, scan: DriveScan, other: NDArray[np.float64], losses: NDArray[np.float64]
 ) -> Reference:
-    return Reference(drive.name, drive.ground, drive.reversed_gyro, scan.scores(), scan.scores(other), losses)
+    return Reference(
+        drive.name,
+        drive.ground,
+        drive.reversed_gyro,
+        scan.scores(),
+        scan.scores(other),
+        losses,
+        drive.robot,
+        drive.soil,
+    )

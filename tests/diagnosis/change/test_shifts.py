@@ -11,6 +11,7 @@ from ddagr_gym.diagnosis.change.ordinary import EXPECTED_DRIVES, Comparison, Exp
 from ddagr_gym.diagnosis.change.shifts import (
     LEVEL,
     family_probability,
+    refitted_shift,
     shift_of,
     single_level,
     sizes_of,
@@ -138,3 +139,31 @@ def test_pieces_widen_the_scatter_of_one_drive_and_never_narrow_it():
     scatter = np.var([-9.0, 9.0, -9.0, 9.0], ddof=1) - 0.1**2
     expected = 2.0**2 + 3.0 / 12.0 * (scatter - 2.0**2)
     assert deviation(-9.0, 9.0, -9.0, 9.0) == pytest.approx(np.sqrt(2.0 * (expected + 0.1**2)) * LEAST, rel=1e-2)
+
+
+def test_a_refit_finds_the_size_that_a_first_step_found_in_part():
+    """A bias of 0.03 rad/s is fitted, and the drive alone would go 0.002 further."""
+    before = shift_of(BIAS, scores(BIAS.keys[0], 4.0, 0.5), ALIKE)
+    away = BIAS.candidate.probes[0].bias
+    refit = scores("named 0", 0.002, 0.1 * away)
+    found = refitted_shift(before, GyroBias(0.03), {"bias": "named 0"}, refit)
+    assert found.value[0] == pytest.approx(0.032 / away - before.mean[0], rel=1e-6)
+    farther = 0.032 / away / 4.0
+    assert farther > 1.0
+    assert found.covariance[0, 0] == pytest.approx(0.01 + farther**2 * before.between[0, 0], rel=1e-3)
+    assert found.distance > before.distance
+    assert found.probability < before.probability
+
+
+def test_what_is_there_or_not_has_no_refitted_size():
+    before = shift_of(SIGN, scores(SIGN.keys[0], 0.5, 0.01), against(*(scores(SIGN.keys[0], 0.0, 0.01),) * 3))
+    assert refitted_shift(before, GyroSign(1.0), {}, scores("named 0", 0.0, 1.0)) is None
+
+
+def test_parameters_that_ordinary_drives_move_far_need_to_move_farther():
+    """Weight 4 of the prior, three drives with moves of 3, so r.m.s. sqrt((4 + 27)/7); never below 1."""
+    moved = Comparison(ALIKE.drives, moved=({"a": 3.0, "b": 0.1},) * 3)
+    assert EXPECTED_DRIVES == 4.0
+    assert moved.usual_move("a") == pytest.approx(np.sqrt(31.0 / 7.0))
+    assert moved.usual_move("b") == 1.0
+    assert moved.usual_move("absent") == 1.0

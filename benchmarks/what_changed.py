@@ -1,0 +1,276 @@
+"""Changes written into real drives, and what ``ddagr diagnose --calibration`` says of them.
+
+    python -m benchmarks.what_changed CALIBRATION [--drives ...] [--changes ...] [--parts FOLDER] [--summary]
+
+``CALIBRATION`` is the folder that ``ddagr calibrate --bank`` wrote of the six ordinary drives of a Warthog
+(:data:`benchmarks.real_drives.__main__.DRIVES`), imported or not. Each drive is compared with the others alone: with
+the robot and the soil as calibrated without it (one Gauss-Newton step from the joint fit), and with the scatter of the
+other five. The ground is given as known where another ordinary drive was on it.
+
+Changes are arithmetic on the columns of the files (:mod:`benchmarks.altered_changes`) and share no code with effects or
+diagnosis. Two of them are no effect of the library: commands of one side times a factor, for which the answer has to be
+``unknown`` or incomplete, and exchanged encoders, which the checks of the data have to name. Written are the answers
+and a picture (``benchmarks/results/what_changed.json``, ``.png``); a run goes on after the cases in the folder of
+parts.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from benchmarks.altered_changes import (
+    BIASED,
+    CHANGES,
+    ONE_ENCODER,
+    Change,
+    Table,
+    biased,
+    encoders_exchanged,
+    layout_of,
+    one_side_commanded,
+    packed,
+    read_table,
+    scaled,
+)
+from benchmarks.real_drives.__main__ import DRIVES, recordings_folder
+from benchmarks.score_concealed import share
+from ddagr_gym.calibration.ordinary_robot import load_ordinary_robot
+from ddagr_gym.diagnosis.answer.verdict import NONE, UNKNOWN, Diagnosis
+from ddagr_gym.diagnosis.change.ordinary import OrdinaryRobot
+from ddagr_gym.diagnosis.change.run import what_changed
+from ddagr_gym.errors import InputError
+from ddagr_gym.files import write_json
+from ddagr_gym.presets import get_robot
+from ddagr_gym.recordings.load import load_recording
+from ddagr_gym.recordings.schema import Recording
+from ddagr_gym.rendering import palette
+from ddagr_gym.reporting.figures import house_style
+
+RESULT = Path(__file__).resolve().parent / "results" / "what_changed.json"
+ROBOT = "warthog"
+REVERSED = "concealed/warthog_4"
+"""Whose gyro turns the wrong way; it is turned before anything is written into the drive."""
+
+OUTSIDE, CHECKS = "outside", "checks"
+"""Truths that are no effect of the library: the answer must not be sure; the checks of the data must name it."""
+
+MOST_IN_SET = 3
+"""Names of a set that still is an answer."""
+
+FURTHER = (
+    Change(
+        "encoder_scaled", f"left encoder times {ONE_ENCODER:g}", "encoder_scale", {"left": ONE_ENCODER, "right": 1.0},
+        lambda table: scaled(table, layout_of(table).encoders[:1], ONE_ENCODER),
+    ),
+    Change("gyro_biased", f"yaw rate + {BIASED:g} rad/s", "gyro_bias", {"bias": BIASED}, biased),
+    Change(
+        "one_side_commanded", "commands of the right side times 0.85", OUTSIDE, {},
+        partial(one_side_commanded, half_track=get_robot(ROBOT).half_track),
+    ),
+    Change("encoders_exchanged", "encoders exchanged", CHECKS, {}, encoders_exchanged),
+)  # fmt: skip
+ALL = {change.name: change for change in (*CHANGES, *FURTHER)}
+WHOLE = sys.maxsize
+"""Steps of a drive that are kept."""
+
+
+@dataclass(frozen=True)
+class Drive:
+    """An ordinary drive.
+
+    Attributes:
+        name: below ``shared/recordings``.
+        ground: that it was on; "" where no other ordinary drive was on it.
+    """
+
+    name: str
+    ground: str
+
+    @property
+    def file(self) -> str:
+        """Name of its file, by which a calibration knows it."""
+        return f"{Path(self.name).name}.csv.gz"
+
+    @property
+    def table(self) -> Table:
+        """Columns of its file."""
+        table = read_table(recordings_folder() / f"{self.name}.csv.gz", WHOLE)
+        return ALL["gyro_reversed"].write(table) if self.name == REVERSED else table
+
+    def with_change(self, change: Change) -> Recording:
+        """The drive with a change, read from a file as a user's."""
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / self.file
+            path.write_bytes(packed(change.write(self.table)))
+            return load_recording(path, DRIVES[self.name][1], ROBOT)
+
+
+def drives() -> dict[str, Drive]:
+    """Ordinary drives by name."""
+    grounds = [ground for ground, _ in DRIVES.values()]
+    return {
+        name: Drive(name, ground if grounds.count(ground) > 1 else "") for name, (ground, _) in DRIVES.items()
+    }  # fmt: skip
+
+
+def answer(drive: Drive, change: Change, ordinary: OrdinaryRobot, threads: int) -> dict[str, Any]:
+    """What is said of a drive with a change, as JSON has it.
+
+    Args:
+        drive: ordinary but for the change.
+        change: that was written.
+        ordinary: the robot calibrated with all drives.
+        threads: of the simulator.
+    """
+    entry: dict[str, Any] = {"drive": drive.name, "change": change.name, "truth": change.effect}
+    try:
+        outcome = what_changed([drive.with_change(change)], ordinary.without(drive.file), drive.ground, threads=threads)
+    except InputError as error:
+        return {**entry, "refused": str(error)}
+    return {**entry, "ground": drive.ground, **_said(outcome.diagnosis, change)}
+
+
+def _said(diagnosis: Diagnosis, change: Change) -> dict[str, Any]:
+    named = {finding.name: finding for finding in diagnosis.findings}
+    least = diagnosis.detectable.get(change.effect, {})
+    return {
+        "verdict": list(diagnosis.verdict),
+        "complete": diagnosis.complete,
+        "sets": [sorted(finding.equivalence_set) for finding in diagnosis.findings],
+        "sizes": {
+            name: {key: [item.value, *(item.interval or (None, None))] for key, item in finding.parameters.items()}
+            for name, finding in named.items()
+        },
+        "least_detectable": {name: least.get(name) for name in change.truth},
+        "checks": sorted({f"{doubt.finding}: {doubt.sentence}" for doubt in diagnosis.checks}),
+        "seconds": round(diagnosis.seconds, 1),
+    }
+
+
+def names_of(case: Mapping[str, Any]) -> list[str]:
+    """Effects that an answer names."""
+    return [name for name in case.get("verdict", ()) if name not in (NONE, UNKNOWN)]
+
+
+def is_right(case: Mapping[str, Any]) -> bool:
+    """Whether the truth is the only name, or in a set of at most three; see the module for what is no effect."""
+    truth = case["truth"]
+    if truth == NONE:
+        return bool(case.get("verdict") == [NONE])
+    if truth == OUTSIDE:
+        return case.get("verdict") != [NONE] and not case.get("complete", False)
+    if truth == CHECKS:
+        return any("moves as the" in sentence for sentence in case.get("checks", ()))
+    sets = case.get("sets", ())
+    return len(sets) == 1 and truth in sets[0] and len(sets[0]) <= MOST_IN_SET
+
+
+def is_sure_and_wrong(case: Mapping[str, Any]) -> bool:
+    """Whether a complete answer names something and the truth is in none of its sets; of no change, any name."""
+    sure = bool(names_of(case)) and bool(case.get("complete"))
+    return sure and not any(case["truth"] in found for found in case["sets"])
+
+
+def coverage_of(case: Mapping[str, Any]) -> list[bool]:
+    """Whether intervals of the named true effect hold what was written."""
+    truth = ALL[case["change"]].truth
+    found = case.get("sizes", {}).get(case["truth"], {})
+    return [
+        found[name][1] <= value <= found[name][2] for name, value in truth.items() if found.get(name, [None] * 3)[1:][0]
+    ]
+
+
+def figures(cases: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Shares with 95 % intervals over the answers."""
+    written = [case for case in cases if case["truth"] != NONE]
+    return {
+        "right or in a set of at most three": share([is_right(case) for case in written]),
+        "ordinary drives with a name or unknown": share([not is_right(c) for c in cases if c["truth"] == NONE]),
+        "sure and wrong": share([is_sure_and_wrong(case) for case in cases]),
+        "intervals that hold the size": share([held for case in cases for held in coverage_of(case)]),
+        "effect named, alone or among others": share([case["truth"] in names_of(case) for case in written]),
+    }
+
+
+def draw(cases: Sequence[Mapping[str, Any]], path: Path) -> None:
+    """What was said, as a table of changes by drives."""
+    from matplotlib.figure import Figure
+
+    names = [name for name in ALL if any(case["change"] == name for case in cases)]
+    columns = [name for name in DRIVES if any(case["drive"] == name for case in cases)]
+    with house_style():
+        figure = Figure(figsize=(2.6 + 2.1 * len(columns), 1.2 + 0.5 * len(names)), layout="constrained")
+        panel = figure.subplots()
+        for case in cases:
+            x, y = columns.index(case["drive"]), names.index(case["change"])
+            colour = (
+                palette.GREEN if is_right(case) else palette.VERMILLION if is_sure_and_wrong(case) else palette.PALE
+            )
+            panel.add_patch(_cell(x, y, colour))
+            panel.text(x, y, _words(case), ha="center", va="center", fontsize=6.5)
+        panel.set_xticks(range(len(columns)), [f"{DRIVES[name][0]}\n{Path(name).name}" for name in columns])
+        panel.set_yticks(range(len(names)), [ALL[name].words for name in names])
+        panel.set(xlim=(-0.5, len(columns) - 0.5), ylim=(len(names) - 0.5, -0.5))
+        panel.grid(visible=False)
+        panel.tick_params(length=0)
+        panel.set_title("Right (green), sure and wrong (red), neither (grey)")
+        figure.savefig(path, dpi=120)
+
+
+def _cell(x: float, y: float, colour: str) -> Any:
+    from matplotlib.patches import Rectangle
+
+    return Rectangle((x - 0.48, y - 0.46), 0.96, 0.92, color=colour, alpha=0.45, lw=0)
+
+
+def _words(case: Mapping[str, Any]) -> str:
+    if "refused" in case:
+        return "refused"
+    said = "\n".join(name.replace("_", " ") for name in case["verdict"])
+    return said if case["complete"] else f"{said} …"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Write, compare, score."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("calibration", type=Path, help="folder that `ddagr calibrate --bank` wrote")
+    parser.add_argument("--drives", nargs="+", choices=tuple(DRIVES), default=tuple(DRIVES))
+    parser.add_argument("--changes", nargs="+", choices=tuple(ALL), default=tuple(ALL))
+    parser.add_argument("--parts", type=Path, default=RESULT.with_suffix(".parts"), help="folder of finished cases")
+    parser.add_argument("--output", type=Path, default=RESULT)
+    parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--summary", action="store_true", help="only the score of the cases that are finished")
+    given = parser.parse_args(arguments)
+    try:
+        ordinary = load_ordinary_robot(given.calibration)
+    except InputError as error:
+        print(f"{error}", file=sys.stderr)
+        return 2
+    cases, by_name = [], drives()
+    for change in given.changes:
+        for drive in given.drives:
+            part = given.parts / ordinary.digest[:12] / f"{drive.replace('/', '_')} {change}.json"
+            if not part.exists() and not given.summary:
+                part.parent.mkdir(parents=True, exist_ok=True)
+                write_json(part, answer(by_name[drive], ALL[change], ordinary, given.threads))
+            if part.exists():
+                cases.append(json.loads(part.read_text()))
+                print(drive, change, cases[-1].get("verdict", "refused"), cases[-1].get("seconds", ""), flush=True)
+    scored = figures(cases)
+    write_json(given.output, {"command": "python -m benchmarks.what_changed", "figures": scored, "cases": cases})
+    draw(cases, given.output.with_suffix(".png"))
+    for name, entry in scored.items():
+        print(f"{name}: {entry['value']} {entry['interval']} of {entry['count']}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
