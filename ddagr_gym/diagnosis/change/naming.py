@@ -89,9 +89,9 @@ class Model:
         """Number of candidates and parameters."""
         return len(self.shifts) + len(self.pulls)
 
-    def probability(self, shift: Shift | Pull) -> float:
-        """Of an ordinary drive to show as much in any candidate or parameter."""
-        return family_probability(shift.probability, self.tests)
+    def probability(self, shift: Shift | Pull, looks: int = 1) -> float:
+        """Of an ordinary drive to show as much in any candidate or parameter, each looked at so many times."""
+        return family_probability(shift.probability, looks * self.tests)
 
     @property
     def best(self) -> tuple[Shift, ...]:
@@ -215,6 +215,7 @@ def _next(
 ) -> tuple[Model, Step] | None:
     """The model with the next name; None where no effect that exists has the shift."""
     dispersion = dispersion_of(problem, model.fitted)
+    looks = 1 if model.conspicuous or model.pulled else 2
     refitted: list[tuple[Shift, Rival]] = []
     for shift, start in _starts(problem, model, ordinary):
         progress(f"refitting with {shift.compared.name}")
@@ -232,7 +233,7 @@ def _next(
         after = model_of(problem, rival.fitted, ordinary, (*model.named, shift))
         evidence = _evidence_after(after, shift)
         # what has no size is taken at the word of the parameter that had to make up for it
-        if model.probability(evidence or shift) < LEVEL or (evidence is None and model.pulled):
+        if model.probability(evidence or shift, looks) < LEVEL or (evidence is None and model.pulled):
             tried.append((replace(after, named=(*model.named, evidence or shift)), rival))
     if not tried:
         return None
