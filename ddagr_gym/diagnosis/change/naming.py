@@ -231,7 +231,7 @@ def _next(
             break
         progress(f"comparing every effect beside {rival.name}")
         after = model_of(problem, rival.fitted, ordinary, (*model.named, shift))
-        evidence = _evidence_after(after, shift)
+        evidence = _evidence_after(after, shift, looks > 1)
         # what has no size is taken at the word of the parameter that had to make up for it
         if model.probability(evidence or shift, looks) < LEVEL or (evidence is None and model.pulled):
             tried.append((replace(after, named=(*model.named, evidence or shift)), rival))
@@ -246,7 +246,7 @@ def _next(
     return chosen[0], Step(chosen[0].named[-1], weights, rivals, dispersion)
 
 
-def _evidence_after(model: Model, shift: Shift) -> Shift | None:
+def _evidence_after(model: Model, shift: Shift, stretched: bool) -> Shift | None:
     """The shift of the last effect of a model as its fit finds it; None where the fit has no size of it."""
     effects = model.fitted.point.effects
     keys = {
@@ -254,7 +254,7 @@ def _evidence_after(model: Model, shift: Shift) -> Shift | None:
         for k, item in enumerate(effect_parameters(effects))
         if item.effect == len(effects) - 1 and f"{NAMED}{k}" in model.scan.keys
     }
-    return refitted_shift(shift, effects[-1], keys, model.scan.scores())
+    return refitted_shift(shift, effects[-1], keys, model.scan.scores(), stretched)
 
 
 def _starts(problem: Problem, model: Model, ordinary: Comparison) -> list[tuple[Shift, Point]]:

@@ -224,19 +224,21 @@ def shift_of(
     return Shift(compared, value, mean, covariance, between, degrees, probability)
 
 
-def refitted_shift(shift: Shift, effect: Effect, keys: Mapping[str, str], scores: Scores) -> Shift | None:
+def refitted_shift(
+    shift: Shift, effect: Effect, keys: Mapping[str, str], scores: Scores, stretched: bool = False
+) -> Shift | None:
     """The shift of an effect as a refit with it finds it; None where its probes are not sizes of their own.
 
     A change of many deviations lies where losses are linear: a first step from the fit without the effect goes part of
-    the way only. The size is that of the refit and one step further without the prior of likely sizes. Sizes in
-    ordinary drives are first steps too: they are taken to scatter more by as much as the refit goes farther than the
-    first step.
+    the way only. The size is that of the refit and one step further without the prior of likely sizes.
 
     Args:
         shift: before the refit, with what ordinary drives show.
         effect: as it was fitted.
         keys: of the columns of its fields, by field.
         scores: of the drive at the refit.
+        stretched: whether sizes in ordinary drives, which are first steps too, are taken to scatter more by as much as
+            the refit goes farther than the first step.
     """
     candidate = shift.compared.candidate
     moved = [moved_field(probe) for probe in candidate.probes] if candidate.has_sizes else []
@@ -250,7 +252,7 @@ def refitted_shift(shift: Shift, effect: Effect, keys: Mapping[str, str], scores
     away = np.array([step for _, _, step in moved])
     here = np.array([float(getattr(effect, name)) - data["neutral"] for name, data, _ in moved])
     size, first = (here + further.value) / away, shift.value + shift.mean
-    farther = max(1.0, float(np.linalg.norm(size)) / max(float(np.linalg.norm(first)), _NOTHING))
+    farther = max(1.0, float(np.linalg.norm(size)) / max(float(np.linalg.norm(first)), _NOTHING)) if stretched else 1.0
     value = size - shift.mean
     covariance = further.within / np.outer(away, away) + farther**2 * shift.between
     found = replace(shift, value=value, covariance=covariance)

@@ -146,13 +146,15 @@ def test_a_refit_finds_the_size_that_a_first_step_found_in_part():
     before = shift_of(BIAS, scores(BIAS.keys[0], 4.0, 0.5), ALIKE)
     away = BIAS.candidate.probes[0].bias
     refit = scores("named 0", 0.002, 0.1 * away)
-    found = refitted_shift(before, GyroBias(0.03), {"bias": "named 0"}, refit)
+    found = refitted_shift(before, GyroBias(0.03), {"bias": "named 0"}, refit, stretched=True)
     assert found.value[0] == pytest.approx(0.032 / away - before.mean[0], rel=1e-6)
     farther = 0.032 / away / 4.0
     assert farther > 1.0
     assert found.covariance[0, 0] == pytest.approx(0.01 + farther**2 * before.between[0, 0], rel=1e-3)
     assert found.distance > before.distance
     assert found.probability < before.probability
+    plain = refitted_shift(before, GyroBias(0.03), {"bias": "named 0"}, refit)
+    assert plain.covariance[0, 0] == pytest.approx(0.01 + before.between[0, 0], rel=1e-6)
 
 
 def test_what_is_there_or_not_has_no_refitted_size():
