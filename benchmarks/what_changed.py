@@ -221,7 +221,7 @@ def draw(cases: Sequence[Mapping[str, Any]], path: Path) -> None:
         panel.set(xlim=(-0.5, len(columns) - 0.5), ylim=(len(names) - 0.5, -0.5))
         panel.grid(visible=False)
         panel.tick_params(length=0)
-        panel.set_title("Right (green), sure and wrong (red), neither (grey)")
+        panel.set_title("Right (green), sure and wrong (orange), neither (grey)")
         figure.savefig(path, dpi=120)
 
 
