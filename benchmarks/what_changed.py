@@ -41,9 +41,9 @@ from benchmarks.altered_changes import (
     scaled,
 )
 from benchmarks.real_drives.__main__ import DRIVES, recordings_folder
-from benchmarks.score_concealed import share
+from benchmarks.score_concealed import names_of, share
 from ddagr_gym.calibration.ordinary_robot import load_ordinary_robot
-from ddagr_gym.diagnosis.answer.verdict import NONE, UNKNOWN, Diagnosis
+from ddagr_gym.diagnosis.answer.verdict import NONE, Diagnosis
 from ddagr_gym.diagnosis.change.ordinary import OrdinaryRobot
 from ddagr_gym.diagnosis.change.run import what_changed
 from ddagr_gym.errors import InputError
@@ -155,11 +155,6 @@ def _said(diagnosis: Diagnosis, change: Change) -> dict[str, Any]:
     }
 
 
-def names_of(case: Mapping[str, Any]) -> list[str]:
-    """Effects that an answer names."""
-    return [name for name in case.get("verdict", ()) if name not in (NONE, UNKNOWN)]
-
-
 def is_right(case: Mapping[str, Any]) -> bool:
     """Whether the truth is the only name, or in a set of at most three; see the module for what is no effect."""
     truth = case["truth"]
@@ -175,7 +170,7 @@ def is_right(case: Mapping[str, Any]) -> bool:
 
 def is_sure_and_wrong(case: Mapping[str, Any]) -> bool:
     """Whether a complete answer names something and the truth is in none of its sets; of no change, any name."""
-    sure = bool(names_of(case)) and bool(case.get("complete"))
+    sure = bool(case.get("complete")) and bool(names_of(case))
     return sure and not any(case["truth"] in found for found in case["sets"])
 
 
@@ -196,7 +191,7 @@ def figures(cases: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         "ordinary drives with a name or unknown": share([not is_right(c) for c in cases if c["truth"] == NONE]),
         "sure and wrong": share([is_sure_and_wrong(case) for case in cases]),
         "intervals that hold the size": share([held for case in cases for held in coverage_of(case)]),
-        "effect named, alone or among others": share([case["truth"] in names_of(case) for case in written]),
+        "effect named, alone or among others": share([case["truth"] in case.get("verdict", ()) for case in written]),
     }
 
 

@@ -84,9 +84,13 @@ class BlockedWindows:
 
     def residual(self, prediction: Array) -> Array:
         """(W, M) block means of measured less predicted over sigma; headings compared on the circle."""
+        return self.means(np.nan_to_num(self.differences(prediction)))
+
+    def differences(self, prediction: Array) -> Array:
+        """(W, T, 8) measured less predicted, NaN where there is no sample; headings compared on the circle."""
         difference = self.windows.measured - prediction
         difference[..., YAW] = np.angle(np.exp(1j * difference[..., YAW]))
-        return self.means(np.nan_to_num(difference))
+        return difference
 
     def by_channel(self, values: Array) -> Array:
         """(W, B, 8) of rows (W, M + S): without those of the local unknowns' priors."""
@@ -94,7 +98,9 @@ class BlockedWindows:
 
     def subset(self, chosen: NDArray[np.int64] | NDArray[np.bool_]) -> BlockedWindows:
         """Only the chosen windows."""
-        return BlockedWindows(self.windows.subset(chosen), self.weights[chosen], self.sigma[chosen])
+        return replace(
+            self, windows=self.windows.subset(chosen), weights=self.weights[chosen], sigma=self.sigma[chosen]
+        )
 
 
 def block_windows(

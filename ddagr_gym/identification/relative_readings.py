@@ -17,7 +17,8 @@ of their covariance, as a triangular factor of a covariance is, but for its size
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +27,6 @@ from ddagr_gym.identification.block_means import BlockedWindows, sample_windows
 from ddagr_gym.identification.windows import CHANNELS, WindowSet
 
 Array = NDArray[np.float64]
-Chosen = NDArray[np.int64] | NDArray[np.bool_]
 
 _RIGHT, _LEFT, _GYRO = (CHANNELS.index(name) for name in ("encoder_right", "encoder_left", "yaw_rate"))
 _SIDEWAYS, _YAW = CHANNELS.index("specific_force_y"), CHANNELS.index("pose_yaw")
@@ -73,10 +73,6 @@ class Between:
         after = np.take_along_axis(chosen, self.upper, axis=1)
         return np.asarray(np.where(self.known > 0.0, (1.0 - self.share) * before + self.share * after, 0.0))
 
-    def subset(self, chosen: Chosen) -> Between:
-        """Only the chosen windows."""
-        return Between(self.lower[chosen], self.upper[chosen], self.share[chosen], self.known[chosen])
-
 
 @dataclass(frozen=True, eq=False)
 class Course:
@@ -120,24 +116,26 @@ class RelativeWindows(BlockedWindows):
     Attributes:
         radius: hub to tread [m].
         turning: yaw rate per difference of the wheel speeds that is usual, c [-].
-        between: of the measured readings.
-        course: measured.
     """
 
     radius: float
     turning: float
-    between: Between
-    course: Course
 
-    def residual(self, prediction: Array) -> Array:
-        """(W, M) measured less predicted over sigma; headings compared on the circle."""
-        return self.means(self.differences(prediction))
+    @cached_property
+    def between(self) -> Between:
+        """Of the measured readings."""
+        return Between.of(self.windows.measured)
+
+    @cached_property
+    def course(self) -> Course:
+        """Measured."""
+        return Course.of(np.nan_to_num(self.windows.measured), self.between, self.radius, self.windows.period)
 
     def differences(self, prediction: Array) -> Array:
-        """(W, T, 8) measured less predicted; 0 where there is no sample."""
+        """(W, T, 8) measured less predicted, NaN where there is no sample; headings compared on the circle."""
         difference = self._measured - self._relative(prediction)
         difference[..., _YAW] = np.angle(np.exp(1j * difference[..., _YAW]))
-        return np.nan_to_num(difference)
+        return difference
 
     def change(self, after: Array, before: Array) -> Array:
         """(W, M) change of predictions over sigma; what breaks down says nothing."""
@@ -151,21 +149,7 @@ class RelativeWindows(BlockedWindows):
         each = [self.derivative(changes[..., k], base) for k in range(changes.shape[3])]
         return np.stack(each, axis=2)
 
-    def subset(self, chosen: Chosen) -> RelativeWindows:
-        """Only the chosen windows."""
-        course = Course(*(getattr(self.course, name)[chosen] for name in Course.__dataclass_fields__))
-        between = self.between.subset(chosen)
-        windows = self.windows.subset(chosen)
-        return replace(
-            self,
-            windows=windows,
-            weights=self.weights[chosen],
-            sigma=self.sigma[chosen],
-            between=between,
-            course=course,
-        )
-
-    @property
+    @cached_property
     def _measured(self) -> Array:
         """(W, T, 8) what is compared with :meth:`_relative`."""
         found = self.windows.measured.copy()
@@ -201,9 +185,7 @@ def relative_windows(windows: WindowSet, sigma: Array, radius: float, turning: f
         turning: usual yaw rate per difference of the wheel speeds [-].
     """
     plain = sample_windows(windows, sigma)
-    between = Between.of(windows.measured)
-    course = Course.of(np.nan_to_num(windows.measured), between, radius, windows.period)
-    return RelativeWindows(windows, plain.weights, plain.sigma, radius, turning, between, course)
+    return RelativeWindows(windows, plain.weights, plain.sigma, radius, turning)
 
 
 def usual_turning(windows: WindowSet) -> float:

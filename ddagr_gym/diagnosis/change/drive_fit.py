@@ -17,8 +17,8 @@ from ddagr_gym.identification.gauss_newton import Fitted, fit
 from ddagr_gym.identification.nuisances import Nuisances
 from ddagr_gym.identification.parameters import ModelParameter
 from ddagr_gym.identification.problem import Problem
-from ddagr_gym.identification.relative_readings import RelativeWindows, relative_windows
-from ddagr_gym.identification.residual_weights import Weights, misfit_weights, weights_by_residuals
+from ddagr_gym.identification.relative_readings import relative_windows
+from ddagr_gym.identification.residual_weights import Weights, weights_by_residuals
 from ddagr_gym.identification.timing_repair import aligned_poses, bridged
 from ddagr_gym.identification.windows import WindowSet, cut_windows, with_presumed_past
 from ddagr_gym.parameters import Robot, Soil
@@ -113,10 +113,13 @@ def compared_windows(windows: WindowSet, weighing: Weighing, robot: Robot) -> Bl
 
 def misfit_of_compared(windows: BlockedWindows, prediction: Array, before: Weights) -> Weights:
     """Weights by what a prediction (W, T, 8) leaves of windows as they are compared."""
-    if not isinstance(windows, RelativeWindows):
-        return misfit_weights(windows.windows, prediction, before)
-    left = np.where(np.isfinite(windows.windows.measured), windows.differences(prediction), np.nan)
-    return weights_by_residuals(left, before)
+    return weights_by_residuals(windows.differences(prediction), before)
+
+
+def moved_parameters(problem: Problem, fitted: Fitted) -> dict[str, float]:
+    """By how many of its prior deviations a fit moved every parameter that it may move, by name."""
+    parameters, values = problem.nuisances.parameters, fitted.point.values.tolist()
+    return {p.name: abs(value) / p.prior for p, value in zip(parameters, values, strict=True) if p.prior > 0.0}
 
 
 def fit_nominal(problem: Problem) -> Fitted:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ddagr_gym.diagnosis.change.drive_fit import ITERATIONS
+from ddagr_gym.diagnosis.change.drive_fit import ITERATIONS, moved_parameters
 from ddagr_gym.diagnosis.change.drive_scan import NAMED, DriveScan, scan_drive
 from ddagr_gym.diagnosis.change.ordinary import Comparison, Scores
 from ddagr_gym.diagnosis.change.shifts import (
@@ -172,9 +172,8 @@ def model_of(problem: Problem, fitted: Fitted, ordinary: Comparison, named: Sequ
     found = [shift_of(item, scores, ordinary, beside, in_ordinary) for item in compared]
     shifts = sorted((item for item in found if item is not None), key=lambda item: (item.probability, -item.distance))
     pulls = tuple(
-        Pull(p.name, abs(float(value)) / p.prior / ordinary.usual_move(p.name), ordinary.degrees)
-        for p, value in zip(problem.nuisances.parameters, fitted.point.values, strict=True)
-        if p.prior > 0.0
+        Pull(name, moved / ordinary.usual_move(name), ordinary.degrees)
+        for name, moved in moved_parameters(problem, fitted).items()
     )
     return Model(fitted, scan, tuple(shifts), pulls, tuple(named))
 

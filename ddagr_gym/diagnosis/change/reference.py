@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.diagnosis.change.drive_fit import change_problem, change_windows, fit_nominal
+from ddagr_gym.diagnosis.change.drive_fit import change_problem, change_windows, fit_nominal, moved_parameters
 from ddagr_gym.diagnosis.change.drive_scan import DriveScan, scan_drive
 from ddagr_gym.diagnosis.change.left_out import left_out_losses
 from ddagr_gym.diagnosis.change.ordinary import Reference, Weighing, uncertain_parameters
@@ -72,11 +72,7 @@ def scan_pieces(drive: OrdinaryDrive, weighing: Weighing, most: int, threads: in
     scan = scan_drive(problem, fitted)
     wide = uncertain_parameters(drive.soil, drive.parameters, None, weighing, 1)
     other = np.array([wide[k].prior for k in scan.free])
-    moved = {
-        p.name: abs(float(value)) / p.prior
-        for p, value in zip(parameters, fitted.point.values, strict=True)
-        if p.prior > 0.0
-    }
+    moved = moved_parameters(problem, fitted)
     whole = replace(_reference(drive, scan, other, left_out_losses(problem, fitted)), moved=moved)
     pieces = scan.pieces(most)
     return [whole, *(_reference(drive, piece, other, np.zeros(0)) for piece in pieces if len(pieces) > 1)]
