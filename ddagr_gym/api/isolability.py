@@ -126,14 +126,14 @@ def isolability(
     """
     from ddagr_gym.diagnosis.planning.isolability import isolability as tabulated
     from ddagr_gym.identification.nuisances import NuisancePriors
-    from ddagr_gym.physics.effects.registry import effect_kinds
+    from ddagr_gym.physics.effects.registry import absolute_effect_kinds
 
     at_least(seed=(seed, 0))
     priors = NuisancePriors().with_soil(soil_uncertainty)
     nominal, ground = robot_from(robot), soil_from(soil)
     drives = _manoeuvres(manoeuvres)
     gates = thresholds_from(thresholds, nominal, soil_name_of(soil), soil_uncertainty)
-    with counting(len(effect_kinds()), "effects", progress) as steps:
+    with counting(len(absolute_effect_kinds()), "effects", progress) as steps:
         table = tabulated(
             nominal,
             ground,

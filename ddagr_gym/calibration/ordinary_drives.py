@@ -24,8 +24,10 @@ from ddagr_gym.diagnosis.change.ordinary import (
     LEAST_ACCELEROMETER_BIAS,
     LEAST_GYRO_BIAS,
     Reference,
+    SensorBias,
     Weighing,
     field_deviations,
+    of_another_logger,
     uncertain_parameters,
 )
 from ddagr_gym.diagnosis.change.reference import OrdinaryDrive, scan_ordinary
@@ -66,14 +68,12 @@ class _Left:
     Attributes:
         sigma: (8,) of the channels' residuals.
         robust: (8,) limits of the loss.
-        gyro_bias: fitted [rad/s].
-        accelerometer_bias: (2,) fitted [m/s^2].
+        bias: what its sensors read too much.
     """
 
     sigma: Array
     robust: Array
-    gyro_bias: float
-    accelerometer_bias: Array
+    bias: SensorBias
 
 
 def robot_deviations(calibration: Calibration) -> dict[str, float]:
@@ -160,15 +160,19 @@ def _without(
     ground = data.grounds[number]
     values = forecast.values_of(model)
     own = replace(fitted_robot(model.model.robot, values), standard_deviations=robot.standard_deviations)
+    recordings = data.prepared.recordings
+    parameters = uncertain_robot(own, robot_deviations(calibration))
+    if recordings[number].meta.column_map not in {r.meta.column_map for k, r in enumerate(recordings) if k != number}:
+        parameters = of_another_logger(parameters, recordings[number].period)
     return OrdinaryDrive(
         name=data.names[number],
         ground=ground,
         alone=len(data.drives_on[ground]) == 1,
         # the drive's own lateness was taken out of its poses
-        recording=aligned_poses(data.prepared.recordings[number], -data.prepared.noise[number].pose_lateness),
+        recording=aligned_poses(recordings[number], -data.prepared.noise[number].pose_lateness),
         robot=own,
         soil=fitted_soil(data, ground, values),
-        parameters=uncertain_robot(own, robot_deviations(calibration)),
+        parameters=parameters,
         deviations=soil_deviations(calibration)[ground],
         reversed_gyro=any(MENDED_SIGN in note for note in data.notes[number]),
     )
@@ -197,8 +201,7 @@ def _left_of(item: OrdinaryDrive, blank: Weighing, noise: Callable[[WindowSet], 
     problem = change_problem(item.robot, item.soil, windows, parameters, second, threads)
     fitted = fit_nominal(problem)
     left = misfit_of_compared(problem.blocked, fitted.prediction, weights)
-    biases = fitted.point.values[-3:]
-    return _Left(left.sigma[0, 0], left.robust, float(biases[0]), biases[1:])
+    return _Left(left.sigma[0, 0], left.robust, SensorBias(item.name, item.ground, fitted.point.values[-3:]))
 
 
 def pooled(blank: Weighing, left: Sequence[_Left]) -> Weighing:
@@ -213,7 +216,7 @@ def pooled(blank: Weighing, left: Sequence[_Left]) -> Weighing:
     square = np.where(known, sigma, 0.0) ** 2
     with np.errstate(divide="ignore", invalid="ignore"):
         mean = np.where(known.any(axis=0), np.sqrt(square.sum(axis=0) / known.sum(axis=0)), np.inf)
-    biases = np.array([[item.gyro_bias, *item.accelerometer_bias] for item in left])
+    biases = np.array([item.bias.value for item in left])
     scatter = biases.std(axis=0, ddof=1) if len(left) > 1 else np.abs(biases[0])
     return replace(
         blank,
@@ -222,4 +225,5 @@ def pooled(blank: Weighing, left: Sequence[_Left]) -> Weighing:
         gyro_bias=max(LEAST_GYRO_BIAS, float(scatter[0])),
         accelerometer_bias=max(LEAST_ACCELEROMETER_BIAS, float(np.sqrt(np.mean(scatter[1:] ** 2)))),
         offsets=biases.mean(axis=0) if len(left) > 1 else np.zeros(3),
+        biases=tuple(item.bias for item in left),
     )

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ddagr_gym.calibration.ordinary_drives import Ordinary
 from ddagr_gym.config import Config, dump_config, parse_config
-from ddagr_gym.diagnosis.change.ordinary import Reference, Scores, Weighing
+from ddagr_gym.diagnosis.change.ordinary import Reference, Scores, SensorBias, Weighing
 from ddagr_gym.parameters import Robot, Soil
 
 Array = NDArray[np.float64]
@@ -22,8 +22,11 @@ DIGITS = 9
 
 def ordinary_as_mapping(ordinary: Ordinary) -> dict[str, Any]:
     """Plain mapping of weights and references."""
-    given = {item.name: getattr(ordinary.weighing, item.name) for item in fields(Weighing)}
+    given = {item.name: getattr(ordinary.weighing, item.name) for item in fields(Weighing) if item.name != "biases"}
     weighing = {name: None if value is None else _plain(value) for name, value in given.items()}
+    weighing["biases"] = [
+        {"drive": item.drive, "ground": item.ground, "value": _plain(item.value)} for item in ordinary.weighing.biases
+    ]
     return {"weighing": weighing, "references": [_reference(item) for item in ordinary.references]}
 
 
@@ -45,6 +48,10 @@ def ordinary_from_mapping(mapping: Mapping[str, Any]) -> Ordinary:
         accelerometer_bias=float(given["accelerometer_bias"]),
         offsets=_array(given.get("offsets", [0.0, 0.0, 0.0])),
         turning=given.get("turning"),
+        biases=tuple(
+            SensorBias(str(item["drive"]), str(item["ground"]), _array(item["value"]))
+            for item in given.get("biases", ())
+        ),
     )
     return Ordinary(weighing, tuple(_reference_of(item) for item in mapping["references"]))
 
@@ -71,6 +78,7 @@ def _reference(item: Reference) -> dict[str, Any]:
         "robot": None if item.robot is None else dump_config(item.robot),
         "soil": None if item.soil is None else dump_config(item.soil),
         "moved": {name: _plain(value) for name, value in item.moved.items()},
+        "column_map": item.column_map,
     }
 
 
@@ -85,6 +93,7 @@ def _reference_of(mapping: Mapping[str, Any]) -> Reference:
         _config_of(mapping.get("robot"), Robot),
         _config_of(mapping.get("soil"), Soil),
         {str(name): float(value) for name, value in mapping.get("moved", {}).items()},
+        str(mapping.get("column_map", "")),
     )
 
 

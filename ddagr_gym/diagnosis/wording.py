@@ -256,6 +256,15 @@ def _delay(a: Amounts) -> str:
     return f"{text} on average, by {right:.2g} s on the right and {left:.2g} s on the left"
 
 
+def _gain(a: Amounts) -> str:
+    parts = [
+        f"the {bank} wheels turn {quantity(a[bank].scaled(100.0, -100.0), '%')} "
+        f"{'faster' if a[bank].value >= 1.0 else 'slower'} than usual for their command"
+        for bank in ("right", "left")
+    ]
+    return _pair(a, ("right", "left"), (parts[0], parts[1]), 0.002, 1.0)
+
+
 def _towed_drag(a: Amounts) -> str:
     place = f"{quantity(a['hitch_distance'], 'm')} behind the centre"
     side = a["hitch_side"].value if "hitch_side" in a else 0.0
@@ -282,6 +291,7 @@ SENTENCES: Mapping[str, Callable[[Amounts], str]] = {
     "centre_of_mass_offset": _centre_of_mass,
     "command_deadband": _deadband,
     "command_delay": _delay,
+    "command_gain": _gain,
     "encoder_scale": _encoder_scale,
     "gyro_bias": lambda a: (
         f"the gyro is off by {quantity(a['bias'].scaled(DEGREES), 'degrees/s', signed=True)} (positive to the left)"

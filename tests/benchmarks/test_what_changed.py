@@ -9,7 +9,6 @@ from benchmarks.altered_changes import BIASED, WEAKENED, biased, encoders_exchan
 from benchmarks.what_changed import (
     ALL,
     CHECKS,
-    OUTSIDE,
     coverage_of,
     draw,
     drives,
@@ -42,12 +41,7 @@ def test_the_true_name_alone_or_in_a_small_set_is_right():
     assert not is_right({"truth": "gyro_scale", "change": "gyro_scaled", "refused": "too short"})
 
 
-def test_what_is_no_effect_must_not_be_sure_or_is_named_by_the_checks():
-    assert ALL["one_side_commanded"].effect == OUTSIDE
-    assert is_right(case("one_side_commanded", ["unknown"], complete=False))
-    assert is_right(case("one_side_commanded", ["motor_lag"], complete=False))
-    assert not is_right(case("one_side_commanded", ["motor_lag"]))
-    assert not is_right(case("one_side_commanded", ["none"]))
+def test_what_is_no_effect_is_named_by_the_checks():
     assert ALL["encoders_exchanged"].effect == CHECKS
     said = ["arbitration: encoder_left moves as the right wheels do"]
     assert is_right(case("encoders_exchanged", ["unknown"], complete=False, checks=said))

@@ -15,7 +15,7 @@ from ddagr_gym.diagnosis.gates.thresholds import NullRun
 from ddagr_gym.diagnosis.null_bank.bank import NullBank
 from ddagr_gym.diagnosis.store import StepStore
 from ddagr_gym.errors import InputError
-from ddagr_gym.physics.effects.registry import effect_kinds
+from ddagr_gym.physics.effects.registry import absolute_effect_kinds
 from ddagr_gym.presets import get_robot, get_soil
 from tests.calibration.conftest import drive
 
@@ -52,7 +52,7 @@ def test_every_drive_is_scanned_for_every_effect(made):
     assert [run.kind for run in runs] == ["real field_1.csv 0", "real field_2.csv 1"]
     for run in runs:
         # an effect of which nothing shows in a drive has no gain there
-        assert set(effect_kinds()) - set(run.gains) <= {"sensor_hold"}
+        assert set(absolute_effect_kinds()) - set(run.gains) <= {"sensor_hold"}
         assert run.windows >= 3
     # what is kept on the way comes back as it was
     assert again == runs

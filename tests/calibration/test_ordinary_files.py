@@ -11,7 +11,7 @@ import pytest
 from ddagr_gym.calibration.effect_bank import load_ordinary, load_runs, save_runs
 from ddagr_gym.calibration.ordinary_drives import Ordinary, pooled
 from ddagr_gym.calibration.ordinary_drives import _Left as Left
-from ddagr_gym.diagnosis.change.ordinary import Reference, Scores, Weighing
+from ddagr_gym.diagnosis.change.ordinary import Reference, Scores, SensorBias, Weighing
 from ddagr_gym.errors import InputError
 from ddagr_gym.presets import get_robot, get_soil
 
@@ -74,8 +74,12 @@ def test_what_is_no_bank_is_refused(text, said, tmp_path):
 def test_weights_are_those_of_all_drives_and_a_channel_that_one_lacks_is_weighed_by_the_others():
     blank = replace(WEIGHING, sigma=np.ones(8), robust=np.ones(8))
     left = [
-        Left(np.array([3.0, np.inf, *np.ones(6)]), np.full(8, 2.0), 0.003, np.array([0.1, 0.0])),
-        Left(np.array([4.0, 2.0, *np.ones(6)]), np.full(8, 1.5), -0.004, np.array([0.0, -0.1])),
+        Left(
+            np.array([3.0, np.inf, *np.ones(6)]), np.full(8, 2.0), SensorBias("a", "sand", np.array([0.003, 0.1, 0.0]))
+        ),
+        Left(
+            np.array([4.0, 2.0, *np.ones(6)]), np.full(8, 1.5), SensorBias("b", "sand", np.array([-0.004, 0.0, -0.1]))
+        ),
     ]
     found = pooled(blank, left)
     assert found.sigma[0] == pytest.approx(np.sqrt(12.5))
@@ -87,7 +91,7 @@ def test_weights_are_those_of_all_drives_and_a_channel_that_one_lacks_is_weighed
 
 
 def test_a_single_drive_says_nothing_of_what_sensors_always_read_too_much():
-    left = [Left(np.ones(8), np.full(8, 2.0), 0.003, np.array([0.1, 0.0]))]
+    left = [Left(np.ones(8), np.full(8, 2.0), SensorBias("a", "sand", np.array([0.003, 0.1, 0.0])))]
     found = pooled(replace(WEIGHING, sigma=np.ones(8), robust=np.ones(8)), left)
     assert found.offsets.tolist() == [0.0, 0.0, 0.0]
     assert found.gyro_bias == 0.003

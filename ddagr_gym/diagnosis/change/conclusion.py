@@ -18,7 +18,7 @@ from ddagr_gym.diagnosis.answer.change import (
 )
 from ddagr_gym.diagnosis.answer.verdict import NONE, UNKNOWN, Diagnosis, Estimate, Finding, GatesUsed, Options
 from ddagr_gym.diagnosis.change.drive_scan import NAMED, NOT_COMPARED
-from ddagr_gym.diagnosis.change.naming import Model, Named, Step
+from ddagr_gym.diagnosis.change.naming import FORM, Model, Named, Step
 from ddagr_gym.diagnosis.change.ordinary import OrdinaryRobot
 from ddagr_gym.diagnosis.change.shifts import LEVEL, POWER, Pull, Shift, sizes_of
 from ddagr_gym.diagnosis.preprocessing.mended_recordings import MendedRecordings
@@ -126,7 +126,9 @@ def _estimates(model: Model, number: int, step: Step) -> dict[str, Estimate]:
     for name in (*effect.size_names(), *effect.shape_names()):
         further, within = beyond.get((number, name), (0.0, math.nan))
         value = float(getattr(effect, name)) + further - ordinary.get(name, 0.0)
-        variance = within + between.get(name, 0.0)
+        neutral = effect.parameter(name).metadata["neutral"]
+        form = 0.0 if neutral is None else FORM * (value - neutral)
+        variance = within + between.get(name, 0.0) + form**2
         half = quantile * math.sqrt(variance) if variance >= 0.0 else math.nan
         interval = (value - half, value + half) if math.isfinite(half) and effect.differentiable else None
         found[name] = Estimate(value, str(effect.parameter(name).metadata["unit"]), interval)

@@ -101,6 +101,19 @@ def library(problem: Problem, fitted: Fitted) -> tuple[Compared, ...]:
 
 
 @dataclass(frozen=True, eq=False)
+class Priors:
+    """Of what may differ between drives, other than those of a fit.
+
+    Attributes:
+        deviations: (P,) standard deviations.
+        middle: (P,) from where the fit's priors have theirs.
+    """
+
+    deviations: Array
+    middle: Array
+
+
+@dataclass(frozen=True, eq=False)
 class DriveScan:
     """Scan of drives at a fit.
 
@@ -126,15 +139,15 @@ class DriveScan:
             for a, b in pairwise(ends.tolist())
         )
 
-    def scores(self, deviations: Array | None = None) -> Scores:
+    def scores(self, priors: Priors | None = None) -> Scores:
         """Gradient and information of the columns, with their covariances.
 
         Args:
-            deviations: (P,) priors of what may differ between drives; those of the fit by default.
+            priors: of what may differ between drives; those of the fit by default.
         """
         products = self.products
-        if deviations is not None:
-            products = InnerProducts(products.normals, deviations**-2.0, products.values)
+        if priors is not None:
+            products = InnerProducts(products.normals, priors.deviations**-2.0, products.values - priors.middle)
         reduced = products.reduced()
         answer = reduced.nuisance[:, 1:]
         # columns without what parameters explain of them

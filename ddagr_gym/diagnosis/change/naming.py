@@ -6,10 +6,11 @@ them away. Of those that do, the joint refits decide, and what they do not tell 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ddagr_gym.diagnosis.change.drive_fit import ITERATIONS, moved_parameters
 from ddagr_gym.diagnosis.change.drive_scan import NAMED, DriveScan, scan_drive
@@ -33,6 +34,9 @@ from ddagr_gym.identification.fit_numerics import FIELD_TOLERANCE
 from ddagr_gym.identification.gauss_newton import Fitted, fit
 from ddagr_gym.identification.misfit import dispersion_of
 from ddagr_gym.identification.problem import Point, Problem
+from ddagr_gym.physics.effects.registry import effect_kinds
+
+Array = NDArray[np.float64]
 
 MOST_NAMES = 3
 """Effects that may be named together: as in a diagnosis."""
@@ -44,15 +48,19 @@ NEAR = 0.4
 """Share of its limit at which an effect is refitted to see (ours): in a real drive poses that come half a second late
 stand at 0.7 of it before the refit."""
 
-MOST_NEAR = 2
+MOST_NEAR = 3
 """Effects that are refitted to see (ours)."""
+
+LENGTHS = (1.0, 2.0, 4.0, 8.0)
+"""Multiples of an effect's first step from the best of which its refit begins (ours): where losses are linear the first
+step goes part of the way only, and delays that are far off cost the same whatever their size."""
 
 RENEWALS = 4
 """Steps of a refit with new derivatives (ours): it may begin many deviations from where it ends."""
 
 FORM = 0.1
-"""Share of the distance of a named effect that a further one needs (ours, as for intervals): the library's form of an
-effect is not the robot's, and the rest of it looks like other effects."""
+"""Share of a named effect by which the library's form of it is not the robot's (ours): deviation of its size, and
+distance that a further effect needs, since the rest of it looks like other effects."""
 
 CLOSE = 0.8
 """Share of the best refit's gain below which another is no rival of one that leaves nothing out of the ordinary (ours:
@@ -64,6 +72,10 @@ NEARLY = 1.1
 
 BIASES = ("gyro_bias", "accelerometer_bias")
 """Begin the names of what stays free where robot and ground are held."""
+
+
+Starts = dict[str, tuple[Shift, Point]]
+"""By name of an effect, its candidate and a point with it from which a refit begins."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,24 +227,17 @@ def _next(
     """The model with the next name; None where no effect that exists has the shift."""
     dispersion = dispersion_of(problem, model.fitted)
     looks = 1 if model.conspicuous or model.pulled else 2
-    refitted: list[tuple[Shift, Rival]] = []
-    for shift, start in _starts(problem, model, ordinary):
-        progress(f"refitting with {shift.compared.name}")
-        fitted = fit(problem, start, iterations=ITERATIONS + 2, tolerance=FIELD_TOLERANCE, renewals=RENEWALS)
-        gain = (model.fitted.cost - fitted.cost) / dispersion
-        meaningful = fitted.point.effects[-1].is_meaningful(drive_extent(problem, fitted.prediction))
-        if gain > 0.0 and meaningful:
-            refitted.append((shift, Rival(shift.compared.name, fitted, gain)))
-    refitted.sort(key=lambda item: -item[1].gain)
+    refitted = _refits(problem, model, ordinary, dispersion, progress)
     tried: list[tuple[Model, Rival]] = []
     for shift, rival in refitted:
-        if any(after.left <= 1.0 for after, _ in tried) and rival.gain < CLOSE * refitted[0][1].gain:
+        if rival.gain < CLOSE * max((item.gain for after, item in tried if after.left <= 1.0), default=0.0):
             break
         progress(f"comparing every effect beside {rival.name}")
         after = model_of(problem, rival.fitted, ordinary, (*model.named, shift))
         evidence = _evidence_after(after, shift, looks > 1)
-        # what has no size is taken at the word of the parameter that had to make up for it
-        if model.probability(evidence or shift, looks) < LEVEL or (evidence is None and model.pulled):
+        # what parameters had to make up for speaks for an effect that takes all of it back, or has no size of its own
+        taken_back = bool(model.pulled) and (evidence is None or not after.pulled)
+        if taken_back or model.probability(evidence or shift, looks) < LEVEL:
             tried.append((replace(after, named=(*model.named, evidence or shift)), rival))
     if not tried:
         return None
@@ -243,6 +248,52 @@ def _next(
     chosen = next(item for item in kept if item[1].name == name)
     rivals = (chosen[1], *(rival for _, rival in kept if rival is not chosen[1]))
     return chosen[0], Step(chosen[0].named[-1], weights, rivals, dispersion)
+
+
+def _refits(
+    problem: Problem, model: Model, ordinary: Comparison, dispersion: float, progress: Callable[[str], None]
+) -> list[tuple[Shift, Rival]]:
+    """Joint refits of what may have changed, and of what the best of them is confused with, the best first."""
+
+    def refitted(starts: Starts) -> list[tuple[Shift, Rival]]:
+        found = []
+        for shift, start in starts.values():
+            progress(f"refitting with {shift.compared.name}")
+            fitted = fit(problem, start, iterations=ITERATIONS + 2, tolerance=FIELD_TOLERANCE, renewals=RENEWALS)
+            gain = (model.fitted.cost - fitted.cost) / dispersion
+            meaningful = fitted.point.effects[-1].is_meaningful(drive_extent(problem, fitted.prediction))
+            if gain > 0.0 and meaningful:
+                found.append((shift, Rival(shift.compared.name, fitted, gain)))
+        return sorted(found, key=lambda item: -item[1].gain)
+
+    first = refitted(_starts(problem, model, ordinary))
+    if not first:
+        return []
+    # fits end at different places in the parameters that they share: what is alike begins where the best one ended
+    beside = replace(first[0][1].fitted.point, effects=model.fitted.point.effects)
+    known = {rival.name: rival.fitted.point.effects[-1] for _, rival in first}
+    alike = _confused(first[0][1].name, model)
+    new = _started(problem, model, beside, [shift for shift in alike if shift.compared.name not in known])
+    again = {
+        name: (shift, replace(beside, effects=(*beside.effects, known[name])))
+        for name, shift in ((shift.compared.name, shift) for shift in alike)
+        if name in known
+    }
+    best: dict[str, tuple[Shift, Rival]] = {}
+    for item in sorted([*first, *refitted({**new, **again})], key=lambda item: -item[1].gain):
+        best.setdefault(item[1].name, item)
+    return list(best.values())
+
+
+def _confused(name: str, model: Model) -> list[Shift]:
+    """Effects that the library says may be taken for one, the farthest shifts first."""
+    kinds = effect_kinds()
+    found = [
+        shift
+        for shift in model.best
+        if shift.compared.name in kinds[name].confused_with or name in kinds[shift.compared.name].confused_with
+    ]
+    return sorted(found, key=lambda shift: -shift.distance / shift.limit(model.tests))[:MOST_NEAR]
 
 
 def _evidence_after(model: Model, shift: Shift, stretched: bool) -> Shift | None:
@@ -256,24 +307,37 @@ def _evidence_after(model: Model, shift: Shift, stretched: bool) -> Shift | None
     return refitted_shift(shift, effects[-1], keys, model.scan.scores(), stretched)
 
 
-def _starts(problem: Problem, model: Model, ordinary: Comparison) -> list[tuple[Shift, Point]]:
-    """Effects that may be what changed, with the points from which they are fitted."""
-    found: dict[str, tuple[Shift, Point]] = {}
+def _starts(problem: Problem, model: Model, ordinary: Comparison) -> Starts:
+    """Effects that may be what changed, by name."""
+    found: Starts = {}
     at = model.fitted.point
     moved = [pull for pull in model.pulled if not pull.name.startswith(BIASES)]
     if moved or not (model.conspicuous or model.near):
-        listed = _where_parameters_stay(problem, model)
-        found = {shift.compared.name: (shift, start) for shift, start in listed}
-        at = replace(listed[0][1], effects=at.effects) if listed else at
-    for shift in _preselected(model, ordinary):
-        effect = first_guess(shift.compared.candidate, (shift.value + shift.mean).tolist())
-        if not effect.is_neutral and shift.compared.name not in found:
-            found[shift.compared.name] = (shift, replace(at, effects=(*at.effects, effect)))
-    return list(found.values())
+        at, found = _where_parameters_stay(problem, model)
+    others = [shift for shift in _preselected(model, ordinary) if shift.compared.name not in found]
+    return {**found, **_started(problem, model, at, others)}
 
 
-def _where_parameters_stay(problem: Problem, model: Model) -> list[tuple[Shift, Point]]:
-    """Effects that explain most where robot and ground stay as they were calibrated.
+def _started(problem: Problem, model: Model, at: Point, shifts: Sequence[Shift]) -> Starts:
+    """Points with one effect each, at the sizes that its first step says."""
+    return _existing({s.compared.name: (s, _begun(problem, model, at, s, s.value + s.mean)) for s in shifts})
+
+
+def _existing(points: Mapping[str, tuple[Shift, Point | None]]) -> Starts:
+    return {name: (shift, point) for name, (shift, point) in points.items() if point is not None}
+
+
+def _begun(problem: Problem, model: Model, at: Point, shift: Shift, multiples: Array) -> Point | None:
+    """The point with an effect at the best length of a first step; None for a step that is none."""
+    guesses = dict.fromkeys(first_guess(shift.compared.candidate, (far * multiples).tolist()) for far in LENGTHS)
+    points = [replace(at, effects=(*at.effects, effect)) for effect in guesses if not effect.is_neutral]
+    if len(points) < 2:
+        return points[0] if points else None
+    return min(points, key=lambda point: fit(problem, point, iterations=0, reuse=model.fitted).cost)
+
+
+def _where_parameters_stay(problem: Problem, model: Model) -> tuple[Point, Starts]:
+    """Effects that explain most where robot and ground stay as they were calibrated, and the point where they do.
 
     What a parameter has taken over, to first order no effect asks back: their columns are alike, but for what is
     nonlinear in them.
@@ -288,18 +352,17 @@ def _where_parameters_stay(problem: Problem, model: Model) -> list[tuple[Shift, 
     shifts = {shift.compared.keys: shift for shift in model.shifts}
     # a step goes three deviations at most, and what has been taken over may be many
     calibrated = replace(fitted.point, values=np.zeros(len(own)))
-    found: dict[str, tuple[float, Shift, Point]] = {}
+    found: dict[str, tuple[float, Shift, Array]] = {}
     for item in scan.compared:
         sizes = sizes_of(scores, item.keys, item.ridge, beside)
-        if sizes is None or item.keys not in shifts:
+        if sizes is None or item.keys not in shifts or first_guess(item.candidate, sizes.value.tolist()).is_neutral:
             continue
-        effect = first_guess(item.candidate, sizes.value.tolist())
         gain = explained(scores, item.keys, item.ridge, beside)
-        if not effect.is_neutral and gain > found.get(item.name, (0.0,))[0]:
-            start = replace(calibrated, effects=(*calibrated.effects, effect))
-            found[item.name] = (gain, shifts[item.keys], start)
+        if gain > found.get(item.name, (0.0,))[0]:
+            found[item.name] = (gain, shifts[item.keys], sizes.value)
     best = sorted(found.values(), key=lambda item: -item[0])[:MOST_RIVALS]
-    return [(shift, start) for _, shift, start in best]
+    points = {s.compared.name: (s, _begun(problem, model, calibrated, s, value)) for _, s, value in best}
+    return calibrated, _existing(points)
 
 
 def _preselected(model: Model, ordinary: Comparison) -> list[Shift]:

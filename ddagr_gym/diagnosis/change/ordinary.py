@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -20,6 +20,7 @@ from ddagr_gym.identification.parameters import (
     soil_parameters,
 )
 from ddagr_gym.parameters import Robot, Soil
+from ddagr_gym.recordings.schema import Recording
 
 Array = NDArray[np.float64]
 
@@ -29,8 +30,26 @@ LEAST_GYRO_BIAS = 2e-4
 LEAST_ACCELEROMETER_BIAS = 0.02
 """Least prior [m/s^2] (ours): a tenth of a degree of slope under a drive."""
 
+SLOPE_ON_A_GROUND = 0.05
+"""Deviation [m/s^2] of what accelerometers read too much between drives on one ground (ours): 0.3 degrees of slope."""
+
 EXPECTED_DRIVES = 4.0
 """Degrees of freedom of the expected scatter where nothing was measured (ours): as if it came from five drives."""
+
+
+@dataclass(frozen=True, eq=False)
+class SensorBias:
+    """What sensors read too much in an ordinary drive.
+
+    Attributes:
+        drive: name of its file.
+        ground: that it was on.
+        value: (3,) of gyro [rad/s] and accelerometers forward and to the left [m/s^2].
+    """
+
+    drive: str
+    ground: str
+    value: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +66,7 @@ class Weighing:
         gyro_bias: between ordinary drives [rad/s].
         accelerometer_bias: the same, slopes included [m/s^2].
         offsets: (3,) what gyro [rad/s] and accelerometers [m/s^2] read too much in ordinary drives, which is taken off.
+        biases: the same of each ordinary drive; none where that is not known.
         turning: usual yaw rate per difference of the wheel speeds, by which readings are compared relative to each
             other (:mod:`ddagr_gym.identification.relative_readings`); None where they are compared one by one.
     """
@@ -61,6 +81,36 @@ class Weighing:
     accelerometer_bias: float
     offsets: Array = field(default_factory=lambda: np.zeros(3))
     turning: float | None = None
+    biases: tuple[SensorBias, ...] = ()
+
+    def on(self, ground: str, drive: str = "") -> Weighing:
+        """The same for a drive on a known ground, where accelerometers lean as in the other drives on it.
+
+        A robot that climbs out of the ruts that it makes leans back by degrees on sand and not on asphalt.
+
+        Args:
+            ground: of the drive; "" where it is not known.
+            drive: its name, if it is one of the ordinary ones.
+        """
+        here = [item.value for item in self.biases if ground and item.ground == ground and item.drive != drive]
+        if not here:
+            return self
+        offsets = np.array([self.offsets[0], *np.mean(here, axis=0)[1:]])
+        scatter = self._accelerometers_on_one_ground * float(np.sqrt(1.0 + 1.0 / len(here)))
+        return replace(self, offsets=offsets, accelerometer_bias=max(LEAST_ACCELEROMETER_BIAS, scatter))
+
+    def without(self, drive: str) -> Weighing:
+        """The same without what one of the drives says of biases."""
+        return replace(self, biases=tuple(item for item in self.biases if item.drive != drive))
+
+    @property
+    def _accelerometers_on_one_ground(self) -> float:
+        """Deviation of the accelerometers' biases between drives on one ground, drawn towards what is expected."""
+        grounds = {item.ground for item in self.biases}
+        groups = [np.array([item.value[1:] for item in self.biases if item.ground == ground]) for ground in grounds]
+        square = sum(float(((group - group.mean(axis=0)) ** 2).sum()) for group in groups)
+        degrees = sum(2.0 * (len(group) - 1) for group in groups)
+        return float(np.sqrt((EXPECTED_DRIVES * SLOPE_ON_A_GROUND**2 + square) / (EXPECTED_DRIVES + degrees)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,6 +199,7 @@ class Reference:
         robot: that was calibrated without the drive; None in files of before.
         soil: of its ground as calibrated without it, likewise.
         moved: by how many of its prior deviations the fit moved every parameter; none in files of before.
+        column_map: by which it was read; "" where that is not known.
     """
 
     drive: str
@@ -160,6 +211,7 @@ class Reference:
     robot: Robot | None = None
     soil: Soil | None = None
     moved: Mapping[str, float] = field(default_factory=dict)
+    column_map: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,11 +248,17 @@ class OrdinaryRobot:
     unnamed: Mapping[str, str] = field(default_factory=dict)
     given: bool = False
 
-    def uncertain(self, ground: str, recordings: int) -> tuple[ModelParameter, ...]:
+    def uncertain(self, ground: str, recordings: Sequence[Recording]) -> tuple[ModelParameter, ...]:
         """All that may differ between ordinary drives, for drives on one ground ("" for an unknown one)."""
         soil = next(iter(self.soils.values())) if not ground else self.soils[ground]
+        known = {item.column_map for item in self.references}
+        other = any(recording.meta.column_map not in known for recording in recordings)
         return uncertain_parameters(
-            soil, self.parameters, self.soil_deviations.get(ground) if ground else None, self.weighing, recordings
+            soil,
+            of_another_logger(self.parameters, recordings[0].period) if other else self.parameters,
+            self.soil_deviations.get(ground) if ground else None,
+            self.weighing.on(ground),
+            len(recordings),
         )
 
     def comparison(self, ground: str) -> Comparison:
@@ -215,7 +273,7 @@ class OrdinaryRobot:
     def without(self, drive: str) -> OrdinaryRobot:
         """The same from the other drives alone: robot and soil as calibrated without one, whose scan is left out.
 
-        Weights, priors and the scans of the others stay as they are with all drives.
+        Weights, priors of robot and soil and the scans of the others stay as they are with all drives.
 
         Args:
             drive: name of an ordinary drive.
@@ -242,6 +300,7 @@ class OrdinaryRobot:
             soils={**soils, own.ground: own.soil} if beside else soils,
             parameters=tuple(replace(p, prior=priors[p.name]) for p in robot_parameters(own.robot) if p.name in priors),
             soil_deviations=deviations,
+            weighing=self.weighing.without(drive),
             references=others,
         )
 
@@ -270,6 +329,18 @@ def uncertain_parameters(
     kind = soil_parameters(soil, KIND_STIFFNESS_DEVIATION)
     made = kind if deviations is None else tuple(replace(p, prior=deviations[p.name]) for p in kind)
     return (*made, *robot, *sensor_parameters(recordings, weighing.gyro_bias, weighing.accelerometer_bias))
+
+
+def of_another_logger(robot: Sequence[ModelParameter], period: float) -> tuple[ModelParameter, ...]:
+    """Parameters of a robot with the delay of its commands as uncertain as what a row's command means.
+
+    Loggers differ in that by a sample or two: a command is that of the row's time, or the one since the row before.
+
+    Args:
+        robot: parameters that may differ between drives.
+        period: of the rows [s].
+    """
+    return tuple(replace(p, prior=float(np.hypot(p.prior, period))) if p.name == "command_delay" else p for p in robot)
 
 
 def field_deviations() -> dict[str, float]:

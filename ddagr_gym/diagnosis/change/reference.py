@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.diagnosis.change.drive_fit import change_problem, change_windows, fit_nominal, moved_parameters
-from ddagr_gym.diagnosis.change.drive_scan import DriveScan, scan_drive
+from ddagr_gym.diagnosis.change.drive_scan import DriveScan, Priors, scan_drive
 from ddagr_gym.diagnosis.change.left_out import left_out_losses
 from ddagr_gym.diagnosis.change.ordinary import Reference, Weighing, uncertain_parameters
 from ddagr_gym.identification.parameters import ModelParameter
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.recordings.schema import Recording
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,23 +66,29 @@ def scan_pieces(drive: OrdinaryDrive, weighing: Weighing, most: int, threads: in
         most: parts.
         threads: of the simulator.
     """
-    windows = change_windows([drive.recording], drive.robot, weighing)
+    known = weighing if drive.alone else weighing.on(drive.ground, drive.name)
+    windows = change_windows([drive.recording], drive.robot, known)
     deviations = None if drive.alone else drive.deviations
-    parameters = uncertain_parameters(drive.soil, drive.parameters, deviations, weighing, 1)
-    problem = change_problem(drive.robot, drive.soil, windows, parameters, weighing, threads)
+    parameters = uncertain_parameters(drive.soil, drive.parameters, deviations, known, 1)
+    problem = change_problem(drive.robot, drive.soil, windows, parameters, known, threads)
     fitted = fit_nominal(problem)
     scan = scan_drive(problem, fitted)
     wide = uncertain_parameters(drive.soil, drive.parameters, None, weighing, 1)
-    other = np.array([wide[k].prior for k in scan.free])
+    other = _of_unknown_ground(scan, wide, known.offsets - weighing.offsets)
     moved = moved_parameters(problem, fitted)
     whole = replace(_reference(drive, scan, other, left_out_losses(problem, fitted)), moved=moved)
     pieces = scan.pieces(most)
     return [whole, *(_reference(drive, piece, other, np.zeros(0)) for piece in pieces if len(pieces) > 1)]
 
 
-def _reference(
-    drive: OrdinaryDrive, scan: DriveScan, other: NDArray[np.float64], losses: NDArray[np.float64]
-) -> Reference:
+def _of_unknown_ground(scan: DriveScan, wide: Sequence[ModelParameter], leaning: Array) -> Priors:
+    """Deviations of what may differ where the ground is not known, and the middle of the biases from there on."""
+    middle = np.zeros(len(wide))
+    middle[-len(leaning) :] = -leaning
+    return Priors(np.array([wide[k].prior for k in scan.free]), middle[scan.free])
+
+
+def _reference(drive: OrdinaryDrive, scan: DriveScan, other: Priors, losses: Array) -> Reference:
     return Reference(
         drive.name,
         drive.ground,
@@ -90,4 +98,5 @@ def _reference(
         losses,
         drive.robot,
         drive.soil,
+        column_map=drive.recording.meta.column_map,
     )

@@ -118,12 +118,11 @@ def what_changed_since(
 
 def _fitted(mended: MendedRecordings, ordinary: OrdinaryRobot, ground: str, threads: int) -> tuple[Problem, Fitted]:
     """The calibrated robot fitted to drives; on an unknown ground from the soil that leaves least."""
-    windows = change_windows(mended.recordings, ordinary.robot, ordinary.weighing)
+    weighing = ordinary.weighing.on(ground)
+    windows = change_windows(mended.recordings, ordinary.robot, weighing)
     soils = ordinary.soils if not ground else {ground: ordinary.soils[ground]}
-    parameters = ordinary.uncertain(ground, len(mended.recordings))
-    problems = [
-        change_problem(ordinary.robot, soil, windows, parameters, ordinary.weighing, threads) for soil in soils.values()
-    ]
+    parameters = ordinary.uncertain(ground, mended.recordings)
+    problems = [change_problem(ordinary.robot, soil, windows, parameters, weighing, threads) for soil in soils.values()]
     found = [(problem, fit_nominal(problem)) for problem in problems]
     return min(found, key=lambda item: item[1].cost)
 

@@ -152,8 +152,10 @@ def sizes_of(scores: Scores, keys: Sequence[str], ridge: Array, beside: Sequence
         @ _within(scores, rows, np.asarray(np.linalg.solve(inner + np.diag(prior), gradient), dtype=np.float64))
         @ inverse.T
     )
-    between = inverse @ scores.between[np.ix_(rows, rows)] @ inverse.T
-    return Sizes(inverse @ gradient, _at_least(within, inverse[:, :k]), between)
+    expected = scores.between[np.ix_(rows, rows)]
+    # what independent readings make of the gradient, without what the priors do: that is between drives
+    independent = inverse @ (inner - expected) @ inverse.T
+    return Sizes(inverse @ gradient, _at_least(within, independent), inverse @ expected @ inverse.T)
 
 
 def _shown(scores: Scores, keys: Sequence[str]) -> tuple[str, ...]:
@@ -212,11 +214,12 @@ def shift_of(
         return None
     least = np.array([least_multiple(compared.candidate, k) for k in range(len(compared.keys))])
     expected = here.between + np.diag((ordinary.expected.of(compared.candidate) * least) ** 2)
-    mean, spread, of_mean, degrees = _ordinary_scatter(others, expected, least)
+    structure = expected - here.between
+    mean, spread, of_mean, degrees = _ordinary_scatter(others, structure, least)
     known = ordinary.expected.degrees
     scatter = (known * expected + degrees * spread) / (known + degrees)
     if len(others) == 1:
-        scatter = _widened(scatter, _sizes_in(compared, ordinary.pieces, beside_ordinary), least, known)
+        scatter = _widened(scatter, structure, _sizes_in(compared, ordinary.pieces, beside_ordinary), least, known)
     between = scatter + (scatter + of_mean) / (degrees + 1.0)
     covariance = here.within + between
     value, degrees = here.value - mean, known + degrees
@@ -264,21 +267,21 @@ def _sizes_in(compared: Compared, drives: Sequence[Scores], beside: Sequence[str
     return [item for item in found if item is not None]
 
 
-def _widened(expected: Array, pieces: Sequence[Sizes], least: Array, known: float) -> Array:
+def _widened(expected: Array, structure: Array, pieces: Sequence[Sizes], least: Array, known: float) -> Array:
     """Expected scatter, shrunk together with that of the pieces of a drive where these scatter more."""
     if len(pieces) < 2:
         return expected
-    _, spread, _, degrees = _ordinary_scatter(pieces, expected, least)
+    _, spread, _, degrees = _ordinary_scatter(pieces, structure, least)
     return expected + degrees / (known + degrees) * _positive(spread - expected)
 
 
-def _ordinary_scatter(found: Sequence[Sizes], expected: Array, least: Array) -> tuple[Array, Array, Array, float]:
+def _ordinary_scatter(found: Sequence[Sizes], structure: Array, least: Array) -> tuple[Array, Array, Array, float]:
     """Mean of ordinary drives, their scatter besides their own covariances, the mean of these, degrees of freedom.
 
-    A drive that says little counts for little.
+    A drive that says little, or of which little was known, counts for little.
     """
     scale = least**-2.0
-    size = np.array([float(scale @ np.diag(item.within + expected)) for item in found])
+    size = np.array([float(scale @ np.diag(item.within + item.between + structure)) for item in found])
     weight = (1.0 / size) / float((1.0 / size).sum())
     count = 1.0 / float((weight**2).sum())
     values = np.stack([item.value for item in found])

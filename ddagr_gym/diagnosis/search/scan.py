@@ -22,7 +22,7 @@ from ddagr_gym.identification.nuisances import absorbed_sizes
 from ddagr_gym.identification.problem import Problem
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.effects.base import DriveExtent
-from ddagr_gym.physics.effects.registry import effect_kinds
+from ddagr_gym.physics.effects.registry import absolute_effect_kinds
 
 Array = NDArray[np.float64]
 
@@ -94,7 +94,7 @@ def scan(
     Args:
         problem: what was fitted.
         fitted: the fit, with or without effects.
-        kinds: effects to try, all by default; those assumed already are left out.
+        kinds: effects to try, by default all that need no drives from before; those assumed already are left out.
         progress: called with the name of each effect when it is done.
     """
     extent = drive_extent(problem, fitted.prediction)
@@ -102,7 +102,7 @@ def scan(
     candidates: list[Candidate] = []
     columns: list[Array] = []
     drives = record_drives(problem, fitted.point)
-    for name, kind in (effect_kinds() if kinds is None else kinds).items():
+    for name, kind in (absolute_effect_kinds() if kinds is None else kinds).items():
         # repeated readings are found in the values themselves (ddagr_gym.diagnosis.preprocessing.repeated_readings)
         if name in assumed or name == "sensor_hold":
             continue

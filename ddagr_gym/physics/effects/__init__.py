@@ -8,7 +8,8 @@ A sample of the simulator runs through these points; an effect is attached to on
 ==============  ====================================  ==============================================================
 point           what an effect may change there       effects
 ==============  ====================================  ==============================================================
-commands        COMMAND                               command_delay, command_deadband, encoder_scale (in the loop)
+commands        COMMAND                               command_delay, command_deadband, command_gain,
+                                                      encoder_scale (in the loop)
 motors          MOTOR_TARGET, MOTOR_RATE              motor_lag, motor_droop, motor_saturation
 loads           MASS ... SLOPE, WHEEL (restored at    slope, payload, centre_of_mass_offset, wheel_radius_mismatch,
                 each sample), TOWED                   towed_drag (the load on its rope)

@@ -105,6 +105,8 @@ class Effect(Validated):
     """Whether readings have a useful derivative by every size at neutral; if not, probe with finite sizes."""
     categorical: ClassVar[bool] = False
     """Whether only the bounds of the sizes exist in nature (a sign); values between serve sensitivities."""
+    needs_earlier_drives: ClassVar[bool] = False
+    """Whether only drives from before say what is usual, so that a diagnosis against a nominal model leaves it out."""
     actions: ClassVar[tuple[tuple[int, Action], ...]]
     """(point, function) pairs, called in this order at their points; each has a memory of its own."""
 

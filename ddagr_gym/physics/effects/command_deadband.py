@@ -49,7 +49,7 @@ class CommandDeadband(Effect):
     equation = "command -> 0 where |command| < width (moving: release width), else command - loss width sgn(command)"
     source = "dead zone (Tao and Kokotovic, IEEE Trans. Automatic Control 39 (1994) 59)"
     signature = "encoders miss a constant amount of every command, all of a small one"
-    confused_with = ("motor_droop",)
+    confused_with = ("command_gain", "motor_droop")
     actions = ((POINT_COMMANDS, lose_small_commands),)
 
     width: float = size("rad/s", 0.0, 1.0, least=0.02)

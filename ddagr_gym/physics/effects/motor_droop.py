@@ -63,7 +63,7 @@ class MotorDroop(Effect):
         "is ours"
     )
     signature = "encoders settle below the command, more in turns and soft places; a locked bank creeps"
-    confused_with = ("command_deadband", "encoder_scale", "motor_saturation")
+    confused_with = ("command_deadband", "command_gain", "encoder_scale", "motor_saturation")
     actions = ((POINT_MOTORS, droop_speed),)
 
     droop: float = size("rad/(s N m)", 0.0, 0.02, least=5e-4)

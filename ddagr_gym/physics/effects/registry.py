@@ -43,6 +43,11 @@ def effect_kinds() -> dict[str, type[Effect]]:
     return kinds
 
 
+def absolute_effect_kinds() -> dict[str, type[Effect]]:
+    """Effects by name that a diagnosis against a nominal model looks for, without drives from before."""
+    return {name: kind for name, kind in effect_kinds().items() if not kind.needs_earlier_drives}
+
+
 def effect_kind(name: object) -> type[Effect]:
     """Effect class by name; an unknown one raises InputError with the closest names."""
     kinds = effect_kinds()

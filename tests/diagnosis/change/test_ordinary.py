@@ -7,10 +7,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ddagr_gym.diagnosis.change.ordinary import OrdinaryRobot, Reference, Scores, Weighing, field_deviations
+from ddagr_gym.diagnosis.change.ordinary import (
+    EXPECTED_DRIVES,
+    SLOPE_ON_A_GROUND,
+    OrdinaryRobot,
+    Reference,
+    Scores,
+    SensorBias,
+    Weighing,
+    field_deviations,
+)
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.parameters import robot_parameters
 from ddagr_gym.presets import get_robot, get_soil
+from ddagr_gym.recordings.schema import Recording, RecordingMeta
 
 ROBOT, SOIL = get_robot("ddagr"), get_soil("thesis_a1")
 SCORES = Scores(("a 0",), np.zeros(1), np.eye(1), np.eye(1), np.eye(1))
@@ -58,3 +68,46 @@ def test_what_cannot_be_left_out_is_refused(robot):
         old.without("a")
     with pytest.raises(InputError, match="with two drives or more"):
         replace(robot, references=robot.references[:1]).without("a")
+
+
+BIASES = (
+    SensorBias("a", "sand", np.array([0.001, 0.40, -0.30])),
+    SensorBias("bb", "sand", np.array([0.003, 0.34, -0.22])),
+    SensorBias("ccc", "yard", np.array([0.002, 0.05, -0.10])),
+)
+
+
+def test_accelerometers_lean_on_a_ground_as_in_the_other_drives_on_it(robot):
+    weighing = replace(robot.weighing, offsets=np.array([0.002, 0.2, -0.2]), accelerometer_bias=0.16, biases=BIASES)
+    known = weighing.on("sand")
+    np.testing.assert_allclose(known.offsets, [0.002, 0.37, -0.26])
+    # two drives, two axes: squares of half the differences, beside what is expected
+    square = 2.0 * 0.03**2 + 2.0 * 0.04**2
+    scatter = np.sqrt((EXPECTED_DRIVES * SLOPE_ON_A_GROUND**2 + square) / (EXPECTED_DRIVES + 2.0))
+    assert known.accelerometer_bias == pytest.approx(scatter * np.sqrt(1.5))
+    np.testing.assert_allclose(weighing.on("sand", "bb").offsets, [0.002, 0.40, -0.30])
+    for unknown in (weighing.on(""), weighing.on("moss"), weighing.on("yard", "ccc")):
+        assert unknown is weighing
+
+
+def test_what_a_left_out_drive_says_of_biases_is_left_out_too(robot):
+    weighing = replace(robot.weighing, biases=BIASES)
+    found = replace(robot, weighing=weighing).without("bb").weighing
+    assert [item.drive for item in found.biases] == ["a", "ccc"]
+
+
+def recording(column_map: str) -> Recording:
+    time = np.arange(100) / 20.0
+    return Recording(time, {}, np.ones(100, dtype=bool), RecordingMeta(column_map=column_map, segments=((0, 100),)))
+
+
+def test_commands_of_another_logger_may_be_a_sample_apart(robot):
+    late = replace(
+        ROBOT, drivetrain=replace(ROBOT.drivetrain, command_delay=0.2), standard_deviations={"command_delay": 0.01}
+    )
+    delay = next(p for p in robot_parameters(late) if p.name == "command_delay")
+    references = tuple(replace(item, column_map="steps") for item in robot.references)
+    robot = replace(robot, parameters=(replace(delay, prior=0.01),), references=references)
+    for column_map, prior in (("steps", 0.01), ("bag", np.hypot(0.01, 0.05))):
+        free = robot.uncertain("sand", [recording("steps"), recording(column_map)])
+        assert {p.name: p.prior for p in free}["command_delay"] == pytest.approx(prior)

@@ -51,6 +51,30 @@ def test_the_size_and_its_deviations_come_back():
     assert found.between[0, 0] == pytest.approx(0.04, rel=1e-4)
 
 
+def test_what_a_prior_leaves_open_counts_between_drives_alone():
+    # readings know the sum of a bias and an effect to 0.01; the prior of the bias alone tells them apart, to 0.3
+    readings, prior = 0.01**-2.0, 0.3**-2.0
+    kept = readings * prior / (readings + prior)
+    drive = Scores(
+        BIAS.keys, np.array([kept * 2.0]), np.array([[kept]]), np.array([[0.0]]), np.array([[kept**2 / prior]])
+    )
+    found = sizes_of(drive, BIAS.keys, np.zeros(1))
+    assert found.between[0, 0] == pytest.approx(0.3**2)
+    assert found.within[0, 0] == pytest.approx(0.01**2, rel=0.01)
+
+
+def test_an_ordinary_drive_of_which_little_was_known_counts_for_little():
+    drive = scores(BIAS.keys[0], 10.0, 0.5, 0.5)
+    sizes = (-0.5, 0.0, 0.5)
+    known = [scores(BIAS.keys[0], size, 0.5, 0.5) for size in sizes]
+    astray = [*known, scores(BIAS.keys[0], 8.0, 0.5, 0.5)]
+    vague = [*known, scores(BIAS.keys[0], 8.0, 0.5, 8.0)]
+    none, much, little = (shift_of(BIAS, drive, against(*drives)) for drives in (known, astray, vague))
+    assert none.mean[0] == pytest.approx(0.0, abs=1e-6)
+    assert much.mean[0] > 1.5 > 0.2 > little.mean[0]
+    assert little.distance > 1.5 * much.distance
+
+
 def test_ordinary_drives_that_scatter_widen_a_shift():
     drive = scores(BIAS.keys[0], 10.0, 0.5)
     alike = shift_of(BIAS, drive, against(*(scores(BIAS.keys[0], size, 0.5) for size in (0.9, 1.0, 1.1))))

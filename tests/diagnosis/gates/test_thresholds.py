@@ -28,7 +28,7 @@ from ddagr_gym.diagnosis.gates.thresholds import (
 )
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.nuisances import LOCAL
-from ddagr_gym.physics.effects.registry import effect_kinds
+from ddagr_gym.physics.effects.registry import absolute_effect_kinds
 
 NAMES = ("slope", "payload", "motor_lag", "gyro_bias")
 
@@ -135,7 +135,7 @@ def test_what_few_windows_carry_must_be_clear() -> None:
 def test_a_bank_ships_for_the_thesis_robot() -> None:
     thresholds = default_thresholds("ddagr")
     assert thresholds.nulls >= 60
-    assert set(effect_kinds()) - {"sensor_hold"} <= set(thresholds.gates)
+    assert set(absolute_effect_kinds()) - {"sensor_hold"} <= set(thresholds.gates)
     assert set(LOCAL) <= set(thresholds.misfit)
     with pytest.raises(InputError, match="null-bank"):
         default_thresholds("nobody")

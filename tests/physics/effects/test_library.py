@@ -21,7 +21,7 @@ from ddagr_gym.physics.effects import GROUPS, DriveExtent, effect_kinds, effect_
 from ddagr_gym.simulator import Simulator
 
 VERDICT_NAMES = {
-    "commands and motors": "command_delay motor_lag motor_droop motor_saturation command_deadband",
+    "commands and motors": "command_delay motor_lag motor_droop motor_saturation command_deadband command_gain",
     "robot": "payload centre_of_mass_offset wheel_radius_mismatch towed_drag viscous_drag",
     "ground": "slope soil_change soil_split soil_patch lateral_bulldozing slip_sinkage multipass",
     "sensors": "gyro_bias gyro_scale gyro_sign accelerometer_bias accelerometer_sign imu_misalignment imu_tilt "
