@@ -130,8 +130,9 @@ def run(arguments: Arguments) -> int | None:
             progress=LinePrinter("ddagr diagnose: "),
             cache=parts,
         )
-        result.report(arguments.output, overwrite=arguments.overwrite)
+        # before the folder, whose presence would end a repetition of the command
         written = _write_viewer_files(arguments, result)
+        result.report(arguments.output, overwrite=arguments.overwrite)
     except KeyboardInterrupt:
         print(f"ddagr: interrupted; the same command goes on from {parts}.", file=sys.stderr)
         return 130
@@ -156,6 +157,12 @@ def _check_viewer_files(arguments: Arguments) -> None:
     if arguments.rrd is not None:
         need("rerun")
         check_rrd_path(arguments.rrd)
+    folder = arguments.output.expanduser().resolve()
+    for path in (arguments.mcap, arguments.rrd):
+        if path is not None and folder in path.expanduser().resolve().parents:
+            raise InputError(
+                f"{path} lies in {arguments.output}, which is written as a whole: choose a place beside it."
+            )
 
 
 def _write_viewer_files(arguments: Arguments, result: DiagnosisReport) -> list[str]:

@@ -144,6 +144,7 @@ def _of_recording(problem: Problem, time: Array, number: int) -> tuple[NDArray[n
     rows = np.flatnonzero(windows.recording == number)
     rows = rows[np.argsort(windows.time[rows], kind="stable")]
     following = np.append(windows.time[rows[1:]], np.inf)
-    kept = time[rows] <= following[:, None] + 1e-9
+    # clocks jitter: the last sample of a window is one with the start of the next
+    kept = time[rows] <= following[:, None] + 0.5 * windows.period
     window, block = np.nonzero(kept)
     return rows[window], block

@@ -101,6 +101,13 @@ def test_files_that_no_viewer_opens_are_refused_first(
     assert not (work / "nothing").exists()
 
 
+def test_a_file_inside_the_output_folder_is_refused_first(work: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("foxglove", reason="needs the extra foxglove")
+    assert main([*words(work, "nothing"), "--mcap", str(work / "nothing" / "drives.mcap")]) == 2
+    assert "which is written as a whole: choose a place beside it" in capsys.readouterr().err
+    assert not (work / "nothing").exists()
+
+
 @pytest.mark.parametrize(("option", "package"), [("--mcap", "foxglove-sdk"), ("--rrd", "rerun-sdk")])
 def test_an_absent_package_is_named_first(
     work: Path, option: str, package: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
