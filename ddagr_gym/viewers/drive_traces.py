@@ -88,41 +88,39 @@ def drive_traces(
         recordings: as they were read, in the order in which the windows count them.
     """
     models = dict(zip(MODELS, (as_it_stands(problem, refitted), refitted, corrected), strict=True))
-    predictions = {name: _block_means(problem, model.prediction) for name, model in models.items()}
+    blocked = problem.blocked
+    predictions = {name: blocked.means_of_all(model.prediction) for name, model in models.items()}
     residuals = {name: _residuals(problem, model) for name, model in models.items()}
-    measured = np.where(
-        np.isfinite(problem.blocked.sigma),
-        _block_means(problem, np.nan_to_num(problem.blocked.windows.measured)),
-        np.nan,
-    )
+    known = np.isfinite(blocked.sigma)
+    measured = np.where(known, blocked.means_of_all(np.nan_to_num(blocked.windows.measured)), np.nan)
     time, first = _times(problem), _clock(recordings[0])
     found = []
     for number, recording in enumerate(recordings):
-        window, block = _of_recording(problem, time, number)
+        rows = _of_recording(problem, number)
         found.append(
             DriveTraces(
                 recording,
                 first,
-                time[window, block],
-                window,
-                measured[window, block],
-                {name: values[window, block] for name, values in predictions.items()},
-                {name: values[window, block] for name, values in residuals.items()},
+                time[rows].ravel(),
+                np.repeat(rows, time.shape[1]),
+                _along(measured[rows]),
+                {name: _along(values[rows]) for name, values in predictions.items()},
+                {name: _along(values[rows]) for name, values in residuals.items()},
             )
         )
         first = first + float(recording.t[-1]) + PAUSE
     return tuple(found)
 
 
+def _along(values: Array) -> Array:
+    """(w * B, 8) of (w, B, 8)."""
+    return values.reshape(-1, values.shape[2])
+
+
 def _clock(recording: Recording) -> float:
     """Clock reading at time 0 of a recording; 0 for one that no viewer can show."""
     start = recording.meta.start_time
     return start if 0.0 <= start < _LATEST else 0.0
-
-
-def _block_means(problem: Problem, values: Array) -> Array:
-    """(W, B, 8) means of (W, T, 8) as they are compared; of headings without jumps inside a window."""
-    return problem.blocked.means_of_all(values)
 
 
 def _residuals(problem: Problem, model: Fitted) -> Array:
@@ -138,13 +136,8 @@ def _times(problem: Problem) -> Array:
     return np.asarray(windows.time[:, None] + windows.period * (length * np.arange(blocks) + 0.5 * (length + 1)))
 
 
-def _of_recording(problem: Problem, time: Array, number: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Window and block (N,) of a recording's samples in the order of time; of overlapping windows the later one's."""
+def _of_recording(problem: Problem, number: int) -> NDArray[np.int64]:
+    """Windows of a recording in the order of time; they do not overlap."""
     windows = problem.blocked.windows
     rows = np.flatnonzero(windows.recording == number)
-    rows = rows[np.argsort(windows.time[rows], kind="stable")]
-    following = np.append(windows.time[rows[1:]], np.inf)
-    # clocks jitter: the last sample of a window is one with the start of the next
-    kept = time[rows] <= following[:, None] + 0.5 * windows.period
-    window, block = np.nonzero(kept)
-    return rows[window], block
+    return rows[np.argsort(windows.time[rows], kind="stable")]
