@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.diagnosis.localisation.effect_timeline import as_it_stands
+from ddagr_gym.frames import wrap_angle
 from ddagr_gym.identification.gauss_newton import Fitted
 from ddagr_gym.identification.misfit import projected_residual
 from ddagr_gym.identification.problem import Problem
@@ -42,8 +43,8 @@ class DriveTraces:
         stamp: of its time 0 in a viewer [s].
         time: (N,) of the samples that were compared, in the recording's time [s].
         window: (N,) number of each sample's window. In every one the models start anew from a fitted state.
-        measured: (N, 8) as it was compared, NaN where there is no sample.
-        predictions: (N, 8) by model.
+        measured: (N, 8) as it was compared, NaN where there is no sample; headings from -pi to pi.
+        predictions: (N, 8) by model; headings likewise.
         residuals: (N, 8) by model, over the noise and without what the unknowns of each window explain; NaN where there
             is no sample.
     """
@@ -103,8 +104,8 @@ def drive_traces(
                 first,
                 time[rows].ravel(),
                 np.repeat(rows, time.shape[1]),
-                _along(measured[rows]),
-                {name: _along(values[rows]) for name, values in predictions.items()},
+                _with_wrapped_heading(_along(measured[rows])),
+                {name: _with_wrapped_heading(_along(values[rows])) for name, values in predictions.items()},
                 {name: _along(values[rows]) for name, values in residuals.items()},
             )
         )
@@ -115,6 +116,15 @@ def drive_traces(
 def _along(values: Array) -> Array:
     """(w * B, 8) of (w, B, 8)."""
     return values.reshape(-1, values.shape[2])
+
+
+def _with_wrapped_heading(values: Array) -> Array:
+    """(N, 8) with headings from -pi to pi: a model counts turns from its start, a receiver often does not."""
+    found = values.copy()
+    heading = found[:, POSE[2]]
+    # a model that breaks down may leave any number
+    found[:, POSE[2]] = wrap_angle(np.where(np.isfinite(heading), heading, np.nan))
+    return found
 
 
 def _clock(recording: Recording) -> float:

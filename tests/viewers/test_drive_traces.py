@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -33,6 +35,16 @@ def test_readings_that_are_compared_relative_to_each_other(answered):
     recording = answered.recordings[0]
     rows = np.searchsorted(recording.t, first.time - 1e-6)
     assert first.measured[:, 2] == pytest.approx(recording["yaw_rate"][rows])
+
+
+def test_headings_of_all_are_within_a_turn(answered):
+    """A receiver that counts from -pi to pi against a model that counts on: no difference of whole turns is shown."""
+    around = dataclasses.replace(
+        answered.corrected, prediction=answered.corrected.prediction + 2.0 * np.pi * (np.arange(8) == 7)
+    )
+    first, _ = drive_traces(answered.problem, around, answered.corrected, answered.recordings)
+    plain, _ = drive_traces(answered.problem, answered.corrected, answered.corrected, answered.recordings)
+    assert first.predictions["refitted"] == pytest.approx(plain.predictions["refitted"], abs=1e-9)
 
 
 def test_a_clock_that_no_viewer_shows_begins_at_nothing(answered):
