@@ -135,6 +135,13 @@ def test_the_drives_are_written_for_viewers(found, tmp_path):
     assert {pair.value for pair in events[0].metadata if pair.key == "finding"} == {"slope"}
 
 
+def test_the_drives_are_written_for_rerun(found, tmp_path):
+    chunks = pytest.importorskip("rerun.chunk", reason="needs the extra rerun")
+    reader = chunks.RrdReader(found.to_rrd(tmp_path / "drives.rrd"))
+    entities = {chunk.entity_path for chunk in reader.stream()}
+    assert {"/readings/yaw_rate/corrected", "/residual/yaw_rate/nominal", "/findings/shows/slope"} <= entities
+
+
 def test_text_and_notebook_have_sentence_and_sizes(found, page_text):
     assert repr(found) == f"<DiagnosisResult: {found.sentence}>"
     assert str(found).startswith(found.sentence)
