@@ -8,12 +8,14 @@ from ddagr_gym.errors import InputError
 
 EXTRA_OF_MODULE = {
     "casadi": "mpc",
+    "foxglove": "foxglove",
     "imageio_ffmpeg": "render",
     "jinja2": "report",
     "matplotlib": "report",
     "mcap": "io",
     "pyarrow": "io",
     "pygame": "render",
+    "rerun": "rerun",
     "rosbags": "io",
     "ruptures": "diagnosis",
     "sb3_contrib": "rl",
@@ -23,6 +25,9 @@ EXTRA_OF_MODULE = {
     "torch": "rl",
 }
 """Import name of an optional library -> extra in pyproject.toml."""
+
+_PACKAGE_OF_MODULE = {"foxglove": "foxglove-sdk", "rerun": "rerun-sdk"}
+"""Name in the package index where that of the import is another project's."""
 
 
 def missing_extra(error: ModuleNotFoundError) -> InputError | None:
@@ -44,6 +49,6 @@ def need(*modules: str) -> None:
 
 def _sentence(module: str) -> InputError:
     return InputError(
-        f"this needs the package {module!r}, which is not installed: "
+        f"this needs the package {_PACKAGE_OF_MODULE.get(module, module)!r}, which is not installed: "
         f"run pip install -c constraints.txt 'ddagr-gym[{EXTRA_OF_MODULE[module]}]', or start through ./ddagr."
     )

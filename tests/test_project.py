@@ -17,8 +17,10 @@ from ddagr_gym.extras import EXTRA_OF_MODULE, missing_extra, need
 
 # Libraries whose import name is not their distribution's name.
 MODULE_OF = {
+    "foxglove-sdk": "foxglove",
     "imageio-ffmpeg": "imageio_ffmpeg",
     "pygame-ce": "pygame",
+    "rerun-sdk": "rerun",
     "sb3-contrib": "sb3_contrib",
     "scikit-learn": "sklearn",
     "stable-baselines3": "stable_baselines3",

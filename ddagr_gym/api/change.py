@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from ddagr_gym.diagnosis.change.run import Outcome
     from ddagr_gym.parameters import Robot, Soil
     from ddagr_gym.recordings.schema import Recording
+    from ddagr_gym.viewers.drive_traces import DriveTraces
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -46,6 +47,12 @@ class ChangeResult(DiagnosisReport):
         from ddagr_gym.reporting.change_text import change_text
 
         return change_text(self.diagnosis)
+
+    def _traces(self) -> tuple[DriveTraces, ...]:
+        from ddagr_gym.viewers.drive_traces import drive_traces
+
+        outcome, models = self.outcome, self.outcome.named.models
+        return drive_traces(outcome.problem, models[0].fitted, models[-1].fitted, outcome.mended.given)
 
     def _fill(self, folder: Path, progress: Callable[[str], None] | None) -> None:
         from ddagr_gym.config import dump_config

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from ddagr_gym.calibration.run import Outcome as CalibrationOutcome
     from ddagr_gym.diagnosis.pipeline import Outcome
     from ddagr_gym.parameters import Robot, Soil
+    from ddagr_gym.viewers.drive_traces import DriveTraces
 
 PAGE = "index.html"
 
@@ -85,6 +86,12 @@ class DiagnosisResult(DiagnosisReport):
         from ddagr_gym.reporting.diagnosis_text import outcome_text
 
         return outcome_text(self.diagnosis)
+
+    def _traces(self) -> tuple[DriveTraces, ...]:
+        from ddagr_gym.viewers.drive_traces import drive_traces
+
+        session, found = self.outcome.session, self.outcome.found
+        return drive_traces(session.problem, found.nominal.fitted, found.chosen.fitted, session.mended.given)
 
     def _fill(self, folder: Path, progress: Callable[[str], None] | None) -> None:
         from ddagr_gym.diagnosis.answer import evidence

@@ -17,12 +17,14 @@ from ddagr_gym.extras import need
 from ddagr_gym.progress import LinePrinter
 
 if TYPE_CHECKING:
+    from ddagr_gym.api.diagnosis_report import DiagnosisReport
     from ddagr_gym.recordings.files import Limits
 
 EXAMPLES = (
     "ddagr diagnose run_1.csv.gz run_2.csv.gz run_3.csv.gz --output diagnosis",
     "ddagr diagnose today.csv.gz --calibration calibration --ground sand --output changed",
     "ddagr diagnose today.csv.gz --before monday.csv.gz tuesday.csv.gz --same-ground --output changed",
+    "ddagr diagnose today.csv.gz --output diagnosis --mcap today.mcap",
     "ddagr diagnose drives --robot ddagr --soil thesis_a1 --thresholds thresholds.json --output diagnosis",
 )
 
@@ -63,6 +65,10 @@ class Arguments:
         stride: seconds between the starts of windows; their length, which uses all samples, when it is left out.
         seed: of the resampling.
         threads: of the simulator.
+        mcap: file to write for Foxglove and PlotJuggler: drives, predictions of the nominal, the refitted and the
+            corrected simulator, residuals over the noise, and findings with their stretches; a layout is put beside it.
+            Needs foxglove-sdk.
+        rrd: file to write for Rerun, with the same. Needs rerun-sdk.
         names_only: only name what is missing: no errors on unseen drives, no unnamed terms, no next drive, no page.
         overwrite: replace an output folder that an earlier command wrote.
         maximum_rows: refuse a recording with more rows or messages.
@@ -85,6 +91,8 @@ class Arguments:
     stride: float | None = None
     seed: int = 0
     threads: int = 2
+    mcap: Path | None = None
+    rrd: Path | None = None
     names_only: bool = False
     overwrite: bool = False
     maximum_rows: int = 2_000_000
@@ -102,6 +110,7 @@ def run(arguments: Arguments) -> int | None:
 
     check_output_folder(arguments.output, overwrite=arguments.overwrite)
     need(*(() if arguments.names_only else ("jinja2", "matplotlib")))
+    _check_viewer_files(arguments)
     read_as = arguments.robot if arguments.calibration is None else str(arguments.calibration / ROBOT)
     limits = Limits(arguments.maximum_rows, arguments.maximum_bytes)
     parts = part_folder(arguments.output.expanduser().resolve())
@@ -121,6 +130,8 @@ def run(arguments: Arguments) -> int | None:
             progress=LinePrinter("ddagr diagnose: "),
             cache=parts,
         )
+        # before the folder, whose presence would end a repetition of the command
+        written = _write_viewer_files(arguments, result)
         result.report(arguments.output, overwrite=arguments.overwrite)
     except KeyboardInterrupt:
         print(f"ddagr: interrupted; the same command goes on from {parts}.", file=sys.stderr)
@@ -130,7 +141,43 @@ def run(arguments: Arguments) -> int | None:
         print(f"ddagr: robot.yaml and soil.yaml are left out, {result.refit_note}", file=sys.stderr)
     print(result)
     print(f"\n{'' if arguments.names_only else 'page, figures, '}diagnosis.json and effects.json: {arguments.output}")
+    for line in written:
+        print(line)
     return None
+
+
+def _check_viewer_files(arguments: Arguments) -> None:
+    """Refuse before long work what cannot be written after it; InputError."""
+    from ddagr_gym.viewers.mcap_file import check_mcap_path
+    from ddagr_gym.viewers.rerun_file import check_rrd_path
+
+    if arguments.mcap is not None:
+        need("foxglove")
+        check_mcap_path(arguments.mcap)
+    if arguments.rrd is not None:
+        need("rerun")
+        check_rrd_path(arguments.rrd)
+    folder = arguments.output.expanduser().resolve()
+    for path in (arguments.mcap, arguments.rrd):
+        if path is not None and folder in path.expanduser().resolve().parents:
+            raise InputError(
+                f"{path} lies in {arguments.output}, which is written as a whole: choose a place beside it."
+            )
+
+
+def _write_viewer_files(arguments: Arguments, result: DiagnosisReport) -> list[str]:
+    """Write what was asked for; a line for each."""
+    from ddagr_gym.viewers.mcap_file import layout_path
+
+    lines = []
+    if arguments.mcap is not None:
+        result.to_mcap(arguments.mcap, progress=LinePrinter("ddagr diagnose: "))
+        lines.append(
+            f"for Foxglove and PlotJuggler: {arguments.mcap}; Foxglove's layout: {layout_path(arguments.mcap)}"
+        )
+    if arguments.rrd is not None:
+        lines.append(f"for Rerun: {result.to_rrd(arguments.rrd)}")
+    return lines
 
 
 def _compared_with(arguments: Arguments, read_as: str, limits: Limits) -> dict[str, Any]:

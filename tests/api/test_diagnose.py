@@ -16,8 +16,10 @@ import ddagr_gym
 from ddagr_gym.diagnosis.answer.next_drive_plan import NextDrivePlan
 from ddagr_gym.diagnosis.result.files import load
 from ddagr_gym.errors import InputError, InputWarning
+from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.physics.effects import load_effects
 from ddagr_gym.presets import get_robot, get_soil
+from tests.viewers.reading import read
 
 pytest.importorskip("ruptures")
 pytest.importorskip("pandas")
@@ -116,6 +118,28 @@ def test_files_are_those_of_the_command_without_a_page(found, tmp_path):
     assert json.loads((tmp_path / "one.json").read_text())["soil"] == "thesis_a1"
     with pytest.raises(InputError, match="overwrite=True"):
         found.report(tmp_path / "found")
+
+
+def test_the_drives_are_written_for_viewers(found, tmp_path):
+    pytest.importorskip("foxglove", reason="needs the extra foxglove")
+    assert found.to_mcap(tmp_path / "drives.mcap") == tmp_path / "drives.mcap"
+    drives = read(tmp_path / "drives.mcap")
+    evidence = found.outcome.evidence
+    for name, model in (("nominal", "raw"), ("refitted", "nominal"), ("corrected", "corrected")):
+        values = drives.column(f"/residual/{name}", "specific_force_x")[:, 2]
+        shown = evidence.standardised(model)[..., CHANNELS.index("specific_force_x")]
+        assert np.mean(values**2) == pytest.approx(np.nanmean(shown**2), rel=1e-4)
+    events = [item for _, item in drives.messages["/findings/events"]]
+    spans = found.findings[0].where.spans
+    assert len(events) == len(spans)
+    assert {pair.value for pair in events[0].metadata if pair.key == "finding"} == {"slope"}
+
+
+def test_the_drives_are_written_for_rerun(found, tmp_path):
+    chunks = pytest.importorskip("rerun.chunk", reason="needs the extra rerun")
+    reader = chunks.RrdReader(found.to_rrd(tmp_path / "drives.rrd"))
+    entities = {chunk.entity_path for chunk in reader.stream()}
+    assert {"/readings/yaw_rate/corrected", "/residual/yaw_rate/nominal", "/findings/shows/slope"} <= entities
 
 
 def test_text_and_notebook_have_sentence_and_sizes(found, page_text):

@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 import shutil
 from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from ddagr_gym import extras
 from ddagr_gym.cli import main
 from ddagr_gym.diagnosis import pipeline
 from ddagr_gym.diagnosis.answer.verdict import DataDoubt, Diagnosis, GatesUsed
@@ -26,6 +28,7 @@ from ddagr_gym.recordings.storage import save_parquet
 from ddagr_gym.replay_analysis.report import REFITTED
 from ddagr_gym.reporting.diagnosis_text import outcome_text
 from ddagr_gym.simulator import simulate
+from tests.viewers.reading import read
 
 NO_GATES = GatesUsed(nulls=0, bank="", level=0.05)
 RATE = 50.0
@@ -67,8 +70,53 @@ def words(work: Path, output: str = "found", *runs: str) -> list[str]:
 @pytest.fixture(scope="session")
 def found(work: Path) -> Path:
     """The folder that the command writes for them."""
-    assert main(words(work)) == 0
+    viewers = ["--mcap", str(work / "drives.mcap")] if find_spec("foxglove") else []
+    assert main([*words(work), *viewers]) == 0
     return work / "found"
+
+
+def test_the_drives_are_written_beside_for_viewers(found: Path, work: Path) -> None:
+    pytest.importorskip("foxglove", reason="needs the extra foxglove")
+    drives = read(work / "drives.mcap")
+    assert drives.metadata["verdict"] == "slope"
+    assert "run_2" in drives.metadata["recording 2"]
+    assert json.loads((work / "drives.layout.json").read_text())["content"]
+
+
+@pytest.mark.parametrize(
+    ("option", "name", "said"),
+    [
+        ("--mcap", "drives.bag", "give a name that ends in .mcap"),
+        ("--rrd", "drives.mcap", "give a name that ends in .rrd"),
+    ],
+)
+def test_files_that_no_viewer_opens_are_refused_first(
+    work: Path, option: str, name: str, said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip({"--mcap": "foxglove", "--rrd": "rerun"}[option], reason="needs the extra")
+    assert main([*words(work, "nothing"), option, str(work / name)]) == 2
+    told = capsys.readouterr()
+    assert said in told.err
+    assert "step 1" not in told.err
+    assert not (work / "nothing").exists()
+
+
+def test_a_file_inside_the_output_folder_is_refused_first(work: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("foxglove", reason="needs the extra foxglove")
+    assert main([*words(work, "nothing"), "--mcap", str(work / "nothing" / "drives.mcap")]) == 2
+    assert "which is written as a whole: choose a place beside it" in capsys.readouterr().err
+    assert not (work / "nothing").exists()
+
+
+@pytest.mark.parametrize(("option", "package"), [("--mcap", "foxglove-sdk"), ("--rrd", "rerun-sdk")])
+def test_an_absent_package_is_named_first(
+    work: Path, option: str, package: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(extras, "find_spec", lambda name: None if name in ("foxglove", "rerun") else object())
+    assert main([*words(work, "nothing"), option, str(work / f"drives.{option[2:]}")]) == 2
+    told = capsys.readouterr()
+    assert f"'{package}', which is not installed" in told.err
+    assert "step 1" not in told.err
 
 
 def test_refitted_robot_and_soil_are_nearer_to_the_true_ones(found: Path) -> None:

@@ -35,12 +35,14 @@ class Outcome:
         effects: what it names, with fitted sizes.
         problem: windows and weights.
         named: models behind the answer.
+        mended: the drives.
     """
 
     diagnosis: Diagnosis
     effects: tuple[Effect, ...]
     problem: Problem
     named: Named
+    mended: MendedRecordings
 
 
 def what_changed(
@@ -77,7 +79,7 @@ def what_changed(
     certified = _certified(problem, ordinary, named)
     diagnosis, effects = conclude_change(problem, mended, ordinary, ground, named, certified)
     diagnosis = replace(diagnosis, checks=doubts, seconds=time.monotonic() - began)
-    return Outcome(diagnosis, effects, problem, named)
+    return Outcome(diagnosis, effects, problem, named, mended)
 
 
 def what_changed_since(

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
+from ddagr_gym.api.change import ChangeResult
 from ddagr_gym.diagnosis.change.run import what_changed
 from ddagr_gym.diagnosis.result.files import as_mapping, validate
 from ddagr_gym.errors import InputError
 from ddagr_gym.reporting.change_page import write_page
 from ddagr_gym.reporting.change_text import change_text
 from tests.diagnosis.change.conftest import drive
+from tests.viewers.reading import read
 
 CHANGES = (
     (21, "gyro_bias=0.02", "gyro_bias", "bias", 0.02),
@@ -49,6 +52,18 @@ def known_effects() -> list[str]:
     from ddagr_gym.physics.effects.registry import effect_kinds
 
     return list(effect_kinds())
+
+
+@pytest.mark.slow
+def test_what_changed_is_written_for_viewers(ordinary_robot, tmp_path):
+    """The bias is what the refitted robot leaves in the gyro, and the corrected one does not."""
+    pytest.importorskip("foxglove", reason="needs the extra foxglove")
+    outcome = what_changed([drive(26, "gyro_bias=0.02")], ordinary_robot, "field")
+    drives = read(ChangeResult(outcome).to_mcap(tmp_path / "changed.mcap"))
+    left = {model: drives.column(f"/residual/{model}", "yaw_rate")[:, 2] for model in ("nominal", "corrected")}
+    assert np.mean(left["corrected"] ** 2) < 0.5 * np.mean(left["nominal"] ** 2)
+    (event,) = [item for _, item in drives.messages["/findings/events"]]
+    assert {pair.key: pair.value for pair in event.metadata}["located"] == "no"
 
 
 @pytest.mark.slow
