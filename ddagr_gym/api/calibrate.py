@@ -172,8 +172,10 @@ def calibrate(
         >>> abs(result.robot.motor_rate - 3.0) < 0.05
         True
     """
+    import numpy as np
+
     from ddagr_gym.calibration.files import check_ground_name
-    from ddagr_gym.calibration.input_requirements import check_drives, grounds_of
+    from ddagr_gym.calibration.input_requirements import check_drives, check_map, grounds_of
     from ddagr_gym.calibration.run import calibrate_drives
     from ddagr_gym.calibration.settings import CalibrationSettings
 
@@ -182,6 +184,7 @@ def calibrate(
     given = _listed(recordings)
     found = _named_apart(recordings_from(given, robot, column_map) if given else ())
     check_drives(found, data_sheet)
+    check_map(found, np.random.default_rng(seed))
     names = [recording.meta.source for recording in found]
     numbers = {ground: [_number(drive, given, found) for drive in drives] for ground, drives in (grounds or {}).items()}
     by_drive = grounds_of(names, numbers)

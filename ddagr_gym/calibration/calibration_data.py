@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ddagr_gym.calibration.settings import HISTORY, CalibrationSettings
 from ddagr_gym.diagnosis.preprocessing.mended_recordings import mend_recordings
+from ddagr_gym.diagnosis.wording import in_sentence
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.data_split import evenly
 from ddagr_gym.identification.windows import WindowSet, cut_windows, with_presumed_past
@@ -92,7 +93,7 @@ def prepare_drives(
     Raises:
         InputError: a drive with too few windows.
     """
-    mended, notes = zip(*(_mended(recording) for recording in recordings), strict=True)
+    mended, notes = zip(*(_mended(recording, settings.seed) for recording in recordings), strict=True)
     prepared = prepare(mended, robot, np.random.default_rng(settings.seed))
     windows = cut_windows(
         prepared.recordings,
@@ -111,10 +112,11 @@ def prepare_drives(
     return CalibrationData(robot, dict(soils), prepared, tuple(grounds), with_presumed_past(windows), notes)
 
 
-def _mended(recording: Recording) -> tuple[Recording, tuple[str, ...]]:
+def _mended(recording: Recording, seed: int) -> tuple[Recording, tuple[str, ...]]:
     """A drive without the faults that show in its values, and sentences on them."""
-    found = mend_recordings([recording])
+    found = mend_recordings([recording], seed)
     said = [f"the {item.sensor} repeats its readings: repeats are left out." for item in found.repeated]
+    said += [f"{in_sentence(fault.name)}: readings were put where they belong." for fault in found.channel_faults]
     said += ["the gyro turns the wrong way: its sign was turned."] if found.reversed_gyro is not None else []
     return found.recordings[0], tuple(said)
 

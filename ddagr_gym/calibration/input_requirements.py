@@ -7,8 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ddagr_gym.diagnosis.preprocessing.channel_faults import find_channel_faults
 from ddagr_gym.diagnosis.preprocessing.input_requirements import check_different
 from ddagr_gym.diagnosis.preprocessing.reversed_gyro import with_gyro_reversed
+from ddagr_gym.diagnosis.wording import amounts, describe
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.windows import PERIOD_TOLERANCE
 from ddagr_gym.parameters import Robot
@@ -114,6 +116,24 @@ def _check_length(recording: Recording) -> None:
             f"{recording.meta.source}: the robot is commanded to stand still {100.0 * (1.0 - moving):.0f} % of the "
             "time: give a drive with straight pieces and arcs to both sides."
         )
+
+
+def check_map(recordings: Sequence[Recording], rng: np.random.Generator) -> None:
+    """Refuse drives whose readings are in the wrong channels: what later drives are compared with has to be right.
+
+    Args:
+        recordings: to be calibrated together.
+        rng: of the intervals.
+
+    Raises:
+        InputError: exchanged or reversed encoders or commands, an IMU upside down, a pose that turns the wrong way.
+    """
+    for recording in recordings:
+        for fault in find_channel_faults([recording], rng):
+            raise InputError(
+                f"{recording.meta.source}: {describe(fault.name, amounts(fault.sizes))}. {fault.remedy} "
+                "A calibration needs drives that are mapped right."
+            )
 
 
 def with_gyro_forward(recording: Recording, rng: np.random.Generator) -> tuple[Recording, tuple[str, ...]]:

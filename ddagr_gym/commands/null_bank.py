@@ -123,11 +123,13 @@ def run(arguments: Arguments) -> None:
 def _mended(loaded: Sequence[Recording]) -> Sequence[Recording]:
     """Recordings as a diagnosis sees them; what had to be mended is reported."""
     from ddagr_gym.diagnosis.preprocessing.mended_recordings import mend_recordings
+    from ddagr_gym.diagnosis.wording import in_sentence
 
     if not loaded:
         return loaded
     found = mend_recordings(loaded)
     faults = [f"repeated readings ({item.sensor})" for item in found.repeated]
+    faults += [in_sentence(fault.name) for fault in found.channel_faults]
     faults += ["a reversed gyro"] if found.reversed_gyro is not None else []
     if faults:
         print(f"ddagr: warning: the recordings have {' and '.join(faults)}, which is mended first.", file=sys.stderr)

@@ -23,6 +23,7 @@ from ddagr_gym.diagnosis.localisation.repeat_spans import where_readings_repeat
 from ddagr_gym.diagnosis.planning.next_drive import plan_next_drive
 from ddagr_gym.diagnosis.preprocessing.data_checks import data_doubts
 from ddagr_gym.diagnosis.preprocessing.session import DiagnosisSession, Progress, be_silent, prepare
+from ddagr_gym.diagnosis.result.channel_fault_findings import with_contradictions
 from ddagr_gym.diagnosis.result.conclusion import accept, conclude
 from ddagr_gym.diagnosis.result.drivetrain_names import (
     CompletedNominal,
@@ -181,7 +182,7 @@ def diagnose(
     traces = steps.keep("localisation traces", trace_mismatch, session, accepted)
     located = steps.keep("localisation", locate, session, accepted, traces)
     repeats = where_readings_repeat(session.mended.given, session.mended.repeated)
-    diagnosis = review(diagnosis, located, repeats, fit, checks)
+    diagnosis = with_contradictions(review(diagnosis, located, repeats, fit, checks), session.mended.contradictions)
     unnamed = None if names_only else steps.run("unnamed terms", unnamed_terms, session, accepted, diagnosis)
     following = None if names_only else steps.run("next drive", plan_next_drive, session, diagnosis)
     evidence = steps.run("evidence", gather_evidence, session, accepted, traces)
@@ -222,7 +223,8 @@ def _beside_drivetrain(
     evidence = steps.run("evidence", gather_evidence, session, found, traces)
     own = {effect.name for effect in nominal.effects}
     every = (*(effect for effect in effects if effect.name not in own), *nominal.effects)
-    return Outcome(replace(diagnosis, localisation=located), every, session, found, evidence)
+    diagnosis = with_contradictions(replace(diagnosis, localisation=located), session.mended.contradictions)
+    return Outcome(diagnosis, every, session, found, evidence)
 
 
 def _options(session: DiagnosisSession, names_only: bool, robot_file: str) -> Options:

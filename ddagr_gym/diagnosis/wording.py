@@ -9,6 +9,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from ddagr_gym.diagnosis.answer.channel_faults import CHANNEL_FAULT_TITLES
 from ddagr_gym.diagnosis.answer.drivetrain import PART_TITLES
 from ddagr_gym.diagnosis.answer.verdict import Estimate
 from ddagr_gym.physics.effects.registry import effect_kinds
@@ -285,6 +286,26 @@ def _multipass(a: Amounts) -> str:
     return f"in the ruts of the front wheels the soil is {quantity(a['stiffening'].scaled(100.0), '%')} {word}"
 
 
+def _wheels(kind: str, exchanged: bool) -> Callable[[Amounts], str]:
+    """Sentence on encoders or commands that are other ones than the map says."""
+
+    def sentence(a: Amounts) -> str:
+        backwards = [bank for bank in ("right", "left") if a[bank].value < 0.0]
+        if not exchanged:
+            which = f"the {backwards[0]} {kind}s" if len(backwards) == 1 else f"the {kind}s"
+            return f"{which} count backwards"
+        also = f", and what is in the {' and '.join(backwards)} counts backwards" if backwards else ""
+        return f"the {kind}s of the right and the left side are exchanged{also}"
+
+    return sentence
+
+
+def _upside_down(a: Amounts) -> str:
+    cosine = math.cos(a["yaw"].value)
+    how = "rolled over" if cosine > 0.5 else "pitched over" if cosine < -0.5 else "and turned by 90 degrees"
+    return f"the IMU is upside down ({how})"
+
+
 SENTENCES: Mapping[str, Callable[[Amounts], str]] = {
     "accelerometer_bias": _accelerometer_bias,
     "accelerometer_sign": _accelerometer_sign,
@@ -326,8 +347,15 @@ SENTENCES: Mapping[str, Callable[[Amounts], str]] = {
     "towed_drag": _towed_drag,
     "viscous_drag": lambda a: f"something holds the robot back with {quantity(a['coefficient'], 'N')} per m/s",
     "wheel_radius_mismatch": _radius,
+    "encoders_exchanged": _wheels("encoder", exchanged=True),
+    "encoders_reversed": _wheels("encoder", exchanged=False),
+    "commands_exchanged": _wheels("command", exchanged=True),
+    "commands_reversed": _wheels("command", exchanged=False),
+    "imu_upside_down": _upside_down,
+    "heading_reversed": lambda a: "the pose's heading turns the wrong way",
+    "path_mirrored": lambda a: "the pose's path is mirrored",
 }
-"""One clause per effect of the library, from its amounts."""
+"""One clause per effect of the library and per fault of channels, from its amounts."""
 
 
 def describe(name: str, parameters: Amounts) -> str:
@@ -354,7 +382,7 @@ def title(name: str) -> str:
     kind = effect_kinds().get(name)
     if kind is not None:
         return kind.title
-    words = PART_TITLES.get(name, name.replace("_", " "))
+    words = {**PART_TITLES, **CHANNEL_FAULT_TITLES}.get(name, name.replace("_", " "))
     return words[:1].upper() + words[1:]
 
 

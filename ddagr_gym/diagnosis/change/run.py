@@ -19,6 +19,7 @@ from ddagr_gym.diagnosis.change.ordinary import OrdinaryRobot
 from ddagr_gym.diagnosis.change.requirements import check_before, check_comparable
 from ddagr_gym.diagnosis.preprocessing.data_checks import data_doubts
 from ddagr_gym.diagnosis.preprocessing.mended_recordings import MendedRecordings, mend_recordings
+from ddagr_gym.diagnosis.result.channel_fault_findings import with_new_faults
 from ddagr_gym.identification.gauss_newton import Fitted
 from ddagr_gym.identification.problem import Problem
 from ddagr_gym.parameters import Robot, Soil
@@ -50,6 +51,7 @@ def what_changed(
     ordinary: OrdinaryRobot,
     ground: str = "",
     *,
+    usual: MendedRecordings | None = None,
     seed: int = 0,
     threads: int = 1,
     progress: Callable[[str], None] = lambda line: None,
@@ -60,6 +62,7 @@ def what_changed(
         recordings: of one robot on one ground.
         ordinary: the calibrated robot.
         ground: of the calibration; "" where it is not known.
+        usual: the drives that they are compared with; what is wrong with the channels of these too is no change.
         seed: of everything random.
         threads: of the simulator.
         progress: called with what is being done.
@@ -69,7 +72,7 @@ def what_changed(
     """
     began = time.monotonic()
     check_comparable(recordings, ordinary, ground)
-    mended = mend_recordings(recordings)
+    mended = mend_recordings(recordings, seed)
     progress("fitting the robot of the ordinary drives")
     problem, fitted = _fitted(mended, ordinary, ground, threads)
     rng = np.random.default_rng(seed)
@@ -78,6 +81,7 @@ def what_changed(
     progress("forecasting windows that were left out")
     certified = _certified(problem, ordinary, named)
     diagnosis, effects = conclude_change(problem, mended, ordinary, ground, named, certified)
+    diagnosis = with_new_faults(diagnosis, mended, usual)
     diagnosis = replace(diagnosis, checks=doubts, seconds=time.monotonic() - began)
     return Outcome(diagnosis, effects, problem, named, mended)
 
@@ -113,7 +117,10 @@ def what_changed_since(
     began = time.monotonic()
     check_before(after, before, robot, window)
     known = robot_of_before(before, robot, soil, window=window, seed=seed, threads=threads, progress=progress)
-    outcome = what_changed(after, known, GROUND if same_ground else "", seed=seed, threads=threads, progress=progress)
+    usual = mend_recordings(before, seed)
+    outcome = what_changed(
+        after, known, GROUND if same_ground else "", usual=usual, seed=seed, threads=threads, progress=progress
+    )
     diagnosis = replace(outcome.diagnosis, seconds=time.monotonic() - began)
     return replace(outcome, diagnosis=diagnosis), known
 

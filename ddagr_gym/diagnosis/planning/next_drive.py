@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.control.manoeuvres import MANOEUVRES, Manoeuvre
+from ddagr_gym.diagnosis.answer.channel_faults import CHANNEL_FAULT_TITLES
 from ddagr_gym.diagnosis.answer.next_drive_plan import DriveProposal, NextDrivePlan
 from ddagr_gym.diagnosis.answer.verdict import Diagnosis, Finding, Options
 from ddagr_gym.diagnosis.planning.isolability import APART
@@ -38,6 +39,9 @@ from ddagr_gym.physics.effects.wheel_radius_mismatch import WheelRadiusMismatch
 from ddagr_gym.simulator import simulate
 
 Array = NDArray[np.float64]
+
+SEEN_IN_VALUES = ("sensor_hold", *CHANNEL_FAULT_TITLES)
+"""Names that no drive needs to tell from others."""
 
 MOST_RIVALS = 5
 """Rivals that are compared: those with most weight."""
@@ -307,7 +311,7 @@ def rivals_of_diagnosis(diagnosis: Diagnosis) -> list[Effect]:
     matters.
     """
     every = [*diagnosis.findings, *diagnosis.rejected]
-    findings = [f for f in every if f.name != "sensor_hold"]
+    findings = [f for f in every if f.name not in SEEN_IN_VALUES]
     if findings:
         widest = max(findings, key=lambda f: (len(f.equivalence_set), -_certainty(f)))
         weights = {widest.name: 1.0, **widest.equivalence_set}

@@ -110,7 +110,7 @@ def prepare(
         InputError: recordings that cannot be diagnosed.
     """
     check_recordings(recordings, robot, setting)
-    mended = mend_recordings(recordings)
+    mended = mend_recordings(recordings, seed)
     problem = make_problem(robot, soil, mended.recordings, setting)
     gates = thresholds.for_length(problem.covered)
     return DiagnosisSession(robot, soil, mended, setting, problem, thresholds, gates, seed, progress)

@@ -14,6 +14,7 @@ from ddagr_gym.diagnosis.preprocessing.mended_recordings import MendedRecordings
 from ddagr_gym.diagnosis.preprocessing.repeated_readings import RepeatedReadings, hold_effect
 from ddagr_gym.diagnosis.preprocessing.reversed_gyro import ReversedGyro
 from ddagr_gym.diagnosis.preprocessing.session import DiagnosisSession
+from ddagr_gym.diagnosis.result.channel_fault_findings import channel_fault_findings
 from ddagr_gym.diagnosis.result.detectable import least_detectable
 from ddagr_gym.diagnosis.result.equivalence import equivalents
 from ddagr_gym.diagnosis.result.sentences import headline
@@ -61,7 +62,11 @@ def conclude(
     """
     gates, mended, values = session.gates, session.mended, accepted.chosen.fitted.point.values
     verdict, complete = _verdict(accepted, mended.names, gates)
-    seen = [*_repeat_findings(mended.repeated), *reversed_gyro_findings(mended.reversed_gyro)]
+    seen = [
+        *_repeat_findings(mended.repeated),
+        *channel_fault_findings(mended.channel_faults),
+        *reversed_gyro_findings(mended.reversed_gyro),
+    ]
     fitted = _findings(session, found)
     kept = fitted if accepted is found else _findings(session, accepted)
     rejected = tuple(item for item in fitted if item.name not in accepted.chosen.names)
@@ -243,7 +248,8 @@ def _stands(found: SearchResult, thresholds: Thresholds, step: int, name: str) -
 def _verdict(found: SearchResult, seen: Sequence[str], thresholds: Thresholds) -> tuple[tuple[str, ...], bool]:
     """Three values: named and complete, named but incomplete, none of these; or nothing at all.
 
-    What was seen in the values themselves (repeats, a reversed gyro) stays named whatever else is left.
+    What was seen in the values themselves (repeats, exchanged channels, a reversed gyro) stays named whatever else is
+    left.
 
     Args:
         found: and accepted.

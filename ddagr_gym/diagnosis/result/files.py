@@ -13,6 +13,7 @@ from typing import Any
 import msgspec
 from msgspec import inspect
 
+from ddagr_gym.diagnosis.answer.channel_faults import CHANNEL_FAULT_TITLES
 from ddagr_gym.diagnosis.answer.drivetrain import PART_TITLES
 from ddagr_gym.diagnosis.answer.verdict import NONE, SCHEMA, UNKNOWN, Diagnosis
 from ddagr_gym.errors import InputError
@@ -103,12 +104,12 @@ def _check_names(diagnosis: Diagnosis) -> None:
     """Names that exist, and findings on all of them."""
     from ddagr_gym.physics.effects.registry import effect_kinds
 
-    known = {NONE, UNKNOWN, *effect_kinds(), *PART_TITLES}
+    known = {NONE, UNKNOWN, *effect_kinds(), *PART_TITLES, *CHANNEL_FAULT_TITLES}
     verdict = list(diagnosis.verdict)
     if not verdict or not known.issuperset(verdict):
         raise InputError(
-            f"the diagnosis has the verdict {verdict!r}: give names of effects or of parts of the drivetrain, none or "
-            "unknown."
+            f"the diagnosis has the verdict {verdict!r}: give names of effects, of parts of the drivetrain or of "
+            f"faults of channels ({', '.join(CHANNEL_FAULT_TITLES)}), none or unknown."
         )
     named = [finding.name for finding in diagnosis.findings]
     if sorted(named) != sorted(name for name in verdict if name not in (NONE, UNKNOWN)):

@@ -32,8 +32,16 @@ from ddagr_gym.recordings.checks.motion_windows import (
     MotionWindows,
     motion_windows,
 )
+from ddagr_gym.recordings.checks.regression import Estimate
 from ddagr_gym.recordings.checks.votes import Pair, Votes, votes
-from ddagr_gym.recordings.checks.wheels import wheel_findings, wheel_shares
+from ddagr_gym.recordings.checks.wheels import (
+    followed_commands,
+    followed_findings,
+    wheel_findings,
+    wheel_shares,
+    wheels_followed,
+    wheels_of,
+)
 from ddagr_gym.recordings.schema import FloatArray, Recording
 
 CHECK = "arbitration"
@@ -68,12 +76,23 @@ class Arbitration:
         driving: votes on forward.
         turning: votes on left.
         mounting: of the IMU; None where it cannot be told.
+        wheels: shares of motion that go with each channel, by encoders and commands; None where they cannot be told.
+        followed: how far encoders follow the commands of each bank; None where they cannot be told.
     """
 
     windows: MotionWindows
     driving: Votes
     turning: Votes
     mounting: MountingFit | None
+    wheels: Mapping[str, Estimate | None]
+    followed: Estimate | None = None
+
+    def accused(self, source: str) -> bool:
+        """Whether other sources speak against encoders or commands and for the other ones of the two, or not at all."""
+        motions, other = (self.turning, self.driving), COMMANDS if source == ENCODERS else ENCODERS
+        against = any(source in votes.minority for votes in motions)
+        trusted = all(other in votes.majority for votes in motions) and any(source not in v.majority for v in motions)
+        return (against and not any(other in votes.minority for votes in motions)) or trusted
 
 
 def arbitration(recording: Recording, rng: np.random.Generator) -> list[CheckFinding]:
@@ -83,16 +102,39 @@ def arbitration(recording: Recording, rng: np.random.Generator) -> list[CheckFin
         recording: any; not testable without the robot's wheel radius and track.
         rng: of the resampling.
     """
-    windows = motion_windows(recording, offsets(recording, rng))
-    if windows is None:
+    found = arbitrated(recording, rng)
+    if found is None:
         return [not_testable(CHECK, "all", "The wheel radius is not known.", "Name the robot with --robot.")]
-    found = arbitrate(windows, rng)
+    return arbitration_findings(found)
+
+
+def arbitration_findings(found: Arbitration) -> list[CheckFinding]:
+    """What an arbitration says, in words."""
     return [
         *_vote_findings("driving", found.driving),
         *_vote_findings("turning", found.turning),
-        *_wheels(found, rng),
+        *itertools.chain(*(_wheel_findings(found, source) for source in found.wheels)),
         mounting_finding(found.mounting),
     ]
+
+
+def _wheel_findings(found: Arbitration, source: str) -> list[CheckFinding]:
+    """By the motion of the robot where that tells, else by what encoders and commands say of each other."""
+    wheels = wheels_followed(found.followed)
+    if wheels_of(found.wheels[source]) is None and found.accused(source) and found.followed and wheels:
+        return followed_findings(source, found.followed, wheels)
+    return wheel_findings(source, found.wheels[source])
+
+
+def arbitrated(recording: Recording, rng: np.random.Generator) -> Arbitration | None:
+    """What the sources of motion in a recording say of each other; None without the robot's wheel radius and track.
+
+    Args:
+        recording: any.
+        rng: of the resampling.
+    """
+    windows = motion_windows(recording, offsets(recording, rng))
+    return None if windows is None else arbitrate(windows, rng)
 
 
 def arbitrate(windows: MotionWindows, rng: np.random.Generator) -> Arbitration:
@@ -106,17 +148,19 @@ def arbitrate(windows: MotionWindows, rng: np.random.Generator) -> Arbitration:
     driving = votes({pair: (forward[pair[0]], forward[pair[1]]) for pair in _pairs(forward)}, windows.block, rng)
     speed, acceleration = _forward_reference(windows, driving)
     turning = votes(_turn_signals(windows, speed), windows.block, rng)
-    if any(turning.camps) and not turning.decided:
+    if any(turning.camps) and (not turning.decided or set(turning.majority) == {GYRO, FORCE}):
         turning = _decided_by_gravity(windows, turning, speed, acceleration, rng)
     turn = turn_reference(windows, turning)
     mounting = None if turn is None else fit_mounting(windows, speed, acceleration, turn, rng)
-    return Arbitration(windows, driving, turning, mounting)
+    found = Arbitration(windows, driving, turning, mounting, {})
+    wheels = {source: _wheels(found, source, turn, rng) for source in (ENCODERS, COMMANDS)}
+    return replace(found, wheels=wheels, followed=followed_commands(windows, rng))
 
 
 def _decided_by_gravity(
     windows: MotionWindows, turning: Votes, speed: FloatArray, acceleration: FloatArray, rng: np.random.Generator
 ) -> Votes:
-    """A tie between the IMU and the wheels, which gravity decides.
+    """The IMU alone against the wheels, which gravity decides.
 
     An IMU that shows both turn rate and sideways force reversed is upside down, and gravity says whether it is. If it
     is not, no mounting explains both, and right and left are exchanged in the wheels.
@@ -178,17 +222,14 @@ def travel_reference(found: Arbitration, source: str) -> FloatArray | None:
     return None
 
 
-def _wheels(found: Arbitration, rng: np.random.Generator) -> list[CheckFinding]:
-    """Findings on which wheels encoders and commands belong to."""
-    turn = turn_reference(found.windows, found.turning)
-    findings = []
-    for source in (ENCODERS, COMMANDS):
-        travel = travel_reference(found, source)
-        shares = None
-        if turn is not None and travel is not None and found.turning.majority != (source,):
-            shares = wheel_shares(found.windows, source, turn[0] * STEP, travel, rng)
-        findings += wheel_findings(source, shares)
-    return findings
+def _wheels(
+    found: Arbitration, source: str, turn: tuple[FloatArray, FloatArray] | None, rng: np.random.Generator
+) -> Estimate | None:
+    """Which wheels encoders or commands belong to; None where nothing else vouches for turns and travel."""
+    travel = travel_reference(found, source)
+    if turn is None or travel is None or found.turning.majority == (source,):
+        return None
+    return wheel_shares(found.windows, source, turn[0] * STEP, travel, rng)
 
 
 def _vote_findings(motion: str, found: Votes) -> list[CheckFinding]:

@@ -6,6 +6,7 @@ import numpy as np
 
 from ddagr_gym.recordings.checks.findings import CheckFinding, Question, Status, not_testable
 from ddagr_gym.recordings.checks.imu_axes import CLEAR, WORST_FIT, Mounting, MountingFit
+from ddagr_gym.recordings.checks.map_lines import Takes, map_lines
 from ddagr_gym.recordings.schema import FloatArray
 
 CHECK = "imu_mounting"
@@ -58,7 +59,7 @@ def _words(mounting: Mounting) -> str:
     """What is wrong, in words."""
     parts = []
     if not np.array_equal(mounting.rotation, np.eye(3)):
-        parts.append(f"the IMU is {_turned(mounting.rotation)}")
+        parts.append(f"the IMU is {turned_in_words(mounting.rotation)}")
     wrong = [name for name, flip in zip(_NAMES, mounting.flips, strict=True) if flip < 0]
     if mounting.gyro < 0:
         wrong.append("yaw_rate")
@@ -68,7 +69,7 @@ def _words(mounting: Mounting) -> str:
     return f"The{sentence[3:]}" if sentence.startswith("the ") else sentence
 
 
-def _turned(rotation: FloatArray) -> str:
+def turned_in_words(rotation: FloatArray) -> str:
     """A rotation by right angles in words."""
     angle = round(float(np.degrees(np.arccos(np.clip(0.5 * (np.trace(rotation) - 1), -1, 1)))))
     if rotation[2, 2] > 0:
@@ -100,19 +101,27 @@ def _evidence(fit: MountingFit) -> str:
     return ", ".join(said)
 
 
-def _remedy(mounting: Mounting) -> str:
-    """Which readings the map has to take for each of the robot's axes."""
-    takes = []
+def mounting_takes(mounting: Mounting) -> Takes:
+    """Which readings belong to each of the robot's axes.
+
+    Args:
+        mounting: of the IMU; of one on its side no recorded gyro axis points up, and the yaw rate stays as it is.
+    """
+    takes = {}
     for k, name in enumerate(_NAMES):
         sensor = int(np.argmax(np.abs(mounting.axes[:, k])))
-        sign = "-" if mounting.axes[sensor, k] < 0 else ""
-        if sensor != k or sign:
-            takes.append(f"{name} = {sign}{_NAMES[sensor]}")
+        sign = float(np.sign(mounting.axes[sensor, k]))
+        if sensor != k or sign < 0:
+            takes[name] = (_NAMES[sensor], sign)
     if mounting.gyro * mounting.rotation[2, 2] < 0:
-        takes.append("yaw_rate = -yaw_rate")
-    elif mounting.rotation[2, 2] == 0:
-        takes.append("yaw_rate = the gyro's axis that points up")
-    return f"In the map take {', '.join(takes)} (right-hand sides as they are now)."
+        takes["yaw_rate"] = ("yaw_rate", -1.0)
+    return takes
+
+
+def _remedy(mounting: Mounting) -> str:
+    """Which readings the map has to take for each of the robot's axes."""
+    beside = " For yaw_rate take the gyro's axis that points up." if mounting.rotation[2, 2] == 0 else ""
+    return f"{map_lines(mounting_takes(mounting))}{beside}"
 
 
 def _suspects(mounting: Mounting) -> tuple[str, ...]:

@@ -1,0 +1,69 @@
+"""What the channels of recordings say against each other, in the answer of a diagnosis."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from ddagr_gym.diagnosis.answer.verdict import NONE, UNKNOWN, Diagnosis, Finding
+from ddagr_gym.diagnosis.preprocessing.channel_faults import ChannelFault
+from ddagr_gym.diagnosis.preprocessing.mended_recordings import MendedRecordings
+from ddagr_gym.diagnosis.result.sentences import change_headline
+from ddagr_gym.recordings.checks.findings import CheckFinding
+
+
+def channel_fault_findings(faults: Sequence[ChannelFault]) -> list[Finding]:
+    """Readings in the wrong channels need no fit: how sure they are is the evidence."""
+    return [
+        Finding(
+            fault.name, dict(fault.sizes), 0.5 * fault.score**2, 0.0, fault.score, 0.5 * fault.score**2,
+            {channel: 1.0 / len(fault.takes) for channel in fault.takes}, {fault.name: 1.0},
+        )
+        for fault in faults
+    ]  # fmt: skip
+
+
+def with_new_faults(
+    diagnosis: Diagnosis, mended: MendedRecordings, before: MendedRecordings | None = None
+) -> Diagnosis:
+    """The answer of a comparison with ordinary drives, with what is wrong with the channels named first.
+
+    Args:
+        diagnosis: of the mended drives.
+        mended: the drives.
+        before: those that they are compared with, whose faults are no change; None where they are not at hand.
+    """
+    usual = () if before is None else before.names
+    faults = [fault for fault in mended.channel_faults if fault.name not in usual]
+    known = {(item.check, item.channel) for item in (() if before is None else before.contradictions)}
+    new = tuple(item for item in mended.contradictions if (item.check, item.channel) not in known)
+    if faults and diagnosis.change is not None:
+        findings = (*channel_fault_findings(faults), *diagnosis.findings)
+        names = tuple(name for name in diagnosis.verdict if name not in (NONE, UNKNOWN))
+        verdict = (*(fault.name for fault in faults), *names)
+        sentence = change_headline(verdict, diagnosis.complete, findings, diagnosis.change)
+        diagnosis = replace(diagnosis, verdict=verdict, findings=findings, sentence=sentence)
+    return with_contradictions(diagnosis, new)
+
+
+def with_contradictions(diagnosis: Diagnosis, contradictions: Sequence[CheckFinding]) -> Diagnosis:
+    """An answer that says first where channels still contradict each other; it is not the whole truth then.
+
+    Args:
+        diagnosis: the answer.
+        contradictions: between channels; what a name of the verdict explains is none.
+    """
+    left = unexplained(contradictions, diagnosis.verdict)
+    if not left:
+        return diagnosis
+    said = dict.fromkeys(f"{finding.meaning} {finding.remedy}".strip() for finding in left)
+    sentence = (
+        f"The recordings contradict themselves, and no name is sure before that is mended: {' '.join(said)} "
+        f"As they are: {diagnosis.sentence}"
+    )
+    return replace(diagnosis, complete=False, sentence=sentence)
+
+
+def unexplained(contradictions: Sequence[CheckFinding], verdict: Sequence[str]) -> tuple[CheckFinding, ...]:
+    """Contradictions that no name of a verdict would explain."""
+    return tuple(finding for finding in contradictions if not set(finding.suspects) & set(verdict))
