@@ -110,9 +110,12 @@ def _wheel_faults(found: Arbitration, source: str) -> tuple[ChannelFault, ...] |
 
 
 def _mounting_faults(found: Arbitration) -> tuple[ChannelFault, ...] | None:
-    """An IMU upside down, which the library has no effect for; None where the drive cannot tell."""
+    """An IMU upside down, which the library has no effect for; None where the drive cannot tell.
+
+    Without gravity the same readings may have two wrong signs, which the library has effects for.
+    """
     fit = found.mounting
-    if fit is None or not fit.decided:
+    if fit is None or not fit.decided or not math.isfinite(fit.errors[2, 2]):
         return None
     best = fit.best
     if not best.upside_down or best.faults > 1:

@@ -11,7 +11,15 @@ import numpy as np
 
 from ddagr_gym.recordings.checks.clock_offsets import encoder_offset
 from ddagr_gym.recordings.checks.findings import CheckFinding, Interval, Question, judge, not_testable
-from ddagr_gym.recordings.checks.regression import Estimate, blocks_in_spans, estimate, sampled, solve
+from ddagr_gym.recordings.checks.regression import (
+    MOST_INFLATION,
+    Estimate,
+    blocks_in_spans,
+    estimate,
+    inflation,
+    sampled,
+    solve,
+)
 from ddagr_gym.recordings.checks.signals import filled, slope, smoothed
 from ddagr_gym.recordings.schema import FloatArray, Recording
 
@@ -71,7 +79,8 @@ def accelerometer(recording: Recording, rng: np.random.Generator) -> list[CheckF
 def force_coefficients(recording: Recording, rng: np.random.Generator) -> Estimate | None:
     """Coefficient of dv/dt in f_x, of v w in f_y, mounting angle about z [rad], offsets of f_x and f_y [m/s^2], (5,).
 
-    The angle is that of the rotation nearest to the 2 x 2 block, positive when the sensor is turned to the left.
+    None too where the robot only accelerates as it begins to turn, so that a lever arm explains the same. The angle is
+    that of the rotation nearest to the 2 x 2 block, positive when the sensor is turned to the left.
     """
     geometry = recording.meta.geometry
     needed = ("encoder_right", "encoder_left", "yaw_rate", "specific_force_x", "specific_force_y")
@@ -84,6 +93,8 @@ def force_coefficients(recording: Recording, rng: np.random.Generator) -> Estima
         rows = columns[block][usable[block]]
         if len(rows) > 10:
             sums.append(rows[:, :5].T @ rows)
+    if sums and inflation(sums, constant=4)[0] > MOST_INFLATION:
+        return None
     return estimate(sums, _values, rng)
 
 

@@ -88,11 +88,17 @@ class Arbitration:
     followed: Estimate | None = None
 
     def accused(self, source: str) -> bool:
-        """Whether other sources speak against encoders or commands and for the other ones of the two, or not at all."""
+        """Whether it is the encoders, or the commands, that are wrong where both differ.
+
+        Either other sources go against them and not against the other two, or with the other two in all motions and
+        not with them.
+        """
         motions, other = (self.turning, self.driving), COMMANDS if source == ENCODERS else ENCODERS
         against = any(source in votes.minority for votes in motions)
-        trusted = all(other in votes.majority for votes in motions) and any(source not in v.majority for v in motions)
-        return (against and not any(other in votes.minority for votes in motions)) or trusted
+        spared = not any(other in votes.minority for votes in motions)
+        alone = any(source not in votes.majority for votes in motions)
+        trusted = all(other in votes.majority for votes in motions)
+        return (against and spared) or (alone and trusted)
 
 
 def arbitration(recording: Recording, rng: np.random.Generator) -> list[CheckFinding]:

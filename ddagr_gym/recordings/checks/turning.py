@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ddagr_gym.recordings.checks.clock_offsets import encoder_offset, pose_offset, unwrapped_heading
 from ddagr_gym.recordings.checks.findings import CheckFinding, Question, not_testable
 from ddagr_gym.recordings.checks.regression import (
+    MOST_INFLATION,
     Estimate,
     blocks_in_spans,
     estimate,
+    inflation,
     inside,
     normal_equations,
     sampled,
@@ -41,6 +45,7 @@ recordings."""
 LEAST_TURN = 0.05
 """Root mean square yaw rate below which turns tell nothing [rad/s]."""
 
+_BANKS = "encoder_right to encoder_left"
 _DRIVE = "Drive turns to both sides at several speeds."
 
 
@@ -55,7 +60,9 @@ def turning(recording: Recording, rng: np.random.Generator) -> list[CheckFinding
 
 
 def gyro_against_pose(recording: Recording, rng: np.random.Generator) -> Estimate | None:
-    """Scale [-] and bias [rad/s] of the gyro, (2,): turned = scale heading + bias t in each block, clocks matched.
+    """Scale [-] and bias [rad/s] of the gyro, (2,): heading = (turned - bias t) / scale in each block, clocks matched.
+
+    The heading is the target since its noise is the larger one: noise in a regressor makes its coefficient too small.
 
     Returns:
         None without poses or turns.
@@ -71,16 +78,22 @@ def gyro_against_pose(recording: Recording, rng: np.random.Generator) -> Estimat
         rows, at = rows[inside(recording, span, at)], at[inside(recording, span, at)]
         gyro = sampled(recording, span, turned, at)
         if rows.size >= 5 and np.all(np.isfinite(gyro)):
-            design = np.stack([heading[rows], at], axis=1)
-            sums.append(normal_equations(design - design.mean(axis=0), gyro - gyro.mean()))
-    return estimate(sums, solve, rng)
+            design = np.stack([gyro, at], axis=1)
+            sums.append(normal_equations(design - design.mean(axis=0), heading[rows] - heading[rows].mean()))
+
+    def values(totals: FloatArray) -> FloatArray:
+        turned, per_time = solve(totals).T
+        return np.stack([1.0 / turned, -per_time / turned], axis=1)
+
+    return estimate(sums, values, rng)
 
 
 def effective_track(recording: Recording, rng: np.random.Generator) -> Estimate | None:
     """Effective over geometric track chi [-] and the right over the left bank's share in the yaw rate [-], (2,).
 
     Yaw rate = a right - b left + c by least squares with the encoders' clock matched. Without slip a = b = R/(2 W);
-    chi = R/(W (a + b)), the share a/b.
+    chi = R/(W (a + b)), the share a/b. Where both banks do the same or the opposite throughout, a = b is presumed,
+    and the interval of the share is infinite.
 
     Returns:
         None without encoders, gyro or the robot's geometry.
@@ -93,11 +106,20 @@ def effective_track(recording: Recording, rng: np.random.Generator) -> Estimate 
     sums = _track_sums(recording, lag)
     ratio = geometry.wheel_radius / geometry.half_track
 
-    def values(totals: FloatArray) -> FloatArray:
+    def of_banks(totals: FloatArray) -> FloatArray:
         a, b, _ = solve(totals).T
         return np.stack([ratio / (a + b), a / b], axis=1)
 
-    return estimate(sums, values, rng)
+    def of_difference(totals: FloatArray) -> FloatArray:
+        common = np.array([[1.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+        reduced = np.concatenate([common.T @ totals[..., :3] @ common, common.T @ totals[..., 3:]], axis=-1)
+        a = solve(reduced)[:, 0]
+        return np.stack([0.5 * ratio / a, np.ones(len(a))], axis=1)
+
+    if sums and inflation(sums, constant=2)[0] > MOST_INFLATION:
+        found = estimate(sums, of_difference, rng)
+        return found and replace(found, intervals=(found.intervals[0], (-np.inf, np.inf)))
+    return estimate(sums, of_banks, rng)
 
 
 def _track_sums(recording: Recording, lag: float) -> list[FloatArray]:
@@ -149,21 +171,18 @@ def _track_findings(recording: Recording, rng: np.random.Generator) -> list[Chec
         why = missing or "Encoders and gyro share too few turns."
         return [not_testable(CHECK, pair, why, "Name the robot with --robot." if missing else _DRIVE)]
     chi, share = (float(v) for v in found.values)
-    return [
-        TRACK.answer(
-            pair,
-            chi,
-            found.intervals[0],
-            meaning=_track_sentence(chi),
-            suspects=("gyro_sign",) if chi < 0 else ("gyro_scale", "encoder_scale"),
-        ),
-        BALANCE.answer(
-            "encoder_right to encoder_left",
-            share,
-            found.intervals[1],
-            meaning=f"A turn of the right wheels turns the robot {share:.3f} times as much as one of the left.",
-        ),
-    ]
+    track = TRACK.answer(
+        pair,
+        chi,
+        found.intervals[0],
+        meaning=_track_sentence(chi),
+        suspects=("gyro_sign",) if chi < 0 else ("gyro_scale", "encoder_scale"),
+    )
+    if not np.isfinite(found.intervals[1][0]):
+        why = "Both banks do the same throughout, so that nothing tells what a turn of either does."
+        return [track, not_testable(BALANCE.check, _BANKS, why, _DRIVE)]
+    meaning = f"A turn of the right wheels turns the robot {share:.3f} times as much as one of the left."
+    return [track, BALANCE.answer(_BANKS, share, found.intervals[1], meaning=meaning)]
 
 
 def _track_sentence(chi: float) -> str:

@@ -127,8 +127,8 @@ def followed_findings(source: str, followed: Estimate, wheels: tuple[str, str]) 
     for k, bank in enumerate(RIGHT_AND_LEFT):
         own, crossed = (float(v) for v in followed.values[2 * k : 2 * k + 2])
         meaning = (
-            f"The {bank} encoder goes with {own:.2f} of the {bank} command and {crossed:.2f} of the other one, and other "
-            f"sources of motion go with the {other}, not with the {source}."
+            f"The {bank} encoder goes with {own:.2f} of the {bank} command and {crossed:.2f} of the other one, and "
+            f"other sources of motion go with the {other}, not with the {source}."
         )
         value, interval = float(followed.values[4 + k]), followed.intervals[4 + k]
         findings.append(question.answer(f"{source.removesuffix('s')}_{bank}", value, interval, meaning=meaning))

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import ddagr_gym
 from ddagr_gym.recordings.checks.arbitration import arbitration
 from ddagr_gym.recordings.checks.findings import Status
 from ddagr_gym.recordings.load import load_recording
@@ -98,6 +99,25 @@ def test_exchanged_wheels_are_named_and_told_from_a_reversed_gyro(make_drive, ki
         assert "moves as the right wheels do: " in found["wheels", f"{kind}_left"].meaning
 
 
+@pytest.mark.parametrize("kind", ["encoder", "command"])
+def test_exchanged_wheels_come_with_the_lines_of_the_map(make_drive, kind):
+    finding = suspicious(exchanged(make_drive(), kind))["wheels", f"{kind}_right"]
+    assert f"{kind}_right: {{column: that of {kind}_left}}" in finding.remedy
+    assert ("patterns right and left of the wheels" in finding.remedy) == (kind == "encoder")
+
+
+@pytest.mark.parametrize("kind", ["encoder", "command"])
+@pytest.mark.parametrize("fault", ["exchanged", "right reversed"])
+def test_forward_weaves_tell_by_what_encoders_and_commands_say_of_each_other(kind, fault):
+    weave = ddagr_gym.simulate("s_weave", rate=20.0, pose_rate=5.0, seed=2).recording
+    assert suspicious(weave) == {}
+    wrong = exchanged(weave, kind) if fault == "exchanged" else scaled(weave, -1.0, f"{kind}_right")
+    found = suspicious(wrong)
+    named = {name for check, name in found if check == "wheels"}
+    assert named == ({f"{kind}_right", f"{kind}_left"} if fault == "exchanged" else {f"{kind}_right"})
+    assert f"not with the {kind}s" in found["wheels", f"{kind}_right"].meaning
+
+
 @pytest.mark.parametrize("channel", ["encoder_right", "encoder_left", "command_right", "command_left"])
 def test_a_wheel_that_counts_backwards_is_named_alone(make_drive, channel):
     found = suspicious(scaled(make_drive(), -1.0, channel))
@@ -111,20 +131,20 @@ def test_a_wheel_that_counts_backwards_is_named_alone(make_drive, channel):
         (
             ((0, 1, 0), (-1, 0, 0), (0, 0, 1)),
             "by 90 degrees about the vertical to the left",
-            "specific_force_x = -spec",
+            "specific_force_x: {column: that of specific_force_y, sign: -1}, specific_force_y: {column: that",
         ),
         (
             ((0, -1, 0), (1, 0, 0), (0, 0, 1)),
             "by 90 degrees about the vertical to the right",
-            "specific_force_y = -spec",
+            "specific_force_y: {column: that of specific_force_x, sign: -1}",
         ),
         (
             ((-1, 0, 0), (0, -1, 0), (0, 0, 1)),
             "by 180 degrees about the vertical",
-            "specific_force_x = -specific_force_x",
+            "signs: {specific_force_x: -1, specific_force_y: -1}",
         ),
-        (((1, 0, 0), (0, -1, 0), (0, 0, -1)), "upside down (rolled over)", "yaw_rate = -yaw_rate"),
-        (((-1, 0, 0), (0, 1, 0), (0, 0, -1)), "upside down (pitched over)", "yaw_rate = -yaw_rate"),
+        (((1, 0, 0), (0, -1, 0), (0, 0, -1)), "upside down (rolled over)", "yaw_rate: {sign: -1}"),
+        (((-1, 0, 0), (0, 1, 0), (0, 0, -1)), "upside down (pitched over)", "yaw_rate: {sign: -1}"),
     ],
 )
 def test_a_turned_imu_is_named_with_what_to_write_into_the_map(make_drive, axes, words, remedy):
@@ -137,8 +157,8 @@ def test_the_remedy_of_a_turned_imu_mends_it(make_drive):
     sound = make_drive()
     turned = mounted(sound, (0, 1, 0), (-1, 0, 0), (0, 0, 1))
     (finding,) = [f for f in findings(turned) if f.check == "imu_mounting"]
-    # specific_force_x = -specific_force_y, specific_force_y = specific_force_x, as the remedy says
-    assert "specific_force_x = -specific_force_y, specific_force_y = specific_force_x" in finding.remedy
+    assert "specific_force_x: {column: that of specific_force_y, sign: -1}" in finding.remedy
+    assert "specific_force_y: {column: that of specific_force_x}" in finding.remedy
     mended = {"specific_force_x": -turned["specific_force_y"], "specific_force_y": turned["specific_force_x"]}
     assert mended["specific_force_x"] == pytest.approx(sound["specific_force_x"])
     assert suspicious(replace(turned, channels={**turned.channels, **mended})) == {}
