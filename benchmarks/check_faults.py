@@ -1,11 +1,13 @@
 """Faults written into drives: does ``ddagr check`` name the channel at fault, and is it silent where nothing is wrong?
 
-    python -m benchmarks.check_faults [--output benchmarks/results/check_faults.json] [--seeds N]
+    python -m benchmarks.check_faults [--output benchmarks/results/check_faults.json] [--seeds N] [--sound N]
 
 Every fault of :mod:`benchmarks.recording_faults` is written into the open real drives, into the three concealed ones
 that are known to be ordinary (two, and a third whose gyro is mended first), and into simulated drives on two soils. A
 fault counts as named where a finding of the arbitration (turning, driving, wheels, mounting, clocks, wheel limits) says
 it in words. Controls are the same drives as they are; any suspicious finding of these checks there is a false alarm.
+Beside them every question of ``ddagr check`` is asked of simulated sound drives of many kinds
+(:mod:`benchmarks.simulated_checks`).
 """
 
 from __future__ import annotations
@@ -21,12 +23,14 @@ from typing import Any
 import numpy as np
 
 from benchmarks.recording_faults import FAULTS, Fault, scaled
+from benchmarks.simulated_checks import false_alarms
 from ddagr_gym.files import write_json
 from ddagr_gym.parameters import Imu, PoseReceiver, Sensors
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.checks.arbitration import arbitration
 from ddagr_gym.recordings.checks.bank_limits import bank_limits
 from ddagr_gym.recordings.checks.clock_drift import clock_drift
+from ddagr_gym.recordings.checks.extremes import extremes
 from ddagr_gym.recordings.checks.findings import Status
 from ddagr_gym.recordings.files import write_atomically
 from ddagr_gym.recordings.load import load_recording
@@ -78,6 +82,7 @@ def said(recording: Recording) -> list[str]:
     """Suspicious findings of the checks in question, in words."""
     rng = np.random.default_rng(0)
     findings = arbitration(recording, rng) + clock_drift(recording, rng) + bank_limits(recording, rng)
+    findings += extremes(recording)
     return [f"{f.check}, {f.channel}: {f.meaning}" for f in findings if f.status is Status.SUSPICIOUS]
 
 
@@ -131,7 +136,8 @@ def main(words: Sequence[str] | None = None) -> int:
     """Write the table and its picture."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--output", type=Path, default=RESULT)
-    parser.add_argument("--seeds", type=int, default=4)
+    parser.add_argument("--seeds", type=int, default=4, help="simulated drives with faults, on each soil")
+    parser.add_argument("--sound", type=int, default=6, help="simulated sound drives of each robot, soil and way")
     options = parser.parse_args(words)
     shared = Path(os.environ.get("DDAGR_SHARED") or Path(__file__).resolve().parents[2] / "shared")
     folder = Path(os.environ.get("DDAGR_RECORDINGS") or shared / "recordings")
@@ -142,6 +148,7 @@ def main(words: Sequence[str] | None = None) -> int:
     for result in run(folder, range(options.seeds)):
         write_json(options.output, result)
         draw(result, options.output.with_suffix(".png"))
+    write_json(options.output, {**result, "sound_simulated": false_alarms(range(options.sound))})
     for name, share in result["share_right"].items():
         print(f"{name:32} {100 * share:.0f} %")
     return 0

@@ -80,6 +80,13 @@ def drifting(recording: Recording, names: Sequence[str], seconds: float) -> Reco
     return changed(recording, moved)
 
 
+def stuck(recording: Recording, name: str) -> Recording:
+    """A channel that stays at its first reading."""
+    values = recording[name]
+    first = float(values[np.isfinite(values)][0])
+    return changed(recording, {name: np.where(np.isfinite(values), first, np.nan)})
+
+
 def capped(recording: Recording) -> Recording:
     """Banks that cannot go faster than a share of the fastest command."""
     limit = CAPPED * float(np.nanmax(np.abs(np.stack([recording[name] for name in COMMANDS]))))
@@ -113,6 +120,10 @@ FAULTS: Mapping[str, Fault] = {
         lambda r: turned(r, ((0, 1, 0), (-1, 0, 0), (0, 0, 1))),
         ("turned by 90 degrees about the vertical to the left",),
     ),
+    "IMU turned by 270 degrees": Fault(
+        lambda r: turned(r, ((0, -1, 0), (1, 0, 0), (0, 0, 1))),
+        ("turned by 90 degrees about the vertical to the right",),
+    ),
     "IMU turned by 180 degrees": Fault(
         lambda r: turned(r, ((-1, 0, 0), (0, -1, 0), (0, 0, 1))), ("turned by 180 degrees about the vertical",)
     ),
@@ -125,6 +136,11 @@ FAULTS: Mapping[str, Fault] = {
     "IMU on its side": Fault(lambda r: turned(r, ((1, 0, 0), (0, 0, 1), (0, -1, 0))), ("on its side",)),
     "sideways axis reversed": Fault(
         lambda r: scaled(r, IMU[1:2], -1.0), ("imu_mounting", "specific_force_y has the wrong sign")
+    ),
+    "right encoder stuck": Fault(lambda r: stuck(r, ENCODERS[0]), ("stuck, encoder_right",)),
+    "gyro and encoders": Fault(
+        lambda r: exchanged(scaled(r, ("yaw_rate",), -1.0), *ENCODERS),
+        ("encoder_right", "It moves as the left wheels do: "),
     ),
     "wheels capped": Fault(capped, ("bank stops at",)),
     "encoder clock drifts": Fault(lambda r: drifting(r, ENCODERS, DRIFT), ("The clock of", "the encoders")),

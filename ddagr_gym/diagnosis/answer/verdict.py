@@ -47,10 +47,12 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Finding:
-    """One named effect, or part of the drivetrain.
+    """One named effect, part of the drivetrain, or fault of channels.
 
     Attributes:
-        name: of the effect (`ddagr effects`), or of the part (`drivetrain`).
+        name: of the effect (`ddagr effects`), of the part (`drivetrain`), or of readings that belong to other channels
+            than the map says, which were mended before anything was fitted: `encoders_exchanged`, `encoders_reversed`,
+            `commands_exchanged`, `commands_reversed`, `imu_upside_down`, `heading_reversed`, `path_mirrored`.
         parameters: by field.
         gain: fall of the cost over the dispersion when it was added; of a part of the drivetrain the relative growth of
             the forecasts' loss without it.
@@ -170,12 +172,13 @@ class Diagnosis:
     """What recordings say about the physics that the nominal simulator leaves out.
 
     Attributes:
-        verdict: names of effects (`ddagr effects`) and of parts of the drivetrain, or `["none"]`: nothing that these
-            data can show, or `["unknown"]`: something that no effect explains.
+        verdict: names of effects (`ddagr effects`), of parts of the drivetrain and of faults of channels, or
+            `["none"]`: nothing that these data can show, or `["unknown"]`: something that no effect explains.
         complete: whether no more is left than in drives with nothing missing, the names explain at least 80 % of the
             mismatch, every size is the same everywhere, none reaches the bound of what exists, no drive that nothing
-            was fitted to is certainly predicted worse, and no channel is dead. Rivals in an equivalence set and what
-            the checks of the recordings suspect leave it as it is; the sentence has them.
+            was fitted to is certainly predicted worse, no channel is dead, and no sources of one motion contradict each
+            other in a way that no name of the verdict explains (the sentence begins with it then). Rivals in an
+            equivalence set and what else the checks of the recordings suspect leave it as it is; the sentence has them.
         findings: one per name of the verdict, in the order in which they were found; none with `["none"]` and
             `["unknown"]`.
         sentence: the answer in words.
