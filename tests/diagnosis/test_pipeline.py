@@ -54,7 +54,7 @@ class Stages:
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.called: list[str] = []
         self.stopped_in = ""
-        mended = SimpleNamespace(given=(), recordings=(), repeated=(), names=())
+        mended = SimpleNamespace(given=(), recordings=(), repeated=(), contradictions=(), names=())
         self.session = SimpleNamespace(
             robot=get_robot("ddagr"), soil=get_soil("thesis_a1"), mended=mended, problem=None, seed=3,
             setting=Setting(), gates=SimpleNamespace(misfit={}), rng=lambda stage: None, key=lambda: "the same",
