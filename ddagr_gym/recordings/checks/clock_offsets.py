@@ -60,6 +60,11 @@ class Offset:
     blocks: int
 
 
+def known_lag(offset: Offset | None) -> float:
+    """Lag of a pair [s], 0 where the drive does not tell it: the best lag of two noises is any."""
+    return 0.0 if offset is None or abs(offset.correlation) < LEAST_CORRELATION else offset.lag
+
+
 @dataclass(frozen=True)
 class LagProfiles:
     """Centred second moments of a pair at every lag of :data:`LAGS`.

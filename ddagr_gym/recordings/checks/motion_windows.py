@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ddagr_gym.recordings.checks.blocks import cut_blocks
-from ddagr_gym.recordings.checks.clock_offsets import ENCODER, POSE, RESPONSE, Offset, unwrapped_heading
+from ddagr_gym.recordings.checks.clock_offsets import ENCODER, POSE, RESPONSE, Offset, known_lag, unwrapped_heading
 from ddagr_gym.recordings.checks.signals import filled, integral, wrap
 from ddagr_gym.recordings.schema import FloatArray, Recording
 
@@ -65,7 +65,7 @@ def motion_windows(recording: Recording, offsets: Mapping[str, Offset | None]) -
     geometry, instants = recording.meta.geometry, _instants(recording)
     if geometry is None or not len(instants):
         return None
-    late = {pair: 0.0 if found is None else found.lag for pair, found in offsets.items()}
+    late = {pair: known_lag(found) for pair, found in offsets.items()}
     sample = _Sampler(recording, instants)
     rolled = {s: geometry.wheel_radius * r for s, r in _rolled(recording, sample, late).items()}
     heading = sample.values(unwrapped_heading(recording), late[POSE])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ddagr_gym.recordings.checks.blocks import cut_blocks
-from ddagr_gym.recordings.checks.clock_offsets import gyro_direction, pose_offset, unwrapped_heading
+from ddagr_gym.recordings.checks.clock_offsets import gyro_direction, known_lag, pose_offset, unwrapped_heading
 from ddagr_gym.recordings.checks.findings import CheckFinding, Question, not_testable
 from ddagr_gym.recordings.checks.regression import Estimate, blocks_in_spans, estimate, inside, sampled
 from ddagr_gym.recordings.checks.signals import filled, integral
@@ -85,8 +85,7 @@ def travelled_over_rolled(recording: Recording, rng: np.random.Generator) -> Est
     needed = ("pose_x", "pose_y", "pose_yaw", "yaw_rate", "encoder_right", "encoder_left")
     if geometry is None or not recording.has(*needed):
         return None
-    offset = pose_offset(recording, rng)
-    lag = offset.lag if offset is not None else 0.0
+    lag = known_lag(pose_offset(recording, rng))
     speed = 0.5 * geometry.wheel_radius * (filled(recording, "encoder_right") + filled(recording, "encoder_left"))
     heading = gyro_direction(recording) * integral(recording, recording["yaw_rate"])
     rolled = [integral(recording, speed * np.cos(heading)), integral(recording, speed * np.sin(heading))]
