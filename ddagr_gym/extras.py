@@ -14,6 +14,7 @@ EXTRA_OF_MODULE = {
     "mcap": "io",
     "pyarrow": "io",
     "pygame": "render",
+    "ray": "cluster",
     "rosbags": "io",
     "ruptures": "diagnosis",
     "sb3_contrib": "rl",
