@@ -15,9 +15,19 @@ raises, or exceeds its time or memory, is named with its case, and the rest goes
 begun again. Results depend on the tasks alone: they have the same bits on either engine and on any number of workers.
 """
 
-from ddagr_gym.tasks.run import run_tasks
+from ddagr_gym.tasks.run import results_of, run_tasks
 from ddagr_gym.tasks.runner import TaskRunner
 from ddagr_gym.tasks.store import ResultStore
 from ddagr_gym.tasks.task import Ended, FailedTasksError, Failure, Limits, Task
 
-__all__ = ["Ended", "FailedTasksError", "Failure", "Limits", "ResultStore", "Task", "TaskRunner", "run_tasks"]
+__all__ = [
+    "Ended",
+    "FailedTasksError",
+    "Failure",
+    "Limits",
+    "ResultStore",
+    "Task",
+    "TaskRunner",
+    "results_of",
+    "run_tasks",
+]

@@ -115,7 +115,8 @@ class LocalProcesses:
 
 def _attempt(call: bytes, memory: int | None) -> bytes:
     """One call, there and back as bytes: the pool's own pickling of a result that cannot be sent ends its worker."""
-    outcome = attempt(*pickle.loads(call), memory)
+    function, arguments = pickle.loads(call)
+    outcome = attempt(function, arguments, memory)
     try:
         return pickle.dumps(outcome)
     except Exception as error:

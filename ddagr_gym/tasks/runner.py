@@ -62,7 +62,8 @@ class TaskRunner(AbstractContextManager["TaskRunner"]):
         at_least(workers=(workers, 1))
         self._limits = limits or Limits()
         check_memory_limit(self._limits.memory)
-        self._make = partial(_engine, workers, cluster, self._limits, fresh) if engine is None else lambda: engine
+        self._given = engine
+        self._make = partial(_engine, workers, cluster, self._limits, fresh)
         self._numbers = count()
         self._asked_to_end = False
 
@@ -70,7 +71,7 @@ class TaskRunner(AbstractContextManager["TaskRunner"]):
         """Start the engine, and take SIGTERM as a request to end it and leave; of the main thread only."""
         main = threading.current_thread() is threading.main_thread()
         self._before: Any = signal.getsignal(signal.SIGTERM) if main else None
-        self._engine = self._make()
+        self._engine = self._given or self._make()
         if main:
             signal.signal(signal.SIGTERM, self._end)
         return self
