@@ -24,6 +24,9 @@ from ddagr_gym.tasks.task import Failure, Limits, Outcome, Task
 LOCAL = "local"
 """Address of a cluster that is started on this machine, and ended with the command."""
 
+ASK_AGAIN = 5.0
+"""Time between looks at how many processors a cluster has [s] (ours): each is a question to its head."""
+
 
 @dataclass(frozen=True)
 class SharedObject:
@@ -57,6 +60,7 @@ class RayCluster:
         self._remote = ray.remote(**options)(_attempt)
         self._running: dict[Any, tuple[int, float]] = {}
         self._code = code_hash()
+        self._slots, self._ask = 1, 0.0
 
     @staticmethod
     def _connect(address: str, workers: int) -> None:
@@ -75,8 +79,11 @@ class RayCluster:
 
     @property
     def slots(self) -> int:
-        """Processors that the cluster has now."""
-        return max(int(ray.cluster_resources().get("CPU", 1)), 1)
+        """Processors of the cluster, asked for again every :data:`ASK_AGAIN` seconds: nodes come and go."""
+        if time.monotonic() >= self._ask:
+            self._slots = max(int(ray.cluster_resources().get("CPU", 1)), 1)
+            self._ask = time.monotonic() + ASK_AGAIN
+        return self._slots
 
     def begin(self, number: int, task: Task) -> None:
         """Send a task."""

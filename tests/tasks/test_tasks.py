@@ -24,6 +24,7 @@ RAY = pytest.param(
     id="ray",
     marks=[
         pytest.mark.ray,
+        pytest.mark.slow,
         pytest.mark.skipif(
             importlib.util.find_spec("ray") is None, reason="needs ray: pip install 'ddagr-gym[cluster]'"
         ),
