@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import importlib.util
 import json
 import os
@@ -166,6 +167,23 @@ def test_finished_tasks_are_not_run_again(tmp_path):
         ("0", True), ("1", True), ("2", False), ("3", False)
     ]  # fmt: skip
     assert [(folder / f"{n}.txt").read_text() for n in range(4)] == ["driven\n"] * 4
+
+
+def test_a_full_disk_ends_the_run_and_loses_nothing(tmp_path, monkeypatch):
+    store, put = ResultStore(tmp_path), ResultStore.put
+
+    def full(self, key, value):
+        if len(list(tmp_path.iterdir())) == 3:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return put(self, key, value)
+
+    tasks = [Task(f"{n}", work.raises, (0,), key=f"case_{n}") for n in range(8)]
+    monkeypatch.setattr(ResultStore, "put", full)
+    with pytest.raises(OSError, match="No space"), TaskRunner(2) as made:
+        run_tasks(tasks, "cases", made, store)
+    monkeypatch.setattr(ResultStore, "put", put)
+    with TaskRunner(2) as made:
+        assert [item.stored for item in made.run(tasks, store)].count(True) == 3
 
 
 def test_many_tasks_are_taken_as_workers_get_free():
