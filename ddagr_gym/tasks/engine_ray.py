@@ -18,7 +18,7 @@ import ray
 
 from ddagr_gym.errors import InputError
 from ddagr_gym.tasks.attempt import attempt
-from ddagr_gym.tasks.shared import SharedPath, pickled, remembered
+from ddagr_gym.tasks.shared import Handle, SharedPath, pickled, remembered
 from ddagr_gym.tasks.task import Failure, Limits, Outcome, Task
 
 LOCAL = "local"
@@ -29,7 +29,7 @@ ASK_AGAIN = 5.0
 
 
 @dataclass(frozen=True)
-class SharedObject:
+class SharedObject(Handle):
     """A pickled value in Ray's object store, which sends it once to each node."""
 
     digest: str

@@ -6,11 +6,12 @@ import hashlib
 import os
 import pickle
 import tempfile
+from abc import ABC, abstractmethod
 from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 from ddagr_gym.files import atomic_path
 
@@ -20,16 +21,16 @@ _REMEMBERED = 4
 _contents: OrderedDict[str, Any] = OrderedDict()
 
 
-@runtime_checkable
-class Handle(Protocol):
+class Handle(ABC):
     """Stands for a content among a task's arguments."""
 
+    @abstractmethod
     def content(self) -> Any:
         """The content, in the worker."""
 
 
 @dataclass(frozen=True)
-class SharedFile:
+class SharedFile(Handle):
     """A pickled value in a file that the driver wrote for its own workers."""
 
     digest: str
@@ -41,7 +42,7 @@ class SharedFile:
 
 
 @dataclass(frozen=True)
-class SharedPath:
+class SharedPath(Handle):
     """A file of the driver, by content.
 
     Attributes:
