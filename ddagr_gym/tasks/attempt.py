@@ -27,7 +27,7 @@ def attempt(function: Callable[..., Any], arguments: tuple[Any, ...], memory: in
         memory: limit of the process's data [bytes].
     """
     try:
-        with memory_limit(memory), _blas().limit(limits=1, user_api="blas"):
+        with memory_limit(memory), linear_algebra().limit(limits=1, user_api="blas"):
             given = [item.content() if isinstance(item, Handle) else item for item in arguments]
             return Outcome(function(*given))
     except MemoryError as error:
@@ -39,7 +39,8 @@ def attempt(function: Callable[..., Any], arguments: tuple[Any, ...], memory: in
 
 
 @cache
-def _blas() -> ThreadpoolController:
+def linear_algebra() -> ThreadpoolController:
+    """Control of the threads of numpy's and scipy's linear algebra, which are loaded where they are not yet."""
     # it has a library of its own beside numpy's
     import scipy.linalg  # noqa: F401
 
