@@ -19,11 +19,10 @@ from __future__ import annotations
 
 import argparse
 import json
-import multiprocessing
 import os
 import shutil
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -33,8 +32,8 @@ import numpy as np
 from benchmarks.ablations.figure import draw
 from benchmarks.score_concealed import NULLS, mean, share
 from ddagr_gym.errors import InputError
-from ddagr_gym.progress import Progress
 from ddagr_gym.recordings.files import write_atomically
+from ddagr_gym.tasks import Task, TaskRunner, run_tasks
 
 RESULT = Path(__file__).resolve().parent / "results" / "concealed_ablations.json"
 
@@ -134,16 +133,14 @@ def _of_arm(
     }
 
 
-def _examine_all(works: Sequence[Work], processes: int) -> Iterator[str]:
-    if processes == 1:
-        yield from map(examined, works)
-        return
-    with multiprocessing.get_context("spawn").Pool(processes) as pool:
-        yield from pool.imap_unordered(examined, works)
-
-
 def ablate(
-    folder: Path, labels: Mapping[str, Any], names: Sequence[str], output: Path, processes: int, thresholds: Path | None
+    folder: Path,
+    labels: Mapping[str, Any],
+    names: Sequence[str],
+    output: Path,
+    processes: int,
+    thresholds: Path | None,
+    cluster: str = "",
 ) -> dict[str, Any]:
     """Examine cases, write the result and the picture.
 
@@ -154,13 +151,13 @@ def ablate(
         output: JSON to write; the picture has the same name.
         processes: that work at the same time.
         thresholds: file of the null bank; the one that ships by default.
+        cluster: as of :class:`ddagr_gym.tasks.TaskRunner`; its nodes see the same files.
     """
     parts = output.with_suffix(".parts")
     parts.mkdir(parents=True, exist_ok=True)
     works = [Work(folder / name, parts / f"{name}.json", thresholds) for name in names]
-    with Progress(len(works), "examining cases") as progress:
-        for _ in _examine_all(works, processes):
-            progress.advance()
+    with TaskRunner(processes, cluster=cluster) as runner:
+        run_tasks([Task(work.folder.name, examined, (work,)) for work in works], "examining cases", runner)
     said = {work.folder.name: json.loads(work.part.read_text())["arms"] for work in works}
     truth = {name: {"kind": labels[name]["kind"], "label": labels[name]["verdict"]} for name in said}
     result = {"arms": figures(labels, said), "cases": {name: truth[name] | {"said": said[name]} for name in said}}
@@ -180,6 +177,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--only", nargs="*", help="names of cases instead")
     parser.add_argument("--thresholds", type=Path, help="of ddagr null-bank; those that ship by default")
     parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("--cluster", default="", help="local, or the address of a Ray cluster")
     parser.add_argument("--output", type=Path, default=RESULT)
     return parser
 
@@ -191,7 +189,10 @@ def main(words: Sequence[str] | None = None) -> int:
     labels = {name: entry["label"] for name, entry in json.loads(arguments.labels.read_text())["cases"].items()}
     try:
         names = arguments.only or chosen(labels, arguments.nulls, arguments.singles, arguments.seed)
-        result = ablate(arguments.cases, labels, names, arguments.output, arguments.processes, arguments.thresholds)
+        result = ablate(
+            arguments.cases, labels, names, arguments.output, arguments.processes, arguments.thresholds,
+            arguments.cluster,
+        )  # fmt: skip
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2

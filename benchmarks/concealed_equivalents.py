@@ -17,10 +17,7 @@ import json
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
-from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -40,9 +37,9 @@ from ddagr_gym.identification.problem import Point
 from ddagr_gym.physics.effects.base import Effect
 from ddagr_gym.physics.effects.registry import effect_kind
 from ddagr_gym.presets import get_robot, get_soil
-from ddagr_gym.progress import Progress
 from ddagr_gym.recordings.files import write_atomically
 from ddagr_gym.recordings.schema import Recording
+from ddagr_gym.tasks import Task, TaskRunner, run_tasks
 
 RESULT = Path(__file__).resolve().parent / "results" / "concealed_equivalents.json"
 ITERATIONS = 12
@@ -141,13 +138,14 @@ def equivalents_of(name: str, folder: Path, opened: Mapping[str, Any]) -> dict[s
     return found
 
 
-def equivalents(folder: Path, opened: Mapping[str, Any], processes: int = 2) -> dict[str, Any]:
+def equivalents(folder: Path, opened: Mapping[str, Any], processes: int = 2, cluster: str = "") -> dict[str, Any]:
     """Equivalent sizes of a set, by case.
 
     Args:
         folder: of the set.
         opened: labels file with its seed.
         processes: that work at the same time.
+        cluster: as of :class:`ddagr_gym.tasks.TaskRunner`; its nodes see the same files.
     """
     labels = {name: entry["label"] for name, entry in opened["cases"].items()}
     chosen = [
@@ -156,15 +154,10 @@ def equivalents(folder: Path, opened: Mapping[str, Any], processes: int = 2) -> 
         if label["kind"] in ("single", "double") and any(needs_equivalent(e) for e in label["effects"])
     ]
     warm_up()
-    found = {}
-    with (
-        Progress(len(chosen), "equivalent sizes") as progress,
-        ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool,
-    ):
-        work = partial(equivalents_of, folder=folder, opened=opened)
-        for name, sizes in zip(chosen, pool.map(work, chosen), strict=True):
-            found[name] = sizes
-            progress.advance()
+    with TaskRunner(processes, cluster=cluster) as runner:
+        labels_file = runner.share(opened)
+        tasks = [Task(name, equivalents_of, (name, folder, labels_file)) for name in chosen]
+        found = dict(zip(chosen, run_tasks(tasks, "equivalent sizes", runner), strict=True))
     return {"set": opened["set"], "generator": opened["generator"], "seed": opened["seed"], "cases": found}
 
 
@@ -173,10 +166,12 @@ def main(words: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("cases", type=Path, help="folder of a set")
     parser.add_argument("--labels", type=Path, required=True, help="with the seed, as the generator writes them")
+    parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("--cluster", default="", help="local, or the address of a Ray cluster")
     parser.add_argument("--output", type=Path, default=RESULT)
     options = parser.parse_args(words)
     try:
-        result = equivalents(options.cases, read_json(options.labels))
+        result = equivalents(options.cases, read_json(options.labels), options.processes, options.cluster)
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2

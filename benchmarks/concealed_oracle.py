@@ -15,9 +15,6 @@ import argparse
 import json
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -39,10 +36,10 @@ from ddagr_gym.diagnosis.setting import Setting
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.gauss_newton import Fitted, fit
 from ddagr_gym.presets import get_robot, get_soil
-from ddagr_gym.progress import Progress
 from ddagr_gym.recordings.files import write_atomically
 from ddagr_gym.rendering import palette
 from ddagr_gym.reporting.figures import house_style
+from ddagr_gym.tasks import Task, TaskRunner, run_tasks
 
 HORIZON = "5"
 SEEN_IN_VALUES = ("sensor_hold", "gyro_sign")
@@ -161,6 +158,8 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--labels", type=Path, required=True)
     parser.add_argument("--answers", type=Path, required=True)
     parser.add_argument("--equivalents", type=Path, required=True, help="sizes in the library's terms, of the same set")
+    parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("--cluster", default="", help="local, or the address of a Ray cluster")
     parser.add_argument("--output", type=Path, default=RESULT.with_name("concealed_oracle.json"))
     return parser
 
@@ -175,14 +174,9 @@ def main(words: Sequence[str] | None = None) -> int:
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
-    cases = []
-    with (
-        Progress(len(chosen), "oracle") as progress,
-        ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool,
-    ):
-        for found in pool.map(partial(one, folder=options.cases, answers=answers), chosen):
-            cases.append(found)
-            progress.advance()
+    with TaskRunner(options.processes, cluster=options.cluster) as runner:
+        shared = runner.share(answers)
+        cases = run_tasks([Task(case[0], one, (case, options.cases, shared)) for case in chosen], "oracle", runner)
     share = mean([case["share"] for case in cases if case["share"] is not None])
     result = {"gain_share_of_oracle": share, "set": opened["set"], "cases": cases}
     write_atomically(options.output, lambda to: to.write_text(json.dumps(result, indent=1, allow_nan=False) + "\n"))

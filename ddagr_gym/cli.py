@@ -21,6 +21,7 @@ import tyro
 from ddagr_gym import __version__, commands
 from ddagr_gym.errors import InputError, InputWarning
 from ddagr_gym.extras import missing_extra
+from ddagr_gym.tasks.task import FailedTasksError
 
 _HELP = ("-h", "--help")
 _USER_ERRNO = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.ENAMETOOLONG, errno.ELOOP)
@@ -43,6 +44,8 @@ def main(arguments: Sequence[str] | None = None, package: ModuleType = commands)
         return code
     except InputError as error:
         return _refuse(str(error))
+    except FailedTasksError as error:
+        return _tell_failures(error)
     except ModuleNotFoundError as error:
         sentence = missing_extra(error)
         if sentence is None:
@@ -62,6 +65,14 @@ def main(arguments: Sequence[str] | None = None, package: ModuleType = commands)
 def _refuse(sentence: str) -> int:
     print("ddagr:", " ".join(sentence.split()), file=sys.stderr)
     return 2
+
+
+def _tell_failures(error: FailedTasksError) -> int:
+    """Which tasks failed, after the tracebacks of those that raised."""
+    for note in getattr(error, "__notes__", []):
+        print(note, file=sys.stderr)
+    print(f"ddagr: {error}. The others are kept: the same command tries these again.", file=sys.stderr)
+    return 1
 
 
 def _file_sentence(error: OSError) -> str:

@@ -15,6 +15,7 @@ EXTRA_OF_MODULE = {
     "mcap": "io",
     "pyarrow": "io",
     "pygame": "render",
+    "ray": "cluster",
     "rerun": "rerun",
     "rosbags": "io",
     "ruptures": "diagnosis",

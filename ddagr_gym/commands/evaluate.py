@@ -34,7 +34,8 @@ class Arguments:
             any letters of the trained ones, so that ppo_ekf_seed_* are all training seeds, which are judged together.
         scenarios: names of frozen sets, separated by commas: S0 to S8, V for tuning, T for another soil law.
         output: folder for report.html, episodes.parquet, summary.json, claims.json and the figure.
-        workers: processes.
+        workers: processes, or processors of a local cluster.
+        cluster: a Ray cluster to drive on: "local" starts one here, an address (ray://HOST:PORT) takes one that runs.
         episodes: only so many of each set; all by default. Claims are then not checked.
         replay: instead of all that drive one scenario, controller:set:number, and write its figure, video and metrics.
     """
@@ -43,6 +44,7 @@ class Arguments:
     scenarios: str = "S0"
     output: Path = Path("ddagr_evaluation")
     workers: int = 2
+    cluster: str = ""
     episodes: int | None = None
     replay: str = ""
 
@@ -76,6 +78,7 @@ def run(arguments: Arguments) -> None:
             sets,
             folder / "episodes.jsonl",
             processes=arguments.workers,
+            cluster=arguments.cluster,
             count=arguments.episodes,
             progress=progress.advance,
         )

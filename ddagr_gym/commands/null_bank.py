@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-import json
 import math
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tyro.conf import Positional
 
-from ddagr_gym.commands.output import atomic_path
 from ddagr_gym.errors import InputError, at_least
 from ddagr_gym.files import check_output_file, make_folder
-from ddagr_gym.progress import Progress
+from ddagr_gym.tasks import ResultStore, Task, TaskRunner, run_tasks
 
 if TYPE_CHECKING:
-    from ddagr_gym.diagnosis.gates.thresholds import NullKind, Origin
+    from ddagr_gym.diagnosis.gates.thresholds import NullKind, NullRun, Origin
     from ddagr_gym.diagnosis.null_bank.bank import NullBank
     from ddagr_gym.diagnosis.null_bank.drives import Template
     from ddagr_gym.diagnosis.setting import Setting
@@ -26,7 +24,6 @@ if TYPE_CHECKING:
     from ddagr_gym.recordings.schema import Recording
 
     _Centre = tuple[Robot, Soil] | None
-    _Task = tuple[NullBank, int, Path]
 
 EXAMPLES = (
     "ddagr null-bank --robot ddagr --soil thesis_a1 --output thresholds.json",
@@ -58,7 +55,8 @@ class Arguments:
         soil_uncertainty: as for `ddagr diagnose`.
         window: length of the windows [s]; diagnoses with these thresholds cut recordings in the same way.
         stride: seconds between the starts of windows; their length, which uses all samples, when it is left out.
-        processes: that work at the same time.
+        processes: that work at the same time, or processors of a local cluster.
+        cluster: a Ray cluster to work on: "local" starts one here, an address (ray://HOST:PORT) takes one that runs.
     """
 
     output: Path
@@ -74,12 +72,13 @@ class Arguments:
     window: float = 6.0
     stride: float | None = None
     processes: int = 2
+    cluster: str = ""
 
 
 def run(arguments: Arguments) -> None:
     """Make what is missing of the bank, then write the thresholds."""
     from ddagr_gym.diagnosis.gates.threshold_files import save_thresholds
-    from ddagr_gym.diagnosis.gates.thresholds import NullRun, thresholds_from
+    from ddagr_gym.diagnosis.gates.thresholds import thresholds_from
     from ddagr_gym.diagnosis.null_bank.bank import NullBank
     from ddagr_gym.diagnosis.null_bank.drives import template_of
     from ddagr_gym.diagnosis.null_bank.fitted_nominal import fitted_nominal
@@ -110,9 +109,7 @@ def run(arguments: Arguments) -> None:
     drives: list[Template | Recording | None] = [*pieces, *longer] or [template] * arguments.count
     made_of = NullBank(robot, soil, setting, tuple(drives), arguments.seed, centre)
     bank, folder = made_of.key(), make_folder(arguments.output.with_suffix(".bank"))
-    paths = [_part(folder, bank, number) for number in range(len(drives))]
-    _make([(made_of, n, path) for n, path in enumerate(paths) if not path.exists()], arguments.processes)
-    made = [NullRun(**json.loads(path.read_text())) for path in paths]
+    made = _make(made_of, [f"{bank[:16]}_{n:03d}" for n in range(len(drives))], folder, arguments)
     runs = [replace(run, own=number < len(drives) - len(longer)) for number, run in enumerate(made)]
     found = thresholds_from(runs, bank, origin=_origin(arguments, robot))
     save_thresholds(found, arguments.output)
@@ -178,28 +175,23 @@ def _origin(arguments: Arguments, robot: Robot) -> Origin:
     return Origin(robot.name, full_name(arguments.soil), arguments.soil_uncertainty, arguments.seed, kind)
 
 
-def _part(folder: Path, bank: str, number: int) -> Path:
-    return folder / f"{bank[:16]}_{number:03d}.json"
+def _make(bank: NullBank, keys: Sequence[str], folder: Path, arguments: Arguments) -> list[NullRun]:
+    """Null runs of a bank, those that are missing made by worker processes or a cluster.
+
+    Args:
+        bank: whose recordings are sent once to a worker or node.
+        keys: of the runs in the store.
+        folder: of the store.
+        arguments: of the command.
+    """
+    from ddagr_gym.diagnosis.gates.thresholds import NullRun
+
+    store = ResultStore(folder)
+    with TaskRunner(min(arguments.processes, len(keys)), cluster=arguments.cluster) as runner:
+        shared = runner.share(bank)
+        tasks = [Task(f"null drive {n}", _one, (shared, n), key) for n, key in enumerate(keys)]
+        return [NullRun(**item) for item in run_tasks(tasks, "null drives", runner, store)]
 
 
-def _make(tasks: list[_Task], processes: int) -> None:
-    """Run the missing nulls, in processes of their own."""
-    import multiprocessing
-
-    if not tasks:
-        return
-    with Progress(len(tasks), "null drives") as progress:
-        if processes == 1:
-            for task in tasks:
-                _one(task)
-                progress.advance()
-            return
-        with multiprocessing.get_context("spawn").Pool(min(processes, len(tasks))) as pool:
-            for _ in pool.imap_unordered(_one, tasks):
-                progress.advance()
-
-
-def _one(task: _Task) -> None:
-    bank, number, path = task
-    with atomic_path(path) as part:
-        part.write_text(json.dumps(asdict(bank.run(number))))
+def _one(bank: NullBank, number: int) -> dict[str, Any]:
+    return asdict(bank.run(number))

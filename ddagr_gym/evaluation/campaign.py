@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import as_completed
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -24,20 +23,23 @@ from ddagr_gym.evaluation.controllers import (
     drives_on,
     find_batch,
     find_controller,
+    is_policy,
     needs_filter,
 )
 from ddagr_gym.evaluation.estimator_metrics import estimator_errors
 from ddagr_gym.evaluation.metrics import turn_metrics
 from ddagr_gym.evaluation.runs import TurnRun, drive_turn, drive_turns
 from ddagr_gym.evaluation.scenarios import Scenario, load_scenarios, set_hash
-from ddagr_gym.evaluation.worker_pool import worker_pool
 from ddagr_gym.files import atomic_path
 from ddagr_gym.parameters import Sensors
 from ddagr_gym.physics.soil_laws import ground_effects
+from ddagr_gym.policies.shipped import policy_file, split_estimate
 from ddagr_gym.presets import ddagr
+from ddagr_gym.tasks import Task, TaskRunner
+from ddagr_gym.tasks.task import Ended, raise_failures
 
 _CHUNK = 50
-"""Episodes per task of a worker, driven side by side where the controller can: a stopped run loses at most a task."""
+"""Episodes per task, driven side by side where the controller can: a stopped run loses at most a task."""
 _SLOW_CHUNK = 10
 """Likewise of controllers that drive one turn at a time."""
 
@@ -46,12 +48,16 @@ Key = tuple[str, str, int]
 
 
 @dataclass(frozen=True)
-class Task:
+class Episodes:
     """A controller and some scenarios of a set."""
 
     controller: str
     set_name: str
     numbers: tuple[int, ...]
+
+    def __str__(self) -> str:
+        """Name in messages."""
+        return f"{self.controller} on {self.set_name} {self.numbers[0]} to {self.numbers[-1]}"
 
 
 def scenario_settings(scenario: Scenario, ekf_features: bool = False) -> TurnSettings:
@@ -150,15 +156,24 @@ def provenance(controller: str, set_name: str) -> str:
     return hashlib.sha256(" ".join(parts).encode()).hexdigest()[:12]
 
 
-def _work(task: Task) -> list[dict[str, Any]]:
-    everything = load_scenarios(task.set_name)
-    scenarios = [everything[number] for number in task.numbers]
-    made_of = provenance(task.controller, task.set_name)
-    runs = drive_scenarios(task.controller, scenarios)
-    return [
-        episode_row(task.controller, scenario, run) | {"made_of": made_of}
-        for scenario, run in zip(scenarios, runs, strict=True)
-    ]
+def _work(
+    episodes: Episodes, scenarios: Sequence[Scenario], policy: Path | None, made_of: str, arm: tuple[str, int]
+) -> list[dict[str, Any]]:
+    """Rows of some episodes.
+
+    Args:
+        episodes: to drive.
+        scenarios: all of the set.
+        policy: file of the controller where it is a policy, which may have another name on another machine.
+        made_of: provenance of the rows.
+        arm: of the controller, and its run.
+    """
+    name = episodes.controller
+    driver = name if policy is None else f"{policy}{name.removeprefix(split_estimate(name)[0])}"
+    chosen = [scenarios[number] for number in episodes.numbers]
+    named = {"controller": name, "arm": arm[0], "run": arm[1], "made_of": made_of}
+    runs = drive_scenarios(driver, chosen)
+    return [episode_row(driver, scenario, run) | named for scenario, run in zip(chosen, runs, strict=True)]
 
 
 def with_bounds(controllers: Sequence[str]) -> list[str]:
@@ -185,7 +200,7 @@ def wanted_episodes(controllers: Sequence[str], sets: Sequence[str], count: int 
     ]
 
 
-def plan(controllers: Sequence[str], sets: Sequence[str], done: set[Key], count: int | None = None) -> list[Task]:
+def plan(controllers: Sequence[str], sets: Sequence[str], done: set[Key], count: int | None = None) -> list[Episodes]:
     """Tasks for all episodes that are not done, small enough to resume by."""
     groups: dict[tuple[str, str], list[int]] = {}
     for controller, set_name, number in wanted_episodes(controllers, sets, count):
@@ -194,7 +209,7 @@ def plan(controllers: Sequence[str], sets: Sequence[str], done: set[Key], count:
     tasks = []
     for (controller, set_name), numbers in groups.items():
         size = _SLOW_CHUNK if find_batch(controller, 1) is None else _CHUNK
-        tasks += [Task(controller, set_name, tuple(numbers[k : k + size])) for k in range(0, len(numbers), size)]
+        tasks += [Episodes(controller, set_name, tuple(numbers[k : k + size])) for k in range(0, len(numbers), size)]
     return tasks
 
 
@@ -216,6 +231,7 @@ def run_campaign(
     journal: Path,
     *,
     processes: int = 2,
+    cluster: str = "",
     count: int | None = None,
     progress: Callable[[int], None] = lambda episodes: None,
 ) -> list[dict[str, Any]]:
@@ -228,8 +244,13 @@ def run_campaign(
         sets: names of frozen sets.
         journal: JSON lines, appended as episodes end; rows of other gains, policies or scenarios are driven again.
         processes: workers.
+        cluster: as of :class:`ddagr_gym.tasks.TaskRunner`.
         count: only the first scenarios of each set.
         progress: called with the number of episodes that a task added, those of the bounds included.
+
+    Raises:
+        InputError: episodes failed, all of them by bad input; the others are driven first.
+        FailedTasksError: episodes failed; the others are driven first.
 
     Returns:
         The rows of ``controllers`` with ``feasible``, ordered by controller, set and number.
@@ -241,7 +262,7 @@ def run_campaign(
     kept = {(row["controller"], row["set"], row["number"]) for row in rows}
     if kept & wanted:
         progress(len(kept & wanted))
-    for added in _results(plan(everyone, sets, kept, count), processes):
+    for added in _results(plan(everyone, sets, kept, count), processes, cluster):
         with journal.open("a", encoding="utf-8") as file:
             file.writelines(json.dumps(row) + "\n" for row in added)
         rows += added
@@ -276,10 +297,36 @@ def _judged(rows: Sequence[dict[str, Any]], controllers: Sequence[str], sets: Se
     return sorted(mine, key=lambda row: (order[row["controller"]], place[row["set"]], row["number"]))
 
 
-def _results(tasks: list[Task], processes: int) -> Iterator[list[dict[str, Any]]]:
-    if processes <= 1 or len(tasks) <= 1:
-        yield from map(_work, tasks)
+def _results(wanted: list[Episodes], processes: int, cluster: str) -> Iterator[list[dict[str, Any]]]:
+    if not wanted:
         return
-    with worker_pool(processes) as pool:
-        for future in as_completed([pool.submit(_work, task) for task in tasks]):
-            yield future.result()
+    failed: list[Ended] = []
+    with TaskRunner(min(processes, len(wanted)), cluster=cluster) as runner:
+        for ended in runner.run(_tasks(wanted, runner)):
+            if ended.failure is None:
+                yield ended.value
+            else:
+                failed.append(ended)
+    raise_failures(failed, len(wanted))
+
+
+def _tasks(wanted: Sequence[Episodes], runner: TaskRunner) -> list[Task]:
+    """Tasks with scenarios and policies by content."""
+    sets = {name: runner.share(load_scenarios(name)) for name in {item.set_name for item in wanted}}
+    names = {item.controller for item in wanted}
+    policies = {name: runner.share_file(policy_file(split_estimate(name)[0])) for name in names if is_policy(name)}
+    made_of = {pair: provenance(*pair) for pair in {(item.controller, item.set_name) for item in wanted}}
+    return [
+        Task(
+            str(item),
+            _work,
+            (
+                item,
+                sets[item.set_name],
+                policies.get(item.controller),
+                made_of[item.controller, item.set_name],
+                controller_arm(item.controller),
+            ),
+        )
+        for item in wanted
+    ]

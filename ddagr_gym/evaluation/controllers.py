@@ -228,7 +228,8 @@ def controller_names() -> tuple[str, ...]:
     return tuple(_LADDER)
 
 
-def _policy(name: str) -> bool:
+def is_policy(name: str) -> bool:
+    """Whether a name is that of a trained policy, or of its file."""
     from ddagr_gym.policies.controller import is_policy_name
 
     return name not in _LADDER and is_policy_name(name)
@@ -242,7 +243,7 @@ def _unknown(name: str) -> InputError:
 
 def controller_title(name: str) -> str:
     """What a controller is, in a phrase; InputError as :func:`find_controller`."""
-    if _policy(name):
+    if is_policy(name):
         from ddagr_gym.policies.controller import policy_title
 
         return policy_title(name)
@@ -253,7 +254,7 @@ def controller_title(name: str) -> str:
 
 def needs_filter(name: str) -> bool:
     """Whether the environment must append the filter's features for this controller."""
-    if _policy(name):
+    if is_policy(name):
         from ddagr_gym.policies.controller import policy_needs_filter
 
         return policy_needs_filter(name)
@@ -262,7 +263,7 @@ def needs_filter(name: str) -> bool:
 
 def is_deployable(name: str) -> bool:
     """Whether a controller does without the true state."""
-    if _policy(name):
+    if is_policy(name):
         from ddagr_gym.policies.controller import is_deployable_policy
 
         return is_deployable_policy(name)
@@ -276,12 +277,12 @@ def drives_on(name: str, law: str) -> bool:
 
 def controller_arm(name: str) -> tuple[str, int]:
     """Arm and run: the training's seed of a policy, 0 of a controller that is not trained."""
-    return arm_and_seed(name) if _policy(name) else (name, 0)
+    return arm_and_seed(name) if is_policy(name) else (name, 0)
 
 
 def controller_version(name: str) -> str:
     """Text that changes when a controller's gains or weights do."""
-    if _policy(name):
+    if is_policy(name):
         return policy_version(name)
     if name in ("B0", "B1"):
         return name
@@ -299,7 +300,7 @@ def find_controller(name: str, turn: RowTurn, gains: LadderGains | None = None) 
     Raises:
         InputError: unknown name, with the closest ones.
     """
-    if _policy(name):
+    if is_policy(name):
         from ddagr_gym.policies.controller import policy_controller
 
         return policy_controller(name)
@@ -315,7 +316,7 @@ def find_batch(name: str, count: int) -> BatchController | None:
         name: of a controller.
         count: N.
     """
-    if not _policy(name):
+    if not is_policy(name):
         return None
     from ddagr_gym.policies.controller import policy_batch
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import partial
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -26,8 +25,8 @@ from ddagr_gym.evaluation.report_data import (
 )
 from ddagr_gym.evaluation.runs import TurnRun
 from ddagr_gym.evaluation.scenarios import Scenario, load_scenarios, scenario_names
-from ddagr_gym.evaluation.worker_pool import worker_pool
 from ddagr_gym.frames import body_to_world
+from ddagr_gym.tasks import Task, TaskRunner, results_of
 
 Array = NDArray[np.float64]
 
@@ -168,28 +167,23 @@ def drive_shown(
         processes: workers.
         progress: called after each.
     """
-    drives = []
-    for drive in _mapped(partial(_shown, with_estimate=with_estimate), rows, processes):
-        drives.append(drive)
-        progress()
-    return drives
+    if not rows:
+        return []
+    tasks = [
+        Task(f"{row['controller']} on {row['set']} {row['number']}", _shown, (row, scenario_of(row), with_estimate))
+        for row in rows
+    ]
+    with TaskRunner(min(processes, len(tasks))) as runner:
+        return results_of(tasks, runner, progress=progress)
 
 
-def _shown(row: Row, with_estimate: bool) -> ShownDrive:
-    return shown_drive(row, drive_scenario(row["controller"], scenario_of(row)), with_estimate)
+def _shown(row: Row, scenario: Scenario, with_estimate: bool) -> ShownDrive:
+    return shown_drive(row, drive_scenario(row["controller"], scenario), with_estimate)
 
 
 def scenario_of(row: Row) -> Scenario:
     """Scenario of an episode."""
     return load_scenarios(row["set"])[row["number"]]
-
-
-def _mapped(work: Callable[[Row], ShownDrive], rows: Sequence[Row], processes: int) -> Iterator[ShownDrive]:
-    if processes <= 1 or len(rows) <= 1:
-        yield from map(work, rows)
-        return
-    with worker_pool(processes) as pool:
-        yield from pool.map(work, rows)
 
 
 def infeasible_soils(rows: Sequence[Row]) -> list[dict[str, Any]]:

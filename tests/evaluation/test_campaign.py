@@ -1,6 +1,7 @@
 """Frozen scenarios and the campaign over them."""
 
 import json
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -32,6 +33,7 @@ from ddagr_gym.evaluation.summary import summaries
 from ddagr_gym.physics.soil_laws import LAW
 from ddagr_gym.policies.archive import Policy, save_policy
 from ddagr_gym.policies.design import PolicyDesign
+from ddagr_gym.tasks import FailedTasksError
 
 
 @pytest.fixture
@@ -93,6 +95,29 @@ def test_campaign_resumes_where_it_stopped(frozen, tmp_path):
 def test_two_workers_find_the_same(frozen, tmp_path):
     one = run_campaign(["B1"], ["V"], tmp_path / "one", processes=1)
     assert run_campaign(["B1"], ["V"], tmp_path / "two", processes=2) == one
+
+
+@pytest.mark.slow
+@pytest.mark.ray
+@pytest.mark.skipif(find_spec("ray") is None, reason="needs ray: pip install 'ddagr-gym[cluster]'")
+def test_a_cluster_finds_the_same(frozen, tmp_path):
+    one = run_campaign(["B1", "ppo_ekf"], ["V"], tmp_path / "one", processes=1)
+    assert run_campaign(["B1", "ppo_ekf"], ["V"], tmp_path / "two", processes=2, cluster="local") == one
+
+
+def test_a_failed_episode_is_named_and_the_others_are_kept(frozen, tmp_path, monkeypatch):
+    original = campaign.drive_scenario
+
+    def drive(name, scenario):
+        if name == "B2":
+            raise ZeroDivisionError("a wheel of radius 0")
+        return original(name, scenario)
+
+    monkeypatch.setattr(campaign, "drive_scenario", drive)
+    with pytest.raises(FailedTasksError, match=r"B2 on V 0 to 2: raised \(ZeroDivisionError"):
+        run_campaign(["B2", "B1"], ["V"], tmp_path / "rows", processes=1)
+    kept = {row["controller"] for row in read_rows(tmp_path / "rows")}
+    assert kept == {"B1", *BOUNDS}
 
 
 def test_rows_of_other_gains_are_driven_again(frozen, tmp_path, monkeypatch):
