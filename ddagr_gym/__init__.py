@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from ddagr_gym.api.check import CheckResult, check
     from ddagr_gym.api.diagnose import diagnose
     from ddagr_gym.api.diagnosis_result import DiagnosisResult
+    from ddagr_gym.api.drive_series import DriveSeriesResult, diagnose_drives
     from ddagr_gym.api.estimate import EstimateResult, estimate
     from ddagr_gym.api.isolability import IsolabilityResult, isolability
     from ddagr_gym.api.load_recording import load_recording
@@ -58,6 +59,7 @@ __all__ = [
     "ChangeResult",
     "CheckResult",
     "DiagnosisResult",
+    "DriveSeriesResult",
     "EstimateResult",
     "IsolabilityResult",
     "NextDriveResult",
@@ -67,6 +69,7 @@ __all__ = [
     "calibrate",
     "check",
     "diagnose",
+    "diagnose_drives",
     "estimate",
     "isolability",
     "load_recording",
@@ -81,6 +84,7 @@ _MODULES = {
     "ChangeResult": "change",
     "CheckResult": "check",
     "DiagnosisResult": "diagnosis_result",
+    "DriveSeriesResult": "drive_series",
     "EstimateResult": "estimate",
     "IsolabilityResult": "isolability",
     "NextDriveResult": "next_drive",
@@ -89,6 +93,7 @@ _MODULES = {
     "calibrate": "calibrate",
     "check": "check",
     "diagnose": "diagnose",
+    "diagnose_drives": "drive_series",
     "estimate": "estimate",
     "isolability": "isolability",
     "load_recording": "load_recording",

@@ -55,10 +55,8 @@ def recordings_from(
     Raises:
         InputError: nothing given, a file that cannot be read, a table without time, another robot's recording.
     """
-    several = isinstance(given, Sequence) and not isinstance(given, str)
-    items: list[Any] = list(given) if several else [given]  # type: ignore[arg-type]
     found: list[Recording] = []
-    for item in _expanded(items):
+    for item in sources_in(given):
         found.append(_recording(item, f"table {len(found) + 1}", robot, column_map, limits))
     if not found:
         raise InputError("no recording is given: name one or more files, or a folder of them.")
@@ -78,14 +76,30 @@ def recording_from(
     return found[0]
 
 
-def _expanded(items: Sequence[Any]) -> list[Any]:
-    """Sources with the recordings of a folder in its place, unless it is one itself (a ROS 2 bag)."""
+def is_folder_of_drives(item: Any) -> bool:
+    """Whether this is the path of a folder that is no recording itself (a ROS 2 bag)."""
+    path = Path(item) if isinstance(item, str | os.PathLike) else None
+    bag = path is not None and ((path / "metadata.yaml").exists() or any(path.glob("*.db3")))
+    return path is not None and path.is_dir() and not bag
+
+
+def sources_in(given: Sources) -> list[Any]:
+    """Sources one by one, with the recordings of a folder in its place.
+
+    Args:
+        given: see :data:`Sources`.
+
+    Raises:
+        InputError: a folder without recordings.
+    """
+    several = isinstance(given, Sequence) and not isinstance(given, str)
+    items: list[Any] = list(given) if several else [given]  # type: ignore[arg-type]
     found: list[Any] = []
     for item in items:
-        path = Path(item) if isinstance(item, str | os.PathLike) else None
-        if path is None or not path.is_dir() or (path / "metadata.yaml").exists() or any(path.glob("*.db3")):
+        if not is_folder_of_drives(item):
             found.append(item)
             continue
+        path = Path(item)
         inside = sorted(file for file in path.iterdir() if file.is_file() and file.name.endswith(ENDINGS))
         if not inside:
             raise InputError(f"the folder {path} holds no recording ({', '.join(ENDINGS)}): name another one.")

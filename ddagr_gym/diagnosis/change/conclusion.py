@@ -197,7 +197,7 @@ def _change(
         shifts,
         parameters,
         hidden,
-        {**NOT_COMPARED, **ordinary.comparison(ground).unnamed},
+        {**ordinary.comparison(ground).unnamed, **NOT_COMPARED},
         BEFORE if ordinary.given else CALIBRATION,
         certified,
     )

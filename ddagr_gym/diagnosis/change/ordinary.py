@@ -20,6 +20,7 @@ from ddagr_gym.identification.parameters import (
     soil_parameters,
 )
 from ddagr_gym.parameters import Robot, Soil
+from ddagr_gym.physics.effects.registry import effect_kinds
 from ddagr_gym.recordings.schema import Recording
 
 Array = NDArray[np.float64]
@@ -35,6 +36,9 @@ SLOPE_ON_A_GROUND = 0.05
 
 EXPECTED_DRIVES = 4.0
 """Degrees of freedom of the expected scatter where nothing was measured (ours): as if it came from five drives."""
+
+
+NEWER = "the calibration is older than this effect: calibrate again with --bank"
 
 
 @dataclass(frozen=True, eq=False)
@@ -263,12 +267,18 @@ class OrdinaryRobot:
 
     def comparison(self, ground: str) -> Comparison:
         """What drives on a ground that is known or ("") not are compared with."""
-        moved = tuple(item.moved for item in self.references)
+        moved, new = tuple(item.moved for item in self.references), dict.fromkeys(self._unscanned, NEWER)
         if ground:
             drives, pieces = ([item.known_ground for item in found] for found in (self.references, self.pieces))
-            return Comparison(tuple(drives), tuple(pieces), self.known_scatter, moved=moved)
+            return Comparison(tuple(drives), tuple(pieces), self.known_scatter, new, moved)
         drives, pieces = ([item.other_ground for item in found] for found in (self.references, self.pieces))
-        return Comparison(tuple(drives), tuple(pieces), self.other_scatter, self.unnamed, moved)
+        return Comparison(tuple(drives), tuple(pieces), self.other_scatter, {**self.unnamed, **new}, moved)
+
+    @property
+    def _unscanned(self) -> list[str]:
+        """Effects that came into the library after the ordinary drives were scanned."""
+        scanned = {key.rpartition(" ")[0] for item in self.references for key in item.known_ground.keys}
+        return [name for name in effect_kinds() if name not in scanned]
 
     def without(self, drive: str) -> OrdinaryRobot:
         """The same from the other drives alone: robot and soil as calibrated without one, whose scan is left out.

@@ -28,6 +28,7 @@ _FILES = (
 _PROSE = (
     "diagnosis/wording.py",
     "diagnosis/result/sentences.py",
+    "diagnosis/series/sentences.py",
 )
 """Modules that only turn results into words, at the end and anew each time. Phrases that finished steps keep, as those
 of a localisation, are not among them."""

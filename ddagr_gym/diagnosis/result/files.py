@@ -61,7 +61,7 @@ def validate(mapping: Mapping[str, Any]) -> Diagnosis:
     if mapping.get("schema") != SCHEMA:
         raise InputError(f"the diagnosis has schema {mapping.get('schema')!r}: this version reads {SCHEMA!r}.")
     try:
-        diagnosis = msgspec.convert(_with_nan(mapping, _form()), Diagnosis)
+        diagnosis = msgspec.convert(with_nan(mapping, _form()), Diagnosis)
     except msgspec.ValidationError as error:
         raise InputError(f"{_sentence(str(error))}: make it again with `ddagr diagnose`.") from None
     _check_names(diagnosis)
@@ -73,22 +73,22 @@ def _form() -> inspect.Type:
     return inspect.type_info(Diagnosis)
 
 
-def _with_nan(value: Any, form: inspect.Type) -> Any:
+def with_nan(value: Any, form: inspect.Type) -> Any:
     """The same with NaN for null where a number is asked for: JSON has no other word for what is not finite."""
     if isinstance(form, inspect.UnionType):
         inner = [item for item in form.types if not isinstance(item, inspect.NoneType)]
-        return value if value is None or len(inner) != 1 else _with_nan(value, inner[0])
+        return value if value is None or len(inner) != 1 else with_nan(value, inner[0])
     if value is None:
         return math.nan if isinstance(form, inspect.FloatType) else None
     if isinstance(form, inspect.DataclassType) and isinstance(value, Mapping):
         forms = {item.encode_name: item.type for item in form.fields}
-        return {key: _with_nan(item, forms[key]) if key in forms else item for key, item in value.items()}
+        return {key: with_nan(item, forms[key]) if key in forms else item for key, item in value.items()}
     if isinstance(form, inspect.DictType) and isinstance(value, Mapping):
-        return {key: _with_nan(item, form.value_type) for key, item in value.items()}
+        return {key: with_nan(item, form.value_type) for key, item in value.items()}
     if isinstance(form, inspect.VarTupleType) and isinstance(value, list | tuple):
-        return [_with_nan(item, form.item_type) for item in value]
+        return [with_nan(item, form.item_type) for item in value]
     if isinstance(form, inspect.TupleType) and isinstance(value, list | tuple) and len(value) == len(form.item_types):
-        return [_with_nan(item, kind) for item, kind in zip(value, form.item_types, strict=True)]
+        return [with_nan(item, kind) for item, kind in zip(value, form.item_types, strict=True)]
     return value
 
 

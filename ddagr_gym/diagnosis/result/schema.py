@@ -1,4 +1,4 @@
-"""The form of ``diagnosis.json`` from the types of the answer: a JSON Schema, and a page on what entries mean."""
+"""The form of ``diagnosis.json`` and ``drives.json`` from the types of the answer: JSON Schemas, and pages on them."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import Any, get_args, get_type_hints
 
 import msgspec
 
+from ddagr_gym.diagnosis.answer.drive_series import SERIES_SCHEMA, DriveSeries
 from ddagr_gym.diagnosis.answer.verdict import SCHEMA, Diagnosis
 
 _HEAD = f"""# diagnosis.json
@@ -33,16 +34,34 @@ corrected simulator, `gym.make("DDAGR-Turn-v0", robot="robot.yaml", soil="soil.y
 """
 
 
+_SERIES_HEAD = f"""# drives.json
+
+What `ddagr diagnose FOLDER --calibration CAL` writes on many drives of one robot, schema `{SERIES_SCHEMA}`. SI units
+and radians. This page and the JSON Schema in `drive_series.schema.json` are made as that of
+[diagnosis.json](diagnosis_schema.md); `ddagr_gym.diagnosis.series.files` reads the file. null stands for what is not
+known, and for a number that is not finite.
+"""
+
+
 def json_schema() -> str:
     """JSON Schema of ``diagnosis.json``, with the docstrings' meanings."""
-    (found,), parts = msgspec.json.schema_components([Diagnosis], ref_template="#/$defs/{name}")
-    kinds = {kind.__name__: kind for kind in answer_types()}
+    return _json_schema(Diagnosis, SCHEMA)
+
+
+def series_json_schema() -> str:
+    """The same of ``drives.json``."""
+    return _json_schema(DriveSeries, SERIES_SCHEMA)
+
+
+def _json_schema(whole_kind: type[Any], title: str) -> str:
+    (found,), parts = msgspec.json.schema_components([whole_kind], ref_template="#/$defs/{name}")
+    kinds = {kind.__name__: kind for kind in answer_types(whole_kind)}
     for name, part in parts.items():
         summary, meanings = meanings_of(kinds[name])
         part["description"] = summary
         for entry, meaning in part["properties"].items():
             meaning["description"] = meanings[entry]
-    whole = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": SCHEMA, **found, "$defs": parts}
+    whole = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": title, **found, "$defs": parts}
     return json.dumps(_with_null(whole), indent=1, ensure_ascii=False) + "\n"
 
 
@@ -59,15 +78,20 @@ def schema_page() -> str:
     return _HEAD + "".join(_table(kind) for kind in answer_types()) + _TAIL
 
 
+def series_schema_page() -> str:
+    """The same of ``drives.json``."""
+    return _SERIES_HEAD + "".join(_table(kind) for kind in answer_types(DriveSeries))
+
+
 def _table(kind: type[Any]) -> str:
     summary, meanings = meanings_of(kind)
     rows = "".join(f"| `{name}` | {meaning} |\n" for name, meaning in meanings.items())
     return f"\n## {kind.__name__}\n\n{summary}\n\n| entry | content |\n|---|---|\n{rows}"
 
 
-def answer_types() -> tuple[type[Any], ...]:
-    """The answer and the types that it is made of, in the order in which its entries name them."""
-    return tuple(dict.fromkeys(_types(Diagnosis)))
+def answer_types(whole: type[Any] = Diagnosis) -> tuple[type[Any], ...]:
+    """An answer and the types that it is made of, in the order in which its entries name them."""
+    return tuple(dict.fromkeys(_types(whole)))
 
 
 def _types(kind: type[Any]) -> Iterator[type[Any]]:

@@ -19,6 +19,7 @@ from ddagr_gym.diagnosis.change.ordinary import (
 )
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.parameters import robot_parameters
+from ddagr_gym.physics.effects.registry import effect_kinds
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.schema import Recording, RecordingMeta
 
@@ -111,3 +112,12 @@ def test_commands_of_another_logger_may_be_a_sample_apart(robot):
     for column_map, prior in (("steps", 0.01), ("bag", np.hypot(0.01, 0.05))):
         free = robot.uncertain("sand", [recording("steps"), recording(column_map)])
         assert {p.name: p.prior for p in free}["command_delay"] == pytest.approx(prior)
+
+
+def test_effects_that_came_after_a_calibration_are_not_compared(robot):
+    keys = ("gyro_bias 0", "slope 0", "slope 1")
+    scores = Scores(keys, np.zeros(3), np.eye(3), np.eye(3), np.eye(3))
+    references = tuple(replace(item, known_ground=scores, other_ground=scores) for item in robot.references)
+    unnamed = replace(robot, references=references).comparison("sand").unnamed
+    assert set(effect_kinds()) - set(unnamed) == {"gyro_bias", "slope"}
+    assert "calibrate again" in unnamed["command_gain"]

@@ -1,0 +1,186 @@
+"""The drives of a folder one by one: what is kept of each by its content, and how several run side by side."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import traceback
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ddagr_gym.api.inputs import Source, Sources, recordings_from, sources_in
+from ddagr_gym.errors import InputError
+from ddagr_gym.recordings.files import DEFAULT_LIMITS, Limits
+from ddagr_gym.recordings.schema import Recording
+
+if TYPE_CHECKING:
+    from ddagr_gym.diagnosis.answer.drive_series import DriveAnswer
+    from ddagr_gym.diagnosis.change.ordinary import OrdinaryRobot
+    from ddagr_gym.diagnosis.store import StepStore
+
+STEP = "answer"
+"""Name of the only finished step of a drive."""
+
+FAULT = "a fault of this program"
+"""Begins the sentence on a drive that failed for a reason that nobody foresaw."""
+
+LESS_AT_ONCE = "mostly for want of memory: give fewer --processes; the same command goes on."
+"""Ends the sentence on a drive whose process was ended from outside."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What all drives are compared with, and how.
+
+    Attributes:
+        calibration: folder.
+        ground: of the calibration that all drives are on; "" where it is not known.
+        column_map: of files that are not imported yet; None for the one that fits best.
+        limits: on rows and bytes of files.
+        seed: of everything random.
+        threads: of the simulator.
+    """
+
+    calibration: Path
+    ground: str = ""
+    column_map: str | None = None
+    limits: Limits = DEFAULT_LIMITS
+    seed: int = 0
+    threads: int = 1
+
+
+@dataclass(frozen=True, eq=False)
+class DriveTask:
+    """One drive.
+
+    Attributes:
+        source: path, or the recording itself.
+        name: of its file, with its folder where another drive has the same.
+        sha256: of the file or of the values; "" where the file cannot be read.
+        unread: why not; "" where it can.
+    """
+
+    source: Path | Recording
+    name: str
+    sha256: str
+    unread: str = ""
+
+
+def tasks_of(given: Sources) -> list[DriveTask]:
+    """One task for each drive that is given, files as they are found in folders.
+
+    Raises:
+        InputError: nothing given, or a folder without recordings.
+    """
+    found = [_task(item, number) for number, item in enumerate(sources_in(given))]
+    if not found:
+        raise InputError("no recording is given: name one or more files, or a folder of them.")
+    names = [task.name for task in found]
+    return [_named_apart(task, number) if names.count(task.name) > 1 else task for number, task in enumerate(found)]
+
+
+def _named_apart(task: DriveTask, number: int) -> DriveTask:
+    apart = f"{task.source.parent.name}/{task.name}" if isinstance(task.source, Path) else f"{task.name} ({number + 1})"
+    return DriveTask(task.source, apart, task.sha256, task.unread)
+
+
+def _task(item: Source, number: int) -> DriveTask:
+    from ddagr_gym.diagnosis.preprocessing.input_requirements import content_hash
+    from ddagr_gym.recordings.files import sha256_of
+
+    if isinstance(item, str | os.PathLike):
+        path = Path(item)
+        try:
+            return DriveTask(path, path.name, sha256_of(path))
+        except InputError as error:
+            return DriveTask(path, path.name, "", str(error))
+    (recording,) = recordings_from(item)
+    return DriveTask(recording, recording.meta.source or f"table {number + 1}", content_hash(recording))
+
+
+def setting_key(setting: Setting) -> str:
+    """SHA-256 of all that an answer depends on besides the drive; the number of threads is not among it."""
+    from ddagr_gym.calibration.effect_bank import NAME as BANK
+    from ddagr_gym.calibration.files import NAME, ROBOT
+    from ddagr_gym.diagnosis.gates.source_digest import source_digest
+
+    digest = hashlib.sha256(source_digest().encode())
+    files = [setting.calibration / name for name in (NAME, ROBOT, BANK)]
+    for path in [*files, *sorted(setting.calibration.glob("soil_*.yaml"))]:
+        digest.update(path.name.encode() + path.read_bytes())
+    chosen = setting.column_map
+    own = Path(chosen).read_bytes() if chosen is not None and Path(chosen).is_file() else b""
+    digest.update(repr((setting.ground, chosen, setting.seed)).encode() + own)
+    return digest.hexdigest()
+
+
+def store_of(task: DriveTask, key: str, cache: Path | None) -> StepStore:
+    """Where the answer on a drive is kept: a folder of its own, named by all that the answer depends on."""
+    from ddagr_gym.diagnosis.store import StepStore
+
+    whole = hashlib.sha256(f"{key} {task.sha256} {task.name}".encode()).hexdigest()
+    return StepStore(None if cache is None else cache / whole[:32], whole)
+
+
+def answered(
+    tasks: Sequence[DriveTask], setting: Setting, processes: int
+) -> Iterator[tuple[DriveTask, DriveAnswer | str]]:
+    """Answers, or sentences why there is none, as they come.
+
+    Args:
+        tasks: drives.
+        setting: of all.
+        processes: that work side by side.
+    """
+    from ddagr_gym.tasks import Task, TaskRunner
+
+    given = {task.name: task for task in tasks}
+    with TaskRunner(min(processes, max(len(tasks), 1))) as runner:
+        for ended in runner.run(Task(task.name, answer_of, (task, setting)) for task in tasks):
+            lost = ended.failure
+            yield given[ended.task.name], ended.value if lost is None else f"no answer, {lost.message}, {LESS_AT_ONCE}"
+
+
+def answer_of(task: DriveTask, setting: Setting) -> DriveAnswer | str:
+    """The answer on a drive; whatever is wrong with it is a sentence, and no other drive's matter."""
+    from ddagr_gym.diagnosis.series.one_drive import answer_for
+
+    if task.unread:
+        return task.unread
+    ordinary, calibrated, robot = _calibrated(setting.calibration)
+    try:
+        (recording,) = recordings_from(task.source, robot, setting.column_map, setting.limits)
+        name = calibrated.get(_hash(recording), "")
+        return answer_for(
+            recording.with_meta(source=task.name), ordinary, setting.ground, name, seed=setting.seed,
+            threads=setting.threads,
+        )  # fmt: skip
+    except InputError as error:
+        return " ".join(str(error).split())
+    except Exception as error:
+        return _fault(error)
+
+
+def _hash(recording: Recording) -> str:
+    from ddagr_gym.diagnosis.preprocessing.input_requirements import content_hash
+
+    return content_hash(recording)
+
+
+def _fault(error: Exception) -> str:
+    last = traceback.extract_tb(error.__traceback__)[-1]
+    where = f"{Path(last.filename).name}, line {last.lineno}"
+    return f"{FAULT} ({type(error).__name__} in {where}: {' '.join(str(error).split())}): report it with the drive."
+
+
+@lru_cache(maxsize=1)
+def _calibrated(folder: Path) -> tuple[OrdinaryRobot, dict[str, str], Any]:
+    """The calibrated robot, its ordinary drives' names by the hash of their values, and the file of the robot."""
+    from ddagr_gym.calibration.files import ROBOT, load
+    from ddagr_gym.calibration.ordinary_robot import load_ordinary_robot
+
+    drives = {item.sha256: item.source for item in load(folder).drives}
+    return load_ordinary_robot(folder), drives, str(folder / ROBOT)
