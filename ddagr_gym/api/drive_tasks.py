@@ -7,19 +7,22 @@ import os
 import traceback
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TypeAlias
 
 from ddagr_gym.api.inputs import Source, Sources, recordings_from, sources_in
 from ddagr_gym.errors import InputError
 from ddagr_gym.recordings.files import DEFAULT_LIMITS, Limits
 from ddagr_gym.recordings.schema import Recording
+from ddagr_gym.tasks.task import Failure
 
 if TYPE_CHECKING:
     from ddagr_gym.diagnosis.answer.drive_series import DriveAnswer
     from ddagr_gym.diagnosis.change.ordinary import OrdinaryRobot
     from ddagr_gym.diagnosis.store import StepStore
+
+Calibrated: TypeAlias = "tuple[OrdinaryRobot, dict[str, str], str]"
+"""The calibrated robot, its ordinary drives' names by the hash of their values, and the file of the robot."""
 
 STEP = "answer"
 """Name of the only finished step of a drive."""
@@ -139,21 +142,27 @@ def answered(
 
     given = {task.name: task for task in tasks}
     with TaskRunner(min(processes, max(len(tasks), 1))) as runner:
-        for ended in runner.run(Task(task.name, answer_of, (task, setting)) for task in tasks):
-            lost = ended.failure
-            yield given[ended.task.name], ended.value if lost is None else f"no answer, {lost.message}, {LESS_AT_ONCE}"
+        calibrated = runner.share(_calibrated(setting.calibration)) if tasks else None
+        for ended in runner.run(Task(task.name, answer_of, (task, setting, calibrated)) for task in tasks):
+            yield given[ended.task.name], ended.value if ended.failure is None else _without_answer(ended.failure)
 
 
-def answer_of(task: DriveTask, setting: Setting) -> DriveAnswer | str:
+def _without_answer(failure: Failure) -> str:
+    if failure.kind == "lost":
+        return f"no answer, {failure.message}, {LESS_AT_ONCE}"
+    return f"{FAULT}: {failure.message}"
+
+
+def answer_of(task: DriveTask, setting: Setting, calibrated: Calibrated) -> DriveAnswer | str:
     """The answer on a drive; whatever is wrong with it is a sentence, and no other drive's matter."""
     from ddagr_gym.diagnosis.series.one_drive import answer_for
 
     if task.unread:
         return task.unread
-    ordinary, calibrated, robot = _calibrated(setting.calibration)
+    ordinary, known, robot = calibrated
     try:
         (recording,) = recordings_from(task.source, robot, setting.column_map, setting.limits)
-        name = calibrated.get(_hash(recording), "")
+        name = known.get(_hash(recording), "")
         return answer_for(
             recording.with_meta(source=task.name), ordinary, setting.ground, name, seed=setting.seed,
             threads=setting.threads,
@@ -176,8 +185,7 @@ def _fault(error: Exception) -> str:
     return f"{FAULT} ({type(error).__name__} in {where}: {' '.join(str(error).split())}): report it with the drive."
 
 
-@lru_cache(maxsize=1)
-def _calibrated(folder: Path) -> tuple[OrdinaryRobot, dict[str, str], Any]:
+def _calibrated(folder: Path) -> Calibrated:
     """The calibrated robot, its ordinary drives' names by the hash of their values, and the file of the robot."""
     from ddagr_gym.calibration.files import ROBOT, load
     from ddagr_gym.calibration.ordinary_robot import load_ordinary_robot

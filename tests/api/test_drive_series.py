@@ -33,6 +33,7 @@ def drives(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     for number in range(1, 7):
         (folder / f"run_{number}.csv").write_text(f"{14 * (number >= 4)} {number}")
     monkeypatch.setattr(ordinary_robot, "load_ordinary_robot", lambda folder: ORDINARY)
+    monkeypatch.setattr(drive_tasks, "_calibrated", lambda folder: (ORDINARY, {}, None))
     return folder
 
 
@@ -41,7 +42,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Names of the drives that are worked on; "stop" and "fault" as contents do what they say."""
     names: list[str] = []
 
-    def made(task, setting):
+    def made(task, setting, calibrated):
         content = Path(task.source).read_text().split()
         if content[0] == "stop":
             raise KeyboardInterrupt
@@ -106,8 +107,6 @@ def test_an_unknown_ground_is_refused_before_any_work(drives, asked, tmp_path):
 
 
 def test_a_fault_of_the_program_costs_one_drive(drives, tmp_path, monkeypatch):
-    monkeypatch.setattr(drive_tasks, "_calibrated", lambda folder: (ORDINARY, {}, None))
-
     def faulty(*arguments):
         raise ZeroDivisionError("by nothing")
 
@@ -117,8 +116,7 @@ def test_a_fault_of_the_program_costs_one_drive(drives, tmp_path, monkeypatch):
     assert result.drives[0].sentence.startswith(f"{FAULT} (ZeroDivisionError in test_drive_series.py, line ")
 
 
-def test_drives_side_by_side_are_each_a_row(drives, tmp_path, monkeypatch):
-    monkeypatch.setattr(drive_tasks, "_calibrated", lambda folder: (ORDINARY, {}, None))
+def test_drives_side_by_side_are_each_a_row(drives, tmp_path):
     result = ddagr_gym.diagnose_drives(drives, tmp_path / "cal", processes=2)
     assert len(result.refused) == 6
     assert {row.drive for row in result.drives} == {path.name for path in drives.iterdir()}
