@@ -20,6 +20,8 @@ from ddagr_gym.diagnosis.gates.thresholds import Thresholds
 from ddagr_gym.diagnosis.localisation.localise import locate
 from ddagr_gym.diagnosis.localisation.mismatch_traces import trace_mismatch
 from ddagr_gym.diagnosis.localisation.repeat_spans import where_readings_repeat
+from ddagr_gym.diagnosis.mid_drive.again import search_in_parts
+from ddagr_gym.diagnosis.mid_drive.onsets import onsets_of, with_onsets
 from ddagr_gym.diagnosis.planning.next_drive import plan_next_drive
 from ddagr_gym.diagnosis.preprocessing.data_checks import data_doubts
 from ddagr_gym.diagnosis.preprocessing.session import DiagnosisSession, Progress, be_silent, prepare
@@ -162,6 +164,8 @@ def diagnose(
     start = starting_models(session, steps.store.step)
     session = start.session
     found = steps.keep("search", search, session, start, steps.store.step)
+    spells, found = steps.keep("search in parts of the drives", search_in_parts, session, start, found)
+    session = replace(session, problem=session.problem.during(spells))
     accepted = accept(found, session.gates)
     unlike = {} if complete_nominal is None else unlike_commands(found, accepted, session.gates)
     nominal = complete_nominal(unlike) if complete_nominal is not None and unlike else None
@@ -181,6 +185,8 @@ def diagnose(
     steps.begin("localisation")
     traces = steps.keep("localisation traces", trace_mismatch, session, accepted)
     located = steps.keep("localisation", locate, session, accepted, traces)
+    onsets = steps.keep("onsets", onsets_of, session.problem, accepted.chosen.fitted)
+    diagnosis = with_onsets(diagnosis, onsets)
     repeats = where_readings_repeat(session.mended.given, session.mended.repeated)
     diagnosis = with_contradictions(review(diagnosis, located, repeats, fit, checks), session.mended.contradictions)
     unnamed = None if names_only else steps.run("unnamed terms", unnamed_terms, session, accepted, diagnosis)

@@ -105,7 +105,7 @@ def finding_card(finding: Finding, recordings: Sequence[str]) -> dict[str, Any]:
     where = finding.where
     return {
         "title": title(name),
-        "sentence": f"{sentence[:1].upper()}{sentence[1:]}.",
+        "sentence": f"{sentence[:1].upper()}{sentence[1:]}{when(finding)}.",
         "where": "not located" if where is None else where.phrase,
         "evidence": _evidence(finding),
         "sizes": [f"{key.replace('_', ' ')} {size(item)}" for key, item in parameters.items()],

@@ -1,0 +1,48 @@
+"""A second search where a name changes in mid-drive, or where something is left without one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from ddagr_gym.diagnosis.mid_drive.onsets import spells_of
+from ddagr_gym.diagnosis.mid_drive.search_in_time import LEAST_EVIDENCE, best_spell
+from ddagr_gym.diagnosis.preprocessing.session import DiagnosisSession
+from ddagr_gym.diagnosis.search.scanned_model import SearchResult
+from ddagr_gym.diagnosis.search.starting_models import StartingModels
+from ddagr_gym.diagnosis.search.stepwise import search
+from ddagr_gym.identification.misfit import dispersion_of, roughest
+from ddagr_gym.identification.spells import Spell
+
+Timed = tuple[Mapping[str, Spell], SearchResult]
+"""Parts of the drives in which effects are present, and the search with them."""
+
+
+def search_in_parts(session: DiagnosisSession, start: StartingModels, found: SearchResult) -> Timed:
+    """The search once more with an effect in a part of the drives, where that explains more than the first one.
+
+    Args:
+        session: of the diagnosis.
+        start: its nominal models.
+        found: by the first search.
+    """
+    problem = session.problem
+    spells = spells_of(problem, found.chosen.fitted, session.progress)
+    if not spells and roughest(found.chosen.misfit, dict(session.gates.misfit))[1] > 1.0:
+        spells = _of_scan(session, found)
+    if not spells:
+        return {}, found
+    session.progress(f"searching once more, {' and '.join(spells)} in a part of the drive")
+    again = search(replace(session, problem=problem.during(spells)), start)
+    kept = {name: spell for name, spell in spells.items() if name in again.chosen.names}
+    fall = found.chosen.fitted.cost - again.chosen.fitted.cost
+    better = fall > LEAST_EVIDENCE * dispersion_of(problem, again.chosen.fitted)
+    return (kept, again) if kept and better else ({}, found)
+
+
+def _of_scan(session: DiagnosisSession, found: SearchResult) -> dict[str, Spell]:
+    nominal = found.nominal
+    explained = (nominal.fitted.cost - found.chosen.fitted.cost) / nominal.dispersion
+    candidates = [(item, item.columns) for item in nominal.terms.candidates]
+    windows = session.problem.blocked.windows
+    return best_spell(nominal.terms, candidates, windows, nominal.dispersion, explained)
