@@ -1,4 +1,4 @@
-"""When effects begin and end: simulated drives in which one does so in mid-drive, and drives in which it holds all along.
+"""When effects begin and end: simulated drives in which one does so in mid-drive, and some in which it is constant.
 
     python -m benchmarks.mid_drive_changes [--summary]
 
@@ -76,14 +76,14 @@ def answer(item: Switched) -> dict[str, Any]:
     began = time.monotonic()
     recording = recording_of(item, get_robot("ddagr"))
     problem = make_problem(get_robot("ddagr"), get_soil("thesis_a1"), [recording], Setting())
-    nominal = fit(problem)
+    nominal = fit(problem, iterations=4)
     terms = scan(problem, nominal, {item.effect: effect_kinds()[item.effect]})
     best = gains(terms)[0]
     guess = first_guess(terms.candidates[best.candidate], best.multiples)
-    fitted = fit(problem, replace(nominal.point, effects=(guess,)), first=nominal, iterations=6)
+    fitted = fit(problem, replace(nominal.point, effects=(guess,)), reuse=nominal, iterations=5)
     spells = spells_of(problem, fitted)
     parts = problem.during(spells)
-    final = fit(parts, fitted.point, iterations=6) if spells else fitted
+    final = fit(parts, fitted.point, iterations=4) if spells else fitted
     onset = onsets_of(parts, final).get(item.effect)
     size = final.point.effects[0]
     return {

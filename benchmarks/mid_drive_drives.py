@@ -6,7 +6,6 @@ effect is absent (or present, where it ends); effects on readings and commands a
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,12 +15,22 @@ from numba import njit
 from benchmarks.concealed.cases import Case, field_noise, field_plant
 from benchmarks.concealed.catalogue import LIBRARY_FORMS, least_size
 from benchmarks.concealed.change import Change, Form, Site
-from benchmarks.concealed.drive import SAMPLE_PERIOD, SETTLING, SUBSTEPS, TRUTH, _new_state, _new_work, _record, drive, read_ground, substep
+from benchmarks.concealed.drive import (
+    SAMPLE_PERIOD,
+    SETTLING,
+    SUBSTEPS,
+    TRUTH,
+    _new_state,
+    _new_work,
+    _record,
+    drive,
+    read_ground,
+    substep,
+)
 from benchmarks.concealed.manoeuvres import programme
 from benchmarks.concealed.plant import Plant, settled
 from benchmarks.concealed.sensors import COLUMNS, readings, with_noise
 from benchmarks.concealed.streams import stream
-
 from ddagr_gym.parameters import Robot
 from ddagr_gym.recordings.schema import Recording
 

@@ -11,6 +11,7 @@ from ddagr_gym.diagnosis.answer.location import Localisation, OperatingCondition
 from ddagr_gym.diagnosis.answer.next_drive_plan import NextDrivePlan
 from ddagr_gym.diagnosis.answer.unnamed_terms import UnnamedTerm, UnnamedTerms
 from ddagr_gym.diagnosis.answer.verdict import NONE, UNKNOWN, DataDoubt, Diagnosis, Finding, GatesUsed
+from ddagr_gym.diagnosis.result.sentences import when
 from ddagr_gym.diagnosis.wording import (
     Amount,
     amounts,

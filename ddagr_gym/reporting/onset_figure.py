@@ -20,7 +20,7 @@ _NINETY = 1.645
 """Normal quantile of a 90 % interval."""
 
 _FARTHEST = 2.5
-"""Size over the stated one up to which intervals are drawn whole (ours): windows that hardly show an effect say less."""
+"""Size over the stated one up to which intervals are drawn whole (ours): what hardly shows an effect says less."""
 
 
 def timed(findings: Sequence[Finding]) -> list[tuple[str, Onset]]:

@@ -11,6 +11,10 @@ against constant sizes is
 
     L = n/2 ln(Q_constant / Q_D).                                                                                   (2)
 
+A size whose form is not the library's differs from window to window with what the robot does. With the variance s of
+that scatter M becomes (M^-1 + s I)^-1; s is what makes Q_D of the best change n less its numbers (method of moments, as
+R. DerSimonian and N. Laird, Control. Clin. Trials 7 (1986) 177).
+
 The step at the best time, or the line, counts where L exceeds a threshold. The 90 % interval of the time holds all t
 whose L is at most half of 5.94 below the best (B. E. Hansen, Econometrica 68 (2000) 575, table 1: the likelihood ratio
 of a change point is not chi-squared), and is widened to whole windows, since a window's state is free at its start and
@@ -40,6 +44,12 @@ INSIDE = 4
 
 CRITICAL = 5.94
 """Twice the fall of the log-likelihood that bounds 90 % of the times (Hansen 2000, table 1)."""
+
+_PASSES = 2
+"""Estimates of the scatter, the second beside the change that is best with the first (ours)."""
+
+_HALVINGS = 10
+"""Of the interval in which the scatter is sought."""
 
 _ANCHOR = 1e4
 """Information of a mean that is taken as known, over that of all windows."""
@@ -93,15 +103,32 @@ class TimeRegression:
 
     Args:
         sizes: by window.
+        scatter: variance of the sizes from window to window besides what the noise makes of them.
     """
 
-    def __init__(self, sizes: WindowSizes) -> None:
+    def __init__(self, sizes: WindowSizes, scatter: float = 0.0) -> None:
+        share = np.linalg.inv(np.eye(sizes.count) + scatter * sizes.information)
+        information = share @ sizes.information
+        information = 0.5 * (information + information.T)
+        sizes = replace(sizes, gradient=share @ sizes.gradient, information=information)
         self.sizes = sizes
         self._inverse = np.linalg.pinv(sizes.information, rcond=_SMALLEST, hermitian=True)
         self._whole = float(sizes.gradient @ self._inverse @ sizes.gradient)
         self._known = int(np.linalg.matrix_rank(sizes.information, rtol=_SMALLEST, hermitian=True))
         numbers = np.unique(sizes.recording)
         self._constant = (sizes.recording[:, None] == numbers).astype(float)
+        self._left = self.described(self._constant).left
+
+    @classmethod
+    def of(cls, sizes: WindowSizes) -> TimeRegression:
+        """With the scatter by window that is left beside the best change."""
+        scatter = 0.0
+        for _ in range(_PASSES):
+            best = cls(sizes, scatter).best()
+            if best is None:
+                break
+            scatter = _scatter(sizes, best)
+        return cls(sizes, scatter)
 
     @property
     def recordings(self) -> list[int]:
@@ -112,7 +139,9 @@ class TimeRegression:
     def described(self, design: Array) -> Described:
         """Sizes as (W, K) combinations of numbers, equation (1)."""
         inner = design.T @ self.sizes.information @ design
-        covariance = np.linalg.pinv(inner, rcond=_SMALLEST, hermitian=True)
+        # a description of which nothing is known (a recording that does not show the effect) gets no number
+        ridge = _SMALLEST * max(float(np.trace(inner)), _SMALLEST)
+        covariance = np.linalg.inv(inner + ridge * np.eye(len(inner)))
         right = design.T @ self.sizes.gradient
         left = max(self._whole - float(right @ covariance @ right), _SMALLEST * max(self._whole, _SMALLEST))
         scale = max(left / max(self._known - design.shape[1], 1), 1.0)
@@ -120,8 +149,7 @@ class TimeRegression:
 
     def evidence(self, found: Described) -> float:
         """Equation (2)."""
-        constant = self.described(self._constant).left
-        return 0.5 * self._known * float(np.log(constant / found.left))
+        return 0.5 * self._known * float(np.log(self._left / found.left))
 
     def in_stretches(self, windows: int, most: int) -> list[tuple[int, float, float, float, float]]:
         """Recording, start, end, size and its deviation in stretches of about equal numbers of windows.
@@ -161,9 +189,13 @@ class TimeRegression:
 
     def around(self, found: Alternative) -> tuple[float, float]:
         """Sizes before and after the time of a change, or at the ends of its line."""
-        shares = self._ends(found.recording) if found.line else self._shares(found.recording, found.time)
-        values = self.described(np.concatenate([shares, self._other_than(found.recording)], axis=1)).values
+        values = self.described(self.design(found)).values
         return float(values[0]), float(values[1])
+
+    def design(self, found: Alternative) -> Array:
+        """(W, K) combinations of numbers that describe a change, sizes before and after it first."""
+        shares = self._ends(found.recording) if found.line else self._shares(found.recording, found.time)
+        return np.concatenate([shares, self._other_than(found.recording)], axis=1)
 
     def best(self) -> Alternative | None:
         """The change with the most evidence; None where no recording has enough windows."""
@@ -229,3 +261,22 @@ class TimeRegression:
         start, end = np.sort(self.sizes.start[own]), np.sort(self.sizes.end[own])
         before, after = start[start < low], end[end > high]
         return float(before[-1]) if before.size else low, float(after[0]) if after.size else high
+
+
+def _scatter(sizes: WindowSizes, found: Alternative) -> float:
+    """Variance of the sizes by window with which what a change leaves is what is expected; 0 where less is left."""
+
+    def excess(scatter: float) -> float:
+        regression = TimeRegression(sizes, scatter)
+        design = regression.design(found)
+        return regression.described(design).left - (sizes.count - design.shape[1])
+
+    low, high = 0.0, 1.0 / max(float(np.median(np.diag(sizes.information))), _SMALLEST)
+    if excess(0.0) <= 0.0:
+        return 0.0
+    while excess(high) > 0.0 and high < 1.0 / _SMALLEST:
+        low, high = high, 4.0 * high
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if excess(middle) > 0.0 else (low, middle)
+    return high

@@ -41,7 +41,7 @@ def onsets_of(problem: Problem, fitted: Fitted) -> dict[str, Onset]:
     """
     found = {}
     for number, effect in enumerate(fitted.point.effects):
-        regression = TimeRegression(window_sizes(problem, fitted, number))
+        regression = TimeRegression.of(window_sizes(problem, fitted, number))
         best = regression.best()
         if best is not None:
             found[effect.name] = _onset(regression, best, problem.spells.get(effect.name))
@@ -80,7 +80,9 @@ def _kind(best: Alternative, spell: Spell | None) -> str:
     return STEPS
 
 
-def spells_of(problem: Problem, fitted: Fitted, progress: Callable[[str], None] = lambda line: None) -> dict[str, Spell]:
+def spells_of(
+    problem: Problem, fitted: Fitted, progress: Callable[[str], None] = lambda line: None
+) -> dict[str, Spell]:
     """Parts of the drives in which effects of a fit are present, where that explains more than their being constant.
 
     Args:
@@ -90,7 +92,7 @@ def spells_of(problem: Problem, fitted: Fitted, progress: Callable[[str], None] 
     """
     found: dict[str, Spell] = {}
     for number, effect in enumerate(fitted.point.effects):
-        best = TimeRegression(window_sizes(problem, fitted, number)).best()
+        best = TimeRegression.of(window_sizes(problem, fitted, number)).best()
         if best is None or best.line or not changes(best):
             continue
         progress(f"refitting {effect.name} in a part of the drive")

@@ -34,7 +34,7 @@ LEAST_INFORMATION = 0.05
 """Information of a window over the mean of all, below which the effect does not act there (ours)."""
 
 _KNOWN = 1e-3
-"""Share of the information that shared parameters leave of a direction of the sizes, below which none is known (ours)."""
+"""Share of the information of a direction that shared parameters leave, below which nothing is known of it (ours)."""
 
 _RIDGE = 1e-9
 """Relative, for shared parameters without a prior that say the same."""
@@ -120,7 +120,9 @@ def sizes_of(
     answer = explained_by(inner, precision, np.concatenate([gradient[:, None], cross.T], axis=1), _RIDGE)
     free = np.einsum("wr,wr->w", column, residual)[acts] - cross @ answer[:, 0]
     information = np.diag(own[acts]) - cross @ answer[:, 1:]
-    return WindowSizes(recording[acts], time[acts], time[acts] + duration, *_what_is_known(free, information, own[acts]))
+    return WindowSizes(
+        recording[acts], time[acts], time[acts] + duration, *_what_is_known(free, information, own[acts])
+    )
 
 
 def _what_is_known(gradient: Array, information: Array, own: Array) -> tuple[Array, Array]:
@@ -151,6 +153,7 @@ def _shared(problem: Problem, fitted: Fitted, number: int) -> tuple[Array, Array
     effect = fitted.point.effects[number]
     own = {*effect.size_names(), "onset"}
     parameters = effect_parameters(fitted.point.effects)
-    kept = np.array([*([True] * int(problem.free.sum())), *(p.effect != number or p.field not in own for p in parameters)])
+    others = [item.effect != number or item.field not in own for item in parameters]
+    kept = np.array([*([True] * int(problem.free.sum())), *others])
     value = np.where(np.isfinite(linear.deviation), linear.here - linear.expected, 0.0)
     return linear.sensitivity[..., kept], linear.precision[kept], value[kept]

@@ -140,7 +140,9 @@ def onset_in_words(onset: Onset) -> str:
     time = f"{onset.value:.0f} s ({low:.0f} to {high:.0f} s) of {_of_drive(onset)}"
     if onset.kind == BEGINS:
         return f", from {time} on"
-    return f", until {time}" if onset.kind == ENDS else f", {before} times that before {time} and {after} times after it"
+    if onset.kind == ENDS:
+        return f", until {time}"
+    return f", {before} times that before {time} and {after} times after it"
 
 
 def _of_drive(onset: Onset) -> str:
