@@ -36,7 +36,7 @@ class Spell:
         """
         own = recording == self.recording
         later = (recording > self.recording) | (own & (0.5 * (start + end) >= self.time))
-        return ~later if self.ends else later
+        return np.asarray(~later if self.ends else later)
 
     def in_windows(self, windows: WindowSet) -> NDArray[np.bool_]:
         """The same of a set of windows."""

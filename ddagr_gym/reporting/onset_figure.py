@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 _NINETY = 1.645
 """Normal quantile of a 90 % interval."""
 
+_MOST_RECORDINGS = 4
+"""Recordings that have room side by side (ours)."""
+
 _FARTHEST = 2.5
 """Size over the stated one up to which intervals are drawn whole (ours): what hardly shows an effect says less."""
 
@@ -36,7 +39,7 @@ def onset_figure(findings: Sequence[Finding], recordings: Sequence[str]) -> Any:
         recordings: names of the sources.
     """
     rows = timed(findings)
-    numbers = sorted({size.recording for _, onset in rows for size in onset.sizes})
+    numbers = _shown(rows)
     figure = blank(0.7 + 1.9 * len(rows), 10.8)
     grid = figure.subplots(len(rows), len(numbers), squeeze=False, sharey="row", sharex="col")
     for axes, (name, onset) in zip(grid, rows, strict=True):
@@ -46,10 +49,18 @@ def onset_figure(findings: Sequence[Finding], recordings: Sequence[str]) -> Any:
                 _draw_time(axis, onset)
         axes[0].set_ylabel(f"{title(name)}\nsize over the stated one")
     for axis, number in zip(grid[0], numbers, strict=True):
-        axis.set_title(recordings[number] if number < len(recordings) else f"recording {number + 1}", fontsize=8)
+        name = recordings[number] if number < len(recordings) else f"recording {number + 1}"
+        axis.set_title(name.replace("$", r"\$"), fontsize=8)
     for axis in grid[-1]:
         axis.set_xlabel("time [s]")
     return figure
+
+
+def _shown(rows: Sequence[tuple[str, Onset]]) -> list[int]:
+    """Numbers of the recordings that are drawn: those in which something changes, and the first ones."""
+    every = sorted({size.recording for _, onset in rows for size in onset.sizes})
+    changing = {onset.recording for _, onset in rows if onset.kind != CONSTANT}
+    return sorted(sorted(every, key=lambda number: (number not in changing, number))[:_MOST_RECORDINGS])
 
 
 def _draw(axis: Axes, sizes: Sequence[TimedSize]) -> None:

@@ -206,7 +206,7 @@ class TimeRegression:
     def _other_than(self, number: int) -> Array:
         """(W, K) constants of all other recordings."""
         own = self.sizes.recording == number
-        return self._constant[:, ~self._constant[own].any(axis=0)]
+        return np.asarray(self._constant[:, ~self._constant[own].any(axis=0)])
 
     def _shares(self, number: int, time: float) -> Array:
         """(W, 2) share of each window of a recording before and after a time."""
@@ -220,7 +220,7 @@ class TimeRegression:
         start, end = np.sort(self.sizes.start[own]), np.sort(self.sizes.end[own])
         inside = start[:, None] + (end - start)[:, None] * np.arange(INSIDE + 1) / INSIDE
         times = np.unique(inside.ravel())
-        return times[(times >= end[FEWEST_ASIDE - 1]) & (times <= start[-FEWEST_ASIDE])]
+        return np.asarray(times[(times >= end[FEWEST_ASIDE - 1]) & (times <= start[-FEWEST_ASIDE])])
 
     def _step(self, number: int) -> Alternative | None:
         times = self._times(number)
@@ -269,7 +269,7 @@ def _scatter(sizes: WindowSizes, found: Alternative) -> float:
     def excess(scatter: float) -> float:
         regression = TimeRegression(sizes, scatter)
         design = regression.design(found)
-        return regression.described(design).left - (sizes.count - design.shape[1])
+        return float(regression.described(design).left - (sizes.count - design.shape[1]))
 
     low, high = 0.0, 1.0 / max(float(np.median(np.diag(sizes.information))), _SMALLEST)
     if excess(0.0) <= 0.0:

@@ -139,7 +139,7 @@ def _always(effect: Effect) -> Effect:
     """The effect from the beginning on, whatever onset of its own it has."""
     if "onset" not in effect.shape_names():
         return effect
-    return effect.with_values(onset=float(effect.parameter("onset").default))
+    return effect.with_values(onset=float(effect.parameter("onset").metadata["low"]))
 
 
 def _with(problem: Problem, fitted: Fitted, number: int, effect: Effect) -> Array:
