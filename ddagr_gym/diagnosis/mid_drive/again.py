@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 
-from ddagr_gym.diagnosis.mid_drive.onsets import spells_of
+from ddagr_gym.diagnosis.answer.onset import Onset
+from ddagr_gym.diagnosis.mid_drive.onsets import onsets_of, spells_of
 from ddagr_gym.diagnosis.mid_drive.search_in_time import LEAST_EVIDENCE, best_spell
 from ddagr_gym.diagnosis.preprocessing.session import DiagnosisSession
 from ddagr_gym.diagnosis.search.scanned_model import SearchResult
@@ -33,11 +33,21 @@ def search_in_parts(session: DiagnosisSession, start: StartingModels, found: Sea
     if not spells:
         return {}, found
     session.progress(f"searching once more, {' and '.join(spells)} in a part of the drive")
-    again = search(replace(session, problem=problem.during(spells)), start)
+    again = search(session.during(spells), start)
     kept = {name: spell for name, spell in spells.items() if name in again.chosen.names}
     fall = found.chosen.fitted.cost - again.chosen.fitted.cost
     better = fall > LEAST_EVIDENCE * dispersion_of(problem, again.chosen.fitted)
     return (kept, again) if kept and better else ({}, found)
+
+
+def onsets_of_names(session: DiagnosisSession, found: SearchResult) -> dict[str, Onset]:
+    """How the size of every name of a search goes with time.
+
+    Args:
+        session: of the diagnosis, with the parts of the drives in which effects are present.
+        found: names that were accepted.
+    """
+    return onsets_of(session.problem, found.chosen.fitted)
 
 
 def _of_scan(session: DiagnosisSession, found: SearchResult) -> dict[str, Spell]:
