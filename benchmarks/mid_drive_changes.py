@@ -143,7 +143,7 @@ def draw(answers: Sequence[dict[str, Any]], path: Path) -> None:
             right.barh(place, item["evidence"], 0.6, color=palette.VERMILLION if wrong else palette.BLUE)
         right.axvline(THRESHOLD, color=palette.INK, lw=0.9)
         right.set_yticks(range(len(constant)), [_label(item) for item in constant], fontsize=7)
-        right.set_xlabel("constant effects: evidence of a change (line: threshold)")
+        right.set_xlabel("constant: evidence of a change (line: threshold)")
         figure.savefig(path, dpi=110)
 
 
