@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from ddagr_gym.diagnosis.change.before_drives import DAY, SAME_GROUND, WINDOW, JointFit, day_parameters, joint_fit
 from ddagr_gym.diagnosis.change.drive_fit import change_problem, change_windows, fit_nominal
-from ddagr_gym.diagnosis.change.drive_scan import DriveScan, scan_drive
+from ddagr_gym.diagnosis.change.drive_scan import DriveScan, Priors, scan_drive
 from ddagr_gym.diagnosis.change.measured_scatter import PATH
 from ddagr_gym.diagnosis.change.ordinary import Scores, uncertain_parameters
 from ddagr_gym.diagnosis.change.shifts import LEVEL, distance_at, family_probability, single_level, sizes_of
@@ -148,9 +148,14 @@ def _scan(joint: JointFit, drive: Recording) -> DriveScan:
     return scan_drive(problem, fit_nominal(problem))
 
 
+def _priors(scan: DriveScan, deviations: Array | None) -> Priors | None:
+    """Of what may differ between drives, about the values that the fit expects; those of the fit where None."""
+    return None if deviations is None else Priors(deviations[scan.free], np.zeros(len(scan.free)))
+
+
 def _differences(one: DriveScan, two: DriveScan, deviations: Array | None) -> list[dict[str, Any]]:
     """Differences of all candidates that both drives show, as JSON has them."""
-    scores: list[Scores] = [scan.scores(None if deviations is None else deviations[scan.free]) for scan in (one, two)]
+    scores: list[Scores] = [scan.scores(_priors(scan, deviations)) for scan in (one, two)]
     found = []
     for item in two.compared:
         if not set(item.keys) <= set(scores[0].keys):

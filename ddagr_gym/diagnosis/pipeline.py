@@ -1,6 +1,7 @@
 """All stages of a diagnosis in their order, each kept when it is finished.
 
-checks of the data -> search -> verdict -> certification -> localisation -> unnamed terms -> next drive -> evidence
+checks of the data -> search, once more with effects in a part of the drives where that explains more -> verdict ->
+certification -> localisation and onsets -> unnamed terms -> next drive -> evidence
 """
 
 from __future__ import annotations
@@ -20,6 +21,8 @@ from ddagr_gym.diagnosis.gates.thresholds import Thresholds
 from ddagr_gym.diagnosis.localisation.localise import locate
 from ddagr_gym.diagnosis.localisation.mismatch_traces import trace_mismatch
 from ddagr_gym.diagnosis.localisation.repeat_spans import where_readings_repeat
+from ddagr_gym.diagnosis.mid_drive.again import onsets_of_names, search_in_parts
+from ddagr_gym.diagnosis.mid_drive.onsets import with_onsets
 from ddagr_gym.diagnosis.planning.next_drive import plan_next_drive
 from ddagr_gym.diagnosis.preprocessing.data_checks import data_doubts
 from ddagr_gym.diagnosis.preprocessing.session import DiagnosisSession, Progress, be_silent, prepare
@@ -162,6 +165,8 @@ def diagnose(
     start = starting_models(session, steps.store.step)
     session = start.session
     found = steps.keep("search", search, session, start, steps.store.step)
+    spells, found = steps.keep("search in parts of the drives", search_in_parts, session, start, found)
+    session = session.during(spells) if spells else session
     accepted = accept(found, session.gates)
     unlike = {} if complete_nominal is None else unlike_commands(found, accepted, session.gates)
     nominal = complete_nominal(unlike) if complete_nominal is not None and unlike else None
@@ -181,6 +186,7 @@ def diagnose(
     steps.begin("localisation")
     traces = steps.keep("localisation traces", trace_mismatch, session, accepted)
     located = steps.keep("localisation", locate, session, accepted, traces)
+    diagnosis = with_onsets(diagnosis, steps.keep("onsets", onsets_of_names, session, accepted))
     repeats = where_readings_repeat(session.mended.given, session.mended.repeated)
     diagnosis = with_contradictions(review(diagnosis, located, repeats, fit, checks), session.mended.contradictions)
     unnamed = None if names_only else steps.run("unnamed terms", unnamed_terms, session, accepted, diagnosis)
@@ -216,6 +222,7 @@ def _beside_drivetrain(
     refitted = steps.keep("completed refit", refit_nominal, session.problem, session.progress)[1]
     found = steps.keep("completed scan", beside_completed, session, refitted, before.chosen.fitted.point.effects)
     diagnosis, effects = steps.run("verdict", conclude, session, found, found)
+    diagnosis = with_onsets(diagnosis, steps.keep("onsets", onsets_of_names, session, found))
     diagnosis = with_drivetrain(diagnosis, nominal, before.nominal.misfit)
     steps.begin("localisation")
     traces = steps.keep("localisation traces", trace_mismatch, session, found)

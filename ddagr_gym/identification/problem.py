@@ -8,7 +8,7 @@ sensitivities are; :mod:`~ddagr_gym.identification.least_squares` has the algebr
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 
@@ -21,6 +21,7 @@ from ddagr_gym.identification.headings import headings_matter, turned_starts
 from ddagr_gym.identification.least_squares import Elimination, huber_loss, huber_roots
 from ddagr_gym.identification.nuisances import SHIFT_AS_EFFECT, Nuisances
 from ddagr_gym.identification.parameters import disjoint_scopes
+from ddagr_gym.identification.spells import Spell
 from ddagr_gym.identification.window_model import WindowModel
 from ddagr_gym.identification.windows import CHANNELS, WindowSet
 from ddagr_gym.parameters import Numerics, Robot, Soil
@@ -133,6 +134,23 @@ class Problem:
         other.blocked, other.model = blocked, self.model.on(blocked.windows)
         other._slopes = None if self._slopes is None else self._slopes.on(blocked.windows)
         return other
+
+    def during(self, spells: Mapping[str, Spell]) -> Problem:
+        """The same problem with effects that are present in a part of the windows only, by name."""
+        other = copy(self)
+        other.model = self.model.during(spells)
+        other._slopes = None if self._slopes is None else self._slopes.during(spells)
+        return other
+
+    @property
+    def spells(self) -> Mapping[str, Spell]:
+        """Parts of the drives in which effects are present, by name; all of it for those without one."""
+        return self.model.spells
+
+    def present(self, name: str) -> Chosen:
+        """(W,) windows in which an effect of a name is present where it is assumed."""
+        windows, spell = self.blocked.windows, self.spells.get(name)
+        return np.ones(windows.count, dtype=bool) if spell is None else spell.in_windows(windows)
 
     def model_of(self, windows: WindowSet) -> WindowModel:
         """The same model over other windows of the same recordings."""

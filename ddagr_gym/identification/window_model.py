@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.identification.parameters import ModelParameter
+from ddagr_gym.identification.spells import Spell
 from ddagr_gym.identification.windows import CHANNELS, STATE, WindowSet
 from ddagr_gym.parameters import Drivetrain, Imu, Numerics, PoseReceiver, Robot, Sensors, Soil, WheelEncoder
 from ddagr_gym.physics import layout
@@ -101,6 +102,13 @@ class WindowModel:
             )  # fmt: skip
         self._row = build_row(robot, soil, ideal_sensors(windows.period))
         self._no_noise = np.zeros((windows.count, windows.samples, layout.NOISE_CHANNELS))
+        self.spells: Mapping[str, Spell] = {}
+
+    def during(self, spells: Mapping[str, Spell]) -> WindowModel:
+        """The same model with effects that are present in a part of the windows only, by name."""
+        other = copy(self)
+        other.spells = dict(spells)
+        return other
 
     def predict(self, values: Array, states: Array, effects: Sequence[Effect] = ()) -> Array:
         """Channels of all windows, (W, T, 8).
@@ -126,6 +134,7 @@ class WindowModel:
         chosen = tuple(e for e in effects if not (self._imposed and e.group == _MOTORS))
         simulator = Simulator(self.windows.count, numerics=self._numerics, effects=chosen, threads=self._threads)
         simulator.rows[:] = self._row
+        self._silence(simulator)
         for parameter, value in zip(self.parameters, values, strict=True):
             parameter.apply(simulator.rows, float(value), self.windows.recording)
         delay = self._delays(values)
@@ -141,6 +150,17 @@ class WindowModel:
         simulator.advance(commands, self._no_noise, recorded, readings, record)
         simulator.close()
         return readings, record
+
+    def _silence(self, simulator: Simulator) -> None:
+        """Make effects neutral in the windows in which they are absent."""
+        first = 0
+        for effect in simulator.effects:
+            actions = slice(first, first + len(effect.acting))
+            first = actions.stop
+            if effect.name in self.spells:
+                sizes = {name: effect.parameter(name).metadata["neutral"] for name in effect.size_names()}
+                absent = ~self.spells[effect.name].in_windows(self.windows)
+                simulator.effect_parameters[absent, actions] = effect.with_values(**sizes).vector()
 
     def on(self, windows: WindowSet) -> WindowModel:
         """The same model over other windows of the same period."""

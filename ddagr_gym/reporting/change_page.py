@@ -11,6 +11,7 @@ from ddagr_gym.reporting import change_figures as figures
 from ddagr_gym.reporting import change_text as text
 from ddagr_gym.reporting.diagnosis_text import FINDING_HEADER, finding_rows
 from ddagr_gym.reporting.figures import house_style
+from ddagr_gym.reporting.onset_figure import onset_figure, timed
 from ddagr_gym.reporting.page_template import embedded, page_template
 
 if TYPE_CHECKING:
@@ -70,6 +71,11 @@ def _context(diagnosis: Diagnosis) -> dict[str, Any]:
             figures.forecast_figure(change.certificate, bool(diagnosis.findings)),
             "Losses of forecasts before and after, side by side",
         ),
+        "onset_picture": embedded(
+            onset_figure(diagnosis.findings, diagnosis.recordings), "Size of each named effect against time"
+        )
+        if timed(diagnosis.findings)
+        else None,
         "parameter_picture": embedded(
             figures.parameter_figure(change), "Parameters of robot and ground without and with what changed"
         ),

@@ -20,6 +20,7 @@ from ddagr_gym.reporting import diagnosis_tables as tables
 from ddagr_gym.reporting.drivetrain_figure import forecast_figure, part_figure
 from ddagr_gym.reporting.drivetrain_section import drivetrain_section, other_findings
 from ddagr_gym.reporting.figures import house_style
+from ddagr_gym.reporting.onset_figure import onset_figure, timed
 from ddagr_gym.reporting.page_template import embedded, page_template
 
 PAGE = "report.html"
@@ -136,6 +137,11 @@ def _pictures(diagnosis: Diagnosis, evidence: Evidence, studio: _Studio) -> dict
             )
             for name in figures.present(evidence)
         ],
+        "onsets": studio.picture(
+            onset_figure(diagnosis.findings, diagnosis.recordings), "onsets", "Size of each named effect against time"
+        )
+        if timed(diagnosis.findings)
+        else None,
         "scores": _scores(diagnosis, evidence, studio),
         "conditions": _conditions(evidence, studio),
         "gains": studio.picture(

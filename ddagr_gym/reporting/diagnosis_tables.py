@@ -11,6 +11,7 @@ from ddagr_gym.diagnosis.answer.location import Localisation, OperatingCondition
 from ddagr_gym.diagnosis.answer.next_drive_plan import NextDrivePlan
 from ddagr_gym.diagnosis.answer.unnamed_terms import UnnamedTerm, UnnamedTerms
 from ddagr_gym.diagnosis.answer.verdict import NONE, UNKNOWN, DataDoubt, Diagnosis, Finding, GatesUsed
+from ddagr_gym.diagnosis.result.sentences import when
 from ddagr_gym.diagnosis.wording import (
     Amount,
     amounts,
@@ -105,7 +106,7 @@ def finding_card(finding: Finding, recordings: Sequence[str]) -> dict[str, Any]:
     where = finding.where
     return {
         "title": title(name),
-        "sentence": f"{sentence[:1].upper()}{sentence[1:]}.",
+        "sentence": f"{sentence[:1].upper()}{sentence[1:]}{when(finding)}.",
         "where": "not located" if where is None else where.phrase,
         "evidence": _evidence(finding),
         "sizes": [f"{key.replace('_', ' ')} {size(item)}" for key, item in parameters.items()],

@@ -37,10 +37,12 @@ ANSWER = Diagnosis(
 STAGES: dict[str, Any] = {
     "data_doubts": (),
     "search": "what was found",
+    "search_in_parts": ({}, "what was found"),
     "conclude": (ANSWER, ()),
     "certify": Certificate("by recording", "", (), 0.9, {}, {}, {}, {}, {}),
     "trace_mismatch": "traces",
     "locate": LOCATED,
+    "onsets_of_names": {},
     "unnamed_terms": UnnamedTerms("", (), 0.0, 0.0, ""),
     "plan_next_drive": NextDrivePlan.none("nothing is left open"),
     "gather_evidence": "arrays",
@@ -126,6 +128,7 @@ def test_the_drivetrain_is_fitted_where_the_library_leaves_too_much_in_the_encod
             chosen=SimpleNamespace(fitted=SimpleNamespace(point=SimpleNamespace(effects=()))),
         ),
     )
+    monkeypatch.setattr(pipeline, "search_in_parts", lambda session, start, found: ({}, found))
     asked: list[Any] = []
 
     def complete(misfit: Any) -> Any:
@@ -148,7 +151,7 @@ def test_a_stopped_diagnosis_goes_on_behind_its_last_step(stages: Stages, tmp_pa
     _, began = stages.run(cache=tmp_path / "steps")
     kept = [name for name, was_kept in began if was_kept]
     assert kept == ["checks", "search", "verdict", "certification"]
-    later = ["locate", "unnamed_terms", "plan_next_drive", "gather_evidence"]
+    later = ["locate", "onsets_of_names", "unnamed_terms", "plan_next_drive", "gather_evidence"]
     assert stages.called == ["prepare", "starting_models", *later]
     stages.run(cache=tmp_path / "steps")
     assert stages.called == ["prepare", "starting_models"]

@@ -10,6 +10,7 @@ from ddagr_gym.diagnosis.answer.change import Change
 from ddagr_gym.diagnosis.answer.drivetrain import DrivetrainAnswer
 from ddagr_gym.diagnosis.answer.location import EffectLocation, Localisation
 from ddagr_gym.diagnosis.answer.next_drive_plan import NextDrivePlan
+from ddagr_gym.diagnosis.answer.onset import Onset
 from ddagr_gym.diagnosis.answer.unnamed_terms import UnnamedTerms
 
 SCHEMA = "ddagr-diagnosis/4"
@@ -64,6 +65,8 @@ class Finding:
         equivalence_set: names that the same windows may mean, with weights that add up to 1; itself included.
         where: where it shows; null where nothing was located.
         calibrated_p: share of null drives that reach as much; null without a bank.
+        onset: how its size goes with time; null for what was seen in the values themselves, and where it acts in too
+            few windows.
     """
 
     name: str
@@ -76,6 +79,7 @@ class Finding:
     equivalence_set: Mapping[str, float] = field(default_factory=dict)
     where: EffectLocation | None = None
     calibrated_p: float | None = None
+    onset: Onset | None = None
 
 
 @dataclass(frozen=True)

@@ -14,12 +14,15 @@ from ddagr_gym.diagnosis.change.before_drives import GROUND, WINDOW, robot_of_be
 from ddagr_gym.diagnosis.change.conclusion import conclude_change
 from ddagr_gym.diagnosis.change.drive_fit import change_problem, change_windows, fit_nominal
 from ddagr_gym.diagnosis.change.left_out import certificate, left_out_losses
+from ddagr_gym.diagnosis.change.mid_drive import name_in_parts
 from ddagr_gym.diagnosis.change.naming import Named, name_changes
 from ddagr_gym.diagnosis.change.ordinary import OrdinaryRobot
 from ddagr_gym.diagnosis.change.requirements import check_before, check_comparable
+from ddagr_gym.diagnosis.mid_drive.onsets import onsets_of, with_onsets
 from ddagr_gym.diagnosis.preprocessing.data_checks import data_doubts
 from ddagr_gym.diagnosis.preprocessing.mended_recordings import MendedRecordings, mend_recordings
 from ddagr_gym.diagnosis.result.channel_fault_findings import with_new_faults
+from ddagr_gym.diagnosis.result.sentences import change_headline
 from ddagr_gym.identification.gauss_newton import Fitted
 from ddagr_gym.identification.problem import Problem
 from ddagr_gym.parameters import Robot, Soil
@@ -77,13 +80,23 @@ def what_changed(
     problem, fitted = _fitted(mended, ordinary, ground, threads)
     rng = np.random.default_rng(seed)
     named = name_changes(problem, fitted, ordinary.comparison(ground), rng, progress)
+    problem, named = name_in_parts(problem, fitted, named, ordinary.comparison(ground), rng, progress)
     doubts = data_doubts(mended.given, rng)
     progress("forecasting windows that were left out")
     certified = _certified(problem, ordinary, named)
     diagnosis, effects = conclude_change(problem, mended, ordinary, ground, named, certified)
+    diagnosis = _timed(diagnosis, problem, named)
     diagnosis = with_new_faults(diagnosis, mended, usual)
     diagnosis = replace(diagnosis, checks=doubts, seconds=time.monotonic() - began)
     return Outcome(diagnosis, effects, problem, named, mended)
+
+
+def _timed(diagnosis: Diagnosis, problem: Problem, named: Named) -> Diagnosis:
+    """The answer with when each effect began."""
+    found = with_onsets(diagnosis, onsets_of(problem, named.models[-1].fitted))
+    if found.change is None:
+        raise ValueError("a comparison says what changed")
+    return replace(found, sentence=change_headline(found.verdict, found.complete, found.findings, found.change))
 
 
 def what_changed_since(

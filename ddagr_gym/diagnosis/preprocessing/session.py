@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
@@ -15,6 +15,7 @@ from ddagr_gym.diagnosis.preprocessing.input_requirements import check_recording
 from ddagr_gym.diagnosis.preprocessing.mended_recordings import MendedRecordings, mend_recordings
 from ddagr_gym.diagnosis.setting import Setting, make_problem
 from ddagr_gym.identification.problem import Problem
+from ddagr_gym.identification.spells import Spell
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.recordings.schema import Recording
 
@@ -67,9 +68,13 @@ class DiagnosisSession:
         problem = make_problem(self.robot, self.soil, self.mended.recordings, setting)
         return replace(self, setting=setting, problem=problem, gates=self.bank.for_length(problem.covered))
 
+    def during(self, spells: Mapping[str, Spell]) -> DiagnosisSession:
+        """The same recordings with effects that are present in a part of them only, by name."""
+        return replace(self, problem=self.problem.during(spells))
+
     def with_nominal(self, robot: Robot, soil: Soil) -> DiagnosisSession:
         """The same recordings beside another nominal simulator."""
-        problem = make_problem(robot, soil, self.mended.recordings, self.setting)
+        problem = make_problem(robot, soil, self.mended.recordings, self.setting).during(self.problem.spells)
         gates = self.bank.for_length(problem.covered)
         return replace(self, robot=robot, soil=soil, problem=problem, gates=gates)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ddagr_gym.diagnosis.answer.change import BEFORE, Change, ChangeCertificate
+from ddagr_gym.diagnosis.answer.onset import BEGINS, CONSTANT, ENDS, Onset
 from ddagr_gym.diagnosis.answer.verdict import NONE, UNKNOWN, Finding
 from ddagr_gym.diagnosis.wording import amounts, describe, in_sentence
 
@@ -32,7 +33,7 @@ def headline(
         return "; ".join(["Nothing is missing that these recordings can show", *doubts]) + "."
     if tuple(verdict) == (UNKNOWN,):
         return "; ".join(["Something is missing that no effect of the library explains", *doubts]) + "."
-    found = _joined([describe(item.name, amounts(item.parameters)) + _rivals(item) for item in findings])
+    found = _joined([describe(item.name, amounts(item.parameters)) + when(item) + _rivals(item) for item in findings])
     share = "" if misfit_share is None else f"; {share_in_words(misfit_share)} of the mismatch"
     return "; ".join([f"{found[:1].upper()}{found[1:]}{share}", *doubts, _rest(complete)]) + "."
 
@@ -47,7 +48,7 @@ def drivetrain_headline(parts: Sequence[str], findings: Sequence[Finding], expla
         complete: whether nothing more is left than in drives with nothing missing.
     """
     lacks = f"the simulator lacks the robot's drivetrain ({_joined_names(parts)})"
-    others = [describe(item.name, amounts(item.parameters)) + _rivals(item) for item in findings]
+    others = [describe(item.name, amounts(item.parameters)) + when(item) + _rivals(item) for item in findings]
     found = _joined([lacks, *others])
     share = share_in_words(max(explained, 0.0))
     worth = f"on stretches that were left out of the fit this explains {share} of the squared error of the wheel speeds"
@@ -82,7 +83,7 @@ def change_headline(verdict: Sequence[str], complete: bool, findings: Sequence[F
             f"Something changed against {drives} that no effect of the library explains, nearest are "
             f"{nearest}{blind}{ground}."
         )
-    found = _joined([describe(item.name, amounts(item.parameters)) + _rivals(item) for item in findings])
+    found = _joined([describe(item.name, amounts(item.parameters)) + when(item) + _rivals(item) for item in findings])
     rest = "nothing else is out of the ordinary" if complete else "something else is out of the ordinary"
     return f"Against {drives}: {found}; {rest}{ground}."
 
@@ -121,6 +122,31 @@ def certificate_in_words(certificate: ChangeCertificate, against: str, named: bo
 
 def _joined_names(names: Sequence[str]) -> str:
     return " and ".join([", ".join(names[:-1]), names[-1]]) if len(names) > 1 else "".join(names)
+
+
+def when(finding: Finding) -> str:
+    """When a finding began, ended or changed, to stand behind its sizes; "" for what is constant."""
+    return "" if finding.onset is None else onset_in_words(finding.onset)
+
+
+def onset_in_words(onset: Onset) -> str:
+    """How a size goes with time, to stand behind it; "" for one that is constant."""
+    if onset.kind == CONSTANT:
+        return ""
+    before, after = (f"{size:.1f}".replace("-", "−") for size in (onset.before, onset.after))
+    if onset.value is None or onset.interval is None:
+        return f", drifting from {before} to {after} times that in the course of {_of_drive(onset)}"
+    low, high = onset.interval
+    time = f"{onset.value:.0f} s ({low:.0f} to {high:.0f} s) of {_of_drive(onset)}"
+    if onset.kind == BEGINS:
+        return f", from {time} on"
+    if onset.kind == ENDS:
+        return f", until {time}"
+    return f", {before} times that before {time} and {after} times after it"
+
+
+def _of_drive(onset: Onset) -> str:
+    return f"drive {onset.recording + 1}" if onset.recording else "the drive"
 
 
 def _rivals(finding: Finding) -> str:

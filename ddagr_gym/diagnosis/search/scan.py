@@ -72,8 +72,9 @@ def probe_column(problem: Problem, fitted: Fitted, probe: Effect, drives: Drives
         drives: simulation of the fitted model, with which an effect on readings needs none of its own.
     """
     if drives is not None and acts_on_readings_only(probe):
-        return problem.blocked.change(drives.readings(probe), fitted.prediction)
-    chosen = touched(probe, problem, fitted.prediction)
+        column = problem.blocked.change(drives.readings(probe), fitted.prediction)
+        return np.where(problem.present(probe.name)[:, None], column, 0.0)
+    chosen = touched(probe, problem, fitted.prediction) & problem.present(probe.name)
     column = np.zeros(problem.blocked.mask.shape)
     if not chosen.any():
         return column

@@ -1,0 +1,57 @@
+"""What changed in mid-drive: names once more with an effect in a part of the drives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ddagr_gym.diagnosis.change.naming import Named, name_changes
+from ddagr_gym.diagnosis.change.ordinary import Comparison
+from ddagr_gym.diagnosis.mid_drive.onsets import spells_of
+from ddagr_gym.diagnosis.mid_drive.search_in_time import LEAST_EVIDENCE, best_spell
+from ddagr_gym.identification.gauss_newton import Fitted
+from ddagr_gym.identification.misfit import dispersion_of
+from ddagr_gym.identification.problem import Problem
+from ddagr_gym.identification.spells import Spell
+
+
+def name_in_parts(
+    problem: Problem,
+    fitted: Fitted,
+    named: Named,
+    ordinary: Comparison,
+    rng: np.random.Generator,
+    progress: Callable[[str], None] = lambda line: None,
+) -> tuple[Problem, Named]:
+    """The names with an effect in a part of the drives, where that explains more; else those that were found.
+
+    Args:
+        problem: of the drive.
+        fitted: without effects.
+        named: what changed, if all of it holds all along the drive.
+        ordinary: what the drive is compared with.
+        rng: of resampled windows.
+        progress: called with what is being done.
+    """
+    last = named.models[-1]
+    spells = spells_of(problem, last.fitted, progress)
+    if not spells and (last.conspicuous or last.pulled):
+        spells = _of_scan(problem, named)
+    if not spells:
+        return problem, named
+    progress(f"comparing once more, {' and '.join(spells)} in a part of the drive")
+    again = name_changes(problem.during(spells), fitted, ordinary, rng, progress)
+    effects = {effect.name for effect in again.models[-1].fitted.point.effects}
+    kept = {name: spell for name, spell in spells.items() if name in effects}
+    fall = last.fitted.cost - again.models[-1].fitted.cost
+    better = fall > LEAST_EVIDENCE * dispersion_of(problem, again.models[-1].fitted)
+    return (problem.during(kept), again) if kept and better else (problem, named)
+
+
+def _of_scan(problem: Problem, named: Named) -> dict[str, Spell]:
+    first, last = named.models[0], named.models[-1]
+    scan, dispersion = first.scan, dispersion_of(problem, first.fitted)
+    explained = (first.fitted.cost - last.fitted.cost) / dispersion
+    candidates = [(item.candidate, [scan.keys.index(key) for key in item.keys]) for item in scan.compared]
+    return best_spell(scan.products, candidates, problem.blocked.windows, dispersion, explained)
