@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ddagr_gym.diagnosis.answer.amounts import amounts
 from ddagr_gym.diagnosis.preprocessing.channel_faults import find_channel_faults
 from ddagr_gym.diagnosis.preprocessing.input_requirements import check_different
 from ddagr_gym.diagnosis.preprocessing.reversed_gyro import with_gyro_reversed
-from ddagr_gym.diagnosis.wording import amounts, describe
+from ddagr_gym.diagnosis.wording import describe
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.windows import PERIOD_TOLERANCE
 from ddagr_gym.parameters import Robot

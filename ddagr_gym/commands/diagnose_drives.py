@@ -7,11 +7,11 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ddagr_gym.commands.diagnose_arguments import Arguments
 from ddagr_gym.errors import InputError
 from ddagr_gym.progress import LinePrinter
 
 if TYPE_CHECKING:
-    from ddagr_gym.commands.diagnose import Arguments
     from ddagr_gym.recordings.files import Limits
 
 REFUSED = 1
@@ -63,9 +63,7 @@ def run_drives(arguments: Arguments, limits: Limits, parts: Path) -> int:
 
 def _calibration_of(arguments: Arguments) -> Path:
     """The calibration; InputError where something is given that it, or the question, has no use for."""
-    from ddagr_gym.commands.diagnose import Arguments as Usual
-
-    usual = Usual(arguments.runs, arguments.output)
+    usual = Arguments(arguments.runs, arguments.output)
     options = (
         "robot", "soil", "before", "same_ground", "other_ground", "thresholds", "soil_uncertainty", "window", "stride",
         "names_only", "mcap", "rrd",

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from ddagr_gym.diagnosis.answer.amounts import number
 from ddagr_gym.diagnosis.result.sentences import certificate_in_words
-from ddagr_gym.diagnosis.wording import number, title
+from ddagr_gym.diagnosis.wording import title
 from ddagr_gym.reporting.diagnosis_text import FINDING_HEADER, finding_rows
 from ddagr_gym.reporting.text_table import format_table
 

@@ -6,22 +6,14 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from ddagr_gym.diagnosis.answer.amounts import Amount, amounts, number, size
 from ddagr_gym.diagnosis.answer.certificate import Certificate, Measured
 from ddagr_gym.diagnosis.answer.location import Localisation, OperatingConditionShare, Span
 from ddagr_gym.diagnosis.answer.next_drive_plan import NextDrivePlan
 from ddagr_gym.diagnosis.answer.unnamed_terms import UnnamedTerm, UnnamedTerms
 from ddagr_gym.diagnosis.answer.verdict import NONE, UNKNOWN, DataDoubt, Diagnosis, Finding, GatesUsed
 from ddagr_gym.diagnosis.result.sentences import when
-from ddagr_gym.diagnosis.wording import (
-    Amount,
-    amounts,
-    describe,
-    in_sentence,
-    number,
-    range_in_words,
-    size,
-    title,
-)
+from ddagr_gym.diagnosis.wording import describe, in_sentence, range_in_words, title
 from ddagr_gym.reporting.diagnosis_figures import LABELS
 from ddagr_gym.reporting.drivetrain_section import drivetrain_tiles
 

@@ -7,9 +7,10 @@ import io
 import math
 from typing import TYPE_CHECKING
 
+from ddagr_gym.diagnosis.answer.amounts import number
 from ddagr_gym.diagnosis.answer.drive_series import LAST, PARAMETER, PASSES, STAYS
 from ddagr_gym.diagnosis.series.sentences import drive_in_words, event_sentence
-from ddagr_gym.diagnosis.wording import in_sentence, number, title
+from ddagr_gym.diagnosis.wording import in_sentence, title
 from ddagr_gym.reporting.text_table import format_table
 
 if TYPE_CHECKING:

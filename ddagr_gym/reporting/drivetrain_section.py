@@ -8,9 +8,9 @@ from typing import Any
 
 from ddagr_gym.calibration.files import PAGE
 from ddagr_gym.calibration.parts import PARTS
+from ddagr_gym.diagnosis.answer.amounts import amounts, size
 from ddagr_gym.diagnosis.answer.drivetrain import PART_TITLES, DrivetrainAnswer, ForecastComparison, PartEvidence
 from ddagr_gym.diagnosis.answer.verdict import Diagnosis, Finding
-from ddagr_gym.diagnosis.wording import amounts, size
 from ddagr_gym.reporting.calibration_text import error_label, number
 
 DRIVETRAIN_FOLDER = "drivetrain"

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ddagr_gym.diagnosis.answer.amounts import amounts
 from ddagr_gym.diagnosis.answer.verdict import Diagnosis, Finding
-from ddagr_gym.diagnosis.wording import amounts, describe
+from ddagr_gym.diagnosis.wording import describe
 from ddagr_gym.viewers.drive_traces import DriveTraces
 
 Array = NDArray[np.float64]

@@ -26,6 +26,7 @@ _FILES = (
     "jit.py",
 )
 _PROSE = (
+    "diagnosis/answer/amounts.py",
     "diagnosis/wording.py",
     "diagnosis/result/sentences.py",
     "diagnosis/series/sentences.py",

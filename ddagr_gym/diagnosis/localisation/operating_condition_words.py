@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Protocol
 
+from ddagr_gym.diagnosis.answer.amounts import number
 from ddagr_gym.diagnosis.answer.location import OperatingConditionShare, Unevenness
-from ddagr_gym.diagnosis.wording import EVERYWHERE, number, range_in_words
+from ddagr_gym.diagnosis.wording import EVERYWHERE, range_in_words
 
 NOWHERE_MORE = "no motion, place or time stands out"
 

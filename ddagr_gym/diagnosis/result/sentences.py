@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from ddagr_gym.diagnosis.answer.amounts import amounts
 from ddagr_gym.diagnosis.answer.change import BEFORE, Change, ChangeCertificate
 from ddagr_gym.diagnosis.answer.onset import BEGINS, CONSTANT, ENDS, Onset
 from ddagr_gym.diagnosis.answer.verdict import NONE, UNKNOWN, Finding
-from ddagr_gym.diagnosis.wording import amounts, describe, in_sentence
+from ddagr_gym.diagnosis.wording import describe, in_sentence
 
 RIVAL_WEIGHT = 0.2
 """Weight in the equivalence set from which a rival stands in the headline (ours)."""

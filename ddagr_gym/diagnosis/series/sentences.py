@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ddagr_gym.diagnosis.answer.amounts import number
 from ddagr_gym.diagnosis.answer.drive_series import (
     BY_TIME,
     LAST,
@@ -20,7 +21,7 @@ from ddagr_gym.diagnosis.answer.drive_series import (
     SeriesEvent,
 )
 from ddagr_gym.diagnosis.answer.verdict import NONE
-from ddagr_gym.diagnosis.wording import in_sentence, number
+from ddagr_gym.diagnosis.wording import in_sentence
 
 MOST_NAMES = 2
 """Effects in a sentence on an event (ours); the page has all of them."""

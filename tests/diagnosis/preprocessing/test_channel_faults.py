@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 import ddagr_gym
+from ddagr_gym.diagnosis.answer.amounts import amounts
 from ddagr_gym.diagnosis.preprocessing.channel_faults import find_channel_faults
 from ddagr_gym.diagnosis.preprocessing.mended_recordings import mend_recordings
 from ddagr_gym.diagnosis.result.channel_fault_findings import channel_fault_findings, unexplained
-from ddagr_gym.diagnosis.wording import amounts, describe
+from ddagr_gym.diagnosis.wording import describe
 from ddagr_gym.recordings.checks.map_lines import with_channels
 from ddagr_gym.recordings.schema import Recording
 

@@ -6,11 +6,12 @@ from dataclasses import dataclass, replace
 
 import pytest
 
+from ddagr_gym.diagnosis.answer.amounts import Amount, amounts, number, quantity
 from ddagr_gym.diagnosis.answer.location import Unevenness
 from ddagr_gym.diagnosis.answer.verdict import Estimate, Finding
 from ddagr_gym.diagnosis.localisation.operating_condition_words import uneven_phrase
 from ddagr_gym.diagnosis.result.sentences import headline, share_in_words
-from ddagr_gym.diagnosis.wording import SENTENCES, Amount, amounts, describe, in_sentence, number, quantity, title
+from ddagr_gym.diagnosis.wording import SENTENCES, describe, in_sentence, title
 from ddagr_gym.physics.effects.registry import effect_kinds
 
 
