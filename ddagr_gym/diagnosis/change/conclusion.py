@@ -18,7 +18,8 @@ from ddagr_gym.diagnosis.answer.change import (
 )
 from ddagr_gym.diagnosis.answer.verdict import NONE, UNKNOWN, Diagnosis, Estimate, Finding, GatesUsed, Options
 from ddagr_gym.diagnosis.change.drive_scan import NAMED, NOT_COMPARED
-from ddagr_gym.diagnosis.change.naming import FORM, Model, Named, Step
+from ddagr_gym.diagnosis.change.model import FORM, Model
+from ddagr_gym.diagnosis.change.naming import Named, Step
 from ddagr_gym.diagnosis.change.ordinary import OrdinaryRobot
 from ddagr_gym.diagnosis.change.shifts import LEVEL, POWER, Pull, Shift, sizes_of
 from ddagr_gym.diagnosis.preprocessing.mended_recordings import MendedRecordings

@@ -37,7 +37,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.diagnosis.answer.drive_series import LAST, PASSES, SINGLE, STAYS
-from ddagr_gym.diagnosis.change.naming import FORM
+from ddagr_gym.diagnosis.change.model import FORM
 from ddagr_gym.diagnosis.change.shifts import LEVEL, family_probability
 
 Array = NDArray[np.float64]

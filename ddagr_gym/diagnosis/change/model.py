@@ -1,0 +1,111 @@
+"""A fit to a drive, and how far every effect and parameter is from ordinary drives there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ddagr_gym.diagnosis.change.drive_fit import moved_parameters
+from ddagr_gym.diagnosis.change.drive_scan import NAMED, DriveScan, scan_drive
+from ddagr_gym.diagnosis.change.ordinary import Comparison
+from ddagr_gym.diagnosis.change.shifts import LEVEL, Pull, Shift, family_probability, shift_of
+from ddagr_gym.identification.gauss_newton import Fitted
+from ddagr_gym.identification.problem import Problem
+
+NEAR = 0.4
+"""Share of its limit at which an effect is refitted to see (ours): in a real drive poses that come half a second late
+stand at 0.7 of it before the refit."""
+
+MOST_NEAR = 3
+"""Effects that are refitted to see (ours)."""
+
+FORM = 0.1
+"""Share of a named effect by which the library's form of it is not the robot's (ours): deviation of its size, and
+distance that a further effect needs, since the rest of it looks like other effects."""
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A fit, and how far every effect that it lacks is from ordinary drives.
+
+    Attributes:
+        fitted: with or without effects.
+        scan: of the library there.
+        shifts: of all candidates, the least probable first.
+        pulls: of all parameters that may differ between drives.
+        named: candidates of the fit's effects, as they were shifted when each was added.
+    """
+
+    fitted: Fitted
+    scan: DriveScan
+    shifts: tuple[Shift, ...]
+    pulls: tuple[Pull, ...]
+    named: tuple[Shift, ...] = ()
+
+    @property
+    def tests(self) -> int:
+        """Number of candidates and parameters."""
+        return len(self.shifts) + len(self.pulls)
+
+    def probability(self, shift: Shift | Pull, looks: int = 1) -> float:
+        """Of an ordinary drive to show as much in any candidate or parameter, each looked at so many times."""
+        return family_probability(shift.probability, looks * self.tests)
+
+    @property
+    def best(self) -> tuple[Shift, ...]:
+        """The least probable candidate of each effect, in their order."""
+        found: dict[str, Shift] = {}
+        for shift in self.shifts:
+            found.setdefault(shift.compared.name, shift)
+        return tuple(found.values())
+
+    @property
+    def conspicuous(self) -> tuple[Shift, ...]:
+        """Those of :attr:`best` that ordinary drives hardly show."""
+        least = FORM * max((shift.distance for shift in self.named), default=0.0)
+        return tuple(s for s in self.best if self.probability(s) < LEVEL and s.distance > least)
+
+    @property
+    def near(self) -> tuple[Shift, ...]:
+        """Those of :attr:`best` that are worth a refit: what is large a first step finds only in part."""
+        listed = sorted(self.best, key=lambda s: -s.distance / s.limit(self.tests))
+        return tuple(s for s in listed[:MOST_NEAR] if s.probability < 1.0 and s.distance > NEAR * s.limit(self.tests))
+
+    @property
+    def pulled(self) -> tuple[Pull, ...]:
+        """Parameters that ordinary drives hardly move as far."""
+        return tuple(pull for pull in self.pulls if self.probability(pull) < LEVEL)
+
+    @property
+    def left(self) -> float:
+        """Largest distance over its limit of any effect or parameter."""
+        parameters = (pull.distance / pull.limit(self.tests) for pull in self.pulls)
+        return max(farthest(self.best, self.tests), max(parameters, default=0.0))
+
+
+def model_of(problem: Problem, fitted: Fitted, ordinary: Comparison, named: Sequence[Shift] = ()) -> Model:
+    """Scan a fit and compare it with ordinary drives.
+
+    Args:
+        problem: of the drive.
+        fitted: to it.
+        ordinary: what the drive is compared with.
+        named: candidates of the fit's effects.
+    """
+    scan = scan_drive(problem, fitted)
+    scores = scan.scores()
+    beside = [key for key in scan.keys if key.startswith(NAMED)]
+    in_ordinary = [key for shift in named for key in shift.compared.keys]
+    compared = [item for item in scan.compared if item.name not in ordinary.unnamed]
+    found = [shift_of(item, scores, ordinary, beside, in_ordinary) for item in compared]
+    shifts = sorted((item for item in found if item is not None), key=lambda item: (item.probability, -item.distance))
+    pulls = tuple(
+        Pull(name, moved / ordinary.usual_move(name), ordinary.degrees)
+        for name, moved in moved_parameters(problem, fitted).items()
+    )
+    return Model(fitted, scan, tuple(shifts), pulls, tuple(named))
+
+
+def farthest(shifts: Sequence[Shift], tests: int) -> float:
+    """Largest distance over its limit of several shifts, each one of so many tests."""
+    return max((s.distance / s.limit(tests) for s in shifts if s.probability < 1.0), default=0.0)

@@ -1,0 +1,186 @@
+"""Joint refits of what may have changed: which effects, from where they begin, and what is alike to the best of them.
+
+Large changes are not linear. A refit begins at the best of several multiples of the first step; where parameters of
+robot or ground have taken a change over, they are held to find it; and what the library calls alike to the best refit
+begins where that one ended.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ddagr_gym.diagnosis.change.drive_fit import ITERATIONS
+from ddagr_gym.diagnosis.change.drive_scan import NAMED, scan_drive
+from ddagr_gym.diagnosis.change.model import MOST_NEAR, Model, farthest
+from ddagr_gym.diagnosis.change.ordinary import Comparison, Scores
+from ddagr_gym.diagnosis.change.shifts import Shift, explained, shift_of, sizes_of
+from ddagr_gym.diagnosis.search.initial_guess import first_guess
+from ddagr_gym.diagnosis.search.scan import drive_extent
+from ddagr_gym.diagnosis.search.scanned_model import Rival
+from ddagr_gym.identification.fit_numerics import FIELD_TOLERANCE
+from ddagr_gym.identification.gauss_newton import fit
+from ddagr_gym.identification.problem import Point, Problem
+from ddagr_gym.physics.effects.registry import effect_kinds
+
+Array = NDArray[np.float64]
+
+MOST_RIVALS = 4
+"""Effects that are refitted at each step (ours): a refit with its scan costs a minute on a long drive."""
+
+LENGTHS = (1.0, 2.0, 4.0, 8.0)
+"""Multiples of an effect's first step from the best of which its refit begins (ours): where losses are linear the first
+step goes part of the way only, and delays that are far off cost the same whatever their size."""
+
+RENEWALS = 4
+"""Steps of a refit with new derivatives (ours): it may begin many deviations from where it ends."""
+
+BIASES = ("gyro_bias", "accelerometer_bias")
+"""Begin the names of what stays free where robot and ground are held."""
+
+Starts = dict[str, tuple[Shift, Point]]
+"""By name of an effect, its candidate and a point with it from which a refit begins."""
+
+
+def joint_refits(
+    problem: Problem, model: Model, ordinary: Comparison, dispersion: float, progress: Callable[[str], None]
+) -> list[tuple[Shift, Rival]]:
+    """Joint refits of what may have changed, and of what the best of them is confused with, the best first.
+
+    Args:
+        problem: of the drive.
+        model: without what may have changed.
+        ordinary: what the drive is compared with.
+        dispersion: of the model.
+        progress: called with what is being done.
+    """
+    first = _refitted(problem, model, _starts(problem, model, ordinary), dispersion, progress)
+    if not first:
+        return []
+    alike = _alike(problem, model, [rival for _, rival in first])
+    best: dict[str, tuple[Shift, Rival]] = {}
+    for item in _by_gain([*first, *_refitted(problem, model, alike, dispersion, progress)]):
+        best.setdefault(item[1].name, item)
+    return list(best.values())
+
+
+def _by_gain(found: Sequence[tuple[Shift, Rival]]) -> list[tuple[Shift, Rival]]:
+    return sorted(found, key=lambda item: -item[1].gain)
+
+
+def _refitted(
+    problem: Problem, model: Model, starts: Starts, dispersion: float, progress: Callable[[str], None]
+) -> list[tuple[Shift, Rival]]:
+    """Refits that explain anything by an effect that matters, the best first."""
+    found = []
+    for shift, start in starts.values():
+        progress(f"refitting with {shift.compared.name}")
+        fitted = fit(problem, start, iterations=ITERATIONS + 2, tolerance=FIELD_TOLERANCE, renewals=RENEWALS)
+        gain = (model.fitted.cost - fitted.cost) / dispersion
+        meaningful = fitted.point.effects[-1].is_meaningful(drive_extent(problem, fitted.prediction))
+        if gain > 0.0 and meaningful:
+            found.append((shift, Rival(shift.compared.name, fitted, gain)))
+    return _by_gain(found)
+
+
+def _alike(problem: Problem, model: Model, refits: Sequence[Rival]) -> Starts:
+    """What is confused with the best refit, from where that ended: fits differ in where parameters end."""
+    beside = replace(refits[0].fitted.point, effects=model.fitted.point.effects)
+    known = {rival.name: rival.fitted.point.effects[-1] for rival in refits}
+    alike = {shift.compared.name: shift for shift in _confused(refits[0].name, model)}
+    new = _started(problem, model, beside, [shift for name, shift in alike.items() if name not in known])
+    again = {
+        name: (shift, replace(beside, effects=(*beside.effects, known[name])))
+        for name, shift in alike.items()
+        if name in known
+    }
+    return {**new, **again}
+
+
+def _confused(name: str, model: Model) -> list[Shift]:
+    """Effects that the library says may be taken for one, the farthest shifts first."""
+    kinds = effect_kinds()
+    found = [
+        shift
+        for shift in model.best
+        if shift.compared.name in kinds[name].confused_with or name in kinds[shift.compared.name].confused_with
+    ]
+    return sorted(found, key=lambda shift: -shift.distance / shift.limit(model.tests))[:MOST_NEAR]
+
+
+def _starts(problem: Problem, model: Model, ordinary: Comparison) -> Starts:
+    """Effects that may be what changed, by name."""
+    found: Starts = {}
+    at = model.fitted.point
+    moved = [pull for pull in model.pulled if not pull.name.startswith(BIASES)]
+    if moved or not (model.conspicuous or model.near):
+        at, found = _where_parameters_stay(problem, model)
+    others = [shift for shift in _preselected(model, ordinary) if shift.compared.name not in found]
+    return {**found, **_started(problem, model, at, others)}
+
+
+def _started(problem: Problem, model: Model, at: Point, shifts: Sequence[Shift]) -> Starts:
+    """Points with one effect each, at the sizes that its first step says."""
+    return _existing({s.compared.name: (s, _begun(problem, model, at, s, s.value + s.mean)) for s in shifts})
+
+
+def _existing(points: Mapping[str, tuple[Shift, Point | None]]) -> Starts:
+    return {name: (shift, point) for name, (shift, point) in points.items() if point is not None}
+
+
+def _begun(problem: Problem, model: Model, at: Point, shift: Shift, multiples: Array) -> Point | None:
+    """The point with an effect at the best length of a first step; None for a step that is none."""
+    guesses = dict.fromkeys(first_guess(shift.compared.candidate, (far * multiples).tolist()) for far in LENGTHS)
+    points = [replace(at, effects=(*at.effects, effect)) for effect in guesses if not effect.is_neutral]
+    if len(points) < 2:
+        return points[0] if points else None
+    return min(points, key=lambda point: fit(problem, point, iterations=0, reuse=model.fitted).cost)
+
+
+def _where_parameters_stay(problem: Problem, model: Model) -> tuple[Point, Starts]:
+    """Effects that explain most where robot and ground stay as they were calibrated, and the point where they do.
+
+    What a parameter has taken over, to first order no effect asks back: their columns are alike, but for what is
+    nonlinear in them.
+    """
+    own = np.array([not p.name.startswith(BIASES) for p in problem.nuisances.parameters])
+    held = problem.holding(own)
+    point = replace(model.fitted.point, values=np.where(own, 0.0, model.fitted.point.values))
+    fitted = fit(held, point, iterations=ITERATIONS, tolerance=FIELD_TOLERANCE, renewals=2)
+    scan = scan_drive(held, fitted)
+    scores = scan.scores()
+    beside = [key for key in scan.keys if key.startswith(NAMED)]
+    shifts = {shift.compared.keys: shift for shift in model.shifts}
+    # a step goes three deviations at most, and what has been taken over may be many
+    calibrated = replace(fitted.point, values=np.zeros(len(own)))
+    found: dict[str, tuple[float, Shift, Array]] = {}
+    for item in scan.compared:
+        sizes = sizes_of(scores, item.keys, item.ridge, beside)
+        if sizes is None or item.keys not in shifts or first_guess(item.candidate, sizes.value.tolist()).is_neutral:
+            continue
+        gain = explained(scores, item.keys, item.ridge, beside)
+        if gain > found.get(item.name, (0.0,))[0]:
+            found[item.name] = (gain, shifts[item.keys], sizes.value)
+    best = sorted(found.values(), key=lambda item: -item[0])[:MOST_RIVALS]
+    points = {s.compared.name: (s, _begun(problem, model, calibrated, s, value)) for _, s, value in best}
+    return calibrated, _existing(points)
+
+
+def _preselected(model: Model, ordinary: Comparison) -> list[Shift]:
+    """The effects beside which, to first order, least is out of the ordinary."""
+    scores = model.scan.scores()
+    listed = sorted(model.conspicuous or model.near, key=lambda shift: _left_beside(shift, model, scores, ordinary))
+    return listed[:MOST_RIVALS]
+
+
+def _left_beside(shift: Shift, model: Model, scores: Scores, ordinary: Comparison) -> float:
+    """Largest distance over its limit of any other effect beside one, to first order."""
+    own = [key for key in scores.keys if key.startswith(NAMED)]
+    before = [key for item in model.named for key in item.compared.keys]
+    keys = shift.compared.keys
+    others = [item.compared for item in model.best if item.compared.name != shift.compared.name]
+    found = [shift_of(item, scores, ordinary, [*own, *keys], [*before, *keys]) for item in others]
+    return farthest([item for item in found if item is not None], model.tests)
