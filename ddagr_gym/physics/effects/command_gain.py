@@ -30,7 +30,7 @@ class CommandGain(Effect):
     equation = "(right command_right, left command_left)"
     source = "gain of a motor controller from set point to speed (Astrom and Murray, Feedback Systems)"
     signature = "bank speeds settle at the same share of every command, whatever the load"
-    confused_with = ("command_deadband", "motor_droop")
+    confused_with = ("command_deadband", "encoder_scale", "motor_droop")
     needs_earlier_drives = True
     actions = ((POINT_COMMANDS, scale_commands),)
 

@@ -35,7 +35,7 @@ class EncoderScale(Effect):
     equation = "(right omega_right, left omega_left) readings; commands over the same factors where loop is 1"
     source = "systematic odometry errors (Borenstein and Feng, IEEE Trans. Robotics and Automation 12 (1996) 869)"
     signature = "bank speed wrong by the same share at every speed; the robot itself moves as it should, or (loop) not"
-    confused_with = ("gyro_scale", "motor_droop", "soil_change", "wheel_radius_mismatch")
+    confused_with = ("command_gain", "gyro_scale", "motor_droop", "soil_change", "wheel_radius_mismatch")
     actions = ((POINT_COMMANDS, slow_down), (POINT_READINGS, scale_encoders))
 
     right: float = size("-", 0.1, 10.0, least=0.01, neutral=1.0)
