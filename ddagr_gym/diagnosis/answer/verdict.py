@@ -65,7 +65,7 @@ class Finding:
         equivalence_set: names that the same windows may mean, with weights that add up to 1; itself included.
         where: where it shows; null where nothing was located.
         calibrated_p: share of null drives that reach as much; null without a bank.
-        onset: how its size goes with time; null for what was seen in the values themselves, and where it acts in too
+        onset: how its size goes with time; absent for what was seen in the values themselves, and where it acts in too
             few windows.
     """
 

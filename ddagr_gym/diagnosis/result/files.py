@@ -27,12 +27,23 @@ _ABSENT_WHERE_NOT_ASKED = ("drivetrain", "change")
 """Entries that are left out instead of null: files of before have none."""
 
 
+_FINDINGS = ("findings", "rejected")
+"""Lists of findings, whose ``onset`` is left out instead of null for the same reason."""
+
+
 def as_mapping(diagnosis: Diagnosis) -> dict[str, Any]:
     """Plain mapping as it stands in ``diagnosis.json``; null stands for numbers that are not finite."""
     mapping = plain(diagnosis)
     for name in _ABSENT_WHERE_UNKNOWN:
         mapping[name] = {key: value for key, value in mapping[name].items() if value is not None}
+    for name in _FINDINGS:
+        mapping[name] = [_without(item, "onset") for item in mapping[name]]
     return {name: value for name, value in mapping.items() if value is not None or name not in _ABSENT_WHERE_NOT_ASKED}
+
+
+def _without(finding: Mapping[str, Any], name: str) -> dict[str, Any]:
+    """A finding without an entry that is null."""
+    return {key: value for key, value in finding.items() if value is not None or key != name}
 
 
 def plain(value: Any) -> dict[str, Any]:
