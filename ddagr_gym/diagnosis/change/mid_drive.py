@@ -9,7 +9,7 @@ import numpy as np
 from ddagr_gym.diagnosis.change.naming import Named, name_changes
 from ddagr_gym.diagnosis.change.ordinary import Comparison
 from ddagr_gym.diagnosis.mid_drive.onsets import spells_of
-from ddagr_gym.diagnosis.mid_drive.search_in_time import LEAST_EVIDENCE, best_spell
+from ddagr_gym.diagnosis.mid_drive.search_in_time import best_spell, spells_that_hold
 from ddagr_gym.identification.gauss_newton import Fitted
 from ddagr_gym.identification.misfit import dispersion_of
 from ddagr_gym.identification.problem import Problem
@@ -43,10 +43,9 @@ def name_in_parts(
     progress(f"comparing once more, {' and '.join(spells)} in a part of the drive")
     again = name_changes(problem.during(spells), fitted, ordinary, rng, progress)
     effects = {effect.name for effect in again.models[-1].fitted.point.effects}
-    kept = {name: spell for name, spell in spells.items() if name in effects}
     fall = last.fitted.cost - again.models[-1].fitted.cost
-    better = fall > LEAST_EVIDENCE * dispersion_of(problem, again.models[-1].fitted)
-    return (problem.during(kept), again) if kept and better else (problem, named)
+    kept = spells_that_hold(spells, effects, fall, dispersion_of(problem, again.models[-1].fitted))
+    return (problem.during(kept), again) if kept else (problem, named)
 
 
 def _of_scan(problem: Problem, named: Named) -> dict[str, Spell]:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from ddagr_gym.diagnosis.answer.onset import Onset
 from ddagr_gym.diagnosis.mid_drive.onsets import onsets_of, spells_of
-from ddagr_gym.diagnosis.mid_drive.search_in_time import LEAST_EVIDENCE
+from ddagr_gym.diagnosis.mid_drive.search_in_time import spells_that_hold
 from ddagr_gym.diagnosis.preprocessing.session import DiagnosisSession
 from ddagr_gym.diagnosis.search.scanned_model import SearchResult
 from ddagr_gym.diagnosis.search.starting_models import StartingModels
@@ -32,10 +32,9 @@ def search_in_parts(session: DiagnosisSession, start: StartingModels, found: Sea
         return {}, found
     session.progress(f"searching once more, {' and '.join(spells)} in a part of the drive")
     again = search(session.during(spells), start)
-    kept = {name: spell for name, spell in spells.items() if name in again.chosen.names}
     fall = found.chosen.fitted.cost - again.chosen.fitted.cost
-    better = fall > LEAST_EVIDENCE * dispersion_of(problem, again.chosen.fitted)
-    return (kept, again) if kept and better else ({}, found)
+    kept = spells_that_hold(spells, again.chosen.names, fall, dispersion_of(problem, again.chosen.fitted))
+    return (kept, again) if kept else ({}, found)
 
 
 def onsets_of_names(session: DiagnosisSession, found: SearchResult) -> dict[str, Onset]:

@@ -7,7 +7,7 @@ between windows without another simulation.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -29,6 +29,22 @@ LEAST_EVIDENCE = 8.0
 
 _FIRST_STEP = 0.5
 """Share of a refit's gain that a scan finds at least (ours)."""
+
+
+def spells_that_hold(
+    spells: Mapping[str, Spell], names: Container[str], fall: float, dispersion: float
+) -> dict[str, Spell]:
+    """Parts of the drives that a second naming keeps; none where it does not explain enough more than the first.
+
+    Args:
+        spells: that it was made with, by effect.
+        names: of its effects.
+        fall: of the cost from the first naming to the second.
+        dispersion: of the second.
+    """
+    if not fall > LEAST_EVIDENCE * dispersion:
+        return {}
+    return {name: spell for name, spell in spells.items() if name in names}
 
 
 @dataclass(frozen=True)
