@@ -5,7 +5,7 @@
 Each drive is diagnosed by itself, without a calibration, by the gates of simulated drives, on a soil of which only the
 kind is known (uncertainty 4). Its page is written to FOLDER; a drive whose page is there is not diagnosed again. Writes
 ``real_diagnoses.json`` and ``real_diagnoses.png``: parts of the drivetrain that are named, and errors on stretches of
-the same drive that nothing was fitted to.
+the same drive that nothing was fitted to, beside those of a learned model that was trained on the rest of the drive.
 """
 
 from __future__ import annotations
@@ -17,10 +17,13 @@ from typing import Any
 
 from benchmarks.answers.run_recordings_check import recordings_folder
 from benchmarks.real_drives.__main__ import DRIVES, SOILS
-from ddagr_gym import diagnose
+from benchmarks.real_drives.ceiling import learned_errors
+from ddagr_gym import diagnose, load_recording
+from ddagr_gym.calibration.result import ForecastError
 from ddagr_gym.diagnosis.answer.verdict import Diagnosis
 from ddagr_gym.diagnosis.result.files import load
 from ddagr_gym.files import make_folder, write_json
+from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.files import write_atomically
 from ddagr_gym.rendering import palette
 from ddagr_gym.reporting.drivetrain_section import forecast_label, grouped_forecasts, root_mean_square
@@ -30,13 +33,16 @@ RESULTS = Path(__file__).resolve().parent / "results"
 UNCERTAINTY = 4.0
 """Of the soil: a factor on that of one which is known by name."""
 
-MODELS = (("nominal", palette.PALE), ("kinematic", palette.ORANGE), ("corrected", palette.BLUE))
-"""Errors of a :class:`~ddagr_gym.diagnosis.answer.drivetrain.ForecastComparison` and their colours."""
+COMPARED = ("nominal", "kinematic", "corrected")
+"""Errors of a :class:`~ddagr_gym.diagnosis.answer.drivetrain.ForecastComparison`."""
+
+COLOURS = {"nominal": palette.PALE, "kinematic": palette.ORANGE, "corrected": palette.BLUE, "learned": palette.GREEN}
 
 WORDS = {
     "nominal": "data sheet",
     "kinematic": "effective track, delay, lag",
     "corrected": "with the drivetrain that is named",
+    "learned": "learned (ceiling)",
 }
 SHOWN = ("heading after 5 s", "wheel speed")
 
@@ -60,8 +66,21 @@ def diagnosed(name: str, folder: Path, threads: int) -> Diagnosis:
     return load(page / "diagnosis.json")
 
 
-def entry(diagnosis: Diagnosis) -> dict[str, Any]:
-    """What is kept of a diagnosis."""
+def learned(name: str) -> dict[str, float]:
+    """Errors of a learned model on every quarter of a drive, trained on the others: root mean squares by metric."""
+    ground, column_map = DRIVES[name]
+    recording = load_recording(recordings_folder() / f"{name}.csv.gz", column_map, "warthog")
+    grouped: dict[str, list[ForecastError]] = {}
+    for item in learned_errors(recording, get_robot("warthog"), get_soil(SOILS[ground])):
+        grouped.setdefault(forecast_label(item), []).append(item)
+    return {
+        label: root_mean_square([item.rms for item in items if item.rms is not None])
+        for label, items in grouped.items()
+    }
+
+
+def entry(diagnosis: Diagnosis, ceiling: Mapping[str, float]) -> dict[str, Any]:
+    """What is kept of a diagnosis, with errors of a learned model by metric beside those of the simulators."""
     answer = diagnosis.drivetrain
     sizes = {
         f"{finding.name} {name}": {"value": item.value, "unit": item.unit, "interval": item.interval}
@@ -75,14 +94,22 @@ def entry(diagnosis: Diagnosis) -> dict[str, Any]:
     if answer is None:
         return kept
     errors = {
-        forecast_label(items[0]): {
+        label: {
             "unit": items[0].unit,
-            **{model: root_mean_square([getattr(item, model) for item in items]) for model, _ in MODELS},
+            **{model: root_mean_square([getattr(item, model) for item in items]) for model in COMPARED},
+            "learned": ceiling[label],
         }
         for items in grouped_forecasts(answer)
+        for label in (forecast_label(items[0]),)
     }
+    shares = {label: _share_of_learned(errors[label]) for label in SHOWN}
     parts = {part.name: {"kept": part.kept, "growth": part.growth, "error": part.error} for part in answer.parts}
-    return {**kept, "explained": answer.explained, "parts": parts, "errors": errors}
+    return {**kept, "explained": answer.explained, "share_of_learned": shares, "parts": parts, "errors": errors}
+
+
+def _share_of_learned(errors: Mapping[str, Any]) -> float:
+    """Share of what the learned model takes off the data sheet's error that the named drivetrain takes off."""
+    return float((errors["nominal"] - errors["corrected"]) / (errors["nominal"] - errors["learned"]))
 
 
 def draw(entries: Mapping[str, Mapping[str, Any]], path: Path) -> None:
@@ -93,14 +120,14 @@ def draw(entries: Mapping[str, Mapping[str, Any]], path: Path) -> None:
 
         figure = Figure(figsize=(8.0, 3.4), layout="constrained")
         for axes, metric in zip(figure.subplots(1, len(SHOWN)), SHOWN, strict=True):
-            for place, (model, colour) in enumerate(MODELS):
+            for place, (model, colour) in enumerate(COLOURS.items()):
                 values = [errors[metric][model] for errors in known.values()]
-                where = [row + 0.27 * (place - 1) for row in range(len(known))]
-                axes.bar(where, values, width=0.25, color=colour, label=WORDS[model])
+                where = [row + 0.21 * (place - 1.5) for row in range(len(known))]
+                axes.bar(where, values, width=0.2, color=colour, label=WORDS[model])
             axes.set_xticks(range(len(known)), [_label(name) for name in known])
             unit = next((errors[metric]["unit"] for errors in known.values()), "")
             axes.set_title(f"{metric} [{unit}], where nothing was fitted")
-        figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
+        figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
         write_atomically(path, lambda temporary: figure.savefig(temporary, format="png", dpi=130))
 
 
@@ -121,7 +148,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     entries: dict[str, Any] = {}
     for name in given.drives:
         print(f"{name}:", flush=True)
-        entries[name] = entry(diagnosed(name, folder, given.threads))
+        entries[name] = entry(diagnosed(name, folder, given.threads), learned(name))
         print(f"{name}: {entries[name]['sentence']}", flush=True)
         write_json(output / "real_diagnoses.json", entries)
         draw(entries, output / "real_diagnoses.png")

@@ -231,17 +231,12 @@ def diagnose(
             names_only=names_only,
             soil_name=nominal.soil_name,
             robot_file=nominal.robot_file,
-            complete_nominal=None if _of_ordinary_drives(gates) else drivetrain.complete,
+            complete_nominal=None if gates.of_ordinary_drives else drivetrain.complete,
             cache=None if cache is None else Path(cache),
             on_step=on_step,
             progress=lambda line: None if progress is None else progress(f"  {line}"),
         )
     return DiagnosisResult(outcome, drivetrain.made if outcome.diagnosis.drivetrain is not None else None)
-
-
-def _of_ordinary_drives(gates: Thresholds) -> bool:
-    """Whether the question is what differs from ordinary drives, not what the simulator lacks."""
-    return gates.origin is not None and gates.origin.kind == "ordinary"
 
 
 @dataclass
@@ -350,7 +345,7 @@ def _gates(given: ThresholdsLike | None, nominal: Nominal, soil_uncertainty: flo
     from ddagr_gym.diagnosis.gates.threshold_files import default_thresholds
 
     found = thresholds_from(given, nominal.robot, nominal.soil_name, soil_uncertainty)
-    if found is not None and (given is not None or not _of_ordinary_drives(found)):
+    if found is not None and (given is not None or not found.of_ordinary_drives):
         return found
     simulated = default_thresholds(_SIMULATED)
     return thresholds_from(simulated, nominal.robot, nominal.soil_name, soil_uncertainty) or simulated

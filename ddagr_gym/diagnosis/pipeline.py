@@ -10,6 +10,7 @@ import hashlib
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import ParamSpec, TypeVar
 
@@ -27,15 +28,16 @@ from ddagr_gym.diagnosis.planning.next_drive import plan_next_drive
 from ddagr_gym.diagnosis.preprocessing.data_checks import data_doubts
 from ddagr_gym.diagnosis.preprocessing.session import DiagnosisSession, Progress, be_silent, prepare
 from ddagr_gym.diagnosis.result.channel_fault_findings import with_contradictions
-from ddagr_gym.diagnosis.result.conclusion import accept, conclude
+from ddagr_gym.diagnosis.result.conclusion import accept, conclude, standing
 from ddagr_gym.diagnosis.result.drivetrain_names import (
     CompletedNominal,
     beside_completed,
+    drivetrain_is_missing,
     unlike_commands,
     with_drivetrain,
 )
 from ddagr_gym.diagnosis.review import review
-from ddagr_gym.diagnosis.search.scanned_model import SearchResult
+from ddagr_gym.diagnosis.search.scanned_model import ScannedModel, SearchResult
 from ddagr_gym.diagnosis.search.starting_models import refit_nominal, starting_models
 from ddagr_gym.diagnosis.search.stepwise import search
 from ddagr_gym.diagnosis.setting import Setting
@@ -164,14 +166,14 @@ def diagnose(
     steps.begin("search")
     start = starting_models(session, steps.store.step)
     session = start.session
-    found = steps.keep("search", search, session, start, steps.store.step)
+    found = steps.keep("search", search, session, start, steps.store.step, _enough(session, complete_nominal))
     spells, found = steps.keep("search in parts of the drives", search_in_parts, session, start, found)
     session = session.during(spells) if spells else session
     accepted = accept(found, session.gates)
-    unlike = {} if complete_nominal is None else unlike_commands(found, accepted, session.gates)
+    unlike = {} if complete_nominal is None else unlike_commands(found, session.gates)
     nominal = complete_nominal(unlike) if complete_nominal is not None and unlike else None
     if nominal is not None:
-        made = _beside_drivetrain(session, accepted, nominal, steps)
+        made = _beside_drivetrain(session, standing(found, session.gates), nominal, steps)
         answer = replace(
             made.diagnosis,
             checks=checks,
@@ -187,7 +189,7 @@ def diagnose(
     traces = steps.keep("localisation traces", trace_mismatch, session, accepted)
     located = steps.keep("localisation", locate, session, accepted, traces)
     diagnosis = with_onsets(diagnosis, steps.keep("onsets", onsets_of_names, session, accepted))
-    repeats = where_readings_repeat(session.mended.given, session.mended.repeated)
+    repeats = where_readings_repeat(session.mended.given, session.mended.repeated, session.mended.left_out)
     diagnosis = with_contradictions(review(diagnosis, located, repeats, fit, checks), session.mended.contradictions)
     unnamed = None if names_only else steps.run("unnamed terms", unnamed_terms, session, accepted, diagnosis)
     following = None if names_only else steps.run("next drive", plan_next_drive, session, diagnosis)
@@ -207,6 +209,15 @@ def diagnose(
     return Outcome(diagnosis, effects, session, accepted, evidence)
 
 
+def _enough(session: DiagnosisSession, complete_nominal: CompleteNominal | None) -> Callable[[ScannedModel], bool]:
+    """Whether a search may end before no effect passes its gate: where the drivetrain is asked for next."""
+    return partial(drivetrain_is_missing, gates=session.gates) if complete_nominal is not None else _never
+
+
+def _never(model: ScannedModel) -> bool:
+    return False
+
+
 def _beside_drivetrain(
     given: DiagnosisSession, before: SearchResult, nominal: CompletedNominal, steps: Steps
 ) -> Outcome:
@@ -214,7 +225,7 @@ def _beside_drivetrain(
 
     Args:
         given: session with the nominal simulator as it was given.
-        before: what was accepted beside that one.
+        before: what stands by itself beside that one.
         nominal: the completed one.
         steps: of the diagnosis.
     """

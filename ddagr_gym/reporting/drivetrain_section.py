@@ -8,6 +8,7 @@ from typing import Any
 
 from ddagr_gym.calibration.files import PAGE
 from ddagr_gym.calibration.parts import PARTS
+from ddagr_gym.calibration.result import ForecastError
 from ddagr_gym.diagnosis.answer.amounts import amounts, size
 from ddagr_gym.diagnosis.answer.drivetrain import PART_TITLES, DrivetrainAnswer, ForecastComparison, PartEvidence
 from ddagr_gym.diagnosis.answer.verdict import Diagnosis, Finding
@@ -120,7 +121,7 @@ def _forecast_row(item: ForecastComparison) -> tuple[str, ...]:
     return item.drive, forecast_label(item), item.unit, number(item.nominal), corrected, number(item.kinematic)
 
 
-def forecast_label(item: ForecastComparison) -> str:
+def forecast_label(item: ForecastComparison | ForecastError) -> str:
     """Metric and horizon in words."""
     return item.metric.replace("_", " ") if item.horizon is None else error_label(item.metric, item.horizon)
 

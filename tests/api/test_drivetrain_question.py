@@ -29,7 +29,7 @@ def driven(seconds: float) -> Recording:
     return made.recording.with_meta(source="yard.csv")
 
 
-def search_nothing(session, start, cache):
+def search_nothing(session, start, cache, enough):
     """A search that finds no name: what it does on a real drive takes minutes."""
     return SearchResult((scan_model(session.problem, start.refitted),))
 
@@ -37,7 +37,7 @@ def search_nothing(session, start, cache):
 @pytest.fixture
 def asked(monkeypatch):
     monkeypatch.setattr(pipeline, "search", search_nothing)
-    monkeypatch.setattr(pipeline, "unlike_commands", lambda found, accepted, gates: {"encoder_left": 9.0})
+    monkeypatch.setattr(pipeline, "unlike_commands", lambda found, gates: {"encoder_left": 9.0})
     monkeypatch.setattr(door, "_ONE_DRIVE", {"fitted": 16, "compared": 12})
 
 
@@ -81,5 +81,5 @@ def test_an_error_inside_the_fit_is_no_property_of_the_recording(asked, monkeypa
 def test_thresholds_of_ordinary_drives_ask_what_differs_from_them():
     from ddagr_gym.diagnosis.gates.threshold_files import default_thresholds
 
-    assert door._of_ordinary_drives(default_thresholds("warthog"))
-    assert not door._of_ordinary_drives(default_thresholds("ddagr"))
+    assert default_thresholds("warthog").of_ordinary_drives
+    assert not default_thresholds("ddagr").of_ordinary_drives

@@ -17,6 +17,7 @@ from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.effects.base import Vector, size
 from ddagr_gym.physics.effects.gyro_bias import GyroBias
 from ddagr_gym.physics.effects.gyro_scale import GyroScale
+from ddagr_gym.physics.effects.motor_lag import MotorLag
 from ddagr_gym.physics.layout import OMEGA, POINT_READINGS, READING, WHEEL_ANGLE
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.schema import Recording
@@ -87,3 +88,4 @@ def test_beside_another_simulator_stays_only_what_stands_there_too():
     refitted = refit_nominal(session.problem)[1]
     assert beside_completed(session, refitted, (GyroBias(0.01),)).chosen.names == ("gyro_bias",)
     assert beside_completed(session, refitted, (GyroScale(1.01),)).chosen.names == ()
+    assert beside_completed(session, refitted, (MotorLag(0.1), GyroBias(0.01))).chosen.names == ("gyro_bias",)

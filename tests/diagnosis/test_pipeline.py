@@ -56,7 +56,7 @@ class Stages:
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.called: list[str] = []
         self.stopped_in = ""
-        mended = SimpleNamespace(given=(), recordings=(), repeated=(), contradictions=(), names=())
+        mended = SimpleNamespace(given=(), recordings=(), repeated=(), left_out=(), contradictions=(), names=())
         self.session = SimpleNamespace(
             robot=get_robot("ddagr"), soil=get_soil("thesis_a1"), mended=mended, problem=None, seed=3,
             setting=Setting(), gates=SimpleNamespace(misfit={}), rng=lambda stage: None, key=lambda: "the same",
@@ -116,7 +116,8 @@ def test_the_drivetrain_is_fitted_where_the_library_leaves_too_much_in_the_encod
     nominal = SimpleNamespace(robot=get_robot("warthog"), soil=get_soil("thesis_a1"), effects=(late,))
     stages.session.with_nominal = lambda robot, soil: SimpleNamespace(**{**vars(stages.session), "robot": robot})
     stages.session.progress = lambda line: None
-    monkeypatch.setattr(pipeline, "unlike_commands", lambda found, accepted, gates: {"encoder_left": 9.0})
+    monkeypatch.setattr(pipeline, "unlike_commands", lambda found, gates: {"encoder_left": 9.0})
+    monkeypatch.setattr(pipeline, "standing", lambda found, gates: found)
     monkeypatch.setattr(pipeline, "refit_nominal", lambda problem, progress: ("raw", "refitted"))
     monkeypatch.setattr(pipeline, "beside_completed", lambda session, refitted, effects: f"{effects} beside {refitted}")
     monkeypatch.setattr(pipeline, "with_drivetrain", lambda answer, made, misfit: replace(answer, verdict=("load",)))

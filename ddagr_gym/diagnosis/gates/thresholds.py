@@ -162,6 +162,11 @@ class Thresholds:
     duration: float = SHORT_WINDOW
     origin: Origin | None = None
 
+    @property
+    def of_ordinary_drives(self) -> bool:
+        """Whether the question is what differs from ordinary drives, not what the simulator lacks."""
+        return self.origin is not None and self.origin.kind == "ordinary"
+
     def for_length(self, seconds: float) -> Thresholds:
         """The same for recordings of another length.
 

@@ -27,14 +27,18 @@ _ALL = 0.95
 
 
 def where_readings_repeat(
-    recordings: Sequence[Recording], repeated: Sequence[RepeatedReadings]
+    recordings: Sequence[Recording], repeated: Sequence[RepeatedReadings], left_out: Sequence[RepeatedReadings] = ()
 ) -> EffectLocation | None:
     """Stretches in which sensors repeat their readings; None where none does.
 
     Args:
         recordings: as they were read, repeats included.
         repeated: from :func:`ddagr_gym.diagnosis.preprocessing.repeated_readings.find_repeated_readings`.
+        left_out: sensors whose repeats the column map left out: they repeat everywhere.
     """
+    if left_out:
+        sensors = " and ".join(dict.fromkeys(item.sensor for item in (*repeated, *left_out)))
+        return EffectLocation((), 1.0, (), (), None, f"{sensors}: {EVERYWHERE}")
     if not repeated:
         return None
     found = [

@@ -11,6 +11,7 @@ from ddagr_gym.diagnosis.preprocessing.channel_faults import ChannelFault, contr
 from ddagr_gym.diagnosis.preprocessing.repeated_readings import (
     RepeatedReadings,
     find_repeated_readings,
+    readings_left_out,
     without_repeats,
 )
 from ddagr_gym.diagnosis.preprocessing.reversed_gyro import ReversedGyro, find_reversed_gyro, with_gyro_reversed
@@ -31,6 +32,7 @@ class MendedRecordings:
         reversed_gyro: evidence of a reversed gyro; None where it is right.
         channel_faults: readings that belonged to other channels.
         contradictions: what sources of one motion still say against each other.
+        left_out: sensors whose repeats the column map left out.
     """
 
     given: tuple[Recording, ...]
@@ -39,11 +41,17 @@ class MendedRecordings:
     reversed_gyro: ReversedGyro | None = None
     channel_faults: tuple[ChannelFault, ...] = ()
     contradictions: tuple[CheckFinding, ...] = ()
+    left_out: tuple[RepeatedReadings, ...] = ()
+
+    @property
+    def held(self) -> tuple[RepeatedReadings, ...]:
+        """Sensors whose readings repeat, in the file as it is."""
+        return (*self.repeated, *self.left_out)
 
     @property
     def names(self) -> tuple[str, ...]:
         """Effects and faults that were found in the values themselves."""
-        repeated = ("sensor_hold",) if self.repeated else ()
+        repeated = ("sensor_hold",) if self.held else ()
         faults = tuple(fault.name for fault in self.channel_faults)
         return (*repeated, *faults, *(() if self.reversed_gyro is None else ("gyro_sign",)))
 
@@ -65,4 +73,4 @@ def mend_recordings(recordings: Sequence[Recording], seed: int = 0) -> MendedRec
     if reversed_gyro is not None:
         clean = tuple(with_gyro_reversed(recording) for recording in clean)
     left = contradictions(clean, np.random.default_rng(seed))
-    return MendedRecordings(given, clean, repeated, reversed_gyro, faults, left)
+    return MendedRecordings(given, clean, repeated, reversed_gyro, faults, left, readings_left_out(given))

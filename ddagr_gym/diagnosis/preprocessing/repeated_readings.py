@@ -110,6 +110,29 @@ def find_repeated_readings(recordings: Sequence[Recording]) -> tuple[RepeatedRea
     return tuple(found)
 
 
+def readings_left_out(recordings: Sequence[Recording]) -> tuple[RepeatedReadings, ...]:
+    """Sensors of which the column map has left out repeated readings in more than :data:`LEAST_SHARE` of the samples.
+
+    A simulator whose sensors read anew at every sample lacks that as much as where the map says nothing.
+
+    Args:
+        recordings: as they were read.
+    """
+    found = []
+    for sensor, names in SENSORS.items():
+        held = [r for r in recordings if r.has(*names) and any(name in r.meta.held for name in names)]
+        if not held:
+            continue
+        rows = sum(len(r) for r in held)
+        read = float(np.mean([np.isfinite(r[name]).sum() for r in held for name in names])) * len(held)
+        between = float(np.median([1.0 / r.rate(name) for r in held for name in names]))
+        repeat = between - float(np.median([r.period for r in held]))
+        share = 1.0 - read / rows
+        if share > LEAST_SHARE and repeat > 0.0:
+            found.append(RepeatedReadings(sensor, share, repeat, rows))
+    return tuple(found)
+
+
 def repeat_runs(repeat: Flags) -> tuple[Rows, Rows]:
     """Of each run of repeats the sample that is repeated, -1 where that is before the first one, and the last repeat.
 

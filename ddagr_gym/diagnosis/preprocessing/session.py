@@ -116,6 +116,8 @@ def prepare(
     """
     check_recordings(recordings, robot, setting)
     mended = mend_recordings(recordings, seed)
+    # beside ordinary drives, that readings repeat is no difference
+    mended = replace(mended, left_out=()) if thresholds.of_ordinary_drives else mended
     problem = make_problem(robot, soil, mended.recordings, setting)
     gates = thresholds.for_length(problem.covered)
     return DiagnosisSession(robot, soil, mended, setting, problem, thresholds, gates, seed, progress)

@@ -63,7 +63,7 @@ def conclude(
     gates, mended, values = session.gates, session.mended, accepted.chosen.fitted.point.values
     verdict, complete = _verdict(accepted, mended.names, gates)
     seen = [
-        *_repeat_findings(mended.repeated),
+        *_repeat_findings(mended.held),
         *channel_fault_findings(mended.channel_faults),
         *reversed_gyro_findings(mended.reversed_gyro),
     ]
@@ -99,7 +99,7 @@ def data_source(recording: Recording) -> DataSource:
 
 def _effects_of_values(mended: MendedRecordings) -> tuple[Effect, ...]:
     """Effects that were found in the values themselves."""
-    hold = (hold_effect(mended.repeated),) if mended.repeated else ()
+    hold = (hold_effect(mended.held),) if mended.held else ()
     return hold if mended.reversed_gyro is None else (*hold, GyroSign(1.0))
 
 

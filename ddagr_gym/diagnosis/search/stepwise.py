@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -33,17 +33,23 @@ _MOST_RIVALS = 4
 """Effects that are refitted jointly at each step (ours): a joint refit costs as much as a scan."""
 
 
-def search(session: DiagnosisSession, start: StartingModels, cache: StepCache = compute_without_cache) -> SearchResult:
+def search(
+    session: DiagnosisSession,
+    start: StartingModels,
+    cache: StepCache = compute_without_cache,
+    enough: Callable[[ScannedModel], bool] = lambda model: False,
+) -> SearchResult:
     """Scan the refitted nominal model, and add effects while one passes the gate (theory: diagnosis, section 6).
 
     Args:
         session: of the diagnosis.
         start: its nominal models.
         cache: of the first scan and of each step, so that a search that was stopped goes on behind the last one.
+        enough: whether no further effect is looked for beside a model.
     """
     models = [cache("search nominal", partial(scan_model, session.problem, start.refitted, session.progress))]
     steps: list[tuple[Rival, ...]] = []
-    while len(models[-1].names) < MOST_EFFECTS:
+    while len(models[-1].names) < MOST_EFFECTS and not enough(models[-1]):
         added = cache(f"search step {len(models)}", partial(_add_effect, session, start.raw, models, steps))
         if added is None or set(added[0].names) in [set(model.names) for model in models]:
             break

@@ -10,6 +10,7 @@ from ddagr_gym.diagnosis.preprocessing.repeated_readings import (
     channel_groups,
     find_repeated_readings,
     hold_effect,
+    readings_left_out,
     without_repeats,
 )
 from ddagr_gym.recordings.schema import Recording
@@ -108,3 +109,19 @@ def test_zeros_of_a_robot_that_often_stops_are_no_repeats(rate: int) -> None:
     turned = np.round(speed / 0.02) * 0.02
     columns = {"t": t, "command_right": speed, "command_left": speed, "encoder_right": turned, "encoder_left": turned}
     assert find_repeated_readings([Recording.from_columns(columns)]) == ()
+
+
+def test_readings_that_the_map_left_out_count_as_held() -> None:
+    held = drive({"encoder_right": 5, "encoder_left": 5})
+    clean = without_repeats(held, find_repeated_readings([held]))
+    by_map = clean.with_meta(held={"encoder_right": 0.1, "encoder_left": 0.1})
+    assert find_repeated_readings([by_map]) == ()
+    assert readings_left_out([clean]) == ()
+    (found,) = readings_left_out([by_map])
+    assert found.sensor == "encoders"
+    assert found.share == pytest.approx(0.8, abs=0.02)
+    assert found.duration == pytest.approx(4 * PERIOD, rel=0.01)
+
+
+def test_a_map_that_leaves_out_hardly_anything_holds_nothing() -> None:
+    assert readings_left_out([drive({}).with_meta(held={"encoder_right": 0.0, "encoder_left": 0.0})]) == ()

@@ -10,7 +10,13 @@ from ddagr_gym.diagnosis.answer.drivetrain import PART_TITLES, DrivetrainAnswer,
 from ddagr_gym.diagnosis.answer.verdict import Diagnosis, Estimate, Finding, GatesUsed
 from ddagr_gym.diagnosis.gates.thresholds import Thresholds
 from ddagr_gym.diagnosis.pipeline import effect_intervals
-from ddagr_gym.diagnosis.result.drivetrain_names import UNLIKE, CompletedNominal, unlike_commands, with_drivetrain
+from ddagr_gym.diagnosis.result.drivetrain_names import (
+    UNLIKE,
+    CompletedNominal,
+    drivetrain_is_missing,
+    unlike_commands,
+    with_drivetrain,
+)
 from ddagr_gym.diagnosis.result.files import as_mapping, validate
 from ddagr_gym.diagnosis.wording import describe, title
 from ddagr_gym.physics.effects.gyro_sign import GyroSign
@@ -36,10 +42,20 @@ def completed(*findings: Finding) -> CompletedNominal:
 
 
 @pytest.mark.parametrize(("misfit", "asked"), [(2.0 * UNLIKE + 0.1, True), (2.0 * UNLIKE - 0.1, False)])
-def test_it_is_asked_for_where_refused_names_leave_too_much_in_an_encoder(misfit, asked):
-    found = search(("motor_lag",), misfit)
-    assert bool(unlike_commands(found, search((), 50.0), GATES)) is asked
-    assert unlike_commands(found, found, GATES) == {}
+def test_it_is_asked_for_where_names_leave_too_much_in_an_encoder(misfit, asked):
+    assert bool(unlike_commands(search(("motor_lag",), misfit), GATES)) is asked
+
+
+@pytest.mark.parametrize(
+    ("names", "misfit", "missing"),
+    [
+        (("motor_lag",), 50.0, False),
+        (("motor_lag", "pose_latency"), 50.0, True),
+        (("motor_lag", "pose_latency"), 2.0, False),
+    ],
+)
+def test_a_third_effect_is_not_looked_for_where_two_leave_the_wheels_unlike_their_commands(names, misfit, missing):
+    assert drivetrain_is_missing(search(names, misfit).chosen, GATES) is missing
 
 
 def test_parts_are_the_verdict_with_what_was_seen_and_it_is_never_complete_without_a_name():

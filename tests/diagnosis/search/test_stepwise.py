@@ -199,6 +199,7 @@ def test_some_windows_of_long_drives_say_whether_the_nominal_model_is_far_off(
     monkeypatch.setattr(starts, "FAR_OFF", 0.0 if far_off else np.inf)
     monkeypatch.setattr(starts, "MOST_WINDOWS", 3)
     monkeypatch.setattr(starts, "MANY_WINDOWS", 4)
+    monkeypatch.setattr(starts, "SOME_WINDOWS", 2)
     start = starting_models(session)
     counts = [problem.blocked.windows.count for problem in refitted]
     whole = session.problem.blocked.windows.count
