@@ -170,7 +170,7 @@ def diagnose(
     spells, found = steps.keep("search in parts of the drives", search_in_parts, session, start, found)
     session = session.during(spells) if spells else session
     accepted = accept(found, session.gates)
-    unlike = {} if complete_nominal is None else unlike_commands(found, session.gates)
+    unlike = {} if complete_nominal is None else unlike_commands(accepted, session.gates)
     nominal = complete_nominal(unlike) if complete_nominal is not None and unlike else None
     if nominal is not None:
         made = _beside_drivetrain(session, standing(found, session.gates), nominal, steps)

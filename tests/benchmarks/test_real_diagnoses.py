@@ -23,7 +23,13 @@ def test_errors_are_those_of_all_stretches_together():
     kept = entry(ASKED, CEILING)
     assert kept["verdict"] == ("command_delay",)
     assert kept["sizes"]["command_delay command_delay"]["value"] == 0.24
-    assert kept["errors"]["heading after 5 s"] == {"unit": "rad", "nominal": 3.25, "corrected": 1.21, "kinematic": 1.27, "learned": 1.0}
+    assert kept["errors"]["heading after 5 s"] == {
+        "unit": "rad",
+        "nominal": 3.25,
+        "corrected": 1.21,
+        "kinematic": 1.27,
+        "learned": 1.0,
+    }
     assert kept["share_of_learned"]["heading after 5 s"] == pytest.approx((3.25 - 1.21) / (3.25 - 1.0))
     assert kept["parts"]["command_delay"]["kept"]
 

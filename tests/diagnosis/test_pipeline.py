@@ -116,7 +116,7 @@ def test_the_drivetrain_is_fitted_where_the_library_leaves_too_much_in_the_encod
     nominal = SimpleNamespace(robot=get_robot("warthog"), soil=get_soil("thesis_a1"), effects=(late,))
     stages.session.with_nominal = lambda robot, soil: SimpleNamespace(**{**vars(stages.session), "robot": robot})
     stages.session.progress = lambda line: None
-    monkeypatch.setattr(pipeline, "unlike_commands", lambda found, gates: {"encoder_left": 9.0})
+    monkeypatch.setattr(pipeline, "unlike_commands", lambda accepted, gates: {"encoder_left": 9.0})
     monkeypatch.setattr(pipeline, "standing", lambda found, gates: found)
     monkeypatch.setattr(pipeline, "refit_nominal", lambda problem, progress: ("raw", "refitted"))
     monkeypatch.setattr(pipeline, "beside_completed", lambda session, refitted, effects: f"{effects} beside {refitted}")

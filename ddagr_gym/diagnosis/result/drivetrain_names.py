@@ -17,10 +17,9 @@ from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.physics.effects import Effect
 
-UNLIKE = 3.0
+UNLIKE = 2.0
 """Misfit of an encoder over its limit from which the whole drivetrain is asked for, whatever the names explain (ours:
-twice what leaves a complete verdict open; right names leave at most 1.3 in 154 simulated cases, the data sheet of a
-real robot leaves 9 and more)."""
+right names leave at most 1.3 in 154 simulated cases, a real robot's data sheet 2.6 and more)."""
 
 TOGETHER = 2
 """Effects of the library that are looked for before the whole drivetrain is asked for (ours: two at once are as many as
@@ -32,14 +31,14 @@ DRIVETRAIN_GROUP = "commands and motors"
 ENCODERS = tuple(name for name in CHANNELS if name.startswith("encoder"))
 
 
-def unlike_commands(found: SearchResult, gates: Thresholds) -> dict[str, float]:
-    """Misfit of the encoders over their limits, by channel, beside what a search found; empty where none is too large.
+def unlike_commands(accepted: SearchResult, gates: Thresholds) -> dict[str, float]:
+    """Misfit of the encoders over their limits, by channel, beside accepted names; empty where none is too large.
 
     Args:
-        found: by the search.
+        accepted: names of a search.
         gates: with the limits.
     """
-    shares = _over_limits(found.chosen, gates)
+    shares = _over_limits(accepted.chosen, gates)
     return shares if _unlike(shares) else {}
 
 

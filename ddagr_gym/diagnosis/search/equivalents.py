@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ddagr_gym.diagnosis.search.initial_guess import looped_encoders, slower_loop
+from ddagr_gym.diagnosis.search.initial_guess import looped_encoders, off_centre_load, slower_loop
 from ddagr_gym.diagnosis.search.scanned_model import Rival, ScannedModel, rival_of
 from ddagr_gym.identification.gauss_newton import fit
 from ddagr_gym.identification.problem import Problem
+from ddagr_gym.physics.effects.centre_of_mass_offset import CentreOfMassOffset
+from ddagr_gym.physics.effects.payload import Payload
 
 TRIAL_STEPS = 3
 """Gauss-Newton steps after which a rival is judged (ours: each costs a simulation per size)."""
@@ -32,9 +34,29 @@ def with_looped_encoders(problem: Problem, model: ScannedModel, tried: list[Riva
     if radii is None or point is None:
         return tried
     looped = rival_of(model, "encoder_scale", fit(problem, point, iterations=TRIAL_STEPS, reuse=radii.fitted))
-    if looped.gain - radii.gain < _SECOND_SIZE * radii.gain:
-        looped = replace(looped, gain=min(looped.gain, radii.gain) * (1.0 - _SECOND_SIZE), equivalent=True)
-    return _beside(tried, looped)
+    return _beside(tried, _behind(looped, radii))
+
+
+def with_off_centre_load(problem: Problem, model: ScannedModel, tried: list[Rival]) -> list[Rival]:
+    """Rivals and, beside an offset centre of mass that explains most, a load that shifts it as much.
+
+    Every load that is not at the centre shifts the centre of mass; how much mass there is, drives hardly tell.
+    """
+    best = max(tried, key=lambda rival: rival.gain, default=None)
+    if best is None or best.name != CentreOfMassOffset.name:
+        return tried
+    point = off_centre_load(problem.robot, best.fitted.point)
+    if point is None:
+        return tried
+    load = rival_of(model, Payload.name, fit(problem, point, iterations=TRIAL_STEPS, renewals=2, reuse=best.fitted))
+    return _beside(tried, _behind(load, best))
+
+
+def _behind(told: Rival, first: Rival) -> Rival:
+    """A rival with one more size that predicts the same as another, behind that one unless it is clearly better."""
+    if told.gain - first.gain >= _SECOND_SIZE * first.gain:
+        return told
+    return replace(told, gain=min(told.gain, first.gain) * (1.0 - _SECOND_SIZE), equivalent=True)
 
 
 def _beside(tried: list[Rival], further: Rival) -> list[Rival]:

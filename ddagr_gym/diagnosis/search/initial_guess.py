@@ -15,15 +15,21 @@ from ddagr_gym.diagnosis.search.inner_products import Terms
 from ddagr_gym.frames import wrap_angle
 from ddagr_gym.identification.gauss_newton import Fitted
 from ddagr_gym.identification.problem import Point, Problem
+from ddagr_gym.parameters import Robot
 from ddagr_gym.physics.effects import Effect
+from ddagr_gym.physics.effects.centre_of_mass_offset import CentreOfMassOffset
 from ddagr_gym.physics.effects.command_delay import CommandDelay
 from ddagr_gym.physics.effects.encoder_scale import EncoderScale
 from ddagr_gym.physics.effects.motor_lag import MotorLag
+from ddagr_gym.physics.effects.payload import Payload
 from ddagr_gym.physics.effects.wheel_radius_mismatch import WheelRadiusMismatch
 
 PULLED = 4.0
 """Prior standard deviations from the nominal value beyond which a refitted nuisance makes up for something missing
 (ours: null drives stay within a tenth of one)."""
+
+_LEAST_OFFSET = 0.02
+"""Offset of the centre of mass, over the distance to the rim, below which no load is looked for behind it (ours)."""
 
 
 def first_guess(candidate: Candidate, multiples: Sequence[float]) -> Effect:
@@ -158,6 +164,33 @@ def looped(radii: WheelRadiusMismatch) -> EncoderScale:
     """Encoders that make a speed loop turn the wheels as unevenly as these radii let them roll."""
     half = 0.5 * radii.difference
     return EncoderScale(1.0 - half, 1.0 + half, 1.0)
+
+
+def off_centre_load(robot: Robot, point: Point) -> Point | None:
+    """A load at the robot's rim that shifts the centre of mass as much, in place of an offset centre of mass.
+
+    Every load that is not at the centre does both; its mass follows from where it lies.
+
+    Args:
+        robot: nominal.
+        point: with the effect to translate as its last one.
+
+    Returns:
+        None where the last effect is another or hardly shifts anything, where no load at the rim shifts as much, or
+        where a load is assumed.
+    """
+    offset = point.effects[-1]
+    if not isinstance(offset, CentreOfMassOffset) or Payload.name in [e.name for e in point.effects]:
+        return None
+    distance, rim = math.hypot(offset.x, offset.y), max(robot.half_wheelbase, robot.half_track)
+    if not _LEAST_OFFSET * rim < distance < 0.5 * rim:
+        return None
+    mass = robot.mass * distance / (rim - distance)
+    x, y, height = robot.centre_of_mass
+    share = rim / distance
+    high = Payload.parameter("mass").metadata["high"]
+    load = Payload(min(mass, high), x + share * offset.x, y + share * offset.y, height)
+    return replace(point, effects=(*point.effects[:-1], load))
 
 
 def slower_loop(problem: Problem, point: Point) -> Point | None:

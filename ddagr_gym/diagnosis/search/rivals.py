@@ -8,7 +8,12 @@ from dataclasses import replace
 import numpy as np
 
 from ddagr_gym.diagnosis.gates.thresholds import UNMISTAKABLE, Thresholds
-from ddagr_gym.diagnosis.search.equivalents import TRIAL_STEPS, with_looped_encoders, with_slower_loop
+from ddagr_gym.diagnosis.search.equivalents import (
+    TRIAL_STEPS,
+    with_looped_encoders,
+    with_off_centre_load,
+    with_slower_loop,
+)
 from ddagr_gym.diagnosis.search.gains import Gain
 from ddagr_gym.diagnosis.search.initial_guess import first_guess, nuisance_answer, turned_to_agree
 from ddagr_gym.diagnosis.search.inner_products import Terms
@@ -58,7 +63,7 @@ def rivals_of(problem: Problem, model: ScannedModel, raw: Fitted, thresholds: Th
     tried = with_slower_loop(problem, model, tried)
     best = max((rival.gain for rival in tried), default=0.0)
     rivals = [_finish(problem, model, rival, large) if rival.gain > CLOSE * best else rival for rival in tried]
-    rivals = with_looped_encoders(problem, model, rivals)
+    rivals = with_off_centre_load(problem, model, with_looped_encoders(problem, model, rivals))
     kept = [
         rival
         for rival in rivals

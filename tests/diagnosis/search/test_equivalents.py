@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from ddagr_gym.diagnosis.search import equivalents
-from ddagr_gym.diagnosis.search.equivalents import with_looped_encoders
+from ddagr_gym.diagnosis.search.equivalents import with_looped_encoders, with_off_centre_load
 from ddagr_gym.diagnosis.search.scanned_model import Rival
 from ddagr_gym.identification.problem import Point
 from ddagr_gym.physics.effects import load_effects
+from ddagr_gym.presets import get_robot
 
 DISPERSION = 2.0
 STANDING: Any = SimpleNamespace(fitted=SimpleNamespace(cost=1000.0), dispersion=DISPERSION)
@@ -65,3 +66,35 @@ def test_without_uneven_radii_nothing_is_told_again(monkeypatch: pytest.MonkeyPa
     assert beside(monkeypatch, 100.0, slope) == [slope]
     beside_encoders = rival(100.0, "encoder_scale=1.1", "wheel_radius_mismatch=0.04")
     assert beside(monkeypatch, 100.0, beside_encoders) == [beside_encoders]
+
+
+CENTRE = rival(100.0, "centre_of_mass_offset=0.05")
+
+
+def beside_centre(monkeypatch: pytest.MonkeyPatch, gain: float, *tried: Rival) -> list[Rival]:
+    """Rivals where a fit of a load reaches a gain."""
+    monkeypatch.setattr(equivalents, "fit", lambda problem, point, **options: fitted_at(point, gain))
+    problem: Any = SimpleNamespace(robot=get_robot("ddagr"))
+    return with_off_centre_load(problem, STANDING, list(tried))
+
+
+@pytest.mark.parametrize(("gain", "equivalent"), [(99.0, True), (110.0, False)])
+def test_a_load_off_the_centre_stands_beside_an_offset_centre_of_mass(
+    monkeypatch: pytest.MonkeyPatch, gain: float, equivalent: bool
+) -> None:
+    kept, load = beside_centre(monkeypatch, gain, CENTRE)
+    assert kept is CENTRE
+    assert (load.name, load.equivalent) == ("payload", equivalent)
+    effect: Any = load.fitted.point.effects[-1]
+    robot = get_robot("ddagr")
+    assert effect.mass / (robot.mass + effect.mass) * effect.x == pytest.approx(0.05)
+    assert effect.x == pytest.approx(max(robot.half_wheelbase, robot.half_track))
+
+
+def test_no_load_is_looked_for_behind_another_effect_or_where_nothing_is_shifted(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    slope, hardly = rival(150.0, "slope=0.02"), rival(100.0, "centre_of_mass_offset=0.001")
+    assert beside_centre(monkeypatch, 99.0, slope, CENTRE) == [slope, CENTRE]
+    assert beside_centre(monkeypatch, 99.0, hardly) == [hardly]
+    assert beside_centre(monkeypatch, 99.0) == []
