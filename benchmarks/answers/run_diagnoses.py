@@ -2,6 +2,7 @@
 
     python -m benchmarks.answers.run_diagnoses concealed             every case of shared/concealed -> concealed.json
     python -m benchmarks.answers.run_diagnoses recordings            every real drive -> recordings.json
+    python -m benchmarks.answers.run_diagnoses recordings --calibration CAL   what changed in those that CAL is not of
     python -m benchmarks.answers.run_diagnoses DIR --output FILE     a set of the project's own generator
 
 Options after ``--`` go to every run; ``-- --names-only`` leaves out what follows the verdict and halves the time.
@@ -32,6 +33,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.commits import commit_of
+from ddagr_gym.calibration.files import load as load_calibration
 from ddagr_gym.recordings.files import write_atomically
 from ddagr_gym.version import __version__
 
@@ -39,7 +41,7 @@ HERE = Path(__file__).resolve().parent
 CHECKOUT = HERE.parents[1]
 ENTRIES = (
     "verdict", "complete", "findings", "rejected", "sentence", "fit", "detectable", "detectable_alone", "misfit",
-    "seconds", "version",
+    "change", "seconds", "version",
 )  # fmt: skip
 """What an answer keeps of a diagnosis.json."""
 
@@ -92,6 +94,15 @@ def real_cases(folder: Path) -> Iterator[Case]:
         robot = path.name.split("_", 1)[0]
         options = ("--robot", robot, *UNKNOWN_GROUND, "--thresholds", str(REAL_BANK))
         yield Case(path.name.split(".", 1)[0], (str(path), *options))
+
+
+def changed_cases(folder: Path, calibration: Path) -> Iterator[Case]:
+    """Real drives of the robot of a calibration that it was not made of, one a case."""
+    made = load_calibration(calibration)
+    of = {item.source.split(".", 1)[0] for item in made.drives}
+    for case in real_cases(folder):
+        if case.name not in of and case.name.startswith(made.robot):
+            yield Case(case.name, (case.arguments[0], "--calibration", str(calibration)))
 
 
 def chosen_for_all(name: str, every: int, seed: int) -> bool:
@@ -148,8 +159,14 @@ def diagnose(case: Case, parts: Path, threads: int, limit: float) -> dict[str, A
 
 
 def shown(arguments: Sequence[str]) -> list[str]:
-    """Arguments of a run as they are kept with its answer: recordings by name, files of the checkout from there."""
-    return [Path(word).name if word.endswith(_RECORDING) else word.removeprefix(f"{CHECKOUT}/") for word in arguments]
+    """Arguments of a run as they are kept with its answer: recordings and other folders by name, the checkout's files
+    from there."""
+    return [_shown(word) for word in arguments]
+
+
+def _shown(word: str) -> str:
+    inside = word.startswith(f"{CHECKOUT}/")
+    return word.removeprefix(f"{CHECKOUT}/") if inside and not word.endswith(_RECORDING) else Path(word).name
 
 
 def data_hash(arguments: Sequence[str]) -> str:
@@ -192,11 +209,14 @@ def main() -> int:
     parser.add_argument("--time-limit", type=float, default=1800.0, help="of a case [s]")
     parser.add_argument("--collect", action="store_true", help="write the answers that are finished, run nothing")
     parser.add_argument("--only", nargs="*", default=None, help="names of cases")
+    parser.add_argument("--calibration", type=Path, default=None, help="of the robot, for the real recordings")
     words = sys.argv[1:]
     end = words.index("--") if "--" in words else len(words)
     arguments, options = parser.parse_args(words[:end]), tuple(words[end + 1 :])
     if arguments.cases == "recordings":
-        found = list(real_cases(Path(os.environ.get("DDAGR_RECORDINGS") or shared() / "recordings")))
+        folder = Path(os.environ.get("DDAGR_RECORDINGS") or shared() / "recordings")
+        known = arguments.calibration
+        found = list(real_cases(folder) if known is None else changed_cases(folder, known.resolve()))
     else:
         folder = shared() / "concealed" if arguments.cases == "concealed" else Path(arguments.cases)
         found = list(synthetic_cases(folder))
@@ -206,7 +226,8 @@ def main() -> int:
         value = getattr(arguments, name)
         if value is not None and value < 1:
             parser.error(f"--{name.replace('_', '-')} must be at least 1")
-    output = arguments.output or HERE / f"{Path(arguments.cases).name}.json"
+    name = Path(arguments.cases).name
+    output = arguments.output or HERE / f"{name if arguments.calibration is None else f'{name}_changed'}.json"
     if not found:
         print(f"no cases for {arguments.cases}: set DDAGR_SHARED or name a folder of cases", file=sys.stderr)
         return 2

@@ -4,6 +4,7 @@ import json
 import subprocess
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -132,3 +133,18 @@ def test_a_kept_answer_is_of_the_same_recordings_and_arguments(runs: list[list[s
         diagnose(asked, parts, 1, 10.0)
         diagnose(asked, parts, 1, 10.0)
         assert len(runs) == number
+
+
+def test_what_changed_is_asked_of_the_robot_of_a_calibration_in_drives_that_it_is_not_of(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("concealed/warthog_1", "concealed/warthog_2", "concealed/husky_1", "open/warthog_sand"):
+        path = tmp_path / f"{name}.csv.gz"
+        path.parent.mkdir(exist_ok=True)
+        path.write_bytes(b"")
+    drives = (SimpleNamespace(source="warthog_2.csv.gz"), SimpleNamespace(source="warthog_sand.csv.gz"))
+    made = SimpleNamespace(drives=drives, robot="warthog")
+    monkeypatch.setattr(run_diagnoses, "load_calibration", lambda folder: made)
+    (case,) = run_diagnoses.changed_cases(tmp_path, tmp_path / "CAL")
+    assert case.name == "warthog_1"
+    assert run_diagnoses.shown(case.arguments) == ["warthog_1.csv.gz", "--calibration", "CAL"]

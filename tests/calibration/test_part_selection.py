@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from ddagr_gym.calibration.joint_fit import Standing
-from ddagr_gym.calibration.part_selection import Candidate, surely_above, worse_by
+from ddagr_gym.calibration.part_selection import (
+    TRIED_DELAY,
+    Candidate,
+    select_parts,
+    surely_above,
+    worse_by,
+)
+from ddagr_gym.presets import get_robot
 
 
 def candidate(*losses: float, counts: tuple[int, ...] = ()) -> Candidate:
@@ -31,3 +40,59 @@ def test_a_short_drive_counts_for_less():
 def test_few_drives_must_show_more():
     assert surely_above(1000) == pytest.approx(1.0, abs=0.01)
     assert surely_above(2) > surely_above(3) > surely_above(6) > 1.0
+
+
+class Made:
+    """A model that knows which parts are out; its losses follow from that."""
+
+    def __init__(self, out: frozenset[str] = frozenset()) -> None:
+        self.out = out
+        self.free = {"command_delay", "command_ramp"} - out
+
+    def without(self, parts: frozenset[str], robot: object) -> Made:
+        return Made(frozenset(parts))
+
+
+class Losses:
+    """In place of fits: forecasts' losses by the parts that are out."""
+
+    data = SimpleNamespace(robot=get_robot("warthog"))
+
+    def __init__(self, losses: dict[frozenset[str], float]) -> None:
+        self.losses = losses
+        self.started_at: list[float | None] = []
+
+    def candidate(self, model: Made, start: Standing) -> Candidate:
+        loss = self.losses[model.out & {"command_delay", "command_ramp"}]
+        self.started_at.append(start.values.get("command_delay"))
+        return candidate(loss, 1.01 * loss, 0.99 * loss)
+
+
+DELAY, RAMP, BOTH = (
+    frozenset({"command_delay"}),
+    frozenset({"command_ramp"}),
+    frozenset({"command_delay", "command_ramp"}),
+)
+
+
+@pytest.mark.parametrize(
+    ("delay_alone", "neither", "left_out"),
+    [(1.0, 1.5, "command_ramp"), (1.2, 1.5, "command_delay"), (1.0, 1.0, "command_delay")],
+)
+def test_a_dead_time_that_forecasts_as_well_takes_the_place_of_a_ramp(delay_alone, neither, left_out):
+    # taken out one after the other, the ramp is missed at first and the dead time is not
+    losses = Losses({frozenset(): 1.0, RAMP: delay_alone, DELAY: 1.0, BOTH: neither})
+    full = candidate(1.0, 1.01, 0.99)
+    begin = {RAMP: 1.1}
+    first = Losses({**losses.losses, **begin})
+
+    class Once(Losses):
+        def candidate(self, model, start):
+            if start.values.get("command_delay") == TRIED_DELAY:
+                return losses.candidate(model, start)
+            return first.candidate(model, start)
+
+    found = select_parts(Once({}), Made(), full, lambda name, make: make(), lambda line: None)
+    assert found.left_out & BOTH == {left_out}
+    kept = {item.name: item.kept for item in found.decisions if item.name in BOTH}
+    assert kept == {name: name != left_out for name in BOTH}
