@@ -1,0 +1,192 @@
+"""``ddagr_gym.export``: a corrected simulator for MuJoCo, for Gazebo, or as ranges for randomisation."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ddagr_gym.api.nominal import RobotLike, SoilLike, robot_from, soil_from
+from ddagr_gym.api.results import Report, Table
+from ddagr_gym.errors import at_least, unknown_name
+from ddagr_gym.extras import need
+
+if TYPE_CHECKING:
+    from ddagr_gym.export.carried_over import CarriedOver
+    from ddagr_gym.export.comparison import Compared
+    from ddagr_gym.export.corrected import Corrected
+    from ddagr_gym.export.ranges import Range
+    from ddagr_gym.export.working_point import SteadyDrives
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ExportResult(Report):
+    """A corrected simulator as another simulator can have it.
+
+    ``report`` writes the files of the format and the page, index.html, which says what carries over, with which error,
+    and what does not.
+
+    Attributes:
+        to: format.
+        corrected: what was exported.
+        working_point: mean bank speed at which slip was measured [rad/s].
+        carried_over: numbers.
+        compared: drives in our simulator and in the other one; in the kinematic model where the other cannot run here.
+        step_error: root mean square error of the wheel speed in a step over its end [-]; None where nothing ran.
+        ranges: of all numbers, by draws.
+        draws: that the ranges come from.
+        seed: of the draws.
+        files: text by name.
+    """
+
+    to: str
+    corrected: Corrected
+    working_point: float
+    carried_over: CarriedOver
+    compared: tuple[Compared, ...]
+    step_error: float | None
+    ranges: tuple[Range, ...]
+    draws: int
+    seed: int
+    files: dict[str, str]
+
+    @property
+    def headline(self) -> str:
+        """What was exported and how well it turns."""
+        from ddagr_gym.reporting.export_text import headline
+
+        return headline(self)
+
+    def tables(self) -> Sequence[Table]:
+        """Drives that were compared, and numbers with ranges."""
+        from ddagr_gym.reporting.export_text import COMPARED_HEADER, RANGE_HEADER, compared_rows, range_rows
+
+        return [Table(COMPARED_HEADER, compared_rows(self.compared)), Table(RANGE_HEADER, range_rows(self.ranges))]
+
+    def __str__(self) -> str:
+        from ddagr_gym.reporting.export_text import export_text
+
+        return export_text(self)
+
+    def _fill(self, folder: Path, progress: Callable[[str], None] | None) -> None:
+        from ddagr_gym.reporting.export_page import write_page
+
+        for name, text in self.files.items():
+            (folder / name).write_text(text, encoding="utf-8")
+        write_page(folder, self)
+
+
+def export(
+    source: str | os.PathLike[str],
+    to: str,
+    *,
+    ground: str = "",
+    robot: RobotLike | None = None,
+    soil: SoilLike | None = None,
+    speed: float | None = None,
+    draws: int = 100,
+    seed: int = 0,
+    progress: Callable[[str], None] | None = None,
+) -> ExportResult:
+    """Take what carries over of a corrected simulator to another one.
+
+    Args:
+        source: folder that ``ddagr diagnose`` or ``ddagr calibrate`` wrote.
+        to: ``mujoco``, ``gazebo`` or ``randomisation``.
+        ground: of a calibration with several.
+        robot: in place of the diagnosis's robot.yaml, or where it has none.
+        soil: in place of the diagnosis's soil.yaml, or where it has none.
+        speed: rim speed of the working point [m/s]; 0.3 times the largest by default.
+        draws: number of draws that ranges come from.
+        seed: of the draws.
+        progress: called with a line of text from time to time.
+
+    Returns:
+        Numbers with ranges, and the comparison; ``report`` writes files and page.
+
+    Raises:
+        InputError: no such folder, an unknown format or ground, a speed that the robot does not reach, a turn that no
+            friction makes, or a missing package.
+
+    Examples:
+        >>> import tempfile
+        >>> import ddagr_gym
+        >>> from pathlib import Path
+        >>> from ddagr_gym.config import dump_config
+        >>> from ddagr_gym.physics.effects import load_effects, save_effects
+        >>> from ddagr_gym.presets import get_robot, get_soil
+        >>> folder = Path(tempfile.mkdtemp())
+        >>> save_effects(folder / "effects.yaml", load_effects("gyro_scale=1.02"))
+        >>> _ = (folder / "diagnosis.json").write_text("{}")
+        >>> result = ddagr_gym.export(folder, "gazebo", robot="ddagr", soil="thesis_a1", draws=2)
+        >>> 1.3 < result.carried_over.effective_track < 1.8  # metres; the geometric track is 1.16
+        True
+    """
+    from ddagr_gym.export import files
+    from ddagr_gym.export.carried_over import carried_over
+    from ddagr_gym.export.corrected import load_corrected
+    from ddagr_gym.export.ranges import ranges_of
+    from ddagr_gym.export.working_point import working_speed
+
+    if to not in files.FORMATS:
+        raise unknown_name("format", to, files.FORMATS)
+    at_least(draws=(draws, 2), seed=(seed, 0))
+    if to == files.MUJOCO:
+        need("mujoco")
+    corrected = load_corrected(
+        source, ground, None if robot is None else robot_from(robot), None if soil is None else soil_from(soil)
+    )
+    mean_speed = working_speed(corrected.found, speed)
+    found, drives = carried_over(corrected.found, mean_speed)
+    texts = _texts(to, corrected, found)
+    compared, step_error = _compared(to, texts, found, drives)
+    ranges = ranges_of(corrected, found, mean_speed, draws=draws, seed=seed, progress=progress)
+    if to == files.RANDOMISATION:
+        texts = _randomisation(corrected, mean_speed, ranges, draws, seed)
+    return ExportResult(to, corrected, mean_speed, found, compared, step_error, ranges, draws, seed, texts)
+
+
+def _texts(to: str, corrected: Corrected, found: CarriedOver) -> dict[str, str]:
+    """Models by the name of their file; none for ranges."""
+    from ddagr_gym.export import files
+    from ddagr_gym.export.gazebo_model import gazebo_config, gazebo_model
+    from ddagr_gym.export.mujoco_model import mujoco_model
+
+    name = corrected.found.robot.name
+    if to == files.MUJOCO:
+        return {files.MUJOCO_FILE: mujoco_model(name, found)}
+    if to == files.GAZEBO:
+        model = gazebo_model(name, found)
+        return {files.GAZEBO_FILE: model, files.GAZEBO_CONFIG: gazebo_config(name, corrected.source)}
+    return {}
+
+
+def _randomisation(
+    corrected: Corrected, speed: float, ranges: tuple[Range, ...], draws: int, seed: int
+) -> dict[str, str]:
+    from ddagr_gym.export import files
+    from ddagr_gym.export.randomisation import as_text, randomisation_file
+
+    content = randomisation_file(corrected.found.robot.name, corrected.source, speed, ranges, draws=draws, seed=seed)
+    return {files.RANDOMISATION_FILE: as_text(content)}
+
+
+def _compared(
+    to: str, texts: dict[str, str], found: CarriedOver, drives: SteadyDrives
+) -> tuple[tuple[Compared, ...], float | None]:
+    """Drives in both simulators, and the error of a step."""
+    from ddagr_gym.export import files
+    from ddagr_gym.export.comparison import compared, kinematic_motion, step_error
+
+    if to != files.MUJOCO:
+        return compared(drives, kinematic_motion(found, drives.commands)), None
+    from ddagr_gym.export.mujoco_drives import drive_mujoco
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / files.MUJOCO_FILE
+        path.write_text(texts[files.MUJOCO_FILE], encoding="utf-8")
+        motion = drive_mujoco(path, drives.commands)
+    return compared(drives, motion), step_error(drives, motion)

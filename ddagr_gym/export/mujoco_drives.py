@@ -1,0 +1,54 @@
+"""A written MuJoCo model, driven as our simulator was."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ddagr_gym.export.comparison import Motion
+from ddagr_gym.export.mujoco_model import WHEELS
+from ddagr_gym.export.working_point import AVERAGED, RATE, SETTLING
+from ddagr_gym.extras import need
+
+Array = NDArray[np.float64]
+
+_LANDING = 1.0
+"""Time that the robot gets to settle on its wheels before it is driven [s]."""
+
+
+def drive_mujoco(model_file: Path, commands: Array) -> Motion:
+    """Drive a model from rest at constant commands; means as :func:`~ddagr_gym.export.working_point.steady_drives`.
+
+    Args:
+        model_file: MJCF of :mod:`~ddagr_gym.export.mujoco_model`.
+        commands: (K, 2) right and left bank speed commands [rad/s].
+
+    Raises:
+        InputError: mujoco is not installed.
+    """
+    need("mujoco")
+    import mujoco
+
+    model = mujoco.MjModel.from_xml_path(str(model_file))
+    driven = [_drive(mujoco, model, command) for command in commands]
+    means = np.array([mean for mean, _ in driven])
+    return Motion(means[:, 0], means[:, 1], driven[0][1])
+
+
+def _drive(mujoco: Any, model: Any, command: Array) -> tuple[Array, Array]:
+    """(2,) mean speed and yaw rate, and (T,) mean wheel speed from the command on."""
+    data = mujoco.MjData(model)
+    each = round(1.0 / (RATE * model.opt.timestep))
+    mujoco.mj_step(model, data, nstep=round(_LANDING / model.opt.timestep))
+    data.ctrl[:] = command[[0 if left < 0 else 1 for _, _, left in WHEELS]]
+    rows = []
+    for _ in range(round(RATE * (SETTLING + AVERAGED))):
+        mujoco.mj_step(model, data, nstep=each)
+        heading = 2.0 * np.arctan2(data.qpos[6], data.qpos[3])
+        along = np.cos(heading) * data.qvel[0] + np.sin(heading) * data.qvel[1]
+        rows.append((along, data.qvel[5], data.qvel[6:10].mean()))
+    record = np.array(rows)
+    return record[-round(RATE * AVERAGED) :, :2].mean(axis=0), record[:, 2]

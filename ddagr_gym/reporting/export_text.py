@@ -1,0 +1,137 @@
+"""What the command and the page of an export say."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from ddagr_gym.export.files import GAZEBO, MUJOCO
+from ddagr_gym.export.ranges import SHARE, Range
+from ddagr_gym.export.sensor_faults import what_becomes_of
+from ddagr_gym.export.working_point import LEFT_TURN, RIGHT_TURN
+from ddagr_gym.reporting.text_table import format_table, short
+
+if TYPE_CHECKING:
+    from ddagr_gym.api.export import ExportResult
+    from ddagr_gym.export.comparison import Compared
+
+COMPARED_HEADER = (
+    "drive", "right [rad/s]", "left [rad/s]", "yaw rate [rad/s]", "exported", "error",
+    "speed [m/s]", "exported", "error",
+)  # fmt: skip
+RANGE_HEADER = ("name", "value", "low", "high", "unit", "meaning", "source")
+EFFECT_HEADER = ("effect", "what becomes of it")
+
+_NOWHERE = (
+    "Slip away from the working point: it is one number each, where soil makes it depend on the command, the load and "
+    "the place. The table of drives says what that costs.",
+    "Sinkage, ruts, rolling resistance as a force, and soil that differs from place to place.",
+    "Sliding of the wheels at rest and in starts and stops; speed lost in tight turns.",
+    "The integral part, friction and power limit of the speed loop, which are in the delay, the lag and the gains.",
+    "Noise that is not white, and quantisation of the sensors.",
+)
+
+_OWN = {
+    MUJOCO: (
+        "Wheels that are dragged sideways: MuJoCo's contacts push apart what slides on them, and the robot would hop. "
+        "They roll at the commanded track instead, and a contact in the middle with the friction across holds the "
+        "robot. The wheels are drawn where they are.",
+        "Gain and bias of the gyro and the accelerometer, scales of the encoders and the lateness of positions: "
+        "MuJoCo's sensors have none. They are numbers of the model (`custom/numeric`), for whoever reads the sensors. Position "
+        "and tilt of the IMU are in the model; of its noise MuJoCo keeps the size and adds none.",
+    ),
+    GAZEBO: (
+        "Delay and lag of the motors: the plugin has neither, only the limits of speed and acceleration.",
+        "Gain of the gyro and scales of the encoders: the format has no place for them.",
+        "This model was not run in Gazebo. The table of drives is of the differential drive's own formulas with the "
+        "commanded track and the rolling radius; friction is that of rigid wheels whose forces balance at the working "
+        "point, and a contact solver may make something else of it.",
+    ),
+}  # fmt: skip
+
+_RANGES = (
+    "Whatever two parameters have to do with each other: ranges are of one at a time. Draws of whole robots and soils "
+    "are in the calibration's draws.yaml.",
+)
+
+
+def not_carried_over(to: str) -> tuple[str, ...]:
+    """Sentences on what another simulator does not get."""
+    return (*_OWN.get(to, _RANGES), *_NOWHERE)
+
+
+def headline(result: ExportResult) -> str:
+    """What was exported and how well it turns."""
+    name = result.corrected.found.robot.name
+    errors = [abs(row.yaw_error) for row in result.compared if row.yaw_error is not None]
+    here = [abs(result.compared[k].yaw_error or 0.0) for k in (LEFT_TURN, RIGHT_TURN)]
+    where = "stepped in MuJoCo, it turns" if result.to == MUJOCO else "a differential drive with these numbers turns"
+    return (
+        f"{name} ({result.corrected.source}) for {result.to}: {where} as the corrected simulator within "
+        f"{100.0 * max(here):.1f} % at the working point, and within {100.0 * max(errors):.0f} % in all drives."
+    )
+
+
+def compared_rows(compared: Sequence[Compared]) -> list[tuple[str, ...]]:
+    """Rows under :data:`COMPARED_HEADER`."""
+    return [
+        (
+            row.drive, short(row.right), short(row.left), f"{row.yaw_rate:.3f}", f"{row.other_yaw_rate:.3f}",
+            percent(row.yaw_error), f"{row.speed:.3f}", f"{row.other_speed:.3f}", percent(row.speed_error),
+        )
+        for row in compared
+    ]  # fmt: skip
+
+
+def percent(share: float | None) -> str:
+    """A signed share in percent; "-" for none."""
+    return "-" if share is None else f"{100.0 * share:+.1f} %"
+
+
+def range_rows(ranges: Sequence[Range]) -> list[tuple[str, ...]]:
+    """Rows under :data:`RANGE_HEADER`; a fixed number has no range."""
+    return [
+        (
+            item.name, short(item.value),
+            *(("-", "-") if item.distribution == "fixed" else (short(item.low), short(item.high))),
+            item.unit, item.meaning, item.source,
+        )
+        for item in ranges
+    ]  # fmt: skip
+
+
+def effect_rows(result: ExportResult) -> list[tuple[str, str]]:
+    """Rows under :data:`EFFECT_HEADER`."""
+    return [(effect.name, what_becomes_of(effect)) for effect in result.corrected.found.effects]
+
+
+def step_sentence(result: ExportResult) -> str:
+    """How well a step of the wheel speed agrees; "" where nothing was stepped."""
+    if result.step_error is None:
+        return ""
+    return f"The wheel speed after a step straight ahead is off by {100.0 * result.step_error:.1f} % of its end (rms)."
+
+
+def range_sentence(result: ExportResult) -> str:
+    """Where low and high come from."""
+    return (
+        f"Low and high hold {SHARE} % of {result.draws} draws (seed {result.seed}) from {result.corrected.spread}. "
+        "A number without them is fixed: nothing says how uncertain it is."
+    )
+
+
+def export_text(result: ExportResult) -> str:
+    """What the command prints."""
+    ranges = [row[:5] for row in range_rows(result.ranges)]
+    return "\n\n".join(
+        text
+        for text in (
+            result.headline,
+            format_table(COMPARED_HEADER, compared_rows(result.compared)),
+            step_sentence(result),
+            format_table(RANGE_HEADER[:5], ranges),
+            range_sentence(result),
+            "Does not carry over:\n" + "\n".join(f"- {line}" for line in not_carried_over(result.to)),
+        )
+        if text
+    )
