@@ -15,11 +15,12 @@ from ddagr_gym.errors import at_least, unknown_name
 from ddagr_gym.extras import need
 
 if TYPE_CHECKING:
-    from ddagr_gym.export.carried_over import CarriedOver
-    from ddagr_gym.export.comparison import Compared
-    from ddagr_gym.export.corrected import Corrected
-    from ddagr_gym.export.ranges import Range
-    from ddagr_gym.export.working_point import SteadyDrives
+    from ddagr_gym.exporting.carried_over import CarriedOver
+    from ddagr_gym.exporting.comparison import Compared
+    from ddagr_gym.exporting.corrected import Corrected
+    from ddagr_gym.exporting.outcome import Outcome
+    from ddagr_gym.exporting.ranges import Range
+    from ddagr_gym.exporting.working_point import SteadyDrives
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -30,35 +31,37 @@ class ExportResult(Report):
     and what does not.
 
     Attributes:
-        to: format.
-        corrected: what was exported.
-        working_point: mean bank speed at which slip was measured [rad/s].
-        carried_over: numbers.
-        compared: drives in our simulator and in the other one; in the kinematic model where the other cannot run here.
-        step_error: root mean square error of the wheel speed in a step over its end [-]; None where nothing ran.
-        ranges: of all numbers, by draws.
-        draws: that the ranges come from.
-        seed: of the draws.
-        files: text by name.
+        outcome: numbers with ranges, the comparison, and files.
     """
 
-    to: str
-    corrected: Corrected
-    working_point: float
-    carried_over: CarriedOver
-    compared: tuple[Compared, ...]
-    step_error: float | None
-    ranges: tuple[Range, ...]
-    draws: int
-    seed: int
-    files: dict[str, str]
+    outcome: Outcome
+
+    @property
+    def carried_over(self) -> CarriedOver:
+        """Numbers that carry over."""
+        return self.outcome.carried_over
+
+    @property
+    def ranges(self) -> tuple[Range, ...]:
+        """The same with their ranges."""
+        return self.outcome.ranges
+
+    @property
+    def compared(self) -> tuple[Compared, ...]:
+        """Drives in our simulator and in the other one, or in the kinematic model where the other cannot run here."""
+        return self.outcome.compared
+
+    @property
+    def files(self) -> dict[str, str]:
+        """Text of the files by name."""
+        return self.outcome.files
 
     @property
     def headline(self) -> str:
         """What was exported and how well it turns."""
         from ddagr_gym.reporting.export_text import headline
 
-        return headline(self)
+        return headline(self.outcome)
 
     def tables(self) -> Sequence[Table]:
         """Drives that were compared, and numbers with ranges."""
@@ -69,14 +72,14 @@ class ExportResult(Report):
     def __str__(self) -> str:
         from ddagr_gym.reporting.export_text import export_text
 
-        return export_text(self)
+        return export_text(self.outcome)
 
     def _fill(self, folder: Path, progress: Callable[[str], None] | None) -> None:
         from ddagr_gym.reporting.export_page import write_page
 
         for name, text in self.files.items():
             (folder / name).write_text(text, encoding="utf-8")
-        write_page(folder, self)
+        write_page(folder, self.outcome)
 
 
 def export(
@@ -126,10 +129,11 @@ def export(
         True
     """
     from ddagr_gym.export import files
-    from ddagr_gym.export.carried_over import carried_over
-    from ddagr_gym.export.corrected import load_corrected
-    from ddagr_gym.export.ranges import ranges_of
-    from ddagr_gym.export.working_point import working_speed
+    from ddagr_gym.exporting.carried_over import carried_over
+    from ddagr_gym.exporting.corrected import load_corrected
+    from ddagr_gym.exporting.outcome import Outcome
+    from ddagr_gym.exporting.ranges import ranges_of
+    from ddagr_gym.exporting.working_point import working_speed
 
     if to not in files.FORMATS:
         raise unknown_name("format", to, files.FORMATS)
@@ -146,14 +150,14 @@ def export(
     ranges = ranges_of(corrected, found, mean_speed, draws=draws, seed=seed, progress=progress)
     if to == files.RANDOMISATION:
         texts = _randomisation(corrected, mean_speed, ranges, draws, seed)
-    return ExportResult(to, corrected, mean_speed, found, compared, step_error, ranges, draws, seed, texts)
+    return ExportResult(Outcome(to, corrected, mean_speed, found, compared, step_error, ranges, draws, seed, texts))
 
 
 def _texts(to: str, corrected: Corrected, found: CarriedOver) -> dict[str, str]:
     """Models by the name of their file; none for ranges."""
     from ddagr_gym.export import files
-    from ddagr_gym.export.gazebo_model import gazebo_config, gazebo_model
-    from ddagr_gym.export.mujoco_model import mujoco_model
+    from ddagr_gym.exporting.gazebo_model import gazebo_config, gazebo_model
+    from ddagr_gym.exporting.mujoco_model import mujoco_model
 
     name = corrected.found.robot.name
     if to == files.MUJOCO:
@@ -168,7 +172,7 @@ def _randomisation(
     corrected: Corrected, speed: float, ranges: tuple[Range, ...], draws: int, seed: int
 ) -> dict[str, str]:
     from ddagr_gym.export import files
-    from ddagr_gym.export.randomisation import as_text, randomisation_file
+    from ddagr_gym.exporting.randomisation import as_text, randomisation_file
 
     content = randomisation_file(corrected.found.robot.name, corrected.source, speed, ranges, draws=draws, seed=seed)
     return {files.RANDOMISATION_FILE: as_text(content)}
@@ -179,11 +183,11 @@ def _compared(
 ) -> tuple[tuple[Compared, ...], float | None]:
     """Drives in both simulators, and the error of a step."""
     from ddagr_gym.export import files
-    from ddagr_gym.export.comparison import compared, kinematic_motion, step_error
+    from ddagr_gym.exporting.comparison import compared, kinematic_motion, step_error
 
     if to != files.MUJOCO:
         return compared(drives, kinematic_motion(found, drives.commands)), None
-    from ddagr_gym.export.mujoco_drives import drive_mujoco
+    from ddagr_gym.exporting.mujoco_drives import drive_mujoco
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / files.MUJOCO_FILE

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ddagr_gym.export.carried_over import GROUPS
-from ddagr_gym.export.files import PAGE
+from ddagr_gym.exporting.carried_over import GROUPS
+from ddagr_gym.exporting.files import PAGE
 from ddagr_gym.files import write_text
 from ddagr_gym.rendering import palette
 from ddagr_gym.reporting import export_text as text
@@ -14,10 +14,10 @@ from ddagr_gym.reporting.figures import house_style
 from ddagr_gym.reporting.page_template import embedded, page_template
 
 if TYPE_CHECKING:
-    from ddagr_gym.api.export import ExportResult
+    from ddagr_gym.exporting.outcome import Outcome
 
 
-def write_page(folder: Path, result: ExportResult) -> None:
+def write_page(folder: Path, result: Outcome) -> None:
     """Write ``index.html``, its picture in it.
 
     Args:
@@ -54,7 +54,7 @@ def write_page(folder: Path, result: ExportResult) -> None:
     write_text(folder / PAGE, page.render(context))
 
 
-def _figure(result: ExportResult) -> Any:
+def _figure(result: Outcome) -> Any:
     """Yaw rates and speeds of every drive, side by side."""
     from matplotlib.figure import Figure
 

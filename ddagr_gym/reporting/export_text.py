@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from ddagr_gym.export.files import GAZEBO, MUJOCO
-from ddagr_gym.export.ranges import SHARE, Range
-from ddagr_gym.export.sensor_faults import what_becomes_of
-from ddagr_gym.export.working_point import LEFT_TURN, RIGHT_TURN
+from ddagr_gym.exporting.files import GAZEBO, MUJOCO
+from ddagr_gym.exporting.ranges import SHARE, Range
+from ddagr_gym.exporting.sensor_faults import what_becomes_of
+from ddagr_gym.exporting.working_point import LEFT_TURN, RIGHT_TURN
 from ddagr_gym.reporting.text_table import format_table, short
 
 if TYPE_CHECKING:
-    from ddagr_gym.api.export import ExportResult
-    from ddagr_gym.export.comparison import Compared
+    from ddagr_gym.exporting.comparison import Compared
+    from ddagr_gym.exporting.outcome import Outcome
 
 COMPARED_HEADER = (
     "drive", "right [rad/s]", "left [rad/s]", "yaw rate [rad/s]", "exported", "error",
@@ -37,8 +37,8 @@ _OWN = {
         "They roll at the commanded track instead, and a contact in the middle with the friction across holds the "
         "robot. The wheels are drawn where they are.",
         "Gain and bias of the gyro and the accelerometer, scales of the encoders and the lateness of positions: "
-        "MuJoCo's sensors have none. They are numbers of the model (`custom/numeric`), for whoever reads the sensors. Position "
-        "and tilt of the IMU are in the model; of its noise MuJoCo keeps the size and adds none.",
+        "MuJoCo's sensors have none. They are numbers of the model (`custom/numeric`), for whoever reads the sensors. "
+        "Position and tilt of the IMU are in the model; of its noise MuJoCo keeps the size and adds none.",
     ),
     GAZEBO: (
         "Delay and lag of the motors: the plugin has neither, only the limits of speed and acceleration.",
@@ -60,7 +60,7 @@ def not_carried_over(to: str) -> tuple[str, ...]:
     return (*_OWN.get(to, _RANGES), *_NOWHERE)
 
 
-def headline(result: ExportResult) -> str:
+def headline(result: Outcome) -> str:
     """What was exported and how well it turns."""
     name = result.corrected.found.robot.name
     errors = [abs(row.yaw_error) for row in result.compared if row.yaw_error is not None]
@@ -100,19 +100,19 @@ def range_rows(ranges: Sequence[Range]) -> list[tuple[str, ...]]:
     ]  # fmt: skip
 
 
-def effect_rows(result: ExportResult) -> list[tuple[str, str]]:
+def effect_rows(result: Outcome) -> list[tuple[str, str]]:
     """Rows under :data:`EFFECT_HEADER`."""
     return [(effect.name, what_becomes_of(effect)) for effect in result.corrected.found.effects]
 
 
-def step_sentence(result: ExportResult) -> str:
+def step_sentence(result: Outcome) -> str:
     """How well a step of the wheel speed agrees; "" where nothing was stepped."""
     if result.step_error is None:
         return ""
     return f"The wheel speed after a step straight ahead is off by {100.0 * result.step_error:.1f} % of its end (rms)."
 
 
-def range_sentence(result: ExportResult) -> str:
+def range_sentence(result: Outcome) -> str:
     """Where low and high come from."""
     return (
         f"Low and high hold {SHARE} % of {result.draws} draws (seed {result.seed}) from {result.corrected.spread}. "
@@ -120,7 +120,7 @@ def range_sentence(result: ExportResult) -> str:
     )
 
 
-def export_text(result: ExportResult) -> str:
+def export_text(result: Outcome) -> str:
     """What the command prints."""
     ranges = [row[:5] for row in range_rows(result.ranges)]
     return "\n\n".join(

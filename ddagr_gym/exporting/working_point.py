@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.errors import InputError, at_least
-from ddagr_gym.export.corrected import Simulated
+from ddagr_gym.exporting.corrected import Simulated
 from ddagr_gym.parameters import Sensors
 from ddagr_gym.physics import layout
 from ddagr_gym.simulator import Simulator

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from ddagr_gym.export.corrected import Simulated
-from ddagr_gym.export.friction import friction_of_turn
-from ddagr_gym.export.sensor_faults import sensor_faults
-from ddagr_gym.export.working_point import (
+from ddagr_gym.exporting.corrected import Simulated
+from ddagr_gym.exporting.friction import friction_of_turn
+from ddagr_gym.exporting.sensor_faults import sensor_faults
+from ddagr_gym.exporting.working_point import (
     LEFT_TURN,
     RATE,
     RIGHT_TURN,

@@ -3,5 +3,5 @@
     corrected (robot, soil, effects, draws) -> working_point (our simulator, steady drives) -> carried_over (numbers)
     -> friction (sliding friction that turns alike), ranges (draws) -> mujoco_model, gazebo_model, randomisation
 
-:mod:`~ddagr_gym.export.mujoco_drives` steps a MuJoCo model for the comparison; only that module knows MuJoCo.
+:mod:`~ddagr_gym.exporting.mujoco_drives` steps a MuJoCo model for the comparison; only that module knows MuJoCo.
 """

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ddagr_gym.export.carried_over import CarriedOver, measured, quantities
-from ddagr_gym.export.corrected import Corrected
-from ddagr_gym.export.working_point import LEFT_TURN, RIGHT_TURN, STRAIGHT, check_commands, steady_drives
+from ddagr_gym.exporting.carried_over import CarriedOver, measured, quantities
+from ddagr_gym.exporting.corrected import Corrected
+from ddagr_gym.exporting.working_point import LEFT_TURN, RIGHT_TURN, STRAIGHT, check_commands, steady_drives
 from ddagr_gym.progress import counting
 
 SHARE = 90
@@ -25,7 +25,7 @@ class Range:
     """A quantity with its range.
 
     Attributes:
-        name: field of :class:`~ddagr_gym.export.carried_over.CarriedOver`.
+        name: field of :class:`~ddagr_gym.exporting.carried_over.CarriedOver`.
         value: as found; infinite for no limit, NaN where there is none.
         low: below which 5 % of the draws are.
         high: above which 5 % are.

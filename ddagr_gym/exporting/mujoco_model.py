@@ -1,9 +1,10 @@
 """A robot as a MuJoCo model (MJCF): four driven wheels that roll at the commanded track.
 
 Wheels that are dragged sideways do not work there: MuJoCo's contacts push apart what slides on them, in proportion to
-friction times sliding speed, and a skid-steer robot with friction by direction hopped through its turns at 0.1 to 0.9 of
-the yaw rate. So the wheels touch the ground at the commanded track, with friction along them only, and a further
-contact in the middle has the friction across: nothing slides in a turn, and its yaw rate is that of the kinematic model.
+friction times sliding speed, and a skid-steer robot with friction by direction hopped through its turns at 0.1 to
+0.9 of the yaw rate. So the wheels touch the ground at the commanded track, with friction along them only, and a
+further contact in the middle has the friction across: nothing slides in a turn, and its yaw rate is that of the
+kinematic model.
 
 The reference of the format is https://mujoco.readthedocs.io/en/stable/XMLreference.html.
 """
@@ -16,7 +17,7 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 from ddagr_gym.errors import InputError
-from ddagr_gym.export.carried_over import CarriedOver
+from ddagr_gym.exporting.carried_over import CarriedOver
 from ddagr_gym.parameters import STANDARD_GRAVITY
 
 WHEELS = (("front_right", 1, -1), ("front_left", 1, 1), ("rear_right", -1, -1), ("rear_left", -1, 1))
@@ -143,7 +144,7 @@ def _add_robot(world: Element, found: CarriedOver) -> None:
     SubElement(base, "inertial", pos=_text(*body.centre), mass=_text(body.mass), diaginertia=_text(*body.inertia))
     box = _text(0.5 * found.wheelbase, 0.5 * found.track - 0.6 * found.wheel_width, 0.4 * radius)
     SubElement(
-        base, "geom", type="box", size=box, pos=_text(0.0, 0.0, 0.5 * radius), rgba="0.2 0.45 0.7 1", **_untouched()
+        base, "geom", _untouched(), type="box", size=box, pos=_text(0.0, 0.0, 0.5 * radius), rgba="0.2 0.45 0.7 1"
     )
     tilt = _text(found.imu_pitch, found.imu_roll, found.imu_yaw)
     SubElement(base, "site", name="imu", pos=_text(found.imu_x, found.imu_y, 0.0), euler=tilt, size="0.02")
@@ -156,7 +157,7 @@ def _add_rolling(body: Element, found: CarriedOver, name: str) -> None:
     """What touches the ground."""
     half = _text(0.0, -_CONTACT_LENGTH, 0.0, 0.0, _CONTACT_LENGTH, 0.0)
     radius = _text(found.rolling_radius)
-    SubElement(body, "geom", name=name, type="capsule", fromto=half, size=radius, rgba="0 0 0 0", **_untouched())
+    SubElement(body, "geom", _untouched(), name=name, type="capsule", fromto=half, size=radius, rgba="0 0 0 0")
 
 
 def _untouched() -> dict[str, str]:
@@ -185,7 +186,7 @@ def _add_wheel(base: Element, found: CarriedOver, name: str, place: tuple[float,
     _add_rolling(body, found, name)
     inward = math.copysign(0.5 * (found.commanded_track - found.track), -place[1])
     drawn = _text(0.0, inward - 0.5 * found.wheel_width, 0.0, 0.0, inward + 0.5 * found.wheel_width, 0.0)
-    SubElement(body, "geom", type="cylinder", fromto=drawn, size=_text(radius), rgba="0.15 0.15 0.15 1", **_untouched())
+    SubElement(body, "geom", _untouched(), type="cylinder", fromto=drawn, size=_text(radius), rgba="0.15 0.15 0.15 1")
 
 
 def _add_contacts(model: Element, found: CarriedOver) -> None:
@@ -225,9 +226,10 @@ def _add_actuators(model: Element, found: CarriedOver) -> None:
     for name, _, left in WHEELS:
         scale = found.command_gain_left if left > 0 else found.command_gain_right
         SubElement(
-            actuator, "general", name=name, joint=name, dyntype="filterexact", dynprm=_text(filter_time(found)),
+            actuator, "general", force | delay, name=name, joint=name, dyntype="filterexact",
+            dynprm=_text(filter_time(found)),
             gainprm=_text(gain * scale), biastype="affine", biasprm=_text(0.0, 0.0, -gain),
-            ctrlrange=_text(-found.speed_limit, found.speed_limit), **force, **delay,
+            ctrlrange=_text(-found.speed_limit, found.speed_limit),
         )  # fmt: skip
 
 

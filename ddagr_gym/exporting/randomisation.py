@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from ddagr_gym.config import dump_config
 from ddagr_gym.errors import InputError
-from ddagr_gym.export.ranges import Range
+from ddagr_gym.exporting.ranges import Range
 
 VERSION = 1
 

@@ -7,15 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.export.carried_over import CarriedOver
-from ddagr_gym.export.working_point import CHECKS, SteadyDrives
+from ddagr_gym.exporting.carried_over import CarriedOver
+from ddagr_gym.exporting.working_point import CHECKS, SteadyDrives
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """What another simulator does at the commands of :data:`~ddagr_gym.export.working_point.CHECKS`.
+    """What another simulator does at the commands of :data:`~ddagr_gym.exporting.working_point.CHECKS`.
 
     Attributes:
         speed: (K,) forward, of the middle of the wheels [m/s].

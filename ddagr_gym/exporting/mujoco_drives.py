@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.export.comparison import Motion
-from ddagr_gym.export.mujoco_model import WHEELS
-from ddagr_gym.export.working_point import AVERAGED, RATE, SETTLING
+from ddagr_gym.exporting.comparison import Motion
+from ddagr_gym.exporting.mujoco_model import WHEELS
+from ddagr_gym.exporting.working_point import AVERAGED, RATE, SETTLING
 from ddagr_gym.extras import need
 
 Array = NDArray[np.float64]
@@ -20,10 +20,10 @@ _LANDING = 1.0
 
 
 def drive_mujoco(model_file: Path, commands: Array) -> Motion:
-    """Drive a model from rest at constant commands; means as :func:`~ddagr_gym.export.working_point.steady_drives`.
+    """Drive a model from rest at constant commands; means as :func:`~ddagr_gym.exporting.working_point.steady_drives`.
 
     Args:
-        model_file: MJCF of :mod:`~ddagr_gym.export.mujoco_model`.
+        model_file: MJCF of :mod:`~ddagr_gym.exporting.mujoco_model`.
         commands: (K, 2) right and left bank speed commands [rad/s].
 
     Raises:

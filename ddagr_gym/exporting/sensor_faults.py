@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from ddagr_gym.export.working_point import LEFT_OUT
+from ddagr_gym.exporting.working_point import LEFT_OUT
 from ddagr_gym.parameters import Imu
 from ddagr_gym.physics.effects import Effect
 
@@ -30,7 +30,7 @@ _NOT_WRITTEN = {
 
 @dataclass(frozen=True)
 class SensorFaults:
-    """Faults and noise of the sensors; as :class:`~ddagr_gym.export.carried_over.CarriedOver` has them."""
+    """Faults and noise of the sensors; as :class:`~ddagr_gym.exporting.carried_over.CarriedOver` has them."""
 
     gyro_scale: float = 1.0
     gyro_bias: float = 0.0
