@@ -118,9 +118,7 @@ def export(
         >>> import tempfile
         >>> import ddagr_gym
         >>> from pathlib import Path
-        >>> from ddagr_gym.config import dump_config
         >>> from ddagr_gym.physics.effects import load_effects, save_effects
-        >>> from ddagr_gym.presets import get_robot, get_soil
         >>> folder = Path(tempfile.mkdtemp())
         >>> save_effects(folder / "effects.yaml", load_effects("gyro_scale=1.02"))
         >>> _ = (folder / "diagnosis.json").write_text("{}")
@@ -128,7 +126,7 @@ def export(
         >>> 1.3 < result.carried_over.effective_track < 1.8  # metres; the geometric track is 1.16
         True
     """
-    from ddagr_gym.export import files
+    from ddagr_gym.exporting import files
     from ddagr_gym.exporting.carried_over import carried_over
     from ddagr_gym.exporting.corrected import load_corrected
     from ddagr_gym.exporting.outcome import Outcome
@@ -155,7 +153,7 @@ def export(
 
 def _texts(to: str, corrected: Corrected, found: CarriedOver) -> dict[str, str]:
     """Models by the name of their file; none for ranges."""
-    from ddagr_gym.export import files
+    from ddagr_gym.exporting import files
     from ddagr_gym.exporting.gazebo_model import gazebo_config, gazebo_model
     from ddagr_gym.exporting.mujoco_model import mujoco_model
 
@@ -171,7 +169,7 @@ def _texts(to: str, corrected: Corrected, found: CarriedOver) -> dict[str, str]:
 def _randomisation(
     corrected: Corrected, speed: float, ranges: tuple[Range, ...], draws: int, seed: int
 ) -> dict[str, str]:
-    from ddagr_gym.export import files
+    from ddagr_gym.exporting import files
     from ddagr_gym.exporting.randomisation import as_text, randomisation_file
 
     content = randomisation_file(corrected.found.robot.name, corrected.source, speed, ranges, draws=draws, seed=seed)
@@ -182,7 +180,7 @@ def _compared(
     to: str, texts: dict[str, str], found: CarriedOver, drives: SteadyDrives
 ) -> tuple[tuple[Compared, ...], float | None]:
     """Drives in both simulators, and the error of a step."""
-    from ddagr_gym.export import files
+    from ddagr_gym.exporting import files
     from ddagr_gym.exporting.comparison import compared, kinematic_motion, step_error
 
     if to != files.MUJOCO:

@@ -37,7 +37,7 @@ _OWN = {
         "They roll at the commanded track instead, and a contact in the middle with the friction across holds the "
         "robot. The wheels are drawn where they are.",
         "Gain and bias of the gyro and the accelerometer, scales of the encoders and the lateness of positions: "
-        "MuJoCo's sensors have none. They are numbers of the model (`custom/numeric`), for whoever reads the sensors. "
+        "MuJoCo's sensors have none. They are numbers of the model (custom/numeric), for whoever reads the sensors. "
         "Position and tilt of the IMU are in the model; of its noise MuJoCo keeps the size and adds none.",
     ),
     GAZEBO: (
