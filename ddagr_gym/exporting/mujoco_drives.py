@@ -12,6 +12,7 @@ from ddagr_gym.exporting.comparison import Motion
 from ddagr_gym.exporting.mujoco_model import WHEELS
 from ddagr_gym.exporting.working_point import AVERAGED, RATE, SETTLING
 from ddagr_gym.extras import need
+from ddagr_gym.parameters import STANDARD_GRAVITY
 
 Array = NDArray[np.float64]
 
@@ -33,6 +34,8 @@ def drive_mujoco(model_file: Path, commands: Array) -> Motion:
     import mujoco
 
     model = mujoco.MjModel.from_xml_path(str(model_file))
+    # the drives that it is compared with are on level ground too
+    model.opt.gravity[:] = (0.0, 0.0, -STANDARD_GRAVITY)
     driven = [_drive(mujoco, model, command) for command in commands]
     means = np.array([mean for mean, _ in driven])
     return Motion(means[:, 0], means[:, 1], driven[0][1])
