@@ -56,7 +56,7 @@ def _add_inertia(link: Element, mass: float, diagonal: tuple[float, float, float
 def _add_base(model: Element, found: CarriedOver) -> None:
     link = SubElement(model, "link", name="base_link")
     _put(link, "pose", 0.0, 0.0, found.rolling_radius, 0.0, 0.0, 0.0)
-    body = chassis(found, found.track)
+    body = chassis(found)
     _add_inertia(link, body.mass, body.inertia, body.centre)
     visual = SubElement(link, "visual", name="chassis")
     _put(visual, "pose", 0.0, 0.0, 0.5 * found.rolling_radius, 0.0, 0.0, 0.0)

@@ -1,12 +1,15 @@
-"""A robot as a MuJoCo model (MJCF): four driven wheels that roll at the commanded track.
+"""A robot as a MuJoCo model (MJCF): four driven wheels that slide, with friction along and across them.
 
-Wheels that are dragged sideways do not work there: MuJoCo's contacts push apart what slides on them, in proportion to
-friction times sliding speed, and a skid-steer robot with friction by direction hopped through its turns at 0.1 to
-0.9 of the yaw rate. So the wheels touch the ground at the commanded track, with friction along them only, and a
-further contact in the middle has the friction across: nothing slides in a turn, and its yaw rate is that of the
-kinematic model.
+Two properties of MuJoCo's contacts matter for a skid-steer robot, whose wheels always slide sideways in a turn:
 
-The reference of the format is https://mujoco.readthedocs.io/en/stable/XMLreference.html.
+- A contact pushes apart what slides on it, by ``friction * b_t v_t / k`` for a sliding speed ``v_t``, the damping ``b_t`` of
+  its friction and the stiffness ``k`` of its normal. With the defaults that is more than the wheels sink in, so the
+  robot hops. Here the normal is a soft spring, and the lift a small part of the sinkage.
+- Friction belongs to the axes of the contact's frame, which for a sphere or a cylinder are the world's. A capsule's
+  contact has the capsule's axis as its first tangent, which stays when the wheel spins.
+
+The reference of the format is https://mujoco.readthedocs.io/en/stable/XMLreference.html, that of the contacts
+https://mujoco.readthedocs.io/en/stable/modeling.html#solver-parameters.
 """
 
 from __future__ import annotations
@@ -32,18 +35,23 @@ WHEEL_MASS = 0.01
 HORIZONTAL_INERTIA = 0.6
 """Of a body about its other axes, over that about the main one; ours, neither matters on level ground."""
 
-_CONTACT_LENGTH = 0.01  # [m], half: a short capsule is a sphere with an axis, which the friction is aligned with
-_SHARE_OF_WHEELS = 0.8
-"""Of the load that four of five alike contacts carry."""
+_CONTACT_LENGTH = 0.01
+"""Half length of the capsules that touch the ground, over the radius: a sphere that has an axis."""
 
-_NO_FRICTION = 0.01
-"""Along a direction that is to have none: less makes the solver complain (ours)."""
+_SINKAGE = 0.02
+"""Of a resting wheel into the ground, over its radius (ours)."""
 
-MIDDLE = "middle"
-"""Name of the contact that holds the robot sideways."""
+_IMPEDANCE = 0.01
+"""Of a contact's normal: close to none it is a spring with a damper (ours)."""
 
-_STIFF_LAG = 0.02  # [s] of a speed loop that loses no speed
-_COLLISIONS = 0  # contype and conaffinity: contacts are listed in pairs
+_STICKING = 0.02
+"""Time in which a sliding that friction can hold ends [s] (ours)."""
+
+_IMPEDANCE_RATIO = 1e4
+"""Of friction over normal: wheels on a slope creep by millimetres a second (ours)."""
+
+_STIFF_LAG = 1e-4
+"""Shortest time in which a speed loop moves a quarter of the robot [s]: its speed hardly gives way to the ground (ours)."""
 
 
 @dataclass(frozen=True)
@@ -61,16 +69,11 @@ class Chassis:
     centre: tuple[float, float, float]
 
 
-def chassis(found: CarriedOver, track: float) -> Chassis:
-    """What is left when four wheels that hang at the hubs' height are taken off.
-
-    Args:
-        found: what carries over.
-        track: at which the wheels are [m].
-    """
+def chassis(found: CarriedOver) -> Chassis:
+    """What is left when four wheels that hang at the hubs' height are taken off."""
     wheel = WHEEL_MASS * found.mass
     mass = found.mass - 4.0 * wheel
-    yaw = found.yaw_inertia - wheel * (found.wheelbase**2 + track**2)
+    yaw = found.yaw_inertia - wheel * (found.wheelbase**2 + found.track**2)
     share = found.mass / mass
     height = found.centre_of_mass_height - found.rolling_radius
     centre = (share * found.centre_of_mass_x, share * found.centre_of_mass_y, share * height)
@@ -100,7 +103,7 @@ def mujoco_model(name: str, found: CarriedOver) -> str:
     model = Element("mujoco", model=name)
     SubElement(model, "compiler", angle="radian", eulerseq="yxz", autolimits="true", inertiafromgeom="false")
     SubElement(
-        model, "option", timestep=_text(TIMESTEP), integrator="implicitfast", cone="elliptic", impratio="10",
+        model, "option", timestep=_text(TIMESTEP), integrator="implicitfast", cone="elliptic", impratio=_text(_IMPEDANCE_RATIO),
         gravity=_text(*_gravity(found)),
     )  # fmt: skip
     _add_numbers(model, found)
@@ -138,9 +141,9 @@ def _add_numbers(model: Element, found: CarriedOver) -> None:
 
 def _add_robot(world: Element, found: CarriedOver) -> None:
     radius = found.rolling_radius
-    base = SubElement(world, "body", name="base", pos=_text(0.0, 0.0, radius))
+    base = SubElement(world, "body", name="base", pos=_text(0.0, 0.0, (1.0 - _SINKAGE) * radius))
     SubElement(base, "freejoint", name="base")
-    body = chassis(found, found.commanded_track)
+    body = chassis(found)
     SubElement(base, "inertial", pos=_text(*body.centre), mass=_text(body.mass), diaginertia=_text(*body.inertia))
     box = _text(0.5 * found.wheelbase, 0.5 * found.track - 0.6 * found.wheel_width, 0.4 * radius)
     SubElement(
@@ -149,25 +152,22 @@ def _add_robot(world: Element, found: CarriedOver) -> None:
     tilt = _text(found.imu_pitch, found.imu_roll, found.imu_yaw)
     SubElement(base, "site", name="imu", pos=_text(found.imu_x, found.imu_y, 0.0), euler=tilt, size="0.02")
     for name, forward, left in WHEELS:
-        _add_wheel(base, found, name, (0.5 * forward * found.wheelbase, 0.5 * left * found.commanded_track))
-    _add_rolling(base, found, MIDDLE)
-
-
-def _add_rolling(body: Element, found: CarriedOver, name: str) -> None:
-    """What touches the ground."""
-    half = _text(0.0, -_CONTACT_LENGTH, 0.0, 0.0, _CONTACT_LENGTH, 0.0)
-    radius = _text(found.rolling_radius)
-    SubElement(body, "geom", _untouched(), name=name, type="capsule", fromto=half, size=radius, rgba="0 0 0 0")
+        _add_wheel(base, found, name, (0.5 * forward * found.wheelbase, 0.5 * left * found.track))
 
 
 def _untouched() -> dict[str, str]:
-    return {"contype": str(_COLLISIONS), "conaffinity": str(_COLLISIONS)}
+    """Contacts are listed in pairs."""
+    return {"contype": "0", "conaffinity": "0"}
 
 
 def wheel_inertia(found: CarriedOver) -> float:
-    """What a wheel's motor turns [kg m^2]: half a bank's inertia, or that of the wheel as a disc."""
+    """What a wheel's motor turns [kg m^2]: half a bank's inertia, or that of the wheel as a disc.
+
+    At least what its loop brakes in two time steps: MuJoCo finds the contacts' forces as if the motors' torques stayed
+    the same in a step, and friction would follow the torque instead of the sliding.
+    """
     disc = 0.5 * WHEEL_MASS * found.mass * found.rolling_radius**2
-    return max(0.5 * found.bank_inertia, disc)
+    return max(0.5 * found.bank_inertia, disc, 2.0 * TIMESTEP * loop_gain(found))
 
 
 def _add_wheel(base: Element, found: CarriedOver, name: str, place: tuple[float, float]) -> None:
@@ -183,36 +183,44 @@ def _add_wheel(base: Element, found: CarriedOver, name: str, place: tuple[float,
         mass=_text(mass),
         diaginertia=_text(HORIZONTAL_INERTIA * disc, disc, HORIZONTAL_INERTIA * disc),
     )
-    _add_rolling(body, found, name)
-    inward = math.copysign(0.5 * (found.commanded_track - found.track), -place[1])
-    drawn = _text(0.0, inward - 0.5 * found.wheel_width, 0.0, 0.0, inward + 0.5 * found.wheel_width, 0.0)
-    SubElement(body, "geom", _untouched(), type="cylinder", fromto=drawn, size=_text(radius), rgba="0.15 0.15 0.15 1")
+    for kind, half, looks in (
+        ("capsule", _CONTACT_LENGTH * radius, {"name": name, "rgba": "0 0 0 0"}),
+        ("cylinder", 0.5 * found.wheel_width, {"rgba": "0.15 0.15 0.15 1"}),
+    ):
+        ends = _text(0.0, -half, 0.0, 0.0, half, 0.0)
+        SubElement(body, "geom", _untouched() | looks, type=kind, fromto=ends, size=_text(radius))
 
 
 def _add_contacts(model: Element, found: CarriedOver) -> None:
-    """Friction across first: a capsule's contact has its axis as the first tangent."""
+    """Soft contacts with friction across the wheel first, which is along the axis of its capsule."""
     contact = SubElement(model, "contact")
-    along = _text(_NO_FRICTION, found.friction_along / _SHARE_OF_WHEELS, 0.0, 0.0, 0.0)
-    across = _text(found.friction_across / (1.0 - _SHARE_OF_WHEELS), _NO_FRICTION, 0.0, 0.0, 0.0)
-    for name, friction in (*((name, along) for name, _, _ in WHEELS), (MIDDLE, across)):
-        SubElement(contact, "pair", name=name, geom1="ground", geom2=name, condim="3", friction=friction)
+    stiffness = (1.0 - _IMPEDANCE) * STANDARD_GRAVITY / (_SINKAGE * found.rolling_radius)
+    normal = _text(-stiffness, -2.0 * math.sqrt(stiffness))
+    tangents = _text(-1.0, -_IMPEDANCE / _STICKING)
+    impedance = _text(_IMPEDANCE, _IMPEDANCE, 1.0, 0.5, 1.0)
+    friction = _text(found.friction_across, found.friction_along, 0.0, 0.0, 0.0)
+    for name, _, _ in WHEELS:
+        SubElement(
+            contact, "pair", name=name, geom1="ground", geom2=name, condim="3", friction=friction,
+            solref=normal, solreffriction=tangents, solimp=impedance,
+        )  # fmt: skip
 
 
 def loop_gain(found: CarriedOver) -> float:
     """Torque of a wheel's motor per speed error [N m s/rad]."""
-    if found.speed_loss > 0.0:
-        return 0.5 / found.speed_loss
-    return moved_inertia(found) / _STIFF_LAG
+    stiffest = _inertia_of_quarter(found) / _STIFF_LAG
+    return min(0.5 / found.speed_loss, stiffest) if found.speed_loss > 0.0 else stiffest
 
 
-def moved_inertia(found: CarriedOver) -> float:
-    """What a wheel's motor accelerates straight ahead [kg m^2]: its wheel and a quarter of the robot."""
-    return wheel_inertia(found) + 0.25 * found.mass * found.rolling_radius**2
+def _inertia_of_quarter(found: CarriedOver) -> float:
+    """What a wheel moves of the robot straight ahead [kg m^2]."""
+    return 0.25 * found.mass * found.rolling_radius**2
 
 
 def filter_time(found: CarriedOver) -> float:
     """Time constant of the filter before the speed loop [s], which makes up the lag together with it."""
-    return max(found.time_constant - moved_inertia(found) / loop_gain(found), TIMESTEP)
+    moved = wheel_inertia(found) + _inertia_of_quarter(found)
+    return max(found.time_constant - moved / loop_gain(found), TIMESTEP)
 
 
 def _add_actuators(model: Element, found: CarriedOver) -> None:
@@ -222,7 +230,7 @@ def _add_actuators(model: Element, found: CarriedOver) -> None:
     samples = max(math.ceil(found.command_delay / TIMESTEP), 1)
     delay = {"delay": _text(found.command_delay), "nsample": str(samples)} if found.command_delay > TIMESTEP else {}
     torque = found.acceleration_limit * wheel_inertia(found)
-    force = {"forcerange": _text(-torque, torque)} if found.bank_inertia > 0.0 and math.isfinite(torque) else {}
+    force = {"forcerange": _text(-torque, torque)} if math.isfinite(torque) else {}
     for name, _, left in WHEELS:
         scale = found.command_gain_left if left > 0 else found.command_gain_right
         SubElement(
