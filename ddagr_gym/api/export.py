@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 import os
-import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ddagr_gym.api.nominal import RobotLike, SoilLike, robot_from, soil_from
 from ddagr_gym.api.results import Report, Table
 from ddagr_gym.errors import at_least, unknown_name
-from ddagr_gym.extras import need
 
 if TYPE_CHECKING:
     from ddagr_gym.exporting.carried_over import CarriedOver
-    from ddagr_gym.exporting.comparison import Compared
+    from ddagr_gym.exporting.comparison import Comparison
     from ddagr_gym.exporting.corrected import Corrected
     from ddagr_gym.exporting.outcome import Outcome
     from ddagr_gym.exporting.ranges import Range
-    from ddagr_gym.exporting.working_point import SteadyDrives
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -42,14 +40,14 @@ class ExportResult(Report):
         return self.outcome.carried_over
 
     @property
-    def ranges(self) -> tuple[Range, ...]:
-        """The same with their ranges."""
+    def ranges(self) -> dict[str, Range]:
+        """The same with their ranges, by name."""
         return self.outcome.ranges
 
     @property
-    def compared(self) -> tuple[Compared, ...]:
-        """Drives in our simulator and in the other one, or in the kinematic model where the other cannot run here."""
-        return self.outcome.compared
+    def comparison(self) -> Comparison:
+        """Drives in our simulator and in the other one, or in the kinematic model where the other did not run."""
+        return self.outcome.comparison
 
     @property
     def files(self) -> dict[str, str]:
@@ -67,7 +65,10 @@ class ExportResult(Report):
         """Drives that were compared, and numbers with ranges."""
         from ddagr_gym.reporting.export_text import COMPARED_HEADER, RANGE_HEADER, compared_rows, range_rows
 
-        return [Table(COMPARED_HEADER, compared_rows(self.compared)), Table(RANGE_HEADER, range_rows(self.ranges))]
+        return [
+            Table(COMPARED_HEADER, compared_rows(self.comparison.drives)),
+            Table(RANGE_HEADER, range_rows(self.ranges)),
+        ]
 
     def __str__(self) -> str:
         from ddagr_gym.reporting.export_text import export_text
@@ -108,11 +109,12 @@ def export(
         progress: called with a line of text from time to time.
 
     Returns:
-        Numbers with ranges, and the comparison; ``report`` writes files and page.
+        Numbers with ranges, and the comparison; ``report`` writes files and page. A MuJoCo model is stepped for the
+        comparison where the package ``mujoco`` is installed.
 
     Raises:
-        InputError: no such folder, an unknown format or ground, a speed that the robot does not reach, a turn that no
-            friction makes, or a missing package.
+        InputError: no such folder, an unknown format or ground, a speed that the robot does not reach, or a turn that
+            no friction makes.
 
     Examples:
         >>> import tempfile
@@ -126,32 +128,38 @@ def export(
         >>> 1.3 < result.carried_over.effective_track < 1.8  # metres; the geometric track is 1.16
         True
     """
+    from ddagr_gym.config import dump_config
     from ddagr_gym.exporting import files
     from ddagr_gym.exporting.carried_over import carried_over
+    from ddagr_gym.exporting.comparison import compare, kinematic_motion
     from ddagr_gym.exporting.corrected import load_corrected
+    from ddagr_gym.exporting.mujoco_drives import drive_mujoco
     from ddagr_gym.exporting.outcome import Outcome
+    from ddagr_gym.exporting.randomisation import VERSION, RandomisationFile
     from ddagr_gym.exporting.ranges import ranges_of
     from ddagr_gym.exporting.working_point import working_speed
 
     if to not in files.FORMATS:
         raise unknown_name("format", to, files.FORMATS)
     at_least(draws=(draws, 2), seed=(seed, 0))
-    if to == files.MUJOCO:
-        need("mujoco")
     corrected = load_corrected(
         source, ground, None if robot is None else robot_from(robot), None if soil is None else soil_from(soil)
     )
     mean_speed = working_speed(corrected.found, speed)
     found, drives = carried_over(corrected.found, mean_speed)
-    texts = _texts(to, corrected, found)
-    compared, step_error = _compared(to, texts, found, drives)
+    texts = _models(to, corrected, found)
+    ran = to == files.MUJOCO and find_spec("mujoco") is not None
+    other = drive_mujoco(texts[files.MUJOCO_FILE], drives.commands) if ran else kinematic_motion(found, drives.commands)
     ranges = ranges_of(corrected, found, mean_speed, draws=draws, seed=seed, progress=progress)
     if to == files.RANDOMISATION:
-        texts = _randomisation(corrected, mean_speed, ranges, draws, seed)
-    return ExportResult(Outcome(to, corrected, mean_speed, found, compared, step_error, ranges, draws, seed, texts))
+        name, source = corrected.found.robot.name, corrected.source
+        content = RandomisationFile(VERSION, name, source, mean_speed, draws, seed, ranges)
+        texts = {files.RANDOMISATION_FILE: dump_config(content)}
+    comparison = compare(drives, other)
+    return ExportResult(Outcome(to, corrected, mean_speed, found, comparison, ranges, draws, seed, texts))
 
 
-def _texts(to: str, corrected: Corrected, found: CarriedOver) -> dict[str, str]:
+def _models(to: str, corrected: Corrected, found: CarriedOver) -> dict[str, str]:
     """Models by the name of their file; none for ranges."""
     from ddagr_gym.exporting import files
     from ddagr_gym.exporting.gazebo_model import gazebo_config, gazebo_model
@@ -164,31 +172,3 @@ def _texts(to: str, corrected: Corrected, found: CarriedOver) -> dict[str, str]:
         model = gazebo_model(name, found)
         return {files.GAZEBO_FILE: model, files.GAZEBO_CONFIG: gazebo_config(name, corrected.source)}
     return {}
-
-
-def _randomisation(
-    corrected: Corrected, speed: float, ranges: tuple[Range, ...], draws: int, seed: int
-) -> dict[str, str]:
-    from ddagr_gym.exporting import files
-    from ddagr_gym.exporting.randomisation import as_text, randomisation_file
-
-    content = randomisation_file(corrected.found.robot.name, corrected.source, speed, ranges, draws=draws, seed=seed)
-    return {files.RANDOMISATION_FILE: as_text(content)}
-
-
-def _compared(
-    to: str, texts: dict[str, str], found: CarriedOver, drives: SteadyDrives
-) -> tuple[tuple[Compared, ...], float | None]:
-    """Drives in both simulators, and the error of a step."""
-    from ddagr_gym.exporting import files
-    from ddagr_gym.exporting.comparison import compared, kinematic_motion, step_error
-
-    if to != files.MUJOCO:
-        return compared(drives, kinematic_motion(found, drives.commands)), None
-    from ddagr_gym.exporting.mujoco_drives import drive_mujoco
-
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / files.MUJOCO_FILE
-        path.write_text(texts[files.MUJOCO_FILE], encoding="utf-8")
-        motion = drive_mujoco(path, drives.commands)
-    return compared(drives, motion), step_error(drives, motion)

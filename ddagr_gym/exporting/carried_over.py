@@ -143,7 +143,7 @@ def measured(simulated: Simulated, drives: SteadyDrives) -> CarriedOver:
         rolling_radius=radius, effective_track=turn_track(drives, drives.omega, radius),
         commanded_track=turn_track(drives, gain * drives.commands, radius),
         force_along=along, force_across=across, friction_along=friction[0], friction_across=friction[1],
-        **vars(_slope(simulated.effects)), **vars(sensor_faults(simulated.effects)),
+        **_slope(simulated.effects), **vars(sensor_faults(simulated.effects)),
     )  # fmt: skip
 
 
@@ -222,12 +222,6 @@ def _limits(simulated: Simulated) -> dict[str, float]:
     }
 
 
-@dataclass(frozen=True)
-class _Slope:
-    slope_angle: float = 0.0
-    slope_direction: float = 0.0
-
-
-def _slope(effects: tuple[Effect, ...]) -> _Slope:
-    found = [vars(effect) for effect in effects if effect.name == "slope"]
-    return _Slope(found[0]["angle"], found[0]["direction"]) if found else _Slope()
+def _slope(effects: tuple[Effect, ...]) -> dict[str, float]:
+    found = next((vars(effect) for effect in effects if effect.name == "slope"), {"angle": 0.0, "direction": 0.0})
+    return {"slope_angle": found["angle"], "slope_direction": found["direction"]}

@@ -20,12 +20,14 @@ class Motion:
     Attributes:
         speed: (K,) forward, of the middle of the wheels [m/s].
         yaw_rate: (K,) [rad/s].
-        wheel_speed: (T,) mean of the wheels in the first drive, from the command on [rad/s]; empty without one.
+        wheel_speed: (T,) mean of the wheels in the first drive, from the command on [rad/s]; empty where none ran.
+        paths: (K, T, 2) positions from the command on, from the world's origin [m]; empty where none ran.
     """
 
     speed: Array
     yaw_rate: Array
     wheel_speed: Array
+    paths: Array
 
 
 @dataclass(frozen=True)
@@ -53,7 +55,8 @@ class Compared:
     @property
     def speed_error(self) -> float | None:
         """Of the other, over ours [-]; None for a turn on the spot."""
-        return self.other_speed / self.speed - 1.0 if abs(self.speed) > 0.02 * self._rim else None
+        moves = abs(self.right + self.left) > 1e-9
+        return self.other_speed / self.speed - 1.0 if moves and self.speed != 0.0 else None
 
     @property
     def yaw_error(self) -> float | None:
@@ -61,19 +64,38 @@ class Compared:
         turns = abs(self.right - self.left) > 1e-9
         return self.other_yaw_rate / self.yaw_rate - 1.0 if turns and self.yaw_rate != 0.0 else None
 
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Another simulator beside ours.
+
+    Attributes:
+        drives: that were compared.
+        own_paths: (K, T, 2) in ours [m].
+        other_paths: (K, T, 2) in the other [m]; empty where it did not run.
+        step_error: root mean square error of the mean wheel speed in a step straight ahead over its end [-]; None where
+            it did not run.
+    """
+
+    drives: tuple[Compared, ...]
+    own_paths: Array
+    other_paths: Array
+    step_error: float | None
+
     @property
-    def _rim(self) -> float:
-        """Speed that counts as none, per radius of a wheel of a fifth of a metre [m/s]."""
-        return 0.2 * max(abs(self.right), abs(self.left))
+    def stepped(self) -> bool:
+        """Whether the written model ran; otherwise it is the kinematic model that is compared."""
+        return self.step_error is not None
 
 
-def compared(drives: SteadyDrives, other: Motion) -> tuple[Compared, ...]:
+def compare(own: SteadyDrives, other: Motion) -> Comparison:
     """Every drive in both simulators."""
-    columns = zip(CHECKS, drives.commands, drives.v_x, other.speed, drives.yaw_rate, other.yaw_rate, strict=True)
-    return tuple(
+    columns = zip(CHECKS, own.commands, own.v_x, other.speed, own.yaw_rate, other.yaw_rate, strict=True)
+    drives = tuple(
         Compared(name, float(right), float(left), float(v), float(v_2), float(rate), float(rate_2))
         for (name, _, _), (right, left), v, v_2, rate, rate_2 in columns
     )
+    return Comparison(drives, own.paths, other.paths, _step_error(own, other) if other.wheel_speed.size else None)
 
 
 def kinematic_motion(found: CarriedOver, commands: Array) -> Motion:
@@ -82,11 +104,10 @@ def kinematic_motion(found: CarriedOver, commands: Array) -> Motion:
     ``v = R (g_r omega_r + g_l omega_l) / 2``, ``yaw rate = R (g_r omega_r - g_l omega_l) / B``.
     """
     right, left = commands[:, 0] * found.command_gain_right, commands[:, 1] * found.command_gain_left
-    radius = found.rolling_radius
-    return Motion(radius * 0.5 * (right + left), radius * (right - left) / found.commanded_track, np.empty(0))
+    radius, none = found.rolling_radius, np.empty(0)
+    return Motion(radius * 0.5 * (right + left), radius * (right - left) / found.commanded_track, none, none)
 
 
-def step_error(drives: SteadyDrives, other: Motion) -> float:
-    """Root mean square error of the mean wheel speed in a step straight ahead, over its end [-]."""
-    ours = drives.speeds.mean(axis=1)
-    return float(np.sqrt(np.mean((other.wheel_speed - ours) ** 2)) / ours[-1])
+def _step_error(own: SteadyDrives, other: Motion) -> float:
+    speeds = own.speeds.mean(axis=1)
+    return float(np.sqrt(np.mean((other.wheel_speed - speeds) ** 2)) / speeds[-1])

@@ -2,9 +2,9 @@
 
 Two properties of MuJoCo's contacts matter for a skid-steer robot, whose wheels always slide sideways in a turn:
 
-- A contact pushes apart what slides on it, by ``friction * b_t v_t / k`` for a sliding speed ``v_t``, the damping ``b_t`` of
-  its friction and the stiffness ``k`` of its normal. With the defaults that is more than the wheels sink in, so the
-  robot hops. Here the normal is a soft spring, and the lift a small part of the sinkage.
+- A contact pushes apart what slides on it, by ``friction * b_t v_t / k`` for a sliding speed ``v_t``, the damping
+  ``b_t`` of its friction and the stiffness ``k`` of its normal. With the defaults that is more than the wheels sink
+  in, so the robot hops. Here the normal is a soft spring, and the lift a small part of the sinkage.
 - Friction belongs to the axes of the contact's frame, which for a sphere or a cylinder are the world's. A capsule's
   contact has the capsule's axis as its first tangent, which stays when the wheel spins.
 
@@ -39,7 +39,7 @@ _CONTACT_LENGTH = 0.01
 """Half length of the capsules that touch the ground, over the radius: a sphere that has an axis."""
 
 _SINKAGE = 0.02
-"""Of a resting wheel into the ground, over its radius (ours)."""
+"""Of a contact that carries all that it can move, over the radius; a wheel sinks in about a quarter of it (ours)."""
 
 _IMPEDANCE = 0.01
 """Of a contact's normal: close to none it is a spring with a damper (ours)."""
@@ -51,7 +51,7 @@ _IMPEDANCE_RATIO = 1e4
 """Of friction over normal: wheels on a slope creep by millimetres a second (ours)."""
 
 _STIFF_LAG = 1e-4
-"""Shortest time in which a speed loop moves a quarter of the robot [s]: its speed hardly gives way to the ground (ours)."""
+"""Shortest time in which a speed loop moves a quarter of the robot [s]: the ground hardly slows it down (ours)."""
 
 
 @dataclass(frozen=True)
@@ -103,8 +103,8 @@ def mujoco_model(name: str, found: CarriedOver) -> str:
     model = Element("mujoco", model=name)
     SubElement(model, "compiler", angle="radian", eulerseq="yxz", autolimits="true", inertiafromgeom="false")
     SubElement(
-        model, "option", timestep=_text(TIMESTEP), integrator="implicitfast", cone="elliptic", impratio=_text(_IMPEDANCE_RATIO),
-        gravity=_text(*_gravity(found)),
+        model, "option", timestep=_text(TIMESTEP), integrator="implicitfast", cone="elliptic",
+        impratio=_text(_IMPEDANCE_RATIO), gravity=_text(*_gravity(found)),
     )  # fmt: skip
     _add_numbers(model, found)
     world = SubElement(model, "worldbody")
@@ -141,7 +141,7 @@ def _add_numbers(model: Element, found: CarriedOver) -> None:
 
 def _add_robot(world: Element, found: CarriedOver) -> None:
     radius = found.rolling_radius
-    base = SubElement(world, "body", name="base", pos=_text(0.0, 0.0, (1.0 - _SINKAGE) * radius))
+    base = SubElement(world, "body", name="base", pos=_text(0.0, 0.0, radius))
     SubElement(base, "freejoint", name="base")
     body = chassis(found)
     SubElement(base, "inertial", pos=_text(*body.centre), mass=_text(body.mass), diaginertia=_text(*body.inertia))

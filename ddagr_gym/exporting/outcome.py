@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ddagr_gym.exporting.carried_over import CarriedOver
-from ddagr_gym.exporting.comparison import Compared
+from ddagr_gym.exporting.comparison import Comparison
 from ddagr_gym.exporting.corrected import Corrected
 from ddagr_gym.exporting.ranges import Range
 
@@ -19,9 +19,8 @@ class Outcome:
         corrected: what was exported.
         working_point: mean bank speed at which slip was measured [rad/s].
         carried_over: numbers.
-        compared: drives in our simulator and in the other one; in the kinematic model where the other cannot run here.
-        step_error: root mean square error of the wheel speed in a step over its end [-]; None where nothing ran.
-        ranges: of all numbers, by draws.
+        comparison: drives in our simulator and in the other one; in the kinematic model where the other did not run.
+        ranges: of all numbers, by name.
         draws: that the ranges come from.
         seed: of the draws.
         files: text by name.
@@ -31,9 +30,8 @@ class Outcome:
     corrected: Corrected
     working_point: float
     carried_over: CarriedOver
-    compared: tuple[Compared, ...]
-    step_error: float | None
-    ranges: tuple[Range, ...]
+    comparison: Comparison
+    ranges: dict[str, Range]
     draws: int
     seed: int
     files: dict[str, str]

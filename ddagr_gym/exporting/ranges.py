@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import Field, dataclass
+from typing import Any
 
 import numpy as np
 
@@ -25,24 +26,20 @@ class Range:
     """A quantity with its range.
 
     Attributes:
-        name: field of :class:`~ddagr_gym.exporting.carried_over.CarriedOver`.
-        value: as found; infinite for no limit, NaN where there is none.
-        low: below which 5 % of the draws are.
-        high: above which 5 % are.
+        value: as found; None for no limit, or where there is none.
+        low: below which 5 % of the draws are; the value where it is fixed.
+        high: above which 5 % are; likewise.
         distribution: normal, or fixed where no draw differs.
-        draws: that have the quantity.
         unit: of the numbers.
         group: that it belongs to.
         meaning: in words.
         source: where value and range come from.
     """
 
-    name: str
-    value: float
-    low: float
-    high: float
+    value: float | None
+    low: float | None
+    high: float | None
     distribution: str
-    draws: int
     unit: str
     group: str
     meaning: str
@@ -57,8 +54,8 @@ def ranges_of(
     draws: int,
     seed: int,
     progress: Callable[[str], None] | None = None,
-) -> tuple[Range, ...]:
-    """Ranges of all quantities.
+) -> dict[str, Range]:
+    """Ranges of all quantities, by their field of :class:`~ddagr_gym.exporting.carried_over.CarriedOver`.
 
     Args:
         corrected: to draw from.
@@ -76,18 +73,17 @@ def ranges_of(
             simulated = corrected.draw(rng)
             drawn.append(measured(simulated, steady_drives(simulated, commands)))
             counter.advance()
-    return tuple(_range(name, found, drawn, corrected.spread) for name in (item.name for item in quantities()))
+    return {item.name: _range(item, found, drawn, corrected.spread) for item in quantities()}
 
 
-def _range(name: str, found: CarriedOver, drawn: list[CarriedOver], spread: str) -> Range:
-    value = float(getattr(found, name))
-    known = [number for item in drawn if math.isfinite(number := float(getattr(item, name)))]
+def _range(item: Field[Any], found: CarriedOver, drawn: list[CarriedOver], spread: str) -> Range:
+    value = float(getattr(found, item.name))
+    known = [number for draw in drawn if math.isfinite(number := float(getattr(draw, item.name)))]
     tail = (100 - SHARE) / 2
     low, high = map(float, np.percentile(known, [tail, 100 - tail])) if known else (value, value)
-    fixed = not math.isfinite(value) or high - low <= _EXACT * max(abs(value), _EXACT)
-    data = next(item.metadata for item in quantities() if item.name == name)
-    source = data["how"] if fixed else f"{data['how']}; range: {spread}"
-    return Range(
-        name, value, value if fixed else low, value if fixed else high, "fixed" if fixed else "normal", len(known),
-        data["unit"], data["group"], data["meaning"], source,
-    )  # fmt: skip
+    unit, group, meaning, how = (item.metadata[key] for key in ("unit", "group", "meaning", "how"))
+    if not math.isfinite(value):
+        return Range(None, None, None, "fixed", unit, group, meaning, how)
+    if high - low <= _EXACT * max(abs(value), _EXACT):
+        return Range(value, value, value, "fixed", unit, group, meaning, how)
+    return Range(value, low, high, "normal", unit, group, meaning, f"{how}; range: {spread}")

@@ -58,6 +58,7 @@ _RECORDED = {
     "force_y": (layout.FORCE_Y, 4),
     "torque": (layout.AXLE_TORQUE, 4),
     "body": (layout.MASS, 5),
+    "position": (layout.X, 2),
 }
 
 
@@ -77,6 +78,7 @@ class SteadyDrives:
         torque: (K, 4) of the soil about the hubs, negative where it brakes a driven wheel [N m].
         body: (K, 5) mass, yaw inertia, centre of mass x, y, height, with what effects do to them.
         speeds: (T, 2) bank speeds of the first drive from rest [rad/s].
+        paths: (K, T, 2) positions of the body origin, from rest at the world's origin [m].
     """
 
     commands: Array
@@ -90,6 +92,7 @@ class SteadyDrives:
     torque: Array
     body: Array
     speeds: Array
+    paths: Array
 
 
 def working_speed(simulated: Simulated, speed: float | None) -> float:
@@ -131,10 +134,10 @@ def steady_drives(simulated: Simulated, commands: Array) -> SteadyDrives:
     simulator.reset()
     entries = [first + k for first, count in _RECORDED.values() for k in range(count)]
     _, record = simulator.step(commands, recorded=entries, samples=round(RATE * (SETTLING + AVERAGED)))
-    means = record[:, -round(RATE * AVERAGED) :].mean(axis=1)
-    found, start = {}, 0
+    traces, start = {}, 0
     for name, (_, count) in _RECORDED.items():
-        found[name] = means[:, start] if count == 1 else means[:, start : start + count]
+        traces[name] = record[:, :, start] if count == 1 else record[:, :, start : start + count]
         start += count
-    omega = entries.index(layout.OMEGA)
-    return SteadyDrives(commands, **found, speeds=record[0, :, omega : omega + 2])
+    paths = traces.pop("position")
+    means = {name: trace[:, -round(RATE * AVERAGED) :].mean(axis=1) for name, trace in traces.items()}
+    return SteadyDrives(commands, **means, speeds=traces["omega"][0], paths=paths)

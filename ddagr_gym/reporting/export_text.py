@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from ddagr_gym.exporting.files import GAZEBO, MUJOCO
+from ddagr_gym.exporting.files import GAZEBO, MUJOCO, MUJOCO_FILE
 from ddagr_gym.exporting.ranges import SHARE, Range
 from ddagr_gym.exporting.sensor_faults import what_becomes_of
 from ddagr_gym.exporting.working_point import LEFT_TURN, RIGHT_TURN
@@ -26,16 +26,17 @@ _NOWHERE = (
     "Slip away from the working point: it is one number each, where soil makes it depend on the command, the load and "
     "the place. The table of drives says what that costs.",
     "Sinkage, ruts, rolling resistance as a force, and soil that differs from place to place.",
-    "Sliding of the wheels at rest and in starts and stops; speed lost in tight turns.",
-    "The integral part, friction and power limit of the speed loop, which are in the delay, the lag and the gains.",
+    "The integral part, friction and power limit of the speed loop, which are in the delay, the lag and the gains; "
+    "and speed that is lost in tight turns to more resistance of the soil.",
     "Noise that is not white, and quantisation of the sensors.",
 )
 
 _OWN = {
     MUJOCO: (
-        "Wheels that are dragged sideways: MuJoCo's contacts push apart what slides on them, and the robot would hop. "
-        "They roll at the commanded track instead, and a contact in the middle with the friction across holds the "
-        "robot. The wheels are drawn where they are.",
+        "The rise of friction with the slip, which on soil is gradual: the wheels of the model stick until their "
+        "friction is used up, and then slide with all of it. That costs speed in tight turns, and yaw rate in wide "
+        "arcs. They hold a slope but for a creep of about a millimetre a second.",
+        "Torques of motors that lose no speed to the ground: such motors are flywheels in the model (armature).",
         "Gain and bias of the gyro and the accelerometer, scales of the encoders and the lateness of positions: "
         "MuJoCo's sensors have none. They are numbers of the model (custom/numeric), for whoever reads the sensors. "
         "Position and tilt of the IMU are in the model; of its noise MuJoCo keeps the size and adds none.",
@@ -63,9 +64,10 @@ def not_carried_over(to: str) -> tuple[str, ...]:
 def headline(result: Outcome) -> str:
     """What was exported and how well it turns."""
     name = result.corrected.found.robot.name
-    errors = [abs(row.yaw_error) for row in result.compared if row.yaw_error is not None]
-    here = [abs(result.compared[k].yaw_error or 0.0) for k in (LEFT_TURN, RIGHT_TURN)]
-    where = "stepped in MuJoCo, it turns" if result.to == MUJOCO else "a differential drive with these numbers turns"
+    drives, stepped = result.comparison.drives, result.comparison.stepped
+    errors = [abs(row.yaw_error) for row in drives if row.yaw_error is not None]
+    here = [abs(drives[k].yaw_error or 0.0) for k in (LEFT_TURN, RIGHT_TURN)]
+    where = "stepped in MuJoCo, it turns" if stepped else "a differential drive with these numbers turns"
     return (
         f"{name} ({result.corrected.source}) for {result.to}: {where} as the corrected simulator within "
         f"{100.0 * max(here):.1f} % at the working point, and within {100.0 * max(errors):.0f} % in all drives."
@@ -88,15 +90,15 @@ def percent(share: float | None) -> str:
     return "-" if share is None else f"{100.0 * share:+.1f} %"
 
 
-def range_rows(ranges: Sequence[Range]) -> list[tuple[str, ...]]:
+def range_rows(ranges: Mapping[str, Range]) -> list[tuple[str, ...]]:
     """Rows under :data:`RANGE_HEADER`; a fixed number has no range."""
     return [
         (
-            item.name, short(item.value),
+            name, short(item.value),
             *(("-", "-") if item.distribution == "fixed" else (short(item.low), short(item.high))),
             item.unit, item.meaning, item.source,
         )
-        for item in ranges
+        for name, item in ranges.items()
     ]  # fmt: skip
 
 
@@ -106,10 +108,16 @@ def effect_rows(result: Outcome) -> list[tuple[str, str]]:
 
 
 def step_sentence(result: Outcome) -> str:
-    """How well a step of the wheel speed agrees; "" where nothing was stepped."""
-    if result.step_error is None:
-        return ""
-    return f"The wheel speed after a step straight ahead is off by {100.0 * result.step_error:.1f} % of its end (rms)."
+    """How well a step of the wheel speed agrees, or why that is not known."""
+    error = result.comparison.step_error
+    if error is not None:
+        return f"The wheel speed after a step straight ahead is off by {100.0 * error:.1f} % of its end (rms)."
+    if result.to == MUJOCO:
+        return (
+            f"{MUJOCO_FILE} was not stepped, since the package 'mujoco' is not installed (extra mujoco): the table is "
+            "of a differential drive's formulas with the commanded track and the rolling radius."
+        )
+    return ""
 
 
 def range_sentence(result: Outcome) -> str:
@@ -126,8 +134,8 @@ def export_text(result: Outcome) -> str:
     return "\n\n".join(
         text
         for text in (
-            result.headline,
-            format_table(COMPARED_HEADER, compared_rows(result.compared)),
+            headline(result),
+            format_table(COMPARED_HEADER, compared_rows(result.comparison.drives)),
             step_sentence(result),
             format_table(RANGE_HEADER[:5], ranges),
             range_sentence(result),
