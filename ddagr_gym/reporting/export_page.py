@@ -63,7 +63,7 @@ def _paths(result: Outcome) -> Any:
     """Paths from rest, with the exported model's over ours."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(9.0, 4.6), layout="constrained")
+    figure = Figure(figsize=(6.4, 4.8), layout="constrained")
     axes = figure.subplots()
     own, other = result.comparison.own_paths, result.comparison.other_paths
     for paths, colour, style, label in (

@@ -25,18 +25,18 @@ EFFECT_HEADER = ("effect", "what becomes of it")
 _NOWHERE = (
     "Slip away from the working point: it is one number each, where soil makes it depend on the command, the load and "
     "the place. The table of drives says what that costs.",
+    "Speed that is lost in turns, where soil holds a braked wheel better than a driven one.",
     "Sinkage, ruts, rolling resistance as a force, and soil that differs from place to place.",
-    "The integral part, friction and power limit of the speed loop, which are in the delay, the lag and the gains; "
-    "and speed that is lost in tight turns to more resistance of the soil.",
+    "The integral part, friction and power limit of the speed loop, which are in the delay, the lag and the gains.",
     "Noise that is not white, and quantisation of the sensors.",
 )
 
 _OWN = {
     MUJOCO: (
-        "The rise of friction with the slip, which on soil is gradual: the wheels of the model stick until their "
-        "friction is used up, and then slide with all of it. That costs speed in tight turns, and yaw rate in wide "
-        "arcs. They hold a slope but for a creep of about a millimetre a second.",
+        "The rise of friction with slip, which on soil is gradual: the wheels of the model stick until their friction "
+        "is used up, and then slide with all of it.",
         "Torques of motors that lose no speed to the ground: such motors are flywheels in the model (armature).",
+        "Time steps longer than the model's 2 ms: contacts and motors are made for it.",
         "Gain and bias of the gyro and the accelerometer, scales of the encoders and the lateness of positions: "
         "MuJoCo's sensors have none. They are numbers of the model (custom/numeric), for whoever reads the sensors. "
         "Position and tilt of the IMU are in the model; of its noise MuJoCo keeps the size and adds none.",
@@ -64,28 +64,33 @@ def not_carried_over(to: str) -> tuple[str, ...]:
 def headline(result: Outcome) -> str:
     """What was exported and how well it turns."""
     name = result.corrected.found.robot.name
-    drives, stepped = result.comparison.drives, result.comparison.stepped
-    errors = [abs(row.yaw_error) for row in drives if row.yaw_error is not None]
-    here = [abs(drives[k].yaw_error or 0.0) for k in (LEFT_TURN, RIGHT_TURN)]
-    where = "stepped in MuJoCo, it turns" if stepped else "a differential drive with these numbers turns"
+    stepped = "stepped in MuJoCo, it" if result.comparison.stepped else "a differential drive with these numbers"
+    drives = result.comparison.drives
     return (
-        f"{name} ({result.corrected.source}) for {result.to}: {where} as the corrected simulator within "
-        f"{100.0 * max(here):.1f} % at the working point, and within {100.0 * max(errors):.0f} % in all drives."
+        f"{name} ({result.corrected.source}) for {result.to}: {stepped} turns as the corrected simulator within "
+        f"{_largest_errors([drives[k] for k in (LEFT_TURN, RIGHT_TURN)])} at the working point, and within "
+        f"{_largest_errors(drives)} in all drives."
     )
+
+
+def _largest_errors(drives: Sequence[Compared]) -> str:
+    yaw = max(abs(row.yaw_error or 0.0) for row in drives)
+    speed = max(abs(row.speed_error or 0.0) for row in drives)
+    return f"{100.0 * yaw:.1f} % (speed {100.0 * speed:.1f} %)"
 
 
 def compared_rows(compared: Sequence[Compared]) -> list[tuple[str, ...]]:
     """Rows under :data:`COMPARED_HEADER`."""
     return [
         (
-            row.drive, short(row.right), short(row.left), f"{row.yaw_rate:.3f}", f"{row.other_yaw_rate:.3f}",
-            percent(row.yaw_error), f"{row.speed:.3f}", f"{row.other_speed:.3f}", percent(row.speed_error),
+            row.drive, short(row.right), short(row.left), f"{row.yaw_rate:z.3f}", f"{row.other_yaw_rate:z.3f}",
+            _percent(row.yaw_error), f"{row.speed:z.3f}", f"{row.other_speed:z.3f}", _percent(row.speed_error),
         )
         for row in compared
     ]  # fmt: skip
 
 
-def percent(share: float | None) -> str:
+def _percent(share: float | None) -> str:
     """A signed share in percent; "-" for none."""
     return "-" if share is None else f"{100.0 * share:+.1f} %"
 
