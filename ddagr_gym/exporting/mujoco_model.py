@@ -39,7 +39,7 @@ _CONTACT_LENGTH = 0.01
 """Half length of the capsules that touch the ground, over the radius: a sphere that has an axis."""
 
 _SINKAGE = 0.02
-"""Of a contact that carries all that it can move, over the radius; a wheel sinks in about a quarter of it (ours)."""
+"""Over the radius, by which the stiffness is set; wheels of two contacts each sink in about a quarter of it (ours)."""
 
 _IMPEDANCE = 0.01
 """Of a contact's normal: close to none it is a spring with a damper (ours)."""
@@ -48,7 +48,7 @@ _STICKING = 0.02
 """Time in which a sliding that friction can hold ends [s] (ours)."""
 
 _IMPEDANCE_RATIO = 1e4
-"""Of friction over normal: wheels on a slope creep by millimetres a second (ours)."""
+"""Of friction over normal: wheels on a slope creep by less than a millimetre a second (ours)."""
 
 _STIFF_LAG = 1e-4
 """Shortest time in which a speed loop moves a quarter of the robot [s]: the ground hardly slows it down (ours)."""

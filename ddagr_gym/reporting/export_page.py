@@ -63,7 +63,7 @@ def _paths(result: Outcome) -> Any:
     """Paths from rest, with the exported model's over ours."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(6.4, 4.8), layout="constrained")
+    figure = Figure(figsize=(9.0, 5.0), layout="constrained")
     axes = figure.subplots()
     own, other = result.comparison.own_paths, result.comparison.other_paths
     for paths, colour, style, label in (
@@ -74,8 +74,8 @@ def _paths(result: Outcome) -> Any:
             axes.plot(path[:, 0], path[:, 1], style, color=colour, label=label if k == 0 else None)
             axes.plot(*path[-1], "o", color=colour, markersize=3)
     axes.set(xlabel="x [m]", ylabel="y [m]")
-    axes.set_aspect("equal", adjustable="datalim")
-    figure.legend(loc="outside upper right", ncols=2, frameon=False)
+    axes.set_aspect("equal", anchor="W")
+    figure.legend(loc="outside upper left", ncols=2, frameon=False)
     return figure
 
 

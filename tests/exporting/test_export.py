@@ -107,6 +107,20 @@ def test_friction_makes_mujoco_turn_as_the_balance_of_forces_says(diagnosis):
     assert rates[0] > 1.1 * rates[1] > 1.2 * rates[2]
 
 
+def test_the_turn_needs_friction_by_direction(tmp_path):
+    pytest.importorskip("mujoco", reason="needs the extra mujoco")
+    from ddagr_gym.exporting.mujoco_drives import drive_mujoco
+
+    save_effects(tmp_path / "effects.yaml", ())
+    (tmp_path / "diagnosis.json").write_text("{}")
+    result = ddagr_gym.export(tmp_path, "mujoco", robot="husky", soil="lete_sand_wong", draws=2)
+    turn, found = result.comparison.drives[1], result.carried_over
+    assert abs(turn.yaw_error) < 0.01
+    alike = dataclasses.replace(found, friction_across=found.friction_along)
+    rate = drive_mujoco(mujoco_model("husky", alike), np.array([[turn.right, turn.left]])).yaw_rate[0]
+    assert rate > 1.1 * turn.yaw_rate
+
+
 def test_without_mujoco_the_model_is_written_and_said_not_to_be_stepped(diagnosis, monkeypatch):
     monkeypatch.setattr("ddagr_gym.api.export.find_spec", lambda name: None)
     result = exported(diagnosis, "mujoco")
