@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from ddagr_gym.api.diagnosis_result import DiagnosisResult
     from ddagr_gym.api.drive_series import DriveSeriesResult, diagnose_drives
     from ddagr_gym.api.estimate import EstimateResult, estimate
+    from ddagr_gym.api.export import ExportResult, export
     from ddagr_gym.api.isolability import IsolabilityResult, isolability
     from ddagr_gym.api.load_recording import load_recording
     from ddagr_gym.api.next_drive import NextDriveResult, next_drive
@@ -61,6 +62,7 @@ __all__ = [
     "DiagnosisResult",
     "DriveSeriesResult",
     "EstimateResult",
+    "ExportResult",
     "IsolabilityResult",
     "NextDriveResult",
     "ReplayResult",
@@ -71,6 +73,7 @@ __all__ = [
     "diagnose",
     "diagnose_drives",
     "estimate",
+    "export",
     "isolability",
     "load_recording",
     "next_drive",
@@ -86,6 +89,7 @@ _MODULES = {
     "DiagnosisResult": "diagnosis_result",
     "DriveSeriesResult": "drive_series",
     "EstimateResult": "estimate",
+    "ExportResult": "export",
     "IsolabilityResult": "isolability",
     "NextDriveResult": "next_drive",
     "ReplayResult": "replay",
@@ -95,6 +99,7 @@ _MODULES = {
     "diagnose": "diagnose",
     "diagnose_drives": "drive_series",
     "estimate": "estimate",
+    "export": "export",
     "isolability": "isolability",
     "load_recording": "load_recording",
     "next_drive": "next_drive",

@@ -13,6 +13,7 @@ EXTRA_OF_MODULE = {
     "jinja2": "report",
     "matplotlib": "report",
     "mcap": "io",
+    "mujoco": "mujoco",
     "pyarrow": "io",
     "pygame": "render",
     "ray": "cluster",

@@ -40,6 +40,7 @@ NAMES = (
     "replay",
     "calibrate",
     "diagnose",
+    "export",
     "estimate",
     "null-bank",
     "isolability",

@@ -9,7 +9,7 @@ import pytest
 
 import ddagr_gym
 
-FAST = ("load_recording", "simulate", "check", "estimate")
+FAST = ("load_recording", "simulate", "check", "estimate", "export")
 SLOW = ("replay", "isolability", "next_drive", "diagnose", "calibrate")
 SKIPPED = ("diagnose_drives",)
 """Whose examples name folders that only a user has."""
