@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import ParamSpec, TypeVar
 
 from ddagr_gym.diagnosis.answer.evidence import Evidence
+from ddagr_gym.diagnosis.answer.location import EffectLocation
 from ddagr_gym.diagnosis.answer.verdict import Diagnosis, Options
 from ddagr_gym.diagnosis.certification.certify import certify
 from ddagr_gym.diagnosis.evidence import gather_evidence
@@ -189,8 +190,8 @@ def diagnose(
     traces = steps.keep("localisation traces", trace_mismatch, session, accepted)
     located = steps.keep("localisation", locate, session, accepted, traces)
     diagnosis = with_onsets(diagnosis, steps.keep("onsets", onsets_of_names, session, accepted))
-    repeats = where_readings_repeat(session.mended.given, session.mended.repeated, session.mended.left_out)
-    diagnosis = with_contradictions(review(diagnosis, located, repeats, fit, checks), session.mended.contradictions)
+    reviewed = review(diagnosis, located, _where_repeated(session), fit, checks)
+    diagnosis = with_contradictions(reviewed, session.mended.contradictions)
     unnamed = None if names_only else steps.run("unnamed terms", unnamed_terms, session, accepted, diagnosis)
     following = None if names_only else steps.run("next drive", plan_next_drive, session, diagnosis)
     evidence = steps.run("evidence", gather_evidence, session, accepted, traces)
@@ -207,6 +208,11 @@ def diagnose(
         seconds=time.monotonic() - began,
     )
     return Outcome(diagnosis, effects, session, accepted, evidence)
+
+
+def _where_repeated(session: DiagnosisSession) -> EffectLocation | None:
+    mended = session.mended
+    return where_readings_repeat(mended.given, mended.repeated, mended.left_out)
 
 
 def _enough(session: DiagnosisSession, complete_nominal: CompleteNominal | None) -> Callable[[ScannedModel], bool]:
@@ -241,7 +247,10 @@ def _beside_drivetrain(
     evidence = steps.run("evidence", gather_evidence, session, found, traces)
     own = {effect.name for effect in nominal.effects}
     every = (*(effect for effect in effects if effect.name not in own), *nominal.effects)
-    diagnosis = with_contradictions(replace(diagnosis, localisation=located), session.mended.contradictions)
+    places = {"sensor_hold": _where_repeated(session)}
+    findings = tuple(replace(item, where=places.get(item.name, item.where)) for item in diagnosis.findings)
+    located_too = replace(diagnosis, localisation=located, findings=findings)
+    diagnosis = with_contradictions(located_too, session.mended.contradictions)
     return Outcome(diagnosis, every, session, found, evidence)
 
 

@@ -36,12 +36,24 @@ _NULLS = {
 }
 
 
+def _of_drive(diagnosis: Diagnosis, seconds: float) -> str:
+    """What the time that windows cover is of: of long drives they are some."""
+    total, recordings = sum(item.seconds for item in diagnosis.data), _recordings(len(diagnosis.recordings))
+    if seconds > _NEARLY_ALL * total:
+        return f"of drive in {recordings}"
+    return f"compared, spread over {total:.0f} s in {recordings}"
+
+
+_NEARLY_ALL = 0.7
+"""Share of the time of drives from which windows count as all of it: at the ends of stretches none fits."""
+
+
 def tiles(diagnosis: Diagnosis, seconds: float) -> list[dict[str, str]]:
     """The few numbers under the headline.
 
     Args:
         diagnosis: the answer.
-        seconds: of drive.
+        seconds: of drive that the windows cover.
     """
     parts = () if diagnosis.drivetrain is None else diagnosis.drivetrain.names
     names = [title(name) if name not in (NONE, UNKNOWN) else name for name in diagnosis.verdict if name not in parts]
@@ -52,7 +64,7 @@ def tiles(diagnosis: Diagnosis, seconds: float) -> list[dict[str, str]]:
     shares = [] if diagnosis.fit is None else _gain_shares(diagnosis.fit)
     found = [
         {"value": verdict, "label": status},
-        {"value": f"{seconds:.0f} s", "label": f"of drive in {_recordings(len(diagnosis.recordings))}"},
+        {"value": f"{seconds:.0f} s", "label": _of_drive(diagnosis, seconds)},
         {"value": str(diagnosis.thresholds.nulls), "label": "null drives behind the gates"},
     ]
     if diagnosis.drivetrain is not None:

@@ -95,18 +95,19 @@ def check_different(recordings: Sequence[Recording]) -> None:
 
 def _check_length(recordings: Sequence[Recording], setting: Setting) -> None:
     duration = window_duration(recordings, setting)
-    total = 0
+    total, commanded = 0, 0.0
     for recording in recordings:
         right, left = recording.held_commands()
         known = np.isfinite(right) & np.isfinite(left)
+        commanded += float(known.sum()) * recording.period
         for s in recording.segments():
             # segments are exactly one window long in logs that were cut into steps
             total += int((int(known[s].sum()) - 1) * recording.period / duration + 1e-6)
     if total < LEAST_WINDOWS:
         names = ", ".join(recording.meta.source for recording in recordings)
         raise InputError(
-            f"{names}: {total} windows of {duration:g} s without a gap and with commands are too few: "
-            f"give drives of {LEAST_WINDOWS * duration:g} s at least."
+            f"{names}: {total} windows of {duration:g} s without a gap and with commands, which are known for "
+            f"{commanded:.0f} s, are too few: give drives with commands for {LEAST_WINDOWS * duration:g} s at least."
         )
 
 
