@@ -21,12 +21,12 @@ _MAGIC = (
     (b"#ROSBAG V", "rosbag"),
     (b"SQLite format 3", "sqlite"),
     (b"\x1f\x8b", "gzip"),
+    (b"\x28\xb5\x2f\xfd", "zstd"),
 )
 _FOREIGN = (
     (b"PK\x03\x04", "a zip archive"),
     (b"BZh", "compressed with bzip2"),
     (b"\xfd7zXZ", "compressed with xz"),
-    (b"\x28\xb5\x2f\xfd", "compressed with zstd"),
     (b"\x89HDF", "an HDF5 file"),
     (b"MATLAB 5.0", "a MATLAB file"),
 )
@@ -62,7 +62,7 @@ DEFAULT_LIMITS = Limits()
 
 
 def kind_of(path: Path) -> str:
-    """Kind of a source by its first bytes: parquet, mcap, rosbag, sqlite, gzip, text or folder.
+    """Kind of a source by its first bytes: parquet, mcap, rosbag, sqlite, gzip, zstd, text or folder.
 
     Raises:
         InputError: absent, empty, unreadable, or a format that no reader takes.

@@ -10,9 +10,8 @@ from ddagr_gym.recordings.column_map import ColumnMap, load_column_map, most_spe
 from ddagr_gym.recordings.conversion import RawTable, build_recording
 from ddagr_gym.recordings.csv_reader import csv_columns, read_csv
 from ddagr_gym.recordings.files import DEFAULT_LIMITS, Limits, kind_of, sha256_of
-from ddagr_gym.recordings.mcap_reader import read_mcap
 from ddagr_gym.recordings.parquet_reader import parquet_columns, read_parquet
-from ddagr_gym.recordings.rosbag_reader import read_rosbag
+from ddagr_gym.recordings.rosbag_reader import BAG_KINDS, read_rosbag
 from ddagr_gym.recordings.schema import Recording, RobotGeometry
 from ddagr_gym.recordings.storage import is_recording, load_parquet
 from ddagr_gym.recordings.topic_map import load_topic_map
@@ -55,11 +54,10 @@ def load_recording(
     """
     path = Path(source)
     kind = kind_of(path)
-    if kind in ("rosbag", "sqlite", "folder", "mcap"):
+    if kind in BAG_KINDS:
         topic_map = load_topic_map(map_name or DEFAULT_TOPICS)
         geometry = _geometry(robot or topic_map.robot, geometry_of)
-        read = read_mcap if kind == "mcap" else read_rosbag
-        return read(path, topic_map, geometry, limits)
+        return read_rosbag(path, topic_map, geometry, limits)
     if kind == "parquet" and is_recording(path, limits):
         recording = load_parquet(path, limits)
         return recording if robot is None else with_robot(recording, robot, geometry_of)

@@ -5,23 +5,19 @@ from __future__ import annotations
 import io
 import json
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Collection, Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from ddagr_gym.errors import InputError
+from ddagr_gym.recordings.bag import Bag, Message
+from ddagr_gym.recordings.cdr import Decoder, cdr_decoder
+from ddagr_gym.recordings.compressed import allowed_bytes, too_large, unpacked_message
 from ddagr_gym.recordings.files import DEFAULT_LIMITS, Limits, damaged, open_source
 from ddagr_gym.recordings.schema import Recording, RobotGeometry
 from ddagr_gym.recordings.streams import recording_of
 from ddagr_gym.recordings.topic_map import Topic, TopicMap
-
-MOST_EXPANSION = 200
-"""Unpacked over packed bytes of a file [-] (ours): sensor messages shrink to a tenth at best, zeros to 1/10000."""
-LEAST_ALLOWED = 64 * 2**20
-"""Unpacked bytes that any file may have (ours)."""
-
-Decoder = Callable[[bytes], Any]
 
 
 def read_mcap(
@@ -41,7 +37,20 @@ def read_mcap(
     Raises:
         InputError: damaged file, missing topics, or an encoding other than JSON and CDR.
     """
-    return recording_of(path, _topics(path, limits), partial(_messages, path, limits), topic_map, geometry, limits)
+    return recording_of(open_mcap(path, limits), topic_map, geometry, limits)
+
+
+def open_mcap(path: Path, limits: Limits = DEFAULT_LIMITS) -> Bag:
+    """Topics and messages of an MCAP file.
+
+    Args:
+        path: MCAP file.
+        limits: on unpacked bytes.
+
+    Raises:
+        InputError: damaged file; while messages are read, an encoding other than JSON and CDR.
+    """
+    return Bag(path, _topics(path, limits), partial(_messages, path, limits))
 
 
 def _topics(path: Path, limits: Limits) -> tuple[Topic, ...]:
@@ -54,9 +63,9 @@ def _topics(path: Path, limits: Limits) -> tuple[Topic, ...]:
     return tuple(Topic(name, kind, count) for (name, kind), count in sorted(totals.items()))
 
 
-def _messages(path: Path, limits: Limits, names: Collection[str]) -> Iterator[tuple[str, float, Any]]:
-    """Topic, time of receipt [s] and decoded message of every message of the named topics."""
-    contents, decoders = _Contents(), _Decoders(path)
+def _messages(path: Path, limits: Limits, names: Collection[str]) -> Iterator[Message]:
+    """Every message of the named topics."""
+    contents, decoders = _Contents(), _Decoders(path, limits)
     for message in contents.messages(path, limits):
         channel = contents.channels.get(message.channel_id)
         if channel is not None and channel.topic in names:
@@ -93,8 +102,8 @@ class _Contents:
 class _Decoders:
     """One decoder for each channel, made when its first message comes."""
 
-    def __init__(self, path: Path) -> None:
-        self._path = path
+    def __init__(self, path: Path, limits: Limits) -> None:
+        self._path, self._limits = path, limits
         self._decoders: dict[int, Decoder] = {}
 
     def decode(self, channel: Any, schema: Any, data: bytes) -> Any:
@@ -103,10 +112,10 @@ class _Decoders:
         Raises:
             InputError: unknown encoding, or data that do not decode.
         """
-        if channel.id not in self._decoders:
-            self._decoders[channel.id] = self._make(channel, schema)
         try:
-            return self._decoders[channel.id](data)
+            if channel.id not in self._decoders:
+                self._decoders[channel.id] = self._make(channel, schema)
+            return self._decoders[channel.id](unpacked_message(data, self._limits, self._path))
         except InputError:
             raise
         except Exception as error:  # decoders of generated types raise whatever the bytes lead them to
@@ -117,21 +126,12 @@ class _Decoders:
         if channel.message_encoding == "json":
             return json.loads
         if channel.message_encoding == "cdr" and schema is not None and schema.encoding == "ros2msg":
-            return _cdr_decoder(schema)
+            return cdr_decoder(schema.name, schema.data.decode("utf-8"))
         encoding = schema.encoding if schema is not None else "no schema"
         raise InputError(
             f"{self._path.name}, topic {channel.topic}, is encoded as {channel.message_encoding!r} ({encoding!r}): "
             "convert it to JSON or to ROS 2 (cdr with ros2msg)."
         )
-
-
-def _cdr_decoder(schema: Any) -> Decoder:
-    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-
-    store = get_typestore(Stores.EMPTY)
-    name = schema.name if "/msg/" in schema.name else schema.name.replace("/", "/msg/", 1)
-    store.register(get_types_from_msg(schema.data.decode("utf-8"), name))
-    return lambda data: store.deserialize_cdr(data, name)
 
 
 def _records(path: Path, limits: Limits) -> Iterator[Any]:
@@ -140,7 +140,7 @@ def _records(path: Path, limits: Limits) -> Iterator[Any]:
     from mcap.stream_reader import StreamReader
 
     unpacked = 0
-    allowed = min(limits.bytes, max(LEAST_ALLOWED, MOST_EXPANSION * path.stat().st_size))
+    allowed = allowed_bytes(path.stat().st_size, limits)
     try:
         with open_source(path) as stream:
             for record in StreamReader(stream, emit_chunks=True, record_size_limit=limits.bytes).records:
@@ -188,10 +188,7 @@ def _unpack(chunk: Any, limit: int, path: Path) -> bytes:
     else:
         raise InputError(f"{path.name} is compressed with {chunk.compression!r}: convert it to zstd, lz4 or none.")
     if len(data) > limit:
-        raise InputError(
-            f"{path.name} unpacks to more than {MOST_EXPANSION} times its size or --maximum-bytes: record it again, or "
-            "cut it and raise the limit."
-        )
+        raise too_large(path)
     if len(data) != chunk.uncompressed_size:
         raise ValueError(f"a chunk unpacks to {len(data)} bytes, not {chunk.uncompressed_size}")
     return data

@@ -1,4 +1,4 @@
-"""What is taken from ROS messages: stamps and schema channels, for rosbags' objects and for parsed JSON alike.
+"""What is taken from ROS messages: schema channels, for rosbags' objects and for parsed JSON alike.
 
 Frames are REP 103's, which ROS messages follow: x forward, y left, z up.
 """
@@ -7,15 +7,22 @@ from __future__ import annotations
 
 import fnmatch
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
+from scipy.spatial.transform import Rotation
+
 from ddagr_gym.errors import InputError
-from ddagr_gym.recordings.schema import RobotGeometry, bank_speeds
-from ddagr_gym.recordings.topic_map import TopicSource
+from ddagr_gym.recordings.frames import FrameTree, frame_name, turned_into
+from ddagr_gym.recordings.message_fields import field_of, number
+from ddagr_gym.recordings.schema import FloatArray, RobotGeometry, bank_speeds
+from ddagr_gym.recordings.topic_map import TRANSFORMS, TopicSource
 
 Sample = dict[str, float]
-Extractor = Callable[[Any], Sample]
+Extractor = Callable[[Any], Sample | None]
+"""Channels of a message; None where a message brings no sample."""
+Rotations = Callable[[Any], FloatArray]
+"""From a message to the rotation (3, 3) of its frame into the robot's."""
 
 EARTH_RADIUS = 6378137.0
 """WGS 84 equatorial radius [m]."""
@@ -23,46 +30,24 @@ EARTH_ECCENTRICITY_SQUARED = 6.69437999014e-3
 """WGS 84 first eccentricity squared [-]."""
 
 
-def field_of(message: Any, path: str) -> Any:
-    """Value at a dotted path of attributes or keys; None where a part is missing."""
-    for part in path.split("."):
-        message = message.get(part) if isinstance(message, Mapping) else getattr(message, part, None)
-        if message is None:
-            return None
-    return message
+def imu(source: TopicSource, rotations: Rotations | None = None) -> Extractor:
+    """sensor_msgs/Imu: specific force, yaw rate, and roll and pitch where the map asks for them.
 
-
-def header_stamp(message: Any) -> float | None:
-    """Header stamp [s]; None where the message has no header or a stamp of 0 (never filled in)."""
-    stamp = field_of(message, "header.stamp")
-    if stamp is None:
-        return None
-    seconds = _first(stamp, "sec", "secs")
-    nanoseconds = _first(stamp, "nanosec", "nsec", "nsecs")
-    total = seconds + 1e-9 * (nanoseconds if math.isfinite(nanoseconds) else 0.0)
-    return total if math.isfinite(total) and total != 0 else None
-
-
-def _first(message: Any, *names: str) -> float:
-    return next((_number(message, name) for name in names if field_of(message, name) is not None), math.nan)
-
-
-def _number(message: Any, path: str) -> float:
-    value = field_of(message, path)
-    try:
-        return float(value)
-    except (TypeError, ValueError, OverflowError):
-        return math.nan
-
-
-def imu(source: TopicSource) -> Extractor:
-    """sensor_msgs/Imu: specific force, yaw rate, and roll and pitch where the map asks for them."""
+    Args:
+        source: entry of the topic map.
+        rotations: turns the readings into the robot's frame; None leaves them as they are.
+    """
 
     def extract(message: Any) -> Sample:
-        sample = {f"specific_force_{axis}": _number(message, f"linear_acceleration.{axis}") for axis in "xyz"}
-        sample["yaw_rate"] = _number(message, "angular_velocity.z")
+        force = [number(message, f"linear_acceleration.{axis}") for axis in "xyz"]
+        turn = [number(message, f"angular_velocity.{axis}") for axis in "xyz"]
+        rotation = None if rotations is None else rotations(message)
+        if rotation is not None:
+            force, turn = (rotation @ force).tolist(), (rotation @ turn).tolist()
+        sample = {f"specific_force_{axis}": value for axis, value in zip("xyz", force, strict=True)}
+        sample["yaw_rate"] = turn[2]
         if source.orientation:
-            sample["roll"], sample["pitch"], _ = _attitude(message, "orientation")
+            sample["roll"], sample["pitch"], _ = attitude(message, "orientation", rotation)
         return sample
 
     return extract
@@ -107,7 +92,7 @@ def twist(prefix: str, geometry: RobotGeometry) -> Extractor:
 
     def extract(message: Any) -> Sample:
         right, left = bank_speeds(
-            _number(message, f"{prefix}linear.x"), _number(message, f"{prefix}angular.z"), geometry
+            number(message, f"{prefix}linear.x"), number(message, f"{prefix}angular.z"), geometry
         )
         return {"command_right": float(right), "command_left": float(left)}
 
@@ -118,8 +103,8 @@ def pose(prefix: str) -> Extractor:
     """nav_msgs/Odometry (``pose.pose``) or geometry_msgs/PoseStamped (``pose``): position and attitude."""
 
     def extract(message: Any) -> Sample:
-        sample = {f"pose_{axis}": _number(message, f"{prefix}.position.{axis}") for axis in "xy"}
-        sample["roll"], sample["pitch"], sample["pose_yaw"] = _attitude(message, f"{prefix}.orientation")
+        sample = {f"pose_{axis}": number(message, f"{prefix}.position.{axis}") for axis in "xy"}
+        sample["roll"], sample["pitch"], sample["pose_yaw"] = attitude(message, f"{prefix}.orientation")
         return sample
 
     return extract
@@ -130,8 +115,8 @@ def nav_sat_fix() -> Extractor:
     origin: list[float] = []
 
     def extract(message: Any) -> Sample:
-        latitude, longitude = _number(message, "latitude"), _number(message, "longitude")
-        status = _number(message, "status.status")
+        latitude, longitude = number(message, "latitude"), number(message, "longitude")
+        status = number(message, "status.status")
         if status < 0 or not (abs(latitude) <= 90 and abs(longitude) <= 180):
             return {"pose_x": math.nan, "pose_y": math.nan}
         if not origin:
@@ -153,9 +138,58 @@ def metres_from(latitude_0: float, longitude_0: float, latitude: float, longitud
     return east, math.radians(latitude - latitude_0) * meridian
 
 
-def _attitude(message: Any, path: str) -> tuple[float, float, float]:
+def transform(source: TopicSource, tree: FrameTree) -> Extractor:
+    """geometry_msgs/TransformStamped of a tf2 tree: the pose of the frame ``child`` in the frame ``parent``.
+
+    Where several transforms between both change (map to odom by a localisation, odom to base_link by the wheels), a
+    sample comes only after an upper one has changed: in between the lower one alone would tell of motion, and wheels
+    are what a pose is held against. It carries the stamp of the lowest.
+
+    Args:
+        source: entry of the topic map, with ``parent`` and ``child``.
+        tree: the transforms that do not change; further ones are put into it.
+    """
+    renewed = False
+
+    def extract(message: Any) -> Sample | None:
+        nonlocal renewed
+        changed, frame = tree.add(message), frame_name(field_of(message, "child_frame_id"))
+        moving = tree.moving(source.child, source.parent)
+        if not moving or frame not in moving:
+            return None
+        if frame != moving[0]:
+            renewed |= changed
+            return None
+        if len(moving) > 1 and not renewed:
+            return None
+        renewed = False
+        matrix = tree.between(source.child, source.parent)
+        return None if matrix is None else _pose_of_matrix(matrix)
+
+    return extract
+
+
+def _pose_of_matrix(matrix: FloatArray) -> Sample:
+    roll, pitch, yaw = angles(*Rotation.from_matrix(matrix[:3, :3]).as_quat())
+    return {"pose_x": float(matrix[0, 3]), "pose_y": float(matrix[1, 3]), "roll": roll, "pitch": pitch, "pose_yaw": yaw}
+
+
+def attitude(message: Any, path: str, mounting: FloatArray | None = None) -> tuple[float, float, float]:
+    """Roll, pitch, yaw [rad] of the quaternion at a dotted path; NaN where it is not one.
+
+    Args:
+        message: any.
+        path: of the quaternion, which turns the sensor's axes into the world's.
+        mounting: rotation (3, 3) of the sensor's axes into the robot's; None where they are the same.
+    """
+    quaternion = [number(message, f"{path}.{name}") for name in "xyzw"]
+    if mounting is None or not 0.5 < math.hypot(*quaternion) < 2.0:
+        return angles(*quaternion)
+    return angles(*(Rotation.from_quat(quaternion) * Rotation.from_matrix(mounting.T)).as_quat())
+
+
+def angles(x: float, y: float, z: float, w: float) -> tuple[float, float, float]:
     """Roll, pitch, yaw [rad] of a quaternion; NaN where it is not one (all zero means "not known" in ROS)."""
-    x, y, z, w = (_number(message, f"{path}.{name}") for name in "xyzw")
     norm = math.sqrt(x * x + y * y + z * z + w * w)
     if not 0.5 < norm < 2.0:
         return math.nan, math.nan, math.nan
@@ -166,7 +200,13 @@ def _attitude(message: Any, path: str) -> tuple[float, float, float]:
     return roll, pitch, yaw
 
 
-def extractor(message_type: str, source: TopicSource, geometry: RobotGeometry | None, file_name: str) -> Extractor:
+def extractor(
+    message_type: str,
+    source: TopicSource,
+    geometry: RobotGeometry | None,
+    file_name: str,
+    tree: FrameTree | None = None,
+) -> Extractor:
     """Function that takes the channels out of one message.
 
     Args:
@@ -174,9 +214,10 @@ def extractor(message_type: str, source: TopicSource, geometry: RobotGeometry | 
         source: entry of the topic map.
         geometry: robot's; needed for Twist.
         file_name: for the message.
+        tree: transforms of the bag that do not change, for what ``source`` says of frames.
 
     Raises:
-        InputError: a Twist without the robot's geometry.
+        InputError: a Twist without the robot's geometry, or transforms without names of frames.
     """
     if message_type in ("Twist", "TwistStamped"):
         if geometry is None:
@@ -185,11 +226,19 @@ def extractor(message_type: str, source: TopicSource, geometry: RobotGeometry | 
                 "them into bank speeds."
             )
         return twist("twist." if message_type == "TwistStamped" else "", geometry)
+    frames = FrameTree() if tree is None else tree
+    if message_type == TRANSFORMS and not (source.parent and source.child):
+        raise InputError(
+            f"{file_name}: the topic {source.topic} holds transforms: name the frames under topics, pose, as parent "
+            "(map) and child (base_link)."
+        )
     makers: dict[str, Callable[[], Extractor]] = {
-        "Imu": lambda: imu(source),
+        "Imu": lambda: imu(source, turned_into(source.frame, frames, file_name) if source.frame else None),
         "JointState": lambda: joint_state(source),
         "Odometry": lambda: pose("pose.pose"),
+        "PoseWithCovarianceStamped": lambda: pose("pose.pose"),
         "PoseStamped": lambda: pose("pose"),
         "NavSatFix": nav_sat_fix,
+        TRANSFORMS: lambda: transform(source, frames),
     }
     return makers[message_type]()

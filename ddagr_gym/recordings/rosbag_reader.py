@@ -1,21 +1,26 @@
-"""ROS 1 bags (.bag) and ROS 2 bags (folder or .db3) through the ``rosbags`` library, without ROS."""
+"""Bags of all kinds: ROS 1 (.bag) and ROS 2 (folder, .db3, .mcap, each also with .zstd), without ROS."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from ddagr_gym.errors import InputError
-from ddagr_gym.recordings.files import DEFAULT_LIMITS, Limits, damaged, kind_of, open_source, sha256_of
-from ddagr_gym.recordings.mcap_reader import read_mcap
+from ddagr_gym.recordings.bag import Bag, Message
+from ddagr_gym.recordings.compressed import unpacked_files
+from ddagr_gym.recordings.files import DEFAULT_LIMITS, Limits, kind_of
+from ddagr_gym.recordings.mcap_reader import open_mcap
+from ddagr_gym.recordings.rosbag2 import open_folder
 from ddagr_gym.recordings.schema import Recording, RobotGeometry
+from ddagr_gym.recordings.sqlite_reader import bag_errors, open_sqlite
 from ddagr_gym.recordings.streams import recording_of
 from ddagr_gym.recordings.topic_map import Topic, TopicMap
 
-_LARGEST_METADATA = 4 * 2**20  # bytes (ours): about ten thousand topics; more is no metadata
+BAG_KINDS = ("rosbag", "sqlite", "folder", "mcap", "zstd")
+"""Kinds of sources (:func:`~ddagr_gym.recordings.files.kind_of`) that are bags."""
 
 
 def read_rosbag(
@@ -24,10 +29,10 @@ def read_rosbag(
     geometry: RobotGeometry | None = None,
     limits: Limits = DEFAULT_LIMITS,
 ) -> Recording:
-    """Recording from a ROS 1 or ROS 2 bag.
+    """Recording from a bag.
 
     Args:
-        path: ``.bag`` file, ``.db3`` file, or folder with ``metadata.yaml``.
+        path: ``.bag``, ``.db3`` or ``.mcap`` file, or folder with ``metadata.yaml``.
         topic_map: which topics hold what.
         geometry: robot's wheel radius and track, for Twist commands.
         limits: on messages and unpacked bytes.
@@ -35,78 +40,67 @@ def read_rosbag(
     Raises:
         InputError: damaged bag, missing topics, or messages that do not decode.
     """
-    inner = _storage(path)
-    if inner is not None:
-        return read_mcap(inner, topic_map, geometry, limits).with_meta(source=path.name, source_sha256=sha256_of(path))
-    with _open(path, limits) as reader:
-        return recording_of(path, _topics(reader), partial(_messages, reader), topic_map, geometry, limits)
-
-
-def _messages(reader: Any, names: Collection[str]) -> Iterator[tuple[str, float, Any]]:
-    """Topic, time of receipt [s] and decoded message of every message of the named topics."""
-    connections = [c for c in reader.connections if c.topic in names]
-    for connection, receive, data in reader.messages(connections=connections):
-        yield connection.topic, receive * 1e-9, reader.deserialize(data, connection.msgtype)
-
-
-def _storage(path: Path) -> Path | None:
-    """MCAP file inside a ROS 2 bag's folder, None where the bag is not stored as MCAP."""
-    if not path.is_dir():
-        return None
-    if not (path / "metadata.yaml").is_file():
-        raise InputError(f"the folder {path.name} has no metadata.yaml: give a ROS 2 bag's folder or a file.")
-    information = _information(path)
-    files = [str(name) for name in information.get("relative_file_paths") or ()]
-    for name in files:
-        if Path(name).is_absolute() or ".." in Path(name).parts:
-            raise InputError(f"{path.name}/metadata.yaml names the file {name!r} outside its folder: correct it.")
-    if str(information.get("compression_mode") or "none").lower() != "none":
-        raise InputError(f"{path.name} is a compressed ROS 2 bag: unpack it with `ros2 bag convert` first.")
-    if information.get("storage_identifier") != "mcap":
-        return None
-    if len(files) != 1:
-        raise InputError(f"{path.name} has {len(files)} MCAP files: import them one by one.")
-    return path / files[0]
-
-
-def _information(path: Path) -> dict[str, Any]:
-    """Content of a ROS 2 bag's metadata.yaml."""
-    import yaml
-
-    with open_source(path / "metadata.yaml") as stream:
-        data = stream.read(_LARGEST_METADATA + 1)
-    try:
-        content = yaml.safe_load(data.decode("utf-8")) if len(data) <= _LARGEST_METADATA else None
-    except (yaml.YAMLError, UnicodeDecodeError, RecursionError, ValueError):
-        content = None
-    information = content.get("rosbag2_bagfile_information") if isinstance(content, dict) else None
-    if not isinstance(information, dict) or not isinstance(information.get("relative_file_paths"), list):
-        raise InputError(f"{path.name}/metadata.yaml is not a ROS 2 bag's: restore it with `ros2 bag reindex`.")
-    return information
+    with open_bag(path, limits) as bag:
+        return recording_of(bag, topic_map, geometry, limits)
 
 
 @contextmanager
-def _open(path: Path, limits: Limits) -> Iterator[Any]:
-    """An open ``rosbags`` reader; every error that a damaged bag causes becomes an InputError."""
+def open_bag(path: Path, limits: Limits = DEFAULT_LIMITS) -> Iterator[Bag]:
+    """Topics and messages of a bag of any kind; they can be read while it is open.
+
+    Args:
+        path: as in :func:`read_rosbag`.
+        limits: on unpacked bytes.
+
+    Raises:
+        InputError: no bag, or a damaged one.
+    """
+    kind = kind_of(path)
+    if kind == "zstd":
+        with unpacked_files([path], limits) as (inner,):
+            if kind_of(inner) not in ("sqlite", "mcap"):
+                raise InputError(
+                    f"{path.name} is compressed with zstd and holds no bag: unpack or convert it to CSV, Parquet, MCAP "
+                    "or a bag first."
+                )
+            with open_bag(inner, limits) as bag:
+                yield Bag(path, bag.topics, bag.read)
+    elif kind == "folder":
+        with open_folder(path, limits) as bag:
+            yield bag
+    elif kind == "mcap":
+        yield open_mcap(path, limits)
+    elif kind == "sqlite":
+        with open_sqlite(path, limits) as bag:
+            yield bag
+    elif kind == "rosbag":
+        with _open_ros1(path, limits) as bag:
+            yield bag
+    else:
+        raise InputError(f"{path.name} is no bag ({kind}): give a ROS bag or an MCAP file.")
+
+
+@contextmanager
+def _open_ros1(path: Path, limits: Limits) -> Iterator[Bag]:
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
 
-    kind = kind_of(path)
-    if kind == "rosbag" and path.suffix != ".bag":
+    if path.suffix != ".bag":
         raise InputError(f"{path.name} is a ROS 1 bag without the ending .bag: rename it.")
-    if kind == "sqlite" and path.suffix != ".db3":
-        raise InputError(
-            f"{path.name} is an SQLite file without the ending .db3 of a ROS 2 bag: rename it if it is one."
-        )
-    try:
-        reader = AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE))
-        with reader:
+    with ExitStack() as stack:
+        with bag_errors(path):
+            typestore = get_typestore(Stores.ROS1_NOETIC)
+            reader = stack.enter_context(AnyReader([path], default_typestore=typestore))
             _bound_chunks(reader, limits, path)
-            yield reader
-    except InputError:
-        raise
-    except Exception as error:  # rosbags lets struct, unicode, key and assertion errors of damaged bags through
-        raise damaged(path, error, "is damaged or not a bag", "reindex it or record it again") from None
+            topics = _topics(reader)
+        yield Bag(path, topics, partial(_messages, reader, path))
+
+
+def _messages(reader: Any, path: Path, names: Collection[str]) -> Iterator[Message]:
+    connections = [c for c in reader.connections if c.topic in names]
+    with bag_errors(path):
+        for connection, receive, data in reader.messages(connections=connections) if connections else ():
+            yield connection.topic, receive * 1e-9, reader.deserialize(data, connection.msgtype)
 
 
 def _topics(reader: Any) -> tuple[Topic, ...]:

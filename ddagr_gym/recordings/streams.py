@@ -1,9 +1,9 @@
-"""From the messages of a bag to a recording: shared by the rosbag and MCAP readers."""
+"""From the messages of a bag to a recording: samples of topics, then samples on one time base."""
 
 from __future__ import annotations
 
 from array import array
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -12,15 +12,25 @@ import numpy as np
 
 from ddagr_gym.errors import InputError
 from ddagr_gym.recordings.alignment import Stream, align, regular_base
+from ddagr_gym.recordings.bag import Bag
 from ddagr_gym.recordings.files import Limits, sha256_of
-from ddagr_gym.recordings.ros_messages import Extractor, extractor, header_stamp
+from ddagr_gym.recordings.frames import mounting_frames, static_frames, transforms
+from ddagr_gym.recordings.message_fields import header_stamp
+from ddagr_gym.recordings.ros_messages import Extractor, extractor
 from ddagr_gym.recordings.schema import COMMANDS, FloatArray, Recording, RobotGeometry
-from ddagr_gym.recordings.topic_map import Topic, TopicMap, choose_topics
+from ddagr_gym.recordings.topic_map import TRANSFORMS, Topic, TopicMap, TopicSource, choose_topics
 
 
 @dataclass
-class _Samples:
-    """Growing samples of one topic, eight bytes a number."""
+class Samples:
+    """Growing samples of one topic, eight bytes a number.
+
+    Attributes:
+        extract: takes channels out of a message.
+        t: stamps [s].
+        values: channels, each as long as ``t``.
+        stamped: number of samples with a header stamp; the others stand at their receipt.
+    """
 
     extract: Extractor
     t: array[float] = field(default_factory=lambda: array("d"))
@@ -28,28 +38,26 @@ class _Samples:
     stamped: int = 0
 
     def add(self, receive: float, message: Any, header_stamps: bool) -> None:
-        stamp = header_stamp(message) if header_stamps else None
+        """Take one message, received at ``receive`` [s]."""
         sample = self.extract(message)
+        if sample is None:
+            return
+        stamp = header_stamp(message) if header_stamps else None
         self.stamped += stamp is not None
         self.t.append(receive if stamp is None else stamp)
         for name, value in sample.items():
             self.values.setdefault(name, array("d")).append(value)
 
+    def stream(self) -> Stream:
+        """What was taken so far."""
+        return Stream(np.array(self.t), {name: np.array(v) for name, v in self.values.items()})
 
-def recording_of(
-    path: Path,
-    topics: tuple[Topic, ...],
-    messages: Callable[[Collection[str]], Iterable[tuple[str, float, Any]]],
-    topic_map: TopicMap,
-    geometry: RobotGeometry | None,
-    limits: Limits,
-) -> Recording:
+
+def recording_of(bag: Bag, topic_map: TopicMap, geometry: RobotGeometry | None, limits: Limits) -> Recording:
     """Recording of the messages of a bag.
 
     Args:
-        path: of the bag.
-        topics: that it holds.
-        messages: takes names of topics and gives topic, time of receipt [s] and decoded message of each message.
+        bag: open.
         topic_map: which topics hold what.
         geometry: robot's wheel radius and track, for Twist commands.
         limits: on the number of messages.
@@ -57,95 +65,150 @@ def recording_of(
     Raises:
         InputError: missing topics, too many messages, or none in the role that gives the time base.
     """
-    chosen = choose_topics(topic_map, topics, path.name)
-    collector = _StreamCollector(topic_map, chosen, geometry, limits, path)
-    for topic, receive, message in messages({topic.name for topic in chosen.values()}):
-        collector.add(topic, receive, message)
-    return collector.recording(sha256_of(path))
+    chosen = choose_topics(topic_map, bag.topics, bag.path.name)
+    extractors = {
+        topic.name: topic_extractor(bag, topic, topic_map.topics[role], geometry) for role, topic in chosen.items()
+    }
+    samples = collect(bag, extractors, topic_map.stamps == "header", limits)
+    by_role = {role: samples[topic.name] for role, topic in chosen.items()}
+    recording = assemble(bag.path, topic_map, chosen, by_role, geometry, limits)
+    return recording.with_meta(source_sha256=sha256_of(bag.path))
 
 
-class _StreamCollector:
-    """Takes messages one by one and gives the recording at the end; ``chosen`` is the topic of each role."""
+def topic_extractor(bag: Bag, topic: Topic, source: TopicSource, geometry: RobotGeometry | None) -> Extractor:
+    """Function that takes the channels out of a topic's messages, with the bag's transforms where it needs them.
 
-    def __init__(
-        self,
-        topic_map: TopicMap,
-        chosen: dict[str, Topic],
-        geometry: RobotGeometry | None,
-        limits: Limits,
-        path: Path,
-    ) -> None:
-        self._map, self._chosen, self._geometry = topic_map, chosen, geometry
-        self._limits, self._path = limits, path
-        self._roles = {topic.name: role for role, topic in chosen.items()}
-        self._samples = {
-            role: _Samples(extractor(topic.message_type, topic_map.topics[role], geometry, path.name))
-            for role, topic in chosen.items()
-        }
-        self._messages = 0
+    Args:
+        bag: open.
+        topic: of the bag.
+        source: what the map says of it.
+        geometry: robot's, for Twist commands.
 
-    def add(self, topic: str, receive: float, message: Any) -> None:
-        """Take one message of a chosen topic, received at ``receive`` [s]."""
-        self._messages += 1
-        self._limits.check_rows(self._messages, self._path)
-        self._samples[self._roles[topic]].add(receive, message, self._map.stamps == "header")
+    Raises:
+        InputError: as :func:`~ddagr_gym.recordings.ros_messages.extractor`.
+    """
+    tree = None
+    if topic.message_type == TRANSFORMS:
+        tree = static_frames(bag, topic.name)
+    elif source.frame:
+        tree = mounting_frames(bag, topic.name)
+    return extractor(topic.message_type, source, geometry, bag.path.name, tree)
 
-    def recording(self, source_sha256: str) -> Recording:
-        """The recording on one time base.
 
-        Raises:
-            InputError: no message in the role that gives the time base.
-        """
-        streams = {role: self._stream(role) for role in self._samples}
+def collect(bag: Bag, extractors: Mapping[str, Extractor], header_stamps: bool, limits: Limits) -> dict[str, Samples]:
+    """Samples of topics, in one pass through a bag.
+
+    Args:
+        bag: open.
+        extractors: by topic.
+        header_stamps: whether header stamps count where messages have one.
+        limits: on the number of messages.
+
+    Raises:
+        InputError: too many messages.
+    """
+    samples = {topic: Samples(extract) for topic, extract in extractors.items()}
+    transform_topics = {topic.name for topic in bag.topics if topic.message_type == TRANSFORMS}
+    count = 0
+    for topic, receive, message in bag.read(set(extractors)):
+        for part in transforms(message) if topic in transform_topics else (message,):
+            count += 1
+            limits.check_rows(count, bag.path)
+            samples[topic].add(receive, part, header_stamps)
+    return samples
+
+
+def assemble(
+    path: Path,
+    topic_map: TopicMap,
+    chosen: Mapping[str, Topic],
+    samples: Mapping[str, Samples],
+    geometry: RobotGeometry | None,
+    limits: Limits,
+) -> Recording:
+    """Recording of samples on one time base; the hash of its source is left empty.
+
+    Args:
+        path: of the bag.
+        topic_map: with the time base, tolerance and signs.
+        chosen: topic by role.
+        samples: by role.
+        geometry: robot's.
+        limits: on the number of rows.
+
+    Raises:
+        InputError: no sample in the role that gives the time base, or stamps of two kinds in one topic.
+    """
+    return _Assembly(path, topic_map, chosen, samples, limits).recording(geometry)
+
+
+@dataclass(frozen=True)
+class _Assembly:
+    path: Path
+    map: TopicMap
+    chosen: Mapping[str, Topic]
+    samples: Mapping[str, Samples]
+    limits: Limits
+
+    def recording(self, geometry: RobotGeometry | None) -> Recording:
+        streams = {role: self._stream(role) for role in self.samples}
         base, period = self._base(streams)
-        channels, lost = align(base, streams, self._map.tolerance * period)
-        columns = {"t": base, **{n: v * self._map.signs.get(n, 1.0) for n, v in channels.items()}}
+        channels, lost = align(base, streams, self.map.tolerance * period)
+        columns = {"t": base, **{n: v * self.map.signs.get(n, 1.0) for n, v in channels.items()}}
         have_commands = all(name in channels for name in COMMANDS)
         recording = Recording.from_columns(
             columns,
-            self._geometry,
-            source=self._path.name,
+            geometry,
+            source=self.path.name,
             command_valid=np.full(len(base), have_commands),
             notes=self._notes(streams, lost, period),
         )
-        return replace(recording, meta=replace(recording.meta, source_sha256=source_sha256, column_map=self._map.name))
+        return replace(recording, meta=replace(recording.meta, column_map=self.map.name))
 
     def _stream(self, role: str) -> Stream:
-        samples = self._samples[role]
+        samples = self.samples[role]
         # Receive times and header stamps may come from two clocks: never mix them inside one stream.
         if 0 < samples.stamped < len(samples.t):
             raise InputError(
-                f"{self._path.name}, {self._chosen[role].name}: only {samples.stamped} of {len(samples.t)} messages "
+                f"{self.path.name}, {self.chosen[role].name}: only {samples.stamped} of {len(samples.t)} messages "
                 "have a header stamp; set stamps: receive in the topic map."
             )
-        return Stream(np.array(samples.t), {name: np.array(v) for name, v in samples.values.items()})
+        return samples.stream()
 
     def _base(self, streams: dict[str, Stream]) -> tuple[FloatArray, float]:
-        base = streams[self._map.base].sorted().t if self._map.base in streams else np.empty(0)
+        base = streams[self.map.base].sorted().t if self.map.base in streams else np.empty(0)
         if base.size < 2:
             raise InputError(
-                f"{self._path.name} has {base.size} messages for {self._map.base}, which gives the time base: name "
+                f"{self.path.name} has {base.size} messages for {self.map.base}, which gives the time base: name "
                 "another role under base in the topic map."
             )
-        if self._map.rate:
-            base = regular_base(float(base[0]), float(base[-1]), self._map.rate, self._limits.rows)
-            return base, 1.0 / self._map.rate
+        if self.map.rate:
+            base = regular_base(float(base[0]), float(base[-1]), self.map.rate, self.limits.rows)
+            return base, 1.0 / self.map.rate
         return base, float(np.median(np.diff(base)))
 
     def _notes(self, streams: dict[str, Stream], lost: dict[str, int], period: float) -> Iterable[str]:
-        for role, topic in self._chosen.items():
-            stamped = self._samples[role].stamped
+        for role, topic in self.chosen.items():
+            stamped = self.samples[role].stamped
             clock = "header stamps" if stamped else "times of receipt"
             repeats = len(streams[role].t) - len(streams[role].sorted().t)
             yield (
                 f"{role} is {topic.name} ({topic.message_type}) by {clock}: {len(streams[role].t)} messages, "
                 f"{repeats} with a repeated stamp, {lost[role]} without a row of their own."
             )
-        where = f"a regular {self._map.rate:g} Hz grid" if self._map.rate else f"the stamps of {self._map.base}"
+            yield from _frame_notes(self.map.topics[role], topic)
+        where = f"a regular {self.map.rate:g} Hz grid" if self.map.rate else f"the stamps of {self.map.base}"
         yield (
             f"rows are {where}; the other samples are at their nearest row within "
-            f"{self._map.tolerance * period:.4g} s, none is interpolated."
+            f"{self.map.tolerance * period:.4g} s, none is interpolated."
         )
-        for name, sign in self._map.signs.items():
+        for name, sign in self.map.signs.items():
             if sign < 0:
                 yield f"{name} was multiplied by -1."
+
+
+def _frame_notes(source: TopicSource, topic: Topic) -> Iterable[str]:
+    if source.frame:
+        yield f"the readings of {topic.name} were turned into {source.frame}; where the sensor sits was not corrected."
+    if topic.message_type == TRANSFORMS:
+        yield f"the pose is that of {source.child} in {source.parent}."

@@ -18,9 +18,14 @@ ROLE_TYPES: Mapping[str, tuple[str, ...]] = {
     "imu": ("Imu",),
     "wheels": ("JointState",),
     "command": ("TwistStamped", "Twist"),
-    "pose": ("Odometry", "PoseStamped", "NavSatFix"),
+    "pose": ("Odometry", "PoseStamped", "PoseWithCovarianceStamped", "NavSatFix", "TFMessage"),
 }
 """Message types that can fill a role, the preferred one first."""
+
+TRANSFORMS = "TFMessage"
+"""Type of /tf and /tf_static."""
+NAMED_ONLY = ("PoseWithCovarianceStamped", TRANSFORMS)
+"""Types that fill a role only where a map names the topic: an initial pose and trees of frames are in most bags."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +38,10 @@ class TopicSource:
         right: patterns of the right wheels' joint names (``*`` and ``?``; case does not matter).
         left: the same for the left wheels.
         orientation: whether roll and pitch are taken from an Imu message.
+        frame: of the robot's body ("base_link"), into which an Imu's readings are turned by the bag's /tf_static; ""
+            takes them as they are.
+        parent: frame in which transforms (/tf) give the pose ("map").
+        child: frame whose pose they give ("base_link").
     """
 
     topic: str = ""
@@ -40,6 +49,9 @@ class TopicSource:
     right: tuple[str, ...] = ("*right*",)
     left: tuple[str, ...] = ("*left*",)
     orientation: bool = False
+    frame: str = ""
+    parent: str = ""
+    child: str = ""
 
 
 @dataclass(frozen=True)
@@ -149,7 +161,7 @@ def _named(role: str, source: TopicSource, topics: tuple[Topic, ...], file_name:
 
 
 def _by_type(role: str, source: TopicSource, topics: tuple[Topic, ...], file_name: str) -> Topic | None:
-    for message_type in ROLE_TYPES[role]:
+    for message_type in (kind for kind in ROLE_TYPES[role] if kind not in NAMED_ONLY):
         found = tuple(t for t in topics if t.message_type == message_type and t.count != 0)
         if len(found) == 1:
             return found[0]

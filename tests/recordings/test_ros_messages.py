@@ -8,15 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ddagr_gym.errors import InputError
-from ddagr_gym.recordings.ros_messages import (
-    extractor,
-    header_stamp,
-    imu,
-    joint_state,
-    metres_from,
-    nav_sat_fix,
-    pose,
-)
+from ddagr_gym.recordings.message_fields import header_stamp
+from ddagr_gym.recordings.ros_messages import extractor, imu, joint_state, metres_from, nav_sat_fix, pose
 from ddagr_gym.recordings.topic_map import TopicSource
 
 

@@ -228,11 +228,11 @@ def test_too_many_messages_are_refused(tmp_path, messages, warthog):
     ("change", "words"),
     [
         (lambda text: text.replace("- run.db3", "- ../run.db3"), "outside"),
-        (lambda text: text.replace("compression_mode: ''", "compression_mode: file"), "compressed"),
+        (lambda text: text.replace("compression_format: ''", "compression_format: lz4", 1), "'lz4'"),
         (lambda text: "a: !!python/object/apply:os.system [true]", "not a ROS 2 bag"),
         (lambda text: "[" * 1200, "not a ROS 2 bag"),
         (lambda text: "", "not a ROS 2 bag"),
-        (lambda text: text.replace("version: 9", "version: 99"), "damaged"),
+        (lambda text: text.replace("version: 9", "version: 99"), "version 99"),
     ],
 )
 def test_hostile_metadata_gets_one_sentence(tmp_path, messages, warthog, change, words):
