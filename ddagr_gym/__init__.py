@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from ddagr_gym.api.drive_series import DriveSeriesResult, diagnose_drives
     from ddagr_gym.api.estimate import EstimateResult, estimate
     from ddagr_gym.api.export import ExportResult, export
+    from ddagr_gym.api.guess_topic_map import TopicMapGuess, guess_topic_map
     from ddagr_gym.api.isolability import IsolabilityResult, isolability
     from ddagr_gym.api.load_recording import load_recording
     from ddagr_gym.api.next_drive import NextDriveResult, next_drive
@@ -67,6 +68,7 @@ __all__ = [
     "NextDriveResult",
     "ReplayResult",
     "SimulationResult",
+    "TopicMapGuess",
     "__version__",
     "calibrate",
     "check",
@@ -74,6 +76,7 @@ __all__ = [
     "diagnose_drives",
     "estimate",
     "export",
+    "guess_topic_map",
     "isolability",
     "load_recording",
     "next_drive",
@@ -94,12 +97,14 @@ _MODULES = {
     "NextDriveResult": "next_drive",
     "ReplayResult": "replay",
     "SimulationResult": "simulate",
+    "TopicMapGuess": "guess_topic_map",
     "calibrate": "calibrate",
     "check": "check",
     "diagnose": "diagnose",
     "diagnose_drives": "drive_series",
     "estimate": "estimate",
     "export": "export",
+    "guess_topic_map": "guess_topic_map",
     "isolability": "isolability",
     "load_recording": "load_recording",
     "next_drive": "next_drive",

@@ -72,6 +72,24 @@ def joint_state(source: TopicSource) -> Extractor:
     return extract
 
 
+def joint_speeds(joints: Sequence[str]) -> Extractor:
+    """sensor_msgs/JointState: the speed of each joint by its name; no sample where a message has other joints.
+
+    Args:
+        joints: names as the messages have them.
+    """
+    wanted = list(joints)
+
+    def extract(message: Any) -> Sample | None:
+        speeds = field_of(message, "velocity")
+        names = [str(name) for name in field_of(message, "name") or ()]
+        if names != wanted or speeds is None or len(speeds) != len(wanted):
+            return None
+        return {name: float(speed) for name, speed in zip(wanted, speeds, strict=True)}
+
+    return extract
+
+
 def _bank_mean(bank: str, names: Sequence[str], speeds: Sequence[float], patterns: tuple[str, ...]) -> float:
     lowered = tuple(pattern.lower() for pattern in patterns)
     matched = [

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from array import array
-from collections.abc import Iterable, Mapping
+from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -19,6 +19,8 @@ from ddagr_gym.recordings.message_fields import header_stamp
 from ddagr_gym.recordings.ros_messages import Extractor, extractor
 from ddagr_gym.recordings.schema import COMMANDS, FloatArray, Recording, RobotGeometry
 from ddagr_gym.recordings.topic_map import TRANSFORMS, Topic, TopicMap, TopicSource, choose_topics
+
+Label = TypeVar("Label", bound=Hashable)
 
 
 @dataclass
@@ -67,11 +69,11 @@ def recording_of(bag: Bag, topic_map: TopicMap, geometry: RobotGeometry | None, 
     """
     chosen = choose_topics(topic_map, bag.topics, bag.path.name)
     extractors = {
-        topic.name: topic_extractor(bag, topic, topic_map.topics[role], geometry) for role, topic in chosen.items()
+        role: (topic.name, topic_extractor(bag, topic, topic_map.topics[role], geometry))
+        for role, topic in chosen.items()
     }
     samples = collect(bag, extractors, topic_map.stamps == "header", limits)
-    by_role = {role: samples[topic.name] for role, topic in chosen.items()}
-    recording = assemble(bag.path, topic_map, chosen, by_role, geometry, limits)
+    recording = assemble(bag.path, topic_map, chosen, samples, geometry, limits)
     return recording.with_meta(source_sha256=sha256_of(bag.path))
 
 
@@ -95,26 +97,35 @@ def topic_extractor(bag: Bag, topic: Topic, source: TopicSource, geometry: Robot
     return extractor(topic.message_type, source, geometry, bag.path.name, tree)
 
 
-def collect(bag: Bag, extractors: Mapping[str, Extractor], header_stamps: bool, limits: Limits) -> dict[str, Samples]:
+def collect(
+    bag: Bag, extractors: Mapping[Label, tuple[str, Extractor]], header_stamps: bool, limits: Limits
+) -> dict[Label, Samples]:
     """Samples of topics, in one pass through a bag.
 
     Args:
         bag: open.
-        extractors: by topic.
+        extractors: topic and what takes channels out of its messages, under any labels.
         header_stamps: whether header stamps count where messages have one.
         limits: on the number of messages.
+
+    Returns:
+        Samples by label.
 
     Raises:
         InputError: too many messages.
     """
-    samples = {topic: Samples(extract) for topic, extract in extractors.items()}
+    samples = {label: Samples(extract) for label, (_, extract) in extractors.items()}
+    takers: dict[str, list[Samples]] = {}
+    for label, (topic, _) in extractors.items():
+        takers.setdefault(topic, []).append(samples[label])
     transform_topics = {topic.name for topic in bag.topics if topic.message_type == TRANSFORMS}
     count = 0
-    for topic, receive, message in bag.read(set(extractors)):
+    for topic, receive, message in bag.read(set(takers)):
         for part in transforms(message) if topic in transform_topics else (message,):
             count += 1
             limits.check_rows(count, bag.path)
-            samples[topic].add(receive, part, header_stamps)
+            for taker in takers[topic]:
+                taker.add(receive, part, header_stamps)
     return samples
 
 
