@@ -130,8 +130,8 @@ def guess_topic_map(
     from ddagr_gym.recordings.schema import RobotGeometry
 
     at_least(seed=(seed, 0))
-    given = None if robot is None or str(robot) == "" else robot_from(robot)
-    name = given.name if isinstance(robot, Robot) else "" if given is None else str(robot)
-    geometry = None if given is None else RobotGeometry.of(given)
     limits = Limits(maximum_rows, maximum_bytes)
-    return TopicMapGuess(propose(Path(path), geometry, name, limits, namespace, seed))
+    if robot is None or str(robot) == "":
+        return TopicMapGuess(propose(Path(path), None, "", limits, namespace, seed))
+    name = robot.name if isinstance(robot, Robot) else str(robot)
+    return TopicMapGuess(propose(Path(path), RobotGeometry.of(robot_from(robot)), name, limits, namespace, seed))

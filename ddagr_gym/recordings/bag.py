@@ -10,7 +10,7 @@ from typing import Any
 
 from ddagr_gym.recordings.topic_map import Topic
 
-Message = tuple[str, float, Any]
+Received = tuple[str, float, Any]
 """Topic, time of receipt [s] and decoded message."""
 
 
@@ -26,7 +26,7 @@ class Bag:
 
     path: Path
     topics: tuple[Topic, ...]
-    read: Callable[[Collection[str]], Iterator[Message]]
+    read: Callable[[Collection[str]], Iterator[Received]]
 
 
 def joined(path: Path, parts: Iterable[Bag]) -> Bag:
@@ -42,7 +42,7 @@ def joined(path: Path, parts: Iterable[Bag]) -> Bag:
         for topic in bag.topics:
             counts[topic.name, topic.message_type] += max(topic.count, 0)
 
-    def read(names: Collection[str]) -> Iterator[Message]:
+    def read(names: Collection[str]) -> Iterator[Received]:
         for bag in bags:
             yield from bag.read(names)
 

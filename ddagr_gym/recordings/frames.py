@@ -6,8 +6,7 @@ Transforms come as edges of a tree, from a frame to its parent. ``/tf_static`` h
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from itertools import islice
-from os.path import commonprefix
+from itertools import islice, takewhile
 from typing import Any
 
 import numpy as np
@@ -68,7 +67,7 @@ class FrameTree:
         return tuple(frame for frame in chain[: chain.index(parent)] if frame not in self._static)
 
     def between(self, frame: str, other: str) -> FloatArray | None:
-        """Matrix (4, 4) that takes coordinates of ``frame`` to those of ``other``; None where they do not hang together."""
+        """Matrix (4, 4) that takes coordinates of ``frame`` to those of ``other``; None where nothing connects them."""
         up, down = self.chain(frame), self.chain(other)
         if up[-1] != down[-1]:
             return None
@@ -119,7 +118,13 @@ def _tree(bag: Bag, topic: Topic | None, most: int | None = None) -> FrameTree:
 def transform_topic(topics: tuple[Topic, ...], near: str, static: bool = False) -> Topic | None:
     """The topic /tf, or /tf_static, that belongs to another topic; None where there is none."""
     found = [t for t in topics if t.message_type == TRANSFORMS and t.count and t.name.endswith(STATIC) == static]
-    return max(found, key=lambda topic: len(commonprefix([topic.name, near])), default=None)
+    return max(found, key=lambda topic: _shared(topic.name, near), default=None)
+
+
+def _shared(one: str, other: str) -> int:
+    """Number of parts that two topics' names have in common at their beginning."""
+    pairs = zip(one.strip("/").split("/"), other.strip("/").split("/"), strict=False)
+    return sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], pairs))
 
 
 def turned_into(frame: str, tree: FrameTree, file_name: str) -> Callable[[Any], FloatArray]:

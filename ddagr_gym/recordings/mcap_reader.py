@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ddagr_gym.errors import InputError
-from ddagr_gym.recordings.bag import Bag, Message
+from ddagr_gym.recordings.bag import Bag, Received
 from ddagr_gym.recordings.cdr import Decoder, cdr_decoder
 from ddagr_gym.recordings.compressed import allowed_bytes, too_large, unpacked_message
 from ddagr_gym.recordings.files import DEFAULT_LIMITS, Limits, damaged, open_source
@@ -63,7 +63,7 @@ def _topics(path: Path, limits: Limits) -> tuple[Topic, ...]:
     return tuple(Topic(name, kind, count) for (name, kind), count in sorted(totals.items()))
 
 
-def _messages(path: Path, limits: Limits, names: Collection[str]) -> Iterator[Message]:
+def _messages(path: Path, limits: Limits, names: Collection[str]) -> Iterator[Received]:
     """Every message of the named topics."""
     contents, decoders = _Contents(), _Decoders(path, limits)
     for message in contents.messages(path, limits):

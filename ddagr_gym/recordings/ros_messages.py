@@ -109,9 +109,7 @@ def twist(prefix: str, geometry: RobotGeometry) -> Extractor:
     """geometry_msgs/Twist or TwistStamped: body-speed commands as bank speeds."""
 
     def extract(message: Any) -> Sample:
-        right, left = bank_speeds(
-            number(message, f"{prefix}linear.x"), number(message, f"{prefix}angular.z"), geometry
-        )
+        right, left = bank_speeds(number(message, f"{prefix}linear.x"), number(message, f"{prefix}angular.z"), geometry)
         return {"command_right": float(right), "command_left": float(left)}
 
     return extract

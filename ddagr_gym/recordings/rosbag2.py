@@ -1,4 +1,4 @@
-"""Folder of a ROS 2 bag: one or several files, named by ``metadata.yaml``, stored as SQLite or MCAP, also compressed."""
+"""Folder of a ROS 2 bag: files that ``metadata.yaml`` names, stored as SQLite or MCAP, also compressed."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ddagr_gym.errors import InputError
-from ddagr_gym.recordings.bag import Bag, Message
+from ddagr_gym.recordings.bag import Bag, Received
 from ddagr_gym.recordings.compressed import unpacked_files
 from ddagr_gym.recordings.files import DEFAULT_LIMITS, Limits, kind_of
 from ddagr_gym.recordings.mcap_reader import open_mcap
@@ -96,7 +96,7 @@ def _open_ros1(path: Path, limits: Limits) -> Iterator[Bag]:
         yield Bag(path, topics, partial(_messages, reader, path))
 
 
-def _messages(reader: Any, path: Path, names: Collection[str]) -> Iterator[Message]:
+def _messages(reader: Any, path: Path, names: Collection[str]) -> Iterator[Received]:
     connections = [c for c in reader.connections if c.topic in names]
     with bag_errors(path):
         for connection, receive, data in reader.messages(connections=connections) if connections else ():

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ddagr_gym.errors import InputError
-from ddagr_gym.recordings.bag import Bag, Message
+from ddagr_gym.recordings.bag import Bag, Received
 from ddagr_gym.recordings.cdr import Decoder, cdr_decoder
 from ddagr_gym.recordings.compressed import unpacked_message
 from ddagr_gym.recordings.files import DEFAULT_LIMITS, Limits, damaged
@@ -51,7 +51,7 @@ def bag_errors(path: Path) -> Iterator[None]:
         raise damaged(path, error, "is damaged or not a bag", "reindex it or record it again") from None
 
 
-def _messages(reader: Any, path: Path, limits: Limits, names: Collection[str]) -> Iterator[Message]:
+def _messages(reader: Any, path: Path, limits: Limits, names: Collection[str]) -> Iterator[Received]:
     wanted = [c for c in reader.connections if c.topic in names]
     decoders: dict[int, Decoder] = {}
     with bag_errors(path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import shutil
 from dataclasses import dataclass, field
@@ -18,6 +19,7 @@ STORE.register(get_types_from_msg("float64 level\n", "my_msgs/msg/Battery"))
 START = 1_700_000_000.0
 IMU, JOINTS, ODOMETRY = "sensor_msgs/msg/Imu", "sensor_msgs/msg/JointState", "nav_msgs/msg/Odometry"
 TWIST, STAMPED = "geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"
+LEVEL = np.eye(3)
 TRANSFORMS = "tf2_msgs/msg/TFMessage"
 
 
@@ -90,7 +92,7 @@ def split(path: Path, messages, parts: int, storage: str = "sqlite3", compressio
     edges = np.linspace(0, len(ordered), parts + 1).astype(int)
     path.mkdir()
     files, content = [], None
-    for k, (a, b) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
+    for k, (a, b) in enumerate(itertools.pairwise(edges)):
         part = write(path.with_name(f"{path.name}-{k}"), ordered[a:b], storage, compression)
         content = yaml.safe_load((part / "metadata.yaml").read_text())
         (name,) = content["rosbag2_bagfile_information"]["relative_file_paths"]
@@ -113,9 +115,11 @@ class Drive:
 
     def rows(self, *names):
         known = np.all([np.isfinite(self.columns[name]) for name in names], axis=0)
-        return ((float(self.columns["t"][k]), [float(self.columns[n][k]) for n in names]) for k in np.flatnonzero(known))
+        return (
+            (float(self.columns["t"][k]), [float(self.columns[n][k]) for n in names]) for k in np.flatnonzero(known)
+        )
 
-    def imu(self, topic="/imu/data", frame="imu_link", rotation=np.eye(3), every=1, scale=1.0):
+    def imu(self, topic="/imu/data", frame="imu_link", rotation=LEVEL, every=1, scale=1.0):
         """Readings of a sensor whose axes are ``rotation`` (rows: sensor axes in the body)."""
         names = ("specific_force_x", "specific_force_y", "yaw_rate")
         for k, (t, (x, y, w)) in enumerate(self.rows(*names)):

@@ -6,7 +6,7 @@ import glob
 from array import array
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -77,7 +77,7 @@ class Contents:
     bag: Bag
     topics: tuple[Topic, ...]
     candidates: tuple[Candidate, ...]
-    stamps: str
+    stamps: Literal["header", "receive"]
     frames: dict[str, str]
     why_receive: str = ""
 
@@ -118,15 +118,15 @@ def contents(bag: Bag, geometry: RobotGeometry | None, limits: Limits, namespace
         number: (topic.name, _extractor(bag, topic, source, geometry or STAND_IN, firsts[topic.name]))
         for number, (_, topic, source) in enumerate(readings)
     }
-    stamps, samples = "header", collect(bag, extractors, True, limits)
+    samples = collect(bag, extractors, True, limits)
     why_receive = _why_not_header(bag, [(readings[k][1], found) for k, found in samples.items()])
     if why_receive:
-        stamps, samples = "receive", collect(bag, extractors, False, limits)
+        samples = collect(bag, extractors, False, limits)
     candidates = tuple(
         Candidate(role, topic, source, samples[k], frame_name(source.parent) or frames[topic.name])
         for k, (role, topic, source) in enumerate(readings)
     )
-    return Contents(bag, topics, candidates, stamps, frames, why_receive)
+    return Contents(bag, topics, candidates, "receive" if why_receive else "header", frames, why_receive)
 
 
 def _topics_of_one_robot(bag: Bag, namespace: str) -> tuple[Topic, ...]:
@@ -153,8 +153,8 @@ def _topics_of_one_robot(bag: Bag, namespace: str) -> tuple[Topic, ...]:
     if not any(_is_readable(topic) for topic in bag.topics):
         kinds = sorted({topic.message_type for topic in bag.topics if topic.count})
         raise InputError(
-            f"{name} holds no message that is read here, only {', '.join(kinds[:8])}: record Imu, JointState, Twist and "
-            "Odometry messages."
+            f"{name} holds no message that is read here, only {', '.join(kinds[:8])}: record Imu, JointState, Twist "
+            "and Odometry messages."
         )
     return bag.topics
 

@@ -62,9 +62,7 @@ def best_of(
         others = {candidate.label: _weakest(merit) for candidate, merit in ranked}
         return Choice(role, None, "; ".join(f"{label}: {why}" for label, why in others.items()), others)
     (best, merit), rivals = ranked[0], ranked[1:]
-    others = {
-        rival.label: _difference(merit, lesser) for rival, lesser in rivals if rival.label != best.label
-    }
+    others = {rival.label: _difference(merit, lesser) for rival, lesser in rivals if rival.label != best.label}
     same = [rival.label for rival, lesser in rivals if lesser.values[:-1] == merit.values[:-1]]
     same = [label for label in dict.fromkeys(same) if label != best.label]
     ambiguous = f"{role}: {' and '.join([best.label, *same])} are alike but for {merit.words[-1]}" if same else ""
@@ -123,9 +121,7 @@ def sided(trials: Trials, wheels: Choice, imu: Choice) -> Choice:
         f"{' and '.join(banks.right)} right, as the gyro says (correlation {abs(offset.correlation):.2f} with the "
         f"difference); {wheels.why}"
     )
-    return Choice(
-        "wheels", as_wheels(candidate, banks.right, banks.left), why, wheels.others, wheels.ambiguous, banks
-    )
+    return Choice("wheels", as_wheels(candidate, banks.right, banks.left), why, wheels.others, wheels.ambiguous, banks)
 
 
 def choose_imu(trials: Trials, wheels: Choice) -> Choice:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Literal
 
-from ddagr_gym.recordings.checks.arbitration import Arbitration
 from ddagr_gym.recordings.checks.imu_findings import mounting_takes
 from ddagr_gym.recordings.checks.map_lines import Takes
 from ddagr_gym.recordings.checks.motion_windows import ENCODERS
-from ddagr_gym.recordings.checks.wheels import wheel_takes, wheels_followed, wheels_of
+from ddagr_gym.recordings.checks.wheels import BACKWARDS, RIGHT_AND_LEFT, wheel_takes, wheels_followed, wheels_of
 from ddagr_gym.recordings.guess.candidates import Candidate, as_wheels
-from ddagr_gym.recordings.guess.choose import Choice
+from ddagr_gym.recordings.guess.choose import Choice, choose_command, choose_imu, choose_pose
 from ddagr_gym.recordings.guess.trials import Trials
 
 
@@ -20,14 +20,19 @@ class Correction:
     """A proposal after the checks.
 
     Attributes:
+        trials: with the signs of the map.
         choices: by role, with exchanged banks or another reading of the IMU.
-        signs: of the map.
         sentences: what was changed and why.
     """
 
+    trials: Trials
     choices: Mapping[str, Choice]
-    signs: Mapping[str, int]
-    sentences: tuple[str, ...]
+    sentences: tuple[str, ...] = ()
+
+    @property
+    def candidates(self) -> dict[str, Candidate | None]:
+        """By role."""
+        return {role: choice.candidate for role, choice in self.choices.items()}
 
 
 def corrected(trials: Trials, choices: Mapping[str, Choice]) -> Correction:
@@ -37,70 +42,80 @@ def corrected(trials: Trials, choices: Mapping[str, Choice]) -> Correction:
         trials: with the robot's geometry; without it nothing is corrected, since slip and scale cannot be told.
         choices: by role.
     """
-    correction = Correction(choices, {}, ())
+    before = Correction(trials, choices)
     if trials.geometry is None:
-        return correction
-    for correct in (_wheels_corrected, _imu_corrected):
-        found = _arbitration(trials, correction)
-        correction = correct(trials, correction, found) if found else correction
-    return correction
+        return before
+    after = _imu_corrected(_wheels_corrected(before))
+    return _chosen_again(after) if after.sentences else before
 
 
-def _arbitration(trials: Trials, correction: Correction) -> Arbitration | None:
-    candidates = {role: choice.candidate for role, choice in correction.choices.items()}
-    return trials.arbitration(candidates, correction.signs)
+def _chosen_again(before: Correction) -> Correction:
+    """What the wheels as they were may have misjudged, once more."""
+    trials, choices = before.trials, dict(before.choices)
+    imu = choose_imu(trials, choices["wheels"])
+    if imu.candidate == choices["imu"].candidate:
+        choices["imu"] = imu
+    choices["command"] = choose_command(trials, choices["imu"], choices["wheels"])
+    choices["pose"] = choose_pose(trials, choices["imu"], choices["wheels"])
+    return replace(before, choices=choices)
 
 
-def _wheels_corrected(trials: Trials, before: Correction, found: Arbitration) -> Correction:
-    wheels, choice = wheels_of(found.wheels[ENCODERS]), before.choices["wheels"]
-    if wheels is None and found.accused(ENCODERS):
+def _wheels_corrected(before: Correction) -> Correction:
+    found, choice = before.trials.arbitration(before.candidates), before.choices["wheels"]
+    wheels = None if found is None else wheels_of(found.wheels[ENCODERS])
+    if wheels is None and found is not None and found.accused(ENCODERS):
         wheels = wheels_followed(found.followed)
     takes = wheel_takes(ENCODERS, wheels) if wheels else {}
-    if not takes or choice.candidate is None or choice.banks is None or wheels is None:
+    if not takes or wheels is None or choice.candidate is None or choice.banks is None:
         return before
-    sentences = [f"the channel of the {bank} wheels moves as {moved}" for bank, moved in _moved(wheels)]
+    pairs = zip(RIGHT_AND_LEFT, wheels, strict=True)
+    sentence = "; ".join(_moved(bank, moved) for bank, moved in pairs if bank != moved)
     if any(name != source for name, (source, _) in takes.items()):
         banks = choice.banks.exchanged()
-        joints = next(c for c in trials.contents.of("wheels") if c.topic == choice.candidate.topic)
-        choice = replace(choice, candidate=as_wheels(joints, banks.right, banks.left), banks=banks)
-        sentences = [f"{sentence}: right and left were exchanged" for sentence in sentences[:1]]
-    signs = {**before.signs, **_signs(takes)}
-    return Correction({**before.choices, "wheels": choice}, signs, (*before.sentences, *sentences))
+        joints = next(c for c in before.trials.contents.of("wheels") if c.topic == choice.candidate.topic)
+        why = f"{' and '.join(banks.right)} right and {' and '.join(banks.left)} left by motion"
+        candidate = as_wheels(joints, banks.right, banks.left)
+        choice = replace(choice, candidate=candidate, banks=banks, why=why)
+    trials = _with_signs(before.trials, takes)
+    return Correction(trials, {**before.choices, "wheels": choice}, (*before.sentences, sentence))
 
 
-def _moved(wheels: tuple[str, str]) -> list[tuple[str, str]]:
-    return [(bank, moved) for bank, moved in zip(("right", "left"), wheels, strict=True) if bank != moved]
+def _moved(bank: str, moved: str) -> str:
+    """What a bank's channel moves as, in words."""
+    backwards = ", but counts backwards" if moved.endswith(BACKWARDS) else ""
+    return f"what was taken for the {bank} wheels moves as the {moved.removesuffix(BACKWARDS)} ones{backwards}"
 
 
-def _imu_corrected(trials: Trials, before: Correction, found: Arbitration) -> Correction:
-    fit, choice = found.mounting, before.choices["imu"]
+def _imu_corrected(before: Correction) -> Correction:
+    found, choice = before.trials.arbitration(before.candidates), before.choices["imu"]
+    fit = None if found is None else found.mounting
     if fit is None or not fit.decided or not fit.best.faults or choice.candidate is None:
         return before
-    as_it_is = _unturned(trials, before) if choice.candidate.source.frame else None
-    if as_it_is is not None:
-        return as_it_is
+    plain = _unturned(before, choice)
+    if plain is not None:
+        return plain
     takes = mounting_takes(fit.best)
     if any(name != source for name, (source, _) in takes.items()):
         return before  # a topic map cannot exchange axes: the finding says what to do
-    sentence = f"motion and gravity show {' and '.join(takes)} with the wrong sign"
-    return replace(before, signs={**before.signs, **_signs(takes)}, sentences=(*before.sentences, sentence))
+    sentence = f"imu: motion and gravity show {' and '.join(takes)} with the wrong sign"
+    return replace(before, trials=_with_signs(before.trials, takes), sentences=(*before.sentences, sentence))
 
 
-def _unturned(trials: Trials, before: Correction) -> Correction | None:
+def _unturned(before: Correction, choice: Choice) -> Correction | None:
     """The IMU's readings as they are, where they fit better than turned by the transforms; None where they do not."""
-    choice = before.choices["imu"]
-    plain = next((c for c in trials.contents.of("imu") if _same_unturned(c, choice.candidate)), None)
-    correction = replace(before, choices={**before.choices, "imu": replace(choice, candidate=plain)})
-    found = _arbitration(trials, correction) if plain else None
+    chosen = choice.candidate
+    if chosen is None or not chosen.source.frame:
+        return None
+    others = (c for c in before.trials.contents.of("imu") if c.topic == chosen.topic and not c.source.frame)
+    plain = replace(choice, candidate=next(others, None))
+    after = replace(before, choices={**before.choices, "imu": plain})
+    found = before.trials.arbitration(after.candidates)
     if found is None or found.mounting is None or not found.mounting.decided or found.mounting.best.faults:
         return None
-    sentence = "the IMU's readings are in the robot's axes already: the transforms were left out"
-    return replace(correction, sentences=(*before.sentences, sentence))
+    sentence = "imu: its readings are in the robot's axes already, the transforms were left out"
+    return replace(after, sentences=(*before.sentences, sentence))
 
 
-def _same_unturned(candidate: Candidate, chosen: Candidate | None) -> bool:
-    return chosen is not None and candidate.topic == chosen.topic and not candidate.source.frame
-
-
-def _signs(takes: Takes) -> dict[str, int]:
-    return {name: -1 for name, (_, sign) in takes.items() if sign < 0}
+def _with_signs(trials: Trials, takes: Takes) -> Trials:
+    signs: dict[str, Literal[1, -1]] = {name: -1 for name, (_, sign) in takes.items() if sign < 0}
+    return replace(trials, signs={**trials.signs, **signs})

@@ -10,7 +10,7 @@ from typing import Any
 from ddagr_gym.errors import InputError
 from ddagr_gym.recordings.checks.arbitration import arbitration_findings
 from ddagr_gym.recordings.checks.clock_offsets import clock_offsets
-from ddagr_gym.recordings.checks.findings import CheckFinding
+from ddagr_gym.recordings.checks.findings import CheckFinding, Status
 from ddagr_gym.recordings.files import DEFAULT_LIMITS, Limits
 from ddagr_gym.recordings.guess.candidates import Contents, contents, rate_of
 from ddagr_gym.recordings.guess.choose import Choice, choose_all
@@ -18,17 +18,17 @@ from ddagr_gym.recordings.guess.corrections import Correction, corrected
 from ddagr_gym.recordings.guess.trials import Trials
 from ddagr_gym.recordings.rosbag_reader import open_bag
 from ddagr_gym.recordings.schema import Recording, RobotGeometry
-from ddagr_gym.recordings.topic_map import ROLE_TYPES, TopicMap, TopicSource
+from ddagr_gym.recordings.topic_map import ROLE_TYPES, TRANSFORMS, TopicMap, TopicSource
 
 COSTS: Mapping[str, str] = {
-    "imu": "`ddagr calibrate` refuses the drive, a diagnosis has wheels and pose alone (no fault of an IMU, no slope), and "
-    "rows are the stamps of the wheels",
-    "wheels": "`ddagr calibrate` refuses the drive, a diagnosis cannot tell late or weak motors from slip, and the checks "
-    "cannot hold gyro and pose against the wheels",
-    "command": "`ddagr diagnose`, `calibrate` and `replay` by commands refuse the drive; only `ddagr check` and `ddagr replay` "
-    "by wheel speeds are left",
-    "pose": "the gyro's scale and bias and the travel of the wheels have no witness, forecasts of position and heading are not "
-    "judged, and faults of the pose cannot be asked for",
+    "imu": "`ddagr calibrate` refuses the drive, a diagnosis has wheels and pose alone (no fault of an IMU, no slope), "
+    "and rows are the stamps of the wheels",
+    "wheels": "`ddagr calibrate` refuses the drive, a diagnosis cannot tell late or weak motors from slip, and the "
+    "checks cannot hold gyro and pose against the wheels",
+    "command": "`ddagr diagnose`, `calibrate` and `replay` by commands refuse the drive; only `ddagr check` and "
+    "`replay` by wheel speeds are left",
+    "pose": "the gyro's scale and bias and the travel of the wheels have no witness, forecasts of position and heading "
+    "are not judged, and faults of the pose cannot be asked for",
 }
 """What cannot be asked without a role."""
 
@@ -63,7 +63,7 @@ class Proposal:
     Attributes:
         source: name of the bag.
         topics: all of the bag, in the order of their names.
-        topic_map: the proposal; None where neither IMU nor wheels were found.
+        topic_map: the proposal.
         reasons: by role that is filled.
         corrections: what the checks changed, one sentence each.
         ambiguous: what could as well be otherwise, one sentence each.
@@ -107,20 +107,21 @@ def propose(
     """
     with open_bag(path, limits) as bag:
         found = contents(bag, geometry, limits, namespace)
-    trials = Trials(found, geometry, limits, seed)
-    correction = corrected(trials, choose_all(trials))
+    first = Trials(found, geometry, limits, seed)
+    correction = corrected(first, choose_all(first))
     choices = correction.choices
     topic_map = _map(found, correction, robot, path.name)
-    recording = trials.recording({role: choice.candidate for role, choice in choices.items()}, correction.signs)
+    recording = correction.trials.recording(correction.candidates)
+    findings = tuple(_findings(correction, recording))
     return Proposal(
         source=path.name,
         topics=tuple(_rows(found, choices)),
         topic_map=topic_map,
         reasons={role: choice.why for role, choice in choices.items() if choice.candidate is not None},
         corrections=correction.sentences,
-        ambiguous=tuple(_ambiguous(found, choices)),
-        missing=tuple(_missing(choices)),
-        findings=tuple(_findings(trials, recording, correction)),
+        ambiguous=tuple(_ambiguous(found, choices, findings)),
+        missing=tuple(_missing(choices, geometry)),
+        findings=findings,
         doubts=recording.validate() if recording else (),
     )
 
@@ -134,8 +135,8 @@ def _map(found: Contents, correction: Correction, robot: str, name: str) -> Topi
     return TopicMap(
         sources,
         base=base,
-        stamps=found.stamps,  # type: ignore[arg-type]
-        signs=dict(correction.signs),  # type: ignore[arg-type]
+        stamps=found.stamps,
+        signs=correction.trials.signs,
         robot=robot,
         description=f"proposed by ddagr import --guess for {name}",
         name="guessed",
@@ -165,32 +166,42 @@ def _why_not(name: str, message_type: str, choices: Mapping[str, Choice]) -> str
         if said:
             best = f" ({choice.candidate.label} is better)" if choice.candidate else ""
             return f"not the {role}: {said[0]}{best}"
+    if message_type == TRANSFORMS:
+        return "transforms between frames"
     known = any(message_type in kinds for kinds in ROLE_TYPES.values())
     return "no sample that can be used" if known else "not read"
 
 
-def _ambiguous(found: Contents, choices: Mapping[str, Choice]) -> Iterator[str]:
+def _ambiguous(found: Contents, choices: Mapping[str, Choice], findings: tuple[CheckFinding, ...]) -> Iterator[str]:
     if found.why_receive:
         yield f"stamps: times of receipt are used, because {found.why_receive}"
     for choice in choices.values():
         if choice.ambiguous:
             yield choice.ambiguous
+    for finding in findings:
+        if finding.status is Status.SUSPICIOUS:
+            yield f"the checks speak against {finding.channel}: {finding.meaning} {finding.remedy}".rstrip()
 
 
-def _missing(choices: Mapping[str, Choice]) -> Iterator[str]:
+def _missing(choices: Mapping[str, Choice], geometry: RobotGeometry | None) -> Iterator[str]:
+    if geometry is None:
+        yield (
+            "no robot (--robot): its wheel radius and track turn body-speed commands into bank speeds, and let the "
+            "checks find exchanged or reversed wheels and axes"
+        )
     for role, choice in choices.items():
         if choice.candidate is None:
             yield f"no {role} ({choice.why}): {COSTS[role]}"
 
 
-def _findings(trials: Trials, recording: Recording | None, correction: Correction) -> Iterator[CheckFinding]:
+def _findings(correction: Correction, recording: Recording | None) -> Iterator[CheckFinding]:
     """Clocks, and with a robot what sources of motion say of each other."""
     if recording is None:
         return
+    trials = correction.trials
     yield from clock_offsets(recording, trials.rng())
     if trials.geometry is not None:
-        candidates = {role: choice.candidate for role, choice in correction.choices.items()}
-        found = trials.arbitration(candidates, correction.signs)
+        found = trials.arbitration(correction.candidates)
         yield from arbitration_findings(found) if found else ()
 
 

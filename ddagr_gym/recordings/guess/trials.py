@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
@@ -39,41 +40,35 @@ class Trials:
         geometry: of the robot; None where none is named.
         limits: on rows.
         seed: of resampled intervals.
+        signs: of channels, as in a topic map.
     """
 
     contents: Contents
     geometry: RobotGeometry | None
     limits: Limits
     seed: int = 0
+    signs: Mapping[str, Literal[1, -1]] = field(default_factory=dict)
 
     def rng(self) -> np.random.Generator:
         """Generator of a trial: the same one for each, so that their order does not matter."""
         return np.random.default_rng(self.seed)
 
-    def recording(
-        self, candidates: Mapping[str, Candidate | None], signs: Mapping[str, int] | None = None
-    ) -> Recording | None:
+    def recording(self, candidates: Mapping[str, Candidate | None]) -> Recording | None:
         """Recording of one candidate for each role; None where it has no rows.
 
         Args:
             candidates: by role; None for roles that are left out.
-            signs: as in a topic map.
         """
         chosen = {role: candidate for role, candidate in candidates.items() if candidate is not None}
         base = "imu" if "imu" in chosen else next(iter(chosen), "")
         if not base:
             return None
-        topic_map = TopicMap(
-            {role: candidate.source for role, candidate in chosen.items()},
-            base=base,
-            signs=dict(signs or {}),  # type: ignore[arg-type]
-        )
+        sources = {role: candidate.source for role, candidate in chosen.items()}
+        topic_map = TopicMap(sources, base=base, signs=self.signs)
         topics = {role: candidate.topic for role, candidate in chosen.items()}
         samples = {role: candidate.samples for role, candidate in chosen.items()}
         try:
-            return assemble(
-                self.contents.bag.path, topic_map, topics, samples, self.geometry or STAND_IN, self.limits
-            )
+            return assemble(self.contents.bag.path, topic_map, topics, samples, self.geometry or STAND_IN, self.limits)
         except InputError:
             return None
 
@@ -115,11 +110,9 @@ class Trials:
         low, high = (math.nan, math.nan) if found is None else found.intervals[0]
         return low > GYRO_SCALE.expected[1] or high < GYRO_SCALE.expected[0]
 
-    def arbitration(
-        self, candidates: Mapping[str, Candidate | None], signs: Mapping[str, int] | None = None
-    ) -> Arbitration | None:
+    def arbitration(self, candidates: Mapping[str, Candidate | None]) -> Arbitration | None:
         """What the sources of motion say of each other; without a robot only signs and correlations mean anything."""
-        recording = self.recording(candidates, signs)
+        recording = self.recording(candidates)
         return None if recording is None else arbitrated(recording, self.rng())
 
 
