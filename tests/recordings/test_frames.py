@@ -73,7 +73,7 @@ def test_transforms_that_do_not_change_may_be_in_tf(tmp_path):
 
 def test_an_unknown_frame_lists_what_is_known(tmp_path):
     static = [transform(0.0, "base", "camera", topic="/tf_static")]
-    with pytest.raises(InputError, match="no transform from 'imu_link' to 'base_link' .it knows base, camera"):
+    with pytest.raises(InputError, match=r"no transform from 'imu_link' to 'base_link' \(it knows base, camera"):
         read(tmp_path, [*imus(), *WHEELS, *static], MOUNTED)
 
 

@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from ddagr_gym.errors import InputError
-from ddagr_gym.recordings.files import Limits
+from ddagr_gym.recordings.files import DEFAULT_LIMITS, Limits
 from ddagr_gym.recordings.load import load_recording
 from tests.recordings.bags import IMU, JOINTS, STAMPED, TWIST, Sent, split, write
 
@@ -32,7 +32,7 @@ def sent(command=TWIST):
     return messages
 
 
-def read(path, warthog, limits=Limits()):
+def read(path, warthog, limits=DEFAULT_LIMITS):
     return load_recording(path, robot="warthog", limits=limits, geometry_of=lambda _: warthog)
 
 

@@ -18,8 +18,9 @@ from ddagr_gym.recordings.checks.clock_offsets import (
     pose_offset,
     response_offset,
 )
-from ddagr_gym.recordings.checks.motion_windows import ENCODERS, GYRO, HEADING
+from ddagr_gym.recordings.checks.motion_windows import ENCODERS, GYRO, HEADING, POSITION
 from ddagr_gym.recordings.checks.turning import GYRO_SCALE, gyro_against_pose
+from ddagr_gym.recordings.checks.wheels import wheel_shares
 from ddagr_gym.recordings.files import Limits
 from ddagr_gym.recordings.guess.candidates import STAND_IN, Candidate, Contents
 from ddagr_gym.recordings.schema import Recording, RobotGeometry
@@ -29,6 +30,11 @@ from ddagr_gym.recordings.topic_map import TopicMap
 COPIED = 0.1
 """Share of what the gyro leaves of a heading that the encoders leave of it, below which the heading was computed from
 them [-] (ours): a heading of its own shows the slip of a skid-steer robot, which the wheels do not know."""
+
+
+NO_SLIP = 0.03
+"""Share of turning by each bank, less 1, below which a heading knows no slip [-] (ours): skid-steer robots turn by a
+half to three quarters of it."""
 
 
 @dataclass(frozen=True)
@@ -91,8 +97,8 @@ class Trials:
     def copies_wheels(self, imu: Candidate | None, wheels: Candidate | None, pose: Candidate) -> bool:
         """Whether a pose's heading was computed from the wheels.
 
-        It follows them far more closely than the gyro; or more closely, and turns by another angle than the gyro, as a
-        skid-steer robot does whose wheels are taken for those of a differential drive.
+        It turns as the wheels do without any slip, which no skid-steer robot does; or it follows them far more closely
+        than the gyro; or more closely, and by another angle than the gyro.
         """
         if imu is None or wheels is None:
             return False
@@ -100,9 +106,18 @@ class Trials:
         found = None if recording is None else arbitrated(recording, self.rng())
         if recording is None or found is None:
             return False
+        if self._turns_without_slip(found):
+            return True
         correlation = {frozenset(pair): abs(value) for pair, value in found.turning.correlation.items()}
         by_wheels, by_gyro = (1.0 - correlation.get(frozenset((HEADING, s)), math.nan) for s in (ENCODERS, GYRO))
         return bool(by_wheels < COPIED * by_gyro or (by_wheels < by_gyro and self._turns_otherwise(recording)))
+
+    def _turns_without_slip(self, found: Arbitration) -> bool:
+        """Whether the pose turns by what the robot's wheel radius and track make of the encoders."""
+        windows = found.windows
+        turn, travel = windows.turn[HEADING], windows.forward[POSITION]
+        shares = None if self.geometry is None else wheel_shares(windows, ENCODERS, turn, travel, self.rng())
+        return shares is not None and bool(np.all(np.abs(shares.values[[0, 2]] - 1.0) < NO_SLIP))
 
     def _turns_otherwise(self, recording: Recording) -> bool:
         """Whether the gyro turns by another angle than the pose."""

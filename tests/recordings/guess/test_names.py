@@ -30,7 +30,7 @@ def test_sides_of_joints(joint, side):
 def test_joints_called_wheels_come_before_others():
     assert wheel_joints(("fl_wheel", "fr_wheel", "shoulder_left")) == ("fl_wheel", "fr_wheel")
     assert wheel_joints(("a", "b", "pan_joint", "rear_caster")) == ("a", "b")
-    assert wheel_joints(("front_steer_wheel", "left_wheel", "right_wheel")) == ("front_steer_wheel", "left_wheel", "right_wheel")
+    assert wheel_joints(("front_steer_wheel", "left_wheel", "right_wheel")) == ("left_wheel", "right_wheel")
 
 
 def test_names_of_twists():

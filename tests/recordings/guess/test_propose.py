@@ -262,7 +262,7 @@ def twice(messages):
 
 
 def test_two_robots_need_a_namespace(usual, proposed, tmp_path, warthog):
-    with pytest.raises(InputError, match="topics of 2 robots, /alpha, /beta: .* --namespace /alpha"):
+    with pytest.raises(InputError, match=r"topics of 2 robots, /alpha, /beta: .* --namespace /alpha"):
         proposed(twice(usual))
     proposal = propose(write(tmp_path / "two", twice(usual)), warthog, namespace="/beta")
     assert topics_of(proposal) == {role: f"/beta{topic}" for role, topic in USUAL.items()}
