@@ -16,6 +16,7 @@ from ddagr_gym.parameters import Robot
 from ddagr_gym.recordings.files import DEFAULT_LIMITS, Limits
 
 if TYPE_CHECKING:
+    from ddagr_gym.recordings.checks.findings import CheckFinding
     from ddagr_gym.recordings.guess.propose import Proposal
     from ddagr_gym.recordings.topic_map import TopicMap
 
@@ -49,6 +50,11 @@ class TopicMapGuess(Result):
         return self.proposal.missing
 
     @property
+    def told(self) -> tuple[CheckFinding, ...]:
+        """What the checks could tell of the recording that the map gives; suspicious ones are among ``ambiguous``."""
+        return tuple(finding for finding in self.proposal.findings if finding.status != "not_testable")
+
+    @property
     def headline(self) -> str:
         """Which topic fills which role."""
         filled = ", ".join(f"{role} is {source.topic}" for role, source in self.topic_map.topics.items())
@@ -62,7 +68,7 @@ class TopicMapGuess(Result):
             (t.name, t.message_type, t.count, f"{t.rate:.3g}" if t.rate else "", t.frame, t.role, t.why)
             for t in self.proposal.topics
         ]
-        told = [finding_row(finding) for finding in self.proposal.findings if finding.status != "not_testable"]
+        told = [finding_row(finding) for finding in self.told]
         return [Table(TOPIC_HEADER, rows), Table(FINDING_HEADER, told, "checks of the recording that this map gives")]
 
     def yaml(self) -> str:
@@ -91,8 +97,8 @@ class TopicMapGuess(Result):
         lines += [f"ambiguous: {sentence}" for sentence in self.ambiguous]
         lines += [f"missing: {sentence}" for sentence in self.missing]
         lines += [f"doubt: {sentence}" for sentence in self.proposal.doubts]
-        told = [finding for finding in self.proposal.findings if finding.status != "not_testable"]
-        return "\n".join([*lines, "checks of the recording that this map gives:", findings_text(told, everything=True)])
+        lines += [f"checks of the recording that this map gives: {findings_text(self.told)}"]
+        return "\n".join(lines)
 
 
 def guess_topic_map(

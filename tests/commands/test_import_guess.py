@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 
 import numpy as np
@@ -23,10 +24,15 @@ def sent():
     return Drive(recording.columns(), geometry.wheel_radius, geometry.half_track).messages()
 
 
+@pytest.fixture(scope="module")
+def bag(tmp_path_factory, sent):
+    return write(tmp_path_factory.mktemp("sent") / "my bag", sent, "mcap", "file")
+
+
 @pytest.fixture
-def folder(tmp_path, monkeypatch, sent):
+def folder(tmp_path, monkeypatch, bag):
     monkeypatch.chdir(tmp_path)
-    write(tmp_path / "my bag", sent, "mcap", "file")
+    shutil.copytree(bag, tmp_path / "my bag")
     return tmp_path
 
 

@@ -13,7 +13,7 @@ from ddagr_gym import cli, commands
 from ddagr_gym.config import load_config
 from ddagr_gym.recordings.column_map import load_column_map
 from ddagr_gym.recordings.topic_map import TopicMap, load_topic_map
-from tools.documentation.pages import ROOT, blocks, command_lines
+from tools.documentation.pages import ROOT, blocks, command_lines, differences, run_page
 
 DOCS = ROOT / "docs"
 HOW_TO = sorted((DOCS / "how-to").glob("*.md"))
@@ -57,3 +57,11 @@ def test_python_runs(page, tmp_path):
     environment = os.environ | {"PYTHONPATH": str(ROOT), "MPLBACKEND": "Agg"}
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.slow
+def test_from_a_bag_to_a_diagnosis(tmp_path):
+    page = DOCS / "how-to" / "from_a_bag.md"
+    printed = run_page(page, tmp_path)
+    assert differences(page.read_text(), printed) == []
+    assert (tmp_path / "diagnosis" / "diagnosis.json").is_file()

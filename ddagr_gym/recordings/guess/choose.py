@@ -66,7 +66,8 @@ def best_of(
     same = [rival.label for rival, lesser in rivals if lesser.values[:-1] == merit.values[:-1]]
     same = [label for label in dict.fromkeys(same) if label != best.label]
     ambiguous = f"{role}: {' and '.join([best.label, *same])} are alike but for {merit.words[-1]}" if same else ""
-    return Choice(role, best, "; ".join(filter(None, merit.words)), others, ambiguous)
+    why = "; ".join(filter(None, merit.words[:-1])) or "the only one of its kind"
+    return Choice(role, best, why, others, ambiguous)
 
 
 def _difference(best: Merit, other: Merit) -> str:
@@ -225,7 +226,9 @@ def choose_all(trials: Trials) -> dict[str, Choice]:
     """Choices by role: wheels and IMU first, which judge the others."""
     wheels = choose_wheels(trials)
     imu = choose_imu(trials, wheels)
-    wheels = sided(trials, wheels, imu)
+    told = sided(trials, wheels, imu)
+    if told is not wheels:
+        wheels, imu = told, choose_imu(trials, told)
     command = choose_command(trials, imu, wheels)
     pose = choose_pose(trials, imu, wheels)
     return {choice.role: choice for choice in itertools.chain((imu, wheels, command, pose))}
