@@ -131,6 +131,14 @@ def guess_topic_map(
     Raises:
         InputError: no bag or a damaged one, no messages, no type that can be read, several robots without
             ``namespace``, or neither an IMU nor wheels.
+
+    Examples:
+        >>> import ddagr_gym
+        >>> guess = ddagr_gym.guess_topic_map("my_bag", robot="husky")
+        >>> guess.topic_map.topics["command"].topic, guess.missing
+        ('/cmd_vel', ())
+        >>> guess.to_yaml("my_topics.yaml")
+        >>> drive = ddagr_gym.load_recording("my_bag", "my_topics.yaml")
     """
     from ddagr_gym.recordings.guess.propose import propose
     from ddagr_gym.recordings.schema import RobotGeometry

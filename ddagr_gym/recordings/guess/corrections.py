@@ -53,7 +53,8 @@ def _chosen_again(before: Correction) -> Correction:
     """What the wheels as they were may have misjudged, once more."""
     trials, choices = before.trials, dict(before.choices)
     imu = choose_imu(trials, choices["wheels"])
-    if imu.candidate == choices["imu"].candidate:
+    chosen = choices["imu"].candidate
+    if imu.candidate is not None and chosen is not None and imu.candidate.source == chosen.source:
         choices["imu"] = imu
     choices["command"] = choose_command(trials, choices["imu"], choices["wheels"])
     choices["pose"] = choose_pose(trials, choices["imu"], choices["wheels"])
