@@ -7,6 +7,7 @@ import pytest
 
 from benchmarks import gain_search
 from benchmarks.gain_search import (
+    PLANT_SEED,
     SPACES,
     STAGES,
     VALIDATION_SET,
@@ -111,6 +112,16 @@ def test_only_the_validation_set_is_read(tmp_path, monkeypatch):
     monkeypatch.setattr(gain_search, "load_scenarios", lambda name: asked.append(name) or load(name))
     GainSearch("B3", tmp_path / "journal", stages=((2, 1),)).run()
     assert asked == [VALIDATION_SET] == ["V"]
+
+
+def test_the_path_tracker_is_searched_on_development_plants_of_its_own(tmp_path, monkeypatch):
+    asked = []
+    find = gain_search.scenario
+    monkeypatch.setattr(gain_search, "scenario", lambda *given: asked.append(given) or find(*given))
+    monkeypatch.setattr(gain_search, "load_scenarios", lambda name: pytest.fail(f"set {name} was read"))
+    GainSearch("B6", tmp_path / "journal", stages=((2, 2),)).run()
+    assert set(asked) == {("level", 0, PLANT_SEED), ("slope_3", 1, PLANT_SEED)}
+    assert find("level", 0, PLANT_SEED)[1].soils != find("level", 0)[1].soils
 
 
 def test_written_gains_read_back(tmp_path):
