@@ -1,6 +1,6 @@
 """Do the filters know their errors of v_x and v_y? Turns on other plants, errors against the filters' variances.
 
-    python -m benchmarks.filter_velocities [--scenarios 20] [--plants level,slope_3,...] [--output FILE]
+    python -m benchmarks.filter_velocities [--scenarios 12] [--plants level,slope_3,...] [--output FILE]
 
 Turns of B6, which stands for 0.8 s first, on the development scenarios of :mod:`benchmarks.row_turn_plants`; both
 filters see the same samples. Errors count from the end of standing on. Coverage: share of control periods in which an
@@ -167,7 +167,7 @@ def draw(plants: Mapping[str, Mapping[str, Any]], path: Path) -> None:
                 lower.plot([at] * 2, own["nees"]["interval"], "-", color=colour, lw=1.2)
                 lower.plot(at, own["nees"]["value"], "o", color=colour, ms=4.5)
         upper.axhline(90.0, color=palette.GREY, lw=0.8)
-        upper.set(title="Errors within 90 % of the filter's own variance", ylabel="share of time [%]", ylim=(0, 105))
+        upper.set(title="Errors inside the filter's own 90 % interval", ylabel="share of time [%]", ylim=(0, 105))
         lower.axhspan(*next(iter(plants.values()))["filter"]["nees_band"], color=palette.BED, lw=0)
         lower.set(title="NEES of v_x and v_y over 2 (shaded: consistent)", ylabel="mean over drives", yscale="log")
         lower.set_xticks(range(len(plants)), [PLANTS[name].title.replace(" from", "\nfrom") for name in plants],
@@ -193,7 +193,7 @@ def table(result: Mapping[str, Any]) -> str:
 def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--plants", default=",".join(PLANTS), help="names, separated by commas")
-    parser.add_argument("--scenarios", type=int, default=20, help="turns on each plant")
+    parser.add_argument("--scenarios", type=int, default=12, help="turns on each plant")
     parser.add_argument("--output", type=Path, default=RESULT, help="JSON file; the picture lies beside it")
     given = parser.parse_args(arguments)
     try:

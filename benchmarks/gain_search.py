@@ -290,8 +290,8 @@ def write_gains(records: Sequence[dict[str, Any]], path: Path) -> LadderGains:
         gains = SPACES[record["controller"]].apply(gains, record["best"])
     head = (
         "# Gains of the controllers' loops; each output is a curvature [1/m] of at most `limit`. Found by\n"
-        "# `ddagr tune-controllers` on the validation set, those of the path tracker on development plants; its record is\n"
-        "# gain_search.json beside this file.\n"
+        "# `ddagr tune-controllers` on the validation set, those of the path tracker on development plants; its\n"
+        "# record is gain_search.json beside this file.\n"
     )
     with atomic_path(path) as temporary:
         temporary.write_text(head + yaml.safe_dump(asdict(gains), sort_keys=False), encoding="utf-8")

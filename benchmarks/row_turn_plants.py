@@ -184,7 +184,7 @@ def study(controllers: Sequence[str], plants: Sequence[str], scenarios: int) -> 
 
 
 def with_kept(result: dict[str, Any], path: Path) -> dict[str, Any]:
-    """A result with the rows of a file that it did not drive, controllers in the ladder's order.
+    """A result with the rows of a file that it did not drive, in the order of that file.
 
     Raises:
         InputError: no such file, or of other scenarios.
@@ -195,12 +195,8 @@ def with_kept(result: dict[str, Any], path: Path) -> dict[str, Any]:
     for name in ("scenarios", "root_seed"):
         if before[name] != result[name]:
             raise InputError(f"{path} has {name} {before[name]}, not {result[name]}: leave --keep out.")
-    plants = {}
-    for plant in PLANTS:
-        rows = before["plants"].get(plant, {}) | result["plants"].get(plant, {})
-        if rows:
-            plants[plant] = {name: rows[name] for name in controller_names() if name in rows}
-    return result | {"plants": plants}
+    plants = {plant: before["plants"].get(plant, {}) | result["plants"].get(plant, {}) for plant in PLANTS}
+    return result | {"plants": {plant: rows for plant, rows in plants.items() if rows}}
 
 
 def names_of(text: str, known: Sequence[str], what: str) -> list[str]:

@@ -24,9 +24,6 @@ SteadyArc = Callable[["MotionEstimate", float, float], tuple[float, float] | Non
 _LEAST_SPEED = 0.05
 """Estimated forward speed below which heading counts as course [m/s] (ours): at rest a course means nothing."""
 
-_LARGEST_SIDE_SLIP = 0.5
-"""That counts [rad] (ours): an estimate beyond is more likely wrong than true."""
-
 _SPEED_SHARES = tuple(round(1.0 - 0.1 * k, 1) for k in range(6))
 """Of the commanded speed (ours): a bank at its limit steers no more, so that the robot rather drives more slowly."""
 
@@ -120,7 +117,7 @@ def _side_slip(at: MotionEstimate) -> float:
     """Angle from the nose to the direction of motion [rad], counter-clockwise positive."""
     if at.v_x <= _LEAST_SPEED:
         return 0.0
-    return min(max(math.atan2(at.v_y, at.v_x), -_LARGEST_SIDE_SLIP), _LARGEST_SIDE_SLIP)
+    return math.atan2(at.v_y, at.v_x)
 
 
 class PathTracker(TurnController):
@@ -141,18 +138,21 @@ class PathTracker(TurnController):
         side_slip_share: of the angle of side slip in the course, 0 for the heading and 1 for the direction of motion.
         aligning: distance before the next row over which the nose turns into it [m], 0 for not at all; see
             :func:`aligning_path`.
+        largest_side_slip: that counts [rad]: an estimate beyond is more likely wrong than true.
     """
 
     def __init__(
         self, robot: Robot, gains: PidGains, course_gain: float, estimator: MotionEstimator, steady_arc: SteadyArc,
         track_ratio: float = 1.0, lead: float = 0.0, standing: int = 0, ahead: float = 0.0,
         side_slip_share: float = 1.0, aligning: float = 0.0,
+        largest_side_slip: float = math.pi,
     ) -> None:  # fmt: skip
         super().__init__(robot, track_ratio, lead, course_gain)
         self._pid = Pid(gains, CONTROL_PERIOD)
         self._estimator, self._steady_arc = estimator, steady_arc
         self._standing, self._ahead = standing, ahead
         self._side_slip_share, self._aligning = side_slip_share, aligning
+        self._largest_side_slip = largest_side_slip
         self.reset()
 
     def reset(self) -> None:
@@ -197,7 +197,7 @@ class PathTracker(TurnController):
         distance, lateral = self._turn.project(x, y)
         to_go = self._turn.run_in + self._turn.turn_length - float(distance)
         aside, slope = aligning_path(to_go, self._aligning)
-        side_slip = _side_slip(at)
+        side_slip = min(max(_side_slip(at), -self._largest_side_slip), self._largest_side_slip)
         course = yaw + self._side_slip_share * side_slip * (1.0 - slope)
         error = wrap_angle(float(course - self._turn.heading(distance)))
         feed_forward = float(self._turn.curvature(distance + self.lead * seen.target_radius))

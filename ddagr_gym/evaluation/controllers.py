@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -67,6 +67,7 @@ class LadderGains:
         path_tracker_ahead: time by which its errors run ahead [s].
         path_tracker_side_slip: share of the side slip in its course [-].
         path_tracker_aligning: distance over which its nose turns into the next row [m].
+        path_tracker_largest_slip: side slip that counts at most [rad]; not searched.
         true_curvature: of the upper bound of that name.
         true_soil: likewise.
         true_path: likewise, curvature per lateral error.
@@ -86,6 +87,7 @@ class LadderGains:
     path_tracker_ahead: float = 0.0
     path_tracker_side_slip: float = 1.0
     path_tracker_aligning: float = 0.0
+    path_tracker_largest_slip: float = 0.5
 
 
 _Maker = Callable[[RowTurn, LadderGains], Controller]
@@ -179,6 +181,7 @@ def make_path_tracker(estimator: MotionEstimator, flat: FilterModel, standing: i
         return PathTracker(
             ddagr(), loop.gains, gains.path_tracker_course, estimator, steady_arc, ratio, lead, standing,
             gains.path_tracker_ahead, gains.path_tracker_side_slip, gains.path_tracker_aligning,
+            gains.path_tracker_largest_slip,
         )  # fmt: skip
 
     return make
@@ -187,6 +190,15 @@ def make_path_tracker(estimator: MotionEstimator, flat: FilterModel, standing: i
 def _reckoned_tracker(model: FilterModel | InertialModel, standing: int) -> _Maker:
     flat = model if isinstance(model, FilterModel) else model.flat
     return make_path_tracker(DeadReckoning(model), flat, standing)
+
+
+def _make_flat_tracker(turn: RowTurn, gains: LadderGains) -> Controller:
+    """With the gains chosen by hand before B6 was searched, without what B6 has besides since: as it was measured."""
+    before = replace(
+        gains, path_tracker=LoopSettings(PidGains(73.0, 20.0, 0.0, 3.0), 0.43), path_tracker_course=12.0,
+        path_tracker_ahead=0.0, path_tracker_side_slip=1.0, path_tracker_aligning=0.0, path_tracker_largest_slip=np.pi,
+    )  # fmt: skip
+    return _reckoned_tracker(_filter_knowledge()[0], 0)(turn, before)
 
 
 def _make_true_curvature(turn: RowTurn, gains: LadderGains) -> Controller:
@@ -232,8 +244,8 @@ _LADDER: dict[str, tuple[_Maker, str]] = {
         "follows the path by the inertial filter's pose",
     ),
     "B6_flat": (
-        lambda turn, gains: _reckoned_tracker(_filter_knowledge()[0], 0)(turn, gains),
-        "B6 by the pose of the filter that takes the ground for level",
+        _make_flat_tracker,
+        "path tracker by the pose of the filter that takes the ground for level",
     ),
     "true_curvature": (_make_true_curvature, "upper bound, not deployable: PI on the true curvature"),
     "true_soil": (_make_true_soil, "upper bound, not deployable: B4 with the true soil and the true curvature"),
