@@ -12,7 +12,10 @@ from ddagr_gym.recordings.files import write_atomically
 from ddagr_gym.rendering import palette
 from ddagr_gym.reporting.figures import house_style
 
-_COLOURS = (palette.GREY, palette.ORANGE, palette.SKY_BLUE, palette.BLUE, palette.PALE)
+_COLOURS = (
+    palette.GREY, palette.ORANGE, palette.SKY_BLUE, palette.BLUE, palette.PALE, palette.GREEN, palette.PURPLE,
+    palette.VERMILLION, palette.INK,
+)  # fmt: skip
 _SHARE = 0.8  # of the room between plants that bars take
 
 

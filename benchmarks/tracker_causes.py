@@ -35,6 +35,7 @@ from ddagr_gym.evaluation.controllers import (
     inertial_model,
     ladder_gains,
     make_path_tracker,
+    tracker_gains_by_hand,
 )
 from ddagr_gym.evaluation.metrics import turn_metrics
 from ddagr_gym.evaluation.runs import Controller, TurnRun, drive_turn
@@ -134,6 +135,7 @@ def _balanced(interval: int) -> Callable[[InertialModel], InertialModel]:
 
 ARMS = {
     "B6": Arm(),
+    "gains by hand": Arm(gains=tracker_gains_by_hand),
     "not ahead": Arm(gains=lambda gains: replace(gains, path_tracker_ahead=0.0)),
     "not aligning": Arm(gains=lambda gains: replace(gains, path_tracker_aligning=0.0)),
     "seldom balanced": Arm(model=_balanced(_SELDOM)),
@@ -142,7 +144,7 @@ ARMS = {
     "true pose": Arm(_pose),
     "true pose and motion": Arm(_pose_and_motion),
 }
-"""Trackers by name; the first is B6 itself, and three lack one thing of it."""
+"""Trackers by name; the first is B6 itself, the next four lack something of it, the others are told something."""
 
 
 @dataclass(frozen=True)

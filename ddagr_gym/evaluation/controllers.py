@@ -192,13 +192,16 @@ def _reckoned_tracker(model: FilterModel | InertialModel, standing: int) -> _Mak
     return make_path_tracker(DeadReckoning(model), flat, standing)
 
 
-def _make_flat_tracker(turn: RowTurn, gains: LadderGains) -> Controller:
-    """With the gains chosen by hand before B6 was searched, without what B6 has besides since: as it was measured."""
-    before = replace(
+def tracker_gains_by_hand(gains: LadderGains) -> LadderGains:
+    """The path tracker's gains before they were searched, without look-ahead and aligning: those of B6_flat."""
+    return replace(
         gains, path_tracker=LoopSettings(PidGains(73.0, 20.0, 0.0, 3.0), 0.43), path_tracker_course=12.0,
         path_tracker_ahead=0.0, path_tracker_side_slip=1.0, path_tracker_aligning=0.0, path_tracker_largest_slip=np.pi,
     )  # fmt: skip
-    return _reckoned_tracker(_filter_knowledge()[0], 0)(turn, before)
+
+
+def _make_flat_tracker(turn: RowTurn, gains: LadderGains) -> Controller:
+    return _reckoned_tracker(_filter_knowledge()[0], 0)(turn, tracker_gains_by_hand(gains))
 
 
 def _make_true_curvature(turn: RowTurn, gains: LadderGains) -> Controller:
