@@ -48,7 +48,9 @@ def draw(plants: Mapping[str, Mapping[str, Any]], titles: Mapping[str, str], pat
         lower.set_xticks(
             places, [titles[plant].replace(" from", "\nfrom") for plant in plants], rotation=18, ha="right"
         )
-        figure.legend(*upper.get_legend_handles_labels(), loc="outside lower center", ncols=len(names), frameon=False)
+        figure.legend(
+            *upper.get_legend_handles_labels(), loc="outside lower center", ncols=min(len(names), 5), frameon=False
+        )
         write_atomically(path, lambda to: figure.savefig(to, format="png", dpi=130))
 
 
