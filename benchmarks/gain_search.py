@@ -7,7 +7,9 @@ better keeps those. The objective, lower is better::
 
     median |e_R| + 95th percentile of |e_R| / 4 + share of turns that do not succeed
 
-with an undefined radius counted as 1. Scenarios S0 to S8 and T are never touched.
+with an undefined radius counted as 1. B6 is searched on other plants than the nominal one, development scenarios of
+:mod:`benchmarks.row_turn_plants` with a seed of their own, all others on set V. Scenarios S0 to S8 and T are never
+touched.
 """
 
 from __future__ import annotations
@@ -21,7 +23,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.row_turn_plants import scenario
 from ddagr_gym.control.pid import PidGains
+from ddagr_gym.envs.settings import Episode, TurnSettings
 from ddagr_gym.errors import InputError, unknown_name
 from ddagr_gym.evaluation.campaign import scenario_settings
 from ddagr_gym.evaluation.controllers import EKF_CONTROLLERS, LadderGains, LoopSettings, find_controller, ladder_gains
@@ -34,11 +38,17 @@ Array = NDArray[np.float64]
 
 VALIDATION_SET = "V"
 
+PLANT_SEED = 78_002
+"""Of the development plants of a search; those of ``benchmarks/results/row_turn_plants.json`` have another."""
+
 STAGES = ((64, 8), (16, 24), (4, 40))
 """Candidates that are driven on so many scenarios; with the hand-chosen gains 872 episodes for each controller."""
 
 _SPREADS = (0.15, 0.06)
 """Standard deviations of the two rounds of refinement, shares of the box."""
+
+
+_TRACKER = ("course", "ahead", "side_slip", "aligning")  # axes of B6 that are fields of LadderGains
 
 
 @dataclass(frozen=True)
@@ -49,11 +59,13 @@ class SearchSpace:
         axes: (name, low, high) each, low above 0.
         start: values chosen by hand before any search, in the order of the axes.
         apply: (gains, values by name) -> gains with these values.
+        plants: names of :data:`benchmarks.row_turn_plants.PLANTS` that are driven in turn, instead of set V.
     """
 
     axes: tuple[tuple[str, float, float], ...]
     start: tuple[float, ...]
     apply: Callable[[LadderGains, dict[str, float]], LadderGains]
+    plants: tuple[str, ...] = ()
 
     def values(self, point: Array) -> dict[str, float]:
         """Values at a point of the unit cube, to four digits."""
@@ -70,8 +82,7 @@ def _loop(field: str, limit: float) -> Callable[[LadderGains, dict[str, float]],
         changed: dict[str, Any] = {field: loop}
         if "heading" in values:
             changed["true_path_heading"] = values["heading"]
-        if "course" in values:
-            changed["path_tracker_course"] = values["course"]
+        changed |= {f"path_tracker_{name}": values[name] for name in _TRACKER if name in values}
         return replace(gains, **changed)
 
     return apply
@@ -107,9 +118,18 @@ SPACES = {
         lambda gains, values: replace(gains, predictive=replace(gains.predictive, **values)),  # type: ignore[arg-type]
     ),
     "B6": SearchSpace(
-        (("proportional", 20.0, 150.0), ("integral", 0.5, 50.0), ("course", 4.0, 15.0), _LEAD),
-        (73.0, 20.0, 12.0, 0.43),
+        (
+            ("proportional", 20.0, 150.0),
+            ("integral", 0.5, 50.0),
+            ("course", 6.0, 30.0),
+            ("lead_factor", 0.05, 1.0),
+            ("ahead", 0.05, 0.4),
+            ("side_slip", 0.3, 1.0),
+            ("aligning", 0.1, 0.6),
+        ),
+        (73.0, 20.0, 18.0, 0.05, 0.2, 0.7, 0.3),
         _loop("path_tracker", 3.0),
+        ("level", "slope_3", "late", "slope_5", "lateral_0.8", "slope_3", "weaker", "slope_5"),
     ),
     "true_curvature": SearchSpace(
         (("proportional", 0.02, 5.0), ("integral", 0.05, 40.0), ("derivative", 1e-4, 0.3), _LEAD),
@@ -164,7 +184,7 @@ class GainSearch:
             raise unknown_name("controller with gains", controller, SPACES)
         self.controller, self.space, self.seed = controller, SPACES[controller], seed
         self.stages, self._progress, self._journal = tuple(stages), progress, journal
-        self._scenarios = load_scenarios(VALIDATION_SET)[: self.stages[-1][1]]
+        self._scenarios = [] if self.space.plants else load_scenarios(VALIDATION_SET)[: self.stages[-1][1]]
         self._driven = self._read()
 
     def _read(self) -> dict[tuple[str, int], tuple[float | None, bool]]:
@@ -179,14 +199,19 @@ class GainSearch:
                     driven[item["values"], item["number"]] = (item["error"], item["success"])
         return driven
 
+    def _scenario(self, number: int) -> tuple[TurnSettings, Episode, int]:
+        plants = self.space.plants
+        if plants:
+            return scenario(plants[number % len(plants)], number, PLANT_SEED)
+        found = self._scenarios[number]
+        return scenario_settings(found, self.controller in EKF_CONTROLLERS), found.episode, found.seed
+
     def _drive(self, values: dict[str, float], number: int) -> tuple[float | None, bool]:
         key = json.dumps(values)
         if (key, number) not in self._driven:
-            scenario = self._scenarios[number]
+            settings, episode, seed = self._scenario(number)
             gains = self.space.apply(ladder_gains(), values)
-            made = find_controller(self.controller, scenario.episode.turn, gains)
-            settings = scenario_settings(scenario, self.controller in EKF_CONTROLLERS)
-            run = drive_turn(made, settings, scenario.seed, scenario.episode)
+            run = drive_turn(find_controller(self.controller, episode.turn, gains), settings, seed, episode)
             error = turn_metrics(run.columns, run.episode.turn, run.episode.robot).turn.error
             self._driven[key, number] = (error, run.success)
             row = {"controller": self.controller, "values": key, "number": number, "error": error}
@@ -265,7 +290,8 @@ def write_gains(records: Sequence[dict[str, Any]], path: Path) -> LadderGains:
         gains = SPACES[record["controller"]].apply(gains, record["best"])
     head = (
         "# Gains of the controllers' loops; each output is a curvature [1/m] of at most `limit`. Found by\n"
-        "# `ddagr tune-controllers` on the validation set; its record is gain_search.json beside this file.\n"
+        "# `ddagr tune-controllers` on the validation set, those of the path tracker on development plants; its\n"
+        "# record is gain_search.json beside this file.\n"
     )
     with atomic_path(path) as temporary:
         temporary.write_text(head + yaml.safe_dump(asdict(gains), sort_keys=False), encoding="utf-8")

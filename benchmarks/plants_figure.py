@@ -12,7 +12,10 @@ from ddagr_gym.recordings.files import write_atomically
 from ddagr_gym.rendering import palette
 from ddagr_gym.reporting.figures import house_style
 
-_COLOURS = (palette.GREY, palette.ORANGE, palette.SKY_BLUE, palette.BLUE, palette.PALE)
+_COLOURS = (
+    palette.GREY, palette.ORANGE, palette.SKY_BLUE, palette.BLUE, palette.PALE, palette.GREEN, palette.PURPLE,
+    palette.VERMILLION, palette.INK,
+)  # fmt: skip
 _SHARE = 0.8  # of the room between plants that bars take
 
 
@@ -45,7 +48,9 @@ def draw(plants: Mapping[str, Mapping[str, Any]], titles: Mapping[str, str], pat
         lower.set_xticks(
             places, [titles[plant].replace(" from", "\nfrom") for plant in plants], rotation=18, ha="right"
         )
-        figure.legend(*upper.get_legend_handles_labels(), loc="outside lower center", ncols=len(names), frameon=False)
+        figure.legend(
+            *upper.get_legend_handles_labels(), loc="outside lower center", ncols=min(len(names), 5), frameon=False
+        )
         write_atomically(path, lambda to: figure.savefig(to, format="png", dpi=130))
 
 

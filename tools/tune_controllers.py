@@ -18,7 +18,7 @@ EXAMPLES = (
 
 @dataclass(frozen=True)
 class Arguments:
-    """Search the controllers' gains on the validation set.
+    """Search the controllers' gains on the validation set, those of B6 on development plants.
 
     Every controller gets the same budget, scenarios and objective: see benchmarks.gain_search. An interrupted
     search continues when it is started again with the same folder. The result, ladder_gains.yaml and gain_search.json,

@@ -80,6 +80,46 @@ class MotionEstimator(Protocol):
         """The estimate as it stands."""
 
 
+def carried(at: MotionEstimate, time: float) -> tuple[float, float, float]:
+    """Pose x [m], y [m], yaw [rad] after a time [s] of the same motion: a command acts on that and not on the present.
+
+    Without it a command that comes 0.1 s late makes the loop swing.
+    """
+    middle = at.yaw + 0.5 * time * at.yaw_rate
+    cosine, sine = math.cos(middle), math.sin(middle)
+    x = at.x + time * (cosine * at.v_x - sine * at.v_y)
+    y = at.y + time * (sine * at.v_x + cosine * at.v_y)
+    return x, y, at.yaw + time * at.yaw_rate
+
+
+def aligning_path(to_go: float, length: float) -> tuple[float, float]:
+    """How far aside of the path a robot that slips sideways should be, per side slip, and the derivative (ours).
+
+    On a slope the nose points uphill while the robot goes straight, and the front wheels would miss the furrow. So it
+    comes up to the row a little uphill, and the nose turns into the row while the robot slips down to it.
+
+    Args:
+        to_go: distance to the next row's start line [m], negative behind it.
+        length: scale of the manoeuvre [m]; 0 for none.
+
+    Returns:
+        ``d exp(-(d/length)^2)`` [m/rad], 0 behind the line, and its derivative by d [1/rad]: 1 at the line, where the
+        wanted course is off the row by the whole side slip and the nose is not.
+    """
+    if length == 0.0:
+        return 0.0, 0.0
+    squared = (to_go / length) ** 2
+    fading = math.exp(-squared)
+    return max(to_go, 0.0) * fading, (1.0 - 2.0 * squared) * fading
+
+
+def _side_slip(at: MotionEstimate) -> float:
+    """Angle from the nose to the direction of motion [rad], counter-clockwise positive."""
+    if at.v_x <= _LEAST_SPEED:
+        return 0.0
+    return math.atan2(at.v_y, at.v_x)
+
+
 class PathTracker(TurnController):
     """Follows the commanded path by the estimated pose; theory: control, eq. (7).
 
@@ -94,16 +134,25 @@ class PathTracker(TurnController):
         track_ratio: see :class:`TurnController`; serves where the estimated soil has no solution.
         lead: heading by which the feed-forward runs ahead, for the motors' lag [rad].
         standing: control periods for which the robot stands before it drives, so that the estimator knows gravity.
+        ahead: time by which the errors run ahead of the estimate, for the lag of commands and motors [s].
+        side_slip_share: of the angle of side slip in the course, 0 for the heading and 1 for the direction of motion.
+        aligning: distance before the next row over which the nose turns into it [m], 0 for not at all; see
+            :func:`aligning_path`.
+        largest_side_slip: that counts [rad]: an estimate beyond is more likely wrong than true.
     """
 
     def __init__(
         self, robot: Robot, gains: PidGains, course_gain: float, estimator: MotionEstimator, steady_arc: SteadyArc,
-        track_ratio: float = 1.0, lead: float = 0.0, standing: int = 0,
+        track_ratio: float = 1.0, lead: float = 0.0, standing: int = 0, ahead: float = 0.0,
+        side_slip_share: float = 1.0, aligning: float = 0.0,
+        largest_side_slip: float = math.pi,
     ) -> None:  # fmt: skip
         super().__init__(robot, track_ratio, lead, course_gain)
         self._pid = Pid(gains, CONTROL_PERIOD)
         self._estimator, self._steady_arc = estimator, steady_arc
-        self._standing = standing
+        self._standing, self._ahead = standing, ahead
+        self._side_slip_share, self._aligning = side_slip_share, aligning
+        self._largest_side_slip = largest_side_slip
         self.reset()
 
     def reset(self) -> None:
@@ -140,14 +189,18 @@ class PathTracker(TurnController):
         return speeds
 
     def curvature(self, seen: TurnObservation, phase: Phase, info: Any) -> float:
-        """Curvature of the path a little ahead, corrected by the estimated errors [1/m]."""
+        """Curvature of the path a little ahead, corrected by the errors that the estimate leads to [1/m]."""
         at = self._estimate
         assert self._turn is not None
         assert at is not None
-        distance, lateral = self._turn.project(at.x, at.y)
-        course = at.yaw + (math.atan2(at.v_y, at.v_x) if at.v_x > _LEAST_SPEED else 0.0)
+        x, y, yaw = carried(at, self._ahead)
+        distance, lateral = self._turn.project(x, y)
+        to_go = self._turn.run_in + self._turn.turn_length - float(distance)
+        aside, slope = aligning_path(to_go, self._aligning)
+        side_slip = min(max(_side_slip(at), -self._largest_side_slip), self._largest_side_slip)
+        course = yaw + self._side_slip_share * side_slip * (1.0 - slope)
         error = wrap_angle(float(course - self._turn.heading(distance)))
         feed_forward = float(self._turn.curvature(distance + self.lead * seen.target_radius))
-        correction = self._pid.update(-float(lateral)) - self.heading_gain * error
+        correction = self._pid.update(-float(lateral) - side_slip * aside) - self.heading_gain * error
         largest = _LARGEST_CORRECTION / seen.target_radius
         return feed_forward + min(max(correction, -largest), largest)

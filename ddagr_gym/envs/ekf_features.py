@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from ddagr_gym.control.observation import EKF_FEATURES, FEATURE_SCALES
 from ddagr_gym.envs.turn_kernel import OBSERVATION_LIMIT
-from ddagr_gym.estimation import BatchFilter, FilterModel
+from ddagr_gym.errors import unknown_name
+from ddagr_gym.estimation import BatchFilter, FilterModel, InertialBatch, InertialModel
 from ddagr_gym.estimation.layout import CHANNEL_SIZE, OMEGA, PARAMETER, PARAMETER_SIZE
 from ddagr_gym.jit import kernel
 from ddagr_gym.parameters import Robot, Sensors
@@ -19,13 +20,23 @@ Array = NDArray[np.float64]
 
 FEATURE_COUNT = len(EKF_FEATURES)
 
+FILTERS = ("flat", "inertial")
+"""Filters that make features: the one that takes the ground for level, and the inertial one."""
+
+
+def check_filter(name: str) -> str:
+    """``name`` if it is one of FILTERS, else an InputError."""
+    if name not in FILTERS:
+        raise unknown_name("filter", name, FILTERS)
+    return name
+
 
 @kernel()
 def write_features(
     states: Array, covariances: Array, prior: Array, outer_radius: float, half_track: float, scales: Array,
     features: NDArray[np.float32],
 ) -> None:  # fmt: skip
-    """Scaled features (N, FEATURE_COUNT) of filter states (N, 12) and covariances (N, 12, 12)."""
+    """Scaled features (N, FEATURE_COUNT) of states (N, S) and covariances (N, S, S), of which the first 12 count."""
     values = np.zeros(FEATURE_COUNT)
     for n in range(states.shape[0]):
         state = states[n]
@@ -48,11 +59,17 @@ class EkfFeatureBatch:
         robot: nominal robot.
         sensors: nominal sensors.
         count: N.
+        kind: of FILTERS.
+
+    Raises:
+        InputError: another kind.
     """
 
-    def __init__(self, robot: Robot, sensors: Sensors, count: int) -> None:
+    def __init__(self, robot: Robot, sensors: Sensors, count: int, kind: str = "flat") -> None:
         model = FilterModel.of(robot, sensors)
-        self.filter = BatchFilter(model, count)
+        self.filter: BatchFilter | InertialBatch = BatchFilter(model, count)
+        if check_filter(kind) == "inertial":
+            self.filter = InertialBatch(InertialModel.of(robot, sensors), count)
         self._prior = model.soil_prior.logs(model.wheel_load)[0]
         self._outer_radius = model.outer_radius
         self._half_track = robot.half_track

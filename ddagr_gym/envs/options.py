@@ -67,6 +67,7 @@ def make_settings(
     effects: Effects = (),
     numerics: Numerics = Numerics(),
     ekf_features: bool = False,
+    filter: str = "flat",
     calibration: str | Path | None = None,
     ground: str = "",
 ) -> TurnSettings:
@@ -106,6 +107,7 @@ def make_settings(
         effects=load_effects(effects),
         numerics=numerics,
         ekf_features=ekf_features,
+        filter=filter,
         calibrated=calibrated,
     )
 

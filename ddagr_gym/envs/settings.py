@@ -8,6 +8,7 @@ import numpy as np
 
 from ddagr_gym.control.row_turn import SIDES, RowTurn
 from ddagr_gym.envs.calibrated_draws import CalibratedDraws
+from ddagr_gym.envs.ekf_features import check_filter
 from ddagr_gym.errors import InputError, unknown_name
 from ddagr_gym.parameters import Imu, Numerics, Robot, Sensors, Soil
 from ddagr_gym.physics.effects import Effect
@@ -112,6 +113,7 @@ class TurnSettings(Validated):
         effects: missing physics.
         numerics: accuracy.
         ekf_features: append the filter's estimates to the observation.
+        filter: "flat" takes the ground for level, "inertial" knows slopes; either makes the features.
         calibrated: robots and soils of a calibration, drawn instead of ``robot`` and ``soil``.
     """
 
@@ -129,8 +131,11 @@ class TurnSettings(Validated):
     numerics: Numerics = Numerics()
     ekf_features: bool = False
     calibrated: CalibratedDraws | None = None
+    filter: str = "flat"
 
     def _check(self) -> None:
+        if check_filter(self.filter) != "flat" and not self.ekf_features:
+            raise InputError(f"the filter is {self.filter!r} and nothing shows it: give ekf_features=True too.")
         if self.side != "random" and self.side not in SIDES:
             raise unknown_name("side", self.side, [*SIDES, "random"])
         for name, value in (("radius", self.radius), ("speed", self.speed)):

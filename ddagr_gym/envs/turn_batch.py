@@ -63,7 +63,9 @@ class TurnBatch:
         self._noise = np.zeros((count, CONTROL_INTERVAL, layout.NOISE_CHANNELS))
         self._outer_radius = np.zeros(count)
         self._weights = np.array(astuple(settings.reward))
-        self.features = EkfFeatureBatch(settings.robot, settings.sensors, count) if settings.ekf_features else None
+        self.features = (
+            EkfFeatureBatch(settings.robot, settings.sensors, count, settings.filter) if settings.ekf_features else None
+        )
         entries = len(OBSERVATION) + (FEATURE_COUNT if settings.ekf_features else 0)
         self.observation_space = spaces.Box(-kernel.OBSERVATION_LIMIT, kernel.OBSERVATION_LIMIT, (entries,), np.float32)
         self.command_limit = settings.robot.maximum_wheel_speed

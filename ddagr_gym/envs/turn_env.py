@@ -51,7 +51,8 @@ class TurnEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     ===  ==================  ========  ============  ==========================================================
 
     ``ekf_features=True``, or the id ``DDAGR-Turn-EKF-v0``, appends the twelve entries of
-    :data:`ddagr_gym.control.observation.EKF_FEATURES`: what the filter makes of the raw samples.
+    :data:`ddagr_gym.control.observation.EKF_FEATURES`: what the filter makes of the raw samples. ``filter="inertial"``
+    takes the inertial filter, which knows slopes, instead of the one that takes the ground for level.
 
     ## Reward
     Weighted sum of named terms, :data:`ddagr_gym.envs.turn_kernel.TERMS`; weights by ``reward=RewardWeights(...)``.
@@ -73,7 +74,7 @@ class TurnEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     ## Arguments
     ``robot, soil, radius, side, run_in, run_out, speed, sensors, randomisation, reward, effects, numerics,
-    ekf_features, calibration, ground`` as in :func:`ddagr_gym.envs.options.make_settings`; ``render_mode``,
+    ekf_features, filter, calibration, ground`` as in :func:`ddagr_gym.envs.options.make_settings`; ``render_mode``,
     ``info_level``. ``reset(options={"episode": e})``
     repeats a given :class:`Episode`; ``env.unwrapped.episode`` is the present one.
 

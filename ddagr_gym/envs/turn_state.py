@@ -9,15 +9,19 @@ import numpy as np
 
 from ddagr_gym.envs.turn_vector_env import TurnVectorEnv
 from ddagr_gym.errors import InputError
+from ddagr_gym.estimation import BatchFilter, InertialBatch
 
 _SIMULATOR = ("rows", "effect_parameters", "effect_memory", "field_index", "_fields", "_field_geometry")
 _BATCH = ("tasks", "readings", "record", "terms", "commands", "_outer_radius")
 _ENVIRONMENT = ("_observations", "_rewards", "_steps", "_ended")
-_FILTER = ("states", "covariances", "_counts")
 
 
 def _arrays(owner: object, names: tuple[str, ...]) -> dict[str, Any]:
     return {name: getattr(owner, name).copy() for name in names}
+
+
+def _filter_arrays(own: BatchFilter | InertialBatch) -> dict[str, Any]:
+    return _arrays(own, own.REMEMBERED)
 
 
 def save_state(env: TurnVectorEnv) -> dict[str, Any]:
@@ -27,7 +31,7 @@ def save_state(env: TurnVectorEnv) -> dict[str, Any]:
         "simulator": _arrays(batch.simulator, _SIMULATOR),
         "batch": _arrays(batch, _BATCH),
         "environment": _arrays(env, _ENVIRONMENT),
-        "filter": None if batch.features is None else _arrays(batch.features.filter, _FILTER),
+        "filter": None if batch.features is None else _filter_arrays(batch.features.filter),
         "episodes": list(batch.episodes),
         "seeds": list(env._seeds),
         "generators": [copy.deepcopy(rng.bit_generator.state) for rng in env._rngs],
@@ -44,10 +48,12 @@ def restore_state(env: TurnVectorEnv, state: dict[str, Any]) -> None:
         InputError: the state is of a batch of another size, or with other features.
     """
     batch = env.batch
-    if len(state["episodes"]) != batch.count or (state["filter"] is None) != (batch.features is None):
+    known = () if state["filter"] is None else tuple(state["filter"])
+    wanted = () if batch.features is None else batch.features.filter.REMEMBERED
+    if len(state["episodes"]) != batch.count or known != wanted:
         raise InputError(
             f"the state is of {len(state['episodes'])} environments"
-            f"{'' if state['filter'] is None else ' with the filter'}: this batch is not alike."
+            f"{'' if state['filter'] is None else ' with a filter'}: this batch, or its filter, is not alike."
         )
     # grids may have another shape than those of a new batch: assigned, not copied into
     for name, value in state["simulator"].items():

@@ -58,6 +58,7 @@ from ddagr_gym.estimation.filter import BatchFilter, Filter, FilterRun, roll_out
 from ddagr_gym.estimation.filter_model import FilterModel, FilterNoise, SoilPrior
 from ddagr_gym.estimation.force_laws import ForceLaw
 from ddagr_gym.estimation.inertial_filter import (
+    InertialBatch,
     InertialFilter,
     InertialKnowledge,
     InertialModel,
@@ -84,6 +85,7 @@ __all__ = [
     "FilterNoise",
     "FilterRun",
     "ForceLaw",
+    "InertialBatch",
     "InertialFilter",
     "InertialKnowledge",
     "InertialModel",

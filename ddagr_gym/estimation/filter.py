@@ -32,6 +32,9 @@ class BatchFilter:
         covariances: (N, 12, 12).
     """
 
+    REMEMBERED = ("states", "covariances", "_counts")
+    """Arrays that it goes on from."""
+
     def __init__(self, model: FilterModel, count: int = 1) -> None:
         if count < 1:
             raise InputError(f"count is {count}: give at least one robot.")

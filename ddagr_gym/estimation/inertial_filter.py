@@ -15,7 +15,7 @@ from ddagr_gym.errors import InputError
 from ddagr_gym.estimation import inertial_layout as layout
 from ddagr_gym.estimation.columns import sample_times, stack_columns
 from ddagr_gym.estimation.filter_model import FilterModel, FilterNoise, SoilPrior
-from ddagr_gym.estimation.inertial_kernels import inertial_series
+from ddagr_gym.estimation.inertial_kernels import inertial_rows, inertial_series
 from ddagr_gym.estimation.layout import CHANNELS, COMMANDS, X
 from ddagr_gym.parameters import Robot, Sensors
 from ddagr_gym.validated import Validated, bounded
@@ -50,7 +50,7 @@ class InertialKnowledge(Validated):
     balance_y: float = bounded("m/s^2", 0.0, 1e3, default=0.1, open_low=True)
     balance_turn: float = bounded("rad/s^2", 0.0, 1e3, default=0.1, open_low=True)
     balance_learning: float = bounded("-", 0.0, 1e9, default=10.0)
-    balance_interval: int = 10
+    balance_interval: int = 3
     launch_speed: float = bounded("m/s", 0.0, 10.0, default=0.1)
     launch_slip: float = bounded("-", 0.0, 10.0, default=0.3)
     launch_floor: float = bounded("m/s", 0.0, 10.0, default=2e-3, open_low=True)
@@ -58,8 +58,8 @@ class InertialKnowledge(Validated):
     unknown_acceleration: float = bounded("m/s^2/sqrt(Hz)", 0.0, 1e3, default=0.1)
     gravity_deviation: float = bounded("m/s^2", 0.0, 10.0, default=0.6, open_low=True)
     gravity_walk: float = bounded("m/s^2/sqrt(s)", 0.0, 10.0, default=3e-4)
-    patch_ahead: float = bounded("m", -1.0, 1.0, default=0.031)
-    patch_deviation: float = bounded("m", 0.0, 1.0, default=0.02, open_low=True)
+    patch_ahead: float = bounded("m", -1.0, 1.0, default=0.026)
+    patch_deviation: float = bounded("m", 0.0, 1.0, default=0.025, open_low=True)
     patch_time: float = bounded("s", 0.0, 1e3, default=5.0, open_low=True)
 
     def _check(self) -> None:
@@ -85,8 +85,8 @@ class InertialModel:
 
         The lateral law is not taken as known (``coupling_deviation``): bulldozing and side walls change it by a fifth.
         """
-        noise = FilterNoise.from_sensors(sensors, acceleration=5e-4, yaw_acceleration=0.03, soil=0.05)
-        prior = SoilPrior(coupling_deviation=0.10)
+        noise = FilterNoise.from_sensors(sensors, acceleration=5e-4, yaw_acceleration=0.02, soil=0.05)
+        prior = SoilPrior(coupling_deviation=0.15)
         return cls(FilterModel.of(robot, sensors, noise=noise, prior=prior))
 
     def initial(self) -> tuple[Array, Array]:
@@ -172,6 +172,79 @@ class InertialFilter:
         )  # fmt: skip
         self._count += len(readings)
         return states, standardised
+
+
+class InertialBatch:
+    """Inertial filters of N robots that share one model, with the face of :class:`~ddagr_gym.estimation.BatchFilter`.
+
+    Args:
+        model: what the filters know.
+        count: N.
+    """
+
+    REMEMBERED = ("works", "_counts")
+    """Arrays that it goes on from."""
+
+    def __init__(self, model: InertialModel, count: int = 1) -> None:
+        if count < 1:
+            raise InputError(f"count is {count}: give at least one robot.")
+        self.model = model
+        self.count = count
+        self.works = np.zeros((count, layout.WORK_SIZE))
+        self._packed = model.pack()
+        self._counts = np.zeros(count, dtype=np.int64)
+        self.reset()
+
+    @property
+    def states(self) -> Array:
+        """(N, 15), see :data:`~ddagr_gym.estimation.inertial_layout.INERTIAL_STATE`; a copy."""
+        return self.works[:, X : X + layout.INERTIAL_STATE_SIZE].copy()
+
+    @property
+    def covariances(self) -> Array:
+        """(N, 15, 15); a copy."""
+        return _covariances(self.works).copy()
+
+    def reset(self, chosen: ArrayLike | None = None) -> None:
+        """Start from the prior, at rest; ``chosen``: indices of robots, all by default."""
+        indices = np.arange(self.count) if chosen is None else np.atleast_1d(np.asarray(chosen))
+        state, covariance = self.model.initial()
+        self.works[indices] = 0.0
+        self.works[indices, X : X + len(state)] = state
+        _covariances(self.works)[indices] = covariance
+        self._counts[indices] = 0
+
+    def step(self, commands: ArrayLike, readings: ArrayLike) -> Array:
+        """Predict and correct through samples.
+
+        Args:
+            commands: (N, 2) right and left bank speed commands, constant over the samples [rad/s]; NaN: unknown.
+            readings: (N, K, 5) in the order of ``CHANNELS``; NaN where a channel has no sample.
+
+        Returns:
+            Standardised innovations (N, K, 5).
+
+        Raises:
+            InputError: shapes that do not fit.
+        """
+        drive = np.ascontiguousarray(commands, dtype=np.float64)
+        samples = np.ascontiguousarray(readings, dtype=np.float64)
+        if drive.shape != (self.count, 2) or samples.ndim != 3 or samples.shape[::2] != (self.count, len(CHANNELS)):
+            raise InputError(
+                f"commands and readings have shapes {drive.shape}, {samples.shape}: give ({self.count}, 2) and "
+                f"({self.count}, K, {len(CHANNELS)})."
+            )
+        standardised = np.empty(samples.shape)
+        period = float(self.model.flat.sample_period)
+        inertial_rows(self._packed, self._counts, drive, samples, period, standardised, self.works)
+        return standardised
+
+
+def _covariances(works: Array) -> Array:
+    """(N, 15, 15) of workspaces (N, WORK_SIZE); a view."""
+    size = layout.INERTIAL_STATE_SIZE
+    whole = works[:, layout.Q : layout.Q + 16 * layout.STRIDE]
+    return whole.reshape(len(works), 16, layout.STRIDE)[:, :size, :size]
 
 
 def run_inertial_filter(model: InertialModel, columns: Mapping[str, ArrayLike]) -> tuple[Array, Array]:

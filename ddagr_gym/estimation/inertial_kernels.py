@@ -356,3 +356,25 @@ def inertial_series(
         )  # fmt: skip
         for i in range(INERTIAL_STATE_SIZE):
             states[k, i] = work[X + i]
+
+
+@kernel()
+def inertial_rows(
+    model: Array, counts: NDArray[np.int64], commands: Array, readings: Array, duration: float, standardised: Array,
+    works: Array,
+) -> None:  # fmt: skip
+    """Every robot through all its samples.
+
+    Args:
+        model: packed model.
+        counts: (N,) samples seen, updated.
+        commands: (N, 2) [rad/s].
+        readings: (N, K, 5).
+        duration: between samples [s].
+        standardised: (N, K, 5), written.
+        works: (N, WORK_SIZE), updated.
+    """
+    for n in range(readings.shape[0]):
+        for k in range(readings.shape[1]):
+            counts[n] += 1
+            inertial_sample(model, works[n], commands[n], readings[n, k], counts[n], duration, standardised[n, k])

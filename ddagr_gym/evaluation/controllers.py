@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -14,7 +14,7 @@ from ddagr_gym.config import configs_dir, load_config
 from ddagr_gym.control.constant_speeds import ConstantSpeeds
 from ddagr_gym.control.force_balance import ForceBalance
 from ddagr_gym.control.model_predictive import ModelPredictive, PredictiveSettings
-from ddagr_gym.control.path_tracker import MotionEstimate, PathTracker
+from ddagr_gym.control.path_tracker import MotionEstimate, MotionEstimator, PathTracker
 from ddagr_gym.control.pid import PidGains
 from ddagr_gym.control.predictive_model import PredictiveModel
 from ddagr_gym.control.radial_pid import RadialPid
@@ -64,6 +64,10 @@ class LadderGains:
         predictive: of B5.
         path_tracker: of B6, curvature per cross-track error.
         path_tracker_course: its curvature per course error [1/(m rad)].
+        path_tracker_ahead: time by which its errors run ahead [s].
+        path_tracker_side_slip: share of the side slip in its course [-].
+        path_tracker_aligning: distance over which its nose turns into the next row [m].
+        path_tracker_largest_slip: side slip that counts at most [rad]; not searched.
         true_curvature: of the upper bound of that name.
         true_soil: likewise.
         true_path: likewise, curvature per lateral error.
@@ -80,6 +84,10 @@ class LadderGains:
     path_tracker: LoopSettings
     true_path_heading: float = 3.0
     path_tracker_course: float = 4.0
+    path_tracker_ahead: float = 0.0
+    path_tracker_side_slip: float = 1.0
+    path_tracker_aligning: float = 0.0
+    path_tracker_largest_slip: float = 0.5
 
 
 _Maker = Callable[[RowTurn, LadderGains], Controller]
@@ -155,8 +163,14 @@ def inertial_model() -> InertialModel:
     return InertialModel.of(ddagr(), Sensors())
 
 
-def _make_path_tracker(model: FilterModel | InertialModel, standing: int) -> _Maker:
-    flat = model if isinstance(model, FilterModel) else model.flat
+def make_path_tracker(estimator: MotionEstimator, flat: FilterModel, standing: int) -> _Maker:
+    """Maker of path trackers by their turn and the ladder's gains.
+
+    Args:
+        estimator: of the pose.
+        flat: robot and force law of the feed-forward.
+        standing: control periods for which it stands before it drives.
+    """
 
     def steady_arc(at: MotionEstimate, speed: float, curvature: float) -> tuple[float, float] | None:
         return arc_bank_speeds(flat, at.soil, speed, curvature, at.gravity)
@@ -165,10 +179,29 @@ def _make_path_tracker(model: FilterModel | InertialModel, standing: int) -> _Ma
         constants, loop = nominal_constants(turn), gains.path_tracker
         ratio, lead = _track_ratio(constants, turn), loop.lead_factor * constants.lead
         return PathTracker(
-            ddagr(), loop.gains, gains.path_tracker_course, DeadReckoning(model), steady_arc, ratio, lead, standing
-        )
+            ddagr(), loop.gains, gains.path_tracker_course, estimator, steady_arc, ratio, lead, standing,
+            gains.path_tracker_ahead, gains.path_tracker_side_slip, gains.path_tracker_aligning,
+            gains.path_tracker_largest_slip,
+        )  # fmt: skip
 
     return make
+
+
+def _reckoned_tracker(model: FilterModel | InertialModel, standing: int) -> _Maker:
+    flat = model if isinstance(model, FilterModel) else model.flat
+    return make_path_tracker(DeadReckoning(model), flat, standing)
+
+
+def tracker_gains_by_hand(gains: LadderGains) -> LadderGains:
+    """The path tracker's gains before they were searched, without look-ahead and aligning: those of B6_flat."""
+    return replace(
+        gains, path_tracker=LoopSettings(PidGains(73.0, 20.0, 0.0, 3.0), 0.43), path_tracker_course=12.0,
+        path_tracker_ahead=0.0, path_tracker_side_slip=1.0, path_tracker_aligning=0.0, path_tracker_largest_slip=np.pi,
+    )  # fmt: skip
+
+
+def _make_flat_tracker(turn: RowTurn, gains: LadderGains) -> Controller:
+    return _reckoned_tracker(_filter_knowledge()[0], 0)(turn, tracker_gains_by_hand(gains))
 
 
 def _make_true_curvature(turn: RowTurn, gains: LadderGains) -> Controller:
@@ -210,12 +243,12 @@ _LADDER: dict[str, tuple[_Maker, str]] = {
     "B4": (_make_force_balance, "force balance at the filter's estimate and PI on the estimated curvature"),
     "B5": (lambda turn, gains: _predictive(gains.predictive), "model-predictive control at the filter's estimate"),
     "B6": (
-        lambda turn, gains: _make_path_tracker(inertial_model(), STANDING)(turn, gains),
+        lambda turn, gains: _reckoned_tracker(inertial_model(), STANDING)(turn, gains),
         "follows the path by the inertial filter's pose",
     ),
     "B6_flat": (
-        lambda turn, gains: _make_path_tracker(_filter_knowledge()[0], 0)(turn, gains),
-        "B6 by the pose of the filter that takes the ground for level",
+        _make_flat_tracker,
+        "path tracker by the pose of the filter that takes the ground for level",
     ),
     "true_curvature": (_make_true_curvature, "upper bound, not deployable: PI on the true curvature"),
     "true_soil": (_make_true_soil, "upper bound, not deployable: B4 with the true soil and the true curvature"),

@@ -26,20 +26,21 @@ class EKFObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArg
 
     Args:
         env: a :class:`ddagr_gym.envs.TurnEnv` made with ``info_level="full"``.
+        filter: "flat" takes the ground for level, "inertial" knows slopes.
 
     Raises:
-        InputError: at the first reset of an environment without raw samples in its info.
+        InputError: an unknown filter; at the first reset of an environment without raw samples in its info.
     """
 
-    def __init__(self, env: gymnasium.Env[Any, Any]) -> None:
-        RecordConstructorArgs.__init__(self)
+    def __init__(self, env: gymnasium.Env[Any, Any], filter: str = "flat") -> None:
+        RecordConstructorArgs.__init__(self, filter=filter)
         gymnasium.Wrapper.__init__(self, env)
         (entries,) = env.observation_space.shape or (0,)
         self.observation_space = spaces.Box(
             -OBSERVATION_LIMIT, OBSERVATION_LIMIT, (entries + FEATURE_COUNT,), np.float32
         )
         settings = self.get_wrapper_attr("settings")
-        self._features = EkfFeatureBatch(settings.robot, settings.sensors, 1)
+        self._features = EkfFeatureBatch(settings.robot, settings.sensors, 1, filter)
 
     def _with_features(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
         features = np.empty((1, FEATURE_COUNT), dtype=np.float32)

@@ -7,6 +7,7 @@ import pytest
 
 from benchmarks import gain_search
 from benchmarks.gain_search import (
+    PLANT_SEED,
     SPACES,
     STAGES,
     VALIDATION_SET,
@@ -46,6 +47,9 @@ def test_values_span_the_box_logarithmically():
         assert middle[name] == pytest.approx((least * most) ** 0.5, rel=1e-3)
 
 
+TRACKER = ("course", "ahead", "side_slip", "aligning")
+
+
 @pytest.mark.parametrize("controller", SPACES)
 def test_every_space_changes_its_own_controller_only(controller):
     before = ladder_gains()
@@ -53,7 +57,8 @@ def test_every_space_changes_its_own_controller_only(controller):
     changed = {name for name in vars(before) if getattr(before, name) != getattr(after, name)}
     fields = {"B2": "yaw_rate", "B3": "radial", "B4": "force_balance", "B5": "predictive", "B6": "path_tracker"}
     expected = fields.get(controller, controller)
-    assert changed - {"true_path_heading", "path_tracker_course"} == {expected}
+    single = {"true_path": {"true_path_heading"}, "B6": {f"path_tracker_{name}" for name in TRACKER}}
+    assert changed == {expected} | single.get(controller, set())
     assert ("true_path_heading" in changed) == (controller == "true_path")
     assert ("path_tracker_course" in changed) == (controller == "B6")
 
@@ -111,6 +116,16 @@ def test_only_the_validation_set_is_read(tmp_path, monkeypatch):
     monkeypatch.setattr(gain_search, "load_scenarios", lambda name: asked.append(name) or load(name))
     GainSearch("B3", tmp_path / "journal", stages=((2, 1),)).run()
     assert asked == [VALIDATION_SET] == ["V"]
+
+
+def test_the_path_tracker_is_searched_on_development_plants_of_its_own(tmp_path, monkeypatch):
+    asked = []
+    find = gain_search.scenario
+    monkeypatch.setattr(gain_search, "scenario", lambda *given: asked.append(given) or find(*given))
+    monkeypatch.setattr(gain_search, "load_scenarios", lambda name: pytest.fail(f"set {name} was read"))
+    GainSearch("B6", tmp_path / "journal", stages=((2, 2),)).run()
+    assert set(asked) == {("level", 0, PLANT_SEED), ("slope_3", 1, PLANT_SEED)}
+    assert find("level", 0, PLANT_SEED)[1].soils != find("level", 0)[1].soils
 
 
 def test_written_gains_read_back(tmp_path):

@@ -55,6 +55,21 @@ def test_files_are_written(tmp_path, capsys):
     assert table(result) in capsys.readouterr().out
 
 
+def test_rows_of_others_are_kept_where_the_scenarios_are_the_same(tmp_path, capsys):
+    out = tmp_path / "plants.json"
+    given = ["--plants", "level", "--output", str(out)]
+    main(["--controllers", "B1,B0", "--scenarios", "2", *given])
+    before = json.loads(out.read_text())["plants"]["level"]
+    assert main(["--controllers", "B0", "--scenarios", "2", "--keep", *given]) == 0
+    assert json.loads(out.read_text())["plants"]["level"] == before
+    assert list(json.loads(out.read_text())["plants"]["level"]) == ["B1", "B0"]
+    for wrong in (["--scenarios", "3", *given], ["--scenarios", "2", "--output", str(tmp_path / "none.json")]):
+        with pytest.raises(SystemExit) as ended:
+            main(["--controllers", "B0", "--keep", *wrong])
+        assert ended.value.code == 2
+        assert "--keep" in capsys.readouterr().err
+
+
 def test_unknown_names_are_one_sentence(capsys):
     with pytest.raises(SystemExit) as ended:
         main(["--plants", "levle"])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ddagr_gym.control.observation import OBSERVATION, SCALES
-from ddagr_gym.control.path_tracker import PathTracker
+from ddagr_gym.control.path_tracker import PathTracker, aligning_path, carried
 from ddagr_gym.control.pid import PidGains
 from ddagr_gym.envs.options import make_settings
 from ddagr_gym.errors import InputError
@@ -69,6 +69,54 @@ def test_course_counts_and_not_heading():
     sliding = Placed()
     sliding.at = sliding.at._replace(v_y=-0.02)  # moves to the right of where it points
     assert curvature_at(sliding) == pytest.approx(1.25 + 3.0 * math.atan2(0.02, 0.2), rel=1e-9)
+
+
+def test_a_share_of_the_side_slip_counts():
+    sliding = Placed()
+    sliding.at = sliding.at._replace(v_y=-0.02)
+    expected = 1.25 + 3.0 * 0.4 * math.atan2(0.02, 0.2)
+    assert curvature_at(sliding, side_slip_share=0.4) == pytest.approx(expected, rel=1e-9)
+
+
+def test_motion_is_carried_ahead_along_its_arc():
+    at = Placed(angle=0.5).at._replace(yaw_rate=0.25)
+    x, y, yaw = carried(at, 0.4)
+    # on the circle of 0.8 m at 0.2 m/s: 0.1 rad further, up to the third order of that angle
+    assert yaw == pytest.approx(0.6)
+    assert (x, y) == pytest.approx((0.8 * math.sin(0.6), 0.8 - 0.8 * math.cos(0.6)), abs=0.8 * 0.1**3 / 24)
+    assert carried(at, 0.0) == pytest.approx((at.x, at.y, at.yaw), abs=1e-15)
+
+
+def test_errors_of_the_motion_ahead_steer():
+    turning = Placed(course=-0.1)
+    turning.at = turning.at._replace(yaw_rate=0.75)
+    now, later = curvature_at(turning), curvature_at(turning, ahead=0.2)
+    # it points outward by 0.1 rad, but in 0.2 s it has turned by 0.1 rad more than the path
+    assert now == pytest.approx(1.25 + 3.0 * 0.1, rel=1e-9)
+    assert later < now - 0.2
+
+
+def test_aligning_path_ends_at_the_row_with_the_slip_as_its_course():
+    assert aligning_path(0.0, 0.3) == (0.0, 1.0)
+    assert aligning_path(0.3, 0.0) == (0.0, 0.0)
+    assert aligning_path(-0.1, 0.3)[0] == 0.0
+    for to_go in (0.05, 0.2, 0.5):
+        (after, slope), (before, _) = aligning_path(to_go + 1e-6, 0.3), aligning_path(to_go - 1e-6, 0.3)
+        assert slope == pytest.approx((after - before) / 2e-6, rel=1e-4)
+    assert max(abs(value) for value in aligning_path(1.2, 0.3)) < 1e-5
+
+
+def test_nose_turns_into_the_row_and_the_slip_carries_to_it():
+    sliding = Placed(angle=math.pi - 1e-9)  # at the end of the turn, nose along the row, slips to the right
+    sliding.at = sliding.at._replace(v_y=-0.04)
+    slip = math.atan2(0.04, 0.2)
+    assert curvature_at(sliding) == pytest.approx(1.25 + 3.0 * slip, rel=1e-6)
+    assert curvature_at(sliding, aligning=0.3) == pytest.approx(1.25, rel=1e-6)
+    early = Placed(angle=math.pi - 0.3)  # 0.24 m before: it should be to the left, so that it asks for more
+    early.at = early.at._replace(v_y=-0.04)
+    aside, slope = aligning_path(0.24, 0.3)
+    expected = 1.25 + 10.0 * slip * aside + 3.0 * slip * (1.0 - slope)
+    assert curvature_at(early, aligning=0.3) == pytest.approx(expected, rel=1e-6)
 
 
 def test_feed_forward_runs_ahead_of_the_end():

@@ -21,9 +21,9 @@ def drive(env, steps, seed):
     return seen
 
 
-@pytest.mark.parametrize("ekf_features", [False, True])
-def test_a_fresh_batch_goes_on_to_the_bit(ekf_features):
-    arguments = {"num_envs": 3, "max_episode_steps": 12, "autoreset_mode": "SameStep", "ekf_features": ekf_features}
+@pytest.mark.parametrize("options", [{}, {"ekf_features": True}, {"ekf_features": True, "filter": "inertial"}])
+def test_a_fresh_batch_goes_on_to_the_bit(options):
+    arguments = {"num_envs": 3, "max_episode_steps": 12, "autoreset_mode": "SameStep", **options}
     env = TurnVectorEnv(**arguments)
     env.reset(seed=1)
     drive(env, 17, 0)
@@ -58,3 +58,7 @@ def test_other_batches_are_refused():
         restore_state(TurnVectorEnv(3), save_state(env))
     with pytest.raises(InputError, match="not alike"):
         restore_state(TurnVectorEnv(2, ekf_features=True), save_state(env))
+    env = TurnVectorEnv(2, ekf_features=True)
+    env.reset(seed=1)
+    with pytest.raises(InputError, match="filter"):
+        restore_state(TurnVectorEnv(2, ekf_features=True, filter="inertial"), save_state(env))

@@ -47,8 +47,35 @@ def test_batch_equals_single_environments(mode):
         np.testing.assert_array_equal(single.step(action)[0], native.step(action)[0])
 
 
-def test_features_follow_the_truth():
-    env = gymnasium.make(TURN_EKF_ID, soil="thesis_a1", randomisation=False, info_level="full", side="left")
+def test_the_inertial_filter_is_an_option_of_id_batch_and_wrapper():
+    composed = gymnasium.make(TURN_EKF_ID, filter="inertial")
+    wrapped = EKFObservation(gymnasium.make(TURN_ID, info_level="full"), filter="inertial")
+    native = gymnasium.make_vec(TURN_EKF_ID, num_envs=1, filter="inertial")
+    flat = gymnasium.make(TURN_EKF_ID)
+    flat.reset(seed=3)
+    first = composed.reset(seed=3)[0]
+    np.testing.assert_array_equal(first, wrapped.reset(seed=3)[0])
+    np.testing.assert_array_equal(first, native.reset(seed=3)[0][0])
+    for action in actions(40, 1)[:, 0]:
+        seen, other = composed.step(action)[0], flat.step(action)[0]
+        np.testing.assert_array_equal(seen, wrapped.step(action)[0])
+        np.testing.assert_array_equal(seen, native.step(action[None])[0][0])
+    np.testing.assert_array_equal(seen[:12], other[:12])
+    assert not np.array_equal(seen[12:], other[12:])
+
+
+def test_filters_that_cannot_be_are_one_sentence():
+    with pytest.raises(InputError, match="'inertial'"):
+        gymnasium.make(TURN_EKF_ID, filter="inertail")
+    with pytest.raises(InputError, match="ekf_features"):
+        gymnasium.make(TURN_ID, filter="inertial")
+
+
+@pytest.mark.parametrize("filter", ["flat", "inertial"])
+def test_features_follow_the_truth(filter):
+    env = gymnasium.make(
+        TURN_EKF_ID, soil="thesis_a1", randomisation=False, info_level="full", side="left", filter=filter
+    )
     env.reset(seed=0)
     for _ in range(120):
         observation, *_, info = env.step(np.array([0.70, 0.10], np.float32))
