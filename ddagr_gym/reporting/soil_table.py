@@ -25,17 +25,17 @@ def soil_section(soil: SoilAtWork) -> dict[str, Any]:
     )
     apart = "can" if soil.told_apart else "cannot"
     together = (
-        f"Strength and stiffness {apart} be told apart here (correlation {fixed(soil.correlation, 1)}). The difference "
+        f"Strength and stiffness {apart} be told apart here (correlation {fixed(soil.correlation, 2)}). The difference "
         "between the soils is known better than the values, which are those of the model's soil law."
     )
-    header = ("", soil.first, soil.second, "difference")
+    header = ("", "difference", soil.first, soil.second)
     return {"header": header, "rows": [_row(item) for item in soil.quantities], "note": f"{at} {together}"}
 
 
 def _row(item: SoilQuantity) -> tuple[str, str, str, str]:
     name = TITLES[item.name]
     first, second = _value(item.first, item.first_interval, item), _value(item.second, item.second_interval, item)
-    return f"{name[:1].upper()}{name[1:]}", first, second, _change(item)
+    return f"{name[:1].upper()}{name[1:]}", _change(item), first, second
 
 
 def _value(value: float, interval: tuple[float, float], item: SoilQuantity) -> str:
@@ -47,5 +47,11 @@ def _value(value: float, interval: tuple[float, float], item: SoilQuantity) -> s
 def _change(item: SoilQuantity) -> str:
     if item.change is None or item.change_interval is None:
         return "–"
-    low, high = (f"{100.0 * end:+.0f}".replace("-", "−") for end in item.change_interval)
-    return f"{100.0 * item.change:+.0f} % ({low} to {high})".replace("-", "−")
+    value, low, high = (_signed(end) for end in (item.change, *item.change_interval))
+    return f"{value} % ({low} to {high})"
+
+
+def _signed(share: float) -> str:
+    """Percent with a sign; "0" for what rounds to it."""
+    percent = round(100.0 * share)
+    return f"{percent:+d}".replace("-", "−") if percent else "0"

@@ -55,8 +55,8 @@ FORM_OF_CHANGE = 0.1
 development drives: intervals without it held 12 of 16 changes of traction, most misses by a few hundredths)."""
 
 FORM_OF_VALUE = 0.6
-"""The same of a force or a sinkage by itself, as a share of its value (chosen on the same drives): with another soil law
-the same motion comes of up to 1.7 times the force."""
+"""The same of a force or a sinkage by itself, as a share of its value (chosen on the same drives): with another soil
+law the same motion comes of up to 1.7 times the force."""
 
 TOGETHER = 0.5
 """Correlation of two sizes from which they depend on each other (ours)."""

@@ -10,6 +10,9 @@ from ddagr_gym.diagnosis.wording import describe
 TITLES = {TRACTION: "traction", SIDE_FORCE: "side force", SINKAGE: "sinkage", "net_pull": "net pull"}
 """Of quantities, inside a sentence."""
 
+LEAST = 0.05
+"""Difference between two soils that the near end of an interval must reach to be said (ours)."""
+
 _NOT_TOLD_APART = "its strength and stiffness cannot be told apart"
 
 
@@ -45,8 +48,8 @@ def change_in_words(item: SoilQuantity) -> str:
 
 
 def _sign(item: SoilQuantity) -> int:
-    """1 or -1 where all of a change's interval has that sign, else 0."""
+    """1 or -1 where all of a change's interval lies beyond LEAST on that side, else 0."""
     if item.change_interval is None:
         return 0
     low, high = item.change_interval
-    return int(low > 0.0) - int(high < 0.0)
+    return int(low >= LEAST) - int(high <= -LEAST)

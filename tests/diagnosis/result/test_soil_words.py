@@ -61,6 +61,11 @@ def test_the_first_that_differs_for_certain_is_said(quantities, words):
     )
 
 
+def test_what_may_be_next_to_nothing_is_not_said():
+    assert soil_in_words(soil(quantity(TRACTION, 0.2, (0.04, 0.4)))) == ""
+    assert soil_in_words(soil(quantity(TRACTION, -0.2, (-0.4, -0.04)))) == ""
+
+
 def test_where_nothing_differs_for_certain_the_sizes_are_said():
     found = replace(SPLIT, soil=soil(quantity(TRACTION, 0.1, (-0.1, 0.4))))
     assert soil_in_words(found.soil) == ""
