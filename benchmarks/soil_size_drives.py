@@ -29,7 +29,7 @@ from ddagr_gym.recordings.schema import Recording
 
 ROBOT = "ddagr"
 OWN, OTHER = "package's simulator", "another simulator"
-SEED = 6000
+SEED = 7000
 BEGIN = 30.0
 """Time from which a changed soil holds [s]."""
 

@@ -2,9 +2,9 @@
 
     python -m benchmarks.soil_sizes [--summary]
 
-Drives of a minute over two soils (:mod:`benchmarks.soil_size_drives`): of the package's simulator on three soils, and of
-the concealed benchmark's simulator with one of its structural differences, over soil that differs from side to side or
-changes in mid-drive. The effect that is there is fitted beside robot and soil as in a diagnosis, from no difference on.
+Drives of a minute over two soils (:mod:`benchmarks.soil_size_drives`): of the package's simulator on three soils, and
+of the concealed benchmark's simulator with one of its structural differences, over soil that differs from side to side
+or changes in mid-drive. The effect that is there is fitted beside robot and soil, from no difference on.
 *Before* are intervals by the fit's own derivatives, as they were stated until now; *now* those of a diagnosis. Drives
 in which the effect gains less than 20 over the noise, so that no diagnosis names it, are counted apart.
 

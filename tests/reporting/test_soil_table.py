@@ -5,9 +5,7 @@ from ddagr_gym.reporting.soil_table import soil_section
 
 SINKS = SoilQuantity(SINKAGE, "m", 0.0059, (0.004, 0.0081), 0.0111, (0.009, 0.0135), -0.468, (-0.7, -0.002))
 PULLS = SoilQuantity(NET_PULL, "N", 67.2, (50.0, 80.0), -1.0, (-3.0, 2.0), None, None)
-SOIL = SoilAtWork(
-    "in the patch", "outside it", WorkingPoint(0.148, 0.248, 0.2618, 410.0), (SINKS, PULLS), 0.954, False
-)
+SOIL = SoilAtWork("in the patch", "outside it", WorkingPoint(0.148, 0.248, 0.2618, 410.0), (SINKS, PULLS), 0.954, False)
 
 
 def test_rows_are_in_units_of_the_field_with_differences_in_percent():

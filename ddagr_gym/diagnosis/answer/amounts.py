@@ -1,7 +1,7 @@
 """Sizes with their doubt as text, in units that people use.
 
-``±`` is half of the 90 % interval, where it is nearly symmetric and does not reach over zero by this alone; otherwise the
-interval stands in brackets.
+``±`` is half of the 90 % interval, where it is nearly symmetric and does not reach over zero by this alone; otherwise
+the interval stands in brackets.
 """
 
 from __future__ import annotations

@@ -30,8 +30,9 @@ class Estimate:
             start of the first.
         unit: SI.
         interval: 90 %, resampled over windows, holding the value in any case; for sizes at least 10 % of their distance
-            from neutral to either side, 2 % of a limit, by which forms of other simulators differ; null where it was
-            not fitted or nothing shows it.
+            from neutral to either side, 2 % of a limit, by which forms of other simulators differ, for sizes of a soil
+            as logarithms, and more in the direction in which strength and stiffness trade; null where it was not fitted
+            or nothing shows it.
     """
 
     value: float
