@@ -98,7 +98,7 @@ def in_logarithms(
     first = len(linear.here) - len(parameters)
     parts = {name: np.array(getattr(linear, name)) for name in ("here", "expected", "deviation", "low", "high")}
     sensitivity = np.array(linear.sensitivity)
-    for k in np.flatnonzero(factors(fitted.point.effects, parameters)):
+    for k in np.flatnonzero(factors(fitted.point.effects, parameters)).tolist():
         item, place = parameters[k], first + k
         value = float(parts["here"][place])
         sensitivity[..., place] = _column(problem, fitted, item, value)
@@ -137,7 +137,7 @@ def valleys(
     """
     first = len(linear.here) - len(parameters)
     chosen = factors(fitted.point.effects, parameters)
-    covariance = np.linalg.inv(linear.information)
+    covariance: Array = np.asarray(np.linalg.inv(linear.information), dtype=np.float64)
     found = []
     for number in range(len(fitted.point.effects)):
         places = [first + k for k, p in enumerate(parameters) if p.effect == number and chosen[k]]
@@ -200,8 +200,8 @@ def _cost(
         nuisances[free] = values[: len(free)]
         tried = problem.moved(replace(point, effects=effects), nuisances)
         known = cost_of(problem, tried, problem.predict(tried), fitted.elimination)[0]
-    own = np.flatnonzero(chosen)
-    places = len(free) + own
+    own = np.flatnonzero(chosen).tolist()
+    places = [len(free) + k for k in own]
     by_logarithm = ((values[places] - linear.expected[places]) / linear.deviation[places]) ** 2
     by_factor = [((math.exp(values[len(free) + k]) - parameters[k].neutral) / parameters[k].scale) ** 2 for k in own]
     return known + 0.5 * float(by_logarithm.sum() - sum(by_factor))

@@ -185,6 +185,8 @@ def _told_apart(effects: Sequence[Effect], number: int, draws: Resampled) -> tup
     """Correlation of the logarithms of an effect's sizes of soil, and whether they are known by themselves."""
     chosen = factors(effects, draws.parameters)
     own = [k for k, p in enumerate(draws.parameters) if p.effect == number and chosen[k]]
+    if len(own) < 2:
+        return 0.0, True
     sizes = np.log(draws.effects[:, own])
     spans = [high / low for low, high in intervals(draws.effects[:, own])]
     correlation = float(np.corrcoef(sizes.T)[0, 1])
