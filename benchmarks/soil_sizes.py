@@ -53,6 +53,8 @@ from ddagr_gym.reporting.figures import house_style
 RESULT = Path(__file__).resolve().parent / "results" / "soil_sizes.json"
 SIZES = ("strength", "stiffness")
 SEED = 0
+TICKS = {"strength": (0.5, 0.7, 1.0, 1.4), "stiffness": (0.2, 0.5, 1.0, 2.0, 5.0)}
+"""Of the picture, over the truth."""
 NAMED = 20.0
 """Gain over the noise from which a diagnosis may name the effect: its gates are 20 and more."""
 
@@ -179,10 +181,14 @@ def draw(answers: Sequence[dict[str, Any]], path: Path) -> None:
             _bar(panels[2], place, 100.0 * (np.array(entry["change_interval"]) - truth), 4.0, 0.8, 0.0)
         for axis, name in zip(panels, SIZES, strict=False):
             axis.set_xscale("log")
+            ticks = TICKS[name]
+            axis.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+            axis.set_xticks([], minor=True)
             axis.axvline(1.0, color=palette.INK, lw=0.9)
-            axis.set_xlabel(f"{name} over the true one (thin: before, thick: now)")
+            axis.set_xlabel(f"{name} over the true one")
         panels[2].axvline(0.0, color=palette.INK, lw=0.9)
-        panels[2].set_xlabel("difference in traction less the true one [percentage points]")
+        panels[2].set_xlabel("difference in traction less the true one [%]")
+        figure.suptitle("90 % intervals: thin before, thick now; orange where the truth lies outside", fontsize=9)
         panels[0].set_yticks(range(len(shown)), [_label(item) for item in shown], fontsize=7)
         figure.savefig(path, dpi=110)
 
