@@ -82,6 +82,15 @@ class Switched:
         """Of the effect."""
         return next(item for item in LIBRARY_FORMS[self.effect] if item.variant == self.variant)
 
+    def start(self) -> tuple[Array, np.random.Generator]:
+        """Pose at the start [m, m, rad], and the random numbers that follow it."""
+        rng = stream(self.seed, "mid drive")
+        return np.array([*rng.uniform(-1.0, 1.0, 2), rng.uniform(-np.pi, np.pi)]), rng
+
+    def change(self) -> Change:
+        """The effect, for a form that looks at no path."""
+        return self.form.build(self.multiple * least_size(self.form), self.start()[1], Site(()))
+
 
 @njit(error_model="numpy", nogil=True)
 def _integrate(first: Any, then: Any, switch: int, commands: Array, start: Array, truth: Array) -> Array:
@@ -122,10 +131,8 @@ def simulate(item: Switched) -> dict[str, Array]:
     bare = field_plant(case, item.seed)
     wanted = programme(RUN, case.manoeuvres)
     commands = np.repeat(wanted, SUBSTEPS, axis=0)
-    rng = stream(item.seed, "mid drive")
-    start = np.array([*rng.uniform(-1.0, 1.0, 2), rng.uniform(-np.pi, np.pi)])
-    site = Site((drive(bare, commands, start),))
-    change = item.form.build(item.multiple * least_size(item.form), rng, site)
+    start, rng = item.start()
+    change = item.form.build(item.multiple * least_size(item.form), rng, Site((drive(bare, commands, start),)))
     full = change.plant(bare) if change.plant else bare
     quiet = _without(full, bare)
     switch = -SETTLING if item.kind == ALWAYS else round(item.time / SAMPLE_PERIOD)

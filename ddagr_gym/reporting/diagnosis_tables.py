@@ -13,9 +13,11 @@ from ddagr_gym.diagnosis.answer.next_drive_plan import NextDrivePlan
 from ddagr_gym.diagnosis.answer.unnamed_terms import UnnamedTerm, UnnamedTerms
 from ddagr_gym.diagnosis.answer.verdict import NONE, UNKNOWN, DataDoubt, Diagnosis, Finding, GatesUsed
 from ddagr_gym.diagnosis.result.sentences import when
-from ddagr_gym.diagnosis.wording import describe, in_sentence, range_in_words, title
+from ddagr_gym.diagnosis.result.soil_words import finding_in_words
+from ddagr_gym.diagnosis.wording import in_sentence, range_in_words, title
 from ddagr_gym.reporting.diagnosis_figures import LABELS
 from ddagr_gym.reporting.drivetrain_section import drivetrain_tiles
+from ddagr_gym.reporting.soil_table import soil_section
 
 if TYPE_CHECKING:
     from ddagr_gym.physics.effects import Effect
@@ -105,7 +107,7 @@ def finding_card(finding: Finding, recordings: Sequence[str]) -> dict[str, Any]:
         recordings: names of the sources.
     """
     name, parameters = finding.name, amounts(finding.parameters)
-    sentence = describe(name, parameters)
+    sentence = finding_in_words(finding)
     equivalents = _equivalents(name, finding.equivalence_set)
     where = finding.where
     return {
@@ -114,6 +116,7 @@ def finding_card(finding: Finding, recordings: Sequence[str]) -> dict[str, Any]:
         "where": "not located" if where is None else where.phrase,
         "evidence": _evidence(finding),
         "sizes": [f"{key.replace('_', ' ')} {size(item)}" for key, item in parameters.items()],
+        "soil": None if finding.soil is None else soil_section(finding.soil),
         "spans": "" if where is None else _spans(where.spans, recordings),
         "equivalents": equivalents,
         "equivalence_note": _equivalence_note(name, equivalents, seen=finding.gate <= 0.0),

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.diagnosis.answer.amounts import amounts
 from ddagr_gym.diagnosis.answer.verdict import Diagnosis, Finding
-from ddagr_gym.diagnosis.wording import describe
+from ddagr_gym.diagnosis.result.soil_words import finding_in_words
 from ddagr_gym.viewers.drive_traces import DriveTraces
 
 Array = NDArray[np.float64]
@@ -89,7 +88,7 @@ def doubts(diagnosis: Diagnosis, drive: DriveTraces) -> tuple[str, ...]:
 
 
 def _of_finding(finding: Finding, drives: Sequence[DriveTraces]) -> Iterator[Annotation]:
-    text = describe(finding.name, amounts(finding.parameters))
+    text = finding_in_words(finding)
     spans = () if finding.where is None else finding.where.spans
     for span in spans:
         yield Annotation(finding.name, text, span.recording, span.start, span.end, True, span.share)

@@ -43,6 +43,24 @@ def test_what_comes_nearest_is_no_finding(tmp_path):
     assert 'id="findings"' not in text
 
 
+def test_a_soil_has_a_table_of_what_it_does(tmp_path):
+    (found,) = entries()["findings"]
+    quantity = {
+        "name": "traction", "unit": "N", "first": 60.0, "first_interval": [50.0, 70.0], "second": 80.0,
+        "second_interval": [70.0, 90.0], "change": -0.25, "change_interval": [-0.3, -0.2],
+    }  # fmt: skip
+    point = {"speed": 0.15, "slip": 0.2, "slip_angle": 0.25, "load": 410.0}
+    soil = {
+        "first": "in the patch", "second": "outside it", "point": point, "quantities": [quantity], "correlation": 0.9,
+        "told_apart": False,
+    }  # fmt: skip
+    write_report(tmp_path, diagnosis(findings=[found | {"soil": soil}]), evidence())
+    text = (tmp_path / PAGE).read_text()
+    assert "What the soil does under a wheel" in text
+    assert "<td>−25 % (−30 to −20)</td><td>60 N (50 to 70)</td><td>80 N (70 to 90)</td>" in text
+    assert "gives 20 to 30 % less traction than outside it (its strength and stiffness cannot be told apart)" in text
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """A report with every section."""

@@ -1,6 +1,7 @@
 """Sizes with their doubt as text, in units that people use.
 
-``±`` is half of the 90 % interval, where it is nearly symmetric; otherwise the interval stands in brackets.
+``±`` is half of the 90 % interval, where it is nearly symmetric and does not reach over zero by this alone; otherwise
+the interval stands in brackets.
 """
 
 from __future__ import annotations
@@ -83,7 +84,8 @@ def quantity(amount: Amount, unit: str = "", signed: bool = False) -> str:
         return f"{plus}{number(value, 3)}{after}"
     places = max(1 - math.floor(math.log10(half)), 0) if half < 10.0 else 0
     places = places - 1 if places > 0 and half * 10.0**places >= 20.0 else places
-    if abs(value - 0.5 * (low + high)) > _LOPSIDED * half:
+    beyond = low > 0.0 >= value - half
+    if beyond or abs(value - 0.5 * (low + high)) > _LOPSIDED * half:
         return f"{plus}{fixed(value, places)}{after} ({fixed(low, places)} to {fixed(high, places)})"
     return f"{plus}{fixed(value, places)} ± {fixed(half, places)}{after}"
 

@@ -11,6 +11,7 @@ from ddagr_gym.diagnosis.answer.drivetrain import DrivetrainAnswer
 from ddagr_gym.diagnosis.answer.location import EffectLocation, Localisation
 from ddagr_gym.diagnosis.answer.next_drive_plan import NextDrivePlan
 from ddagr_gym.diagnosis.answer.onset import Onset
+from ddagr_gym.diagnosis.answer.soil_at_work import SoilAtWork
 from ddagr_gym.diagnosis.answer.unnamed_terms import UnnamedTerms
 
 SCHEMA = "ddagr-diagnosis/4"
@@ -29,8 +30,9 @@ class Estimate:
             start of the first.
         unit: SI.
         interval: 90 %, resampled over windows, holding the value in any case; for sizes at least 10 % of their distance
-            from neutral to either side, 2 % of a limit, by which forms of other simulators differ; null where it was
-            not fitted or nothing shows it.
+            from neutral to either side, 2 % of a limit, by which forms of other simulators differ, for sizes of a soil
+            as logarithms, and more in the direction in which strength and stiffness trade; null where it was not fitted
+            or nothing shows it.
     """
 
     value: float
@@ -67,6 +69,8 @@ class Finding:
         calibrated_p: share of null drives that reach as much; null without a bank.
         onset: how its size goes with time; absent for what was seen in the values themselves, and where it acts in too
             few windows.
+        soil: what a soil of which strength and stiffness are said does under a wheel; absent for other effects, and
+            against earlier drives.
     """
 
     name: str
@@ -80,6 +84,7 @@ class Finding:
     where: EffectLocation | None = None
     calibrated_p: float | None = None
     onset: Onset | None = None
+    soil: SoilAtWork | None = None
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from ddagr_gym.diagnosis.result.channel_fault_findings import channel_fault_find
 from ddagr_gym.diagnosis.result.detectable import least_detectable
 from ddagr_gym.diagnosis.result.equivalence import equivalents
 from ddagr_gym.diagnosis.result.sentences import headline
+from ddagr_gym.diagnosis.result.soil_at_work import soil_at_work
 from ddagr_gym.diagnosis.result.uncertainty import intervals, resampled_parameters, with_structure
 from ddagr_gym.diagnosis.search.scanned_model import ScannedModel, SearchResult
 from ddagr_gym.diagnosis.search.stepwise import MOST_EFFECTS, further_gates
@@ -130,13 +131,13 @@ def _findings(session: DiagnosisSession, found: SearchResult) -> list[Finding]:
     problem, gates, chosen, rng = session.problem, session.gates, found.chosen, session.rng("verdict")
     if not chosen.names:
         return []
-    parameters, draws = resampled_parameters(problem, chosen.fitted, rng)
-    bounds = intervals(draws)
+    draws = resampled_parameters(problem, chosen.fitted, rng)
+    bounds = intervals(draws.effects)
     findings = []
     for number, effect in enumerate(chosen.fitted.point.effects):
         spread = {
             p.field: with_structure(b, effect, p.field)
-            for p, b in zip(parameters, bounds, strict=True)
+            for p, b in zip(draws.parameters, bounds, strict=True)
             # a shape that no resampling moves is not known: nothing shows it
             if p.effect == number and (b[0] < b[1] or p.field in effect.size_names())
         }
@@ -158,6 +159,7 @@ def _findings(session: DiagnosisSession, found: SearchResult) -> list[Finding]:
                 _channel_shares(before, after),
                 equivalents(found, effect.name, rng),
                 calibrated_p=gates.p_value(effect.name, gain),
+                soil=soil_at_work(problem, session.soil, chosen.fitted, number, draws),
             )
         )
     return findings

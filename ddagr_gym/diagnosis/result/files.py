@@ -28,7 +28,10 @@ _ABSENT_WHERE_NOT_ASKED = ("drivetrain", "change")
 
 
 _FINDINGS = ("findings", "rejected")
-"""Lists of findings, whose ``onset`` is left out instead of null for the same reason."""
+"""Lists of findings."""
+
+_ABSENT_IN_FINDINGS = ("onset", "soil")
+"""Entries of findings that are left out instead of null for the same reason."""
 
 
 def as_mapping(diagnosis: Diagnosis) -> dict[str, Any]:
@@ -37,13 +40,13 @@ def as_mapping(diagnosis: Diagnosis) -> dict[str, Any]:
     for name in _ABSENT_WHERE_UNKNOWN:
         mapping[name] = {key: value for key, value in mapping[name].items() if value is not None}
     for name in _FINDINGS:
-        mapping[name] = [_without(item, "onset") for item in mapping[name]]
+        mapping[name] = [_without_null(item) for item in mapping[name]]
     return {name: value for name, value in mapping.items() if value is not None or name not in _ABSENT_WHERE_NOT_ASKED}
 
 
-def _without(finding: Mapping[str, Any], name: str) -> dict[str, Any]:
-    """A finding without an entry that is null."""
-    return {key: value for key, value in finding.items() if value is not None or key != name}
+def _without_null(finding: Mapping[str, Any]) -> dict[str, Any]:
+    """A finding without those entries that are null."""
+    return {key: value for key, value in finding.items() if value is not None or key not in _ABSENT_IN_FINDINGS}
 
 
 def plain(value: Any) -> dict[str, Any]:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ddagr_gym.diagnosis.answer.amounts import amounts
 from ddagr_gym.diagnosis.answer.change import BEFORE, Change, ChangeCertificate
 from ddagr_gym.diagnosis.answer.onset import BEGINS, CONSTANT, ENDS, Onset
 from ddagr_gym.diagnosis.answer.verdict import NONE, UNKNOWN, Finding
-from ddagr_gym.diagnosis.wording import describe, in_sentence
+from ddagr_gym.diagnosis.result.soil_words import finding_in_words
+from ddagr_gym.diagnosis.wording import in_sentence
 
 RIVAL_WEIGHT = 0.2
 """Weight in the equivalence set from which a rival stands in the headline (ours)."""
@@ -34,7 +34,7 @@ def headline(
         return "; ".join(["Nothing is missing that these recordings can show", *doubts]) + "."
     if tuple(verdict) == (UNKNOWN,):
         return "; ".join(["Something is missing that no effect of the library explains", *doubts]) + "."
-    found = _joined([describe(item.name, amounts(item.parameters)) + when(item) + _rivals(item) for item in findings])
+    found = _joined([finding_in_words(item) + when(item) + _rivals(item) for item in findings])
     share = "" if misfit_share is None else f"; {share_in_words(misfit_share)} of the mismatch"
     return "; ".join([f"{found[:1].upper()}{found[1:]}{share}", *doubts, _rest(complete)]) + "."
 
@@ -49,7 +49,7 @@ def drivetrain_headline(parts: Sequence[str], findings: Sequence[Finding], expla
         complete: whether nothing more is left than in drives with nothing missing.
     """
     lacks = f"the simulator lacks the robot's drivetrain ({_joined_names(parts)})"
-    others = [describe(item.name, amounts(item.parameters)) + when(item) + _rivals(item) for item in findings]
+    others = [finding_in_words(item) + when(item) + _rivals(item) for item in findings]
     found = _joined([lacks, *others])
     share = share_in_words(max(explained, 0.0))
     worth = f"on stretches that were left out of the fit this explains {share} of the squared error of the wheel speeds"
@@ -84,7 +84,7 @@ def change_headline(verdict: Sequence[str], complete: bool, findings: Sequence[F
             f"Something changed against {drives} that no effect of the library explains, nearest are "
             f"{nearest}{blind}{ground}."
         )
-    found = _joined([describe(item.name, amounts(item.parameters)) + when(item) + _rivals(item) for item in findings])
+    found = _joined([finding_in_words(item) + when(item) + _rivals(item) for item in findings])
     rest = "nothing else is out of the ordinary" if complete else "something else is out of the ordinary"
     return f"Against {drives}: {found}; {rest}{ground}."
 

@@ -170,6 +170,15 @@ class Effect(Validated):
         """The actions that a simulation calls; fewer where a shape switches some off."""
         return self.actions
 
+    @property
+    def soils(self) -> Mapping[str, tuple[float, float]]:
+        """Factors on strength and stiffness of the soils that it tells apart, by where they are, in words.
+
+        Two at most, the one that is stated first; a single one where it is the same everywhere. Empty for effects on
+        anything else.
+        """
+        return {}
+
     def is_meaningful(self, extent: DriveExtent) -> bool:
         """Whether any size is at least its least meaningful distance from neutral."""
         limits = {name: self.parameter(name).metadata for name in self.size_names()}

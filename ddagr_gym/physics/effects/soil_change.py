@@ -1,6 +1,7 @@
 """Soil that is not the nominal one, everywhere or from a moment on: rain, another field, a wrong map."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ddagr_gym.physics.effects.base import DriveExtent, Effect, Vector, shape, size
@@ -64,3 +65,11 @@ class SoilChange(Effect):
         stiffness = 1.0 + cls.parameter("stiffness").metadata["step"]
         onsets = (_ALWAYS, *(share * extent.duration for share in _ONSETS))
         return tuple(effect for t in onsets for effect in (cls(strength, 1.0, t), cls(1.0, stiffness, t)))
+
+    @property
+    def soils(self) -> Mapping[str, tuple[float, float]]:
+        """After the onset and before; of one that holds always no other."""
+        changed = (self.strength, self.stiffness)
+        if self.onset <= _ALWAYS:
+            return {"on these drives": changed}
+        return {"after the change": changed, "before it": (1.0, 1.0)}

@@ -1,6 +1,7 @@
 """A place where the soil is different: a wet hollow, a headland, a dung heap."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ddagr_gym.physics.effects.base import DriveExtent, Effect, Vector, shape, size
@@ -72,3 +73,8 @@ class SoilPatch(Effect):
                 for inside in ((strength, 1.0), (1.0, stiffness)):
                     found.append(cls(inside[0], inside[1], x, y, radius, edge))
         return tuple(found)
+
+    @property
+    def soils(self) -> Mapping[str, tuple[float, float]]:
+        """Well inside the patch and outside."""
+        return {"in the patch": (self.strength, self.stiffness), "outside it": (1.0, 1.0)}

@@ -1,6 +1,7 @@
 """Soil that differs between left and right: one bank on a tramline, the other on the crop row."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ddagr_gym.physics.effects.base import Effect, Vector, size
@@ -39,3 +40,9 @@ class SoilSplit(Effect):
 
     strength: float = size("-", LOWEST_FACTOR, HIGHEST_FACTOR, least=0.2, neutral=1.0, step=0.04)
     stiffness: float = size("-", LOWEST_FACTOR, HIGHEST_FACTOR, least=0.3, default=1.0, neutral=1.0, step=0.06)
+
+    @property
+    def soils(self) -> Mapping[str, tuple[float, float]]:
+        """Of the left and the right bank."""
+        left = (math.sqrt(self.strength), math.sqrt(self.stiffness))
+        return {"under the left wheels": left, "under the right wheels": (1.0 / left[0], 1.0 / left[1])}

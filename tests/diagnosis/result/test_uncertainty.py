@@ -183,8 +183,8 @@ def test_a_size_is_as_uncertain_as_what_the_data_cannot_tell_it_from(drive, prob
     problem = problem_of(drive(("accelerometer_bias=0.1",), seconds=10.0))
     effects = (parse_effect("accelerometer_bias=0.1"), parse_effect("gyro_scale=1.0"))
     fitted = fit(problem, replace(problem.start(), effects=effects), iterations=2)
-    parameters, draws = resampled_parameters(problem, fitted, np.random.default_rng(3))
-    deviations = dict(zip([p.field for p in parameters], draws.std(axis=0).tolist(), strict=True))
+    draws = resampled_parameters(problem, fitted, np.random.default_rng(3))
+    deviations = dict(zip([p.field for p in draws.parameters], draws.effects.std(axis=0).tolist(), strict=True))
     assert deviations["x"] == pytest.approx(NuisancePriors().accelerometer_bias, rel=0.2)
     assert deviations["scale"] < 0.5 * size_scale(effects[1], "scale")
 
@@ -194,3 +194,14 @@ def test_an_interval_holds_its_value() -> None:
     low, high = with_structure((0.1, 0.15), parse_effect("command_delay=0.3"), "delay")
     assert low < 0.1
     assert high == 0.3
+
+
+def test_sizes_of_a_soil_are_widened_as_factors() -> None:
+    """Half as strong and twice as strong are as uncertain as each other."""
+    weak, strong = (with_structure((size, size), parse_effect(f"soil_split={size}"), "strength") for size in (0.5, 2.0))
+    assert weak[0] * strong[1] == pytest.approx(1.0)
+    assert weak[1] * strong[0] == pytest.approx(1.0)
+    assert math.log(strong[1] / 2.0) == pytest.approx(math.hypot(STRUCTURE * math.log(1.2), FORM * math.log(2.0)))
+    low, high = with_structure((9.9, 10.0), parse_effect("soil_split=9.95"), "strength")
+    assert low < 9.0
+    assert high == pytest.approx(10.0)

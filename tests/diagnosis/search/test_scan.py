@@ -70,7 +70,7 @@ def test_joint_refit_recovers_the_size_with_an_interval_that_holds_it(drive, pro
     assert refitted.cost < raw.cost - 20.0
     scale = refitted.point.effects[0].scale
     assert scale == pytest.approx(1.05, abs=0.012)
-    _, draws = resampled_parameters(problem, refitted, np.random.default_rng(2))
-    low, high = intervals(draws)[0]
+    draws = resampled_parameters(problem, refitted, np.random.default_rng(2))
+    low, high = intervals(draws.effects)[0]
     assert low < scale < high
     assert 1e-4 < high - low < 0.05

@@ -269,3 +269,27 @@ def test_rear_wheels_sink_less_in_ruts(drive, straight):
     assert columns["true_sinkage_3"][-1] < 0.9 * columns["true_sinkage_1"][-1]
     # on equal loads k sinkage^(n + 1), nearly: the patch grows in length and width as the root of the sinkage
     assert columns["true_sinkage_3"][-1] / columns["true_sinkage_1"][-1] == pytest.approx(1.6 ** (-1 / 1.5), rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("text", "wheels"),
+    [
+        ("soil_split=1.44,stiffness=0.64", (1, 0)),
+        ("soil_change=0.7,stiffness=1.3", (0,)),
+        ("soil_change=0.7,stiffness=1.3,onset=-100", (0,)),
+        ("soil_patch=0.8,stiffness=1.3,radius=100", (0,)),
+    ],
+)
+def test_an_effect_says_which_soils_it_makes(act, turning_row, text, wheels):
+    """What it says is what its action does to a wheel on each of them; a soil of the model has factors of 1."""
+    effect = parse_effect(text)
+    row = act(effect, turning_row)
+    found = [(soil_factors(row, turning_row, e)[w]) for w in wheels for e in (STRENGTH, STIFFNESS)]
+    said = list(effect.soils.values())
+    np.testing.assert_allclose(np.ravel(said[: len(wheels)]), found, rtol=1e-9)
+    assert said[len(wheels) :] in ([], [(1.0, 1.0)])
+
+
+def test_other_effects_make_no_soils():
+    assert not parse_effect("slope=0.1").soils
+    assert not parse_effect("multipass=0.5").soils
