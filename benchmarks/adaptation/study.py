@@ -54,9 +54,7 @@ def diagnosed(truth: Truth, folder: Path) -> Corrected:
     """What the diagnosis makes of recordings of a truth; kept in the folder."""
     if not (folder / "diagnosis" / "diagnosis.json").is_file():
         drives = TruePlant(truth).record(folder / "recordings")
-        result = ddagr_gym.diagnose(
-            drives, column_map="concealed", names_only=True, cache=folder / "diagnosis.parts"
-        )
+        result = ddagr_gym.diagnose(drives, column_map="concealed", names_only=True, cache=folder / "diagnosis.parts")
         result.report(folder / "diagnosis", overwrite=True)
     return corrected_by_diagnosis(folder / "diagnosis")
 

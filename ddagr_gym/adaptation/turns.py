@@ -97,9 +97,7 @@ class MeasuredTurns:
         progress: called when a turn is driven or remembered.
     """
 
-    def __init__(
-        self, turns: Turns, journal: Path | None = None, progress: Callable[[], None] = lambda: None
-    ) -> None:
+    def __init__(self, turns: Turns, journal: Path | None = None, progress: Callable[[], None] = lambda: None) -> None:
         self.turns, self._journal, self._progress = turns, journal, progress
         self._known = {} if journal is None else _read(journal)
 

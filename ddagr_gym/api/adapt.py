@@ -189,8 +189,9 @@ def _diagnosed(
     from ddagr_gym.api.diagnose import diagnose
     from ddagr_gym.diagnosis.pipeline import effect_intervals
 
+    steps = None if cache is None else cache / "diagnosis"
     if calibration is None:
-        result = diagnose(recordings, robot, soil, names_only=True, cache=cache, **options)  # type: ignore[call-overload]
+        result = diagnose(recordings, robot, soil, names_only=True, cache=steps, **options)  # type: ignore[call-overload]
         if result.robot is None or result.soil is None:
             raise InputError(f"there is no corrected simulator to tune on, {result.refit_note}: check the recordings.")
         base = Corrected(result.robot, result.soil)

@@ -1,9 +1,9 @@
 """Search of a box for the gains that drive best: successive halving, the same for every controller.
 
-Candidates are points of the box, logarithmic along each axis: the first half a Sobol sequence, then two rounds around the
-best so far. All are driven on the first scenarios, the best of them on more, the last few on all (successive halving),
-and with them the values that were chosen by hand: a search that finds nothing better keeps those. The objective, lower
-is better::
+Candidates are points of the box, logarithmic along each axis: the first half a Sobol sequence, then two rounds around
+the best so far. All are driven on the first scenarios, the best of them on more, the last few on all (successive
+halving), and with them the values that were chosen by hand: a search that finds nothing better keeps those. The
+objective, lower is better::
 
     median |e_R| + 95th percentile of |e_R| / 4 + share of turns that do not succeed
 
