@@ -29,7 +29,7 @@ def path_figure(before: Paths, after: Paths, turns: Sequence[RowTurn]) -> Any:
     """
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(6.4, 3.6), layout="constrained")
+    figure = Figure(figsize=(6.4, 4.2), layout="constrained")
     panels = figure.subplots(1, 2, sharex=True, sharey=True)
     for panel, driven, title, colour in zip(panels, (before, after), ("Before", "After"), (BEFORE, AFTER), strict=True):
         for turn in {item.side: item for item in turns}.values():

@@ -53,7 +53,7 @@ def write_page(folder: Path, adapted: Adapted, corrected: Corrected, turns: Corr
             "outcomes": text.outcome_rows(adapted),
             "taken_header": text.TAKEN_HEADER,
             "taken": text.taken_rows(adapted, corrected),
-            "score_header": ("controller", "objective in the corrected simulator, lower is better"),
+            "score_header": ("controller", "objective, lower is better"),
             "scores": [(name, f"{value:.3g}") for name, value in adapted.scores.items()],
             "files": [CONTROLLER, ROBOT, SOIL, EFFECTS, NAME],
         }

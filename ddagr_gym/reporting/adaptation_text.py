@@ -80,7 +80,7 @@ def kept_sentence(adapted: Adapted) -> str:
 
 
 def _percent(entry: dict[str, Any], digits: int = 1) -> str:
-    return f"{100.0 * entry['value']:.{digits}f} %"
+    return f"{100.0 * entry['value']:.{digits}f}\u00a0%"
 
 
 def adaptation_text(adapted: Adapted, corrected: Corrected) -> str:

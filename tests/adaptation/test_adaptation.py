@@ -69,13 +69,16 @@ def test_the_best_is_kept_and_told(on_a_slope, little):
     assert written["after"]["success"]["value"] >= written["before"]["success"]["value"]
 
 
-def test_nothing_is_lost_where_nothing_is_better(little, on_a_slope):
-    """A corrected simulator that is wrong on purpose: what it knows misleads, so that nominal stays."""
-    level = replace(on_a_slope, effects=(), intervals=())
-    turns = MeasuredTurns(CorrectedTurns(level))
-    found = adapted(on_a_slope, ddagr(), get_soil("thesis_a1"), turns, effort=replace(little, rounds=0, report=0))
-    assert found.scores[found.kept] <= found.scores["nominal"]
+def test_knowledge_that_misleads_is_not_kept(little, on_a_slope):
+    """The turns are those of a robot whose gyro is right; the diagnosis says that it is not."""
+    right = replace(on_a_slope, effects=(), intervals=())
+    wrong = replace(right, effects=load_effects(["gyro_scale=1.3"]))
+    turns = MeasuredTurns(CorrectedTurns(right))
+    found = adapted(wrong, ddagr(), get_soil("thesis_a1"), turns, effort=replace(little, rounds=0, report=0))
     assert found.scores["known"] > found.scores["nominal"]
+    assert found.kept == "nominal"
+    assert found.used == ()
+    assert as_json(found, wrong)["after"] is None
 
 
 def test_the_counted_turns_are_those_that_are_asked_for(on_a_slope, little):
