@@ -18,7 +18,7 @@ _COLOURS = dict(zip(ARMS, (palette.ORANGE, palette.BLUE, palette.PALE), strict=T
 _SHARE = 0.8  # of the room between truths that bars take
 _PANELS = (
     ("radius_error", "|radius error| [%]", (0.3, 110.0)),
-    ("exit_deviation", "deviation at the next row [cm]", (1.0, 110.0)),
+    ("exit_deviation", "deviation at the next row [cm]", (0.3, 110.0)),
     ("success", "success [%]", (0.0, 105.0)),
 )
 
@@ -42,6 +42,8 @@ def draw(result: Mapping[str, Any], path: Path) -> None:
                 at = places + (k - 0.5 * (len(ARMS) - 1)) * width
                 _bars(panel, at, width, [item["arms"][arm][name] for item in truths.values()], _COLOURS[arm], title)
             panel.set(ylabel=label, ylim=limits, yscale="linear" if name == "success" else "log")
+        for panel in panels[:2]:
+            panel.yaxis.set_major_formatter("{x:g}")
         panels[1].axhline(100.0 * FURROW_SLACK, color=palette.INK, linestyle=DASHED, linewidth=0.9)
         panels[1].annotate("fits the furrow below", (places[-1] + 0.45, 100.0 * FURROW_SLACK * 1.08), ha="right")
         panels[0].set_title("Turns driven in the truth: medians and shares with 95 % intervals")

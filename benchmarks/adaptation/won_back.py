@@ -23,10 +23,15 @@ SCORES: dict[str, Callable[[Sequence[DrivenTurn]], Array]] = {
 
 _RESAMPLES = 2000
 
+_LEVEL = "nothing"
+"""Truth in which nothing is different: what an adaptation wins there is no effect's doing."""
+
 
 def result_of(found: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     """What the study writes: each truth by arm, and the shares that were won back."""
     truths = {name: _of_truth(item) for name, item in found.items()}
+    for name, spoilt in _spoilt(found).items():
+        truths[name]["spoilt"] = spoilt
     return {
         "arms": ARMS,
         "truths": truths,
@@ -40,6 +45,23 @@ def _of_truth(item: Mapping[str, Any]) -> dict[str, Any]:
     known = {key: item[key] for key in ("title", "effect", "verdict", "complete", "sentence", "kept")}
     arms = {arm: summary(own, ddagr().half_wheelbase) for arm, own in turns.items()}
     return {**known, "arms": arms, "gains": {name: gains(turns, score) for name, score in SCORES.items()}}
+
+
+def _spoilt(found: Mapping[str, Mapping[str, Any]]) -> dict[str, list[str]]:
+    """By truth the scores of the nominal controller that are certainly worse than where nothing is different.
+
+    The same places and noise are compared, turn by turn, with 95 % by resampling; none where that truth is missing.
+    """
+    if _LEVEL not in found:
+        return {name: [] for name in found}
+    rng = np.random.default_rng(1)
+    worse: dict[str, list[str]] = {}
+    for name, item in found.items():
+        own, level = (as_turns(entry["turns"]["nominal"]) for entry in (item, found[_LEVEL]))
+        chosen = rng.integers(len(own), size=(_RESAMPLES, len(own)))
+        excess = {key: (score(own) - score(level))[chosen].mean(axis=1) for key, score in SCORES.items()}
+        worse[name] = [key for key, values in excess.items() if np.quantile(values, 0.025) > 0.0]
+    return worse
 
 
 def gains(turns: Mapping[str, Sequence[DrivenTurn]], score: Callable[[Sequence[DrivenTurn]], Array]) -> dict[str, Any]:
@@ -77,11 +99,18 @@ def _over_truths(truths: Mapping[str, Mapping[str, Any]], score: str) -> dict[st
     """Median share over the truths in which there is something to win, and where the adapted controller loses."""
     shares = {name: item["gains"][score]["share"] for name, item in truths.items()}
     known = {name: share["value"] for name, share in shares.items() if share is not None}
+    spoilt = [share for name, share in known.items() if score in truths[name]["spoilt"]]
     return {
         "truths": sorted(known),
-        "median_share": float(f"{np.median(list(known.values())):.4g}") if known else None,
+        "median_share": _median(list(known.values())),
+        "truths_spoilt": sorted(name for name in known if score in truths[name]["spoilt"]),
+        "median_share_where_spoilt": _median(spoilt),
         "lost_in": sorted(name for name, item in truths.items() if item["gains"][score]["loses"]),
     }
+
+
+def _median(values: Sequence[float]) -> float | None:
+    return float(f"{np.median(values):.4g}") if values else None
 
 
 def table(result: Mapping[str, Any]) -> str:
