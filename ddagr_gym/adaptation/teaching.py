@@ -43,14 +43,18 @@ def taught(bundle: Bundle, turns: MeasuredTurns, numbers: Sequence[int], rounds:
 
 
 def _improved(settings: AdaptedSettings, driven: Sequence[DrivenTurn]) -> AdaptedSettings:
-    sides = {}
-    for side in SIDES:
-        own = [item for item in driven if item.side == side and item.curvature is not None]
-        sides[side] = _corrected(getattr(settings, side), side, own) if own else getattr(settings, side)
-    return replace(settings, **sides)
+    return replace(
+        settings,
+        left=_corrected(settings.left, "left", driven),
+        right=_corrected(settings.right, "right", driven),
+    )
 
 
 def _corrected(feed_forward: FeedForward, side: str, driven: Sequence[DrivenTurn]) -> FeedForward:
+    """Feed-forward of a side after its finished turns; as it was without any."""
+    driven = [item for item in driven if item.side == side and item.curvature is not None]
+    if not driven:
+        return feed_forward
     ratio = np.median([item.curvature for item in driven if item.curvature is not None], axis=0)
     factors = np.array(feed_forward.curvature) / np.maximum(ratio, 0.2) ** GAIN
     late = float(np.median([SIDES[side] * item.heading for item in driven if item.heading is not None]))

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ddagr_gym.api.inputs import Sources
 from ddagr_gym.api.nominal import RobotLike, SoilLike, robot_from, soil_from
@@ -182,7 +182,7 @@ def _diagnosed(
     calibration: str | os.PathLike[str] | None,
     ground: str,
     cache: Path | None,
-    options: dict[str, object],
+    options: Mapping[str, Any],
 ) -> Corrected:
     """What recordings say: against the nominal simulator, or against a calibration's ordinary drives."""
     from ddagr_gym.adaptation.corrected import Corrected
@@ -191,12 +191,12 @@ def _diagnosed(
 
     steps = None if cache is None else cache / "diagnosis"
     if calibration is None:
-        result = diagnose(recordings, robot, soil, names_only=True, cache=steps, **options)  # type: ignore[call-overload]
+        result = diagnose(recordings, robot, soil, names_only=True, cache=steps, **options)
         if result.robot is None or result.soil is None:
             raise InputError(f"there is no corrected simulator to tune on, {result.refit_note}: check the recordings.")
         base = Corrected(result.robot, result.soil)
     else:
-        result = diagnose(recordings, calibration=calibration, ground=ground, names_only=True, **options)  # type: ignore[call-overload]
+        result = diagnose(recordings, calibration=calibration, ground=ground, names_only=True, **options)
         base = corrected_by_calibration(Path(calibration), ground)
     return replace(
         base,
@@ -206,7 +206,7 @@ def _diagnosed(
     )
 
 
-def _answer(diagnosis: Diagnosis) -> dict[str, object]:
+def _answer(diagnosis: Diagnosis) -> dict[str, Any]:
     return {"verdict": tuple(diagnosis.verdict), "complete": diagnosis.complete, "sentence": diagnosis.sentence}
 
 
@@ -241,7 +241,7 @@ def corrected_by_diagnosis(folder: Path) -> Corrected:
             }
             for entry in entries
         ),
-        **_answer(answer),  # type: ignore[arg-type]
+        **_answer(answer),
     )
 
 

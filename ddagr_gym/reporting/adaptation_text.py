@@ -29,8 +29,10 @@ def outcome_rows(adapted: Adapted) -> list[tuple[str, str, str]]:
     before, after = summary(adapted.before, reach), summary(adapted.after, reach)
     rows = (("radius error, median", "radius_error", 100.0, "%", 1), ("success", "success", 100.0, "%", 0),
             ("deviation at the next row, median", "exit_deviation", 100.0, "cm", 1))  # fmt: skip
-    return [(title, *(_span(item[key], scale, unit, digits) for item in (before, after)))
-            for title, key, scale, unit, digits in rows]  # fmt: skip
+    return [
+        (title, _span(before[key], scale, unit, digits), _span(after[key], scale, unit, digits))
+        for title, key, scale, unit, digits in rows
+    ]
 
 
 def _span(entry: dict[str, Any], scale: float, unit: str, digits: int) -> str:

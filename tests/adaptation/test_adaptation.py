@@ -74,7 +74,7 @@ def test_knowledge_that_misleads_is_not_kept(little, on_a_slope):
     right = replace(on_a_slope, effects=(), intervals=())
     wrong = replace(right, effects=load_effects(["gyro_scale=1.3"]))
     turns = MeasuredTurns(CorrectedTurns(right))
-    found = adapted(wrong, ddagr(), get_soil("thesis_a1"), turns, effort=replace(little, rounds=0, report=0))
+    found = adapted(wrong, ddagr(), get_soil("thesis_a1"), turns, effort=replace(little, taught=0, report=0))
     assert found.scores["known"] > found.scores["nominal"]
     assert found.kept == "nominal"
     assert found.used == ()
