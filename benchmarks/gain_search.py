@@ -1,15 +1,8 @@
 """Search for the gains of the ladder's closed loops: the same budget, scenarios and objective for every controller.
 
-Candidates are points of a box, logarithmic along each axis: the first half a Sobol sequence, then two rounds around the
-best so far. All are driven on the first scenarios of the validation set, the best of them on more, the last few on all
-of the search's (successive halving), and with them the gains that were chosen by hand: a search that finds nothing
-better keeps those. The objective, lower is better::
-
-    median |e_R| + 95th percentile of |e_R| / 4 + share of turns that do not succeed
-
-with an undefined radius counted as 1. B6 is searched on other plants than the nominal one, development scenarios of
-:mod:`benchmarks.row_turn_plants` with a seed of their own, all others on set V. Scenarios S0 to S8 and T are never
-touched.
+The search itself is :mod:`ddagr_gym.evaluation.gain_search`. B6 is searched on other plants than the nominal one,
+development scenarios of :mod:`benchmarks.row_turn_plants` with a seed of their own, all others on the first scenarios
+of the validation set. Scenarios S0 to S8 and T are never touched.
 """
 
 from __future__ import annotations
@@ -20,21 +13,19 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from benchmarks.row_turn_plants import scenario
 from ddagr_gym.control.pid import PidGains
 from ddagr_gym.envs.settings import Episode, TurnSettings
 from ddagr_gym.errors import InputError, unknown_name
 from ddagr_gym.evaluation.campaign import scenario_settings
 from ddagr_gym.evaluation.controllers import EKF_CONTROLLERS, LadderGains, LoopSettings, find_controller, ladder_gains
+from ddagr_gym.evaluation.gain_search import SearchBox, episodes_of, objective, search_box
 from ddagr_gym.evaluation.metrics import turn_metrics
 from ddagr_gym.evaluation.runs import drive_turn
 from ddagr_gym.evaluation.scenarios import load_scenarios
 from ddagr_gym.files import atomic_path
 
-Array = NDArray[np.float64]
+__all__ = ["SPACES", "STAGES", "GainSearch", "SearchSpace", "check_names", "episodes_of", "objective", "write_gains"]
 
 VALIDATION_SET = "V"
 
@@ -44,35 +35,21 @@ PLANT_SEED = 78_002
 STAGES = ((64, 8), (16, 24), (4, 40))
 """Candidates that are driven on so many scenarios; with the hand-chosen gains 872 episodes for each controller."""
 
-_SPREADS = (0.15, 0.06)
-"""Standard deviations of the two rounds of refinement, shares of the box."""
-
 
 _TRACKER = ("course", "ahead", "side_slip", "aligning")  # axes of B6 that are fields of LadderGains
 
 
 @dataclass(frozen=True)
-class SearchSpace:
+class SearchSpace(SearchBox):
     """Box of one controller.
 
     Attributes:
-        axes: (name, low, high) each, low above 0.
-        start: values chosen by hand before any search, in the order of the axes.
         apply: (gains, values by name) -> gains with these values.
         plants: names of :data:`benchmarks.row_turn_plants.PLANTS` that are driven in turn, instead of set V.
     """
 
-    axes: tuple[tuple[str, float, float], ...]
-    start: tuple[float, ...]
     apply: Callable[[LadderGains, dict[str, float]], LadderGains]
     plants: tuple[str, ...] = ()
-
-    def values(self, point: Array) -> dict[str, float]:
-        """Values at a point of the unit cube, to four digits."""
-        return {
-            name: float(f"{low * (high / low) ** float(share):.4g}")
-            for (name, low, high), share in zip(self.axes, point, strict=True)
-        }
 
 
 def _loop(field: str, limit: float) -> Callable[[LadderGains, dict[str, float]], LadderGains]:
@@ -150,13 +127,6 @@ SPACES = {
 """Controllers that have something to search for; B0 has nothing, B1 is calibrated on the nominal soil."""
 
 
-def objective(outcomes: Sequence[tuple[float | None, bool]]) -> float:
-    """The module's objective of (e_R or None, success) of each episode."""
-    errors = np.array([1.0 if error is None else min(abs(error), 1.0) for error, _ in outcomes])
-    failures = float(np.mean([not success for _, success in outcomes]))
-    return float(np.median(errors) + 0.25 * np.quantile(errors, 0.95, method="inverted_cdf") + failures)
-
-
 class GainSearch:
     """Search of one controller, resumed from a journal of what has been driven.
 
@@ -220,65 +190,15 @@ class GainSearch:
         self._progress(1)
         return self._driven[key, number]
 
-    def _scores(self, candidates: Sequence[dict[str, float]], first: int, last: int) -> list[float]:
-        """Objective of candidates on the scenarios up to ``last``, of which those before ``first`` are driven."""
-        for values in candidates:
-            for number in range(first, last):
-                self._drive(values, number)
-        return [objective([self._driven[json.dumps(v), n] for n in range(last)]) for v in candidates]
-
     def run(self) -> dict[str, Any]:
         """Best values, and the record of the search."""
-        count, scenarios = self.stages[0]
-        candidates, scores = self._explore(count, scenarios)
-        first_score = min(scores)
-        driven = scenarios
-        for count, scenarios in self.stages[1:]:
-            best = np.argsort(scores, kind="stable")[:count]
-            candidates = [candidates[i] for i in best]
-            scores = self._scores(candidates, driven, scenarios)
-            driven = scenarios
-        start = dict(zip((name for name, _, _ in self.space.axes), self.space.start, strict=True))
-        scores += self._scores([start], 0, driven)
-        candidates.append(start)
-        order = np.argsort(scores, kind="stable")
         return {
             "controller": self.controller,
             "seed": self.seed,
             "stages": [list(stage) for stage in self.stages],
             "axes": [list(axis) for axis in self.space.axes],
-            "best": candidates[order[0]],
-            "objective": scores[order[0]],
-            "objective_by_hand": scores[-1],
-            "objective_on_the_first_scenarios": first_score,
-            "finalists": [{"values": candidates[i], "objective": scores[i]} for i in order],
+            **search_box(self.space, self._drive, self.stages, self.seed),
         }
-
-    def _explore(self, count: int, scenarios: int) -> tuple[list[dict[str, float]], list[float]]:
-        """Candidates of the first stage and their objective."""
-        from scipy.stats import qmc
-
-        size, half = len(self.space.axes), count // 2
-        points = [qmc.Sobol(size, rng=np.random.default_rng(self.seed)).random(half)]
-        candidates = [self.space.values(point) for point in points[0]]
-        scores = self._scores(candidates, 0, scenarios)
-        rng = np.random.default_rng([self.seed, 1])
-        for spread, share in zip(_SPREADS, (count - half - (count - half) // 2, (count - half) // 2), strict=True):
-            middle = np.concatenate(points)[int(np.argmin(scores))]
-            points.append(np.clip(middle + spread * rng.standard_normal((share, size)), 0.0, 1.0))
-            added = [self.space.values(point) for point in points[-1]]
-            scores += self._scores(added, 0, scenarios)
-            candidates += added
-        return candidates, scores
-
-
-def episodes_of(stages: Sequence[tuple[int, int]]) -> int:
-    """Episodes that a search of one controller drives."""
-    last, total = 0, stages[-1][1]
-    for count, scenarios in stages:
-        total += count * (scenarios - last)
-        last = scenarios
-    return total
 
 
 def write_gains(records: Sequence[dict[str, Any]], path: Path) -> LadderGains:

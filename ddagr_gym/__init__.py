@@ -7,6 +7,7 @@ what the commands of the same names do, with typed results::
     ddagr_gym.check(drive)                                       # clocks, signs, units, sensors
     result = ddagr_gym.diagnose(drive)                           # which physics the simulator leaves out
     result.findings[0].parameters["angle"], result.effects       # how big; what gym.make(effects=...) takes
+    ddagr_gym.adapt(drive).report("adapted")                     # a controller that is tuned on what was found
 
 Conventions, everywhere in the package:
 
@@ -41,6 +42,7 @@ from ddagr_gym.envs.registration import register_environments
 from ddagr_gym.version import __version__
 
 if TYPE_CHECKING:
+    from ddagr_gym.api.adapt import AdaptationResult, adapt
     from ddagr_gym.api.calibrate import CalibrationResult, calibrate
     from ddagr_gym.api.change import ChangeResult
     from ddagr_gym.api.check import CheckResult, check
@@ -57,6 +59,7 @@ if TYPE_CHECKING:
     from ddagr_gym.api.simulate import SimulationResult, simulate
 
 __all__ = [
+    "AdaptationResult",
     "CalibrationResult",
     "ChangeResult",
     "CheckResult",
@@ -70,6 +73,7 @@ __all__ = [
     "SimulationResult",
     "TopicMapGuess",
     "__version__",
+    "adapt",
     "calibrate",
     "check",
     "diagnose",
@@ -86,6 +90,7 @@ __all__ = [
 ]
 
 _MODULES = {
+    "AdaptationResult": "adapt",
     "CalibrationResult": "calibrate",
     "ChangeResult": "change",
     "CheckResult": "check",
@@ -98,6 +103,7 @@ _MODULES = {
     "ReplayResult": "replay",
     "SimulationResult": "simulate",
     "TopicMapGuess": "guess_topic_map",
+    "adapt": "adapt",
     "calibrate": "calibrate",
     "check": "check",
     "diagnose": "diagnose",

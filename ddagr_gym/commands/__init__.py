@@ -40,6 +40,7 @@ NAMES = (
     "replay",
     "calibrate",
     "diagnose",
+    "adapt",
     "export",
     "estimate",
     "null-bank",

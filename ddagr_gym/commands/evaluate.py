@@ -30,8 +30,9 @@ class Arguments:
     say which scenarios are feasible, and are in the tables only where they are asked for.
 
     Attributes:
-        controllers: names, separated by commas: B0 to B6, upper bounds, trained policies or their files; a * stands for
-            any letters of the trained ones, so that ppo_ekf_seed_* are all training seeds, which are judged together.
+        controllers: names, separated by commas: B0 to B6, upper bounds, trained policies or their files, folders of
+            `ddagr adapt`; a * stands for any letters of the trained ones, so that ppo_ekf_seed_* are all training
+            seeds, which are judged together.
         scenarios: names of frozen sets, separated by commas: S0 to S8, V for tuning, T for another soil law.
         output: folder for report.html, episodes.parquet, summary.json, claims.json and the figure.
         workers: processes, or processors of a local cluster.

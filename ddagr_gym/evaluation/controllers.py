@@ -268,6 +268,13 @@ def is_policy(name: str) -> bool:
     return name not in _LADDER and is_policy_name(name)
 
 
+def is_adapted(name: str) -> bool:
+    """Whether a name is that of no controller and of a folder that ``ddagr adapt`` wrote."""
+    from ddagr_gym.evaluation.bundles import is_bundle
+
+    return name not in _LADDER and is_bundle(name)
+
+
 def _unknown(name: str) -> InputError:
     from ddagr_gym.policies.shipped import policy_names
 
@@ -276,6 +283,8 @@ def _unknown(name: str) -> InputError:
 
 def controller_title(name: str) -> str:
     """What a controller is, in a phrase; InputError as :func:`find_controller`."""
+    if is_adapted(name):
+        return "B4 adapted to recordings, see its own page"
     if is_policy(name):
         from ddagr_gym.policies.controller import policy_title
 
@@ -319,6 +328,10 @@ def controller_version(name: str) -> str:
         return policy_version(name)
     if name in ("B0", "B1"):
         return name
+    if is_adapted(name):
+        from ddagr_gym.evaluation.bundles import bundle_version
+
+        return bundle_version(name)
     return f"{name} {ladder_gains()!r}" + (f" {inertial_model()!r}" if name == "B6" else "")
 
 
@@ -326,7 +339,8 @@ def find_controller(name: str, turn: RowTurn, gains: LadderGains | None = None) 
     """Controller or trained policy by name for a commanded turn.
 
     Args:
-        name: of the ladder, or of a policy as :func:`ddagr_gym.policies.controller.policy_controller` takes it.
+        name: of the ladder, of a policy as :func:`ddagr_gym.policies.controller.policy_controller` takes it, or a
+            folder that ``ddagr adapt`` wrote.
         turn: the commanded manoeuvre.
         gains: instead of :func:`ladder_gains`.
 
@@ -337,6 +351,10 @@ def find_controller(name: str, turn: RowTurn, gains: LadderGains | None = None) 
         from ddagr_gym.policies.controller import policy_controller
 
         return policy_controller(name)
+    if is_adapted(name):
+        from ddagr_gym.evaluation.bundles import load_bundle
+
+        return load_bundle(name).controller(turn)
     if name not in _LADDER:
         raise _unknown(name)
     return _LADDER[name][0](turn, ladder_gains() if gains is None else gains)

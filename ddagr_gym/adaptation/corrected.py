@@ -1,0 +1,85 @@
+"""The corrected simulator as a controller is tuned on it: robot, soil, effects, and how far each is known."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+
+import numpy as np
+
+from ddagr_gym.envs.options import make_settings
+from ddagr_gym.envs.settings import TurnSettings
+from ddagr_gym.errors import InputError
+from ddagr_gym.parameters import Robot, Soil
+from ddagr_gym.physics.effects import Effect
+
+_SPREADS_OF_90_PERCENT = 3.29
+"""Width of a 90 % interval over the standard deviation of a normal distribution."""
+
+
+@dataclass(frozen=True)
+class Corrected:
+    """What recordings say about a robot on its ground.
+
+    Attributes:
+        robot: refitted.
+        soil: refitted.
+        effects: named, at their estimated sizes.
+        intervals: 90 %, by parameter, of each effect.
+        verdict: names.
+        complete: whether nothing else is left.
+        sentence: the answer in words.
+        calibration: folder of a calibration, whose drives say how much robot and soil differ; None without one.
+        ground: of the calibration.
+        ordinary: effects that the calibration has of its own, of its sensors.
+    """
+
+    robot: Robot
+    soil: Soil
+    effects: tuple[Effect, ...] = ()
+    intervals: tuple[Mapping[str, tuple[float, float]], ...] = ()
+    verdict: tuple[str, ...] = ("none",)
+    complete: bool = True
+    sentence: str = ""
+    calibration: Path | None = None
+    ground: str = ""
+    ordinary: tuple[Effect, ...] = ()
+
+    @property
+    def all_effects(self) -> tuple[Effect, ...]:
+        """What belongs to the robot as calibrated, and what was named."""
+        return (*self.ordinary, *self.effects)
+
+    def __post_init__(self) -> None:
+        if len(self.intervals) not in (0, len(self.effects)):
+            raise InputError(
+                f"{len(self.intervals)} sets of intervals for {len(self.effects)} effects: give one for each, or none."
+            )
+
+    def draw_effects(self, rng: np.random.Generator) -> tuple[Effect, ...]:
+        """Effects with sizes drawn from their intervals; at their estimates where there are none."""
+        known = self.intervals or ({},) * len(self.effects)
+        return tuple(_drawn(effect, own, rng) for effect, own in zip(self.effects, known, strict=True))
+
+    def settings(self, rng: np.random.Generator, radius: float, speed: float, side: str) -> TurnSettings:
+        """Settings of the environment of one turn."""
+        turn = {"radius": radius, "speed": speed, "side": side}
+        effects = self.draw_effects(rng)
+        if self.calibration is not None:
+            return make_settings(calibration=self.calibration, ground=self.ground, effects=effects, **turn)  # type: ignore[arg-type]
+        return make_settings(robot=self.robot, soil=self.soil, effects=effects, **turn)  # type: ignore[arg-type]
+
+
+def _drawn(
+    effect: Effect, intervals: Mapping[str, tuple[float, float] | Sequence[float]], rng: np.random.Generator
+) -> Effect:
+    changed = {}
+    for item in fields(effect):
+        if item.name not in intervals:
+            continue
+        low, high = intervals[item.name]
+        value = getattr(effect, item.name) + (high - low) / _SPREADS_OF_90_PERCENT * rng.standard_normal()
+        low, high = max(low, item.metadata["low"]), min(high, item.metadata["high"])
+        changed[item.name] = float(min(max(value, low), high))
+    return replace(effect, **changed)

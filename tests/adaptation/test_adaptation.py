@@ -1,0 +1,104 @@
+"""From a corrected simulator to a controller: draws, teaching, what is kept, what is remembered."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ddagr_gym.adaptation.corrected import Corrected
+from ddagr_gym.adaptation.files import as_json, deviations, sizes, summary
+from ddagr_gym.adaptation.run import adapted, refitted_prior, score
+from ddagr_gym.adaptation.teaching import taught
+from ddagr_gym.adaptation.turns import CorrectedTurns, DrivenTurn, MeasuredTurns
+from ddagr_gym.errors import InputError
+from ddagr_gym.evaluation.adapted_controller import NODES, AdaptedSettings
+from ddagr_gym.evaluation.bundles import Bundle
+from ddagr_gym.physics.effects import load_effects
+from ddagr_gym.presets import ddagr, get_soil
+
+
+def turn(error=0.01, lateral=0.02, heading=0.0, success=True):
+    return DrivenTurn(0, "left", error, success, lateral, heading, None)
+
+
+def test_sizes_are_drawn_from_their_intervals(on_a_slope):
+    drawn = [on_a_slope.draw_effects(np.random.default_rng(n))[0] for n in range(200)]
+    angles = np.array([item.angle for item in drawn])
+    assert (angles.min(), angles.max()) == (0.045, 0.055)
+    assert np.mean(angles) == pytest.approx(0.05, abs=0.0005)
+    assert {item.direction for item in drawn} == {0.0}  # no interval, no draw
+
+
+def test_intervals_belong_to_their_effects():
+    with pytest.raises(InputError, match="2 sets of intervals for 1 effects"):
+        Corrected(ddagr(), get_soil("thesis_a1"), load_effects(["slope=0.05"]), ({}, {}))
+
+
+def test_a_turn_is_driven_once_and_goes_on_from_its_file(on_a_slope, tmp_path):
+    bundle = Bundle(AdaptedSettings(), ddagr(), get_soil("thesis_a1"))
+    journal = tmp_path / "turns.jsonl"
+    first = MeasuredTurns(CorrectedTurns(on_a_slope), journal).measure(bundle, 0)
+    journal.write_text(journal.read_text() + '{"key": "cut o')
+    again = MeasuredTurns(CorrectedTurns(on_a_slope), journal)
+    again.turns.drive = lambda *_: pytest.fail("driven twice")
+    assert again.measure(bundle, 0) == first
+    assert len(first.curvature) == NODES
+    assert first.side == "left"
+
+
+def test_teaching_removes_what_a_slope_does(on_a_slope):
+    bundle = Bundle(AdaptedSettings(), ddagr(), get_soil("thesis_a1"), on_a_slope.effects)
+    turns = MeasuredTurns(CorrectedTurns(on_a_slope))
+    before = turns.measure(bundle, 8)
+    after = turns.measure(taught(bundle, turns, (0, 2), 2), 8)
+    assert abs(before.heading) > 0.2
+    assert abs(after.heading) < 0.6 * abs(before.heading)
+    assert np.ptp(after.curvature) < np.ptp(before.curvature)
+
+
+def test_the_best_is_kept_and_told(on_a_slope, little):
+    turns = MeasuredTurns(CorrectedTurns(on_a_slope))
+    found = adapted(on_a_slope, ddagr(), get_soil("thesis_a1"), turns, effort=little)
+    assert found.kept == min(found.scores, key=found.scores.get)
+    assert found.kept != "nominal"  # which fails all turns on this slope
+    assert found.used == ("slope",)
+    assert score(found.after) < score(found.before)
+    written = json.loads(json.dumps(as_json(found, on_a_slope)))
+    assert written["before"]["turns"] == little.report
+    assert written["after"]["success"]["value"] >= written["before"]["success"]["value"]
+
+
+def test_knowledge_that_misleads_is_not_kept(little, on_a_slope):
+    """The turns are those of a robot whose gyro is right; the diagnosis says that it is not."""
+    right = replace(on_a_slope, effects=(), intervals=())
+    wrong = replace(right, effects=load_effects(["gyro_scale=1.3"]))
+    turns = MeasuredTurns(CorrectedTurns(right))
+    found = adapted(wrong, ddagr(), get_soil("thesis_a1"), turns, effort=replace(little, taught=0, report=0))
+    assert found.scores["known"] > found.scores["nominal"]
+    assert found.kept == "nominal"
+    assert found.used == ()
+    assert as_json(found, wrong)["after"] is None
+
+
+def test_the_counted_turns_are_those_that_are_asked_for(on_a_slope, little):
+    asked = []
+    turns = MeasuredTurns(CorrectedTurns(on_a_slope), progress=lambda: asked.append(1))
+    adapted(on_a_slope, ddagr(), get_soil("thesis_a1"), turns, effort=little)
+    assert len(asked) == little.turns
+
+
+def test_the_prior_follows_the_soil():
+    soil = get_soil("thesis_a1")
+    strong = replace(soil, cohesion=2.0 * soil.cohesion, friction_angle=1.3 * soil.friction_angle)
+    weak_prior, strong_prior = (refitted_prior(ddagr(), item) for item in (soil, strong))
+    assert strong_prior.traction_limit_over_load > 1.2 * weak_prior.traction_limit_over_load
+
+
+def test_summary_by_hand():
+    driven = [turn(0.01), turn(-0.03), turn(None, None, None, False)]
+    assert sizes(driven).tolist() == [0.01, 0.03, 1.0]
+    assert deviations([turn(heading=np.pi / 2), turn(None, None, None)], 0.33).tolist() == pytest.approx([0.35, 1.0])
+    found = summary(driven, 0.33)
+    assert (found["radius_error"]["value"], found["turns"]) == (0.03, 3)
+    assert found["success"]["value"] == pytest.approx(2 / 3, abs=1e-4)

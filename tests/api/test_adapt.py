@@ -1,0 +1,121 @@
+"""``ddagr_gym.adapt`` and ``ddagr adapt``: what is refused, what is warned of, what is written."""
+
+import json
+from dataclasses import replace
+
+import pytest
+
+import ddagr_gym
+from ddagr_gym import cli
+from ddagr_gym.adaptation import run
+from ddagr_gym.api.adapt import corrected_by_diagnosis
+from ddagr_gym.config import dump_config
+from ddagr_gym.diagnosis.answer.verdict import Diagnosis, Estimate, Finding, GatesUsed
+from ddagr_gym.diagnosis.result.files import save
+from ddagr_gym.errors import InputError, InputWarning
+from ddagr_gym.evaluation.controllers import find_controller
+from ddagr_gym.physics.effects import load_effects, save_effects
+from ddagr_gym.presets import ddagr, get_soil
+
+FINDING = Finding("slope", {"angle": Estimate(0.05, "rad", (0.045, 0.055))}, 30.0, 8.0, 4.0, 20.0)
+ANSWER = Diagnosis(
+    ("slope",),
+    True,
+    (FINDING,),
+    "The ground slopes.",
+    {"nominal": {"yaw_rate": 2.0}},
+    {},
+    {},
+    ("a.csv",),
+    GatesUsed(nulls=60, bank="a test", level=0.05),
+    1.0,
+    "0",
+)
+
+
+@pytest.fixture
+def diagnosis(tmp_path):
+    """Maker of a folder as ``ddagr diagnose`` writes it."""
+
+    def make(**changes):
+        folder = tmp_path / "diagnosis"
+        folder.mkdir(exist_ok=True)
+        answer = replace(ANSWER, **changes)
+        save(answer, folder / "diagnosis.json")
+        (folder / "robot.yaml").write_text(dump_config(ddagr()))
+        (folder / "soil.yaml").write_text(dump_config(get_soil("thesis_a1")))
+        known = [{"angle": (0.045, 0.055)}] if "slope" in answer.verdict else []
+        effects = load_effects(["slope=0.05"]) if known else ()
+        save_effects(folder / "effects.yaml", effects, intervals=known, source="a test")
+        return folder
+
+    return make
+
+
+@pytest.fixture
+def few_turns(monkeypatch):
+    """Adaptations of a few turns."""
+    little = {"rounds": 1, "taught": 2, "stages": ((2, 1),), "selection": 2}
+    whole = run.Effort
+    monkeypatch.setattr(run, "Effort", lambda report=2: whole(**little, report=report))
+
+
+def test_a_diagnosis_is_read_with_its_intervals(diagnosis):
+    found = corrected_by_diagnosis(diagnosis())
+    assert [item.name for item in found.effects] == ["slope"]
+    assert found.intervals == ({"angle": (0.045, 0.055)},)
+    assert found.verdict == ("slope",)
+    assert corrected_by_diagnosis(diagnosis() / "diagnosis.json").effects == found.effects
+
+
+def test_what_has_no_name_is_refused(diagnosis):
+    folder = diagnosis(verdict=("unknown",), findings=(), complete=False)
+    with pytest.raises(InputError, match=r"verdict: unknown.*--anyway"):
+        ddagr_gym.adapt(diagnosis=folder)
+
+
+def test_an_incomplete_diagnosis_is_warned_of(diagnosis, few_turns):
+    with pytest.warns(InputWarning, match="not complete"):
+        result = ddagr_gym.adapt(diagnosis=diagnosis(complete=False), turns=2)
+    assert "not complete" in str(result)
+
+
+@pytest.mark.parametrize(
+    ("given", "complaint"),
+    [
+        ({}, "nothing to adapt to"),
+        ({"recordings": ["a.csv"], "diagnosis": "d"}, "leave out one"),
+        ({"diagnosis": "d", "ground": "sand"}, "no calibration"),
+        ({"diagnosis": "absent"}, "cannot be read as a diagnosis"),
+        ({"diagnosis": "d", "turns": 1}, "turns is 1"),
+    ],
+)
+def test_bad_sources_are_one_sentence(given, complaint):
+    with pytest.raises(InputError, match=complaint):
+        ddagr_gym.adapt(**given)
+
+
+def test_a_diagnosis_without_a_simulator_is_refused(diagnosis):
+    folder = diagnosis()
+    (folder / "robot.yaml").unlink()
+    with pytest.raises(InputError, match=r"holds no robot\.yaml"):
+        ddagr_gym.adapt(diagnosis=folder)
+
+
+def test_the_command_writes_a_bundle_that_drives(diagnosis, few_turns, tmp_path, capsys):
+    words = ["adapt", "--diagnosis", str(diagnosis()), "--turns", "2", "--output", str(tmp_path / "adapted")]
+    assert cli.main(words) == 0
+    printed = capsys.readouterr().out
+    assert "In the corrected simulator the median radius error goes from" in printed
+    folder = tmp_path / "adapted"
+    written = {path.name for path in folder.iterdir() if not path.name.startswith(".")}
+    files = {"controller.yaml", "robot.yaml", "soil.yaml", "effects.yaml"}
+    assert written == files | {"adaptation.json", "index.html"}
+    answer = json.loads((folder / "adaptation.json").read_text())
+    assert answer["effects"][0]["name"] == "slope"
+    page = (folder / "index.html").read_text()
+    assert page.count("<img") == 2
+    assert "Sloping ground" in page
+    assert not list(tmp_path.glob(".adapted*"))  # nothing of the work is left
+    assert find_controller(str(folder), ddagr_gym.envs.TurnSettings().turn(0.8, "left", 0.2)) is not None
+    assert cli.main(words) == 2  # an earlier output is not replaced

@@ -1,0 +1,118 @@
+"""The demonstration of adaptations: truths, the loop in the other simulator, what counts as won back, its files."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from benchmarks.adaptation import __main__ as command
+from benchmarks.adaptation.plant import SAMPLES, TruePlant
+from benchmarks.adaptation.study import ARMS, TrueTurns, nominal
+from benchmarks.adaptation.truths import TRUTHS
+from benchmarks.adaptation.won_back import SCORES, gains, result_of, table
+from benchmarks.concealed.drive import SAMPLE_PERIOD, SUBSTEPS, drive
+from ddagr_gym.adaptation.turns import DrivenTurn, judged
+from ddagr_gym.control.row_turn import RowTurn
+from ddagr_gym.physics.effects.registry import effect_kinds
+from ddagr_gym.recordings.load import load_recording
+
+
+def turns(errors):
+    return [DrivenTurn(k, "left", error, True, error, 0.0, None) for k, error in enumerate(errors)]
+
+
+def test_truths_are_told_in_the_librarys_terms():
+    named = {name: truth.library_effects() for name, truth in TRUTHS.items()}
+    assert named.pop("nothing") == ()
+    assert all(len(effects) == 1 and effects[0].name == TRUTHS[name].effect for name, effects in named.items())
+    assert {TRUTHS[name].effect for name in named} <= set(effect_kinds())
+    (slope,) = named["slope"]
+    assert math.degrees(slope.angle) == pytest.approx(3.0)
+    (split,) = named["split"]
+    assert split.strength == pytest.approx(math.exp(-0.4))  # left over right, the generator's is right over left
+
+
+def test_recordings_are_read_as_any_others(tmp_path, monkeypatch):
+    monkeypatch.setattr("benchmarks.adaptation.plant.RECORDED", ("straight",))
+    (path,) = TruePlant(TRUTHS["gyro"]).record(tmp_path)
+    recording = load_recording(path, "concealed", "ddagr")
+    assert recording.has("yaw_rate", "pose_x", "command_right")
+
+
+class _Straight:
+    """Both banks at one speed; keeps the samples that it is given."""
+
+    def __init__(self):
+        self.samples = []
+
+    def reset(self):
+        self.samples.clear()
+
+    def __call__(self, observation, info=None):
+        self.samples.append(info["samples"])
+        return np.array([0.4, 0.4])
+
+
+def test_the_loop_is_that_of_the_other_simulator(monkeypatch):
+    """A drive in pieces goes where the whole one goes, up to the load that settles beforehand."""
+    monkeypatch.setattr("benchmarks.adaptation.plant.LONGEST", 4.0)
+    controller, plant = _Straight(), TruePlant(TRUTHS["nothing"])
+    columns = plant.turn(controller, RowTurn(run_in=0.5), 3)
+    steps = len(columns["t"])
+    rng = np.random.default_rng([20_261_124, 2, 3])
+    made = plant.plant(rng)
+    start = np.array([-0.5, 0.01 * rng.standard_normal(), 0.01 * rng.standard_normal()])
+    whole = drive(made, np.full(((steps + 1) * SUBSTEPS, 2), 0.8), start)
+    assert columns["true_x"][-1] == pytest.approx(whole["x"][-1], abs=2e-4)
+    assert columns["t"][-1] == pytest.approx(steps * SAMPLE_PERIOD)
+    assert all(item.shape == (SAMPLES, 5) for item in controller.samples)
+    assert np.mean([item[:, 3] for item in controller.samples[-5:]]) == pytest.approx(0.8, abs=0.02)
+
+
+def test_a_late_command_comes_late(monkeypatch):
+    monkeypatch.setattr("benchmarks.adaptation.plant.LONGEST", 2.0)
+    ways = [
+        TruePlant(TRUTHS[name]).turn(_Straight(), RowTurn(run_in=0.5), 3)["true_x"] for name in ("nothing", "delay")
+    ]
+    assert (ways[0][-1] - ways[1][-1]) / 0.2 == pytest.approx(0.16, abs=0.04)
+
+
+def test_a_turn_in_a_truth_is_judged_as_others_are():
+    own = TrueTurns(TRUTHS["nothing"])
+    columns = own.drive(nominal().controller(own.turn(0)), 0)
+    found = judged(columns, own.turn(0), own.robot, 0)
+    assert found.success
+    assert abs(found.error) < 0.1
+
+
+def test_what_is_won_back_by_hand():
+    before, best = np.full(12, 0.10), np.full(12, 0.02)
+    spread = 0.002 * np.arange(12)
+    score = SCORES["radius_error"]
+    found = gains(
+        {"nominal": turns(before + spread), "adapted": turns(best + spread + 0.02), "told": turns(best + spread)}, score
+    )
+    assert found["share"]["value"] == pytest.approx(0.75)
+    assert not found["loses"]
+    nothing = gains({arm: turns(before + spread) for arm in ARMS}, score)
+    assert nothing["share"] is None
+    worse = gains({"nominal": turns(best), "adapted": turns(before), "told": turns(best)}, score)
+    assert worse["loses"]
+
+
+def test_published_figures_are_of_their_turns():
+    result = json.loads(command.RESULT.read_text())
+    assert len(result["truths"]) >= 8
+    found = {name: {**item, "turns": result["turns"][name]} for name, item in result["truths"].items()}
+    again = json.loads(json.dumps(result_of(found)))
+    assert again["won_back"] == result["won_back"]
+    assert again["truths"] == result["truths"]
+    assert table(again) == table(result)
+
+
+def test_unknown_truths_are_one_sentence(capsys):
+    with pytest.raises(SystemExit) as ended:
+        command.main(["--truths", "slop"])
+    assert ended.value.code == 2
+    assert "'slope'" in capsys.readouterr().err
