@@ -16,9 +16,9 @@ from ddagr_gym.estimation.filter_model import SoilPrior
 from ddagr_gym.estimation.force_laws import ForceLaw
 from ddagr_gym.evaluation.adapted_controller import AdaptedSettings
 from ddagr_gym.evaluation.bundles import Bundle
-from ddagr_gym.evaluation.controllers import LoopSettings, ladder_gains
 from ddagr_gym.evaluation.force_law_fits import fit_law, true_forces, turn_states
 from ddagr_gym.evaluation.gain_search import SearchBox, episodes_of, objective, search_box
+from ddagr_gym.evaluation.ladder_gains import LoopSettings, ladder_gains
 from ddagr_gym.parameters import STANDARD_GRAVITY, Robot, Soil
 
 _TEACHING, _SELECTION, _REPORT = 1000, 2000, 3000

@@ -147,7 +147,7 @@ def _left_out(sets: Sequence[SetNote]) -> str:
 
 
 def _sources(arms: Sequence[Arm], sets: Sequence[SetNote]) -> list[tuple[str, str]]:
-    from ddagr_gym.evaluation.controllers import gains_file
+    from ddagr_gym.evaluation.ladder_gains import gains_file
     from ddagr_gym.recordings.files import sha256_of
     from ddagr_gym.version import __version__
 

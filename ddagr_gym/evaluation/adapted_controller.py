@@ -23,8 +23,8 @@ from ddagr_gym.estimation import BatchFilter, FilterModel
 from ddagr_gym.estimation.filter_model import SoilPrior
 from ddagr_gym.estimation.force_balance import arc_bank_speeds
 from ddagr_gym.estimation.layout import CHANNEL_SIZE, PARAMETER, PARAMETER_SIZE
-from ddagr_gym.evaluation.controllers import LoopSettings, ladder_gains
 from ddagr_gym.evaluation.known_physics import KnownPhysics
+from ddagr_gym.evaluation.ladder_gains import LoopSettings, ladder_gains
 from ddagr_gym.parameters import STANDARD_GRAVITY, Sensors
 from ddagr_gym.validated import Validated, bounded
 

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.config import configs_dir, load_config
 from ddagr_gym.control.constant_speeds import ConstantSpeeds
 from ddagr_gym.control.force_balance import ForceBalance
 from ddagr_gym.control.model_predictive import ModelPredictive, PredictiveSettings
@@ -31,77 +29,15 @@ from ddagr_gym.estimation.dead_reckoning import DeadReckoning
 from ddagr_gym.estimation.force_balance import arc_bank_speeds
 from ddagr_gym.estimation.inertial_filter import InertialModel
 from ddagr_gym.evaluation.calibration import calibrate_constant_speeds
+from ddagr_gym.evaluation.ladder_gains import LadderGains, LoopSettings, ladder_gains
 from ddagr_gym.evaluation.policy_seeds import arm_and_seed, policy_version
 from ddagr_gym.evaluation.runs import BatchController, Controller
 from ddagr_gym.parameters import Sensors
 from ddagr_gym.physics.soil_laws import NOMINAL_LAW
 from ddagr_gym.physics.steady_arc import soil_of, steady_bank_speeds
 from ddagr_gym.presets import ddagr, get_soil
-from ddagr_gym.validated import Validated, bounded
-
-
-@dataclass(frozen=True)
-class LoopSettings(Validated):
-    """A closed loop of the ladder.
-
-    Attributes:
-        gains: of the loop.
-        lead_factor: heading before the end of the turn at which it straightens, over that of the constant speeds.
-    """
-
-    gains: PidGains
-    lead_factor: float = bounded("-", 0.0, 5.0, default=1.0)
-
-
-@dataclass(frozen=True)
-class LadderGains:
-    """What the search on the validation set found.
-
-    Attributes:
-        yaw_rate: of B2, curvature per yaw rate.
-        radial: of B3, curvature per distance.
-        force_balance: of B4.
-        predictive: of B5.
-        path_tracker: of B6, curvature per cross-track error.
-        path_tracker_course: its curvature per course error [1/(m rad)].
-        path_tracker_ahead: time by which its errors run ahead [s].
-        path_tracker_side_slip: share of the side slip in its course [-].
-        path_tracker_aligning: distance over which its nose turns into the next row [m].
-        path_tracker_largest_slip: side slip that counts at most [rad]; not searched.
-        true_curvature: of the upper bound of that name.
-        true_soil: likewise.
-        true_path: likewise, curvature per lateral error.
-        true_path_heading: its curvature per heading error [1/(m rad)].
-    """
-
-    yaw_rate: LoopSettings
-    radial: LoopSettings
-    force_balance: LoopSettings
-    predictive: PredictiveSettings
-    true_curvature: LoopSettings
-    true_soil: LoopSettings
-    true_path: LoopSettings
-    path_tracker: LoopSettings
-    true_path_heading: float = 3.0
-    path_tracker_course: float = 4.0
-    path_tracker_ahead: float = 0.0
-    path_tracker_side_slip: float = 1.0
-    path_tracker_aligning: float = 0.0
-    path_tracker_largest_slip: float = 0.5
-
 
 _Maker = Callable[[RowTurn, LadderGains], Controller]
-
-
-@lru_cache(maxsize=1)
-def ladder_gains() -> LadderGains:
-    """Gains of ``configs/evaluation/ladder_gains.yaml``, where the search writes its result."""
-    return load_config(gains_file(), LadderGains)
-
-
-def gains_file() -> Path:
-    """Where :func:`ladder_gains` reads."""
-    return configs_dir() / "evaluation" / "ladder_gains.yaml"
 
 
 @lru_cache(maxsize=64)

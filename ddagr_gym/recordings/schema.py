@@ -230,8 +230,7 @@ class Recording:
 
     def held_encoders(self, maximum_age: float = math.inf) -> tuple[FloatArray, FloatArray]:
         """Bank speeds (right, left) as last read at every row, at most ``maximum_age`` [s] ago; else NaN."""
-        every = np.ones(len(self), dtype=bool)
-        return _hold(self, "encoder_right", maximum_age, every), _hold(self, "encoder_left", maximum_age, every)
+        return _hold(self, "encoder_right", maximum_age), _hold(self, "encoder_left", maximum_age)
 
     @classmethod
     def from_columns(
@@ -333,7 +332,7 @@ def _check_ranges(kind: str, ranges: Ranges, n: int) -> None:
         previous = stop
 
 
-def _hold(recording: Recording, name: str, maximum_age: float, valid: npt.NDArray[np.bool_]) -> FloatArray:
+def _hold(recording: Recording, name: str, maximum_age: float, valid: BoolArray | bool = True) -> FloatArray:
     values = recording[name]
     known = np.isfinite(values) & valid
     carried = np.full(len(recording), np.nan)
@@ -342,8 +341,7 @@ def _hold(recording: Recording, name: str, maximum_age: float, valid: npt.NDArra
         last = np.maximum.accumulate(np.where(known[span], rows, -1))
         fresh = (last >= 0) & (recording.t[span] - recording.t[last] <= maximum_age)
         carried[span] = np.where(fresh, values[last], np.nan)
-    carried[~valid] = np.nan
-    return carried
+    return np.where(valid, carried, np.nan)
 
 
 def _doubts(recording: Recording) -> Iterator[str]:

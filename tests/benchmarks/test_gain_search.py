@@ -19,7 +19,7 @@ from benchmarks.gain_search import (
 )
 from ddagr_gym.config import load_config
 from ddagr_gym.errors import InputError
-from ddagr_gym.evaluation.controllers import LadderGains, gains_file, ladder_gains
+from ddagr_gym.evaluation.ladder_gains import LadderGains, gains_file, ladder_gains
 
 FEW = ((4, 1), (2, 2))
 
