@@ -11,6 +11,7 @@ the same drive that nothing was fitted to, beside those of a learned model that 
 from __future__ import annotations
 
 import argparse
+import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -37,6 +38,9 @@ COMPARED = ("nominal", "kinematic", "corrected")
 """Errors of a :class:`~ddagr_gym.diagnosis.answer.drivetrain.ForecastComparison`."""
 
 COLOURS = {"nominal": palette.PALE, "kinematic": palette.ORANGE, "corrected": palette.BLUE, "learned": palette.GREEN}
+
+LEAST_TO_GAIN = 0.2
+"""Share of the data sheet's error that the learned model must take off before a share of that means anything (ours)."""
 
 WORDS = {
     "nominal": "data sheet",
@@ -66,8 +70,20 @@ def diagnosed(name: str, folder: Path, threads: int) -> Diagnosis:
     return load(page / "diagnosis.json")
 
 
-def learned(name: str) -> dict[str, float]:
-    """Errors of a learned model on every quarter of a drive, trained on the others: root mean squares by metric."""
+def learned(name: str, folder: Path) -> dict[str, float]:
+    """Errors of a learned model on every quarter of a drive, trained on the others: root mean squares by metric.
+
+    Args:
+        name: of :data:`DRIVES`.
+        folder: of the pages, where they are kept.
+    """
+    kept = folder / f"{name.replace('/', '_')}.learned.json"
+    if not kept.is_file():
+        write_json(kept, _learned(name))
+    return {label: float(error) for label, error in json.loads(kept.read_text()).items()}
+
+
+def _learned(name: str) -> dict[str, float]:
     ground, column_map = DRIVES[name]
     recording = load_recording(recordings_folder() / f"{name}.csv.gz", column_map, "warthog")
     grouped: dict[str, list[ForecastError]] = {}
@@ -107,9 +123,14 @@ def entry(diagnosis: Diagnosis, ceiling: Mapping[str, float]) -> dict[str, Any]:
     return {**kept, "explained": answer.explained, "share_of_learned": shares, "parts": parts, "errors": errors}
 
 
-def _share_of_learned(errors: Mapping[str, Any]) -> float:
-    """Share of what the learned model takes off the data sheet's error that the named drivetrain takes off."""
-    return float((errors["nominal"] - errors["corrected"]) / (errors["nominal"] - errors["learned"]))
+def _share_of_learned(errors: Mapping[str, Any]) -> float | None:
+    """Share of what the learned model takes off the data sheet's error that the named drivetrain takes off.
+
+    None where the learned model hardly takes anything off.
+    """
+    possible = errors["nominal"] - errors["learned"]
+    known = possible > LEAST_TO_GAIN * errors["nominal"]
+    return float((errors["nominal"] - errors["corrected"]) / possible) if known else None
 
 
 def draw(entries: Mapping[str, Mapping[str, Any]], path: Path) -> None:
@@ -148,7 +169,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     entries: dict[str, Any] = {}
     for name in given.drives:
         print(f"{name}:", flush=True)
-        entries[name] = entry(diagnosed(name, folder, given.threads), learned(name))
+        entries[name] = entry(diagnosed(name, folder, given.threads), learned(name, folder))
         print(f"{name}: {entries[name]['sentence']}", flush=True)
         write_json(output / "real_diagnoses.json", entries)
         draw(entries, output / "real_diagnoses.png")

@@ -127,10 +127,23 @@ def adapt(
         progress: called with a line of text from time to time.
         cache: folder in which finished steps are kept, so that the same call goes on after an interruption.
 
+    Returns:
+        The controller, what was kept and why, turns before and after; ``report`` writes the bundle.
+
     Raises:
         InputError: recordings that cannot be diagnosed, a diagnosis that says "unknown", a turn that the robot cannot
             make.
         InputWarning: (a warning) the diagnosis is not complete, or names what the controller does not use.
+
+    Examples:
+        >>> import ddagr_gym
+        >>> names = ("arcs", "s_weave")
+        >>> drives = [ddagr_gym.simulate(name, effects="slope=0.05", pose_rate=5.0) for name in names]
+        >>> result = ddagr_gym.adapt(drives, turns=6)
+        >>> result.kept
+        'taught'
+        >>> result.adapted.used
+        ('slope',)
     """
     from ddagr_gym.adaptation.run import Effort, adapted
     from ddagr_gym.adaptation.turns import CorrectedTurns, MeasuredTurns

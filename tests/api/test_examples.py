@@ -10,7 +10,7 @@ import pytest
 import ddagr_gym
 
 FAST = ("load_recording", "simulate", "check", "estimate", "export")
-SLOW = ("replay", "isolability", "next_drive", "diagnose", "calibrate")
+SLOW = ("replay", "isolability", "next_drive", "diagnose", "calibrate", "adapt")
 SKIPPED = ("diagnose_drives", "guess_topic_map")
 """Whose examples name folders that only a user has."""
 

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import pytest
 
 from benchmarks import real_diagnoses
-from benchmarks.real_diagnoses import diagnosed, draw, entry, main
+from benchmarks.real_diagnoses import diagnosed, draw, entry, learned, main
 from ddagr_gym.diagnosis.result.files import save
 from tests.reporting.made_diagnosis import diagnosis
 from tests.reporting.test_drivetrain_section import ANSWER, DELAY
@@ -34,6 +34,10 @@ def test_errors_are_those_of_all_stretches_together():
     assert kept["parts"]["command_delay"]["kept"]
 
 
+def test_a_share_of_hardly_anything_means_nothing():
+    assert entry(ASKED, {**CEILING, "wheel speed": 1e9})["share_of_learned"]["wheel speed"] is None
+
+
 def test_without_a_drivetrain_there_are_no_errors_to_draw(tmp_path):
     assert "errors" not in entry(diagnosis(), {})
     draw({NAMES[0]: entry(diagnosis(), {})}, tmp_path / "empty.png")
@@ -54,8 +58,11 @@ def test_a_drive_whose_page_is_there_is_not_diagnosed_again(tmp_path, monkeypatc
         return SimpleNamespace(report=report)
 
     monkeypatch.setattr(real_diagnoses, "diagnose", diagnose)
-    monkeypatch.setattr(real_diagnoses, "learned", lambda name: CEILING)
+    monkeypatch.setattr(real_diagnoses, "_learned", lambda name: CEILING)
     assert diagnosed(NAMES[0], tmp_path, 1).verdict == ("command_delay",)
+    assert learned(NAMES[0], tmp_path) == CEILING
+    monkeypatch.setattr(real_diagnoses, "_learned", lambda name: {**CEILING, "wheel speed": 9.0})
+    assert learned(NAMES[0], tmp_path) == CEILING
     main([str(tmp_path), "--drives", *NAMES, "--output", str(tmp_path / "results")])
     assert asked == ["warthog_asphalt.csv.gz", "warthog_sand.csv.gz"]
     written = json.loads((tmp_path / "results" / "real_diagnoses.json").read_text())
