@@ -139,7 +139,7 @@ def draw(entries: Mapping[str, Mapping[str, Any]], path: Path) -> None:
     with house_style():
         from matplotlib.figure import Figure
 
-        figure = Figure(figsize=(8.0, 3.4), layout="constrained")
+        figure = Figure(figsize=(10.0, 3.6), layout="constrained")
         for axes, metric in zip(figure.subplots(1, len(SHOWN)), SHOWN, strict=True):
             for place, (model, colour) in enumerate(COLOURS.items()):
                 values = [errors[metric][model] for errors in known.values()]
