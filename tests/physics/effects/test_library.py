@@ -277,8 +277,9 @@ def call_often(count, point, row, start, actions):
             apply_effects(point, row, actions)
 
 
+@pytest.mark.slow
 def test_no_action_is_slow(turning_row):
-    """0.1 us is 0.3 percent of a sample; the limit here leaves room for a busy machine."""
+    """0.1 us is 0.3 percent of a sample; slow, since a time says little on a busy machine."""
     row = turning_row.copy()
     costs = {}
     for name, kind in KINDS.items():
