@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 
 from benchmarks.filter_study.summary import interval
-from benchmarks.row_turn_plants import PLANTS, names_of, scenario
+from benchmarks.row_turn_plants import PLANTS, driven_on, names_of, scenario
 from ddagr_gym.control.timing import CONTROL_INTERVAL
 from ddagr_gym.errors import InputError
 from ddagr_gym.estimation import (
@@ -38,13 +38,15 @@ from ddagr_gym.evaluation.runs import drive_turn
 from ddagr_gym.files import atomic_path
 from ddagr_gym.parameters import Sensors
 from ddagr_gym.presets import ddagr
-from ddagr_gym.progress import Progress
 from ddagr_gym.recordings.files import write_atomically
 from ddagr_gym.rendering import palette
 from ddagr_gym.reporting.figures import house_style
 
 Array = NDArray[np.float64]
 Columns = Mapping[str, Array]
+
+CONTROLLER = "B6"
+"""That drives the turns."""
 
 RESULT = Path(__file__).parent / "results" / "filter_velocities.json"
 
@@ -106,7 +108,7 @@ def judge_velocities(estimates: Array, covariances: Array, columns: Columns) -> 
 def velocity_drive(plant: str, number: int) -> dict[str, Any]:
     """One turn of B6, which stands first, as every filter sees it."""
     settings, episode, seed = scenario(plant, number)
-    columns = drive_turn(find_controller("B6", episode.turn), settings, seed, episode).columns
+    columns = drive_turn(find_controller(CONTROLLER, episode.turn), settings, seed, episode).columns
     return {name: judge_velocities(*of(columns), columns) for name, of in VELOCITY_FILTERS.items()}
 
 
@@ -135,15 +137,8 @@ def velocity_table(drives: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 
 def study(plants: Sequence[str], scenarios: int) -> dict[str, Any]:
     """Both filters on every plant."""
-    result: dict[str, Any] = {"scenarios": scenarios, "plants": {}}
-    with Progress(len(plants) * scenarios, "driving") as progress:
-        for plant in plants:
-            drives = []
-            for number in range(scenarios):
-                drives.append(velocity_drive(plant, number))
-                progress.advance(1)
-            result["plants"][plant] = velocity_table(drives)
-    return result
+    driven = driven_on(plants, (CONTROLLER,), scenarios, lambda name, plant, number: velocity_drive(plant, number))
+    return {"scenarios": scenarios, "plants": {plant: velocity_table(own[CONTROLLER]) for plant, own in driven}}
 
 
 _LOOKS = {"filter": ("filter, ground level", palette.BLUE), "inertial_filter": ("inertial filter", palette.ORANGE)}

@@ -15,10 +15,10 @@ from __future__ import annotations
 import argparse
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -169,18 +169,34 @@ def table(result: Mapping[str, Any]) -> str:
     return "\n".join(lines)
 
 
+Driven = TypeVar("Driven")
+
+
+def driven_on(
+    plants: Sequence[str], names: Sequence[str], scenarios: int, drive_one: Callable[[str, str, int], Driven]
+) -> Iterator[tuple[str, dict[str, list[Driven]]]]:
+    """Every plant with what each name comes to in its scenarios, the same for all, with a progress bar.
+
+    Args:
+        plants: names.
+        names: of what drives.
+        scenarios: of each plant.
+        drive_one: (name, plant, number) -> what one turn comes to.
+    """
+    with Progress(len(names) * len(plants) * scenarios, "driving") as progress:
+        for plant in plants:
+            found: dict[str, list[Driven]] = {name: [] for name in names}
+            for name in names:
+                for number in range(scenarios):
+                    found[name].append(drive_one(name, plant, number))
+                    progress.advance(1)
+            yield plant, found
+
+
 def study(controllers: Sequence[str], plants: Sequence[str], scenarios: int) -> dict[str, Any]:
     """Every controller on every plant, the same scenarios."""
-    result: dict[str, Any] = {"scenarios": scenarios, "root_seed": _ROOT_SEED, "plants": {}}
-    with Progress(len(controllers) * len(plants) * scenarios, "driving") as progress:
-        for plant in plants:
-            outcomes: dict[str, list[Outcome]] = {name: [] for name in controllers}
-            for name in controllers:
-                for number in range(scenarios):
-                    outcomes[name].append(drive(name, plant, number))
-                    progress.advance(1)
-            result["plants"][plant] = compared(outcomes)
-    return result
+    found = {plant: compared(outcomes) for plant, outcomes in driven_on(plants, controllers, scenarios, drive)}
+    return {"scenarios": scenarios, "root_seed": _ROOT_SEED, "plants": found}
 
 
 def with_kept(result: dict[str, Any], path: Path) -> dict[str, Any]:

@@ -23,27 +23,20 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from benchmarks.plants_figure import draw
-from benchmarks.row_turn_plants import PLANTS, Outcome, compared, names_of, scenario
+from benchmarks.row_turn_plants import PLANTS, Outcome, compared, driven_on, names_of, scenario
 from ddagr_gym.control.row_turn import FURROW_SLACK
 from ddagr_gym.control.timing import CONTROL_PERIOD
 from ddagr_gym.envs.settings import Episode, TurnSettings
 from ddagr_gym.errors import InputError
 from ddagr_gym.estimation import DeadReckoning, InertialModel, Reckoned, run_inertial_filter
-from ddagr_gym.evaluation.controllers import (
-    STANDING,
-    LadderGains,
-    inertial_model,
-    ladder_gains,
-    make_path_tracker,
-    tracker_gains_by_hand,
-)
+from ddagr_gym.evaluation.controllers import STANDING, inertial_model, make_path_tracker, tracker_gains_by_hand
+from ddagr_gym.evaluation.ladder_gains import LadderGains, ladder_gains
 from ddagr_gym.evaluation.metrics import turn_metrics
 from ddagr_gym.evaluation.runs import Controller, TurnRun, drive_turn
 from ddagr_gym.files import atomic_path
 from ddagr_gym.frames import wrap_angle
 from ddagr_gym.parameters import STANDARD_GRAVITY
 from ddagr_gym.physics.effects.slope import Slope
-from ddagr_gym.progress import Progress
 
 RESULT = Path(__file__).parent / "results" / "tracker_causes.json"
 _SELDOM = 10  # samples from balance to balance in the arm "seldom balanced"
@@ -226,15 +219,9 @@ def details(looks: Sequence[Look]) -> dict[str, Any]:
 def study(arms: Sequence[str], plants: Sequence[str], scenarios: int) -> dict[str, Any]:
     """Every arm on every plant, the same scenarios."""
     result: dict[str, Any] = {"scenarios": scenarios, "plants": {}}
-    with Progress(len(arms) * len(plants) * scenarios, "driving") as progress:
-        for plant in plants:
-            looks: dict[str, list[Look]] = {name: [] for name in arms}
-            for name in arms:
-                for number in range(scenarios):
-                    looks[name].append(drive(name, plant, number))
-                    progress.advance(1)
-            found = compared({name: [item.outcome for item in own] for name, own in looks.items()})
-            result["plants"][plant] = {name: found[name] | details(own) for name, own in looks.items()}
+    for plant, looks in driven_on(plants, arms, scenarios, drive):
+        found = compared({name: [item.outcome for item in own] for name, own in looks.items()})
+        result["plants"][plant] = {name: found[name] | details(own) for name, own in looks.items()}
     return result
 
 

@@ -76,7 +76,7 @@ def one_truth(truth: Truth, work: Path, turns: int, say: Say) -> dict[str, Any]:
     folder.mkdir(parents=True, exist_ok=True)
     say(f"{truth.name}: diagnosing")
     found = diagnosed(truth, folder)
-    told = Corrected(ddagr(), get_soil("thesis_a1"), truth.library_effects())
+    told = Corrected(ddagr(), get_soil("thesis_a1"), truth.named_effects())
     usable = "unknown" not in found.verdict
     bundles, kept = {"nominal": nominal()}, {}
     for arm, corrected in (("adapted", found), ("told", told)):

@@ -40,7 +40,7 @@ class Truth:
         """What is different; the same at every call."""
         return self.make(np.random.default_rng(0))
 
-    def library_effects(self) -> tuple[Effect, ...]:
+    def named_effects(self) -> tuple[Effect, ...]:
         """The same in the library's terms, as one who was told would write it down."""
         if not self.effect:
             return ()

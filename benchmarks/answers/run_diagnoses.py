@@ -32,6 +32,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from benchmarks.answers.run_recordings_check import recordings_folder
 from benchmarks.commits import commit_of
 from ddagr_gym.calibration.files import load as load_calibration
 from ddagr_gym.recordings.files import write_atomically
@@ -214,8 +215,7 @@ def main() -> int:
     end = words.index("--") if "--" in words else len(words)
     arguments, options = parser.parse_args(words[:end]), tuple(words[end + 1 :])
     if arguments.cases == "recordings":
-        folder = Path(os.environ.get("DDAGR_RECORDINGS") or shared() / "recordings")
-        known = arguments.calibration
+        folder, known = recordings_folder(), arguments.calibration
         found = list(real_cases(folder) if known is None else changed_cases(folder, known.resolve()))
     else:
         folder = shared() / "concealed" if arguments.cases == "concealed" else Path(arguments.cases)

@@ -23,7 +23,7 @@ def turns(errors):
 
 
 def test_truths_are_told_in_the_librarys_terms():
-    named = {name: truth.library_effects() for name, truth in TRUTHS.items()}
+    named = {name: truth.named_effects() for name, truth in TRUTHS.items()}
     assert named.pop("nothing") == ()
     assert all(len(effects) == 1 and effects[0].name == TRUTHS[name].effect for name, effects in named.items())
     assert {TRUTHS[name].effect for name in named} <= set(effect_kinds())
