@@ -57,8 +57,8 @@ def main(arguments: Sequence[str] | None = None, package: ModuleType = commands)
         return 128 + 13
     except OSError as error:
         return _refuse(_file_sentence(error))
-    except KeyboardInterrupt:
-        print("ddagr: interrupted.", file=sys.stderr)
+    except KeyboardInterrupt as stop:
+        print("; ".join(["ddagr: interrupted", *map(str, stop.args)]) + ".", file=sys.stderr)
         return 130
 
 

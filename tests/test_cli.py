@@ -218,6 +218,15 @@ def test_interrupt_gives_130(fake_command, capsys):
     assert capsys.readouterr().err == "ddagr: interrupted.\n"
 
 
+def test_interrupt_of_work_that_can_go_on_says_how(fake_command, capsys):
+    def run(arguments):
+        raise KeyboardInterrupt("the same command goes on from out.part")
+
+    fake_command(run)
+    assert cli.main(["fake-command", "--side", "left"]) == 130
+    assert capsys.readouterr().err == "ddagr: interrupted; the same command goes on from out.part.\n"
+
+
 @pytest.mark.parametrize(
     "bug", [ZeroDivisionError("x"), ValueError("x"), OSError("x"), ModuleNotFoundError(name="ddagr_gym.x")]
 )

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -12,6 +10,7 @@ import tyro
 from tyro.conf import Positional
 
 from ddagr_gym.commands.output import check_output_folder
+from ddagr_gym.commands.resumed import resumable
 from ddagr_gym.extras import need
 from ddagr_gym.progress import LinePrinter
 
@@ -71,15 +70,15 @@ class Arguments:
     overwrite: bool = False
 
 
-def run(arguments: Arguments) -> int | None:
-    """Diagnose, adapt, write the folder, print the answer; 130 when interrupted."""
+def run(arguments: Arguments) -> None:
+    """Diagnose, adapt, write the folder, print the answer."""
     import ddagr_gym
     from ddagr_gym.diagnosis.store import part_folder
 
     check_output_folder(arguments.output, overwrite=arguments.overwrite)
     need("jinja2", "matplotlib")
     parts = part_folder(arguments.output.expanduser().resolve())
-    try:
+    with resumable(parts):
         result = ddagr_gym.adapt(
             list(arguments.runs) or None,
             arguments.robot,
@@ -89,13 +88,8 @@ def run(arguments: Arguments) -> int | None:
             cache=parts,
         )
         result.report(arguments.output, overwrite=arguments.overwrite)
-    except KeyboardInterrupt:
-        print(f"ddagr: interrupted; the same command goes on from {parts}.", file=sys.stderr)
-        return 130
-    shutil.rmtree(parts, ignore_errors=True)
     print(result)
     print(f"\npage, controller.yaml and what it knows: {arguments.output}")
-    return None
 
 
 def _options(arguments: Arguments) -> dict[str, Any]:

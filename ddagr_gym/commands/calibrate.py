@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -12,6 +10,7 @@ import tyro
 from tyro.conf import Positional
 
 from ddagr_gym.commands.output import check_output_folder
+from ddagr_gym.commands.resumed import resumable
 from ddagr_gym.errors import InputError
 from ddagr_gym.extras import need
 from ddagr_gym.progress import LinePrinter
@@ -62,8 +61,8 @@ class Arguments:
     maximum_bytes: int = 4 * 2**30
 
 
-def run(arguments: Arguments) -> int | None:
-    """Calibrate, write the folder, print the tables; 130 when interrupted."""
+def run(arguments: Arguments) -> None:
+    """Calibrate, write the folder, print the tables."""
     import ddagr_gym
     from ddagr_gym.api.inputs import recordings_from
     from ddagr_gym.diagnosis.store import part_folder
@@ -74,7 +73,7 @@ def run(arguments: Arguments) -> int | None:
     limits = Limits(arguments.maximum_rows, arguments.maximum_bytes)
     parts = part_folder(arguments.output.expanduser().resolve())
     grounds = {name: tuple(text.split(",")) for name, text in by_name("ground", arguments.ground).items()}
-    try:
+    with resumable(parts):
         result = ddagr_gym.calibrate(
             recordings_from(arguments.drives, arguments.robot, arguments.map or None, limits),
             arguments.robot,
@@ -87,13 +86,8 @@ def run(arguments: Arguments) -> int | None:
             cache=parts,
         )
         result.report(arguments.output, overwrite=arguments.overwrite)
-    except KeyboardInterrupt:
-        print(f"ddagr: interrupted; the same command goes on from {parts}.", file=sys.stderr)
-        return 130
-    shutil.rmtree(parts, ignore_errors=True)
     print(result)
     print(f"\nrobot.yaml, soils, calibration.json and page: {arguments.output}")
-    return None
 
 
 def by_name(option: str, given: tuple[str, ...]) -> dict[str, str]:

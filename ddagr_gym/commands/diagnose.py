@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import shutil
 import sys
 from typing import TYPE_CHECKING, Any
 
 from ddagr_gym.commands.diagnose_arguments import EXAMPLES, Arguments
 from ddagr_gym.commands.output import check_output_folder
+from ddagr_gym.commands.resumed import resumable
 from ddagr_gym.errors import InputError
 from ddagr_gym.extras import need
 from ddagr_gym.progress import LinePrinter
@@ -20,7 +20,7 @@ __all__ = ["EXAMPLES", "Arguments", "run"]
 
 
 def run(arguments: Arguments) -> int | None:
-    """Diagnose, write the folder, print the answer; 130 when interrupted."""
+    """Diagnose, write the folder, print the answer."""
     import ddagr_gym
     from ddagr_gym.api.diagnosis_result import DiagnosisResult
     from ddagr_gym.api.inputs import is_folder_of_drives, recordings_from
@@ -37,7 +37,7 @@ def run(arguments: Arguments) -> int | None:
     parts = part_folder(arguments.output.expanduser().resolve())
     if arguments.calibration is not None and any(map(is_folder_of_drives, arguments.runs)):
         return run_drives(arguments, limits, parts)
-    try:
+    with resumable(parts):
         result = ddagr_gym.diagnose(
             recordings_from(arguments.runs, read_as, arguments.map or None, limits),
             arguments.robot,
@@ -56,10 +56,6 @@ def run(arguments: Arguments) -> int | None:
         # before the folder, whose presence would end a repetition of the command
         written = _write_viewer_files(arguments, result)
         result.report(arguments.output, overwrite=arguments.overwrite)
-    except KeyboardInterrupt:
-        print(f"ddagr: interrupted; the same command goes on from {parts}.", file=sys.stderr)
-        return 130
-    shutil.rmtree(parts, ignore_errors=True)
     if isinstance(result, DiagnosisResult) and result.robot is None:
         print(f"ddagr: robot.yaml and soil.yaml are left out, {result.refit_note}", file=sys.stderr)
     print(result)

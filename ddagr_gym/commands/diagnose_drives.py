@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import shutil
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ddagr_gym.commands.diagnose_arguments import Arguments
+from ddagr_gym.commands.resumed import resumable
 from ddagr_gym.errors import InputError
 from ddagr_gym.progress import LinePrinter
 
@@ -27,7 +27,7 @@ def run_drives(arguments: Arguments, limits: Limits, parts: Path) -> int:
         parts: where answers are kept meanwhile.
 
     Returns:
-        0 where every drive has an answer, else 1; 2 where none has; 130 when interrupted.
+        0 where every drive has an answer, else 1; 2 where none has.
     """
     import ddagr_gym
     from ddagr_gym.api.drive_series import ANSWERS
@@ -36,7 +36,7 @@ def run_drives(arguments: Arguments, limits: Limits, parts: Path) -> int:
     earlier = arguments.output.expanduser() / ANSWERS
     if earlier.is_dir():
         shutil.copytree(earlier, parts, dirs_exist_ok=True)
-    try:
+    with resumable(parts):
         result = ddagr_gym.diagnose_drives(
             list(arguments.runs),
             calibration,
@@ -50,10 +50,6 @@ def run_drives(arguments: Arguments, limits: Limits, parts: Path) -> int:
             cache=parts,
         )
         result.report(arguments.output, overwrite=arguments.overwrite)
-    except KeyboardInterrupt:
-        print(f"ddagr: interrupted; the same command goes on from {parts}.", file=sys.stderr)
-        return 130
-    shutil.rmtree(parts, ignore_errors=True)
     print(result)
     print(f"\npage, drives.csv and drives.json: {arguments.output}")
     if len(result.refused) == len(result.drives):

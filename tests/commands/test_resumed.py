@@ -1,0 +1,34 @@
+"""Finished steps of a long command: removed after its work, kept where it was stopped or failed."""
+
+from pathlib import Path
+
+import pytest
+
+from ddagr_gym.commands.resumed import resumable
+from ddagr_gym.errors import InputError
+
+
+@pytest.fixture
+def parts(tmp_path: Path) -> Path:
+    folder = tmp_path / "output.part"
+    folder.mkdir()
+    (folder / "step").write_text("done")
+    return folder
+
+
+def test_steps_are_removed_after_the_work(parts):
+    with resumable(parts):
+        assert (parts / "step").is_file()
+    assert not parts.exists()
+
+
+def test_a_stop_keeps_them_and_says_where_they_are(parts):
+    with pytest.raises(KeyboardInterrupt, match=f"the same command goes on from {parts}$"), resumable(parts):
+        raise KeyboardInterrupt
+    assert (parts / "step").is_file()
+
+
+def test_a_fault_keeps_them(parts):
+    with pytest.raises(InputError, match="wrong"), resumable(parts):
+        raise InputError("wrong")
+    assert (parts / "step").is_file()
