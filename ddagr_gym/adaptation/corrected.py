@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -13,9 +13,7 @@ from ddagr_gym.envs.settings import TurnSettings
 from ddagr_gym.errors import InputError
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.physics.effects import Effect
-
-_SPREADS_OF_90_PERCENT = 3.29
-"""Width of a 90 % interval over the standard deviation of a normal distribution."""
+from ddagr_gym.physics.effects.draws import draw_sizes
 
 
 @dataclass(frozen=True)
@@ -60,7 +58,8 @@ class Corrected:
     def draw_effects(self, rng: np.random.Generator) -> tuple[Effect, ...]:
         """Effects with sizes drawn from their intervals; at their estimates where there are none."""
         known = self.intervals or ({},) * len(self.effects)
-        return tuple(_drawn(effect, own, rng) for effect, own in zip(self.effects, known, strict=True))
+        pairs = zip(self.effects, known, strict=True)
+        return tuple(draw_sizes(effect, own, rng, inside=True) for effect, own in pairs)
 
     def settings(self, rng: np.random.Generator, radius: float, speed: float, side: str) -> TurnSettings:
         """Settings of the environment of one turn."""
@@ -69,17 +68,3 @@ class Corrected:
         if self.calibration is not None:
             return make_settings(calibration=self.calibration, ground=self.ground, effects=effects, **turn)  # type: ignore[arg-type]
         return make_settings(robot=self.robot, soil=self.soil, effects=effects, **turn)  # type: ignore[arg-type]
-
-
-def _drawn(
-    effect: Effect, intervals: Mapping[str, tuple[float, float] | Sequence[float]], rng: np.random.Generator
-) -> Effect:
-    changed = {}
-    for item in fields(effect):
-        if item.name not in intervals:
-            continue
-        low, high = intervals[item.name]
-        value = getattr(effect, item.name) + (high - low) / _SPREADS_OF_90_PERCENT * rng.standard_normal()
-        low, high = max(low, item.metadata["low"]), min(high, item.metadata["high"])
-        changed[item.name] = float(min(max(value, low), high))
-    return replace(effect, **changed)

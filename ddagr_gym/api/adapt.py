@@ -231,8 +231,7 @@ def corrected_by_diagnosis(folder: Path) -> Corrected:
     """
     from ddagr_gym.adaptation.corrected import Corrected
     from ddagr_gym.diagnosis.result.files import load
-    from ddagr_gym.physics.effects import load_effects, read_effects_file
-    from ddagr_gym.physics.effects.files import ParameterEntry
+    from ddagr_gym.physics.effects import load_effects, load_intervals
     from ddagr_gym.presets import get_robot, get_soil
 
     place = folder.expanduser()
@@ -241,19 +240,11 @@ def corrected_by_diagnosis(folder: Path) -> Corrected:
     for name in ("robot.yaml", "soil.yaml", "effects.yaml"):
         if not (place / name).is_file():
             raise InputError(f"{place} holds no {name}, so that there is no corrected simulator: diagnose again.")
-    entries = read_effects_file(place / "effects.yaml").effects
     return Corrected(
         get_robot(str(place / "robot.yaml")),
         get_soil(str(place / "soil.yaml")),
         load_effects(place / "effects.yaml"),
-        tuple(
-            {
-                name: item.interval
-                for name, item in entry.parameters.items()
-                if isinstance(item, ParameterEntry) and item.interval is not None
-            }
-            for entry in entries
-        ),
+        load_intervals(place / "effects.yaml"),
         **_answer(answer),
     )
 

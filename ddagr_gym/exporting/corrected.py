@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
@@ -16,13 +16,11 @@ from ddagr_gym.envs.calibrated_draws import EFFECTS, MOST_DEVIATIONS, load_draws
 from ddagr_gym.errors import InputError
 from ddagr_gym.files import expanded
 from ddagr_gym.parameters import Robot, Soil
-from ddagr_gym.physics.effects import Effect, load_effects, read_effects_file
+from ddagr_gym.physics.effects import Effect, load_effects, load_intervals
+from ddagr_gym.physics.effects.draws import draw_sizes
 
 DIAGNOSIS = "diagnosis.json"
-_DEVIATIONS_OF_AN_INTERVAL = 3.29
-"""Width of an interval of 90 % of a normal distribution, in its standard deviations."""
 
-Interval = tuple[float, float]
 Kind = TypeVar("Kind", Robot, Soil)
 
 
@@ -107,10 +105,11 @@ def _of_diagnosis(folder: Path, robot: Robot | None, soil: Soil | None) -> Corre
     given_soil = _given_or_file(folder, "soil", soil, Soil)
     path = folder / EFFECTS
     effects = load_effects(path)
-    intervals = _intervals(path)
+    intervals = load_intervals(path)
 
     def draw(rng: np.random.Generator) -> Simulated:
-        drawn = tuple(_drawn(effect, known, rng) for effect, known in zip(effects, intervals, strict=True))
+        known = zip(effects, intervals, strict=True)
+        drawn = tuple(draw_sizes(effect, own, rng, most=MOST_DEVIATIONS) for effect, own in known)
         return Simulated(given_robot, given_soil, drawn)
 
     found = Simulated(given_robot, given_soil, effects)
@@ -124,27 +123,3 @@ def _given_or_file(folder: Path, name: str, given: Kind | None, kind: type[Kind]
     if not file.is_file():
         raise InputError(f"{folder} holds no {file.name}: name the {name} that it was compared with by --{name}.")
     return load_config(file, kind)
-
-
-def _intervals(path: Path) -> tuple[Mapping[str, Interval], ...]:
-    """Interval of every estimated parameter, by effect."""
-    return tuple(
-        {
-            name: interval
-            for name, item in entry.parameters.items()
-            if (interval := getattr(item, "interval", None)) is not None
-        }
-        for entry in read_effects_file(path).effects
-    )
-
-
-def _drawn(effect: Effect, intervals: Mapping[str, Interval], rng: np.random.Generator) -> Effect:
-    """The effect with each estimated parameter drawn from a normal distribution, inside its bounds."""
-    bounds = {item.name: item.metadata for item in fields(effect)}
-    values = {}
-    for name, (low, high) in intervals.items():
-        deviation = (high - low) / _DEVIATIONS_OF_AN_INTERVAL
-        change = deviation * float(np.clip(rng.standard_normal(), -MOST_DEVIATIONS, MOST_DEVIATIONS))
-        value = getattr(effect, name) + change
-        values[name] = min(max(value, bounds[name]["low"]), bounds[name]["high"])
-    return effect.with_values(**values)

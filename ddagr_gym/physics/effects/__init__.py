@@ -31,7 +31,7 @@ entry point group ``ddagr_gym.effects``.
 """
 
 from ddagr_gym.physics.effects.base import GROUPS, DriveExtent, Effect, build_effect, effect_table
-from ddagr_gym.physics.effects.files import EffectsFile, load_effects, read_effects_file, save_effects
+from ddagr_gym.physics.effects.files import EffectsFile, load_effects, load_intervals, read_effects_file, save_effects
 from ddagr_gym.physics.effects.registry import ENTRY_POINT_GROUP, effect_kind, effect_kinds, parse_effect
 
 __all__ = [
@@ -45,6 +45,7 @@ __all__ = [
     "effect_kinds",
     "effect_table",
     "load_effects",
+    "load_intervals",
     "parse_effect",
     "read_effects_file",
     "save_effects",

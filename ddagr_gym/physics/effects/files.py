@@ -135,6 +135,22 @@ def _build_all(path: str | os.PathLike[str]) -> tuple[Effect, ...]:
         raise InputError(f"{os.fspath(path)}: {error}") from None
 
 
+def load_intervals(path: str | os.PathLike[str]) -> tuple[Mapping[str, tuple[float, float]], ...]:
+    """Interval of every estimated parameter in an effects file: by name, for each effect; empty where none was.
+
+    Raises:
+        InputError: as :func:`read_effects_file`.
+    """
+    return tuple(
+        {
+            name: item.interval
+            for name, item in entry.parameters.items()
+            if isinstance(item, ParameterEntry) and item.interval is not None
+        }
+        for entry in read_effects_file(path).effects
+    )
+
+
 def save_effects(
     path: str | os.PathLike[str],
     effects: Iterable[Effect],

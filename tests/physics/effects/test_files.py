@@ -10,7 +10,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ddagr_gym.errors import InputError
-from ddagr_gym.physics.effects import effect_kinds, load_effects, parse_effect, read_effects_file, save_effects
+from ddagr_gym.physics.effects import (
+    effect_kinds,
+    load_effects,
+    load_intervals,
+    parse_effect,
+    read_effects_file,
+    save_effects,
+)
 from ddagr_gym.physics.effects.gyro_sign import GyroSign
 from ddagr_gym.physics.effects.slope import Slope
 
@@ -135,3 +142,9 @@ def test_bad_requests_to_write_are_refused(tmp_path, name, options, sentence):
     with pytest.raises(InputError, match=sentence):
         save_effects(tmp_path / name, [Slope(0.1)], **options)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_intervals_are_read_by_effect_and_are_empty_where_nothing_was_estimated(tmp_path):
+    file = tmp_path / "found.yaml"
+    save_effects(file, [Slope(0.06, 0.5), GyroSign()], intervals=[{"angle": (0.05, 0.07)}, {}])
+    assert load_intervals(file) == ({"angle": (0.05, 0.07)}, {})
