@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ddagr_gym.control.observation import decode
+from ddagr_gym.control.row_turn import RowTurn
+from ddagr_gym.parameters import Robot
 from ddagr_gym.validated import Validated, bounded
 
 
@@ -29,6 +31,16 @@ class ConstantSpeeds(Validated):
     inner: float = bounded("rad/s", -100.0, 100.0)
     lead: float = bounded("rad", -1.0, 1.0, default=0.0)
     limit: float = bounded("rad/s", 0.0, 100.0, default=2.0, open_low=True)
+
+    def track_ratio(self, turn: RowTurn, robot: Robot) -> float:
+        """Effective over geometric track [-] of a robot that makes a turn with these speeds (theory: control, eq. (2)).
+
+        Args:
+            turn: that they were found for.
+            robot: that makes it.
+        """
+        spread = (self.outer - self.inner) / (self.outer + self.inner)
+        return spread * turn.radius / robot.half_track
 
     def reset(self) -> None:
         """Nothing to forget."""

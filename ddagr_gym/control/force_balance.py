@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ddagr_gym.control.observation import EKF_FEATURES, FEATURE_SCALES, OBSERVATION, TurnObservation, decode
 from ddagr_gym.control.pid import PidGains
-from ddagr_gym.control.turn_controller import FeedbackController
+from ddagr_gym.control.turn_controller import FeedbackController, curvature_error
 from ddagr_gym.errors import InputError
 from ddagr_gym.parameters import Robot
 
@@ -41,8 +41,8 @@ class ForceBalance(FeedbackController):
 
     def error(self, seen: TurnObservation, feed_forward: float, info: Any) -> float:
         """Commanded less estimated curvature [1/m]."""
-        speed = max(float(self._features[0]), 0.25 * seen.target_speed)
-        return feed_forward - float(self._features[1]) / speed
+        speed, yaw_rate = float(self._features[0]), float(self._features[1])
+        return curvature_error(feed_forward, yaw_rate, speed, seen.target_speed)
 
     def __call__(self, observation: ArrayLike, info: Any = None) -> NDArray[np.float32]:
         """Action (2,), right and left bank speed over the robot's maximum."""

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from ddagr_gym.control.force_balance import ForceBalance
 from ddagr_gym.control.observation import TurnObservation, decode
 from ddagr_gym.control.row_turn import Phase
+from ddagr_gym.control.turn_controller import curvature_error
 from ddagr_gym.errors import InputError
 
 
@@ -38,5 +39,5 @@ class TrueSoil(ForceBalance):
 
     def error(self, seen: TurnObservation, feed_forward: float, info: Any) -> float:
         """Commanded less true curvature [1/m]."""
-        speed = max(math.hypot(info["true_v_x"], info["true_v_y"]), 0.25 * seen.target_speed)
-        return float(feed_forward - info["true_yaw_rate"] / speed)
+        speed = math.hypot(info["true_v_x"], info["true_v_y"])
+        return curvature_error(feed_forward, info["true_yaw_rate"], speed, seen.target_speed)

@@ -15,11 +15,26 @@ from ddagr_gym.control.row_turn import SIDES, Phase, RowTurn
 from ddagr_gym.control.timing import CONTROL_PERIOD
 from ddagr_gym.parameters import Robot
 
+_LEAST_SPEED_SHARE = 0.25
+"""Of the commanded speed, below which a curvature means nothing."""
+
 
 def commanded_turn(seen: TurnObservation) -> RowTurn:
     """The manoeuvre that an episode's first observation commands; the run-out is not observed."""
     side = next(name for name, sign in SIDES.items() if sign == (1 if seen.side > 0.0 else -1))
     return RowTurn(radius=seen.target_radius, side=side, run_in=seen.run_in_to_go, speed=seen.target_speed)
+
+
+def curvature_error(commanded: float, yaw_rate: float, speed: float, target_speed: float) -> float:
+    """Commanded less driven curvature [1/m].
+
+    Args:
+        commanded: curvature [1/m].
+        yaw_rate: driven [rad/s].
+        speed: driven [m/s]; at least a share of the commanded one counts.
+        target_speed: commanded [m/s].
+    """
+    return float(commanded - yaw_rate / max(speed, _LEAST_SPEED_SHARE * target_speed))
 
 
 class TurnController:

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from ddagr_gym.control.observation import TurnObservation, decode
 from ddagr_gym.control.row_turn import Phase
 from ddagr_gym.control.timing import CONTROL_INTERVAL, CONTROL_PERIOD
-from ddagr_gym.control.turn_controller import FeedbackController
+from ddagr_gym.control.turn_controller import FeedbackController, curvature_error
 from ddagr_gym.errors import InputError
 from ddagr_gym.estimation import BatchFilter, FilterModel
 from ddagr_gym.estimation.filter_model import SoilPrior
@@ -32,8 +32,6 @@ Array = NDArray[np.float64]
 
 NODES = 7
 """Places of the half circle at which a feed-forward is taught, both ends included."""
-
-_LEAST_SPEED_SHARE = 0.25  # of the commanded speed, as B4: below it a curvature means nothing
 
 
 @dataclass(frozen=True)
@@ -194,7 +192,7 @@ class AdaptedController(FeedbackController):
         """Commanded less estimated curvature [1/m]."""
         assert self._filter is not None
         v_x, _, yaw_rate = self._filter.states[0, :3]
-        return feed_forward - float(yaw_rate) / max(float(v_x), _LEAST_SPEED_SHARE * seen.target_speed)
+        return curvature_error(feed_forward, float(yaw_rate), float(v_x), seen.target_speed)
 
 
 _LONGEST = 256

@@ -49,8 +49,7 @@ class Bundle:
         """Controller of a commanded turn; InputError where the robot cannot turn so on this soil."""
         known = self.known
         constants = self._steady(known.robot, turn)
-        spread = (constants.outer - constants.inner) / (constants.outer + constants.inner)
-        ratio = spread * turn.radius / known.robot.half_track
+        ratio = constants.track_ratio(turn, known.robot)
         return AdaptedController(self.settings, known, Sensors(), ratio, constants.lead)
 
     def _steady(self, robot: Robot, turn: RowTurn) -> ConstantSpeeds:

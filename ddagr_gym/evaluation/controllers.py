@@ -46,21 +46,16 @@ def nominal_constants(turn: RowTurn) -> ConstantSpeeds:
     return calibrate_constant_speeds(ddagr(), get_soil("thesis_a1"), turn)
 
 
-def _track_ratio(constants: ConstantSpeeds, turn: RowTurn) -> float:
-    spread = (constants.outer - constants.inner) / (constants.outer + constants.inner)
-    return spread * turn.radius / ddagr().half_track
-
-
 def _make_yaw_rate(turn: RowTurn, gains: LadderGains) -> Controller:
     constants, loop = nominal_constants(turn), gains.yaw_rate
-    return YawRatePid(ddagr(), loop.gains, _track_ratio(constants, turn), loop.lead_factor * constants.lead)
+    return YawRatePid(ddagr(), loop.gains, constants.track_ratio(turn, ddagr()), loop.lead_factor * constants.lead)
 
 
 def _make_radial(turn: RowTurn, gains: LadderGains) -> Controller:
     constants, robot, loop = nominal_constants(turn), ddagr(), gains.radial
     speed_ratio = turn.speed / (robot.wheels[0].outer_radius * 0.5 * (constants.outer + constants.inner))
     lead = loop.lead_factor * constants.lead
-    return RadialPid(robot, loop.gains, _track_ratio(constants, turn), speed_ratio, lead)
+    return RadialPid(robot, loop.gains, constants.track_ratio(turn, ddagr()), speed_ratio, lead)
 
 
 @lru_cache(maxsize=1)
@@ -77,7 +72,7 @@ def _make_force_balance(turn: RowTurn, gains: LadderGains) -> Controller:
     def feed_forward(logs: NDArray[np.float64], speed: float, curvature: float) -> tuple[float, float] | None:
         return arc_bank_speeds(model, np.exp(prior + logs), speed, curvature)
 
-    ratio, lead = _track_ratio(constants, turn), loop.lead_factor * constants.lead
+    ratio, lead = constants.track_ratio(turn, ddagr()), loop.lead_factor * constants.lead
     return ForceBalance(ddagr(), loop.gains, feed_forward, ratio, lead)
 
 
@@ -113,7 +108,7 @@ def make_path_tracker(estimator: MotionEstimator, flat: FilterModel, standing: i
 
     def make(turn: RowTurn, gains: LadderGains) -> Controller:
         constants, loop = nominal_constants(turn), gains.path_tracker
-        ratio, lead = _track_ratio(constants, turn), loop.lead_factor * constants.lead
+        ratio, lead = constants.track_ratio(turn, ddagr()), loop.lead_factor * constants.lead
         return PathTracker(
             ddagr(), loop.gains, gains.path_tracker_course, estimator, steady_arc, ratio, lead, standing,
             gains.path_tracker_ahead, gains.path_tracker_side_slip, gains.path_tracker_aligning,
@@ -142,7 +137,7 @@ def _make_flat_tracker(turn: RowTurn, gains: LadderGains) -> Controller:
 
 def _make_true_curvature(turn: RowTurn, gains: LadderGains) -> Controller:
     constants, loop = nominal_constants(turn), gains.true_curvature
-    return TrueCurvature(ddagr(), loop.gains, _track_ratio(constants, turn), loop.lead_factor * constants.lead)
+    return TrueCurvature(ddagr(), loop.gains, constants.track_ratio(turn, ddagr()), loop.lead_factor * constants.lead)
 
 
 def _make_true_soil(turn: RowTurn, gains: LadderGains) -> Controller:
@@ -151,13 +146,13 @@ def _make_true_soil(turn: RowTurn, gains: LadderGains) -> Controller:
     def feed_forward(soil: NDArray[np.float64], speed: float, curvature: float) -> tuple[float, float] | None:
         return steady_bank_speeds(robot, soil_of(soil), speed, curvature)
 
-    ratio, lead = _track_ratio(constants, turn), loop.lead_factor * constants.lead
+    ratio, lead = constants.track_ratio(turn, ddagr()), loop.lead_factor * constants.lead
     return TrueSoil(robot, loop.gains, feed_forward, ratio, lead)
 
 
 def _make_true_path(turn: RowTurn, gains: LadderGains) -> Controller:
     constants, loop = nominal_constants(turn), gains.true_path
-    ratio, lead = _track_ratio(constants, turn), loop.lead_factor * constants.lead
+    ratio, lead = constants.track_ratio(turn, ddagr()), loop.lead_factor * constants.lead
     return TruePath(ddagr(), loop.gains, gains.true_path_heading, ratio, lead)
 
 

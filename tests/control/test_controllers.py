@@ -12,6 +12,7 @@ from ddagr_gym.control.radial_pid import RadialPid
 from ddagr_gym.control.rolling import RollingWithoutSlip
 from ddagr_gym.control.row_turn import RowTurn
 from ddagr_gym.control.true_curvature import TrueCurvature
+from ddagr_gym.control.turn_controller import curvature_error
 from ddagr_gym.control.yaw_rate_pid import YawRatePid
 from ddagr_gym.envs.options import make_settings
 from ddagr_gym.errors import InputError
@@ -78,6 +79,18 @@ def test_constant_speeds_by_part_and_side():
     np.testing.assert_allclose(controller(observation()), [0.7, 0.05], rtol=1e-6)
     np.testing.assert_allclose(controller(observation(side=-1.0)), [0.05, 0.7], rtol=1e-6)
     np.testing.assert_allclose(controller(observation(heading_to_go=0.04)), [0.35, 0.35], rtol=1e-6)
+
+
+def test_constant_speeds_that_roll_without_slip_have_the_track_of_the_wheels():
+    turn = RowTurn(radius=0.8, speed=0.2)
+    spread = ROBOT.half_track / turn.radius
+    assert ConstantSpeeds(1.0, 1.0 + spread, 1.0 - spread).track_ratio(turn, ROBOT) == pytest.approx(1.0)
+    assert ConstantSpeeds(1.0, 1.5, 0.5).track_ratio(turn, ROBOT) == pytest.approx(0.5 * 0.8 / ROBOT.half_track)
+
+
+@pytest.mark.parametrize(("speed", "driven"), [(0.2, 0.1 / 0.2), (0.05, 0.1 / 0.05), (0.01, 0.1 / 0.05)])
+def test_a_quarter_of_the_commanded_speed_is_the_least_that_a_curvature_counts_with(speed, driven):
+    assert curvature_error(1.25, 0.1, speed, 0.2) == pytest.approx(1.25 - driven)
 
 
 def test_yaw_rate_loop_turns_faster_when_too_slow():
