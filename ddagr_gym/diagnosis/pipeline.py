@@ -10,7 +10,6 @@ import hashlib
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import ParamSpec, TypeVar
 
@@ -38,7 +37,7 @@ from ddagr_gym.diagnosis.result.drivetrain_names import (
     with_drivetrain,
 )
 from ddagr_gym.diagnosis.review import review
-from ddagr_gym.diagnosis.search.scanned_model import ScannedModel, SearchResult
+from ddagr_gym.diagnosis.search.scanned_model import SearchResult
 from ddagr_gym.diagnosis.search.starting_models import refit_nominal, starting_models
 from ddagr_gym.diagnosis.search.stepwise import search
 from ddagr_gym.diagnosis.setting import Setting
@@ -167,11 +166,14 @@ def diagnose(
     steps.begin("search")
     start = starting_models(session, steps.store.step)
     session = start.session
-    found = steps.keep("search", search, session, start, steps.store.step, _enough(session, complete_nominal))
+    found = steps.keep(
+        "search", search, session, start, steps.store.step,
+        lambda model: complete_nominal is not None and drivetrain_is_missing(model, start.session.gates),
+    )  # fmt: skip
     spells, found = steps.keep("search in parts of the drives", search_in_parts, session, start, found)
     session = session.during(spells) if spells else session
     accepted = accept(found, session.gates)
-    unlike = {} if complete_nominal is None else unlike_commands(accepted, session.gates)
+    unlike = {} if complete_nominal is None else unlike_commands(accepted.chosen, session.gates)
     nominal = complete_nominal(unlike) if complete_nominal is not None and unlike else None
     if nominal is not None:
         made = _beside_drivetrain(session, standing(found, session.gates), nominal, steps)
@@ -213,15 +215,6 @@ def diagnose(
 def _where_repeated(session: DiagnosisSession) -> EffectLocation | None:
     mended = session.mended
     return where_readings_repeat(mended.given, mended.repeated, mended.left_out)
-
-
-def _enough(session: DiagnosisSession, complete_nominal: CompleteNominal | None) -> Callable[[ScannedModel], bool]:
-    """Whether a search may end before no effect passes its gate: where the drivetrain is asked for next."""
-    return partial(drivetrain_is_missing, gates=session.gates) if complete_nominal is not None else _never
-
-
-def _never(model: ScannedModel) -> bool:
-    return False
 
 
 def _beside_drivetrain(

@@ -31,15 +31,15 @@ DRIVETRAIN_GROUP = "commands and motors"
 ENCODERS = tuple(name for name in CHANNELS if name.startswith("encoder"))
 
 
-def unlike_commands(accepted: SearchResult, gates: Thresholds) -> dict[str, float]:
-    """Misfit of the encoders over their limits, by channel, beside accepted names; empty where none is too large.
+def unlike_commands(model: ScannedModel, gates: Thresholds) -> dict[str, float]:
+    """Misfit of the encoders over their limits, by channel, beside a model; empty where none is too large.
 
     Args:
-        accepted: names of a search.
+        model: of a search.
         gates: with the limits.
     """
-    shares = _over_limits(accepted.chosen, gates)
-    return shares if _unlike(shares) else {}
+    shares = {name: model.misfit[name] / gates.misfit[name] for name in ENCODERS if gates.misfit.get(name, 0.0) > 0.0}
+    return shares if max(shares.values(), default=0.0) > UNLIKE else {}
 
 
 def drivetrain_is_missing(model: ScannedModel, gates: Thresholds) -> bool:
@@ -49,15 +49,7 @@ def drivetrain_is_missing(model: ScannedModel, gates: Thresholds) -> bool:
         model: of a search.
         gates: with the limits.
     """
-    return len(model.names) >= TOGETHER and _unlike(_over_limits(model, gates))
-
-
-def _over_limits(model: ScannedModel, gates: Thresholds) -> dict[str, float]:
-    return {name: model.misfit[name] / gates.misfit[name] for name in ENCODERS if gates.misfit.get(name, 0.0) > 0.0}
-
-
-def _unlike(shares: Mapping[str, float]) -> bool:
-    return max(shares.values(), default=0.0) > UNLIKE
+    return len(model.names) >= TOGETHER and bool(unlike_commands(model, gates))
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,9 +29,8 @@ LEFT = Diagnosis(
 )  # fmt: skip
 
 
-def search(names: tuple[str, ...], misfit: float) -> Any:
-    chosen = SimpleNamespace(names=names, misfit={"encoder_right": misfit, "encoder_left": 1.0, "yaw_rate": 99.0})
-    return SimpleNamespace(chosen=chosen)
+def model(names: tuple[str, ...], misfit: float) -> Any:
+    return SimpleNamespace(names=names, misfit={"encoder_right": misfit, "encoder_left": 1.0, "yaw_rate": 99.0})
 
 
 def completed(*findings: Finding) -> CompletedNominal:
@@ -43,7 +42,7 @@ def completed(*findings: Finding) -> CompletedNominal:
 
 @pytest.mark.parametrize(("misfit", "asked"), [(2.0 * UNLIKE + 0.1, True), (2.0 * UNLIKE - 0.1, False)])
 def test_it_is_asked_for_where_names_leave_too_much_in_an_encoder(misfit, asked):
-    assert bool(unlike_commands(search(("motor_lag",), misfit), GATES)) is asked
+    assert bool(unlike_commands(model(("motor_lag",), misfit), GATES)) is asked
 
 
 @pytest.mark.parametrize(
@@ -55,7 +54,7 @@ def test_it_is_asked_for_where_names_leave_too_much_in_an_encoder(misfit, asked)
     ],
 )
 def test_a_third_effect_is_not_looked_for_where_two_leave_the_wheels_unlike_their_commands(names, misfit, missing):
-    assert drivetrain_is_missing(search(names, misfit).chosen, GATES) is missing
+    assert drivetrain_is_missing(model(names, misfit), GATES) is missing
 
 
 def test_parts_are_the_verdict_with_what_was_seen_and_it_is_never_complete_without_a_name():
