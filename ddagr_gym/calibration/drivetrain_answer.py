@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ddagr_gym.calibration.part_selection import surely_above
+from ddagr_gym.calibration.part_selection import least_growth
 from ddagr_gym.calibration.result import (
     CALIBRATED,
     DATA_SHEET,
@@ -84,7 +84,7 @@ def _finding(part: PartDecision, parameters: list[CalibratedParameter], folds: i
     estimates = {p.name: Estimate(p.value, p.unit, p.interval) for p in parameters if p.value is not None}
     score = part.growth / error if error > 0.0 else 0.0
     return Finding(
-        part.name, estimates, part.growth, surely_above(folds) * error, score, part.growth,
+        part.name, estimates, part.growth, least_growth(error, folds), score, part.growth,
         {}, {part.name: 1.0},
     )  # fmt: skip
 

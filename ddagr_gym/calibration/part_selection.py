@@ -121,6 +121,16 @@ def surely_above(folds: int) -> float:
     return float(stdtrit(folds - 1, CONFIDENCE))
 
 
+def least_growth(error: float, folds: int) -> float:
+    """Growth of the losses above which a part is missed: surely above 0, and enough to matter.
+
+    Args:
+        error: standard error of the growth.
+        folds: that were left out.
+    """
+    return max(LEAST_GROWTH, surely_above(folds) * error)
+
+
 def is_missed(growth: float, error: float, folds: int) -> bool:
     """Whether forecasts without a part are surely worse, and by enough to matter.
 
@@ -129,7 +139,7 @@ def is_missed(growth: float, error: float, folds: int) -> bool:
         error: standard error of the growth.
         folds: that were left out.
     """
-    return growth > max(LEAST_GROWTH, surely_above(folds) * error)
+    return growth > least_growth(error, folds)
 
 
 def select_parts(

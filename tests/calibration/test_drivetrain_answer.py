@@ -1,9 +1,11 @@
 """What a calibration says of the drivetrain becomes names, sizes and errors of a diagnosis."""
 
+from dataclasses import replace
+
 import pytest
 
 from ddagr_gym.calibration.drivetrain_answer import drivetrain_answer, drivetrain_findings, late_poses
-from ddagr_gym.calibration.part_selection import surely_above
+from ddagr_gym.calibration.part_selection import LEAST_GROWTH, is_missed, surely_above
 from ddagr_gym.calibration.result import (
     CALIBRATED,
     DATA_SHEET,
@@ -87,6 +89,16 @@ def test_the_gain_of_a_part_is_what_forecasts_lose_without_it_and_its_gate_what_
     assert (delay.name, load.name) == ("command_delay", "load")
     assert (delay.gain, delay.gate) == (0.2, pytest.approx(surely_above(2) * 0.05))
     assert delay.parameters["command_delay"].interval == (0.1, 0.3)
+
+
+@pytest.mark.parametrize("error", [0.0, 0.001, 0.1])
+def test_the_gate_of_a_part_is_the_one_that_its_selection_used(error):
+    given = calibration()
+    parts = tuple(replace(part, error=error) if part.name == "load" else part for part in given.parts)
+    gate = next(item.gate for item in drivetrain_findings(replace(given, parts=parts)) if item.name == "load")
+    assert gate == max(LEAST_GROWTH, surely_above(2) * error)
+    assert not is_missed(gate, error, 2)
+    assert is_missed(gate + 1e-9, error, 2)
 
 
 @pytest.mark.parametrize(("lateness", "named"), [(0.01, False), (0.4, True)])
