@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 from ddagr_gym.exporting.carried_over import CarriedOver
-from ddagr_gym.exporting.mujoco_model import HORIZONTAL_INERTIA, WHEEL_MASS, WHEELS, chassis, check_friction
+from ddagr_gym.exporting.chassis import HORIZONTAL_INERTIA, WHEEL_MASS, WHEELS, chassis, check_friction
 
 NAMESPACE = "http://gazebosim.org/schema"
 PLUGIN = "gz::sim::systems::DiffDrive"

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ddagr_gym.exporting.chassis import WHEELS
 from ddagr_gym.exporting.comparison import Motion
-from ddagr_gym.exporting.mujoco_model import WHEELS
 from ddagr_gym.exporting.working_point import AVERAGED, RATE, SETTLING
 from ddagr_gym.parameters import STANDARD_GRAVITY
 
