@@ -11,7 +11,17 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ddagr_gym.api.drive_tasks import STEP, DriveTask, Setting, answered, setting_key, store_of, tasks_of
+from ddagr_gym.api.drive_tasks import (
+    STEP,
+    Calibrated,
+    DriveTask,
+    Setting,
+    answered,
+    load_calibrated,
+    setting_key,
+    store_of,
+    tasks_of,
+)
 from ddagr_gym.api.inputs import Sources
 from ddagr_gym.api.results import Report, Table
 from ddagr_gym.errors import at_least, unknown_name
@@ -147,24 +157,24 @@ def diagnose_drives(
         >>> result = ddagr_gym.diagnose_drives("drives", calibration="calibration")  # doctest: +SKIP
         >>> print(result.headline)  # doctest: +SKIP
     """
-    from ddagr_gym.calibration.ordinary_robot import load_ordinary_robot
-
     at_least(threads=(threads, 1), processes=(processes, 1), seed=(seed, 0))
     folder = Path(calibration)
-    ordinary = load_ordinary_robot(folder)
+    calibrated = load_calibrated(folder)
+    ordinary = calibrated[0]
     if ground and ground not in ordinary.soils:
         raise unknown_name("ground", ground, ordinary.soils)
     setting = Setting(folder, ground, None if column_map is None else str(column_map), limits, seed, threads)
     tasks = tasks_of(recordings)
     kept = None if cache is None else Path(cache)
     key = "" if kept is None else setting_key(setting)
-    found = _found(tasks, setting, processes, kept, key, progress)
+    found = _found(tasks, setting, calibrated, processes, kept, key, progress)
     return _result(tasks, found, ordinary, ground, kept, key)
 
 
 def _found(
     tasks: Sequence[DriveTask],
     setting: Setting,
+    calibrated: Calibrated,
     processes: int,
     cache: Path | None,
     key: str,
@@ -176,7 +186,7 @@ def _found(
     found |= {name: _kept(store) for name, store in stores.items() if store.has(STEP)}
     missing = [task for task in tasks if task.name not in found]
     say = _Counter(len(tasks), len(tasks) - len(missing), progress)
-    for task, answer in answered(missing, setting, processes):
+    for task, answer in answered(missing, setting, calibrated, processes):
         found[task.name] = answer
         if not isinstance(answer, str):
             stores[task.name].step(STEP, partial(_same, answer))

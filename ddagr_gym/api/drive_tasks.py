@@ -129,21 +129,22 @@ def store_of(task: DriveTask, key: str, cache: Path | None) -> StepStore:
 
 
 def answered(
-    tasks: Sequence[DriveTask], setting: Setting, processes: int
+    tasks: Sequence[DriveTask], setting: Setting, calibrated: Calibrated, processes: int
 ) -> Iterator[tuple[DriveTask, DriveAnswer | str]]:
     """Answers, or sentences why there is none, as they come.
 
     Args:
         tasks: drives.
         setting: of all.
+        calibrated: what all are compared with.
         processes: that work side by side.
     """
     from ddagr_gym.tasks import Task, TaskRunner
 
     given = {task.name: task for task in tasks}
     with TaskRunner(min(processes, max(len(tasks), 1))) as runner:
-        calibrated = runner.share(_calibrated(setting.calibration)) if tasks else None
-        for ended in runner.run(Task(task.name, answer_of, (task, setting, calibrated)) for task in tasks):
+        shared = runner.share(calibrated) if tasks else None
+        for ended in runner.run(Task(task.name, answer_of, (task, setting, shared)) for task in tasks):
             yield given[ended.task.name], ended.value if ended.failure is None else _without_answer(ended.failure)
 
 
@@ -185,8 +186,12 @@ def _fault(error: Exception) -> str:
     return f"{FAULT} ({type(error).__name__} in {where}: {' '.join(str(error).split())}): report it with the drive."
 
 
-def _calibrated(folder: Path) -> Calibrated:
-    """The calibrated robot, its ordinary drives' names by the hash of their values, and the file of the robot."""
+def load_calibrated(folder: Path) -> Calibrated:
+    """What drives are compared with, from a calibration's folder.
+
+    Raises:
+        InputError: no such calibration, or one without a bank.
+    """
     from ddagr_gym.calibration.files import ROBOT, load
     from ddagr_gym.calibration.ordinary_robot import load_ordinary_robot
 

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 import ddagr_gym
-from ddagr_gym.api import drive_tasks
+from ddagr_gym.api import drive_series, drive_tasks
 from ddagr_gym.api.drive_tasks import FAULT, tasks_of
-from ddagr_gym.calibration import ordinary_robot
 from ddagr_gym.cli import main
 from ddagr_gym.diagnosis.series.files import load
 from ddagr_gym.errors import InputError
@@ -32,8 +31,7 @@ def drives(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         (calibration / name).write_text("made")
     for number in range(1, 7):
         (folder / f"run_{number}.csv").write_text(f"{14 * (number >= 4)} {number}")
-    monkeypatch.setattr(ordinary_robot, "load_ordinary_robot", lambda folder: ORDINARY)
-    monkeypatch.setattr(drive_tasks, "_calibrated", lambda folder: (ORDINARY, {}, None))
+    monkeypatch.setattr(drive_series, "load_calibrated", lambda folder: (ORDINARY, {}, None))
     return folder
 
 
