@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ddagr_gym.recordings.channels import CURRENTS, VOLTAGES
 from ddagr_gym.recordings.checks.clock_offsets import LAGS, Offset, offsets
 from ddagr_gym.recordings.checks.findings import CheckFinding, CheckReport, Status
 from ddagr_gym.recordings.checks.gravity import rests
@@ -37,13 +38,17 @@ def check_figure(recording: Recording, report: CheckReport, rng: np.random.Gener
     """
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(12.5, 8.4), layout="constrained")
-    grid = figure.add_gridspec(4, 3, width_ratios=(1.0, 1.1, 1.2))
+    drawn = [name for name in (*CURRENTS, *VOLTAGES) if recording.has(name)]
+    rows = 5 if drawn else 4
+    figure = Figure(figsize=(12.5, 2.1 * rows), layout="constrained")
+    grid = figure.add_gridspec(rows, 3, width_ratios=(1.0, 1.1, 1.2))
     _speeds(figure.add_subplot(grid[0, :2]), recording)
     _turn_rate(figure.add_subplot(grid[1, :2]), recording)
-    _path(figure.add_subplot(grid[2:, 0]), recording)
-    _clocks(figure.add_subplot(grid[2, 1]), offsets(recording, rng) if len(recording) >= 3 else {})
-    _gravity(figure.add_subplot(grid[3, 1]), recording)
+    if drawn:
+        draw_currents(figure.add_subplot(grid[2, :2]), recording)
+    _path(figure.add_subplot(grid[rows - 2 :, 0]), recording)
+    _clocks(figure.add_subplot(grid[rows - 2, 1]), offsets(recording, rng) if len(recording) >= 3 else {})
+    _gravity(figure.add_subplot(grid[rows - 1, 1]), recording)
     _ranges(figure.add_subplot(grid[:, 2]), report)
     count = len(report.suspicious)
     verdict = f"{count} suspicious" if count else "nothing suspicious"
@@ -99,6 +104,34 @@ def _turn_rate(axes: Any, recording: Recording) -> None:
     axes.set_xlabel("time [s]")
     axes.legend(ncols=3, **_ABOVE)
     axes.margins(x=0)
+
+
+def draw_currents(axes: Any, recording: Recording) -> None:
+    """Currents of both banks, and voltages on an axis of their own, over time.
+
+    Args:
+        axes: matplotlib's.
+        recording: with at least one of these channels.
+    """
+    for name, colour in zip(CURRENTS, (RIGHT, LEFT), strict=True):
+        if recording.has(name):
+            values = _gapped(recording, filled(recording, name))
+            axes.plot(*values, color=colour, lw=0.8, drawstyle="steps-post", label=name.replace("_", " "))
+    axes.set_ylabel("current [A]")
+    axes.set_xlabel("time [s]")
+    axes.margins(x=0)
+    if axes.lines:
+        axes.legend(ncols=2, **_ABOVE)
+    voltages = [name for name in VOLTAGES if recording.has(name)]
+    if voltages:
+        other = axes.twinx()
+        for name, colour in zip(VOLTAGES, (RIGHT, LEFT, GYRO), strict=True):
+            if name in voltages:
+                values = _gapped(recording, filled(recording, name))
+                other.plot(*values, color=colour, lw=0.8, ls=":", label=name.replace("_", " "))
+        other.set_ylabel("voltage, dotted [V]")
+        other.grid(visible=False)
+        other.legend(ncols=3, loc="lower left", bbox_to_anchor=(0.0, 1.0))
 
 
 def _path(axes: Any, recording: Recording) -> None:
