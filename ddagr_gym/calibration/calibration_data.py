@@ -13,6 +13,7 @@ from ddagr_gym.diagnosis.preprocessing.mended_recordings import mend_recordings
 from ddagr_gym.diagnosis.wording import in_sentence
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.data_split import evenly
+from ddagr_gym.identification.motor_currents import CurrentModel, current_model, with_currents
 from ddagr_gym.identification.windows import WindowSet, cut_windows, with_presumed_past
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.recordings.schema import Recording
@@ -38,6 +39,7 @@ class CalibrationData:
         grounds: ground of each drive.
         windows: all of them, in the order of the drives and of time.
         notes: of each drive, sentences on what was mended.
+        currents: how the motors' currents follow, None where none is compared; the windows hold them then.
     """
 
     robot: Robot
@@ -46,6 +48,7 @@ class CalibrationData:
     grounds: tuple[str, ...]
     windows: WindowSet
     notes: tuple[tuple[str, ...], ...]
+    currents: CurrentModel | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -109,7 +112,12 @@ def prepare_drives(
                 f"{recording.meta.source} has {count} windows of {windows.duration:.3g} s without a gap and with "
                 f"commands, a calibration needs {FEWEST_WINDOWS} of each drive: give a longer drive, or leave it out."
             )
-    return CalibrationData(robot, dict(soils), prepared, tuple(grounds), with_presumed_past(windows), notes)
+    currents, said = current_model(prepared.recordings, robot, np.random.default_rng(settings.seed))
+    notes = tuple((*own, *said) for own in notes)
+    windows = with_presumed_past(windows)
+    if currents is not None:
+        windows = with_currents(windows, prepared.recordings)
+    return CalibrationData(robot, dict(soils), prepared, tuple(grounds), windows, notes, currents)
 
 
 def _mended(recording: Recording, seed: int) -> tuple[Recording, tuple[str, ...]]:

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from ddagr_gym.calibration.joint_fit import FittedModel
 from ddagr_gym.identification.gauss_newton import linearised
+from ddagr_gym.identification.parameters import OF_SENSORS
 
 Array = NDArray[np.float64]
 
@@ -33,7 +34,7 @@ def unidentified(model: FittedModel) -> dict[str, float]:
             break
         found[str(names[open_[worst]])] = float(ratio[worst])
         open_ = np.delete(open_, worst)
-    return {name: ratio for name, ratio in found.items() if not name.startswith("gyro_bias")}
+    return {name: ratio for name, ratio in found.items() if not name.startswith(OF_SENSORS)}
 
 
 def covariance(model: FittedModel) -> Array:

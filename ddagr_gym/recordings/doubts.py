@@ -45,7 +45,8 @@ def doubts(recording: Recording) -> Iterator[str]:
 
 
 def _unit_hint(unit: str) -> str:
-    return {"rad/s": " (deg/s?)", "rad": " (deg?)", "m/s^2": " (g?)", "m": " (mm?)", "A": " (mA?)", "V": " (mV?)"}.get(unit, "")
+    hints = {"rad/s": "deg/s", "rad": "deg", "m/s^2": "g", "m": "mm", "A": "mA", "V": "mV"}
+    return f" ({hints[unit]}?)" if unit in hints else ""
 
 
 def _degrees(recording: Recording) -> Iterator[str]:

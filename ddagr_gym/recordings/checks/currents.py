@@ -46,7 +46,7 @@ WEAKENING = Question(
     "voltage_to_speed",
     (-np.inf, 0.3),
     "-",
-    "The wheels turn more slowly at a lower voltage: their limits belong to the battery, so drive at one state of charge.",
+    "The wheels turn more slowly at a lower voltage: their limits are the battery's, so drive at one state of charge.",
     ("motor_saturation", "motor_droop"),
 )
 """Exponent e of speed over command ~ voltage^e [-]: 0 where a speed loop makes up for the voltage, 1 where wheels run
