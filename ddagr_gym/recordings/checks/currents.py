@@ -5,9 +5,9 @@ bank is a line in how much faster than the other bank it turns,
 
     i = i_0 + b x,    x = (w - w_other) sgn(w) / (|w| + |w_other|),                                                 (1)
 
-and i_0 is what it draws driving straight. Forwards i_0 is positive. Backwards its sign says what was measured: the
-motors' own current has the sign of the torque and is negative; what motors draw from their supply has the sign of the
-power and is positive.
+and i_0 is what it draws driving straight. Forwards i_0 is positive. Driving backwards, what motors draw from their
+supply follows the same line, because it has the sign of the power; the motors' own current has the sign of the torque
+and follows the line with the signs reversed.
 """
 
 from __future__ import annotations
@@ -99,37 +99,83 @@ def currents(recording: Recording, rng: np.random.Generator) -> list[CheckFindin
 
 
 def current_kind(recording: Recording, rng: np.random.Generator) -> CurrentKind | None:
-    """What the current channels of a recording measure; None where their signs do not say it surely.
+    """What the current channels of a recording measure; None where the drive does not say it surely.
+
+    Equation (1) is fitted twice to all rows in which the robot drives: as it stands, and with the signs that the
+    currents of motors have. The interval of the difference of what both leave decides.
 
     Args:
         recording: any.
         rng: of the resampling.
     """
-    found = {kind for kind in (_kind(recording, name, rng) for name in CURRENTS) if kind is not None}
-    return found.pop() if len(found) == 1 else None
+    readings = [_driven(recording, name) for name in CURRENTS if recording.has(name)]
+    sums = []
+    for _, block in blocks_in_spans(recording):
+        found = [_kind_sums(*(column[block] for column in reading)) for reading in readings]
+        if found and np.sum(found, axis=0)[0, 0, 0] > 0.0:
+            sums.append(np.stack(found))
+    found = estimate(sums, _explained_difference, rng) if sums else None
+    if found is None or found.intervals[0][0] <= 0.0 <= found.intervals[0][1]:
+        return None
+    return CurrentKind.SUPPLY if found.values[0] > 0.0 else CurrentKind.MOTOR
+
+
+def _driven(recording: Recording, name: str) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Current, x of equation (1) and the direction of the bank (n,); the current is NaN where it does not drive."""
+    own, other = _speeds(recording, name)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        x = (own - other) * np.sign(own) / (np.abs(own) + np.abs(other))
+        driven = (np.abs(own) > SLOWEST) & np.isfinite(x)
+    return np.where(driven, recording[name], np.nan), x, np.sign(own)
+
+
+def _kind_sums(current: FloatArray, x: FloatArray, direction: FloatArray) -> FloatArray:
+    """(2, 2, 4) of a block: normal equations of both models, and behind them the power of the current."""
+    known = np.isfinite(current)
+    plain = np.stack([np.ones(known.sum()), x[known]], axis=1)
+    power = np.full((2, 1), 0.5 * float(np.sum(current[known] ** 2)))
+    both = (plain, plain * direction[known][:, None])
+    return np.stack([np.concatenate([normal_equations(d, current[known]), power], axis=1) for d in both])
+
+
+def _explained_difference(totals: FloatArray) -> FloatArray:
+    """(m, 1) share of the power that a current of the supply explains less that of a current of the motors.
+
+    Args:
+        totals: (m, channels, 2, 2, 4).
+    """
+    difference = np.zeros(len(totals))
+    for channel in range(totals.shape[1]):
+        power = totals[:, channel, 0, :, 3].sum(axis=1)
+        for model, sign in ((0, 1.0), (1, -1.0)):
+            equations = totals[:, channel, model, :, :3]
+            explained = np.einsum("mk,mk->m", solve(equations), equations[..., 2])
+            difference += sign * explained / power
+    return np.asarray(difference[:, None] / totals.shape[1])
 
 
 def wrong_sign(recording: Recording, name: str, rng: np.random.Generator) -> bool:
-    """Whether a current channel surely goes against the push forwards."""
-    found = straight_current(recording, name, 1, rng)
+    """Whether a current channel surely goes against the push of a robot that drives straight."""
+    found = straight_current(recording, name, current_kind(recording, rng), rng)
     return found is not None and found.intervals[0][1] < 0.0
 
 
-def straight_current(recording: Recording, name: str, direction: int, rng: np.random.Generator) -> Estimate | None:
-    """i_0 and b of equation (1) [A]; None for too few samples.
+def straight_current(
+    recording: Recording, name: str, kind: CurrentKind | None, rng: np.random.Generator
+) -> Estimate | None:
+    """i_0 and b of equation (1) [A], forwards; None for too few samples.
 
     Args:
         recording: any.
         name: of CURRENTS.
-        direction: 1 forwards, -1 backwards.
+        kind: of the channel, by which driving backwards counts too; None leaves it out.
         rng: of the resampling.
     """
-    own, other = _speeds(recording, name)
-    measured = recording[name]
-    with np.errstate(invalid="ignore", divide="ignore"):
-        x = (own - other) * np.sign(own) / (np.abs(own) + np.abs(other))
-        chosen = np.isfinite(measured) & (np.minimum(direction * own, direction * other) > 0)
-        chosen &= (np.abs(own) > SLOWEST) & (np.abs(other) > SLOWEST) & (np.abs(x) <= LARGEST_DIFFERENCE)
+    current, x, direction = _driven(recording, name)
+    with np.errstate(invalid="ignore"):
+        chosen = np.isfinite(current) & (np.abs(x) <= LARGEST_DIFFERENCE)
+    if kind is None:
+        chosen &= direction > 0.0
     if np.count_nonzero(chosen) < FEWEST:
         return None
     sums = []
@@ -137,7 +183,8 @@ def straight_current(recording: Recording, name: str, direction: int, rng: np.ra
         rows = block.start + np.flatnonzero(chosen[block])
         if rows.size:
             design = np.stack([np.ones(rows.size), x[rows]], axis=1)
-            sums.append(normal_equations(design, measured[rows]))
+            signs = direction[rows][:, None] if kind is CurrentKind.MOTOR else 1.0
+            sums.append(normal_equations(design * signs, current[rows]))
     return estimate(sums, solve, rng)
 
 
@@ -147,36 +194,21 @@ def _speeds(recording: Recording, name: str) -> tuple[FloatArray, FloatArray]:
     return (right, left) if name.endswith("right") else (left, right)
 
 
-def _kind(recording: Recording, name: str, rng: np.random.Generator) -> CurrentKind | None:
-    """Of one channel, by its sign backwards against that forwards."""
-    signs = []
-    for direction in (1, -1):
-        found = straight_current(recording, name, direction, rng)
-        if found is None or found.intervals[0][0] <= 0.0 <= found.intervals[0][1]:
-            return None
-        signs.append(np.sign(found.values[0]))
-    return CurrentKind.SUPPLY if signs[0] == signs[1] else CurrentKind.MOTOR
-
-
 _MEASURES = {
-    CurrentKind.MOTOR: "; backwards it has the other sign, so it is the motors' own current",
-    CurrentKind.SUPPLY: "; backwards it has the same sign, so it is what the motors draw from their supply",
+    CurrentKind.MOTOR: "; its sign goes with the torque, so it is the motors' own current",
+    CurrentKind.SUPPLY: "; its sign goes with the power, so it is what the motors draw from their supply",
     None: "",
 }
 
 
 def _direction(recording: Recording, name: str, rng: np.random.Generator) -> CheckFinding:
-    found = straight_current(recording, name, 1, rng)
+    kind = current_kind(recording, rng)
+    found = straight_current(recording, name, kind, rng)
     if found is None:
-        why = "There are too few samples of the current while driving straight and forwards."
+        why = "There are too few samples of the current while driving straight."
         return not_testable(DIRECTION.check, name, why, "Drive straight pieces forwards and backwards.")
-    kind = _MEASURES[_kind(recording, name, rng)]
-    return DIRECTION.answer(
-        name,
-        float(found.values[0]),
-        found.intervals[0],
-        meaning=f"Driving straight and forwards, the bank's current is {found.values[0]:.3g} A{kind}.",
-    )
+    said = f"Driving straight and forwards, the bank's current is {found.values[0]:.3g} A{_MEASURES[kind]}."
+    return DIRECTION.answer(name, float(found.values[0]), found.intervals[0], meaning=said)
 
 
 def _voltage(recording: Recording, name: str, rng: np.random.Generator) -> list[CheckFinding]:
