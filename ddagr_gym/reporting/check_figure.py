@@ -7,25 +7,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ddagr_gym.recordings.channels import CURRENTS, VOLTAGES
 from ddagr_gym.recordings.checks.clock_offsets import LAGS, Offset, offsets
 from ddagr_gym.recordings.checks.findings import CheckFinding, CheckReport, Status
 from ddagr_gym.recordings.checks.gravity import rests
 from ddagr_gym.recordings.checks.signals import filled
 from ddagr_gym.recordings.files import write_atomically
-from ddagr_gym.recordings.schema import FloatArray, Recording
+from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.rendering import palette
 from ddagr_gym.reporting.figures import house_style, nothing_to_draw
+from ddagr_gym.reporting.recorded_currents import ABOVE, draw_currents, gapped, has_currents
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 COLOURS = {Status.PASS: palette.BLUE, Status.SUSPICIOUS: palette.VERMILLION, Status.NOT_TESTABLE: palette.GREY}
 RIGHT, LEFT, GYRO, POSE = palette.RIGHT, palette.LEFT, palette.INK, palette.GREEN
-_MOST_POINTS = 6000
-"""Drawn of a line, about (ours: several for each pixel of its width)."""
-
-_ABOVE: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0)}
 
 
 def check_figure(recording: Recording, report: CheckReport, rng: np.random.Generator) -> Figure:
@@ -38,7 +34,7 @@ def check_figure(recording: Recording, report: CheckReport, rng: np.random.Gener
     """
     from matplotlib.figure import Figure
 
-    drawn = [name for name in (*CURRENTS, *VOLTAGES) if recording.has(name)]
+    drawn = has_currents(recording)
     rows = 5 if drawn else 4
     figure = Figure(figsize=(12.5, 2.1 * rows), layout="constrained")
     grid = figure.add_gridspec(rows, 3, width_ratios=(1.0, 1.1, 1.2))
@@ -70,68 +66,29 @@ def save_check_figure(recording: Recording, report: CheckReport, rng: np.random.
         write_atomically(path, lambda to: figure.savefig(to, dpi=160, format="png", metadata={"Software": None}))
 
 
-def _gapped(recording: Recording, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Time and values with a NaN between spans, thinned, so that no line crosses a gap."""
-    parts = []
-    step = max(1, len(recording) // _MOST_POINTS)
-    for span in recording.spans():
-        rows = np.arange(span.start, span.stop, step)
-        parts.append(np.stack([np.append(recording.t[rows], recording.t[rows[-1]]), np.append(values[rows], np.nan)]))
-    joined = np.concatenate(parts, axis=1) if parts else np.empty((2, 0))
-    return joined[0], joined[1]
-
-
 def _speeds(axes: Any, recording: Recording) -> None:
     for bank, colour in (("right", RIGHT), ("left", LEFT)):
         command = recording.held_commands()[0 if bank == "right" else 1]
-        axes.plot(*_gapped(recording, command), color=colour, lw=0.8, ls=":", label=f"command {bank}")
+        axes.plot(*gapped(recording, command), color=colour, lw=0.8, ls=":", label=f"command {bank}")
         axes.plot(
-            *_gapped(recording, filled(recording, f"encoder_{bank}")), color=colour, lw=0.9, label=f"encoder {bank}"
+            *gapped(recording, filled(recording, f"encoder_{bank}")), color=colour, lw=0.9, label=f"encoder {bank}"
         )
     axes.set_ylabel("bank speed [rad/s]")
-    axes.legend(ncols=4, **_ABOVE)
+    axes.legend(ncols=4, **ABOVE)
     axes.margins(x=0)
 
 
 def _turn_rate(axes: Any, recording: Recording) -> None:
-    axes.plot(*_gapped(recording, recording["yaw_rate"]), color=GYRO, lw=0.7, label="gyro")
+    axes.plot(*gapped(recording, recording["yaw_rate"]), color=GYRO, lw=0.7, label="gyro")
     geometry = recording.meta.geometry
     if geometry is not None:
         difference = filled(recording, "encoder_right") - filled(recording, "encoder_left")
         turn = 0.5 * geometry.wheel_radius / geometry.half_track * difference
-        axes.plot(*_gapped(recording, turn), color=LEFT, lw=0.7, alpha=0.8, label="encoders without slip")
+        axes.plot(*gapped(recording, turn), color=LEFT, lw=0.7, alpha=0.8, label="encoders without slip")
     axes.set_ylabel("yaw rate [rad/s]")
     axes.set_xlabel("time [s]")
-    axes.legend(ncols=3, **_ABOVE)
+    axes.legend(ncols=3, **ABOVE)
     axes.margins(x=0)
-
-
-def draw_currents(axes: Any, recording: Recording) -> None:
-    """Currents of both banks, and voltages on an axis of their own, over time.
-
-    Args:
-        axes: matplotlib's.
-        recording: with at least one of these channels.
-    """
-    for name, colour in zip(CURRENTS, (RIGHT, LEFT), strict=True):
-        if recording.has(name):
-            values = _gapped(recording, filled(recording, name))
-            axes.plot(*values, color=colour, lw=0.8, drawstyle="steps-post", label=name.replace("_", " "))
-    axes.set_ylabel("current [A]")
-    axes.set_xlabel("time [s]")
-    axes.margins(x=0)
-    if axes.lines:
-        axes.legend(ncols=2, **_ABOVE)
-    voltages = [name for name in VOLTAGES if recording.has(name)]
-    if voltages:
-        other = axes.twinx()
-        for name, colour in zip(VOLTAGES, (RIGHT, LEFT, GYRO), strict=True):
-            if name in voltages:
-                values = _gapped(recording, filled(recording, name))
-                other.plot(*values, color=colour, lw=0.8, ls=":", label=name.replace("_", " "))
-        other.set_ylabel("voltage, dotted [V]")
-        other.grid(visible=False)
-        other.legend(ncols=3, loc="lower left", bbox_to_anchor=(0.0, 1.0))
 
 
 def _path(axes: Any, recording: Recording) -> None:

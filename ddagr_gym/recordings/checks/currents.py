@@ -111,9 +111,9 @@ def current_kind(recording: Recording, rng: np.random.Generator) -> CurrentKind 
     readings = [_driven(recording, name) for name in CURRENTS if recording.has(name)]
     sums = []
     for _, block in blocks_in_spans(recording):
-        found = [_kind_sums(*(column[block] for column in reading)) for reading in readings]
-        if found and np.sum(found, axis=0)[0, 0, 0] > 0.0:
-            sums.append(np.stack(found))
+        parts = [_kind_sums(*(column[block] for column in reading)) for reading in readings]
+        if parts and np.sum(parts, axis=0)[0, 0, 0] > 0.0:
+            sums.append(np.stack(parts))
     found = estimate(sums, _explained_difference, rng) if sums else None
     if found is None or found.intervals[0][0] <= 0.0 <= found.intervals[0][1]:
         return None
