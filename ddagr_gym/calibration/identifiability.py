@@ -49,7 +49,12 @@ def covariance(model: FittedModel) -> Array:
 
 
 def _at_least(sandwich: Array, inverse: Array) -> Array:
-    """Covariance with the correlations of the sandwich and the larger deviations of the two."""
+    """Covariance with the correlations of the sandwich and the larger deviations of the two.
+
+    A parameter that no reading depends on has no sandwich, and its prior alone.
+    """
     wide = np.sqrt(np.maximum(np.diag(sandwich), np.diag(inverse)))
-    scale = wide / np.sqrt(np.diag(sandwich))
-    return np.asarray(sandwich * np.outer(scale, scale))
+    root = np.sqrt(np.diag(sandwich))
+    scale = np.divide(wide, root, out=np.zeros(len(root)), where=root > 0.0)
+    alone = np.where(root > 0.0, 0.0, np.diag(inverse))
+    return np.asarray(sandwich * np.outer(scale, scale) + np.diag(alone))
