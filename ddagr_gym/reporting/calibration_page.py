@@ -90,7 +90,7 @@ _ALL = (
 """Errors of the table on the page."""
 
 
-_KINDS = {"motor": "the motors' own current", "supply": "the current that they draw from their supply"}
+_KINDS = {"motor": "the motors' own current", "supply": "the current that the motors draw from their supply"}
 
 
 def _currents(calibration: Calibration, forecasts: Sequence[Forecasts]) -> dict[str, Any] | None:
