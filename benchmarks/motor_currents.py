@@ -74,7 +74,7 @@ Array = NDArray[np.float64]
 
 def ready(recording: Recording, fitted: int) -> CalibrationData:
     """A drive ready to be fitted, with its currents."""
-    settings = CalibrationSettings(fitted=fitted)
+    settings = CalibrationSettings(fitted=fitted, supply_currents=True)
     return ready_drives([recording], [GROUND], get_robot(ROBOT), {GROUND: get_soil(SOIL)}, settings)
 
 
@@ -121,6 +121,7 @@ def simulated_summary(answers: Sequence[dict[str, Any]]) -> dict[str, Any]:
         inside = {n: np.abs(errors[n][:, 0] - truth[n]) <= QUANTILE * errors[n][:, 1] for n in SHOWN}
         held = int(sum(v.sum() for v in inside.values()))
         asked = sum(v.size for v in inside.values())
+        share = wilson_interval(held, asked)
         found[fit] = {
             "parameters": {
                 name: {
@@ -131,7 +132,7 @@ def simulated_summary(answers: Sequence[dict[str, Any]]) -> dict[str, Any]:
                 for name in SHOWN
             },
             "held": [held, asked],
-            "coverage": list(wilson_interval(held, asked)),
+            "coverage": [share.low, share.high],
         }
     return found
 

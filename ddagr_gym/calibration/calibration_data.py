@@ -16,6 +16,8 @@ from ddagr_gym.identification.data_split import evenly
 from ddagr_gym.identification.motor_currents import CurrentModel, current_model, with_currents
 from ddagr_gym.identification.windows import WindowSet, cut_windows, with_presumed_past
 from ddagr_gym.parameters import Robot, Soil
+from ddagr_gym.recordings.channels import CURRENTS
+from ddagr_gym.recordings.checks.currents import CurrentKind
 from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.replay_analysis.prepare import Prepared, prepare
 
@@ -23,6 +25,9 @@ Integers = NDArray[np.int64]
 
 FEWEST_WINDOWS = 8
 """Windows of a drive below which neither its noise nor its estimates have a meaning (ours)."""
+
+SUPPLY_LEFT_OUT = "the currents, which are what the motors draw from their supply, are left out of the fit."
+"""Note on a drive with such currents."""
 
 SHORTEST_WINDOW = 2.0
 """[s], ours: ten time constants of a bank."""
@@ -113,7 +118,9 @@ def prepare_drives(
                 f"commands, a calibration needs {FEWEST_WINDOWS} of each drive: give a longer drive, or leave it out."
             )
     currents, said = current_model(prepared.recordings, robot, np.random.default_rng(settings.seed))
-    notes = tuple((*own, *said) for own in notes)
+    if currents is not None and currents.kind is CurrentKind.SUPPLY and not settings.supply_currents:
+        currents, said = None, (SUPPLY_LEFT_OUT,)
+    notes = tuple((*own, *(said if r.has(*CURRENTS) else ())) for own, r in zip(notes, mended, strict=True))
     windows = with_presumed_past(windows)
     if currents is not None:
         windows = with_currents(windows, prepared.recordings)

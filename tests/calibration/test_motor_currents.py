@@ -24,7 +24,7 @@ from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.checks.currents import CurrentKind
 from ddagr_gym.reporting.current_figure import current_figure
 
-SETTINGS = CalibrationSettings(window=5.0, fitted=8, judged=8)
+SETTINGS = CalibrationSettings(window=5.0, fitted=8, judged=8, supply_currents=True)
 
 
 def ready(recording):
@@ -57,6 +57,14 @@ def test_drives_without_currents_are_prepared_to_the_bit_as_before(drive, data):
     assert [p.name for p in complete_model(plain)[0].parameters if p.name.startswith("current")] == []
     kept = complete_model(data)[0].parameters
     assert complete_model(plain)[0].parameters == tuple(p for p in kept if not p.name.startswith("current"))
+
+
+def test_supply_currents_are_left_out_unless_asked_for(drive):
+    settings = replace(SETTINGS, supply_currents=False)
+    plain = ready_drives([drive.recording], ["ground"], get_robot(ROBOT), {"ground": get_soil(SOIL)}, settings)
+    assert plain.currents is None
+    assert plain.windows.measured.shape[2] == 8
+    assert any("draw from their supply, are left out" in note for note in plain.notes[0])
 
 
 @pytest.fixture(scope="module")
