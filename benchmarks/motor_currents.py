@@ -113,7 +113,7 @@ def _values(data: CalibrationData) -> dict[str, Any]:
 
 
 def simulated_summary(answers: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """By parameter and readings: median deviation, root mean square error, and how often intervals hold the truth."""
+    """By parameter and readings: median deviation, r.m.s. and median error, and how often intervals hold the truth."""
     found: dict[str, Any] = {}
     for fit in (WITHOUT, *map(str, RATES)):
         errors = {name: np.array([item["fits"][fit]["values"][name] for item in answers]) for name in SHOWN}
@@ -127,6 +127,7 @@ def simulated_summary(answers: Sequence[dict[str, Any]]) -> dict[str, Any]:
                 name: {
                     "deviation": float(np.median(errors[name][:, 1])),
                     "error": float(np.sqrt(np.mean((errors[name][:, 0] - truth[name]) ** 2))),
+                    "median": float(np.median(np.abs(errors[name][:, 0] - truth[name]))),
                     "held": int(inside[name].sum()),
                 }
                 for name in SHOWN
@@ -194,7 +195,7 @@ def save_figure(content: dict[str, Any], path: Path) -> None:
     with house_style():
         figure = Figure(figsize=(7.4, 3.6), layout="constrained")
         panels = figure.subplots(1, 2, sharey=True)
-        for axis, key, title in zip(panels, ("deviation", "error"), ("stated deviation", "r.m.s. error"), strict=True):
+        for axis, key, title in zip(panels, ("deviation", "median"), ("stated deviation", "median error"), strict=True):
             axis.axvline(1.0, color=palette.GREY, lw=0.8)
             for shift, kind, colour in ((0.15, "supply", palette.VERMILLION), (-0.15, "motor", palette.BLUE)):
                 ratio = [summary[kind]["parameters"][name][key] / plain[name][key] for name in SHOWN]
