@@ -17,7 +17,8 @@ from ddagr_gym.commands.demo import SAMPLE, SAMPLE_SOIL
 from ddagr_gym.control.manoeuvres import MANOEUVRES
 from ddagr_gym.parameters import Imu, PoseReceiver, Sensors
 from ddagr_gym.presets import get_robot, get_soil
-from ddagr_gym.recordings.schema import CHANNELS, Recording
+from ddagr_gym.recordings.channels import CHANNELS
+from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.recordings.storage import save_parquet
 from ddagr_gym.simulator import simulate
 

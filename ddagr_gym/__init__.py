@@ -27,7 +27,8 @@ truth            columns that no sensor reads carry the prefix ``true_``
 
 Columns of a drive: ``t``; ``command_right``, ``command_left``, ``encoder_right``, ``encoder_left`` [rad/s];
 ``specific_force_x``, ``specific_force_y``, ``specific_force_z`` [m/s^2]; ``yaw_rate`` [rad/s]; optional ``roll``,
-``pitch`` [rad], ``pose_x``, ``pose_y`` [m], ``pose_yaw`` [rad], ``current_right``, ``current_left`` [A].
+``pitch`` [rad], ``pose_x``, ``pose_y`` [m], ``pose_yaw`` [rad], ``current_right``, ``current_left`` [A],
+``voltage_right``, ``voltage_left``, ``battery_voltage`` [V].
 
 Bad input raises :class:`ddagr_gym.errors.InputError`: one sentence with the offending value and the remedy.
 """

@@ -129,6 +129,7 @@ def calibrate(
     seed: int = 0,
     threads: int = 1,
     bank: bool = False,
+    supply_currents: bool = False,
     column_map: str | os.PathLike[str] | None = None,
     progress: Callable[[str], None] | None = None,
     cache: str | os.PathLike[str] | None = None,
@@ -146,6 +147,7 @@ def calibrate(
         grounds: drives on each ground by its name, as numbers, paths or objects; all on one where it is None.
         seed: of the resampled intervals.
         threads: of the simulator.
+        supply_currents: also fit currents that motors draw from their supply; their own current is always fitted.
         bank: also diagnose every drive with the robot calibrated without it: what ordinary drives do to every effect of
             the library, about a minute for each drive of 10 min.
         column_map: shipped map by name or the path of one's own, for files that are not imported yet.
@@ -196,7 +198,7 @@ def calibrate(
         by_drive,
         data_sheet,
         {ground: soil_from(item) for ground, item in soils.items()},
-        CalibrationSettings(threads=threads, seed=seed),
+        CalibrationSettings(threads=threads, seed=seed, supply_currents=supply_currents),
         data_sheet=OWN if not isinstance(robot, str | os.PathLike) else str(robot),
         soil_names={ground: soil_name_of(item) for ground, item in soils.items()},
         with_bank=bank,

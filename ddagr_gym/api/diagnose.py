@@ -269,7 +269,8 @@ class _Drivetrain:
         from ddagr_gym.diagnosis.result.drivetrain_names import CompletedNominal
 
         settings = CalibrationSettings(threads=self.threads, seed=self.seed)
-        settings = replace(settings, **_ONE_DRIVE) if len(self.recordings) == 1 else settings
+        if len(self.recordings) == 1:
+            settings = replace(settings, fitted=_ONE_DRIVE["fitted"], compared=_ONE_DRIVE["compared"])
         self._say("the wheels do not follow their commands as the simulator says: fitting its drivetrain")
         grounds, soils = [_GROUND] * len(self.recordings), {_GROUND: self.nominal.soil}
         drives = (self.recordings, grounds, self.nominal.robot, soils, settings)

@@ -102,7 +102,8 @@ class DiagnosisResult(DiagnosisReport):
         self.to_json(folder / "diagnosis.json")
         self.outcome.evidence.save(folder / evidence.NAME)
         if not self.diagnosis.options.names_only:
-            diagnosis_page.write_report(folder, self.diagnosis, self.outcome.evidence)
+            given = self.outcome.session.mended.given
+            diagnosis_page.write_report(folder, self.diagnosis, self.outcome.evidence, recordings=given)
             (folder / diagnosis_page.PAGE).rename(folder / PAGE)
             self._save_drivetrain(folder)
 

@@ -191,7 +191,10 @@ def driven_robot(robot: RobotLike | None, recordings: Sequence[Recording]) -> Ro
 def _draw(
     runs: Sequence[RunResult], folder: Path, progress: Callable[[str], None] | None
 ) -> dict[tuple[int, str], list[Path]]:
+    from ddagr_gym.reporting.figures import house_style, save_figure
+    from ddagr_gym.reporting.recorded_currents import currents_figure, has_currents
     from ddagr_gym.reporting.replay_figures import replay_overview, replay_residuals
+    from ddagr_gym.reporting.replay_page import RECORDED
     from ddagr_gym.reporting.replay_text import DRIVEN_BY
 
     figures: dict[tuple[int, str], list[Path]] = {}
@@ -204,6 +207,10 @@ def _draw(
                 detail, _ = replay_residuals(mode, folder / f"{stem}_{mode.report.drive}_residuals", title)
                 figures[number, mode.report.drive] = [overview, detail]
                 steps.advance()
+            measured = [recording for recording in run.prepared.recordings if has_currents(recording)]
+            if measured:
+                with house_style():
+                    figures[number, RECORDED] = [save_figure(currents_figure(measured), folder / f"{stem}_currents")[0]]
     return figures
 
 

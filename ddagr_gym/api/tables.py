@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.errors import InputError
-from ddagr_gym.recordings.schema import CHANNELS, Recording
+from ddagr_gym.recordings.channels import CHANNELS
+from ddagr_gym.recordings.schema import Recording
 
 VALID = "command_valid"
 """Column that says where the commands are what the robot received."""

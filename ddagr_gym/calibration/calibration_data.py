@@ -13,8 +13,11 @@ from ddagr_gym.diagnosis.preprocessing.mended_recordings import mend_recordings
 from ddagr_gym.diagnosis.wording import in_sentence
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.data_split import evenly
+from ddagr_gym.identification.motor_currents import CurrentModel, current_model, with_currents
 from ddagr_gym.identification.windows import WindowSet, cut_windows, with_presumed_past
 from ddagr_gym.parameters import Robot, Soil
+from ddagr_gym.recordings.channels import CURRENTS
+from ddagr_gym.recordings.checks.currents import CurrentKind
 from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.replay_analysis.prepare import Prepared, prepare
 
@@ -22,6 +25,9 @@ Integers = NDArray[np.int64]
 
 FEWEST_WINDOWS = 8
 """Windows of a drive below which neither its noise nor its estimates have a meaning (ours)."""
+
+SUPPLY_LEFT_OUT = "the currents, which are what the motors draw from their supply, are left out of the fit."
+"""Note on a drive with such currents."""
 
 SHORTEST_WINDOW = 2.0
 """[s], ours: ten time constants of a bank."""
@@ -38,6 +44,7 @@ class CalibrationData:
         grounds: ground of each drive.
         windows: all of them, in the order of the drives and of time.
         notes: of each drive, sentences on what was mended.
+        currents: how the motors' currents follow, None where none is compared; the windows hold them then.
     """
 
     robot: Robot
@@ -46,6 +53,7 @@ class CalibrationData:
     grounds: tuple[str, ...]
     windows: WindowSet
     notes: tuple[tuple[str, ...], ...]
+    currents: CurrentModel | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -109,7 +117,14 @@ def prepare_drives(
                 f"{recording.meta.source} has {count} windows of {windows.duration:.3g} s without a gap and with "
                 f"commands, a calibration needs {FEWEST_WINDOWS} of each drive: give a longer drive, or leave it out."
             )
-    return CalibrationData(robot, dict(soils), prepared, tuple(grounds), with_presumed_past(windows), notes)
+    currents, said = current_model(prepared.recordings, robot, np.random.default_rng(settings.seed))
+    if currents is not None and currents.kind is CurrentKind.SUPPLY and not settings.supply_currents:
+        currents, said = None, (SUPPLY_LEFT_OUT,)
+    notes = tuple((*own, *(said if r.has(*CURRENTS) else ())) for own, r in zip(notes, mended, strict=True))
+    windows = with_presumed_past(windows)
+    if currents is not None:
+        windows = with_currents(windows, prepared.recordings)
+    return CalibrationData(robot, dict(soils), prepared, tuple(grounds), windows, notes, currents)
 
 
 def _mended(recording: Recording, seed: int) -> tuple[Recording, tuple[str, ...]]:

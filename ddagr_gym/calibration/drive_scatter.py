@@ -23,7 +23,7 @@ from ddagr_gym.calibration.joint_fit import FittedModel, fit_model
 from ddagr_gym.calibration.parts import RobotModel
 from ddagr_gym.calibration.result import Scatter
 from ddagr_gym.identification.gauss_newton import linearised
-from ddagr_gym.identification.parameters import ModelParameter, per_group
+from ddagr_gym.identification.parameters import OF_SENSORS, ModelParameter, per_group
 from ddagr_gym.identification.residual_weights import Weights
 
 Array = NDArray[np.float64]
@@ -63,7 +63,7 @@ def drive_estimates(data: CalibrationData, model: FittedModel, weights: Weights,
         weights: of its windows.
         threads: of the simulator.
     """
-    moved = [p for p in model.parameters if p.prior > 0.0 and not p.name.startswith("gyro_bias")]
+    moved = [p for p in model.parameters if p.prior > 0.0 and not p.name.startswith(OF_SENSORS)]
     own = [made for p in moved for made in _by_drive(p, model.values[p.name], data.count)]
     joint = tuple(replace(p, prior=0.0) if p in moved else p for p in model.parameters)
     by_drive = RobotModel(model.model.robot, (*joint, *own))

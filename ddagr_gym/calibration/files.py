@@ -38,7 +38,10 @@ def check_ground_name(ground: str) -> None:
 
 def as_text(calibration: Calibration) -> str:
     """JSON of a calibration; null stands for numbers that are not finite."""
-    return json.dumps(_finite(asdict(calibration)), indent=1, allow_nan=False) + "\n"
+    content = asdict(calibration)
+    if calibration.currents is None:
+        del content["currents"]
+    return json.dumps(_finite(content), indent=1, allow_nan=False) + "\n"
 
 
 def _finite(value: Any) -> Any:

@@ -15,11 +15,13 @@ from ddagr_gym.calibration.left_out import ENCODERS, Forecast, fold_name, folds
 from ddagr_gym.calibration.result import CALIBRATED, DATA_SHEET, KINEMATIC, ForecastError
 from ddagr_gym.calibration.simulator_values import fitted_robot, fitted_sensors, fitted_soil
 from ddagr_gym.identification.fit_numerics import field_numerics
+from ddagr_gym.identification.motor_currents import without_currents
 from ddagr_gym.identification.residual_weights import ROBUST
 from ddagr_gym.identification.window_model import WindowModel
 from ddagr_gym.identification.windows import CHANNELS, WindowSet
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.physics.effects import Effect
+from ddagr_gym.recordings.channels import CURRENTS
 from ddagr_gym.replay_analysis.horizons import METRICS, horizon_errors
 from ddagr_gym.replay_analysis.intervals import error_statistics
 from ddagr_gym.replay_analysis.kinematic import KinematicModel, fit_motor, fit_track
@@ -48,6 +50,7 @@ class Forecasts:
         robot: as calibrated without the drive.
         soil: of its ground, likewise.
         sensors: what was calibrated of the sensors, likewise.
+        currents: measured and forecast currents of both banks (W, T, 2) [A]; None where none is compared.
     """
 
     drive: str
@@ -58,6 +61,7 @@ class Forecasts:
     robot: Robot
     soil: Soil
     sensors: tuple[Effect, ...]
+    currents: tuple[Array, Array] | None = None
 
 
 OTHER_DRIVES = "other drives"
@@ -83,11 +87,11 @@ def all_forecasts(
     soil = next(iter(data.soils.values()))
     found = []
     for forecast in made:
-        windows = forecast.windows
+        windows = without_currents(forecast.windows)
         sheet = WindowModel(data.robot, soil, windows, offsets, numerics=field_numerics(), threads=threads)
         before = sheet.predict(nominal, windows.initial)
-        predictions = {DATA_SHEET: before, CALIBRATED: forecast.prediction}
-        kinematic = _kinematic(data, fitted.subset(np.asarray(by_window != forecast.fold)))
+        predictions = {DATA_SHEET: before, CALIBRATED: forecast.prediction[..., : len(CHANNELS)]}
+        kinematic = _kinematic(data, without_currents(fitted.subset(np.asarray(by_window != forecast.fold))))
         if kinematic is not None:
             predictions[KINEMATIC] = kinematic.predict(windows)
         ground = data.grounds[int(windows.recording[0])]
@@ -97,9 +101,16 @@ def all_forecasts(
             Forecasts(
                 fold_name(data, forecast.fold), ground, ITSELF if alone else OTHER_DRIVES, windows, predictions,
                 fitted_robot(model.model.robot, values), fitted_soil(data, ground, values), fitted_sensors(values),
+                None if data.currents is None else _currents(forecast),
             )
         )  # fmt: skip
     return tuple(found)
+
+
+def _currents(forecast: Forecast) -> tuple[Array, Array]:
+    """Measured and forecast currents of both banks (W, T, 2) [A]."""
+    own = slice(len(CHANNELS), len(CHANNELS) + len(CURRENTS))
+    return forecast.windows.measured[..., own], forecast.prediction[..., own]
 
 
 def _kinematic(data: CalibrationData, windows: WindowSet) -> KinematicModel | None:

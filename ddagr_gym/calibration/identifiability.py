@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from ddagr_gym.calibration.joint_fit import FittedModel
 from ddagr_gym.identification.gauss_newton import linearised
+from ddagr_gym.identification.parameters import OF_SENSORS
 
 Array = NDArray[np.float64]
 
@@ -33,7 +34,7 @@ def unidentified(model: FittedModel) -> dict[str, float]:
             break
         found[str(names[open_[worst]])] = float(ratio[worst])
         open_ = np.delete(open_, worst)
-    return {name: ratio for name, ratio in found.items() if not name.startswith("gyro_bias")}
+    return {name: ratio for name, ratio in found.items() if not name.startswith(OF_SENSORS)}
 
 
 def covariance(model: FittedModel) -> Array:
@@ -48,7 +49,12 @@ def covariance(model: FittedModel) -> Array:
 
 
 def _at_least(sandwich: Array, inverse: Array) -> Array:
-    """Covariance with the correlations of the sandwich and the larger deviations of the two."""
+    """Covariance with the correlations of the sandwich and the larger deviations of the two.
+
+    A parameter that no reading depends on has no sandwich, and its prior alone.
+    """
     wide = np.sqrt(np.maximum(np.diag(sandwich), np.diag(inverse)))
-    scale = wide / np.sqrt(np.diag(sandwich))
-    return np.asarray(sandwich * np.outer(scale, scale))
+    root = np.sqrt(np.diag(sandwich))
+    scale = np.divide(wide, root, out=np.zeros(len(root)), where=root > 0.0)
+    alone = np.where(root > 0.0, 0.0, np.diag(inverse))
+    return np.asarray(sandwich * np.outer(scale, scale) + np.diag(alone))

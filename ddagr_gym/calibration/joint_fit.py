@@ -13,6 +13,7 @@ from ddagr_gym.calibration.parts import RobotModel, complete_robot, shared_param
 from ddagr_gym.identification.block_means import sample_windows
 from ddagr_gym.identification.fit_numerics import FIELD_TOLERANCE, field_numerics, field_slope_numerics
 from ddagr_gym.identification.gauss_newton import Fitted, fit
+from ddagr_gym.identification.motor_currents import current_noise
 from ddagr_gym.identification.nuisances import Nuisances
 from ddagr_gym.identification.parameters import (
     KIND_STIFFNESS_DEVIATION,
@@ -25,6 +26,7 @@ from ddagr_gym.identification.parameters import (
 from ddagr_gym.identification.problem import Point, Problem
 from ddagr_gym.identification.residual_weights import (
     LEAST_GYRO_BIAS,
+    ROBUST,
     UNKNOWN_GYRO_BIAS,
     Weights,
     misfit_weights,
@@ -33,6 +35,7 @@ from ddagr_gym.identification.residual_weights import (
 from ddagr_gym.identification.windows import WindowSet
 from ddagr_gym.parameters import Numerics, Soil
 from ddagr_gym.physics.wheel_forces import soil_vector
+from ddagr_gym.recordings.channels import CURRENTS
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
@@ -121,7 +124,8 @@ def complete_model(data: CalibrationData) -> tuple[RobotModel, dict[str, float]]
     bias = max(*known, LEAST_GYRO_BIAS) if len(known) == len(noise) else UNKNOWN_GYRO_BIAS
     biases = [p for p in sensor_parameters(data.count, bias, 1.0) if p.name.startswith("gyro_bias")]
     robot = complete_robot(data.robot)
-    return RobotModel(robot, (*offsets, *soil, *shared_parameters(robot), *biases)), held
+    constants = () if data.currents is None else data.currents.parameters
+    return RobotModel(robot, (*offsets, *soil, *shared_parameters(robot), *biases, *constants)), held
 
 
 def _soil_offsets(data: CalibrationData) -> tuple[list[ModelParameter], dict[str, float]]:
@@ -150,7 +154,7 @@ def make_problem(
     soil: Soil = next(iter(data.soils.values()))
     return Problem(
         model.robot, soil, sample_windows(windows, weights.sigma), Nuisances(model.parameters), robust=weights.robust,
-        threads=threads, numerics=field_numerics(), slopes=slopes,
+        threads=threads, numerics=field_numerics(), slopes=slopes, currents=data.currents,
     )  # fmt: skip
 
 
@@ -165,7 +169,11 @@ def point_at(problem: Problem, values: Mapping[str, float], states: Array | None
 
 def first_weights(data: CalibrationData, windows: WindowSet) -> Weights:
     """Weights by the sensors' noise."""
-    return noise_weights(data.prepared.noise, windows, False, data.prepared.dead)
+    weights = noise_weights(data.prepared.noise, windows, False, data.prepared.dead)
+    if data.currents is None:
+        return weights
+    sigma = np.concatenate([weights.sigma, current_noise(data.currents, windows)], axis=2)
+    return Weights(sigma, np.concatenate([weights.robust, np.full(len(CURRENTS), ROBUST)]))
 
 
 def weights_by_drive(windows: WindowSet, prediction: Array, before: Weights) -> Weights:

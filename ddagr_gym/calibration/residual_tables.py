@@ -13,7 +13,7 @@ from ddagr_gym.calibration.result import CALIBRATED, DATA_SHEET, Spectrum, Unexp
 from ddagr_gym.identification.residual_weights import residuals
 from ddagr_gym.identification.signals import on_lines
 from ddagr_gym.identification.windows import CHANNELS, WindowSet
-from ddagr_gym.recordings.schema import CHANNELS as SCHEMA
+from ddagr_gym.recordings.channels import CHANNELS as SCHEMA
 
 Array = NDArray[np.float64]
 Booleans = NDArray[np.bool_]

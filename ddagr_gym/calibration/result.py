@@ -225,6 +225,57 @@ class Unexplained:
 
 
 @dataclass(frozen=True)
+class CurrentConstant:
+    """An unknown constant between the torque of the motors and their measured current.
+
+    Attributes:
+        name: identifier.
+        unit: of the value.
+        value: fitted.
+        deviation: standard deviation of it inside the drives.
+    """
+
+    name: str
+    unit: str
+    value: float
+    deviation: float
+
+
+@dataclass(frozen=True)
+class CurrentError:
+    """How well the current of a bank of a left-out drive was forecast.
+
+    Attributes:
+        drive: name of the drive, or of its part.
+        bank: right or left.
+        count: of samples.
+        measured: root mean square of the measured current about its mean [A].
+        left: root mean square of measured less forecast [A].
+    """
+
+    drive: str
+    bank: str
+    count: int
+    measured: float
+    left: float
+
+
+@dataclass(frozen=True)
+class CurrentEvidence:
+    """Currents of the motors as a calibration used them.
+
+    Attributes:
+        kind: "motor" for the motors' own current, "supply" for what they draw.
+        constants: that were fitted with robot and grounds.
+        errors: on left-out drives.
+    """
+
+    kind: str
+    constants: tuple[CurrentConstant, ...]
+    errors: tuple[CurrentError, ...]
+
+
+@dataclass(frozen=True)
 class Calibration:
     """The whole answer.
 
@@ -246,6 +297,7 @@ class Calibration:
         converged: whether the joint fit settled.
         seed: of resampled intervals.
         seconds: that the calibration took.
+        currents: of the motors; None, and not in the file, where none was used.
     """
 
     schema: str
@@ -265,6 +317,7 @@ class Calibration:
     converged: bool
     seed: int
     seconds: float
+    currents: CurrentEvidence | None = None
 
     def parameter(self, name: str) -> CalibratedParameter:
         """Parameter by name; KeyError where there is none."""

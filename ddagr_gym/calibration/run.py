@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from ddagr_gym.calibration.calibration_data import CalibrationData, prepare_drives
+from ddagr_gym.calibration.current_evidence import current_evidence
 from ddagr_gym.calibration.drive_scatter import drive_estimates
 from ddagr_gym.calibration.effect_bank import ordinary_runs
 from ddagr_gym.calibration.fit_starts import fit_from_several
@@ -181,6 +182,7 @@ def calibrate_drives(
         converged=final.standing.converged,
         seed=settings.seed,
         seconds=time.monotonic() - began,
+        currents=current_evidence(data, model, compared),
     )
     found = {ground: fitted_soil(data, ground, model.values) for ground in data.drives_on}
     calibrated = calibrated_robot(data, model, calibration)

@@ -23,6 +23,8 @@ class CalibrationSettings:
         judged: windows of a left-out drive that are forecast.
         threads: of the simulator.
         seed: of resampled intervals.
+        supply_currents: also use currents that motors draw from their supply; their own always count. On simulated
+            drives those of the supply, at 1 Hz, made nothing better known (benchmarks/motor_currents.py).
     """
 
     window: float = 6.0
@@ -31,3 +33,4 @@ class CalibrationSettings:
     judged: int = 100
     threads: int = 1
     seed: int = 0
+    supply_currents: bool = False

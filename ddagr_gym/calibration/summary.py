@@ -15,7 +15,7 @@ from ddagr_gym.calibration.parts import RobotModel
 from ddagr_gym.calibration.result import CalibratedParameter, DriveEstimate, DriveSummary, Scatter
 from ddagr_gym.calibration.simulator_values import Quantity, quantity
 from ddagr_gym.diagnosis.preprocessing.input_requirements import content_hash
-from ddagr_gym.identification.parameters import ModelParameter
+from ddagr_gym.identification.parameters import OF_SENSORS, ModelParameter
 from ddagr_gym.identification.windows import WindowSet
 from ddagr_gym.recordings.schema import Recording
 
@@ -77,7 +77,7 @@ def parameter_results(
     deviation = dict(zip(model.free, np.sqrt(np.diag(covariance(model))).tolist(), strict=True))
     found = []
     for parameter in complete.parameters:
-        if parameter.prior == 0.0 or parameter.name.startswith("gyro_bias"):
+        if parameter.prior == 0.0 or parameter.name.startswith(OF_SENSORS):
             continue
         known = quantity(data, complete, parameter)
         if parameter.name in deviation:

@@ -40,6 +40,7 @@ class Arguments:
         map: shipped map by name or the path of one's own YAML file, for sources that are not imported yet.
         seed: of the resampled intervals.
         threads: of the simulator.
+        supply_currents: also fit currents that motors draw from their supply; their own current is always fitted.
         bank: also diagnose every drive with the robot calibrated without it, and write bank.json: what ordinary drives
             do to every effect of the library.
         overwrite: replace an output folder that an earlier command wrote.
@@ -56,6 +57,7 @@ class Arguments:
     seed: int = 0
     threads: int = 2
     bank: bool = False
+    supply_currents: bool = False
     overwrite: bool = False
     maximum_rows: int = 2_000_000
     maximum_bytes: int = 4 * 2**30
@@ -82,6 +84,7 @@ def run(arguments: Arguments) -> None:
             seed=arguments.seed,
             threads=arguments.threads,
             bank=arguments.bank,
+            supply_currents=arguments.supply_currents,
             progress=LinePrinter("ddagr calibrate: "),
             cache=parts,
         )

@@ -8,6 +8,7 @@ Reading order, each module using those before it::
     block_means      residuals: samples or means over blocks, each over its standard deviation
     parameters       what is uncertain, shared by all recordings or own to some; nuisances and headings choose for a fit
     fit_numerics     accuracy of the simulator inside a fit
+    motor_currents   what motor currents measure, up to unknown constants
     window_model     the simulator over windows: predictions and their derivatives
     least_squares    the linearised problem: elimination, robust weights, bounded step, deviations
     problem          residuals, sensitivities and local unknowns of one fit

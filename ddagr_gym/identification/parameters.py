@@ -22,6 +22,13 @@ from ddagr_gym.physics import layout
 Array = NDArray[np.float64]
 
 
+CURRENT = "current_"
+"""Begins the names of the unknown constants between motor torque and measured current."""
+
+OF_SENSORS = ("gyro_bias", CURRENT)
+"""Begin the names of parameters that belong to sensors, not to robot or ground."""
+
+
 @dataclass(frozen=True)
 class ModelParameter:
     """A scalar that changes simulator rows; 0 is the nominal value.

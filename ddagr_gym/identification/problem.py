@@ -19,6 +19,7 @@ from ddagr_gym.identification.block_means import BlockedWindows
 from ddagr_gym.identification.fit_numerics import block_mean_numerics
 from ddagr_gym.identification.headings import headings_matter, turned_starts
 from ddagr_gym.identification.least_squares import Elimination, huber_loss, huber_roots
+from ddagr_gym.identification.motor_currents import CurrentModel
 from ddagr_gym.identification.nuisances import SHIFT_AS_EFFECT, Nuisances
 from ddagr_gym.identification.parameters import disjoint_scopes
 from ddagr_gym.identification.spells import Spell
@@ -78,6 +79,7 @@ class Problem:
         threads: of the simulator.
         numerics: of the simulator.
         slopes: of the simulator where it only serves sensitivities to nuisances and states; the same by default.
+        currents: how motor currents follow, where the windows compare them.
     """
 
     def __init__(
@@ -94,6 +96,7 @@ class Problem:
         threads: int = 1,
         numerics: Numerics | None = None,
         slopes: Numerics | None = None,
+        currents: CurrentModel | None = None,
     ) -> None:
         self.robot = robot
         self.blocked = blocked
@@ -101,11 +104,11 @@ class Problem:
         self.model = WindowModel(
             robot, soil, blocked.windows, nuisances.parameters, imposed=imposed,
             numerics=block_mean_numerics() if numerics is None else numerics, threads=threads,
-            delay=delay,
+            delay=delay, currents=currents,
         )  # fmt: skip
         self._slopes = None if slopes is None else WindowModel(
             robot, soil, blocked.windows, nuisances.parameters, imposed=imposed, numerics=slopes, threads=threads,
-            delay=delay,
+            delay=delay, currents=currents,
         )  # fmt: skip
         self.prior = np.array([p.prior for p in nuisances.parameters])
         self.low = np.array([p.low for p in nuisances.parameters])
@@ -236,6 +239,10 @@ class Problem:
         columns = np.zeros((*self.blocked.mask.shape, len(self.prior)))
         simulated = []
         for k, parameter in enumerate(self.nuisances.parameters):
+            of_current = self._current_column(parameter.name, point, base)
+            if of_current is not None:
+                columns[..., k] = of_current
+                continue
             channel = _BIAS_CHANNEL.get(parameter.entries[0]) if len(parameter.entries) == 1 else None
             if channel is not None and not parameter.factor:
                 columns[..., k] = self._bias_column(channel, base, parameter.acts_in(self.blocked.windows.recording))
@@ -311,6 +318,12 @@ class Problem:
         ones = np.zeros(self.blocked.windows.measured.shape)
         ones[chosen, :, channel] = 1.0
         return self.blocked.derivative(ones, base)
+
+    def _current_column(self, name: str, point: Point, base: Array) -> Array | None:
+        """(W, M) exact sensitivity to a constant of the currents; None for all other parameters."""
+        currents = self.model.currents
+        change = None if currents is None else currents.derivative(name, base, self.model.named(point.values))
+        return None if change is None else self.blocked.derivative(change, base)
 
     def eliminate(self, point: Point, base: Array, by_parameter: Array) -> Elimination:
         """Basis of the local unknowns of each window at a point (theory: identification, eq. (7)).

@@ -45,8 +45,9 @@ class Weights:
     linear reduced by it, so that outliers are judged by the size of single samples.
 
     Attributes:
-        sigma: (W, 1, 8) enlarged standard deviations; infinite for channels that are left out.
-        robust: (8,) weighted residuals from which the loss is linear.
+        sigma: (W, 1, 8) enlarged standard deviations, (W, 1, 10) with the motors' currents; infinite for channels that
+            are left out.
+        robust: (8,) or (10,) weighted residuals from which the loss is linear.
     """
 
     sigma: Array
@@ -55,7 +56,7 @@ class Weights:
 
 def residuals(windows: WindowSet, prediction: Array) -> Array:
     """Measurement less prediction (W, T, 8), NaN where there is no sample; headings on the circle."""
-    difference = windows.measured - prediction
+    difference = windows.measured[..., : prediction.shape[-1]] - prediction
     difference[..., CHANNELS.index("pose_yaw")] = wrap_angle(difference[..., CHANNELS.index("pose_yaw")])
     return difference
 
@@ -107,7 +108,7 @@ def misfit_weights(windows: WindowSet, prediction: Array, before: Weights) -> We
 def weights_by_residuals(left: Array, before: Weights) -> Weights:
     """The same by residuals (W, T, 8), NaN where there is no sample."""
     sigma, robust = before.sigma.copy(), before.robust.copy()
-    for k in range(len(CHANNELS)):
+    for k in range(left.shape[-1]):
         residual = left[..., k]
         known = np.isfinite(residual)
         if known.sum() < _FEWEST or not np.isfinite(sigma[..., k]).any():

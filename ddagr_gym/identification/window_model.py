@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ddagr_gym.identification.motor_currents import CurrentModel
 from ddagr_gym.identification.parameters import ModelParameter
 from ddagr_gym.identification.spells import Spell
 from ddagr_gym.identification.windows import CHANNELS, STATE, WindowSet
@@ -16,6 +17,7 @@ from ddagr_gym.parameters import Drivetrain, Imu, Numerics, PoseReceiver, Robot,
 from ddagr_gym.physics import layout
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.effects.base import GROUPS
+from ddagr_gym.physics.motor_torque import RECORDED, motor_torques
 from ddagr_gym.simulator import Simulator, build_row
 
 Array = NDArray[np.float64]
@@ -75,6 +77,7 @@ class WindowModel:
         numerics: accuracy; ``Numerics.smooth()`` by default.
         threads: see :class:`Simulator`.
         delay: by which the commands act late, besides the shift parameters [s]; negative where their clock is late.
+        currents: how motor currents follow, where the windows compare them; they are channels 8 and 9 then.
     """
 
     def __init__(
@@ -88,8 +91,10 @@ class WindowModel:
         numerics: Numerics | None = None,
         threads: int = 1,
         delay: float = 0.0,
+        currents: CurrentModel | None = None,
     ) -> None:
         self.windows = windows
+        self.currents = currents
         self.parameters = tuple(parameters)
         self._numerics = Numerics.smooth() if numerics is None else numerics
         self._threads = threads
@@ -111,14 +116,22 @@ class WindowModel:
         return other
 
     def predict(self, values: Array, states: Array, effects: Sequence[Effect] = ()) -> Array:
-        """Channels of all windows, (W, T, 8).
+        """Channels of all windows, (W, T, 8), or (W, T, 10) with the currents of the motors.
 
         Args:
             values: (P,) of the parameters.
             states: (W, 8) initial STATE.
             effects: missing physics.
         """
-        return self.predict_recorded(values, states, (), effects)[0]
+        if self.currents is None:
+            return self.predict_recorded(values, states, (), effects)[0]
+        readings, record = self.predict_recorded(values, states, RECORDED, effects)
+        currents = self.currents.currents(motor_torques(record), record[..., :2], self.named(values))
+        return np.concatenate([readings, currents], axis=2)
+
+    def named(self, values: Array) -> dict[str, float]:
+        """Values (P,) of the parameters by name."""
+        return dict(zip((parameter.name for parameter in self.parameters), values.tolist(), strict=True))
 
     def predict_recorded(
         self, values: Array, states: Array, entries: Sequence[int], effects: Sequence[Effect] = ()

@@ -51,7 +51,8 @@ class WindowSet:
         commands: (W, H + T + A, 2) right and left commands [rad/s]; command [H + k] is in force in the period that
             ends at sample k, the first H belong to the past (for delays), the last A to the future (for late clocks).
         history: H.
-        measured: (W, T, 8) in the order of CHANNELS, NaN where there is no new sample.
+        measured: (W, T, 8) in the order of CHANNELS, NaN where there is no new sample; (W, T, 10) with the currents of
+            the right and left motors behind them, where those are compared.
         initial: (W, 8) first guess of STATE at the start.
         ahead: A.
         unknown: (W,) how many of the first commands nobody recorded: before a recording, or a stretch of it, the first

@@ -230,6 +230,19 @@ def bank_inertia(row: Array, bank: int) -> float:
 
 
 @kernel()
+def motor_torque(row: Array, bank: int) -> float:
+    """Torque of a bank's motors at its wheels [N m] (theory: drivetrain, eq. (7)).
+
+    Where the ground has no influence on the bank, the motors give what carries the ground's torque.
+    """
+    if row[DRIVETRAIN + LOAD_COMPLIANCE] > 0.0:
+        wanted = _wanted(row, bank)
+        limit = _limit(row, bank, wanted)
+        return min(max(wanted, -limit), limit) / row[DRIVETRAIN + LOAD_COMPLIANCE]
+    return -(row[AXLE_TORQUE + bank] + row[AXLE_TORQUE + 2 + bank])
+
+
+@kernel()
 def follows_past(row: Array) -> bool:
     """Whether the drivetrain depends on the bank speeds of earlier samples."""
     return row[COMMAND_DELAY] > 0.0 or row[COMMAND_RAMP] < NO_LIMIT or row[DYNAMIC_BANKS] != 0.0

@@ -12,7 +12,7 @@ from typing import Literal
 
 from ddagr_gym.config import config_names, find_config, load_config
 from ddagr_gym.errors import InputError, unknown_name
-from ddagr_gym.recordings.schema import CHANNELS, COMMANDS
+from ddagr_gym.recordings.channels import CHANNELS, COMMANDS
 from ddagr_gym.recordings.units import check_channel_unit, factor
 
 FOLDER = "recordings"

@@ -28,7 +28,9 @@ import numpy.typing as npt
 
 from ddagr_gym.errors import InputError, unknown_name
 from ddagr_gym.parameters import Robot
-from ddagr_gym.recordings.plausible import check_extent, check_magnitude, slow_rows
+from ddagr_gym.recordings.channels import CHANNELS
+from ddagr_gym.recordings.doubts import doubts
+from ddagr_gym.recordings.plausible import check_extent, check_magnitude
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -36,45 +38,6 @@ Ranges = tuple[tuple[int, int], ...]
 
 GAP_IN_PERIODS = 1.8
 """Time between rows, in median periods, above which a segment ends (ours: one lost sample makes it 2)."""
-
-
-@dataclass(frozen=True)
-class Channel:
-    """One column of the schema.
-
-    Attributes:
-        unit: SI unit.
-        description: what it holds.
-        limit: largest magnitude that a ground robot's sensor gives [unit]; beyond it the unit is in doubt.
-        core: whether the checks and the diagnosis need it.
-    """
-
-    unit: str
-    description: str
-    limit: float
-    core: bool = True
-
-
-CHANNELS: Mapping[str, Channel] = {
-    "command_right": Channel("rad/s", "right bank speed command", 200.0),
-    "command_left": Channel("rad/s", "left bank speed command", 200.0),
-    "encoder_right": Channel("rad/s", "right bank speed, forward positive", 200.0),
-    "encoder_left": Channel("rad/s", "left bank speed, forward positive", 200.0),
-    "specific_force_x": Channel("m/s^2", "raw accelerometer, forward", 320.0),
-    "specific_force_y": Channel("m/s^2", "raw accelerometer, to the left", 320.0),
-    "specific_force_z": Channel("m/s^2", "raw accelerometer, up; gravity included", 320.0, core=False),
-    "yaw_rate": Channel("rad/s", "gyro about z, counter-clockwise", 10.0),
-    "roll": Channel("rad", "attitude about x", 1.6, core=False),
-    "pitch": Channel("rad", "attitude about y, nose down positive", 1.6, core=False),
-    "pose_x": Channel("m", "position in the span's frame", 1e7, core=False),
-    "pose_y": Channel("m", "position in the span's frame", 1e7, core=False),
-    "pose_yaw": Channel("rad", "heading in the span's frame", 1e3, core=False),
-    "current_right": Channel("A", "right motors' current", 2000.0, core=False),
-    "current_left": Channel("A", "left motors' current", 2000.0, core=False),
-}
-"""The channels of the schema by name, in the order in which files hold them."""
-
-COMMANDS = ("command_right", "command_left")
 
 
 @dataclass(frozen=True)
@@ -217,7 +180,7 @@ class Recording:
 
     def validate(self) -> tuple[str, ...]:
         """Sentences on values that are missing or implausible; empty for a sound recording."""
-        return tuple(_doubts(self))
+        return tuple(doubts(self))
 
     def held_commands(self, maximum_age: float = math.inf) -> tuple[FloatArray, FloatArray]:
         """Commands (right, left) in force at every row: the last valid sample of the span, NaN before the first.
@@ -342,57 +305,6 @@ def _hold(recording: Recording, name: str, maximum_age: float, valid: BoolArray 
         fresh = (last >= 0) & (recording.t[span] - recording.t[last] <= maximum_age)
         carried[span] = np.where(fresh, values[last], np.nan)
     return np.where(valid, carried, np.nan)
-
-
-def _doubts(recording: Recording) -> Iterator[str]:
-    if not len(recording):
-        yield "the recording holds no rows."
-        return
-    for name, channel in CHANNELS.items():
-        values = recording[name]
-        finite = np.abs(values[np.isfinite(values)])
-        if not finite.size:
-            if channel.core:
-                yield f"{name} holds no samples: checks and diagnosis that need it will be left out."
-            continue
-        # A single wild sample is not a wrong unit: look at the hundredth-largest share.
-        high = float(np.quantile(finite, 0.99))
-        if high > channel.limit:
-            yield (
-                f"{name} reaches {high:.4g} {channel.unit}, beyond the {channel.limit:g} {channel.unit} of a ground "
-                f"robot: check its unit in the column map{_unit_hint(channel.unit)}."
-            )
-    yield from slow_rows(recording.period)
-    yield from _degrees(recording)
-    yield from _gravity(recording)
-    if not recording.command_valid.any():
-        yield "no row has valid commands: the recording can be checked but not replayed from commands."
-
-
-def _unit_hint(unit: str) -> str:
-    return {"rad/s": " (deg/s?)", "rad": " (deg?)", "m/s^2": " (g?)", "m": " (mm?)"}.get(unit, "")
-
-
-def _degrees(recording: Recording) -> Iterator[str]:
-    yaw = recording["pose_yaw"][np.isfinite(recording["pose_yaw"])]
-    if not yaw.size or np.max(np.abs(yaw)) > 360.5 or np.max(np.abs(yaw)) < 7.0:
-        return
-    # Continuous radians grow by small steps; wrapped degrees jump by 360.
-    if np.any(np.abs(np.abs(np.diff(yaw)) - 360.0) < 20.0):
-        yield f"pose_yaw jumps by 360 and reaches {np.max(np.abs(yaw)):.4g}: degrees? Say unit: deg in the map."
-
-
-def _gravity(recording: Recording) -> Iterator[str]:
-    z = recording["specific_force_z"]
-    if not np.any(np.isfinite(z)):
-        return
-    middle = float(np.nanmedian(z))
-    if abs(middle - 1.0) < 0.1 or abs(middle + 1.0) < 0.1:
-        yield f"specific_force_z has the median {middle:.3g}: the accelerometer is in g; say unit: g in the map."
-    elif abs(middle + 9.8) < 1.0:
-        yield f"specific_force_z has the median {middle:.3g} m/s^2: z points down here; give the axes signs in the map."
-    elif abs(middle) < 1.0:
-        yield f"specific_force_z has the median {middle:.3g} m/s^2: gravity was taken out; the schema wants it in."
 
 
 def _whole_numbers(ranges: Iterable[tuple[int, int]]) -> Ranges:

@@ -20,9 +20,10 @@ from numpy.typing import NDArray
 from ddagr_gym.errors import InputError
 from ddagr_gym.files import atomic_path
 from ddagr_gym.parameters import Robot
+from ddagr_gym.recordings.channels import CHANNELS
 from ddagr_gym.recordings.files import DEFAULT_LIMITS, Limits, write_atomically
 from ddagr_gym.recordings.parquet_reader import open_parquet
-from ddagr_gym.recordings.schema import CHANNELS, Recording, RecordingMeta
+from ddagr_gym.recordings.schema import Recording, RecordingMeta
 
 if TYPE_CHECKING:
     import pyarrow as pa

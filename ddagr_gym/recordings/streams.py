@@ -13,11 +13,12 @@ import numpy as np
 from ddagr_gym.errors import InputError
 from ddagr_gym.recordings.alignment import Stream, align, regular_base
 from ddagr_gym.recordings.bag import Bag
+from ddagr_gym.recordings.channels import COMMANDS
 from ddagr_gym.recordings.files import Limits, sha256_of
 from ddagr_gym.recordings.frames import mounting_frames, static_frames, transforms
 from ddagr_gym.recordings.message_fields import header_stamp
 from ddagr_gym.recordings.ros_messages import Extractor, extractor
-from ddagr_gym.recordings.schema import COMMANDS, FloatArray, Recording, RobotGeometry
+from ddagr_gym.recordings.schema import FloatArray, Recording, RobotGeometry
 from ddagr_gym.recordings.topic_map import TRANSFORMS, Topic, TopicMap, TopicSource, choose_topics
 
 Label = TypeVar("Label", bound=Hashable)

@@ -11,8 +11,8 @@ from typing import Literal
 
 from ddagr_gym.config import find_config, load_config
 from ddagr_gym.errors import InputError, unknown_name
+from ddagr_gym.recordings.channels import CHANNELS
 from ddagr_gym.recordings.column_map import FOLDER
-from ddagr_gym.recordings.schema import CHANNELS
 
 ROLE_TYPES: Mapping[str, tuple[str, ...]] = {
     "imu": ("Imu",),

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 
 from ddagr_gym.errors import InputError, unknown_name
 from ddagr_gym.parameters import STANDARD_GRAVITY
-from ddagr_gym.recordings.schema import CHANNELS
+from ddagr_gym.recordings.channels import CHANNELS
 
 FACTORS: Mapping[str, Mapping[str, float]] = {
     "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
@@ -20,6 +20,7 @@ FACTORS: Mapping[str, Mapping[str, float]] = {
     "rad": {"rad": 1.0, "deg": math.radians(1.0)},
     "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "km": 1e3},
     "A": {"A": 1.0, "mA": 1e-3},
+    "V": {"V": 1.0, "mV": 1e-3},
 }
 """Factor to SI by SI unit and written unit."""
 

@@ -12,7 +12,7 @@ from ddagr_gym.frames import wrap_angle
 from ddagr_gym.identification.residual_weights import successive_correlation
 from ddagr_gym.identification.windows import CHANNELS, WindowSet
 from ddagr_gym.physics import layout
-from ddagr_gym.recordings.schema import CHANNELS as SCHEMA
+from ddagr_gym.recordings.channels import CHANNELS as SCHEMA
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]

@@ -6,12 +6,15 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ddagr_gym.calibration.files import NAME, PAGE, ROBOT, soil_file
 from ddagr_gym.calibration.forecast_errors import Forecasts
 from ddagr_gym.calibration.result import CALIBRATED, DATA_SHEET, MODELS, Calibration
 from ddagr_gym.files import write_text
 from ddagr_gym.reporting import calibration_figures as figures
 from ddagr_gym.reporting import calibration_text as text
+from ddagr_gym.reporting.current_figure import current_figure
 from ddagr_gym.reporting.figures import house_style
 from ddagr_gym.reporting.page_template import embedded, page_template
 
@@ -70,6 +73,7 @@ def _context(calibration: Calibration, forecasts: Sequence[Forecasts]) -> dict[s
         "unexplained_rows": text.unexplained_rows(calibration),
         "usage": [_usage(calibration, number) for number in range(len(calibration.drives))],
         "usage_header": ("drive", "ground", "under command [s]", "fitted [s]", "forecast [s]", "poses late by [s]"),
+        "currents": _currents(calibration, forecasts),
         "seconds": f"{calibration.seconds:.0f}",
         "models": [text.MODEL_LABELS[name] for name in MODELS],
     }
@@ -84,6 +88,35 @@ _ALL = (
     ("position", 5.0),
 )
 """Errors of the table on the page."""
+
+
+_KINDS = {"motor": "the motors' own current", "supply": "the current that the motors draw from their supply"}
+
+
+def _currents(calibration: Calibration, forecasts: Sequence[Forecasts]) -> dict[str, Any] | None:
+    """Pictures and tables of the motors' currents; None where none was used."""
+    found = calibration.currents
+    if found is None:
+        return None
+    by_drive: dict[int, list[Forecasts]] = {}
+    for item in forecasts:
+        if item.currents is not None and np.isfinite(item.currents[0]).any():
+            by_drive.setdefault(int(item.windows.recording[0]), []).append(item)
+    names = [drive.source for drive in calibration.drives]
+    return {
+        "kind": _KINDS[found.kind],
+        "pictures": [
+            {**embedded(current_figure(items), f"Motor currents of {names[number]}"), "title": names[number]}
+            for number, items in by_drive.items()
+        ],
+        "constant_header": ("constant", "value", "standard deviation", "unit"),
+        "constants": [
+            (item.name.replace("_", " "), f"{item.value:.3g}", f"{item.deviation:.2g}", item.unit)
+            for item in found.constants
+        ],
+        "error_header": ("drive", "bank", "samples", "measured, r.m.s. about the mean [A]", "left, r.m.s. [A]"),
+        "errors": [(e.drive, e.bank, str(e.count), f"{e.measured:.2f}", f"{e.left:.2f}") for e in found.errors],
+    }
 
 
 def _tiles(calibration: Calibration) -> list[dict[str, str]]:

@@ -12,19 +12,16 @@ from ddagr_gym.recordings.checks.findings import CheckFinding, CheckReport, Stat
 from ddagr_gym.recordings.checks.gravity import rests
 from ddagr_gym.recordings.checks.signals import filled
 from ddagr_gym.recordings.files import write_atomically
-from ddagr_gym.recordings.schema import FloatArray, Recording
+from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.rendering import palette
 from ddagr_gym.reporting.figures import house_style, nothing_to_draw
+from ddagr_gym.reporting.recorded_currents import ABOVE, draw_currents, gapped, has_currents
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 COLOURS = {Status.PASS: palette.BLUE, Status.SUSPICIOUS: palette.VERMILLION, Status.NOT_TESTABLE: palette.GREY}
 RIGHT, LEFT, GYRO, POSE = palette.RIGHT, palette.LEFT, palette.INK, palette.GREEN
-_MOST_POINTS = 6000
-"""Drawn of a line, about (ours: several for each pixel of its width)."""
-
-_ABOVE: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0)}
 
 
 def check_figure(recording: Recording, report: CheckReport, rng: np.random.Generator) -> Figure:
@@ -37,13 +34,17 @@ def check_figure(recording: Recording, report: CheckReport, rng: np.random.Gener
     """
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(12.5, 8.4), layout="constrained")
-    grid = figure.add_gridspec(4, 3, width_ratios=(1.0, 1.1, 1.2))
+    drawn = has_currents(recording)
+    rows = 5 if drawn else 4
+    figure = Figure(figsize=(12.5, 2.1 * rows), layout="constrained")
+    grid = figure.add_gridspec(rows, 3, width_ratios=(1.0, 1.1, 1.2))
     _speeds(figure.add_subplot(grid[0, :2]), recording)
     _turn_rate(figure.add_subplot(grid[1, :2]), recording)
-    _path(figure.add_subplot(grid[2:, 0]), recording)
-    _clocks(figure.add_subplot(grid[2, 1]), offsets(recording, rng) if len(recording) >= 3 else {})
-    _gravity(figure.add_subplot(grid[3, 1]), recording)
+    if drawn:
+        draw_currents(figure.add_subplot(grid[2, :2]), recording)
+    _path(figure.add_subplot(grid[rows - 2 :, 0]), recording)
+    _clocks(figure.add_subplot(grid[rows - 2, 1]), offsets(recording, rng) if len(recording) >= 3 else {})
+    _gravity(figure.add_subplot(grid[rows - 1, 1]), recording)
     _ranges(figure.add_subplot(grid[:, 2]), report)
     count = len(report.suspicious)
     verdict = f"{count} suspicious" if count else "nothing suspicious"
@@ -65,39 +66,28 @@ def save_check_figure(recording: Recording, report: CheckReport, rng: np.random.
         write_atomically(path, lambda to: figure.savefig(to, dpi=160, format="png", metadata={"Software": None}))
 
 
-def _gapped(recording: Recording, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Time and values with a NaN between spans, thinned, so that no line crosses a gap."""
-    parts = []
-    step = max(1, len(recording) // _MOST_POINTS)
-    for span in recording.spans():
-        rows = np.arange(span.start, span.stop, step)
-        parts.append(np.stack([np.append(recording.t[rows], recording.t[rows[-1]]), np.append(values[rows], np.nan)]))
-    joined = np.concatenate(parts, axis=1) if parts else np.empty((2, 0))
-    return joined[0], joined[1]
-
-
 def _speeds(axes: Any, recording: Recording) -> None:
     for bank, colour in (("right", RIGHT), ("left", LEFT)):
         command = recording.held_commands()[0 if bank == "right" else 1]
-        axes.plot(*_gapped(recording, command), color=colour, lw=0.8, ls=":", label=f"command {bank}")
+        axes.plot(*gapped(recording, command), color=colour, lw=0.8, ls=":", label=f"command {bank}")
         axes.plot(
-            *_gapped(recording, filled(recording, f"encoder_{bank}")), color=colour, lw=0.9, label=f"encoder {bank}"
+            *gapped(recording, filled(recording, f"encoder_{bank}")), color=colour, lw=0.9, label=f"encoder {bank}"
         )
     axes.set_ylabel("bank speed [rad/s]")
-    axes.legend(ncols=4, **_ABOVE)
+    axes.legend(ncols=4, **ABOVE)
     axes.margins(x=0)
 
 
 def _turn_rate(axes: Any, recording: Recording) -> None:
-    axes.plot(*_gapped(recording, recording["yaw_rate"]), color=GYRO, lw=0.7, label="gyro")
+    axes.plot(*gapped(recording, recording["yaw_rate"]), color=GYRO, lw=0.7, label="gyro")
     geometry = recording.meta.geometry
     if geometry is not None:
         difference = filled(recording, "encoder_right") - filled(recording, "encoder_left")
         turn = 0.5 * geometry.wheel_radius / geometry.half_track * difference
-        axes.plot(*_gapped(recording, turn), color=LEFT, lw=0.7, alpha=0.8, label="encoders without slip")
+        axes.plot(*gapped(recording, turn), color=LEFT, lw=0.7, alpha=0.8, label="encoders without slip")
     axes.set_ylabel("yaw rate [rad/s]")
     axes.set_xlabel("time [s]")
-    axes.legend(ncols=3, **_ABOVE)
+    axes.legend(ncols=3, **ABOVE)
     axes.margins(x=0)
 
 

@@ -13,7 +13,7 @@ from ddagr_gym.diagnosis.answer.certificate import Measured, ModelErrors
 from ddagr_gym.diagnosis.answer.evidence import Evidence
 from ddagr_gym.diagnosis.answer.location import EffectLocation
 from ddagr_gym.identification.windows import CHANNELS
-from ddagr_gym.recordings.schema import CHANNELS as SCHEMA
+from ddagr_gym.recordings.channels import CHANNELS as SCHEMA
 from ddagr_gym.rendering import palette
 from ddagr_gym.reporting.figures import DASHED
 

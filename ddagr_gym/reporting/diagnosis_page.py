@@ -14,6 +14,7 @@ from ddagr_gym.diagnosis.answer.evidence import Evidence
 from ddagr_gym.diagnosis.answer.verdict import Diagnosis
 from ddagr_gym.diagnosis.wording import title
 from ddagr_gym.files import atomic_path, make_folder
+from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.reporting import diagnosis_figures as figures
 from ddagr_gym.reporting import diagnosis_maps as maps
 from ddagr_gym.reporting import diagnosis_tables as tables
@@ -22,6 +23,7 @@ from ddagr_gym.reporting.drivetrain_section import drivetrain_section, other_fin
 from ddagr_gym.reporting.figures import house_style
 from ddagr_gym.reporting.onset_figure import onset_figure, timed
 from ddagr_gym.reporting.page_template import embedded, page_template
+from ddagr_gym.reporting.recorded_currents import currents_figure, has_currents
 
 PAGE = "report.html"
 PICTURES = "figures"
@@ -46,7 +48,11 @@ class _Studio:
 
 
 def write_report(
-    folder: Path, diagnosis: Diagnosis, evidence: Evidence, progress: Progress = lambda name: None
+    folder: Path,
+    diagnosis: Diagnosis,
+    evidence: Evidence,
+    progress: Progress = lambda name: None,
+    recordings: Sequence[Recording] = (),
 ) -> None:
     """Write ``report.html`` and, in ``figures``, its pictures as PNG.
 
@@ -55,6 +61,7 @@ def write_report(
         diagnosis: what later steps add may be absent.
         evidence: of the same diagnosis.
         progress: called with the name of each figure.
+        recordings: that were diagnosed, whose currents and voltages are drawn.
 
     Raises:
         InputError: matplotlib or jinja2 is not installed, or the folder cannot be one.
@@ -62,7 +69,8 @@ def write_report(
     page = page_template("diagnosis.html")
     pictures = make_folder(make_folder(folder) / PICTURES)
     with house_style():
-        context = _context(diagnosis, evidence, _Studio(pictures, progress))
+        studio = _Studio(pictures, progress)
+        context = _context(diagnosis, evidence, studio) | {"currents": _currents(recordings, studio)}
     with atomic_path(folder / PAGE) as path:
         path.write_text(page.render(context), encoding="utf-8")
 
@@ -106,6 +114,14 @@ def _drivetrain_pictures(answer: DrivetrainAnswer | None, studio: _Studio) -> li
         studio.picture(part_figure(answer), "drivetrain_parts", "What forecasts lose without each part"),
         studio.picture(forecast_figure(answer), "drivetrain_errors", "Errors over those of the simulator as given"),
     ]
+
+
+def _currents(recordings: Sequence[Recording], studio: _Studio) -> dict[str, Any] | None:
+    """Picture of the currents and voltages; None where nothing of the kind was recorded."""
+    measured = [recording for recording in recordings if has_currents(recording)]
+    if not measured:
+        return None
+    return studio.picture(currents_figure(measured, "none"), "currents", "Currents and voltages as recorded")
 
 
 def _seconds(evidence: Evidence) -> float:

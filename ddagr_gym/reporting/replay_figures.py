@@ -331,6 +331,6 @@ def _draw_bins(figure: Any, mode: DriveModeResult, channel: str, bottom: float, 
 
 
 def _unit(channel: str) -> str:
-    from ddagr_gym.recordings.schema import CHANNELS as SCHEMA
+    from ddagr_gym.recordings.channels import CHANNELS as SCHEMA
 
     return SCHEMA[channel].unit.replace("^2", "²")

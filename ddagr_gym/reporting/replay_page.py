@@ -13,6 +13,8 @@ from ddagr_gym.reporting.page_template import page_template
 from ddagr_gym.reporting.replay_figures import MODEL_STYLES
 
 DRIVEN = {"commands": "commands", "encoders": "wheel speeds"}
+RECORDED = "recorded"
+"""Stands for a drive mode with figures of what no model is compared with: currents and voltages."""
 LEAD = 5.0
 """Horizon [s] of the table at the head."""
 
@@ -48,7 +50,7 @@ def replay_page(report: ReplayReport, figures: Figures) -> str:
             found = lead_errors(mode, LEAD)
             leads.append((number, mode, [found[m].error if m in found else None for m in MODELS]))
     page: str = page_template("replay.html").render(
-        report=report, figures=figures, lead=LEAD, leads=leads, driven=DRIVEN, tables=_tables,
+        report=report, figures=figures, recorded=RECORDED, lead=LEAD, leads=leads, driven=DRIVEN, tables=_tables,
         models=[MODEL_STYLES[m][0] for m in MODELS],
     )  # fmt: skip
     return page

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ddagr_gym.diagnosis.answer.verdict import Diagnosis
 from ddagr_gym.identification.windows import CHANNELS
-from ddagr_gym.recordings.schema import CHANNELS as SCHEMA
+from ddagr_gym.recordings.channels import CHANNELS as SCHEMA
 from ddagr_gym.viewers.annotations import Annotation, finding_names, shows
 from ddagr_gym.viewers.drive_traces import MODELS, DriveTraces
 from ddagr_gym.viewers.mcap_messages import Message, nanoseconds

@@ -14,7 +14,7 @@ from ddagr_gym.diagnosis.answer.verdict import Diagnosis
 from ddagr_gym.errors import InputError
 from ddagr_gym.files import atomic_path, check_output_file
 from ddagr_gym.identification.windows import CHANNELS
-from ddagr_gym.recordings.schema import CHANNELS as SCHEMA
+from ddagr_gym.recordings.channels import CHANNELS as SCHEMA
 from ddagr_gym.rendering.palette import rgb
 from ddagr_gym.viewers.annotations import Annotation, annotated, doubts, finding_names, shows
 from ddagr_gym.viewers.drive_traces import MODELS, POSE, DriveTraces

@@ -15,7 +15,8 @@ from ddagr_gym.config import dump_config
 from ddagr_gym.diagnosis.gates.threshold_files import default_thresholds, save_thresholds
 from ddagr_gym.errors import InputError, InputWarning
 from ddagr_gym.presets import get_robot, get_soil
-from ddagr_gym.recordings.schema import CHANNELS, Recording
+from ddagr_gym.recordings.channels import CHANNELS
+from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.recordings.storage import arrow_table, save_parquet
 
 pandas = pytest.importorskip("pandas")

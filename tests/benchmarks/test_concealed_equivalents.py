@@ -10,7 +10,8 @@ from benchmarks.concealed.cases import Case, plan
 from benchmarks.concealed_equivalents import drives, equivalent, needs_equivalent, without
 from ddagr_gym.errors import InputError
 from ddagr_gym.physics.effects.registry import effect_kind
-from ddagr_gym.recordings.schema import CHANNELS, Recording
+from ddagr_gym.recordings.channels import CHANNELS
+from ddagr_gym.recordings.schema import Recording
 
 SEED = 20
 

@@ -19,7 +19,7 @@ from ddagr_gym.identification.windows import CHANNELS, STATE, WindowSet, cut_win
 from ddagr_gym.parameters import Drivetrain, Imu, PoseReceiver, Sensors
 from ddagr_gym.physics.effects.gyro_scale import GyroScale
 from ddagr_gym.presets import get_robot, get_soil
-from ddagr_gym.recordings.schema import CHANNELS as SCHEMA
+from ddagr_gym.recordings.channels import CHANNELS as SCHEMA
 from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.simulator import simulate
 

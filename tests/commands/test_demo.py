@@ -17,8 +17,9 @@ from ddagr_gym.evaluation.runs import drive_turn
 from ddagr_gym.evaluation.shown import estimated_track
 from ddagr_gym.parameters import Imu, PoseReceiver, Sensors
 from ddagr_gym.presets import get_robot, get_soil
+from ddagr_gym.recordings.channels import CHANNELS
 from ddagr_gym.recordings.load import load_recording
-from ddagr_gym.recordings.schema import CHANNELS, Recording
+from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.recordings.storage import save_parquet
 from ddagr_gym.simulator import simulate
 

@@ -10,7 +10,8 @@ from ddagr_gym.cli import main
 from ddagr_gym.config import config_from
 from ddagr_gym.parameters import Imu, PoseReceiver, Sensors
 from ddagr_gym.presets import get_robot, get_soil
-from ddagr_gym.recordings.schema import CHANNELS, Recording
+from ddagr_gym.recordings.channels import CHANNELS
+from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.recordings.storage import save_parquet
 from ddagr_gym.replay_analysis.report import ReplayReport
 from ddagr_gym.reporting.replay_text import summary

@@ -29,7 +29,7 @@ TRUTH |= {"omega_left": "true_omega_left", "x": "true_x", "y": "true_y", "yaw": 
 @pytest.fixture(scope="module")
 def truth(robot, soil):
     """Noise-free columns of arcs, and the recording of them."""
-    from ddagr_gym.recordings.schema import CHANNELS as SCHEMA
+    from ddagr_gym.recordings.channels import CHANNELS as SCHEMA
     from ddagr_gym.recordings.schema import Recording
 
     commands = MANOEUVRES["arcs"].commands(RATE)

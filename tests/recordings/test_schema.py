@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from ddagr_gym.errors import InputError
 from ddagr_gym.presets import get_robot
+from ddagr_gym.recordings.channels import CHANNELS
 from ddagr_gym.recordings.schema import (
-    CHANNELS,
     Recording,
     RobotGeometry,
     bank_speeds,

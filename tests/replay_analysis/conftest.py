@@ -14,7 +14,8 @@ from ddagr_gym.identification.windows import CHANNELS as PREDICTED
 from ddagr_gym.identification.windows import WindowSet
 from ddagr_gym.parameters import Imu, PoseReceiver, Sensors
 from ddagr_gym.presets import get_robot, get_soil
-from ddagr_gym.recordings.schema import CHANNELS, Recording
+from ddagr_gym.recordings.channels import CHANNELS
+from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.simulator import simulate
 
 RATE = 50.0

@@ -6,7 +6,8 @@ import pytest
 from ddagr_gym.control.manoeuvres import MANOEUVRES
 from ddagr_gym.parameters import Imu, PoseReceiver, Sensors
 from ddagr_gym.presets import get_robot, get_soil
-from ddagr_gym.recordings.schema import CHANNELS, Recording
+from ddagr_gym.recordings.channels import CHANNELS
+from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.replay_analysis.drive_mode import ReplaySettings
 from ddagr_gym.replay_analysis.run import replay_run
 from ddagr_gym.reporting.replay_figures import (

@@ -22,7 +22,7 @@ from ddagr_gym.identification.noise import noise_from_differences
 from ddagr_gym.identification.problem import Point, Problem
 from ddagr_gym.identification.window_model import STATE_ENTRIES
 from ddagr_gym.identification.windows import CHANNELS, STATE, WindowSet, cut_windows
-from ddagr_gym.recordings.schema import CHANNELS as SCHEMA
+from ddagr_gym.recordings.channels import CHANNELS as SCHEMA
 from ddagr_gym.recordings.schema import Recording, RobotGeometry
 
 Array = NDArray[np.float64]

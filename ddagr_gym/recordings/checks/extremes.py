@@ -41,14 +41,20 @@ def extremes(recording: Recording) -> list[CheckFinding]:
         if values.size < 50:
             continue
         if driving:
-            findings.append(_stuck(name, values))
+            findings.append(stuck(name, values))
         if name in INERTIAL:
             findings.append(_saturated(name, values))
         findings.append(_zeros(recording, name))
     return findings
 
 
-def _stuck(name: str, values: FloatArray) -> CheckFinding:
+def stuck(name: str, values: FloatArray) -> CheckFinding:
+    """Whether a channel changes at all while the robot drives.
+
+    Args:
+        name: of the channel.
+        values: its samples (n,).
+    """
     spread = float(np.ptp(values))
     return judge(
         "stuck",

@@ -6,9 +6,10 @@ import itertools
 
 import numpy as np
 
+from ddagr_gym.recordings.channels import CHANNELS, COMMANDS, VOLTAGES
 from ddagr_gym.recordings.checks.findings import CheckFinding, Question, judge, not_testable
 from ddagr_gym.recordings.checks.signals import moving_mask
-from ddagr_gym.recordings.schema import CHANNELS, COMMANDS, BoolArray, FloatArray, Recording
+from ddagr_gym.recordings.schema import BoolArray, FloatArray, Recording
 
 CHECK = "timing"
 
@@ -71,8 +72,8 @@ def _rate_findings(recording: Recording) -> list[CheckFinding]:
     findings: list[CheckFinding] = []
     for name, channel in CHANNELS.items():
         if recording.has(name):
-            # Commands may come only when they change.
-            if name not in COMMANDS:
+            # Commands may come only when they change, and a good battery's voltage hardly does.
+            if name not in (*COMMANDS, *VOLTAGES):
                 findings += _hold_findings(recording, name, driving)
         elif channel.core:
             why = "The channel has no samples."

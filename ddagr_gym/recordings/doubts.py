@@ -1,0 +1,71 @@
+"""Values that are missing or implausible, in one sentence each: wrong units, degrees, gravity taken out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ddagr_gym.recordings.channels import CHANNELS
+from ddagr_gym.recordings.plausible import slow_rows
+
+if TYPE_CHECKING:
+    from ddagr_gym.recordings.schema import Recording
+
+
+def doubts(recording: Recording) -> Iterator[str]:
+    """Sentences on values that are missing or implausible.
+
+    Args:
+        recording: any.
+    """
+    if not len(recording):
+        yield "the recording holds no rows."
+        return
+    for name, channel in CHANNELS.items():
+        values = recording[name]
+        finite = np.abs(values[np.isfinite(values)])
+        if not finite.size:
+            if channel.core:
+                yield f"{name} holds no samples: checks and diagnosis that need it will be left out."
+            continue
+        # A single wild sample is not a wrong unit: look at the hundredth-largest share.
+        high = float(np.quantile(finite, 0.99))
+        if high > channel.limit:
+            yield (
+                f"{name} reaches {high:.4g} {channel.unit}, beyond the {channel.limit:g} {channel.unit} of a ground "
+                f"robot: check its unit in the column map{_unit_hint(channel.unit)}."
+            )
+    yield from slow_rows(recording.period)
+    yield from _degrees(recording)
+    yield from _gravity(recording)
+    if not recording.command_valid.any():
+        yield "no row has valid commands: the recording can be checked but not replayed from commands."
+
+
+def _unit_hint(unit: str) -> str:
+    hints = {"rad/s": "deg/s", "rad": "deg", "m/s^2": "g", "m": "mm", "A": "mA", "V": "mV"}
+    return f" ({hints[unit]}?)" if unit in hints else ""
+
+
+def _degrees(recording: Recording) -> Iterator[str]:
+    yaw = recording["pose_yaw"][np.isfinite(recording["pose_yaw"])]
+    if not yaw.size or np.max(np.abs(yaw)) > 360.5 or np.max(np.abs(yaw)) < 7.0:
+        return
+    # Continuous radians grow by small steps; wrapped degrees jump by 360.
+    if np.any(np.abs(np.abs(np.diff(yaw)) - 360.0) < 20.0):
+        yield f"pose_yaw jumps by 360 and reaches {np.max(np.abs(yaw)):.4g}: degrees? Say unit: deg in the map."
+
+
+def _gravity(recording: Recording) -> Iterator[str]:
+    z = recording["specific_force_z"]
+    if not np.any(np.isfinite(z)):
+        return
+    middle = float(np.nanmedian(z))
+    if abs(middle - 1.0) < 0.1 or abs(middle + 1.0) < 0.1:
+        yield f"specific_force_z has the median {middle:.3g}: the accelerometer is in g; say unit: g in the map."
+    elif abs(middle + 9.8) < 1.0:
+        yield f"specific_force_z has the median {middle:.3g} m/s^2: z points down here; give the axes signs in the map."
+    elif abs(middle) < 1.0:
+        yield f"specific_force_z has the median {middle:.3g} m/s^2: gravity was taken out; the schema wants it in."
