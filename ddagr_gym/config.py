@@ -100,7 +100,10 @@ def parse_config(text: str, kind: type[Config], *, source: str = "configuration"
 
 
 def config_from(content: Any, kind: type[Config], *, source: str = "configuration") -> Config:
-    """The same as :func:`load_config` for content that is read already, such as JSON's dictionaries and lists."""
+    """The same as :func:`load_config` for content that is read already, such as JSON's dictionaries and lists.
+
+    :func:`dataclasses.asdict` of an instance gives such content too.
+    """
     return typing.cast(Config, _convert(content, kind, source))
 
 
@@ -234,7 +237,7 @@ def _convert_sequence(value: Any, hint: Any, place: str) -> Any:
     items = typing.get_args(hint)
     origin = typing.get_origin(hint)
     fixed = origin is tuple and not (len(items) == 2 and items[1] is Ellipsis)
-    if not isinstance(value, list):
+    if not isinstance(value, list | tuple):
         raise InputError(f"{place} is {_shown(value)}: give a list{f' of {len(items)} values' if fixed else ''}.")
     if fixed and len(value) != len(items):
         raise InputError(f"{place} has {len(value)} values: give {len(items)}.")

@@ -13,6 +13,7 @@ EXTRA_OF_MODULE = {
     "jinja2": "report",
     "matplotlib": "report",
     "mcap": "io",
+    "minari": "minari",
     "mujoco": "mujoco",
     "pyarrow": "io",
     "pygame": "render",
@@ -25,10 +26,12 @@ EXTRA_OF_MODULE = {
     "stable_baselines3": "rl",
     "tensorboard": "rl",
     "torch": "rl",
+    "torchrl": "torchrl",
+    "tree": "cluster",
 }
 """Import name of an optional library -> extra in pyproject.toml."""
 
-_PACKAGE_OF_MODULE = {"foxglove": "foxglove-sdk", "rerun": "rerun-sdk"}
+_PACKAGE_OF_MODULE = {"foxglove": "foxglove-sdk", "rerun": "rerun-sdk", "tree": "dm-tree"}
 """Name in the package index where that of the import is another project's."""
 
 

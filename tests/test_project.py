@@ -17,6 +17,7 @@ from ddagr_gym.extras import EXTRA_OF_MODULE, missing_extra, need
 
 # Libraries whose import name is not their distribution's name.
 MODULE_OF = {
+    "dm-tree": "tree",
     "foxglove-sdk": "foxglove",
     "imageio-ffmpeg": "imageio_ffmpeg",
     "pygame-ce": "pygame",

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import Any, TypeVar
 
 import numpy as np
 from gymnasium import spaces
 
+from ddagr_gym.config import config_from
 from ddagr_gym.envs.calibrated_draws import EFFECTS, load_draws
 from ddagr_gym.envs.settings import Randomisation, RewardWeights, TurnSettings
 from ddagr_gym.errors import InputError, unknown_name
@@ -20,17 +22,29 @@ DEFAULT_SOIL = "thesis_a1_range"
 DEFAULT_REWARD = RewardWeights()
 INFO_LEVELS = ("small", "full")
 
-Effects = str | Path | Effect | Iterable[str | Effect]
+Effects = str | Path | Effect | Iterable[str | Effect | Mapping[str, Any]]
+Fields = Mapping[str, Any]
+"""An object's fields by name, nested: what Gymnasium's ``EnvSpec.to_json`` keeps of it."""
+
+Given = TypeVar("Given")
 
 
-def find_soil(soil: str | Path | Soil | SoilDistribution) -> Soil | SoilDistribution:
-    """Soil or distribution by name or from a YAML file; objects pass through.
+def _of_fields(given: Given | Fields, kind: type[Given], name: str) -> Given:
+    """The argument ``name`` as it is, or from its fields."""
+    return config_from(dict(given), kind, source=name) if isinstance(given, Mapping) else given
+
+
+def find_soil(soil: str | Path | Soil | SoilDistribution | Fields) -> Soil | SoilDistribution:
+    """Soil or distribution by name, from a YAML file or from its fields; objects pass through.
 
     Raises:
         InputError: unknown name, with the closest ones; a file that is neither.
     """
     if isinstance(soil, Path):
         soil = str(soil)
+    if isinstance(soil, Mapping):
+        kind: type[Soil | SoilDistribution] = SoilDistribution if "reference_pressure" in soil else Soil
+        return _of_fields(soil, kind, "soil")
     if not isinstance(soil, str):
         return soil
     if is_file(soil):
@@ -54,18 +68,18 @@ def _soil_of_file(path: str) -> Soil | SoilDistribution:
 
 def make_settings(
     *,
-    robot: str | Path | Robot = "ddagr",
-    soil: str | Path | Soil | SoilDistribution = DEFAULT_SOIL,
-    radius: float | tuple[float, float] = 0.80,
+    robot: str | Path | Robot | Fields = "ddagr",
+    soil: str | Path | Soil | SoilDistribution | Fields = DEFAULT_SOIL,
+    radius: float | tuple[float, float] | list[float] = 0.80,
     side: str = "random",
     run_in: float = 0.5,
     run_out: float = 0.5,
-    speed: float | tuple[float, float] = 0.20,
-    sensors: Sensors = Sensors(),
-    randomisation: bool | Randomisation = True,
-    reward: RewardWeights = DEFAULT_REWARD,
+    speed: float | tuple[float, float] | list[float] = 0.20,
+    sensors: Sensors | Fields = Sensors(),
+    randomisation: bool | Randomisation | Fields = True,
+    reward: RewardWeights | Fields = DEFAULT_REWARD,
     effects: Effects = (),
-    numerics: Numerics = Numerics(),
+    numerics: Numerics | Fields = Numerics(),
     ekf_features: bool = False,
     filter: str = "flat",
     calibration: str | Path | None = None,
@@ -76,6 +90,9 @@ def make_settings(
     With a ``calibration``, the folder that ``ddagr calibrate`` wrote, every episode draws a robot and a soil of one of
     its grounds (or of ``ground``) from the scatter between its drives. They stand in place of ``robot``, ``soil`` and
     the default randomisation's spread of mass, inertia, motor rate and delay; its sensors' effects are added.
+
+    Every object may be given by its fields, and (low, high) as a list, so that an environment can be made again from
+    JSON. Effects need their names: as texts, as a file or as the entries of one.
 
     Raises:
         InputError: any value that is not valid, in one sentence.
@@ -94,22 +111,27 @@ def make_settings(
     if isinstance(randomisation, bool):
         randomisation = Randomisation() if randomisation else Randomisation.none()
     return TurnSettings(
-        robot=get_robot(str(robot)) if isinstance(robot, str | Path) else robot,
+        robot=get_robot(str(robot)) if isinstance(robot, str | Path) else _of_fields(robot, Robot, "robot"),
         soil=find_soil(soil),
-        radius=radius,
+        radius=_range(radius),
         side=side,
         run_in=run_in,
         run_out=run_out,
-        speed=speed,
-        sensors=sensors,
-        randomisation=randomisation,
-        reward=reward,
+        speed=_range(speed),
+        sensors=_of_fields(sensors, Sensors, "sensors"),
+        randomisation=_of_fields(randomisation, Randomisation, "randomisation"),
+        reward=_of_fields(reward, RewardWeights, "reward"),
         effects=load_effects(effects),
-        numerics=numerics,
+        numerics=_of_fields(numerics, Numerics, "numerics"),
         ekf_features=ekf_features,
         filter=filter,
         calibrated=calibrated,
     )
+
+
+def _range(value: float | tuple[float, float] | list[float]) -> float | tuple[float, float]:
+    """(low, high) as a tuple, for which JSON has a list."""
+    return tuple(value) if isinstance(value, list) else value  # type: ignore[return-value]
 
 
 def check_info_level(level: str) -> str:

@@ -47,9 +47,9 @@ class EKFObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArg
         self._features.write(features)
         return np.concatenate([observation, features[0]])
 
-    def reset(self, **arguments: Any) -> tuple[Any, dict[str, Any]]:
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Reset environment and filter."""
-        observation, info = self.env.reset(**arguments)
+        observation, info = self.env.reset(seed=seed, options=options)
         if "samples" not in info:
             raise InputError('EKFObservation needs the raw samples: make the environment with info_level="full".')
         self._features.reset([0])

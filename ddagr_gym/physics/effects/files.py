@@ -24,7 +24,7 @@ from typing import Any
 
 import yaml
 
-from ddagr_gym.config import load_config
+from ddagr_gym.config import config_from, load_config
 from ddagr_gym.errors import InputError
 from ddagr_gym.files import atomic_path, expanded
 from ddagr_gym.physics.effects.base import Effect, build_effect
@@ -108,8 +108,11 @@ def read_effects_file(path: str | os.PathLike[str]) -> EffectsFile:
     return load_config(file, EffectsFile)
 
 
-def load_effects(specification: str | os.PathLike[str] | Effect | Iterable[str | Effect]) -> tuple[Effect, ...]:
-    """Effects from objects, ``name=size`` texts or an effects file (YAML or JSON, by its ending).
+Specification = str | os.PathLike[str] | Effect | Mapping[str, Any]
+
+
+def load_effects(specification: Specification | Iterable[Specification]) -> tuple[Effect, ...]:
+    """Effects from objects, ``name=size`` texts, an effects file (YAML or JSON, by its ending) or entries of one.
 
     Raises:
         InputError: anything that is not an effect, with the reason.
@@ -122,9 +125,21 @@ def load_effects(specification: str | os.PathLike[str] | Effect | Iterable[str |
         return _build_all(specification)
     if isinstance(specification, str):
         return (parse_effect(specification),)
+    if isinstance(specification, Mapping):
+        return (_read_entry(specification).build(),)
     if not isinstance(specification, Iterable):
         raise InputError(f"effects are {specification!r}: give effects, name=size texts or the path of a file.")
     return tuple(effect for item in specification for effect in load_effects(item))
+
+
+def _read_entry(content: Mapping[str, Any]) -> EffectEntry:
+    if "name" not in content:
+        # what Gymnasium's EnvSpec keeps of an Effect object: its fields, not its class
+        raise InputError(
+            f"an effect is given as {dict(content)!r}, without its name: give name=size texts or an effects file "
+            "to an environment that is to be stored."
+        )
+    return config_from(dict(content), EffectEntry, source="effect")
 
 
 def _build_all(path: str | os.PathLike[str]) -> tuple[Effect, ...]:
