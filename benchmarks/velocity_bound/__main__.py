@@ -1,6 +1,6 @@
 """What gyro, accelerometer and encoders can know of a row turn at all, and how far the filters are from it.
 
-    python -m benchmarks.velocity_bound [--plants level,weaker] [--scenarios 10] [--checked 10] [--work DIR]
+    python -m benchmarks.velocity_bound [--plants level,weaker] [--scenarios 8] [--checked 5] [--work DIR]
         [--output FILE]
 
 The posterior Cramer-Rao bound of v_x, v_y and the pose at the next row, along turns of B6 on the development scenarios
@@ -32,8 +32,8 @@ def main(words: Sequence[str] | None = None) -> int:
     """Command line; returns the exit code."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--plants", default=",".join(PLANTS), help="names, separated by commas")
-    parser.add_argument("--scenarios", type=int, default=10, help="turns of each plant")
-    parser.add_argument("--checked", type=int, default=10, help="turns of each plant that a smoother is run on")
+    parser.add_argument("--scenarios", type=int, default=8, help="turns of each plant")
+    parser.add_argument("--checked", type=int, default=5, help="turns of each plant that a smoother is run on")
     parser.add_argument("--work", type=Path, default=Path("velocity_bound_work"), help="folder of what is finished")
     parser.add_argument("--output", type=Path, default=RESULT, help="JSON file; the picture lies beside it")
     given = parser.parse_args(words)
@@ -42,6 +42,8 @@ def main(words: Sequence[str] | None = None) -> int:
         for name, least in (("scenarios", 2), ("checked", 0)):
             if getattr(given, name) < least:
                 raise InputError(f"{name} is {getattr(given, name)}: give at least {least}.")
+        if given.checked > given.scenarios:
+            raise InputError(f"checked is {given.checked}: give at most the {given.scenarios} scenarios.")
     except InputError as error:
         parser.error(str(error))
     try:

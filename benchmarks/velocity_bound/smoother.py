@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
 
 from benchmarks.velocity_bound.information import accumulated_information
 from benchmarks.velocity_bound.turn_model import TurnModel
 
 Array = NDArray[np.float64]
 
-_ITERATIONS = 2
+_LINEARISATIONS = 2  # the first at the truth
+_STEPS = 12  # with the derivatives of one of them: dear are these, cheap is a step
+_SETTLED = 0.1  # of the posterior's log from step to step: far below what noise makes of it
 _SHARES = np.array([1.0, 0.5, 0.25, 0.1])  # of a Gauss-Newton step that are tried
 
 
@@ -22,7 +26,7 @@ class Smoothed(NamedTuple):
     Attributes:
         unknowns: (P,) standardised.
         motion: (T, 6) to which they lead.
-        cost: negative log of the posterior, less a constant, at the start and after each iteration.
+        cost: negative log of the posterior, less a constant, at the start and after each step.
     """
 
     unknowns: Array
@@ -51,23 +55,30 @@ def smooth(
     now = model.truth
     motion, modelled = (array[0] for array in model.simulate(now[None]))
     history = [float(cost(modelled[None], now[None])[0])]
-    for iteration in range(_ITERATIONS):
-        slopes = derivatives if iteration == 0 else model.derivatives(now)[1]
-        step = np.zeros(len(now))
-        residuals = (readings - modelled) / deviations
-        step[free] = _gauss_newton(slopes[..., free] / deviations[:, None], residuals, now[free])
-        tried = now + _SHARES[:, None] * step
-        motions, candidates = model.simulate(tried)
-        values = cost(candidates, tried)
-        best = int(np.argmin(values))
-        if values[best] >= history[-1]:
-            break
-        now, modelled, motion = tried[best], candidates[best], motions[best]
-        history.append(float(values[best]))
+    for linearisation in range(_LINEARISATIONS):
+        slopes = derivatives if linearisation == 0 else model.derivatives(now)[1]
+        solve = _gauss_newton(slopes[..., free] / deviations[:, None])
+        for _ in range(_STEPS):
+            step = np.zeros(len(now))
+            step[free] = solve((readings - modelled) / deviations, now[free])
+            tried = now + _SHARES[:, None] * step
+            motions, candidates = model.simulate(tried)
+            values = cost(candidates, tried)
+            best = int(np.argmin(values))
+            gained = history[-1] - float(values[best])
+            if gained > 0.0:
+                now, modelled, motion = tried[best], candidates[best], motions[best]
+                history.append(float(values[best]))
+            if gained < _SETTLED:
+                break
     return Smoothed(now, motion, np.array(history))
 
 
-def _gauss_newton(slopes: Array, residuals: Array, now: Array) -> Array:
-    """Step (P,) by standardised derivatives (T, C, P) and residuals (T, C)."""
-    information = accumulated_information(slopes, np.ones(slopes.shape[1]), len(slopes))[-1]
-    return np.asarray(np.linalg.solve(information, np.einsum("tcp,tc->p", slopes, residuals) - now))
+def _gauss_newton(slopes: Array) -> Callable[[Array, Array], Array]:
+    """(standardised residuals (T, C), unknowns (P,)) -> step (P,), by standardised derivatives (T, C, P)."""
+    factor = cho_factor(accumulated_information(slopes, np.ones(slopes.shape[1]), len(slopes))[-1])
+
+    def step(residuals: Array, now: Array) -> Array:
+        return np.asarray(cho_solve(factor, np.einsum("tcp,tc->p", slopes, residuals) - now))
+
+    return step

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -46,7 +46,7 @@ SERIES = ("task", "slope")
 DRAWN, TASK = CHECKED_NOISE = ("drawn", "task")
 """Readings that the smoother is given: of its own model with Gaussian noise, and the task's own, made by numerics that
 soften friction near rest less than its model does."""
-OWN_READINGS = 3
+OWN_READINGS = 2
 """Turns of each plant on which it is given the task's own too."""
 
 
@@ -103,14 +103,8 @@ def _bounds_of(turn: _Turn, name: str, motion: Array, readings: Array) -> Bounds
     return motion_bounds(information, motion[rows][..., free], turn.truth[rows, 3:], CONTROL_PERIOD)
 
 
-def turn_result(plant: str, number: int, check: bool) -> dict[str, Any]:
-    """Everything of one turn, as numbers for JSON.
-
-    Args:
-        plant: one of PLANTS.
-        number: of the scenario.
-        check: whether a smoother is run too.
-    """
+def turn_result(plant: str, number: int) -> dict[str, Any]:
+    """Bounds and the filters' errors of one turn of one of PLANTS, as numbers for JSON."""
     turn = _Turn(plant, number)
     by_motion, by_reading = turn.model.derivatives(turn.model.truth)
     found: dict[str, Any] = {"kept": turn.model.kept, "unknowns": len(turn.model.names), "exit": turn.exit}
@@ -124,22 +118,23 @@ def turn_result(plant: str, number: int, check: bool) -> dict[str, Any]:
         found["bounds"][name] = own | {"reckoned": _diagonal(bounds.reckoned)[STANDING + turn.exit].tolist()}
         if name in SERIES:
             found["series"][f"bound_{name}"] = variances[:, :2].tolist()
-        if name == "task":
-            smoothed = _diagonal(bounds.smoothed)[STANDING:]
     found["filters"] = {}
     for name in ESTIMATORS:
         squares = turn.instants(estimated_motion(name, turn.columns, turn.episode) - turn.truth) ** 2
         found["filters"][name] = _figures(turn, squares[:, :2], squares[turn.exit, 3:])
         found["series"][name] = _numbers(squares[:, :2])
     found["turning"] = np.abs(turn.instants(turn.truth[:, 5])).tolist()
-    if check:
-        found["smoother"] = {
-            "bound": smoothed.mean(axis=0).tolist(),
-            "bound_at_end": smoothed[-1].tolist(),
-            DRAWN: _smoother_errors(turn, by_reading, DRAWN),
-        }
-        if number < OWN_READINGS:
-            found["smoother"][TASK] = _smoother_errors(turn, by_reading, TASK)
+    return found
+
+
+def check_result(plant: str, number: int) -> dict[str, Any]:
+    """The smoother's errors in one turn beside their bound, as numbers for JSON."""
+    turn = _Turn(plant, number)
+    by_motion, by_reading = turn.model.derivatives(turn.model.truth)
+    smoothed = _diagonal(_bounds_of(turn, "task", by_motion, by_reading).smoothed)[STANDING:]
+    found: dict[str, Any] = {"bound": smoothed.mean(axis=0).tolist(), "bound_at_end": smoothed[-1].tolist()}
+    for noise in CHECKED_NOISE[: 2 if number < OWN_READINGS else 1]:
+        found[noise] = _smoother_errors(turn, by_reading, noise)
     return found
 
 
@@ -180,17 +175,24 @@ def run(plants: Sequence[str], scenarios: int, checked: int, work: Path) -> dict
     Args:
         plants: names.
         scenarios: turns of each.
-        checked: of these with a smoother.
+        checked: of these with a smoother; no more than scenarios.
         work: folder of what is finished.
     """
     found: dict[str, list[dict[str, Any]]] = {plant: [] for plant in plants}
-    with Progress(len(plants) * scenarios, "turns") as progress:
+    with Progress(len(plants) * (scenarios + checked), "turns") as progress:
         for number in range(scenarios):
             for plant in plants:
-                check = number < checked
-                path = work / f"{plant}_{number}{'_checked' if check else ''}.json"
-                if not path.is_file():
-                    write_json(path, turn_result(plant, number, check))
-                found[plant].append(json.loads(path.read_text(encoding="utf-8")))
+                turn = _kept(work / f"{plant}_{number}.json", turn_result, plant, number)
                 progress.advance()
+                if number < checked:
+                    turn["smoother"] = _kept(work / f"{plant}_{number}_checked.json", check_result, plant, number)
+                    progress.advance()
+                found[plant].append(turn)
     return found
+
+
+def _kept(path: Path, make: Callable[[str, int], dict[str, Any]], plant: str, number: int) -> dict[str, Any]:
+    """What a file of finished work holds; it is made first where there is none."""
+    if not path.is_file():
+        write_json(path, make(plant, number))
+    return dict(json.loads(path.read_text(encoding="utf-8")))

@@ -272,7 +272,7 @@ def test_summary_names_ratios_and_what_broke_down(tmp_path):
 
 
 def test_bad_arguments_are_one_sentence(capsys):
-    for words in (["--plants", "levle"], ["--scenarios", "1"], ["--checked", "-1"]):
+    for words in (["--plants", "levle"], ["--scenarios", "1"], ["--checked", "9"], ["--checked", "-1"]):
         with pytest.raises(SystemExit) as ended:
             program.main(words)
         assert ended.value.code == 2
