@@ -57,7 +57,8 @@ def _interval(axes: Any, at: float, item: Mapping[str, Any], mark: str, colour: 
         return
     axes.plot([at] * 2, [item["value"] if v is None else v for v in item["interval"]], "-", color=colour, lw=1.4)
     axes.plot(at, item["value"], mark, color=colour, ms=5)
-    axes.annotate(f"{item['value']:.2g}", (at, item["value"]), xytext=(5, -3), textcoords="offset points", fontsize=8)
+    text = f"{item['value']:.2g}" if item["value"] < 10.0 else f"{item['value']:.0f}"
+    axes.annotate(text, (at, item["value"]), xytext=(5, -3), textcoords="offset points", fontsize=8)
 
 
 def _draw_ratios(axes: Any, filters: Mapping[str, Any]) -> None:
