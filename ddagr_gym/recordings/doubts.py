@@ -3,18 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ddagr_gym.recordings.channels import CHANNELS
 from ddagr_gym.recordings.plausible import slow_rows
 
-if TYPE_CHECKING:
-    from ddagr_gym.recordings.schema import Recording
+
+class Readings(Protocol):
+    """What is asked of a recording: its channels, NaN where there is no sample."""
+
+    def __len__(self) -> int: ...
+
+    def __getitem__(self, channel: str) -> NDArray[np.float64]: ...
+
+    @property
+    def period(self) -> float:
+        """Time between rows [s]."""
+        ...
+
+    @property
+    def command_valid(self) -> NDArray[np.bool_]:
+        """Rows with commands (N,)."""
+        ...
 
 
-def doubts(recording: Recording) -> Iterator[str]:
+def doubts(recording: Readings) -> Iterator[str]:
     """Sentences on values that are missing or implausible.
 
     Args:
@@ -49,7 +65,7 @@ def _unit_hint(unit: str) -> str:
     return f" ({hints[unit]}?)" if unit in hints else ""
 
 
-def _degrees(recording: Recording) -> Iterator[str]:
+def _degrees(recording: Readings) -> Iterator[str]:
     yaw = recording["pose_yaw"][np.isfinite(recording["pose_yaw"])]
     if not yaw.size or np.max(np.abs(yaw)) > 360.5 or np.max(np.abs(yaw)) < 7.0:
         return
@@ -58,7 +74,7 @@ def _degrees(recording: Recording) -> Iterator[str]:
         yield f"pose_yaw jumps by 360 and reaches {np.max(np.abs(yaw)):.4g}: degrees? Say unit: deg in the map."
 
 
-def _gravity(recording: Recording) -> Iterator[str]:
+def _gravity(recording: Readings) -> Iterator[str]:
     z = recording["specific_force_z"]
     if not np.any(np.isfinite(z)):
         return
