@@ -41,6 +41,8 @@ class NuisancePriors:
         friction: logarithm of a factor on tan(phi) alone.
         exponent: logarithm of the factor on n.
         peak: coefficients of the stress peak, absolute.
+        side_slip_lead: where the sideways velocity of a wheel counts, over its radius; two published ways to direct the
+            shear stress (against the sliding velocity, against the displacement) differ by 0.06.
         gyro_bias: of a recording [rad/s].
         accelerometer_bias: of a recording [m/s^2].
         local_strength: as strength, of one window against the field.
@@ -57,6 +59,7 @@ class NuisancePriors:
     friction: float = 0.1
     exponent: float = 0.15
     peak: float = 0.1
+    side_slip_lead: float = 0.07
     gyro_bias: float = 2e-4
     accelerometer_bias: float = 0.01
     local_strength: float = 0.05
@@ -144,6 +147,14 @@ def _structural(priors: NuisancePriors) -> tuple[ModelParameter, ...]:
     )
 
 
+def _side_slip_lead(robot: Robot, priors: NuisancePriors) -> ModelParameter:
+    """Where along its contact a wheel's sideways velocity counts: the place of the turning centre."""
+    deviation = priors.side_slip_lead * robot.outer_radius
+    return ModelParameter(
+        "side_slip_lead", "m", (layout.SIDE_SLIP_LEAD,), False, deviation, 0.2 * deviation, -0.2, 0.2
+    )
+
+
 def nuisances(
     robot: Robot,
     recordings: int,
@@ -170,6 +181,7 @@ def nuisances(
     parameters = (
         *soil,
         *_structural(priors),
+        _side_slip_lead(robot, priors),
         *robot_parameters(robot),
         command_shift(period),
         *sensor_parameters(recordings, priors.gyro_bias, priors.accelerometer_bias),
