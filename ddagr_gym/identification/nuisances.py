@@ -59,7 +59,7 @@ class NuisancePriors:
     friction: float = 0.1
     exponent: float = 0.15
     peak: float = 0.1
-    side_slip_lead: float = 0.07
+    side_slip_lead: float = 0.05
     gyro_bias: float = 2e-4
     accelerometer_bias: float = 0.01
     local_strength: float = 0.05
@@ -147,12 +147,21 @@ def _structural(priors: NuisancePriors) -> tuple[ModelParameter, ...]:
     )
 
 
+LEAD = "side_slip_lead"
+"""Parameter of the place along its contact at which a wheel's sideways velocity counts."""
+
+_MOST_LEAD = 0.2
+"""Largest lead of the side slip over the wheel's radius: the contact of the DDAGR's wheels on its soil ends at 0.24."""
+
+_LEAD_STEP = 0.01
+"""Of finite differences, over the wheel's radius."""
+
+
 def _side_slip_lead(robot: Robot, priors: NuisancePriors) -> ModelParameter:
     """Where along its contact a wheel's sideways velocity counts: the place of the turning centre."""
-    deviation = priors.side_slip_lead * robot.outer_radius
-    return ModelParameter(
-        "side_slip_lead", "m", (layout.SIDE_SLIP_LEAD,), False, deviation, 0.2 * deviation, -0.2, 0.2
-    )
+    deviation, most = (share * robot.outer_radius for share in (priors.side_slip_lead, _MOST_LEAD))
+    step = _LEAD_STEP * robot.outer_radius
+    return ModelParameter(LEAD, "m", (layout.SIDE_SLIP_LEAD,), False, deviation, step, -most, most)
 
 
 def nuisances(
