@@ -133,7 +133,7 @@ class Robot(Validated):
         motor_rate: k_omega of the first-order bank speed loop [1/s] (thesis 4.11).
         maximum_wheel_speed: largest bank speed command that the motors follow [rad/s].
         drivetrain: what else stands between commands and wheels; nothing by default.
-        side_slip_lead: how far ahead of its hub, in its direction of travel, the sideways velocity of a wheel counts [m]
+        side_slip_lead: how far ahead of its hub, in its direction of travel, a wheel's sideways velocity counts [m]
             (theory: wheel model, eq. (1a)).
         standard_deviations: uncertainty of fields by name, in their units; absent means taken as exact.
         source: where the values come from.

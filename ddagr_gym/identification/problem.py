@@ -41,7 +41,7 @@ _BIAS_CHANNEL = {
 
 
 _AT_BOUND = 1e-3
-"""Share of its range from which a parameter counts as held at a bound (ours): damped steps come close and never arrive."""
+"""Share of its range from which a parameter counts as held at a bound (ours): damped steps come close, no more."""
 
 _NEAR_BOUND = 0.03
 """An upper bound below this (that of the commands' shift [s], two samples) is no limit to finite differences: it says
@@ -178,7 +178,8 @@ class Problem:
 
         The shift of the commands, which a delay takes over, stands for that delay.
         """
-        near = _AT_BOUND * (self.high - self.low)
+        span = self.high - self.low
+        near = np.where(np.isfinite(span), _AT_BOUND * span, 0.0)
         held = (point.values <= self.low + near) | (point.values >= self.high - near)
         if any(effect.name == SHIFT_AS_EFFECT for effect in point.effects):
             held &= ~np.array([parameter.shift for parameter in self.nuisances.parameters])

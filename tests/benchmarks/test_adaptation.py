@@ -15,7 +15,7 @@ from benchmarks.concealed.drive import SAMPLE_PERIOD, SUBSTEPS, drive
 from ddagr_gym.adaptation.turns import DrivenTurn, judged
 from ddagr_gym.control.row_turn import RowTurn
 from ddagr_gym.diagnosis.gates.threshold_files import default_thresholds
-from ddagr_gym.diagnosis.search.gains import gains
+from ddagr_gym.diagnosis.search.gains import gains as gains_of
 from ddagr_gym.diagnosis.search.scan import scan
 from ddagr_gym.diagnosis.setting import Setting, make_problem
 from ddagr_gym.identification.gauss_newton import fit
@@ -49,7 +49,7 @@ def test_recordings_are_read_as_any_others(tmp_path, monkeypatch):
 
 @pytest.mark.slow
 def test_another_simulators_shear_is_not_called_ruts(tmp_path):
-    """Where the soil resists the displacement, the robot turns 2 cm further ahead than ours: no effect of the library."""
+    """Where the soil resists the displacement, it turns the robot 2 cm further ahead than ours."""
     drives = [load_recording(path, "concealed", "ddagr") for path in TruePlant(TRUTHS["nothing"]).record(tmp_path)]
     kinds = {name: effect_kinds()[name] for name in ("multipass", "centre_of_mass_offset")}
     thresholds = default_thresholds("ddagr")
@@ -58,7 +58,7 @@ def test_another_simulators_shear_is_not_called_ruts(tmp_path):
         setting = Setting(priors=priors).with_windows(thresholds.duration)
         problem = make_problem(ddagr(), get_soil("thesis_a1"), drives, setting)
         gate = thresholds.for_length(problem.covered).of("multipass").gain
-        return max(item.gain for item in gains(scan(problem, fit(problem), kinds))) / gate
+        return max(item.gain for item in gains_of(scan(problem, fit(problem), kinds))) / gate
 
     assert largest(NuisancePriors()) < 0.3
     # a simulator that is sure where along the contact the side slip counts is wrong for sure
