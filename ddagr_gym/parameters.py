@@ -133,6 +133,8 @@ class Robot(Validated):
         motor_rate: k_omega of the first-order bank speed loop [1/s] (thesis 4.11).
         maximum_wheel_speed: largest bank speed command that the motors follow [rad/s].
         drivetrain: what else stands between commands and wheels; nothing by default.
+        side_slip_lead: how far ahead of its hub, in its direction of travel, a wheel's sideways velocity counts [m]
+            (theory: wheel model, eq. (1a)).
         standard_deviations: uncertainty of fields by name, in their units; absent means taken as exact.
         source: where the values come from.
     """
@@ -147,6 +149,7 @@ class Robot(Validated):
     motor_rate: float = bounded("1/s", 0.0, 1e4, default=4.5, open_low=True)
     maximum_wheel_speed: float = bounded("rad/s", 0.0, 1e3, default=2.0, open_low=True)
     drivetrain: Drivetrain = Drivetrain()
+    side_slip_lead: float = bounded("m", -0.5, 0.5, default=0.0)
     standard_deviations: Mapping[str, float] = field(default_factory=dict)
     source: str = ""
 

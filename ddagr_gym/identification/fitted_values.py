@@ -35,7 +35,9 @@ def _robot(robot: Robot, values: Mapping[str, float]) -> Robot:
         )
         for wheel in robot.wheels
     )
-    return replace(robot, wheels=wheels, drivetrain=drivetrain_of(robot, values), **factors)
+    lead = robot.side_slip_lead + values.get("side_slip_lead", 0.0)
+    drivetrain = drivetrain_of(robot, values)
+    return replace(robot, wheels=wheels, drivetrain=drivetrain, side_slip_lead=lead, **factors)
 
 
 def _soil(soil: Soil, values: Mapping[str, float]) -> Soil:

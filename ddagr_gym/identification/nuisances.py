@@ -41,6 +41,8 @@ class NuisancePriors:
         friction: logarithm of a factor on tan(phi) alone.
         exponent: logarithm of the factor on n.
         peak: coefficients of the stress peak, absolute.
+        side_slip_lead: where the sideways velocity of a wheel counts, over its radius; two published ways to direct the
+            shear stress (against the sliding velocity, against the displacement) differ by 0.06.
         gyro_bias: of a recording [rad/s].
         accelerometer_bias: of a recording [m/s^2].
         local_strength: as strength, of one window against the field.
@@ -57,6 +59,7 @@ class NuisancePriors:
     friction: float = 0.1
     exponent: float = 0.15
     peak: float = 0.1
+    side_slip_lead: float = 0.05
     gyro_bias: float = 2e-4
     accelerometer_bias: float = 0.01
     local_strength: float = 0.05
@@ -144,6 +147,23 @@ def _structural(priors: NuisancePriors) -> tuple[ModelParameter, ...]:
     )
 
 
+LEAD = "side_slip_lead"
+"""Parameter of the place along its contact at which a wheel's sideways velocity counts."""
+
+_MOST_LEAD = 0.2
+"""Largest lead of the side slip over the wheel's radius: the contact of the DDAGR's wheels on its soil ends at 0.24."""
+
+_LEAD_STEP = 0.01
+"""Of finite differences, over the wheel's radius."""
+
+
+def _side_slip_lead(robot: Robot, priors: NuisancePriors) -> ModelParameter:
+    """Where along its contact a wheel's sideways velocity counts: the place of the turning centre."""
+    deviation, most = (share * robot.outer_radius for share in (priors.side_slip_lead, _MOST_LEAD))
+    step = _LEAD_STEP * robot.outer_radius
+    return ModelParameter(LEAD, "m", (layout.SIDE_SLIP_LEAD,), False, deviation, step, -most, most)
+
+
 def nuisances(
     robot: Robot,
     recordings: int,
@@ -170,6 +190,7 @@ def nuisances(
     parameters = (
         *soil,
         *_structural(priors),
+        _side_slip_lead(robot, priors),
         *robot_parameters(robot),
         command_shift(period),
         *sensor_parameters(recordings, priors.gyro_bias, priors.accelerometer_bias),

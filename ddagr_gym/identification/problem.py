@@ -40,6 +40,9 @@ _BIAS_CHANNEL = {
 """Entries that add to one channel, whose derivative needs no simulation."""
 
 
+_AT_BOUND = 1e-3
+"""Share of its range from which a parameter counts as held at a bound (ours): damped steps come close, no more."""
+
 _NEAR_BOUND = 0.03
 """An upper bound below this (that of the commands' shift [s], two samples) is no limit to finite differences: it says
 what is believed, not what can be simulated."""
@@ -175,7 +178,9 @@ class Problem:
 
         The shift of the commands, which a delay takes over, stands for that delay.
         """
-        held = (point.values <= self.low + 1e-9) | (point.values >= self.high - 1e-9)
+        span = self.high - self.low
+        near = np.where(np.isfinite(span), _AT_BOUND * span, 0.0)
+        held = (point.values <= self.low + near) | (point.values >= self.high - near)
         if any(effect.name == SHIFT_AS_EFFECT for effect in point.effects):
             held &= ~np.array([parameter.shift for parameter in self.nuisances.parameters])
         return np.flatnonzero(self.free & ~held)

@@ -36,6 +36,7 @@ from ddagr_gym.physics.layout import (
     OMEGA,
     POINT_BODY_FORCES,
     POINT_WHEEL_FORCES,
+    SIDE_SLIP_LEAD,
     SINKAGE,
     SLIP_RATIO,
     SLOPE,
@@ -73,6 +74,9 @@ Array = NDArray[np.float64]
 _EXTRAPOLATION_LIMIT = 0.1
 """Largest relative change of sinkage that the derivative is trusted for (ours)."""
 
+_REST_TRAVEL = 0.01
+"""Sum of rim speed and hub velocity below which the direction of travel turns gradually [m/s] (ours)."""
+
 
 @kernel(inline=True)
 def hub_x(row: Array, wheel: int) -> float:
@@ -84,6 +88,17 @@ def hub_x(row: Array, wheel: int) -> float:
 def hub_y(row: Array, wheel: int) -> float:
     """Hub position to the left of the body origin [m]: odd indices are the left bank."""
     return row[HALF_TRACK] if wheel % 2 else -row[HALF_TRACK]
+
+
+@kernel(inline=True)
+def side_slip_x(row: Array, wheel: int) -> float:
+    """Where a wheel's sideways velocity counts, forward of the body origin [m] (theory: wheel model, eq. (1a))."""
+    x = hub_x(row, wheel)
+    if row[SIDE_SLIP_LEAD] == 0.0:
+        return x
+    rim = (row[WHEEL + wheel] + row[WHEEL + 8 + wheel]) * row[OMEGA + wheel % 2]
+    travel = rim + row[V_X] - row[YAW_RATE] * hub_y(row, wheel)
+    return x + row[SIDE_SLIP_LEAD] * travel / math.sqrt(travel * travel + _REST_TRAVEL * _REST_TRAVEL)
 
 
 @kernel()
@@ -158,7 +173,7 @@ def share_load(row: Array) -> None:
 def _set_wheel_kinematics(row: Array, i: int) -> None:
     """Not fused: effects compute it again, and the next evaluation starts from the motion of the last one."""
     row[WHEEL_V_X + i] = row[V_X] - row[YAW_RATE] * hub_y(row, i)
-    row[WHEEL_V_Y + i] = row[V_Y] + row[YAW_RATE] * hub_x(row, i)
+    row[WHEEL_V_Y + i] = row[V_Y] + row[YAW_RATE] * side_slip_x(row, i)
     row[WHEEL_OMEGA + i] = row[OMEGA + i % 2]
     rim = (row[WHEEL + i] + row[WHEEL + 8 + i]) * row[WHEEL_OMEGA + i]
     row[SLIP_RATIO + i] = slip_ratio(rim, row[WHEEL_V_X + i])
@@ -319,7 +334,7 @@ def _may_extrapolate(row: Array, limit: float) -> bool:
         v_x, _, rim, speed = relative_motion(row, i)
         change = limit * max(abs(v_x), abs(rim)) * speed
         d_x = row[V_X] - row[YAW_RATE] * hub_y(row, i) - row[WHEEL_V_X + i]
-        d_y = row[V_Y] + row[YAW_RATE] * hub_x(row, i) - row[WHEEL_V_Y + i]
+        d_y = row[V_Y] + row[YAW_RATE] * side_slip_x(row, i) - row[WHEEL_V_Y + i]
         d_rim = (row[WHEEL + i] + row[WHEEL + 8 + i]) * (row[OMEGA + i % 2] - row[WHEEL_OMEGA + i])
         carried = row[LOAD + i] > 0.0 and row[BOGGED + i] == 0.0 and stiffness_of(row, i) > 0.0
         if not (carried and abs(d_x) < change and abs(d_y) < change and abs(d_rim) < change):

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.jit import kernel, stack_array
-from ddagr_gym.physics.body_dynamics import extra_forces, hub_x, hub_y, set_kinematics, sum_extra
+from ddagr_gym.physics.body_dynamics import extra_forces, hub_x, hub_y, set_kinematics, side_slip_x, sum_extra
 from ddagr_gym.physics.callbacks import EffectActions
 from ddagr_gym.physics.drivetrain import bank_damping, moving_entries
 from ddagr_gym.physics.layout import (
@@ -39,7 +39,7 @@ BANKS = 8
 @kernel()
 def _add_torque_jacobian(row: Array, i: int, banks: Array) -> None:
     """Add how the torque of wheel ``i`` changes with the velocities and with its bank's speed [N m per their unit]."""
-    x, y, bank = hub_x(row, i), hub_y(row, i), i % 2
+    x, y, bank = side_slip_x(row, i), hub_y(row, i), i % 2
     stiffness, speed = stiffness_of(row, i), relative_motion(row, i)[3]
     for direction in range(3):
         d_x = 1.0 / speed if direction == 0 else 0.0
@@ -100,7 +100,7 @@ def _add_wheel_jacobian(row: Array, i: int, jacobian: Array, drive: Array) -> No
             drive[2 + bank] += f_y
             drive[4 + bank] += moment
             continue
-        arm = x if direction == 1 else -y
+        arm = side_slip_x(row, i) if direction == 1 else -y
         jacobian[direction] += f_x
         jacobian[3 + direction] += f_y
         jacobian[6 + direction] += moment

@@ -87,6 +87,7 @@ BASE_BODY = _block(7)  # mass, yaw inertia, centre of mass, slope
 BASE_WHEEL = _block(12)
 HALF_WHEELBASE = _block()  # [m]
 HALF_TRACK = _block()
+SIDE_SLIP_LEAD = _block()  # [m]
 BASE_MOTOR_RATE = _block()
 BASE_DRIVETRAIN = _block(9)
 COMMAND_DELAY = _block()  # [s]

@@ -14,7 +14,14 @@ from benchmarks.adaptation.won_back import SCORES, gains, result_of, table
 from benchmarks.concealed.drive import SAMPLE_PERIOD, SUBSTEPS, drive
 from ddagr_gym.adaptation.turns import DrivenTurn, judged
 from ddagr_gym.control.row_turn import RowTurn
+from ddagr_gym.diagnosis.gates.threshold_files import default_thresholds
+from ddagr_gym.diagnosis.search.gains import gains as gains_of
+from ddagr_gym.diagnosis.search.scan import scan
+from ddagr_gym.diagnosis.setting import Setting, make_problem
+from ddagr_gym.identification.gauss_newton import fit
+from ddagr_gym.identification.nuisances import NuisancePriors
 from ddagr_gym.physics.effects.registry import effect_kinds
+from ddagr_gym.presets import ddagr, get_soil
 from ddagr_gym.recordings.load import load_recording
 
 
@@ -38,6 +45,24 @@ def test_recordings_are_read_as_any_others(tmp_path, monkeypatch):
     (path,) = TruePlant(TRUTHS["gyro"]).record(tmp_path)
     recording = load_recording(path, "concealed", "ddagr")
     assert recording.has("yaw_rate", "pose_x", "command_right")
+
+
+@pytest.mark.slow
+def test_another_simulators_shear_is_not_called_ruts(tmp_path):
+    """Where the soil resists the displacement, it turns the robot 2 cm further ahead than ours."""
+    drives = [load_recording(path, "concealed", "ddagr") for path in TruePlant(TRUTHS["nothing"]).record(tmp_path)]
+    kinds = {name: effect_kinds()[name] for name in ("multipass", "centre_of_mass_offset")}
+    thresholds = default_thresholds("ddagr")
+
+    def largest(priors):
+        setting = Setting(priors=priors).with_windows(thresholds.duration)
+        problem = make_problem(ddagr(), get_soil("thesis_a1"), drives, setting)
+        gate = thresholds.for_length(problem.covered).of("multipass").gain
+        return max(item.gain for item in gains_of(scan(problem, fit(problem), kinds))) / gate
+
+    assert largest(NuisancePriors()) < 0.3
+    # a simulator that is sure where along the contact the side slip counts is wrong for sure
+    assert largest(NuisancePriors(side_slip_lead=1e-4)) > 1.0
 
 
 class _Straight:

@@ -11,7 +11,7 @@ from ddagr_gym.diagnosis.result.soil_words import finding_in_words
 from ddagr_gym.diagnosis.wording import in_sentence
 
 RIVAL_WEIGHT = 0.2
-"""Weight in the equivalence set from which a rival stands in the headline (ours)."""
+"""Weight in the equivalence set below which the headline says that a rival is less likely (ours)."""
 
 
 def headline(
@@ -151,13 +151,13 @@ def _of_drive(onset: Onset) -> str:
 
 
 def _rivals(finding: Finding) -> str:
-    """Names that the same windows may mean nearly as well, in brackets; "" where there are none."""
-    others = [
-        in_sentence(name)
-        for name, weight in finding.equivalence_set.items()
-        if name != finding.name and weight >= RIVAL_WEIGHT
-    ]
-    return f" (or {' or '.join(others)}: these drives do not tell them apart)" if others else ""
+    """Names that the same windows may mean, in brackets, the less likely ones last; "" where there are none."""
+    weights = {name: weight for name, weight in finding.equivalence_set.items() if name != finding.name}
+    close = " or ".join(in_sentence(name) for name, weight in weights.items() if weight >= RIVAL_WEIGHT)
+    others = " or ".join(in_sentence(name) for name, weight in weights.items() if weight < RIVAL_WEIGHT)
+    phrases = [f"or {close}: these drives do not tell them apart"] if close else []
+    phrases += [f"less likely {others}"] if others else []
+    return f" ({'; '.join(phrases)})" if phrases else ""
 
 
 def share_in_words(share: float) -> str:

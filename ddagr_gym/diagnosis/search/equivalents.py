@@ -6,9 +6,12 @@ from dataclasses import replace
 
 from ddagr_gym.diagnosis.search.initial_guess import looped_encoders, off_centre_load, slower_loop
 from ddagr_gym.diagnosis.search.scanned_model import Rival, ScannedModel, rival_of
-from ddagr_gym.identification.gauss_newton import fit
+from ddagr_gym.identification.gauss_newton import Fitted, fit
+from ddagr_gym.identification.nuisances import LEAD
 from ddagr_gym.identification.problem import Problem
+from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.effects.centre_of_mass_offset import CentreOfMassOffset
+from ddagr_gym.physics.effects.multipass import Multipass
 from ddagr_gym.physics.effects.payload import Payload
 
 TRIAL_STEPS = 3
@@ -50,6 +53,33 @@ def with_off_centre_load(problem: Problem, model: ScannedModel, tried: list[Riva
         return tried
     load = rival_of(model, Payload.name, fit(problem, point, iterations=TRIAL_STEPS, renewals=2, reuse=best.fitted))
     return _beside(tried, _behind(load, best))
+
+
+def with_turning_centre(problem: Problem, model: ScannedModel, raw: Fitted, tried: list[Rival]) -> list[Rival]:
+    """Rivals and, where no place in the contact explains the turning centre, what else moves it along the robot.
+
+    The lead of the side slip then stands at its bound, and soil and robot are bent beside it, so far that the scan may
+    not show the truth: the others begin at the raw nominal model.
+
+    Args:
+        problem: what to fit.
+        model: the model so far.
+        raw: the nominal model with its sensitivities.
+        tried: rivals.
+    """
+    names = [parameter.name for parameter in problem.nuisances.parameters]
+    if LEAD not in names or names.index(LEAD) in problem.open_at(model.fitted.point):
+        return tried
+    forward = 1.0 if model.fitted.point.values[names.index(LEAD)] > 0.0 else -1.0
+    least = CentreOfMassOffset.parameter("x").metadata["least"]
+    movers: tuple[Effect, ...] = (CentreOfMassOffset(x=forward * least), Multipass(forward * 0.2))
+    named = {effect.name for effect in model.fitted.point.effects}
+    for mover in movers:
+        if mover.name not in named:
+            point = replace(raw.point, effects=(*model.fitted.point.effects, mover))
+            moved = fit(problem, point, iterations=TRIAL_STEPS, renewals=2, first=raw)
+            tried = _beside(tried, rival_of(model, mover.name, moved))
+    return tried
 
 
 def _behind(told: Rival, first: Rival) -> Rival:

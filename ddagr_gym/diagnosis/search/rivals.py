@@ -13,6 +13,7 @@ from ddagr_gym.diagnosis.search.equivalents import (
     with_looped_encoders,
     with_off_centre_load,
     with_slower_loop,
+    with_turning_centre,
 )
 from ddagr_gym.diagnosis.search.gains import Gain
 from ddagr_gym.diagnosis.search.initial_guess import first_guess, nuisance_answer, turned_to_agree
@@ -60,7 +61,7 @@ def rivals_of(problem: Problem, model: ScannedModel, raw: Fitted, thresholds: Th
             # the start that serves the first rival serves the others
             starts = [starts[best_start]]
             tried.append(rival_of(model, gain.name, trials[best_start]))
-    tried = with_slower_loop(problem, model, tried)
+    tried = with_turning_centre(problem, model, raw, with_slower_loop(problem, model, tried))
     best = max((rival.gain for rival in tried), default=0.0)
     rivals = [_finish(problem, model, rival, large) if rival.gain > CLOSE * best else rival for rival in tried]
     rivals = with_off_centre_load(problem, model, with_looped_encoders(problem, model, rivals))
