@@ -160,6 +160,8 @@ class TrainingSettings:
         if content["filter"]["robot"]["drivetrain"] == asdict(Drivetrain()):
             # one without parts is no part: digests of before robots had one stay as they were
             del content["filter"]["robot"]["drivetrain"]
+        if not content["filter"]["robot"]["side_slip_lead"]:
+            del content["filter"]["robot"]["side_slip_lead"]
         calibration, ground = (content["task"].pop(name) for name in ("calibration", "ground"))
         if calibration:
             # what a calibration says counts, not its path

@@ -34,6 +34,21 @@ def test_on_the_spot_both_sides_cancel() -> None:
     assert turning(LEAD, 0.6, -0.6)[2] == pytest.approx(0.0, abs=1e-3)
 
 
+@pytest.mark.parametrize("lead", [-0.2, 0.2])
+@pytest.mark.parametrize("seed", range(4))
+def test_the_ground_gives_no_energy_to_locked_wheels(lead: float, seed: int) -> None:
+    """Each wheel alone may gain some, four together lose: passive for leads below the wheelbase."""
+    robot = replace(ROBOT, side_slip_lead=lead * ROBOT.outer_radius)
+    v_x, v_y, rate = np.random.default_rng(seed).uniform(-1.0, 1.0, 3) * (0.3, 0.3, 1.0)
+    start = {"v_x": v_x, "v_y": v_y, "yaw_rate": rate, "omega_right": 0.0, "omega_left": 0.0}
+    drive = simulate(robot, SOIL, np.zeros((100, 2)), initial_state=start)
+    energy = 0.5 * (
+        robot.mass * (drive["true_v_x"] ** 2 + drive["true_v_y"] ** 2) + robot.yaw_inertia * drive["true_yaw_rate"] ** 2
+    )
+    assert (np.diff(energy) < 1e-9 * energy[0]).all()
+    assert energy[-1] < 1e-3 * energy[0]
+
+
 def test_where_the_side_slip_counts_is_kept_with_a_fit() -> None:
     robot, _ = with_values(replace(ROBOT, side_slip_lead=0.01), SOIL, {"side_slip_lead": 0.015})
     assert robot.side_slip_lead == pytest.approx(0.025)
