@@ -49,7 +49,7 @@ FIRST_ITERATIONS = 8
 FIRST_TOLERANCE = 5e-3
 """Relative gain of a step that ends that fit (ours): medians of residuals move by half as much."""
 
-LAST_ITERATIONS = 8
+LAST_ITERATIONS = 12
 """Steps of a fit that begins at the values of another one (ours)."""
 
 OFFSET = "offset_"

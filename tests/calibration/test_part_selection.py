@@ -18,8 +18,8 @@ from ddagr_gym.calibration.part_selection import (
 from ddagr_gym.presets import get_robot
 
 
-def candidate(*losses: float, counts: tuple[int, ...] = ()) -> Candidate:
-    standing = Standing({}, np.zeros((0, 8)), True)
+def candidate(*losses: float, counts: tuple[int, ...] = (), settled: bool = True) -> Candidate:
+    standing = Standing({}, np.zeros((0, 8)), settled)
     return Candidate(standing, dict(enumerate(losses)), dict(enumerate(counts or (1,) * len(losses))))
 
 
@@ -96,3 +96,27 @@ def test_a_dead_time_that_forecasts_as_well_takes_the_place_of_a_ramp(delay_alon
     assert found.left_out & BOTH == {left_out}
     kept = {item.name: item.kept for item in found.decisions if item.name in BOTH}
     assert kept == {name: name != left_out for name in BOTH}
+
+
+@pytest.mark.parametrize(
+    ("losses", "kept", "fits"),
+    [
+        ((1.05, 1.04, 1.0), False, 3),  # as good once it is settled
+        ((1.05, 1.05, 1.05, 1.05, 1.0), True, 4),  # so many steps are enough
+        ((1.2, 1.0), True, 1),  # too far off
+        ((1.01, 2.0), False, 1),  # not missed at first
+    ],
+)
+def test_a_fit_without_a_part_goes_on_while_it_is_not_settled(losses, kept, fits):
+    made: list[float] = []
+
+    class Slow(Losses):
+        def candidate(self, model, start):
+            if model.out & BOTH != RAMP:
+                return candidate(3.0, 3.01, 2.99)
+            made.append(losses[min(len(made), len(losses) - 1)])
+            return candidate(made[-1], 1.001 * made[-1], 0.999 * made[-1], settled=False)
+
+    found = select_parts(Slow({}), Made(), candidate(1.0, 1.0, 1.0), lambda name, make: make(), lambda line: None)
+    decision = {item.name: item for item in found.decisions}["command_ramp"]
+    assert (decision.kept, decision.growth) == (kept, pytest.approx(losses[fits - 1] - 1.0))
