@@ -89,6 +89,8 @@ class Drivetrain(Validated):
     Attributes:
         command_delay: dead time between a command and the set point of the loop [s].
         command_deadband: smallest command that moves the bank; smaller ones count as zero [rad/s].
+        turning_limit: most by which the commands let a bank differ from the mean of both [rad/s]: the highest yaw rate
+            of a drive controller, times half track over wheel radius; the mean stays.
         command_ramp: largest change of the set point per time [rad/s^2].
         integral_rate: k_i, growth of the loop's integral part per speed error [1/s^2].
         integral_limit: largest integral part [rad/s^2].
@@ -104,6 +106,7 @@ class Drivetrain(Validated):
 
     command_delay: float = bounded("s", 0.0, 1.0, default=0.0)
     command_deadband: float = bounded("rad/s", 0.0, 100.0, default=0.0)
+    turning_limit: float = bounded("rad/s", 0.0, 1e3, default=1e3, open_low=True)
     command_ramp: float = bounded("rad/s^2", 0.0, 1e6, default=1e6, open_low=True)
     integral_rate: float = bounded("1/s^2", 0.0, 1e4, default=0.0)
     integral_limit: float = bounded("rad/s^2", 0.0, 1e6, default=1e6, open_low=True)

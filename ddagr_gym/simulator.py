@@ -118,6 +118,7 @@ def build_row(robot: Robot, soil: Soils, sensors: Sensors) -> Array:
         layout.BASE_DRIVETRAIN: [getattr(robot.drivetrain, name) for name in layout.DRIVETRAIN_PARAMETERS],
         layout.COMMAND_DELAY: robot.drivetrain.command_delay,
         layout.COMMAND_DEADBAND: robot.drivetrain.command_deadband,
+        layout.TURNING_LIMIT: robot.drivetrain.turning_limit,
         layout.COMMAND_RAMP: robot.drivetrain.command_ramp,
         layout.BASE_SOIL: _soils(soil),
         **_sensor_entries(sensors),

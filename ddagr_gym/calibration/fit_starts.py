@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 
 from ddagr_gym.calibration.calibration_data import CalibrationData
 from ddagr_gym.calibration.joint_fit import ITERATIONS, FittedModel, fit_model, rough_fit
-from ddagr_gym.calibration.parts import RobotModel, first_values
+from ddagr_gym.calibration.parts import RobotModel, complete_robot, first_values
 from ddagr_gym.calibration.settings import LONGEST_DELAY
 from ddagr_gym.identification.parameters import ModelParameter
 from ddagr_gym.identification.residual_weights import Weights
 from ddagr_gym.identification.windows import CHANNELS, WindowSet
+from ddagr_gym.parameters import Robot
 from ddagr_gym.replay_analysis.kinematic import Motor
 
 Array = NDArray[np.float64]
@@ -35,6 +36,12 @@ two and four times as fast as a likely one. On three drives these two or three o
 
 TRIAL_ITERATIONS = 6
 """Steps of the fit from each start (ours): enough to tell minima apart whose costs differ by some per cent."""
+
+FASTEST = 99.0
+"""Percentile of the wheels' turning at which a limit of it starts (ours): single samples overshoot."""
+
+LEAST_TURNING = 0.2
+"""Share of a likely turning limit below which it does not start (ours)."""
 
 _ROBUST_SPEED = 0.5
 """Error of a bank speed from which the loss of the start is linear [rad/s] (ours)."""
@@ -57,7 +64,25 @@ def start_values(data: CalibrationData, windows: WindowSet, parameters: tuple[Mo
             motor = Motor(factor * data.robot.motor_rate, data.robot.maximum_wheel_speed, float(delay))
             error = (motor.speeds(windows)[:, 1:] - measured)[known] / _ROBUST_SPEED
             best = min(best, (float(np.mean(np.sqrt(1.0 + error**2))), float(delay), factor))
-    return {**first_values(parameters), "command_delay": best[1], "motor_rate": float(np.log(best[2]))}
+    return {
+        **first_values(parameters),
+        "command_delay": best[1],
+        "motor_rate": float(np.log(best[2])),
+        "turning_limit": _turning_start(data.robot, measured),
+    }
+
+
+def _turning_start(robot: Robot, speeds: Array) -> float:
+    """Factor on the turning limit, as a logarithm, that brings it to the fastest turning of the wheels (W, T, 2).
+
+    Where commands never reach a limit, nothing says where it is: a fit has to begin where it acts.
+    """
+    turning = np.abs(speeds[..., 0] - speeds[..., 1]) / 2.0
+    if not np.isfinite(turning).any():
+        return 0.0
+    fastest = float(np.nanpercentile(turning, FASTEST))
+    likely = complete_robot(robot).drivetrain.turning_limit
+    return float(np.log(max(fastest, LEAST_TURNING * likely) / likely))
 
 
 def fit_from_several(

@@ -33,6 +33,9 @@ INTEGRAL_SHARE = 1.0 / 3.0
 FRICTION_TIME = 10.0
 """In which Coulomb friction alone would stop a bank from its highest speed [s], which sets its scale (ours)."""
 
+TURNING_SHARE = 0.5
+"""Of the highest speed, by which commands let a bank differ from the mean of both at most (ours): 0.55 on a Warthog."""
+
 STEADY_SHARE = 1.0 / 3.0
 """Of the highest speed, at which the power limit takes over from the torque limit (ours)."""
 
@@ -68,6 +71,7 @@ class Part:
 _STEPS = "steps of the commands held for 3 s or more, with wheel speeds recorded at 10 Hz or more"
 _FULL = "straight pieces at the highest speed that the robot takes, commanded beyond it"
 _HARD = "full reversals of the commands on firm ground, with wheel speeds recorded at 10 Hz or more"
+_SPINS = "turns on the spot on loose ground at the highest yaw rate that the robot takes, commanded beyond it"
 _TURNS = "turns on the spot and wide arcs on firm ground, each held for 3 s or more"
 
 PARTS = (
@@ -97,6 +101,7 @@ PARTS = (
     ),
     Part("command_ramp", PART_TITLES["command_ramp"], ("command_ramp",), _HARD),
     Part("power_limit", PART_TITLES["power_limit"], ("power_limit",), _FULL),
+    Part("turning_limit", PART_TITLES["turning_limit"], ("turning_limit",), _SPINS),
     Part("speed_limit", PART_TITLES["speed_limit"], ("maximum_wheel_speed",), _FULL),
     Part("integral", PART_TITLES["integral"], ("integral_rate",), _TURNS),
     Part("load", PART_TITLES["load"], ("load_compliance",), _TURNS),
@@ -111,6 +116,7 @@ PARTS = (
 """In the order in which their removal is tried: what the fewest robots need comes first."""
 
 LIMITS = {
+    "turning_limit": "turning_limit",
     "command_ramp": "command_ramp",
     "integral_limit": "integral_limit",
     "acceleration_limit": "torque_limit",
@@ -152,6 +158,7 @@ def complete_robot(robot: Robot) -> Robot:
     top = robot.maximum_wheel_speed
     strongest = top / TIME_TO_FULL_SPEED
     likely = {
+        "turning_limit": TURNING_SHARE * top,
         "command_ramp": strongest,
         "integral_limit": INTEGRAL_SHARE * strongest,
         "acceleration_limit": strongest,

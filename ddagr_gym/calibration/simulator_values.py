@@ -40,6 +40,7 @@ _UNITS = {
     "half_width": "m",
     "outer_radius": "m",
     "command_delay": "s",
+    "turning_limit": "rad/s",
     "command_ramp": "rad/s^2",
     "integral_rate": "1/s^2",
     "integral_limit": "rad/s^2",

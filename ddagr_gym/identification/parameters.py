@@ -198,10 +198,11 @@ def robot_parameters(robot: Robot) -> tuple[ModelParameter, ...]:
 _DRIVETRAIN_ENTRIES = {
     "command_delay": layout.COMMAND_DELAY,
     "command_deadband": layout.COMMAND_DEADBAND,
+    "turning_limit": layout.TURNING_LIMIT,
     "command_ramp": layout.COMMAND_RAMP,
     **{name: layout.BASE_DRIVETRAIN + k for k, name in enumerate(layout.DRIVETRAIN_PARAMETERS)},
 }
-_LIMITS = ("command_ramp", "integral_limit", "acceleration_limit", "no_load_speed", "power_limit")
+_LIMITS = ("turning_limit", "command_ramp", "integral_limit", "acceleration_limit", "no_load_speed", "power_limit")
 
 
 def drivetrain_of(robot: Robot, values: Mapping[str, float]) -> Drivetrain:

@@ -1,6 +1,6 @@
 """From a bank's speed command to its acceleration (theory: drivetrain, section 1).
 
-    r = ramp(deadband(u(t - delay)))
+    r = ramp(deadband(limit_turning(u(t - delay))))
     d omega/dt = limit(k_omega (r - omega) + z) + T/J - viscous omega - friction sgn(omega),  dz/dt = k_i (r - omega)
 
 T is the torque of the ground on the bank's wheels. With the defaults of :class:`ddagr_gym.parameters.Drivetrain` only
@@ -47,6 +47,7 @@ from ddagr_gym.physics.layout import (
     SAMPLE_PERIOD,
     SET_POINT,
     SIZE,
+    TURNING_LIMIT,
     VISCOUS_RATE,
     WHEEL,
     WHEEL_ANGLE,
@@ -79,9 +80,19 @@ def delay_commands(row: Array) -> None:
         row[COMMAND + bank] = recall(ring, 2, COMMAND_NODES, stride, bank, samples, row[COMMAND + bank])
 
 
+@kernel(inline=True)
+def _limit_turning(row: Array) -> None:
+    """Bring the banks' commands closer to their mean where they differ by more than the robot carries out."""
+    mean = 0.5 * (row[COMMAND] + row[COMMAND + 1])
+    turning = min(max(row[COMMAND] - mean, -row[TURNING_LIMIT]), row[TURNING_LIMIT])
+    row[COMMAND], row[COMMAND + 1] = mean + turning, mean - turning
+
+
 @kernel()
 def set_targets(row: Array) -> None:
     """Set points of the coming sample from the commands, and the drivetrain as the robot has it."""
+    if row[TURNING_LIMIT] < NO_SPEED_LIMIT:
+        _limit_turning(row)
     for bank in range(2):
         limit = row[MAXIMUM_WHEEL_SPEED]
         row[COMMAND + bank] = min(max(row[COMMAND + bank], -limit), limit)

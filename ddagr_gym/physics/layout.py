@@ -92,6 +92,7 @@ BASE_MOTOR_RATE = _block()
 BASE_DRIVETRAIN = _block(9)
 COMMAND_DELAY = _block()  # [s]
 COMMAND_DEADBAND = _block()  # [rad/s]
+TURNING_LIMIT = _block()  # [rad/s]
 COMMAND_RAMP = _block()  # [rad/s^2]
 MAXIMUM_WHEEL_SPEED = _block()  # [rad/s]
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 PART_TITLES = {
     "command_delay": "dead time of the commands",
+    "turning_limit": "limit of the commanded turning",
     "command_ramp": "ramp of the commands",
     "speed_loop": "speed loop",
     "integral": "integral part of the speed loop",
