@@ -89,8 +89,6 @@ class Drivetrain(Validated):
     Attributes:
         command_delay: dead time between a command and the set point of the loop [s].
         command_deadband: smallest command that moves the bank; smaller ones count as zero [rad/s].
-        turning_limit: most by which the commands let a bank differ from the mean of both [rad/s]: the highest yaw rate
-            of a drive controller, times half track over wheel radius; the mean stays.
         command_ramp: largest change of the set point per time [rad/s^2].
         integral_rate: k_i, growth of the loop's integral part per speed error [1/s^2].
         integral_limit: largest integral part [rad/s^2].
@@ -102,11 +100,12 @@ class Drivetrain(Validated):
         limit_imbalance: share by which the right bank's limits are above the mean of both, the left one's below [-].
         viscous_rate: friction of motor and gear per speed [1/s].
         coulomb_friction: friction of motor and gear, as the acceleration that it takes [rad/s^2].
+        turning_limit: most by which the commands let a bank differ from the mean of both [rad/s]: the highest yaw rate
+            of a drive controller, times half track over wheel radius; the mean stays.
     """
 
     command_delay: float = bounded("s", 0.0, 1.0, default=0.0)
     command_deadband: float = bounded("rad/s", 0.0, 100.0, default=0.0)
-    turning_limit: float = bounded("rad/s", 0.0, 1e3, default=1e3, open_low=True)
     command_ramp: float = bounded("rad/s^2", 0.0, 1e6, default=1e6, open_low=True)
     integral_rate: float = bounded("1/s^2", 0.0, 1e4, default=0.0)
     integral_limit: float = bounded("rad/s^2", 0.0, 1e6, default=1e6, open_low=True)
@@ -117,6 +116,7 @@ class Drivetrain(Validated):
     limit_imbalance: float = bounded("-", -0.9, 0.9, default=0.0)
     viscous_rate: float = bounded("1/s", 0.0, 1e3, default=0.0)
     coulomb_friction: float = bounded("rad/s^2", 0.0, 1e3, default=0.0)
+    turning_limit: float = bounded("rad/s", 0.0, 1e3, default=1e3, open_low=True)
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import ddagr_gym
+from ddagr_gym.parameters import Robot
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.schema import Recording
 
@@ -44,10 +45,10 @@ def steps(seed: int, seconds: float) -> np.ndarray:
     return np.array(rows[: int(seconds * RATE)])
 
 
-def drive(ground: str, seed: int, seconds: float = 120.0, name: str = "") -> Recording:
+def drive(ground: str, seed: int, seconds: float = 120.0, name: str = "", robot: Robot | None = None) -> Recording:
     made = ddagr_gym.simulate(
-        steps(seed, seconds), true_robot(), true_soil(ground), f"command_delay={DELAY}", rate=RATE, pose_rate=5.0,
-        seed=seed,
+        steps(seed, seconds), robot or true_robot(), true_soil(ground), f"command_delay={DELAY}", rate=RATE,
+        pose_rate=5.0, seed=seed,
     )  # fmt: skip
     return made.recording.with_meta(source=name or f"{ground}_{seed}.csv")
 

@@ -18,10 +18,13 @@ from ddagr_gym.config import load_config
 from ddagr_gym.errors import InputError
 from ddagr_gym.parameters import Robot
 from ddagr_gym.presets import get_robot, get_soil
-from tests.calibration.conftest import DELAY, MOTOR_RATE, STRENGTH, drive
+from tests.calibration.conftest import DELAY, MOTOR_RATE, STRENGTH, drive, true_robot
 
 FEW = CalibrationSettings(fitted=10, compared=6, judged=12)
 """Enough windows for three parameters and two grounds, at a fifth of the cost."""
+
+TURNING_LIMIT = 0.6
+"""Of a robot whose controller limits the yaw rate [rad/s]."""
 
 GROUNDS = ("field", "field", "track")
 
@@ -181,3 +184,16 @@ def test_the_page_stands_alone(folder):
     for name in ("field_1.csv", "track_3.csv", "motor rate", "What would help"):
         assert name in page
     assert page.count("<figure>") == 3 + 4
+
+
+@pytest.mark.slow
+def test_a_limit_of_the_commanded_turning_is_found():
+    """Half of the turns of these steps are cut by the robot's controller; its data sheet does not say so."""
+    robot = true_robot()
+    limited = replace(robot, drivetrain=replace(robot.drivetrain, turning_limit=TURNING_LIMIT))
+    made = [drive(ground, seed, robot=limited) for seed, ground in enumerate(GROUNDS, 1)]
+    found = calibrated(made)
+    assert {part.name for part in found.calibration.parts if part.kept} == {
+        "speed_loop", "command_delay", "turning_limit",
+    }  # fmt: skip
+    assert found.robot.drivetrain.turning_limit == pytest.approx(TURNING_LIMIT, rel=0.02)

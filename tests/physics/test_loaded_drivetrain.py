@@ -113,6 +113,22 @@ def test_commands_act_after_the_delay_and_the_ramp_and_outside_the_deadband():
     np.testing.assert_allclose(dead["true_omega_right"], prompt["true_omega_right"], atol=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("command", "reached"),
+    [((1.5, -1.5), (0.4, -0.4)), ((1.6, 0.0), (1.2, 0.4)), ((-1.0, 0.6), (-0.6, 0.2)), ((1.5, 0.9), (1.5, 0.9))],
+)
+def test_banks_differ_by_no_more_than_the_turning_limit_and_keep_their_mean(command, reached):
+    drive = _drive(_with(DDAGR, turning_limit=0.4), _steps((4.0, *command)))
+    assert [drive[f"true_omega_{bank}"][-1] for bank in ("right", "left")] == pytest.approx(reached, abs=1e-3)
+
+
+def test_turning_is_limited_before_each_bank_is():
+    """A controller brings the banks together first; what is then above the highest speed is cut."""
+    drive = _drive(_with(replace(DDAGR, maximum_wheel_speed=1.0), turning_limit=0.4), _steps((4.0, 2.2, 0.2)))
+    assert drive["true_omega_right"][-1] == pytest.approx(1.0, abs=1e-3)
+    assert drive["true_omega_left"][-1] == pytest.approx(0.8, abs=1e-3)
+
+
 @pytest.mark.parametrize("limit", [2.0, 0.5])
 def test_bank_speeds_up_no_faster_than_its_torque_allows(limit):
     speed = _drive(_with(DDAGR, acceleration_limit=limit), _steps((1.0, 1.5, -1.5)))["true_omega_right"]
