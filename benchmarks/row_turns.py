@@ -2,7 +2,7 @@
 
     python -m benchmarks.row_turns --output FOLDER [--workers 2]
 
-Drives :data:`PLAN` as ``ddagr evaluate`` does, with the same journal, page and files (about twenty minutes of one core;
+Drives :data:`PLAN` as ``ddagr evaluate`` does, with the same dataset, page and files (about twenty minutes of one core;
 stopped and started again with the same folder, it goes on), then writes ``benchmarks/results/row_turns.json`` and the
 figure of the page of results, ``docs/radius_error.png``. The JSON file has the form of ``summary.json``, {controller:
 {set: {metric: {value, interval}}}}, and one entry more, ``_run``: command line, commits, who drove what, hashes of
@@ -26,6 +26,7 @@ from ddagr_gym.commands.output import make_folder, write_bytes, write_text
 from ddagr_gym.evaluation.campaign import run_campaign, wanted_episodes, with_bounds
 from ddagr_gym.evaluation.claims import check_claims, load_claims
 from ddagr_gym.evaluation.controllers import BOUNDS
+from ddagr_gym.evaluation.dataset import EPISODES
 from ddagr_gym.evaluation.report_data import Evaluation
 from ddagr_gym.evaluation.summary import summaries
 from ddagr_gym.progress import Progress
@@ -135,15 +136,13 @@ def as_lines(content: Mapping[str, Any]) -> str:
 
 
 def drive(folder: Path, workers: int) -> list[dict[str, Any]]:
-    """Episodes of the plan, driven where the folder's journal does not hold them."""
+    """Episodes of the plan, driven where the dataset in the folder does not hold them."""
     plan = [(without_stars(controllers), sets) for controllers, sets in PLAN]
     total = sum(len(wanted_episodes(with_bounds(controllers), sets)) for controllers, sets in plan)
     rows = []
     with Progress(total, "driving") as progress:
         for controllers, sets in plan:
-            rows += run_campaign(
-                controllers, sets, folder / "episodes.jsonl", processes=workers, progress=progress.advance
-            )
+            rows += run_campaign(controllers, sets, folder / EPISODES, processes=workers, progress=progress.advance)
     places = {name: place for place, name in enumerate(ORDER)}
     return sorted(rows, key=lambda row: (places.get(row["arm"], len(ORDER)), SETS.index(row["set"])))
 

@@ -27,6 +27,7 @@ def evaluation_step(folder: Path, scenarios: int = SCENARIOS, workers: int = 2) 
     from ddagr_gym.commands.evaluation_report import write_files, write_report
     from ddagr_gym.commands.output import format_table
     from ddagr_gym.evaluation.campaign import run_campaign
+    from ddagr_gym.evaluation.dataset import EPISODES
     from ddagr_gym.evaluation.summary import summaries
     from ddagr_gym.policies.shipped import selected_policies
     from ddagr_gym.reporting.evaluation_page import PAGE, PICTURE
@@ -35,7 +36,7 @@ def evaluation_step(folder: Path, scenarios: int = SCENARIOS, workers: int = 2) 
     print(f"Driving {len(controllers)} controllers over {scenarios} scenarios of set {SET} ...", flush=True)
     target = folder / "evaluation"
     target.mkdir()
-    rows = run_campaign(controllers, [SET], target / "episodes.jsonl", processes=workers, count=scenarios)
+    rows = run_campaign(controllers, [SET], target / EPISODES, processes=workers, count=scenarios)
     summary: dict[str, Any] = summaries(rows)
     write_files(target, rows, summary)
     write_report(target, rows, summary, workers=workers)

@@ -34,7 +34,8 @@ class Arguments:
             `ddagr adapt`; a * stands for any letters of the trained ones, so that ppo_ekf_seed_* are all training
             seeds, which are judged together.
         scenarios: names of frozen sets, separated by commas: S0 to S8, V for tuning, T for another soil law.
-        output: folder for report.html, episodes.parquet, summary.json, claims.json and the figure.
+        output: folder for report.html, summary.json, claims.json, the figure, episodes.parquet, and the dataset
+            `episodes` by which it resumes.
         workers: processes, or processors of a local cluster.
         cluster: a Ray cluster to drive on: "local" starts one here, an address (ray://HOST:PORT) takes one that runs.
         episodes: only so many of each set; all by default. Claims are then not checked.
@@ -56,6 +57,7 @@ def run(arguments: Arguments) -> None:
     from ddagr_gym.control.row_turn import RowTurn
     from ddagr_gym.evaluation.campaign import run_campaign, wanted_episodes, with_bounds
     from ddagr_gym.evaluation.controllers import find_controller
+    from ddagr_gym.evaluation.dataset import EPISODES
     from ddagr_gym.evaluation.scenarios import scenario_names
     from ddagr_gym.evaluation.summary import summaries
 
@@ -77,7 +79,7 @@ def run(arguments: Arguments) -> None:
         rows = run_campaign(
             controllers,
             sets,
-            folder / "episodes.jsonl",
+            folder / EPISODES,
             processes=arguments.workers,
             cluster=arguments.cluster,
             count=arguments.episodes,

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -26,11 +25,11 @@ from ddagr_gym.evaluation.controllers import (
     is_policy,
     needs_filter,
 )
+from ddagr_gym.evaluation.dataset import IDENTITY, EpisodeDataset
 from ddagr_gym.evaluation.estimator_metrics import estimator_errors
 from ddagr_gym.evaluation.metrics import turn_metrics
 from ddagr_gym.evaluation.runs import TurnRun, drive_turn, drive_turns
 from ddagr_gym.evaluation.scenarios import Scenario, load_scenarios, set_hash
-from ddagr_gym.files import atomic_path
 from ddagr_gym.parameters import Sensors
 from ddagr_gym.physics.soil_laws import ground_effects
 from ddagr_gym.policies.shipped import policy_file, split_estimate
@@ -42,6 +41,9 @@ _CHUNK = 50
 """Episodes per task, driven side by side where the controller can: a stopped run loses at most a task."""
 _SLOW_CHUNK = 10
 """Likewise of controllers that drive one turn at a time."""
+
+EARLIER = "episodes.jsonl"
+"""Rows of a campaign of an earlier version, beside the dataset."""
 
 Key = tuple[str, str, int]
 """Controller, set and number of an episode."""
@@ -213,43 +215,34 @@ def plan(controllers: Sequence[str], sets: Sequence[str], done: set[Key], count:
     return tasks
 
 
-def read_rows(journal: Path) -> list[dict[str, Any]]:
-    """Rows of a journal; a last line that was cut off by an interruption is dropped."""
-    rows = []
-    if journal.is_file():
-        for line in journal.read_text(encoding="utf-8").splitlines():
-            try:
-                rows.append(json.loads(line))
-            except json.JSONDecodeError:
-                break
-    return rows
-
-
 def run_campaign(
     controllers: Sequence[str],
     sets: Sequence[str],
-    journal: Path,
+    folder: Path,
     *,
     processes: int = 2,
     cluster: str = "",
     count: int | None = None,
     progress: Callable[[int], None] = lambda episodes: None,
 ) -> list[dict[str, Any]]:
-    """Drive every controller on every scenario of the sets, continuing what the journal holds.
+    """Drive every controller on every scenario of the sets, continuing what the dataset holds.
 
     The upper bounds are driven as well, asked for or not: a scenario is feasible if one of them succeeds.
 
     Args:
         controllers: names.
         sets: names of frozen sets.
-        journal: JSON lines, appended as episodes end; rows of other gains, policies or scenarios are driven again.
+        folder: of the :class:`~ddagr_gym.evaluation.dataset.EpisodeDataset`, to which episodes are added as they end;
+            rows of other gains, policies or scenarios are driven again. ``episodes.jsonl`` beside it, of an earlier
+            version, is taken over.
         processes: workers.
         cluster: as of :class:`ddagr_gym.tasks.TaskRunner`.
         count: only the first scenarios of each set.
         progress: called with the number of episodes that a task added, those of the bounds included.
 
     Raises:
-        InputError: episodes failed, all of them by bad input; the others are driven first.
+        InputError: episodes failed, all of them by bad input; the others are driven first. Or the dataset is not
+            readable.
         FailedTasksError: episodes failed; the others are driven first.
 
     Returns:
@@ -257,35 +250,29 @@ def run_campaign(
     """
     everyone = with_bounds(controllers)
     wanted = set(wanted_episodes(everyone, sets, count))
-    rows = _rows_to_keep(read_rows(journal), wanted)
-    _rewrite(journal, rows)
-    kept = {(row["controller"], row["set"], row["number"]) for row in rows}
+    dataset = EpisodeDataset(folder, folder.parent / EARLIER)
+    kept = _keep_valid(dataset, wanted)
     if kept & wanted:
         progress(len(kept & wanted))
-    for added in _results(plan(everyone, sets, kept, count), processes, cluster):
-        with journal.open("a", encoding="utf-8") as file:
-            file.writelines(json.dumps(row) + "\n" for row in added)
-        rows += added
-        progress(len(added))
-    return _judged([row for row in rows if (row["controller"], row["set"], row["number"]) in wanted], controllers, sets)
+    try:
+        for added in _results(plan(everyone, sets, kept, count), processes, cluster):
+            dataset.append(added)
+            progress(len(added))
+    finally:
+        dataset.write_manifest()
+    rows = [row for row in dataset.read() if _key(row) in wanted]
+    return _judged(rows, controllers, sets)
 
 
-def _rows_to_keep(rows: Sequence[dict[str, Any]], wanted: set[Key]) -> list[dict[str, Any]]:
-    """One row an episode; wanted rows only where scenarios, controller and filter are still the same."""
+def _keep_valid(dataset: EpisodeDataset, wanted: set[Key]) -> set[Key]:
+    """Drop wanted rows whose scenarios, controller or filter are no longer the same; the keys of the others."""
     now = {pair: provenance(*pair) for pair in {(controller, name) for controller, name, _ in wanted}}
-    kept: dict[Key, dict[str, Any]] = {}
-    for row in rows:
-        key = (row["controller"], row["set"], row["number"])
-        if key not in wanted or row.get("made_of") == now[key[:2]]:
-            kept[key] = row
-    return list(kept.values())
+    dataset.keep(lambda row: _key(row) not in wanted or row["made_of"] == now[_key(row)[:2]])
+    return {_key(row) for row in dataset.read(IDENTITY)}
 
 
-def _rewrite(journal: Path, rows: Sequence[dict[str, Any]]) -> None:
-    """Rewrite the journal with whole and valid rows only, so that the next row starts on a new line."""
-    if journal.is_file():
-        with atomic_path(journal) as temporary:
-            temporary.write_text("".join(json.dumps(row) + "\n" for row in rows), encoding="utf-8")
+def _key(row: Mapping[str, Any]) -> Key:
+    return row["controller"], row["set"], row["number"]
 
 
 def _judged(rows: Sequence[dict[str, Any]], controllers: Sequence[str], sets: Sequence[str]) -> list[dict[str, Any]]:

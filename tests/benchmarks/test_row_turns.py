@@ -16,7 +16,8 @@ from benchmarks.scenario_sets import PLANS, draw_set
 from ddagr_gym.commands.evaluate import without_stars
 from ddagr_gym.evaluation import scenarios as scenario_module
 from ddagr_gym.evaluation.claims import HEADLINE, check_claims, load_claims
-from ddagr_gym.evaluation.controllers import controller_arm, controller_version, drives_on
+from ddagr_gym.evaluation.controllers import BOUNDS, controller_arm, controller_version, drives_on
+from ddagr_gym.evaluation.dataset import EPISODES, EpisodeDataset
 from ddagr_gym.evaluation.scenarios import save_scenarios, set_hash
 from ddagr_gym.evaluation.summary import BASELINES, summaries
 
@@ -72,9 +73,10 @@ def test_an_evaluation_is_driven_kept_and_not_driven_again(tmp_path, monkeypatch
     assert [(row["controller"], row["number"]) for row in rows] == [
         (name, number) for name in ("B1", "B4", "true_path") for number in (0, 1)
     ]
-    journal = (folder / "episodes.jsonl").read_bytes()
+    parts = {part: part.stat().st_mtime_ns for part in EpisodeDataset(folder / EPISODES).parts()}
+    assert len(parts) == 3 + len(set(BOUNDS) - {"true_path"})
     assert row_turns.drive(folder, 1) == rows
-    assert (folder / "episodes.jsonl").read_bytes() == journal
+    assert {part: part.stat().st_mtime_ns for part in EpisodeDataset(folder / EPISODES).parts()} == parts
     result, figure = tmp_path / "kept.json", tmp_path / "figure.png"
     row_turns.keep(folder, rows, "the command", ["abc"], result=result, figure=figure, films=False)
     content = json.loads(result.read_text())

@@ -18,6 +18,11 @@ def run_evaluation(folder, *extra):
     return main(["evaluate", "--scenarios", "V", "--workers", "1", "--output", str(folder), *extra])
 
 
+def content(folder):
+    """Bytes of all files, by path."""
+    return {path: path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
+
+
 def test_tables_summary_and_figure(tmp_path, capsys):
     pytest.importorskip("pyarrow")
     pytest.importorskip("matplotlib")
@@ -34,8 +39,8 @@ def test_tables_summary_and_figure(tmp_path, capsys):
     table = parquet.read_table(folder / "episodes.parquet")
     assert table.num_rows == 4
     assert {"feasible", "radius_error", "estimator_radius", "arm"} <= set(table.column_names)
-    lines = (folder / "episodes.jsonl").read_text().splitlines()
-    assert len(lines) == 2 * (1 + len(BOUNDS))
+    driven = parquet.read_table(folder / "episodes")
+    assert driven.num_rows == 2 * (1 + len(BOUNDS))
     assert (folder / "radius_error.png").stat().st_size > 10_000
     assert not (folder / "claims.json").exists()  # two episodes decide no claim
 
@@ -44,10 +49,10 @@ def test_a_second_run_drives_nothing_and_agrees(tmp_path, capsys):
     folder = tmp_path / "out"
     arguments = ("--controllers", "B1", "--episodes", "2")
     assert run_evaluation(folder, *arguments) == 0
-    first, journal = (folder / "summary.json").read_text(), (folder / "episodes.jsonl").read_text()
+    first, rows = (folder / "summary.json").read_text(), content(folder / "episodes")
     assert run_evaluation(folder, *arguments) == 0
     assert (folder / "summary.json").read_text() == first
-    assert (folder / "episodes.jsonl").read_text() == journal
+    assert content(folder / "episodes") == rows
 
 
 def test_claims_are_written_and_those_on_what_was_driven_are_printed(tmp_path, capsys):

@@ -8,6 +8,7 @@ from ddagr_gym.cli import main
 from ddagr_gym.commands import demo_evaluation, evaluation_report
 from ddagr_gym.commands.evaluation_report import assemble, write_report
 from ddagr_gym.evaluation.campaign import run_campaign
+from ddagr_gym.evaluation.dataset import EPISODES
 from ddagr_gym.evaluation.report_data import Arm
 from ddagr_gym.evaluation.summary import summaries
 from ddagr_gym.policies import shipped
@@ -20,7 +21,7 @@ pytest.importorskip("pyarrow", reason="needs the extra io")
 @pytest.fixture(scope="module")
 def rows(tmp_path_factory):
     folder = tmp_path_factory.mktemp("driven")
-    return run_campaign(["true_path", "B1", "B4"], ["V"], folder / "episodes.jsonl", processes=1, count=2)
+    return run_campaign(["true_path", "B1", "B4"], ["V"], folder / EPISODES, processes=1, count=2)
 
 
 def test_evidence_says_what_everything_was_made_of(rows):

@@ -15,7 +15,6 @@ from ddagr_gym.evaluation.campaign import (
     drive_scenarios,
     episode_row,
     plan,
-    read_rows,
     run_campaign,
     wanted_episodes,
 )
@@ -28,6 +27,7 @@ from ddagr_gym.evaluation.controllers import (
     is_deployable,
     needs_filter,
 )
+from ddagr_gym.evaluation.dataset import EpisodeDataset
 from ddagr_gym.evaluation.scenarios import load_scenarios, save_scenarios, scenario_names
 from ddagr_gym.evaluation.summary import summaries
 from ddagr_gym.physics.soil_laws import LAW
@@ -78,18 +78,39 @@ def test_every_plan_draws_what_it_says(name):
 
 
 def test_campaign_resumes_where_it_stopped(frozen, tmp_path):
-    journal = tmp_path / "episodes.jsonl"
-    whole = run_campaign(["B0", "B1"], ["V"], journal, processes=1)
+    folder = tmp_path / "episodes"
+    whole = run_campaign(["B0", "B1"], ["V"], folder, processes=1)
     assert [(row["controller"], row["number"]) for row in whole] == [(c, n) for c in ("B0", "B1") for n in range(3)]
-    lines = journal.read_text().splitlines()
-    assert len(lines) == 3 * (2 + len(BOUNDS))
-    journal.write_text("\n".join(lines[:4]) + "\n" + lines[4][:20])  # cut off in the fifth line
+    parts = EpisodeDataset(folder).parts()
+    assert len(parts) == 2 + len(BOUNDS)
+    parts[0].unlink()
+    (parts[1].parent / ".part-cut-off.parquet").write_bytes(parts[1].read_bytes()[:100])  # killed while it was written
     counted = []
-    again = run_campaign(["B0", "B1"], ["V"], journal, processes=1, progress=counted.append)
+    again = run_campaign(["B0", "B1"], ["V"], folder, processes=1, progress=counted.append)
     assert again == whole
-    assert counted[0] == 4
+    assert counted[0] == 3 * (1 + len(BOUNDS))
     assert sum(counted) == 3 * (2 + len(BOUNDS))
-    assert len(read_rows(journal)) == 3 * (2 + len(BOUNDS))
+    assert EpisodeDataset(folder).parts() == parts
+
+
+def test_rows_of_an_earlier_version_are_taken_over(frozen, tmp_path):
+    whole = run_campaign(["B1"], ["V"], tmp_path / "new" / "episodes", processes=1)
+    rows = EpisodeDataset(tmp_path / "new" / "episodes").read()
+    journal = tmp_path / "old" / "episodes.jsonl"
+    journal.parent.mkdir()
+    text = "".join(json.dumps(row) + "\n" for row in rows)
+    journal.write_text(text + '{"controller": "cut o')
+    counted = []
+    again = run_campaign(["B1"], ["V"], journal.with_name("episodes"), processes=1, progress=counted.append)
+    assert again == whole
+    assert counted == [len(rows)]
+    assert journal.read_text().startswith(text)
+
+
+def test_a_campaign_does_not_touch_the_rows_of_another(frozen, tmp_path):
+    first = run_campaign(["B0"], ["V"], tmp_path / "rows", processes=1)
+    run_campaign(["B1"], ["V"], tmp_path / "rows", processes=1)
+    assert run_campaign(["B0"], ["V"], tmp_path / "rows", processes=1) == first
 
 
 def test_two_workers_find_the_same(frozen, tmp_path):
@@ -116,23 +137,23 @@ def test_a_failed_episode_is_named_and_the_others_are_kept(frozen, tmp_path, mon
     monkeypatch.setattr(campaign, "drive_scenario", drive)
     with pytest.raises(FailedTasksError, match=r"B2 on V 0 to 2: raised \(ZeroDivisionError"):
         run_campaign(["B2", "B1"], ["V"], tmp_path / "rows", processes=1)
-    kept = {row["controller"] for row in read_rows(tmp_path / "rows")}
+    kept = {row["controller"] for row in EpisodeDataset(tmp_path / "rows").read()}
     assert kept == {"B1", *BOUNDS}
 
 
 def test_rows_of_other_gains_are_driven_again(frozen, tmp_path, monkeypatch):
-    journal = tmp_path / "episodes.jsonl"
-    run_campaign(["B1", "B2"], ["V"], journal, processes=1)
+    folder = tmp_path / "episodes"
+    run_campaign(["B1", "B2"], ["V"], folder, processes=1)
     driven = []
     original = campaign.drive_scenario
     monkeypatch.setattr(
         campaign, "drive_scenario", lambda name, scenario: driven.append(name) or original(name, scenario)
     )
-    run_campaign(["B1", "B2"], ["V"], journal, processes=1)
+    run_campaign(["B1", "B2"], ["V"], folder, processes=1)
     assert not driven
     version = campaign.controller_version
     monkeypatch.setattr(campaign, "controller_version", lambda name: version(name) + ("2" if name == "B2" else ""))
-    run_campaign(["B1", "B2"], ["V"], journal, processes=1)
+    run_campaign(["B1", "B2"], ["V"], folder, processes=1)
     assert driven == ["B2"] * 3
 
 
