@@ -39,13 +39,13 @@ def test_nothing_is_lost_and_nothing_done_twice(nodes, tmp_path, fault):
 
 
 def test_a_full_disk_keeps_what_fits(tmp_path):
-    store = FullDisk(tmp_path)
+    store = FullDisk(tmp_path / "store")
     for number, value in alone(4, tmp_path / "marks").items():
         store.put(number.replace(" ", "_"), value)
     with pytest.raises(OSError, match="space left") as caught:
         store.put("case_4", [0.1] * 40)
     assert caught.value.errno == errno.ENOSPC
-    assert len(list(tmp_path.glob("*.json"))) == 4
+    assert len(list(store.folder.iterdir())) == 4
 
 
 def test_begun_again_counts_attempts(tmp_path):
