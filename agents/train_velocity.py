@@ -50,7 +50,9 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument("--estimators", default=",".join(VARIANTS), help="names, separated by commas")
     parser.add_argument("--publish", action="store_true", help="write to agents/estimators")
     for name in ("turns", "validation", "epochs", "units", "seed"):
-        parser.add_argument(f"--{name}", type=int, default=getattr(VelocitySettings(), name), help="default %(default)s")
+        parser.add_argument(
+            f"--{name}", type=int, default=getattr(VelocitySettings(), name), help="default %(default)s"
+        )
     given = parser.parse_args(words)
     names = [name.strip() for name in given.estimators.split(",") if name.strip()]
     chosen = {name: getattr(given, name) for name in ("turns", "validation", "epochs", "units", "seed")}
@@ -58,7 +60,9 @@ def main(words: Sequence[str] | None = None) -> int:
         for name in names:
             if name not in VARIANTS:
                 raise unknown_name("estimator", name, VARIANTS)
-        train_estimators(names, replace(VelocitySettings(), **chosen), given.output, PUBLISHED if given.publish else None)
+        train_estimators(
+            names, replace(VelocitySettings(), **chosen), given.output, PUBLISHED if given.publish else None
+        )
     except InputError as error:
         parser.error(str(error))
     except KeyboardInterrupt:

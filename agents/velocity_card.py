@@ -8,6 +8,7 @@ from typing import Any
 
 from agents.velocity_drives import Plan
 from agents.velocity_training import VelocityTraining
+from ddagr_gym.estimation.learned_inputs import SENSOR_INPUTS
 from ddagr_gym.estimation.learned_network import VelocityNetwork, save_network
 from ddagr_gym.files import atomic_path, make_folder, write_json, write_text
 from ddagr_gym.rendering import palette
@@ -58,15 +59,14 @@ def card(record: dict[str, Any], description: str, inputs: int) -> str:
     settings, last, plan = record["settings"], record["course"][-1], record["plan"]
     shares = ", ".join(f"{key.replace('_', ' ')} {100.0 * value:.0f} %" for key, value in plan.items())
     v_x, v_y = record["calibration"]
+    filtered = "" if inputs == len(SENSOR_INPUTS) else ", and the inertial filter's state, deviations and innovations"
     return "\n".join(
         [
-            f"# {record['name']}: learned estimator that {description}"
-            if description.startswith(("corrects", "sees"))
-            else f"# {record['name']}: learned estimator {description}",
+            f"# {record['name']}: learned estimator that {description}",
             "",
-            "A recurrent network (gated recurrent unit) that estimates forward speed and side slip of a DDAGR robot in a "
-            "row turn, with their covariance, from gyro, accelerometer, encoders and commands. It learnt from simulated "
-            "turns alone and has never seen a robot's own recording.",
+            "A recurrent network (gated recurrent unit) that estimates forward speed and side slip of a DDAGR robot in "
+            "a row turn, with their covariance, from gyro, accelerometer, encoders and commands. It learnt from "
+            "simulated turns alone and has never seen a robot's own recording.",
             "",
             "## Use",
             "",
@@ -83,19 +83,19 @@ def card(record: dict[str, Any], description: str, inputs: int) -> str:
             "",
             "## What it sees",
             "",
-            f"{inputs} inputs every 0.08 s: means of the last ten samples' halves (25 Hz), commands, heading by the gyro, "
-            "means over the rest before the drive"
-            + (", and the inertial filter's state, deviations and innovations." if inputs > 25 else "."),
+            f"{inputs} inputs every 0.08 s: means of the last ten samples' halves (25 Hz), commands, heading by the "
+            f"gyro, means over the rest before the drive{filtered}.",
             "",
             "## How it was trained",
             "",
             f"- {settings['turns']} simulated turns, numbers 0 to {settings['turns'] - 1} of the seed "
-            f"{settings['root_seed']}; the next {settings['validation']} are its validation. No scenario of a frozen set "
-            "took part.",
+            f"{settings['root_seed']}; the next {settings['validation']} are its validation. No scenario of a frozen "
+            "set took part.",
             "- Driven by B6 (60 %), B4 (25 %) and two constant speeds (15 %), their gains times a half to two, their "
             "commands wandering in most turns; 0.3 to 1.3 s of standing first.",
-            f"- Shares of turns: {shares}. Slopes up to 6 degrees, lateral forces x 0.75 to 1.3, strength and stiffness x "
-            "0.6 to 1.6 from some time on, dead time up to 0.25 s, mass x 0.9 to 1.25, variation of the soil up to 10 %.",
+            f"- Shares of turns: {shares}. Slopes up to 6 degrees, lateral forces x 0.75 to 1.3, strength and "
+            "stiffness x 0.6 to 1.6 from some time on, dead time up to 0.25 s, mass x 0.9 to 1.25, variation of the "
+            "soil up to 10 %.",
             f"- Gaussian likelihood of v_x and v_y with their correlation; {settings['units']} units, "
             f"{settings['epochs']} passes, seed {settings['seed']}; turns mirrored at random; "
             f"{record['cpu_seconds']} CPU seconds.",
@@ -106,14 +106,15 @@ def card(record: dict[str, Any], description: str, inputs: int) -> str:
             f"(median {last['v_x_median_mm_s']:.1f}), v_y {last['v_y_rmse_mm_s']:.1f} mm/s "
             f"(median {last['v_y_median_mm_s']:.1f}); of 90 % intervals {100 * last['v_x_covered']:.0f} and "
             f"{100 * last['v_y_covered']:.0f} % were covered. Calibrated by the factors {v_x:.2f} and {v_y:.2f} on the "
-            "deviations, with which 90 % are covered on these turns.",
+            "deviations, with which 90 % are covered on these turns. Root mean squares are those of the few turns on "
+            "which the robot gets stuck or the filter diverges.",
             "",
             "![Course of training](training.png)",
             "",
             "## Limits",
             "",
-            "It knows this robot, these sensors at 125 Hz and commands every ten samples. Slopes, soil that changes and "
-            "scaled lateral forces were in its training; another law of the soil was not. Where it fails, and how it "
+            "It knows this robot, these sensors at 125 Hz and commands every ten samples. Slopes, soil that changes "
+            "and scaled lateral forces were in its training; another law of the soil was not. Where it fails, and how it "
             "compares with the filters, is in `benchmarks/results/learned_estimator.json` and `docs/results.md`.",
             "",
         ]

@@ -3,11 +3,11 @@
     python -m benchmarks.learned_estimator [--scenarios 20] [--plants level,slope_3,...,T] [--output FILE]
 
 Turns of B6 on the development scenarios of ``benchmarks.row_turn_plants`` and on the frozen set T, the first ones of
-each; every estimator sees the same samples. From the end of standing to the next row: root mean square errors of v_x and
-v_y, coverage of 90 % intervals, NEES over 2, and the pose to which the velocities lead. On level ground and where the
-soil weakens, the first eight turns are those of ``benchmarks.velocity_bound``, whose bound is read from its file. The
-networks learnt from turns of other seeds on the same kinds of plant; set T is another law of the soil, which was not in
-their training. About two minutes of one core. Writes ``results/learned_estimator.json`` and a picture beside it.
+each; every estimator sees the same samples. From the end of standing to the next row: root mean square errors of v_x
+and v_y, coverage of 90 % intervals, NEES over 2, and the pose to which the velocities lead. On level ground and where
+the soil weakens, the first eight turns are those of ``benchmarks.velocity_bound``, whose bound is read from its file.
+The networks learnt from turns of other seeds on the same kinds of plant; set T is another law of the soil, which was
+not in their training. About two minutes of one core. Writes ``results/learned_estimator.json`` and a picture beside it.
 """
 
 from __future__ import annotations
@@ -139,8 +139,8 @@ def study(plants: Sequence[str], scenarios: int) -> dict[str, Any]:
 
 def table(result: Mapping[str, Any]) -> str:
     """Markdown: a row a plant and estimator."""
-    head = "| plant | estimator | v_x, v_y [mm/s] | covered of 90 %: v_x, v_y | NEES | at the next row: along, across [mm] |"
-    lines = [head, "|---" * 6 + "|"]
+    names = ("plant", "estimator", "v_x, v_y [mm/s]", "covered of 90 %: v_x, v_y", "NEES", "exit along, across [mm]")
+    lines = [f"| {' | '.join(names)} |", "|---" * 6 + "|"]
     for plant, found in result["plants"].items():
         for name, own in found["estimators"].items():
             velocity = ", ".join(f"{own[f'{v}_mm_s']['value']:.1f}" for v in ("v_x", "v_y"))

@@ -1,4 +1,4 @@
-"""Files of plain numbers, npz without pickle, from elsewhere and not trusted: size, types, shapes and values are checked."""
+"""Files of plain numbers, npz without pickle. They are not trusted: size, types, shapes and values are checked."""
 
 from __future__ import annotations
 

@@ -39,8 +39,8 @@ Use: ``Filter(FilterModel(robot)).step(command, reading)``; ``BatchFilter`` for 
 recording; ``estimates`` for speeds, soil, slip and turn radius with their standard deviations.
 
 ``InertialFilter(InertialModel.of(robot, sensors))`` is for ground that slopes and soil that changes: its velocities
-follow the accelerometer, gravity is among its states (theory: filter, section 9). ``LearnedFilter`` takes its velocities
-from a trained network instead (section 11).
+follow the accelerometer, gravity is among its states (theory: filter, section 9). ``LearnedFilter`` takes its
+velocities from a trained network instead (section 11).
 """
 
 from ddagr_gym.estimation.closed_form import PlanarMotion, encoder_motion, symmetric_forward_speed

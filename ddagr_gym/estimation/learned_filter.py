@@ -1,4 +1,7 @@
-"""The learned estimator: velocities by a trained network, all else by the inertial filter (theory: filter, section 11)."""
+"""The learned estimator: velocities by a trained network, all else by the inertial filter.
+
+Theory: filter, section 11.
+"""
 
 from __future__ import annotations
 
@@ -65,7 +68,8 @@ class LearnedModel:
         period, own = self.inertial.flat.sample_period, self.network.description.sample_period
         if abs(period - own) > 1e-6 * own:
             raise InputError(
-                f"the sensors' period is {period:g} s and the network was trained for {own:g} s: give sensors of that rate."
+                f"the sensors' period is {period:g} s and the network was trained for {own:g} s: give sensors of that "
+                "rate."
             )
 
     @classmethod
@@ -179,7 +183,7 @@ class LearnedBatch:
 
 
 def with_velocity_block(covariances: Array, velocities: Array) -> Array:
-    """Covariances (N, 15, 15) with another block of v_x and v_y (N, 2, 2), taken to be independent of the rest; changed."""
+    """Covariances (N, 15, 15), changed: with another block of v_x and v_y (N, 2, 2), independent of the rest."""
     covariances[:, :2, :] = covariances[:, :, :2] = 0.0
     covariances[:, :2, :2] = velocities
     return covariances

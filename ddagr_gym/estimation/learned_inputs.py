@@ -23,9 +23,9 @@ SENSOR_INPUTS = (
     "command_right", "command_left", "heading_cosine", "heading_sine", "centripetal",
     "rest_specific_force_x", "rest_specific_force_y", "rest_yaw_rate", "rest_share",
 )  # fmt: skip
-"""From sensors and commands alone: means of the first and the second half of a block [m/s^2, rad/s, m/s], commanded rim
-speeds [m/s], the heading by the gyro as cosine and sine, yaw rate times mean rim speed [m/s^2], the means of all samples
-at rest before the drive [m/s^2, rad/s], and the number of these over 125."""
+"""From sensors and commands alone: means of the first and the second half of a block [m/s^2, rad/s, m/s], commanded
+rim speeds [m/s], the heading by the gyro as cosine and sine, yaw rate times mean rim speed [m/s^2], the means of all
+samples at rest before the drive [m/s^2, rad/s], and the number of these over 125."""
 
 FILTER_INPUTS = (
     "filter_v_x", "filter_v_y", "filter_yaw_rate",
