@@ -39,17 +39,21 @@ def draw_training(record: dict[str, Any], path: Path) -> None:
     with house_style():
         from matplotlib.figure import Figure
 
-        figure = Figure(figsize=(7.4, 2.6), layout="constrained")
+        figure = Figure(figsize=(7.4, 3.0), layout="constrained")
         errors, covered = figure.subplots(1, 2)
         for name, colour in (("v_x", palette.BLUE), ("v_y", palette.ORANGE)):
-            errors.plot(passes, [entry[f"{name}_rmse_mm_s"] for entry in course], color=colour, label=name)
+            for kind, style, label in (("median", "-", name), ("rmse", ":", f"{name}, root mean square")):
+                errors.plot(
+                    passes, [entry[f"{name}_{kind}_mm_s"] for entry in course], style, color=colour, label=label
+                )
             covered.plot(passes, [100.0 * entry[f"{name}_covered"] for entry in course], color=colour, label=name)
-        errors.set(xlabel="passes over the turns", title="error [mm/s], rms of validation", yscale="log")
+        errors.set(
+            xlabel="passes over the turns", title="error on validation [mm/s], median", yscale="log", ylim=(1.0, 100.0)
+        )
         errors.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
-        errors.yaxis.set_minor_formatter(lambda value, _: f"{value:g}")
         covered.axhline(90.0, color=palette.VERMILLION, linestyle=(0, (4, 2)), linewidth=1.0)
         covered.set(xlabel="passes over the turns", title="covered of 90 % [%], before calibration")
-        errors.legend(frameon=False)
+        figure.legend(*errors.get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False)
         with atomic_path(path) as temporary:
             figure.savefig(temporary, dpi=130.0, metadata={"Software": None})
 

@@ -50,6 +50,7 @@ def draw(
             else:
                 axes.set_yscale("log")
                 axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+                axes.yaxis.set_minor_formatter(lambda value, _: f"{value:g}" if f"{value:g}"[0] in "25" else "")
             axes.set_title(title)
         axes.set_xticks(range(len(plants)), [titles[name].replace(" from", "\nfrom") for name in plants], rotation=18,
                         ha="right")  # fmt: skip
