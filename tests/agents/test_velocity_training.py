@@ -61,7 +61,7 @@ def test_it_learns_and_is_calibrated(tmp_path):
     assert own.course[-1]["v_y_rmse_mm_s"] < 20.0  # 30 mm/s without learning
     errors, deviations = own._predicted()
     inside = np.abs(errors) <= 1.645 * deviations * network.description.calibration
-    assert inside.mean(axis=0) == pytest.approx(0.90, abs=0.01)
+    assert inside[:, 1].mean() == pytest.approx(0.90, abs=0.01)  # the forward speed is the rim's, without any error
 
 
 def test_an_interrupted_training_goes_on_to_the_same_numbers(tmp_path):
