@@ -164,3 +164,12 @@ def _replace_folder(temporary: Path, final: Path) -> None:
     os.rename(final, old)
     os.rename(temporary, final)
     shutil.rmtree(old)
+
+
+def shipped_folder(kind: str) -> Path:
+    """Folder of what was trained: ``agents/<kind>`` of the checkout, else the installed package's ``data/<kind>``."""
+    package = Path(__file__).resolve().parent
+    checkout = package.parent / "agents" / kind
+    if checkout.is_dir() and (package.parent / "pyproject.toml").is_file():
+        return checkout
+    return package / "data" / kind

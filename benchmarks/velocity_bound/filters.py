@@ -110,7 +110,11 @@ ESTIMATORS: dict[str, tuple[str, Estimate]] = FILTERS | {
 
 def estimated_motion(name: str, columns: Columns, episode: Episode) -> Array:
     """v_x, v_y, yaw rate and, integrated from the known start, x, y, yaw (T, 6) by one of ESTIMATORS."""
-    velocities = ESTIMATORS[name][1](columns, episode)
+    return placed_motion(ESTIMATORS[name][1](columns, episode), episode)
+
+
+def placed_motion(velocities: Array, episode: Episode) -> Array:
+    """v_x, v_y, yaw rate (T, 3) and, integrated from the known start of an episode, x, y, yaw: (T, 6)."""
     x, y, yaw = integrate_track(*velocities.T, Sensors().period).T
     start = -episode.turn.run_in, episode.lateral_offset, episode.heading_offset
     cosine, sine = np.cos(start[2]), np.sin(start[2])

@@ -65,17 +65,21 @@ class _Turn:
         self.truth = np.column_stack([self.columns[f"true_{name}"] for name in MOTION])
         commands = np.column_stack([self.columns["command_right"], self.columns["command_left"]])
         self.model = TurnModel(settings, episode, commands, self.truth[:, 3:])
-        self.exit = _exit_instant(run) - STANDING
+        exit_at = exit_instant(run)
+        if exit_at is None:
+            raise InputError("a turn never reached the next row's start line: give another root seed.")
+        self.exit = exit_at - STANDING
 
     def instants(self, series: Array) -> Array:
         """The control instants (K, ...) of a series by sample, from the end of standing on."""
         return series[CONTROL_INTERVAL - 1 :: CONTROL_INTERVAL][STANDING:]
 
 
-def _exit_instant(run: TurnRun) -> int:
+def exit_instant(run: TurnRun) -> int | None:
+    """Control instant at the next row's start line, from the start on; None where it was never reached."""
     found = turn_metrics(run.columns, run.episode.turn, run.episode.robot).exit
     if found is None:
-        raise InputError("a turn never reached the next row's start line: give another root seed.")
+        return None
     return min(round(found.time / CONTROL_PERIOD), len(run.columns["t"]) // CONTROL_INTERVAL) - 1
 
 

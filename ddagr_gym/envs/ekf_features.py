@@ -10,7 +10,14 @@ from numpy.typing import NDArray
 from ddagr_gym.control.observation import EKF_FEATURES, FEATURE_SCALES
 from ddagr_gym.envs.turn_kernel import OBSERVATION_LIMIT
 from ddagr_gym.errors import unknown_name
-from ddagr_gym.estimation import BatchFilter, FilterModel, InertialBatch, InertialModel
+from ddagr_gym.estimation import (
+    BatchFilter,
+    FilterModel,
+    InertialBatch,
+    InertialModel,
+    LearnedBatch,
+    LearnedModel,
+)
 from ddagr_gym.estimation.layout import CHANNEL_SIZE, OMEGA, PARAMETER, PARAMETER_SIZE
 from ddagr_gym.jit import kernel
 from ddagr_gym.parameters import Robot, Sensors
@@ -20,8 +27,8 @@ Array = NDArray[np.float64]
 
 FEATURE_COUNT = len(EKF_FEATURES)
 
-FILTERS = ("flat", "inertial")
-"""Filters that make features: the one that takes the ground for level, and the inertial one."""
+FILTERS = ("flat", "inertial", "learned")
+"""Filters that make features: the one that takes the ground for level, the inertial one, and that with a network."""
 
 
 def check_filter(name: str) -> str:
@@ -67,9 +74,11 @@ class EkfFeatureBatch:
 
     def __init__(self, robot: Robot, sensors: Sensors, count: int, kind: str = "flat") -> None:
         model = FilterModel.of(robot, sensors)
-        self.filter: BatchFilter | InertialBatch = BatchFilter(model, count)
+        self.filter: BatchFilter | InertialBatch | LearnedBatch = BatchFilter(model, count)
         if check_filter(kind) == "inertial":
             self.filter = InertialBatch(InertialModel.of(robot, sensors), count)
+        elif kind == "learned":
+            self.filter = LearnedBatch(LearnedModel.of(robot, sensors), count)
         self._prior = model.soil_prior.logs(model.wheel_load)[0]
         self._outer_radius = model.outer_radius
         self._half_track = robot.half_track

@@ -113,7 +113,8 @@ class TurnSettings(Validated):
         effects: missing physics.
         numerics: accuracy.
         ekf_features: append the filter's estimates to the observation.
-        filter: "flat" takes the ground for level, "inertial" knows slopes; either makes the features.
+        filter: makes the features: "flat" takes the ground for level, "inertial" knows slopes, "learned" is that with
+            its velocities corrected by a trained network.
         calibrated: robots and soils of a calibration, drawn instead of ``robot`` and ``soil``.
     """
 

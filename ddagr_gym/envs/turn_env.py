@@ -52,7 +52,8 @@ class TurnEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     ``ekf_features=True``, or the id ``DDAGR-Turn-EKF-v0``, appends the twelve entries of
     :data:`ddagr_gym.control.observation.EKF_FEATURES`: what the filter makes of the raw samples. ``filter="inertial"``
-    takes the inertial filter, which knows slopes, instead of the one that takes the ground for level.
+    takes the inertial filter, which knows slopes, instead of the one that takes the ground for level, and
+    ``filter="learned"`` that filter with its velocities corrected by a trained network.
 
     ## Reward
     Weighted sum of named terms, :data:`ddagr_gym.envs.turn_kernel.TERMS`; weights by ``reward=RewardWeights(...)``.

@@ -9,7 +9,7 @@ import numpy as np
 
 from ddagr_gym.envs.turn_vector_env import TurnVectorEnv
 from ddagr_gym.errors import InputError
-from ddagr_gym.estimation import BatchFilter, InertialBatch
+from ddagr_gym.estimation import BatchFilter, InertialBatch, LearnedBatch
 
 _SIMULATOR = ("rows", "effect_parameters", "effect_memory", "field_index", "_fields", "_field_geometry")
 _BATCH = ("tasks", "readings", "record", "terms", "commands", "_outer_radius")
@@ -20,7 +20,7 @@ def _arrays(owner: object, names: tuple[str, ...]) -> dict[str, Any]:
     return {name: getattr(owner, name).copy() for name in names}
 
 
-def _filter_arrays(own: BatchFilter | InertialBatch) -> dict[str, Any]:
+def _filter_arrays(own: BatchFilter | InertialBatch | LearnedBatch) -> dict[str, Any]:
     return _arrays(own, own.REMEMBERED)
 
 

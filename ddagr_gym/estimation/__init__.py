@@ -39,7 +39,8 @@ Use: ``Filter(FilterModel(robot)).step(command, reading)``; ``BatchFilter`` for 
 recording; ``estimates`` for speeds, soil, slip and turn radius with their standard deviations.
 
 ``InertialFilter(InertialModel.of(robot, sensors))`` is for ground that slopes and soil that changes: its velocities
-follow the accelerometer, gravity is among its states (theory: filter, section 9).
+follow the accelerometer, gravity is among its states (theory: filter, section 9). ``LearnedFilter`` takes its
+velocities from a trained network instead (section 11).
 """
 
 from ddagr_gym.estimation.closed_form import PlanarMotion, encoder_motion, symmetric_forward_speed
@@ -65,6 +66,13 @@ from ddagr_gym.estimation.inertial_filter import (
     run_inertial_filter,
 )
 from ddagr_gym.estimation.layout import CHANNELS, STATE
+from ddagr_gym.estimation.learned_filter import (
+    LearnedBatch,
+    LearnedFilter,
+    LearnedModel,
+    estimator_names,
+    run_learned_filter,
+)
 from ddagr_gym.estimation.matched_truth import draw_drive
 from ddagr_gym.estimation.steps import Correction, Prediction, correct, predict
 from ddagr_gym.estimation.thesis_filter import THESIS_STATE, ThesisModel, run_thesis_filter
@@ -89,6 +97,9 @@ __all__ = [
     "InertialFilter",
     "InertialKnowledge",
     "InertialModel",
+    "LearnedBatch",
+    "LearnedFilter",
+    "LearnedModel",
     "PlanarMotion",
     "Prediction",
     "Reckoned",
@@ -101,11 +112,13 @@ __all__ = [
     "draw_drive",
     "encoder_motion",
     "estimates",
+    "estimator_names",
     "normalised_estimation_error",
     "predict",
     "roll_out",
     "run_filter",
     "run_inertial_filter",
+    "run_learned_filter",
     "run_thesis_filter",
     "slip_ratio",
     "symmetric_forward_speed",

@@ -13,6 +13,7 @@ from ddagr_gym.estimation.filter_model import FilterModel
 from ddagr_gym.estimation.inertial_filter import InertialFilter, InertialModel
 from ddagr_gym.estimation.inertial_layout import GRAVITY
 from ddagr_gym.estimation.layout import PARAMETER, PARAMETER_SIZE
+from ddagr_gym.estimation.learned_filter import LearnedFilter, LearnedModel
 
 Array = NDArray[np.float64]
 
@@ -59,6 +60,12 @@ def integrate_track(
     return np.column_stack([x, y, yaw])
 
 
+def _filter_of(model: FilterModel | InertialModel | LearnedModel) -> Filter | InertialFilter | LearnedFilter:
+    if isinstance(model, LearnedModel):
+        return LearnedFilter(model)
+    return Filter(model) if isinstance(model, FilterModel) else InertialFilter(model)
+
+
 class DeadReckoning:
     """A filter of one robot and the pose that its velocities lead to; deployable, it sees samples and commands alone.
 
@@ -66,9 +73,9 @@ class DeadReckoning:
         model: what the filter knows; its kind chooses the filter.
     """
 
-    def __init__(self, model: FilterModel | InertialModel) -> None:
+    def __init__(self, model: FilterModel | InertialModel | LearnedModel) -> None:
         flat = model if isinstance(model, FilterModel) else model.flat
-        self._filter = Filter(model) if isinstance(model, FilterModel) else InertialFilter(model)
+        self._filter = _filter_of(model)
         self._period = flat.sample_period
         self.reset(0.0, 0.0, 0.0)
 
@@ -88,7 +95,7 @@ class DeadReckoning:
 
     def _motion(self, command: Array, samples: Array) -> Array:
         """Estimated velocities (K, 3) after each sample."""
-        if isinstance(self._filter, InertialFilter):
+        if not isinstance(self._filter, Filter):
             return self._filter.run(command[None], np.ascontiguousarray(samples))[0][:, :3]
         motion = np.empty((len(samples), 3))
         for k, sample in enumerate(samples):
@@ -101,7 +108,7 @@ class DeadReckoning:
         state = self._filter.state
         soil = np.exp(state[PARAMETER : PARAMETER + PARAMETER_SIZE])
         pull = (0.0, 0.0)
-        if isinstance(self._filter, InertialFilter):
+        if not isinstance(self._filter, Filter):
             pull = (float(state[GRAVITY]), float(state[GRAVITY + 1]))
         x, y, yaw = self._pose.tolist()
         v_x, v_y, yaw_rate = state[:3].tolist()

@@ -28,6 +28,7 @@ from ddagr_gym.estimation import FilterModel
 from ddagr_gym.estimation.dead_reckoning import DeadReckoning
 from ddagr_gym.estimation.force_balance import arc_bank_speeds
 from ddagr_gym.estimation.inertial_filter import InertialModel
+from ddagr_gym.estimation.learned_filter import LearnedModel
 from ddagr_gym.evaluation.calibration import calibrate_constant_speeds
 from ddagr_gym.evaluation.ladder_gains import LadderGains, LoopSettings, ladder_gains
 from ddagr_gym.evaluation.policy_seeds import arm_and_seed, policy_version
@@ -94,6 +95,12 @@ def inertial_model() -> InertialModel:
     return InertialModel.of(ddagr(), Sensors())
 
 
+@lru_cache(maxsize=1)
+def learned_model() -> LearnedModel:
+    """The learned estimator that knows the nominal robot and sensors."""
+    return LearnedModel.of(ddagr(), Sensors())
+
+
 def make_path_tracker(estimator: MotionEstimator, flat: FilterModel, standing: int) -> _Maker:
     """Maker of path trackers by their turn and the ladder's gains.
 
@@ -118,7 +125,7 @@ def make_path_tracker(estimator: MotionEstimator, flat: FilterModel, standing: i
     return make
 
 
-def _reckoned_tracker(model: FilterModel | InertialModel, standing: int) -> _Maker:
+def _reckoned_tracker(model: FilterModel | InertialModel | LearnedModel, standing: int) -> _Maker:
     flat = model if isinstance(model, FilterModel) else model.flat
     return make_path_tracker(DeadReckoning(model), flat, standing)
 
@@ -180,6 +187,10 @@ _LADDER: dict[str, tuple[_Maker, str]] = {
     "B6_flat": (
         _make_flat_tracker,
         "path tracker by the pose of the filter that takes the ground for level",
+    ),
+    "B6_learned": (
+        lambda turn, gains: _reckoned_tracker(learned_model(), STANDING)(turn, gains),
+        "B6 by the velocities of the learned estimator",
     ),
     "true_curvature": (_make_true_curvature, "upper bound, not deployable: PI on the true curvature"),
     "true_soil": (_make_true_soil, "upper bound, not deployable: B4 with the true soil and the true curvature"),
@@ -263,7 +274,8 @@ def controller_version(name: str) -> str:
         from ddagr_gym.evaluation.bundles import bundle_version
 
         return bundle_version(name)
-    return f"{name} {ladder_gains()!r}" + (f" {inertial_model()!r}" if name == "B6" else "")
+    text = f"{name} {ladder_gains()!r}" + (f" {inertial_model()!r}" if name in ("B6", "B6_learned") else "")
+    return text + (f" {learned_model().network.digest()}" if name == "B6_learned" else "")
 
 
 def find_controller(name: str, turn: RowTurn, gains: LadderGains | None = None) -> Controller:

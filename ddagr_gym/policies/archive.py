@@ -8,9 +8,6 @@ from __future__ import annotations
 
 import json
 import os
-import struct
-import zipfile
-import zlib
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -21,16 +18,15 @@ from numpy.typing import NDArray
 from ddagr_gym.config import parse_config
 from ddagr_gym.errors import InputError
 from ddagr_gym.files import atomic_path
+from ddagr_gym.number_files import read_arrays, take_array
 from ddagr_gym.policies.design import PolicyDesign
 
 FORMAT = 1
 """Of the files; another number is refused."""
-MAXIMUM_BYTES = 1_000_000
-"""Largest file that is read."""
-MAXIMUM_UNPACKED = 8_000_000
-"""Largest sum of its members, unpacked."""
 MAXIMUM_LAYERS = 8
 """Most layers of a network (ours): published ones have three."""
+
+_KIND = "a policy"
 
 Weights = NDArray[np.float32]
 
@@ -152,7 +148,7 @@ def load_policy(path: str | os.PathLike[str]) -> Policy:
         InputError: no such file, too large, damaged, of another format, or numbers that do not fit together.
     """
     file = Path(path).expanduser()
-    arrays = _read_arrays(file)
+    arrays = read_arrays(file, _KIND)
     described = _description(file, arrays.pop("description", None))
     design = described.design
     if described.inputs != design.inputs:
@@ -160,7 +156,7 @@ def load_policy(path: str | os.PathLike[str]) -> Policy:
     if not 0.0 < described.clip <= 1e6:
         raise InputError(f"{file}: clip is {described.clip:g}: it must be positive.")
     count = len(design.inputs)
-    mean, deviation = (_array(file, arrays, name, (count,), np.float64) for name in ("mean", "deviation"))
+    mean, deviation = (take_array(file, arrays, name, (count,), np.float64, _KIND) for name in ("mean", "deviation"))
     if not (deviation > 0.0).all():
         raise InputError(f"{file}: deviation holds values that are not positive.")
     weights, biases = _layers(file, arrays, count, described.outputs)
@@ -170,26 +166,6 @@ def load_policy(path: str | os.PathLike[str]) -> Policy:
         design, weights, biases, mean, deviation, described.clip, described.activation, described.squashed,
         asdict(described.training),
     )  # fmt: skip
-
-
-def _read_arrays(file: Path) -> dict[str, NDArray[Any]]:
-    try:
-        size = file.stat().st_size
-        if size > MAXIMUM_BYTES:
-            raise InputError(f"{file} has {size} bytes: a policy may have {MAXIMUM_BYTES} at most.")
-        with zipfile.ZipFile(file) as archive:
-            unpacked = sum(member.file_size for member in archive.infolist())
-        if unpacked > MAXIMUM_UNPACKED:
-            raise InputError(f"{file} unpacks to {unpacked} bytes: a policy may have {MAXIMUM_UNPACKED} at most.")
-        with np.load(file, allow_pickle=False) as archive:
-            return {name: archive[name] for name in archive.files}
-    except InputError:
-        raise
-    except OSError as error:
-        raise InputError(f"{file} cannot be read: {(error.strerror or 'not a policy').lower()}.") from None
-    except (zipfile.BadZipFile, zlib.error, struct.error, ValueError, KeyError, EOFError, NotImplementedError,
-            RuntimeError, SyntaxError, TypeError, MemoryError):  # fmt: skip
-        raise InputError(f"{file} is not a policy: give an .npz file that `ddagr train` wrote.") from None
 
 
 def _description(file: Path, stored: NDArray[Any] | None) -> Description:
@@ -205,19 +181,6 @@ def _description(file: Path, stored: NDArray[Any] | None) -> Description:
     return parse_config(text, Description, source=str(file))
 
 
-def _array(
-    file: Path, arrays: dict[str, NDArray[Any]], name: str, shape: tuple[int, ...], kind: type[np.floating[Any]]
-) -> NDArray[Any]:
-    value = arrays.pop(name, None)
-    if value is None:
-        raise InputError(f"{file} is not a policy: it has no {name!r}.")
-    if value.shape != shape or value.dtype != kind:
-        raise InputError(f"{file}: {name} is {value.dtype} of shape {value.shape}: {kind.__name__} {shape} expected.")
-    if not np.isfinite(value).all():
-        raise InputError(f"{file}: {name} holds values that are not finite.")
-    return value
-
-
 def _layers(
     file: Path, arrays: dict[str, NDArray[Any]], inputs: int, outputs: int
 ) -> tuple[tuple[Weights, ...], tuple[Weights, ...]]:
@@ -227,7 +190,7 @@ def _layers(
     weights, biases = [], []
     for k in range(count):
         units = outputs if k == count - 1 else int(np.size(arrays.get(f"bias_{k}", ())))
-        weights.append(_array(file, arrays, f"weight_{k}", (units, inputs), np.float32))
-        biases.append(_array(file, arrays, f"bias_{k}", (units,), np.float32))
+        weights.append(take_array(file, arrays, f"weight_{k}", (units, inputs), np.float32, _KIND))
+        biases.append(take_array(file, arrays, f"bias_{k}", (units,), np.float32, _KIND))
         inputs = units
     return tuple(weights), tuple(biases)

@@ -6,6 +6,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from ddagr_gym.errors import InputError, unknown_name
+from ddagr_gym.files import shipped_folder
 from ddagr_gym.policies.archive import Policy, load_policy
 
 SUFFIX, SEPARATOR = ".npz", "@"
@@ -14,11 +15,7 @@ SUFFIX, SEPARATOR = ".npz", "@"
 
 def policies_dir() -> Path:
     """Folder of the trained policies: ``agents/policies`` of the checkout, else the installed package's."""
-    package = Path(__file__).resolve().parents[1]
-    checkout = package.parent / "agents" / "policies"
-    if checkout.is_dir() and (package.parent / "pyproject.toml").is_file():
-        return checkout
-    return package / "data" / "policies"
+    return shipped_folder("policies")
 
 
 def policy_files() -> dict[str, Path]:

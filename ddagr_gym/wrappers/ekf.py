@@ -26,7 +26,7 @@ class EKFObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArg
 
     Args:
         env: a :class:`ddagr_gym.envs.TurnEnv` made with ``info_level="full"``.
-        filter: "flat" takes the ground for level, "inertial" knows slopes.
+        filter: "flat" takes the ground for level, "inertial" knows slopes, "learned" corrects it by a network.
 
     Raises:
         InputError: an unknown filter; at the first reset of an environment without raw samples in its info.

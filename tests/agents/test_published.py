@@ -15,7 +15,8 @@ from agents.run import validation_episodes
 from agents.train_all import PUBLISHED
 from agents.validation import drive_all
 from ddagr_gym.envs.options import make_settings
-from ddagr_gym.policies.archive import MAXIMUM_BYTES, load_policy
+from ddagr_gym.number_files import MAXIMUM_BYTES
+from ddagr_gym.policies.archive import load_policy
 from ddagr_gym.policies.controller import policy_controller
 from ddagr_gym.policies.shipped import policies_dir, selected_policies
 

@@ -35,6 +35,7 @@ MAKERS = [
     pytest.param(functools.partial(gymnasium.make, TURN_EKF_ID, filter="inertial", info_level="full"), id="inertial"),
     pytest.param(filtered, id="wrapped"),
     pytest.param(functools.partial(filtered, "inertial"), id="wrapped-inertial"),
+    pytest.param(functools.partial(gymnasium.make, TURN_EKF_ID, filter="learned", info_level="full"), id="learned"),
 ]
 
 

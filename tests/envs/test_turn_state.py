@@ -21,7 +21,8 @@ def drive(env, steps, seed):
     return seen
 
 
-@pytest.mark.parametrize("options", [{}, {"ekf_features": True}, {"ekf_features": True, "filter": "inertial"}])
+@pytest.mark.parametrize("options", [{}, {"ekf_features": True}, {"ekf_features": True, "filter": "inertial"},
+                                     {"ekf_features": True, "filter": "learned"}])  # fmt: skip
 def test_a_fresh_batch_goes_on_to_the_bit(options):
     arguments = {"num_envs": 3, "max_episode_steps": 12, "autoreset_mode": "SameStep", **options}
     env = TurnVectorEnv(**arguments)

@@ -84,6 +84,18 @@ def test_the_python_functions_work():
     assert "<table" in estimated._repr_html_()
 
 
+def test_learned_estimators_run_without_torch():
+    from ddagr_gym.estimation import estimator_names
+
+    assert estimator_names() == ("alone", "correction", "features")
+    environment = gymnasium.make("DDAGR-Turn-EKF-v0", filter="learned")
+    environment.reset(seed=1)
+    for _ in range(40):
+        observation, *_ = environment.step(np.array([0.6, 0.6], dtype=np.float32))
+    assert observation[12] > 0.1  # the estimated speed: it drives
+    environment.close()
+
+
 def test_trained_policies_drive_without_torch():
     from ddagr_gym.policies.controller import policy_controller
     from ddagr_gym.policies.shipped import policies_dir, policy_names

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from ddagr_gym.errors import InputError
-from ddagr_gym.policies.archive import MAXIMUM_BYTES, MAXIMUM_UNPACKED, Policy, load_policy, save_policy
+from ddagr_gym.number_files import MAXIMUM_BYTES, MAXIMUM_UNPACKED
+from ddagr_gym.policies.archive import Policy, load_policy, save_policy
 from ddagr_gym.policies.design import PolicyDesign
 
 DESIGN = PolicyDesign()

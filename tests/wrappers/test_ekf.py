@@ -71,7 +71,7 @@ def test_filters_that_cannot_be_are_one_sentence():
         gymnasium.make(TURN_ID, filter="inertial")
 
 
-@pytest.mark.parametrize("filter", ["flat", "inertial"])
+@pytest.mark.parametrize("filter", ["flat", "inertial", "learned"])
 def test_features_follow_the_truth(filter):
     env = gymnasium.make(
         TURN_EKF_ID, soil="thesis_a1", randomisation=False, info_level="full", side="left", filter=filter

@@ -1,0 +1,125 @@
+"""What is published of a learned estimator: its network, the record of its training with a picture, and a card."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from agents.velocity_drives import Plan
+from agents.velocity_training import VelocityTraining
+from ddagr_gym.estimation.learned_inputs import SENSOR_INPUTS
+from ddagr_gym.estimation.learned_network import VelocityNetwork, save_network
+from ddagr_gym.files import atomic_path, make_folder, write_json, write_text
+from ddagr_gym.rendering import palette
+from ddagr_gym.reporting.figures import house_style
+
+
+def publish_estimator(training: VelocityTraining, network: VelocityNetwork, plan: Plan, folder: Path) -> None:
+    """Write ``folder``: network.npz, training.json, training.png, README.md."""
+    make_folder(folder)
+    save_network(network, folder / "network.npz")
+    record: dict[str, Any] = {
+        "name": training.name,
+        "settings": asdict(training.settings),
+        "plan": asdict(plan),
+        "calibration": network.description.calibration,
+        "cpu_seconds": round(training.cpu_seconds),
+        "course": training.course,
+    }
+    write_json(folder / "training.json", record)
+    draw_training(record, folder / "training.png")
+    write_text(folder / "README.md", card(record, training.variant.description, len(network.description.inputs)))
+
+
+def draw_training(record: dict[str, Any], path: Path) -> None:
+    """Errors and coverage on the validation turns over training; PNG."""
+    course = record["course"]
+    passes = range(1, len(course) + 1)
+    with house_style():
+        from matplotlib.figure import Figure
+
+        figure = Figure(figsize=(7.4, 3.0), layout="constrained")
+        errors, covered = figure.subplots(1, 2)
+        for name, colour in (("v_x", palette.BLUE), ("v_y", palette.ORANGE)):
+            for kind, style, label in (("median", "-", name), ("rmse", ":", f"{name}, root mean square")):
+                errors.plot(
+                    passes, [entry[f"{name}_{kind}_mm_s"] for entry in course], style, color=colour, label=label
+                )
+            covered.plot(passes, [100.0 * entry[f"{name}_covered"] for entry in course], color=colour, label=name)
+        errors.set(
+            xlabel="passes over the turns", title="error on validation [mm/s], median", yscale="log", ylim=(1.0, 100.0)
+        )
+        errors.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+        covered.axhline(90.0, color=palette.VERMILLION, linestyle=(0, (4, 2)), linewidth=1.0)
+        covered.set(xlabel="passes over the turns", title="covered of 90 % [%], before calibration")
+        figure.legend(*errors.get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False)
+        with atomic_path(path) as temporary:
+            figure.savefig(temporary, dpi=130.0, metadata={"Software": None})
+
+
+def card(record: dict[str, Any], description: str, inputs: int) -> str:
+    """Card in Markdown."""
+    settings, last, plan = record["settings"], record["course"][-1], record["plan"]
+    shares = ", ".join(f"{key.replace('_', ' ')} {100.0 * value:.0f} %" for key, value in plan.items())
+    v_x, v_y = record["calibration"]
+    filtered = "" if inputs == len(SENSOR_INPUTS) else ", and the inertial filter's state, deviations and innovations"
+    return "\n".join(
+        [
+            f"# {record['name']}: learned estimator that {description}",
+            "",
+            "A recurrent network (gated recurrent unit) that estimates forward speed and side slip of a DDAGR robot in "
+            "a row turn, with their covariance, from gyro, accelerometer, encoders and commands. It learnt from "
+            "simulated turns alone and has never seen a robot's own recording.",
+            "",
+            "## Use",
+            "",
+            "```python",
+            "from ddagr_gym.estimation import LearnedModel, run_learned_filter",
+            "from ddagr_gym.parameters import Sensors",
+            "from ddagr_gym.presets import ddagr",
+            "",
+            f'model = LearnedModel.of(ddagr(), Sensors(), "{record["name"]}")',
+            "states, velocities, covariances = run_learned_filter(model, columns)",
+            "```",
+            "",
+            "`network.npz` holds weights, normalisation and a JSON description, no pickle; numpy runs it.",
+            "",
+            "## What it sees",
+            "",
+            f"{inputs} inputs every 0.08 s: means of the last ten samples' halves (25 Hz), commands, heading by the "
+            f"gyro, means over the rest before the drive{filtered}.",
+            "",
+            "## How it was trained",
+            "",
+            f"- {settings['turns']} simulated turns, numbers 0 to {settings['turns'] - 1} of the seed "
+            f"{settings['root_seed']}; the next {settings['validation']} are its validation. No scenario of a frozen "
+            "set took part.",
+            "- Driven by B6 (60 %), B4 (25 %) and two constant speeds (15 %), their gains times a half to two, their "
+            "commands wandering in most turns; 0.3 to 1.3 s of standing first.",
+            f"- Shares of turns: {shares}. Slopes up to 6 degrees, lateral forces x 0.75 to 1.3, strength and "
+            "stiffness x 0.6 to 1.6 from some time on, dead time up to 0.25 s, mass x 0.9 to 1.25, variation of the "
+            "soil up to 10 %.",
+            f"- Gaussian likelihood of v_x and v_y with their correlation; {settings['units']} units, "
+            f"{settings['epochs']} passes, seed {settings['seed']}; turns mirrored at random; "
+            f"{record['cpu_seconds']} CPU seconds.",
+            "",
+            "## Validation",
+            "",
+            f"On {settings['validation']} turns of the same draws, while driving: v_x {last['v_x_rmse_mm_s']:.1f} mm/s "
+            f"(median {last['v_x_median_mm_s']:.1f}), v_y {last['v_y_rmse_mm_s']:.1f} mm/s "
+            f"(median {last['v_y_median_mm_s']:.1f}); of 90 % intervals {100 * last['v_x_covered']:.0f} and "
+            f"{100 * last['v_y_covered']:.0f} % were covered. Calibrated by the factors {v_x:.2f} and {v_y:.2f} on the "
+            "deviations, with which 90 % are covered on these turns. Root mean squares are those of the few turns on "
+            "which the robot gets stuck or the filter diverges.",
+            "",
+            "![Course of training](training.png)",
+            "",
+            "## Limits",
+            "",
+            "It knows this robot, these sensors at 125 Hz and commands every ten samples. Slopes, soil that changes "
+            "and scaled lateral forces were in its training; another law of the soil was not. Where it fails, and how "
+            "it compares with the filters, is in `benchmarks/results/learned_estimator.json` and `docs/results.md`.",
+            "",
+        ]
+    )

@@ -1,0 +1,257 @@
+"""The learned estimator: velocities by a trained network, all else by the inertial filter.
+
+Theory: filter, section 11.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ddagr_gym.errors import InputError, unknown_name
+from ddagr_gym.estimation.columns import stack_columns
+from ddagr_gym.estimation.filter_model import FilterModel
+from ddagr_gym.estimation.inertial_filter import InertialBatch, InertialFilter, InertialModel
+from ddagr_gym.estimation.layout import CHANNELS, COMMANDS
+from ddagr_gym.estimation.learned_inputs import MEMORY_SIZE, block_inputs, mean_rim_speed
+from ddagr_gym.estimation.learned_network import VelocityNetwork, load_network, velocity_base
+from ddagr_gym.files import shipped_folder
+from ddagr_gym.parameters import Robot, Sensors
+
+Array = NDArray[np.float64]
+
+FILE = "network.npz"
+"""Of a published estimator, in a folder of its name."""
+
+
+def estimator_names() -> tuple[str, ...]:
+    """Names of the estimators that come with the package."""
+    return tuple(sorted(file.parent.name for file in shipped_folder("estimators").glob(f"*/{FILE}")))
+
+
+@lru_cache(maxsize=16)
+def find_network(name: str) -> VelocityNetwork:
+    """Network of a published estimator by name, or of a path that ends in ``.npz``.
+
+    Raises:
+        InputError: no such estimator, with the closest names, or a file that is not one.
+    """
+    if name.endswith(".npz"):
+        return load_network(name)
+    if name not in estimator_names():
+        raise unknown_name("estimator", name, estimator_names())
+    return load_network(Path(shipped_folder("estimators")) / name / FILE)
+
+
+DEFAULT_ESTIMATOR = "correction"
+"""That ``filter="learned"`` stands for."""
+
+
+@dataclass(frozen=True)
+class LearnedModel:
+    """Model of the learned estimator.
+
+    Attributes:
+        inertial: of the filter that runs beside the network and makes soil, gravity and yaw rate.
+        network: of the velocities.
+    """
+
+    inertial: InertialModel
+    network: VelocityNetwork
+
+    def __post_init__(self) -> None:
+        period, own = self.inertial.flat.sample_period, self.network.description.sample_period
+        if abs(period - own) > 1e-6 * own:
+            raise InputError(
+                f"the sensors' period is {period:g} s and the network was trained for {own:g} s: give sensors of that "
+                "rate."
+            )
+
+    @classmethod
+    def of(cls, robot: Robot, sensors: Sensors, estimator: str = DEFAULT_ESTIMATOR) -> LearnedModel:
+        """Model of a robot with its instruments, and a published estimator or a file (:func:`find_network`)."""
+        return cls(InertialModel.of(robot, sensors), find_network(estimator))
+
+    @property
+    def flat(self) -> FilterModel:
+        """Robot, sensors and soil, as for the filter that takes the ground for level."""
+        return self.inertial.flat
+
+
+class _Velocities:
+    """The network of N robots and what it remembers of them."""
+
+    def __init__(self, model: LearnedModel, count: int) -> None:
+        flat = model.inertial.flat
+        self.network = model.network
+        self.estimates = np.zeros((count, 2))
+        self.covariances = np.zeros((count, 2, 2))
+        self.units = np.zeros((count, model.network.units), dtype=np.float32)
+        self.blocks = np.zeros((count, MEMORY_SIZE))
+        self._chosen = model.network.chosen
+        self._period, self._outer_radius = flat.sample_period, flat.outer_radius
+        self._prior = flat.soil_prior.logs(flat.wheel_load)[0]
+
+    def reset(self, chosen: NDArray[np.intp], covariance: Array) -> None:
+        """Forget robots; they are at rest with a covariance (2, 2)."""
+        for own in (self.estimates, self.units, self.blocks):
+            own[chosen] = 0.0
+        self.covariances[chosen] = covariance
+
+    def update(self, commands: Array, readings: Array, states: Array, covariances: Array, innovations: Array) -> None:
+        """Through one block (:func:`~ddagr_gym.estimation.learned_inputs.block_inputs`)."""
+        samples = self.network.description.samples
+        if readings.shape[1] != samples:
+            raise InputError(f"{readings.shape[1]} samples under one command: the network takes {samples} at a time.")
+        inputs = block_inputs(
+            self.blocks, commands, readings, states, covariances, innovations, self._period, self._outer_radius,
+            self._prior,
+        )  # fmt: skip
+        outputs = self.network.step(inputs[:, self._chosen], self.units)
+        rim = mean_rim_speed(readings, self._outer_radius)
+        base = velocity_base(self.network.description.base, rim, states[:, :2])
+        self.estimates[:], self.covariances[:] = self.network.estimate(outputs, base)
+
+
+class LearnedBatch:
+    """Learned estimators of N robots that share one model, with the face of :class:`~ddagr_gym.estimation.BatchFilter`.
+
+    A step takes the samples of one block, as many as the network was trained for.
+
+    Args:
+        model: what the estimators know.
+        count: N.
+    """
+
+    REMEMBERED = ("works", "counts", "estimates", "velocity_covariances", "units", "blocks")
+    """Arrays that it goes on from."""
+
+    def __init__(self, model: LearnedModel, count: int = 1) -> None:
+        self.model = model
+        self.count = count
+        self._inertial = InertialBatch(model.inertial, count)
+        self._velocities = _Velocities(model, count)
+        self.works, self.counts = self._inertial.works, self._inertial._counts
+        own = self._velocities
+        self.estimates, self.velocity_covariances, self.units, self.blocks = (
+            own.estimates, own.covariances, own.units, own.blocks,
+        )  # fmt: skip
+        self.reset()
+
+    @property
+    def states(self) -> Array:
+        """(N, 15) of the inertial filter, with the network's v_x and v_y; a copy."""
+        found = self._inertial.states
+        found[:, :2] = self.estimates
+        return found
+
+    @property
+    def covariances(self) -> Array:
+        """(N, 15, 15) of the inertial filter, with the network's for v_x and v_y; a copy."""
+        return with_velocity_block(self._inertial.covariances, self.velocity_covariances)
+
+    def reset(self, chosen: ArrayLike | None = None) -> None:
+        """Start from the prior, at rest; ``chosen``: indices of robots, all by default."""
+        indices = np.arange(self.count) if chosen is None else np.atleast_1d(np.asarray(chosen))
+        self._inertial.reset(indices)
+        self._velocities.reset(indices, self.model.inertial.initial()[1][:2, :2])
+
+    def step(self, commands: ArrayLike, readings: ArrayLike) -> Array:
+        """Through the samples of one block.
+
+        Args:
+            commands: (N, 2) right and left bank speed commands, constant over the samples [rad/s].
+            readings: (N, K, 5) in the order of ``CHANNELS``; NaN where a channel has no sample.
+
+        Returns:
+            Standardised innovations of the inertial filter (N, K, 5).
+
+        Raises:
+            InputError: shapes that do not fit.
+        """
+        drive = np.ascontiguousarray(commands, dtype=np.float64)
+        samples = np.ascontiguousarray(readings, dtype=np.float64)
+        innovations = self._inertial.step(drive, samples)
+        inertial = self._inertial
+        self._velocities.update(drive, samples, inertial.states, inertial.covariances, innovations)
+        return innovations
+
+
+def with_velocity_block(covariances: Array, velocities: Array) -> Array:
+    """Covariances (N, 15, 15), changed: with another block of v_x and v_y (N, 2, 2), independent of the rest."""
+    covariances[:, :2, :] = covariances[:, :, :2] = 0.0
+    covariances[:, :2, :2] = velocities
+    return covariances
+
+
+class LearnedFilter:
+    """Learned estimator of one robot.
+
+    Args:
+        model: what the estimator knows.
+    """
+
+    def __init__(self, model: LearnedModel) -> None:
+        self.model = model
+        self._inertial = InertialFilter(model.inertial)
+        self._velocities = _Velocities(model, 1)
+        self.reset()
+
+    @property
+    def state(self) -> Array:
+        """(15,) of the inertial filter, with the network's v_x and v_y; a copy."""
+        found = self._inertial.state.copy()
+        found[:2] = self._velocities.estimates[0]
+        return found
+
+    @property
+    def covariance(self) -> Array:
+        """(15, 15) of the inertial filter, with the network's for v_x and v_y; a copy."""
+        return with_velocity_block(self._inertial.covariance[None].copy(), self._velocities.covariances)[0]
+
+    def reset(self) -> None:
+        """Start again from the prior, at rest."""
+        self._inertial.reset()
+        self._velocities.reset(np.arange(1), self.model.inertial.initial()[1][:2, :2])
+
+    def run(self, commands: Array, readings: Array) -> tuple[Array, Array]:
+        """Through the samples of one block.
+
+        Args:
+            commands: (1, 2) right and left bank speed commands [rad/s].
+            readings: (K, 5) in the order of ``CHANNELS``; NaN where a channel has no sample.
+
+        Returns:
+            States after each sample (K, 15), in which the network's velocities lie on a line from block to block, and
+            the inertial filter's standardised innovations (K, 5).
+        """
+        before = self._velocities.estimates[0].copy()
+        states, innovations = self._inertial.run(commands, np.ascontiguousarray(readings))
+        own = self._inertial
+        self._velocities.update(commands, readings[None], own.state[None], own.covariance[None], innovations[None])
+        share = np.arange(1.0, len(readings) + 1.0)[:, None] / len(readings)
+        states[:, :2] = before + share * (self._velocities.estimates[0] - before)
+        return states, innovations
+
+
+def run_learned_filter(model: LearnedModel, columns: Mapping[str, ArrayLike]) -> tuple[Array, Array, Array]:
+    """Filter a recording at the sensors' rate, whose commands change at every block.
+
+    Returns:
+        States after each sample (T, 15), and v_x, v_y after each block (B, 2) with their covariances (B, 2, 2); an
+        incomplete last block is left out.
+    """
+    commands, readings = stack_columns(columns, COMMANDS, np.nan), stack_columns(columns, CHANNELS, np.nan)
+    one, samples = LearnedFilter(model), model.network.description.samples
+    states, velocities, covariances = [], [], []
+    for first in range(0, len(readings) - samples + 1, samples):
+        block = slice(first, first + samples)
+        states.append(one.run(commands[first : first + 1], readings[block])[0])
+        velocities.append(one.state[:2])
+        covariances.append(one.covariance[:2, :2])
+    return np.concatenate(states), np.array(velocities), np.array(covariances)

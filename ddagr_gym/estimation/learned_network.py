@@ -1,0 +1,230 @@
+"""The recurrent network of the learned estimator as plain numbers: numpy runs it, one npz file holds it.
+
+A gated recurrent unit (K. Cho et al., 2014, in the form of ``torch.nn.GRU``) and one linear layer on its memory h::
+
+    r = sigmoid(W_ir x + b_ir + W_hr h + b_hr),  z = sigmoid(W_iz x + b_iz + W_hz h + b_hz)
+    n = tanh(W_in x + b_in + r (W_hn h + b_hn)),  h <- (1 - z) n + z h,  o = W_o h + b_o
+
+The five outputs o are two velocities over VELOCITY_SCALE, the logs of two standard deviations over it, and atanh of the
+correlation over LARGEST_CORRELATION.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import os
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ddagr_gym.errors import InputError, unknown_name
+from ddagr_gym.estimation.learned_inputs import INPUTS
+from ddagr_gym.files import atomic_path
+from ddagr_gym.number_files import read_arrays, take_array
+
+Array = NDArray[np.float64]
+Weights = NDArray[np.float32]
+
+FORMAT = 1
+"""Of the files; another number is refused."""
+VELOCITY_SCALE = 0.01
+"""Of the outputs that are velocities [m/s]."""
+LEAST_LOG, LARGEST_LOG = math.log(0.02), math.log(50.0)
+"""Of a standard deviation over VELOCITY_SCALE: 0.2 mm/s to 0.5 m/s."""
+LARGEST_CORRELATION = 0.98
+OUTPUTS = 5
+BASES = ("rim", "filter")
+"""What the velocities are added to: the mean rim speed and no side slip, or the inertial filter's."""
+
+LARGEST_SLIP_SPEED, LARGEST_SIDE_SPEED = 0.35, 0.25
+"""How far the filter's v_x may be from the mean rim speed, and its v_y from zero, where it is a base [m/s] (ours): a
+filter that diverges must not take the network with it."""
+
+_KIND = "an estimator's network"
+_MOST_UNITS = 512
+
+
+@dataclass(frozen=True)
+class NetworkDescription:
+    """The JSON description inside a file.
+
+    Attributes:
+        format: of the file.
+        name: of the estimator.
+        inputs: names of its inputs, of ``learned_inputs.INPUTS``.
+        base: of BASES.
+        samples: of a block.
+        sample_period: between them [s].
+        calibration: factors on the standard deviations of v_x and v_y.
+        training: where it comes from.
+    """
+
+    format: int
+    name: str
+    inputs: tuple[str, ...]
+    base: str
+    samples: int
+    sample_period: float
+    calibration: tuple[float, float]
+    training: dict[str, Any]
+
+
+@dataclass(frozen=True, eq=False)
+class VelocityNetwork:
+    """A trained network.
+
+    Attributes:
+        description: what it is.
+        input_weight: (3 H, I) of r, z, n in this order.
+        memory_weight: (3 H, H).
+        input_bias: (3 H,).
+        memory_bias: (3 H,).
+        output_weight: (5, H).
+        output_bias: (5,).
+        mean: (I,) subtracted from the inputs.
+        deviation: (I,) that they are divided by.
+        clip: of the normalised inputs.
+    """
+
+    description: NetworkDescription
+    input_weight: Weights
+    memory_weight: Weights
+    input_bias: Weights
+    memory_bias: Weights
+    output_weight: Weights
+    output_bias: Weights
+    mean: Array
+    deviation: Array
+    clip: float = 8.0
+
+    @property
+    def units(self) -> int:
+        """H."""
+        return self.memory_weight.shape[1]
+
+    def digest(self) -> str:
+        """SHA-256 of its numbers and its description."""
+        parts = [getattr(self, name).tobytes() for name in _shapes(0, 0)]
+        return hashlib.sha256(b"".join([*parts, repr((self.description, self.clip)).encode()])).hexdigest()
+
+    @property
+    def chosen(self) -> NDArray[np.intp]:
+        """Places of its inputs among all INPUTS."""
+        return np.array([INPUTS.index(name) for name in self.description.inputs])
+
+    def step(self, inputs: Array, memory: Weights) -> Weights:
+        """Outputs (N, 5) for inputs (N, I); ``memory`` (N, H), zero at the start, is changed."""
+        normal = np.clip((inputs - self.mean) / self.deviation, -self.clip, self.clip).astype(np.float32)
+        # a product for each row: its bits do not depend on how many rows there are
+        by_input = (normal[:, None] @ self.input_weight.T)[:, 0] + self.input_bias
+        by_memory = (memory[:, None] @ self.memory_weight.T)[:, 0] + self.memory_bias
+        units = self.units
+        reset, keep = (
+            1.0 / (1.0 + np.exp(-(by_input[:, part] + by_memory[:, part])))
+            for part in (slice(units), slice(units, 2 * units))
+        )
+        candidate = np.tanh(by_input[:, 2 * units :] + reset * by_memory[:, 2 * units :])
+        memory[:] = (1.0 - keep) * candidate + keep * memory
+        outputs: Weights = (memory[:, None] @ self.output_weight.T)[:, 0] + self.output_bias
+        return outputs
+
+    def estimate(self, outputs: Weights, base: Array) -> tuple[Array, Array]:
+        """v_x, v_y (N, 2) [m/s] and covariances (N, 2, 2) of outputs (N, 5) on a base (N, 2) [m/s]."""
+        raw = outputs.astype(np.float64)
+        deviations = VELOCITY_SCALE * np.exp(np.clip(raw[:, 2:4], LEAST_LOG, LARGEST_LOG))
+        deviations *= self.description.calibration
+        covariances = np.empty((len(raw), 2, 2))
+        covariances[:, [0, 1], [0, 1]] = deviations**2
+        shared = LARGEST_CORRELATION * np.tanh(raw[:, 4]) * deviations.prod(axis=1)
+        covariances[:, 0, 1] = covariances[:, 1, 0] = shared
+        return base + VELOCITY_SCALE * raw[:, :2], covariances
+
+
+def velocity_base(base: str, rim: Array, filtered: Array) -> Array:
+    """What a network's velocities are added to (..., 2) [m/s].
+
+    Args:
+        base: of BASES.
+        rim: mean rim speed (...).
+        filtered: v_x, v_y (..., 2) of the inertial filter.
+    """
+    if base == "rim":
+        return np.stack([rim, np.zeros_like(rim)], axis=-1)
+    slip = np.clip(filtered[..., 0] - rim, -LARGEST_SLIP_SPEED, LARGEST_SLIP_SPEED)
+    return np.stack([rim + slip, np.clip(filtered[..., 1], -LARGEST_SIDE_SPEED, LARGEST_SIDE_SPEED)], axis=-1)
+
+
+def save_network(network: VelocityNetwork, path: str | os.PathLike[str]) -> Path:
+    """Write a network; the same one gives the same bytes."""
+    arrays: dict[str, NDArray[Any]] = {name: getattr(network, name) for name in _shapes(0, 0)}
+    text = json.dumps(asdict(network.description) | {"clip": network.clip}, sort_keys=True)
+    arrays["description"] = np.frombuffer(text.encode(), dtype=np.uint8)
+    with atomic_path(path) as temporary:
+        np.savez_compressed(temporary, **arrays)  # type: ignore[arg-type]
+    return Path(path)
+
+
+def load_network(path: str | os.PathLike[str]) -> VelocityNetwork:
+    """Read a network and check all of it.
+
+    Raises:
+        InputError: no such file, too large, damaged, of another format, or numbers that do not fit together.
+    """
+    file = Path(path).expanduser()
+    arrays = read_arrays(file, _KIND)
+    described, clip = _description(file, arrays.pop("description", None))
+    units = int(np.size(arrays.get("input_bias", ()))) // 3
+    if not 1 <= units <= _MOST_UNITS:
+        raise InputError(f"{file} has {units} units: 1 to {_MOST_UNITS} expected.")
+    shapes = _shapes(len(described.inputs), units)
+    found = {name: take_array(file, arrays, name, *wanted, _KIND) for name, wanted in shapes.items()}
+    if arrays:
+        raise InputError(f"{file}: {sorted(arrays)[0]!r} is not part of {_KIND}.")
+    if not (found["deviation"] > 0.0).all():
+        raise InputError(f"{file}: deviation holds values that are not positive.")
+    return VelocityNetwork(described, **found, clip=clip)
+
+
+def _shapes(inputs: int, units: int) -> dict[str, tuple[tuple[int, ...], type[np.floating[Any]]]]:
+    """Shape and type of every array."""
+    return {
+        "input_weight": ((3 * units, inputs), np.float32),
+        "memory_weight": ((3 * units, units), np.float32),
+        "input_bias": ((3 * units,), np.float32),
+        "memory_bias": ((3 * units,), np.float32),
+        "output_weight": ((OUTPUTS, units), np.float32),
+        "output_bias": ((OUTPUTS,), np.float32),
+        "mean": ((inputs,), np.float64),
+        "deviation": ((inputs,), np.float64),
+    }
+
+
+def _description(file: Path, stored: NDArray[Any] | None) -> tuple[NetworkDescription, float]:
+    if stored is None or stored.dtype != np.uint8 or stored.ndim != 1:
+        raise InputError(f"{file} is not {_KIND}: it has no description.")
+    try:
+        content = json.loads(stored.tobytes().decode())
+        clip = float(content.pop("clip"))
+        content["inputs"], content["calibration"] = tuple(content["inputs"]), tuple(content["calibration"])
+        described = NetworkDescription(**content)
+        low, high = (float(value) for value in described.calibration)
+        samples, period = int(described.samples), float(described.sample_period)
+    except (ValueError, AttributeError, KeyError, TypeError, RecursionError):
+        raise InputError(f"{file} is not {_KIND}: its description is incomplete.") from None
+    if described.format != FORMAT:
+        raise InputError(f"{file} has format {described.format!r}: this version reads {FORMAT}.")
+    if described.base not in BASES:
+        raise unknown_name("base", str(described.base), BASES)
+    unknown = [name for name in described.inputs if name not in INPUTS]
+    if unknown or not described.inputs:
+        raise InputError(f"{file}: its inputs are not those of this version: train anew.")
+    if not (min(low, high, clip, period) > 0.0 and max(low, high, clip, period) < 1e6):
+        raise InputError(f"{file}: clip, calibration and sample period must be positive.")
+    if not 2 <= samples <= 1000 or samples % 2:
+        raise InputError(f"{file} has {samples} samples in a block: give an even number up to 1000.")
+    return described, clip
