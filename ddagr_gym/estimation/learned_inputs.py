@@ -100,13 +100,13 @@ def block_inputs(
 
 def mean_rim_speed(readings: Array, outer_radius: float) -> Array:
     """Of both banks over a block (N,) [m/s], from readings (N, K, 5)."""
-    return outer_radius * _means(readings[..., ENCODER_CHANNEL:]).mean(axis=1)  # type: ignore[no-any-return]
+    return np.asarray(outer_radius * _means(readings[..., ENCODER_CHANNEL:]).mean(axis=1))
 
 
 def _means(samples: Array) -> Array:
     """Means over the last axis but one of what is not missing; 0 where all is."""
     known = np.isfinite(samples)
-    return np.where(known, samples, 0.0).sum(axis=-2) / np.maximum(known.sum(axis=-2), 1)  # type: ignore[no-any-return]
+    return np.asarray(np.where(known, samples, 0.0).sum(axis=-2) / np.maximum(known.sum(axis=-2), 1))
 
 
 def _rest(memory: Array, commands: Array, readings: Array) -> None:
