@@ -90,8 +90,8 @@ def test_learned_estimators_run_without_torch():
     assert estimator_names() == ("alone", "correction", "features")
     environment = gymnasium.make("DDAGR-Turn-EKF-v0", filter="learned")
     environment.reset(seed=1)
-    for _ in range(40):
-        observation, *_ = environment.step(np.array([0.6, 0.6], dtype=np.float32))
+    for command in (*[0.0] * 5, *[0.6] * 40):  # it stands first: that shows the filter beside it how the ground slopes
+        observation, *_ = environment.step(np.full(2, command, dtype=np.float32))
     assert observation[12] > 0.1  # the estimated speed: it drives
     environment.close()
 

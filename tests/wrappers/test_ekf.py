@@ -106,3 +106,16 @@ def test_the_old_name_says_the_new_one():
 
     with pytest.warns(DeprecationWarning, match="EKFObservation"):
         assert ekf.EkfFeatures is EKFObservation
+
+
+@pytest.mark.parametrize("name", ["inertial", "learned"])
+def test_after_three_steps_of_standing_the_filter_is_not_misled_by_a_hard_start(name):
+    """Straight on at a rim speed of 0.32 m/s, on soils of the default range."""
+    environment = gymnasium.make(TURN_EKF_ID, filter=name)
+    speed = NAMES.index("estimated_v_x")
+    for seed in range(12):
+        environment.reset(seed=seed)
+        for command in (*[0.0] * 3, *[0.6] * 40):
+            observation, *_ = environment.step(np.full(2, command, dtype=np.float32))
+        assert SCALES[speed] * observation[speed] == pytest.approx(0.32, abs=0.03), seed
+    environment.close()
