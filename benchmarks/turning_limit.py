@@ -11,15 +11,14 @@ falls behind in both; one whose controller limits the yaw rate keeps the mean. A
 from __future__ import annotations
 
 import argparse
-import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.answers.run_recordings_check import recordings_folder
 from benchmarks.drivetrain.figures import COLOURS, RESOLUTION
 from benchmarks.drivetrain.stretches import Stretch, find_stretches
 from ddagr_gym import load_recording
@@ -98,7 +97,10 @@ def summary_of(steady: Steady) -> dict[str, Any]:
 def draw(drives: dict[str, Steady], path: Path) -> None:
     """Measured against commanded, turning and mean, one colour per drive."""
     with house_style():
-        figure, axes = plt.subplots(1, 2, figsize=(9.6, 4.4), layout="constrained")
+        from matplotlib.figure import Figure
+
+        figure = Figure(figsize=(9.6, 4.4), layout="constrained")
+        axes = figure.subplots(1, 2)
         for k, (axis, title) in enumerate(
             zip(axes, ("Half difference of the banks", "Mean of the banks"), strict=True)
         ):
@@ -111,16 +113,12 @@ def draw(drives: dict[str, Steady], path: Path) -> None:
             axis.set(title=title, xlabel="commanded [rad/s]", ylabel="after 3 s [rad/s]")
         axes[1].legend()
         write_atomically(path, lambda part: figure.savefig(part, format="png", dpi=RESOLUTION))
-        plt.close(figure)
 
 
 def main(words: list[str] | None = None) -> None:
     """Command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    shared = Path(os.environ.get("DDAGR_SHARED") or REPOSITORY.parent / "shared")
-    parser.add_argument(
-        "--recordings", type=Path, default=shared / "recordings", help="folder with open/ and concealed/"
-    )
+    parser.add_argument("--recordings", type=Path, default=recordings_folder(), help="folder with open/ and concealed/")
     parser.add_argument("--output", type=Path, default=REPOSITORY / "benchmarks" / "results" / "turning_limit.json")
     figures = REPOSITORY / "docs" / "theory" / "figures"
     parser.add_argument("--figure", type=Path, default=figures / "turning_limit.png")

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import json
+import os
 import struct
 import zipfile
 import zlib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +15,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.errors import InputError
+from ddagr_gym.files import atomic_path
 
 MAXIMUM_BYTES = 1_000_000
 """Largest file that is read."""
 MAXIMUM_UNPACKED = 8_000_000
 """Largest sum of its members, unpacked."""
+_DESCRIPTION = "description"
+
+
+def write_arrays(
+    path: str | os.PathLike[str], arrays: Mapping[str, NDArray[Any]], description: Mapping[str, Any]
+) -> Path:
+    """Write arrays and a description as JSON, whole or not at all; the same content gives the same bytes.
+
+    Args:
+        path: of the file.
+        arrays: by name.
+        description: of them.
+
+    Returns:
+        The file.
+    """
+    text = json.dumps(description, sort_keys=True)
+    members = {**arrays, _DESCRIPTION: np.frombuffer(text.encode(), dtype=np.uint8)}
+    with atomic_path(path) as temporary:
+        np.savez_compressed(temporary, **members)  # type: ignore[arg-type]
+    return Path(path)
 
 
 def read_arrays(file: Path, kind: str) -> dict[str, NDArray[Any]]:
@@ -61,3 +86,11 @@ def take_array(
     if not np.isfinite(value).all():
         raise InputError(f"{file}: {name} holds values that are not finite.")
     return value
+
+
+def take_description(file: Path, arrays: dict[str, NDArray[Any]], kind: str) -> bytes:
+    """JSON of the description, not checked, which is taken out of the arrays; InputError where there is none."""
+    stored = arrays.pop(_DESCRIPTION, None)
+    if stored is None or stored.dtype != np.uint8 or stored.ndim != 1:
+        raise InputError(f"{file} is not {kind}: it has no description.")
+    return stored.tobytes()

@@ -183,27 +183,35 @@ def select_parts(
     idle = idle_parts(left_out, comparison.data.robot)
     if idle:
         left_out |= idle
-        without = model.without(left_out, comparison.data.robot)
-        name = f"without {' '.join(sorted(left_out))}"
-        best = cache(name, partial(comparison.candidate, without, best.standing))
+        best = _fitted_without(comparison, model, left_out, best.standing, cache)
         decisions = [replace(item, kept=item.kept and item.name not in idle) for item in decisions]
     return Selection(left_out, tuple(decisions), best.standing)
+
+
+def _fitted_without(
+    comparison: Comparison,
+    model: RobotModel,
+    left_out: frozenset[str],
+    start: Standing,
+    cache: StepCache,
+    stage: str = "",
+) -> Candidate:
+    """A model without some parts, fitted from a start; ``stage`` tells fits of the same parts apart in the cache."""
+    without = model.without(left_out, comparison.data.robot)
+    return cache(f"without {' '.join(sorted(left_out))}{stage}", partial(comparison.candidate, without, start))
 
 
 def _settled(
     comparison: Comparison, model: RobotModel, left_out: frozenset[str], best: Candidate, cache: StepCache
 ) -> Candidate:
     """A model without some parts, fitted from where another one stands; further while it seems to miss them."""
-    without = model.without(left_out, comparison.data.robot)
-    name = f"without {' '.join(sorted(left_out))}"
-    tried = cache(name, partial(comparison.candidate, without, best.standing))
+    tried = _fitted_without(comparison, model, left_out, best.standing, cache)
     for time in range(SETTLINGS):
         growth, error = worse_by(best, tried)
         missed = is_missed(growth, error, len(tried.losses))
         if not missed or tried.standing.converged or growth > HOPELESS:
             break
-        further = partial(comparison.candidate, without, tried.standing)
-        tried = cache(f"{name}, settling {time + 1}", further)
+        tried = _fitted_without(comparison, model, left_out, tried.standing, cache, f", settling {time + 1}")
     return tried
 
 

@@ -24,8 +24,7 @@ from numpy.typing import NDArray
 
 from ddagr_gym.errors import InputError, unknown_name
 from ddagr_gym.estimation.learned_inputs import INPUTS
-from ddagr_gym.files import atomic_path
-from ddagr_gym.number_files import read_arrays, take_array
+from ddagr_gym.number_files import read_arrays, take_array, take_description, write_arrays
 
 Array = NDArray[np.float64]
 Weights = NDArray[np.float32]
@@ -162,11 +161,7 @@ def velocity_base(base: str, rim: Array, filtered: Array) -> Array:
 def save_network(network: VelocityNetwork, path: str | os.PathLike[str]) -> Path:
     """Write a network; the same one gives the same bytes."""
     arrays: dict[str, NDArray[Any]] = {name: getattr(network, name) for name in _shapes(0, 0)}
-    text = json.dumps(asdict(network.description) | {"clip": network.clip}, sort_keys=True)
-    arrays["description"] = np.frombuffer(text.encode(), dtype=np.uint8)
-    with atomic_path(path) as temporary:
-        np.savez_compressed(temporary, **arrays)  # type: ignore[arg-type]
-    return Path(path)
+    return write_arrays(path, arrays, asdict(network.description) | {"clip": network.clip})
 
 
 def load_network(path: str | os.PathLike[str]) -> VelocityNetwork:
@@ -177,7 +172,7 @@ def load_network(path: str | os.PathLike[str]) -> VelocityNetwork:
     """
     file = Path(path).expanduser()
     arrays = read_arrays(file, _KIND)
-    described, clip = _description(file, arrays.pop("description", None))
+    described, clip = _description(file, take_description(file, arrays, _KIND))
     units = int(np.size(arrays.get("input_bias", ()))) // 3
     if not 1 <= units <= _MOST_UNITS:
         raise InputError(f"{file} has {units} units: 1 to {_MOST_UNITS} expected.")
@@ -204,11 +199,9 @@ def _shapes(inputs: int, units: int) -> dict[str, tuple[tuple[int, ...], type[np
     }
 
 
-def _description(file: Path, stored: NDArray[Any] | None) -> tuple[NetworkDescription, float]:
-    if stored is None or stored.dtype != np.uint8 or stored.ndim != 1:
-        raise InputError(f"{file} is not {_KIND}: it has no description.")
+def _description(file: Path, stored: bytes) -> tuple[NetworkDescription, float]:
     try:
-        content = json.loads(stored.tobytes().decode())
+        content = json.loads(stored.decode())
         clip = float(content.pop("clip"))
         content["inputs"], content["calibration"] = tuple(content["inputs"]), tuple(content["calibration"])
         described = NetworkDescription(**content)

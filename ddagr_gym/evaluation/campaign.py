@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -25,7 +25,7 @@ from ddagr_gym.evaluation.controllers import (
     is_policy,
     needs_filter,
 )
-from ddagr_gym.evaluation.dataset import IDENTITY, EpisodeDataset
+from ddagr_gym.evaluation.dataset import IDENTITY, EpisodeDataset, Key, episode_key
 from ddagr_gym.evaluation.estimator_metrics import estimator_errors
 from ddagr_gym.evaluation.metrics import turn_metrics
 from ddagr_gym.evaluation.runs import TurnRun, drive_turn, drive_turns
@@ -44,9 +44,6 @@ _SLOW_CHUNK = 10
 
 EARLIER = "episodes.jsonl"
 """Rows of a campaign of an earlier version, beside the dataset."""
-
-Key = tuple[str, str, int]
-"""Controller, set and number of an episode."""
 
 
 @dataclass(frozen=True)
@@ -260,19 +257,15 @@ def run_campaign(
             progress(len(added))
     finally:
         dataset.write_manifest()
-    rows = [row for row in dataset.read() if _key(row) in wanted]
+    rows = [row for row in dataset.read() if episode_key(row) in wanted]
     return _judged(rows, controllers, sets)
 
 
 def _keep_valid(dataset: EpisodeDataset, wanted: set[Key]) -> set[Key]:
     """Drop wanted rows whose scenarios, controller or filter are no longer the same; the keys of the others."""
     now = {pair: provenance(*pair) for pair in {(controller, name) for controller, name, _ in wanted}}
-    dataset.keep(lambda row: _key(row) not in wanted or row["made_of"] == now[_key(row)[:2]])
-    return {_key(row) for row in dataset.read(IDENTITY)}
-
-
-def _key(row: Mapping[str, Any]) -> Key:
-    return row["controller"], row["set"], row["number"]
+    dataset.keep(lambda row: episode_key(row) not in wanted or row["made_of"] == now[episode_key(row)[:2]])
+    return {episode_key(row) for row in dataset.read(IDENTITY)}
 
 
 def _judged(rows: Sequence[dict[str, Any]], controllers: Sequence[str], sets: Sequence[str]) -> list[dict[str, Any]]:

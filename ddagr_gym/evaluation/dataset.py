@@ -45,6 +45,13 @@ COLUMNS = (
 """Type of every column of a part, also of one in which nothing is defined."""
 
 Row = Mapping[str, Any]
+Key = tuple[str, str, int]
+"""Controller, set and number of an episode."""
+
+
+def episode_key(row: Row) -> Key:
+    """Which episode a row is."""
+    return row["controller"], row["set"], row["number"]
 
 
 class EpisodeDataset:
@@ -96,7 +103,9 @@ class EpisodeDataset:
         Args:
             rows: with :data:`PARTITIONS` and :data:`COLUMNS`; others raise ValueError.
         """
-        for (controller, set_name), group in groupby(sorted(rows, key=_place), key=lambda row: _place(row)[:2]):
+        for (controller, set_name), group in groupby(
+            sorted(rows, key=episode_key), key=lambda row: episode_key(row)[:2]
+        ):
             self._write(controller, set_name, list(group))
 
     def _write(self, controller: str, set_name: str, rows: Sequence[Row]) -> Path:
@@ -143,13 +152,13 @@ class EpisodeDataset:
         Args:
             wanted: says from the columns of :data:`PARTITIONS` and :data:`IDENTITY` whether a row stays.
         """
-        seen: set[tuple[str, str, int]] = set()
+        seen: set[Key] = set()
         for part in self.parts():
             kept = []
             rows = self._rows(part, IDENTITY)
             for place, row in enumerate(rows):
-                if wanted(row) and _place(row) not in seen:
-                    seen.add(_place(row))
+                if wanted(row) and episode_key(row) not in seen:
+                    seen.add(episode_key(row))
                     kept.append(place)
             if len(kept) < len(rows):
                 self._shorten(part, kept)
@@ -167,10 +176,10 @@ class EpisodeDataset:
             rows = self._rows(part, IDENTITY)
             for row in rows:
                 new = {"controller": row["controller"], "set": row["set"], "rows": 0, "parts": 0, "made_of": []}
-                entry = partitions.setdefault(_place(row)[:2], new)
+                entry = partitions.setdefault(episode_key(row)[:2], new)
                 entry["rows"] += 1
                 entry["made_of"] = sorted({*entry["made_of"], row["made_of"] or ""})
-            partitions[_place(rows[0])[:2]]["parts"] += 1
+            partitions[episode_key(rows[0])[:2]]["parts"] += 1
         content = {
             "format": FORMAT,
             "written_by": f"ddagr-gym {__version__}",
@@ -181,10 +190,6 @@ class EpisodeDataset:
         }
         if content != self._manifest():
             write_json(self.folder / MANIFEST, content)
-
-
-def _place(row: Row) -> tuple[str, str, int]:
-    return row["controller"], row["set"], row["number"]
 
 
 def _schema() -> Any:

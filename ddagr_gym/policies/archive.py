@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 
 from ddagr_gym.config import parse_config
 from ddagr_gym.errors import InputError
-from ddagr_gym.files import atomic_path
-from ddagr_gym.number_files import read_arrays, take_array
+from ddagr_gym.number_files import read_arrays, take_array, take_description, write_arrays
 from ddagr_gym.policies.design import PolicyDesign
 
 FORMAT = 1
@@ -134,11 +133,7 @@ def save_policy(policy: Policy, path: str | os.PathLike[str]) -> Path:
     arrays: dict[str, NDArray[Any]] = {"mean": policy.mean, "deviation": policy.deviation}
     for k, (weight, bias) in enumerate(zip(policy.weights, policy.biases, strict=True)):
         arrays |= {f"weight_{k}": weight, f"bias_{k}": bias}
-    text = json.dumps(asdict(policy.description()), sort_keys=True)
-    arrays["description"] = np.frombuffer(text.encode(), dtype=np.uint8)
-    with atomic_path(path) as temporary:
-        np.savez_compressed(temporary, **arrays)  # type: ignore[arg-type]
-    return Path(path)
+    return write_arrays(path, arrays, asdict(policy.description()))
 
 
 def load_policy(path: str | os.PathLike[str]) -> Policy:
@@ -149,7 +144,7 @@ def load_policy(path: str | os.PathLike[str]) -> Policy:
     """
     file = Path(path).expanduser()
     arrays = read_arrays(file, _KIND)
-    described = _description(file, arrays.pop("description", None))
+    described = _description(file, take_description(file, arrays, _KIND))
     design = described.design
     if described.inputs != design.inputs:
         raise InputError(f"{file}: its inputs are not those of this version's {design.features!r} design: train anew.")
@@ -168,11 +163,9 @@ def load_policy(path: str | os.PathLike[str]) -> Policy:
     )  # fmt: skip
 
 
-def _description(file: Path, stored: NDArray[Any] | None) -> Description:
-    if stored is None or stored.dtype != np.uint8 or stored.ndim != 1:
-        raise InputError(f"{file} is not a policy: it has no description.")
+def _description(file: Path, stored: bytes) -> Description:
     try:
-        text = stored.tobytes().decode()
+        text = stored.decode()
         found = json.loads(text).get("format")
     except (ValueError, AttributeError, RecursionError):
         raise InputError(f"{file} is not a policy: its description is not JSON.") from None
