@@ -37,6 +37,8 @@ class InertialKnowledge(Validated):
             forces depend too steeply on the velocities.
         launch_slip: standard deviation of slip and slip angle there [-].
         launch_floor: that of the velocities at rest [m/s].
+        known_pull: while gravity along the robot less the accelerometer's bias is not known this well, slip is also
+            taken to be as small as at launch [m/s^2]; 0.13 s of standing are enough.
         largest_acceleration: of the robot; a reading of the accelerometer that says more counts as missing [m/s^2].
         unknown_acceleration: random walk of the velocities where the accelerometer is missing [m/s^2/sqrt(Hz)].
         gravity_deviation: initial, of either component of gravity along the ground [m/s^2].
@@ -54,6 +56,7 @@ class InertialKnowledge(Validated):
     launch_speed: float = bounded("m/s", 0.0, 10.0, default=0.1)
     launch_slip: float = bounded("-", 0.0, 10.0, default=0.3)
     launch_floor: float = bounded("m/s", 0.0, 10.0, default=2e-3, open_low=True)
+    known_pull: float = bounded("m/s^2", 0.0, 1e3, default=0.008, open_low=True)
     largest_acceleration: float = bounded("m/s^2", 0.0, 1e3, default=5.0, open_low=True)
     unknown_acceleration: float = bounded("m/s^2/sqrt(Hz)", 0.0, 1e3, default=0.1)
     gravity_deviation: float = bounded("m/s^2", 0.0, 10.0, default=0.6, open_low=True)
@@ -110,6 +113,7 @@ class InertialModel:
         packed[layout.LAUNCH_SPEED] = own.launch_speed
         packed[layout.LAUNCH_SLIP] = own.launch_slip
         packed[layout.LAUNCH_FLOOR] = own.launch_floor
+        packed[layout.KNOWN_PULL] = own.known_pull**2
         packed[layout.LARGEST_ACCELERATION] = own.largest_acceleration
         packed[layout.UNKNOWN_ACCELERATION] = own.unknown_acceleration**2
         packed[layout.GRAVITY_WALK] = own.gravity_walk**2

@@ -27,6 +27,7 @@ from ddagr_gym.estimation.inertial_layout import (
     GRAVITY,
     GRAVITY_WALK,
     INERTIAL_STATE_SIZE,
+    KNOWN_PULL,
     LARGEST_ACCELERATION,
     LAST_RATE,
     LAUNCH_FLOOR,
@@ -37,6 +38,7 @@ from ddagr_gym.estimation.inertial_layout import (
     PATCH_MEAN,
     PATCH_RATE,
     PATCH_VARIANCE,
+    PULL_KNOWN,
     SUMMED,
     UNKNOWN_ACCELERATION,
     Q,
@@ -259,8 +261,8 @@ def balance_forces(model: Array, work: Array, duration: float) -> None:
 
 
 @kernel()
-def _roll(model: Array, work: Array, speed: float) -> None:
-    """Measure that the robot rolls with little slip at a mean rim speed [m/s]: the law's forces are stiff near rest."""
+def _hold_slip(model: Array, work: Array, speed: float) -> float:
+    """Measure that the robot goes at a mean rim speed [m/s] with little slip; returns the deviation of it [m/s]."""
     deviation = model[LAUNCH_FLOOR] + model[LAUNCH_SLIP] * abs(speed)
     half = 0.5 * model[OUTER_RADIUS]
     for j in range(STRIDE):
@@ -268,9 +270,26 @@ def _roll(model: Array, work: Array, speed: float) -> None:
     work[ROW] = 1.0
     work[ROW + OMEGA] = work[ROW + OMEGA + 1] = -half
     _update(model, work, speed - work[X], _row_column(work), deviation * deviation)
+    return deviation
+
+
+@kernel()
+def _roll(model: Array, work: Array, speed: float) -> None:
+    """Measure that the robot rolls with little slip at a mean rim speed [m/s]: the law's forces are stiff near rest."""
+    deviation = _hold_slip(model, work, speed)
     _update(model, work, -work[X + 1], _entry_column(work, 1), deviation * deviation)
     work[MEAN_FORCE] = work[MEAN_FORCE + 1] = work[SUMMED] = 0.0
     work[LAST_RATE] = work[X + 2]
+
+
+@kernel(inline=True)
+def _pull_known(model: Array, work: Array) -> bool:
+    """Whether gravity along the robot, less the accelerometer's bias, has been known since it stood or drove off."""
+    pull, bias = Q + STRIDE * GRAVITY, Q + STRIDE * ACCELEROMETER_BIAS
+    variance = work[pull + GRAVITY] + work[bias + ACCELEROMETER_BIAS] - 2.0 * work[pull + ACCELEROMETER_BIAS]
+    if variance < model[KNOWN_PULL]:
+        work[PULL_KNOWN] = 1.0
+    return work[PULL_KNOWN] > 0.0
 
 
 @kernel()
@@ -322,10 +341,13 @@ def inertial_sample(
     interval = int(model[BALANCE_INTERVAL])
     if number % interval == 0:
         speed = 0.5 * model[OUTER_RADIUS] * (work[X + OMEGA] + work[X + OMEGA + 1])
+        known = _pull_known(model, work)
         if abs(speed) < model[LAUNCH_SPEED]:
             _roll(model, work, speed)
         else:
             balance_forces(model, work, interval * duration)
+            if not known:
+                _hold_slip(model, work, speed)
     _limit(model, work)
     limit_inertial_covariance(model, work)
     for channel in range(CHANNEL_SIZE):

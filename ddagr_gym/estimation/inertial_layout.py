@@ -31,6 +31,7 @@ BALANCE_INTERVAL = _block()  # samples
 LAUNCH_SPEED = _block()  # [m/s]
 LAUNCH_SLIP = _block()  # share of the speed
 LAUNCH_FLOOR = _block()  # [m/s]
+KNOWN_PULL = _block()  # variance of gravity less bias from which on it is known [m^2/s^4]
 LARGEST_ACCELERATION = _block()  # beyond which a reading of the accelerometer is none [m/s^2]
 UNKNOWN_ACCELERATION = _block()  # random walk of the velocities without accelerometer [m^2/s^3]
 GRAVITY_WALK = _block()  # variance that a second adds to either component [m^2/s^5]
@@ -48,6 +49,7 @@ Q = _block(16 * STRIDE)  # covariance
 MEAN_FORCE = _block(2)  # sums of the specific force since the last balance [m/s^2]
 SUMMED = _block()  # samples in them
 LAST_RATE = _block()  # yaw rate at the last balance [rad/s]
+PULL_KNOWN = _block()  # 1 from when gravity along the robot less the bias is known
 WORK_SIZE = _next
 MEMORY = slice(MEAN_FORCE, WORK_SIZE)
 """What the workspace remembers between samples besides state and covariance."""
