@@ -18,7 +18,7 @@ from ddagr_gym.diagnosis.change.drive_scan import NAMED, scan_drive
 from ddagr_gym.diagnosis.change.model import MOST_NEAR, Model, farthest
 from ddagr_gym.diagnosis.change.ordinary import Comparison, Scores
 from ddagr_gym.diagnosis.change.shifts import Shift, explained, shift_of, sizes_of
-from ddagr_gym.diagnosis.search.initial_guess import first_guess
+from ddagr_gym.diagnosis.search.initial_guess import first_guess, same_lateness
 from ddagr_gym.diagnosis.search.scan import drive_extent
 from ddagr_gym.diagnosis.search.scanned_model import Rival
 from ddagr_gym.identification.fit_numerics import FIELD_TOLERANCE
@@ -88,7 +88,8 @@ def _refitted(
 
 def _alike(problem: Problem, model: Model, refits: Sequence[Rival]) -> Starts:
     """What is confused with the best refit, from where that ended: fits differ in where parameters end."""
-    beside = replace(refits[0].fitted.point, effects=model.fitted.point.effects)
+    best = refits[0].fitted.point
+    beside = replace(best, effects=model.fitted.point.effects)
     known = {rival.name: rival.fitted.point.effects[-1] for rival in refits}
     alike = {shift.compared.name: shift for shift in _confused(refits[0].name, model)}
     new = _started(problem, model, beside, [shift for name, shift in alike.items() if name not in known])
@@ -97,7 +98,19 @@ def _alike(problem: Problem, model: Model, refits: Sequence[Rival]) -> Starts:
         for name, shift in alike.items()
         if name in known
     }
-    return {**new, **again}
+    translated = same_lateness(best.effects[-1])
+    if translated is None or translated.name not in alike:
+        return {**new, **again}
+    late = (alike[translated.name], replace(beside, effects=(*beside.effects, translated)))
+    return _nearest(problem, model, {**new, **again}, late)
+
+
+def _nearest(problem: Problem, model: Model, starts: Starts, other: tuple[Shift, Point]) -> Starts:
+    """Starts with another one for its effect, where that explains more as it stands."""
+    name = other[0].compared.name
+    points = [*([starts[name]] if name in starts else []), other]
+    nearest = min(points, key=lambda item: fit(problem, item[1], iterations=0, reuse=model.fitted).cost)
+    return {**starts, name: nearest}
 
 
 def _confused(name: str, model: Model) -> list[Shift]:

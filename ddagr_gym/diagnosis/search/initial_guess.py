@@ -218,6 +218,25 @@ def slower_loop(problem: Problem, point: Point) -> Point | None:
     return _handed_over(point, place, (*point.effects, lag))
 
 
+def same_lateness(effect: Effect) -> Effect | None:
+    """A dead time in place of slow motors that trail a ramp of commands by as much, or a second pole in place of one.
+
+    Where steps of the commands are soft both predict nearly the same, and small steps do not lead from none of one to
+    all of the other.
+
+    Args:
+        effect: to translate.
+
+    Returns:
+        None for other effects, and for motors that are quicker than the nominal ones.
+    """
+    if isinstance(effect, MotorLag) and effect.lag > 0.0:
+        return CommandDelay(min(effect.lag, CommandDelay.parameter("delay").metadata["high"]))
+    if isinstance(effect, CommandDelay) and effect.delay > 0.0:
+        return MotorLag(effect.delay, 1.0)
+    return None
+
+
 def _handed_over(point: Point, place: int, effects: tuple[Effect, ...]) -> Point:
     """A point with effects in place of what a nuisance did, which is back at its nominal value."""
     values = point.values.copy()

@@ -15,6 +15,7 @@ from ddagr_gym.diagnosis.search.gains import Gain, gains
 from ddagr_gym.diagnosis.search.initial_guess import (
     first_guess,
     looped_encoders,
+    same_lateness,
     slower_loop,
     turned_to_agree,
     with_whole_delay,
@@ -212,3 +213,25 @@ def test_sizes_for_an_unseen_drive_leave_its_heading_as_the_fit_to_all_drives_ha
         found = refitted_on(turned.problem, fitted, _recording_fold(turned.problem, unseen))
         assert heading(turned, found) == heading(turned, fitted.point)
         assert found.effects[0].direction != fitted.point.effects[0].direction
+
+
+@pytest.mark.parametrize("effect", ["command_delay=0.3", "motor_lag=0.3,second_pole=1"])
+def test_a_dead_time_and_a_second_pole_trail_commands_alike(drive: Callable[..., Recording], effect: str) -> None:
+    """At a steady speed the robot is as far behind."""
+    (own,) = load_effects((effect,))
+    other = same_lateness(own)
+    assert other is not None
+    assert other.name != own.name
+    plain, first, second = (drive(effects, seconds=4.0) for effects in ((), (own,), (other,)))
+    behind = [float((plain.extras["true_x"] - r.extras["true_x"])[-1]) for r in (first, second)]
+    assert behind[0] > 0.05
+    assert behind[1] == pytest.approx(behind[0], rel=0.1)
+
+
+@pytest.mark.parametrize("effect", ["slope=0.1", "motor_lag=-0.02", "command_delay=0"])
+def test_other_effects_and_quick_motors_have_no_lateness_to_translate(effect: str) -> None:
+    assert same_lateness(load_effects((effect,))[0]) is None
+
+
+def test_a_lag_longer_than_any_dead_time_becomes_the_longest() -> None:
+    assert same_lateness(load_effects(("motor_lag=2",))[0]) == load_effects(("command_delay=0.49",))[0]
