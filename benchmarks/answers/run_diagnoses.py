@@ -13,7 +13,9 @@ Each case is one run of the command line in a process of its own; the cores are 
 Finished cases are kept beside the answers until all are there, so that an interrupted script goes on, and a case that
 was run with other options is run again; nothing is edited by hand. A run that fails, or takes longer than
 ``--time-limit``, is an answer that says so. ``--collect`` runs nothing and writes the answers of the cases that an
-interrupted script has finished. ``commit`` is the checkout's at the time.
+interrupted script has finished. ``commit`` is the checkout's at the time. A case without an answer, as where its run
+was told to stop or its recording cannot be read, is named at the end (exit code 1), and the others go on. ``--cluster``
+runs cases on Ray (``local``, or an address), whose nodes see the same files.
 """
 
 from __future__ import annotations
@@ -23,19 +25,26 @@ import hashlib
 import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from types import FrameType
+from typing import Any, NoReturn
 
 from benchmarks.answers.run_recordings_check import recordings_folder
 from benchmarks.commits import commit_of
 from ddagr_gym.calibration.files import load as load_calibration
+from ddagr_gym.errors import InputError
 from ddagr_gym.recordings.files import write_atomically
+from ddagr_gym.tasks import FailedTasksError, Task, TaskRunner
+from ddagr_gym.tasks.runner import STOPPED
+from ddagr_gym.tasks.task import raise_failures
 from ddagr_gym.version import __version__
 
 HERE = Path(__file__).resolve().parent
@@ -183,11 +192,34 @@ def _run(command: list[str], limit: float) -> subprocess.CompletedProcess[str]:
     """The command in one thread of linear algebra; one that takes too long ends with code 124."""
     environment = os.environ | {"OMP_NUM_THREADS": "1"}
     try:
-        return subprocess.run(
-            command, capture_output=True, text=True, cwd=CHECKOUT, env=environment, check=False, timeout=limit
-        )
+        with _ended_by_sigterm():
+            return subprocess.run(
+                command, capture_output=True, text=True, cwd=CHECKOUT, env=environment, check=False, timeout=limit
+            )
     except subprocess.TimeoutExpired:
         return subprocess.CompletedProcess(command, 124, "", f"stopped after {limit:g} s")
+
+
+@contextmanager
+def _ended_by_sigterm() -> Iterator[None]:
+    """Block that SIGTERM leaves by an exception, so that a worker that is stopped takes its command with it."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.getsignal(signal.SIGTERM)
+    if before is not signal.SIG_DFL:
+        # the runner's own, where the case runs in its process
+        yield
+        return
+    signal.signal(signal.SIGTERM, _leave)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _leave(number: int, frame: FrameType | None) -> NoReturn:
+    raise SystemExit(STOPPED)
 
 
 def _answer(path: Path, done: subprocess.CompletedProcess[str]) -> dict[str, Any]:
@@ -211,6 +243,7 @@ def main() -> int:
     parser.add_argument("--collect", action="store_true", help="write the answers that are finished, run nothing")
     parser.add_argument("--only", nargs="*", default=None, help="names of cases")
     parser.add_argument("--calibration", type=Path, default=None, help="of the robot, for the real recordings")
+    parser.add_argument("--cluster", default="", help="local, or the address of a Ray cluster (extra cluster)")
     words = sys.argv[1:]
     end = words.index("--") if "--" in words else len(words)
     arguments, options = parser.parse_args(words[:end]), tuple(words[end + 1 :])
@@ -236,14 +269,20 @@ def main() -> int:
         print(f"{collect(found, output)} of {len(found)} cases are finished: {output}")
         return 0
     try:
-        write_answers(found, output, arguments.processes, arguments.time_limit)
-    except (InterruptedRunError, KeyboardInterrupt):
+        write_answers(found, output, arguments.processes, arguments.time_limit, arguments.cluster)
+    except FailedTasksError as error:
+        print(f"{error}\nthe same command runs them again", file=sys.stderr)
+        return 1
+    except InputError as error:
+        print(error, file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
         print(f"interrupted; the same command goes on from {output.with_suffix('.parts')}", file=sys.stderr)
         return 130
     return 0
 
 
-def write_answers(cases: list[Case], output: Path, processes: int, limit: float) -> None:
+def write_answers(cases: list[Case], output: Path, processes: int, limit: float, cluster: str = "") -> None:
     """Answers of all cases into one file, in the cases' order.
 
     Args:
@@ -251,24 +290,28 @@ def write_answers(cases: list[Case], output: Path, processes: int, limit: float)
         output: file to write.
         processes: runs at the same time.
         limit: of one run [s].
+        cluster: as of :class:`ddagr_gym.tasks.TaskRunner`.
 
     Raises:
-        InterruptedRunError: a run was told to stop.
+        FailedTasksError: cases without an answer; the others were run and are kept.
+        InputError: a cluster that does not answer.
     """
-    parts = output.with_suffix(".parts")
+    parts = output.resolve().with_suffix(".parts")
     parts.mkdir(parents=True, exist_ok=True)
     threads = max((os.cpu_count() or 1) // processes, 1)
+    tasks = [Task(case.name, diagnose, (case, parts, threads, limit)) for case in cases]
     answers: dict[str, Any] = {}
-    pool = ThreadPoolExecutor(processes)
-    try:
-        futures = {pool.submit(diagnose, case, parts, threads, limit): case.name for case in cases}
-        for future in as_completed(futures):
-            answers[futures[future]] = future.result()
-            said = future.result()["verdict"] or future.result().get("failure")
-            print(f"{len(answers)}/{len(cases)} {futures[future]}: {said}", flush=True)
-    finally:
-        # an interrupted script starts no further case
-        pool.shutdown(cancel_futures=True)
+    failed = []
+    with TaskRunner(processes, cluster=cluster) as runner:
+        for count, ended in enumerate(runner.run(tasks), start=1):
+            if ended.failure is not None:
+                failed.append(ended)
+                said = ended.failure.message
+            else:
+                answers[ended.task.name] = ended.value
+                said = ended.value["verdict"] or ended.value.get("failure")
+            print(f"{count}/{len(cases)} {ended.task.name}: {said}", flush=True)
+    raise_failures(failed, len(cases))
     ordered = {case.name: answers[case.name] for case in cases}
     write_atomically(output, lambda to: to.write_text(json.dumps(ordered, indent=1, allow_nan=False) + "\n"))
     shutil.rmtree(parts)

@@ -1,7 +1,12 @@
 """The answering script: which cases, which options, what is kept, going on after an interruption."""
 
+import gzip
 import json
+import os
+import signal
 import subprocess
+import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,7 +17,6 @@ import pytest
 from benchmarks.answers import run_diagnoses
 from benchmarks.answers.run_diagnoses import (
     Case,
-    InterruptedRunError,
     _answer,
     chosen_for_all,
     collect,
@@ -21,6 +25,7 @@ from benchmarks.answers.run_diagnoses import (
     with_options,
     write_answers,
 )
+from ddagr_gym.tasks import FailedTasksError
 
 CASES = [Case(f"case_{number:03d}", ()) for number in range(1, 125)]
 
@@ -71,7 +76,7 @@ def test_a_share_of_the_cases_is_run_to_the_end_by_their_names_alone() -> None:
 
 def test_answers_keep_what_was_said_and_how(runs: list[list[str]], tmp_path: Path) -> None:
     cases = [replace(case, options=("--names-only",)) for case in CASES[:2]]
-    write_answers(cases, tmp_path / "answers.json", 2, 10.0)
+    write_answers(cases, tmp_path / "answers.json", 1, 10.0)
     found = json.loads((tmp_path / "answers.json").read_text())
     assert list(found) == ["case_001", "case_002"]
     assert found["case_001"]["verdict"] == ["none"]
@@ -109,8 +114,8 @@ def test_an_interrupted_run_is_no_answer(tmp_path: Path, monkeypatch: pytest.Mon
         return subprocess.CompletedProcess(command, 130, "", "ddagr: interrupted")
 
     monkeypatch.setattr(run_diagnoses, "_run", interrupted)
-    with pytest.raises(InterruptedRunError):
-        write_answers(CASES, tmp_path / "answers.json", 1, 10.0)
+    with pytest.raises(FailedTasksError, match="case_001"):
+        write_answers(CASES[:3], tmp_path / "answers.json", 1, 10.0)
     assert not (tmp_path / "answers.json").exists()
     assert list((tmp_path / "answers.parts").iterdir()) == []
 
@@ -148,3 +153,55 @@ def test_what_changed_is_asked_of_the_robot_of_a_calibration_in_drives_that_it_i
     (case,) = run_diagnoses.changed_cases(tmp_path, tmp_path / "CAL")
     assert case.name == "warthog_1"
     assert run_diagnoses.shown(case.arguments) == ["warthog_1.csv.gz", "--calibration", "CAL"]
+
+
+@pytest.mark.slow
+def test_a_case_that_fails_is_named_while_the_others_are_kept_on_any_number_of_workers(tmp_path: Path) -> None:
+    files = [tmp_path / f"run_{number}.csv.gz" for number in range(3)]
+    for file in files[:2]:
+        file.write_bytes(gzip.compress(b"time\n", mtime=0))
+    cases = [Case(f"case_{number}", (str(file), "--robot", "ddagr")) for number, file in enumerate(files)]
+    found = []
+    for workers in (1, 2):
+        output = tmp_path / f"answers_{workers}.json"
+        files[2].unlink(missing_ok=True)
+        with pytest.raises(FailedTasksError, match=r"1 of 3 tasks failed: case_2: .*run_2\.csv\.gz"):
+            write_answers(cases, output, workers, 60.0)
+        assert not output.exists()
+        kept = {part: part.read_bytes() for part in output.with_suffix(".parts").glob("*.json")}
+        assert sorted(part.stem for part in kept) == ["case_0", "case_1"]
+        files[2].write_bytes(files[0].read_bytes())
+        write_answers(cases, output, workers, 60.0)
+        answers = json.loads(output.read_text())
+        # seconds are of the clock: an answer that was run again would have others
+        assert all(answers[part.stem] == json.loads(content) for part, content in kept.items())
+        found.append({name: {**answer, "seconds": 0.0} for name, answer in answers.items()})
+    assert found[0] == found[1]
+    assert all(answer["failure"]["exit_code"] == 2 for answer in found[0].values())
+
+
+def test_a_script_that_is_ended_takes_the_runs_of_its_workers_with_it(tmp_path: Path) -> None:
+    script = tmp_path / "script.py"
+    script.write_text(
+        "import os, sys\n"
+        "from pathlib import Path\n"
+        "from benchmarks.answers.run_diagnoses import _run\n"
+        "from ddagr_gym.tasks import Task, TaskRunner\n"
+        "if __name__ == '__main__':\n"
+        "    command = ['sh', '-c', f'echo $$ > {sys.argv[1]}; exec sleep 60']\n"
+        "    with TaskRunner(2) as runner:\n"
+        "        list(runner.run([Task('case', _run, (command, 60.0))]))\n"
+    )
+    written = tmp_path / "number"
+    driver = subprocess.Popen(
+        [sys.executable, str(script), str(written)],
+        env=os.environ | {"PYTHONPATH": f"{run_diagnoses.CHECKOUT}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"},
+    )
+    until = time.monotonic() + 60.0
+    while not (written.exists() and written.read_text().strip()) and time.monotonic() < until:
+        time.sleep(0.05)
+    number = int(written.read_text())
+    driver.send_signal(signal.SIGTERM)
+    assert driver.wait(30.0) == 128 + signal.SIGTERM
+    with pytest.raises(ProcessLookupError):
+        os.kill(number, 0)
