@@ -111,7 +111,9 @@ def _finding(named: Named, number: int) -> Finding:
 
 
 def _evidence(before: Model, step: Step) -> Shift | Pull:
-    """What spoke for an effect: its shift, or that of the parameter that had taken it over."""
+    """What spoke for an effect: its shift, that of a rival which explains less, or of a parameter that took it over."""
+    if step.alarm is not None:
+        return step.alarm
     if before.probability(step.shift) < LEVEL or not before.pulled:
         return step.shift
     return max(before.pulled, key=lambda pull: pull.distance)

@@ -1,7 +1,9 @@
 """Names for what changed: the effect beside which nothing else is out of the ordinary, one after the other.
 
 An effect that is not the one that changed leaves shifts of others behind when it is fitted; the right one takes all of
-them away. Of those that do, the joint refits decide, and what they do not tell apart stays an equivalence set.
+them away. Of those that do, the joint refits decide, and what they do not tell apart stays an equivalence set. Where
+one of them is out of the ordinary among all effects, another that explains more need be so by itself only: that
+something changed is then known.
 """
 
 from __future__ import annotations
@@ -43,12 +45,15 @@ class Step:
         weights: of the names that the same windows may mean.
         rivals: joint refits, the named one first.
         dispersion: of the model before.
+        alarm: shift of the rival that ordinary drives do not show, where the named effect explains more and they show
+            it more often; None where its own shift is the alarm.
     """
 
     shift: Shift
     weights: dict[str, float]
     rivals: tuple[Rival, ...]
     dispersion: float
+    alarm: Shift | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,6 +108,7 @@ def _next(
     looks = 1 if model.conspicuous or model.pulled else 2
     refitted = joint_refits(problem, model, ordinary, dispersion, progress)
     tried: list[tuple[Model, Rival]] = []
+    usual: list[tuple[Model, Rival]] = []
     for shift, rival in refitted:
         if rival.gain < CLOSE * max((item.gain for after, item in tried if after.left <= 1.0), default=0.0):
             break
@@ -111,17 +117,23 @@ def _next(
         evidence = _evidence_after(after, shift, looks > 1)
         # what parameters had to make up for speaks for an effect that takes all of it back, or has no size of its own
         taken_back = bool(model.pulled) and (evidence is None or not after.pulled)
+        found = replace(after, named=(*model.named, evidence or shift)), rival
         if taken_back or model.probability(evidence or shift, looks) < LEVEL:
-            tried.append((replace(after, named=(*model.named, evidence or shift)), rival))
+            tried.append(found)
+        elif (evidence or shift).probability < LEVEL:
+            usual.append(found)
     if not tried:
         return None
+    most = max(rival.gain for _, rival in tried)
+    better = [item for item in usual if item[1].gain > most and item[0].left <= 1.0]
     allowed = max(1.0, NEARLY * min(after.left for after, _ in tried))
-    kept = [item for item in tried if item[0].left <= allowed]
+    kept = [*better, *(item for item in tried if item[0].left <= allowed)]
     weights = equivalence_weights([rival for _, rival in kept], dispersion, rng)
     name = max(weights, key=weights.__getitem__)
     chosen = next(item for item in kept if item[1].name == name)
     rivals = (chosen[1], *(rival for _, rival in kept if rival is not chosen[1]))
-    return chosen[0], Step(chosen[0].named[-1], weights, rivals, dispersion)
+    alarm = None if chosen in tried else max(tried, key=lambda item: item[1].gain)[0].named[-1]
+    return chosen[0], Step(chosen[0].named[-1], weights, rivals, dispersion, alarm)
 
 
 def _evidence_after(model: Model, shift: Shift, stretched: bool) -> Shift | None:
