@@ -66,6 +66,7 @@ _FORGOTTEN = (
 
 _PARTS_PER_THREAD = 6  # (ours) small enough that no thread waits long for the last part of another
 _LONG = 100  # samples from which handing out parts costs less than waiting for the slower thread
+_MUCH = 2000  # samples of all drives together from which it does
 
 
 def _soils(soil: Soils) -> Array:
@@ -292,11 +293,12 @@ class Simulator:
         list(self._pool.map(lambda first, last: advance_rows(self.rows, first, last, *shared), ends[:-1], ends[1:]))
 
     def _chunks(self, samples: int) -> NDArray[np.int64]:
-        """Ends of the parts that threads take: one each for a short stretch, several for a long one.
+        """Ends of the parts that threads take: one each for a short stretch, several for a long one or for many drives.
 
         Some drives cost twice as much as others, and whoever is done takes the next part.
         """
-        each = _PARTS_PER_THREAD if samples >= _LONG and self._threads > 1 else 1
+        long = samples >= _LONG or self.count * samples >= _MUCH
+        each = _PARTS_PER_THREAD if long and self._threads > 1 else 1
         return np.linspace(0, self.count, min(each * self._threads, self.count) + 1).astype(np.int64)
 
     def step(

@@ -150,6 +150,9 @@ def test_threads_share_long_stretches_by_who_is_free_and_give_the_same_bits():
     simulator = Simulator(count, threads=2)
     assert len(simulator._chunks(10)) == 3
     assert len(simulator._chunks(samples)) == count + 1
+    many = Simulator(60, threads=2)
+    assert len(many._chunks(10)) == 3
+    assert len(many._chunks(40)) == 13
 
 
 def test_saved_rows_continue_to_the_same_bits_also_in_another_simulator():

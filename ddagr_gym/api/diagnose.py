@@ -32,9 +32,9 @@ _GROUND = "ground"
 _SIMULATED = "ddagr"
 """Robot with a shipped bank of simulated drives."""
 
-_ONE_DRIVE = {"fitted": 36, "compared": 20}
+_ONE_DRIVE = {"fitted": 36, "compared": 20, "settlings": 1}
 """Windows of a single drive that a fit of its drivetrain uses, and those that decide on parts (ours): a quarter of them
-is left out at a time."""
+is left out at a time; and how often a fit without a part goes on (more changed no name on real drives)."""
 
 _SAME_WINDOW = 0.5
 """Difference of lengths of windows up to which gates are taken to hold [s] (ours; short segments shorten windows)."""
@@ -270,7 +270,8 @@ class _Drivetrain:
 
         settings = CalibrationSettings(threads=self.threads, seed=self.seed)
         if len(self.recordings) == 1:
-            settings = replace(settings, fitted=_ONE_DRIVE["fitted"], compared=_ONE_DRIVE["compared"])
+            fitted, compared, settlings = (_ONE_DRIVE[name] for name in ("fitted", "compared", "settlings"))
+            settings = replace(settings, fitted=fitted, compared=compared, settlings=settlings)
         self._say("the wheels do not follow their commands as the simulator says: fitting its drivetrain")
         grounds, soils = [_GROUND] * len(self.recordings), {_GROUND: self.nominal.soil}
         drives = (self.recordings, grounds, self.nominal.robot, soils, settings)

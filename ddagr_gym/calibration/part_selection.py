@@ -36,10 +36,6 @@ ITERATIONS = 8
 """Steps of a fit without one part, from where the fit with it stands (ours): with 3 the fits of a simulated robot were
 not settled, and parts were kept that it does not have."""
 
-SETTLINGS = 3
-"""Times that a fit without a part goes on, where its forecasts are worse and it is not settled (ours): with the wheels'
-places of a Warthog as on its data sheet they were 4 % worse after 8 steps and 2 % better after 16."""
-
 HOPELESS = 0.1
 """Growth of the losses from which no further steps are spent on a fit without a part (ours)."""
 
@@ -90,6 +86,7 @@ class Comparison:
         judged: to forecast.
         weights: of the residuals.
         threads: of the simulator.
+        settlings: times that a fit without a part goes on, where its forecasts are worse and it is not settled.
     """
 
     data: CalibrationData
@@ -97,6 +94,7 @@ class Comparison:
     judged: WindowSet
     weights: Weights
     threads: int
+    settlings: int
 
     def candidate(self, model: RobotModel, start: Standing, iterations: int = ITERATIONS) -> Candidate:
         """A model, fitted from where another one stands, and its forecasts."""
@@ -206,7 +204,7 @@ def _settled(
 ) -> Candidate:
     """A model without some parts, fitted from where another one stands; further while it seems to miss them."""
     tried = _fitted_without(comparison, model, left_out, best.standing, cache)
-    for time in range(SETTLINGS):
+    for time in range(comparison.settlings):
         growth, error = worse_by(best, tried)
         missed = is_missed(growth, error, len(tried.losses))
         if not missed or tried.standing.converged or growth > HOPELESS:

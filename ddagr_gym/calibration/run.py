@@ -211,7 +211,7 @@ def _select(
     """Parts that forecasts of left-out drives ask for, by fits to some of the windows."""
     windows, judged = data.spread(settings.compared), data.spread(settings.judged)
     rough = store.step("all parts", partial(_weigh, data, windows, model, held, settings.threads, progress))
-    comparison = Comparison(data, windows, judged, rough.weights, settings.threads)
+    comparison = Comparison(data, windows, judged, rough.weights, settings.threads, settings.settlings)
     full = store.step("all parts forecast", partial(comparison.candidate, model, rough.standing, 0))
     return select_parts(comparison, model, full, store.step, progress)
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.block_means import BLOCK, block_windows, located
+from ddagr_gym.identification.fit_numerics import block_mean_numerics, far_off_numerics
 from ddagr_gym.identification.headings import without_poses
 from ddagr_gym.identification.noise import noise_from_differences
 from ddagr_gym.identification.nuisances import NuisancePriors, nuisances
@@ -40,6 +41,7 @@ class Setting:
         block: length of the means that are compared [s].
         priors: of what is uncertain.
         threads: of the simulator.
+        far_off: whether the simulator is only as accurate as a model that is far off needs.
     """
 
     duration: float = 2.0
@@ -47,6 +49,7 @@ class Setting:
     block: float = BLOCK
     priors: NuisancePriors = field(default_factory=NuisancePriors)
     threads: int = 1
+    far_off: bool = False
 
     def with_windows(self, duration: float, stride: float | None = None) -> Setting:
         """The same with windows of another length.
@@ -107,4 +110,5 @@ def make_problem(
     # where none has poses the first one begins along the world's x axis
     unplaced = reckoned[1:] if len(reckoned) == len(recordings) else reckoned
     uncertain = nuisances(robot, len(recordings), windows.period, setting.priors, unplaced)
-    return Problem(robot, soil, blocked, uncertain, threads=setting.threads)
+    numerics = far_off_numerics() if setting.far_off else block_mean_numerics()
+    return Problem(robot, soil, blocked, uncertain, threads=setting.threads, numerics=numerics)

@@ -223,8 +223,9 @@ def fit_states(problem: Problem, values: Array, iterations: int = 2) -> tuple[Ar
 
 
 def _sensitivities(problem: Problem, point: Point, prediction: Array) -> tuple[Array, Elimination]:
-    by_parameter = problem.parameter_columns(point, prediction)
-    return by_parameter, problem.eliminate(point, prediction, by_parameter)
+    unmoved = problem.varied_from(point, prediction)
+    by_parameter = problem.parameter_columns(point, prediction, unmoved)
+    return by_parameter, problem.eliminate(point, prediction, by_parameter, unmoved)
 
 
 def _raw_columns(problem: Problem, here: _Iterate) -> Array:

@@ -206,8 +206,8 @@ class Problem:
         model = self._slopes or self.model
         return model.predict(point.values, point.states, (*self._known, *point.effects))
 
-    def _varied_from(self, point: Point, base: Array) -> Array:
-        """What such a prediction is held against: the prediction at a point, by the same numerics."""
+    def varied_from(self, point: Point, base: Array) -> Array:
+        """(W, T, 8) what predictions for sensitivities are held against: that at a point, by the same numerics."""
         return base if self._slopes is None else self._varied_prediction(point)
 
     def residual(self, point: Point, prediction: Array) -> Array:
@@ -235,11 +235,16 @@ class Problem:
         rows = np.zeros((columns.shape[0], len(self.local_prior), columns.shape[2]))
         return np.concatenate([columns, rows], axis=1)
 
-    def parameter_columns(self, point: Point, base: Array) -> Array:
+    def parameter_columns(self, point: Point, base: Array, unmoved: Array | None = None) -> Array:
         """Weighted sensitivity to every nuisance parameter, (W, M, P).
 
         One simulation serves all parameters of scopes that do not overlap: a window sees one of them. So do headings,
         see :meth:`heading_columns`, and biases need none. What is held and has no local unknown is left out.
+
+        Args:
+            point: where the model stands.
+            base: (W, T, 8) prediction there.
+            unmoved: see :meth:`varied_from`; simulated when it is None.
         """
         columns = np.zeros((*self.blocked.mask.shape, len(self.prior)))
         simulated = []
@@ -253,7 +258,7 @@ class Problem:
                 columns[..., k] = self._bias_column(channel, base, parameter.acts_in(self.blocked.windows.recording))
             elif not parameter.heading and (self.prior[k] > 0.0 or k in self._varied):
                 simulated.append(k)
-        unmoved = self._varied_from(point, base)
+        unmoved = self.varied_from(point, base) if unmoved is None else unmoved
         for together in disjoint_scopes(self.nuisances.parameters, simulated):
             spans = np.array([self._difference(k, point.values[k]) for k in together])
             begin = self._beside(point, together, spans[:, 0]) if spans[:, 0].any() else unmoved
@@ -283,7 +288,7 @@ class Problem:
     def local_columns(self, point: Point, base: Array) -> Array:
         """The sensitivities (W, M, P) to the parameters that have a local unknown; 0 for all others."""
         columns = np.zeros((*self.blocked.mask.shape, len(self.prior)))
-        unmoved = self._varied_from(point, base) if self._varied else base
+        unmoved = self.varied_from(point, base) if self._varied else base
         for index in self._varied:
             moved = point.values.copy()
             moved[index] += self.nuisances.parameters[index].step
@@ -311,7 +316,7 @@ class Problem:
         step = self.nuisances.parameters[own[0]].step
         values = point.values.copy()
         values[own] += step
-        unmoved = self._varied_from(point, base)
+        unmoved = self.varied_from(point, base)
         change = self.blocked.change(self._varied_prediction(self.moved(point, values)), unmoved) / step
         for k in own:
             chosen = self.nuisances.parameters[k].acts_in(self.blocked.windows.recording)
@@ -330,16 +335,17 @@ class Problem:
         change = None if currents is None else currents.derivative(name, base, self.model.named(point.values))
         return None if change is None else self.blocked.derivative(change, base)
 
-    def eliminate(self, point: Point, base: Array, by_parameter: Array) -> Elimination:
+    def eliminate(self, point: Point, base: Array, by_parameter: Array, unmoved: Array | None = None) -> Elimination:
         """Basis of the local unknowns of each window at a point (theory: identification, eq. (7)).
 
         Args:
             point: where the model stands.
             base: (W, T, 8) prediction there.
             by_parameter: (W, M, P) sensitivities, of which those with a local unknown count.
+            unmoved: see :meth:`varied_from`; simulated when it is None.
         """
         model, effects = self._slopes or self.model, (*self._known, *point.effects)
-        unmoved = self._varied_from(point, base)
+        unmoved = self.varied_from(point, base) if unmoved is None else unmoved
         changes = model.state_derivatives(point.values, point.states, unmoved, effects)
         by_state = np.nan_to_num(self.blocked.derivative(changes, unmoved))
         local = [

@@ -38,7 +38,7 @@ def search_nothing(session, start, cache, enough):
 def asked(monkeypatch):
     monkeypatch.setattr(pipeline, "search", search_nothing)
     monkeypatch.setattr(pipeline, "unlike_commands", lambda accepted, gates: {"encoder_left": 9.0})
-    monkeypatch.setattr(door, "_ONE_DRIVE", {"fitted": 16, "compared": 12})
+    monkeypatch.setattr(door, "_ONE_DRIVE", {"fitted": 16, "compared": 12, "settlings": 1})
 
 
 @pytest.mark.slow

@@ -57,6 +57,7 @@ class Losses:
     """In place of fits: forecasts' losses by the parts that are out."""
 
     data = SimpleNamespace(robot=get_robot("warthog"))
+    settlings = 3
 
     def __init__(self, losses: dict[frozenset[str], float]) -> None:
         self.losses = losses
@@ -99,18 +100,21 @@ def test_a_dead_time_that_forecasts_as_well_takes_the_place_of_a_ramp(delay_alon
 
 
 @pytest.mark.parametrize(
-    ("losses", "kept", "fits"),
+    ("losses", "most", "kept", "fits"),
     [
-        ((1.05, 1.04, 1.0), False, 3),  # as good once it is settled
-        ((1.05, 1.05, 1.05, 1.05, 1.0), True, 4),  # so many steps are enough
-        ((1.2, 1.0), True, 1),  # too far off
-        ((1.01, 2.0), False, 1),  # not missed at first
+        ((1.05, 1.04, 1.0), 3, False, 3),  # as good once it is settled
+        ((1.05, 1.04, 1.0), 1, True, 2),  # a single drive has less time
+        ((1.05, 1.05, 1.05, 1.05, 1.0), 3, True, 4),  # so many steps are enough
+        ((1.2, 1.0), 3, True, 1),  # too far off
+        ((1.01, 2.0), 3, False, 1),  # not missed at first
     ],
 )
-def test_a_fit_without_a_part_goes_on_while_it_is_not_settled(losses, kept, fits):
+def test_a_fit_without_a_part_goes_on_while_it_is_not_settled(losses, most, kept, fits):
     made: list[float] = []
 
     class Slow(Losses):
+        settlings = most
+
         def candidate(self, model, start):
             if model.out & BOTH != RAMP:
                 return candidate(3.0, 3.01, 2.99)

@@ -22,6 +22,7 @@ from ddagr_gym.identification.parameters import (
     soil_parameters,
 )
 from ddagr_gym.identification.problem import Point, Problem
+from ddagr_gym.identification.window_model import WindowModel
 from ddagr_gym.identification.windows import CHANNELS, cut_windows
 from ddagr_gym.parameters import Imu, PoseReceiver, Sensors
 from ddagr_gym.recordings.schema import RobotGeometry
@@ -82,6 +83,21 @@ def test_coarse_sensitivities_find_the_same_values(one_drive):
     _, spread = linearised(one_drive(robust=ROBUST), fine).deviations()
     assert (np.abs(coarse.point.values - fine.point.values) <= 0.2 * spread).all()
     assert coarse.cost <= 1.001 * fine.cost
+
+
+def test_coarse_sensitivities_simulate_the_unmoved_point_once(one_drive, monkeypatch):
+    """Two parameters, the five initial speeds, and what all of them are held against."""
+    problem = one_drive(robust=ROBUST, slopes=field_slope_numerics())
+    coarse, predict = [], WindowModel.predict
+
+    def counted(model, *given):
+        if model is problem._slopes:
+            coarse.append(given)
+        return predict(model, *given)
+
+    monkeypatch.setattr(WindowModel, "predict", counted)
+    fit(problem, iterations=0)
+    assert len(coarse) == 2 + 5 + 1
 
 
 def test_a_step_that_rounds_over_a_bound_ends_on_it(one_drive, robot, soil, monkeypatch):

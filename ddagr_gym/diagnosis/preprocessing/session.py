@@ -64,7 +64,13 @@ class DiagnosisSession:
             duration: of a window [s].
             stride: between their starts [s].
         """
-        setting = self.setting.with_windows(duration, stride)
+        return self._with(self.setting.with_windows(duration, stride))
+
+    def as_far_off(self) -> DiagnosisSession:
+        """The same with a simulator that is only as accurate as a model that is far off needs."""
+        return self._with(replace(self.setting, far_off=True))
+
+    def _with(self, setting: Setting) -> DiagnosisSession:
         problem = make_problem(self.robot, self.soil, self.mended.recordings, setting)
         return replace(self, setting=setting, problem=problem, gates=self.bank.for_length(problem.covered))
 

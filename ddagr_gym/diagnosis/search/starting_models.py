@@ -15,6 +15,7 @@ from ddagr_gym.errors import InputError
 from ddagr_gym.identification.gauss_newton import Fitted, fit
 from ddagr_gym.identification.misfit import dispersion_of
 from ddagr_gym.identification.problem import Problem
+from ddagr_gym.parameters import Robot
 
 FAR_OFF = 4.0
 """Dispersion of the refitted nominal model above which something large is missing: windows are then short, and the raw
@@ -32,6 +33,11 @@ MANY_WINDOWS = 2 * MOST_WINDOWS
 SOME_WINDOWS = 60
 """Windows that stand for long drives there (ours): what is large shows in a few, and the time of a search does not grow
 with the length of the drives. On a drive of ten minutes half of 120 named the same, in 0.6 times the time."""
+
+
+FAST = 2.0
+"""Rim speed of a robot [m/s] above which a model that is far off is simulated as coarsely as field drives allow (ours;
+measured on a Warthog, 5 m/s): slow robots accelerate less, and errors of that simulation count more."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +59,8 @@ def starting_models(session: DiagnosisSession, cache: StepCache = compute_withou
     """Nominal models on windows of the set length; on short ones where the refitted one is far off.
 
     What is large bends long predictions so much that no small step leads to it, and shows in short ones as well. Of
-    long drives some of the windows say whether it is there.
+    long drives some of the windows say whether it is there. For a fast robot a coarse simulator says so, and serves the
+    whole search where it is.
 
     Args:
         session: of the diagnosis.
@@ -62,17 +69,32 @@ def starting_models(session: DiagnosisSession, cache: StepCache = compute_withou
     Raises:
         InputError: the nominal simulator breaks down on some window.
     """
-    some = _thinned(session, MANY_WINDOWS)
+    begun = session.as_far_off() if _is_fast(session.robot) else session
+    some = _thinned(begun, MANY_WINDOWS)
     raw, refitted = _refitted(some, "search refit" if some is session else "search refit, some windows", cache)
     if dispersion_of(some.problem, refitted) > FAR_OFF and session.setting.duration > SHORT:
-        session.progress("far off: again in short windows")
-        short = session.with_windows(SHORT, SHORT * session.setting.stride / session.setting.duration)
+        short = begun.with_windows(SHORT, SHORT * session.setting.stride / session.setting.duration)
         session = _thinned(short, MOST_WINDOWS)
-        raw, refitted = _refitted(session, "search refit, short windows", cache)
+        # windows of drives in short segments are as short already
+        if not _same_windows(session, some):
+            session.progress("far off: again in short windows")
+            raw, refitted = _refitted(session, "search refit, short windows", cache)
     elif some is not session:
         raw, refitted = _refitted(session, "search refit", cache)
     _check_predicted(session, refitted)
     return StartingModels(session, raw, refitted)
+
+
+def _is_fast(robot: Robot) -> bool:
+    return robot.maximum_wheel_speed * robot.outer_radius > FAST
+
+
+def _same_windows(session: DiagnosisSession, other: DiagnosisSession) -> bool:
+    """Whether two sessions of the same recordings fit the same samples."""
+    here, there = session.problem.blocked.windows, other.problem.blocked.windows
+    return here.samples == there.samples and all(
+        np.array_equal(a, b) for a, b in ((here.recording, there.recording), (here.start, there.start))
+    )
 
 
 def _refitted(session: DiagnosisSession, name: str, cache: StepCache) -> tuple[Fitted, Fitted]:

@@ -212,6 +212,58 @@ def test_some_windows_of_long_drives_say_whether_the_nominal_model_is_far_off(
         assert counts[0] < counts[1] == whole
 
 
+@pytest.fixture
+def refits(monkeypatch: pytest.MonkeyPatch) -> list[Problem]:
+    """Problems of the nominal refits, which take no step."""
+    made: list[Problem] = []
+
+    def refit(problem: Problem, progress: object) -> tuple[Fitted, Fitted]:
+        made.append(problem)
+        found = fit(problem, iterations=0)
+        return found, found
+
+    monkeypatch.setattr(starts, "refit_nominal", refit)
+    return made
+
+
+def test_windows_that_are_short_already_are_fitted_once(
+    drive: Callable[..., Recording],
+    problem_of: Callable[..., Problem],
+    monkeypatch: pytest.MonkeyPatch,
+    refits: list[Problem],
+) -> None:
+    """Drives in segments of 2 s have no longer windows, whatever is set."""
+    recordings = (drive(seconds=8.0),)
+    session = session_of(problem_of(*recordings), recordings, THRESHOLDS)
+    session = replace(session, setting=replace(session.setting, duration=6.0, stride=6.0))
+    monkeypatch.setattr(starts, "FAR_OFF", 0.0)
+    start = starting_models(session)
+    assert len(refits) == 1
+    assert start.session.setting.duration == SHORT
+    assert start.session.problem.blocked.windows.count == session.problem.blocked.windows.count
+
+
+@pytest.mark.parametrize("far_off", [False, True])
+def test_a_fast_robot_is_simulated_coarsely_where_the_nominal_model_is_far_off(
+    drive: Callable[..., Recording],
+    problem_of: Callable[..., Problem],
+    monkeypatch: pytest.MonkeyPatch,
+    refits: list[Problem],
+    far_off: bool,
+) -> None:
+    recordings = (drive(seconds=24.0),)
+    session = session_of(problem_of(*recordings), recordings, THRESHOLDS).with_windows(3.0, 3.0)
+    exact = session.problem.predict(session.problem.start())
+    monkeypatch.setattr(starts, "FAST", 0.5 * session.robot.maximum_wheel_speed * session.robot.outer_radius)
+    monkeypatch.setattr(starts, "FAR_OFF", 0.0 if far_off else np.inf)
+    start = starting_models(session)
+    assert len(refits) == 2
+    assert start.session.setting.far_off is far_off
+    assert not np.array_equal(refits[0].predict(refits[0].start()), exact)
+    if not far_off:
+        np.testing.assert_array_equal(refits[1].predict(refits[1].start()), exact)
+
+
 def test_a_second_effect_keeps_the_overlap_it_had_before_it_was_named() -> None:
     def scanned(cost: float, overlap: dict[str, float], *effects: str) -> Any:
         point = SimpleNamespace(effects=tuple(parse_effect(text) for text in effects))
