@@ -24,7 +24,7 @@ from ddagr_gym.extras import missing_extra
 from ddagr_gym.tasks.task import FailedTasksError
 
 _HELP = ("-h", "--help")
-_USER_ERRNO = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.ENAMETOOLONG, errno.ELOOP)
+_USER_ERRNO = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.ENAMETOOLONG, errno.ELOOP)
 
 
 def main(arguments: Sequence[str] | None = None, package: ModuleType = commands) -> int:

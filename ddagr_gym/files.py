@@ -66,6 +66,10 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
         yield temporary
         os.chmod(temporary, _mode_of(final))
         os.replace(temporary, final)
+    except OSError as error:
+        if error.errno is not None and error.filename is None:
+            error.filename = str(final)  # a full disk is met while writing, where nobody knows the name
+        raise
     finally:
         temporary.unlink(missing_ok=True)
 

@@ -268,3 +268,25 @@ def test_python_m_is_the_same_command(tmp_path: Path):
     assert done.returncode == 2
     assert done.stderr.startswith("ddagr: unknown robot 'no-such'")
     assert "Traceback" not in done.stderr
+
+
+FULL = """
+import resource, sys
+from ddagr_gym.cli import main
+words = ["simulate", "--output", sys.argv[1]]
+assert main(words) == 0
+resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))
+sys.exit(main(words))
+"""
+"""Writes a drive, and again where no file may be longer than 4 kB, as on a disk that fills."""
+
+
+def test_a_disk_that_fills_is_one_sentence_and_keeps_the_file_of_before(tmp_path):
+    pytest.importorskip("resource", reason="limits of POSIX")
+    path = tmp_path / "drive.csv"
+    done = subprocess.run([sys.executable, "-c", FULL, str(path)], capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert f"ddagr: {path}: file too large: choose another path or make room." in done.stderr
+    assert "Traceback" not in done.stderr
+    assert path.stat().st_size > 4096
+    assert [item.name for item in tmp_path.iterdir()] == ["drive.csv"]
