@@ -117,11 +117,12 @@ def _next(
         evidence = _evidence_after(after, shift, looks > 1)
         # what parameters had to make up for speaks for an effect that takes all of it back, or has no size of its own
         taken_back = bool(model.pulled) and (evidence is None or not after.pulled)
-        found = replace(after, named=(*model.named, evidence or shift)), rival
+        # that ordinary drives scatter more as refits than as first steps guards the alarm; a rival follows one
+        by_itself = (_evidence_after(after, shift, stretched=False) if evidence else None) or shift
         if taken_back or model.probability(evidence or shift, looks) < LEVEL:
-            tried.append(found)
-        elif (evidence or shift).probability < LEVEL:
-            usual.append(found)
+            tried.append((replace(after, named=(*model.named, evidence or shift)), rival))
+        elif by_itself.probability < LEVEL:
+            usual.append((replace(after, named=(*model.named, by_itself)), rival))
     if not tried:
         return None
     most = max(rival.gain for _, rival in tried)
