@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from ddagr_gym.estimation.ekf import at_rest, bank_noise, limit_state
 from ddagr_gym.estimation.inertial_covariance import (
-    joseph_update_inertial,
     limit_inertial_covariance,
     propagate_inertial,
 )
@@ -43,15 +42,18 @@ from ddagr_gym.estimation.inertial_layout import (
     UNKNOWN_ACCELERATION,
     Q,
 )
+from ddagr_gym.estimation.inertial_update import (
+    entry_column,
+    gyro_column,
+    row_column,
+    use_innovation,
+)
 from ddagr_gym.estimation.layout import (
     ACCELEROMETER_BIAS,
     CHANNEL_SIZE,
-    COLUMN,
     ENCODER_CHANNEL,
     FORCE,
     FORCE_CHANNEL,
-    GAIN,
-    GATE,
     GRADIENT,
     GYRO_BIAS,
     GYRO_CHANNEL,
@@ -77,8 +79,6 @@ from ddagr_gym.estimation.process_model import advance_banks, body_forces, half_
 from ddagr_gym.jit import kernel
 
 Array = NDArray[np.float64]
-
-_ABSURD = 1e12  # standardised innovations from here on are no readings: their squares would overflow
 
 
 @kernel()
@@ -172,59 +172,6 @@ def predict_inertial(model: Array, work: Array, right: float, left: float, durat
 
 
 @kernel()
-def _update(
-    model: Array, work: Array, innovation: float, expected: float, variance: float, learning: float = 0.0
-) -> float:
-    """Use one innovation with ``P h^T`` in COLUMN; the gate is that of :func:`~ddagr_gym.estimation.ekf.update`."""
-    total = max(expected, 0.0) + variance
-    standardised = innovation / math.sqrt(total)
-    if not abs(standardised) < _ABSURD:
-        return math.nan
-    excess = abs(standardised) / model[GATE]
-    if excess > 1.0:
-        variance += total * (excess - 1.0)
-        total *= excess
-    for i in range(STRIDE):
-        work[GAIN + i] = work[COLUMN + i] / total
-    slower = total / (total + learning * variance)
-    for i in range(PARAMETER, PARAMETER + PARAMETER_SIZE):
-        work[GAIN + i] *= slower
-    for i in range(INERTIAL_STATE_SIZE):
-        work[X + i] += work[GAIN + i] * innovation
-    joseph_update_inertial(work, expected, variance)
-    return standardised
-
-
-@kernel(inline=True)
-def _entry_column(work: Array, entry: int) -> float:
-    for i in range(STRIDE):
-        work[COLUMN + i] = work[Q + entry * STRIDE + i]
-    return work[COLUMN + entry]
-
-
-@kernel(inline=True)
-def _gyro_column(work: Array) -> float:
-    for i in range(STRIDE):
-        work[COLUMN + i] = work[Q + 2 * STRIDE + i] + work[Q + GYRO_BIAS * STRIDE + i]
-    return work[COLUMN + 2] + work[COLUMN + GYRO_BIAS]
-
-
-@kernel(inline=True)
-def _row_column(work: Array) -> float:
-    """``P h^T`` of the row in ROW."""
-    for i in range(STRIDE):
-        work[COLUMN + i] = 0.0
-    for k in range(INERTIAL_STATE_SIZE):
-        weight = work[ROW + k]
-        for i in range(STRIDE):
-            work[COLUMN + i] += weight * work[Q + STRIDE * k + i]
-    expected = 0.0
-    for k in range(INERTIAL_STATE_SIZE):
-        expected += work[ROW + k] * work[COLUMN + k]
-    return expected
-
-
-@kernel()
 def shifted_forces(model: Array, work: Array) -> None:
     """:func:`~process_model.body_forces` with lateral forces ahead of the hubs, and the derivative by that distance."""
     ahead, turn, v_y = work[X + PATCH_AHEAD], work[X + 2], work[X + 1]
@@ -255,7 +202,7 @@ def balance_forces(model: Array, work: Array, duration: float) -> None:
             work[ROW + ACCELEROMETER_BIAS + axis] = 1.0
             felt = work[MEAN_FORCE + axis] / count - work[X + ACCELEROMETER_BIAS + axis]
         variance = model[BALANCE + axis]
-        _update(model, work, felt - work[FORCE + axis], _row_column(work), variance, model[BALANCE_LEARNING])
+        use_innovation(model, work, felt - work[FORCE + axis], row_column(work), variance, model[BALANCE_LEARNING])
     work[MEAN_FORCE] = work[MEAN_FORCE + 1] = work[SUMMED] = 0.0
     work[LAST_RATE] = work[X + 2]
 
@@ -269,7 +216,7 @@ def _hold_slip(model: Array, work: Array, speed: float) -> float:
         work[ROW + j] = 0.0
     work[ROW] = 1.0
     work[ROW + OMEGA] = work[ROW + OMEGA + 1] = -half
-    _update(model, work, speed - work[X], _row_column(work), deviation * deviation)
+    use_innovation(model, work, speed - work[X], row_column(work), deviation * deviation)
     return deviation
 
 
@@ -277,7 +224,7 @@ def _hold_slip(model: Array, work: Array, speed: float) -> float:
 def _roll(model: Array, work: Array, speed: float) -> None:
     """Measure that the robot rolls with little slip at a mean rim speed [m/s]: the law's forces are stiff near rest."""
     deviation = _hold_slip(model, work, speed)
-    _update(model, work, -work[X + 1], _entry_column(work, 1), deviation * deviation)
+    use_innovation(model, work, -work[X + 1], entry_column(work, 1), deviation * deviation)
     work[MEAN_FORCE] = work[MEAN_FORCE + 1] = work[SUMMED] = 0.0
     work[LAST_RATE] = work[X + 2]
 
@@ -305,18 +252,20 @@ def correct_inertial(model: Array, work: Array, standing: bool) -> None:
         work[STANDARDISED + channel] = math.nan
     if math.isfinite(work[READING + GYRO_CHANNEL]):
         innovation = work[READING + GYRO_CHANNEL] - work[X + 2] - work[X + GYRO_BIAS]
-        work[STANDARDISED + GYRO_CHANNEL] = _update(
-            model, work, innovation, _gyro_column(work), model[MEASUREMENT + GYRO_CHANNEL]
+        work[STANDARDISED + GYRO_CHANNEL] = use_innovation(
+            model, work, innovation, gyro_column(work), model[MEASUREMENT + GYRO_CHANNEL]
         )
     for bank in range(2):
         channel = ENCODER_CHANNEL + bank
         if math.isfinite(work[READING + channel]):
             innovation = work[READING + channel] - work[X + OMEGA + bank]
-            expected = _entry_column(work, OMEGA + bank)
-            work[STANDARDISED + channel] = _update(model, work, innovation, expected, model[MEASUREMENT + channel])
+            expected = entry_column(work, OMEGA + bank)
+            work[STANDARDISED + channel] = use_innovation(
+                model, work, innovation, expected, model[MEASUREMENT + channel]
+            )
     if standing:
         for axis in range(3):
-            _update(model, work, -work[X + axis], _entry_column(work, axis), model[STANDSTILL_VARIANCE + axis])
+            use_innovation(model, work, -work[X + axis], entry_column(work, axis), model[STANDSTILL_VARIANCE + axis])
 
 
 @kernel()

@@ -8,7 +8,7 @@ something changed is then known.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -34,6 +34,9 @@ further than any weight of an equivalence set)."""
 
 NEARLY = 1.1
 """Factor on what the best name leaves out of the ordinary up to which another leaves nearly as little (ours)."""
+
+Tried = tuple[Model, Rival]
+"""The model with one more effect, and its joint refit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,12 +108,35 @@ def _next(
 ) -> tuple[Model, Step] | None:
     """The model with the next name; None where no effect that exists has the shift."""
     dispersion = dispersion_of(problem, model.fitted)
-    looks = 1 if model.conspicuous or model.pulled else 2
     refitted = joint_refits(problem, model, ordinary, dispersion, progress)
-    tried: list[tuple[Model, Rival]] = []
-    usual: list[tuple[Model, Rival]] = []
+    alarming, usual = _compared_beside(problem, model, ordinary, refitted, progress)
+    if not alarming:
+        return None
+    most = max(rival.gain for _, rival in alarming)
+    better = [item for item in usual if item[1].gain > most and item[0].left <= 1.0]
+    allowed = max(1.0, NEARLY * min(after.left for after, _ in alarming))
+    kept = [*better, *(item for item in alarming if item[0].left <= allowed)]
+    weights = equivalence_weights([rival for _, rival in kept], dispersion, rng)
+    name = max(weights, key=weights.__getitem__)
+    chosen = next(item for item in kept if item[1].name == name)
+    rivals = (chosen[1], *(rival for _, rival in kept if rival is not chosen[1]))
+    alarm = None if chosen in alarming else max(alarming, key=lambda item: item[1].gain)[0].named[-1]
+    return chosen[0], Step(chosen[0].named[-1], weights, rivals, dispersion, alarm)
+
+
+def _compared_beside(
+    problem: Problem,
+    model: Model,
+    ordinary: Comparison,
+    refitted: Sequence[tuple[Shift, Rival]],
+    progress: Callable[[str], None],
+) -> tuple[list[Tried], list[Tried]]:
+    """Models with refitted effects: those that are out of the ordinary among all, and those that are by themselves."""
+    looks = 1 if model.conspicuous or model.pulled else 2
+    alarming: list[Tried] = []
+    usual: list[Tried] = []
     for shift, rival in refitted:
-        if rival.gain < CLOSE * max((item.gain for after, item in tried if after.left <= 1.0), default=0.0):
+        if rival.gain < CLOSE * max((item.gain for after, item in alarming if after.left <= 1.0), default=0.0):
             break
         progress(f"comparing every effect beside {rival.name}")
         after = model_of(problem, rival.fitted, ordinary, (*model.named, shift))
@@ -120,21 +146,10 @@ def _next(
         # that ordinary drives scatter more as refits than as first steps guards the alarm; a rival follows one
         by_itself = (_evidence_after(after, shift, stretched=False) if evidence else None) or shift
         if taken_back or model.probability(evidence or shift, looks) < LEVEL:
-            tried.append((replace(after, named=(*model.named, evidence or shift)), rival))
+            alarming.append((replace(after, named=(*model.named, evidence or shift)), rival))
         elif by_itself.probability < LEVEL:
             usual.append((replace(after, named=(*model.named, by_itself)), rival))
-    if not tried:
-        return None
-    most = max(rival.gain for _, rival in tried)
-    better = [item for item in usual if item[1].gain > most and item[0].left <= 1.0]
-    allowed = max(1.0, NEARLY * min(after.left for after, _ in tried))
-    kept = [*better, *(item for item in tried if item[0].left <= allowed)]
-    weights = equivalence_weights([rival for _, rival in kept], dispersion, rng)
-    name = max(weights, key=weights.__getitem__)
-    chosen = next(item for item in kept if item[1].name == name)
-    rivals = (chosen[1], *(rival for _, rival in kept if rival is not chosen[1]))
-    alarm = None if chosen in tried else max(tried, key=lambda item: item[1].gain)[0].named[-1]
-    return chosen[0], Step(chosen[0].named[-1], weights, rivals, dispersion, alarm)
+    return alarming, usual
 
 
 def _evidence_after(model: Model, shift: Shift, stretched: bool) -> Shift | None:
