@@ -36,7 +36,7 @@ from ddagr_gym.recordings.schema import Recording
 
 Array = np.ndarray
 
-_NAMES = {
+NAMES = {
     "command_right": "cmd_right", "command_left": "cmd_left", "encoder_right": "enc_right", "encoder_left": "enc_left",
     "specific_force_x": "imu_ax", "specific_force_y": "imu_ay", "yaw_rate": "imu_gz", "pose_x": "x", "pose_y": "y",
     "pose_yaw": "yaw",
@@ -112,13 +112,22 @@ def _integrate(first: Any, then: Any, switch: int, commands: Array, start: Array
     return truth
 
 
-def _driven(first: Plant, then: Plant, switch: int, commands: Array, start: Array) -> dict[str, Array]:
+def driven(first: Plant, then: Plant, switch: int, commands: Array, start: Array) -> dict[str, Array]:
+    """As :func:`benchmarks.concealed.drive.drive`, with another plant from a sample on.
+
+    Args:
+        first: plant before the switch.
+        then: plant from it on, whose state has the same shape.
+        switch: sample.
+        commands: (samples * substeps, 2) as the motors receive them [rad/s].
+        start: pose of the body origin [m, m, rad].
+    """
     truth = np.zeros((len(commands) // SUBSTEPS, len(TRUTH)))
     _integrate(settled(first), settled(then), switch, np.ascontiguousarray(commands), start.copy(), truth)
     return {name: truth[:, k] for k, name in enumerate(TRUTH)}
 
 
-def _without(plant: Plant, bare: Plant) -> Plant:
+def without_externals(plant: Plant, bare: Plant) -> Plant:
     """The bare plant with the external forces of another one, at no strength: they keep the shape of its state."""
     quiet = plant.externals.copy()
     quiet[:, 1:4] = 0.0
@@ -134,14 +143,14 @@ def simulate(item: Switched) -> dict[str, Array]:
     start, rng = item.start()
     change = item.form.build(item.multiple * least_size(item.form), rng, Site((drive(bare, commands, start),)))
     full = change.plant(bare) if change.plant else bare
-    quiet = _without(full, bare)
+    quiet = without_externals(full, bare)
     switch = -SETTLING if item.kind == ALWAYS else round(item.time / SAMPLE_PERIOD)
     changed = change.command(commands, rng) if change.command else commands
     before, after = ((quiet, commands, ()), (full, changed, (change,)))
     if item.kind == ENDS:
         before, after = after, before
-    driven = np.where(np.arange(len(commands))[:, None] < switch * SUBSTEPS, before[1], after[1])
-    truth = _driven(before[0], after[0], switch, driven, start)
+    received = np.where(np.arange(len(commands))[:, None] < switch * SUBSTEPS, before[1], after[1])
+    truth = driven(before[0], after[0], switch, received, start)
     return _spliced(case, item, truth, wanted, (before[0], before[2]), (after[0], after[2]), switch)
 
 
@@ -167,5 +176,5 @@ def _spliced(
 def recording_of(item: Switched, robot: Robot) -> Recording:
     """The drive as a recording."""
     log = simulate(item)
-    columns = {"t": log["t"]} | {ours: log[theirs] for ours, theirs in _NAMES.items()}
+    columns = {"t": log["t"]} | {ours: log[theirs] for ours, theirs in NAMES.items()}
     return Recording.from_columns(columns, robot, source=item.name)

@@ -81,7 +81,7 @@ def _differences(with_effects: list[Log], without: list[Log]) -> dict[str, float
     return sizes
 
 
-def _effect_labels(case: Case, changes: tuple[Change, ...]) -> list[dict[str, Any]]:
+def effect_labels(case: Case, changes: tuple[Change, ...]) -> list[dict[str, Any]]:
     labels = []
     for (form, multiple), change in zip(case.effects, changes, strict=True):
         label = {"name": form.name, "variant": form.variant, "tag": form.tag, "equation": form.equation}
@@ -124,7 +124,7 @@ def simulate_case(case: Case, seed: int) -> tuple[dict[str, Log], dict[str, Any]
         "case": case.name,
         "kind": case.kind,
         "verdict": case.verdict,
-        "effects": _effect_labels(case, changes),
+        "effects": effect_labels(case, changes),
         "structure": case.structure,
         "receiver": case.receiver,
         "manoeuvres": case.manoeuvres,

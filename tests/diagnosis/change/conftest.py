@@ -17,6 +17,12 @@ from ddagr_gym.recordings.schema import Recording
 RATE = 20.0
 """Of the recordings [Hz]."""
 
+PICTURES = (
+    "Shift of every effect over its limit", "Size of every effect before and after", "Losses of forecasts",
+    "Size of each named effect against time", "Parameters of robot and ground",
+)  # fmt: skip
+"""Beginnings of what the pictures of a page with a name show."""
+
 STRENGTH = 0.05
 """Deviation of the logarithm of the soil's strength between drives."""
 

@@ -18,7 +18,7 @@ from ddagr_gym.physics.effects.registry import effect_kinds
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.reporting.change_page import write_page
 from ddagr_gym.reporting.change_text import change_text
-from tests.diagnosis.change.conftest import drive
+from tests.diagnosis.change.conftest import PICTURES, drive
 
 ROBOT, SOIL = get_robot("ddagr"), get_soil("thesis_a1")
 
@@ -99,7 +99,7 @@ def test_three_drives_before_and_two_after_on_another_ground(tmp_path):
     assert "left-out windows are forecast as well as 90 % of those of the drives before" in text
     write_page(tmp_path, diagnosis)
     page = (tmp_path / "index.html").read_text()
-    assert page.count("<figure>") == 4
+    assert [page.count(f'alt="{picture}') for picture in PICTURES] == [1] * len(PICTURES)
     assert "http" not in page.replace("http-equiv", "")
     assert "on another ground it is another one in any case" in page
 

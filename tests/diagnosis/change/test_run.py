@@ -13,7 +13,7 @@ from ddagr_gym.diagnosis.result.files import as_mapping, validate
 from ddagr_gym.errors import InputError
 from ddagr_gym.reporting.change_page import write_page
 from ddagr_gym.reporting.change_text import change_text
-from tests.diagnosis.change.conftest import drive
+from tests.diagnosis.change.conftest import PICTURES, drive
 from tests.viewers.reading import read
 
 CHANGES = (
@@ -77,7 +77,7 @@ def test_an_unknown_ground_hides_the_soil_and_not_the_sensors(ordinary_robot, tm
     assert math.isclose(again.findings[0].gain, diagnosis.findings[0].gain)
     write_page(tmp_path, diagnosis)
     page = (tmp_path / "index.html").read_text()
-    assert page.count("<figure>") == 4
+    assert [page.count(f'alt="{picture}') for picture in PICTURES] == [1] * len(PICTURES)
     assert "http" not in page.replace("http-equiv", "")
     assert "Gyro bias" in change_text(diagnosis)
 

@@ -1,0 +1,180 @@
+"""What ``ddagr diagnose --before`` says of simulated pairs of drives in which the generator changed something.
+
+    python -m benchmarks.changed_pairs --seed 1 [--limit N] [--kinds single ...]      to develop on
+    python -m benchmarks.changed_pairs --draw SECRET                                 a sealed set: its seed, drawn
+    python -m benchmarks.changed_pairs --secret SECRET                               answers to it, and their score
+
+Every pair has three drives of 60 s before and one after, of a DDAGR on one field of a simulator that shares no code
+with the package and is of another structure (``benchmarks/concealed/README.md``): the drive after is on another patch
+of the field, on another day, with other commands. The ground is said to be the same; the nominal is the data sheet on
+the thesis's soil. The diagnosis gets the recordings alone.
+
+``--draw`` writes the seed to SECRET, which lies outside the checkout, and its hash to
+``benchmarks/results/changed_pairs_commitment.json``, which is committed before the answers are made; ``--secret``
+refuses a seed of another hash. Written are the answers' score and a picture (``benchmarks/results/changed_pairs.json``,
+``.png``); a run goes on after the answers in the folder of parts. Fifty seconds of a core a pair, 208 pairs in a set.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import secrets
+import sys
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from benchmarks.changed_pairs.drives import recordings_of, simulate
+from benchmarks.changed_pairs.figure import draw
+from benchmarks.changed_pairs.plan import Pair, plan
+from benchmarks.changed_pairs.score import against_targets, score
+from benchmarks.commits import commit_of
+from ddagr_gym.diagnosis.change.run import what_changed_since
+from ddagr_gym.diagnosis.result.files import as_mapping
+from ddagr_gym.errors import InputError
+from ddagr_gym.files import write_json
+from ddagr_gym.presets import get_robot, get_soil
+from ddagr_gym.tasks import ResultStore, Task, TaskRunner, run_tasks
+
+CHECKOUT = Path(__file__).resolve().parents[2]
+RESULT = CHECKOUT / "benchmarks" / "results" / "changed_pairs.json"
+COMMITMENT = RESULT.with_name("changed_pairs_commitment.json")
+ROBOT, SOIL = "ddagr", "thesis_a1"
+KEPT = ("verdict", "complete", "findings", "sentence", "detectable", "detectable_alone", "change", "checks", "seconds")
+"""Entries of an answer."""
+
+
+def answer(seed: int, pair: Pair) -> dict[str, Any]:
+    """What is said of a pair, as JSON has it.
+
+    Args:
+        seed: of the set.
+        pair: of it.
+    """
+    logs, after, _ = simulate(pair, seed)
+    robot = get_robot(ROBOT)
+    before = recordings_of(logs, [f"before {k}" for k in (1, 2, 3)], robot)
+    outcome, _ = what_changed_since(
+        recordings_of([after], ["after"], robot), before, robot, get_soil(SOIL), same_ground=True
+    )
+    body = as_mapping(outcome.diagnosis)
+    return {name: body[name] for name in KEPT if name in body}
+
+
+def digest_of(seed: int) -> str:
+    """Hash by which a seed is committed to.
+
+    Args:
+        seed: of a set.
+    """
+    return hashlib.sha256(f"changed pairs {seed}".encode()).hexdigest()
+
+
+def draw_secret(path: Path) -> None:
+    """Draw the seed of a sealed set and commit to it.
+
+    Args:
+        path: new file for the seed.
+
+    Raises:
+        InputError: the file exists or lies in the checkout.
+    """
+    if path.exists() or path.resolve().is_relative_to(CHECKOUT):
+        raise InputError(f"{path} exists or lies in the checkout: give a new file outside of it.")
+    seed = secrets.randbits(128)
+    write_json(path, {"seed": seed})
+    write_json(COMMITMENT, {"seed": digest_of(seed), "commit": commit_of(CHECKOUT)})
+
+
+def secret_seed(path: Path) -> int:
+    """Seed of a sealed set.
+
+    Args:
+        path: file of :func:`draw_secret`.
+
+    Raises:
+        InputError: it is not the one that was committed to.
+    """
+    seed = int(json.loads(path.read_text())["seed"])
+    if digest_of(seed) != json.loads(COMMITMENT.read_text())["seed"]:
+        raise InputError(f"{path} holds another seed than the one that {COMMITMENT.name} is the hash of.")
+    return seed
+
+
+def answers_to(pairs: Sequence[Pair], seed: int, parts: Path, workers: int, cluster: str) -> dict[str, Any]:
+    """Answers by pair, those that are missing made by workers.
+
+    Args:
+        pairs: to answer.
+        seed: of the set.
+        parts: folder of finished answers.
+        workers: processes.
+        cluster: a Ray cluster, as of :class:`ddagr_gym.tasks.TaskRunner`.
+    """
+    mark = digest_of(seed)[:12]
+    tasks = [Task(pair.name, answer, (seed, pair), key=f"{mark}-{pair.name}") for pair in pairs]
+    with TaskRunner(workers, cluster=cluster) as runner:
+        found = run_tasks(tasks, "pairs", runner, ResultStore(parts))
+    return {pair.name: entry for pair, entry in zip(pairs, found, strict=True)}
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """Command line; returns the exit code."""
+    given = _parser().parse_args(words)
+    try:
+        if given.draw is not None:
+            draw_secret(given.draw)
+            return 0
+        seed = given.seed if given.secret is None else secret_seed(given.secret)
+    except InputError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    pairs = [pair for pair in plan(seed) if not given.kinds or pair.kind in given.kinds][: given.limit]
+    answers = answers_to(pairs, seed, given.parts, given.workers, given.cluster)
+    labels = {pair.name: simulate(pair, seed)[2] for pair in pairs}
+    figures = score(labels, answers)
+    about = {
+        "command": "python -m benchmarks.changed_pairs",
+        "set": f"development, seed {seed}" if given.secret is None else "sealed",
+        "seed": seed,
+        "commit": commit_of(CHECKOUT),
+        "pairs": dict(Counter(pair.kind for pair in pairs)),
+    }
+    write_json(given.output, {"about": about, "targets": against_targets(figures), **figures})
+    draw(figures, given.output.with_suffix(".png"))
+    _print(figures)
+    return 0
+
+
+def _print(figures: dict[str, Any]) -> None:
+    aims = against_targets(figures)
+    for name, entry in figures.items():
+        if isinstance(entry, dict) and entry.get("count"):
+            aim = aims.get(name)
+            said = (
+                "" if aim is None else f", aim {aim['least']:g} to {aim['most']:g}: {'met' if aim['met'] else 'missed'}"
+            )
+            low, high = entry["interval"]
+            print(f"{name}: {entry['value']:.3f} ({low:.3f} to {high:.3f}) of {entry['count']}{said}")
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    seed = parser.add_mutually_exclusive_group()
+    seed.add_argument("--seed", type=int, default=1, help="of a set to develop on")
+    seed.add_argument("--draw", type=Path, help="new file for the seed of a sealed set")
+    seed.add_argument("--secret", type=Path, help="file of that seed")
+    parser.add_argument("--limit", type=int, help="only the first pairs")
+    parser.add_argument("--kinds", nargs="+", help="only pairs of these kinds")
+    parser.add_argument("--parts", type=Path, default=RESULT.with_suffix(".parts"), help="folder of finished answers")
+    parser.add_argument("--output", type=Path, default=RESULT, help="JSON; the picture has the same name")
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--cluster", default="", help="a Ray cluster: local, or its address")
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main())
