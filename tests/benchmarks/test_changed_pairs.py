@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from benchmarks.changed_pairs import __main__ as command
+from benchmarks.changed_pairs import answers as answering
 from benchmarks.changed_pairs.drives import simulate
 from benchmarks.changed_pairs.figure import draw
 from benchmarks.changed_pairs.plan import BEGINNING, HIDDEN, SINGLES, SWITCHED, plan
@@ -130,15 +131,15 @@ def test_a_wrong_name_beside_the_right_one_is_sure_and_wrong():
 
 
 def test_another_seed_than_the_one_committed_to_is_refused(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(command, "COMMITMENT", tmp_path / "commitment.json")
+    monkeypatch.setattr(answering, "COMMITMENT", tmp_path / "commitment.json")
     secret = tmp_path / "secret.json"
     assert command.main(["--draw", str(secret)]) == 0
-    assert command.secret_seed(secret) == json.loads(secret.read_text())["seed"]
+    assert answering.secret_seed(secret) == json.loads(secret.read_text())["seed"]
     assert command.main(["--draw", str(secret)]) == 2
     other = tmp_path / "other.json"
     other.write_text('{"seed": 5}')
     with pytest.raises(InputError, match="another seed"):
-        command.secret_seed(other)
+        answering.secret_seed(other)
     assert command.main(["--secret", str(other)]) == 2
     assert "another seed" in capsys.readouterr().err
 

@@ -2,7 +2,7 @@
 
 An effect that is not the one that changed leaves shifts of others behind when it is fitted; the right one takes all of
 them away. Of those that do, the joint refits decide, and what they do not tell apart stays an equivalence set. Where
-one of them is out of the ordinary among all effects, another that explains more need be so by itself only: that
+one of them is out of the ordinary among all effects, another that explains as much need be so by itself only: that
 something changed is then known.
 """
 
@@ -113,9 +113,9 @@ def _next(
     if not alarming:
         return None
     most = max(rival.gain for _, rival in alarming)
-    better = [item for item in usual if item[1].gain > most and item[0].left <= 1.0]
+    alike = [item for item in usual if item[1].gain > CLOSE * most and item[0].left <= 1.0]
     allowed = max(1.0, NEARLY * min(after.left for after, _ in alarming))
-    kept = [*better, *(item for item in alarming if item[0].left <= allowed)]
+    kept = sorted([*alike, *(item for item in alarming if item[0].left <= allowed)], key=lambda item: -item[1].gain)
     weights = equivalence_weights([rival for _, rival in kept], dispersion, rng)
     name = max(weights, key=weights.__getitem__)
     chosen = next(item for item in kept if item[1].name == name)
