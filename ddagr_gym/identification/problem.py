@@ -134,6 +134,14 @@ class Problem:
         held.prior = np.where(chosen, 0.0, self.prior)
         return held
 
+    def expecting(self, priors: Mapping[str, float]) -> Problem:
+        """The same problem with other prior deviations of parameters that it moves, by name."""
+        other = copy(self)
+        parameters = tuple(replace(p, prior=priors.get(p.name, p.prior)) for p in self.nuisances.parameters)
+        other.nuisances = replace(self.nuisances, parameters=parameters)
+        other.prior = np.where(self.prior > 0.0, [p.prior for p in parameters], 0.0)
+        return other
+
     def on(self, blocked: BlockedWindows) -> Problem:
         """The same problem on other windows of the same recordings."""
         other = copy(self)

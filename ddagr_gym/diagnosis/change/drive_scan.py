@@ -27,7 +27,7 @@ from ddagr_gym.physics.effects.registry import effect_kinds
 Array = NDArray[np.float64]
 
 NOT_COMPARED: Mapping[str, str] = {
-    "sensor_hold": "repeated readings are found in the values themselves, by a diagnosis without a calibration",
+    "sensor_hold": "repeated readings are seen in the values themselves, and no size of them is compared",
     "soil_patch": "a place of one drive has no counterpart in others",
 }
 """Effects that have no size which two drives share."""

@@ -29,6 +29,7 @@ class Model:
     """A fit, and how far every effect that it lacks is from ordinary drives.
 
     Attributes:
+        problem: that was fitted.
         fitted: with or without effects.
         scan: of the library there.
         shifts: of all candidates, the least probable first.
@@ -36,6 +37,7 @@ class Model:
         named: candidates of the fit's effects, as they were shifted when each was added.
     """
 
+    problem: Problem
     fitted: Fitted
     scan: DriveScan
     shifts: tuple[Shift, ...]
@@ -103,7 +105,7 @@ def model_of(problem: Problem, fitted: Fitted, ordinary: Comparison, named: Sequ
         Pull(name, moved / ordinary.usual_move(name), ordinary.degrees)
         for name, moved in moved_parameters(problem, fitted).items()
     )
-    return Model(fitted, scan, tuple(shifts), pulls, tuple(named))
+    return Model(problem, fitted, scan, tuple(shifts), pulls, tuple(named))
 
 
 def farthest(shifts: Sequence[Shift], tests: int) -> float:

@@ -16,7 +16,7 @@ import numpy as np
 from ddagr_gym.diagnosis.change.drive_scan import NAMED
 from ddagr_gym.diagnosis.change.model import Model, model_of
 from ddagr_gym.diagnosis.change.ordinary import Comparison
-from ddagr_gym.diagnosis.change.refits import joint_refits
+from ddagr_gym.diagnosis.change.refits import Refit, joint_refits
 from ddagr_gym.diagnosis.change.shifts import LEVEL, Shift, refitted_shift
 from ddagr_gym.diagnosis.result.equivalence import equivalence_weights
 from ddagr_gym.diagnosis.search.scanned_model import Rival
@@ -91,7 +91,7 @@ def name_changes(
     progress("comparing every effect with ordinary drives")
     models, steps = [model_of(problem, fitted, ordinary)], list[Step]()
     while len(steps) < MOST_NAMES and (models[-1].conspicuous or models[-1].pulled or (not steps and models[-1].near)):
-        found = _next(problem, models[-1], ordinary, rng, progress)
+        found = _next(models[-1], ordinary, rng, progress)
         if found is None:
             break
         models.append(found[0])
@@ -100,23 +100,26 @@ def name_changes(
 
 
 def _next(
-    problem: Problem,
     model: Model,
     ordinary: Comparison,
     rng: np.random.Generator,
     progress: Callable[[str], None],
 ) -> tuple[Model, Step] | None:
     """The model with the next name; None where no effect that exists has the shift."""
-    dispersion = dispersion_of(problem, model.fitted)
-    refitted = joint_refits(problem, model, ordinary, dispersion, progress)
-    alarming, usual = _compared_beside(problem, model, ordinary, refitted, progress)
+    dispersion = dispersion_of(model.problem, model.fitted)
+    refitted = joint_refits(model, ordinary, dispersion, progress)
+    alarming, usual = _compared_beside(model, ordinary, refitted, progress)
     if not alarming:
         return None
     most = max(rival.gain for _, rival in alarming)
     alike = [item for item in usual if item[1].gain > CLOSE * most and item[0].left <= 1.0]
     allowed = max(1.0, NEARLY * min(after.left for after, _ in alarming))
-    kept = sorted([*alike, *(item for item in alarming if item[0].left <= allowed)], key=lambda item: -item[1].gain)
+    soil = _soil_alone(alarming, model)
+    kept = [*alike, *(item for item in alarming if item[0].left <= allowed or item in soil)]
+    kept.sort(key=lambda item: -item[1].gain)
     weights = equivalence_weights([rival for _, rival in kept], dispersion, rng)
+    for _, rival in soil:
+        weights = _first(rival.name, weights)
     name = max(weights, key=weights.__getitem__)
     chosen = next(item for item in kept if item[1].name == name)
     rivals = (chosen[1], *(rival for _, rival in kept if rival is not chosen[1]))
@@ -124,22 +127,36 @@ def _next(
     return chosen[0], Step(chosen[0].named[-1], weights, rivals, dispersion, alarm)
 
 
+def _soil_alone(alarming: Sequence[Tried], model: Model) -> list[Tried]:
+    """Another soil, where parameters of the soil gave the alarm and no effect is out of the ordinary by itself."""
+    if any(model.probability(after.named[-1]) < LEVEL for after, _ in alarming):
+        return []
+    return [item for item in alarming if item[0].problem is not model.problem]
+
+
+def _first(name: str, weights: dict[str, float]) -> dict[str, float]:
+    """Weights in which a name comes first and none weighs more."""
+    raised = {name: max(weights.values()), **{other: weight for other, weight in weights.items() if other != name}}
+    return {other: weight / sum(raised.values()) for other, weight in raised.items()}
+
+
 def _compared_beside(
-    problem: Problem,
     model: Model,
     ordinary: Comparison,
-    refitted: Sequence[tuple[Shift, Rival]],
+    refitted: Sequence[Refit],
     progress: Callable[[str], None],
 ) -> tuple[list[Tried], list[Tried]]:
     """Models with refitted effects: those that are out of the ordinary among all, and those that are by themselves."""
     looks = 1 if model.conspicuous or model.pulled else 2
     alarming: list[Tried] = []
     usual: list[Tried] = []
-    for shift, rival in refitted:
-        if rival.gain < CLOSE * max((item.gain for after, item in alarming if after.left <= 1.0), default=0.0):
-            break
+    for item in refitted:
+        shift, rival = item.shift, item.rival
+        far = rival.gain < CLOSE * max((other.gain for after, other in alarming if after.left <= 1.0), default=0.0)
+        if far and item.problem is model.problem:
+            continue
         progress(f"comparing every effect beside {rival.name}")
-        after = model_of(problem, rival.fitted, ordinary, (*model.named, shift))
+        after = model_of(item.problem, rival.fitted, ordinary, (*model.named, shift))
         evidence = _evidence_after(after, shift, looks > 1)
         # what parameters had to make up for speaks for an effect that takes all of it back, or has no size of its own
         taken_back = bool(model.pulled) and (evidence is None or not after.pulled)

@@ -2,13 +2,14 @@
 
 Large changes are not linear. A refit begins at the best of several multiples of the first step; where parameters of
 robot or ground have taken a change over, they are held to find it; and what the library calls alike to the best refit
-begins where that one ended.
+begins where that one ended. Where a fit moved the soil farther than ordinary drives do, a changed soil is refitted with
+all that tells soils apart, of which the effect has two sizes only.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +24,10 @@ from ddagr_gym.diagnosis.search.scan import drive_extent
 from ddagr_gym.diagnosis.search.scanned_model import Rival
 from ddagr_gym.identification.fit_numerics import FIELD_TOLERANCE
 from ddagr_gym.identification.gauss_newton import fit
+from ddagr_gym.identification.parameters import KIND_STIFFNESS_DEVIATION, soil_parameters
 from ddagr_gym.identification.problem import Point, Problem
 from ddagr_gym.physics.effects.registry import effect_kinds
+from ddagr_gym.physics.effects.soil_change import SoilChange
 
 Array = NDArray[np.float64]
 
@@ -38,6 +41,9 @@ step goes part of the way only, and delays that are far off cost the same whatev
 RENEWALS = 4
 """Steps of a refit with new derivatives (ours): it may begin many deviations from where it ends."""
 
+SIZES_OF_SOIL = ("soil_strength", "soil_stiffness")
+"""Parameters of a soil that :class:`~ddagr_gym.physics.effects.soil_change.SoilChange` has sizes of."""
+
 BIASES = ("gyro_bias", "accelerometer_bias")
 """Begin the names of what stays free where robot and ground are held."""
 
@@ -45,26 +51,54 @@ Starts = dict[str, tuple[Shift, Point]]
 """By name of an effect, its candidate and a point with it from which a refit begins."""
 
 
-def joint_refits(
-    problem: Problem, model: Model, ordinary: Comparison, dispersion: float, progress: Callable[[str], None]
-) -> list[tuple[Shift, Rival]]:
+@dataclass(frozen=True, eq=False)
+class Refit:
+    """A joint refit of what may have changed.
+
+    Attributes:
+        problem: that was fitted.
+        shift: of the effect before.
+        rival: the refit.
+    """
+
+    problem: Problem
+    shift: Shift
+    rival: Rival
+
+
+def joint_refits(model: Model, ordinary: Comparison, dispersion: float, progress: Callable[[str], None]) -> list[Refit]:
     """Joint refits of what may have changed, and of what the best of them is confused with, the best first.
 
     Args:
-        problem: of the drive.
         model: without what may have changed.
         ordinary: what the drive is compared with.
         dispersion: of the model.
         progress: called with what is being done.
     """
+    problem = model.problem
     first = _refitted(problem, model, _starts(problem, model, ordinary), dispersion, progress)
-    if not first:
-        return []
-    alike = _alike(problem, model, [rival for _, rival in first])
-    best: dict[str, tuple[Shift, Rival]] = {}
-    for item in _by_gain([*first, *_refitted(problem, model, alike, dispersion, progress)]):
-        best.setdefault(item[1].name, item)
+    alike = _alike(problem, model, [rival for _, rival in first]) if first else {}
+    again = _refitted(problem, model, alike, dispersion, progress)
+    found = [Refit(problem, *item) for item in (*first, *again)]
+    found += _with_another_soil(model, dispersion, progress)
+    best: dict[str, Refit] = {}
+    for item in sorted(found, key=lambda item: -item.rival.gain):
+        best.setdefault(item.rival.name, item)
     return list(best.values())
+
+
+def _with_another_soil(model: Model, dispersion: float, progress: Callable[[str], None]) -> list[Refit]:
+    """The refit of a changed soil that may be any of its kind; none where no fit moved the soil."""
+    any_soil = {p.name: p.prior for p in soil_parameters(None, KIND_STIFFNESS_DEVIATION)}
+    changed = next((shift for shift in model.best if shift.compared.name == SoilChange.name), None)
+    if changed is None or not any(pull.name in any_soil for pull in model.pulled):
+        return []
+    wider = {name: prior for name, prior in any_soil.items() if name not in SIZES_OF_SOIL}
+    problem, at = model.problem.expecting(wider), model.fitted.point
+    values = [0.0 if p.name in any_soil else v for p, v in zip(problem.nuisances.parameters, at.values, strict=True)]
+    start = _begun(problem, model, replace(at, values=np.array(values)), changed, changed.value + changed.mean)
+    starts = {} if start is None else {SoilChange.name: (changed, start)}
+    return [Refit(problem, *item) for item in _refitted(problem, model, starts, dispersion, progress)]
 
 
 def _by_gain(found: Sequence[tuple[Shift, Rival]]) -> list[tuple[Shift, Rival]]:

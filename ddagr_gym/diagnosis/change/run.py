@@ -21,7 +21,8 @@ from ddagr_gym.diagnosis.change.requirements import check_before, check_comparab
 from ddagr_gym.diagnosis.mid_drive.onsets import onsets_of, with_onsets
 from ddagr_gym.diagnosis.preprocessing.data_checks import data_doubts
 from ddagr_gym.diagnosis.preprocessing.mended_recordings import MendedRecordings, mend_recordings
-from ddagr_gym.diagnosis.result.channel_fault_findings import with_new_faults
+from ddagr_gym.diagnosis.preprocessing.repeated_readings import hold_effect
+from ddagr_gym.diagnosis.result.channel_fault_findings import new_holds, with_new_faults
 from ddagr_gym.diagnosis.result.sentences import change_headline
 from ddagr_gym.identification.gauss_newton import Fitted
 from ddagr_gym.identification.problem import Problem
@@ -88,6 +89,8 @@ def what_changed(
     diagnosis, effects = conclude_change(problem, mended, ordinary, ground, named, certified)
     diagnosis = _timed(diagnosis, problem, named)
     diagnosis = with_new_faults(diagnosis, mended, usual)
+    held = new_holds(mended, usual)
+    effects = ((hold_effect(held),) if held else ()) + effects
     diagnosis = replace(diagnosis, checks=doubts, seconds=time.monotonic() - began)
     return Outcome(diagnosis, effects, problem, named, mended)
 

@@ -5,11 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from ddagr_gym.diagnosis.answer.verdict import NONE, UNKNOWN, Diagnosis, Finding
+from ddagr_gym.diagnosis.answer.verdict import NONE, UNKNOWN, Diagnosis, Estimate, Finding
 from ddagr_gym.diagnosis.preprocessing.channel_faults import ChannelFault
 from ddagr_gym.diagnosis.preprocessing.mended_recordings import MendedRecordings
+from ddagr_gym.diagnosis.preprocessing.repeated_readings import RepeatedReadings, hold_effect
 from ddagr_gym.diagnosis.result.sentences import change_headline
 from ddagr_gym.recordings.checks.findings import CheckFinding
+
+LONGER = 1.5
+"""Times as long as before for which a reading must be repeated to be a change (ours): holds jitter."""
 
 
 def channel_fault_findings(faults: Sequence[ChannelFault]) -> list[Finding]:
@@ -21,6 +25,32 @@ def channel_fault_findings(faults: Sequence[ChannelFault]) -> list[Finding]:
         )
         for fault in faults
     ]  # fmt: skip
+
+
+def repeat_findings(repeated: Sequence[RepeatedReadings]) -> list[Finding]:
+    """Repeated readings need no fit: the share of repeats is the evidence, and its own score."""
+    if not repeated:
+        return []
+    effect = hold_effect(repeated)
+    parameters = {
+        name: Estimate(float(getattr(effect, name)), str(effect.parameter(name).metadata["unit"]))
+        for name in ("duration", "accelerometer", "gyro", "encoders", "pose")
+    }
+    repeats = sum(item.share * item.samples for item in repeated)
+    return [Finding("sensor_hold", parameters, repeats, 0.0, repeats**0.5, repeats, {}, {"sensor_hold": 1.0})]
+
+
+def new_holds(mended: MendedRecordings, before: MendedRecordings | None) -> tuple[RepeatedReadings, ...]:
+    """Sensors that repeat their readings for longer than in drives from before; none where these are not at hand.
+
+    Args:
+        mended: drives that are compared.
+        before: those that they are compared with.
+    """
+    if before is None:
+        return ()
+    usual = {item.sensor: item.duration for item in before.held}
+    return tuple(item for item in mended.held if item.duration > LONGER * usual.get(item.sensor, 0.0))
 
 
 def with_new_faults(
@@ -37,10 +67,11 @@ def with_new_faults(
     faults = [fault for fault in mended.channel_faults if fault.name not in usual]
     known = {(item.check, item.channel) for item in (() if before is None else before.contradictions)}
     new = tuple(item for item in mended.contradictions if (item.check, item.channel) not in known)
-    if faults and diagnosis.change is not None:
-        findings = (*channel_fault_findings(faults), *diagnosis.findings)
+    seen = [*channel_fault_findings(faults), *repeat_findings(new_holds(mended, before))]
+    if seen and diagnosis.change is not None:
+        findings = (*seen, *diagnosis.findings)
         names = tuple(name for name in diagnosis.verdict if name not in (NONE, UNKNOWN))
-        verdict = (*(fault.name for fault in faults), *names)
+        verdict = (*(finding.name for finding in seen), *names)
         sentence = change_headline(verdict, diagnosis.complete, findings, diagnosis.change)
         diagnosis = replace(diagnosis, verdict=verdict, findings=findings, sentence=sentence)
     return with_contradictions(diagnosis, new)

@@ -11,10 +11,10 @@ from ddagr_gym.diagnosis.answer.verdict import NONE, UNKNOWN, DataSource, Diagno
 from ddagr_gym.diagnosis.gates.thresholds import Thresholds
 from ddagr_gym.diagnosis.preprocessing.input_requirements import content_hash
 from ddagr_gym.diagnosis.preprocessing.mended_recordings import MendedRecordings
-from ddagr_gym.diagnosis.preprocessing.repeated_readings import RepeatedReadings, hold_effect
+from ddagr_gym.diagnosis.preprocessing.repeated_readings import hold_effect
 from ddagr_gym.diagnosis.preprocessing.reversed_gyro import ReversedGyro
 from ddagr_gym.diagnosis.preprocessing.session import DiagnosisSession
-from ddagr_gym.diagnosis.result.channel_fault_findings import channel_fault_findings
+from ddagr_gym.diagnosis.result.channel_fault_findings import channel_fault_findings, repeat_findings
 from ddagr_gym.diagnosis.result.detectable import least_detectable
 from ddagr_gym.diagnosis.result.equivalence import equivalents
 from ddagr_gym.diagnosis.result.sentences import headline
@@ -64,7 +64,7 @@ def conclude(
     gates, mended, values = session.gates, session.mended, accepted.chosen.fitted.point.values
     verdict, complete = _verdict(accepted, mended.names, gates)
     seen = [
-        *_repeat_findings(mended.held),
+        *repeat_findings(mended.held),
         *channel_fault_findings(mended.channel_faults),
         *reversed_gyro_findings(mended.reversed_gyro),
     ]
@@ -102,19 +102,6 @@ def _effects_of_values(mended: MendedRecordings) -> tuple[Effect, ...]:
     """Effects that were found in the values themselves."""
     hold = (hold_effect(mended.held),) if mended.held else ()
     return hold if mended.reversed_gyro is None else (*hold, GyroSign(1.0))
-
-
-def _repeat_findings(repeated: Sequence[RepeatedReadings]) -> list[Finding]:
-    """Repeated readings need no fit: the share of repeats is the evidence, and its own score."""
-    if not repeated:
-        return []
-    effect = hold_effect(repeated)
-    parameters = {
-        name: Estimate(float(getattr(effect, name)), str(effect.parameter(name).metadata["unit"]))
-        for name in ("duration", "accelerometer", "gyro", "encoders", "pose")
-    }
-    repeats = sum(item.share * item.samples for item in repeated)
-    return [Finding("sensor_hold", parameters, repeats, 0.0, repeats**0.5, repeats, {}, {"sensor_hold": 1.0})]
 
 
 def reversed_gyro_findings(reversed_gyro: ReversedGyro | None) -> list[Finding]:

@@ -18,7 +18,7 @@ from ddagr_gym.physics.effects.registry import effect_kinds
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.reporting.change_page import write_page
 from ddagr_gym.reporting.change_text import change_text
-from tests.diagnosis.change.conftest import PICTURES, drive
+from tests.diagnosis.change.conftest import PICTURES, RATE, drive
 
 ROBOT, SOIL = get_robot("ddagr"), get_soil("thesis_a1")
 
@@ -164,3 +164,15 @@ def test_drives_that_cannot_be_compared_are_refused_with_a_sentence(tmp_path):
 
 def without(recording, name):
     return replace(recording, channels={k: v for k, v in recording.channels.items() if k != name})
+
+
+@pytest.mark.slow
+def test_a_gyro_that_began_to_hold_its_readings_is_named(before):
+    after = drive(34)
+    rows = np.arange(len(after)) // 5 * 5
+    held = replace(after, channels={**after.channels, "yaw_rate": after["yaw_rate"][rows]})
+    diagnosis = since([held], [before])
+    assert diagnosis.verdict == ("sensor_hold",)
+    finding = diagnosis.findings[0]
+    assert finding.parameters["duration"].value == pytest.approx(4.0 / RATE, rel=0.1)
+    assert {name for name in ("gyro", "encoders", "accelerometer") if finding.parameters[name].value} == {"gyro"}
