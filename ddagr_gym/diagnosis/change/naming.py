@@ -8,11 +8,13 @@ something changed is then known.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ddagr_gym.diagnosis.change.drive_fit import ITERATIONS
 from ddagr_gym.diagnosis.change.drive_scan import NAMED
 from ddagr_gym.diagnosis.change.model import Model, model_of
 from ddagr_gym.diagnosis.change.ordinary import Comparison
@@ -21,7 +23,8 @@ from ddagr_gym.diagnosis.change.shifts import LEVEL, Shift, refitted_shift
 from ddagr_gym.diagnosis.result.equivalence import equivalence_weights
 from ddagr_gym.diagnosis.search.scanned_model import Rival
 from ddagr_gym.identification.effect_parameters import effect_parameters
-from ddagr_gym.identification.gauss_newton import Fitted
+from ddagr_gym.identification.fit_numerics import FIELD_TOLERANCE
+from ddagr_gym.identification.gauss_newton import Fitted, fit
 from ddagr_gym.identification.misfit import dispersion_of
 from ddagr_gym.identification.problem import Problem
 
@@ -96,7 +99,32 @@ def name_changes(
             break
         models.append(found[0])
         steps.append(found[1])
-    return Named(tuple(models), tuple(steps))
+    return _without_idle(Named(tuple(models), tuple(steps)), ordinary, progress)
+
+
+def _without_idle(named: Named, ordinary: Comparison, progress: Callable[[str], None]) -> Named:
+    """The names that are needed beside those that came later: what took over from an effect that was missing goes."""
+    for place in range(len(named.steps) - 1):
+        shift = _evidence_after(named.models[-1], named.steps[place].shift, stretched=False, place=place)
+        if shift is None or shift.probability < LEVEL:
+            continue
+        progress(f"comparing every effect without {shift.compared.name}")
+        fewer = _without(named, place, ordinary)
+        if fewer.models[-1].left <= NEARLY * max(1.0, named.models[-1].left):
+            return _without_idle(fewer, ordinary, progress)
+    return named
+
+
+def _without(named: Named, place: int, ordinary: Comparison) -> Named:
+    """The names without one of them, each of the later ones fitted anew."""
+    models = list(named.models[: place + 1])
+    for model in named.models[place + 2 :]:
+        effects = model.fitted.point.effects
+        point = replace(model.fitted.point, effects=(*effects[:place], *effects[place + 1 :]))
+        fitted = fit(model.problem, point, iterations=ITERATIONS, tolerance=FIELD_TOLERANCE, renewals=ITERATIONS)
+        kept = (*model.named[:place], *model.named[place + 1 :])
+        models.append(model_of(model.problem, fitted, ordinary, kept))
+    return Named(tuple(models), (*named.steps[:place], *named.steps[place + 1 :]))
 
 
 def _next(
@@ -113,9 +141,9 @@ def _next(
         return None
     most = max(rival.gain for _, rival in alarming)
     alike = [item for item in usual if item[1].gain > CLOSE * most and item[0].left <= 1.0]
-    allowed = max(1.0, NEARLY * min(after.left for after, _ in alarming))
     soil = _soil_alone(alarming, model)
-    kept = [*alike, *(item for item in alarming if item[0].left <= allowed or item in soil)]
+    explaining = _explaining(alarming, model)
+    kept = [*alike, *explaining, *(item for item in soil if item not in explaining)]
     kept.sort(key=lambda item: -item[1].gain)
     weights = equivalence_weights([rival for _, rival in kept], dispersion, rng)
     for _, rival in soil:
@@ -125,6 +153,18 @@ def _next(
     rivals = (chosen[1], *(rival for _, rival in kept if rival is not chosen[1]))
     alarm = None if chosen in alarming else max(alarming, key=lambda item: item[1].gain)[0].named[-1]
     return chosen[0], Step(chosen[0].named[-1], weights, rivals, dispersion, alarm)
+
+
+def _explaining(alarming: Sequence[Tried], model: Model) -> list[Tried]:
+    """Refits beside which least is out of the ordinary; where something is beside each, also those that explain most.
+
+    Where two things changed, one of them takes over much of the other in what is left, and little in what is explained.
+    """
+    least = min(after.left for after, _ in alarming)
+    allowed = max(1.0, NEARLY * least)
+    sure = [rival.gain for after, rival in alarming if model.probability(after.named[-1]) < LEVEL]
+    most = max(sure, default=0.0) if least > 1.0 else math.inf
+    return [item for item in alarming if item[0].left <= allowed or item[1].gain >= CLOSE * most]
 
 
 def _soil_alone(alarming: Sequence[Tried], model: Model) -> list[Tried]:
@@ -169,12 +209,12 @@ def _compared_beside(
     return alarming, usual
 
 
-def _evidence_after(model: Model, shift: Shift, stretched: bool) -> Shift | None:
-    """The shift of the last effect of a model as its fit finds it; None where the fit has no size of it."""
+def _evidence_after(model: Model, shift: Shift, stretched: bool, place: int = -1) -> Shift | None:
+    """The shift of one effect of a model, by default the last, as its fit finds it; None where that has no size."""
     effects = model.fitted.point.effects
     keys = {
         item.field: f"{NAMED}{k}"
         for k, item in enumerate(effect_parameters(effects))
-        if item.effect == len(effects) - 1 and f"{NAMED}{k}" in model.scan.keys
+        if item.effect == place % len(effects) and f"{NAMED}{k}" in model.scan.keys
     }
-    return refitted_shift(shift, effects[-1], keys, model.scan.scores(), stretched)
+    return refitted_shift(shift, effects[place], keys, model.scan.scores(), stretched)

@@ -188,7 +188,7 @@ def _within(scores: Scores, rows: Sequence[int], sizes: Array) -> Array:
 def _at_least(scattered: Array, independent: Array) -> Array:
     """The windows' covariance, with deviations that are at least those of independent rows."""
     size = np.diag(scattered)
-    wide = np.sqrt(np.maximum(size, np.diag(independent)) / np.where(size > 0.0, size, 1.0))
+    wide = np.sqrt(np.maximum(np.maximum(size, np.diag(independent)), 0.0) / np.where(size > 0.0, size, 1.0))
     return np.asarray(scattered * np.outer(wide, wide) + np.diag(np.where(size > 0.0, 0.0, np.diag(independent))))
 
 
