@@ -115,6 +115,19 @@ def test_a_step_that_rounds_over_a_bound_ends_on_it(one_drive, robot, soil, monk
     assert fitted.point.values[0] == lowest
 
 
+def test_what_is_expected_of_a_parameter_may_be_changed_by_name(one_drive):
+    problem = one_drive()
+    strength, motor = (p.name for p in problem.nuisances.parameters)
+    tight = problem.expecting({motor: 1e-4})
+    assert problem.prior[1] > 1e-4
+    assert tight.prior.tolist() == [problem.prior[0], 1e-4]
+    assert [p.prior for p in tight.nuisances.parameters] == tight.prior.tolist()
+    loose, held = (fit(item, iterations=6, renewals=6).point.values for item in (problem, tight))
+    assert abs(held[1]) < 0.1 * abs(loose[1])
+    # what is held stays so
+    assert problem.holding(np.array([True, False])).expecting({strength: 1.0}).prior[0] == 0.0
+
+
 def test_wrong_initial_states_are_found_again(one_drive):
     problem = one_drive()
     truth = np.log([STRENGTH, MOTOR_RATE])

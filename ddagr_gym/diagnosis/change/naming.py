@@ -8,7 +8,6 @@ something changed is then known.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -162,9 +161,10 @@ def _explaining(alarming: Sequence[Tried], model: Model) -> list[Tried]:
     """
     least = min(after.left for after, _ in alarming)
     allowed = max(1.0, NEARLY * least)
-    sure = [rival.gain for after, rival in alarming if model.probability(after.named[-1]) < LEVEL]
-    most = max(sure, default=0.0) if least > 1.0 else math.inf
-    return [item for item in alarming if item[0].left <= allowed or item[1].gain >= CLOSE * most]
+    sure = [item for item in alarming if model.probability(item[0].named[-1]) < LEVEL]
+    most = max((rival.gain for _, rival in sure), default=0.0)
+    explaining = [item for item in sure if least > 1.0 and item[1].gain >= CLOSE * most]
+    return [item for item in alarming if item[0].left <= allowed or item in explaining]
 
 
 def _soil_alone(alarming: Sequence[Tried], model: Model) -> list[Tried]:

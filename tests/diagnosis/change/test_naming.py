@@ -1,0 +1,56 @@
+"""Which refits stand for a name, by what they explain and what they leave."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import pytest
+
+from ddagr_gym.diagnosis.change.naming import _explaining, _first, _soil_alone
+
+
+def tried(name: str, gain: float, left: float, probability: float, problem: str = "same"):
+    """A model with a refit, as far as these rules look at it."""
+    after = SimpleNamespace(left=left, named=(SimpleNamespace(probability=probability),), problem=problem)
+    return after, SimpleNamespace(name=name, gain=gain)
+
+
+MODEL = SimpleNamespace(problem="same", probability=lambda shift: min(1.0, 40.0 * shift.probability))
+
+
+def names(found) -> list[str]:
+    return [rival.name for _, rival in found]
+
+
+def test_of_one_change_those_that_leave_nothing_stand_whatever_others_explain():
+    alarming = [tried("motor_lag", 300.0, 2.0, 1e-6), tried("command_delay", 280.0, 0.9, 1e-6)]
+    assert names(_explaining(alarming, MODEL)) == ["command_delay"]
+
+
+def test_of_two_changes_those_that_explain_most_stand_beside_those_that_leave_least():
+    alarming = [
+        tried("motor_lag", 2800.0, 3.6, 1e-6),
+        tried("command_delay", 2700.0, 3.6, 1e-9),
+        tried("towed_drag", 1500.0, 3.1, 0.2),
+        tried("wheel_radius_mismatch", 1000.0, 3.5, 1e-4),
+        tried("payload", 20.0, 3.7, 1e-4),
+    ]
+    assert names(_explaining(alarming, MODEL)) == ["motor_lag", "command_delay", "towed_drag"]
+
+
+def test_what_only_takes_a_parameter_back_does_not_stand_by_what_it_explains():
+    alarming = [tried("towed_drag", 3000.0, 4.0, 0.2), tried("gyro_bias", 900.0, 1.5, 1e-6)]
+    assert names(_explaining(alarming, MODEL)) == ["gyro_bias"]
+
+
+@pytest.mark.parametrize(("probability", "alone"), [(0.01, ["soil_change"]), (1e-6, [])])
+def test_another_soil_comes_first_where_no_effect_is_out_of_the_ordinary_by_itself(probability, alone):
+    alarming = [tried("gyro_scale", 54.0, 0.9, probability), tried("soil_change", 40.0, 1.4, 0.1, "any soil")]
+    assert names(_soil_alone(alarming, MODEL)) == alone
+
+
+def test_a_name_that_comes_first_weighs_as_much_as_the_heaviest():
+    found = _first("soil_change", {"gyro_scale": 0.9, "slope": 0.1})
+    assert list(found) == ["soil_change", "gyro_scale", "slope"]
+    assert found["soil_change"] == found["gyro_scale"]
+    assert sum(found.values()) == pytest.approx(1.0)
