@@ -139,7 +139,7 @@ def _next(
     if not alarming:
         return None
     most = max(rival.gain for _, rival in alarming)
-    alike = [item for item in usual if item[1].gain > CLOSE * most and item[0].left <= 1.0]
+    alike = [item for item in usual if item[1].gain > CLOSE * most and item[0].left <= NEARLY]
     soil = _soil_alone(alarming, model)
     explaining = _explaining(alarming, model)
     kept = [*alike, *explaining, *(item for item in soil if item not in explaining)]
