@@ -18,7 +18,7 @@ import ray
 
 from ddagr_gym.errors import InputError
 from ddagr_gym.tasks.attempt import attempt
-from ddagr_gym.tasks.shared import Handle, SharedPath, pickled, remembered
+from ddagr_gym.tasks.shared import Handle, SharedPath, content_of, pickled, remembered
 from ddagr_gym.tasks.task import Failure, Limits, Outcome, Task
 
 LOCAL = "local"
@@ -120,9 +120,9 @@ class RayCluster:
         return SharedObject(digest, ray.put(data))
 
     def share_file(self, path: Path) -> SharedPath:
-        """Handle of a file whose bytes are in the object store."""
-        data = path.read_bytes()
-        return SharedPath(hashlib.sha256(data).hexdigest(), str(path), partial(ray.get, ray.put(data)))
+        """Handle of a file or folder whose content is in the object store."""
+        content = content_of(path)
+        return SharedPath(pickled(content)[0], str(path), partial(ray.get, ray.put(content)))
 
     def close(self) -> None:
         """Leave the cluster."""

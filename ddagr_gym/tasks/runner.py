@@ -98,7 +98,7 @@ class TaskRunner(AbstractContextManager["TaskRunner"]):
         return self._engine.share(value)
 
     def share_file(self, path: Path) -> Any:
-        """Handle of a file; the task gets a path at which its content lies on the node."""
+        """Handle of a file, or of a folder's files; the task gets a path at which its content lies on the node."""
         return self._engine.share_file(path)
 
     def run(self, tasks: Iterable[Task], store: ResultStore | None = None) -> Iterator[Ended]:

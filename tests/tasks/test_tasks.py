@@ -76,9 +76,11 @@ def test_what_tasks_share_is_sent_by_content(runner, engine, tmp_path):
     values, file = np.arange(1000.0), tmp_path / "map.yaml"
     file.write_text("columns")
     with runner(engine) as made:
-        shared, path = made.share(values), made.share_file(file)
+        shared, path, folder = made.share(values), made.share_file(file), made.share_file(tmp_path)
         tasks = [Task(f"{n}", work.mean_of, (shared, n)) for n in range(4)] + [Task("file", work.text_of, (path,))]
-        assert run_tasks(tasks, "means", made) == [float(values[n:].mean()) for n in range(4)] + ["columns"]
+        tasks += [Task(f"folder {n}", work.texts_of, (folder,)) for n in range(2)]
+        expected = [float(values[n:].mean()) for n in range(4)] + ["columns"] + 2 * [{"map.yaml": "columns"}]
+        assert run_tasks(tasks, "means", made) == expected
 
 
 @pytest.mark.parametrize("engine", ENGINES)
