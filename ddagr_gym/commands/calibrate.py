@@ -41,7 +41,7 @@ class Arguments:
         seed: of the resampled intervals.
         threads: of the simulator, in each process.
         processes: for what does not depend on each other: the fits from several starts and, with --bank, the drives;
-            each takes about as much memory as the first one.
+            each holds the drives that it works on.
         cluster: a Ray cluster to run that on: "local" starts one of so many processors here, an address
             (ray://HOST:PORT) takes one that runs.
         supply_currents: also fit currents that motors draw from their supply; their own current is always fitted.
