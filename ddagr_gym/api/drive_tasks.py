@@ -185,12 +185,17 @@ def answer_of(
         column_map: its place, or its name.
     """
     from ddagr_gym.diagnosis.series.one_drive import answer_for
+    from ddagr_gym.tasks import release
 
     if task.unread:
         return task.unread
     ordinary, known = calibrated
     try:
-        (recording,) = recordings_from(file or task.source, ordinary.robot, column_map, setting.limits)
+        try:
+            (recording,) = recordings_from(file or task.source, ordinary.robot, column_map, setting.limits)
+        finally:
+            if file is not None:
+                release(file)
         name = known.get(_hash(recording), "")
         return answer_for(
             recording.with_meta(source=task.name), ordinary, setting.ground, name, seed=setting.seed,

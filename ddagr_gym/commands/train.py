@@ -27,7 +27,7 @@ EXAMPLES = (
 
 @dataclass(frozen=True)
 class Arguments:
-    """Train a policy by reinforcement learning, all published ones, or a sweep of configurations by seeds; resumes.
+    """Train a policy by reinforcement learning, all published ones, or a sweep; resumes.
 
     Needs the checkout, where agents/ and configs/training/ are.
 

@@ -6,6 +6,7 @@ import contextlib
 import hashlib
 import os
 import pickle
+import shutil
 import tempfile
 from abc import ABC, abstractmethod
 from collections import OrderedDict
@@ -63,10 +64,25 @@ class SharedPath(Handle):
         """Path of a file or folder with this content and the driver's name, written once a node."""
         if self.fetch is None:
             return Path(self.path)
-        place = Path(tempfile.gettempdir()) / f"ddagr-gym-{os.getuid()}" / self.digest / Path(self.path).name
+        place = written_folder() / self.digest / Path(self.path).name
         if not place.exists():
             _write(place, self.fetch())
         return place
+
+
+def written_folder() -> Path:
+    """Where a node keeps the files that it got, each in a folder named by its content."""
+    return Path(tempfile.gettempdir()) / f"ddagr-gym-{os.getuid()}"
+
+
+def release(path: Path) -> None:
+    """Remove a file or folder that no other task needs, where :class:`SharedPath` wrote it; the driver's own stays.
+
+    Args:
+        path: as the task got it.
+    """
+    if path.parent.parent == written_folder():
+        shutil.rmtree(path.parent, ignore_errors=True)
 
 
 def content_of(path: Path) -> FileContent:
