@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import time
@@ -34,11 +35,17 @@ from ddagr_gym.wrappers.sb3 import TurnVecEnv
 
 Episodes = list[tuple[int, Episode]]
 
+Report = Callable[[dict[str, Any]], None]
+
 CHECKPOINT = "checkpoint.pkl"
 POLICY = "policy.npz"
 RESULT = "result.json"
 
 _REWARD_CLIP = 10.0
+
+
+def _unheard(entry: dict[str, Any]) -> None:
+    """A report that nobody asked for."""
 
 
 def make_environment(settings: TrainingSettings) -> VecNormalize:
@@ -61,6 +68,8 @@ class Training:
         folder: of its files.
         validation: scenarios that its course is judged on.
         checkpoint_seconds: between checkpoints.
+        report: called with each validation of its course, those before an interruption included.
+        quiet: without a bar of progress.
     """
 
     settings: TrainingSettings
@@ -68,6 +77,8 @@ class Training:
     folder: Path
     validation: Episodes
     checkpoint_seconds: float = 60.0
+    report: Report = _unheard
+    quiet: bool = False
 
     def logger(self) -> Logger:
         """TensorBoard under the folder; nothing on the terminal."""
@@ -90,7 +101,10 @@ class Training:
             extra = resume(model, normalise, saved)
             history, spent = extra["history"], extra["seconds"]
         steps = self.settings.steps
-        with Progress(steps, f"{self.folder.parent.name} {self.folder.name}") as progress:
+        for entry in history:
+            self.report(entry)
+        stream = io.StringIO() if self.quiet else None
+        with Progress(steps, f"{self.folder.parent.name} {self.folder.name}", stream=stream) as progress:
             progress.advance(model.num_timesteps)
             course = _Course(self, normalise, progress, history, spent)
             if model.num_timesteps < steps:
@@ -109,6 +123,7 @@ class Training:
             "course": course.history,
         }
         write_text(self.folder / RESULT, json.dumps(result, indent=1))
+        self.report(course_of(result)[-1])
         return result
 
     def validate(self, model: BaseAlgorithm, normalise: VecNormalize) -> ValidationResult:
@@ -156,6 +171,7 @@ class _Course(BaseCallback):
         summary = self.training.validate(self.model, self.normalise).summary()
         entry = {"steps": self.model.num_timesteps, "cpu_seconds": round(self.seconds(), 1), **summary}
         self.history.append(entry)
+        self.training.report(entry)
         for name, value in summary.items():
             if value is not None:
                 self.logger.record(f"validation/{name}", value)
@@ -184,6 +200,12 @@ def finished(folder: Path, settings: TrainingSettings) -> dict[str, Any] | None:
         return None
     result: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
     return result if result["digest"] == settings.digest() else None
+
+
+def course_of(result: dict[str, Any]) -> list[dict[str, Any]]:
+    """Validations of a training that has ended, the last one of the policy that it gave."""
+    last = {"steps": result["steps"], "cpu_seconds": result["cpu_seconds"], **result["validation"]}
+    return [*result["course"], last]
 
 
 def validation_episodes(count: int | None = None) -> Episodes:
@@ -218,6 +240,9 @@ def train(
     folder: Path,
     validation: Episodes | None = None,
     checkpoint_seconds: float = 60.0,
+    *,
+    report: Report = _unheard,
+    quiet: bool = False,
 ) -> dict[str, Any]:
     """One training from start, or from its checkpoint, to end; what has ended before is not done again.
 
@@ -228,6 +253,8 @@ def train(
         folder: of its files.
         validation: scenarios that its course is judged on; the validation set by default.
         checkpoint_seconds: between checkpoints.
+        report: called with each validation as it is made, and with those before an interruption.
+        quiet: without a bar of progress.
     """
     one_thread()
     before = finished(folder, settings)
@@ -240,6 +267,6 @@ def train(
     normalise.seed(1_000_000 * (seed + 1))
     judged = validation_episodes() if validation is None else validation
     try:
-        return Training(settings, seed, folder, judged, checkpoint_seconds).run(model, normalise)
+        return Training(settings, seed, folder, judged, checkpoint_seconds, report, quiet).run(model, normalise)
     finally:
         normalise.close()

@@ -1,12 +1,14 @@
 """Search for the gains of the ladder's closed loops: the same budget, scenarios and objective for every controller.
 
-The search itself is :mod:`ddagr_gym.evaluation.gain_search`. B6 is searched on other plants than the nominal one,
-development scenarios of :mod:`benchmarks.row_turn_plants` with a seed of their own, all others on the first scenarios
-of the validation set. Scenarios S0 to S8 and T are never touched.
+The search itself is :mod:`ddagr_gym.evaluation.gain_search`; the episodes of one of its stages do not depend on each
+other and are driven by the runner of tasks, to the same bits on any number of workers. B6 is searched on other plants
+than the nominal one, development scenarios of :mod:`benchmarks.row_turn_plants` with a seed of their own, all others on
+the first scenarios of the validation set. Scenarios S0 to S8 and T are never touched.
 """
 
 from __future__ import annotations
 
+import contextlib
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -19,12 +21,14 @@ from ddagr_gym.envs.settings import Episode, TurnSettings
 from ddagr_gym.errors import InputError, unknown_name
 from ddagr_gym.evaluation.campaign import scenario_settings
 from ddagr_gym.evaluation.controllers import EKF_CONTROLLERS, find_controller
-from ddagr_gym.evaluation.gain_search import SearchBox, episodes_of, objective, search_box
+from ddagr_gym.evaluation.gain_search import Outcome, SearchBox, Wanted, episodes_of, objective, search_box
 from ddagr_gym.evaluation.ladder_gains import LadderGains, LoopSettings, ladder_gains
 from ddagr_gym.evaluation.metrics import turn_metrics
 from ddagr_gym.evaluation.runs import drive_turn
 from ddagr_gym.evaluation.scenarios import load_scenarios
 from ddagr_gym.files import atomic_path
+from ddagr_gym.tasks import Ended, Task, TaskRunner
+from ddagr_gym.tasks.task import raise_failures
 
 __all__ = ["SPACES", "STAGES", "GainSearch", "SearchSpace", "check_names", "episodes_of", "objective", "write_gains"]
 
@@ -137,6 +141,7 @@ class GainSearch:
         seed: of the candidates.
         stages: see :data:`STAGES`; fewer scenarios and candidates in a later one.
         progress: called with the number of episodes as they end, those of the journal included.
+        runner: drives the episodes; this process where it is None.
 
     Raises:
         InputError: a controller without gains.
@@ -150,11 +155,13 @@ class GainSearch:
         seed: int = 0,
         stages: Sequence[tuple[int, int]] = STAGES,
         progress: Callable[[int], None] = lambda episodes: None,
+        runner: TaskRunner | None = None,
     ) -> None:
         if controller not in SPACES:
             raise unknown_name("controller with gains", controller, SPACES)
         self.controller, self.space, self.seed = controller, SPACES[controller], seed
         self.stages, self._progress, self._journal = tuple(stages), progress, journal
+        self._runner = runner
         self._scenarios = [] if self.space.plants else load_scenarios(VALIDATION_SET)[: self.stages[-1][1]]
         self._driven = self._read()
 
@@ -177,19 +184,37 @@ class GainSearch:
         found = self._scenarios[number]
         return scenario_settings(found, self.controller in EKF_CONTROLLERS), found.episode, found.seed
 
-    def _drive(self, values: dict[str, float], number: int) -> tuple[float | None, bool]:
-        key = json.dumps(values)
-        if (key, number) not in self._driven:
-            settings, episode, seed = self._scenario(number)
-            gains = self.space.apply(ladder_gains(), values)
-            run = drive_turn(find_controller(self.controller, episode.turn, gains), settings, seed, episode)
-            error = turn_metrics(run.columns, run.episode.turn, run.episode.robot).turn.error
-            self._driven[key, number] = (error, run.success)
-            row = {"controller": self.controller, "values": key, "number": number, "error": error}
-            with self._journal.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(row | {"success": run.success}) + "\n")
+    def _drive(self, wanted: Sequence[Wanted]) -> list[Outcome]:
+        keys = [(json.dumps(values), number) for values, number in wanted]
+        missing = [key for key in dict.fromkeys(keys) if key not in self._driven]
+        self._progress(len(wanted) - len(missing))
+        if missing:
+            self._drive_missing(missing)
+        return [self._driven[key] for key in keys]
+
+    def _drive_missing(self, keys: Sequence[tuple[str, int]]) -> None:
+        """Drive episodes, each kept as it ends; those that fail are named when the others have ended."""
+        tasks = {f"{self.controller} with {text} on {number}": (text, number) for text, number in keys}
+        failed: list[Ended] = []
+        with contextlib.ExitStack() as stack:
+            runner = self._runner or stack.enter_context(TaskRunner())
+            for ended in runner.run(Task(name, drive_once, self._arguments(*key)) for name, key in tasks.items()):
+                if ended.failure is None:
+                    self._keep(*tasks[ended.task.name], ended.value)
+                else:
+                    failed.append(ended)
+        raise_failures(failed, len(tasks))
+
+    def _arguments(self, values: str, number: int) -> tuple[str, LadderGains, TurnSettings, Episode, int]:
+        return self.controller, self.space.apply(ladder_gains(), json.loads(values)), *self._scenario(number)
+
+    def _keep(self, values: str, number: int, outcome: Outcome) -> None:
+        error, success = outcome
+        self._driven[values, number] = (error, success)
+        row = {"controller": self.controller, "values": values, "number": number, "error": error, "success": success}
+        with self._journal.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(row) + "\n")
         self._progress(1)
-        return self._driven[key, number]
 
     def run(self) -> dict[str, Any]:
         """Best values, and the record of the search."""
@@ -200,6 +225,13 @@ class GainSearch:
             "axes": [list(axis) for axis in self.space.axes],
             **search_box(self.space, self._drive, self.stages, self.seed),
         }
+
+
+def drive_once(controller: str, gains: LadderGains, settings: TurnSettings, episode: Episode, seed: int) -> Outcome:
+    """One episode of a controller with gains; workers call it by name."""
+    run = drive_turn(find_controller(controller, episode.turn, gains), settings, seed, episode)
+    error = turn_metrics(run.columns, run.episode.turn, run.episode.robot).turn.error
+    return error, bool(run.success)
 
 
 def write_gains(records: Sequence[dict[str, Any]], path: Path) -> LadderGains:

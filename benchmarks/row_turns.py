@@ -135,14 +135,16 @@ def as_lines(content: Mapping[str, Any]) -> str:
     return "{\n" + ",\n".join(parts) + "\n}\n"
 
 
-def drive(folder: Path, workers: int) -> list[dict[str, Any]]:
+def drive(folder: Path, workers: int, cluster: str = "") -> list[dict[str, Any]]:
     """Episodes of the plan, driven where the dataset in the folder does not hold them."""
     plan = [(without_stars(controllers), sets) for controllers, sets in PLAN]
     total = sum(len(wanted_episodes(with_bounds(controllers), sets)) for controllers, sets in plan)
     rows = []
     with Progress(total, "driving") as progress:
         for controllers, sets in plan:
-            rows += run_campaign(controllers, sets, folder / EPISODES, processes=workers, progress=progress.advance)
+            rows += run_campaign(
+                controllers, sets, folder / EPISODES, processes=workers, cluster=cluster, progress=progress.advance
+            )
     places = {name: place for place, name in enumerate(ORDER)}
     return sorted(rows, key=lambda row: (places.get(row["arm"], len(ORDER)), SETS.index(row["set"])))
 
@@ -167,11 +169,12 @@ def keep(
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--output", type=Path, required=True, help="folder of the evaluation")
-    parser.add_argument("--workers", type=int, default=2, help="processes")
+    parser.add_argument("--workers", type=int, default=2, help="processes, or processors of a local cluster")
+    parser.add_argument("--cluster", default="", help="local, or the address of a Ray cluster")
     arguments = parser.parse_args()
     folder = make_folder(arguments.output)
     made_at = remembered_commits(folder)
-    rows = drive(folder, arguments.workers)
+    rows = drive(folder, arguments.workers, arguments.cluster)
     keep(folder, rows, "python -m benchmarks.row_turns --output FOLDER", made_at, arguments.workers)
     return 0
 

@@ -1,7 +1,8 @@
 """The simulator: functions of (state, command, noise, parameters) over a batch of environments.
 
 The environment, the command line, replay, diagnosis and the tests all run :class:`Simulator`; a single robot is a
-batch of one, so that single and vectorised runs agree to the bit.
+batch of one, so that single and vectorised runs agree to the bit. Its threads are no tasks of
+:mod:`ddagr_gym.tasks`: they share the rows of one batch at every call, and compiled steps do not hold Python's lock.
 """
 
 from __future__ import annotations

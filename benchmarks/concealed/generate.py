@@ -5,7 +5,7 @@
 ``python -m benchmarks.concealed.generate --set sealed --plan``
 
 The same seed gives the same bytes. A run that was interrupted goes on where it stopped. ``--seed secret`` draws a
-128-bit seed that is kept with the labels only.
+128-bit seed that is kept with the labels only. The pool is its own: this folder shares no code with ``ddagr_gym``.
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ from ddagr_gym.estimation.force_laws import ForceLaw
 from ddagr_gym.evaluation.adapted_controller import AdaptedSettings
 from ddagr_gym.evaluation.bundles import Bundle
 from ddagr_gym.evaluation.force_law_fits import fit_law, true_forces, turn_states
-from ddagr_gym.evaluation.gain_search import SearchBox, episodes_of, objective, search_box
+from ddagr_gym.evaluation.gain_search import Outcome, SearchBox, Wanted, episodes_of, objective, search_box
 from ddagr_gym.evaluation.ladder_gains import LoopSettings, ladder_gains
 from ddagr_gym.parameters import STANDARD_GRAVITY, Robot, Soil
 
@@ -160,9 +160,9 @@ def _tuned(bundle: Bundle, turns: MeasuredTurns, effort: Effort, seed: int) -> t
         loop = LoopSettings(PidGains(**values, limit=before.limit), bundle.settings.gains.lead_factor)
         return bundle.with_settings(replace(bundle.settings, gains=loop))
 
-    def drive(values: dict[str, float], number: int) -> tuple[float | None, bool]:
-        found = turns.measure(with_gains(values), number)
-        return found.error, found.success
+    def drive(wanted: Sequence[Wanted]) -> list[Outcome]:
+        found = [turns.measure(with_gains(values), number) for values, number in wanted]
+        return [(item.error, item.success) for item in found]
 
     record = search_box(box, drive, effort.stages, seed)
     return with_gains(record["best"]), record

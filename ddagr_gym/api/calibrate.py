@@ -130,6 +130,8 @@ def calibrate(
     threads: int = 1,
     bank: bool = False,
     supply_currents: bool = False,
+    processes: int = 1,
+    cluster: str = "",
     column_map: str | os.PathLike[str] | None = None,
     progress: Callable[[str], None] | None = None,
     cache: str | os.PathLike[str] | None = None,
@@ -146,10 +148,13 @@ def calibrate(
         soil: nominal one: name, YAML file or object, or one of these for each ground by its name.
         grounds: drives on each ground by its name, as numbers, paths or objects; all on one where it is None.
         seed: of the resampled intervals.
-        threads: of the simulator.
+        threads: of the simulator, in each process.
         supply_currents: also fit currents that motors draw from their supply; their own current is always fitted.
         bank: also diagnose every drive with the robot calibrated without it: what ordinary drives do to every effect of
             the library, about a minute for each drive of 10 min.
+        processes: for what does not depend on each other: the fits from several starts and, for the bank, the drives.
+        cluster: a Ray cluster to run them on: "local" starts one of so many processors here, an address takes one that
+            runs. The result is the same.
         column_map: shipped map by name or the path of one's own, for files that are not imported yet.
         progress: called with a line of text at each step; ``print`` will do.
         cache: folder in which finished steps are kept. After an interruption (KeyboardInterrupt) the same call goes on
@@ -160,7 +165,7 @@ def calibrate(
 
     Raises:
         InputError: drives of another robot or of two, too short, without commands, encoders or gyro; grounds that do
-            not fit the drives; unknown names.
+            not fit the drives; unknown names; a cluster that does not answer.
 
     Examples:
         >>> import ddagr_gym
@@ -180,8 +185,9 @@ def calibrate(
     from ddagr_gym.calibration.input_requirements import check_drives, check_map, grounds_of
     from ddagr_gym.calibration.run import calibrate_drives
     from ddagr_gym.calibration.settings import CalibrationSettings
+    from ddagr_gym.tasks import TaskRunner
 
-    at_least(threads=(threads, 1), seed=(seed, 0))
+    at_least(threads=(threads, 1), seed=(seed, 0), processes=(processes, 1))
     data_sheet = robot_from(robot)
     given = _listed(recordings)
     found = _named_apart(recordings_from(given, robot, column_map) if given else ())
@@ -193,18 +199,20 @@ def calibrate(
     for ground in dict.fromkeys(by_drive):
         check_ground_name(ground)
     soils = _soils(soil, by_drive)
-    outcome = calibrate_drives(
-        found,
-        by_drive,
-        data_sheet,
-        {ground: soil_from(item) for ground, item in soils.items()},
-        CalibrationSettings(threads=threads, seed=seed, supply_currents=supply_currents),
-        data_sheet=OWN if not isinstance(robot, str | os.PathLike) else str(robot),
-        soil_names={ground: soil_name_of(item) for ground, item in soils.items()},
-        with_bank=bank,
-        cache=None if cache is None else Path(cache),
-        progress=(lambda line: None) if progress is None else progress,
-    )
+    with TaskRunner(processes, cluster=cluster) as runner:
+        outcome = calibrate_drives(
+            found,
+            by_drive,
+            data_sheet,
+            {ground: soil_from(item) for ground, item in soils.items()},
+            CalibrationSettings(threads=threads, seed=seed, supply_currents=supply_currents),
+            data_sheet=OWN if not isinstance(robot, str | os.PathLike) else str(robot),
+            soil_names={ground: soil_name_of(item) for ground, item in soils.items()},
+            with_bank=bank,
+            runner=runner,
+            cache=None if cache is None else Path(cache),
+            progress=(lambda line: None) if progress is None else progress,
+        )
     return CalibrationResult(outcome)
 
 

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 
 from ddagr_gym.api.drive_tasks import (
     STEP,
-    Calibrated,
     DriveTask,
     Setting,
     answered,
@@ -122,6 +121,7 @@ def diagnose_drives(
     seed: int = 0,
     threads: int = 1,
     processes: int = 1,
+    cluster: str = "",
     column_map: str | os.PathLike[str] | None = None,
     limits: Limits = DEFAULT_LIMITS,
     progress: Callable[[str], None] | None = None,
@@ -140,6 +140,8 @@ def diagnose_drives(
         seed: of the resampling.
         threads: of the simulator, in each process.
         processes: drives at a time; each takes 0.3 to 1 GB.
+        cluster: a Ray cluster to work on: "local" starts one of so many processors here, an address takes one that
+            runs. Answers are the same.
         column_map: shipped map by name or the path of one's own, for files that are not imported yet.
         limits: on rows and bytes of files.
         progress: called with a line of text for each drive.
@@ -150,7 +152,8 @@ def diagnose_drives(
         Table of drives, control charts of all sizes, and the drives at which something changed.
 
     Raises:
-        InputError: no recording, no such calibration, one without a bank, or an unknown ground.
+        InputError: no recording, no such calibration, one without a bank, an unknown ground, or a cluster that does
+            not answer.
 
     Examples:
         >>> import ddagr_gym
@@ -160,38 +163,32 @@ def diagnose_drives(
     at_least(threads=(threads, 1), processes=(processes, 1), seed=(seed, 0))
     folder = Path(calibration)
     calibrated = load_calibrated(folder)
-    ordinary = calibrated[0]
+    ordinary, _ = calibrated
     if ground and ground not in ordinary.soils:
         raise unknown_name("ground", ground, ordinary.soils)
     setting = Setting(folder, ground, None if column_map is None else str(column_map), limits, seed, threads)
     tasks = tasks_of(recordings)
     kept = None if cache is None else Path(cache)
     key = "" if kept is None else setting_key(setting)
-    found = _found(tasks, setting, calibrated, processes, kept, key, progress)
-    return _result(tasks, found, ordinary, ground, kept, key)
-
-
-def _found(
-    tasks: Sequence[DriveTask],
-    setting: Setting,
-    calibrated: Calibrated,
-    processes: int,
-    cache: Path | None,
-    key: str,
-    progress: Callable[[str], None] | None,
-) -> dict[str, DriveAnswer | str]:
-    """Answers by name: kept ones, and those that are made now."""
-    found: dict[str, DriveAnswer | str] = _twins(tasks)
-    stores = {task.name: store_of(task, key, cache) for task in tasks if task.name not in found and not task.unread}
-    found |= {name: _kept(store) for name, store in stores.items() if store.has(STEP)}
+    found, stores = _known(tasks, kept, key)
     missing = [task for task in tasks if task.name not in found]
     say = _Counter(len(tasks), len(tasks) - len(missing), progress)
-    for task, answer in answered(missing, setting, calibrated, processes):
+    for task, answer in answered(missing, setting, calibrated, processes, cluster):
         found[task.name] = answer
         if not isinstance(answer, str):
             stores[task.name].step(STEP, partial(_same, answer))
         say.answered(task.name, answer)
-    return found
+    return _result(tasks, found, ordinary, ground, kept, key)
+
+
+def _known(
+    tasks: Sequence[DriveTask], cache: Path | None, key: str
+) -> tuple[dict[str, DriveAnswer | str], dict[str, StepStore]]:
+    """Answers by name that need no work: kept ones, and drives that are there twice; and where each is kept."""
+    found: dict[str, DriveAnswer | str] = _twins(tasks)
+    stores = {task.name: store_of(task, key, cache) for task in tasks if task.name not in found and not task.unread}
+    found |= {name: _kept(store) for name, store in stores.items() if store.has(STEP)}
+    return found, stores
 
 
 def _same(answer: DriveAnswer) -> DriveAnswer:

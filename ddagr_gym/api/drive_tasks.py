@@ -8,7 +8,7 @@ import traceback
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from ddagr_gym.api.inputs import Source, Sources, recordings_from, sources_in
 from ddagr_gym.errors import InputError
@@ -20,9 +20,10 @@ if TYPE_CHECKING:
     from ddagr_gym.diagnosis.answer.drive_series import DriveAnswer
     from ddagr_gym.diagnosis.change.ordinary import OrdinaryRobot
     from ddagr_gym.diagnosis.store import StepStore
+    from ddagr_gym.tasks import TaskRunner
 
-Calibrated: TypeAlias = "tuple[OrdinaryRobot, dict[str, str], str]"
-"""The calibrated robot, its ordinary drives' names by the hash of their values, and the file of the robot."""
+Calibrated: TypeAlias = "tuple[OrdinaryRobot, dict[str, str]]"
+"""The calibrated robot, and its ordinary drives' names by the hash of their values."""
 
 STEP = "answer"
 """Name of the only finished step of a drive."""
@@ -129,7 +130,7 @@ def store_of(task: DriveTask, key: str, cache: Path | None) -> StepStore:
 
 
 def answered(
-    tasks: Sequence[DriveTask], setting: Setting, calibrated: Calibrated, processes: int
+    tasks: Sequence[DriveTask], setting: Setting, calibrated: Calibrated, processes: int, cluster: str = ""
 ) -> Iterator[tuple[DriveTask, DriveAnswer | str]]:
     """Answers, or sentences why there is none, as they come.
 
@@ -138,14 +139,31 @@ def answered(
         setting: of all.
         calibrated: what all are compared with.
         processes: that work side by side.
+        cluster: as of :class:`ddagr_gym.tasks.TaskRunner`; files are sent there by content.
     """
     from ddagr_gym.tasks import Task, TaskRunner
 
+    if not tasks:
+        return
     given = {task.name: task for task in tasks}
-    with TaskRunner(min(processes, max(len(tasks), 1))) as runner:
-        shared = runner.share(calibrated) if tasks else None
-        for ended in runner.run(Task(task.name, answer_of, (task, setting, shared)) for task in tasks):
+    with TaskRunner(min(processes, len(tasks)), cluster=cluster) as runner:
+        shared, column_map = runner.share(calibrated), _own_map(setting, runner)
+        # one after the other: a file is read when its turn comes
+        sent = (Task(task.name, answer_of, (task, setting, shared, _file(task, runner), column_map)) for task in tasks)
+        for ended in runner.run(sent):
             yield given[ended.task.name], ended.value if ended.failure is None else _without_answer(ended.failure)
+
+
+def _file(task: DriveTask, runner: TaskRunner) -> Any:
+    """Handle of a drive's file or folder (a bag); None for a recording, and for what cannot be read."""
+    source = task.source
+    return runner.share_file(source) if isinstance(source, Path) and source.exists() and not task.unread else None
+
+
+def _own_map(setting: Setting, runner: TaskRunner) -> Any:
+    """Handle of one's own column map; the name of a shipped one."""
+    chosen = setting.column_map
+    return runner.share_file(Path(chosen)) if chosen is not None and Path(chosen).is_file() else chosen
 
 
 def _without_answer(failure: Failure) -> str:
@@ -154,15 +172,30 @@ def _without_answer(failure: Failure) -> str:
     return f"{FAULT}: {failure.message}"
 
 
-def answer_of(task: DriveTask, setting: Setting, calibrated: Calibrated) -> DriveAnswer | str:
-    """The answer on a drive; whatever is wrong with it is a sentence, and no other drive's matter."""
+def answer_of(
+    task: DriveTask, setting: Setting, calibrated: Calibrated, file: Path | None, column_map: Path | str | None
+) -> DriveAnswer | str:
+    """The answer on a drive; whatever is wrong with it is a sentence, and no other drive's matter.
+
+    Args:
+        task: the drive.
+        setting: of all.
+        calibrated: what all are compared with.
+        file: of the drive where the task is run; None for a recording.
+        column_map: its place, or its name.
+    """
     from ddagr_gym.diagnosis.series.one_drive import answer_for
+    from ddagr_gym.tasks import release
 
     if task.unread:
         return task.unread
-    ordinary, known, robot = calibrated
+    ordinary, known = calibrated
     try:
-        (recording,) = recordings_from(task.source, robot, setting.column_map, setting.limits)
+        try:
+            (recording,) = recordings_from(file or task.source, ordinary.robot, column_map, setting.limits)
+        finally:
+            if file is not None:
+                release(file)
         name = known.get(_hash(recording), "")
         return answer_for(
             recording.with_meta(source=task.name), ordinary, setting.ground, name, seed=setting.seed,
@@ -192,8 +225,8 @@ def load_calibrated(folder: Path) -> Calibrated:
     Raises:
         InputError: no such calibration, or one without a bank.
     """
-    from ddagr_gym.calibration.files import ROBOT, load
+    from ddagr_gym.calibration.files import load
     from ddagr_gym.calibration.ordinary_robot import load_ordinary_robot
 
     drives = {item.sha256: item.source for item in load(folder).drives}
-    return load_ordinary_robot(folder), drives, str(folder / ROBOT)
+    return load_ordinary_robot(folder), drives

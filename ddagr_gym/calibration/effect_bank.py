@@ -7,13 +7,13 @@ with a robot that was calibrated on the other drives, is what a diagnosis with t
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 from ddagr_gym.calibration.calibration_data import CalibrationData
+from ddagr_gym.calibration.independent_steps import IndependentSteps
 from ddagr_gym.calibration.joint_fit import FittedModel
 from ddagr_gym.calibration.left_out import Forecast
 from ddagr_gym.calibration.ordinary_drives import Ordinary
@@ -22,9 +22,10 @@ from ddagr_gym.calibration.simulator_values import fitted_robot, fitted_soil
 from ddagr_gym.diagnosis.gates.thresholds import NullRun
 from ddagr_gym.diagnosis.null_bank.bank import NullBank
 from ddagr_gym.diagnosis.setting import Setting
-from ddagr_gym.diagnosis.store import StepCache
 from ddagr_gym.errors import InputError
 from ddagr_gym.files import write_text
+from ddagr_gym.recordings.schema import Recording
+from ddagr_gym.tasks import Task
 
 NAME = "bank.json"
 VERSION = 2
@@ -40,8 +41,7 @@ def ordinary_runs(
     model: FittedModel,
     made: Sequence[Forecast],
     threads: int,
-    cache: StepCache,
-    progress: Callable[[str], None],
+    steps: IndependentSteps,
 ) -> tuple[NullRun, ...]:
     """One run for each drive: gains of all effects beside the robot that was calibrated without it.
 
@@ -50,21 +50,28 @@ def ordinary_runs(
         model: joint fit.
         made: forecasts of the left-out drives, with the values of the fit without each.
         threads: of the simulator.
-        cache: of runs that are done.
-        progress: called with a line of text for each drive.
+        steps: run the drives.
     """
-    setting = setting_of(data, threads)
-    found = []
-    for forecast in made:
-        number = int(forecast.windows.recording[0])
-        values = forecast.values_of(model)
-        robot = fitted_robot(model.model.robot, values)
-        soil = fitted_soil(data, data.grounds[number], values)
-        recording, name = data.prepared.recordings[number], f"{data.names[number]} {forecast.fold}"
-        progress(f"every effect of the library on {data.names[number]}")
-        bank = NullBank(robot, soil, setting, (recording,))
-        found.append(cache(f"bank {forecast.fold}", partial(bank.scan, [recording], f"real {name}")))
-    return tuple(found)
+    tasks = [_task(data, model, forecast, threads) for forecast in made]
+    return tuple(steps.results("every effect of the library on each drive", tasks))
+
+
+def _task(data: CalibrationData, model: FittedModel, forecast: Forecast, threads: int) -> Task:
+    """Scan of the drive that a forecast left out."""
+    number = int(forecast.windows.recording[0])
+    values = forecast.values_of(model)
+    robot = fitted_robot(model.model.robot, values)
+    soil = fitted_soil(data, data.grounds[number], values)
+    recording, name = data.prepared.recordings[number], f"{data.names[number]} {forecast.fold}"
+    bank = NullBank(robot, soil, setting_of(data, threads), (recording,))
+    return Task(name, scan_drive, (bank, f"real {name}"), f"bank {forecast.fold}")
+
+
+def scan_drive(bank: NullBank, kind: str) -> NullRun:
+    """Run of the only drive of a bank; workers call it by name."""
+    (drive,) = bank.drives
+    assert isinstance(drive, Recording)
+    return bank.scan([drive], kind)
 
 
 def setting_of(data: CalibrationData, threads: int) -> Setting:

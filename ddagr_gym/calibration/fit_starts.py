@@ -7,13 +7,14 @@ have delays of real robots with a ramp that hardly shapes anything.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.calibration.calibration_data import CalibrationData
-from ddagr_gym.calibration.joint_fit import ITERATIONS, FittedModel, fit_model, rough_fit
+from ddagr_gym.calibration.independent_steps import IndependentSteps
+from ddagr_gym.calibration.joint_fit import ITERATIONS, FittedModel, Standing, fit_model, rough_fit
 from ddagr_gym.calibration.parts import RobotModel, complete_robot, first_values
 from ddagr_gym.calibration.settings import LONGEST_DELAY
 from ddagr_gym.identification.parameters import ModelParameter
@@ -21,6 +22,7 @@ from ddagr_gym.identification.residual_weights import Weights
 from ddagr_gym.identification.windows import CHANNELS, WindowSet
 from ddagr_gym.parameters import Robot
 from ddagr_gym.replay_analysis.kinematic import Motor
+from ddagr_gym.tasks import Task
 
 Array = NDArray[np.float64]
 
@@ -91,7 +93,7 @@ def fit_from_several(
     model: RobotModel,
     held: Mapping[str, float],
     threads: int,
-    progress: Callable[[str], None] = lambda line: None,
+    steps: IndependentSteps,
 ) -> tuple[FittedModel, Weights]:
     """Fit of all parts, by what a rough fit leaves of each drive, from the start that a few steps like best.
 
@@ -101,19 +103,37 @@ def fit_from_several(
         model: with all parts.
         held: values of parameters that never move.
         threads: of the simulator.
-        progress: called with a line of text for each start.
+        steps: run the first steps from each start.
 
     Returns:
         The fit, and its weights.
     """
     rough, weights = rough_fit(data, windows, model, {**held, **start_values(data, windows, model.parameters)}, threads)
 
-    def fit_from(values: Mapping[str, float], states: Array, iterations: int) -> FittedModel:
-        return fit_model(data, windows, model, weights, values, threads, states=states, iterations=iterations)
+    common, states = (data, windows, model, weights, threads), rough.fitted.point.states
+    changes: tuple[dict[str, float], ...] = ({}, *OTHER_STARTS)
+    tasks = [
+        Task(_name(change), first_steps, (*common, {**rough.values, **change}, states), f"start {number}")
+        for number, change in enumerate(changes)
+    ]
+    tried = steps.results("fit of all parts from several starts", tasks)
+    _, best = min(tried, key=lambda item: item[0])
+    return fit_model(*common[:4], best.values, threads, states=best.states, iterations=ITERATIONS), weights
 
-    tried = []
-    for change in ({}, *OTHER_STARTS):
-        progress("fit of all parts" + "".join(f", {name} from {value:g}" for name, value in change.items()))
-        tried.append(fit_from({**rough.values, **change}, rough.fitted.point.states, TRIAL_ITERATIONS))
-    best = min(tried, key=lambda item: item.fitted.cost)
-    return fit_from(best.values, best.fitted.point.states, ITERATIONS), weights
+
+def _name(change: Mapping[str, float]) -> str:
+    return "fit of all parts" + "".join(f", {name} from {value:g}" for name, value in change.items())
+
+
+def first_steps(
+    data: CalibrationData,
+    windows: WindowSet,
+    model: RobotModel,
+    weights: Weights,
+    threads: int,
+    values: Mapping[str, float],
+    states: Array,
+) -> tuple[float, Standing]:
+    """Cost after a few steps from a start, and where they lead. Arguments as :func:`fit_model`."""
+    found = fit_model(data, windows, model, weights, values, threads, states=states, iterations=TRIAL_ITERATIONS)
+    return found.fitted.cost, found.standing

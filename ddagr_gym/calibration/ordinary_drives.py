@@ -6,14 +6,14 @@ a drive is no part of what that drive says.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.calibration.calibration_data import CalibrationData
+from ddagr_gym.calibration.independent_steps import IndependentSteps
 from ddagr_gym.calibration.joint_fit import FittedModel
 from ddagr_gym.calibration.left_out import Forecast
 from ddagr_gym.calibration.result import Calibration
@@ -31,13 +31,13 @@ from ddagr_gym.diagnosis.change.ordinary import (
     uncertain_parameters,
 )
 from ddagr_gym.diagnosis.change.reference import OrdinaryDrive, scan_ordinary
-from ddagr_gym.diagnosis.store import StepCache
 from ddagr_gym.identification.parameters import ModelParameter, robot_parameters
+from ddagr_gym.identification.recording_noise import RecordingNoise
 from ddagr_gym.identification.relative_readings import usual_turning
-from ddagr_gym.identification.residual_weights import UNKNOWN_GYRO_BIAS, Weights, noise_weights
+from ddagr_gym.identification.residual_weights import UNKNOWN_GYRO_BIAS, noise_weights
 from ddagr_gym.identification.timing_repair import aligned_poses
-from ddagr_gym.identification.windows import WindowSet
 from ddagr_gym.parameters import Robot
+from ddagr_gym.tasks import Task
 
 Array = NDArray[np.float64]
 
@@ -115,8 +115,7 @@ def ordinary_drives(
     calibration: Calibration,
     robot: Robot,
     threads: int,
-    cache: StepCache,
-    progress: Callable[[str], None],
+    steps: IndependentSteps,
 ) -> Ordinary:
     """Weigh and scan every drive with the robot that was calibrated without it.
 
@@ -127,8 +126,7 @@ def ordinary_drives(
         calibration: the answer.
         robot: calibrated, with the deviations of another drive.
         threads: of the simulator.
-        cache: of drives that are done.
-        progress: called with a line of text for each drive.
+        steps: run the drives.
     """
     without = [_without(data, model, forecast, calibration, robot) for forecast in made]
     noise = [data.prepared.noise[int(forecast.windows.recording[0])] for forecast in made]
@@ -136,17 +134,19 @@ def ordinary_drives(
         data.windows.duration, HISTORY, _lateness(data), _gyro_scale(calibration), *_UNKNOWN,
         turning=usual_turning(data.windows),
     )  # fmt: skip
-    left = []
-    for number, (item, own) in enumerate(zip(without, noise, strict=True)):
-        progress(f"what the calibrated robot leaves of {item.name}")
-        weights = partial(noise_weights, [own], imposed=False, dead=data.prepared.dead, unfitted=())
-        left.append(cache(f"ordinary {number} left", partial(_left_of, item, blank, weights, threads)))
+    left = steps.results(
+        "what the calibrated robot leaves of each drive",
+        [
+            Task(item.name, left_of, (item, blank, own, data.prepared.dead, threads), f"ordinary {number} left")
+            for number, (item, own) in enumerate(zip(without, noise, strict=True))
+        ],
+    )
     weighing = pooled(blank, left)
-    references = []
-    for number, item in enumerate(without):
-        progress(f"every effect of the library in {item.name}")
-        references.append(cache(f"ordinary {number}", partial(scan_ordinary, item, weighing, threads)))
-    return Ordinary(weighing, tuple(references))
+    tasks = [
+        Task(item.name, scan_ordinary, (item, weighing, threads), f"ordinary {number}")
+        for number, item in enumerate(without)
+    ]
+    return Ordinary(weighing, tuple(steps.results("every effect of the library in each drive", tasks)))
 
 
 _UNKNOWN = (np.ones(8), np.ones(8), UNKNOWN_GYRO_BIAS, UNKNOWN_ACCELEROMETER_BIAS)
@@ -189,10 +189,10 @@ def _gyro_scale(calibration: Calibration) -> float:
     return 1.0 if not found or found[0] is None else found[0]
 
 
-def _left_of(item: OrdinaryDrive, blank: Weighing, noise: Callable[[WindowSet], Weights], threads: int) -> _Left:
-    """Weights and biases by a first fit with those of the sensors' noise."""
+def left_of(item: OrdinaryDrive, blank: Weighing, noise: RecordingNoise, dead: Sequence[str], threads: int) -> _Left:
+    """Weights and biases by a first fit with those of the sensors' noise; workers call it by name."""
     windows = change_windows([item.recording], item.robot, blank)
-    weights = noise(windows)
+    weights = noise_weights([noise], windows, imposed=False, dead=dead, unfitted=())
     parameters = uncertain_parameters(item.soil, item.parameters, item.deviations, blank, 1)
     first = replace(blank, sigma=weights.sigma, robust=weights.robust)
     problem = change_problem(item.robot, item.soil, windows, parameters, first, threads)

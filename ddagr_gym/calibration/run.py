@@ -19,6 +19,7 @@ from ddagr_gym.calibration.effect_bank import ordinary_runs
 from ddagr_gym.calibration.fit_starts import fit_from_several
 from ddagr_gym.calibration.forecast_errors import Forecasts, all_forecasts, forecast_errors
 from ddagr_gym.calibration.identifiability import covariance, unidentified
+from ddagr_gym.calibration.independent_steps import IndependentSteps
 from ddagr_gym.calibration.input_requirements import check_drives, check_scales, drive_scale, with_gyro_forward
 from ddagr_gym.calibration.joint_fit import (
     LAST_ITERATIONS,
@@ -45,6 +46,7 @@ from ddagr_gym.identification.residual_weights import Weights
 from ddagr_gym.identification.windows import WindowSet
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.recordings.schema import Recording
+from ddagr_gym.tasks import TaskRunner
 from ddagr_gym.version import __version__
 
 Progress = Callable[[str], None]
@@ -126,6 +128,7 @@ def calibrate_drives(
     soil_names: Mapping[str, str] | None = None,
     with_bank: bool = False,
     ready: CalibrationData | None = None,
+    runner: TaskRunner | None = None,
     cache: Path | None = None,
     progress: Progress = lambda line: None,
 ) -> Outcome:
@@ -141,18 +144,28 @@ def calibrate_drives(
         soil_names: of the soils by ground.
         with_bank: also scan every drive for every effect of the library.
         ready: the same drives as :func:`ready_drives` leaves them; made of them where it is None.
+        runner: of steps that do not depend on each other: the fits from several starts and, for the bank, the drives;
+            this process where it is None. The result is the same to the bit.
         cache: folder of finished steps, from which the same calibration goes on after an interruption; None keeps
             nothing.
         progress: called with what is being done.
 
     Raises:
         InputError: drives that cannot be calibrated, or a cache that holds something else.
+        FailedTasksError: some of the independent steps failed; the others are kept.
     """
+    if runner is None:
+        with TaskRunner() as own:
+            return calibrate_drives(
+                recordings, grounds, robot, soils, settings, data_sheet=data_sheet, soil_names=soil_names,
+                with_bank=with_bank, ready=ready, runner=own, cache=cache, progress=progress,
+            )  # fmt: skip
     began = time.monotonic()
     data = ready_drives(recordings, grounds, robot, soils, settings, progress) if ready is None else ready
     store = StepStore(cache, "" if cache is None else _key(recordings, grounds, robot, soils, settings))
+    steps = IndependentSteps(runner, store, progress)
     complete, held = complete_model(data)
-    selection = _select(data, complete, held, settings, store, progress)
+    selection = _select(data, complete, held, settings, store, steps)
     kept = complete.without(selection.left_out, robot)
     progress("joint fit")
     final = store.step("joint fit", partial(_final_fit, data, kept, selection.standing.values, settings))
@@ -186,9 +199,9 @@ def calibrate_drives(
     )
     found = {ground: fitted_soil(data, ground, model.values) for ground in data.drives_on}
     calibrated = calibrated_robot(data, model, calibration)
-    bank = ordinary_runs(data, model, made, settings.threads, store.step, progress) if with_bank else ()
+    bank = ordinary_runs(data, model, made, settings.threads, steps) if with_bank else ()
     ordinary = (
-        ordinary_drives(data, model, made, calibration, calibrated, settings.threads, store.step, progress)
+        ordinary_drives(data, model, made, calibration, calibrated, settings.threads, steps)
         if with_bank and data.count > 1
         else None
     )
@@ -206,14 +219,14 @@ def _select(
     held: Mapping[str, float],
     settings: CalibrationSettings,
     store: StepStore,
-    progress: Progress,
+    steps: IndependentSteps,
 ) -> Selection:
     """Parts that forecasts of left-out drives ask for, by fits to some of the windows."""
     windows, judged = data.spread(settings.compared), data.spread(settings.judged)
-    rough = store.step("all parts", partial(_weigh, data, windows, model, held, settings.threads, progress))
+    rough = store.step("all parts", partial(_weigh, data, windows, model, held, settings.threads, steps))
     comparison = Comparison(data, windows, judged, rough.weights, settings.threads, settings.settlings)
     full = store.step("all parts forecast", partial(comparison.candidate, model, rough.standing, 0))
-    return select_parts(comparison, model, full, store.step, progress)
+    return select_parts(comparison, model, full, store.step, steps.progress)
 
 
 def _weigh(
@@ -222,9 +235,9 @@ def _weigh(
     model: RobotModel,
     held: Mapping[str, float],
     threads: int,
-    progress: Progress,
+    steps: IndependentSteps,
 ) -> FinalFit:
-    found, weights = fit_from_several(data, windows, model, held, threads, progress)
+    found, weights = fit_from_several(data, windows, model, held, threads, steps)
     return FinalFit(found.standing, weights, {})
 
 

@@ -39,7 +39,11 @@ class Arguments:
         soil: nominal soil (see `ddagr soils`) of all grounds, or NAME=SOIL of one; may be repeated.
         map: shipped map by name or the path of one's own YAML file, for sources that are not imported yet.
         seed: of the resampled intervals.
-        threads: of the simulator.
+        threads: of the simulator, in each process.
+        processes: for what does not depend on each other: the fits from several starts and, with --bank, the drives;
+            each holds the drives that it works on.
+        cluster: a Ray cluster to run that on: "local" starts one of so many processors here, an address
+            (ray://HOST:PORT) takes one that runs.
         supply_currents: also fit currents that motors draw from their supply; their own current is always fitted.
         bank: also diagnose every drive with the robot calibrated without it, and write bank.json: what ordinary drives
             do to every effect of the library.
@@ -56,6 +60,8 @@ class Arguments:
     map: str = ""
     seed: int = 0
     threads: int = 2
+    processes: int = 1
+    cluster: str = ""
     bank: bool = False
     supply_currents: bool = False
     overwrite: bool = False
@@ -84,6 +90,8 @@ def run(arguments: Arguments) -> None:
             seed=arguments.seed,
             threads=arguments.threads,
             bank=arguments.bank,
+            processes=arguments.processes,
+            cluster=arguments.cluster,
             supply_currents=arguments.supply_currents,
             progress=LinePrinter("ddagr calibrate: "),
             cache=parts,

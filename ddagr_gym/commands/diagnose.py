@@ -37,6 +37,8 @@ def run(arguments: Arguments) -> int | None:
     parts = part_folder(arguments.output.expanduser().resolve())
     if arguments.calibration is not None and any(map(is_folder_of_drives, arguments.runs)):
         return run_drives(arguments, limits, parts)
+    if arguments.cluster:
+        raise InputError("--cluster is for a folder of drives with --calibration: leave it out.")
     with resumable(parts):
         result = ddagr_gym.diagnose(
             recordings_from(arguments.runs, read_as, arguments.map or None, limits),

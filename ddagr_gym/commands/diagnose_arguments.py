@@ -67,6 +67,8 @@ class Arguments:
             Needs foxglove-sdk.
         rrd: file to write for Rerun, with the same. Needs rerun-sdk.
         processes: of a folder with --calibration, how many drives at a time; each takes 0.3 to 1 GB.
+        cluster: of a folder with --calibration, a Ray cluster to work on: "local" starts one of so many processors
+            here, an address (ray://HOST:PORT) takes one that runs.
         names_only: only name what is missing: no errors on unseen drives, no unnamed terms, no next drive, no page.
         overwrite: replace an output folder that an earlier command wrote.
         maximum_rows: refuse a recording with more rows or messages.
@@ -92,6 +94,7 @@ class Arguments:
     mcap: Path | None = None
     rrd: Path | None = None
     processes: int = 1
+    cluster: str = ""
     names_only: bool = False
     overwrite: bool = False
     maximum_rows: int = 2_000_000

@@ -44,6 +44,7 @@ def run_drives(arguments: Arguments, limits: Limits, parts: Path) -> int:
             seed=arguments.seed,
             threads=arguments.threads,
             processes=arguments.processes,
+            cluster=arguments.cluster,
             column_map=arguments.map or None,
             limits=limits,
             progress=LinePrinter("ddagr diagnose: "),

@@ -70,14 +70,21 @@ class StepStore:
 
     def step(self, name: str, work: Callable[[], Result]) -> Result:
         """Result of a step: the kept one, or that of ``work``, which is kept."""
-        if self.folder is None:
-            return work()
         if self.has(name):
-            kept: Result = _load(self.folder, name)
+            kept: Result = self.get(name)
             return kept
-        made = work()
-        _save(self.folder, name, made)
-        return made
+        return self.put(name, work())
+
+    def get(self, name: str) -> Any:
+        """The kept result of a finished step."""
+        assert self.folder is not None
+        return _load(self.folder, name)
+
+    def put(self, name: str, result: Result) -> Result:
+        """Keep the result of a step, and give it back."""
+        if self.folder is not None:
+            _save(self.folder, name, result)
+        return result
 
     def clear(self) -> None:
         """Remove the folder."""

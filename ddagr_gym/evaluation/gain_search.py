@@ -24,6 +24,12 @@ Array = NDArray[np.float64]
 Outcome = tuple[float | None, bool]
 """e_R, None where it is undefined, and success of an episode."""
 
+Wanted = tuple[dict[str, float], int]
+"""An episode: values, and number of a scenario."""
+
+Drive = Callable[[Sequence[Wanted]], Sequence[Outcome]]
+"""Drives episodes, which do not depend on each other, and gives their outcomes in their order."""
+
 _SPREADS = (0.15, 0.06)
 """Standard deviations of the two rounds of refinement, shares of the box."""
 
@@ -61,7 +67,7 @@ def objective(outcomes: Sequence[Outcome]) -> float:
 
 def search_box(
     box: SearchBox,
-    drive: Callable[[dict[str, float], int], Outcome],
+    drive: Drive,
     stages: Sequence[tuple[int, int]],
     seed: int = 0,
 ) -> dict[str, Any]:
@@ -69,7 +75,7 @@ def search_box(
 
     Args:
         box: to search.
-        drive: (values, number of a scenario) -> outcome; asked for the same again in a later stage only if it is new.
+        drive: all episodes of a stage at once; what was driven in an earlier one is not asked for again.
         stages: (candidates, scenarios); fewer candidates and more scenarios in a later one.
         seed: of the candidates.
     """
@@ -106,15 +112,15 @@ def episodes_of(stages: Sequence[tuple[int, int]]) -> int:
 class _Search:
     """Outcomes so far."""
 
-    def __init__(self, box: SearchBox, drive: Callable[[dict[str, float], int], Outcome]) -> None:
+    def __init__(self, box: SearchBox, drive: Drive) -> None:
         self._box, self._drive = box, drive
         self._driven: dict[tuple[str, int], Outcome] = {}
 
     def scores(self, candidates: Sequence[dict[str, float]], first: int, last: int) -> list[float]:
         """Objective of candidates on the scenarios up to ``last``, of which those before ``first`` are driven."""
-        for values in candidates:
-            for number in range(first, last):
-                self._driven[repr(values), number] = self._drive(values, number)
+        wanted = [(values, number) for values in candidates for number in range(first, last)]
+        for (values, number), outcome in zip(wanted, self._drive(wanted), strict=True):
+            self._driven[repr(values), number] = outcome
         return [objective([self._driven[repr(values), n] for n in range(last)]) for values in candidates]
 
     def explore(self, count: int, scenarios: int, seed: int) -> tuple[list[dict[str, float]], list[float]]:

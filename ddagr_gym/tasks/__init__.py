@@ -17,6 +17,7 @@ begun again. Results depend on the tasks alone: they have the same bits on eithe
 
 from ddagr_gym.tasks.run import results_of, run_tasks
 from ddagr_gym.tasks.runner import TaskRunner
+from ddagr_gym.tasks.shared import release
 from ddagr_gym.tasks.store import ResultStore
 from ddagr_gym.tasks.task import Ended, FailedTasksError, Failure, Limits, Task
 
@@ -28,6 +29,7 @@ __all__ = [
     "ResultStore",
     "Task",
     "TaskRunner",
+    "release",
     "results_of",
     "run_tasks",
 ]

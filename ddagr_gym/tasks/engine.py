@@ -27,7 +27,7 @@ class Engine(Protocol):
         """Handle of a value."""
 
     def share_file(self, path: Path) -> Any:
-        """Handle of a file."""
+        """Handle of a file, or of a folder's files."""
 
     def close(self) -> None:
         """End when nothing runs."""

@@ -18,7 +18,7 @@ import ray
 
 from ddagr_gym.errors import InputError
 from ddagr_gym.tasks.attempt import attempt
-from ddagr_gym.tasks.shared import Handle, SharedPath, pickled, remembered
+from ddagr_gym.tasks.shared import Handle, SharedPath, content_of, pickled, remembered
 from ddagr_gym.tasks.task import Failure, Limits, Outcome, Task
 
 LOCAL = "local"
@@ -55,27 +55,12 @@ class RayCluster:
 
     def __init__(self, address: str, workers: int, limits: Limits, fresh: bool = False) -> None:
         self._limits = limits
-        self._connect(address, workers)
+        connect(address, workers)
         options = {"num_cpus": 1, "max_retries": 0, "max_calls": 1 if fresh else 0}
         self._remote = ray.remote(**options)(_attempt)
         self._running: dict[Any, tuple[int, float]] = {}
         self._code = code_hash()
         self._slots, self._ask = 1, 0.0
-
-    @staticmethod
-    def _connect(address: str, workers: int) -> None:
-        quiet: dict[str, Any] = {"log_to_driver": False, "logging_level": logging.FATAL}
-        try:
-            if address == LOCAL:
-                # nothing about its use goes to its makers
-                os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
-                ray.init(address=LOCAL, num_cpus=workers, include_dashboard=False, **quiet)
-            else:
-                ray.init(address=address, **quiet)
-        except (ConnectionError, ValueError, RuntimeError) as error:
-            raise InputError(
-                f"no Ray cluster answers at {address!r} ({error}): start one with ray start, or give --cluster local."
-            ) from None
 
     @property
     def slots(self) -> int:
@@ -120,9 +105,9 @@ class RayCluster:
         return SharedObject(digest, ray.put(data))
 
     def share_file(self, path: Path) -> SharedPath:
-        """Handle of a file whose bytes are in the object store."""
-        data = path.read_bytes()
-        return SharedPath(hashlib.sha256(data).hexdigest(), str(path), partial(ray.get, ray.put(data)))
+        """Handle of a file or folder whose content is in the object store."""
+        content = content_of(path)
+        return SharedPath(pickled(content)[0], str(path), partial(ray.get, ray.put(content)))
 
     def close(self) -> None:
         """Leave the cluster."""
@@ -135,17 +120,57 @@ class RayCluster:
         ray.shutdown()
 
 
+def connect(address: str, workers: int) -> None:
+    """Join a cluster, or start one of so many processors here.
+
+    Args:
+        address: of the cluster, or "local".
+        workers: processors of a local cluster.
+
+    Raises:
+        InputError: no cluster answers at the address.
+    """
+    quiet: dict[str, Any] = {"log_to_driver": False, "logging_level": logging.FATAL}
+    try:
+        if address == LOCAL:
+            # nothing about its use goes to its makers
+            os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+            ray.init(address=LOCAL, num_cpus=workers, include_dashboard=False, **quiet)
+        else:
+            ray.init(address=address, **quiet)
+    except (ConnectionError, ValueError, RuntimeError) as error:
+        raise InputError(
+            f"no Ray cluster answers at {address!r} ({error}): start one with ray start, or give --cluster local."
+        ) from None
+
+
 def _attempt(function: Callable[..., Any], arguments: tuple[Any, ...], limits: Limits, code: str) -> Outcome:
     """One task on a node, which must have the driver's code; a worker that exceeds its time is ended."""
-    if code_hash() != code:
-        sentence = f"the node {os.uname().nodename} has another ddagr_gym: install the same version on every node."
-        return Outcome(failure=Failure("raised", sentence, bad_input=True))
+    try:
+        check_code(code)
+    except InputError as error:
+        return Outcome(failure=Failure("raised", str(error), bad_input=True))
     # The default action of the signal: Python's would wait for a compiled function to return.
     signal.setitimer(signal.ITIMER_REAL, limits.seconds or 0.0)
     try:
         return attempt(function, arguments, limits.memory)
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
+
+
+def check_code(code: str) -> None:
+    """Refuse a driver whose package is not that of this node.
+
+    Args:
+        code: the driver's :func:`code_hash`.
+
+    Raises:
+        InputError: it is another one.
+    """
+    if code_hash() != code:
+        raise InputError(
+            f"the node {os.uname().nodename} has another ddagr_gym: install the same version on every node."
+        )
 
 
 @cache

@@ -7,11 +7,11 @@ from typing import Any
 
 from ddagr_gym.progress import Progress
 from ddagr_gym.tasks.runner import TaskRunner
-from ddagr_gym.tasks.store import ResultStore
+from ddagr_gym.tasks.store import Store
 from ddagr_gym.tasks.task import Ended, Task, raise_failures
 
 
-def run_tasks(tasks: Sequence[Task], label: str, runner: TaskRunner, store: ResultStore | None = None) -> list[Any]:
+def run_tasks(tasks: Sequence[Task], label: str, runner: TaskRunner, store: Store | None = None) -> list[Any]:
     """Results of all tasks, with a bar of progress.
 
     Args:
@@ -33,7 +33,7 @@ def run_tasks(tasks: Sequence[Task], label: str, runner: TaskRunner, store: Resu
 def results_of(
     tasks: Sequence[Task],
     runner: TaskRunner,
-    store: ResultStore | None = None,
+    store: Store | None = None,
     progress: Callable[[], object] = lambda: None,
 ) -> list[Any]:
     """Results of all tasks.

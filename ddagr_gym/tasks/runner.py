@@ -18,7 +18,7 @@ from ddagr_gym.errors import at_least
 from ddagr_gym.extras import need
 from ddagr_gym.tasks.attempt import check_memory_limit
 from ddagr_gym.tasks.engine import Engine, ThisProcess
-from ddagr_gym.tasks.store import ResultStore
+from ddagr_gym.tasks.store import Store
 from ddagr_gym.tasks.task import Ended, Failure, Limits, Outcome, Task
 
 STOPPED = 128 + signal.SIGTERM
@@ -98,10 +98,10 @@ class TaskRunner(AbstractContextManager["TaskRunner"]):
         return self._engine.share(value)
 
     def share_file(self, path: Path) -> Any:
-        """Handle of a file; the task gets a path at which its content lies on the node."""
+        """Handle of a file, or of a folder's files; the task gets a path at which its content lies on the node."""
         return self._engine.share_file(path)
 
-    def run(self, tasks: Iterable[Task], store: ResultStore | None = None) -> Iterator[Ended]:
+    def run(self, tasks: Iterable[Task], store: Store | None = None) -> Iterator[Ended]:
         """What becomes of tasks, as they end; those whose results are stored first come as they are met.
 
         Args:
@@ -129,9 +129,7 @@ class TaskRunner(AbstractContextManager["TaskRunner"]):
         running[number] = item
         self._engine.begin(number, item.task)
 
-    def _ended(
-        self, running: dict[int, _Attempt], again: deque[_Attempt], store: ResultStore | None
-    ) -> Iterator[Ended]:
+    def _ended(self, running: dict[int, _Attempt], again: deque[_Attempt], store: Store | None) -> Iterator[Ended]:
         for number, outcome in self._engine.ended(WAIT):
             item = running.pop(number)
             failure = outcome.failure

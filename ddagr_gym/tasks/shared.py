@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
 import pickle
+import shutil
 import tempfile
 from abc import ABC, abstractmethod
 from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
-from ddagr_gym.files import atomic_path
+from ddagr_gym.files import atomic_path, make_folder
+
+FileContent: TypeAlias = bytes | dict[str, bytes]
+"""Of a file, or of the files of a folder by their names."""
 
 _REMEMBERED = 4
 """Contents that a worker keeps in memory (ours): a bank and some drives."""
@@ -43,28 +48,65 @@ class SharedFile(Handle):
 
 @dataclass(frozen=True)
 class SharedPath(Handle):
-    """A file of the driver, by content.
+    """A file of the driver, or a folder of files, by content.
 
     Attributes:
-        digest: SHA-256 of the bytes.
+        digest: SHA-256 of the content.
         path: on the driver.
-        fetch: gives the bytes on another node; None where the driver's path is there.
+        fetch: gives the content on another node; None where the driver's path is there.
     """
 
     digest: str
     path: str
-    fetch: Callable[[], bytes] | None = None
+    fetch: Callable[[], FileContent] | None = None
 
     def content(self) -> Path:
-        """Path of a file with these bytes and the driver's name, written once a node."""
+        """Path of a file or folder with this content and the driver's name, written once a node."""
         if self.fetch is None:
             return Path(self.path)
-        folder = Path(tempfile.gettempdir()) / f"ddagr-gym-{os.getuid()}" / self.digest
-        file = folder / Path(self.path).name
-        if not file.is_file():
-            with atomic_path(file) as part:
-                part.write_bytes(self.fetch())
-        return file
+        place = written_folder() / self.digest / Path(self.path).name
+        if not place.exists():
+            _write(place, self.fetch())
+        return place
+
+
+def written_folder() -> Path:
+    """Where a node keeps the files that it got, each in a folder named by its content."""
+    return Path(tempfile.gettempdir()) / f"ddagr-gym-{os.getuid()}"
+
+
+def release(path: Path) -> None:
+    """Remove a file or folder that no other task needs, where :class:`SharedPath` wrote it; the driver's own stays.
+
+    Args:
+        path: as the task got it.
+    """
+    if path.parent.parent == written_folder():
+        shutil.rmtree(path.parent, ignore_errors=True)
+
+
+def content_of(path: Path) -> FileContent:
+    """Bytes of a file, or of the files of a folder by their names."""
+    if path.is_dir():
+        return {file.name: file.read_bytes() for file in sorted(path.iterdir()) if file.is_file()}
+    return path.read_bytes()
+
+
+def _write(place: Path, content: FileContent) -> None:
+    """Write a file or folder, whole or not at all."""
+    if isinstance(content, bytes):
+        with atomic_path(place) as part:
+            part.write_bytes(content)
+        return
+    with tempfile.TemporaryDirectory(dir=make_folder(place.parent)) as folder:
+        part = make_folder(Path(folder) / place.name)
+        for name, data in content.items():
+            (part / name).write_bytes(data)
+        # where another task of this node was faster, its folder stays
+        with contextlib.suppress(OSError):
+            part.rename(place)
+    if not place.is_dir():
+        raise OSError(f"{place} cannot be written")
 
 
 def remembered(digest: str, load: Callable[[], Any]) -> Any:

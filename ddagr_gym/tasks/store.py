@@ -5,11 +5,24 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from ddagr_gym.files import atomic_path, make_folder
 
 _KEY = re.compile(r"[\w.-]+")
+
+
+class Store(Protocol):
+    """Where results of finished tasks are kept by key."""
+
+    def has(self, key: str) -> bool:
+        """Whether the result is there."""
+
+    def get(self, key: str) -> Any:
+        """The result."""
+
+    def put(self, key: str, value: Any) -> Any:
+        """Keep a result, and give it back."""
 
 
 class ResultStore:

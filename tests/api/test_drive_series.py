@@ -31,7 +31,7 @@ def drives(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         (calibration / name).write_text("made")
     for number in range(1, 7):
         (folder / f"run_{number}.csv").write_text(f"{14 * (number >= 4)} {number}")
-    monkeypatch.setattr(drive_series, "load_calibrated", lambda folder: (ORDINARY, {}, None))
+    monkeypatch.setattr(drive_series, "load_calibrated", lambda folder: (ORDINARY, {}))
     return folder
 
 
@@ -40,8 +40,8 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Names of the drives that are worked on; "stop" and "fault" as contents do what they say."""
     names: list[str] = []
 
-    def made(task, setting, calibrated):
-        content = Path(task.source).read_text().split()
+    def made(task, setting, calibrated, file, column_map):
+        content = file.read_text().split()
         if content[0] == "stop":
             raise KeyboardInterrupt
         names.append(task.name)
@@ -167,3 +167,13 @@ def test_options_that_a_calibration_has_are_refused(drives, asked, capsys):
     assert main([*words(drives), "--window", "3"]) == 2
     assert "--window is given with a folder of drives and a calibration: leave it out" in capsys.readouterr().err
     assert not asked
+
+
+def test_a_cluster_is_for_folders_of_drives_and_needs_its_extra(drives, asked, tmp_path, monkeypatch, capsys):
+    assert main(["diagnose", str(drives / "run_1.csv"), "--output", str(tmp_path / "one"), "--cluster", "local"]) == 2
+    assert "--cluster is for a folder of drives with --calibration: leave it out" in capsys.readouterr().err
+    monkeypatch.setattr("ddagr_gym.extras.find_spec", lambda name: None if name == "ray" else True)
+    assert main([*words(drives), "--cluster", "local"]) == 2
+    assert "ddagr-gym[cluster]" in capsys.readouterr().err
+    assert not asked
+    assert not (tmp_path / "over").exists()

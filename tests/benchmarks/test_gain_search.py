@@ -1,6 +1,7 @@
 """The search for gains, on few candidates and scenarios."""
 
 import json
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -20,8 +21,18 @@ from benchmarks.gain_search import (
 from ddagr_gym.config import load_config
 from ddagr_gym.errors import InputError
 from ddagr_gym.evaluation.ladder_gains import LadderGains, gains_file, ladder_gains
+from ddagr_gym.tasks import FailedTasksError, TaskRunner
 
 FEW = ((4, 1), (2, 2))
+RAY = pytest.param(
+    (2, "local"),
+    id="ray",
+    marks=[
+        pytest.mark.ray,
+        pytest.mark.slow,
+        pytest.mark.skipif(find_spec("ray") is None, reason="needs ray: pip install 'ddagr-gym[cluster]'"),
+    ],
+)
 
 
 def test_objective_by_hand():
@@ -81,15 +92,39 @@ def test_search_resumes_and_is_repeatable(tmp_path):
     assert {"values": by_hand, "objective": first["objective_by_hand"]} in first["finalists"]
 
 
+@pytest.mark.parametrize("engine", [pytest.param((2, ""), id="two processes"), RAY])
+def test_every_engine_finds_the_same_bits(tmp_path, engine):
+    expected = GainSearch("B2", tmp_path / "here", stages=FEW).run()
+    with TaskRunner(engine[0], cluster=engine[1]) as runner:
+        assert GainSearch("B2", tmp_path / "there", stages=FEW, runner=runner).run() == expected
+    assert sorted((tmp_path / "there").open()) == sorted((tmp_path / "here").open())
+
+
+def test_an_episode_that_fails_is_named_and_the_others_are_kept(tmp_path, monkeypatch):
+    drive = gain_search.drive_turn
+
+    def fails_on_the_second(controller, settings, seed, episode):
+        if seed == second:
+            raise ZeroDivisionError("a wheel of radius 0")
+        return drive(controller, settings, seed, episode)
+
+    second = gain_search.load_scenarios(VALIDATION_SET)[1].seed
+    monkeypatch.setattr(gain_search, "drive_turn", fails_on_the_second)
+    with pytest.raises(FailedTasksError, match=r"4 of 8 tasks failed: B2 with .* on 1: raised \(ZeroDivisionError"):
+        GainSearch("B2", tmp_path / "journal", stages=((8, 2),)).run()
+    assert {json.loads(line)["number"] for line in (tmp_path / "journal").open()} == {0}
+
+
 def test_search_finds_a_known_optimum(tmp_path, monkeypatch):
     space = SPACES["B4"]
     wanted = np.array([0.7, 0.3, 0.5, 0.6])
 
-    def drive(self, values, number):
+    def outcome(values):
         point = [np.log(max(values[n], 1e-9) / low) / np.log(high / low) for n, low, high in space.axes]
-        outcome = (float(0.1 * np.linalg.norm(np.array(point) - wanted)), True)
-        self._driven[json.dumps(values), number] = outcome
-        return outcome
+        return float(0.1 * np.linalg.norm(np.array(point) - wanted)), True
+
+    def drive(self, episodes):
+        return [outcome(values) for values, _ in episodes]
 
     monkeypatch.setattr(GainSearch, "_drive", drive)
     found = GainSearch("B4", tmp_path / "journal").run()
@@ -102,9 +137,8 @@ def test_gains_chosen_by_hand_win_where_nothing_is_better(tmp_path, monkeypatch)
     space = SPACES["B3"]
     by_hand = dict(zip((name for name, _, _ in space.axes), space.start, strict=True))
 
-    def drive(self, values, number):
-        self._driven[json.dumps(values), number] = (0.01 if values == by_hand else 0.02, True)
-        return self._driven[json.dumps(values), number]
+    def drive(self, episodes):
+        return [(0.01 if values == by_hand else 0.02, True) for values, _ in episodes]
 
     monkeypatch.setattr(GainSearch, "_drive", drive)
     assert GainSearch("B3", tmp_path / "journal").run()["best"] == by_hand

@@ -7,6 +7,7 @@ import pytest
 from ddagr_gym.calibration.calibration_data import prepare_drives
 from ddagr_gym.calibration.effect_bank import NAME, load_runs, ordinary_runs, save_runs, setting_of
 from ddagr_gym.calibration.fit_starts import start_values
+from ddagr_gym.calibration.independent_steps import IndependentSteps
 from ddagr_gym.calibration.joint_fit import complete_model, weigh_and_fit
 from ddagr_gym.calibration.left_out import forecasts
 from ddagr_gym.calibration.parts import PARTS
@@ -17,6 +18,7 @@ from ddagr_gym.diagnosis.store import StepStore
 from ddagr_gym.errors import InputError
 from ddagr_gym.physics.effects.registry import absolute_effect_kinds
 from ddagr_gym.presets import get_robot, get_soil
+from ddagr_gym.tasks import TaskRunner
 from tests.calibration.conftest import drive
 
 FEW = CalibrationSettings(fitted=6, judged=4)
@@ -36,8 +38,10 @@ def made(tmp_path_factory):
     fitted, weights = weigh_and_fit(data, windows, model, {**held, **start}, 1)
     out = tuple(forecasts(data, fitted, data.spread(FEW.judged), weights, 1))
     store, lines = StepStore(tmp_path_factory.mktemp("bank") / "steps", "key"), []
-    runs = ordinary_runs(data, fitted, out, 1, store.step, lines.append)
-    again = ordinary_runs(data, fitted, out, 1, store.step, lines.append)
+    with TaskRunner() as runner:
+        steps = IndependentSteps(runner, store, lines.append)
+        runs = ordinary_runs(data, fitted, out, 1, steps)
+        again = ordinary_runs(data, fitted, out, 1, steps)
     return runs, again, lines, beside_the_data_sheet(data)
 
 
@@ -56,7 +60,8 @@ def test_every_drive_is_scanned_for_every_effect(made):
         assert run.windows >= 3
     # what is kept on the way comes back as it was
     assert again == runs
-    assert len(lines) == 4
+    label = "every effect of the library on each drive"
+    assert lines == 2 * [label, f"{label}: 1 of 2", f"{label}: 2 of 2"]
 
 
 @pytest.mark.slow

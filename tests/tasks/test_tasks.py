@@ -10,14 +10,16 @@ import pickle
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 
 import numpy as np
 import pytest
 
 from ddagr_gym.errors import InputError
-from ddagr_gym.tasks import FailedTasksError, Limits, ResultStore, Task, TaskRunner, run_tasks
+from ddagr_gym.tasks import FailedTasksError, Limits, ResultStore, Task, TaskRunner, release, run_tasks
 from ddagr_gym.tasks.runner import STOPPED
+from ddagr_gym.tasks.shared import SharedPath, content_of
 from tests.tasks import work
 
 RAY = pytest.param(
@@ -76,9 +78,34 @@ def test_what_tasks_share_is_sent_by_content(runner, engine, tmp_path):
     values, file = np.arange(1000.0), tmp_path / "map.yaml"
     file.write_text("columns")
     with runner(engine) as made:
-        shared, path = made.share(values), made.share_file(file)
+        shared, path, folder = made.share(values), made.share_file(file), made.share_file(tmp_path)
         tasks = [Task(f"{n}", work.mean_of, (shared, n)) for n in range(4)] + [Task("file", work.text_of, (path,))]
-        assert run_tasks(tasks, "means", made) == [float(values[n:].mean()) for n in range(4)] + ["columns"]
+        tasks += [Task(f"folder {n}", work.texts_of, (folder,)) for n in range(2)]
+        expected = [float(values[n:].mean()) for n in range(4)] + ["columns"] + 2 * [{"map.yaml": "columns"}]
+        assert run_tasks(tasks, "means", made) == expected
+
+
+@pytest.mark.parametrize("folder", [False, True])
+def test_what_a_node_got_is_written_once_and_released(tmp_path, monkeypatch, folder):
+    """Another node has nothing at the driver's path."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "node"))
+    fetched = []
+
+    def fetch():
+        fetched.append(1)
+        return {"a.db3": b"one", "metadata.yaml": b"two"} if folder else b"one"
+
+    handle = SharedPath("digest", "/driver/drive.csv", fetch)
+    place = handle.content()
+    assert (place.name, handle.content(), len(fetched)) == ("drive.csv", place, 1)
+    assert content_of(place) == fetch()
+    release(place)
+    assert not place.exists()
+    assert list(place.parent.parent.iterdir()) == []
+    own = tmp_path / "own.csv"
+    own.write_text("kept")
+    release(own)
+    assert own.exists()
 
 
 @pytest.mark.parametrize("engine", ENGINES)

@@ -27,6 +27,10 @@ def text_of(path):
     return path.read_text()
 
 
+def texts_of(folder):
+    return {path.name: path.read_text() for path in folder.iterdir()}
+
+
 def process():
     return os.getpid()
 

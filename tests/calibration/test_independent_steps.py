@@ -1,0 +1,83 @@
+"""Steps that do not depend on each other give the same bits on every engine, and are kept as they end."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from importlib.util import find_spec
+
+import pytest
+
+from ddagr_gym.calibration import files
+from ddagr_gym.calibration.effect_bank import save_runs
+from ddagr_gym.calibration.independent_steps import IndependentSteps
+from ddagr_gym.calibration.run import calibrate_drives
+from ddagr_gym.calibration.settings import CalibrationSettings
+from ddagr_gym.diagnosis.store import StepStore
+from ddagr_gym.errors import InputError
+from ddagr_gym.presets import get_robot, get_soil
+from ddagr_gym.tasks import FailedTasksError, Task, TaskRunner
+from tests.calibration.conftest import drive
+from tests.tasks import work
+
+RAY = pytest.param(
+    (2, "local"),
+    id="ray",
+    marks=[
+        pytest.mark.ray,
+        pytest.mark.skipif(find_spec("ray") is None, reason="needs ray: pip install 'ddagr-gym[cluster]'"),
+    ],
+)
+FEW = CalibrationSettings(fitted=3, compared=2, judged=3, settlings=0)
+"""Far too few windows to find anything, and enough for every step."""
+
+
+def test_finished_steps_are_kept_and_not_run_again(tmp_path):
+    lines: list[str] = []
+    tasks = [Task(f"drive {n}", work.raises, (n,), f"drive {n}") for n in (0, 1, 3)]
+    with TaskRunner() as runner:
+        store = StepStore(tmp_path / "steps", "key")
+        steps = IndependentSteps(runner, store, lines.append)
+        assert steps.results("drives", tasks[:2]) == [0, 1]
+        broken = [Task("drive 1", work.refuses, (1,), "drive 1"), *tasks]
+        assert steps.results("drives", broken) == [1, 0, 1, 3]
+    assert lines[:3] == ["drives", "drives: 1 of 2", "drives: 2 of 2"]
+    assert StepStore(tmp_path / "steps", "key").get("drive 3") == 3
+    assert not StepStore(tmp_path / "steps", "another key").has("drive 3")
+
+
+def test_a_step_that_fails_is_named_and_the_others_are_kept(tmp_path):
+    store = StepStore(tmp_path / "steps", "key")
+    with TaskRunner() as runner:
+        steps = IndependentSteps(runner, store)
+        with pytest.raises(FailedTasksError, match=r"1 of 3 tasks failed: drive 2: raised \(ZeroDivisionError"):
+            steps.results("drives", [Task(f"drive {n}", work.raises, (n,), f"drive {n}") for n in (1, 2, 3)])
+        with pytest.raises(InputError, match="drive 7: drive 7 has no clock"):
+            steps.results("drives", [Task("drive 7", work.refuses, (7,), "drive 7")])
+    assert [store.has(f"drive {n}") for n in (1, 2, 3)] == [True, False, True]
+
+
+@pytest.fixture(scope="module")
+def drives():
+    return [drive("field", seed, 60.0) for seed in (1, 2)]
+
+
+def written(drives, folder, workers=1, cluster=""):
+    """All that a calibration with its bank says, but the time that it took."""
+    soil = {"field": get_soil("thesis_a1")}
+    with TaskRunner(workers, cluster=cluster) as runner:
+        made = calibrate_drives(
+            drives, ["field"] * 2, get_robot("ddagr"), soil, FEW, with_bank=True, runner=runner, cache=folder / "steps"
+        )
+    save_runs(made.bank, folder / "bank.json", made.ordinary)
+    return files.as_text(replace(made.calibration, seconds=0.0)), (folder / "bank.json").read_bytes()
+
+
+@pytest.fixture(scope="module")
+def expected(drives, tmp_path_factory):
+    return written(drives, tmp_path_factory.mktemp("here"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", [pytest.param((2, ""), id="two processes"), RAY])
+def test_a_calibration_has_the_same_bits_on_every_engine(drives, expected, tmp_path, engine):
+    assert written(drives, tmp_path, *engine) == expected
