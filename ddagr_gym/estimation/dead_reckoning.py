@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ddagr_gym.errors import InputError
 from ddagr_gym.estimation.filter import Filter
 from ddagr_gym.estimation.filter_model import FilterModel
 from ddagr_gym.estimation.inertial_filter import InertialFilter, InertialModel
@@ -85,13 +86,17 @@ class DeadReckoning:
 
     Args:
         model: what the filter knows; its kind chooses the filter.
-        integrated: the velocities are integrated as they come also where the filter has a pose of its own.
+        settling: time in which what the inertial filter learns later of the way so far comes into the pose [s]: a
+            controller would follow each correction at once, and a circle with a step in it is none (ours). 0: at
+            once, the pose is the filter's; infinite: never, the velocities are integrated as they come.
     """
 
-    def __init__(self, model: FilterModel | InertialModel | LearnedModel, integrated: bool = False) -> None:
+    def __init__(self, model: FilterModel | InertialModel | LearnedModel, settling: float = 0.0) -> None:
+        if not settling >= 0.0:
+            raise InputError(f"settling is {settling:g}: give a time of 0 s or more.")
         flat = model if isinstance(model, FilterModel) else model.flat
         self._filter = _filter_of(model)
-        self._integrated = integrated
+        self._settling = settling
         self._period = flat.sample_period
         self.reset(0.0, 0.0, 0.0)
 
@@ -107,12 +112,15 @@ class DeadReckoning:
         """Through samples (K, 5) in the order of ``CHANNELS`` under one command (2,) [rad/s]."""
         drive, readings = np.asarray(command, dtype=np.float64), np.asarray(samples, dtype=np.float64)
         before = self._filter.state[:3].copy()
-        motion = _motion(self._filter, drive, readings)
-        if isinstance(self._filter, InertialFilter) and not self._integrated:
-            self._pose = self._filter.pose.copy()
-        else:
-            self._integrate(motion, before)
+        self._integrate(_motion(self._filter, drive, readings), before)
+        if isinstance(self._filter, InertialFilter):
+            self._settle(self._filter.pose, len(readings) * self._period)
         return self.present()
+
+    def _settle(self, pose: Array, time: float) -> None:
+        """Approach the filter's pose for a time [s]."""
+        kept = math.exp(-time / self._settling) if self._settling > 0.0 else 0.0
+        self._pose = (1.0 - kept) * pose + kept * self._pose
 
     def _integrate(self, motion: Array, before: Array) -> None:
         x, y, turned = integrate_track(motion[:, 0], motion[:, 1], motion[:, 2], self._period, before)[-1]

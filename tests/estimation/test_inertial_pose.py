@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from ddagr_gym.envs.options import make_settings
+from ddagr_gym.errors import InputError
 from ddagr_gym.estimation import (
     CHANNELS,
     DeadReckoning,
@@ -149,6 +150,31 @@ def test_batch_and_dead_reckoning_give_the_bits_of_the_track(level):
     assert (found.x, found.y, found.yaw) == tuple(one.pose)
     batch.reset([1])
     np.testing.assert_array_equal(batch.poses, [one.pose, np.zeros(3)])
+
+
+def test_a_correction_of_the_past_settles():
+    """A pose that jumps by 0.1 m while the robot stands."""
+    still = np.zeros((10, 5))
+    for settling, share in ((0.0, 1.0), (3.0, 1.0 - math.exp(-1.0)), (math.inf, 0.0)):
+        reckoning = DeadReckoning(MODEL, settling)
+        reckoning.reset(0.0, 0.0, 0.0)
+        reckoning._filter.pose[0] += 0.1
+        for _ in range(round(3.0 / (10 * PERIOD))):
+            found = reckoning.update(np.zeros(2), still)
+        assert found.x == pytest.approx(0.1 * share, abs=1e-3)
+    with pytest.raises(InputError, match="settling"):
+        DeadReckoning(MODEL, -1.0)
+
+
+def test_without_settling_the_velocities_are_integrated(level):
+    columns, _ = level[3]
+    commands, readings = readings_of(columns)
+    reckoning = DeadReckoning(MODEL, math.inf)
+    reckoning.reset(0.0, 0.0, 0.0)
+    for first in range(0, 1000, 10):
+        found = reckoning.update(commands[first], np.ascontiguousarray(readings[first : first + 10]))
+    states, _ = InertialFilter(MODEL).run(np.repeat(commands[0:1000:10], 10, axis=0), readings[:1000])
+    np.testing.assert_allclose([found.x, found.y, found.yaw], integrate_track(*states[:, :3].T, PERIOD)[-1], atol=1e-12)
 
 
 def covariance_of(work):
