@@ -29,7 +29,13 @@ from ddagr_gym.control.timing import CONTROL_PERIOD
 from ddagr_gym.envs.settings import Episode, TurnSettings
 from ddagr_gym.errors import InputError
 from ddagr_gym.estimation import DeadReckoning, InertialModel, Reckoned, run_inertial_filter
-from ddagr_gym.evaluation.controllers import STANDING, inertial_model, make_path_tracker, tracker_gains_by_hand
+from ddagr_gym.evaluation.controllers import (
+    SETTLING,
+    STANDING,
+    inertial_model,
+    make_path_tracker,
+    tracker_gains_by_hand,
+)
 from ddagr_gym.evaluation.ladder_gains import LadderGains, ladder_gains
 from ddagr_gym.evaluation.metrics import turn_metrics
 from ddagr_gym.evaluation.runs import Controller, TurnRun, drive_turn
@@ -75,7 +81,7 @@ class ToldReckoning(DeadReckoning):
     def __init__(self, model: InertialModel, tell: Telling, slope: tuple[float, float]) -> None:
         self.info: Mapping[str, Any] = {}
         self._tell, self._slope = tell, slope
-        super().__init__(model)
+        super().__init__(model, SETTLING)
 
     def present(self) -> Reckoned:
         """What is known now, with what was told."""
@@ -106,17 +112,19 @@ class Arm:
         tell: what it is told.
         gains: its gains, from those of B6.
         model: its filter, from that of B6.
+        settling: of :class:`DeadReckoning` [s].
     """
 
     tell: Telling | None = None
     gains: Callable[[LadderGains], LadderGains] = lambda gains: gains
     model: Callable[[InertialModel], InertialModel] = lambda model: model
+    settling: float = SETTLING
 
     def controller(self, settings: TurnSettings, episode: Episode) -> Controller:
         """For one turn."""
         gains, model = self.gains(ladder_gains()), self.model(inertial_model())
         if self.tell is None:
-            return make_path_tracker(DeadReckoning(model), model.flat, STANDING)(episode.turn, gains)
+            return make_path_tracker(DeadReckoning(model, self.settling), model.flat, STANDING)(episode.turn, gains)
         grounds = [(item.angle, item.direction) for item in settings.effects if isinstance(item, Slope)]
         estimator = ToldReckoning(model, self.tell, grounds[0] if grounds else (0.0, 0.0))
         return _Informed(make_path_tracker(estimator, model.flat, STANDING)(episode.turn, gains), estimator)
@@ -132,12 +140,14 @@ ARMS = {
     "not ahead": Arm(gains=lambda gains: replace(gains, path_tracker_ahead=0.0)),
     "not aligning": Arm(gains=lambda gains: replace(gains, path_tracker_aligning=0.0)),
     "seldom balanced": Arm(model=_balanced(_SELDOM)),
+    "velocities integrated": Arm(settling=math.inf),
+    "pose at once": Arm(settling=0.0),
     "true gravity": Arm(_gravity),
     "true motion": Arm(_motion),
     "true pose": Arm(_pose),
     "true pose and motion": Arm(_pose_and_motion),
 }
-"""Trackers by name; the first is B6 itself, the next four lack something of it, the others are told something."""
+"""Trackers by name; the first is B6 itself, the next six lack something of it, the others are told something."""
 
 
 @dataclass(frozen=True)

@@ -39,8 +39,8 @@ Use: ``Filter(FilterModel(robot)).step(command, reading)``; ``BatchFilter`` for 
 recording; ``estimates`` for speeds, soil, slip and turn radius with their standard deviations.
 
 ``InertialFilter(InertialModel.of(robot, sensors))`` is for ground that slopes and soil that changes: its velocities
-follow the accelerometer, gravity is among its states (theory: filter, section 9). ``LearnedFilter`` takes its
-velocities from a trained network instead (section 11).
+follow the accelerometer, gravity is among its states, and it carries the pose along (theory: filter, section 9).
+``LearnedFilter`` takes its velocities from a trained network instead (section 11).
 """
 
 from ddagr_gym.estimation.closed_form import PlanarMotion, encoder_motion, symmetric_forward_speed
@@ -64,6 +64,7 @@ from ddagr_gym.estimation.inertial_filter import (
     InertialKnowledge,
     InertialModel,
     run_inertial_filter,
+    run_inertial_track,
 )
 from ddagr_gym.estimation.layout import CHANNELS, STATE
 from ddagr_gym.estimation.learned_filter import (
@@ -118,6 +119,7 @@ __all__ = [
     "roll_out",
     "run_filter",
     "run_inertial_filter",
+    "run_inertial_track",
     "run_learned_filter",
     "run_thesis_filter",
     "slip_ratio",

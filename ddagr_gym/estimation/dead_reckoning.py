@@ -1,4 +1,7 @@
-"""Where a robot is by its own filter: the estimated velocity, integrated from a known start."""
+"""Where a robot is by its own filter, from a known start on.
+
+The inertial filter carries the pose along; of the others the estimated velocities are integrated.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ddagr_gym.errors import InputError
 from ddagr_gym.estimation.filter import Filter
 from ddagr_gym.estimation.filter_model import FilterModel
 from ddagr_gym.estimation.inertial_filter import InertialFilter, InertialModel
@@ -66,42 +70,62 @@ def _filter_of(model: FilterModel | InertialModel | LearnedModel) -> Filter | In
     return Filter(model) if isinstance(model, FilterModel) else InertialFilter(model)
 
 
+def _motion(own: Filter | InertialFilter | LearnedFilter, command: Array, samples: Array) -> Array:
+    """Estimated velocities (K, 3) after each sample."""
+    if not isinstance(own, Filter):
+        return own.run(command[None], np.ascontiguousarray(samples))[0][:, :3]
+    motion = np.empty((len(samples), 3))
+    for k, sample in enumerate(samples):
+        own.step(command, sample)
+        motion[k] = own.state[:3]
+    return motion
+
+
 class DeadReckoning:
-    """A filter of one robot and the pose that its velocities lead to; deployable, it sees samples and commands alone.
+    """A filter of one robot and the pose that it leads to; deployable, it sees samples and commands alone.
 
     Args:
         model: what the filter knows; its kind chooses the filter.
+        settling: time in which what the inertial filter learns later of the way so far comes into the pose [s]: a
+            controller would follow each correction at once, and a circle with a step in it is none (ours). 0: at
+            once, the pose is the filter's; infinite: never, the velocities are integrated as they come.
     """
 
-    def __init__(self, model: FilterModel | InertialModel | LearnedModel) -> None:
+    def __init__(self, model: FilterModel | InertialModel | LearnedModel, settling: float = 0.0) -> None:
+        if not settling >= 0.0:
+            raise InputError(f"settling is {settling:g}: give a time of 0 s or more.")
         flat = model if isinstance(model, FilterModel) else model.flat
         self._filter = _filter_of(model)
+        self._settling = settling
         self._period = flat.sample_period
         self.reset(0.0, 0.0, 0.0)
 
     def reset(self, x: float, y: float, yaw: float) -> None:
         """Forget everything; the robot is at rest at a place [m] with a heading [rad]."""
-        self._filter.reset()
         self._pose = np.array([x, y, yaw])
+        if isinstance(self._filter, InertialFilter):
+            self._filter.reset(self._pose)
+        else:
+            self._filter.reset()
 
     def update(self, command: ArrayLike, samples: ArrayLike) -> Reckoned:
         """Through samples (K, 5) in the order of ``CHANNELS`` under one command (2,) [rad/s]."""
+        drive, readings = np.asarray(command, dtype=np.float64), np.asarray(samples, dtype=np.float64)
         before = self._filter.state[:3].copy()
-        motion = self._motion(np.asarray(command, dtype=np.float64), np.asarray(samples, dtype=np.float64))
+        self._integrate(_motion(self._filter, drive, readings), before)
+        if isinstance(self._filter, InertialFilter):
+            self._settle(self._filter.pose, len(readings) * self._period)
+        return self.present()
+
+    def _settle(self, pose: Array, time: float) -> None:
+        """Approach the filter's pose for a time [s]."""
+        kept = math.exp(-time / self._settling) if self._settling > 0.0 else 0.0
+        self._pose = (1.0 - kept) * pose + kept * self._pose
+
+    def _integrate(self, motion: Array, before: Array) -> None:
         x, y, turned = integrate_track(motion[:, 0], motion[:, 1], motion[:, 2], self._period, before)[-1]
         cosine, sine = math.cos(self._pose[2]), math.sin(self._pose[2])
         self._pose += [cosine * x - sine * y, sine * x + cosine * y, turned]
-        return self.present()
-
-    def _motion(self, command: Array, samples: Array) -> Array:
-        """Estimated velocities (K, 3) after each sample."""
-        if not isinstance(self._filter, Filter):
-            return self._filter.run(command[None], np.ascontiguousarray(samples))[0][:, :3]
-        motion = np.empty((len(samples), 3))
-        for k, sample in enumerate(samples):
-            self._filter.step(command, sample)
-            motion[k] = self._filter.state[:3]
-        return motion
 
     def present(self) -> Reckoned:
         """What is known now."""

@@ -10,9 +10,12 @@ from numpy.typing import NDArray
 from ddagr_gym.estimation.inertial_layout import (
     ADDED_CEILING,
     ADDED_FLOOR,
+    COVARIANCE_ROWS,
     GRAVITY,
     INERTIAL_STATE_SIZE,
     PATCH_AHEAD,
+    POSE_CROSS,
+    POSE_SIZE,
     Q,
 )
 from ddagr_gym.estimation.layout import (
@@ -43,7 +46,7 @@ def _turn_rows(work: Array, first: int, cosine: float, sine: float) -> None:
 
 @kernel(inline=True)
 def _turn_columns(work: Array, first: int, cosine: float, sine: float) -> None:
-    for i in range(INERTIAL_STATE_SIZE):
+    for i in range(COVARIANCE_ROWS):
         base = Q + STRIDE * i + first
         along, across = work[base], work[base + 1]
         work[base] = cosine * along + sine * across
@@ -59,7 +62,7 @@ def _accelerate_rows(work: Array, step: float) -> None:
         for j in range(STRIDE):
             work[row + j] += step * (work[pull + j] - work[bias + j])
     for axis in range(2):
-        for i in range(INERTIAL_STATE_SIZE):
+        for i in range(COVARIANCE_ROWS):
             base = Q + STRIDE * i
             work[base + axis] += step * (work[base + GRAVITY + axis] - work[base + ACCELEROMETER_BIAS + axis])
 
@@ -72,7 +75,7 @@ def _couple_rate(work: Array, first: int, along: float, across: float, step: flo
     for j in range(STRIDE):
         work[x + j] += step * across * work[rate + j]
         work[y + j] -= step * along * work[rate + j]
-    for i in range(INERTIAL_STATE_SIZE):
+    for i in range(COVARIANCE_ROWS):
         base = Q + STRIDE * i
         work[base + first] += step * across * work[base + 2]
         work[base + first + 1] -= step * along * work[base + 2]
@@ -84,6 +87,8 @@ def propagate_inertial(
     decays: tuple[float, float, float], step: float,
 ) -> None:  # fmt: skip
     """``P <- Phi P Phi^T``, Phi the product of elementary maps, each applied to rows and columns.
+
+    The rows of the pose lie behind those of the state: ``C <- C Phi^T``.
 
     Args:
         work: workspace; P symmetric before and after.
@@ -103,7 +108,7 @@ def propagate_inertial(
     for entry, kept in ((OMEGA, decays[0]), (OMEGA + 1, decays[1]), (PATCH_AHEAD, decays[2])):
         for j in range(STRIDE):
             work[Q + STRIDE * entry + j] *= kept
-        for i in range(INERTIAL_STATE_SIZE):
+        for i in range(COVARIANCE_ROWS):
             work[Q + STRIDE * i + entry] *= kept
 
 
@@ -146,5 +151,7 @@ def limit_inertial_covariance(model: Array, work: Array) -> None:
             for j in range(INERTIAL_STATE_SIZE):
                 work[Q + STRIDE * i + j] *= factor
                 work[Q + STRIDE * j + i] *= factor
+            for j in range(POSE_SIZE):
+                work[POSE_CROSS + STRIDE * j + i] *= factor
         if variance < low:
             work[Q + (STRIDE + 1) * i] = low

@@ -148,14 +148,23 @@ class InertialFilter:
     @property
     def covariance(self) -> Array:
         """(15, 15); a view."""
-        size = layout.INERTIAL_STATE_SIZE
-        whole = self._work[layout.Q : layout.Q + 16 * layout.STRIDE].reshape(16, layout.STRIDE)
-        return whole[:size, :size]
+        return _covariances(self._work[None])[0]
 
-    def reset(self) -> None:
-        """Start again from the prior, at rest."""
+    @property
+    def pose(self) -> Array:
+        """(3,) x, y [m] and continuous yaw [rad] in the world in which the filter was placed; a view."""
+        return self._work[layout.POSE : layout.POSE + layout.POSE_SIZE]
+
+    @property
+    def pose_covariance(self) -> Array:
+        """(3, 3); a view."""
+        return _pose_covariances(self._work[None, layout.POSE :])[0]
+
+    def reset(self, pose: ArrayLike = (0.0, 0.0, 0.0)) -> None:
+        """Start again from the prior, at rest at a known pose x, y [m], yaw [rad]."""
         self._work[:] = 0.0
         self.state[:], self.covariance[:] = self.model.initial()
+        self.pose[:] = pose
         self._count = 0
 
     def run(self, commands: Array, readings: Array, durations: Array | None = None) -> tuple[Array, Array]:
@@ -169,13 +178,25 @@ class InertialFilter:
         Returns:
             States after each sample (T, 15), and standardised innovations (T, 5).
         """
-        states, standardised = np.empty((len(readings), layout.INERTIAL_STATE_SIZE)), np.empty(readings.shape)
+        states, _, standardised = self._through(commands, readings, durations)
+        return states, standardised
+
+    def track(self, commands: Array, readings: Array, durations: Array | None = None) -> tuple[Array, Array]:
+        """As :meth:`run`; returns poses after each sample (T, 3) and their covariances (T, 3, 3)."""
+        _, poses, _ = self._through(commands, readings, durations)
+        return poses[:, : layout.POSE_SIZE], _pose_covariances(poses)
+
+    def _through(self, commands: Array, readings: Array, durations: Array | None) -> tuple[Array, Array, Array]:
+        """States (T, 15), poses with covariances (T, 12) and innovations (T, 5)."""
+        count = len(readings)
+        states, standardised = np.empty((count, layout.INERTIAL_STATE_SIZE)), np.empty(readings.shape)
+        poses = np.empty((count, layout.POSE_SIZE * (layout.POSE_SIZE + 1)))
         inertial_series(
             self._packed, self._count, commands, readings, self._period if durations is None else durations, states,
-            standardised, self._work,
+            poses, standardised, self._work,
         )  # fmt: skip
-        self._count += len(readings)
-        return states, standardised
+        self._count += count
+        return states, poses, standardised
 
 
 class InertialBatch:
@@ -208,6 +229,16 @@ class InertialBatch:
     def covariances(self) -> Array:
         """(N, 15, 15); a copy."""
         return _covariances(self.works).copy()
+
+    @property
+    def poses(self) -> Array:
+        """(N, 3) x, y [m] and continuous yaw [rad] since the start; a copy."""
+        return self.works[:, layout.POSE : layout.POSE + layout.POSE_SIZE].copy()
+
+    @property
+    def pose_covariances(self) -> Array:
+        """(N, 3, 3); a copy."""
+        return _pose_covariances(self.works[:, layout.POSE :]).copy()
 
     def reset(self, chosen: ArrayLike | None = None) -> None:
         """Start from the prior, at rest; ``chosen``: indices of robots, all by default."""
@@ -251,8 +282,34 @@ def _covariances(works: Array) -> Array:
     return whole.reshape(len(works), 16, layout.STRIDE)[:, :size, :size]
 
 
+def _pose_covariances(poses: Array) -> Array:
+    """(N, 3, 3) of rows that begin with a pose and its covariance (N, 12 or more); a view."""
+    size = layout.POSE_SIZE
+    return poses[:, size : size * (size + 1)].reshape(len(poses), size, size)
+
+
 def run_inertial_filter(model: InertialModel, columns: Mapping[str, ArrayLike]) -> tuple[Array, Array]:
     """Filter a recording as :func:`~ddagr_gym.estimation.run_filter` does; states (T, 15), innovations (T, 5)."""
     _, durations = sample_times(columns, model.flat.sample_period)
     commands, readings = stack_columns(columns, COMMANDS, np.nan), stack_columns(columns, CHANNELS, np.nan)
     return InertialFilter(model).run(commands, readings, durations)
+
+
+def run_inertial_track(
+    model: InertialModel, columns: Mapping[str, ArrayLike], start: ArrayLike = (0.0, 0.0, 0.0)
+) -> tuple[Array, Array]:
+    """Where the inertial filter takes the robot to be along a recording (theory: filter, section 9, eq. (13a)).
+
+    Args:
+        model: what the filter knows.
+        columns: recording, as for :func:`run_inertial_filter`.
+        start: pose x, y [m], yaw [rad] at rest before the first sample.
+
+    Returns:
+        Poses after each sample (T, 3) and their covariances (T, 3, 3).
+    """
+    _, durations = sample_times(columns, model.flat.sample_period)
+    commands, readings = stack_columns(columns, COMMANDS, np.nan), stack_columns(columns, CHANNELS, np.nan)
+    one = InertialFilter(model)
+    one.reset(start)
+    return one.track(commands, readings, durations)

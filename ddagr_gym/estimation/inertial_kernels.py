@@ -37,11 +37,14 @@ from ddagr_gym.estimation.inertial_layout import (
     PATCH_MEAN,
     PATCH_RATE,
     PATCH_VARIANCE,
+    POSE,
+    POSE_SIZE,
     PULL_KNOWN,
     SUMMED,
     UNKNOWN_ACCELERATION,
     Q,
 )
+from ddagr_gym.estimation.inertial_pose import add_pose_noise, advance_pose
 from ddagr_gym.estimation.inertial_update import (
     entry_column,
     gyro_column,
@@ -155,6 +158,7 @@ def predict_inertial(model: Array, work: Array, right: float, left: float, durat
         left: of the left bank.
         duration: [s].
     """
+    before = work[X], work[X + 1], work[X + 2]
     lag_right, lag_left = right - work[X + OMEGA], left - work[X + OMEGA + 1]
     if _believed(model, work):
         f_x, f_y = _felt(model, work, 0), _felt(model, work, 1)
@@ -167,7 +171,9 @@ def predict_inertial(model: Array, work: Array, right: float, left: float, durat
         f_y = work[X + ACCELEROMETER_BIAS + 1] - work[X + GRAVITY + 1] + work[X + 2] * work[X]
         noise = model[UNKNOWN_ACCELERATION] * duration
     _advance(model, work, right, left, f_x, f_y, duration)
+    advance_pose(work, before, duration)
     _add_noise(model, work, lag_right, lag_left, noise, duration)
+    add_pose_noise(work, noise, duration * model[PROCESS + 2], duration)
     _limit(model, work)
 
 
@@ -305,8 +311,8 @@ def inertial_sample(
 
 @kernel()
 def inertial_series(
-    model: Array, first: int, commands: Array, readings: Array, durations: Array, states: Array, standardised: Array,
-    work: Array,
+    model: Array, first: int, commands: Array, readings: Array, durations: Array, states: Array, poses: Array,
+    standardised: Array, work: Array,
 ) -> None:  # fmt: skip
     """One robot through a series, from the state and covariance in its workspace.
 
@@ -317,6 +323,7 @@ def inertial_series(
         readings: (T, 5).
         durations: (T or 1,) since the sample before [s].
         states: (T, 15), written.
+        poses: (T, 12) pose and its covariance by rows, written.
         standardised: (T, 5), written.
         work: (WORK_SIZE,), updated.
     """
@@ -327,6 +334,8 @@ def inertial_series(
         )  # fmt: skip
         for i in range(INERTIAL_STATE_SIZE):
             states[k, i] = work[X + i]
+        for i in range(POSE_SIZE * (POSE_SIZE + 1)):
+            poses[k, i] = work[POSE + i]
 
 
 @kernel()

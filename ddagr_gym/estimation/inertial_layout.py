@@ -12,7 +12,10 @@ INERTIAL_STATE_SIZE = len(INERTIAL_STATE)  # 15
 GRAVITY = layout.STATE_SIZE  # x, y
 PATCH_AHEAD = GRAVITY + 2  # as in INERTIAL_STATE
 
+POSE_SIZE = 3  # x, y [m], yaw [rad]: where the robot is since it was placed; no part of the state, nothing measures it
+
 STRIDE = layout.STRIDE  # of matrices: the sixteenth row and column stay zero
+COVARIANCE_ROWS = STRIDE + POSE_SIZE  # of Q and POSE_CROSS together, whose columns are the state's
 
 _next = layout.MODEL_SIZE
 
@@ -46,10 +49,14 @@ MODEL_SIZE = _next
 # The workspace too; its own covariance lies behind, that of the flat filter is not used
 _next = layout.WORK_SIZE
 Q = _block(16 * STRIDE)  # covariance
+POSE_CROSS = _block(POSE_SIZE * STRIDE)  # covariances of the pose with the state, right behind it
 MEAN_FORCE = _block(2)  # sums of the specific force since the last balance [m/s^2]
 SUMMED = _block()  # samples in them
 LAST_RATE = _block()  # yaw rate at the last balance [rad/s]
 PULL_KNOWN = _block()  # 1 from when gravity along the robot less the bias is known
+POSE = _block(POSE_SIZE)  # x, y, yaw
+POSE_OWN = _block(POSE_SIZE * POSE_SIZE)  # their covariance, right behind them
+POSE_COLUMN = _block(POSE_SIZE)  # covariances of the pose with a reading
 WORK_SIZE = _next
 MEMORY = slice(MEAN_FORCE, WORK_SIZE)
 """What the workspace remembers between samples besides state and covariance."""

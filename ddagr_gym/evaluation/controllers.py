@@ -90,6 +90,11 @@ STANDING = 10
 """Control periods for which the path tracker stands before it drives, 0.8 s: 100 samples tell gravity to 3 mm/s^2."""
 
 
+SETTLING = 3.0
+"""Time in which the path tracker's pose takes over what its filter learns later of the way so far [s]; chosen by turns
+on development plants with seeds of their own, for the error of the radius (docs/results)."""
+
+
 def inertial_model() -> InertialModel:
     """The inertial filter that knows the nominal robot and sensors."""
     return InertialModel.of(ddagr(), Sensors())
@@ -127,7 +132,7 @@ def make_path_tracker(estimator: MotionEstimator, flat: FilterModel, standing: i
 
 def _reckoned_tracker(model: FilterModel | InertialModel | LearnedModel, standing: int) -> _Maker:
     flat = model if isinstance(model, FilterModel) else model.flat
-    return make_path_tracker(DeadReckoning(model), flat, standing)
+    return make_path_tracker(DeadReckoning(model, SETTLING), flat, standing)
 
 
 def tracker_gains_by_hand(gains: LadderGains) -> LadderGains:
@@ -275,6 +280,7 @@ def controller_version(name: str) -> str:
 
         return bundle_version(name)
     text = f"{name} {ladder_gains()!r}" + (f" {inertial_model()!r}" if name in ("B6", "B6_learned") else "")
+    text += f" {SETTLING}" if name == "B6" else ""
     return text + (f" {learned_model().network.digest()}" if name == "B6_learned" else "")
 
 
