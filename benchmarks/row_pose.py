@@ -5,12 +5,14 @@
 Turns of B6 on the development scenarios of :mod:`benchmarks.row_turn_plants`; both estimates are of the same filter on
 the same readings, from the known start. Errors at the next row's start line along and across it and in heading, root
 mean squares over turns that reach it; ratios of pose to integral over the same turns, with 95 % bootstrap intervals.
-NEES: of the pose over 3, 1 for a consistent filter. About two minutes of one core. Writes ``results/row_pose.json``.
+NEES: of the pose over 3, 1 for a consistent filter. About two minutes of one core. Writes ``results/row_pose.json`` and
+a picture, ``row_pose.png``; ``--summary`` only makes the picture of the file.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -36,6 +38,9 @@ from ddagr_gym.evaluation.runs import TurnRun, drive_turn
 from ddagr_gym.files import write_json
 from ddagr_gym.parameters import Sensors
 from ddagr_gym.presets import ddagr
+from ddagr_gym.recordings.files import write_atomically
+from ddagr_gym.rendering import palette
+from ddagr_gym.reporting.figures import house_style
 
 Array = NDArray[np.float64]
 
@@ -130,11 +135,39 @@ def table(result: Mapping[str, Any]) -> str:
     return "\n".join(lines)
 
 
+def draw(result: Mapping[str, Any], path: Path) -> None:
+    """Errors of both at the next row by plant, with 95 % intervals.
+
+    Args:
+        result: of :func:`study`.
+        path: of the PNG file.
+    """
+    from matplotlib.figure import Figure
+
+    plants = [name for name, found in result["plants"].items() if found["reached"]]
+    with house_style():
+        figure = Figure(figsize=(11.0, 1.4 + 0.42 * len(plants)), layout="constrained")
+        panels = figure.subplots(1, len(UNITS), sharey=True)
+        for panel, (key, (unit, _)) in zip(panels, UNITS.items(), strict=True):
+            for place, plant in enumerate(plants):
+                for name, shift, colour in (("integrated", -0.15, palette.ORANGE), ("pose", 0.15, palette.BLUE)):
+                    entry = result["plants"][plant][name][f"{key}_{unit}"]
+                    panel.plot(entry["interval"], [place + shift] * 2, color=colour, lw=1.6)
+                    panel.plot(entry["value"], place + shift, "o", color=colour, ms=5)
+            panel.set_xlim(left=0.0)
+            panel.set_xlabel(f"{key} [{unit}]")
+        panels[0].set_yticks(range(len(plants)), [PLANTS[name].title for name in plants])
+        panels[0].set_ylim(len(plants) - 0.5, -0.5)
+        figure.suptitle("Error at the next row: velocities integrated (orange), pose among the states (blue)")
+        write_atomically(path, lambda to: figure.savefig(to, format="png", dpi=110))
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--plants", default=",".join(PLANTS), help="names, separated by commas")
     parser.add_argument("--scenarios", type=int, default=100, help="turns on each plant")
     parser.add_argument("--output", type=Path, default=RESULT, help="JSON file")
+    parser.add_argument("--summary", action="store_true", help="only the picture of the file")
     given = parser.parse_args(arguments)
     try:
         plants = names_of(given.plants, list(PLANTS), "plant")
@@ -142,8 +175,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             raise InputError(f"scenarios is {given.scenarios}: give at least 2.")
     except InputError as error:
         parser.error(str(error))
-    result = study(plants, given.scenarios)
+    result = json.loads(given.output.read_text()) if given.summary else study(plants, given.scenarios)
     write_json(given.output, result)
+    draw(result, given.output.with_suffix(".png"))
     print(table(result))
     return 0
 

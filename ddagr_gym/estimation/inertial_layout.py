@@ -58,5 +58,3 @@ POSE = _block(POSE_SIZE)  # x, y, yaw
 POSE_OWN = _block(POSE_SIZE * POSE_SIZE)  # their covariance, right behind them
 POSE_COLUMN = _block(POSE_SIZE)  # covariances of the pose with a reading
 WORK_SIZE = _next
-MEMORY = slice(MEAN_FORCE, WORK_SIZE)
-"""What the workspace remembers between samples besides state and covariance."""

@@ -37,7 +37,12 @@ def test_on_a_slope_the_pose_knows_the_heading_better():
 def test_files_are_written_and_bad_names_are_one_sentence(tmp_path, capsys):
     out = tmp_path / "row.json"
     assert main(["--plants", "level", "--scenarios", "2", "--output", str(out)]) == 0
-    assert json.loads(out.read_text())["plants"]["level"]["turns"] == 2
+    written = out.read_text()
+    assert json.loads(written)["plants"]["level"]["turns"] == 2
+    out.with_suffix(".png").unlink()
+    assert main(["--summary", "--output", str(out)]) == 0
+    assert out.with_suffix(".png").stat().st_size > 10_000
+    assert out.read_text() == written
     for wrong in (["--plants", "moon"], ["--scenarios", "1"]):
         with pytest.raises(SystemExit) as stopped:
             main([*wrong, "--output", str(tmp_path / "none.json")])
