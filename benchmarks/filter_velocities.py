@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 
 from benchmarks.filter_study.summary import interval
-from benchmarks.row_turn_plants import PLANTS, driven_on, names_of, scenario
+from benchmarks.row_turn_plants import PLANTS, driven_on, plants_of, scenario
 from ddagr_gym.control.timing import CONTROL_INTERVAL
 from ddagr_gym.errors import InputError
 from ddagr_gym.estimation import (
@@ -192,9 +192,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--output", type=Path, default=RESULT, help="JSON file; the picture lies beside it")
     given = parser.parse_args(arguments)
     try:
-        plants = names_of(given.plants, list(PLANTS), "plant")
-        if given.scenarios < 2:
-            raise InputError(f"scenarios is {given.scenarios}: give at least 2.")
+        plants = plants_of(given.plants, given.scenarios)
     except InputError as error:
         parser.error(str(error))
     result = study(plants, given.scenarios)

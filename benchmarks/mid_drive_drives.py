@@ -36,7 +36,7 @@ from ddagr_gym.recordings.schema import Recording
 
 Array = np.ndarray
 
-NAMES = {
+_NAMES = {
     "command_right": "cmd_right", "command_left": "cmd_left", "encoder_right": "enc_right", "encoder_left": "enc_left",
     "specific_force_x": "imu_ax", "specific_force_y": "imu_ay", "yaw_rate": "imu_gz", "pose_x": "x", "pose_y": "y",
     "pose_yaw": "yaw",
@@ -175,6 +175,16 @@ def _spliced(
 
 def recording_of(item: Switched, robot: Robot) -> Recording:
     """The drive as a recording."""
-    log = simulate(item)
-    columns = {"t": log["t"]} | {ours: log[theirs] for ours, theirs in NAMES.items()}
-    return Recording.from_columns(columns, robot, source=item.name)
+    return as_recording(simulate(item), robot, item.name)
+
+
+def as_recording(log: dict[str, Array], robot: Robot, source: str) -> Recording:
+    """A log of the simulator as a recording.
+
+    Args:
+        log: columns of :data:`benchmarks.concealed.sensors.COLUMNS`.
+        robot: that drove.
+        source: name of the recording.
+    """
+    columns = {"t": log["t"]} | {ours: log[theirs] for ours, theirs in _NAMES.items()}
+    return Recording.from_columns(columns, robot, source=source)

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.filter_study.summary import interval
-from benchmarks.row_turn_plants import PLANTS, driven_on, names_of, scenario
+from benchmarks.row_turn_plants import PLANTS, driven_on, plants_of, scenario
 from benchmarks.velocity_bound.filters import placed_motion
 from benchmarks.velocity_bound.study import exit_instant
 from benchmarks.velocity_bound.summary import root_ratio
@@ -170,13 +170,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--summary", action="store_true", help="only the picture of the file")
     given = parser.parse_args(arguments)
     try:
-        plants = names_of(given.plants, list(PLANTS), "plant")
-        if given.scenarios < 2:
-            raise InputError(f"scenarios is {given.scenarios}: give at least 2.")
+        plants = plants_of(given.plants, given.scenarios)
     except InputError as error:
         parser.error(str(error))
-    result = json.loads(given.output.read_text()) if given.summary else study(plants, given.scenarios)
-    write_json(given.output, result)
+    if not given.summary:
+        write_json(given.output, study(plants, given.scenarios))
+    result = json.loads(given.output.read_text())
     draw(result, given.output.with_suffix(".png"))
     print(table(result))
     return 0

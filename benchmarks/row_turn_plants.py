@@ -226,6 +226,22 @@ def names_of(text: str, known: Sequence[str], what: str) -> list[str]:
     return names
 
 
+def plants_of(words: str, scenarios: int) -> list[str]:
+    """Plants by their names, of which so many turns are driven.
+
+    Args:
+        words: names, separated by commas.
+        scenarios: turns on each plant.
+
+    Raises:
+        InputError: an unknown name, none, or too few turns.
+    """
+    names = names_of(words, list(PLANTS), "plant")
+    if scenarios < 2:
+        raise InputError(f"scenarios is {scenarios}: give at least 2.")
+    return names
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--controllers", default=",".join(CONTROLLERS), help="names, separated by commas")
@@ -236,9 +252,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = parser.parse_args(arguments)
     try:
         controllers = names_of(given.controllers, controller_names(), "controller")
-        plants = names_of(given.plants, list(PLANTS), "plant")
-        if given.scenarios < 2:
-            raise InputError(f"scenarios is {given.scenarios}: give at least 2.")
+        plants = plants_of(given.plants, given.scenarios)
         if given.keep:
             with_kept({"scenarios": given.scenarios, "root_seed": _ROOT_SEED, "plants": {}}, given.output)
     except InputError as error:

@@ -214,10 +214,15 @@ def _failure(case: Case, visible: bool) -> dict[str, Any]:
     }
 
 
-def against_targets(figures: Mapping[str, Any]) -> dict[str, Any]:
-    """Least and largest value aimed at, and whether the figure lies between them; None where there is none."""
+def against_targets(figures: Mapping[str, Any], targets: Mapping[str, tuple[float, float]] = TARGETS) -> dict[str, Any]:
+    """Least and largest value aimed at, and whether the figure lies between them; None where there is none.
+
+    Args:
+        figures: by name.
+        targets: least and largest value of those that are aimed at.
+    """
     found = {}
-    for name, (low, high) in TARGETS.items():
+    for name, (low, high) in targets.items():
         value = figures[name]["value"]
         # half a count of rounding would turn a bound that is met exactly
         met = None if value is None else low - 1e-9 <= value <= high + 1e-9

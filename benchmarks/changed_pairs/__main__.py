@@ -25,11 +25,12 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.changed_pairs.answers import CHECKOUT, RESULT, answers_to, draw_secret, secret_seed
-from benchmarks.changed_pairs.drives import simulate
+from benchmarks.changed_pairs.drives import label_of
 from benchmarks.changed_pairs.figure import draw
 from benchmarks.changed_pairs.plan import plan
-from benchmarks.changed_pairs.score import against_targets, score
+from benchmarks.changed_pairs.score import TARGETS, score
 from benchmarks.commits import commit_of
+from benchmarks.score_concealed import against_targets
 from ddagr_gym.errors import InputError
 from ddagr_gym.files import write_json
 
@@ -47,7 +48,7 @@ def main(words: Sequence[str] | None = None) -> int:
         return 2
     pairs = [pair for pair in plan(seed) if not given.kinds or pair.kind in given.kinds][: given.limit]
     answers = answers_to(pairs, seed, given.parts, given.workers, given.cluster)
-    labels = {pair.name: simulate(pair, seed)[2] for pair in pairs}
+    labels = {pair.name: label_of(pair, seed) for pair in pairs}
     figures = score(labels, answers)
     about = {
         "command": "python -m benchmarks.changed_pairs",
@@ -56,14 +57,14 @@ def main(words: Sequence[str] | None = None) -> int:
         "commit": commit_of(CHECKOUT),
         "pairs": dict(Counter(pair.kind for pair in pairs)),
     }
-    write_json(given.output, {"about": about, "targets": against_targets(figures), **figures})
+    write_json(given.output, {"about": about, "targets": against_targets(figures, TARGETS), **figures})
     draw(figures, given.output.with_suffix(".png"))
     _print(figures)
     return 0
 
 
 def _print(figures: dict[str, Any]) -> None:
-    aims = against_targets(figures)
+    aims = against_targets(figures, TARGETS)
     for name, entry in figures.items():
         if isinstance(entry, dict) and entry.get("count"):
             aim = aims.get(name)

@@ -9,9 +9,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks.changed_pairs.drives import recordings_of, simulate
+from benchmarks.changed_pairs.drives import simulate
 from benchmarks.changed_pairs.plan import Pair
 from benchmarks.commits import commit_of
+from benchmarks.mid_drive_drives import as_recording
 from ddagr_gym.diagnosis.change.run import what_changed_since
 from ddagr_gym.diagnosis.result.files import as_mapping
 from ddagr_gym.errors import InputError
@@ -34,12 +35,11 @@ def answer(seed: int, pair: Pair) -> dict[str, Any]:
         seed: of the set.
         pair: of it.
     """
-    logs, after, _ = simulate(pair, seed)
+    logs, last = simulate(pair, seed)
     robot = get_robot(ROBOT)
-    before = recordings_of(logs, [f"before {k}" for k in (1, 2, 3)], robot)
-    outcome, _ = what_changed_since(
-        recordings_of([after], ["after"], robot), before, robot, get_soil(SOIL), same_ground=True
-    )
+    before = [as_recording(log, robot, f"before {k}") for k, log in enumerate(logs, start=1)]
+    after = [as_recording(last, robot, "after")]
+    outcome, _ = what_changed_since(after, before, robot, get_soil(SOIL), same_ground=True)
     body = as_mapping(outcome.diagnosis)
     return {name: body[name] for name in KEPT if name in body}
 

@@ -6,25 +6,22 @@ and sensors change by what a day makes of them.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from benchmarks.changed_pairs.plan import SET, Pair
-from benchmarks.concealed.cases import Case, field_noise, field_plant
+from benchmarks.concealed.cases import field_noise, field_plant
 from benchmarks.concealed.catalogue import least_size
 from benchmarks.concealed.change import Change, Site, with_motors
 from benchmarks.concealed.drive import SAMPLE_PERIOD, SETTLING, SUBSTEPS, drive
 from benchmarks.concealed.manoeuvres import PAUSE_BETWEEN_RUNS, RUNS, programme
 from benchmarks.concealed.plant import Plant
 from benchmarks.concealed.sensors import COLUMNS, SensorNoise, readings, with_noise
-from benchmarks.concealed.simulate import effect_labels
+from benchmarks.concealed.simulate import effect_labels, logged_commands
 from benchmarks.concealed.streams import stream
-from benchmarks.mid_drive_drives import NAMES, driven, without_externals
-from ddagr_gym.parameters import Robot
-from ddagr_gym.recordings.schema import Recording
+from benchmarks.mid_drive_drives import driven, without_externals
 
 Array = np.ndarray
 Log = dict[str, Array]
@@ -51,10 +48,6 @@ def _start(pair: Pair, seed: int, run: str, away: float) -> Array:
     return np.array([*place, rng.uniform(-np.pi, np.pi)])
 
 
-def _logged_commands(case: Case, commands: Array) -> Array:
-    return np.concatenate([np.zeros((1, 2)), commands[:-1]]) if case.command_row == "acting" else commands
-
-
 def _before(pair: Pair, seed: int, run: str) -> Log:
     """What was logged of a drive before."""
     case, number = pair.case, pair.case.number
@@ -62,7 +55,7 @@ def _before(pair: Pair, seed: int, run: str) -> Log:
     commands = programme(run, case.manoeuvres + COMMANDS)
     clock = RUNS.index(run) * PAUSE_BETWEEN_RUNS
     truth = drive(plant, np.repeat(commands, SUBSTEPS, axis=0), _start(pair, seed, run, 0.0), clock)
-    clean = readings(truth, plant, _logged_commands(case, commands), (), stream(seed, SET, number, "unused", run))
+    clean = readings(truth, plant, logged_commands(case, commands), (), stream(seed, SET, number, "unused", run))
     return with_noise(clean, truth, noise, (), True, stream(seed, SET, number, "noise", run))
 
 
@@ -76,15 +69,28 @@ def _day(pair: Pair, seed: int) -> tuple[Plant, SensorNoise]:
     return plant, replace(noise, accelerometer_offset=offsets, gyro_offset=1.5e-4 * float(rng.standard_normal()))
 
 
-def _after(pair: Pair, seed: int) -> tuple[Log, tuple[Change, ...]]:
-    """What was logged of the drive after, and what had changed."""
+def _asked(pair: Pair, seed: int) -> tuple[Array, Array]:
+    """Commands (samples, 2) of the drive after, and where it starts."""
+    commands = programme(AFTER, pair.case.manoeuvres + COMMANDS + AFTER_MANOEUVRES)
+    return commands, _start(pair, seed, "after", AWAY)
+
+
+def _changes(pair: Pair, seed: int) -> tuple[Change, ...]:
+    """What had changed; forms look at the path of the drive after without them."""
+    if not pair.case.effects:
+        return ()
+    commands, start = _asked(pair, seed)
+    site = Site((drive(_day(pair, seed)[0], np.repeat(commands, SUBSTEPS, axis=0), start),))
+    rng = stream(seed, SET, pair.case.number, "effect")
+    return tuple(form.build(multiple * least_size(form), rng, site) for form, multiple in pair.case.effects)
+
+
+def _after(pair: Pair, seed: int) -> Log:
+    """What was logged of the drive after."""
     case, number = pair.case, pair.case.number
-    bare, noise = _day(pair, seed)
-    wanted = programme(AFTER, case.manoeuvres + COMMANDS + AFTER_MANOEUVRES)
-    commands, start = np.repeat(wanted, SUBSTEPS, axis=0), _start(pair, seed, "after", AWAY)
-    site = Site((drive(bare, commands, start),))
-    rng = stream(seed, SET, number, "effect")
-    changes = tuple(form.build(multiple * least_size(form), rng, site) for form, multiple in case.effects)
+    (bare, noise), changes = _day(pair, seed), _changes(pair, seed)
+    wanted, start = _asked(pair, seed)
+    commands = np.repeat(wanted, SUBSTEPS, axis=0)
     full, changed = bare, commands
     for k, change in enumerate(changes):
         full = change.plant(full) if change.plant else full
@@ -93,44 +99,39 @@ def _after(pair: Pair, seed: int) -> tuple[Log, tuple[Change, ...]]:
     first = without_externals(full, bare)
     received = np.where(np.arange(len(commands))[:, None] < switch * SUBSTEPS, commands, changed)
     truth = driven(first, full, switch, received, start)
+    present: tuple[tuple[Plant, tuple[Change, ...]], ...] = ((first, ()), (full, changes))
     logs = []
-    for plant, present in ((first, ()), (full, changes)):
-        clean = readings(
-            truth, plant, _logged_commands(case, wanted), present, stream(seed, SET, number, "sensor effect")
-        )
-        logs.append(with_noise(clean, truth, noise, present, True, stream(seed, SET, number, "noise", "after")))
+    for plant, there in present:
+        sensors = stream(seed, SET, number, "sensor effect")
+        clean = readings(truth, plant, logged_commands(case, wanted), there, sensors)
+        logs.append(with_noise(clean, truth, noise, there, True, stream(seed, SET, number, "noise", "after")))
     late = np.arange(len(wanted)) >= switch
-    return {name: np.where(late, logs[1][name], logs[0][name]) for name in COLUMNS}, changes
+    return {name: np.where(late, logs[1][name], logs[0][name]) for name in COLUMNS}
 
 
-def simulate(pair: Pair, seed: int) -> tuple[list[Log], Log, dict[str, Any]]:
-    """Logs of the drives before and of the one after, and the label.
+def label_of(pair: Pair, seed: int) -> dict[str, Any]:
+    """The right answer, without the drives.
 
     Args:
         pair: of :func:`benchmarks.changed_pairs.plan.plan`.
         seed: of the set.
     """
-    before = [_before(pair, seed, run) for run in RUNS]
-    after, changes = _after(pair, seed)
-    label = {
+    return {
         "kind": pair.kind,
         "verdict": pair.case.verdict,
-        "effects": effect_labels(pair.case, changes),
+        "effects": effect_labels(pair.case, _changes(pair, seed)),
         "structure": pair.case.structure,
         "manoeuvres": pair.case.manoeuvres,
         "command_row": pair.case.command_row,
         "begins": pair.begins,
     }
-    return before, after, label
 
 
-def recordings_of(logs: Sequence[Log], names: Sequence[str], robot: Robot) -> list[Recording]:
-    """Logs as recordings.
+def simulate(pair: Pair, seed: int) -> tuple[list[Log], Log]:
+    """Logs of the drives before and of the one after.
 
     Args:
-        logs: of one robot.
-        names: of the recordings.
-        robot: that drove.
+        pair: of :func:`benchmarks.changed_pairs.plan.plan`.
+        seed: of the set.
     """
-    columns = [{"t": log["t"]} | {ours: log[theirs] for ours, theirs in NAMES.items()} for log in logs]
-    return [Recording.from_columns(c, robot, source=name) for c, name in zip(columns, names, strict=True)]
+    return [_before(pair, seed, run) for run in RUNS], _after(pair, seed)

@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks.changed_pairs.score import TARGETS, against_targets
+from benchmarks.changed_pairs.score import TARGETS
+from benchmarks.score_concealed import against_targets
 from ddagr_gym.diagnosis.wording import title
 from ddagr_gym.recordings.files import write_atomically
 from ddagr_gym.rendering import palette
@@ -53,7 +54,7 @@ def draw(figures: Mapping[str, Any], path: Path) -> None:
 
 def _draw_rates(panel: Any, figures: Mapping[str, Any]) -> None:
     names = [name for name in WORDS if figures[name]["count"]]
-    aims = against_targets(figures)
+    aims = against_targets(figures, TARGETS)
     for place, name in enumerate(names):
         entry, (low, high) = figures[name], TARGETS[name]
         panel.barh(place, high - low, left=low, height=0.66, color=palette.SKY_BLUE, alpha=0.3)

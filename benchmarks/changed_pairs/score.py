@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from benchmarks.changed_pairs.plan import HIDDEN
-from benchmarks.concealed_truth import Case, covered, detectable, misses, sizes
-from benchmarks.score_concealed import confident, in_set, mean, median, names_of, right, share
+from benchmarks.concealed_truth import Case, covered, detectable, misses, sizes, true_sizes
+from benchmarks.score_concealed import NULLS, confident, in_set, mean, median, names_of, right, share
 from ddagr_gym.physics.effects.registry import effect_kind
 
 TARGETS: dict[str, tuple[float, float]] = {
@@ -23,7 +23,6 @@ TARGETS: dict[str, tuple[float, float]] = {
 }
 """Least and largest value aimed at."""
 
-NULLS = ("null", "structural null")
 CHANGED = ("single", "beginning")
 TWICE = 2.0
 """Multiples of the least detectable size from which a hidden effect is to be named."""
@@ -47,8 +46,6 @@ def multiple(label: Mapping[str, Any], answer: Mapping[str, Any]) -> float | Non
         label: of a pair with one effect.
         answer: to it.
     """
-    from benchmarks.concealed_truth import true_sizes
-
     (effect,) = label["effects"]
     limits = answer["detectable"].get(effect["name"], {})
     kind = effect_kind(effect["name"])
@@ -157,12 +154,3 @@ def _failure(case: Case, seen: bool) -> dict[str, Any]:
         "found_sizes": sizes(answer),
         "equivalence": [finding["equivalence_set"] for finding in answer["findings"]],
     }
-
-
-def against_targets(figures: Mapping[str, Any]) -> dict[str, Any]:
-    """Least and largest value aimed at, and whether the figure lies between them; None where there is none."""
-    found = {}
-    for name, (low, high) in TARGETS.items():
-        value = figures[name]["value"]
-        found[name] = {"least": low, "most": high, "met": None if value is None else low <= value <= high}
-    return found

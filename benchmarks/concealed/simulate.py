@@ -51,8 +51,8 @@ def _commands(case: Case, run: str) -> np.ndarray:
     return programme(run, case.manoeuvres + (0 if case.set_name == "development" else 1000))
 
 
-def _logged_commands(case: Case, run: str) -> np.ndarray:
-    commands = _commands(case, run)
+def logged_commands(case: Case, commands: np.ndarray) -> np.ndarray:
+    """Commands (samples, 2) as the case's logger writes them into the rows."""
     return np.concatenate([np.zeros((1, 2)), commands[:-1]]) if case.command_row == "acting" else commands
 
 
@@ -64,7 +64,7 @@ def _log(
         plant = change.plant(plant) if change.plant else plant
     effect_rng = stream(seed, case.set_name, case.number, "sensor effect", run)
     noise_rng = stream(seed, case.set_name, case.number, "noise", run)
-    clean = readings(truth, plant, _logged_commands(case, run), changes, effect_rng)
+    clean = readings(truth, plant, logged_commands(case, _commands(case, run)), changes, effect_rng)
     return with_noise(clean, truth, field_noise(case, seed), changes, case.receiver, noise_rng)
 
 

@@ -22,6 +22,7 @@ from agents.run import POLICY, RESULT
 from agents.sweep import COLUMNS, FIGURE, STOPPED, TABLE, load_sweep, run_sweep
 from ddagr_gym.cli import main
 from ddagr_gym.errors import InputError
+from tests.needs_ray import NEEDS_RAY
 
 WORDS = ("steps=64", "environments=4", "ppo.rollout=8", "ppo.batch=16", "validation_interval=32")
 """Changes that make a training tiny."""
@@ -29,8 +30,7 @@ WORDS = ("steps=64", "environments=4", "ppo.rollout=8", "ppo.batch=16", "validat
 
 def on_ray(test):
     """A test that starts a cluster."""
-    absent = pytest.mark.skipif(find_spec("ray") is None, reason="needs ray: pip install 'ddagr-gym[cluster]'")
-    return pytest.mark.ray(pytest.mark.slow(absent(test)))
+    return pytest.mark.ray(pytest.mark.slow(NEEDS_RAY(test)))
 
 
 def sweep_file(folder: Path, *lines: str, second: str = "ppo.learning_rate=1e-2", seeds: int = 2) -> Path:

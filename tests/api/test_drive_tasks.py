@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 from dataclasses import replace
 
@@ -12,15 +11,14 @@ from ddagr_gym.api.drive_tasks import Setting, answered, tasks_of
 from ddagr_gym.diagnosis.store import encode
 from ddagr_gym.recordings.storage import save_parquet
 from tests.diagnosis.change.conftest import drive, ordinary_robot  # noqa: F401
+from tests.needs_ray import NEEDS_RAY
 
 RAY = pytest.param(
     (2, "local"),
     id="ray",
     marks=[
         pytest.mark.ray,
-        pytest.mark.skipif(
-            importlib.util.find_spec("ray") is None, reason="needs ray: pip install 'ddagr-gym[cluster]'"
-        ),
+        NEEDS_RAY,
     ],
 )
 

@@ -256,7 +256,7 @@ def test_command_line_goes_on_and_writes_result_and_picture(tmp_path: Path, monk
 @pytest.mark.slow
 def test_every_arm_examines_a_case_of_the_generator(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A gyro bias of 8 mrad/s, 40 times its prior: even with the nominal model held fixed it stands first."""
-    monkeypatch.setattr(manoeuvres, "DURATION", 16.0)
+    monkeypatch.setattr(manoeuvres, "DURATION", 20.0)
     case = Case("development", 1, "single", ((LIBRARY_FORMS["gyro_bias"][0], 8.0),))
     logs, _ = simulate_case(case, 1)
     write_case(tmp_path / case.name, logs)

@@ -11,7 +11,7 @@ import pytest
 
 from benchmarks.changed_pairs import __main__ as command
 from benchmarks.changed_pairs import answers as answering
-from benchmarks.changed_pairs.drives import simulate
+from benchmarks.changed_pairs.drives import label_of, simulate
 from benchmarks.changed_pairs.figure import draw
 from benchmarks.changed_pairs.plan import BEGINNING, HIDDEN, SINGLES, SWITCHED, plan
 from benchmarks.changed_pairs.score import score, sure_and_wrong
@@ -63,7 +63,8 @@ def test_a_set_holds_what_the_plan_says():
 
 def test_drives_of_a_pair_are_on_one_field_and_show_what_changed_from_its_time_on():
     (pair, *_) = (pair for pair in plan(3) if pair.begins is not None and pair.case.verdict == ["gyro_bias"])
-    before, after, told = simulate(pair, 3)
+    before, after = simulate(pair, 3)
+    told = label_of(pair, 3)
     assert [len(log["t"]) for log in before] == [3000] * 3
     assert told["kind"] == "beginning"
     bare = simulate(replace(pair, case=replace(pair.case, effects=()), begins=None), 3)[1]

@@ -1,7 +1,6 @@
 """The search for gains, on few candidates and scenarios."""
 
 import json
-from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -22,6 +21,7 @@ from ddagr_gym.config import load_config
 from ddagr_gym.errors import InputError
 from ddagr_gym.evaluation.ladder_gains import LadderGains, gains_file, ladder_gains
 from ddagr_gym.tasks import FailedTasksError, TaskRunner
+from tests.needs_ray import NEEDS_RAY
 
 FEW = ((4, 1), (2, 2))
 RAY = pytest.param(
@@ -30,7 +30,7 @@ RAY = pytest.param(
     marks=[
         pytest.mark.ray,
         pytest.mark.slow,
-        pytest.mark.skipif(find_spec("ray") is None, reason="needs ray: pip install 'ddagr-gym[cluster]'"),
+        NEEDS_RAY,
     ],
 )
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from importlib.util import find_spec
 
 import pytest
 
@@ -17,6 +16,7 @@ from ddagr_gym.errors import InputError
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.tasks import FailedTasksError, Task, TaskRunner
 from tests.calibration.conftest import drive
+from tests.needs_ray import NEEDS_RAY
 from tests.tasks import work
 
 RAY = pytest.param(
@@ -24,7 +24,7 @@ RAY = pytest.param(
     id="ray",
     marks=[
         pytest.mark.ray,
-        pytest.mark.skipif(find_spec("ray") is None, reason="needs ray: pip install 'ddagr-gym[cluster]'"),
+        NEEDS_RAY,
     ],
 )
 FEW = CalibrationSettings(fitted=3, compared=2, judged=3, settlings=0)

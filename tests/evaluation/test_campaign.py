@@ -1,7 +1,6 @@
 """Frozen scenarios and the campaign over them."""
 
 import json
-from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -34,6 +33,7 @@ from ddagr_gym.physics.soil_laws import LAW
 from ddagr_gym.policies.archive import Policy, save_policy
 from ddagr_gym.policies.design import PolicyDesign
 from ddagr_gym.tasks import FailedTasksError
+from tests.needs_ray import NEEDS_RAY
 
 
 @pytest.fixture
@@ -120,7 +120,7 @@ def test_two_workers_find_the_same(frozen, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.ray
-@pytest.mark.skipif(find_spec("ray") is None, reason="needs ray: pip install 'ddagr-gym[cluster]'")
+@NEEDS_RAY
 def test_a_cluster_finds_the_same(frozen, tmp_path):
     one = run_campaign(["B1", "ppo_ekf"], ["V"], tmp_path / "one", processes=1)
     assert run_campaign(["B1", "ppo_ekf"], ["V"], tmp_path / "two", processes=2, cluster="local") == one

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import importlib.util
 import json
 import os
 import pickle
@@ -20,6 +19,7 @@ from ddagr_gym.errors import InputError
 from ddagr_gym.tasks import FailedTasksError, Limits, ResultStore, Task, TaskRunner, release, run_tasks
 from ddagr_gym.tasks.runner import STOPPED
 from ddagr_gym.tasks.shared import SharedPath, content_of
+from tests.needs_ray import NEEDS_RAY
 from tests.tasks import work
 
 RAY = pytest.param(
@@ -28,9 +28,7 @@ RAY = pytest.param(
     marks=[
         pytest.mark.ray,
         pytest.mark.slow,
-        pytest.mark.skipif(
-            importlib.util.find_spec("ray") is None, reason="needs ray: pip install 'ddagr-gym[cluster]'"
-        ),
+        NEEDS_RAY,
     ],
 )
 ENGINES = [pytest.param((1, ""), id="this process"), pytest.param((2, ""), id="two processes"), RAY]

@@ -16,7 +16,7 @@ from ddagr_gym.identification.fit_numerics import FIELD_TOLERANCE, field_numeric
 from ddagr_gym.identification.gauss_newton import Fitted, fit
 from ddagr_gym.identification.nuisances import Nuisances
 from ddagr_gym.identification.parameters import ModelParameter
-from ddagr_gym.identification.problem import Problem
+from ddagr_gym.identification.problem import Point, Problem
 from ddagr_gym.identification.relative_readings import relative_windows
 from ddagr_gym.identification.residual_weights import Weights, weights_by_residuals
 from ddagr_gym.identification.timing_repair import aligned_poses, bridged
@@ -122,6 +122,6 @@ def moved_parameters(problem: Problem, fitted: Fitted) -> dict[str, float]:
     return {p.name: abs(value) / p.prior for p, value in zip(parameters, values, strict=True) if p.prior > 0.0}
 
 
-def fit_nominal(problem: Problem) -> Fitted:
-    """Fit of a problem without effects."""
-    return fit(problem, iterations=ITERATIONS, tolerance=FIELD_TOLERANCE, renewals=ITERATIONS)
+def fit_nominal(problem: Problem, start: Point | None = None) -> Fitted:
+    """Fit of a problem, without effects where it does not start with some."""
+    return fit(problem, start, iterations=ITERATIONS, tolerance=FIELD_TOLERANCE, renewals=ITERATIONS)

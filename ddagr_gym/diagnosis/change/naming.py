@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ddagr_gym.diagnosis.change.drive_fit import ITERATIONS
+from ddagr_gym.diagnosis.change.drive_fit import fit_nominal
 from ddagr_gym.diagnosis.change.drive_scan import NAMED
 from ddagr_gym.diagnosis.change.model import Model, model_of
 from ddagr_gym.diagnosis.change.ordinary import Comparison
@@ -22,8 +22,7 @@ from ddagr_gym.diagnosis.change.shifts import LEVEL, Shift, refitted_shift
 from ddagr_gym.diagnosis.result.equivalence import equivalence_weights
 from ddagr_gym.diagnosis.search.scanned_model import Rival
 from ddagr_gym.identification.effect_parameters import effect_parameters
-from ddagr_gym.identification.fit_numerics import FIELD_TOLERANCE
-from ddagr_gym.identification.gauss_newton import Fitted, fit
+from ddagr_gym.identification.gauss_newton import Fitted
 from ddagr_gym.identification.misfit import dispersion_of
 from ddagr_gym.identification.problem import Problem
 
@@ -120,7 +119,7 @@ def _without(named: Named, place: int, ordinary: Comparison) -> Named:
     for model in named.models[place + 2 :]:
         effects = model.fitted.point.effects
         point = replace(model.fitted.point, effects=(*effects[:place], *effects[place + 1 :]))
-        fitted = fit(model.problem, point, iterations=ITERATIONS, tolerance=FIELD_TOLERANCE, renewals=ITERATIONS)
+        fitted = fit_nominal(model.problem, point)
         kept = (*model.named[:place], *model.named[place + 1 :])
         models.append(model_of(model.problem, fitted, ordinary, kept))
     return Named(tuple(models), (*named.steps[:place], *named.steps[place + 1 :]))
