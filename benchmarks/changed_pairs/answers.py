@@ -23,7 +23,7 @@ from ddagr_gym.tasks import ResultStore, Task, TaskRunner, run_tasks
 CHECKOUT = Path(__file__).resolve().parents[2]
 RESULT = CHECKOUT / "benchmarks" / "results" / "changed_pairs.json"
 COMMITMENT = RESULT.with_name("changed_pairs_commitment.json")
-ROBOT, SOIL = "ddagr", "thesis_a1"
+SOIL = "thesis_a1"
 KEPT = ("verdict", "complete", "findings", "sentence", "detectable", "detectable_alone", "change", "checks", "seconds")
 """Entries of an answer."""
 
@@ -36,7 +36,7 @@ def answer(seed: int, pair: Pair) -> dict[str, Any]:
         pair: of it.
     """
     logs, last = simulate(pair, seed)
-    robot = get_robot(ROBOT)
+    robot = get_robot(pair.robot)
     before = [as_recording(log, robot, f"before {k}") for k, log in enumerate(logs, start=1)]
     after = [as_recording(last, robot, "after")]
     outcome, _ = what_changed_since(after, before, robot, get_soil(SOIL), same_ground=True)

@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.changed_pairs.plan import SET, Pair
+from benchmarks.changed_pairs.plan import Pair
+from benchmarks.changed_pairs.robots import simulated_robot
 from benchmarks.concealed.cases import field_noise, field_plant
 from benchmarks.concealed.catalogue import least_size
 from benchmarks.concealed.change import Change, Site, with_motors
@@ -43,26 +44,31 @@ COMMANDS = 1000
 
 
 def _start(pair: Pair, seed: int, run: str, away: float) -> Array:
-    rng = stream(seed, SET, pair.case.number, "start", run)
+    rng = stream(seed, pair.case.set_name, pair.case.number, "start", run)
     place = rng.uniform(-1.0, 1.0, 2) + away * np.array([np.cos(1.0), np.sin(1.0)])
     return np.array([*place, rng.uniform(-np.pi, np.pi)])
 
 
+def _plant(pair: Pair, seed: int) -> Plant:
+    """The pair's robot on its field, as it was in the drives before."""
+    return simulated_robot(pair.robot).put_into(field_plant(pair.case, seed))
+
+
 def _before(pair: Pair, seed: int, run: str) -> Log:
     """What was logged of a drive before."""
-    case, number = pair.case, pair.case.number
-    plant, noise = field_plant(case, seed), field_noise(case, seed)
+    case, name, number = pair.case, pair.case.set_name, pair.case.number
+    plant, noise = _plant(pair, seed), field_noise(case, seed)
     commands = programme(run, case.manoeuvres + COMMANDS)
     clock = RUNS.index(run) * PAUSE_BETWEEN_RUNS
     truth = drive(plant, np.repeat(commands, SUBSTEPS, axis=0), _start(pair, seed, run, 0.0), clock)
-    clean = readings(truth, plant, logged_commands(case, commands), (), stream(seed, SET, number, "unused", run))
-    return with_noise(clean, truth, noise, (), True, stream(seed, SET, number, "noise", run))
+    clean = readings(truth, plant, logged_commands(case, commands), (), stream(seed, name, number, "unused", run))
+    return with_noise(clean, truth, noise, (), True, stream(seed, name, number, "noise", run))
 
 
 def _day(pair: Pair, seed: int) -> tuple[Plant, SensorNoise]:
     """Robot and sensors as they are on the day of the drive after, before anything changed."""
-    rng = stream(seed, SET, pair.case.number, "day")
-    bare, noise = field_plant(pair.case, seed), field_noise(pair.case, seed)
+    rng = stream(seed, pair.case.set_name, pair.case.number, "day")
+    bare, noise = _plant(pair, seed), field_noise(pair.case, seed)
     faster = float(np.exp(DAY_MOTORS * rng.standard_normal()))
     plant = with_motors(bare, rate_up=bare.motors.rate_up * faster, rate_down=bare.motors.rate_down * faster)
     offsets = tuple(0.006 * rng.standard_normal(2))
@@ -81,20 +87,20 @@ def _changes(pair: Pair, seed: int) -> tuple[Change, ...]:
         return ()
     commands, start = _asked(pair, seed)
     site = Site((drive(_day(pair, seed)[0], np.repeat(commands, SUBSTEPS, axis=0), start),))
-    rng = stream(seed, SET, pair.case.number, "effect")
+    rng = stream(seed, pair.case.set_name, pair.case.number, "effect")
     return tuple(form.build(multiple * least_size(form), rng, site) for form, multiple in pair.case.effects)
 
 
 def _after(pair: Pair, seed: int) -> Log:
     """What was logged of the drive after."""
-    case, number = pair.case, pair.case.number
+    case, name, number = pair.case, pair.case.set_name, pair.case.number
     (bare, noise), changes = _day(pair, seed), _changes(pair, seed)
     wanted, start = _asked(pair, seed)
     commands = np.repeat(wanted, SUBSTEPS, axis=0)
     full, changed = bare, commands
     for k, change in enumerate(changes):
         full = change.plant(full) if change.plant else full
-        changed = change.command(changed, stream(seed, SET, number, "command", k)) if change.command else changed
+        changed = change.command(changed, stream(seed, name, number, "command", k)) if change.command else changed
     switch = -SETTLING if pair.begins is None else round(pair.begins / SAMPLE_PERIOD)
     first = without_externals(full, bare)
     received = np.where(np.arange(len(commands))[:, None] < switch * SUBSTEPS, commands, changed)
@@ -102,11 +108,11 @@ def _after(pair: Pair, seed: int) -> Log:
     present: tuple[tuple[Plant, tuple[Change, ...]], ...] = ((first, ()), (full, changes))
     logs = []
     for plant, there in present:
-        sensors = stream(seed, SET, number, "sensor effect")
+        sensors = stream(seed, name, number, "sensor effect")
         clean = readings(truth, plant, logged_commands(case, wanted), there, sensors)
-        logs.append(with_noise(clean, truth, noise, there, True, stream(seed, SET, number, "noise", "after")))
+        logs.append(with_noise(clean, truth, noise, there, True, stream(seed, name, number, "noise", "after")))
     late = np.arange(len(wanted)) >= switch
-    return {name: np.where(late, logs[1][name], logs[0][name]) for name in COLUMNS}
+    return {column: np.where(late, logs[1][column], logs[0][column]) for column in COLUMNS}
 
 
 def label_of(pair: Pair, seed: int) -> dict[str, Any]:

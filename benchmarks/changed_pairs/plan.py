@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from benchmarks.changed_pairs.robots import simulated_robot
 from benchmarks.concealed.cases import MANOEUVRE_SETS, STRUCTURED_SHARE, STRUCTURES, Case
 from benchmarks.concealed.catalogue import LIBRARY_FORMS, OPEN_PAIRS, OUTSIDE_FORMS, RESERVED_PAIRS
 from benchmarks.concealed.change import Form
@@ -36,15 +37,17 @@ class Pair:
     Attributes:
         case: what changed, on which kind of simulator; its number is that of the pair.
         begins: time of the drive after at which it begins [s]; None where it was there from the start.
+        robot: key of :data:`benchmarks.changed_pairs.robots.ROBOTS`.
     """
 
     case: Case
     begins: float | None = None
+    robot: str = "ddagr"
 
     @property
     def name(self) -> str:
-        """Of the pair."""
-        return f"pair_{self.case.number:03d}"
+        """Of the pair, unlike any of another robot."""
+        return f"{'pair' if self.robot == 'ddagr' else self.robot}_{self.case.number:03d}"
 
     @property
     def kind(self) -> str:
@@ -90,7 +93,12 @@ def _drafts(rng: np.random.Generator) -> list[Draft]:
     return nulls + _singles(rng) + _doubles(rng) + outside + _beginning(rng)
 
 
-def plan(seed: int) -> list[Pair]:
+def _set_of(robot: str) -> str:
+    """Name from which the numbers of a robot's set are drawn."""
+    return SET if robot == "ddagr" else f"{SET} {robot}"
+
+
+def plan(seed: int, robot: str = "ddagr") -> list[Pair]:
     """All pairs of a set, in the order of their numbers.
 
     Sizes are drawn evenly between half the least and the largest of the effect's form in the sets of single drives:
@@ -98,20 +106,27 @@ def plan(seed: int) -> list[Pair]:
 
     Args:
         seed: any non-negative integer.
+        robot: key of :data:`benchmarks.changed_pairs.robots.ROBOTS`.
+
+    Raises:
+        InputError: there is no such robot.
     """
-    rng = stream(seed, SET, "labels")
+    scaled, name = simulated_robot(robot), _set_of(robot)
+    rng = stream(seed, name, "labels")
     drafts, structures, pairs = _drafts(rng), list(STRUCTURES)[1:], []
     for number, k in enumerate(rng.permutation(len(drafts)), start=1):
         kind, forms, begins = drafts[k]
-        effects = tuple((form, float(rng.uniform(0.5 * form.low, form.high))) for form in forms)
+        effects = tuple(
+            (form, float(rng.uniform(0.5 * form.low, form.high)) * scaled.size_factor(form.name)) for form in forms
+        )
         structure = structures[k % len(structures)] if kind == "structural null" else ""
-        pairs.append(Pair(_complete(Case(SET, number, kind, effects, structure), seed), begins))
+        pairs.append(Pair(_complete(Case(name, number, kind, effects, structure), seed), begins, robot))
     return pairs
 
 
 def _complete(case: Case, seed: int) -> Case:
     """Draw what does not depend on the label: manoeuvres, logging, structure of pairs in which something changes."""
-    rng = stream(seed, SET, case.number, "plan")
+    rng = stream(seed, case.set_name, case.number, "plan")
     manoeuvres, row = int(rng.integers(MANOEUVRE_SETS)), str(rng.choice(["issued", "acting"]))
     structure, structured = str(rng.choice(list(STRUCTURES)[1:])), bool(rng.random() < STRUCTURED_SHARE)
     case = replace(case, structure=structure) if case.effects and structured else case

@@ -91,6 +91,12 @@ def with_wheels(plant: Plant, **values: Any) -> Plant:
     return plant._replace(wheels=plant.wheels._replace(**values))
 
 
+def with_radii(plant: Plant, growth: Array) -> Plant:
+    """Plant whose outer wheel radii have grown by these shares, (4,)."""
+    radii = plant.wheels.major_radius
+    return with_wheels(plant, major_radius=radii + (plant.wheels.minor_radius + radii) * growth)
+
+
 def with_soil(plant: Plant, **factors: float) -> Plant:
     """Plant with numbers of the soil multiplied."""
     soil = plant.soil

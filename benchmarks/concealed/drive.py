@@ -122,7 +122,7 @@ def _set_arm(body, wheel, arm):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _packing(ground, state, wheel, x, y, time):  # type: ignore[no-untyped-def]
+def _packing(ground, body, state, wheel, x, y, time):  # type: ignore[no-untyped-def]
     """Relative stiffening of soil that another wheel has just rolled."""
     if ground.rut_mode == 2:
         return ground.rut_gain * rut_share(state.ruts, x, y, state.pose[2], time)
@@ -130,7 +130,7 @@ def _packing(ground, state, wheel, x, y, time):  # type: ignore[no-untyped-def]
     trailing = wheel >= 2 if v_x >= 0.0 else wheel < 2
     if ground.rut_mode == 0 or not trailing:
         return 0.0
-    swing = 0.66 * turn / (abs(v_x) + 0.02)
+    swing = 2.0 * body.half_wheelbase * turn / (abs(v_x) + 0.02)
     return ground.rut_gain * math.exp(-((swing / 0.35) ** 2)) * min(abs(v_x) / 0.02, 1.0)
 
 
@@ -144,7 +144,7 @@ def read_ground(plant, state, arm, time):  # type: ignore[no-untyped-def]
         x = state.pose[0] + cosine * arm[0] - sine * arm[1]
         y = state.pose[1] + sine * arm[0] + cosine * arm[1]
         strength, stiffness = local_factors(ground, i, x, y, time)
-        packed = _packing(ground, state, i, x, y, time)
+        packed = _packing(ground, plant.body, state, i, x, y, time)
         state.factors[i, 0] = strength * (1.0 + PACKED_STRENGTH * packed)
         state.factors[i, 1] = stiffness * (1.0 + packed)
         state.factors[i, 2] = relief(ground, x, y)

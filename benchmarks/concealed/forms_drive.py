@@ -7,7 +7,7 @@ import numpy as np
 from .change import Array, Change, Rng, Site, form, with_motors
 from .drive import SAMPLE_PERIOD, SUBSTEPS
 from .manoeuvres import FASTEST
-from .plant import Motors
+from .plant import Motors, Plant
 
 STEP = SAMPLE_PERIOD / SUBSTEPS
 
@@ -40,10 +40,17 @@ def one_bank_delay(size: float, rng: Rng, site: Site) -> Change:
     return Change({"delay": size, "bank": "right"}, command=command)
 
 
+def _slower(rate: float, seconds: float) -> float:
+    """Rate [1/s] of a first-order lag whose time constant has grown."""
+    return 1.0 / (1.0 / rate + seconds)
+
+
 @form("motor_lag", "slower loop", "same", 2, 6, "reference' = (c - reference)/(1/k + T)")
 def slower_loop(size: float, rng: Rng, site: Site) -> Change:
-    rate = 1.0 / (1.0 / Motors().rate_up + size)
-    return Change({"added_time_constant": size}, plant=lambda p: with_motors(p, rate_up=rate, rate_down=rate))
+    def plant(p: Plant) -> Plant:
+        return with_motors(p, rate_up=_slower(p.motors.rate_up, size), rate_down=_slower(p.motors.rate_down, size))
+
+    return Change({"added_time_constant": size}, plant=plant)
 
 
 @form("motor_lag", "second pole", "variant", 2, 6, "reference passes a second lag of time constant T")
@@ -53,8 +60,10 @@ def second_pole(size: float, rng: Rng, site: Site) -> Change:
 
 @form("motor_lag", "speeding up only", "different", 3, 7, "slower loop only while |c| exceeds |reference|")
 def lag_when_speeding_up(size: float, rng: Rng, site: Site) -> Change:
-    rate = 1.0 / (1.0 / Motors().rate_up + size)
-    return Change({"added_time_constant": size}, plant=lambda p: with_motors(p, rate_up=rate))
+    def plant(p: Plant) -> Plant:
+        return with_motors(p, rate_up=_slower(p.motors.rate_up, size))
+
+    return Change({"added_time_constant": size}, plant=plant)
 
 
 @form("motor_droop", "leaky integrator", "same", 2, 3.9, "speed falls by D per torque: the loop's integrator leaks")
@@ -95,7 +104,12 @@ def slew_limit(size: float, rng: Rng, site: Site) -> Change:
 @form("motor_saturation", "torque limit", "different", 3, 6, "|torque| <= 70 (1 - S) N m per bank")
 def torque_limit(size: float, rng: Rng, site: Site) -> Change:
     limit = 70.0 * (1.0 - size)
-    return Change({"torque_limit": limit}, plant=lambda p: with_motors(p, torque_limit=limit))
+    share = limit / Motors().torque_limit
+
+    def plant(p: Plant) -> Plant:
+        return with_motors(p, torque_limit=share * p.motors.torque_limit)
+
+    return Change({"torque_limit": limit, "share": share}, plant=plant)
 
 
 @form("command_deadband", "cut out", "same", 5, 10, "u = 0 where |c| < B, else c")

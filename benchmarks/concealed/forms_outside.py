@@ -9,6 +9,7 @@ import numpy as np
 from . import externals
 from .change import Array, Change, Rng, Site, outside, signed, with_external, with_ground, with_motors, with_wheels
 from .forms_drive import delayed
+from .plant import Plant
 
 
 def _force(kind: float, *numbers: float, **parameters: float) -> Change:
@@ -26,10 +27,13 @@ def tether(size: float, rng: Rng, site: Site) -> Change:
 def bearing_drag(size: float, rng: Rng, site: Site) -> Change:
     wheel = int(rng.integers(4))
     free = np.eye(4)[wheel]
-    x, y = (0.33 if wheel < 2 else -0.33), (0.58 if wheel % 2 else -0.58)
-    row = externals.row(externals.HUB_DRAG, 30.0 * size, x, y, 0.01)
-    parameters = {"wheel": wheel + 1, "force": 30.0 * size}
-    return Change(parameters, plant=lambda p: with_external(with_wheels(p, free=free), row))
+    along, across = (1.0 if wheel < 2 else -1.0), (1.0 if wheel % 2 else -1.0)
+
+    def plant(p: Plant) -> Plant:
+        x, y = along * p.body.half_wheelbase, across * p.body.half_track
+        return with_external(with_wheels(p, free=free), externals.row(externals.HUB_DRAG, 30.0 * size, x, y, 0.01))
+
+    return Change({"wheel": wheel + 1, "force": 30.0 * size}, plant=plant)
 
 
 @outside("wheel_bounce", "flat spot", "one wheel's load times 1 + 0.4 cos(bank angle)")

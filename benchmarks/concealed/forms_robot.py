@@ -7,23 +7,26 @@ import math
 import numpy as np
 
 from . import externals
-from .change import Change, Rng, Site, form, signed, with_body, with_external, with_wheels
-from .plant import Body, Plant, Wheels
+from .change import Change, Rng, Site, form, signed, with_body, with_external, with_radii
+from .plant import Plant
 
 
 @form("payload", "low", "same", 4, 8, "mass + m at the centre, inertia + m 0.2^2")
 def low_payload(size: float, rng: Rng, site: Site) -> Change:
-    body = Body()
-    values = {"mass": body.mass + size, "inertia": body.inertia + 0.04 * size}
-    return Change({"mass": size}, plant=lambda p: with_body(p, **values))
+    def plant(p: Plant) -> Plant:
+        return with_body(p, mass=p.body.mass + size, inertia=p.body.inertia + 0.04 * size)
+
+    return Change({"mass": size}, plant=plant)
 
 
 @form("payload", "mast", "variant", 4, 8, "mass + m spread out 0.5 m wide, and centre of mass higher by m 0.6/(M + m)")
 def high_payload(size: float, rng: Rng, site: Site) -> Change:
-    body = Body()
-    height = (body.mass * body.mass_height + size * (body.mass_height + 0.6)) / (body.mass + size)
-    values = {"mass": body.mass + size, "inertia": body.inertia + 0.25 * size, "mass_height": height}
-    return Change({"mass": size}, plant=lambda p: with_body(p, **values))
+    def plant(p: Plant) -> Plant:
+        body = p.body
+        height = (body.mass * body.mass_height + size * (body.mass_height + 0.6)) / (body.mass + size)
+        return with_body(p, mass=body.mass + size, inertia=body.inertia + 0.25 * size, mass_height=height)
+
+    return Change({"mass": size}, plant=plant)
 
 
 @form("centre_of_mass_offset", "anywhere", "same", 2, 6, "N_i ~ (1 +- x/L)(1 +- y/W), forces act about (x, y)")
@@ -36,24 +39,26 @@ def offset_anywhere(size: float, rng: Rng, site: Site) -> Change:
 @form("centre_of_mass_offset", "along", "variant", 3, 7, "x only, and the inertia grows by M x^2 (battery moved)")
 def offset_along(size: float, rng: Rng, site: Site) -> Change:
     x = signed(rng) * size
-    inertia = Body().inertia + Body().mass * x * x
-    return Change({"x": x, "y": 0.0}, plant=lambda p: with_body(p, mass_x=x, inertia=inertia))
+
+    def plant(p: Plant) -> Plant:
+        return with_body(p, mass_x=x, inertia=p.body.inertia + p.body.mass * x * x)
+
+    return Change({"x": x, "y": 0.0}, plant=plant)
 
 
 @form("wheel_radius_mismatch", "banks", "same", 2, 6, "R_right/R_left = 1 + e, mean kept")
 def bank_mismatch(size: float, rng: Rng, site: Site) -> Change:
     ratio = signed(rng) * size
-    grow = 0.2794 * 0.5 * ratio * np.array([1.0, -1.0, 1.0, -1.0])
-    return Change({"ratio": ratio}, plant=lambda p: with_wheels(p, major_radius=Wheels().major_radius + grow))
+    sides = 0.5 * ratio * np.array([1.0, -1.0, 1.0, -1.0])
+    return Change({"ratio": ratio}, plant=lambda p: with_radii(p, sides))
 
 
 @form("wheel_radius_mismatch", "one wheel", "different", 5, 10, "one wheel's radius is smaller by e (soft tyre)")
 def one_small_wheel(size: float, rng: Rng, site: Site) -> Change:
     wheel = int(rng.integers(4))
-    shrink = np.zeros(4)
-    shrink[wheel] = 0.2794 * size
+    growth = -size * np.eye(4)[wheel]
     parameters = {"ratio": -size if wheel % 2 == 0 else size, "wheel": wheel + 1}
-    return Change(parameters, plant=lambda p: with_wheels(p, major_radius=Wheels().major_radius - shrink))
+    return Change(parameters, plant=lambda p: with_radii(p, growth))
 
 
 def _dragging(row: np.ndarray, **parameters: float) -> Change:
@@ -94,4 +99,7 @@ def power_drag(size: float, rng: Rng, site: Site) -> Change:
 
 @form("viscous_drag", "mud at wheels", "different", 3, 8, "-c/4 times each wheel hub's velocity")
 def mud(size: float, rng: Rng, site: Site) -> Change:
-    return _dragging(externals.row(externals.MUD, size / 4.0, 0.33, 0.58), coefficient=size)
+    def plant(p: Plant) -> Plant:
+        return with_external(p, externals.row(externals.MUD, size / 4.0, p.body.half_wheelbase, p.body.half_track))
+
+    return Change({"coefficient": size}, plant=plant)

@@ -14,11 +14,15 @@ from benchmarks.changed_pairs import answers as answering
 from benchmarks.changed_pairs.drives import label_of, simulate
 from benchmarks.changed_pairs.figure import draw
 from benchmarks.changed_pairs.plan import BEGINNING, HIDDEN, SINGLES, SWITCHED, plan
+from benchmarks.changed_pairs.robots import ROBOTS, simulated_robot
 from benchmarks.changed_pairs.score import score, sure_and_wrong
-from benchmarks.concealed.catalogue import LIBRARY_FORMS
+from benchmarks.concealed.catalogue import LIBRARY_FORMS, least_size
+from benchmarks.concealed.change import Site
 from benchmarks.concealed.drive import SAMPLE_PERIOD
+from benchmarks.concealed.plant import nominal_plant
 from ddagr_gym.errors import InputError
 from ddagr_gym.physics.effects.registry import effect_kinds
+from ddagr_gym.presets import get_robot
 
 
 def finding(name, others=(), **sizes):
@@ -75,6 +79,40 @@ def test_drives_of_a_pair_are_on_one_field_and_show_what_changed_from_its_time_o
     assert np.mean(gap[late]) == pytest.approx(bias, rel=0.2)
     distance = np.hypot(np.nanmean(after["x"]) - np.nanmean(before[0]["x"]), np.nanmean(after["y"]))
     assert distance > 5.0
+
+
+@pytest.mark.parametrize(("robot", "turning"), [("ddagr", 0.17), ("warthog", 0.14), ("husky", 0.14)])
+def test_every_robot_drives_the_programme_and_turns_less_than_without_slip(robot, turning):
+    (pair, *_) = (pair for pair in plan(3, robot) if pair.kind == "null")
+    before, after = simulate(pair, 3)
+    for log in (*before[1:], after):
+        assert np.sqrt(np.mean((log["enc_right"] - log["cmd_right"]) ** 2)) < 0.1
+        sides = log["enc_right"] - log["enc_left"]
+        assert np.sum(log["imu_gz"] * sides) / np.sum(sides**2) == pytest.approx(turning, abs=0.03)
+        sheet = get_robot(robot)
+        assert turning < sheet.outer_radius / (2.0 * sheet.half_track)
+
+
+def test_sets_of_different_robots_are_drawn_apart_and_sizes_grow_with_the_robot():
+    labels = {robot: [pair.case.verdict for pair in plan(3, robot)] for robot in ROBOTS}
+    assert labels["ddagr"] != labels["warthog"] != labels["husky"]
+    assert simulated_robot("warthog").size_factor("payload") == pytest.approx(470.0 / 168.0)
+    assert simulated_robot("ddagr").size_factor("payload") == 1.0
+    assert simulated_robot("husky").size_factor("gyro_bias") == 1.0
+
+
+def test_a_change_of_a_robots_body_starts_from_that_robot():
+    pairs = [pair for pair in plan(3, "husky") if pair.case.verdict == ["payload"]]
+    plant = simulated_robot("husky").put_into(nominal_plant())
+    (form, size), site = pairs[0].case.effects[0], Site(())
+    change = form.build(size * least_size(form), np.random.default_rng(0), site)
+    assert change.plant(plant).body.mass == 75.0 + change.parameters["mass"]
+    assert change.plant(plant).body.half_track == plant.body.half_track
+
+
+def test_an_unknown_robot_is_refused():
+    with pytest.raises(InputError, match="ddagr, warthog, husky"):
+        plan(3, "jackal")
 
 
 def test_motors_that_weaken_in_mid_drive_leave_the_drive_before_as_it_was():
