@@ -12,7 +12,8 @@ the nominal is the data sheet on the thesis's soil. The diagnosis gets the recor
 ``--draw`` writes the seed to SECRET, which lies outside the checkout, and its hash to
 ``benchmarks/results/changed_pairs_commitment.json``, which is committed before the answers are made; ``--secret``
 refuses a seed of another hash. Written are the answers' score and a picture (``benchmarks/results/changed_pairs.json``,
-``.png``); a run goes on after the answers in the folder of parts. Fifty seconds of a core a pair, 208 pairs in a set.
+``.png``; ``changed_pairs_warthog.json`` of a Warthog); a run goes on after the answers in the folder of parts. Fifty
+seconds of a core a pair, 208 pairs in a set.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks.changed_pairs.answers import CHECKOUT, RESULT, answers_to, draw_secret, secret_seed
+from benchmarks.changed_pairs.answers import CHECKOUT, RESULT, answers_to, draw_secret, result_of, secret_seed
 from benchmarks.changed_pairs.drives import label_of
 from benchmarks.changed_pairs.figure import draw
 from benchmarks.changed_pairs.plan import plan
@@ -61,8 +62,9 @@ def main(words: Sequence[str] | None = None) -> int:
         "commit": commit_of(CHECKOUT),
         "pairs": dict(Counter(pair.kind for pair in pairs)),
     }
-    write_json(given.output, {"about": about, "targets": against_targets(figures, TARGETS), **figures})
-    draw(figures, given.output.with_suffix(".png"))
+    output = given.output or result_of(given.robot)
+    write_json(output, {"about": about, "targets": against_targets(figures, TARGETS), **figures})
+    draw(figures, output.with_suffix(".png"))
     _print(figures)
     return 0
 
@@ -90,7 +92,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--kinds", nargs="+", help="only pairs of these kinds")
     parser.add_argument("--parts", type=Path, default=RESULT.with_suffix(".parts"), help="folder of finished answers")
     parser.add_argument("--answers", type=Path, help="JSON of all answers, word by word")
-    parser.add_argument("--output", type=Path, default=RESULT, help="JSON; the picture has the same name")
+    parser.add_argument("--output", type=Path, help="JSON; the picture has the same name")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--cluster", default="", help="a Ray cluster: local, or its address")
     return parser

@@ -44,6 +44,15 @@ def answer(seed: int, pair: Pair) -> dict[str, Any]:
     return {name: body[name] for name in KEPT if name in body}
 
 
+def result_of(robot: str) -> Path:
+    """File of the figures of a robot's set.
+
+    Args:
+        robot: key of :data:`benchmarks.changed_pairs.robots.ROBOTS`.
+    """
+    return RESULT if robot == "ddagr" else RESULT.with_stem(f"{RESULT.stem}_{robot}")
+
+
 def digest_of(seed: int) -> str:
     """Hash by which a seed is committed to.
 

@@ -1,7 +1,8 @@
 """The robots of the sets of pairs, as the concealed benchmark's simulator has them.
 
 Numbers are those of the makers' manuals and robot descriptions; speed loops and heights of the centre of mass are
-assumptions. The wheels' true track of the Warthog is the description's, not that of its data sheet in the package.
+assumptions. The wheels' true track of the Warthog is the description's, not that of its data sheet in the package. A
+limited torque is limited to the same share of every robot's; the label has that of the DDAGR.
 """
 
 from __future__ import annotations

@@ -104,12 +104,11 @@ def slew_limit(size: float, rng: Rng, site: Site) -> Change:
 @form("motor_saturation", "torque limit", "different", 3, 6, "|torque| <= 70 (1 - S) N m per bank")
 def torque_limit(size: float, rng: Rng, site: Site) -> Change:
     limit = 70.0 * (1.0 - size)
-    share = limit / Motors().torque_limit
 
     def plant(p: Plant) -> Plant:
-        return with_motors(p, torque_limit=share * p.motors.torque_limit)
+        return with_motors(p, torque_limit=limit * (p.motors.torque_limit / Motors().torque_limit))
 
-    return Change({"torque_limit": limit, "share": share}, plant=plant)
+    return Change({"torque_limit": limit}, plant=plant)
 
 
 @form("command_deadband", "cut out", "same", 5, 10, "u = 0 where |c| < B, else c")

@@ -110,6 +110,11 @@ def test_a_change_of_a_robots_body_starts_from_that_robot():
     assert change.plant(plant).body.half_track == plant.body.half_track
 
 
+def test_results_of_different_robots_have_files_of_their_own():
+    assert answering.result_of("ddagr") == answering.RESULT
+    assert len({answering.result_of(robot) for robot in ROBOTS}) == len(ROBOTS)
+
+
 def test_an_unknown_robot_is_refused():
     with pytest.raises(InputError, match="ddagr, warthog, husky"):
         plan(3, "jackal")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import importlib.util
 import json
 
 import pytest
@@ -12,6 +11,7 @@ pytest.importorskip("matplotlib", reason="needs the extra report")
 
 from benchmarks import cluster_faults
 from benchmarks.cluster_faults import FAULTS, FullDisk, Run, alone, struck, two_nodes
+from tests.needs_ray import NEEDS_RAY
 
 NAMED = {"task raises": ["case 3: raised"], "task over its memory": ["case 3: over its memory"]}
 AGAIN = {"worker killed": (1, 1), "node killed": (1, 1), "driver killed": (0, 2), "full disk at the store": (1, 2)}
@@ -26,7 +26,7 @@ def nodes():
 
 @pytest.mark.ray
 @pytest.mark.slow
-@pytest.mark.skipif(importlib.util.find_spec("ray") is None, reason="needs ray: pip install 'ddagr-gym[cluster]'")
+@NEEDS_RAY
 @pytest.mark.parametrize("fault", FAULTS)
 def test_nothing_is_lost_and_nothing_done_twice(nodes, tmp_path, fault):
     row = struck(fault, nodes, tmp_path, count=8)
