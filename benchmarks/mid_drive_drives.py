@@ -127,11 +127,14 @@ def driven(first: Plant, then: Plant, switch: int, commands: Array, start: Array
     return {name: truth[:, k] for k, name in enumerate(TRUTH)}
 
 
-def without_externals(plant: Plant, bare: Plant) -> Plant:
-    """The bare plant with the external forces of another one, at no strength: they keep the shape of its state."""
+def with_state_of(plant: Plant, bare: Plant) -> Plant:
+    """The bare plant with a state of the shape that another one needs: its external forces at no strength, and a map of
+    ruts that stiffen nothing."""
     quiet = plant.externals.copy()
     quiet[:, 1:4] = 0.0
-    return bare._replace(externals=np.concatenate([bare.externals, quiet[len(bare.externals) :]]))
+    marked = plant.ground.rut_mode == 2 and bare.ground.rut_mode == 0
+    ground = bare.ground._replace(rut_mode=2, rut_gain=0.0) if marked else bare.ground
+    return bare._replace(ground=ground, externals=np.concatenate([bare.externals, quiet[len(bare.externals) :]]))
 
 
 def simulate(item: Switched) -> dict[str, Array]:
@@ -143,7 +146,7 @@ def simulate(item: Switched) -> dict[str, Array]:
     start, rng = item.start()
     change = item.form.build(item.multiple * least_size(item.form), rng, Site((drive(bare, commands, start),)))
     full = change.plant(bare) if change.plant else bare
-    quiet = without_externals(full, bare)
+    quiet = with_state_of(full, bare)
     switch = -SETTLING if item.kind == ALWAYS else round(item.time / SAMPLE_PERIOD)
     changed = change.command(commands, rng) if change.command else commands
     before, after = ((quiet, commands, ()), (full, changed, (change,)))

@@ -22,7 +22,7 @@ from benchmarks.concealed.plant import Plant
 from benchmarks.concealed.sensors import COLUMNS, SensorNoise, readings, with_noise
 from benchmarks.concealed.simulate import effect_labels, logged_commands
 from benchmarks.concealed.streams import stream
-from benchmarks.mid_drive_drives import driven, without_externals
+from benchmarks.mid_drive_drives import driven, with_state_of
 
 Array = np.ndarray
 Log = dict[str, Array]
@@ -102,7 +102,7 @@ def _after(pair: Pair, seed: int) -> Log:
         full = change.plant(full) if change.plant else full
         changed = change.command(changed, stream(seed, name, number, "command", k)) if change.command else changed
     switch = -SETTLING if pair.begins is None else round(pair.begins / SAMPLE_PERIOD)
-    first = without_externals(full, bare)
+    first = with_state_of(full, bare)
     received = np.where(np.arange(len(commands))[:, None] < switch * SUBSTEPS, commands, changed)
     truth = driven(first, full, switch, received, start)
     present: tuple[tuple[Plant, tuple[Change, ...]], ...] = ((first, ()), (full, changes))

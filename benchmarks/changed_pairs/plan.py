@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from benchmarks.changed_pairs.robots import simulated_robot
-from benchmarks.concealed.cases import MANOEUVRE_SETS, STRUCTURED_SHARE, STRUCTURES, Case
+from benchmarks.concealed.cases import ALL_STRUCTURES, MANOEUVRE_SETS, STRUCTURED_SHARE, STRUCTURES, Case
 from benchmarks.concealed.catalogue import LIBRARY_FORMS, OPEN_PAIRS, OUTSIDE_FORMS, RESERVED_PAIRS
 from benchmarks.concealed.change import Form
 from benchmarks.concealed.streams import stream
@@ -16,6 +16,12 @@ SET = "pairs"
 PLAIN_NULLS, STRUCTURAL_NULLS, DOUBLES, OUTSIDE, BEGINNING = 20, 20, 24, 24, 24
 HIDDEN = ("payload", "viscous_drag", "slip_sinkage", "multipass", "soil_change")
 """Effects of load and soil that an uncertain soil hides: drawn more often than the others."""
+
+FORMS: dict[str, list[Form]] = {
+    name: [form for form in forms if (name, form.variant) != ("soil_change", "onset")]
+    for name, forms in LIBRARY_FORMS.items()
+}
+"""Forms of each effect; not the soil that changes in the second of several drives."""
 
 OF_HIDDEN, OF_OTHERS, SINGLES = 6, 2, 96
 """Singles of each hidden effect, at least of each other one, and in all."""
@@ -59,11 +65,11 @@ Draft = tuple[str, tuple[Form, ...], float | None]
 
 
 def _singles(rng: np.random.Generator) -> list[Draft]:
-    others = [name for name in LIBRARY_FORMS if name not in HIDDEN]
+    others = [name for name in FORMS if name not in HIDDEN]
     further = rng.choice(others, SINGLES - OF_HIDDEN * len(HIDDEN) - OF_OTHERS * len(others), replace=False)
-    counts = {name: OF_HIDDEN if name in HIDDEN else OF_OTHERS for name in LIBRARY_FORMS}
+    counts = {name: OF_HIDDEN if name in HIDDEN else OF_OTHERS for name in FORMS}
     drafts: list[Draft] = []
-    for name, forms in LIBRARY_FORMS.items():
+    for name, forms in FORMS.items():
         order = rng.permutation(len(forms))
         count = counts[name] + int(name in further)
         drafts += [("single", (forms[order[k % len(forms)]],), None) for k in range(count)]
@@ -77,7 +83,7 @@ def _doubles(rng: np.random.Generator) -> list[Draft]:
 
 
 def _form(rng: np.random.Generator, name: str) -> Form:
-    return LIBRARY_FORMS[name][int(rng.integers(len(LIBRARY_FORMS[name])))]
+    return FORMS[name][int(rng.integers(len(FORMS[name])))]
 
 
 def _beginning(rng: np.random.Generator) -> list[Draft]:
@@ -113,7 +119,7 @@ def plan(seed: int, robot: str = "ddagr") -> list[Pair]:
     """
     scaled, name = simulated_robot(robot), _set_of(robot)
     rng = stream(seed, name, "labels")
-    drafts, structures, pairs = _drafts(rng), list(STRUCTURES)[1:], []
+    drafts, structures, pairs = _drafts(rng), list(ALL_STRUCTURES)[1:], []
     for number, k in enumerate(rng.permutation(len(drafts)), start=1):
         kind, forms, begins = drafts[k]
         effects = tuple(

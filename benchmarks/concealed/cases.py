@@ -15,6 +15,7 @@ from .plant import Body, Plant, nominal_plant
 from .sensors import SensorNoise
 from .soil import ELASTOPLASTIC, HUMP, SATURATING, TWO_STAGE, Soil
 from .streams import stream
+from .terrain_memory import HEIGHT_GRID
 
 SETS = ("development", "sealed")
 PLAIN_NULLS, STRUCTURAL_NULLS, SINGLES_PER_EFFECT, DOUBLES = 20, 20, 2, 10
@@ -43,6 +44,14 @@ STRUCTURES: dict[str, dict[str, dict[str, Any]]] = {
     },
 }
 """Structural changes of the simulator by name: fields of soil, ground, body and noise."""
+
+LATER_STRUCTURES: dict[str, dict[str, dict[str, Any]]] = {
+    "ruts that stay": {"ground": {"rut_mode": HEIGHT_GRID, "rebound": 0.2}},
+}
+"""Structural changes that came after the first sets, whose draws must stay as they are."""
+
+ALL_STRUCTURES = STRUCTURES | LATER_STRUCTURES
+"""Whatever a case may have."""
 
 
 @dataclass(frozen=True)
@@ -166,7 +175,7 @@ def _field_soil(rng: np.random.Generator, changes: dict[str, Any]) -> Soil:
 def field_plant(case: Case, seed: int) -> Plant:
     """The robot on the case's own field, without its effects."""
     rng = stream(seed, case.set_name, case.number, "soil")
-    changes = STRUCTURES[case.structure]
+    changes = ALL_STRUCTURES[case.structure]
     soil = _field_soil(rng, changes.get("soil", {}))
     spread = rng.uniform(0.02, 0.04, 2)
     length = rng.uniform(0.8, 3.0, 2)
@@ -190,4 +199,4 @@ def field_noise(case: Case, seed: int) -> SensorNoise:
         accelerometer_offset=tuple(0.006 * rng.standard_normal(2)),
         gyro_offset=1.5e-4 * rng.standard_normal(),
     )
-    return replace(noise, **STRUCTURES[case.structure].get("noise", {}))
+    return replace(noise, **ALL_STRUCTURES[case.structure].get("noise", {}))

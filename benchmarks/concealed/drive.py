@@ -18,6 +18,7 @@ from .ground import RUT_CELLS, gradient, local_factors, relief, rut_share
 from .jit import kernel
 from .mechanics import add_derivative, local_soil, passive_pressure, solve_in_place, wheel_loads, wheel_wrench
 from .plant import GRAVITY, Plant, settled
+from .terrain_memory import FLOOR, HEIGHT_GRID, WALL_LEFT, WALL_RIGHT, new_grid, press
 from .wheel import NODES, PROFILE_FIELDS, lay_profile, travel_direction, wheel_slip
 
 SAMPLE_PERIOD = 0.02
@@ -52,11 +53,13 @@ class State(NamedTuple):
     specific: np.ndarray  # lagged specific force (2,)
     sinkage: np.ndarray  # (4,)
     heights: np.ndarray  # of the wheels' lowest points (4,)
+    surface: np.ndarray  # of the ground that they climb (4,)
     slips: np.ndarray  # (4,)
     digging: np.ndarray  # (2, 4): soil dug out, berm
-    factors: np.ndarray  # (4, 3): strength, stiffness, relief under each wheel
+    factors: np.ndarray  # (4, 6): strength, stiffness, relief under each wheel, floor and walls of its rut
     memory: np.ndarray  # of the external forces
     ruts: np.ndarray  # time of the first pass per cell
+    grid: np.ndarray  # of depths that wheels left
     mean: np.ndarray  # sums over the sample of specific force (2), yaw rate, yaw acceleration
 
 
@@ -81,6 +84,8 @@ def _new_state(plant, start):  # type: ignore[no-untyped-def]
     pose[0] += body.mass_x * math.cos(pose[2]) - body.mass_y * math.sin(pose[2])
     pose[1] += body.mass_x * math.sin(pose[2]) + body.mass_y * math.cos(pose[2])
     ruts = np.full((RUT_CELLS, RUT_CELLS) if plant.ground.rut_mode == 2 else (1, 1), np.inf)
+    factors = np.ones((4, 6))
+    factors[:, FLOOR:] = 0.0
     memory = start_memory(plant.externals, start[0], start[1], start[2])
     return State(
         pose,
@@ -91,10 +96,12 @@ def _new_state(plant, start):  # type: ignore[no-untyped-def]
         np.full(4, 0.008),
         np.zeros(4),
         np.zeros(4),
+        np.zeros(4),
         np.zeros((2, 4)),
-        np.ones((4, 3)),
+        factors,
         memory,
         ruts,
+        new_grid(plant.ground.rut_mode == HEIGHT_GRID),
         np.zeros(4),
     )
 
@@ -135,6 +142,14 @@ def _packing(ground, body, state, wheel, x, y, time):  # type: ignore[no-untyped
 
 
 @kernel
+def _pressed(ground, exponent, state, wheel, x, y, time):  # type: ignore[no-untyped-def]
+    """Press one wheel into the grid; relative stiffening of the soil under it."""
+    travel = math.hypot(state.velocity[0], state.velocity[1]) * SAMPLE_PERIOD
+    under, sinkage, yaw = state.factors[wheel], state.sinkage[wheel], state.pose[2]
+    return press(state.grid, ground.rebound, exponent, under, sinkage, x, y, yaw, travel, time)
+
+
+@kernel
 def read_ground(plant, state, arm, time):  # type: ignore[no-untyped-def]
     """Soil factors and relief under each wheel, once per sample."""
     ground = plant.ground
@@ -144,10 +159,13 @@ def read_ground(plant, state, arm, time):  # type: ignore[no-untyped-def]
         x = state.pose[0] + cosine * arm[0] - sine * arm[1]
         y = state.pose[1] + sine * arm[0] + cosine * arm[1]
         strength, stiffness = local_factors(ground, i, x, y, time)
-        packed = _packing(ground, plant.body, state, i, x, y, time)
+        if ground.rut_mode == HEIGHT_GRID:
+            packed = _pressed(ground, plant.soil.exponent, state, i, x, y, time)
+        else:
+            packed = _packing(ground, plant.body, state, i, x, y, time)
         state.factors[i, 0] = strength * (1.0 + PACKED_STRENGTH * packed)
         state.factors[i, 1] = stiffness * (1.0 + packed)
-        state.factors[i, 2] = relief(ground, x, y)
+        state.factors[i, 2] = relief(ground, x, y) - state.factors[i, FLOOR]
 
 
 @kernel
@@ -189,6 +207,9 @@ def wheel_step(plant, state, work, wheel, aging, dt):  # type: ignore[no-untyped
     mode[0], mode[1], mode[2], mode[3] = direction, radius, wheels.toe[wheel], wheels.free[wheel]
     contact = 2.0 * math.sqrt(2.0 * radius * state.sinkage[wheel])
     mode[4] = side * passive_pressure(soil, state.sinkage[wheel], contact) if side > 0.0 else 0.0
+    if ground.rut_mode == HEIGHT_GRID:
+        wall = state.factors[wheel, WALL_LEFT if motion[1] > 0.0 else WALL_RIGHT]
+        mode[4] += passive_pressure(soil, wall, contact)
     mode[5] = 1.0 - ground.furrow * math.cos(2.0 * (state.pose[2] - ground.furrow_angle))
     wheel_wrench(soil, work.profile, mode, motion, work.base)
     add_derivative(soil, work.profile, mode, motion, work.base, arm, bank, work.shifted, work.system)
@@ -201,6 +222,8 @@ def wheel_step(plant, state, work, wheel, aging, dt):  # type: ignore[no-untyped
     limit = 0.98 * wheels.minor_radius
     state.sinkage[wheel] = min(max(state.sinkage[wheel] + dt * sinking, 1e-4), limit)
     state.heights[wheel] = state.factors[wheel, 2] - state.sinkage[wheel]
+    kept = ground.rut_mode == HEIGHT_GRID
+    state.surface[wheel] = state.factors[wheel, 2] + state.factors[wheel, FLOOR] if kept else state.heights[wheel]
 
 
 @kernel
@@ -232,21 +255,27 @@ def motor_step(motors, drives, bank, command, omega, power, time, dt):  # type: 
 
 
 @kernel
+def _gravity(plant, state, h):  # type: ignore[no-untyped-def]
+    """Gravity in the plane of four heights ``h`` on the field's slope, body frame (x, y) [m/s^2]."""
+    body = plant.body
+    g_x, g_y = gradient(plant.ground, state.pose[0], state.pose[1])
+    cosine, sine = math.cos(state.pose[2]), math.sin(state.pose[2])
+    climb = cosine * g_x + sine * g_y + (h[0] + h[1] - h[2] - h[3]) / (4.0 * body.half_wheelbase)
+    bank_up = -sine * g_x + cosine * g_y + (h[1] + h[3] - h[0] - h[2]) / (4.0 * body.half_track)
+    level = math.sqrt(1.0 + climb * climb + bank_up * bank_up)
+    return -GRAVITY * climb / level, -GRAVITY * bank_up / level
+
+
+@kernel
 def _solve_step(plant, state, work, command, time, dt):  # type: ignore[no-untyped-def]
-    """Add motors and gravity, solve for the change of velocity; return the body-frame gravity (x, y)."""
+    """Add motors and gravity, solve for the change of velocity; return the gravity that the IMU sees (x, y)."""
     body, rate, system, velocity = plant.body, work.rate, work.system, state.velocity
     power = abs(state.drives[0, 4] * velocity[3]) + abs(state.drives[1, 4] * velocity[4])
     for bank in range(2):
         torque, slope = motor_step(plant.motors, state.drives, bank, command[bank], velocity[3 + bank], power, time, dt)
         rate[3 + bank] += torque
         system[3 + bank, 3 + bank] += slope
-    g_x, g_y = gradient(plant.ground, state.pose[0], state.pose[1])
-    cosine, sine = math.cos(state.pose[2]), math.sin(state.pose[2])
-    h = state.heights
-    climb = cosine * g_x + sine * g_y + (h[0] + h[1] - h[2] - h[3]) / (4.0 * body.half_wheelbase)
-    bank_up = -sine * g_x + cosine * g_y + (h[1] + h[3] - h[0] - h[2]) / (4.0 * body.half_track)
-    level = math.sqrt(1.0 + climb * climb + bank_up * bank_up)
-    gravity_x, gravity_y = -GRAVITY * climb / level, -GRAVITY * bank_up / level
+    gravity_x, gravity_y = _gravity(plant, state, state.surface)
     inertias = (body.mass, body.mass, body.inertia, plant.motors.inertia, plant.motors.inertia)
     for i in range(5):
         rate[i] *= dt / inertias[i]
@@ -256,7 +285,7 @@ def _solve_step(plant, state, work, command, time, dt):  # type: ignore[no-untyp
     rate[0] += dt * (velocity[2] * velocity[1] + gravity_x)
     rate[1] += dt * (-velocity[2] * velocity[0] + gravity_y)
     solve_in_place(system, rate)
-    return gravity_x, gravity_y
+    return _gravity(plant, state, state.heights)
 
 
 @kernel

@@ -54,12 +54,13 @@ class Ground(NamedTuple):
     aging: float = 0.0  # gain of ln strength after long rest [-]
     furrow: float = 0.0  # relative growth of lateral force across the furrows [-]
     furrow_angle: float = 0.0  # of the furrows [rad]
-    rut_mode: int = 0  # 0 none, 1 by alignment of the wheels, 2 by a map of earlier passes
-    rut_gain: float = 0.0  # stiffening by one pass [-]
+    rut_mode: int = 0  # 0 none, 1 by alignment of the wheels, 2 by a map of earlier passes, 3 by a grid of depths
+    rut_gain: float = 0.0  # stiffening by one pass, modes 1 and 2 [-]
     sinkage_mode: int = 0  # slip sinkage: 0 none, 1 immediate, 2 by soil dug out
     sinkage_gain: float = 0.0  # [-]
     bulldozing_mode: int = 0  # 0 none, 1 immediate, 2 growing with the berm
     bulldozing_gain: float = 0.0  # multiple of the passive earth pressure [-]
+    rebound: float = 0.2  # share of a rut's depth that springs back, mode 3 [-]
 
 
 @kernel

@@ -13,7 +13,10 @@ from typing import Any
 from numba import njit
 
 FOLDER = Path(__file__).resolve().parent
-KERNEL_FILES = ("jit.py", "soil.py", "wheel.py", "externals.py", "ground.py", "plant.py", "mechanics.py", "drive.py")
+KERNEL_FILES = (
+    "jit.py", "soil.py", "wheel.py", "externals.py", "ground.py", "plant.py", "mechanics.py", "drive.py",
+    "terrain_memory.py",
+)  # fmt: skip
 
 
 def source_digest(names: tuple[str, ...] = KERNEL_FILES) -> str:

@@ -16,10 +16,12 @@ from benchmarks.changed_pairs.figure import draw
 from benchmarks.changed_pairs.plan import BEGINNING, HIDDEN, SINGLES, SWITCHED, plan
 from benchmarks.changed_pairs.robots import ROBOTS, simulated_robot
 from benchmarks.changed_pairs.score import score, sure_and_wrong
+from benchmarks.concealed.cases import ALL_STRUCTURES
 from benchmarks.concealed.catalogue import LIBRARY_FORMS, least_size
-from benchmarks.concealed.change import Site
-from benchmarks.concealed.drive import SAMPLE_PERIOD
+from benchmarks.concealed.change import Site, with_ground
+from benchmarks.concealed.drive import SAMPLE_PERIOD, SUBSTEPS, drive
 from benchmarks.concealed.plant import nominal_plant
+from benchmarks.mid_drive_drives import driven, with_state_of
 from ddagr_gym.errors import InputError
 from ddagr_gym.physics.effects.registry import effect_kinds
 from ddagr_gym.presets import get_robot
@@ -72,13 +74,31 @@ def test_drives_of_a_pair_are_on_one_field_and_show_what_changed_from_its_time_o
     assert [len(log["t"]) for log in before] == [3000] * 3
     assert told["kind"] == "beginning"
     bare = simulate(replace(pair, case=replace(pair.case, effects=()), begins=None), 3)[1]
-    late = after["t"] >= pair.begins
+    late = np.arange(len(after["t"])) >= round(pair.begins / SAMPLE_PERIOD)
     gap = after["imu_gz"] - bare["imu_gz"]
     np.testing.assert_array_equal(gap[~late], 0.0)
     bias = told["effects"][0]["parameters"]["bias"]
     assert np.mean(gap[late]) == pytest.approx(bias, rel=0.2)
     distance = np.hypot(np.nanmean(after["x"]) - np.nanmean(before[0]["x"]), np.nanmean(after["y"]))
     assert distance > 5.0
+
+
+def test_ruts_that_are_there_after_leave_the_state_of_the_robot_before_as_it_is():
+    bare = nominal_plant()
+    full = with_ground(bare, rut_mode=2, rut_gain=1.0)
+    quiet = with_state_of(full, bare)
+    commands, start = np.full((100 * SUBSTEPS, 2), 2.0), np.zeros(3)
+    before, after = driven(quiet, full, 100, commands, start), drive(bare, commands, start)
+    for name in ("x", "sinkage_3", "torque_left"):
+        np.testing.assert_allclose(before[name], after[name], rtol=1e-9, atol=1e-12)
+    changed = driven(quiet, full, 0, np.full((300 * SUBSTEPS, 2), 2.0), start)
+    assert changed["sinkage_3"][-1] < 0.6 * changed["sinkage_1"][-1]
+
+
+def test_nothing_that_changes_in_a_second_drive_is_drawn():
+    forms = {(form.name, form.variant) for pair in plan(3) for form, _ in pair.case.effects}
+    assert ("soil_change", "onset") not in forms
+    assert {pair.case.structure for pair in plan(3) if pair.kind == "structural null"} == set(ALL_STRUCTURES) - {""}
 
 
 @pytest.mark.parametrize(("robot", "turning"), [("ddagr", 0.17), ("warthog", 0.14), ("husky", 0.14)])

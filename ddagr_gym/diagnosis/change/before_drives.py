@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.diagnosis.change.drive_fit import change_problem, change_windows, fit_nominal
+from ddagr_gym.diagnosis.change.drive_fit import change_problem, change_windows, fit_nominal, misfit_of_compared
 from ddagr_gym.diagnosis.change.measured_scatter import measured_scatter
 from ddagr_gym.diagnosis.change.ordinary import (
     LEAST_ACCELEROMETER_BIAS,
@@ -33,7 +33,8 @@ from ddagr_gym.identification.gauss_newton import Fitted
 from ddagr_gym.identification.parameters import ModelParameter, robot_parameters
 from ddagr_gym.identification.problem import Problem
 from ddagr_gym.identification.recording_noise import recording_noise
-from ddagr_gym.identification.residual_weights import UNKNOWN_GYRO_BIAS, Weights, misfit_weights, noise_weights
+from ddagr_gym.identification.relative_readings import usual_turning
+from ddagr_gym.identification.residual_weights import UNKNOWN_GYRO_BIAS, Weights, noise_weights
 from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.recordings.schema import Recording
@@ -159,6 +160,7 @@ def joint_fit(
         window, HISTORY, lateness, 1.0, np.ones(8), np.ones(8), UNKNOWN_GYRO_BIAS, UNKNOWN_ACCELEROMETER_BIAS
     )
     windows = change_windows(mended.recordings, robot, blank)
+    blank = replace(blank, turning=usual_turning(windows))
     parameters = uncertain_parameters(soil, robot_parameters(robot), None, blank, len(noise))
     of_noise = noise_weights(noise, windows, imposed=False, dead=(), unfitted=())
 
@@ -167,10 +169,10 @@ def joint_fit(
         return change_problem(robot, soil, windows, parameters, weighing, threads)
 
     first = problem_of(of_noise)
-    problem = problem_of(misfit_weights(windows, first.predict(first.start()), of_noise))
+    problem = problem_of(misfit_of_compared(first.blocked, first.predict(first.start()), of_noise))
     fitted = fit_nominal(problem)
     values = {p.name: float(value) for p, value in zip(parameters, fitted.point.values, strict=True)}
-    left = misfit_weights(windows, fitted.prediction, of_noise)
+    left = misfit_of_compared(problem.blocked, fitted.prediction, of_noise)
     return JointFit(*with_values(robot, soil, values), _weighing(blank, left, _biases(fitted, len(noise))))
 
 
