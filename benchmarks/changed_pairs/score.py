@@ -114,11 +114,24 @@ def score(labels: Mapping[str, Any], answers: Mapping[str, Any]) -> dict[str, An
         "sure_and_wrong": over(cases, sure_and_wrong),
         "flagged_outside": over(of("outside"), lambda _, a: a["verdict"] != ["none"]),
         "set_size": mean([float(len(f["equivalence_set"])) for _, _, a in cases for f in a["findings"]]),
+        "least_detectable": _least_detectable(cases),
         "seconds": median([float(answer["seconds"]) for _, _, answer in cases]),
         "by_effect": _by_effect(of(*CHANGED)),
         "failures": [_failure(case, case[0] in seen) for case in cases if not right(case[1], case[2])],
         "interval_misses": misses([*of("single"), *of("double")]),
     }
+
+
+def _least_detectable(cases: Sequence[Case]) -> dict[str, Any]:
+    """Least change of each hidden effect that would be found, by field: median where nothing was named."""
+    quiet = [answer["detectable"] for _, _, answer in cases if not answer["findings"]]
+    found: dict[str, list[float]] = {}
+    for limits in quiet:
+        for name in HIDDEN:
+            for field, least in limits.get(name, {}).items():
+                if least is not None:
+                    found.setdefault(f"{name}.{field}", []).append(float(least))
+    return {name: median(values) for name, values in sorted(found.items())}
 
 
 def _by_effect(cases: Sequence[Case]) -> dict[str, Any]:
