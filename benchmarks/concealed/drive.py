@@ -14,10 +14,18 @@ from typing import NamedTuple
 import numpy as np
 
 from .externals import external_wrench, start_memory
-from .ground import RUT_CELLS, gradient, local_factors, relief, rut_share
+from .ground import RUT_CELLS, local_factors, relief, rut_share
 from .jit import kernel
-from .mechanics import add_derivative, local_soil, passive_pressure, solve_in_place, wheel_loads, wheel_wrench
-from .plant import GRAVITY, Plant, settled
+from .mechanics import (
+    add_derivative,
+    gravity_in_plane,
+    local_soil,
+    passive_pressure,
+    solve_in_place,
+    wheel_loads,
+    wheel_wrench,
+)
+from .plant import Plant, settled
 from .terrain_memory import FLOOR, HEIGHT_GRID, WALL_LEFT, WALL_RIGHT, new_grid, press
 from .wheel import NODES, PROFILE_FIELDS, lay_profile, travel_direction, wheel_slip
 
@@ -255,18 +263,6 @@ def motor_step(motors, drives, bank, command, omega, power, time, dt):  # type: 
 
 
 @kernel
-def _gravity(plant, state, h):  # type: ignore[no-untyped-def]
-    """Gravity in the plane of four heights ``h`` on the field's slope, body frame (x, y) [m/s^2]."""
-    body = plant.body
-    g_x, g_y = gradient(plant.ground, state.pose[0], state.pose[1])
-    cosine, sine = math.cos(state.pose[2]), math.sin(state.pose[2])
-    climb = cosine * g_x + sine * g_y + (h[0] + h[1] - h[2] - h[3]) / (4.0 * body.half_wheelbase)
-    bank_up = -sine * g_x + cosine * g_y + (h[1] + h[3] - h[0] - h[2]) / (4.0 * body.half_track)
-    level = math.sqrt(1.0 + climb * climb + bank_up * bank_up)
-    return -GRAVITY * climb / level, -GRAVITY * bank_up / level
-
-
-@kernel
 def _solve_step(plant, state, work, command, time, dt):  # type: ignore[no-untyped-def]
     """Add motors and gravity, solve for the change of velocity; return the gravity that the IMU sees (x, y)."""
     body, rate, system, velocity = plant.body, work.rate, work.system, state.velocity
@@ -275,7 +271,7 @@ def _solve_step(plant, state, work, command, time, dt):  # type: ignore[no-untyp
         torque, slope = motor_step(plant.motors, state.drives, bank, command[bank], velocity[3 + bank], power, time, dt)
         rate[3 + bank] += torque
         system[3 + bank, 3 + bank] += slope
-    gravity_x, gravity_y = _gravity(plant, state, state.surface)
+    gravity_x, gravity_y = gravity_in_plane(plant, state, state.surface)
     inertias = (body.mass, body.mass, body.inertia, plant.motors.inertia, plant.motors.inertia)
     for i in range(5):
         rate[i] *= dt / inertias[i]
@@ -285,7 +281,7 @@ def _solve_step(plant, state, work, command, time, dt):  # type: ignore[no-untyp
     rate[0] += dt * (velocity[2] * velocity[1] + gravity_x)
     rate[1] += dt * (-velocity[2] * velocity[0] + gravity_y)
     solve_in_place(system, rate)
-    return _gravity(plant, state, state.heights)
+    return gravity_in_plane(plant, state, state.heights)
 
 
 @kernel

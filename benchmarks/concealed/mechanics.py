@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from .ground import gradient
 from .jit import kernel
 from .plant import GRAVITY
 from .soil import Soil
@@ -119,6 +120,18 @@ def wheel_loads(body, wheels, specific, heights, angles, loads):  # type: ignore
         load = 0.25 * weight * share - body.mass * body.mass_height * (pitch + roll)
         load -= front * left * body.torsion * twist
         loads[i] = max(load * (1.0 + wheels.bounce[i] * math.cos(angles[i % 2])), 0.0)
+
+
+@kernel
+def gravity_in_plane(plant, state, h):  # type: ignore[no-untyped-def]
+    """Gravity in the plane of four heights ``h`` on the field's slope, body frame (x, y) [m/s^2]."""
+    body = plant.body
+    g_x, g_y = gradient(plant.ground, state.pose[0], state.pose[1])
+    cosine, sine = math.cos(state.pose[2]), math.sin(state.pose[2])
+    climb = cosine * g_x + sine * g_y + (h[0] + h[1] - h[2] - h[3]) / (4.0 * body.half_wheelbase)
+    bank_up = -sine * g_x + cosine * g_y + (h[1] + h[3] - h[0] - h[2]) / (4.0 * body.half_track)
+    level = math.sqrt(1.0 + climb * climb + bank_up * bank_up)
+    return -GRAVITY * climb / level, -GRAVITY * bank_up / level
 
 
 @kernel
