@@ -36,7 +36,7 @@ from ddagr_gym.tasks.engine import ThisProcess
 from ddagr_gym.tasks.task import Failure, Outcome
 
 RESULT = Path(__file__).resolve().parent / "results" / "task_runner.json"
-LENGTHS = {0.05: 100, 1.0: 8}
+LENGTHS = {0.05: 100, 1.0: 8, 30.0: 1}
 """Tasks for each worker, by their length [s]."""
 LOST = 0.01
 
@@ -163,7 +163,7 @@ def main(words: Sequence[str] | None = None) -> int:
     """Command line; returns the exit code."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--engines", nargs="+", choices=("local", "ray"), default=None)
-    parser.add_argument("--workers", nargs="+", type=int, default=[1, 2])
+    parser.add_argument("--workers", nargs="+", type=int, default=[1, 2, 4])
     parser.add_argument("--lost", type=int, default=1_000_000, help="tasks of the simulation with losses")
     parser.add_argument("--output", type=Path, default=RESULT)
     options = parser.parse_args(words)

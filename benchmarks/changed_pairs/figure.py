@@ -48,7 +48,7 @@ def draw(figures: Mapping[str, Any], path: Path) -> None:
         right.set(xscale="log", xlim=(0.8 * LEAST, 1.25 * MOST), ylim=(-0.7, max(len(effects), 1) - 0.3))
         right.set_yticks(range(len(effects)), [title(name) for name in effects], fontsize=8)
         right.set_xlabel("size over what can be told (line: 1; no size, or another one: right edge)")
-        right.set_title("green: right name; blue: in the set; orange: another name; grey: none or unknown", fontsize=9)
+        right.set_title("green: right; blue: in the set; orange: another; grey: none, unknown", fontsize=9)
         write_atomically(path, lambda to: figure.savefig(to, format="png", dpi=110))
 
 

@@ -125,7 +125,7 @@ def robot_of_before(
         parameters,
         {GROUND: SAME_GROUND},
         joint.weighing,
-        tuple(found[0] for found in scanned),
+        tuple(as_left_out(found[0], len(recordings)) for found in scanned),
         digest=hashlib.sha256("".join(content_hash(item) for item in recordings).encode()).hexdigest(),
         pieces=tuple(piece for found in scanned for piece in found[1:]),
         known_scatter=scatter.same_ground,
@@ -133,6 +133,17 @@ def robot_of_before(
         unnamed=dict.fromkeys(SOIL_EFFECTS, OF_ANOTHER_GROUND),
         given=True,
     )
+
+
+def as_left_out(reference: Reference, drives: int) -> Reference:
+    """A drive whose parameters moved as far as from a fit to the other drives alone: the common fit has its share.
+
+    Args:
+        reference: the drive beside the common fit.
+        drives: number of them in that fit.
+    """
+    share = drives / max(drives - 1.0, 1.0)
+    return replace(reference, moved={name: share * moved for name, moved in reference.moved.items()})
 
 
 def day_parameters(robot: Robot) -> tuple[ModelParameter, ...]:

@@ -56,7 +56,7 @@ def conclude_change(
     turned = mended.reversed_gyro is not None and not _usually_reversed(ordinary)
     seen = tuple(reversed_gyro_findings(mended.reversed_gyro)) if turned else ()
     findings = (*seen, *(_finding(named, k) for k in range(len(named.steps))))
-    complete = not (named.models[-1].conspicuous or named.models[-1].pulled)
+    complete = named.complete
     verdict = tuple(item.name for item in findings) or ((NONE,) if complete else (UNKNOWN,))
     change = _change(problem, ordinary, ground, named, certified)
     diagnosis = Diagnosis(

@@ -102,7 +102,7 @@ def model_of(problem: Problem, fitted: Fitted, ordinary: Comparison, named: Sequ
     found = [shift_of(item, scores, ordinary, beside, in_ordinary) for item in compared]
     shifts = sorted((item for item in found if item is not None), key=lambda item: (item.probability, -item.distance))
     pulls = tuple(
-        Pull(name, moved / ordinary.usual_move(name), ordinary.degrees)
+        Pull(name, moved / ordinary.usual_move(name), ordinary.move_degrees)
         for name, moved in moved_parameters(problem, fitted).items()
     )
     return Model(problem, fitted, scan, tuple(shifts), pulls, tuple(named))

@@ -17,7 +17,7 @@ from ddagr_gym.diagnosis.change.drive_fit import fit_nominal
 from ddagr_gym.diagnosis.change.drive_scan import NAMED
 from ddagr_gym.diagnosis.change.model import Model, model_of
 from ddagr_gym.diagnosis.change.ordinary import Comparison
-from ddagr_gym.diagnosis.change.refits import Refit, joint_refits
+from ddagr_gym.diagnosis.change.refits import MOST_RIVALS, Refit, joint_refits
 from ddagr_gym.diagnosis.change.shifts import LEVEL, Shift, refitted_shift
 from ddagr_gym.diagnosis.result.equivalence import equivalence_weights
 from ddagr_gym.diagnosis.search.scanned_model import Rival
@@ -67,10 +67,18 @@ class Named:
     Attributes:
         models: from the one without effects to the last.
         steps: that led from each to the next.
+        absent: limits and signs that stood out in a first step, and of which a refit found nothing.
     """
 
     models: tuple[Model, ...]
     steps: tuple[Step, ...]
+    absent: frozenset[str] = frozenset()
+
+    @property
+    def complete(self) -> bool:
+        """Whether nothing else is out of the ordinary."""
+        last = self.models[-1]
+        return not (last.pulled or any(shift.compared.name not in self.absent for shift in last.conspicuous))
 
 
 def name_changes(
@@ -97,7 +105,15 @@ def name_changes(
             break
         models.append(found[0])
         steps.append(found[1])
+    if not steps:
+        return Named(tuple(models), (), _absent(models[0]))
     return _without_idle(Named(tuple(models), tuple(steps)), ordinary, progress)
+
+
+def _absent(model: Model) -> frozenset[str]:
+    """What is there or not and stood out, where no refit found it: its first step is that of a probe, not of a size."""
+    refitted = model.conspicuous if len(model.conspicuous) <= MOST_RIVALS else ()
+    return frozenset(shift.compared.name for shift in refitted if not shift.compared.candidate.has_sizes)
 
 
 def _without_idle(named: Named, ordinary: Comparison, progress: Callable[[str], None]) -> Named:

@@ -182,11 +182,16 @@ class Comparison:
         """Of freedom of the scatter between drives."""
         return self.expected.degrees + len(self.drives) - 1.0
 
+    @property
+    def move_degrees(self) -> float:
+        """Of freedom of the parameters' moves: simulated pairs do not show how far structure moves them."""
+        return EXPECTED_DRIVES + len(self.drives) - 1.0
+
     def usual_move(self, parameter: str) -> float:
         """Prior deviations by which ordinary drives move a parameter (r.m.s., drawn towards 1), at least 1."""
         known = [item[parameter] for item in self.moved if parameter in item]
-        square = self.expected.degrees + sum(value**2 for value in known)
-        return max(1.0, float(np.sqrt(square / (self.expected.degrees + len(known)))))
+        square = EXPECTED_DRIVES + sum(value**2 for value in known)
+        return max(1.0, float(np.sqrt(square / (EXPECTED_DRIVES + len(known)))))
 
 
 @dataclass(frozen=True, eq=False)

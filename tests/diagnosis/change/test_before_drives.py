@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 import ddagr_gym
-from ddagr_gym.diagnosis.change.before_drives import DAY, SOIL_EFFECTS, day_parameters, robot_of_before
+from ddagr_gym.diagnosis.change.before_drives import DAY, SOIL_EFFECTS, as_left_out, day_parameters, robot_of_before
 from ddagr_gym.diagnosis.change.measured_scatter import measured_scatter
+from ddagr_gym.diagnosis.change.ordinary import Reference
 from ddagr_gym.diagnosis.change.run import what_changed_since
 from ddagr_gym.diagnosis.result.files import as_mapping, validate
 from ddagr_gym.errors import InputError
@@ -39,6 +40,12 @@ def since(after, before, same_ground=True):
 @pytest.fixture(scope="module")
 def before():
     return drive(1)
+
+
+def test_a_drive_of_a_common_fit_counts_as_if_it_had_been_left_out():
+    own = Reference("one", "same", False, None, None, moved={"soil_strength": 1.2})
+    assert as_left_out(own, 3).moved == {"soil_strength": pytest.approx(1.8)}
+    assert as_left_out(own, 1).moved == {"soil_strength": 1.2}
 
 
 @pytest.mark.slow

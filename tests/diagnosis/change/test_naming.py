@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from ddagr_gym.diagnosis.change.naming import _explaining, _first, _soil_alone
+from ddagr_gym.diagnosis.change.naming import Named, _absent, _explaining, _first, _soil_alone
 
 
 def tried(name: str, gain: float, left: float, probability: float, problem: str = "same"):
@@ -54,3 +54,25 @@ def test_a_name_that_comes_first_weighs_as_much_as_the_heaviest():
     assert list(found) == ["soil_change", "gyro_scale", "slope"]
     assert found["soil_change"] == found["gyro_scale"]
     assert sum(found.values()) == pytest.approx(1.0)
+
+
+def standing_out(*candidates: tuple[str, bool], pulled=()):
+    """A model beside which effects stand out, each with whether it has sizes."""
+    found = [
+        SimpleNamespace(compared=SimpleNamespace(name=n, candidate=SimpleNamespace(has_sizes=h))) for n, h in candidates
+    ]
+    return SimpleNamespace(conspicuous=tuple(found), pulled=pulled)
+
+
+def test_a_limit_that_stands_out_and_that_no_refit_finds_is_no_alarm_and_a_size_is_one():
+    limit, size = standing_out(("motor_saturation", False)), standing_out(("gyro_bias", True))
+    assert Named((limit,), (), _absent(limit)).complete
+    assert not Named((limit,), ()).complete
+    assert not Named((size,), (), _absent(size)).complete
+    pulled = standing_out(("motor_saturation", False), pulled=("soil_strength",))
+    assert not Named((pulled,), (), _absent(pulled)).complete
+
+
+def test_of_more_than_were_refitted_none_is_known_to_be_absent():
+    many = standing_out(*((f"limit_{k}", False) for k in range(5)))
+    assert _absent(many) == frozenset()
