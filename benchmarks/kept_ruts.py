@@ -20,12 +20,11 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.concealed.cases import Case, field_noise, field_plant
+from benchmarks.concealed.cases import Case, field_plant
 from benchmarks.concealed.change import with_body, with_ground
-from benchmarks.concealed.drive import SUBSTEPS, drive
 from benchmarks.concealed.manoeuvres import RUNS, programme
 from benchmarks.concealed.plant import Plant
-from benchmarks.concealed.sensors import readings, with_noise
+from benchmarks.concealed.simulate import plain_log
 from benchmarks.concealed.streams import stream
 from benchmarks.concealed.terrain_memory import HEIGHT_GRID
 from benchmarks.mid_drive_drives import as_recording
@@ -92,11 +91,8 @@ def _plant(truth: Truth, case: Case) -> Plant:
 
 
 def _log(case: Case, plant: Plant, run: str) -> dict[str, np.ndarray]:
-    commands = programme(run, case.manoeuvres)
     start = np.append(np.zeros(2), stream(SEED, SET, case.number, "start", run).uniform(-np.pi, np.pi))
-    truth = drive(plant, np.repeat(commands, SUBSTEPS, axis=0), start)
-    clean = readings(truth, plant, commands, (), stream(SEED, SET, case.number, "unused", run))
-    return with_noise(clean, truth, field_noise(case, SEED), (), True, stream(SEED, SET, case.number, "noise", run))
+    return plain_log(case, plant, programme(run, case.manoeuvres), start, run, SEED)
 
 
 def answer(truth: Truth) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from benchmarks.concealed.drive import SAMPLE_PERIOD, SETTLING, SUBSTEPS, drive
 from benchmarks.concealed.manoeuvres import PAUSE_BETWEEN_RUNS, RUNS, programme
 from benchmarks.concealed.plant import Plant
 from benchmarks.concealed.sensors import COLUMNS, SensorNoise, readings, with_noise
-from benchmarks.concealed.simulate import effect_labels, logged_commands
+from benchmarks.concealed.simulate import effect_labels, logged_commands, plain_log
 from benchmarks.concealed.streams import stream
 from benchmarks.mid_drive_drives import driven, with_state_of
 
@@ -56,13 +56,9 @@ def _plant(pair: Pair, seed: int) -> Plant:
 
 def _before(pair: Pair, seed: int, run: str) -> Log:
     """What was logged of a drive before."""
-    case, name, number = pair.case, pair.case.set_name, pair.case.number
-    plant, noise = _plant(pair, seed), field_noise(case, seed)
-    commands = programme(run, case.manoeuvres + COMMANDS)
+    commands = programme(run, pair.case.manoeuvres + COMMANDS)
     clock = RUNS.index(run) * PAUSE_BETWEEN_RUNS
-    truth = drive(plant, np.repeat(commands, SUBSTEPS, axis=0), _start(pair, seed, run, 0.0), clock)
-    clean = readings(truth, plant, logged_commands(case, commands), (), stream(seed, name, number, "unused", run))
-    return with_noise(clean, truth, noise, (), True, stream(seed, name, number, "noise", run))
+    return plain_log(pair.case, _plant(pair, seed), commands, _start(pair, seed, run, 0.0), run, seed, clock)
 
 
 def _day(pair: Pair, seed: int) -> tuple[Plant, SensorNoise]:

@@ -61,7 +61,6 @@ class State(NamedTuple):
     specific: np.ndarray  # lagged specific force (2,)
     sinkage: np.ndarray  # (4,)
     heights: np.ndarray  # of the wheels' lowest points (4,)
-    surface: np.ndarray  # of the ground that they climb (4,)
     slips: np.ndarray  # (4,)
     digging: np.ndarray  # (2, 4): soil dug out, berm
     factors: np.ndarray  # (4, 6): strength, stiffness, relief under each wheel, floor and walls of its rut
@@ -104,7 +103,6 @@ def _new_state(plant, start):  # type: ignore[no-untyped-def]
         np.full(4, 0.008),
         np.zeros(4),
         np.zeros(4),
-        np.zeros(4),
         np.zeros((2, 4)),
         factors,
         memory,
@@ -137,8 +135,12 @@ def _set_arm(body, wheel, arm):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _packing(ground, body, state, wheel, x, y, time):  # type: ignore[no-untyped-def]
+def _packing(ground, exponent, body, state, wheel, x, y, time):  # type: ignore[no-untyped-def]
     """Relative stiffening of soil that another wheel has just rolled."""
+    if ground.rut_mode == HEIGHT_GRID:
+        travel = math.hypot(state.velocity[0], state.velocity[1]) * SAMPLE_PERIOD
+        under, sinkage, yaw = state.factors[wheel], state.sinkage[wheel], state.pose[2]
+        return press(state.grid, ground.rebound, exponent, under, sinkage, x, y, yaw, travel, time)
     if ground.rut_mode == 2:
         return ground.rut_gain * rut_share(state.ruts, x, y, state.pose[2], time)
     v_x, turn = state.velocity[0], state.velocity[2]
@@ -147,14 +149,6 @@ def _packing(ground, body, state, wheel, x, y, time):  # type: ignore[no-untyped
         return 0.0
     swing = 2.0 * body.half_wheelbase * turn / (abs(v_x) + 0.02)
     return ground.rut_gain * math.exp(-((swing / 0.35) ** 2)) * min(abs(v_x) / 0.02, 1.0)
-
-
-@kernel
-def _pressed(ground, exponent, state, wheel, x, y, time):  # type: ignore[no-untyped-def]
-    """Press one wheel into the grid; relative stiffening of the soil under it."""
-    travel = math.hypot(state.velocity[0], state.velocity[1]) * SAMPLE_PERIOD
-    under, sinkage, yaw = state.factors[wheel], state.sinkage[wheel], state.pose[2]
-    return press(state.grid, ground.rebound, exponent, under, sinkage, x, y, yaw, travel, time)
 
 
 @kernel
@@ -167,13 +161,10 @@ def read_ground(plant, state, arm, time):  # type: ignore[no-untyped-def]
         x = state.pose[0] + cosine * arm[0] - sine * arm[1]
         y = state.pose[1] + sine * arm[0] + cosine * arm[1]
         strength, stiffness = local_factors(ground, i, x, y, time)
-        if ground.rut_mode == HEIGHT_GRID:
-            packed = _pressed(ground, plant.soil.exponent, state, i, x, y, time)
-        else:
-            packed = _packing(ground, plant.body, state, i, x, y, time)
+        packed = _packing(ground, plant.soil.exponent, plant.body, state, i, x, y, time)
         state.factors[i, 0] = strength * (1.0 + PACKED_STRENGTH * packed)
         state.factors[i, 1] = stiffness * (1.0 + packed)
-        state.factors[i, 2] = relief(ground, x, y) - state.factors[i, FLOOR]
+        state.factors[i, 2] = relief(ground, x, y)
 
 
 @kernel
@@ -229,9 +220,7 @@ def wheel_step(plant, state, work, wheel, aging, dt):  # type: ignore[no-untyped
     sinking = (work.loads[wheel] - support - work.base[2]) / plant.body.soil_damping
     limit = 0.98 * wheels.minor_radius
     state.sinkage[wheel] = min(max(state.sinkage[wheel] + dt * sinking, 1e-4), limit)
-    state.heights[wheel] = state.factors[wheel, 2] - state.sinkage[wheel]
-    kept = ground.rut_mode == HEIGHT_GRID
-    state.surface[wheel] = state.factors[wheel, 2] + state.factors[wheel, FLOOR] if kept else state.heights[wheel]
+    state.heights[wheel] = state.factors[wheel, 2] - state.factors[wheel, FLOOR] - state.sinkage[wheel]
 
 
 @kernel
@@ -271,7 +260,10 @@ def _solve_step(plant, state, work, command, time, dt):  # type: ignore[no-untyp
         torque, slope = motor_step(plant.motors, state.drives, bank, command[bank], velocity[3 + bank], power, time, dt)
         rate[3 + bank] += torque
         system[3 + bank, 3 + bank] += slope
-    gravity_x, gravity_y = gravity_in_plane(plant, state, state.surface)
+    seen_x, seen_y = gravity_in_plane(plant, state, state.heights)
+    gravity_x, gravity_y = seen_x, seen_y
+    if plant.ground.rut_mode == HEIGHT_GRID:  # deeper wheels tilt the robot, which does not climb by it
+        gravity_x, gravity_y = gravity_in_plane(plant, state, state.factors[:, 2])
     inertias = (body.mass, body.mass, body.inertia, plant.motors.inertia, plant.motors.inertia)
     for i in range(5):
         rate[i] *= dt / inertias[i]
@@ -281,7 +273,7 @@ def _solve_step(plant, state, work, command, time, dt):  # type: ignore[no-untyp
     rate[0] += dt * (velocity[2] * velocity[1] + gravity_x)
     rate[1] += dt * (-velocity[2] * velocity[0] + gravity_y)
     solve_in_place(system, rate)
-    return gravity_in_plane(plant, state, state.heights)
+    return seen_x, seen_y
 
 
 @kernel

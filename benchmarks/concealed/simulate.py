@@ -68,6 +68,27 @@ def _log(
     return with_noise(clean, truth, field_noise(case, seed), changes, case.receiver, noise_rng)
 
 
+def plain_log(
+    case: Case, plant: Plant, commands: np.ndarray, start: np.ndarray, run: str, seed: int, clock: float = 0.0
+) -> Log:
+    """What a robot with a receiver logs of one drive without effects.
+
+    Args:
+        case: that noise and logging are of.
+        plant: that drives.
+        commands: (samples, 2) right, left [rad/s].
+        start: x, y [m], yaw [rad].
+        run: name of the drive, by which its noise is drawn.
+        seed: of the set.
+        clock: time since the case's first drive began [s].
+    """
+    truth = drive(plant, np.repeat(commands, SUBSTEPS, axis=0), start, clock)
+    unused = stream(seed, case.set_name, case.number, "unused", run)
+    clean = readings(truth, plant, logged_commands(case, commands), (), unused)
+    noise = stream(seed, case.set_name, case.number, "noise", run)
+    return with_noise(clean, truth, field_noise(case, seed), (), True, noise)
+
+
 def _differences(with_effects: list[Log], without: list[Log]) -> dict[str, float]:
     """RMS difference per channel to the twin without effects, in units of one sample's noise; largest of the runs."""
     sizes = {}

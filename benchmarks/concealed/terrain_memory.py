@@ -9,8 +9,8 @@ Soil that has carried depth d carries a stiffer load until it is as deep again,
 under each part k of the width, with the share r of the depth that springs back: reloading by a stiffness of k r^-n,
 then the curve of untouched soil (elastic reloading after Wong, Theory of Ground Vehicles, section 2.4). A wheel that
 moves sideways presses what it meets, and is held by the wall of its rut with the passive earth pressure of the wall's
-height. What the same wheel pressed a moment ago is not yet a rut. A robot
-whose rear wheels stand in ruts is tilted, which its accelerometer sees, but does not drive uphill.
+height. What the same wheel pressed a moment ago is not yet a rut. A robot whose rear wheels stand in ruts is tilted,
+which its accelerometer sees, but does not drive uphill.
 """
 
 from __future__ import annotations
