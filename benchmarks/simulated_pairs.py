@@ -10,6 +10,9 @@ between drives on the same ground and on two grounds equation (1) of
 :mod:`ddagr_gym.diagnosis.change.measured_scatter` gives the scatter of each effect, never less than a fifth of the
 least size that matters; degrees of freedom are the most with which no more than 5 % of the pairs raise an alarm.
 
+Between drives on one ground :mod:`benchmarks.independent_pairs` counts too: the larger scatter of the two, the fewer
+degrees of freedom, and what it alone measures.
+
 Written are the differences and a picture (``benchmarks/results/simulated_pairs.json``, ``.png``) and what the package
 ships (``ddagr_gym/data/change_scatter.json``). ``--summary`` only makes the latter two of the former. A run goes on
 after the pairs that the file holds.
@@ -28,6 +31,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.independent_pairs import RESULT as INDEPENDENT
 from ddagr_gym.diagnosis.change.before_drives import DAY, SAME_GROUND, WINDOW, JointFit, day_parameters, joint_fit
 from ddagr_gym.diagnosis.change.drive_fit import change_problem, change_windows, fit_nominal
 from ddagr_gym.diagnosis.change.drive_scan import DriveScan, Priors, scan_drive
@@ -257,9 +261,29 @@ def draw(pairs: Sequence[dict[str, Any]], shipped: dict[str, Any], path: Path) -
         figure.savefig(path, dpi=110)
 
 
+def with_independent(own: dict[str, Any], other: dict[str, Any]) -> dict[str, Any]:
+    """What is shipped of drives on one ground, from pairs of both simulators.
+
+    Args:
+        own: :func:`summary` of the package's.
+        other: of :func:`benchmarks.independent_pairs.summary`.
+    """
+    names = sorted({*own["deviations"], *other["deviations"]})
+    larger = {name: max(item["deviations"].get(name, 0.0) for item in (own, other)) for name in names}
+    return {
+        **own,
+        "degrees": min(own["degrees"], other["degrees"]),
+        "deviations": larger,
+        "moves": other["moves"],
+        "rises": other["rises"],
+        "independent_false_alarms": other["false_alarms"],
+        "independent_false_alarms_crossed": other["false_alarms_crossed"],
+    }
+
+
 def write_summary(pairs: Sequence[dict[str, Any]]) -> None:
     """Write what the package ships, and the picture."""
-    shipped = {
+    shipped: dict[str, Any] = {
         "command": "python -m benchmarks.simulated_pairs",
         "robot": "ddagr",
         "soil": "thesis_a1",
@@ -267,6 +291,7 @@ def write_summary(pairs: Sequence[dict[str, Any]]) -> None:
         "pairs": len(pairs),
         **{ground: summary(pairs, ground) for ground in (SAME, OTHER)},
     }
+    shipped[SAME] = with_independent(shipped[SAME], json.loads(INDEPENDENT.read_text(encoding="utf-8")))
     write_json(PATH, shipped)
     draw(pairs, shipped, RESULT.with_suffix(".png"))
     for ground in (SAME, OTHER):

@@ -18,6 +18,7 @@ from ddagr_gym.diagnosis.result.files import as_mapping
 from ddagr_gym.errors import InputError
 from ddagr_gym.files import write_json
 from ddagr_gym.presets import get_robot, get_soil
+from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.tasks import ResultStore, Task, TaskRunner, run_tasks
 
 CHECKOUT = Path(__file__).resolve().parents[2]
@@ -28,6 +29,19 @@ KEPT = ("verdict", "complete", "findings", "sentence", "detectable", "detectable
 """Entries of an answer."""
 
 
+def recordings_of(pair: Pair, seed: int) -> tuple[list[Recording], list[Recording]]:
+    """Drives before and after.
+
+    Args:
+        pair: of a set.
+        seed: of it.
+    """
+    logs, last = simulate(pair, seed)
+    robot = get_robot(pair.robot)
+    before = [as_recording(log, robot, f"before {k}") for k, log in enumerate(logs, start=1)]
+    return before, [as_recording(last, robot, "after")]
+
+
 def answer(seed: int, pair: Pair) -> dict[str, Any]:
     """What is said of a pair, as JSON has it.
 
@@ -35,11 +49,8 @@ def answer(seed: int, pair: Pair) -> dict[str, Any]:
         seed: of the set.
         pair: of it.
     """
-    logs, last = simulate(pair, seed)
-    robot = get_robot(pair.robot)
-    before = [as_recording(log, robot, f"before {k}") for k, log in enumerate(logs, start=1)]
-    after = [as_recording(last, robot, "after")]
-    outcome, _ = what_changed_since(after, before, robot, get_soil(SOIL), same_ground=True)
+    before, after = recordings_of(pair, seed)
+    outcome, _ = what_changed_since(after, before, get_robot(pair.robot), get_soil(SOIL), same_ground=True)
     body = as_mapping(outcome.diagnosis)
     return {name: body[name] for name in KEPT if name in body}
 

@@ -10,6 +10,16 @@ from ddagr_gym.diagnosis.answer.channel_faults import CHANNEL_FAULT_TITLES
 from ddagr_gym.diagnosis.answer.drivetrain import PART_TITLES
 from ddagr_gym.physics.effects.registry import effect_kinds
 
+CHANNEL_NAMES = {
+    "specific_force_x": "specific force, forward", "specific_force_y": "specific force, to the left",
+    "yaw_rate": "yaw rate", "encoder_right": "right encoder", "encoder_left": "left encoder",
+    "pose_x": "position x", "pose_y": "position y", "pose_yaw": "heading",
+    "local_strength": "soil strength by window", "local_stiffness": "soil stiffness by window",
+    "local_split": "soil left/right by window", "local_accelerometer_x": "accelerometer x by window",
+    "local_accelerometer_y": "accelerometer y by window", "local_gyro": "gyro by window",
+}  # fmt: skip
+"""Channels, and what a window may take over of them, for people."""
+
 _UNEVEN_BANKS = 0.3
 """Share by which the banks' delays differ from their mean before both are reported (ours)."""
 

@@ -226,9 +226,17 @@ class Problem:
 
     def losses(self, residual: Array) -> Array:
         """(W,) loss of residuals (W, M + S)."""
+        return np.asarray(self._loss(residual).sum(axis=1))
+
+    def losses_by_channel(self, residual: Array) -> dict[str, float]:
+        """Loss of residuals (W, M + S) of every channel, over all windows."""
+        sums = self.blocked.by_channel(self._loss(residual)).sum(axis=(0, 1)).tolist()
+        return dict(zip(CHANNELS, sums, strict=True))
+
+    def _loss(self, residual: Array) -> Array:
+        """The same shape."""
         limits = self._limits
-        loss = 0.5 * residual**2 if limits is None else huber_loss(residual, limits)
-        return np.asarray(loss.sum(axis=1))
+        return np.asarray(0.5 * residual**2 if limits is None else huber_loss(residual, limits))
 
     @property
     def _limits(self) -> Array | None:

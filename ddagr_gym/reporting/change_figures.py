@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 from ddagr_gym.diagnosis.answer.change import BEFORE
-from ddagr_gym.diagnosis.wording import title
+from ddagr_gym.diagnosis.wording import CHANNEL_NAMES, title
 from ddagr_gym.physics.effects.registry import effect_kind
 from ddagr_gym.rendering import palette
 from ddagr_gym.reporting.calibration_figures import blank
@@ -151,4 +152,32 @@ def parameter_figure(change: Change) -> Any:
     axis.set_ylim(-0.6, len(items) - 0.4)
     axis.set_xlabel("from the calibrated value, in standard deviations of ordinary drives (band: two)")
     axis.legend(ncols=2, loc="lower left", bbox_to_anchor=(0.0, 1.0))
+    return figure
+
+
+def channel_figure(change: Change) -> Any:
+    """What the model leaves of each channel before, and after without and with what changed, with its limit."""
+    items = list(reversed(change.channels))
+    figure = blank(1.0 + 0.3 * len(items), _WIDTH)
+    axis = figure.subplots()
+    for place, item in enumerate(items):
+        rows = (
+            (item.before, "before", {"marker": "o", "ms": 7, "color": palette.GREY}),
+            (
+                item.without_effects,
+                "after, without effects",
+                {"marker": "o", "ms": 6, "color": palette.VERMILLION, "mfc": "none"},
+            ),
+            (item.with_effects, "after, with what changed", {"marker": "o", "ms": 4, "color": palette.BLUE}),
+            (item.limit, "limit", {"marker": "|", "ms": 16, "color": palette.INK}),
+        )
+        for value, name, look in rows:
+            axis.plot(math.sqrt(value), place, ls="none", label=None if place else name, **look)
+    axis.set_xscale("log")
+    for plain in (axis.xaxis.set_major_formatter, axis.xaxis.set_minor_formatter):
+        plain("{x:g}")
+    axis.set_yticks(range(len(items)), [CHANNEL_NAMES[item.channel] for item in items])
+    axis.set_ylim(-0.6, len(items) - 0.4)
+    axis.set_xlabel("residual over its usual size, r.m.s.")
+    axis.legend(ncols=4, loc="lower left", bbox_to_anchor=(0.0, 1.0))
     return figure

@@ -79,6 +79,13 @@ def _context(diagnosis: Diagnosis) -> dict[str, Any]:
         "parameter_picture": embedded(
             figures.parameter_figure(change), "Parameters of robot and ground without and with what changed"
         ),
+        "channel_picture": embedded(
+            figures.channel_figure(change), "What the model leaves of each channel, before and after"
+        )
+        if change.channels
+        else None,
+        "channel_header": text.CHANNEL_HEADER,
+        "channels": text.channel_rows(diagnosis),
         "finding_header": FINDING_HEADER,
         "findings": finding_rows(diagnosis),
         "shift_header": text.SHIFT_HEADER,

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from ddagr_gym.diagnosis.answer.amounts import number
 from ddagr_gym.diagnosis.result.sentences import certificate_in_words
-from ddagr_gym.diagnosis.wording import title
+from ddagr_gym.diagnosis.wording import CHANNEL_NAMES, title
 from ddagr_gym.reporting.diagnosis_text import FINDING_HEADER, finding_rows
 from ddagr_gym.reporting.text_table import format_table
 
@@ -19,6 +20,9 @@ SHIFT_HEADER = ("effect", "size", "before", "shift", "deviation", "unit", "dista
 
 PARAMETER_HEADER = ("parameter", "without effects", "with what changed", "ordinary drives", "unit")
 """Columns of :func:`parameter_rows`."""
+
+CHANNEL_HEADER = ("readings", "before", "without effects", "with what changed", "limit")
+"""Columns of :func:`channel_rows`; root mean squares of what the model leaves, over their usual size."""
 
 SHOWN = 8
 """Effects in the text, the most conspicuous (ours); the page has all of them."""
@@ -56,6 +60,17 @@ def parameter_rows(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
             "log of a factor" if item.unit == "-" else item.unit,
         )
         for item in _of(diagnosis).parameters
+    ]
+
+
+def channel_rows(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
+    """What is left of each channel, root mean squares under :data:`CHANNEL_HEADER`."""
+    return [
+        (
+            CHANNEL_NAMES[item.channel],
+            *(number(math.sqrt(value)) for value in (item.before, item.without_effects, item.with_effects, item.limit)),
+        )
+        for item in _of(diagnosis).channels
     ]
 
 

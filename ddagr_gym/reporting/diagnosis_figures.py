@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ddagr_gym.diagnosis.answer.certificate import Measured, ModelErrors
 from ddagr_gym.diagnosis.answer.evidence import Evidence
 from ddagr_gym.diagnosis.answer.location import EffectLocation
+from ddagr_gym.diagnosis.wording import CHANNEL_NAMES
 from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.recordings.channels import CHANNELS as SCHEMA
 from ddagr_gym.rendering import palette
@@ -22,14 +23,6 @@ Array = NDArray[np.float64]
 RAW = "#9AA1A8"
 BEFORE = palette.VERMILLION
 AFTER = palette.BLUE
-LABELS = {
-    "specific_force_x": "specific force, forward", "specific_force_y": "specific force, to the left",
-    "yaw_rate": "yaw rate", "encoder_right": "right encoder", "encoder_left": "left encoder",
-    "pose_x": "position x", "pose_y": "position y", "pose_yaw": "heading",
-    "local_strength": "soil strength by window", "local_stiffness": "soil stiffness by window",
-    "local_split": "soil left/right by window", "local_accelerometer_x": "accelerometer x by window",
-    "local_accelerometer_y": "accelerometer y by window", "local_gyro": "gyro by window",
-}  # fmt: skip
 CONDITION_LABELS = {
     "speed": "speed [m/s]", "slip": "slip [-]", "turning": "size of the yaw rate [rad/s]",
     "yaw_rate": "yaw rate [rad/s]", "heading": "heading [degrees]", "command": "larger command [rad/s]",
@@ -133,7 +126,7 @@ def channel_figure(evidence: Evidence, channel: str, rows: NDArray[np.int64]) ->
     reach = max(abs(limit) for limit in (*lower.get_ylim(), 3.0))
     lower.set_ylim(-reach, reach)
     unit = "degrees" if channel == "pose_yaw" else unit_of(channel)
-    upper.set(title=f"{LABELS[channel][:1].upper()}{LABELS[channel][1:]} [{unit}]")
+    upper.set(title=f"{CHANNEL_NAMES[channel][:1].upper()}{CHANNEL_NAMES[channel][1:]} [{unit}]")
     lower.set(xlabel="time [s]", ylabel="residual\n/ noise", xlim=(time[0, 0], time[-1, -1]))
     figure.align_ylabels([upper, lower])
     return figure
@@ -164,7 +157,7 @@ def lasting_figure(evidence: Evidence) -> Figure:
 
 
 def _channel_axis(axes: Any, names: Sequence[str], place: Any, label: str) -> None:
-    axes.set_yticks(place, [LABELS[name] for name in names])
+    axes.set_yticks(place, [CHANNEL_NAMES[name] for name in names])
     axes.tick_params(axis="y", length=0.0)
     axes.grid(False, axis="y")
     axes.set(xlabel=label)
@@ -187,7 +180,7 @@ def misfit_figure(misfit: Mapping[str, Mapping[str, float]]) -> Figure:
     Args:
         misfit: "nominal", "corrected" and "limit" by channel.
     """
-    names = [name for name in LABELS if name in misfit.get("nominal", {})]
+    names = [name for name in CHANNEL_NAMES if name in misfit.get("nominal", {})]
     figure = blank_figure(0.9 + 0.34 * max(len(names), 1))
     axes = figure.subplots()
     place = np.arange(len(names))[::-1]
@@ -360,7 +353,7 @@ def horizon_figure(horizons: Mapping[str, ModelErrors], channel: str) -> Figure:
                 axes.plot([place + shift] * 2, item.interval, color=colour, linewidth=1.4)
             axes.plot(place + shift, item.value, "o", color=colour, markersize=4.5)
     unit = next(iter(horizons.values())).unit
-    axes.set_title(f"{LABELS.get(channel, channel.replace('_', ' '))} [{unit.replace('^2', '²')}]")
+    axes.set_title(f"{CHANNEL_NAMES.get(channel, channel.replace('_', ' '))} [{unit.replace('^2', '²')}]")
     axes.set_xticks(range(len(horizons)), [f"{float(h):g} s" for h in horizons])
     axes.set_xlim(-0.6, len(horizons) - 0.4)
     axes.set_ylim(bottom=0.0)

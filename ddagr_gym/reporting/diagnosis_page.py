@@ -12,7 +12,7 @@ from ddagr_gym.diagnosis.answer.certificate import Certificate
 from ddagr_gym.diagnosis.answer.drivetrain import DrivetrainAnswer
 from ddagr_gym.diagnosis.answer.evidence import Evidence
 from ddagr_gym.diagnosis.answer.verdict import Diagnosis
-from ddagr_gym.diagnosis.wording import title
+from ddagr_gym.diagnosis.wording import CHANNEL_NAMES, title
 from ddagr_gym.files import atomic_path, make_folder
 from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.reporting import diagnosis_figures as figures
@@ -149,7 +149,7 @@ def _pictures(diagnosis: Diagnosis, evidence: Evidence, studio: _Studio) -> dict
         "stretch": _stretch(evidence, rows, diagnosis.recordings),
         "channels": [
             studio.picture(
-                figures.channel_figure(evidence, name, rows), f"channel_{name}", f"{figures.LABELS[name]} over time"
+                figures.channel_figure(evidence, name, rows), f"channel_{name}", f"{CHANNEL_NAMES[name]} over time"
             )
             for name in figures.present(evidence)
         ],

@@ -14,8 +14,7 @@ from ddagr_gym.diagnosis.answer.unnamed_terms import UnnamedTerm, UnnamedTerms
 from ddagr_gym.diagnosis.answer.verdict import NONE, UNKNOWN, DataDoubt, Diagnosis, Finding, GatesUsed
 from ddagr_gym.diagnosis.result.sentences import when
 from ddagr_gym.diagnosis.result.soil_words import finding_in_words
-from ddagr_gym.diagnosis.wording import in_sentence, range_in_words, title
-from ddagr_gym.reporting.diagnosis_figures import LABELS
+from ddagr_gym.diagnosis.wording import CHANNEL_NAMES, in_sentence, range_in_words, title
 from ddagr_gym.reporting.drivetrain_section import drivetrain_tiles
 from ddagr_gym.reporting.soil_table import soil_section
 
@@ -234,7 +233,7 @@ def fit_table(fit: Certificate) -> dict[str, Any]:
     """Held-out errors as rows of text."""
     rows = []
     for channel, horizons in fit.channels.items():
-        name = LABELS.get(channel, channel.replace("_", " "))
+        name = CHANNEL_NAMES.get(channel, channel.replace("_", " "))
         for horizon, errors in horizons.items():
             unit = errors.unit.replace("^2", "²")
             cells = [_error(item) for item in (errors.raw, errors.refitted, errors.corrected, errors.ceiling)]

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ddagr_gym.diagnosis.answer.verdict import Diagnosis
+from ddagr_gym.diagnosis.wording import CHANNEL_NAMES
 from ddagr_gym.identification.windows import CHANNELS
-from ddagr_gym.reporting.diagnosis_figures import LABELS, unit_of
+from ddagr_gym.reporting.diagnosis_figures import unit_of
 from ddagr_gym.viewers.annotations import finding_names
 from ddagr_gym.viewers.drive_traces import MODELS, DriveTraces
 from ddagr_gym.viewers.mcap_messages import WORLD
@@ -78,12 +79,12 @@ def _scene(drives: Sequence[DriveTraces]) -> layouts.ThreeDeeConfig:
 def _readings(name: str) -> layouts.PlotPanel:
     series = ((f"/{source}.{name}", source, COLOURS[source]) for source in ("measured", *MODELS))
     unit = "rad" if name == "pose_yaw" else unit_of(name)
-    return _plot(f"{LABELS[name]} [{unit}]", series)
+    return _plot(f"{CHANNEL_NAMES[name]} [{unit}]", series)
 
 
 def _residuals(name: str) -> layouts.PlotPanel:
     series = ((f"/residual/{model}.{name}", model, COLOURS[model]) for model in MODELS)
-    return _plot(f"{LABELS[name]}: residual over noise", series)
+    return _plot(f"{CHANNEL_NAMES[name]}: residual over noise", series)
 
 
 def _plot(title: str, series: Iterable[tuple[str, str, str]]) -> layouts.PlotPanel:

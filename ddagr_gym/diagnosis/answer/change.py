@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -67,6 +68,35 @@ class ParameterShift:
 
 
 @dataclass(frozen=True)
+class ChannelShift:
+    """What a fit leaves of a channel, against the same of ordinary drives.
+
+    Attributes:
+        channel: its name.
+        before: mean square of the weighted residuals in ordinary drives (geometric mean).
+        without_effects: the same in this drive, fitted without any effect.
+        with_effects: the same beside the named effects.
+        limit: that ordinary drives exceed, in any effect, parameter or channel, in 5 % of the cases.
+    """
+
+    channel: str
+    before: float
+    without_effects: float
+    with_effects: float
+    limit: float
+
+    @property
+    def rougher(self) -> bool:
+        """Whether more is left than of ordinary drives."""
+        return self.with_effects > self.limit
+
+    @property
+    def times(self) -> float:
+        """Root mean square of what is left, over that of ordinary drives."""
+        return math.sqrt(self.with_effects / self.before)
+
+
+@dataclass(frozen=True)
 class ChangeCertificate:
     """How well the drives are forecast with what changed, beside how well ordinary ones are.
 
@@ -117,6 +147,7 @@ class Change:
         against: "calibration", or "before" for drives that were given with `--before`.
         certificate: whether the drives are forecast as well with what changed as ordinary ones are; null where the
             calibration was made before that was kept.
+        channels: what is left of each channel; none where drives on several grounds were compared.
     """
 
     ground: str
@@ -130,3 +161,4 @@ class Change:
     not_compared: Mapping[str, str]
     against: str = CALIBRATION
     certificate: ChangeCertificate | None = None
+    channels: tuple[ChannelShift, ...] = ()

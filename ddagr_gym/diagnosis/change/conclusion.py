@@ -12,6 +12,7 @@ from ddagr_gym.diagnosis.answer.change import (
     CALIBRATION,
     Change,
     ChangeCertificate,
+    ChannelShift,
     EffectShift,
     ParameterShift,
     SizeShift,
@@ -67,7 +68,7 @@ def conclude_change(
         {
             "nominal": channel_misfit(problem, named.models[0].fitted),
             "corrected": channel_misfit(problem, named.models[-1].fitted),
-            "limit": {},
+            "limit": {item.channel: item.limit for item in change.channels},
         },
         {item.effect: {name: size.least_detectable for name, size in item.sizes.items()} for item in change.shifts},
         {item.name: item.with_effects for item in change.parameters},
@@ -203,6 +204,15 @@ def _change(
         {**ordinary.comparison(ground).unnamed, **NOT_COMPARED},
         BEFORE if ordinary.given else CALIBRATION,
         certified,
+        _channel_shifts(first, last),
+    )
+
+
+def _channel_shifts(first: Model, last: Model) -> tuple[ChannelShift, ...]:
+    before = {rise.channel: rise.misfit for rise in first.rises}
+    return tuple(
+        ChannelShift(rise.channel, rise.usual, before[rise.channel], rise.misfit, rise.most(last.tests))
+        for rise in last.rises
     )
 
 

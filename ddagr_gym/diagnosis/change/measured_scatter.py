@@ -7,16 +7,21 @@ the robot of the first one, and fits to the differences d of a size in multiples
 
 with what each drive knows, V, what robot and soil are expected to do, B, and the scatter F of each effect; degrees of
 freedom d0 are the most with which no more than 5 % of the pairs raise an alarm over the whole library.
+``python -m benchmarks.independent_pairs`` does the same on one ground with another simulator and other manoeuvres, and
+measures how far parameters move and what is left of the channels; the larger scatter of the two counts, and the fewer
+degrees of freedom.
 """
 
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any
 
-from ddagr_gym.diagnosis.change.ordinary import ExpectedScatter
+from ddagr_gym.diagnosis.change.expected_scatter import ExpectedScatter
 
 PATH = Path(__file__).resolve().parents[2] / "data" / "change_scatter.json"
 """That the package ships."""
@@ -40,7 +45,16 @@ def measured_scatter(path: Path = PATH) -> MeasuredScatter:
     """What a file says, by default that of the package."""
     body = json.loads(path.read_text(encoding="utf-8"))
     same, other = (
-        ExpectedScatter({str(k): float(v) for k, v in body[name]["deviations"].items()}, float(body[name]["degrees"]))
+        ExpectedScatter(
+            _numbers(body[name]["deviations"]),
+            float(body[name]["degrees"]),
+            _numbers(body[name].get("moves", {})),
+            _numbers(body[name].get("rises", {})),
+        )
         for name in ("same_ground", "other_ground")
     )
     return MeasuredScatter(same, other)
+
+
+def _numbers(mapping: Mapping[str, Any]) -> dict[str, float]:
+    return {str(name): float(value) for name, value in mapping.items()}

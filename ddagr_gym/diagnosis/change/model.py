@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from ddagr_gym.diagnosis.change.channel_rises import ChannelRise, channel_rises
 from ddagr_gym.diagnosis.change.drive_fit import moved_parameters
 from ddagr_gym.diagnosis.change.drive_scan import NAMED, DriveScan, scan_drive
 from ddagr_gym.diagnosis.change.ordinary import Comparison
 from ddagr_gym.diagnosis.change.shifts import LEVEL, Pull, Shift, family_probability, shift_of
 from ddagr_gym.identification.gauss_newton import Fitted
+from ddagr_gym.identification.misfit import channel_misfit, projected_residual
 from ddagr_gym.identification.problem import Problem
 
 NEAR = 0.4
@@ -35,6 +37,7 @@ class Model:
         shifts: of all candidates, the least probable first.
         pulls: of all parameters that may differ between drives.
         named: candidates of the fit's effects, as they were shifted when each was added.
+        rises: of what is left of each channel; none where that is not known of ordinary drives.
     """
 
     problem: Problem
@@ -43,13 +46,14 @@ class Model:
     shifts: tuple[Shift, ...]
     pulls: tuple[Pull, ...]
     named: tuple[Shift, ...] = ()
+    rises: tuple[ChannelRise, ...] = ()
 
     @property
     def tests(self) -> int:
-        """Number of candidates and parameters."""
-        return len(self.shifts) + len(self.pulls)
+        """Number of candidates, parameters and channels."""
+        return len(self.shifts) + len(self.pulls) + len(self.rises)
 
-    def probability(self, shift: Shift | Pull, looks: int = 1) -> float:
+    def probability(self, shift: Shift | Pull | ChannelRise, looks: int = 1) -> float:
         """Of an ordinary drive to show as much in any candidate or parameter, each looked at so many times."""
         return family_probability(shift.probability, looks * self.tests)
 
@@ -79,6 +83,20 @@ class Model:
         return tuple(pull for pull in self.pulls if self.probability(pull) < LEVEL)
 
     @property
+    def rougher(self) -> tuple[ChannelRise, ...]:
+        """Channels of which ordinary drives hardly leave as much, the least probable first."""
+        found = [rise for rise in self.rises if self.probability(rise) < LEVEL]
+        return tuple(sorted(found, key=lambda rise: rise.probability))
+
+    @property
+    def excess(self) -> float:
+        """Cost of the channels that are left rougher than usual, beyond what ordinary drives leave of them."""
+        if not self.rougher:
+            return 0.0
+        losses = self.problem.losses_by_channel(projected_residual(self.problem, self.fitted))
+        return sum(losses[rise.channel] * (1.0 - rise.usual / rise.misfit) for rise in self.rougher)
+
+    @property
     def left(self) -> float:
         """Largest distance over its limit of any effect or parameter."""
         parameters = (pull.distance / pull.limit(self.tests) for pull in self.pulls)
@@ -105,7 +123,8 @@ def model_of(problem: Problem, fitted: Fitted, ordinary: Comparison, named: Sequ
         Pull(name, moved / ordinary.usual_move(name), ordinary.move_degrees)
         for name, moved in moved_parameters(problem, fitted).items()
     )
-    return Model(problem, fitted, scan, tuple(shifts), pulls, tuple(named))
+    rises = channel_rises(channel_misfit(problem, fitted), ordinary.misfits, ordinary.expected)
+    return Model(problem, fitted, scan, tuple(shifts), pulls, tuple(named), rises)
 
 
 def farthest(shifts: Sequence[Shift], tests: int) -> float:

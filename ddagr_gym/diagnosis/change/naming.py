@@ -33,6 +33,10 @@ CLOSE = 0.8
 """Share of the best refit's gain below which another is no rival of one that leaves nothing out of the ordinary (ours:
 further than any weight of an equivalence set)."""
 
+LEAST_SHARE = 0.04
+"""Share of all that is out of the ordinary below which nothing is named (ours): what a library's form that is off by a
+fifth leaves to other effects, a fifth squared."""
+
 NEARLY = 1.1
 """Factor on what the best name leaves out of the ordinary up to which another leaves nearly as little (ours)."""
 
@@ -78,7 +82,8 @@ class Named:
     def complete(self) -> bool:
         """Whether nothing else is out of the ordinary."""
         last = self.models[-1]
-        return not (last.pulled or any(shift.compared.name not in self.absent for shift in last.conspicuous))
+        conspicuous = [shift for shift in last.conspicuous if shift.compared.name not in self.absent]
+        return not (last.pulled or last.rougher or conspicuous)
 
 
 def name_changes(
@@ -101,13 +106,19 @@ def name_changes(
     models, steps = [model_of(problem, fitted, ordinary)], list[Step]()
     while len(steps) < MOST_NAMES and (models[-1].conspicuous or models[-1].pulled or (not steps and models[-1].near)):
         found = _next(models[-1], ordinary, rng, progress)
-        if found is None:
+        if found is None or not _is_share(found, models):
             break
         models.append(found[0])
         steps.append(found[1])
     if not steps:
         return Named(tuple(models), (), _absent(models[0]))
     return _without_idle(Named(tuple(models), tuple(steps)), ordinary, progress)
+
+
+def _is_share(found: tuple[Model, Step], models: Sequence[Model]) -> bool:
+    """Whether a name explains enough of what the names before it did and of what they leave of rough channels."""
+    cost = models[-1].fitted.cost - found[0].fitted.cost
+    return cost >= LEAST_SHARE * (models[0].fitted.cost - models[-1].fitted.cost + models[-1].excess)
 
 
 def _absent(model: Model) -> frozenset[str]:

@@ -8,8 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.diagnosis.result.uncertainty import STRUCTURE, STRUCTURE_OF_LIMIT
-from ddagr_gym.diagnosis.search.candidates import Candidate
+from ddagr_gym.diagnosis.change.expected_scatter import EXPECTED_DRIVES, ExpectedScatter
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.nuisances import NuisancePriors
 from ddagr_gym.identification.parameters import (
@@ -33,10 +32,6 @@ LEAST_ACCELEROMETER_BIAS = 0.02
 
 SLOPE_ON_A_GROUND = 0.05
 """Deviation [m/s^2] of what accelerometers read too much between drives on one ground (ours): 0.3 degrees of slope."""
-
-EXPECTED_DRIVES = 4.0
-"""Degrees of freedom of the expected scatter where nothing was measured (ours): as if it came from five drives."""
-
 
 NEWER = "the calibration is older than this effect: calibrate again with --bank"
 
@@ -140,25 +135,6 @@ class Scores:
     informations: Array | None = None
 
 
-@dataclass(frozen=True)
-class ExpectedScatter:
-    """By how much the sizes of effects differ between ordinary drives because simulators differ in structure.
-
-    Attributes:
-        deviations: by effect, in least sizes that matter, of limits and signs in the whole of them; those that are
-            missing have what intervals are widened by.
-        degrees: of freedom with which that is known.
-    """
-
-    deviations: Mapping[str, float] = field(default_factory=dict)
-    degrees: float = EXPECTED_DRIVES
-
-    def of(self, candidate: Candidate) -> float:
-        """Deviation of a candidate's sizes, in least sizes that matter."""
-        usual = STRUCTURE if candidate.has_sizes else STRUCTURE_OF_LIMIT
-        return self.deviations.get(candidate.name, usual)
-
-
 @dataclass(frozen=True, eq=False)
 class Comparison:
     """What drives are compared with.
@@ -169,13 +145,15 @@ class Comparison:
         expected: scatter between drives before any data.
         unnamed: effects that cannot be what changed, with the reason.
         moved: by how many of its prior deviations the fit to each ordinary drive moved every parameter.
+        misfits: what fits leave of the channels of each ordinary drive; none where drives are on several grounds.
     """
 
     drives: tuple[Scores, ...]
     pieces: tuple[Scores, ...] = ()
-    expected: ExpectedScatter = ExpectedScatter()
+    expected: ExpectedScatter = field(default_factory=ExpectedScatter)
     unnamed: Mapping[str, str] = field(default_factory=dict)
     moved: tuple[Mapping[str, float], ...] = ()
+    misfits: tuple[Mapping[str, float], ...] = ()
 
     @property
     def degrees(self) -> float:
@@ -184,13 +162,14 @@ class Comparison:
 
     @property
     def move_degrees(self) -> float:
-        """Of freedom of the parameters' moves: simulated pairs do not show how far structure moves them."""
-        return EXPECTED_DRIVES + len(self.drives) - 1.0
+        """Of freedom of the parameters' moves."""
+        known = self.expected.degrees if self.expected.moves else EXPECTED_DRIVES
+        return known + len(self.drives) - 1.0
 
     def usual_move(self, parameter: str) -> float:
-        """Prior deviations by which ordinary drives move a parameter (r.m.s., drawn towards 1), at least 1."""
+        """Prior deviations by which ordinary drives move a parameter (r.m.s., drawn to the expected), at least 1."""
         known = [item[parameter] for item in self.moved if parameter in item]
-        square = EXPECTED_DRIVES + sum(value**2 for value in known)
+        square = EXPECTED_DRIVES * self.expected.move(parameter) ** 2 + sum(value**2 for value in known)
         return max(1.0, float(np.sqrt(square / (EXPECTED_DRIVES + len(known)))))
 
 
@@ -209,6 +188,7 @@ class Reference:
         soil: of its ground as calibrated without it, likewise.
         moved: by how many of its prior deviations the fit moved every parameter; none in files of before.
         column_map: by which it was read; "" where that is not known.
+        misfit: mean square of what the fit leaves of each channel; none in files of before.
     """
 
     drive: str
@@ -221,6 +201,7 @@ class Reference:
     soil: Soil | None = None
     moved: Mapping[str, float] = field(default_factory=dict)
     column_map: str = ""
+    misfit: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -252,8 +233,8 @@ class OrdinaryRobot:
     source: str = ""
     digest: str = ""
     pieces: tuple[Reference, ...] = ()
-    known_scatter: ExpectedScatter = ExpectedScatter()
-    other_scatter: ExpectedScatter = ExpectedScatter()
+    known_scatter: ExpectedScatter = field(default_factory=ExpectedScatter)
+    other_scatter: ExpectedScatter = field(default_factory=ExpectedScatter)
     unnamed: Mapping[str, str] = field(default_factory=dict)
     given: bool = False
 
@@ -275,9 +256,14 @@ class OrdinaryRobot:
         moved, new = tuple(item.moved for item in self.references), dict.fromkeys(self._unscanned, NEWER)
         if ground:
             drives, pieces = ([item.known_ground for item in found] for found in (self.references, self.pieces))
-            return Comparison(tuple(drives), tuple(pieces), self.known_scatter, new, moved)
+            return Comparison(tuple(drives), tuple(pieces), self.known_scatter, new, moved, self._misfits)
         drives, pieces = ([item.other_ground for item in found] for found in (self.references, self.pieces))
         return Comparison(tuple(drives), tuple(pieces), self.other_scatter, {**self.unnamed, **new}, moved)
+
+    @property
+    def _misfits(self) -> tuple[Mapping[str, float], ...]:
+        """Of drives from before on the same ground: how far channels differ between grounds is not known."""
+        return tuple(item.misfit for item in self.references if item.misfit) if self.given else ()
 
     @property
     def _unscanned(self) -> list[str]:

@@ -12,6 +12,7 @@ from ddagr_gym.diagnosis.change.drive_fit import change_problem, change_windows,
 from ddagr_gym.diagnosis.change.drive_scan import DriveScan, Priors, scan_drive
 from ddagr_gym.diagnosis.change.left_out import left_out_losses
 from ddagr_gym.diagnosis.change.ordinary import Reference, Weighing, uncertain_parameters
+from ddagr_gym.identification.misfit import channel_misfit
 from ddagr_gym.identification.parameters import ModelParameter
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.recordings.schema import Recording
@@ -75,8 +76,11 @@ def scan_pieces(drive: OrdinaryDrive, weighing: Weighing, most: int, threads: in
     scan = scan_drive(problem, fitted)
     wide = uncertain_parameters(drive.soil, drive.parameters, None, weighing, 1)
     other = _of_unknown_ground(scan, wide, known.offsets - weighing.offsets)
-    moved = moved_parameters(problem, fitted)
-    whole = replace(_reference(drive, scan, other, left_out_losses(problem, fitted)), moved=moved)
+    whole = replace(
+        _reference(drive, scan, other, left_out_losses(problem, fitted)),
+        moved=moved_parameters(problem, fitted),
+        misfit=channel_misfit(problem, fitted),
+    )
     pieces = scan.pieces(most)
     return [whole, *(_reference(drive, piece, other, np.zeros(0)) for piece in pieces if len(pieces) > 1)]
 

@@ -78,7 +78,7 @@ def what_changed(
     check_comparable(recordings, ordinary, ground)
     mended = mend_recordings(recordings, seed)
     progress("fitting the robot of the ordinary drives")
-    problem, fitted = _fitted(mended, ordinary, ground, threads)
+    problem, fitted = fit_ordinary(mended, ordinary, ground, threads)
     rng = np.random.default_rng(seed)
     comparison = ordinary.comparison(ground)
     named = name_changes(problem, fitted, comparison, rng, progress)
@@ -142,8 +142,17 @@ def what_changed_since(
     return replace(outcome, diagnosis=diagnosis), known
 
 
-def _fitted(mended: MendedRecordings, ordinary: OrdinaryRobot, ground: str, threads: int) -> tuple[Problem, Fitted]:
-    """The calibrated robot fitted to drives; on an unknown ground from the soil that leaves least."""
+def fit_ordinary(
+    mended: MendedRecordings, ordinary: OrdinaryRobot, ground: str, threads: int = 1
+) -> tuple[Problem, Fitted]:
+    """The calibrated robot fitted to drives; on an unknown ground from the soil that leaves least.
+
+    Args:
+        mended: drives.
+        ordinary: calibrated robot.
+        ground: that they are on; "" where it is not known.
+        threads: of the simulator.
+    """
     weighing = ordinary.weighing.on(ground)
     windows = change_windows(mended.recordings, ordinary.robot, weighing)
     soils = ordinary.soils if not ground else {ground: ordinary.soils[ground]}

@@ -213,18 +213,44 @@ def shift_of(
     if here is None or len(others) < min(2, len(ordinary.drives)):
         return None
     least = np.array([least_multiple(compared.candidate, k) for k in range(len(compared.keys))])
-    expected = here.between + np.diag((ordinary.expected.of(compared.candidate) * least) ** 2)
-    structure = expected - here.between
+    structure = np.diag((ordinary.expected.of(compared.candidate) * least) ** 2)
+    pieces = _sizes_in(compared, ordinary.pieces, beside_ordinary) if len(others) == 1 else []
+    away = away_from(here, others, pieces, structure, least, ordinary.expected.degrees)
+    probability = _probability(compared, away.value, away.covariance, away.degrees)
+    return Shift(compared, away.value, away.mean, away.covariance, away.between, away.degrees, probability)
+
+
+@dataclass(frozen=True, eq=False)
+class Away:
+    """Sizes of one drive against those of others; attributes as of :class:`Shift`."""
+
+    value: Array
+    mean: Array
+    covariance: Array
+    between: Array
+    degrees: float
+
+
+def away_from(
+    here: Sizes, others: Sequence[Sizes], pieces: Sequence[Sizes], structure: Array, least: Array, known: float
+) -> Away:
+    """Sizes of a drive against those of ordinary ones, equation (2).
+
+    Args:
+        here: of the drive.
+        others: of ordinary drives.
+        pieces: of parts of the only ordinary drive; none where there are several.
+        structure: (k, k) covariance by which simulators of another structure differ, F.
+        least: (k,) least sizes that matter.
+        known: degrees of freedom of what is expected, d0.
+    """
+    expected = here.between + structure
     mean, spread, of_mean, degrees = _ordinary_scatter(others, structure, least)
-    known = ordinary.expected.degrees
     scatter = (known * expected + degrees * spread) / (known + degrees)
-    if len(others) == 1:
-        scatter = _widened(scatter, structure, _sizes_in(compared, ordinary.pieces, beside_ordinary), least, known)
+    if pieces:
+        scatter = _widened(scatter, structure, pieces, least, known)
     between = scatter + (scatter + of_mean) / (degrees + 1.0)
-    covariance = here.within + between
-    value, degrees = here.value - mean, known + degrees
-    probability = _probability(compared, value, covariance, degrees)
-    return Shift(compared, value, mean, covariance, between, degrees, probability)
+    return Away(here.value - mean, mean, here.within + between, between, known + degrees)
 
 
 def refitted_shift(

@@ -8,7 +8,10 @@ from ddagr_gym.diagnosis.answer.change import BEFORE, Change, ChangeCertificate
 from ddagr_gym.diagnosis.answer.onset import BEGINS, CONSTANT, ENDS, Onset
 from ddagr_gym.diagnosis.answer.verdict import NONE, UNKNOWN, Finding
 from ddagr_gym.diagnosis.result.soil_words import finding_in_words
-from ddagr_gym.diagnosis.wording import in_sentence
+from ddagr_gym.diagnosis.wording import CHANNEL_NAMES, in_sentence
+
+MOST_CHANNELS = 3
+"""Channels that a sentence lists (ours); the answer has all."""
 
 RIVAL_WEIGHT = 0.2
 """Weight in the equivalence set below which the headline says that a rival is less likely (ours)."""
@@ -80,13 +83,21 @@ def change_headline(verdict: Sequence[str], complete: bool, findings: Sequence[F
         )
     if tuple(verdict) == (UNKNOWN,):
         nearest = _joined_names([in_sentence(item.effect) for item in change.shifts[:3]])
-        return (
-            f"Something changed against {drives} that no effect of the library explains, nearest are "
-            f"{nearest}{blind}{ground}."
-        )
+        seen = rougher_in_words(change) or f"nearest are {nearest}"
+        return f"Something changed against {drives} that no effect of the library explains, {seen}{blind}{ground}."
     found = _joined([finding_in_words(item) + when(item) + _rivals(item) for item in findings])
     rest = "nothing else is out of the ordinary" if complete else "something else is out of the ordinary"
-    return f"Against {drives}: {found}; {rest}{ground}."
+    rougher = rougher_in_words(change)
+    return f"Against {drives}: {found}; {rest}{', ' + rougher if rougher else ''}{ground}."
+
+
+def rougher_in_words(change: Change) -> str:
+    """Channels of which more is left than of ordinary drives, the worst first; "" where there is none."""
+    found = sorted((item for item in change.channels if item.rougher), key=lambda item: -item.times)
+    if not found:
+        return ""
+    named = _joined_names([f"{CHANNEL_NAMES[item.channel]} ({item.times:.1f} times)" for item in found[:MOST_CHANNELS]])
+    return f"as the model leaves more of {named} than before"
 
 
 def _reference(change: Change) -> str:

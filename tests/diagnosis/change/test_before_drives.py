@@ -76,14 +76,20 @@ def test_nothing_is_named_where_nothing_changed(before, seed):
 
 
 @pytest.mark.slow
-def test_noisier_sensors_are_no_change(before):
-    """Noise of twice the size is in no effect of the library; the certificate says that forecasts are worse."""
+def test_noisier_sensors_are_a_change_without_a_name(before, tmp_path):
+    """Noise of twice the size is in no effect of the library: the answer says which channels are rougher."""
     rng = np.random.default_rng(5)
     after = drive(32)
     more = {"yaw_rate": 0.004, "specific_force_x": 0.05, "specific_force_y": 0.05, "encoder_right": 0.02}
     channels = {name: after[name] + size * rng.normal(size=len(after)) for name, size in more.items()}
     diagnosis = since([replace(after, channels={**after.channels, **channels})], [before])
-    assert diagnosis.verdict == ("none",)
+    assert diagnosis.verdict == ("unknown",)
+    assert not diagnosis.complete
+    assert {item.channel for item in diagnosis.change.channels if item.rougher} >= {"yaw_rate", "specific_force_x"}
+    assert "as the model leaves more of" in diagnosis.sentence
+    write_page(tmp_path, diagnosis)
+    assert (tmp_path / "index.html").read_text().count('alt="What the model leaves of each channel') == 1
+    assert validate(as_mapping(diagnosis)).change.channels == diagnosis.change.channels
     assert diagnosis.change.certificate.as_well < 0.3 * diagnosis.change.certificate.windows
 
 

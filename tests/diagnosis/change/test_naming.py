@@ -56,12 +56,12 @@ def test_a_name_that_comes_first_weighs_as_much_as_the_heaviest():
     assert sum(found.values()) == pytest.approx(1.0)
 
 
-def standing_out(*candidates: tuple[str, bool], pulled=()):
+def standing_out(*candidates: tuple[str, bool], pulled=(), rougher=()):
     """A model beside which effects stand out, each with whether it has sizes."""
     found = [
         SimpleNamespace(compared=SimpleNamespace(name=n, candidate=SimpleNamespace(has_sizes=h))) for n, h in candidates
     ]
-    return SimpleNamespace(conspicuous=tuple(found), pulled=pulled)
+    return SimpleNamespace(conspicuous=tuple(found), pulled=pulled, rougher=rougher)
 
 
 def test_a_limit_that_stands_out_and_that_no_refit_finds_is_no_alarm_and_a_size_is_one():
@@ -71,6 +71,11 @@ def test_a_limit_that_stands_out_and_that_no_refit_finds_is_no_alarm_and_a_size_
     assert not Named((size,), (), _absent(size)).complete
     pulled = standing_out(("motor_saturation", False), pulled=("soil_strength",))
     assert not Named((pulled,), (), _absent(pulled)).complete
+
+
+def test_a_channel_that_is_rougher_than_usual_leaves_an_answer_open():
+    assert Named((standing_out(),), ()).complete
+    assert not Named((standing_out(rougher=("yaw_rate",)),), ()).complete
 
 
 def test_of_more_than_were_refitted_none_is_known_to_be_absent():

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ddagr_gym.diagnosis.change.expected_scatter import EXPECTED_DRIVES
 from ddagr_gym.diagnosis.change.ordinary import (
-    EXPECTED_DRIVES,
     SLOPE_ON_A_GROUND,
     OrdinaryRobot,
     Reference,

@@ -7,7 +7,8 @@ import pytest
 from scipy import stats
 
 from ddagr_gym.diagnosis.change.drive_scan import Compared, scattered
-from ddagr_gym.diagnosis.change.ordinary import EXPECTED_DRIVES, Comparison, ExpectedScatter, Scores
+from ddagr_gym.diagnosis.change.expected_scatter import EXPECTED_DRIVES, ExpectedScatter
+from ddagr_gym.diagnosis.change.ordinary import Comparison, Scores
 from ddagr_gym.diagnosis.change.shifts import (
     LEVEL,
     family_probability,

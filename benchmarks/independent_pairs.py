@@ -1,0 +1,326 @@
+"""How much two ordinary drives differ in a simulator that shares no code with the package's, driven in other ways.
+
+    python -m benchmarks.independent_pairs [--pairs N] [--workers N]
+
+Pairs in which nothing changed, of the open set of :mod:`benchmarks.changed_pairs` (seed 1; half of them with a
+structure that no effect of the library has): three drives before and one after, with other manoeuvres on another patch
+of the field, on another day. Each is compared as ``ddagr diagnose --before`` does, up to the first fit. From the sizes
+of all effects, the moves of parameters and what is left of the channels follow, by maximum likelihood of the t
+distributions with which the package judges them (equations (2) of :mod:`ddagr_gym.diagnosis.change.shifts` and (1) of
+:mod:`~ddagr_gym.diagnosis.change.channel_rises`),
+
+* the scatter of each effect, in least sizes that matter,
+* prior deviations by which drives move each parameter of robot and soil,
+* deviations of what is left of each channel,
+
+and the most degrees of freedom with which no more than 5 % of the pairs raise any alarm. Written are the sizes and a
+picture (``benchmarks/results/independent_pairs.json``, ``.png``); ``python -m benchmarks.simulated_pairs --summary``
+puts them into what the package ships. A run goes on after the pairs that it finished before.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.changed_pairs.answers import SOIL, recordings_of
+from benchmarks.changed_pairs.plan import Pair, plan
+from ddagr_gym.diagnosis.change.before_drives import GROUND, robot_of_before
+from ddagr_gym.diagnosis.change.channel_rises import channel_rises
+from ddagr_gym.diagnosis.change.drive_fit import moved_parameters
+from ddagr_gym.diagnosis.change.drive_scan import scan_drive
+from ddagr_gym.diagnosis.change.expected_scatter import ExpectedScatter
+from ddagr_gym.diagnosis.change.ordinary import Comparison
+from ddagr_gym.diagnosis.change.run import fit_ordinary
+from ddagr_gym.diagnosis.change.shifts import LEVEL, Away, Pull, Sizes, away_from, family_probability, sizes_of
+from ddagr_gym.diagnosis.preprocessing.mended_recordings import mend_recordings
+from ddagr_gym.diagnosis.result.detectable import least_multiple
+from ddagr_gym.diagnosis.result.uncertainty import STRUCTURE, STRUCTURE_OF_LIMIT
+from ddagr_gym.diagnosis.wording import title
+from ddagr_gym.files import write_text
+from ddagr_gym.identification.misfit import channel_misfit
+from ddagr_gym.presets import get_robot, get_soil
+from ddagr_gym.rendering import palette
+from ddagr_gym.reporting.figures import house_style
+from ddagr_gym.tasks import ResultStore, Task, TaskRunner, run_tasks
+
+Array = NDArray[np.float64]
+
+RESULT = Path(__file__).resolve().parent / "results" / "independent_pairs.json"
+COMMAND = "python -m benchmarks.independent_pairs"
+SEED = 1
+DEGREES = (24.0, 16.0, 12.0, 10.0, 8.0, 6.0, 5.0, 4.0, 3.0)
+"""Degrees of freedom that are tried, the most first."""
+MOST = 30.0
+"""Largest scatter that is tried, in least sizes that matter."""
+LEAST_MOVE, MOST_MOVE = 1.0, 10.0
+"""Of the prior deviations that are tried."""
+LEAST_RISE, MOST_RISE = 0.1, 3.0
+"""Of the deviations of a channel's logarithm that are tried."""
+STEPS = 60
+
+
+def ordinary_pairs(count: int) -> list[Pair]:
+    """The first pairs of the open set in which nothing changed."""
+    return [pair for pair in plan(SEED) if not pair.case.effects][:count]
+
+
+def compared(pair: Pair) -> dict[str, Any]:
+    """What the drives of a pair say of every effect, parameter and channel, as JSON has it."""
+    robot = get_robot(pair.robot)
+    before, after = recordings_of(pair, SEED)
+    known = robot_of_before(before, robot, get_soil(SOIL))
+    problem, fitted = fit_ordinary(mend_recordings(after), known, GROUND)
+    scan = scan_drive(problem, fitted)
+    scores = scan.scores()
+    effects = []
+    for item in scan.compared:
+        drives = [scores, *(reference.known_ground for reference in known.references)]
+        found = [sizes_of(drive, item.keys, item.ridge) for drive in drives]
+        if any(sizes is None for sizes in found):
+            continue
+        least = np.array([least_multiple(item.candidate, k) for k in range(len(item.keys))])
+        effects.append(
+            {
+                "effect": item.name,
+                "has_sizes": item.candidate.has_sizes,
+                "drives": [_written(sizes, least) for sizes in found if sizes is not None],
+            }
+        )
+    comparison = known.comparison(GROUND)
+    return {
+        "pair": pair.name,
+        "structure": pair.case.structure,
+        "effects": effects,
+        "moved": [moved_parameters(problem, fitted), *map(dict, comparison.moved)],
+        "misfits": [channel_misfit(problem, fitted), *map(dict, comparison.misfits)],
+    }
+
+
+def _written(sizes: Sizes, least: Array) -> dict[str, Any]:
+    """Sizes of a drive in least sizes that matter, the drive after first."""
+    square = np.outer(least, least)
+    return {
+        "value": _rounded(sizes.value / least),
+        "within": [_rounded(row) for row in sizes.within / square],
+        "between": [_rounded(row) for row in sizes.between / square],
+    }
+
+
+def _rounded(values: Array) -> list[float]:
+    return [float(f"{value:.4g}") for value in values]
+
+
+def _sizes(mapping: Mapping[str, Any]) -> Sizes:
+    return Sizes(*(np.array(mapping[name]) for name in ("value", "within", "between")))
+
+
+def _away(item: Mapping[str, Any], scatter: float, known: float) -> Away:
+    """Sizes of one candidate in the drive after against those before."""
+    here, *others = (_sizes(drive) for drive in item["drives"])
+    k = len(here.value)
+    return away_from(here, others, (), scatter**2 * np.eye(k), np.ones(k), known)
+
+
+def _one_sided(item: Mapping[str, Any], away: Away) -> bool:
+    """Whether it is there or not, and no less than nothing was found of it."""
+    return not item["has_sizes"] and float(away.value[0]) <= 0.0
+
+
+def _log_density(away: Away) -> float:
+    """Of the multivariate t distribution."""
+    k, degrees = len(away.value), away.degrees
+    square = float(away.value @ np.linalg.solve(away.covariance, away.value))
+    constant = math.lgamma(0.5 * (degrees + k)) - math.lgamma(0.5 * degrees) - 0.5 * k * math.log(degrees * math.pi)
+    spread = 0.5 * float(np.linalg.slogdet(away.covariance)[1])
+    return constant - spread - 0.5 * (degrees + k) * math.log1p(square / degrees)
+
+
+def _best(tried: Array, density: Callable[[float], float]) -> float:
+    return max(tried.tolist(), key=density)
+
+
+def scatter_of(pairs: Sequence[Mapping[str, Any]], known: float) -> dict[str, float]:
+    """Scatter of each effect in least sizes that matter, by maximum likelihood.
+
+    Args:
+        pairs: of :func:`compared`.
+        known: degrees of freedom of what is expected.
+    """
+    by_effect: dict[str, list[Mapping[str, Any]]] = {}
+    for pair in pairs:
+        for item in pair["effects"]:
+            by_effect.setdefault(item["effect"], []).append(item)
+    found = {}
+    for name, items in by_effect.items():
+        least = STRUCTURE if items[0]["has_sizes"] else STRUCTURE_OF_LIMIT
+        tried = np.geomspace(least, MOST, STEPS)
+        found[name] = _best(tried, lambda s, items=items: sum(_log_density(_away(i, s, known)) for i in items))
+    return found
+
+
+def moves_of(pairs: Sequence[Mapping[str, Any]], known: float) -> dict[str, float]:
+    """Prior deviations by which drives move each parameter of robot and soil, most likely ones; arguments alike."""
+    names = [name for name in pairs[0]["moved"][0] if "bias" not in name]
+
+    def density(name: str, move: float) -> float:
+        expected = ExpectedScatter(moves={name: move}, degrees=known)
+        values = [(pair["moved"][0][name], _comparison(pair, expected)) for pair in pairs]
+        return sum(
+            _log_t(value / against.usual_move(name), against.move_degrees) - math.log(against.usual_move(name))
+            for value, against in values
+        )
+
+    tried = np.geomspace(LEAST_MOVE, MOST_MOVE, STEPS)
+    return {name: _best(tried, lambda move, name=name: density(name, move)) for name in names}
+
+
+def rises_of(pairs: Sequence[Mapping[str, Any]], known: float) -> dict[str, float]:
+    """Deviation of the logarithm of what is left of each channel, by maximum likelihood; arguments alike."""
+
+    def density(name: str, rise: float) -> float:
+        expected = ExpectedScatter(rises={name: rise}, degrees=known)
+        found = [channel_rises({name: pair["misfits"][0][name]}, pair["misfits"][1:], expected)[0] for pair in pairs]
+        return sum(_log_t(item.distance, item.degrees) - math.log(item.deviation) for item in found)
+
+    tried = np.geomspace(LEAST_RISE, MOST_RISE, STEPS)
+    return {name: _best(tried, lambda rise, name=name: density(name, rise)) for name in pairs[0]["misfits"][0]}
+
+
+def _log_t(distance: float, degrees: float) -> float:
+    """Logarithm of the density of Student's distribution."""
+    constant = math.lgamma(0.5 * (degrees + 1.0)) - math.lgamma(0.5 * degrees) - 0.5 * math.log(degrees * math.pi)
+    return constant - 0.5 * (degrees + 1.0) * math.log1p(distance**2 / degrees)
+
+
+def _comparison(pair: Mapping[str, Any], expected: ExpectedScatter) -> Comparison:
+    return Comparison((None,) * (len(pair["moved"]) - 1), expected=expected, moved=tuple(pair["moved"][1:]))  # type: ignore[arg-type]
+
+
+def probabilities(pair: Mapping[str, Any], expected: ExpectedScatter) -> dict[str, float]:
+    """Of an ordinary drive to show as much as the drive after: of each effect's worst candidate, parameter and channel.
+
+    Args:
+        pair: of :func:`compared`.
+        expected: scatter before any data.
+    """
+    from scipy.special import fdtrc
+
+    found: dict[str, float] = {}
+    for item in pair["effects"]:
+        usual = STRUCTURE if item["has_sizes"] else STRUCTURE_OF_LIMIT
+        away = _away(item, expected.deviations.get(item["effect"], usual), expected.degrees)
+        k = len(away.value)
+        square = float(away.value @ np.linalg.solve(away.covariance, away.value)) / k
+        own = 1.0 if _one_sided(item, away) else float(fdtrc(k, away.degrees, square))
+        found[item["effect"]] = min(own, found.get(item["effect"], 1.0))
+    against = _comparison(pair, expected)
+    for name, moved in pair["moved"][0].items():
+        found[name] = Pull(name, moved / against.usual_move(name), against.move_degrees).probability
+    for rise in channel_rises(pair["misfits"][0], pair["misfits"][1:], expected):
+        found[rise.channel] = rise.probability
+    return found
+
+
+def alarms(pairs: Sequence[Mapping[str, Any]], expected: ExpectedScatter) -> float:
+    """Share of pairs of which anything is out of the ordinary; arguments as of :func:`probabilities`."""
+    raised = []
+    for pair in pairs:
+        tests = len(pair["effects"]) + len(pair["moved"][0]) + len(pair["misfits"][0])
+        raised.append(family_probability(min(probabilities(pair, expected).values()), tests) < LEVEL)
+    return float(np.mean(raised))
+
+
+def fitted_expectation(pairs: Sequence[Mapping[str, Any]]) -> ExpectedScatter:
+    """Scatter, moves and rises with the most degrees of freedom that keep the level of alarms; argument alike."""
+    for degrees in DEGREES:
+        expected = ExpectedScatter(
+            scatter_of(pairs, degrees), degrees, moves_of(pairs, degrees), rises_of(pairs, degrees)
+        )
+        if alarms(pairs, expected) <= LEVEL:
+            break
+    return expected
+
+
+def crossed_alarms(pairs: Sequence[Mapping[str, Any]]) -> float:
+    """Share of alarms of each half of the pairs by what the other half expects; argument alike."""
+    halves = [list(pairs[half::2]) for half in (0, 1)]
+    found = [alarms(mine, fitted_expectation(other)) for mine, other in zip(halves, reversed(halves), strict=True)]
+    return float(np.mean(found))
+
+
+def draw(pairs: Sequence[Mapping[str, Any]], expected: ExpectedScatter, path: Path) -> None:
+    """How probable the sizes, moves and rises of every pair are, against the limit of all of them together."""
+    from matplotlib.figure import Figure
+
+    found = [probabilities(pair, expected) for pair in pairs]
+    names = list(dict.fromkeys(name for item in found for name in item))[::-1]
+    tests = max(len(pair["effects"]) + len(pair["moved"][0]) + len(pair["misfits"][0]) for pair in pairs)
+    with house_style():
+        figure = Figure(figsize=(7.5, 1.0 + 0.22 * len(names)), layout="constrained")
+        axis = figure.subplots()
+        for item in found:
+            values = [(value, names.index(name)) for name, value in item.items() if value < 1.0]
+            axis.plot(*zip(*values, strict=True), "o", ms=3, color=palette.BLUE, alpha=0.35)
+        axis.axvline(-math.expm1(math.log1p(-LEVEL) / tests), color=palette.INK, lw=0.9)
+        axis.set_xscale("log")
+        axis.set_yticks(range(len(names)), [title(name) for name in names])
+        axis.set_xlabel("probability of as much in an ordinary drive (line: an alarm)")
+        figure.savefig(path, dpi=110)
+
+
+def written_pairs(path: Path = RESULT) -> list[dict[str, Any]]:
+    """The pairs that a run wrote; none where there was none."""
+    return list(json.loads(path.read_text(encoding="utf-8"))["pairs"]) if path.exists() else []
+
+
+def summary(pairs: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
+    """What follows from pairs, as JSON has it."""
+    known = list(pairs)
+    expected = fitted_expectation(known)
+    return {
+        "pairs": len(known),
+        "degrees": expected.degrees,
+        "deviations": _sorted(expected.deviations),
+        "moves": _sorted(expected.moves),
+        "rises": _sorted(expected.rises),
+        "false_alarms": alarms(known, expected),
+        "false_alarms_crossed": crossed_alarms(known),
+    }
+
+
+def _sorted(values: Mapping[str, float]) -> dict[str, float]:
+    return {name: float(f"{value:.3g}") for name, value in sorted(values.items())}
+
+
+def expectation_of(found: Mapping[str, Any]) -> ExpectedScatter:
+    """The expectation of a :func:`summary`."""
+    return ExpectedScatter(found["deviations"], found["degrees"], found["moves"], found["rises"])
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Drive, compare and write."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--pairs", type=int, default=40, help="number of pairs")
+    parser.add_argument("--workers", type=int, default=2, help="processes")
+    parser.add_argument("--parts", type=Path, default=RESULT.with_suffix(".parts"), help="folder of finished pairs")
+    given = parser.parse_args(arguments)
+    tasks = [Task(pair.name, compared, (pair,), key=pair.name) for pair in ordinary_pairs(given.pairs)]
+    with TaskRunner(given.workers) as runner:
+        pairs = run_tasks(tasks, "pairs", runner, ResultStore(given.parts))
+    found = summary(pairs)
+    body = {"command": COMMAND, "seed": SEED, **found, "pairs": pairs}
+    write_text(RESULT, json.dumps(body, separators=(",", ":")) + "\n")
+    draw(pairs, expectation_of(found), RESULT.with_suffix(".png"))
+    print({name: found[name] for name in ("degrees", "false_alarms", "false_alarms_crossed", "moves", "rises")})
+
+
+if __name__ == "__main__":
+    main()
