@@ -8,7 +8,7 @@ something changed is then known.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -29,13 +29,17 @@ from ddagr_gym.identification.problem import Problem
 MOST_NAMES = 3
 """Effects that may be named together: as in a diagnosis."""
 
-CLOSE = 0.8
+CLOSE = 0.7
 """Share of the best refit's gain below which another is no rival of one that leaves nothing out of the ordinary (ours:
 further than any weight of an equivalence set)."""
 
 LEAST_SHARE = 0.04
 """Share of all that is out of the ordinary below which nothing is named (ours): what a library's form that is off by a
 fifth leaves to other effects, a fifth squared."""
+
+FORM_OF_GAIN = 0.15
+"""Share of the best refit's gain in units of which differences of cost count (ours): robot and ground are fitted anew
+in every comparison, and the forms of effects are not the robot's."""
 
 NEARLY = 1.1
 """Factor on what the best name leaves out of the ordinary up to which another leaves nearly as little (ours)."""
@@ -170,9 +174,9 @@ def _next(
     explaining = _explaining(alarming, model)
     kept = [*alike, *explaining, *(item for item in soil if item not in explaining)]
     kept.sort(key=lambda item: -item[1].gain)
-    weights = equivalence_weights([rival for _, rival in kept], dispersion, rng)
-    for _, rival in soil:
-        weights = _first(rival.name, weights)
+    weights = equivalence_weights([rival for _, rival in kept], dispersion, rng, FORM_OF_GAIN)
+    for name in [rival.name for _, rival in soil] or _standing_out(alarming, model, weights):
+        weights = _first(name, weights)
     name = max(weights, key=weights.__getitem__)
     chosen = next(item for item in kept if item[1].name == name)
     rivals = (chosen[1], *(rival for _, rival in kept if rival is not chosen[1]))
@@ -186,7 +190,7 @@ def _explaining(alarming: Sequence[Tried], model: Model) -> list[Tried]:
     Where two things changed, one of them takes over much of the other in what is left, and little in what is explained.
     """
     least = min(after.left for after, _ in alarming)
-    allowed = max(1.0, NEARLY * least)
+    allowed = NEARLY * max(1.0, least)
     sure = [item for item in alarming if model.probability(item[0].named[-1]) < LEVEL]
     most = max((rival.gain for _, rival in sure), default=0.0)
     explaining = [item for item in sure if least > 1.0 and item[1].gain >= CLOSE * most]
@@ -198,6 +202,18 @@ def _soil_alone(alarming: Sequence[Tried], model: Model) -> list[Tried]:
     if any(model.probability(after.named[-1]) < LEVEL for after, _ in alarming):
         return []
     return [item for item in alarming if item[0].problem is not model.problem]
+
+
+def _standing_out(alarming: Sequence[Tried], model: Model, weights: Mapping[str, float]) -> list[str]:
+    """The heaviest name that is out of the ordinary by itself, where a heavier one is not: it comes first then.
+
+    One that only takes back what parameters had to make up for may do so by its further sizes.
+    """
+    sure = [rival.name for after, rival in alarming if model.probability(after.named[-1]) < LEVEL]
+    found = [name for name in sure if name in weights]
+    heaviest = max(weights, key=lambda name: weights[name])
+    unsure = heaviest in [rival.name for _, rival in alarming] and heaviest not in sure
+    return [max(found, key=lambda name: weights[name])] if found and unsure else []
 
 
 def _first(name: str, weights: dict[str, float]) -> dict[str, float]:

@@ -34,6 +34,10 @@ Array = NDArray[np.float64]
 MOST_RIVALS = 4
 """Effects that are refitted at each step (ours): a refit with its scan costs a minute on a long drive."""
 
+ALIKE = 0.6
+"""Share of the largest gain, both to first order and beyond that in ordinary drives, from which an effect is refitted
+beside what is out of the ordinary (ours: refits differ from first steps by a fifth)."""
+
 LENGTHS = (1.0, 2.0, 4.0, 8.0)
 """Multiples of an effect's first step from the best of which its refit begins (ours): where losses are linear the first
 step goes part of the way only, and delays that are far off cost the same whatever their size."""
@@ -79,12 +83,36 @@ def joint_refits(model: Model, ordinary: Comparison, dispersion: float, progress
     first = _refitted(problem, model, _starts(problem, model, ordinary), dispersion, progress)
     alike = _alike(problem, model, [rival for _, rival in first]) if first else {}
     again = _refitted(problem, model, alike, dispersion, progress)
-    found = [Refit(problem, *item) for item in (*first, *again)]
+    done = {rival.name for _, rival in (*first, *again)}
+    others = [s for s in _explaining_alike(model, ordinary) if s.compared.name not in done] if first else []
+    beside = _refitted(problem, model, _started(problem, model, model.fitted.point, others), dispersion, progress)
+    found = [Refit(problem, *item) for item in (*first, *again, *beside)]
     found += _with_another_soil(model, dispersion, progress)
     best: dict[str, Refit] = {}
     for item in sorted(found, key=lambda item: -item.rival.gain):
         best.setdefault(item.rival.name, item)
     return list(best.values())
+
+
+def _explaining_alike(model: Model, ordinary: Comparison) -> list[Shift]:
+    """Effects that explain, to first order, about as much as any beyond what they do of ordinary drives.
+
+    What is not far enough out of the ordinary to be refitted by itself may still be what changed; nothing is asked
+    where nothing is out of the ordinary.
+    """
+    if not (model.conspicuous or model.pulled):
+        return []
+    scores = model.scan.scores()
+    own = [key for key in scores.keys if key.startswith(NAMED)]
+    before = [key for shift in model.named for key in shift.compared.keys]
+    gains = {}
+    for shift in model.best:
+        keys, ridge = shift.compared.keys, shift.compared.ridge
+        usual = max((explained(drive, keys, ridge, before) for drive in ordinary.drives), default=0.0)
+        gains[shift] = explained(scores, keys, ridge, own) - usual
+    least = ALIKE * max(gains.values(), default=0.0)
+    listed = sorted(gains, key=lambda shift: -gains[shift])
+    return [shift for shift in listed if gains[shift] > max(least, 0.0)][:MOST_NEAR]
 
 
 def _with_another_soil(model: Model, dispersion: float, progress: Callable[[str], None]) -> list[Refit]:

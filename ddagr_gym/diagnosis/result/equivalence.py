@@ -21,19 +21,22 @@ FORM = 0.08
 """Share of its gain that an effect may lose because the library's form of it is not the robot's (ours)."""
 
 
-def equivalence_weights(rivals: Sequence[Rival], dispersion: float, rng: np.random.Generator) -> dict[str, float]:
+def equivalence_weights(
+    rivals: Sequence[Rival], dispersion: float, rng: np.random.Generator, form: float = FORM
+) -> dict[str, float]:
     """Weight of each rival as the better explanation, averaged over resamplings of the windows.
 
     Theory: diagnosis, eq. (9).
 
     In a resampling a joint refit has the weight exp(-cost/dispersion) over the sum of all: two that explain the same
     share it equally even where one is always ahead by a little. The library's form of an effect is not the robot's:
-    differences of cost count in units of :data:`FORM` of what the best explains, where that is more than 1.
+    differences of cost count in units of a share of what the best explains, where that is more than 1.
 
     Args:
         rivals: joint refits of one step of the search, best first.
         dispersion: of the model before.
         rng: of the resampling.
+        form: that share.
 
     Returns:
         Weights that add up to 1, of the first rival and of all with :data:`LEAST_WEIGHT`.
@@ -43,8 +46,8 @@ def equivalence_weights(rivals: Sequence[Rival], dispersion: float, rng: np.rand
     unusual = np.array([implausibility(rival.fitted.point.effects[-1]) for rival in rivals])
     count = windows.shape[1]
     counts = rng.multinomial(count, np.full(count, 1.0 / count), size=DRAWS).astype(float)
-    form = max(FORM * rivals[0].gain, 1.0)
-    costs = (counts @ windows.T + priors) / dispersion / form + unusual
+    unit = max(form * rivals[0].gain, 1.0)
+    costs = (counts @ windows.T + priors) / dispersion / unit + unusual
     relative = np.exp(costs.min(axis=1, keepdims=True) - costs)
     weights = (relative / relative.sum(axis=1, keepdims=True)).mean(axis=0)
     kept = {

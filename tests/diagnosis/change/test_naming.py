@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from ddagr_gym.diagnosis.change.naming import Named, _absent, _explaining, _first, _soil_alone
+from ddagr_gym.diagnosis.change.naming import Named, _absent, _explaining, _first, _soil_alone, _standing_out
 
 
 def tried(name: str, gain: float, left: float, probability: float, problem: str = "same"):
@@ -54,6 +54,22 @@ def test_a_name_that_comes_first_weighs_as_much_as_the_heaviest():
     assert list(found) == ["soil_change", "gyro_scale", "slope"]
     assert found["soil_change"] == found["gyro_scale"]
     assert sum(found.values()) == pytest.approx(1.0)
+
+
+def by_itself(name: str, probability: float):
+    shift = SimpleNamespace(probability=probability)
+    return SimpleNamespace(named=(shift,)), SimpleNamespace(name=name)
+
+
+def test_a_name_that_is_out_of_the_ordinary_by_itself_comes_before_one_that_takes_parameters_back():
+    model = SimpleNamespace(probability=lambda shift: shift.probability)
+    weights = {"soil_change": 0.6, "lateral_bulldozing": 0.3, "towed_drag": 0.1}
+    alarming = [by_itself("soil_change", 0.3), by_itself("lateral_bulldozing", 1e-5), by_itself("towed_drag", 0.01)]
+    assert _standing_out(alarming, model, weights) == ["lateral_bulldozing"]
+    assert _standing_out(alarming[:1], model, weights) == []
+    # a heavier name that no alarm needs, and one that is out of the ordinary itself, stay first
+    assert _standing_out(alarming[1:], model, weights) == []
+    assert _standing_out([by_itself("soil_change", 1e-5), *alarming[1:]], model, weights) == []
 
 
 def standing_out(*candidates: tuple[str, bool], pulled=(), rougher=()):
