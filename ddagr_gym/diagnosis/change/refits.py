@@ -105,14 +105,14 @@ def _explaining_alike(model: Model, ordinary: Comparison) -> list[Shift]:
     scores = model.scan.scores()
     own = [key for key in scores.keys if key.startswith(NAMED)]
     before = [key for shift in model.named for key in shift.compared.keys]
-    gains = {}
+    gains: list[tuple[float, Shift]] = []
     for shift in model.best:
         keys, ridge = shift.compared.keys, shift.compared.ridge
         usual = max((explained(drive, keys, ridge, before) for drive in ordinary.drives), default=0.0)
-        gains[shift] = explained(scores, keys, ridge, own) - usual
-    least = ALIKE * max(gains.values(), default=0.0)
-    listed = sorted(gains, key=lambda shift: -gains[shift])
-    return [shift for shift in listed if gains[shift] > max(least, 0.0)][:MOST_NEAR]
+        gains.append((explained(scores, keys, ridge, own) - usual, shift))
+    gains.sort(key=lambda item: -item[0])
+    least = max(ALIKE * gains[0][0], 0.0) if gains else 0.0
+    return [shift for gain, shift in gains if gain > least][:MOST_NEAR]
 
 
 def _with_another_soil(model: Model, dispersion: float, progress: Callable[[str], None]) -> list[Refit]:

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from ddagr_gym.diagnosis.change.naming import Named, _absent, _explaining, _first, _soil_alone, _standing_out
+from ddagr_gym.diagnosis.change.naming import Named, _absent, _explaining, _first, _is_share, _soil_alone, _standing_out
 
 
 def tried(name: str, gain: float, left: float, probability: float, problem: str = "same"):
@@ -97,3 +97,15 @@ def test_a_channel_that_is_rougher_than_usual_leaves_an_answer_open():
 def test_of_more_than_were_refitted_none_is_known_to_be_absent():
     many = standing_out(*((f"limit_{k}", False) for k in range(5)))
     assert _absent(many) == frozenset()
+
+
+def costing(cost: float, excess: float = 0.0):
+    return SimpleNamespace(fitted=SimpleNamespace(cost=cost), excess=excess)
+
+
+def test_a_name_explains_a_share_of_what_the_names_before_it_did_and_of_what_rough_channels_leave():
+    first, second = costing(1000.0), costing(600.0)
+    assert _is_share((costing(580.0), None), (first, second))
+    assert not _is_share((costing(590.0), None), (first, second))
+    assert not _is_share((costing(960.0), None), (costing(1000.0, 2000.0),))
+    assert _is_share((costing(999.0), None), (first,))
