@@ -30,8 +30,8 @@ MOST_NAMES = 3
 """Effects that may be named together: as in a diagnosis."""
 
 CLOSE = 0.7
-"""Share of the best refit's gain below which another is no rival of one that leaves nothing out of the ordinary (ours:
-further than any weight of an equivalence set)."""
+"""Share of the best refit's gain below which another is no rival (ours), where the best leaves nothing out of the
+ordinary."""
 
 LEAST_SHARE = 0.04
 """Share of all that is out of the ordinary below which nothing is named (ours): what a library's form that is off by a
