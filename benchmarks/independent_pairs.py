@@ -23,7 +23,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +32,7 @@ from numpy.typing import NDArray
 
 from benchmarks.changed_pairs.answers import SOIL, recordings_of
 from benchmarks.changed_pairs.plan import Pair, plan
+from benchmarks.pair_scatter import DEGREES, MOST, least_scatter, log_density, most_likely, rounded
 from ddagr_gym.diagnosis.change.before_drives import GROUND, robot_of_before
 from ddagr_gym.diagnosis.change.channel_rises import channel_rises
 from ddagr_gym.diagnosis.change.drive_fit import moved_parameters
@@ -39,10 +40,18 @@ from ddagr_gym.diagnosis.change.drive_scan import scan_drive
 from ddagr_gym.diagnosis.change.expected_scatter import ExpectedScatter
 from ddagr_gym.diagnosis.change.ordinary import Comparison
 from ddagr_gym.diagnosis.change.run import fit_ordinary
-from ddagr_gym.diagnosis.change.shifts import LEVEL, Away, Pull, Sizes, away_from, family_probability, sizes_of
+from ddagr_gym.diagnosis.change.shifts import (
+    LEVEL,
+    Away,
+    Pull,
+    Sizes,
+    away_from,
+    family_probability,
+    probability_of,
+    sizes_of,
+)
 from ddagr_gym.diagnosis.preprocessing.mended_recordings import mend_recordings
 from ddagr_gym.diagnosis.result.detectable import least_multiple
-from ddagr_gym.diagnosis.result.uncertainty import STRUCTURE, STRUCTURE_OF_LIMIT
 from ddagr_gym.diagnosis.wording import title
 from ddagr_gym.files import write_text
 from ddagr_gym.identification.misfit import channel_misfit
@@ -56,15 +65,12 @@ Array = NDArray[np.float64]
 RESULT = Path(__file__).resolve().parent / "results" / "independent_pairs.json"
 COMMAND = "python -m benchmarks.independent_pairs"
 SEED = 1
-DEGREES = (24.0, 16.0, 12.0, 10.0, 8.0, 6.0, 5.0, 4.0, 3.0)
-"""Degrees of freedom that are tried, the most first."""
-MOST = 30.0
-"""Largest scatter that is tried, in least sizes that matter."""
+DIGITS = 4
+"""Of the sizes that are written."""
 LEAST_MOVE, MOST_MOVE = 1.0, 10.0
 """Of the prior deviations that are tried."""
 LEAST_RISE, MOST_RISE = 0.1, 3.0
 """Of the deviations of a channel's logarithm that are tried."""
-STEPS = 60
 
 
 def ordinary_pairs(count: int) -> list[Pair]:
@@ -108,14 +114,10 @@ def _written(sizes: Sizes, least: Array) -> dict[str, Any]:
     """Sizes of a drive in least sizes that matter, the drive after first."""
     square = np.outer(least, least)
     return {
-        "value": _rounded(sizes.value / least),
-        "within": [_rounded(row) for row in sizes.within / square],
-        "between": [_rounded(row) for row in sizes.between / square],
+        "value": rounded(sizes.value / least, DIGITS),
+        "within": [rounded(row, DIGITS) for row in sizes.within / square],
+        "between": [rounded(row, DIGITS) for row in sizes.between / square],
     }
-
-
-def _rounded(values: Array) -> list[float]:
-    return [float(f"{value:.4g}") for value in values]
 
 
 def _sizes(mapping: Mapping[str, Any]) -> Sizes:
@@ -127,24 +129,6 @@ def _away(item: Mapping[str, Any], scatter: float, known: float) -> Away:
     here, *others = (_sizes(drive) for drive in item["drives"])
     k = len(here.value)
     return away_from(here, others, (), scatter**2 * np.eye(k), np.ones(k), known)
-
-
-def _one_sided(item: Mapping[str, Any], away: Away) -> bool:
-    """Whether it is there or not, and no less than nothing was found of it."""
-    return not item["has_sizes"] and float(away.value[0]) <= 0.0
-
-
-def _log_density(away: Away) -> float:
-    """Of the multivariate t distribution."""
-    k, degrees = len(away.value), away.degrees
-    square = float(away.value @ np.linalg.solve(away.covariance, away.value))
-    constant = math.lgamma(0.5 * (degrees + k)) - math.lgamma(0.5 * degrees) - 0.5 * k * math.log(degrees * math.pi)
-    spread = 0.5 * float(np.linalg.slogdet(away.covariance)[1])
-    return constant - spread - 0.5 * (degrees + k) * math.log1p(square / degrees)
-
-
-def _best(tried: Array, density: Callable[[float], float]) -> float:
-    return max(tried.tolist(), key=density)
 
 
 def scatter_of(pairs: Sequence[Mapping[str, Any]], known: float) -> dict[str, float]:
@@ -160,10 +144,14 @@ def scatter_of(pairs: Sequence[Mapping[str, Any]], known: float) -> dict[str, fl
             by_effect.setdefault(item["effect"], []).append(item)
     found = {}
     for name, items in by_effect.items():
-        least = STRUCTURE if items[0]["has_sizes"] else STRUCTURE_OF_LIMIT
-        tried = np.geomspace(least, MOST, STEPS)
-        found[name] = _best(tried, lambda s, items=items: sum(_log_density(_away(i, s, known)) for i in items))
+        least = least_scatter(items[0]["has_sizes"])
+        found[name] = most_likely(least, MOST, lambda s, items=items: _likelihood(items, s, known))
     return found
+
+
+def _likelihood(items: Sequence[Mapping[str, Any]], scatter: float, known: float) -> float:
+    away = (_away(item, scatter, known) for item in items)
+    return sum(log_density(item.value, item.covariance, item.degrees) for item in away)
 
 
 def moves_of(pairs: Sequence[Mapping[str, Any]], known: float) -> dict[str, float]:
@@ -173,13 +161,14 @@ def moves_of(pairs: Sequence[Mapping[str, Any]], known: float) -> dict[str, floa
     def density(name: str, move: float) -> float:
         expected = ExpectedScatter(moves={name: move}, degrees=known)
         values = [(pair["moved"][0][name], _comparison(pair, expected)) for pair in pairs]
-        return sum(
-            _log_t(value / against.usual_move(name), against.move_degrees) - math.log(against.usual_move(name))
-            for value, against in values
-        )
+        return sum(_of_number(value, against.usual_move(name), against.move_degrees) for value, against in values)
 
-    tried = np.geomspace(LEAST_MOVE, MOST_MOVE, STEPS)
-    return {name: _best(tried, lambda move, name=name: density(name, move)) for name in names}
+    return {name: most_likely(LEAST_MOVE, MOST_MOVE, lambda move, name=name: density(name, move)) for name in names}
+
+
+def _of_number(value: float, deviation: float, degrees: float) -> float:
+    """Logarithm of the density of one number."""
+    return log_density(np.array([value]), np.array([[deviation**2]]), degrees)
 
 
 def rises_of(pairs: Sequence[Mapping[str, Any]], known: float) -> dict[str, float]:
@@ -188,16 +177,10 @@ def rises_of(pairs: Sequence[Mapping[str, Any]], known: float) -> dict[str, floa
     def density(name: str, rise: float) -> float:
         expected = ExpectedScatter(rises={name: rise}, degrees=known)
         found = [channel_rises({name: pair["misfits"][0][name]}, pair["misfits"][1:], expected)[0] for pair in pairs]
-        return sum(_log_t(item.distance, item.degrees) - math.log(item.deviation) for item in found)
+        return sum(_of_number(item.distance * item.deviation, item.deviation, item.degrees) for item in found)
 
-    tried = np.geomspace(LEAST_RISE, MOST_RISE, STEPS)
-    return {name: _best(tried, lambda rise, name=name: density(name, rise)) for name in pairs[0]["misfits"][0]}
-
-
-def _log_t(distance: float, degrees: float) -> float:
-    """Logarithm of the density of Student's distribution."""
-    constant = math.lgamma(0.5 * (degrees + 1.0)) - math.lgamma(0.5 * degrees) - 0.5 * math.log(degrees * math.pi)
-    return constant - 0.5 * (degrees + 1.0) * math.log1p(distance**2 / degrees)
+    names = pairs[0]["misfits"][0]
+    return {name: most_likely(LEAST_RISE, MOST_RISE, lambda rise, name=name: density(name, rise)) for name in names}
 
 
 def _comparison(pair: Mapping[str, Any], expected: ExpectedScatter) -> Comparison:
@@ -211,15 +194,11 @@ def probabilities(pair: Mapping[str, Any], expected: ExpectedScatter) -> dict[st
         pair: of :func:`compared`.
         expected: scatter before any data.
     """
-    from scipy.special import fdtrc
-
     found: dict[str, float] = {}
     for item in pair["effects"]:
-        usual = STRUCTURE if item["has_sizes"] else STRUCTURE_OF_LIMIT
+        usual = least_scatter(item["has_sizes"])
         away = _away(item, expected.deviations.get(item["effect"], usual), expected.degrees)
-        k = len(away.value)
-        square = float(away.value @ np.linalg.solve(away.covariance, away.value)) / k
-        own = 1.0 if _one_sided(item, away) else float(fdtrc(k, away.degrees, square))
+        own = probability_of(item["has_sizes"], away.value, away.covariance, away.degrees)
         found[item["effect"]] = min(own, found.get(item["effect"], 1.0))
     against = _comparison(pair, expected)
     for name, moved in pair["moved"][0].items():
@@ -276,17 +255,12 @@ def draw(pairs: Sequence[Mapping[str, Any]], expected: ExpectedScatter, path: Pa
         figure.savefig(path, dpi=110)
 
 
-def written_pairs(path: Path = RESULT) -> list[dict[str, Any]]:
-    """The pairs that a run wrote; none where there was none."""
-    return list(json.loads(path.read_text(encoding="utf-8"))["pairs"]) if path.exists() else []
-
-
 def summary(pairs: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
     """What follows from pairs, as JSON has it."""
     known = list(pairs)
     expected = fitted_expectation(known)
     return {
-        "pairs": len(known),
+        "count": len(known),
         "degrees": expected.degrees,
         "deviations": _sorted(expected.deviations),
         "moves": _sorted(expected.moves),

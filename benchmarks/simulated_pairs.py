@@ -32,18 +32,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.independent_pairs import RESULT as INDEPENDENT
+from benchmarks.pair_scatter import DEGREES, MOST, least_scatter, log_density, most_likely, rounded
 from ddagr_gym.diagnosis.change.before_drives import DAY, SAME_GROUND, WINDOW, JointFit, day_parameters, joint_fit
 from ddagr_gym.diagnosis.change.drive_fit import change_problem, change_windows, fit_nominal
 from ddagr_gym.diagnosis.change.drive_scan import DriveScan, Priors, scan_drive
 from ddagr_gym.diagnosis.change.measured_scatter import PATH
 from ddagr_gym.diagnosis.change.ordinary import Scores, uncertain_parameters
-from ddagr_gym.diagnosis.change.shifts import LEVEL, distance_at, family_probability, single_level, sizes_of
+from ddagr_gym.diagnosis.change.shifts import (
+    LEVEL,
+    distance_at,
+    family_probability,
+    probability_of,
+    single_level,
+    sizes_of,
+)
 from ddagr_gym.diagnosis.null_bank.drives import Template, null_recordings
 from ddagr_gym.diagnosis.null_bank.standard_drives import standard_template
 from ddagr_gym.diagnosis.null_bank.structural_variants import KINDS
 from ddagr_gym.diagnosis.preprocessing.mended_recordings import mend_recordings
 from ddagr_gym.diagnosis.result.detectable import least_multiple
-from ddagr_gym.diagnosis.result.uncertainty import STRUCTURE, STRUCTURE_OF_LIMIT
 from ddagr_gym.diagnosis.wording import title
 from ddagr_gym.files import write_json
 from ddagr_gym.parameters import Robot, Soil
@@ -56,11 +63,9 @@ Array = NDArray[np.float64]
 
 RESULT = Path(__file__).resolve().parent / "results" / "simulated_pairs.json"
 SEED = 7
+DIGITS = 5
+"""Of the differences that are written."""
 SAME, OTHER = "same_ground", "other_ground"
-DEGREES = (24.0, 16.0, 12.0, 10.0, 8.0, 6.0, 5.0, 4.0, 3.0)
-"""Degrees of freedom that are tried, the most first."""
-MOST = 30.0
-"""Largest scatter that is tried, in least sizes that matter."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,33 +89,24 @@ class Difference:
     @property
     def least(self) -> float:
         """Scatter below which none counts."""
-        return STRUCTURE if self.has_sizes else STRUCTURE_OF_LIMIT
+        return least_scatter(self.has_sizes)
 
     def distance(self, scatter: float) -> float:
         """In standard deviations of all that is expected; of what is there or not none below nothing."""
-        one_sided = not self.has_sizes and self.value[0] <= 0.0
-        return 0.0 if one_sided else math.sqrt(self._square(scatter)[0])
+        if not self.has_sizes and self.value[0] <= 0.0:
+            return 0.0
+        return math.sqrt(float(self.value @ np.linalg.solve(self._whole(scatter), self.value)))
 
     def probability(self, scatter: float, degrees: float) -> float:
         """Of such a difference or a larger one."""
-        from scipy.special import fdtrc
-
-        # what is there or not has no less than nothing
-        if not self.has_sizes and self.value[0] <= 0.0:
-            return 1.0
-        k = len(self.value)
-        return float(fdtrc(k, degrees, self._square(scatter)[0] / k))
+        return probability_of(self.has_sizes, self.value, self._whole(scatter), degrees)
 
     def log_density(self, scatter: float, degrees: float) -> float:
         """Of the multivariate t distribution."""
-        k = len(self.value)
-        square, log_determinant = self._square(scatter)
-        constant = math.lgamma(0.5 * (degrees + k)) - math.lgamma(0.5 * degrees) - 0.5 * k * math.log(degrees * math.pi)
-        return constant - 0.5 * log_determinant - 0.5 * (degrees + k) * math.log1p(square / degrees)
+        return log_density(self.value, self._whole(scatter), degrees)
 
-    def _square(self, scatter: float) -> tuple[float, float]:
-        whole = self.covariance + 2.0 * scatter**2 * np.eye(len(self.value))
-        return float(self.value @ np.linalg.solve(whole, self.value)), float(np.linalg.slogdet(whole)[1])
+    def _whole(self, scatter: float) -> Array:
+        return np.asarray(self.covariance + 2.0 * scatter**2 * np.eye(len(self.value)))
 
 
 def drives_of(number: int, robot: Robot, soil: Soil) -> tuple[Recording, Recording, Recording]:
@@ -173,15 +169,11 @@ def _differences(one: DriveScan, two: DriveScan, deviations: Array | None) -> li
             {
                 "effect": item.name,
                 "has_sizes": item.candidate.has_sizes,
-                "value": _rounded((second.value - first.value) / least),
-                "covariance": [_rounded(row) for row in covariance / np.outer(least, least)],
+                "value": rounded((second.value - first.value) / least, DIGITS),
+                "covariance": [rounded(row, DIGITS) for row in covariance / np.outer(least, least)],
             }
         )
     return found
-
-
-def _rounded(values: Array) -> list[float]:
-    return [float(f"{value:.5g}") for value in values]
 
 
 def differences(pairs: Iterable[dict[str, Any]], ground: str) -> list[Difference]:
@@ -209,8 +201,7 @@ def fitted_scatter(found: Sequence[Difference]) -> tuple[dict[str, float], float
 
 def _best_scatter(items: Sequence[Difference], degrees: float) -> float:
     """Scatter of one effect."""
-    tried: list[float] = np.geomspace(items[0].least, MOST, 60).tolist()
-    return max(tried, key=lambda scatter: sum(item.log_density(scatter, degrees) for item in items))
+    return most_likely(items[0].least, MOST, lambda scatter: sum(item.log_density(scatter, degrees) for item in items))
 
 
 def alarms(found: Sequence[Difference], deviations: dict[str, float], degrees: float) -> float:

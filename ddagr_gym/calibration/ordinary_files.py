@@ -79,7 +79,6 @@ def _reference(item: Reference) -> dict[str, Any]:
         "soil": None if item.soil is None else dump_config(item.soil),
         "moved": {name: _plain(value) for name, value in item.moved.items()},
         "column_map": item.column_map,
-        "misfit": {name: _plain(value) for name, value in item.misfit.items()},
     }
 
 
@@ -95,7 +94,6 @@ def _reference_of(mapping: Mapping[str, Any]) -> Reference:
         _config_of(mapping.get("soil"), Soil),
         {str(name): float(value) for name, value in mapping.get("moved", {}).items()},
         str(mapping.get("column_map", "")),
-        {str(name): float(value) for name, value in mapping.get("misfit", {}).items()},
     )
 
 

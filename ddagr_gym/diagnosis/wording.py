@@ -11,7 +11,7 @@ from ddagr_gym.diagnosis.answer.drivetrain import PART_TITLES
 from ddagr_gym.physics.effects.registry import effect_kinds
 
 CHANNEL_NAMES = {
-    "specific_force_x": "specific force, forward", "specific_force_y": "specific force, to the left",
+    "specific_force_x": "forward specific force", "specific_force_y": "specific force to the left",
     "yaw_rate": "yaw rate", "encoder_right": "right encoder", "encoder_left": "left encoder",
     "pose_x": "position x", "pose_y": "position y", "pose_yaw": "heading",
     "local_strength": "soil strength by window", "local_stiffness": "soil stiffness by window",

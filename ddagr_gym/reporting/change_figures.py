@@ -178,6 +178,6 @@ def channel_figure(change: Change) -> Any:
         plain("{x:g}")
     axis.set_yticks(range(len(items)), [CHANNEL_NAMES[item.channel] for item in items])
     axis.set_ylim(-0.6, len(items) - 0.4)
-    axis.set_xlabel("residual over its usual size, r.m.s.")
+    axis.set_xlabel("error of the model in units of its weight, r.m.s.")
     axis.legend(ncols=4, loc="lower left", bbox_to_anchor=(0.0, 1.0))
     return figure

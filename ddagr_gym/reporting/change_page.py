@@ -80,7 +80,7 @@ def _context(diagnosis: Diagnosis) -> dict[str, Any]:
             figures.parameter_figure(change), "Parameters of robot and ground without and with what changed"
         ),
         "channel_picture": embedded(
-            figures.channel_figure(change), "What the model leaves of each channel, before and after"
+            figures.channel_figure(change), "Error of the model in each channel, before and after"
         )
         if change.channels
         else None,

@@ -22,7 +22,7 @@ PARAMETER_HEADER = ("parameter", "without effects", "with what changed", "ordina
 """Columns of :func:`parameter_rows`."""
 
 CHANNEL_HEADER = ("readings", "before", "without effects", "with what changed", "limit")
-"""Columns of :func:`channel_rows`; root mean squares of what the model leaves, over their usual size."""
+"""Columns of :func:`channel_rows`; root mean squares of the model's error, in units of its weight."""
 
 SHOWN = 8
 """Effects in the text, the most conspicuous (ours); the page has all of them."""
@@ -64,7 +64,7 @@ def parameter_rows(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
 
 
 def channel_rows(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
-    """What is left of each channel, root mean squares under :data:`CHANNEL_HEADER`."""
+    """Error of the model in each channel, under :data:`CHANNEL_HEADER`."""
     return [
         (
             CHANNEL_NAMES[item.channel],

@@ -48,7 +48,7 @@ def pairs() -> list[dict]:
 
 
 def test_known_scatter_moves_and_rises_come_back(pairs):
-    # the priors are rather wide of the mark than narrow: drives scatter as normal ones, and t is expected
+    # values are drawn from normal distributions and fitted by Student's t
     assert scatter_of(pairs, 24.0)["payload"] == pytest.approx(SCATTER, rel=0.25)
     assert moves_of(pairs, 24.0) == {"soil_strength": pytest.approx(MOVE, rel=0.25)}
     assert rises_of(pairs, 24.0) == {"yaw_rate": pytest.approx(RISE, rel=0.25)}
@@ -62,7 +62,7 @@ def test_pairs_that_differ_more_than_expected_raise_alarms(pairs):
     assert alarms(pairs, ExpectedScatter(degrees=24.0)) > 0.3
     found = summary(pairs)
     assert found["false_alarms"] <= 0.05
-    assert found["pairs"] == 60
+    assert found["count"] == 60
     assert alarms(pairs, expectation_of(found)) == found["false_alarms"]
 
 

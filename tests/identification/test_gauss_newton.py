@@ -152,6 +152,18 @@ def test_a_step_of_the_states_never_raises_the_cost_of_a_window(one_drive):
     assert after.sum() < 0.9 * before.sum()
 
 
+def test_losses_by_channel_are_those_of_the_windows(one_drive):
+    problem = one_drive()
+    nominal = problem.start()
+    residual = problem.residual(nominal, problem.predict(nominal))
+    found = problem.losses_by_channel(residual)
+    assert set(found) == set(CHANNELS)
+    assert found["yaw_rate"] > 0.0
+    without_priors = residual.copy()
+    without_priors[:, problem.blocked.mask.shape[1] :] = 0.0
+    assert sum(found.values()) == pytest.approx(problem.losses(without_priors).sum())
+
+
 @pytest.mark.parametrize(("delay", "begin", "end"), [(0.12, 0.07, 0.17), (0.0, 0.0, 0.05)])
 def test_the_derivative_to_a_delay_spans_a_sample_to_both_sides_inside_its_bounds(
     one_drive, robot, soil, delay, begin, end

@@ -147,7 +147,7 @@ class Change:
         against: "calibration", or "before" for drives that were given with `--before`.
         certificate: whether the drives are forecast as well with what changed as ordinary ones are; null where the
             calibration was made before that was kept.
-        channels: what is left of each channel; none where drives on several grounds were compared.
+        channels: what is left of each channel; only where drives from before on the same ground were given.
     """
 
     ground: str

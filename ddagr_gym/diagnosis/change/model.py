@@ -13,6 +13,7 @@ from ddagr_gym.diagnosis.change.shifts import LEVEL, Pull, Shift, family_probabi
 from ddagr_gym.identification.gauss_newton import Fitted
 from ddagr_gym.identification.misfit import channel_misfit, projected_residual
 from ddagr_gym.identification.problem import Problem
+from ddagr_gym.identification.windows import CHANNELS
 
 NEAR = 0.4
 """Share of its limit at which an effect is refitted to see (ours): in a real drive poses that come half a second late
@@ -37,7 +38,7 @@ class Model:
         shifts: of all candidates, the least probable first.
         pulls: of all parameters that may differ between drives.
         named: candidates of the fit's effects, as they were shifted when each was added.
-        rises: of what is left of each channel; none where that is not known of ordinary drives.
+        rises: of what is left of each channel; only against drives from before on the same ground.
     """
 
     problem: Problem
@@ -123,7 +124,8 @@ def model_of(problem: Problem, fitted: Fitted, ordinary: Comparison, named: Sequ
         Pull(name, moved / ordinary.usual_move(name), ordinary.move_degrees)
         for name, moved in moved_parameters(problem, fitted).items()
     )
-    rises = channel_rises(channel_misfit(problem, fitted), ordinary.misfits, ordinary.expected)
+    misfit = {name: value for name, value in channel_misfit(problem, fitted).items() if name in CHANNELS}
+    rises = channel_rises(misfit, ordinary.misfits, ordinary.expected)
     return Model(problem, fitted, scan, tuple(shifts), pulls, tuple(named), rises)
 
 

@@ -145,7 +145,7 @@ class Comparison:
         expected: scatter between drives before any data.
         unnamed: effects that cannot be what changed, with the reason.
         moved: by how many of its prior deviations the fit to each ordinary drive moved every parameter.
-        misfits: what fits leave of the channels of each ordinary drive; none where drives are on several grounds.
+        misfits: mean square of what fits leave of the channels of each drive from before on the same ground; else none.
     """
 
     drives: tuple[Scores, ...]
@@ -167,7 +167,10 @@ class Comparison:
         return known + len(self.drives) - 1.0
 
     def usual_move(self, parameter: str) -> float:
-        """Prior deviations by which ordinary drives move a parameter (r.m.s., drawn to the expected), at least 1."""
+        """Prior deviations by which ordinary drives move a parameter (r.m.s., drawn to the expected), at least 1.
+
+        What is expected has the weight of few drives: those of this robot say more of it than simulated ones.
+        """
         known = [item[parameter] for item in self.moved if parameter in item]
         square = EXPECTED_DRIVES * self.expected.move(parameter) ** 2 + sum(value**2 for value in known)
         return max(1.0, float(np.sqrt(square / (EXPECTED_DRIVES + len(known)))))
@@ -188,7 +191,7 @@ class Reference:
         soil: of its ground as calibrated without it, likewise.
         moved: by how many of its prior deviations the fit moved every parameter; none in files of before.
         column_map: by which it was read; "" where that is not known.
-        misfit: mean square of what the fit leaves of each channel; none in files of before.
+        misfit: mean square of what the fit leaves of each channel; none in files of calibrations.
     """
 
     drive: str

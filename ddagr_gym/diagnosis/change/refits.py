@@ -71,7 +71,7 @@ class Refit:
 
 
 def joint_refits(model: Model, ordinary: Comparison, dispersion: float, progress: Callable[[str], None]) -> list[Refit]:
-    """Joint refits of what may have changed, and of what the best of them is confused with, the best first.
+    """Joint refits of what may have changed, of what the best is confused with and of what explains alike, best first.
 
     Args:
         model: without what may have changed.

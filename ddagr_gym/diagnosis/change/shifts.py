@@ -164,8 +164,13 @@ def _shown(scores: Scores, keys: Sequence[str]) -> tuple[str, ...]:
 
 
 def explained(scores: Scores, keys: Sequence[str], ridge: Array, beside: Sequence[str] = ()) -> float:
-    """Fall of the cost by an effect at the best of its sizes, to first order; arguments as of :func:`sizes_of`."""
+    """Fall of the cost by an effect at the best of its sizes, to first order; 0 where the drive shows nothing of it.
+
+    Arguments as of :func:`sizes_of`.
+    """
     known = _shown(scores, beside)
+    if len(_shown(scores, keys)) < len(keys):
+        return 0.0
     falls = []
     for chosen, prior in (((*keys, *known), ridge), (known, np.zeros(0))):
         rows = [scores.keys.index(key) for key in chosen]
@@ -216,7 +221,7 @@ def shift_of(
     structure = np.diag((ordinary.expected.of(compared.candidate) * least) ** 2)
     pieces = _sizes_in(compared, ordinary.pieces, beside_ordinary) if len(others) == 1 else []
     away = away_from(here, others, pieces, structure, least, ordinary.expected.degrees)
-    probability = _probability(compared, away.value, away.covariance, away.degrees)
+    probability = probability_of(compared.candidate.has_sizes, away.value, away.covariance, away.degrees)
     return Shift(compared, away.value, away.mean, away.covariance, away.between, away.degrees, probability)
 
 
@@ -285,7 +290,7 @@ def refitted_shift(
     value = size - shift.mean
     covariance = further.within / np.outer(away, away) + farther**2 * shift.between
     found = replace(shift, value=value, covariance=covariance)
-    return replace(found, probability=_probability(shift.compared, value, covariance, shift.degrees))
+    return replace(found, probability=probability_of(candidate.has_sizes, value, covariance, shift.degrees))
 
 
 def _sizes_in(compared: Compared, drives: Sequence[Scores], beside: Sequence[str]) -> list[Sizes]:
@@ -325,12 +330,18 @@ def _positive(matrix: Array) -> Array:
     return np.asarray((vectors * np.maximum(values, 0.0)) @ vectors.T)
 
 
-def _probability(compared: Compared, value: Array, covariance: Array, degrees: float) -> float:
-    """Of an ordinary drive to show as much."""
+def probability_of(has_sizes: bool, value: Array, covariance: Array, degrees: float) -> float:
+    """Of an ordinary drive to show sizes as far away; of what is there or not nothing is less than nothing.
+
+    Args:
+        has_sizes: False for a limit or a sign.
+        value: (k,) sizes.
+        covariance: (k, k) of them.
+        degrees: of freedom.
+    """
     from scipy.special import fdtrc
 
-    # what is there or not has no less than nothing
-    if not compared.candidate.has_sizes and value[0] <= 0.0:
+    if not has_sizes and value[0] <= 0.0:
         return 1.0
     k = len(value)
     return float(fdtrc(k, degrees, float(value @ np.linalg.solve(covariance, value)) / k))

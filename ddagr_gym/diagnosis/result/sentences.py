@@ -83,21 +83,20 @@ def change_headline(verdict: Sequence[str], complete: bool, findings: Sequence[F
         )
     if tuple(verdict) == (UNKNOWN,):
         nearest = _joined_names([in_sentence(item.effect) for item in change.shifts[:3]])
-        seen = rougher_in_words(change) or f"nearest are {nearest}"
-        return f"Something changed against {drives} that no effect of the library explains, {seen}{blind}{ground}."
+        seen = rougher_in_words(change) or f", nearest are {nearest}"
+        return f"Something changed against {drives} that no effect of the library explains{seen}{blind}{ground}."
     found = _joined([finding_in_words(item) + when(item) + _rivals(item) for item in findings])
     rest = "nothing else is out of the ordinary" if complete else "something else is out of the ordinary"
-    rougher = rougher_in_words(change)
-    return f"Against {drives}: {found}; {rest}{', ' + rougher if rougher else ''}{ground}."
+    return f"Against {drives}: {found}; {rest}{rougher_in_words(change)}{ground}."
 
 
 def rougher_in_words(change: Change) -> str:
-    """Channels of which more is left than of ordinary drives, the worst first; "" where there is none."""
+    """Channels that the model fits worse than in ordinary drives, the worst first; "" where there is none."""
     found = sorted((item for item in change.channels if item.rougher), key=lambda item: -item.times)
     if not found:
         return ""
-    named = _joined_names([f"{CHANNEL_NAMES[item.channel]} ({item.times:.1f} times)" for item in found[:MOST_CHANNELS]])
-    return f"as the model leaves more of {named} than before"
+    shown = [f"{CHANNEL_NAMES[item.channel]} ({item.times:.1f} times)" for item in found[:MOST_CHANNELS]]
+    return f": the model's error is larger than before in {_joined_names(shown)}"
 
 
 def _reference(change: Change) -> str:

@@ -86,9 +86,9 @@ def test_noisier_sensors_are_a_change_without_a_name(before, tmp_path):
     assert diagnosis.verdict == ("unknown",)
     assert not diagnosis.complete
     assert {item.channel for item in diagnosis.change.channels if item.rougher} >= {"yaw_rate", "specific_force_x"}
-    assert "as the model leaves more of" in diagnosis.sentence
+    assert "the model's error is larger than before in" in diagnosis.sentence
     write_page(tmp_path, diagnosis)
-    assert (tmp_path / "index.html").read_text().count('alt="What the model leaves of each channel') == 1
+    assert (tmp_path / "index.html").read_text().count('alt="Error of the model in each channel') == 1
     assert validate(as_mapping(diagnosis)).change.channels == diagnosis.change.channels
     assert diagnosis.change.certificate.as_well < 0.3 * diagnosis.change.certificate.windows
 

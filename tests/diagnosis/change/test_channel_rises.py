@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy import stats
 
 from ddagr_gym.diagnosis.answer.change import ChannelShift
+from ddagr_gym.diagnosis.change import model
 from ddagr_gym.diagnosis.change.channel_rises import channel_rises
 from ddagr_gym.diagnosis.change.expected_scatter import RISE, ExpectedScatter
+from ddagr_gym.diagnosis.change.measured_scatter import measured_scatter
+from ddagr_gym.diagnosis.change.model import Model
 from ddagr_gym.diagnosis.change.shifts import single_level
 from ddagr_gym.diagnosis.result.sentences import rougher_in_words
+from ddagr_gym.identification.windows import CHANNELS
 
 EXPECTED = ExpectedScatter(degrees=8.0, rises={"yaw_rate": 0.2})
 BEFORE = [{"yaw_rate": 1.0}, {"yaw_rate": float(np.e**0.3)}, {"yaw_rate": float(np.e**-0.3)}]
@@ -68,5 +74,23 @@ def test_a_sentence_lists_the_roughest_channels_first():
     encoder = ChannelShift("encoder_left", 1.0, 9.0, 9.0, 2.0)
     quiet = ChannelShift("pose_x", 1.0, 9.0, 1.5, 2.0)
     words = rougher_in_words(_Changed(gyro, encoder, quiet))
-    assert words == "as the model leaves more of left encoder (3.0 times) and yaw rate (2.0 times) than before"
+    assert words == ": the model's error is larger than before in left encoder (3.0 times) and yaw rate (2.0 times)"
     assert rougher_in_words(_Changed(quiet)) == ""
+
+
+def test_excess_is_what_rough_channels_cost_beyond_what_they_usually_do(monkeypatch):
+    monkeypatch.setattr(model, "projected_residual", lambda problem, fitted: None)
+    problem = SimpleNamespace(losses_by_channel=lambda residual: {"yaw_rate": 300.0, "encoder_left": 100.0})
+    before = [{"yaw_rate": 1.0, "encoder_left": 1.0}] * 3
+    quiet = channel_rises({"yaw_rate": 1.1, "encoder_left": 1.0}, before, EXPECTED)
+    rough = channel_rises({"yaw_rate": 4.0, "encoder_left": 1.0}, before, EXPECTED)
+    assert Model(problem, None, None, (), (), (), quiet).excess == 0.0
+    assert Model(problem, None, None, (), (), (), rough).excess == pytest.approx(300.0 * (1.0 - 1.0 / 4.0))
+
+
+def test_the_package_ships_what_was_measured_of_one_ground():
+    measured = measured_scatter()
+    assert set(measured.same_ground.rises) == set(CHANNELS)
+    assert measured.same_ground.move("shear_modulus") > 1.0
+    assert measured.other_ground.rises == {}
+    assert measured.other_ground.move("shear_modulus") == 1.0

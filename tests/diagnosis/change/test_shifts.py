@@ -11,6 +11,7 @@ from ddagr_gym.diagnosis.change.expected_scatter import EXPECTED_DRIVES, Expecte
 from ddagr_gym.diagnosis.change.ordinary import Comparison, Scores
 from ddagr_gym.diagnosis.change.shifts import (
     LEVEL,
+    explained,
     family_probability,
     refitted_shift,
     shift_of,
@@ -201,3 +202,18 @@ def test_how_far_parameters_move_is_known_as_well_as_from_the_drives_and_the_pri
     assert measured.degrees == 26.0
     assert measured.move_degrees == EXPECTED_DRIVES + 2.0
     assert measured.usual_move("a") == pytest.approx(np.sqrt(31.0 / 7.0))
+
+
+def test_where_moves_were_measured_their_degrees_are_those_of_the_measurement():
+    expected = ExpectedScatter({}, 16.0, {"a": 2.0})
+    measured = Comparison(ALIKE.drives, expected=expected, moved=({"a": 3.0, "b": 0.0},) * 3)
+    assert measured.move_degrees == 18.0
+    assert measured.usual_move("a") == pytest.approx(np.sqrt((4.0 * 2.0**2 + 27.0) / 7.0))
+    assert measured.usual_move("b") == 1.0
+
+
+def test_a_drive_that_shows_nothing_of_an_effect_explains_nothing_by_it():
+    blind = Scores(SIGN.keys, *(np.zeros(shape) for shape in ((1,), (1, 1), (1, 1), (1, 1))))
+    assert explained(blind, SIGN.keys, SIGN.ridge) == 0.0
+    seeing = scores(SIGN.keys[0], 2.0, 0.5)
+    assert explained(seeing, SIGN.keys, np.zeros(1)) == pytest.approx(0.5 * (2.0 / 0.5) ** 2)
