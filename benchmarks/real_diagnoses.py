@@ -1,9 +1,10 @@
-"""What the data sheet's simulator lacks against each ordinary drive of a Warthog, as ``ddagr diagnose`` says it.
+"""What the data sheet's simulator lacks against real drives, as ``ddagr diagnose`` says it.
 
     python -m benchmarks.real_diagnoses FOLDER [--drives NAME ...] [--threads 2] [--output benchmarks/results]
 
-Each drive is diagnosed by itself, without a calibration, by the gates of simulated drives, on a soil of which only the
-kind is known (uncertainty 4). Its page is written to FOLDER; a drive whose page is there is not diagnosed again. Writes
+Six ordinary drives of a Warthog and one of a Husky, of which we are not told what is wrong with it. Each is diagnosed
+by itself, without a calibration, by the gates of simulated drives, on a soil of which only the kind is known
+(uncertainty 4). Its page is written to FOLDER; a drive whose page is there is not diagnosed again. Writes
 ``real_diagnoses.json`` and ``real_diagnoses.png``: parts of the drivetrain that are named, and errors on stretches of
 the same drive that nothing was fitted to, beside those of a learned model that was trained on the rest of the drive.
 """
@@ -17,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.answers.run_recordings_check import recordings_folder
-from benchmarks.real_drives.__main__ import DRIVES, SOILS
+from benchmarks.real_drives import __main__ as ordinary
 from benchmarks.real_drives.ceiling import learned_errors
 from ddagr_gym import diagnose, load_recording
 from ddagr_gym.calibration.result import ForecastError
@@ -31,6 +32,12 @@ from ddagr_gym.reporting.drivetrain_section import forecast_label, grouped_forec
 from ddagr_gym.reporting.figures import house_style
 
 RESULTS = Path(__file__).resolve().parent / "results"
+DRIVES = {**ordinary.DRIVES, "concealed/husky_1": ("tiles", "drive_steps")}
+"""Ground and column map by file below ``shared/recordings``; the robot is the first word of a file's name."""
+
+SOILS = {**ordinary.SOILS, "tiles": "firm_ground"}
+"""Nominal soil of each ground."""
+
 UNCERTAINTY = 4.0
 """Of the soil: a factor on that of one which is known by name."""
 
@@ -51,6 +58,11 @@ WORDS = {
 SHOWN = ("heading after 5 s", "wheel speed")
 
 
+def robot_of(name: str) -> str:
+    """Name of the robot of one of :data:`DRIVES`."""
+    return name.rpartition("/")[2].partition("_")[0]
+
+
 def diagnosed(name: str, folder: Path, threads: int) -> Diagnosis:
     """Diagnosis of a drive, of which the page is written; the one that was written before where there is one.
 
@@ -63,8 +75,9 @@ def diagnosed(name: str, folder: Path, threads: int) -> Diagnosis:
     if not (page / "diagnosis.json").is_file():
         ground, column_map = DRIVES[name]
         result = diagnose(
-            recordings_folder() / f"{name}.csv.gz", robot="warthog", soil=SOILS[ground], soil_uncertainty=UNCERTAINTY,
-            threads=threads, column_map=column_map, progress=lambda line: print(line, flush=True),
+            recordings_folder() / f"{name}.csv.gz", robot=robot_of(name), soil=SOILS[ground],
+            soil_uncertainty=UNCERTAINTY, threads=threads, column_map=column_map,
+            progress=lambda line: print(line, flush=True),
         )  # fmt: skip
         result.report(page)
     return load(page / "diagnosis.json")
@@ -85,9 +98,9 @@ def learned(name: str, folder: Path) -> dict[str, float]:
 
 def _learned(name: str) -> dict[str, float]:
     ground, column_map = DRIVES[name]
-    recording = load_recording(recordings_folder() / f"{name}.csv.gz", column_map, "warthog")
+    recording = load_recording(recordings_folder() / f"{name}.csv.gz", column_map, robot_of(name))
     grouped: dict[str, list[ForecastError]] = {}
-    for item in learned_errors(recording, get_robot("warthog"), get_soil(SOILS[ground])):
+    for item in learned_errors(recording, get_robot(robot_of(name)), get_soil(SOILS[ground])):
         grouped.setdefault(forecast_label(item), []).append(item)
     return {
         label: root_mean_square([item.rms for item in items if item.rms is not None])

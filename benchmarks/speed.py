@@ -31,6 +31,8 @@ from ddagr_gym.version import __version__
 
 RESULTS = Path(__file__).with_name("results")
 OURS = "DDAGR-Turn-v0"
+FIRST_STEPS = 40
+"""Of an episode, in which none ends."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +43,7 @@ class Effort:
         repeats: turns of each contestant.
         steps: environment steps in a turn.
         batches: numbers of environments.
+        shared_batches: those of which two threads are held against one between resets.
         evaluations: of the kernel in a turn.
         states: of wheels per soil for the force errors.
         samples: of a drive for the step errors and the kernel's share.
@@ -50,6 +53,7 @@ class Effort:
     repeats: int = 15
     steps: int = 1500
     batches: tuple[int, ...] = (1, 4, 16, 64, 256)
+    shared_batches: tuple[int, ...] = (64, 256)
     evaluations: int = 40_000
     states: int = 100
     samples: int = 2000
@@ -58,7 +62,16 @@ class Effort:
     @classmethod
     def quick(cls) -> Effort:
         """Half a minute; the figures scatter by some ten percent."""
-        return cls(repeats=5, steps=300, batches=(1, 16, 64), evaluations=10_000, states=20, samples=600, resets=500)
+        return cls(
+            repeats=5,
+            steps=300,
+            batches=(1, 16, 64),
+            shared_batches=(64,),
+            evaluations=10_000,
+            states=20,
+            samples=600,
+            resets=500,
+        )
 
 
 def measure(effort: Effort, report: Callable[[str], None]) -> dict[str, Any]:
@@ -78,6 +91,7 @@ def measure(effort: Effort, report: Callable[[str], None]) -> dict[str, Any]:
     parts: dict[str, Callable[[], Any]] = {
         "steps_per_second": lambda: steps_per_second(tables, effort),
         "batch": lambda: {name: batch(actions, effort) for name, actions in tables.items()},
+        "two_threads": lambda: two_threads(tables, effort),
         "kernel_share": lambda: {
             name: kernel_share.share(actions[:4], effort.samples, effort.repeats, effort.evaluations)
             for name, actions in tables.items()
@@ -146,6 +160,20 @@ def batch(actions: np.ndarray, effort: Effort) -> list[dict[str, Any]]:
         }
         for count in effort.batches
     ]
+
+
+def two_threads(tables: dict[str, np.ndarray], effort: Effort) -> list[dict[str, Any]]:
+    """Rate of two threads over that of one, by the wall clock, in stepping alone: resets are of one thread."""
+    found = []
+    for workload, actions in tables.items():
+        for count in effort.shared_batches:
+            steps = max(2, min(FIRST_STEPS, 2 * effort.steps // count))
+            both = [environments.between_resets(f"{n}", actions, steps, count, n) for n in (1, 2)]
+            rates = race(both, effort.repeats)
+            gain = ratio(rates, "2", "1", clock="wall")
+            got = rates["2"].summary()["cpu_over_wall"]
+            found.append({"workload": workload, "environments": count, "gain": gain, "cores_got": got})
+    return found
 
 
 def main(arguments: list[str] | None = None) -> None:

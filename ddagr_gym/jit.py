@@ -211,3 +211,23 @@ def stack_array(typing_context: Any, size: Any) -> Any:
         return array._getvalue()
 
     return array_type(size), generate
+
+
+@intrinsic
+def claim(typing_context: Any, claims: Any, index: Any) -> Any:
+    """Whether this thread is the first to ask for ``index``: sets ``claims[index]`` to 1 atomically.
+
+    Args:
+        claims: (N,) int64, contiguous, 0 where nobody has asked.
+        index: from 0 to N - 1, unchecked.
+    """
+    if claims != types.Array(types.int64, 1, "C") or not isinstance(index, types.Integer):
+        return None
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        array = context.make_array(claims)(context, builder, arguments[0])
+        place = builder.gep(array.data, [arguments[1]])
+        before = builder.atomic_rmw("xchg", place, ir.Constant(ir.IntType(64), 1), "acq_rel")
+        return builder.icmp_signed("==", before, ir.Constant(ir.IntType(64), 0))
+
+    return types.boolean(claims, index), generate

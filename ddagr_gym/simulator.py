@@ -65,10 +65,6 @@ _FORGOTTEN = (
 )
 """First entries and sizes of what a reset sets to zero."""
 
-_PARTS_PER_THREAD = 6  # (ours) small enough that no thread waits long for the last part of another
-_LONG = 100  # samples from which handing out parts costs less than waiting for the slower thread
-_MUCH = 2000  # samples of all drives together from which it does
-
 
 def _soils(soil: Soils) -> Array:
     per_wheel = [soil] * 4 if isinstance(soil, Soil) else list(soil)
@@ -175,8 +171,9 @@ class Simulator:
         self._set_fields(fields)
         self._numerics = _plain(step_numerics(numerics))
         threads = min(threads, count)
-        self._threads = threads
-        self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
+        self._parts = np.linspace(0, count, threads + 1).astype(np.int64)
+        self._claims = np.zeros(count, dtype=np.int64)
+        self._pool = ThreadPoolExecutor(threads - 1) if threads > 1 else None
 
     def _set_fields(self, fields: Sequence[SoilField]) -> None:
         if len({field.values.shape for field in fields}) > 1:
@@ -285,22 +282,21 @@ class Simulator:
             record: (N, samples, K), written.
         """
         stretch = (commands, noise, recorded, readings, record)
-        shared = (stretch, self._grids(), self._actions(), self._numerics)
-
+        shared: tuple[Any, ...] = (self._claims, stretch, self._grids(), self._actions(), self._numerics)
+        self._claims[:] = 0
         if self._pool is None:
-            advance_rows(self.rows, 0, self.count, *shared)
+            advance_rows(self.rows, self._parts, 0, *shared)
             return
-        ends = self._chunks(noise.shape[1])
-        list(self._pool.map(lambda first, last: advance_rows(self.rows, first, last, *shared), ends[:-1], ends[1:]))
-
-    def _chunks(self, samples: int) -> NDArray[np.int64]:
-        """Ends of the parts that threads take: one each for a short stretch, several for a long one or for many drives.
-
-        Some drives cost twice as much as others, and whoever is done takes the next part.
-        """
-        long = samples >= _LONG or self.count * samples >= _MUCH
-        each = _PARTS_PER_THREAD if long and self._threads > 1 else 1
-        return np.linspace(0, self.count, min(each * self._threads, self.count) + 1).astype(np.int64)
+        helpers = [
+            self._pool.submit(advance_rows, self.rows, self._parts, part, *shared)
+            for part in range(1, len(self._parts) - 1)
+        ]
+        try:
+            advance_rows(self.rows, self._parts, 0, *shared)
+        finally:
+            for helper in helpers:
+                if not helper.cancel():  # one that has not begun has nothing left to do
+                    helper.result()
 
     def step(
         self, commands: ArrayLike, noise: ArrayLike | None = None, *, recorded: Sequence[int] = (), samples: int = 1

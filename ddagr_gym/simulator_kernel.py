@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.jit import kernel
+from ddagr_gym.jit import claim, kernel
 from ddagr_gym.physics.body_dynamics import evaluate_forces, place_wheels, restore_body
 from ddagr_gym.physics.callbacks import EffectActions, actions_on, apply_effects
 from ddagr_gym.physics.drivetrain import (
@@ -178,39 +178,54 @@ def remember_rows(rows: Array, past: Array, speeds: Array, actions: Bundle) -> N
         row[TIME], row[OMEGA], row[OMEGA + 1] = now, right, left
 
 
+@kernel(inline=True)
+def _advance_row(
+    row: Array, n: int, stretch: Stretch, grids: SoilGrids, actions: EffectActions, accuracy: StepNumerics
+) -> None:
+    """Advance row ``n`` by the samples of ``stretch``; ``actions`` are its own."""
+    held = stretch.commands.shape[1] == 1
+    for k in range(stretch.readings.shape[1]):
+        _drive(row, stretch.commands[n, 0 if held else k], actions)
+        _prepare_ground(row, grids, n, actions)
+        v_x, v_y, yaw_rate = row[V_X], row[V_Y], row[YAW_RATE]
+        steps = _division(row, accuracy)
+        for _ in range(steps):
+            advance_body(row, row[SAMPLE_PERIOD] / steps, accuracy, actions)
+        _average_motion(row, v_x, v_y, yaw_rate)
+        read_imu(row, stretch.noise[n, k, 0:3])
+        read_encoders(row, stretch.noise[n, k, 3:5], row[SAMPLE_PERIOD])
+        read_pose(row, stretch.noise[n, k, 5:8])
+        apply_effects(POINT_READINGS, row, actions)
+        for j in range(8):
+            stretch.readings[n, k, j] = row[READING + j]
+        for j in range(stretch.recorded.shape[0]):
+            stretch.record[n, k, j] = row[stretch.recorded[j]]
+
+
 @kernel()
 def advance_rows(
-    rows: Array, first: int, last: int, stretch: Bundle, grids: Bundle, actions: Bundle, numerics: Bundle
-) -> None:
-    """Advance rows ``first`` to ``last`` (exclusive) by the samples of ``stretch``.
+    rows: Array, ends: Integers, part: int, claims: Integers,
+    stretch: Bundle, grids: Bundle, actions: Bundle, numerics: Bundle,
+) -> None:  # fmt: skip
+    """Advance by the samples of ``stretch`` all rows that no other thread has claimed, those of one part first.
+
+    A thread goes up its own part, which its processor has in its cache from the step before, and then down the others'.
 
     Args:
         rows: (N, layout.SIZE), updated.
-        first: first row.
-        last: one past the last row.
+        ends: (P + 1,) first row of each part, and N.
+        part: of this thread, from 0 to P - 1.
+        claims: (N,) 0; shared by the threads, 1 where one of them has taken the row.
         stretch: fields of :class:`Stretch`.
         grids: fields of :class:`SoilGrids`.
         actions: fields of :class:`EffectActions` on N environments.
         numerics: fields of :class:`StepNumerics`.
     """
-    commands, noise, recorded, readings, record = Stretch(*stretch)
-    accuracy = named_numerics(numerics)
-    held = commands.shape[1] == 1
-    for n in range(first, last):
-        row, own = rows[n], actions_on(EffectActions(*actions), n)
-        for k in range(readings.shape[1]):
-            _drive(row, commands[n, 0 if held else k], own)
-            _prepare_ground(row, SoilGrids(*grids), n, own)
-            v_x, v_y, yaw_rate = row[V_X], row[V_Y], row[YAW_RATE]
-            steps = _division(row, accuracy)
-            for _ in range(steps):
-                advance_body(row, row[SAMPLE_PERIOD] / steps, accuracy, own)
-            _average_motion(row, v_x, v_y, yaw_rate)
-            read_imu(row, noise[n, k, 0:3])
-            read_encoders(row, noise[n, k, 3:5], row[SAMPLE_PERIOD])
-            read_pose(row, noise[n, k, 5:8])
-            apply_effects(POINT_READINGS, row, own)
-            for j in range(8):
-                readings[n, k, j] = row[READING + j]
-            for j in range(recorded.shape[0]):
-                record[n, k, j] = row[recorded[j]]
+    parts, accuracy = ends.size - 1, named_numerics(numerics)
+    for turn in range(parts):
+        p = (part + turn) % parts
+        for i in range(ends[p + 1] - ends[p]):
+            n = ends[p] + i if turn == 0 else ends[p + 1] - 1 - i
+            if claim(claims, n):
+                own = actions_on(EffectActions(*actions), n)
+                _advance_row(rows[n], n, Stretch(*stretch), SoilGrids(*grids), own, accuracy)

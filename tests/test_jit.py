@@ -3,13 +3,14 @@
 import os
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
 from numba.core.errors import NumbaError
 
 from ddagr_gym import jit
-from ddagr_gym.jit import kernel, stack_array
+from ddagr_gym.jit import claim, kernel, stack_array
 
 
 @kernel(cached=False)
@@ -54,6 +55,26 @@ def test_stack_array_needs_a_constant_size():
 
     with pytest.raises(NumbaError):
         variable(3)
+
+
+@kernel(cached=False)
+def claim_all(claims, mine):
+    for i in range(claims.size):
+        mine[i] = claim(claims, i)
+
+
+def test_each_index_is_claimed_by_one_of_several_threads():
+    claims, mine = np.zeros(200_000, dtype=np.int64), np.zeros((4, 200_000), dtype=bool)
+    claim_all(claims[:0], mine[0, :0])  # compiled before the threads start
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(claim_all, [claims] * 4, mine))
+    assert (mine.sum(axis=0) == 1).all()
+    assert (claims == 1).all()
+
+
+def test_claims_must_be_whole_numbers():
+    with pytest.raises(NumbaError):
+        claim_all(np.zeros(3), np.zeros(3, dtype=bool))
 
 
 def test_unfused_function_gives_plain_arithmetic():

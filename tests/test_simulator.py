@@ -13,6 +13,7 @@ from ddagr_gym.parameters import STANDARD_GRAVITY, Imu, Numerics, PoseReceiver, 
 from ddagr_gym.physics import layout
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.simulator import INITIAL_STATE, TRUTH, Simulator, simulate
+from ddagr_gym.simulator_kernel import advance_rows
 
 ROBOT, SOIL = get_robot("ddagr"), get_soil("thesis_a1")
 SENSORS = Sensors(pose=PoseReceiver(rate=10.0))
@@ -98,20 +99,32 @@ def test_single_batch_and_threads_give_the_same_bits():
         np.testing.assert_array_equal(record[0], results[0][1][i])
 
 
-def test_threads_share_long_stretches_by_who_is_free_and_give_the_same_bits():
+def test_threads_that_help_each_other_give_the_same_bits():
     count, samples = 9, 150
     soils = [get_soil("thesis_a1")] * count
     rng = np.random.default_rng(3)
     commands = np.repeat(rng.uniform(-1.0, 1.0, (count, samples // 50, 2)), 50, axis=1)
     noise = rng.standard_normal((count, samples, layout.NOISE_CHANNELS))
-    one, two = (_batch(count, soils, threads=threads).step(commands, noise)[0] for threads in (1, 2))
-    assert np.array_equal(one, two, equal_nan=True)
-    simulator = Simulator(count, threads=2)
-    assert len(simulator._chunks(10)) == 3
-    assert len(simulator._chunks(samples)) == count + 1
-    many = Simulator(60, threads=2)
-    assert len(many._chunks(10)) == 3
-    assert len(many._chunks(40)) == 13
+    one, *others = (_batch(count, soils, threads=threads).step(commands, noise)[0] for threads in (1, 2, 4, 30))
+    for other in others:
+        assert np.array_equal(one, other, equal_nan=True)
+
+
+def test_a_row_that_another_thread_has_claimed_is_left_alone(monkeypatch):
+    """Also by a thread that has done its own part and helps with the others."""
+    batch = _batch(5, [get_soil("thesis_a1")] * 5, threads=2)
+    before = batch.rows.copy()
+    taken = np.array([0, 1, 0, 1, 0])
+
+    def with_claims(rows, parts, part, claims, *rest):
+        claims[:] = np.maximum(claims, taken)
+        return advance_rows(rows, parts, part, claims, *rest)
+
+    monkeypatch.setattr("ddagr_gym.simulator.advance_rows", with_claims)
+    batch.step(np.full((5, 2), 1.0), samples=3)
+    assert batch._claims.tolist() == [1] * 5
+    moved = (batch.rows != before).any(axis=1)
+    assert moved.tolist() == [True, False, True, False, True]
 
 
 def test_saved_rows_continue_to_the_same_bits_also_in_another_simulator():

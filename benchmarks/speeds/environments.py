@@ -56,3 +56,22 @@ def batch(name: str, actions: np.ndarray, steps: int, count: int, threads: int =
         return steps * count * STEP_SECONDS
 
     return Contestant(name, run, threads)
+
+
+def between_resets(name: str, actions: np.ndarray, steps: int, count: int, threads: int = 1) -> Contestant:
+    """``gym.make_vec`` over the first ``steps`` steps of ``count`` episodes, reset before the clock starts.
+
+    Raises:
+        RuntimeError: an episode ended within these steps.
+    """
+    env = gymnasium.make_vec(ENVIRONMENT, num_envs=count, threads=threads)
+    sequence = np.arange(count) % len(actions)
+
+    def run() -> float:
+        for k in range(steps):
+            _, _, terminated, truncated, _ = env.step(actions[sequence, k])
+            if (terminated | truncated).any():
+                raise RuntimeError(f"an episode ended at step {k}: measure fewer than {steps}.")
+        return steps * count * STEP_SECONDS
+
+    return Contestant(name, run, threads, lambda: env.reset(seed=1))

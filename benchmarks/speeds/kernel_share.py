@@ -16,7 +16,7 @@ from benchmarks.speeds.kernel_time import Kernel
 from benchmarks.speeds.timing import race
 from ddagr_gym.parameters import Numerics
 
-FORCE_NODES = (7, 14, 28)
+FORCE_NODES = (4, 8, 16)
 DERIVATIVE_NODES = (2, 4, 8)
 
 

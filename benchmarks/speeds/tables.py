@@ -12,6 +12,7 @@ def tables_of(results: dict[str, Any]) -> str:
     parts = [
         _steps(results["steps_per_second"]),
         _batch(results["batch"]),
+        _two_threads(results["two_threads"]),
         _share(results["kernel_share"]),
         _kernel(results["kernel_beside_c"]),
         _quadrature(results["quadrature"]),
@@ -54,6 +55,15 @@ def _batch(batch: dict[str, list[dict[str, Any]]]) -> str:
         "CPU of one over two",
     )
     return "Native batch, resets included\n" + format_table(header, rows)
+
+
+def _two_threads(found: list[dict[str, Any]]) -> str:
+    rows = [
+        (row["workload"], row["environments"], row["gain"]["median"], *row["gain"]["quartiles"], row["cores_got"])
+        for row in found
+    ]
+    header = ("workload", "environments", "two threads over one", "from", "to", "cores got")
+    return "Native batch between resets\n" + format_table(header, rows)
 
 
 def _share(shares: dict[str, dict[str, float]]) -> str:

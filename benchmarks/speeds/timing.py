@@ -24,11 +24,13 @@ class Contestant:
         name: in tables and results.
         run: does a chunk of work and returns its amount.
         threads: that it uses.
+        prepare: called before each turn, outside of its time.
     """
 
     name: str
     run: Callable[[], float]
     threads: int = 1
+    prepare: Callable[[], object] = lambda: None
 
 
 @dataclass(frozen=True)
@@ -73,7 +75,7 @@ def race(contestants: Sequence[Contestant], repeats: int) -> dict[str, Rates]:
         repeats: turns of each that count.
     """
     for contestant in contestants:
-        contestant.run()
+        _turn(contestant)
     turns: dict[str, list[tuple[float, float]]] = {contestant.name: [] for contestant in contestants}
     for repeat in range(repeats):
         first = repeat % len(contestants)
@@ -83,6 +85,7 @@ def race(contestants: Sequence[Contestant], repeats: int) -> dict[str, Rates]:
 
 
 def _turn(contestant: Contestant) -> tuple[float, float]:
+    contestant.prepare()
     wall, cpu = time.perf_counter(), time.process_time()
     amount = contestant.run()
     return amount / (time.process_time() - cpu), amount / (time.perf_counter() - wall)

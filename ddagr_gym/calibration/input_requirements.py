@@ -106,7 +106,7 @@ def _check_length(recording: Recording) -> None:
     speed = np.max(np.abs(np.stack(recording.held_commands())), axis=0)
     known = np.isfinite(speed)
     seconds = float(known.sum()) * recording.period
-    if not seconds >= SHORTEST_DRIVE:
+    if not seconds >= SHORTEST_DRIVE - 0.5 * recording.period:
         raise InputError(
             f"{recording.meta.source} has {seconds:.0f} s under known commands: give drives of {SHORTEST_DRIVE:g} s "
             "at least."

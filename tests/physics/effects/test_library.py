@@ -44,8 +44,9 @@ POSE = ("pose_x", "pose_y", "pose_yaw")
 # about the sensors' noise
 SCALES = {"specific_force_x": 0.05, "specific_force_y": 0.05, "yaw_rate": 3e-3, "encoder_right": 0.01}
 SCALES |= {"encoder_left": 0.01, "pose_x": 0.02, "pose_y": 0.02, "pose_yaw": 0.01}
-# no adaptive choices: these depend on parameters in steps
+# no adaptive choices: these depend on parameters in steps; more nodes, since slopes move where a kink passes one
 SMOOTH = Numerics(
+    contact_nodes=7,
     substeps=4,
     launch_substeps=1,
     jacobian_refresh=0.0,
