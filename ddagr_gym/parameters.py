@@ -277,8 +277,8 @@ class Sensors:
 class Numerics(Validated):
     """Accuracy against cost of the simulator. The default keeps nine in ten force errors below 1e-3 of the force.
 
-    That holds over the reference rows (largest 4e-3) and over states of turns on 24 soils (median 1.4e-4). A wheel whose
-    sliding velocity changes sign inside the patch at almost no lateral motion reaches 1 to 5 percent (section 5).
+    That holds over the reference rows (largest 4e-3) and over states of turns on 24 soils (median 1.4e-4). A wheel
+    whose sliding velocity changes sign inside the patch at almost no lateral motion reaches 1 to 5 percent (section 5).
 
     Attributes:
         section_nodes: Gauss nodes across the tyre (psi), a multiple of 8 (the kernel's vector width).
