@@ -65,6 +65,8 @@ _FORGOTTEN = (
 )
 """First entries and sizes of what a reset sets to zero."""
 
+_WORTH_WAKING = 100  # (ours) samples of all rows together below which a thread that wakes up comes too late
+
 
 def _soils(soil: Soils) -> Array:
     per_wheel = [soil] * 4 if isinstance(soil, Soil) else list(soil)
@@ -284,7 +286,7 @@ class Simulator:
         stretch = (commands, noise, recorded, readings, record)
         shared: tuple[Any, ...] = (self._claims, stretch, self._grids(), self._actions(), self._numerics)
         self._claims[:] = 0
-        if self._pool is None:
+        if self._pool is None or noise.shape[0] * noise.shape[1] < _WORTH_WAKING:
             advance_rows(self.rows, self._parts, 0, *shared)
             return
         helpers = [

@@ -121,7 +121,7 @@ def test_a_row_that_another_thread_has_claimed_is_left_alone(monkeypatch):
         return advance_rows(rows, parts, part, claims, *rest)
 
     monkeypatch.setattr("ddagr_gym.simulator.advance_rows", with_claims)
-    batch.step(np.full((5, 2), 1.0), samples=3)
+    batch.step(np.full((5, 2), 1.0), samples=30)
     assert batch._claims.tolist() == [1] * 5
     moved = (batch.rows != before).any(axis=1)
     assert moved.tolist() == [True, False, True, False, True]
