@@ -16,7 +16,7 @@ from agents.main import ALGORITHMS
 from agents.run import course_of, finished, train
 from agents.sweep import OBJECTIVE, STOPPED, Sweep, Trial, stopped_course
 from ddagr_gym.errors import InputError
-from ddagr_gym.extras import need
+from ddagr_gym.extras import how_to_install, need
 from ddagr_gym.files import write_json
 from ddagr_gym.progress import Progress
 from ddagr_gym.tasks import Ended, Failure, Task
@@ -33,9 +33,7 @@ try:
     from ray import tune
     from ray.tune.schedulers import FIFOScheduler, MedianStoppingRule
 except ImportError as error:
-    raise InputError(
-        f"Ray is installed without Tune ({error}): run pip install -c constraints.txt 'ddagr-gym[cluster]'."
-    ) from None
+    raise InputError(f"Ray is installed without Tune ({error}): run {how_to_install('cluster')}.") from None
 
 
 def train_on_ray(sweep: Sweep, trials: Sequence[Trial], output: Path, workers: int, cluster: str) -> None:
@@ -115,14 +113,17 @@ def _scheduler(sweep: Sweep) -> Any:
 
 
 class _Ends(tune.Callback):  # type: ignore[misc]
-    """Counts trainings that have ended, and keeps the courses of those that were stopped."""
+    """Counts trainings that have ended, and keeps the courses of those that were stopped.
 
-    def __init__(self, trials: Sequence[Trial], output: Path, progress: Progress) -> None:
-        self._trials, self._output, self._progress = trials, output, progress
+    By a ``ray://`` address Tune runs on the head of the cluster, with a copy of this that shows no progress.
+    """
+
+    def __init__(self, trials: Sequence[Trial], output: Path, progress: Progress | None) -> None:
+        self._trials, self._output, self._progress = trials, output.resolve(), progress
         self._courses: dict[int, dict[int, dict[str, Any]]] = {n: {} for n in range(len(trials))}
 
     def __getstate__(self) -> dict[str, Any]:
-        # Tune writes a copy of its callbacks that nothing reads again; a terminal has none
+        # a terminal cannot be sent or written
         return self.__dict__ | {"_progress": None}
 
     def on_trial_result(self, iteration: int, trials: list[Any], trial: Any, result: dict[str, Any], **_: Any) -> None:
@@ -138,11 +139,16 @@ class _Ends(tune.Callback):  # type: ignore[misc]
         if finished(own.folder(self._output), own.settings) is None and stopped_course(own, self._output) is None:
             content = {"digest": own.settings.digest(), "course": list(self._courses[number].values())}
             write_json(own.folder(self._output) / STOPPED, content)
-        self._progress.advance()
+        self._count()
 
     def on_trial_error(self, iteration: int, trials: list[Any], trial: Any, **_: Any) -> None:
         """Count a training that failed."""
-        self._progress.advance()
+        self._count()
+
+    def _count(self) -> None:
+        """One training more, where there is somebody to tell."""
+        if self._progress is not None:
+            self._progress.advance()
 
 
 def _failed(trial: Trial, error: Exception) -> Ended:

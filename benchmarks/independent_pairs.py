@@ -1,6 +1,6 @@
 """How much two ordinary drives differ in a simulator that shares no code with the package's, driven in other ways.
 
-    python -m benchmarks.independent_pairs [--pairs N] [--workers N]
+    python -m benchmarks.independent_pairs [--pairs N] [--workers N] [--cluster ADDRESS]
 
 Pairs in which nothing changed, of the open set of :mod:`benchmarks.changed_pairs` (seed 1; half of them with a
 structure that no effect of the library has): three drives before and one after, with other manoeuvres on another patch
@@ -285,9 +285,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--pairs", type=int, default=40, help="number of pairs")
     parser.add_argument("--workers", type=int, default=2, help="processes")
     parser.add_argument("--parts", type=Path, default=RESULT.with_suffix(".parts"), help="folder of finished pairs")
+    parser.add_argument("--cluster", default="", help="local, or the address of a Ray cluster")
     given = parser.parse_args(arguments)
     tasks = [Task(pair.name, compared, (pair,), key=pair.name) for pair in ordinary_pairs(given.pairs)]
-    with TaskRunner(given.workers) as runner:
+    with TaskRunner(given.workers, cluster=given.cluster) as runner:
         pairs = run_tasks(tasks, "pairs", runner, ResultStore(given.parts))
     found = summary(pairs)
     body = {"command": COMMAND, "seed": SEED, **found, "pairs": pairs}

@@ -1,6 +1,6 @@
 """Front against rear: what a diagnosis says of ground that keeps its ruts, and of a mass that is off centre.
 
-    python -m benchmarks.kept_ruts [--workers N] [--parts DIR]
+    python -m benchmarks.kept_ruts [--workers N] [--cluster ADDRESS] [--parts DIR]
 
 Twelve cases of the concealed benchmark's simulator, three drives of 60 s each, on fields and with noise of their own:
 six on ground that keeps its ruts (:mod:`benchmarks.concealed.terrain_memory`), of which 0.1, 0.2 or 0.4 of the depth
@@ -179,9 +179,10 @@ def main(words: Sequence[str] | None = None) -> None:
     parser.add_argument("--parts", type=Path, default=RESULT.with_suffix(".parts"), help="folder of finished answers")
     parser.add_argument("--output", type=Path, default=RESULT, help="JSON; the picture has the same name")
     parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--cluster", default="", help="local, or the address of a Ray cluster")
     given = parser.parse_args(words)
     tasks = [Task(truth.words, answer, (truth,), key=f"case-{truth.number:02d}") for truth in CASES]
-    with TaskRunner(given.workers) as runner:
+    with TaskRunner(given.workers, cluster=given.cluster) as runner:
         answers = run_tasks(tasks, "cases", runner, ResultStore(given.parts))
     found = summary(answers)
     write_json(given.output, {"command": "python -m benchmarks.kept_ruts", **found, "answers": answers})

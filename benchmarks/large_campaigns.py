@@ -1,11 +1,12 @@
 """What 100,000 recordings and 1e9 environment steps would take on 100 nodes, from measured figures.
 
     python -m benchmarks.large_campaigns
-    python -m benchmarks.large_campaigns --nodes 20 --processors 64 --price 0.03
+    python -m benchmarks.large_campaigns --nodes 20 --processors 64 --price 0.03 --folder my_diagnosis
 
-Figures of ``task_runner.json`` and ``diagnosis_speed.json``; episodes of an evaluation and parts of its dataset are
-measured anew. The runner itself runs a million tasks on a cluster whose time is simulated and which loses one attempt
-in a hundred: its retries are the real ones. ``benchmarks/results/large_campaigns.json`` and ``.png`` have the figures.
+Figures of ``task_runner.json``, ``diagnosis_speed.json`` and ``long_drives.json``; episodes of an evaluation and parts
+of its dataset are measured anew. The runner itself runs a million tasks on a cluster whose time is simulated and which
+loses one attempt in a hundred: its retries are the real ones. ``benchmarks/results/large_campaigns.json`` and ``.png``
+have the figures.
 """
 
 from __future__ import annotations
@@ -40,6 +41,8 @@ RESULT = RESULTS / "large_campaigns.json"
 RECORDINGS, STEPS = 100_000, 1_000_000_000
 PER_TASK = 50
 """Episodes of a task, as in an evaluation."""
+FOLDER = 3_753_588
+"""Size of what ``ddagr diagnose`` wrote of three drives of 60 s: page, figures, evidence [bytes] (measured)."""
 
 
 class SimulatedCluster(ThisProcess):
@@ -159,6 +162,32 @@ def measured_store(rows: Sequence[dict[str, Any]], parts: int = 100) -> dict[str
     }
 
 
+def room_of_diagnoses(folder: int, processors: int) -> dict[str, float]:
+    """Disk for the folders of all recordings, and memory of a node that diagnoses one on each processor.
+
+    Args:
+        folder: size of one folder [bytes].
+        processors: of a node.
+    """
+    drives = json.loads((RESULTS / "long_drives.json").read_text())["drives"]
+    memory = max(drive["gibibytes"] for drive in drives)
+    return {
+        "bytes_per_folder": folder,
+        "store_GiB": RECORDINGS * folder / 2**30,
+        "memory_GiB_each": memory,
+        "memory_GiB_per_node": processors * memory,
+    }
+
+
+def size_of(folder: Path) -> int:
+    """Bytes of the files of a folder.
+
+    Args:
+        folder: of a diagnosis.
+    """
+    return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
+
+
 def arithmetic(options: argparse.Namespace) -> dict[str, Any]:
     """Both campaigns on the cluster that the options name."""
     processors = options.nodes * options.processors
@@ -171,6 +200,7 @@ def arithmetic(options: argparse.Namespace) -> dict[str, Any]:
         "core_seconds_each": {"least": min(each), "mean": float(np.mean(each)), "most": max(each)},
         **_priced(RECORDINGS * float(np.mean(each)), processors, options.price),
         "tasks_per_second": processors / float(np.mean(each)),
+        **room_of_diagnoses(size_of(options.folder) if options.folder else FOLDER, options.processors),
     }
     episodes = STEPS / (driven["steps"] / driven["episodes"])
     seconds = episodes * driven["cpu_seconds"] / driven["episodes"]
@@ -238,6 +268,7 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument("--nodes", type=int, default=100)
     parser.add_argument("--processors", type=int, default=32, help="of a node")
     parser.add_argument("--price", type=float, default=0.04, help="of a core hour, in any currency")
+    parser.add_argument("--folder", type=Path, help="a diagnosis whose size counts, instead of the measured one")
     parser.add_argument("--tasks", type=int, default=1_000_000, help="of the simulation")
     parser.add_argument("--task-seconds", type=float, nargs="+", default=[1.0, 5.0, 20.0, 30.0, 60.0])
     parser.add_argument("--output", type=Path, default=RESULT)

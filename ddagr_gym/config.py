@@ -12,7 +12,6 @@ import enum
 import math
 import os
 import re
-import stat
 import types
 import typing
 from collections.abc import Mapping, Sequence
@@ -22,7 +21,7 @@ from typing import Any, Literal, TypeVar, Union
 import yaml
 
 from ddagr_gym.errors import InputError, unknown_name
-from ddagr_gym.files import expanded
+from ddagr_gym.files import expanded, read_text
 
 Config = TypeVar("Config")
 
@@ -63,12 +62,14 @@ def find_config(folder: str, name: str | os.PathLike[str]) -> Path:
         name: one of :func:`config_names`, or the path of a ``.yaml`` or ``.yml`` file.
 
     Raises:
-        InputError: no such name (closest names listed) or file.
+        InputError: no such name (closest names listed) or file, or no regular one.
     """
     path = expanded(name)
     if path.suffix in (".yaml", ".yml"):
-        if not path.is_file():
+        if not path.exists():
             raise InputError(f"{path}: no such configuration file.")
+        if not path.is_file():
+            raise InputError(f"{path} is not a regular file: give a configuration's file.")
         return path
     names = config_names(folder)
     if str(name) not in names:
@@ -113,18 +114,9 @@ def dump_config(config: Any) -> str:
 
 
 def _read(file: Path) -> str:
-    try:
-        status = file.stat()
-        size = status.st_size
-        if not stat.S_ISREG(status.st_mode):
-            raise InputError(f"{file} is not a regular file: give a configuration's file.")
-        if size > MAXIMUM_BYTES:
-            raise InputError(f"{file} has {size} bytes: a configuration may have {MAXIMUM_BYTES} at most.")
-        return file.read_text(encoding="utf-8")
-    except UnicodeDecodeError as error:
-        raise InputError(f"{file} is not UTF-8 text (byte {error.start}): save it as UTF-8.") from None
-    except OSError as error:
-        raise InputError(f"{file} cannot be read: {(error.strerror or 'unknown error').lower()}.") from None
+    return read_text(
+        file, MAXIMUM_BYTES, lambda reason: InputError(f"{file} cannot be read: {reason}, give a configuration's file.")
+    )
 
 
 def _parse_yaml(text: str, source: str) -> Any:

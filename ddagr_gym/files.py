@@ -7,7 +7,7 @@ import os
 import shutil
 import stat
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,9 @@ from ddagr_gym.errors import InputError
 
 FOLDER_MARK = ".ddagr-output"
 """Empty file in every folder that a command wrote; only such a folder is ever replaced."""
+
+MAXIMUM_JSON = 50_000_000
+"""Bytes of the largest JSON file that is read (ours): an answer on thousands of drives has fewer."""
 
 
 def expanded(path: str | os.PathLike[str]) -> Path:
@@ -45,12 +48,64 @@ def check_output_file(path: str | os.PathLike[str]) -> None:
         raise InputError(f"{final} is not a regular file: give another path.")
 
 
+def read_text(path: str | os.PathLike[str], maximum: int, refusal: Callable[[str], InputError]) -> str:
+    """Text (UTF-8) of a regular file; a pipe or a device is never opened, since it may have no end.
+
+    Args:
+        path: of the file.
+        maximum: size that is read [bytes].
+        refusal: error for a reason such as "no such file or directory".
+
+    Raises:
+        InputError: what ``refusal`` makes of another kind of file, a larger one, other text, or a missing right.
+    """
+    file = expanded(path)
+    try:
+        status = file.stat()
+        if not stat.S_ISREG(status.st_mode):
+            raise refusal("it is not a regular file")
+        if status.st_size > maximum:
+            raise refusal(f"it has {status.st_size} bytes and may have {maximum} at most")
+        return file.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise refusal(f"it is not UTF-8 text, at byte {error.start}") from None
+    except OSError as error:
+        raise refusal((error.strerror or "unknown error").lower()) from None
+
+
+def read_json(
+    path: str | os.PathLike[str], fault: str = "cannot be read as JSON", remedy: str = "give a JSON file"
+) -> Any:
+    """Content of a JSON file.
+
+    Args:
+        path: of a regular file of at most :data:`MAXIMUM_JSON` bytes.
+        fault: what the error says of the file, before the reason.
+        remedy: and after it.
+
+    Raises:
+        InputError: unreadable file, or text that is not JSON; one sentence with file and reason.
+    """
+
+    def refusal(reason: str) -> InputError:
+        return InputError(f"{os.fspath(path)} {fault} ({reason}): {remedy}.")
+
+    text = read_text(path, MAXIMUM_JSON, refusal)
+    try:
+        return json.loads(text)
+    except RecursionError:
+        raise refusal("it is nested too deeply") from None
+    except ValueError as error:
+        raise refusal(str(error)) from None
+
+
 @contextmanager
 def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Path to write to in place of ``path``, moved there when the block ends without an error.
 
     The temporary file is in the same folder and keeps the suffix (writers choose a format by it); parent folders
-    are made. After an error it is removed and ``path`` is as it was.
+    are made. After an error it is removed and ``path`` is as it was. What was written is on the disk before it is
+    moved, so that a power cut leaves no empty file.
 
     Raises:
         InputError: ``path`` is a folder or a device, or a part of it is a file.
@@ -64,6 +119,7 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     temporary = Path(name)
     try:
         yield temporary
+        _to_disk(temporary)
         os.chmod(temporary, _mode_of(final))
         os.replace(temporary, final)
     except OSError as error:
@@ -72,6 +128,16 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
         raise
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def _to_disk(path: Path) -> None:
+    """Wait until the content of a file is on the disk."""
+    # opened anew: writers close their own handle, and some replace the file
+    handle = os.open(path, os.O_RDWR)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
 
 
 def _mode_of(path: Path) -> int:

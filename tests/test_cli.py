@@ -206,7 +206,7 @@ def test_absent_optional_package_names_its_extra(fake_command, capsys, monkeypat
 
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     fake_command(run)
-    assert "ddagr-gym[io]" in refused(capsys, "fake-command", "--side", "left")
+    assert ".[io]" in refused(capsys, "fake-command", "--side", "left")
 
 
 def test_interrupt_gives_130(fake_command, capsys):

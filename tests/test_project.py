@@ -13,7 +13,7 @@ from packaging.utils import canonicalize_name
 
 from ddagr_gym import __version__, commands, extras
 from ddagr_gym.errors import InputError
-from ddagr_gym.extras import EXTRA_OF_MODULE, missing_extra, need
+from ddagr_gym.extras import EXTRA_OF_MODULE, how_to_install, missing_extra, need
 
 # Libraries whose import name is not their distribution's name.
 MODULE_OF = {
@@ -84,7 +84,7 @@ def test_table_of_extras_is_that_of_the_project(project):
 def test_missing_package_sentence():
     error = missing_extra(ModuleNotFoundError("No module named 'pyarrow.parquet'", name="pyarrow.parquet"))
     assert "'pyarrow'" in str(error)
-    assert "ddagr-gym[io]" in str(error)
+    assert ".[io]" in str(error)
     assert missing_extra(ModuleNotFoundError(name="ddagr_gym.x")) is None
     assert missing_extra(ModuleNotFoundError()) is None
 
@@ -92,15 +92,26 @@ def test_missing_package_sentence():
 def test_what_long_work_needs_at_its_end_is_asked_for_before(monkeypatch: pytest.MonkeyPatch) -> None:
     need("numpy", "scipy")
     monkeypatch.setattr(extras, "find_spec", lambda name: None if name == "sklearn" else object())
-    with pytest.raises(InputError, match=r"'sklearn', which is not installed.*ddagr-gym\[diagnosis\]"):
+    with pytest.raises(InputError, match=r"'sklearn', which is not installed.*\.\[diagnosis\]"):
         need("ruptures", "sklearn")
+
+
+def test_a_missing_package_is_installed_into_the_running_interpreter(monkeypatch, repository, tmp_path):
+    place = f"in {repository}"
+    monkeypatch.setattr(extras.sys, "executable", "/a b/python")
+    assert how_to_install("cluster") == f"'/a b/python' -m pip install -c constraints.txt -e '.[cluster]' {place}"
+    assert "--extra-index-url https://download.pytorch.org/whl/cpu -e '.[rl]'" in how_to_install("rl")
+    monkeypatch.setattr(extras, "find_spec", lambda name: None)
+    assert how_to_install("io").startswith("python3 -m pip --python '/a b/python' install -c constraints.txt")
+    monkeypatch.setattr(extras, "_CHECKOUT", tmp_path)
+    assert how_to_install("io") == "python3 -m pip --python '/a b/python' install 'ddagr-gym[io]'"
 
 
 def test_script_asks_for_extras_that_exist(project, repository):
     script = (repository / "ddagr").read_text()
     body = script[script.index("extras_of() {") : script.index("program_of() {")]
-    asked = dict(re.findall(r"^ +([\w| ]+)\) echo \"([\w ]+)\"", body, re.MULTILINE))
-    assert "test" in asked
+    asked = dict(re.findall(r"^ +([\w|=* -]+)\) echo \"?([\w ]+)\"? ;;", body, re.MULTILINE))
+    assert {"test", "--cluster | --cluster=*"} <= set(asked)
     assert {word for words in asked.values() for word in words.split()} <= set(extras_without(project, "all"))
 
 

@@ -153,6 +153,21 @@ def test_extras_follow_the_command_and_add_up(checkout):
     assert checkout.calls() == []
 
 
+@pytest.mark.parametrize(
+    ("words", "more"),
+    [
+        (["--cluster", "local"], {"cluster"}),
+        (["--cluster=ray://a b:10001", "--rrd", "x"], {"cluster", "rerun"}),
+        (["--rrd=a b.rrd"], {"rerun"}),
+        (["--output", "cluster", "--clusters", "a --cluster b"], set()),
+    ],
+)
+def test_extras_follow_the_options_too(checkout, words, more):
+    done = checkout.run("diagnose", *words)
+    assert done.stdout == f"{checkout.cwd} {['diagnose', *words]} 1\n", done.stderr
+    assert extras(checkout.calls()) == {"io", "report", "diagnosis", "foxglove"} | more
+
+
 @pytest.mark.parametrize("file", ["pyproject.toml", "constraints.txt"])
 def test_a_changed_project_file_is_installed_anew(checkout, file):
     checkout.run("simulate")

@@ -23,7 +23,7 @@ from ddagr_gym.diagnosis.gates.thresholds import NullRun
 from ddagr_gym.diagnosis.null_bank.bank import NullBank
 from ddagr_gym.diagnosis.setting import Setting
 from ddagr_gym.errors import InputError
-from ddagr_gym.files import write_text
+from ddagr_gym.files import read_json, write_text
 from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.tasks import Task
 
@@ -31,6 +31,9 @@ NAME = "bank.json"
 VERSION = 2
 READ = (1, 2)
 """Versions that are read: the first one has no ordinary drives to compare others with."""
+
+_FAULT = "is no bank of drives"
+_REMEDY = "make it with `ddagr calibrate --bank`"
 
 STRIDE = 18.0
 """Seconds between windows of 6 s (ours): a third of a drive, so that its scan takes about a minute."""
@@ -118,10 +121,10 @@ def load_ordinary(path: Path) -> Ordinary:
 
 
 def _read(path: Path) -> dict[str, Any]:
+    body = read_json(path, _FAULT, _REMEDY)
     try:
-        body = json.loads(path.read_text(encoding="utf-8"))
         version = body["version"]
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (KeyError, TypeError) as error:
         raise _no_bank(path, error) from None
     if version not in READ:
         raise InputError(f"{path} has version {version!r}, this program reads {VERSION}: calibrate again.")
@@ -130,4 +133,4 @@ def _read(path: Path) -> dict[str, Any]:
 
 
 def _no_bank(path: Path, error: Exception) -> InputError:
-    return InputError(f"{path} is no bank of drives ({error}): make it with `ddagr calibrate --bank`.")
+    return InputError(f"{path} {_FAULT} ({error}): {_REMEDY}.")

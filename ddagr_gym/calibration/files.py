@@ -14,7 +14,7 @@ import msgspec
 from ddagr_gym.calibration.result import SCHEMA, SCHEMA_VERSION, Calibration
 from ddagr_gym.config import load_config
 from ddagr_gym.errors import InputError
-from ddagr_gym.files import write_text
+from ddagr_gym.files import read_json, write_text
 from ddagr_gym.parameters import Robot, Soil
 
 NAME = "calibration.json"
@@ -66,10 +66,7 @@ def load(folder: Path) -> Calibration:
         InputError: no such folder or file, no JSON, or not of this schema.
     """
     path = folder / NAME if folder.is_dir() else folder
-    try:
-        mapping = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path} cannot be read as a calibration ({error}): make it with `ddagr calibrate`.") from None
+    mapping = read_json(path, "cannot be read as a calibration", "make it with `ddagr calibrate`")
     if not isinstance(mapping, dict) or mapping.get("schema") != SCHEMA:
         raise InputError(f"{path} holds no calibration: make it with `ddagr calibrate`.")
     if mapping.get("schema_version") != SCHEMA_VERSION:

@@ -110,15 +110,16 @@ def fit_from_several(
     """
     rough, weights = rough_fit(data, windows, model, {**held, **start_values(data, windows, model.parameters)}, threads)
 
-    common, states = (data, windows, model, weights, threads), rough.fitted.point.states
+    common = steps.runner.share((data, windows, model, weights, threads, rough.fitted.point.states))
     changes: tuple[dict[str, float], ...] = ({}, *OTHER_STARTS)
     tasks = [
-        Task(_name(change), first_steps, (*common, {**rough.values, **change}, states), f"start {number}")
+        Task(_name(change), first_steps, (common, {**rough.values, **change}), f"start {number}")
         for number, change in enumerate(changes)
     ]
     tried = steps.results("fit of all parts from several starts", tasks)
     _, best = min(tried, key=lambda item: item[0])
-    return fit_model(*common[:4], best.values, threads, states=best.states, iterations=ITERATIONS), weights
+    fitted = fit_model(data, windows, model, weights, best.values, threads, states=best.states, iterations=ITERATIONS)
+    return fitted, weights
 
 
 def _name(change: Mapping[str, float]) -> str:
@@ -126,14 +127,14 @@ def _name(change: Mapping[str, float]) -> str:
 
 
 def first_steps(
-    data: CalibrationData,
-    windows: WindowSet,
-    model: RobotModel,
-    weights: Weights,
-    threads: int,
-    values: Mapping[str, float],
-    states: Array,
+    common: tuple[CalibrationData, WindowSet, RobotModel, Weights, int, Array], values: Mapping[str, float]
 ) -> tuple[float, Standing]:
-    """Cost after a few steps from a start, and where they lead. Arguments as :func:`fit_model`."""
+    """Cost after a few steps from a start, and where they lead; workers call it by name.
+
+    Args:
+        common: what all starts share: data, windows, model, weights, threads and states, as of :func:`fit_model`.
+        values: of the start.
+    """
+    data, windows, model, weights, threads, states = common
     found = fit_model(data, windows, model, weights, values, threads, states=states, iterations=TRIAL_ITERATIONS)
     return found.fitted.cost, found.standing

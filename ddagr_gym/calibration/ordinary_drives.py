@@ -134,17 +134,19 @@ def ordinary_drives(
         data.windows.duration, HISTORY, _lateness(data), _gyro_scale(calibration), *_UNKNOWN,
         turning=usual_turning(data.windows),
     )  # fmt: skip
+    # two rounds of tasks need them
+    drives = [steps.runner.share(item) for item in without]
     left = steps.results(
         "what the calibrated robot leaves of each drive",
         [
-            Task(item.name, left_of, (item, blank, own, data.prepared.dead, threads), f"ordinary {number} left")
-            for number, (item, own) in enumerate(zip(without, noise, strict=True))
+            Task(item.name, left_of, (drive, blank, own, data.prepared.dead, threads), f"ordinary {number} left")
+            for number, (item, drive, own) in enumerate(zip(without, drives, noise, strict=True))
         ],
     )
     weighing = pooled(blank, left)
     tasks = [
-        Task(item.name, scan_ordinary, (item, weighing, threads), f"ordinary {number}")
-        for number, item in enumerate(without)
+        Task(item.name, scan_ordinary, (drive, weighing, threads), f"ordinary {number}")
+        for number, (item, drive) in enumerate(zip(without, drives, strict=True))
     ]
     return Ordinary(weighing, tuple(steps.results("every effect of the library in each drive", tasks)))
 

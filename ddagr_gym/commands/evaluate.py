@@ -10,6 +10,7 @@ from typing import Any
 
 from ddagr_gym.commands.output import format_table, make_folder, write_json
 from ddagr_gym.errors import InputError, unknown_name
+from ddagr_gym.extras import need
 from ddagr_gym.progress import Progress
 
 EXAMPLES = (
@@ -53,6 +54,8 @@ class Arguments:
 
 def run(arguments: Arguments) -> None:
     """Drive, summarise, print the tables, write the page."""
+    if arguments.cluster:
+        need("ray")
     from ddagr_gym.commands.evaluation_report import replay_scenario, write_files, write_report
     from ddagr_gym.control.row_turn import RowTurn
     from ddagr_gym.evaluation.campaign import run_campaign, wanted_episodes, with_bounds

@@ -9,6 +9,7 @@ from typing import Annotated
 import tyro
 
 from ddagr_gym.errors import InputError
+from ddagr_gym.files import check_output_file
 
 EXAMPLES = (
     "ddagr simulate --manoeuvre table_6_2 --soil thesis_a1 --output run.parquet",
@@ -54,9 +55,9 @@ def run(arguments: Arguments) -> None:
     """Simulate, write what was asked for, and print where the drive ended."""
     import ddagr_gym
 
-    _check_suffix("output", arguments.output, (".parquet", ".csv"))
-    _check_suffix("figure", arguments.figure, (".png",))
-    _check_suffix("video", arguments.video, (".mp4",))
+    _check_output("output", arguments.output, ".parquet", ".csv")
+    _check_output("figure", arguments.figure, ".png")
+    _check_output("video", arguments.video, ".mp4")
     result = ddagr_gym.simulate(
         arguments.manoeuvre,
         arguments.robot,
@@ -77,6 +78,10 @@ def run(arguments: Arguments) -> None:
     print(result)
 
 
-def _check_suffix(option: str, path: Path | None, allowed: tuple[str, ...]) -> None:
-    if path is not None and path.suffix.lower() not in allowed:
+def _check_output(option: str, path: Path | None, *allowed: str) -> None:
+    """Refuse before the drive what cannot be written after it."""
+    if path is None:
+        return
+    if path.suffix.lower() not in allowed:
         raise InputError(f"--{option} {path}: give a path that ends in {' or '.join(allowed)}.")
+    check_output_file(path)

@@ -7,12 +7,14 @@ import logging
 import os
 import pickle
 import signal
+import socket
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import ray
 
@@ -26,6 +28,9 @@ LOCAL = "local"
 
 ASK_AGAIN = 5.0
 """Time between looks at how many processors a cluster has [s] (ours): each is a question to its head."""
+
+PATIENCE = 5.0
+"""Longest wait for a connection to a cluster [s] (ours): Ray itself waits minutes for one that is not there."""
 
 
 @dataclass(frozen=True)
@@ -130,6 +135,8 @@ def connect(address: str, workers: int) -> None:
     Raises:
         InputError: no cluster answers at the address.
     """
+    if address != LOCAL:
+        check_listens(address)
     quiet: dict[str, Any] = {"log_to_driver": False, "logging_level": logging.FATAL}
     try:
         if address == LOCAL:
@@ -139,9 +146,41 @@ def connect(address: str, workers: int) -> None:
         else:
             ray.init(address=address, **quiet)
     except (ConnectionError, ValueError, RuntimeError) as error:
-        raise InputError(
-            f"no Ray cluster answers at {address!r} ({error}): start one with ray start, or give --cluster local."
-        ) from None
+        raise _no_cluster(address, error) from None
+
+
+def check_listens(address: str) -> None:
+    """Refuse an address at which nothing listens; one without host and port, as "auto", is left to Ray.
+
+    Args:
+        address: of a cluster, host:port or ray://host:port.
+
+    Raises:
+        InputError: nothing listens there, or the port is missing or none.
+    """
+    try:
+        parts = urlsplit(address if "://" in address else f"//{address}")
+        host, port = parts.hostname, parts.port
+    except ValueError:
+        raise _without_port(address) from None
+    if port is None and parts.scheme:
+        raise _without_port(address)
+    if not host or port is None:
+        return
+    try:
+        socket.create_connection((host, port), PATIENCE).close()
+    except OSError as error:
+        raise _no_cluster(address, error) from None
+
+
+def _no_cluster(address: str, error: Exception) -> InputError:
+    return InputError(
+        f"no Ray cluster answers at {address!r} ({error}): start one with ray start, or give --cluster local."
+    )
+
+
+def _without_port(address: str) -> InputError:
+    return InputError(f"the cluster {address!r} has no port: give host and port, such as ray://head:10001.")
 
 
 def _attempt(function: Callable[..., Any], arguments: tuple[Any, ...], limits: Limits, code: str) -> Outcome:

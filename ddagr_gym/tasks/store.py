@@ -7,7 +7,8 @@ import re
 from pathlib import Path
 from typing import Any, Protocol
 
-from ddagr_gym.files import atomic_path, make_folder
+from ddagr_gym.errors import InputError
+from ddagr_gym.files import atomic_path, make_folder, read_json
 
 _KEY = re.compile(r"[\w.-]+")
 
@@ -46,19 +47,30 @@ class ResultStore:
         return self.folder / f"{key}.json"
 
     def has(self, key: str) -> bool:
-        """Whether the result is there."""
-        return self.path(key).is_file()
+        """Whether the result is there; an empty or damaged file is none, so that the task is done again."""
+        if not self.path(key).exists():
+            return False
+        try:
+            self.get(key)
+        except InputError:
+            return False
+        return True
 
     def get(self, key: str) -> Any:
-        """The result."""
-        return json.loads(self.path(key).read_text(encoding="utf-8"))
+        """The result.
+
+        Raises:
+            InputError: no file, or a damaged one.
+        """
+        return read_json(self.path(key), "cannot be read as a result", "delete it and give the same command again")
 
     def put(self, key: str, value: Any) -> Any:
         """Keep a result, and give it back as :meth:`get` would: a tuple as a list.
 
         Args:
             key: of the task.
-            value: of JSON's kinds; other kinds raise TypeError.
+            value: of JSON's kinds, other kinds raise TypeError; with more than ``files.MAXIMUM_JSON`` bytes of text the
+                task is done again next time.
         """
         text = json.dumps(value)
         with atomic_path(self.path(key)) as part:

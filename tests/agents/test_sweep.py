@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import csv
+import json
 import os
+import pickle
 import shutil
 import signal
 import subprocess
@@ -11,6 +13,7 @@ import sys
 import time
 from importlib.util import find_spec
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,9 +22,10 @@ pytest.importorskip("stable_baselines3", reason="the extra rl is not installed")
 pytest.importorskip("matplotlib", reason="needs the extra report")
 
 from agents.run import POLICY, RESULT
-from agents.sweep import COLUMNS, FIGURE, STOPPED, TABLE, load_sweep, run_sweep
+from agents.sweep import COLUMNS, FIGURE, OBJECTIVE, STOPPED, TABLE, load_sweep, run_sweep
 from ddagr_gym.cli import main
 from ddagr_gym.errors import InputError
+from ddagr_gym.progress import Progress
 from tests.needs_ray import NEEDS_RAY
 
 WORDS = ("steps=64", "environments=4", "ppo.rollout=8", "ppo.batch=16", "validation_interval=32")
@@ -109,7 +113,7 @@ def test_what_is_wrong_with_a_file_is_one_sentence(tmp_path, capsys, lines, part
         (["--sweep", "sweep.yaml", "--workers", "0"], "--workers is 0"),
         (["--sweep", "none.yaml"], "none.yaml cannot be read"),
         (["--sweep", "sweep.yaml"], "give --cluster local, or set it to false"),
-        (["--sweep", "sweep.yaml", "--cluster", "local"], "ddagr-gym[cluster]"),
+        (["--sweep", "sweep.yaml", "--cluster", "local"], ".[cluster]"),
     ],
 )
 def test_wrong_words_get_one_sentence(tmp_path, monkeypatch, capsys, words, part):
@@ -154,6 +158,27 @@ def test_a_training_that_fails_is_named_and_the_table_has_the_others(trained, tm
     assert [row["ended"] for row in rows] == ["finished", "finished", "finished", ""]
     assert rows[:3] == table(trained)[:3]
     assert rows[3]["mean_return"] == ""
+
+
+@NEEDS_RAY
+def test_what_counts_trainings_works_as_a_copy_on_another_machine(tmp_path, monkeypatch, capsys):
+    from agents.sweep_tune import _Ends
+
+    _, trials = load_sweep(sweep_file(tmp_path))
+    monkeypatch.chdir(tmp_path)
+    with Progress(len(trials), "trainings") as progress:
+        ends = _Ends(trials, Path("out"), progress)
+        ends.on_trial_error(0, [], SimpleNamespace(config={"number": 1}))
+        copy = pickle.loads(pickle.dumps(ends))
+    assert "trainings: 25 %" in capsys.readouterr().err
+    monkeypatch.chdir("/")
+    trial = SimpleNamespace(config={"number": 0})
+    copy.on_trial_result(1, [], trial, dict.fromkeys(("steps", "cpu_seconds", "success_rate", OBJECTIVE), 1.0))
+    copy.on_trial_complete(1, [], trial)
+    copy.on_trial_error(1, [], SimpleNamespace(config={"number": 1}))
+    (kept,) = (tmp_path / "out").rglob(STOPPED)
+    assert len(json.loads(kept.read_text())["course"]) == 1
+    assert capsys.readouterr().err == ""
 
 
 def command(file: Path, out: Path) -> list[str]:

@@ -174,6 +174,6 @@ def test_a_cluster_is_for_folders_of_drives_and_needs_its_extra(drives, asked, t
     assert "--cluster is for a folder of drives with --calibration: leave it out" in capsys.readouterr().err
     monkeypatch.setattr("ddagr_gym.extras.find_spec", lambda name: None if name == "ray" else True)
     assert main([*words(drives), "--cluster", "local"]) == 2
-    assert "ddagr-gym[cluster]" in capsys.readouterr().err
+    assert ".[cluster]" in capsys.readouterr().err
     assert not asked
     assert not (tmp_path / "over").exists()

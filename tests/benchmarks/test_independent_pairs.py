@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from benchmarks import independent_pairs
 from benchmarks.independent_pairs import (
     alarms,
     draw,
@@ -18,6 +19,7 @@ from benchmarks.independent_pairs import (
 )
 from benchmarks.simulated_pairs import with_independent
 from ddagr_gym.diagnosis.change.expected_scatter import ExpectedScatter
+from ddagr_gym.errors import InputError
 
 WITHIN, SCATTER, MOVE, RISE = 0.1, 1.0, 3.0, 0.3
 
@@ -96,3 +98,10 @@ def test_the_picture_is_drawn(pairs, tmp_path):
     path = tmp_path / "pairs.png"
     draw(pairs[:5], ExpectedScatter(), path)
     assert path.stat().st_size > 5000
+
+
+def test_a_cluster_needs_its_extra(tmp_path, monkeypatch):
+    monkeypatch.setattr("ddagr_gym.extras.find_spec", lambda name: None)
+    with pytest.raises(InputError, match="'ray', which is not installed"):
+        independent_pairs.main(["--pairs", "1", "--parts", str(tmp_path / "parts"), "--cluster", "local"])
+    assert not (tmp_path / "parts").exists()

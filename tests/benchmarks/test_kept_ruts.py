@@ -1,8 +1,11 @@
 """Cases of ruts and offset masses: their drives, counts and picture."""
 
 import numpy as np
+import pytest
 
+from benchmarks import kept_ruts
 from benchmarks.kept_ruts import CASES, OFFSET, RUTS, Truth, draw, drives, summary
+from ddagr_gym.errors import InputError
 
 
 def said(truth, *names, complete=True):
@@ -38,3 +41,10 @@ def test_counts_tell_right_names_from_the_other_axle_effect(tmp_path):
     assert found["both_named"] == found["both"] == 1
     draw(answers, tmp_path / "picture.png")
     assert (tmp_path / "picture.png").stat().st_size > 5000
+
+
+def test_a_cluster_needs_its_extra(tmp_path, monkeypatch):
+    monkeypatch.setattr("ddagr_gym.extras.find_spec", lambda name: None)
+    with pytest.raises(InputError, match="'ray', which is not installed"):
+        kept_ruts.main(["--parts", str(tmp_path / "parts"), "--cluster", "local"])
+    assert not (tmp_path / "parts").exists()

@@ -10,7 +10,16 @@ pytest.importorskip("matplotlib", reason="needs the extra report")
 pytest.importorskip("pyarrow", reason="needs the extra io")
 
 from benchmarks import large_campaigns
-from benchmarks.large_campaigns import PER_TASK, RECORDINGS, SimulatedCluster, sending_time, simulate
+from benchmarks.large_campaigns import (
+    FOLDER,
+    PER_TASK,
+    RECORDINGS,
+    SimulatedCluster,
+    room_of_diagnoses,
+    sending_time,
+    simulate,
+    size_of,
+)
 
 
 @pytest.fixture(scope="module")
@@ -56,12 +65,23 @@ def test_a_processor_runs_one_task_at_a_time():
     assert engine.clock == 6.0
 
 
+def test_a_folder_is_as_large_as_its_files(tmp_path):
+    (tmp_path / "figures").mkdir()
+    for name, size in (("index.html", 1000), ("figures/gains.png", 234)):
+        (tmp_path / name).write_bytes(bytes(size))
+    assert size_of(tmp_path) == 1234
+
+
 def test_the_record_adds_up(record):
     cluster, found = record["cluster"], record["diagnoses"]
     processors = cluster["nodes"] * cluster["processors"]
     assert found["core_hours"] == pytest.approx(RECORDINGS * found["core_seconds_each"]["mean"] / 3600.0)
     assert found["cost"] == pytest.approx(found["core_hours"] * cluster["price_per_core_hour"])
     assert found["hours"] * processors == pytest.approx(found["core_hours"])
+    room = room_of_diagnoses(found["bytes_per_folder"], cluster["processors"])
+    assert {name: found[name] for name in room} == pytest.approx(room)
+    assert room["store_GiB"] * 2**30 == pytest.approx(RECORDINGS * FOLDER)
+    assert room["memory_GiB_per_node"] == pytest.approx(32 * 0.4371, rel=1e-3)
     evaluation = record["evaluation"]
     assert evaluation["tasks"] * PER_TASK == pytest.approx(evaluation["episodes"])
     assert record["measured"]["sending_seconds"] == pytest.approx(sending_time())

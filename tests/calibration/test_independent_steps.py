@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
-from ddagr_gym.calibration import files
+from ddagr_gym.calibration import files, fit_starts
 from ddagr_gym.calibration.effect_bank import save_runs
 from ddagr_gym.calibration.independent_steps import IndependentSteps
 from ddagr_gym.calibration.run import calibrate_drives
@@ -54,6 +55,25 @@ def test_a_step_that_fails_is_named_and_the_others_are_kept(tmp_path):
         with pytest.raises(InputError, match="drive 7: drive 7 has no clock"):
             steps.results("drives", [Task("drive 7", work.refuses, (7,), "drive 7")])
     assert [store.has(f"drive {n}") for n in (1, 2, 3)] == [True, False, True]
+
+
+def test_starts_share_what_they_have_in_common(monkeypatch):
+    shared, sent = [], []
+    states = SimpleNamespace(fitted=SimpleNamespace(point=SimpleNamespace(states="states")), values={"a": 1.0})
+    monkeypatch.setattr(fit_starts, "rough_fit", lambda *_: (states, "weights"))
+    monkeypatch.setattr(fit_starts, "start_values", lambda *_: {})
+    monkeypatch.setattr(fit_starts, "fit_model", lambda *given, **_: given[4])
+    tried = [(2.0, None), (1.0, SimpleNamespace(values={"best": 1.0}, states=None)), (3.0, None)]
+    steps = SimpleNamespace(
+        runner=SimpleNamespace(share=lambda value: shared.append(value) or "handle"),
+        results=lambda label, tasks: sent.extend(tasks) or tried,
+    )
+    model = SimpleNamespace(parameters=())
+    assert fit_starts.fit_from_several("data", "windows", model, {}, 1, steps) == ({"best": 1.0}, "weights")
+    assert shared == [("data", "windows", model, "weights", 1, "states")]
+    assert [task.arguments for task in sent] == [
+        ("handle", {"a": 1.0} | change) for change in ({}, *fit_starts.OTHER_STARTS)
+    ]
 
 
 @pytest.fixture(scope="module")

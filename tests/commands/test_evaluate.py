@@ -2,6 +2,7 @@
 
 import json
 import sys
+from importlib.util import find_spec
 
 import pytest
 
@@ -94,9 +95,17 @@ def test_bad_input_is_one_sentence(tmp_path, capsys, arguments, message):
     assert not (tmp_path / "out").exists()
 
 
+def test_without_ray_nothing_is_made_ready(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("ddagr_gym.extras.find_spec", lambda name: None if name == "ray" else find_spec(name))
+    monkeypatch.setattr("ddagr_gym.evaluation.campaign.wanted_episodes", None)
+    assert run_evaluation(tmp_path / "out", "--cluster", "local") == 2
+    assert ".[cluster]" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
 def test_without_casadi_nothing_is_driven(tmp_path, capsys, monkeypatch):
     controllers._predictive.cache_clear()
     monkeypatch.setitem(sys.modules, "casadi", None)
     assert run_evaluation(tmp_path / "out", "--controllers", "B1,B5", "--episodes", "1") == 2
-    assert "ddagr-gym[mpc]" in capsys.readouterr().err
+    assert ".[mpc]" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()

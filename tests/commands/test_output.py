@@ -59,6 +59,19 @@ def test_the_file_appears_at_the_end_only_and_the_suffix_is_kept(tmp_path):
     assert content(tmp_path) == {"run.parquet": "whole"}
 
 
+def test_content_is_on_the_disk_before_the_file_appears(tmp_path, monkeypatch):
+    done = []
+
+    def fsync(handle):
+        done.append((os.fstat(handle).st_ino, os.fstat(handle).st_size, (tmp_path / "a").read_text()))
+
+    (tmp_path / "a").write_text("old")
+    monkeypatch.setattr(os, "fsync", fsync)
+    write_text(tmp_path / "a", "newer")
+    assert done == [((tmp_path / "a").stat().st_ino, 5, "old")]
+    assert (tmp_path / "a").read_text() == "newer"
+
+
 def test_permissions_follow_the_umask_or_the_old_file(tmp_path, umask):
     file = tmp_path / "a"
     write_text(file, "")

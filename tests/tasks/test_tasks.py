@@ -196,6 +196,22 @@ def test_finished_tasks_are_not_run_again(tmp_path):
     assert [(folder / f"{n}.txt").read_text() for n in range(4)] == ["driven\n"] * 4
 
 
+@pytest.mark.parametrize("left", ["", '{"half": ', "[" * 100_000, "\0" * 40])
+def test_a_task_whose_result_is_damaged_is_done_again(left, tmp_path):
+    store, tasks = ResultStore(tmp_path), [Task(f"{n}", work.raises, (0,), key=f"case_{n}") for n in range(2)]
+    with TaskRunner(1) as made:
+        whole = run_tasks(tasks, "cases", made, store)
+        store.path("case_1").write_text(left)
+        assert (store.has("case_0"), store.has("case_1"), store.has("case_2")) == (True, False, False)
+        with pytest.raises(InputError, match=r"cannot be read as a result .*: delete it"):
+            store.get("case_1")
+        ended = list(made.run(tasks, store))
+    assert sorted((item.task.name, item.stored, item.value) for item in ended) == [
+        ("0", True, whole[0]), ("1", False, whole[1])
+    ]  # fmt: skip
+    assert store.get("case_1") == whole[1]
+
+
 def test_a_full_disk_ends_the_run_and_loses_nothing(tmp_path, monkeypatch):
     store, put = ResultStore(tmp_path), ResultStore.put
 

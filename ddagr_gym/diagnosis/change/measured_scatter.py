@@ -14,7 +14,6 @@ degrees of freedom.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -22,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from ddagr_gym.diagnosis.change.expected_scatter import ExpectedScatter
+from ddagr_gym.files import read_json
 
 PATH = Path(__file__).resolve().parents[2] / "data" / "change_scatter.json"
 """That the package ships."""
@@ -42,8 +42,12 @@ class MeasuredScatter:
 
 @cache
 def measured_scatter(path: Path = PATH) -> MeasuredScatter:
-    """What a file says, by default that of the package."""
-    body = json.loads(path.read_text(encoding="utf-8"))
+    """What a file says, by default that of the package.
+
+    Raises:
+        InputError: the file cannot be read, or is no JSON.
+    """
+    body = read_json(path, remedy="make it with `python -m benchmarks.simulated_pairs`")
     same, other = (
         ExpectedScatter(
             _numbers(body[name]["deviations"]),

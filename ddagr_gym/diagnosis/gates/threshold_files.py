@@ -10,7 +10,7 @@ from typing import Any, get_args
 
 from ddagr_gym.diagnosis.gates.thresholds import SHORT_WINDOW, VERSION, Gate, NullKind, Origin, Thresholds
 from ddagr_gym.errors import InputError
-from ddagr_gym.files import atomic_path
+from ddagr_gym.files import atomic_path, read_json
 
 
 def save_thresholds(thresholds: Thresholds, path: Path) -> None:
@@ -27,10 +27,7 @@ def load_thresholds(path: Path) -> Thresholds:
         InputError: a file that is missing, no JSON, of another version, without an entry, or with one that makes no
             sense.
     """
-    try:
-        body = json.loads(path.read_text())
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path} cannot be read as thresholds ({error}): make it with `ddagr null-bank`.") from None
+    body = read_json(path, "cannot be read as thresholds", "make it with `ddagr null-bank`")
     if not isinstance(body, dict) or body.get("version") != VERSION:
         raise InputError(f"{path} is not a thresholds file of version {VERSION}: make it with `ddagr null-bank`.")
     origin = _origin(body.get("origin"), path)
@@ -38,7 +35,7 @@ def load_thresholds(path: Path) -> Thresholds:
         return _thresholds(body, origin)
     except KeyError as error:
         raise InputError(f"{path} has no entry {error}: make it with `ddagr null-bank`.") from None
-    except (TypeError, ValueError, AttributeError) as error:
+    except (TypeError, ValueError, AttributeError, OverflowError) as error:
         raise InputError(f"{path} has an entry of another form ({error}): make it with `ddagr null-bank`.") from None
 
 

@@ -17,7 +17,7 @@ from ddagr_gym.diagnosis.answer.channel_faults import CHANNEL_FAULT_TITLES
 from ddagr_gym.diagnosis.answer.drivetrain import PART_TITLES
 from ddagr_gym.diagnosis.answer.verdict import NONE, SCHEMA, UNKNOWN, Diagnosis
 from ddagr_gym.errors import InputError
-from ddagr_gym.files import atomic_path
+from ddagr_gym.files import atomic_path, read_json
 
 _ABSENT_WHERE_UNKNOWN = ("options", "thresholds")
 """Entries whose own entries are left out instead of null."""
@@ -148,10 +148,7 @@ def load(path: Path) -> Diagnosis:
     Raises:
         InputError: no such file, no JSON, or not of this schema.
     """
-    try:
-        mapping = json.loads(path.read_text())
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path} cannot be read as a diagnosis ({error}): make it with `ddagr diagnose`.") from None
+    mapping = read_json(path, "cannot be read as a diagnosis", "make it with `ddagr diagnose`")
     if not isinstance(mapping, dict):
         raise InputError(f"{path} holds no mapping: make it with `ddagr diagnose`.")
     return validate(mapping)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
-from typing import Any
 
 import msgspec
 from msgspec import inspect
@@ -12,7 +10,7 @@ from msgspec import inspect
 from ddagr_gym.diagnosis.answer.drive_series import SERIES_SCHEMA, DriveSeries
 from ddagr_gym.diagnosis.result.files import plain, with_nan
 from ddagr_gym.errors import InputError
-from ddagr_gym.files import write_json
+from ddagr_gym.files import read_json, write_json
 
 
 def save(series: DriveSeries, path: Path) -> None:
@@ -26,15 +24,12 @@ def load(path: Path) -> DriveSeries:
     Raises:
         InputError: no such file, no JSON, another schema, a missing or wrong entry.
     """
-    again = "make it again with `ddagr diagnose FOLDER --calibration CAL`."
-    try:
-        mapping: Any = json.loads(path.read_text())
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path} cannot be read as the answer on many drives ({error}): {again}") from None
+    again = "make it again with `ddagr diagnose FOLDER --calibration CAL`"
+    mapping = read_json(path, "cannot be read as the answer on many drives", again)
     schema = mapping.get("schema") if isinstance(mapping, dict) else None
     if schema != SERIES_SCHEMA:
-        raise InputError(f"{path} has schema {schema!r} and this version reads {SERIES_SCHEMA!r}: {again}")
+        raise InputError(f"{path} has schema {schema!r} and this version reads {SERIES_SCHEMA!r}: {again}.")
     try:
         return msgspec.convert(with_nan(mapping, inspect.type_info(DriveSeries)), DriveSeries)
     except msgspec.ValidationError as error:
-        raise InputError(f"{path} is wrong ({error}): {again}") from None
+        raise InputError(f"{path} is wrong ({error}): {again}.") from None

@@ -103,7 +103,7 @@ def read_effects_file(path: str | os.PathLike[str]) -> EffectsFile:
         InputError: unreadable file, or content that does not fit; one sentence with file and place.
     """
     file = expanded(path)
-    if not file.is_file():
+    if not file.exists():
         raise InputError(f"effects file {str(path)!r} does not exist: give a YAML or JSON file, or name=size.")
     return load_config(file, EffectsFile)
 
