@@ -21,8 +21,8 @@ def load_recording(
 
     Args:
         path: CSV or gzip CSV, Parquet, ROS bag (.bag, .db3, folder of a ROS 2 bag), or MCAP.
-        column_map: shipped map by name (drive_steps, drive_continuous, concealed, topics_default), or the path of one's
-            own YAML file; a table without one takes the shipped map that fits its columns.
+        column_map: shipped map by name (schema, drive_steps, drive_continuous, concealed, topics_default), or the path
+            of one's own YAML file; a table without one takes the shipped map that fits its columns.
         robot: that drove, for body-speed commands: name, YAML file or object; the map's own when it is None.
         maximum_rows: refuse a recording with more rows or messages.
         maximum_bytes: refuse a recording that unpacks to more bytes.

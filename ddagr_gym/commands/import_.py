@@ -32,8 +32,9 @@ class Arguments:
         source: recording: CSV or gzip CSV, Parquet, .bag, .db3, a ROS 2 bag's folder (also split or zstd-compressed),
             or .mcap.
         output: Parquet file to write; it is replaced only when the import succeeded.
-        map: shipped map by name (drive_steps, drive_continuous, concealed, topics_default) or the path of one's own
-            YAML file; a table without one takes the shipped map that fits its columns, a bag topics by message type.
+        map: shipped map by name (schema, drive_steps, drive_continuous, concealed, topics_default) or the path of one's
+            own YAML file; a table without one takes the shipped map that fits its columns, a bag topics by message
+            type.
         robot: robot that drove (see `ddagr robots`), for body-speed commands; the map's own when it is left out.
         guess: propose which topics of a bag are IMU, wheels, command and pose, show the reasons, write the map, and ask
             whether to import with it. Where nobody can answer, nothing is imported.

@@ -14,6 +14,7 @@ from ddagr_gym.recordings.csv_reader import Collector, wanted_columns
 from ddagr_gym.recordings.files import DEFAULT_LIMITS, Limits, damaged, open_source
 
 if TYPE_CHECKING:
+    import pyarrow as pa
     import pyarrow.parquet as pq
 
 _BATCH = 65_536  # rows that are read at once (ours): a few megabytes
@@ -68,8 +69,22 @@ def read_parquet(path: Path, column_map: ColumnMap, limits: Limits = DEFAULT_LIM
     """
     with open_parquet(path, limits) as file:
         numbers, labels = wanted_columns(path, column_map, tuple(file.schema_arrow.names))
+        _check_time_stamps(path, column_map, file.schema_arrow)
         collector = Collector(numbers, labels, limits, path)
         columns = list(dict.fromkeys((*numbers, *labels)))
         for batch in file.iter_batches(batch_size=_BATCH, columns=columns):
             collector.add(batch)
         return collector.table()
+
+
+def _check_time_stamps(path: Path, column_map: ColumnMap, schema: pa.Schema) -> None:
+    """Refuse a unit of time for a column whose type says its own."""
+    import pyarrow as pa
+
+    time = column_map.time
+    for name in (time.column, time.absolute_column):
+        if time.unit != "s" and name in schema.names and pa.types.is_temporal(schema.field(name).type):
+            raise InputError(
+                f"column {name!r} of {path.name} holds time stamps with a unit of their own and the column map says "
+                f"unit: {time.unit}: leave unit out under time in the map."
+            )

@@ -14,6 +14,8 @@ FloatArray = npt.NDArray[np.float64]
 LONGEST = 1e6
 """Longest recording that is taken [s] (ours): eleven days; beyond it a clock is wrong or several drives are in one
 file, and what counts blocks of a drive would fill the memory."""
+FASTEST_PERIOD = 1e-6
+"""Mean time between rows below which stamps have another unit [s] (ours): no log has a million rows a second."""
 SLOWEST_PERIOD = 5.0
 """Time between rows beyond which the unit of the stamps is doubted [s] (ours): no robot's log is that slow."""
 ABSURD = 1e12
@@ -27,8 +29,14 @@ def check_extent(t: FloatArray) -> None:
         t: (n,), finite [s].
 
     Raises:
-        InputError: longer than :data:`LONGEST`, with the unit that the stamps look like or the place of the gap.
+        InputError: longer than :data:`LONGEST`, with the unit that the stamps look like or the place of the gap; rows
+            closer together than :data:`FASTEST_PERIOD`.
     """
+    if t.size > 1 and t[-1] - t[0] < FASTEST_PERIOD * (t.size - 1):
+        raise InputError(
+            f"{t.size} rows lie within {t[-1] - t[0]:.3g} s, and no log of a robot is that fast: check the unit of the "
+            "time stamps in the column map."
+        )
     if t.size < 2 or t[-1] - t[0] <= LONGEST:
         return
     steps = np.diff(t)

@@ -1,9 +1,12 @@
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
+from ddagr_gym import load_recording, simulate
 from ddagr_gym.config import find_config, load_config
 from ddagr_gym.errors import InputError
+from ddagr_gym.recordings.channels import CHANNELS
 from ddagr_gym.recordings.column_map import ColumnMap, load_column_map, most_specific_map, shipped_column_maps
 
 STEPS = ["seq", "window", "t", "cmd_left", "cmd_right", "enc_left", "enc_right", "imu_gz", "imu_ax", "imu_ay", "imu_az"]
@@ -24,9 +27,19 @@ def write(tmp_path, text):
 
 
 def test_shipped_maps_load_and_carry_their_name():
-    assert set(shipped_column_maps()) == {"concealed", "drive_continuous", "drive_steps"}
+    assert set(shipped_column_maps()) == {"concealed", "drive_continuous", "drive_steps", "schema"}
     for name in shipped_column_maps():
         assert load_column_map(name).name == name
+
+
+def test_what_simulate_writes_as_csv_is_read_without_a_map(tmp_path):
+    drive = simulate("arcs", rate=50.0, pose_rate=5.0)
+    path = tmp_path / "drive.csv"
+    drive.save(path)
+    read = load_recording(path)
+    for name, values in drive.recording.channels.items():
+        np.testing.assert_allclose(read[name], values, rtol=1e-8, atol=1e-9)
+    assert set(load_column_map("schema").channels) == set(CHANNELS)
 
 
 def test_the_commented_example_is_valid():

@@ -37,6 +37,16 @@ def test_time_stamps_become_seconds(tmp_path):
     np.testing.assert_allclose(np.diff(table.numbers["t"]), 0.02, atol=1e-6)
 
 
+def test_time_stamps_have_a_unit_of_their_own(tmp_path):
+    start = datetime.datetime(2026, 5, 1, tzinfo=datetime.UTC)
+    stamps = [start + datetime.timedelta(milliseconds=20 * i) for i in range(3)]
+    nanoseconds = ColumnMap(TimeSource("t", "ns"), {"yaw_rate": ColumnSource("gz")}, name="small")
+    with pytest.raises(InputError, match="leave unit out"):
+        read_parquet(write(tmp_path, {"t": pa.array(stamps), "gz": [0.0, 0.0, 0.0]}), nanoseconds)
+    path = write(tmp_path, {"t": pa.array([0, 20_000_000], pa.int64()), "gz": [0.0, 0.0]})
+    assert read_parquet(path, nanoseconds).numbers["t"].size == 2
+
+
 def test_labels_may_be_numbers_or_text(tmp_path):
     path = write(tmp_path, {"t": [0.0, 1.0, 0.0], "gz": [0.0, 0.0, 0.0], "run": [4, 4, 5]})
     table = read_parquet(path, ColumnMap(TimeSource("t"), MAP.channels, pieces=Pieces(("run",))))

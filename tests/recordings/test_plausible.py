@@ -61,6 +61,11 @@ def test_milliseconds_are_doubted(tmp_path):
     assert any("rows come every 50 s" in sentence and "(ms?)" in sentence for sentence in doubts)
 
 
+def test_seconds_taken_for_nanoseconds_are_refused(tmp_path):
+    with pytest.raises(InputError, match="no log of a robot is that fast"):
+        load_recording(*write(tmp_path, 1e-9 * T))
+
+
 def test_a_reading_that_no_sensor_gives_is_named(tmp_path):
     with pytest.raises(InputError, match=r"yaw_rate is 1e\+160 rad/s in row 8"):
         load_recording(*write(tmp_path, T, yaw_rate=np.where(np.arange(T.size) == 7, 1e160, 0.1)))
