@@ -157,7 +157,7 @@ def test_needs_the_filters_features():
 
 def test_without_casadi_it_is_one_sentence(monkeypatch):
     monkeypatch.setitem(sys.modules, "casadi", None)
-    with pytest.raises(InputError, match=r"\[mpc\]"):
+    with pytest.raises(InputError, match=r"-e '\.\[mpc\]'"):
         ModelPredictive(MODEL, PRIOR)
 
 

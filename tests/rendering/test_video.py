@@ -98,5 +98,5 @@ def test_bad_input_is_one_sentence_and_writes_nothing(tmp_path, name, pictures, 
 
 def test_missing_ffmpeg_names_the_extra(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
-    with pytest.raises(InputError, match=r"\[render\]"):
+    with pytest.raises(InputError, match=r"-e '\.\[render\]'"):
         write_video(tmp_path / "turn.mp4", frames())

@@ -106,7 +106,7 @@ def test_bad_input_is_one_sentence_and_writes_nothing(tmp_path, monkeypatch):
         turn_figure(columns, turn, tmp_path / "absent" / "turn", robot=ROBOT, soil_name="soil")
     monkeypatch.setitem(sys.modules, "matplotlib.style", None)
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    with pytest.raises(InputError, match=r"\[report\]"):
+    with pytest.raises(InputError, match=r"-e '\.\[report\]'"):
         turn_figure(columns, turn, tmp_path / "turn", robot=ROBOT, soil_name="soil")
     del columns["true_slip_ratio_2"]
     with pytest.raises(InputError, match="column 'true_slip_ratio_2' is missing"):
