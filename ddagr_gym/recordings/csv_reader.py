@@ -1,9 +1,8 @@
-"""CSV files, plain or gzip, read in blocks of a megabyte with a bound on rows and bytes."""
+"""CSV files, plain or gzip, read in pieces of a megabyte with a bound on rows and bytes."""
 
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,13 +12,13 @@ import numpy.typing as npt
 from ddagr_gym.errors import InputError, unknown_name
 from ddagr_gym.recordings.column_map import ColumnMap
 from ddagr_gym.recordings.conversion import RawTable
+from ddagr_gym.recordings.csv_pieces import PieceParser
 from ddagr_gym.recordings.files import DEFAULT_LIMITS, Limits, damaged, open_text
 from ddagr_gym.recordings.schema import FloatArray
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
-_BLOCK = 2**20  # bytes that are parsed at once (ours): about ten thousand rows
 _LONGEST_HEADER = 64 * 1024  # bytes (ours): beyond it a first line names no columns
 _MOST_LABELS = 100_000  # different values of a column that numbers spans (ours): more are readings, not labels
 
@@ -64,8 +63,11 @@ def read_csv(path: Path, column_map: ColumnMap, limits: Limits = DEFAULT_LIMITS)
     names = csv_columns(path, limits, column_map.delimiter)
     numbers, labels = wanted_columns(path, column_map, names)
     collector = Collector(numbers, labels, limits, path)
-    for batch in _batches(path, column_map, numbers, labels, limits):
-        collector.add(batch)
+    # A column may serve both as a number and as a label; text converts to either.
+    parser = PieceParser(path, names, column_map.delimiter, {name: name in labels for name in (*numbers, *labels)})
+    with open_text(path, limits) as stream:
+        for batch in parser.batches(stream):
+            collector.add(batch)
     return collector.table()
 
 
@@ -88,30 +90,6 @@ def wanted_columns(
 
 def _absolute(column_map: ColumnMap, names: tuple[str, ...]) -> bool:
     return column_map.time.absolute_column in names
-
-
-def _batches(
-    path: Path, column_map: ColumnMap, numbers: tuple[str, ...], labels: tuple[str, ...], limits: Limits
-) -> Iterator[pa.RecordBatch]:
-    import pyarrow as pa
-    from pyarrow import csv as arrow_csv
-
-    # A column may serve both as a number and as a label; text converts to either.
-    columns = tuple(dict.fromkeys((*numbers, *labels)))
-    types = {name: pa.string() if name in labels else pa.float64() for name in columns}
-    try:
-        with open_text(path, limits) as stream:
-            reader = arrow_csv.open_csv(
-                pa.PythonFile(stream, mode="r"),
-                read_options=arrow_csv.ReadOptions(block_size=_BLOCK, use_threads=False),
-                parse_options=arrow_csv.ParseOptions(delimiter=column_map.delimiter),
-                convert_options=arrow_csv.ConvertOptions(
-                    include_columns=list(columns), column_types=types, strings_can_be_null=False
-                ),
-            )
-            yield from reader
-    except pa.ArrowException as error:
-        raise damaged(path, error, "is not a sound CSV file", "correct or delete that place") from None
 
 
 class Collector:

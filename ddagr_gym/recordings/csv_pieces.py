@@ -1,0 +1,110 @@
+"""The body of a CSV file, read in pieces of whole lines and parsed one after the other."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ddagr_gym.errors import InputError
+from ddagr_gym.recordings.files import BoundedStream, damaged
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+PIECE = 2**20
+"""Bytes that are read at once; no line may be as long (ours): about ten thousand rows."""
+
+
+class PieceParser:
+    """Parses a CSV file piece by piece, counting its rows, the header as row 1 and without empty lines.
+
+    pyarrow is given bytes, never the Python stream: its reading thread would hold that beyond an error.
+
+    Args:
+        path: of the file, for messages.
+        names: of all columns, in their order.
+        delimiter: between fields.
+        texts: columns to parse, and whether each holds text instead of numbers.
+    """
+
+    def __init__(self, path: Path, names: tuple[str, ...], delimiter: str, texts: Mapping[str, bool]) -> None:
+        import pyarrow as pa
+        from pyarrow import csv as arrow_csv
+
+        self._path = path
+        self._names = names
+        self._rows = 1
+        self._extra_row = delimiter.join("0" * len(names)).encode()
+        self._parse = arrow_csv.ParseOptions(delimiter=delimiter)
+        self._convert = arrow_csv.ConvertOptions(
+            include_columns=list(texts),
+            column_types={name: pa.string() if text else pa.float64() for name, text in texts.items()},
+            strings_can_be_null=False,
+        )
+
+    def batches(self, stream: BoundedStream) -> Iterator[pa.RecordBatch]:
+        """Record batches of all rows below the header.
+
+        Args:
+            stream: at the beginning of the file.
+
+        Raises:
+            InputError: a row that does not parse, a line of :data:`PIECE` bytes, or a quoted field without an end.
+        """
+        rest = _below_header(stream)
+        while block := stream.read(PIECE - len(rest)):
+            rest += block
+            line = rest.rfind(b"\n") + 1
+            end = max(rest.rfind(b"\r", line) + 1, line)
+            yield from self._parsed(rest[:end])
+            rest = rest[end:]
+            if len(rest) == PIECE:
+                raise self._unsound(f"the line after row {self._rows} has {PIECE:,} bytes or more")
+        yield from self._parsed(rest)
+
+    def _parsed(self, piece: bytes) -> Iterator[pa.RecordBatch]:
+        """Record batches of some whole lines."""
+        import pyarrow as pa
+
+        piece = piece.lstrip(b"\r\n")
+        if not piece:
+            return
+        try:
+            table = self._table(piece)
+            if self._is_open(piece, table.num_rows):
+                raise self._unsound(f"the quoted field in row {self._rows + table.num_rows} does not end with its line")
+        except pa.ArrowException as error:
+            raise self._unsound(re.sub(r"Row #(\d+)", self._row_of_the_file, str(error))) from None
+        self._rows += table.num_rows
+        yield from table.to_batches()
+
+    def _is_open(self, piece: bytes, rows: int) -> bool:
+        """Whether a quoted field would swallow a row behind the piece.
+
+        Quotes inside unquoted fields are plain text, so an odd number of them alone proves nothing.
+        """
+        odd = b'"' in piece and piece.count(b'"') % 2 == 1  # to find none is ten times faster than to count
+        return odd and self._table(piece + b"\n" + self._extra_row).num_rows == rows
+
+    def _table(self, piece: bytes) -> pa.Table:
+        import pyarrow as pa
+        from pyarrow import csv as arrow_csv
+
+        options = arrow_csv.ReadOptions(column_names=self._names, block_size=len(piece), use_threads=False)
+        return arrow_csv.read_csv(pa.BufferReader(piece), options, self._parse, self._convert)
+
+    def _row_of_the_file(self, found: re.Match[str]) -> str:
+        return f"Row #{self._rows + int(found[1])}"
+
+    def _unsound(self, reason: str) -> InputError:
+        return damaged(self._path, ValueError(reason), "is not a sound CSV file", "correct or delete that place")
+
+
+def _below_header(stream: BoundedStream) -> bytes:
+    """First bytes below the header line; nothing where the header is all there is."""
+    head = b""
+    while b"\n" not in head and (block := stream.read(PIECE - len(head))):
+        head += block
+    return head.partition(b"\n")[2]
