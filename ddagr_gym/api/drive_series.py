@@ -170,7 +170,7 @@ def diagnose_drives(
     tasks = tasks_of(recordings)
     kept = None if cache is None else Path(cache)
     key = "" if kept is None else setting_key(setting)
-    found, stores = _known(tasks, kept, key)
+    found, stores = _known(tasks, kept, key, (lambda line: None) if progress is None else progress)
     missing = [task for task in tasks if task.name not in found]
     say = _Counter(len(tasks), len(tasks) - len(missing), progress)
     for task, answer in answered(missing, setting, calibrated, processes, cluster):
@@ -182,24 +182,18 @@ def diagnose_drives(
 
 
 def _known(
-    tasks: Sequence[DriveTask], cache: Path | None, key: str
+    tasks: Sequence[DriveTask], cache: Path | None, key: str, progress: Callable[[str], None]
 ) -> tuple[dict[str, DriveAnswer | str], dict[str, StepStore]]:
     """Answers by name that need no work: kept ones, and drives that are there twice; and where each is kept."""
     found: dict[str, DriveAnswer | str] = _twins(tasks)
-    stores = {task.name: store_of(task, key, cache) for task in tasks if task.name not in found and not task.unread}
-    found |= {name: _kept(store) for name, store in stores.items() if store.has(STEP)}
-    return found, stores
+    open_tasks = [task for task in tasks if task.name not in found and not task.unread]
+    stores = {task.name: store_of(task, key, cache, progress) for task in open_tasks}
+    kept = {name: store.find(STEP) for name, store in stores.items()}
+    return found | {name: item.value for name, item in kept.items() if item is not None}, stores
 
 
 def _same(answer: DriveAnswer) -> DriveAnswer:
     return answer
-
-
-def _kept(store: StepStore) -> DriveAnswer:
-    def never() -> DriveAnswer:
-        raise AssertionError(f"{store.folder} has no answer")
-
-    return store.step(STEP, never)
 
 
 def _twins(tasks: Sequence[DriveTask]) -> dict[str, DriveAnswer | str]:

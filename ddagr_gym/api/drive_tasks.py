@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import traceback
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -121,12 +121,14 @@ def setting_key(setting: Setting) -> str:
     return digest.hexdigest()
 
 
-def store_of(task: DriveTask, key: str, cache: Path | None) -> StepStore:
+def store_of(
+    task: DriveTask, key: str, cache: Path | None, progress: Callable[[str], None] = lambda line: None
+) -> StepStore:
     """Where the answer on a drive is kept: a folder of its own, named by all that the answer depends on."""
     from ddagr_gym.diagnosis.store import StepStore
 
     whole = hashlib.sha256(f"{key} {task.sha256} {task.name}".encode()).hexdigest()
-    return StepStore(None if cache is None else cache / whole[:32], whole)
+    return StepStore(None if cache is None else cache / whole[:32], whole, progress)
 
 
 def answered(

@@ -162,7 +162,7 @@ def calibrate_drives(
             )  # fmt: skip
     began = time.monotonic()
     data = ready_drives(recordings, grounds, robot, soils, settings, progress) if ready is None else ready
-    store = StepStore(cache, "" if cache is None else _key(recordings, grounds, robot, soils, settings))
+    store = StepStore(cache, "" if cache is None else _key(recordings, grounds, robot, soils, settings), progress)
     steps = IndependentSteps(runner, store, progress)
     complete, held = complete_model(data)
     selection = _select(data, complete, held, settings, store, steps)

@@ -161,7 +161,7 @@ def diagnose(
     """
     began = time.monotonic()
     session = prepare(recordings, robot, soil, thresholds, setting, seed=seed, progress=progress)
-    steps = Steps(StepStore(cache, "" if cache is None else session.key()), on_step)
+    steps = Steps(StepStore(cache, "" if cache is None else session.key(), progress), on_step)
     checks = steps.run("checks", data_doubts, session.mended.given, session.rng("checks"))
     steps.begin("search")
     start = starting_models(session, steps.store.step)

@@ -18,7 +18,7 @@ from ddagr_gym.errors import at_least
 from ddagr_gym.extras import need
 from ddagr_gym.tasks.attempt import check_memory_limit
 from ddagr_gym.tasks.engine import Engine, ThisProcess
-from ddagr_gym.tasks.store import Store
+from ddagr_gym.tasks.store import Kept, Store
 from ddagr_gym.tasks.task import Ended, Failure, Limits, Outcome, Task
 
 STOPPED = 128 + signal.SIGTERM
@@ -116,8 +116,8 @@ class TaskRunner(AbstractContextManager["TaskRunner"]):
                 item = again.popleft() if again else _next(source)
                 if item is None:
                     left = False
-                elif store is not None and item.task.key and store.has(item.task.key):
-                    yield Ended(item.task, store.get(item.task.key), stored=True)
+                elif (kept := _find(store, item.task)) is not None:
+                    yield Ended(item.task, kept.value, stored=True)
                 else:
                     self._begin(item, running)
             if running:
@@ -147,6 +147,11 @@ def _with_attempts(outcome: Outcome, begun: int) -> Failure | None:
     if failure is None or failure.kind != "lost":
         return failure
     return Failure("lost", f"{failure.message}, {begun} times")
+
+
+def _find(store: Store | None, task: Task) -> Kept | None:
+    """The stored result of a task; none for one without a key."""
+    return store.find(task.key) if store is not None and task.key else None
 
 
 def _next(source: Iterator[Task]) -> _Attempt | None:

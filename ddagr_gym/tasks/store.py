@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -13,14 +14,22 @@ from ddagr_gym.files import atomic_path, make_folder, read_json
 _KEY = re.compile(r"[\w.-]+")
 
 
+@dataclass(frozen=True)
+class Kept:
+    """A result that was found.
+
+    Attributes:
+        value: of the task, which may be None.
+    """
+
+    value: Any
+
+
 class Store(Protocol):
     """Where results of finished tasks are kept by key."""
 
-    def has(self, key: str) -> bool:
-        """Whether the result is there."""
-
-    def get(self, key: str) -> Any:
-        """The result."""
+    def find(self, key: str) -> Kept | None:
+        """The result; None where there is none, or a damaged one."""
 
     def put(self, key: str, value: Any) -> Any:
         """Keep a result, and give it back."""
@@ -46,15 +55,18 @@ class ResultStore:
             raise ValueError(f"key {key!r}: letters, digits, '_', '-' and '.' only")
         return self.folder / f"{key}.json"
 
-    def has(self, key: str) -> bool:
-        """Whether the result is there; an empty or damaged file is none, so that the task is done again."""
+    def find(self, key: str) -> Kept | None:
+        """The result; None where there is no file, or an empty or damaged one, so that the task is done again."""
         if not self.path(key).exists():
-            return False
+            return None
         try:
-            self.get(key)
+            return Kept(self.get(key))
         except InputError:
-            return False
-        return True
+            return None
+
+    def has(self, key: str) -> bool:
+        """Whether :meth:`find` finds the result."""
+        return self.find(key) is not None
 
     def get(self, key: str) -> Any:
         """The result.

@@ -81,6 +81,18 @@ def test_what_is_answered_is_not_asked_again(drives, asked, tmp_path):
     assert len(asked) == 15 + 7
 
 
+def test_a_damaged_answer_is_asked_again_and_said(drives, asked, tmp_path):
+    said: list[str] = []
+    ddagr_gym.diagnose_drives(drives, tmp_path / "cal", cache=tmp_path / "kept")
+    damaged = sorted((tmp_path / "kept").glob("*/answer.json"))[2]
+    damaged.write_text(damaged.read_text()[:99])
+    again = ddagr_gym.diagnose_drives(drives, tmp_path / "cal", cache=tmp_path / "kept", progress=said.append)
+    assert len(asked) == 7
+    assert said[0].startswith(f"{damaged}, a finished step, is damaged (")
+    assert said[1] == "5 of 6 drives have an answer already"
+    assert [row.refused for row in again.drives] == [False] * 6
+
+
 def test_a_drive_that_is_there_twice_counts_once(drives, asked, tmp_path):
     (drives / "run_9.csv").write_text((drives / "run_1.csv").read_text())
     result = ddagr_gym.diagnose_drives(drives, tmp_path / "cal")

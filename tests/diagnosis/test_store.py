@@ -3,10 +3,12 @@
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from ddagr_gym.diagnosis import store as module
 from ddagr_gym.diagnosis.search.gains import gains
 from ddagr_gym.diagnosis.search.scan import scan
 from ddagr_gym.diagnosis.search.scanned_model import ScannedModel, SearchResult
@@ -17,7 +19,7 @@ from ddagr_gym.physics.effects.registry import effect_kind
 from tests.diagnosis.conftest import Sloping
 
 
-def never() -> None:
+def never() -> Any:
     raise AssertionError("a finished step was done again")
 
 
@@ -77,6 +79,90 @@ def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
 def test_without_a_folder_nothing_is_kept() -> None:
     store = StepStore(None, "")
     assert [store.step("one", lambda: 1), store.step("one", lambda: 2)] == [1, 2]
+
+
+def _truncated(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:40])
+
+
+def _emptied(path: Path) -> None:
+    path.write_bytes(b"")
+
+
+def _garbled(path: Path) -> None:
+    path.write_bytes(b"\xff\x00 no text")
+
+
+def _nested(path: Path) -> None:
+    path.write_text("[" * 100_000)
+
+
+def _of_other_keys(path: Path) -> None:
+    path.write_text('{"tuple": []}')
+
+
+def _of_another_kind(path: Path) -> None:
+    path.write_text("[]")
+
+
+def _with_another_number(path: Path) -> None:
+    path.write_text(path.read_text().replace("2.5", "2.6"))
+
+
+@pytest.mark.parametrize(
+    ("suffix", "damage", "reason"),
+    [
+        ("npz", _truncated, "its hash is another one"),
+        ("npz", _emptied, "its hash is another one"),
+        ("npz", Path.unlink, "No such file"),
+        ("json", _truncated, "Unterminated string"),
+        ("json", _emptied, "Expecting value"),
+        ("json", _garbled, "can't decode"),
+        ("json", _nested, "nested too deeply"),
+        ("json", _of_other_keys, "no result with a hash"),
+        ("json", _of_another_kind, "no result with a hash"),
+        ("json", _with_another_number, "its hash is another one"),
+    ],
+)
+def test_a_damaged_step_is_done_again_and_says_so_once(
+    suffix: str, damage: Callable[[Path], None], reason: str, tmp_path: Path
+) -> None:
+    value, lines = ({"size": 2.5}, np.arange(3.0)), list[str]()
+    StepStore(tmp_path / "part", "key").put("one", value)
+    damage(tmp_path / "part" / f"one.{suffix}")
+    store = StepStore(tmp_path / "part", "key", lines.append)
+    assert not store.has("one")
+    assert store.step("one", lambda: value) is value
+    (line,) = lines
+    assert line.startswith(f"{tmp_path / 'part' / 'one.json'}, a finished step, is damaged (")
+    assert reason in line
+    assert line.endswith("): it is done again")
+    sizes, array = store.step("one", never)
+    assert (sizes, array.tolist()) == ({"size": 2.5}, [0.0, 1.0, 2.0])
+
+
+def test_a_step_is_read_once_for_its_question_and_its_result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    StepStore(tmp_path / "part", "key").put("one", None)
+    store, reads = StepStore(tmp_path / "part", "key"), list[str]()
+    load = module._load
+
+    def counted(folder: Path, name: str) -> Any:
+        reads.append(name)
+        return load(folder, name)
+
+    monkeypatch.setattr(module, "_load", counted)
+    assert store.has("one")
+    assert store.step("one", never) is None
+    assert reads == ["one"]
+    store.has("one")
+    store.put("one", 3)
+    assert store.step("one", never) == 3
+
+
+def test_a_garbled_key_is_that_of_something_else(tmp_path: Path) -> None:
+    StepStore(tmp_path / "part", "key").put("one", 1)
+    (tmp_path / "part" / "key.txt").write_bytes(b"\xff\xfe")
+    assert not StepStore(tmp_path / "part", "key").has("one")
 
 
 def test_cleared(tmp_path: Path) -> None:

@@ -212,6 +212,16 @@ def test_a_task_whose_result_is_damaged_is_done_again(left, tmp_path):
     assert store.get("case_1") == whole[1]
 
 
+def test_a_stored_result_is_read_once(tmp_path, monkeypatch):
+    store, tasks, reads = ResultStore(tmp_path), [Task("0", work.raises, (0,), key="case_0")], []
+    with TaskRunner(1) as made:
+        run_tasks(tasks, "cases", made, store)
+        get = ResultStore.get
+        monkeypatch.setattr(ResultStore, "get", lambda self, key: reads.append(key) or get(self, key))
+        assert [item.stored for item in made.run(tasks, store)] == [True]
+    assert reads == ["case_0"]
+
+
 def test_a_full_disk_ends_the_run_and_loses_nothing(tmp_path, monkeypatch):
     store, put = ResultStore(tmp_path), ResultStore.put
 
