@@ -20,6 +20,9 @@ FOLDER_MARK = ".ddagr-output"
 MAXIMUM_JSON = 50_000_000
 """Bytes of the largest JSON file that is read (ours): an answer on thousands of drives has fewer."""
 
+MAXIMUM_JSON_LINES = 1_000_000_000
+"""The same of a file with one JSON value a line (ours): a million episodes have fewer."""
+
 
 def expanded(path: str | os.PathLike[str]) -> Path:
     """Path with ``~`` and ``~user`` written out.
@@ -59,6 +62,22 @@ def read_text(path: str | os.PathLike[str], maximum: int, refusal: Callable[[str
     Raises:
         InputError: what ``refusal`` makes of another kind of file, a larger one, other text, or a missing right.
     """
+    try:
+        with _regular_file(path, maximum, refusal) as file:
+            return file.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise refusal(f"it is not UTF-8 text, at byte {error.start}") from None
+
+
+def read_bytes(path: str | os.PathLike[str], maximum: int, refusal: Callable[[str], InputError]) -> bytes:
+    """Bytes of a regular file; arguments and errors are those of :func:`read_text`."""
+    with _regular_file(path, maximum, refusal) as file:
+        return file.read_bytes()
+
+
+@contextmanager
+def _regular_file(path: str | os.PathLike[str], maximum: int, refusal: Callable[[str], InputError]) -> Iterator[Path]:
+    """Path of a regular file that is small enough to read; errors of the system become refusals."""
     file = expanded(path)
     try:
         status = file.stat()
@@ -66,9 +85,7 @@ def read_text(path: str | os.PathLike[str], maximum: int, refusal: Callable[[str
             raise refusal("it is not a regular file")
         if status.st_size > maximum:
             raise refusal(f"it has {status.st_size} bytes and may have {maximum} at most")
-        return file.read_text(encoding="utf-8")
-    except UnicodeDecodeError as error:
-        raise refusal(f"it is not UTF-8 text, at byte {error.start}") from None
+        yield file
     except OSError as error:
         raise refusal((error.strerror or "unknown error").lower()) from None
 
@@ -90,13 +107,46 @@ def read_json(
     def refusal(reason: str) -> InputError:
         return InputError(f"{os.fspath(path)} {fault} ({reason}): {remedy}.")
 
-    text = read_text(path, MAXIMUM_JSON, refusal)
+    return parse_json(read_text(path, MAXIMUM_JSON, refusal), refusal)
+
+
+def parse_json(text: str | bytes, refusal: Callable[[str], InputError]) -> Any:
+    """Content of JSON text; InputError that ``refusal`` makes of a reason."""
     try:
         return json.loads(text)
     except RecursionError:
         raise refusal("it is nested too deeply") from None
     except ValueError as error:
         raise refusal(str(error)) from None
+
+
+def read_json_lines(path: str | os.PathLike[str], fault: str, remedy: str) -> list[dict[str, Any]]:
+    """Mappings of a file with one JSON value a line; a line that is no JSON was cut off when it was written.
+
+    Args:
+        path: of a regular file of at most :data:`MAXIMUM_JSON_LINES` bytes.
+        fault: as of :func:`read_json`.
+        remedy: likewise.
+
+    Raises:
+        InputError: unreadable file, or a line with another value; one sentence with file and reason.
+    """
+
+    def refusal(reason: str) -> InputError:
+        return InputError(f"{os.fspath(path)} {fault} ({reason}): {remedy}.")
+
+    found = []
+    for number, line in enumerate(read_text(path, MAXIMUM_JSON_LINES, refusal).splitlines(), 1):
+        try:
+            value = json.loads(line)
+        except json.JSONDecodeError:
+            continue
+        except RecursionError:
+            value = None
+        if not isinstance(value, dict):
+            raise refusal(f"line {number} holds no mapping")
+        found.append(value)
+    return found
 
 
 @contextmanager

@@ -10,16 +10,19 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.adaptation.corrected import Corrected
 from ddagr_gym.config import dump_config
 from ddagr_gym.control.row_turn import SIDES, RowTurn
+from ddagr_gym.errors import InputError
 from ddagr_gym.evaluation.adapted_controller import NODES
 from ddagr_gym.evaluation.bundles import Bundle
 from ddagr_gym.evaluation.metrics import turn_metrics
 from ddagr_gym.evaluation.runs import Controller, drive_turn
+from ddagr_gym.files import make_folder, read_json_lines
 from ddagr_gym.parameters import Robot
 
 Array = NDArray[np.float64]
@@ -95,6 +98,9 @@ class MeasuredTurns:
         turns: where they are driven.
         journal: JSON lines; None for none.
         progress: called when a turn is driven or remembered.
+
+    Raises:
+        InputError: the journal holds something else.
     """
 
     def __init__(self, turns: Turns, journal: Path | None = None, progress: Callable[[], None] = lambda: None) -> None:
@@ -109,9 +115,7 @@ class MeasuredTurns:
             columns = self.turns.drive(bundle.controller(turn), number)
             self._known[key] = judged(columns, turn, self.turns.robot, number)
             if self._journal is not None:
-                self._journal.parent.mkdir(parents=True, exist_ok=True)
-                with self._journal.open("a", encoding="utf-8") as file:
-                    file.write(json.dumps({"key": key, "turn": asdict(self._known[key])}) + "\n")
+                _append(self._journal, json.dumps({"key": key, "turn": asdict(self._known[key])}))
         self._progress()
         return self._known[key]
 
@@ -126,15 +130,28 @@ def _digest(bundle: Bundle) -> str:
 
 
 def _read(journal: Path) -> dict[str, DrivenTurn]:
-    known: dict[str, DrivenTurn] = {}
-    for line in journal.read_text(encoding="utf-8").splitlines() if journal.is_file() else []:
-        try:
-            item: dict[str, Any] = json.loads(line)
-        except json.JSONDecodeError:
-            break  # cut off by an interruption
-        curvature = item["turn"].pop("curvature")
-        known[item["key"]] = DrivenTurn(**item["turn"], curvature=None if curvature is None else tuple(curvature))
-    return known
+    """Turns of a journal by their keys; InputError where it holds anything else."""
+    if not journal.exists():
+        return {}
+    fault, remedy = "is no journal of driven turns", "delete it, and they are driven again"
+    try:
+        return dict(_turn_of(item) for item in read_json_lines(journal, fault, remedy))
+    except (KeyError, msgspec.ValidationError) as error:
+        raise InputError(f"{journal} {fault} (an entry is absent or wrong: {error}): {remedy}.") from None
+
+
+def _turn_of(item: Mapping[str, Any]) -> tuple[str, DrivenTurn]:
+    """Key and turn of a line."""
+    return msgspec.convert(item["key"], str), msgspec.convert(item["turn"], DrivenTurn)
+
+
+def _append(journal: Path, line: str) -> None:
+    """Add a line, after the rest of one that was cut off."""
+    make_folder(journal.parent)
+    with journal.open("ab+") as file:
+        file.seek(max(file.tell() - 1, 0))
+        whole = file.read(1) in (b"", b"\n")
+        file.write(("" if whole else "\n").encode() + f"{line}\n".encode())
 
 
 def judged(columns: Columns, turn: RowTurn, robot: Robot, number: int) -> DrivenTurn:

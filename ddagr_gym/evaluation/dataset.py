@@ -18,7 +18,7 @@ from urllib.parse import quote, unquote
 
 from ddagr_gym.errors import InputError
 from ddagr_gym.extras import need
-from ddagr_gym.files import atomic_path, make_folder, write_json
+from ddagr_gym.files import atomic_path, make_folder, read_json, read_json_lines, write_json
 from ddagr_gym.version import __version__
 
 EPISODES = "episodes"
@@ -62,8 +62,8 @@ class EpisodeDataset:
         earlier: JSON lines of an earlier version; their rows are taken over once, and the file is left as it is.
 
     Raises:
-        InputError: pyarrow is not installed, the dataset is of a later version, or the rows of ``earlier`` are of
-            another one.
+        InputError: pyarrow is not installed, the manifest is none, the dataset is of a later version, or the rows of
+            ``earlier`` are of another one.
     """
 
     def __init__(self, folder: Path, earlier: Path | None = None) -> None:
@@ -74,24 +74,30 @@ class EpisodeDataset:
                 f"{self.folder} is written in format {self._manifest()['format']} and this version reads {FORMAT}: "
                 f"use the version that wrote it, or choose another folder."
             )
-        if earlier is not None and earlier.is_file() and not (self.folder / MANIFEST).is_file():
+        if earlier is not None and earlier.exists() and not (self.folder / MANIFEST).is_file():
             self._take_over(earlier)
         self.write_manifest()
 
     def _manifest(self) -> dict[str, Any]:
         file = self.folder / MANIFEST
-        try:
-            content: dict[str, Any] = json.loads(file.read_text(encoding="utf-8")) if file.is_file() else {}
-            return content
-        except (json.JSONDecodeError, UnicodeDecodeError):
-            raise InputError(f"{file} is no manifest of episodes: delete it, and it is made anew.") from None
+        if not file.exists():
+            return {}
+        fault, remedy = "is no manifest of episodes", "delete it, and it is made anew"
+        content = read_json(file, fault, remedy)
+        if not isinstance(content, dict):
+            raise InputError(f"{file} {fault} (it holds no mapping): {remedy}.")
+        return content
 
     def _take_over(self, earlier: Path) -> None:
         rows = read_lines(earlier)
         known = {*COLUMNS, *PARTITIONS}
+        other = InputError(f"{earlier} has rows of another version: move it away and drive again.")
         if any(set(row) != known for row in rows):
-            raise InputError(f"{earlier} has rows of another version: move it away and drive again.")
-        self.append(rows)
+            raise other
+        try:
+            self.append(rows)
+        except (TypeError, ValueError):  # pyarrow's errors are among these
+            raise other from None
 
     def parts(self) -> list[Path]:
         """Files of the rows, ordered by path."""
@@ -200,11 +206,9 @@ def _schema() -> Any:
 
 
 def read_lines(journal: Path) -> list[dict[str, Any]]:
-    """Rows of JSON lines, as an earlier version wrote; a last line that was cut off by an interruption is dropped."""
-    rows = []
-    for line in journal.read_text(encoding="utf-8").splitlines():
-        try:
-            rows.append(json.loads(line))
-        except json.JSONDecodeError:
-            break
-    return rows
+    """Rows of JSON lines, as an earlier version wrote; a line that was cut off by an interruption is dropped.
+
+    Raises:
+        InputError: the file cannot be read, or a line is no row.
+    """
+    return read_json_lines(journal, "has no rows of episodes", "move it away and drive again")

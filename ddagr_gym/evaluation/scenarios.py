@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import gzip
 import hashlib
+import io
 import json
 import math
 import zlib
@@ -25,7 +26,7 @@ from ddagr_gym.config import configs_dir
 from ddagr_gym.control.row_turn import RowTurn
 from ddagr_gym.envs.settings import Episode
 from ddagr_gym.errors import InputError, unknown_name
-from ddagr_gym.files import atomic_path
+from ddagr_gym.files import MAXIMUM_JSON, atomic_path, parse_json, read_bytes
 from ddagr_gym.parameters import Robot, Sensors, Soil
 from ddagr_gym.physics.soil_laws import NOMINAL_LAW
 from ddagr_gym.physics.terrain import SoilField
@@ -225,15 +226,38 @@ def _read(name: str, path: Path) -> dict[str, Any]:
     """Content of a set's file, once its hash agrees."""
     if name not in scenario_names():
         raise unknown_name("scenario set", name, scenario_names())
-    try:
-        content: dict[str, Any] = json.loads(gzip.decompress(path.read_bytes()))
-    except (OSError, EOFError, zlib.error, ValueError):
-        raise InputError(f"{path} is not a scenario set: restore the file, or freeze the set anew.") from None
+    content = _unpacked(path)
     if content.get("format") != FORMAT:
         raise InputError(f"scenario set {name!r} has format {content.get('format')!r}: this version reads {FORMAT}.")
+    absent = [entry for entry in ("description", "law", "scenarios", "sha256") if entry not in content]
+    if absent:
+        raise _no_set(path, f"it lacks {absent[0]!r}")
     if _fingerprint(content["law"], content["scenarios"]) != content["sha256"]:
         raise InputError(f"scenario set {name!r} is not what its hash says: restore its file, or freeze it anew.")
     return content
+
+
+def _unpacked(path: Path) -> dict[str, Any]:
+    """Mapping of a compressed JSON file."""
+
+    def refusal(reason: str) -> InputError:
+        return _no_set(path, reason)
+
+    try:
+        with gzip.open(io.BytesIO(read_bytes(path, MAXIMUM_JSON, refusal))) as stream:
+            text = stream.read(MAXIMUM_JSON + 1)
+    except (OSError, EOFError, zlib.error) as error:
+        raise refusal(str(error)) from None
+    if len(text) > MAXIMUM_JSON:
+        raise refusal(f"it holds more than {MAXIMUM_JSON} bytes")
+    content = parse_json(text, refusal)
+    if not isinstance(content, dict):
+        raise refusal("it holds no mapping")
+    return content
+
+
+def _no_set(path: Path, reason: str) -> InputError:
+    return InputError(f"{path} is not a scenario set ({reason}): restore the file, or freeze the set anew.")
 
 
 def save_scenarios(

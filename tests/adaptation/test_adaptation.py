@@ -1,11 +1,14 @@
 """From a corrected simulator to a controller: draws, teaching, what is kept, what is remembered."""
 
 import json
-from dataclasses import replace
+import os
+import re
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
 
+from ddagr_gym.adaptation import turns as turns_module
 from ddagr_gym.adaptation.corrected import Corrected
 from ddagr_gym.adaptation.files import as_json, deviations, sizes, summary
 from ddagr_gym.adaptation.run import adapted, refitted_prior, score
@@ -45,6 +48,44 @@ def test_a_turn_is_driven_once_and_goes_on_from_its_file(on_a_slope, tmp_path):
     assert again.measure(bundle, 0) == first
     assert len(first.curvature) == NODES
     assert first.side == "left"
+
+
+def test_what_is_driven_after_a_cut_off_line_is_kept(on_a_slope, tmp_path, monkeypatch):
+    bundle, journal = Bundle(AdaptedSettings(), ddagr(), get_soil("thesis_a1")), tmp_path / "turns.jsonl"
+    journal.write_text('{"key": "cut o')
+    monkeypatch.setattr(
+        turns_module, "judged", lambda columns, commanded, robot, number: replace(turn(), number=number)
+    )
+    monkeypatch.setattr(CorrectedTurns, "drive", lambda *_: {})
+    turns = MeasuredTurns(CorrectedTurns(on_a_slope), journal)
+    driven = [turns.measure(bundle, number) for number in (0, 1)]
+    again = MeasuredTurns(CorrectedTurns(on_a_slope), journal)
+    monkeypatch.setattr(CorrectedTurns, "drive", lambda *_: pytest.fail("driven twice"))
+    assert [again.measure(bundle, number) for number in (0, 1)] == driven
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("3\n", "line 1 holds no mapping"),
+        ("[" * 100_000, "line 1 holds no mapping"),
+        ('{"turn": {}}', "'key'"),
+        ('{"key": "a", "turn": {"number": 0}}', "missing required field `side`"),
+        ('{"key": "a", "turn": 3}', "Expected `object`"),
+        (json.dumps({"key": "a", "turn": asdict(turn(error="far"))}), "Expected `float | null`"),
+    ],
+)
+def test_a_journal_of_something_else_is_one_sentence(text, reason, on_a_slope, tmp_path):
+    journal = tmp_path / "turns.jsonl"
+    journal.write_text(text)
+    with pytest.raises(InputError, match=f"is no journal of driven turns .*{re.escape(reason)}.*: delete it"):
+        MeasuredTurns(CorrectedTurns(on_a_slope), journal)
+
+
+def test_a_pipe_is_no_journal(on_a_slope, tmp_path):
+    os.mkfifo(tmp_path / "turns.jsonl")
+    with pytest.raises(InputError, match="it is not a regular file"):
+        MeasuredTurns(CorrectedTurns(on_a_slope), tmp_path / "turns.jsonl")
 
 
 def test_teaching_removes_what_a_slope_does(on_a_slope):

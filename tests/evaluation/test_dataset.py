@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 
 import pytest
 
@@ -93,9 +94,15 @@ def test_what_cannot_be_read_is_a_sentence(tmp_path):
     with pytest.raises(InputError, match=r"cannot be read .*: delete it to drive its episodes again"):
         store.read()
     store.parts()[0].unlink()
-    (folder / MANIFEST).write_text("{")
-    with pytest.raises(InputError, match="is no manifest of episodes: delete it"):
+    for text, reason in (("{", "Expecting property name"), ("[]", "no mapping"), ("[" * 100_000, "nested too deeply")):
+        (folder / MANIFEST).write_text(text)
+        with pytest.raises(InputError, match=f"is no manifest of episodes .*{reason}.*: delete it"):
+            EpisodeDataset(folder)
+    (folder / MANIFEST).unlink()
+    os.mkfifo(folder / MANIFEST)
+    with pytest.raises(InputError, match=r"is no manifest of episodes \(it is not a regular file\): delete it"):
         EpisodeDataset(folder)
+    (folder / MANIFEST).unlink()
     (folder / MANIFEST).write_text('{"format": 2}')
     with pytest.raises(InputError, match="written in format 2 and this version reads 1"):
         EpisodeDataset(folder)
@@ -104,4 +111,25 @@ def test_what_cannot_be_read_is_a_sentence(tmp_path):
 def test_lines_of_another_version_are_not_guessed(tmp_path):
     (tmp_path / "episodes.jsonl").write_text(json.dumps({"controller": "B1", "set": "V", "number": 0}) + "\n")
     with pytest.raises(InputError, match="rows of another version: move it away"):
+        EpisodeDataset(tmp_path / "episodes", tmp_path / "episodes.jsonl")
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("3\n", r"has no rows of episodes \(line 1 holds no mapping\): move it away"),
+        ("[" * 100_000, r"has no rows of episodes \(line 1 holds no mapping\): move it away"),
+        (json.dumps(row(0) | {"controller": 3}), "rows of another version: move it away"),
+        (json.dumps(row(0) | {"radius": "wide"}), "rows of another version: move it away"),
+    ],
+)
+def test_lines_that_are_no_rows_are_one_sentence(text, said, tmp_path):
+    (tmp_path / "episodes.jsonl").write_text(text)
+    with pytest.raises(InputError, match=said):
+        EpisodeDataset(tmp_path / "episodes", tmp_path / "episodes.jsonl")
+
+
+def test_a_pipe_of_lines_is_never_opened(tmp_path):
+    os.mkfifo(tmp_path / "episodes.jsonl")
+    with pytest.raises(InputError, match="it is not a regular file"):
         EpisodeDataset(tmp_path / "episodes", tmp_path / "episodes.jsonl")

@@ -2,6 +2,7 @@
 
 import gzip
 import json
+import os
 
 import numpy as np
 import pytest
@@ -120,7 +121,28 @@ def test_another_grid_is_refused(copied):
         load_scenarios("S0")
 
 
-def test_a_broken_file_is_one_sentence(copied):
-    copied(lambda content: None).write_bytes(b"\x1f\x8bnothing")
-    with pytest.raises(InputError, match="not a scenario set"):
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        (b"\x1f\x8bnothing at all", "nknown compression method"),
+        (b"{}", "Not a gzipped file"),
+        (gzip.compress(b"{}")[:10], "ended before"),
+        (gzip.compress(b"{"), "Expecting property name"),
+        (gzip.compress(b"[]"), "it holds no mapping"),
+        (gzip.compress(b"[" * 100_000), "it is nested too deeply"),
+        (gzip.compress(b" " * 60_000_000), "it holds more than 50000000 bytes"),
+        (gzip.compress(b'{"format": 1, "description": "", "scenarios": []}'), "it lacks 'law'"),
+    ],
+)
+def test_a_broken_file_is_one_sentence(copied, content, reason):
+    copied(lambda content: None).write_bytes(content)
+    with pytest.raises(InputError, match=f"not a scenario set .*{reason}.*: restore the file"):
+        load_scenarios("S0")
+
+
+def test_a_pipe_is_never_opened(copied):
+    path = copied(lambda content: None)
+    path.unlink()
+    os.mkfifo(path)
+    with pytest.raises(InputError, match=r"not a scenario set .it is not a regular file.: restore the file"):
         load_scenarios("S0")
