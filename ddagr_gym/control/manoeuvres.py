@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,11 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.errors import InputError, unknown_name
+from ddagr_gym.files import read_text
 
 LARGEST_SPEED = 100.0
 """Commands beyond this are a mistake of units [rad/s]."""
 LONGEST_DRIVE = 36_000.0
 """[s], ten hours: more is a mistake of units (ours)."""
+LARGEST_FILE = 500_000_000
+"""Size of a file of commands that is read, at most [bytes] (ours): ten hours at 125 Hz have a third of it."""
+
+COLUMNS = ("t", "command_right", "command_left")
+"""Of a file of commands [s, rad/s]."""
 
 
 @dataclass(frozen=True)
@@ -164,26 +171,28 @@ def read_manoeuvre(path: Path) -> Manoeuvre:
     The last row's command lasts as long as the one before it.
 
     Raises:
-        InputError: absent file, missing column, or values that are not numbers in increasing time.
+        InputError: absent file, a pipe or a device, one beyond :data:`LARGEST_FILE`, missing column, or values that are
+            not numbers in increasing time.
     """
-    if not path.is_file():
-        raise InputError(f"{path} does not exist: give a CSV with columns t, command_right, command_left.")
     try:
-        with path.open(newline="", encoding="utf-8") as file:
-            rows = list(csv.DictReader(file))
-    except (UnicodeDecodeError, csv.Error) as error:
+        rows = list(csv.DictReader(io.StringIO(_text(path))))
+    except csv.Error as error:
         raise InputError(f"{path} is not a CSV file: {error}.") from None
-    columns = ("t", "command_right", "command_left")
-    missing = [name for name in columns if not rows or name not in rows[0]]
+    missing = [name for name in COLUMNS if not rows or name not in rows[0]]
     if missing:
-        raise InputError(
-            f"{path} has no column {missing[0]!r}: give t, command_right, command_left and a row at least."
-        )
+        raise InputError(f"{path} has no column {missing[0]!r}: give {', '.join(COLUMNS)} and a row at least.")
     try:
-        table = np.array([[float(row[name]) for name in columns] for row in rows])
+        table = np.array([[float(row[name]) for name in COLUMNS] for row in rows])
     except (TypeError, ValueError) as error:
         raise InputError(f"{path} holds a value that is no number: {error}.") from None
     return _from_table(path, table)
+
+
+def _text(path: Path) -> str:
+    remedy = f"give a CSV with columns {', '.join(COLUMNS)}"
+    if not path.exists():
+        raise InputError(f"{path} does not exist: {remedy}.")
+    return read_text(path, LARGEST_FILE, lambda reason: InputError(f"{path} cannot be read ({reason}): {remedy}."))
 
 
 def _from_table(path: Path, table: NDArray[np.float64]) -> Manoeuvre:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -10,6 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.errors import InputError
+from ddagr_gym.files import read_text
+
+LARGEST = 500_000_000
+"""Size of a table that is read, at most [bytes] (ours)."""
+
+_OTHER = "it is not the reference table expected here"
 
 
 def read_columns(
@@ -23,21 +30,29 @@ def read_columns(
         texts: names of the columns to read as text.
 
     Raises:
-        InputError: the file is missing or empty, lacks a column, or holds something that is no number.
+        InputError: the file is missing, no ordinary file or empty, lacks a column, or holds something that is no
+            number.
     """
     file = Path(path)
-    if not file.is_file():
-        raise InputError(f"{file} does not exist: give the folder of the reference data.")
-    with file.open(newline="", encoding="utf-8") as handle:
-        reader = csv.DictReader(handle)
+    reader = csv.DictReader(io.StringIO(_text(file)))
+    try:
         missing = [name for name in (*numbers, *texts) if name not in (reader.fieldnames or ())]
-        if missing:
-            raise InputError(f"{file} has no column {missing[0]!r}: it is not the reference table expected here.")
-        rows = list(reader)
+        rows = [] if missing else list(reader)
+    except csv.Error as error:
+        raise InputError(f"{file} is not a CSV file ({error}): {_OTHER}.") from None
+    if missing:
+        raise InputError(f"{file} has no column {missing[0]!r}: {_OTHER}.")
     if not rows:
-        raise InputError(f"{file} has no rows: it is not the reference table expected here.")
+        raise InputError(f"{file} has no rows: {_OTHER}.")
     values = {name: np.array([_number(file, i, name, row[name]) for i, row in enumerate(rows)]) for name in numbers}
     return values, {name: [row[name] for row in rows] for name in texts}
+
+
+def _text(file: Path) -> str:
+    remedy = "give the folder of the reference data"
+    if not file.exists():
+        raise InputError(f"{file} does not exist: {remedy}.")
+    return read_text(file, LARGEST, lambda reason: InputError(f"{file} cannot be read ({reason}): {remedy}."))
 
 
 def _number(file: Path, index: int, name: str, text: str | None) -> float:

@@ -1,5 +1,7 @@
 """Named drives and commands from CSV."""
 
+import os
+
 import numpy as np
 import pytest
 
@@ -52,6 +54,15 @@ def test_binary_file_is_one_sentence(tmp_path):
     path.write_bytes(bytes(range(256)))
     with pytest.raises(InputError, match="CSV"):
         read_manoeuvre(path)
+
+
+def test_a_pipe_or_a_device_is_no_ordinary_file(tmp_path):
+    os.mkfifo(tmp_path / "drive.csv")
+    for path in (tmp_path / "drive.csv", tmp_path, "/dev/zero"):
+        with pytest.raises(InputError, match=r"cannot be read \(it is not a regular file\): give a CSV"):
+            find_manoeuvre(str(path))
+    with pytest.raises(InputError, match=r"absent\.csv does not exist: give a CSV with columns t"):
+        find_manoeuvre(str(tmp_path / "absent.csv"))
 
 
 def test_unknown_name_lists_the_closest():

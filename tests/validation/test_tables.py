@@ -1,6 +1,7 @@
 """Reading reference tables: columns, and one sentence for each way in which a file can be wrong."""
 
 import math
+import os
 
 import numpy as np
 import pytest
@@ -38,6 +39,22 @@ def test_wrong_file_is_one_sentence(tmp_path, content, words):
     assert words in str(error.value)
     assert str(path) in str(error.value)
     assert str(error.value).endswith(".")
+
+
+def test_a_pipe_or_a_folder_is_no_ordinary_file(tmp_path):
+    os.mkfifo(tmp_path / "pipe.csv")
+    for path in (tmp_path / "pipe.csv", tmp_path):
+        with pytest.raises(InputError, match=r"cannot be read \(it is not a regular file\): give the folder"):
+            read_columns(path, ["a"])
+
+
+def test_other_bytes_are_one_sentence(tmp_path):
+    (tmp_path / "table.csv").write_bytes(b"a\n\xff\n")
+    with pytest.raises(InputError, match="it is not UTF-8 text, at byte 2"):
+        read_columns(tmp_path / "table.csv", ["a"])
+    (tmp_path / "table.csv").write_text("a\n" + "1" * 200_000)
+    with pytest.raises(InputError, match=r"is not a CSV file \(field larger"):
+        read_columns(tmp_path / "table.csv", ["a"])
 
 
 def test_root_mean_square():
