@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.errors import InputError, unknown_name
+from ddagr_gym.extras import how_to_install
 from ddagr_gym.rendering import palette
 from ddagr_gym.rendering.camera import Camera
 from ddagr_gym.rendering.ground import Image, paint_ground
@@ -47,7 +48,7 @@ def import_pygame() -> ModuleType:
         pygame = None
     # The older package pygame owns the same module name.
     if pygame is None or not getattr(pygame, "IS_CE", False):
-        raise InputError('rendering needs pygame-ce, which is not installed: run pip install "ddagr-gym[render]".')
+        raise InputError(f"rendering needs pygame-ce, which is not installed: run {how_to_install('render')}.")
     return pygame
 
 

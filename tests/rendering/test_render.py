@@ -1,4 +1,5 @@
 import dataclasses
+import re
 import subprocess
 import sys
 import time
@@ -8,6 +9,7 @@ import pytest
 
 from ddagr_gym.control.row_turn import RowTurn
 from ddagr_gym.errors import InputError
+from ddagr_gym.extras import how_to_install
 from ddagr_gym.presets import get_robot
 from ddagr_gym.rendering import palette, render
 from ddagr_gym.rendering.camera import Camera
@@ -230,7 +232,7 @@ def test_bad_input_is_one_sentence(renderer):
 def test_missing_pygame_names_the_extra(monkeypatch, module):
     monkeypatch.setitem(sys.modules, "pygame", module)
     monkeypatch.setitem(sys.modules, "pygame.freetype", module)
-    with pytest.raises(InputError, match=r'pygame-ce, .*pip install "ddagr-gym\[render\]"'):
+    with pytest.raises(InputError, match=re.escape(how_to_install("render"))):
         SceneRenderer()
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.diagnosis.answer.location import Span
-from ddagr_gym.errors import InputError
+from ddagr_gym.extras import need
 from ddagr_gym.identification.gauss_newton import Fitted
 from ddagr_gym.identification.least_squares import explained_by
 from ddagr_gym.identification.misfit import projected_residual
@@ -158,12 +158,9 @@ def change_points(signal: Array) -> list[int]:
     """
     if len(signal) < 2 * _SHORTEST:
         return [len(signal)]
-    try:
-        import ruptures
-    except ImportError:
-        raise InputError(
-            'change points need ruptures, which is not installed: run pip install "ddagr-gym[diagnosis]".'
-        ) from None
+    need("ruptures")
+    import ruptures
+
     search = ruptures.KernelCPD(kernel="linear", min_size=_SHORTEST).fit(np.asarray(signal).reshape(-1, 1))
     return [int(end) for end in search.predict(pen=_PENALTY * np.log(len(signal)))]
 

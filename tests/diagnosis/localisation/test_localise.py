@@ -1,6 +1,8 @@
 """Where an effect acts: known onsets, places and regimes come back, and noise makes no phrases."""
 
 import json
+import re
+import sys
 from dataclasses import asdict, replace
 
 import numpy as np
@@ -24,6 +26,8 @@ from ddagr_gym.diagnosis.localisation.operating_conditions import Pieces, shares
 from ddagr_gym.diagnosis.localisation.residual_wrench import HeldWrench, residual_wrench
 from ddagr_gym.diagnosis.search.scanned_model import ScannedModel, SearchResult
 from ddagr_gym.diagnosis.wording import EVERYWHERE, range_in_words
+from ddagr_gym.errors import InputError
+from ddagr_gym.extras import how_to_install
 from ddagr_gym.identification.gauss_newton import fit
 from ddagr_gym.identification.misfit import channel_misfit, dispersion_of
 from ddagr_gym.identification.nuisances import LOCAL
@@ -162,6 +166,13 @@ def process_of(information, size, rng, windows=40):
     score = size * information + noise
     beside = score - information
     return ScoreProcess("some", score, information, score - 0.5 * information, beside, information)
+
+
+def test_missing_ruptures_names_the_extra(monkeypatch):
+    monkeypatch.setitem(sys.modules, "ruptures", None)
+    said = f"'ruptures', which is not installed: run {how_to_install('diagnosis')}."
+    with pytest.raises(InputError, match=re.escape(said)):
+        change_points(np.zeros(60))
 
 
 def test_spans_are_those_in_which_the_effect_acts():
