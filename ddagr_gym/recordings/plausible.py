@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 import numpy.typing as npt
@@ -18,8 +18,21 @@ FASTEST_PERIOD = 1e-6
 """Mean time between rows below which stamps have another unit [s] (ours): no log has a million rows a second."""
 SLOWEST_PERIOD = 5.0
 """Time between rows beyond which the unit of the stamps is doubted [s] (ours): no robot's log is that slow."""
-ABSURD = 1e12
-"""Magnitude of a reading beyond which it is no number of a sensor, in SI (ours): its powers would overflow."""
+IMPOSSIBLE: Mapping[str, float] = {
+    # Gyros end at 350 rad/s and motor shafts at 5e3 rad/s, 5e6 in thousandths.
+    "rad/s": 1e7,
+    # Accelerometers for explosions end at 1e6 m/s^2; those of robots at 2e3 m/s^2, 2e5 in thousandths of g.
+    "m/s^2": 1e7,
+    # Coordinates fixed to the Earth stay below 1e7 m, 1e10 in millimetres.
+    "m": 1e11,
+    # A heading that counts turns at 10 rad/s for the longest recording ends at 1e7 rad, 6e8 in degrees.
+    "rad": 1e9,
+    # Motors of vehicles draw up to 2e3 A from up to 1e3 V, 2e6 and 1e6 in thousandths.
+    "A": 1e8,
+    "V": 1e8,
+}
+"""Magnitude by unit beyond which a reading is no number of a sensor (ours). A wild reading, or a channel in a smaller
+unit, stays below: the checks and the doubts speak of those."""
 
 
 def check_extent(t: FloatArray) -> None:
@@ -77,20 +90,22 @@ def slow_rows(period: float) -> Iterator[str]:
         yield f"rows come every {period:.3g} s: check the unit of the time stamps in the column map{hint}."
 
 
-def check_magnitude(name: str, values: FloatArray, unit: str) -> None:
-    """Refuse readings beyond :data:`ABSURD`.
+def check_magnitude(name: str, values: FloatArray, unit: str, t: FloatArray) -> None:
+    """Refuse readings that no sensor gives, by :data:`IMPOSSIBLE`.
 
     Args:
         name: of the channel.
         values: (n,), NaN where there is none.
-        unit: of the channel.
+        unit: of the channel, one of :data:`IMPOSSIBLE`.
+        t: (n,) time of the rows [s].
 
     Raises:
-        InputError: with the first such reading.
+        InputError: with the first such reading, its row and its time.
     """
-    wild = np.flatnonzero(np.abs(values) > ABSURD)
+    wild = np.flatnonzero(np.abs(values) > IMPOSSIBLE[unit])
     if wild.size:
+        row = wild[0]
         raise InputError(
-            f"{name} is {values[wild[0]]:g} {unit} in row {wild[0] + 1}, which no sensor gives: correct it or leave "
-            "the field empty."
+            f"{name} is {values[row]:g} {unit} in row {row + 1} at t = {t[row]:.6g} s, which no sensor gives: correct "
+            "it or its unit in the map, or leave the field empty."
         )

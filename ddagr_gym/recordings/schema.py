@@ -281,7 +281,7 @@ def _check_arrays(recording: Recording) -> None:
         if np.shape(value) != (n,):
             raise InputError(f"column {name} has the shape {np.shape(value)} where t has ({n},): make them equal.")
     for name, value in recording.channels.items():
-        check_magnitude(name, value, CHANNELS[name].unit)
+        check_magnitude(name, value, CHANNELS[name].unit, recording.t)
 
 
 def _check_ranges(kind: str, ranges: Ranges, n: int) -> None:

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from ddagr_gym.errors import InputError
+from ddagr_gym.recordings.channels import CHANNELS
 from ddagr_gym.recordings.column_map import load_column_map
 from ddagr_gym.recordings.load import load_recording
-from ddagr_gym.recordings.plausible import check_magnitude, likely_unit, slow_rows
+from ddagr_gym.recordings.plausible import IMPOSSIBLE, check_magnitude, likely_unit, slow_rows
 from ddagr_gym.recordings.schema import Recording
 
 T = np.arange(200) * 0.05
@@ -81,8 +82,21 @@ def test_the_unit_of_a_period(period, unit):
     assert bool(list(slow_rows(period))) == (period > 5.0)
 
 
-def test_missing_and_large_readings_pass():
-    check_magnitude("pose_x", np.array([np.nan, 1e11, -1e11]), "m")
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("name", CHANNELS)
+def test_one_impossible_reading_of_any_channel_is_refused_with_its_time(name, sign):
+    values = np.full(T.size, 0.1)
+    values[7] = sign * 9e11
+    with pytest.raises(InputError, match=rf"^{name} is -?9e\+11 .* in row 8 at t = 0.35 s, .*: correct it"):
+        Recording.from_columns({"t": 100.0 + T, name: values})
+
+
+@pytest.mark.parametrize("name", CHANNELS)
+def test_missing_and_large_readings_pass(name):
+    unit, limit = CHANNELS[name].unit, CHANNELS[name].limit
+    # What a doubt is for, a channel in thousandths of its unit, is not refused.
+    check_magnitude(name, np.array([np.nan, 1e3 * limit, -1e3 * limit]), unit, T[:3])
+    check_magnitude(name, np.array([np.nan, IMPOSSIBLE[unit]]), unit, T[:2])
 
 
 def test_the_shipped_maps_still_load():
