@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from ddagr_gym.errors import InputError
 from ddagr_gym.recordings.column_map import BodyCommands, ColumnMap, HeldChannels
+from ddagr_gym.recordings.plausible import check_stamps
 from ddagr_gym.recordings.schema import (
     BoolArray,
     FloatArray,
@@ -118,6 +119,7 @@ def _without_duplicates(table: RawTable, column_map: ColumnMap, notes: list[str]
         raise InputError(
             f"row {bad[0] + 1} has no valid time in {column_map.time.column}: fill it in or delete the row."
         )
+    check_stamps(clock)
     new_span = _changes(table, column_map.pieces.span_columns)
     repeated = np.zeros(clock.size, dtype=bool)
     repeated[1:] = (np.diff(clock) == 0) & ~new_span[1:]

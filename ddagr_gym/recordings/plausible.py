@@ -18,6 +18,8 @@ FASTEST_PERIOD = 1e-6
 """Mean time between rows below which stamps have another unit [s] (ours): no log has a million rows a second."""
 SLOWEST_PERIOD = 5.0
 """Time between rows beyond which the unit of the stamps is doubted [s] (ours): no robot's log is that slow."""
+LARGEST_STAMP = 1e305
+"""Magnitude of a time stamp beyond which no clock counts [s] (ours): differences of two would overflow."""
 IMPOSSIBLE: Mapping[str, float] = {
     # Gyros end at 350 rad/s and motor shafts at 5e3 rad/s, 5e6 in thousandths.
     "rad/s": 1e7,
@@ -33,6 +35,23 @@ IMPOSSIBLE: Mapping[str, float] = {
 }
 """Magnitude by unit beyond which a reading is no number of a sensor (ours). A wild reading, or a channel in a smaller
 unit, stays below: the checks and the doubts speak of those."""
+
+
+def check_stamps(t: FloatArray) -> None:
+    """Refuse stamps whose differences would overflow.
+
+    Args:
+        t: (n,) clock of the rows [s].
+
+    Raises:
+        InputError: with the first stamp beyond :data:`LARGEST_STAMP`.
+    """
+    beyond = np.flatnonzero(np.abs(t) > LARGEST_STAMP)
+    if beyond.size and np.isfinite(t).all():
+        row = beyond[0]
+        raise InputError(
+            f"row {row + 1} has the time {t[row]:g} s, and no clock counts that far: correct it or delete the row."
+        )
 
 
 def check_extent(t: FloatArray) -> None:

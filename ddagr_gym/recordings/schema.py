@@ -30,7 +30,7 @@ from ddagr_gym.errors import InputError, unknown_name
 from ddagr_gym.parameters import Robot
 from ddagr_gym.recordings.channels import CHANNELS
 from ddagr_gym.recordings.doubts import doubts
-from ddagr_gym.recordings.plausible import check_extent, check_magnitude
+from ddagr_gym.recordings.plausible import check_extent, check_magnitude, check_stamps
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -225,6 +225,7 @@ class Recording:
         if "t" not in arrays:
             raise InputError(f"the columns {sorted(arrays)} hold no time: add a column t in seconds.")
         t = arrays.pop("t")
+        check_stamps(t)
         geometry = RobotGeometry.of(robot) if isinstance(robot, Robot) else robot
         whole: Ranges = ((0, len(t)),) if len(t) else ()
         span_ranges = whole if spans is None else _whole_numbers(spans)
@@ -270,6 +271,7 @@ def _check_arrays(recording: Recording) -> None:
     n = len(recording.t)
     if recording.t.ndim != 1 or not np.all(np.isfinite(recording.t)):
         raise InputError("the recording's time holds NaN, infinity or more than one dimension: clean it first.")
+    check_stamps(recording.t)
     back = np.flatnonzero(np.diff(recording.t) <= 0)
     if back.size:
         raise InputError(f"the recording's time does not increase at row {back[0] + 1}: sort it or drop repeated rows.")
