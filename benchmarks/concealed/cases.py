@@ -8,7 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from .catalogue import LIBRARY_FORMS, OPEN_PAIRS, OUTSIDE_FORMS, RESERVED_PAIRS
+from .catalogue import (
+    DRIVETRAIN,
+    DRIVETRAIN_FORMS,
+    DRIVETRAIN_PAIRS,
+    LIBRARY_FORMS,
+    OPEN_PAIRS,
+    OUTSIDE_FORMS,
+    RESERVED_PAIRS,
+)
 from .change import Form
 from .ground import Ground, random_waves
 from .plant import Body, Plant, nominal_plant
@@ -17,9 +25,12 @@ from .soil import ELASTOPLASTIC, HUMP, SATURATING, TWO_STAGE, Soil
 from .streams import stream
 from .terrain_memory import HEIGHT_GRID
 
-SETS = ("development", "sealed")
+SETS = ("development", "sealed", "ninth")
+"""The first eight sealed sets are "sealed"; the ninth has the drivetrain's later forms and more pairs with it."""
 PLAIN_NULLS, STRUCTURAL_NULLS, SINGLES_PER_EFFECT, DOUBLES = 20, 20, 2, 10
-OUTSIDE = {"development": (16, 0), "sealed": (8, 10)}
+DRIVETRAIN_DOUBLES, OTHER_DOUBLES = 8, 6
+"""Doubles of the ninth set with an effect between command and wheel, and without one."""
+OUTSIDE = {"development": (16, 0), "sealed": (8, 10), "ninth": (8, 10)}
 """(open, reserved) effects outside the library."""
 MANOEUVRE_SETS = 8
 STRUCTURED_SHARE = 0.2
@@ -59,7 +70,7 @@ class Case:
     """One case of a set.
 
     Attributes:
-        set_name: "development" or "sealed".
+        set_name: of :data:`SETS`.
         number: from 1, after shuffling.
         kind: "null", "structural null", "single", "double" or "outside".
         effects: (form, multiple of the least meaningful size), at most two.
@@ -111,6 +122,27 @@ def _doubles(set_name: str, rng: np.random.Generator) -> list[Draft]:
     return [("double", pair) for pair in forms]
 
 
+def _drivetrain_singles() -> list[Draft]:
+    """Every later form of the drivetrain once."""
+    return [("single", (form,)) for forms in DRIVETRAIN_FORMS.values() for form in forms]
+
+
+def _ninth_doubles(rng: np.random.Generator) -> list[Draft]:
+    """Pairs with and without the drivetrain; every other one of the former has a later form of it."""
+    pool = OPEN_PAIRS + RESERVED_PAIRS + DRIVETRAIN_PAIRS
+    driven = [pair for pair in pool if set(pair) & set(DRIVETRAIN)]
+    others = [pair for pair in pool if not set(pair) & set(DRIVETRAIN)]
+    chosen = [driven[k] for k in rng.choice(len(driven), DRIVETRAIN_DOUBLES, replace=False)]
+    chosen += [others[k] for k in rng.choice(len(others), OTHER_DOUBLES, replace=False)]
+    return [("double", _forms_of(pair, k % 2 == 0, rng)) for k, pair in enumerate(chosen)]
+
+
+def _forms_of(pair: tuple[str, str], later: bool, rng: np.random.Generator) -> tuple[Form, ...]:
+    """A form of each effect; of the drivetrain's a later one where that is asked for."""
+    pools = [DRIVETRAIN_FORMS[name] if later and name in DRIVETRAIN else LIBRARY_FORMS[name] for name in pair]
+    return tuple(pool[rng.integers(len(pool))] for pool in pools)
+
+
 def _outside(set_name: str, rng: np.random.Generator) -> list[Draft]:
     drafts: list[Draft] = []
     for reserved, count in zip((False, True), OUTSIDE[set_name], strict=True):
@@ -135,12 +167,14 @@ def plan(set_name: str, seed: int) -> list[Case]:
     """All cases of a set, in the order of their numbers.
 
     Args:
-        set_name: "development" or "sealed".
+        set_name: of :data:`SETS`.
         seed: any non-negative integer.
     """
     rng = stream(seed, set_name, "labels")
     drafts: list[Draft] = [("null", ())] * PLAIN_NULLS + [("structural null", ())] * STRUCTURAL_NULLS
-    drafts += _singles(rng) + _doubles(set_name, rng) + _outside(set_name, rng)
+    drafts += _singles(rng)
+    drafts += _drivetrain_singles() + _ninth_doubles(rng) if set_name == "ninth" else _doubles(set_name, rng)
+    drafts += _outside(set_name, rng)
     structures, cases = list(STRUCTURES)[1:], []
     for number, k in enumerate(rng.permutation(len(drafts)), start=1):
         kind, forms = drafts[k]
@@ -154,7 +188,7 @@ def counts(set_name: str) -> dict[str, int]:
     """Cases of each kind in a set; the same for every seed.
 
     Args:
-        set_name: "development" or "sealed".
+        set_name: of :data:`SETS`.
     """
     return dict(Counter(case.kind for case in plan(set_name, 0)))
 

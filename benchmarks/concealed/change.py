@@ -55,6 +55,9 @@ class Site:
         return tuple(float(np.mean([np.mean(p[name]) for p in self.paths])) for name in ("x", "y"))  # type: ignore[return-value]
 
 
+Builder = Callable[[float, Rng, Site], Change]
+
+
 @dataclass(frozen=True)
 class Form:
     """One physical form of an effect.
@@ -68,6 +71,8 @@ class Form:
         build: (size in the least meaningful unit's unit, rng, site) -> change.
         needs_pose: whether it shows only where the robot carries a receiver.
         reserved: kept for the sealed set.
+        later: came after the first sets, whose draws must stay as they are.
+        also: other names of the verdict that a field engineer may give it as rightly.
     """
 
     name: str
@@ -76,9 +81,11 @@ class Form:
     low: float
     high: float
     equation: str
-    build: Callable[[float, Rng, Site], Change]
+    build: Builder
     needs_pose: bool = False
     reserved: bool = False
+    later: bool = False
+    also: tuple[str, ...] = ()
 
 
 def with_body(plant: Plant, **values: Any) -> Plant:
@@ -133,19 +140,27 @@ REGISTRY: list[Form] = []
 
 
 def form(
-    name: str, variant: str, tag: str, low: float, high: float, equation: str, **flags: bool
-) -> Callable[[Callable[[float, Rng, Site], Change]], Callable[[float, Rng, Site], Change]]:
+    name: str,
+    variant: str,
+    tag: str,
+    low: float,
+    high: float,
+    equation: str,
+    *,
+    needs_pose: bool = False,
+    reserved: bool = False,
+    later: bool = False,
+    also: tuple[str, ...] = (),
+) -> Callable[[Builder], Builder]:
     """Register a builder as one form; arguments as in :class:`Form`."""
 
-    def register(build: Callable[[float, Rng, Site], Change]) -> Callable[[float, Rng, Site], Change]:
-        REGISTRY.append(Form(name, variant, tag, low, high, equation, build, **flags))
+    def register(build: Builder) -> Builder:
+        REGISTRY.append(Form(name, variant, tag, low, high, equation, build, needs_pose, reserved, later, also))
         return build
 
     return register
 
 
-def outside(
-    name: str, variant: str, equation: str, **flags: bool
-) -> Callable[[Callable[[float, Rng, Site], Change]], Callable[[float, Rng, Site], Change]]:
+def outside(name: str, variant: str, equation: str, **flags: bool) -> Callable[[Builder], Builder]:
     """Register a builder of an effect that no library lists, once to twice the figure in its equation."""
     return form(name, variant, "outside", 1, 2, equation, **flags)

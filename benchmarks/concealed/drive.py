@@ -25,6 +25,7 @@ from .mechanics import (
     wheel_loads,
     wheel_wrench,
 )
+from .motors import motor_step
 from .plant import Plant, settled
 from .terrain_memory import FLOOR, HEIGHT_GRID, WALL_LEFT, WALL_RIGHT, new_grid, press
 from .wheel import NODES, PROFILE_FIELDS, lay_profile, travel_direction, wheel_slip
@@ -221,34 +222,6 @@ def wheel_step(plant, state, work, wheel, aging, dt):  # type: ignore[no-untyped
     limit = 0.98 * wheels.minor_radius
     state.sinkage[wheel] = min(max(state.sinkage[wheel] + dt * sinking, 1e-4), limit)
     state.heights[wheel] = state.factors[wheel, 2] - state.factors[wheel, FLOOR] - state.sinkage[wheel]
-
-
-@kernel
-def motor_step(motors, drives, bank, command, omega, power, time, dt):  # type: ignore[no-untyped-def]
-    """Advance one speed loop; return (torque, its derivative by bank speed)."""
-    state = drives[bank]
-    fade = max(1.0 - motors.fading * time, 0.1)
-    rate = (motors.rate_up if abs(command) > abs(state[0]) else motors.rate_down) * fade
-    state[0] += dt * rate * (command - state[0]) / (1.0 + dt * rate)
-    wanted = state[0]
-    if motors.second_lag > 0.0:
-        wanted = state[1] + dt * (state[0] - state[1]) / (motors.second_lag + dt)
-    limit = max(motors.speed_limit - motors.load_line * abs(state[4]), 0.05)
-    wanted = min(max(wanted, -limit), limit)
-    acceleration, state[1] = (wanted - state[1]) / dt, wanted
-    moved = motors.inertia + motors.carried_inertia
-    proportional = 2.0 * motors.damping * motors.bandwidth * moved
-    integral = motors.bandwidth**2 * moved
-    leak = integral * motors.droop / (1.0 - min(proportional * motors.droop, 0.95))
-    error = wanted * (1.0 - motors.sag * power) - omega
-    torque = moved * acceleration + proportional * error + integral * state[2]
-    ceiling = motors.torque_limit * fade
-    if abs(torque) < ceiling:
-        state[2] = (state[2] + dt * error) / (1.0 + dt * leak)
-    torque = min(max(torque, -ceiling), ceiling)
-    state[3] = torque
-    state[4] += dt / 0.25 * (torque - state[4])
-    return torque, -proportional if abs(torque) < ceiling else 0.0
 
 
 @kernel

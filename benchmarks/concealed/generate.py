@@ -1,8 +1,8 @@
 """Generate a set of concealed cases.
 
 ``python -m benchmarks.concealed.generate --set development --seed 1 --output DIR``
-``python -m benchmarks.concealed.generate --set sealed --seed secret --output DIR --labels FILE``
-``python -m benchmarks.concealed.generate --set sealed --plan``
+``python -m benchmarks.concealed.generate --set ninth --seed secret --output DIR --labels FILE``
+``python -m benchmarks.concealed.generate --set ninth --plan``
 
 The same seed gives the same bytes. A run that was interrupted goes on where it stopped. ``--seed secret`` draws a
 128-bit seed that is kept with the labels only. The pool is its own: this folder shares no code with ``ddagr_gym``.
@@ -97,7 +97,7 @@ def _finish(header: dict[str, Any], cases: list[Case], output: Path, labels_file
     """Collect the parts into labels and, for a sealed set, commitments."""
     parts = _parts(labels_file)
     entries = {case.name: read_json(parts / f"{case.name}.json") for case in cases}
-    sealed = header["set"] == "sealed"
+    sealed = header["set"] != "development"
     opened = {
         name: {"label": entry["label"], **({"salt": salt(header["seed"], name)} if sealed else {})}
         for name, entry in entries.items()
@@ -119,7 +119,7 @@ def generate(
     """Generate a set.
 
     Args:
-        set_name: "development" or "sealed".
+        set_name: of :data:`benchmarks.concealed.cases.SETS`; all but the development set are sealed.
         seed: of the set; None draws a secret one.
         output: folder for the cases; may hold the same set begun earlier.
         labels_file: where the labels go; default ``output/labels.json`` (development) or a file beside the folder.
@@ -133,8 +133,8 @@ def generate(
     beside = output.with_name(f"{output.name}.labels.json")
     default = output / "labels.json" if set_name == "development" else beside
     labels_file = (labels_file or default).resolve()
-    if set_name == "sealed" and output in labels_file.parents:
-        raise BenchmarkError(f"{labels_file} lies inside the sealed set: give --labels a file outside {output}.")
+    if set_name != "development" and output in labels_file.parents:
+        raise BenchmarkError(f"{labels_file} lies inside the {set_name} set: give --labels a file outside {output}.")
     header = _begin(set_name, seed, output, labels_file)
     cases = plan(set_name, header["seed"])[:limit]
     if labels_file.exists() and len(read_json(labels_file)["cases"]) == len(cases):

@@ -15,7 +15,7 @@ from numba import njit
 FOLDER = Path(__file__).resolve().parent
 KERNEL_FILES = (
     "jit.py", "soil.py", "wheel.py", "externals.py", "ground.py", "plant.py", "mechanics.py", "drive.py",
-    "terrain_memory.py",
+    "terrain_memory.py", "motors.py",
 )  # fmt: skip
 
 

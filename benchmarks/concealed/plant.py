@@ -60,6 +60,9 @@ class Motors(NamedTuple):
     droop: float = 0.0  # static speed loss per torque [rad/s per N m]
     sag: float = 0.0  # relative speed loss of both banks per total power [1/W]
     fading: float = 0.0  # relative loss of rate and torque per second of operation [1/s]
+    fold_back: float = 0.0  # relative fall of the torque limit per speed [s/rad]
+    power_limit: float = 0.0  # of a bank that drives [W]; 0 for none
+    integral_limit: float = 0.0  # of the torque of the loop's integral part [N m]; 0 for none
 
 
 class Plant(NamedTuple):

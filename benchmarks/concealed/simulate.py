@@ -103,11 +103,21 @@ def _differences(with_effects: list[Log], without: list[Log]) -> dict[str, float
 
 
 def effect_labels(case: Case, changes: tuple[Change, ...]) -> list[dict[str, Any]]:
+    """What a label says of each effect of a case.
+
+    Args:
+        case: with the effects.
+        changes: what each does.
+
+    Returns:
+        Name, other names that are as right (where there are any), variant, tag, equation, size and parameters of each.
+    """
     labels = []
     for (form, multiple), change in zip(case.effects, changes, strict=True):
         label = {"name": form.name, "variant": form.variant, "tag": form.tag, "equation": form.equation}
         size = {"multiple": multiple, "size": multiple * least_size(form)} if form.high > 0 else {}
-        labels.append({**label, **size, "parameters": _plain(change.parameters)})
+        also = {"also": list(form.also)} if form.also else {}
+        labels.append({**label, **also, **size, "parameters": _plain(change.parameters)})
     return labels
 
 

@@ -15,8 +15,9 @@ from benchmarks.concealed.plant import GRAVITY, Plant, nominal_plant
 from benchmarks.concealed.soil import ELASTOPLASTIC, HUMP, KONDNER, REECE, SATURATING, TWO_STAGE, Soil
 from benchmarks.concealed.wheel import static_wheel
 
-ALL_FORMS = [*catalogue.OUTSIDE_FORMS, *(form for forms in catalogue.LIBRARY_FORMS.values() for form in forms)]
-TESTED_APART = (("brownout", "cut outs"), ("soil_change", "onset"))
+NAMED_FORMS = (*catalogue.LIBRARY_FORMS.values(), *catalogue.DRIVETRAIN_FORMS.values())
+ALL_FORMS = [*catalogue.OUTSIDE_FORMS, *(form for forms in NAMED_FORMS for form in forms)]
+TESTED_APART = (("brownout", "cut outs"), ("soil_change", "onset"), ("command_deadband", "turning only"))
 IN_A_SHORT_DRIVE = [form for form in ALL_FORMS if (form.name, form.variant) not in TESTED_APART]
 WHEEL = (0.05, 0.1016, 0.2294)
 RADIUS, LOAD = 0.2794, 168.0 * GRAVITY / 4.0
