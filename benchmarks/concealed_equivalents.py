@@ -23,7 +23,7 @@ from typing import Any
 
 from benchmarks.ablations.examine import ROBOT, SOIL, read_runs
 from benchmarks.concealed.cases import Case, plan
-from benchmarks.concealed.change import Form
+from benchmarks.concealed.change import Change, Form, Rng, Site
 from benchmarks.concealed.generate import warm_up
 from benchmarks.concealed.simulate import simulate_case
 from benchmarks.concealed.storage import csv_bytes, digest, read_json, recording_digest, write_case
@@ -56,7 +56,7 @@ def needs_equivalent(effect: Mapping[str, Any]) -> bool:
 
 
 def without(case: Case, left_out: int) -> Case:
-    """The case with one effect of its plant idle: drawn as before, it changes nothing.
+    """The case with one effect of its plant or commands idle: drawn as before, it changes nothing.
 
     Args:
         case: of a set.
@@ -64,7 +64,10 @@ def without(case: Case, left_out: int) -> Case:
     """
 
     def idle(form: Form) -> Form:
-        return replace(form, build=lambda size, rng, site: replace(form.build(size, rng, site), plant=None))
+        def build(size: float, rng: Rng, site: Site) -> Change:
+            return replace(form.build(size, rng, site), plant=None, command=None)
+
+        return replace(form, build=build)
 
     effects = [(idle(form) if k == left_out else form, size) for k, (form, size) in enumerate(case.effects)]
     return replace(case, effects=tuple(effects))

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.concealed.sizes import LEAST_MEANINGFUL
+from benchmarks.concealed_names import accepted, as_effects
 from ddagr_gym.recordings.files import write_atomically
 from ddagr_gym.rendering import palette
 from ddagr_gym.reporting.figures import house_style
@@ -26,9 +27,9 @@ WORDS = {
     "size_error": "median error of the size",
     "gain_share": "share of the explainable error explained",
 }
-_NOTHING, _OUTSIDE, _FAILED = "none", "unknown", "failed"
+_OTHER, _NOTHING, _OUTSIDE, _FAILED = "another name", "none", "unknown", "failed"
 _ROWS = {"null": "nothing (nulls)", "structural null": "nothing (structural nulls)", "outside": "in no library"}
-_COLUMNS = (*LEAST_MEANINGFUL, _NOTHING, _OUTSIDE, _FAILED)
+_COLUMNS = (*LEAST_MEANINGFUL, _OTHER, _NOTHING, _OUTSIDE, _FAILED)
 
 
 def draw(labels: Mapping[str, Any], answers: Mapping[str, Any], result: Mapping[str, Any], path: Path) -> None:
@@ -52,8 +53,14 @@ def draw(labels: Mapping[str, Any], answers: Mapping[str, Any], result: Mapping[
 
 
 def row_of(label: Mapping[str, Any]) -> str:
-    """Row of a case: its effects, or the kind of what has no name."""
-    return _ROWS.get(label["kind"]) or " + ".join(label["verdict"])
+    """Row of a case: its effects with all their right names, or the kind of what has no name."""
+    return _ROWS.get(label["kind"]) or " + ".join(" or ".join(sorted(names)) for names in accepted(label))
+
+
+def _said(label: Mapping[str, Any], answer: Mapping[str, Any]) -> list[str]:
+    """Columns of an answer; parts of the drivetrain stand in those of their effects."""
+    names = as_effects(answer["verdict"], accepted(label)) or [_FAILED]
+    return [name if name in _COLUMNS else _OTHER for name in names]
 
 
 def tabled(labels: Mapping[str, Any], answers: Mapping[str, Any]) -> dict[str, tuple[int, Counter[str], list[str]]]:
@@ -68,8 +75,9 @@ def tabled(labels: Mapping[str, Any], answers: Mapping[str, Any]) -> dict[str, t
 
     rows: dict[str, tuple[int, Counter[str], list[str]]] = {}
     for case in sorted(answers, key=place):
-        count, said, truth = rows.get(row_of(labels[case]), (0, Counter(), labels[case]["verdict"]))
-        said.update(answers[case]["verdict"] or [_FAILED])
+        right = sorted(name for names in accepted(labels[case]) for name in names)
+        count, said, truth = rows.get(row_of(labels[case]), (0, Counter(), right))
+        said.update(_said(labels[case], answers[case]))
         rows[row_of(labels[case])] = (count + 1, said, truth)
     return rows
 

@@ -22,7 +22,7 @@ import numpy as np
 
 from benchmarks.ablations.examine import ROBOT, SOIL, read_runs
 from benchmarks.concealed_truth import Sizes, detectable
-from benchmarks.score_concealed import RESULT, figure_line, mean, read_equivalents, right
+from benchmarks.score_concealed import RESULT, figure_line, mean, read_equivalents
 from ddagr_gym.diagnosis.certification.certificate import LEAST_EXPLAINABLE
 from ddagr_gym.diagnosis.certification.certify import certify_models
 from ddagr_gym.diagnosis.gates.threshold_files import default_thresholds
@@ -123,7 +123,7 @@ def eligible(
         if detectable(label, answer, equivalents.get(name)):
             fitted = [item for item in label["verdict"] if item not in SEEN_IN_VALUES]
             if fitted:
-                yield name, fitted, right(label, answer)
+                yield name, fitted, sorted(answer["verdict"]) == sorted(label["verdict"])
 
 
 def one(case: tuple[str, list[str], bool], folder: Path, answers: Mapping[str, Any]) -> dict[str, Any]:

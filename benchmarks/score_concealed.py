@@ -11,7 +11,8 @@ alarms over the whole library; ``false_alarm_rate`` is what the nulls show of th
 where its true size is at least the least detectable one that the diagnosis of its own case states; a categorical one
 always. For one whose size means something else in the library the size in the library's terms counts, which
 :mod:`benchmarks.concealed_equivalents` measures (``--equivalents``). A run that failed has named nothing: a false alarm
-on a null, a miss elsewhere. Every case that went wrong is listed.
+on a null, a miss elsewhere. Every case that went wrong is listed. Parts of the drivetrain count as the effects that
+they stand for, and some effects have a second right name (:mod:`benchmarks.concealed_names`).
 """
 
 from __future__ import annotations
@@ -27,8 +28,10 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.concealed.catalogue import DRIVETRAIN
 from benchmarks.concealed.commitments import commitment
 from benchmarks.concealed_figure import draw
+from benchmarks.concealed_names import accepted, all_held_possible, any_right, as_effects, rightly_named
 from benchmarks.concealed_truth import Case, Sizes, covered, detectable, misses, size_errors, sizes
 from ddagr_gym.errors import InputError
 from ddagr_gym.evaluation.statistics import wilson_interval
@@ -86,14 +89,14 @@ def names_of(answer: Mapping[str, Any]) -> list[str]:
 
 
 def right(label: Mapping[str, Any], answer: Mapping[str, Any]) -> bool:
-    """Exactly the label's names."""
-    return sorted(answer["verdict"]) == sorted(label["verdict"])
+    """Exactly the label's names, or such as are as right."""
+    return rightly_named(label, answer["verdict"])
 
 
 def in_set(label: Mapping[str, Any], answer: Mapping[str, Any]) -> bool:
     """Each of the label's effects stands in the equivalence set of some finding, and the verdict names something."""
-    sets = [set(finding["equivalence_set"]) for finding in answer["findings"]]
-    return bool(names_of(answer)) and all(any(name in found for found in sets) for name in label["verdict"])
+    sets = [finding["equivalence_set"] for finding in answer["findings"]]
+    return bool(names_of(answer)) and all_held_possible(label, sets)
 
 
 def set_share(label: Mapping[str, Any], answer: Mapping[str, Any]) -> float:
@@ -108,7 +111,8 @@ def set_share(label: Mapping[str, Any], answer: Mapping[str, Any]) -> float:
     """
     if not in_set(label, answer):
         return 0.0
-    return 1.0 / len({name for finding in answer["findings"] for name in finding["equivalence_set"]})
+    held = {name for finding in answer["findings"] for name in finding["equivalence_set"]}
+    return 1.0 / len(as_effects(held, accepted(label)))
 
 
 def alarm(answer: Mapping[str, Any]) -> bool:
@@ -160,6 +164,7 @@ def score(
     seen = [case for case in of("single") if case[0] in visible]
     doubles = [case for case in of("double") if case[0] in visible]
     named = of("single", "double")
+    driven, driven_doubles = ([case for case in chosen if _of_drivetrain(case)] for chosen in (seen, doubles))
     certified = [case for case in cases if case[2].get("fit")]
     return {
         "false_alarm_rate": over(of(*NULLS), lambda _, a: a["verdict"] != ["none"]),
@@ -176,7 +181,10 @@ def score(
         "top1_other_form": over([c for c in seen if c[1]["effects"][0]["tag"] != "same"], right),
         "top1_doubles": over(doubles, right),
         "in_set_doubles": over(doubles, in_set),
-        "one_of_double": over(doubles, lambda label, a: bool(set(names_of(a)) & set(label["verdict"]))),
+        "one_of_double": over(doubles, lambda label, a: any_right(label, names_of(a))),
+        "top1_drivetrain": over(driven, right),
+        "in_set_drivetrain": over(driven, in_set),
+        "top1_doubles_drivetrain": over(driven_doubles, right),
         "unknown_outside": over(of("outside"), lambda _, a: a["verdict"] == ["unknown"]),
         "flagged_outside": over(of("outside"), lambda _, a: not a["complete"]),
         "confident_wrong": over(of(*NULLS, "outside"), lambda _, a: confident(a)),
@@ -193,6 +201,11 @@ def score(
         "failures": [_failure(case, case[0] in visible) for case in cases if not right(case[1], case[2])],
         "interval_misses": misses(named),
     }
+
+
+def _of_drivetrain(case: Case) -> bool:
+    """Whether an effect between command and wheel is among those of the case."""
+    return not set(DRIVETRAIN).isdisjoint(case[1]["verdict"])
 
 
 def _failure(case: Case, visible: bool) -> dict[str, Any]:

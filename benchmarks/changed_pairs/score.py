@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from benchmarks.changed_pairs.plan import HIDDEN
+from benchmarks.concealed_names import any_right
 from benchmarks.concealed_truth import Case, covered, detectable, misses, sizes, true_sizes
 from benchmarks.score_concealed import NULLS, confident, in_set, mean, median, names_of, right, share
 from ddagr_gym.physics.effects.registry import effect_kind
@@ -35,8 +36,7 @@ def sure_and_wrong(label: Mapping[str, Any], answer: Mapping[str, Any]) -> bool:
         label: of the pair.
         answer: to it.
     """
-    truth = set(label["verdict"])
-    return confident(answer) and any(not truth & set(found["equivalence_set"]) for found in answer["findings"])
+    return confident(answer) and not all(any_right(label, item["equivalence_set"]) for item in answer["findings"])
 
 
 def multiple(label: Mapping[str, Any], answer: Mapping[str, Any]) -> float | None:
@@ -108,7 +108,7 @@ def score(labels: Mapping[str, Any], answers: Mapping[str, Any]) -> dict[str, An
         "right_name_all_singles": over(of("single"), right),
         "right_name_beginning": over(beginning, right),
         "both_of_double": over(doubles, right),
-        "one_of_double": over(doubles, lambda label, a: bool(set(names_of(a)) & set(label["verdict"]))),
+        "one_of_double": over(doubles, lambda label, a: any_right(label, names_of(a))),
         "interval_holds": share(covered([*of("single"), *of("double")])),
         "time_inside": share(times),
         "sure_and_wrong": over(cases, sure_and_wrong),

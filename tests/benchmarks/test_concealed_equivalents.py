@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from benchmarks.concealed.cases import Case, plan
+from benchmarks.concealed.catalogue import DRIVETRAIN_FORMS
+from benchmarks.concealed.change import Site
 from benchmarks.concealed_equivalents import drives, equivalent, needs_equivalent, without
 from ddagr_gym.errors import InputError
 from ddagr_gym.physics.effects.registry import effect_kind
@@ -48,6 +50,14 @@ def test_a_case_must_be_made_again(case: Case, tmp_path: Path) -> None:
     drives(case, SEED, tmp_path)
     with pytest.raises(InputError, match="not what its seed gives"):
         drives(without(case, 0), SEED, tmp_path)
+
+
+def test_the_twin_of_an_effect_on_commands_receives_them_as_sent() -> None:
+    form = DRIVETRAIN_FORMS["motor_lag"][0]
+    changed = Case("ninth", 1, "single", ((form, form.high),))
+    idle = without(changed, 0).effects[0][0].build(0.3, np.random.default_rng(0), Site(()))
+    assert form.build(0.3, np.random.default_rng(0), Site(())).command is not None
+    assert (idle.command, idle.plant) == (None, None)
 
 
 @pytest.mark.slow
