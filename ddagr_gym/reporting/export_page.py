@@ -49,7 +49,7 @@ def write_page(folder: Path, result: Outcome) -> None:
         "compared_header": text.COMPARED_HEADER,
         "compared": text.compared_rows(result.comparison.drives),
         "step": text.step_sentence(result),
-        "lost": text.not_carried_over(result.to),
+        "lost": text.not_carried_over(result),
         "effect_header": text.EFFECT_HEADER,
         "effects": text.effect_rows(result),
         "range_header": text.RANGE_HEADER,

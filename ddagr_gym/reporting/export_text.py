@@ -52,14 +52,14 @@ _OWN = {
 }  # fmt: skip
 
 _RANGES = (
-    "Whatever two parameters have to do with each other: ranges are of one at a time. Draws of whole robots and soils "
-    "are in the calibration's draws.yaml.",
+    "Whatever two numbers have to do with each other: ranges are of one at a time. Draws of whole robots and soils "
+    "are in a calibration's draws.yaml.",
 )
 
 
-def not_carried_over(to: str) -> tuple[str, ...]:
+def not_carried_over(result: Outcome) -> tuple[str, ...]:
     """Sentences on what another simulator does not get."""
-    return (*_OWN.get(to, _RANGES), *_NOWHERE)
+    return (*_OWN.get(result.to, _RANGES), *_NOWHERE, *result.corrected.fixed)
 
 
 def headline(result: Outcome) -> str:
@@ -145,7 +145,7 @@ def export_text(result: Outcome) -> str:
             step_sentence(result),
             format_table(RANGE_HEADER[:5], ranges),
             range_sentence(result),
-            "Does not carry over:\n" + "\n".join(f"- {line}" for line in not_carried_over(result.to)),
+            "Does not carry over:\n" + "\n".join(f"- {line}" for line in not_carried_over(result)),
         )
         if text
     )

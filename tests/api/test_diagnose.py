@@ -6,6 +6,8 @@ The command's tests cover certification, page and exit codes.
 from __future__ import annotations
 
 import json
+import math
+import shutil
 from dataclasses import replace
 
 import gymnasium
@@ -16,6 +18,7 @@ import ddagr_gym
 from ddagr_gym.diagnosis.answer.next_drive_plan import NextDrivePlan
 from ddagr_gym.diagnosis.result.files import load
 from ddagr_gym.errors import InputError, InputWarning
+from ddagr_gym.exporting.corrected import GIVEN
 from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.physics.effects import load_effects
 from ddagr_gym.presets import get_robot, get_soil
@@ -118,6 +121,59 @@ def test_files_are_those_of_the_command_without_a_page(found, tmp_path):
     assert json.loads((tmp_path / "one.json").read_text())["soil"] == "thesis_a1"
     with pytest.raises(InputError, match="overwrite=True"):
         found.report(tmp_path / "found")
+
+
+@pytest.fixture(scope="module")
+def saved(found, tmp_path_factory):
+    """Folder of the diagnosis, saved."""
+    return found.report(tmp_path_factory.mktemp("saved") / "found")
+
+
+def test_an_export_has_ranges_of_all_that_was_refitted(found, saved):
+    spread = found.diagnosis.nuisance_spread
+    exported = ddagr_gym.export(saved, "randomisation", draws=100)
+    mass, inertia, track = (exported.ranges[name] for name in ("mass", "yaw_inertia", "effective_track"))
+    ends = [found.nominal[0].mass * math.exp(value) for value in spread.intervals["mass"]]
+    assert (mass.low, mass.high) == (pytest.approx(ends[0], rel=0.015), pytest.approx(ends[1], rel=0.015))
+    assert mass.low < mass.value < mass.high
+    assert mass.value == pytest.approx(found.robot.mass)
+    assert {item.distribution for item in (mass, inertia, track)} == {"normal"}
+    assert mass.source.endswith(
+        "range: the 90 % intervals of the effects that were named and of its refitted robot and soil"
+    )
+    assert "- What was refitted of single recordings and not of robot or soil: biases" in str(exported)
+    assert "does not say it" not in str(exported)
+
+
+def test_an_export_draws_soils_together_as_they_were_refitted(saved, tmp_path):
+    together = ddagr_gym.export(saved, "randomisation", draws=60).ranges["force_along"]
+    shutil.copytree(saved, tmp_path / "apart")
+    content = json.loads((saved / "diagnosis.json").read_text())
+    content["nuisance_spread"]["correlation"] = np.eye(len(content["nuisance_spread"]["shared"])).tolist()
+    (tmp_path / "apart" / "diagnosis.json").write_text(json.dumps(content))
+    apart = ddagr_gym.export(tmp_path / "apart", "randomisation", draws=60).ranges["force_along"]
+    assert together.high - together.low < 0.5 * (apart.high - apart.low)
+
+
+def test_an_export_of_an_answer_of_before_says_what_is_fixed(saved, tmp_path):
+    shutil.copytree(saved, tmp_path / "before")
+    content = json.loads((saved / "diagnosis.json").read_text())
+    del content["nuisance_spread"]
+    (tmp_path / "before" / "diagnosis.json").write_text(json.dumps(content))
+    exported = ddagr_gym.export(tmp_path / "before", "gazebo", draws=3)
+    assert exported.ranges["mass"].distribution == "fixed"
+    assert "- How sure robot and soil are: this diagnosis does not say it" in str(exported)
+
+
+def test_what_an_option_gives_is_fixed_in_the_export(saved):
+    exported = ddagr_gym.export(saved, "gazebo", robot="ddagr", draws=3)
+    assert exported.ranges["mass"].distribution == "fixed"
+    assert exported.ranges["force_along"].distribution == "normal"
+    assert exported.outcome.corrected.spread.endswith("and of its refitted soil")
+    assert "- How sure the given robot may be: what an option gives is fixed" in str(exported)
+    both = ddagr_gym.export(saved, "gazebo", robot="ddagr", soil="thesis_a1", draws=3)
+    assert both.ranges["yaw_inertia"].distribution == "fixed"
+    assert both.outcome.corrected.fixed == (GIVEN.format("robot and soil"),)
 
 
 def test_the_drives_are_written_for_viewers(found, tmp_path):

@@ -10,6 +10,7 @@ from ddagr_gym.diagnosis.answer.change import Change
 from ddagr_gym.diagnosis.answer.drivetrain import DrivetrainAnswer
 from ddagr_gym.diagnosis.answer.location import EffectLocation, Localisation
 from ddagr_gym.diagnosis.answer.next_drive_plan import NextDrivePlan
+from ddagr_gym.diagnosis.answer.nuisance_spread import NuisanceSpread
 from ddagr_gym.diagnosis.answer.onset import Onset
 from ddagr_gym.diagnosis.answer.soil_at_work import SoilAtWork
 from ddagr_gym.diagnosis.answer.unnamed_terms import UnnamedTerms
@@ -225,6 +226,7 @@ class Diagnosis:
             `held_out` and `where` are null, `parameters` are what differs from ordinary drives, `calibrated_p` is the
             probability over the whole library, `detectable` is the least detectable change, `misfit` has no limit,
             and `complete` says that nothing else is out of the ordinary.
+        nuisance_spread: how sure the nuisances are; absent with `--calibration` and in files of before.
     """
 
     verdict: tuple[str, ...]
@@ -252,3 +254,4 @@ class Diagnosis:
     detectable_alone: Mapping[str, Mapping[str, float | None]] = field(default_factory=dict)
     schema: str = SCHEMA
     change: Change | None = None
+    nuisance_spread: NuisanceSpread | None = None

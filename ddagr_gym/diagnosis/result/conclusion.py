@@ -19,7 +19,13 @@ from ddagr_gym.diagnosis.result.detectable import least_detectable
 from ddagr_gym.diagnosis.result.equivalence import equivalents
 from ddagr_gym.diagnosis.result.sentences import headline
 from ddagr_gym.diagnosis.result.soil_at_work import soil_at_work
-from ddagr_gym.diagnosis.result.uncertainty import intervals, resampled_parameters, with_structure
+from ddagr_gym.diagnosis.result.uncertainty import (
+    Resampled,
+    intervals,
+    nuisance_spread,
+    resampled_parameters,
+    with_structure,
+)
 from ddagr_gym.diagnosis.search.scanned_model import ScannedModel, SearchResult
 from ddagr_gym.diagnosis.search.stepwise import MOST_EFFECTS, further_gates
 from ddagr_gym.identification.misfit import explained_share, roughest
@@ -68,8 +74,8 @@ def conclude(
         *channel_fault_findings(mended.channel_faults),
         *reversed_gyro_findings(mended.reversed_gyro),
     ]
-    fitted = _findings(session, found)
-    kept = fitted if accepted is found else _findings(session, accepted)
+    fitted, draws = _findings(session, found)
+    kept, draws = (fitted, draws) if accepted is found else _findings(session, accepted)
     rejected = tuple(item for item in fitted if item.name not in accepted.chosen.names)
     alone, beside = _detectable(accepted, gates)
     diagnosis = Diagnosis(
@@ -87,6 +93,7 @@ def conclude(
         data=tuple(data_source(recording) for recording in mended.recordings),
         rejected=rejected,
         detectable_alone=alone,
+        nuisance_spread=nuisance_spread(session.problem, accepted.chosen.fitted, draws),
     )
     return diagnosis, (*_effects_of_values(mended), *accepted.chosen.fitted.point.effects)
 
@@ -113,12 +120,12 @@ def reversed_gyro_findings(reversed_gyro: ReversedGyro | None) -> list[Finding]:
     return [Finding("gyro_sign", flip, gain, 0.0, (2.0 * gain) ** 0.5, gain, {"yaw_rate": 1.0}, {"gyro_sign": 1.0})]
 
 
-def _findings(session: DiagnosisSession, found: SearchResult) -> list[Finding]:
-    """One finding per effect of the chosen model."""
+def _findings(session: DiagnosisSession, found: SearchResult) -> tuple[list[Finding], Resampled]:
+    """One finding per effect of the chosen model, and the resampled parameters of that."""
     problem, gates, chosen, rng = session.problem, session.gates, found.chosen, session.rng("verdict")
-    if not chosen.names:
-        return []
     draws = resampled_parameters(problem, chosen.fitted, rng)
+    if not chosen.names:
+        return [], draws
     bounds = intervals(draws.effects)
     findings = []
     for number, effect in enumerate(chosen.fitted.point.effects):
@@ -149,7 +156,7 @@ def _findings(session: DiagnosisSession, found: SearchResult) -> list[Finding]:
                 soil=soil_at_work(problem, session.soil, chosen.fitted, number, draws),
             )
         )
-    return findings
+    return findings, draws
 
 
 def _gates_used(thresholds: Thresholds) -> GatesUsed:

@@ -23,7 +23,7 @@ _ABSENT_WHERE_UNKNOWN = ("options", "thresholds")
 """Entries whose own entries are left out instead of null."""
 
 
-_ABSENT_WHERE_NOT_ASKED = ("drivetrain", "change")
+_ABSENT_WHERE_NOT_ASKED = ("drivetrain", "change", "nuisance_spread")
 """Entries that are left out instead of null: files of before have none."""
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ddagr_gym.diagnosis.answer.nuisance_spread import NuisanceSpread
 from ddagr_gym.diagnosis.result.factor_sizes import (
     Valley,
     factors,
@@ -126,6 +127,32 @@ def intervals(draws: Array, level: float = LEVEL) -> list[tuple[float, float]]:
     """Central intervals of each column of (draws, E)."""
     tail = 0.5 * (1.0 - level)
     return [(float(a), float(b)) for a, b in np.quantile(draws, [tail, 1.0 - tail], axis=0).T]
+
+
+def nuisance_spread(problem: Problem, fitted: Fitted, draws: Resampled) -> NuisanceSpread:
+    """How sure the free nuisances are, and how those of robot and soil go together.
+
+    Args:
+        problem: what was fitted.
+        fitted: from which the draws were made.
+        draws: of :func:`resampled_parameters`.
+    """
+    free = [problem.nuisances.parameters[k] for k in np.flatnonzero(problem.free).tolist()]
+    known = zip(free, intervals(draws.nuisances), fitted.point.values[problem.free].tolist(), strict=True)
+    found = {p.name: (min(low, value), max(high, value)) for p, (low, high), value in known}
+    # whatever has a scope, a shift or a heading belongs to recordings
+    shared = [k for k, p in enumerate(free) if p.scope is None and not (p.shift or p.heading)]
+    return NuisanceSpread(found, tuple(free[k].name for k in shared), _correlation(draws.nuisances[:, shared]))
+
+
+def _correlation(draws: Array) -> tuple[tuple[float, ...], ...]:
+    """Of the columns of (draws, P), to four digits; one that nothing moves goes with no other."""
+    away = draws - draws.mean(axis=0)
+    size = np.linalg.norm(away, axis=0)
+    unit = np.divide(away, size, out=np.zeros_like(away), where=size > 0.0)
+    matrix = unit.T @ unit
+    np.fill_diagonal(matrix, 1.0)
+    return tuple(tuple(row) for row in np.round(matrix, 4).tolist())
 
 
 def with_structure(interval: tuple[float, float], effect: Effect, field: str) -> tuple[float, float]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ddagr_gym.physics.effects.base import Effect
 
-_DEVIATIONS_OF_AN_INTERVAL = 3.29
+DEVIATIONS_OF_AN_INTERVAL = 3.29
 """Width of an interval of 90 % of a normal distribution, in its standard deviations."""
 
 
@@ -37,7 +37,7 @@ def draw_sizes(
         if item.name not in intervals:
             continue
         low, high = intervals[item.name]
-        deviation = (high - low) / _DEVIATIONS_OF_AN_INTERVAL
+        deviation = (high - low) / DEVIATIONS_OF_AN_INTERVAL
         value = getattr(effect, item.name) + deviation * float(np.clip(rng.standard_normal(), -most, most))
         bounds = item.metadata["low"], item.metadata["high"]
         least, largest = (max(low, bounds[0]), min(high, bounds[1])) if inside else bounds
