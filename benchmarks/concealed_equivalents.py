@@ -23,7 +23,8 @@ from typing import Any
 
 from benchmarks.ablations.examine import ROBOT, SOIL, read_runs
 from benchmarks.concealed.cases import Case, plan
-from benchmarks.concealed.change import Change, Form, Rng, Site
+from benchmarks.concealed.catalogue import DRIVETRAIN
+from benchmarks.concealed.change import Form
 from benchmarks.concealed.generate import warm_up
 from benchmarks.concealed.simulate import simulate_case
 from benchmarks.concealed.storage import csv_bytes, digest, read_json, recording_digest, write_case
@@ -48,15 +49,19 @@ ITERATIONS = 12
 def needs_equivalent(effect: Mapping[str, Any]) -> bool:
     """Whether a label's effect has sizes in the library, but none that means the same.
 
+    Not between command and wheel: beside faults of another structure, which show all the same, the library's sizes
+    shrink to next to nothing, and the cases would count as too small to tell. They count as they are.
+
     Args:
         effect: entry of a label.
     """
     kind = effect_kind(effect["name"])
-    return kind.differentiable and not kind.categorical and not true_sizes(effect)
+    fitted = kind.differentiable and not kind.categorical and effect["name"] not in DRIVETRAIN
+    return fitted and not true_sizes(effect)
 
 
 def without(case: Case, left_out: int) -> Case:
-    """The case with one effect of its plant or commands idle: drawn as before, it changes nothing.
+    """The case with one effect of its plant idle: drawn as before, it changes nothing.
 
     Args:
         case: of a set.
@@ -64,10 +69,7 @@ def without(case: Case, left_out: int) -> Case:
     """
 
     def idle(form: Form) -> Form:
-        def build(size: float, rng: Rng, site: Site) -> Change:
-            return replace(form.build(size, rng, site), plant=None, command=None)
-
-        return replace(form, build=build)
+        return replace(form, build=lambda size, rng, site: replace(form.build(size, rng, site), plant=None))
 
     effects = [(idle(form) if k == left_out else form, size) for k, (form, size) in enumerate(case.effects)]
     return replace(case, effects=tuple(effects))

@@ -5,10 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from benchmarks.changed_pairs.score import sure_and_wrong
-from benchmarks.concealed.catalogue import DRIVETRAIN
+from benchmarks.concealed.catalogue import DRIVETRAIN, DRIVETRAIN_FORMS, least_size
+from benchmarks.concealed.change import Site
 from benchmarks.concealed_figure import draw, tabled
 from benchmarks.concealed_names import PART_FAMILIES, as_effects, rightly_named
 from benchmarks.concealed_oracle import eligible
@@ -136,6 +138,16 @@ def test_figures_of_the_drivetrain_are_over_its_cases() -> None:
     assert found["top1"]["count"] == 3
     assert found["one_of_double"]["value"] == 1.0
     assert [entry["case"] for entry in found["failures"]] == ["b", "e"]
+
+
+def test_faults_of_another_structure_count_whatever_the_size_of_an_effect_that_shows() -> None:
+    """The sizes of the later forms mean nothing in the library, so that no limit of it can make them too small."""
+    for form in (form for forms in DRIVETRAIN_FORMS.values() for form in forms if form.name != "command_delay"):
+        change = form.build(form.low * least_size(form), np.random.default_rng(0), Site(()))
+        told = label("single", form.name)
+        told["effects"][0]["parameters"] = dict(change.parameters)
+        missed = answer("none") | {"detectable": {form.name: dict.fromkeys(("lag", "droop", "width"), 1e3)}}
+        assert score({"a": told}, {"a": missed})["top1"]["count"] == 1
 
 
 def test_the_picture_has_a_place_for_parts_second_names_and_names_of_channels(tmp_path: Path) -> None:
