@@ -9,15 +9,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.recordings.channels import CHANNELS
-from ddagr_gym.recordings.plausible import slow_rows
+from ddagr_gym.recordings.plausible import pauses, slow_rows
 
 
 class Readings(Protocol):
-    """What is asked of a recording: its channels, NaN where there is no sample."""
+    """What is asked of a recording: its time, and its channels, NaN where there is no sample."""
 
     def __len__(self) -> int: ...
 
     def __getitem__(self, channel: str) -> NDArray[np.float64]: ...
+
+    @property
+    def t(self) -> NDArray[np.float64]:
+        """Time of the rows (N,) [s]."""
+        ...
+
+    def spans(self) -> Iterator[slice]:
+        """Rows that share one clock."""
+        ...
 
     @property
     def period(self) -> float:
@@ -54,6 +63,7 @@ def doubts(recording: Readings) -> Iterator[str]:
                 f"robot: check its unit in the column map{_unit_hint(channel.unit)}."
             )
     yield from slow_rows(recording.period)
+    yield from pauses(recording.t, recording.spans())
     yield from _degrees(recording)
     yield from _gravity(recording)
     if not recording.command_valid.any():

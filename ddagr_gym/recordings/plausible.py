@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +18,8 @@ FASTEST_PERIOD = 1e-6
 """Mean time between rows below which stamps have another unit [s] (ours): no log has a million rows a second."""
 SLOWEST_PERIOD = 5.0
 """Time between rows beyond which the unit of the stamps is doubted [s] (ours): no robot's log is that slow."""
+LONGEST_PAUSE = 600.0
+"""Time without rows beyond which a recording may hold two drives [s] (ours)."""
 LARGEST_STAMP = 1e305
 """Magnitude of a time stamp beyond which no clock counts [s] (ours): differences of two would overflow."""
 IMPOSSIBLE: Mapping[str, float] = {
@@ -107,6 +109,19 @@ def slow_rows(period: float) -> Iterator[str]:
         unit = likely_unit(period)
         hint = f" ({unit}?)" if unit else ""
         yield f"rows come every {period:.3g} s: check the unit of the time stamps in the column map{hint}."
+
+
+def pauses(t: FloatArray, spans: Iterable[slice]) -> Iterator[str]:
+    """A sentence on the longest time without rows where it is that between two drives.
+
+    Args:
+        t: (n,) time of the rows [s].
+        spans: rows that share one clock.
+    """
+    longest = [(float(np.max(np.diff(t[s]))), s.start + int(np.argmax(np.diff(t[s])))) for s in spans if t[s].size > 1]
+    pause, row = max(longest, default=(0.0, 0))
+    if pause > LONGEST_PAUSE:
+        yield f"no rows come for {pause:.4g} s after row {row + 1}: if two drives are in one file, cut it there."
 
 
 def check_magnitude(name: str, values: FloatArray, unit: str, t: FloatArray) -> None:

@@ -11,7 +11,7 @@ from ddagr_gym.errors import InputError
 from ddagr_gym.recordings.channels import CHANNELS
 from ddagr_gym.recordings.column_map import load_column_map
 from ddagr_gym.recordings.load import load_recording
-from ddagr_gym.recordings.plausible import IMPOSSIBLE, check_magnitude, likely_unit, slow_rows
+from ddagr_gym.recordings.plausible import IMPOSSIBLE, check_magnitude, likely_unit, pauses, slow_rows
 from ddagr_gym.recordings.schema import Recording
 
 T = np.arange(200) * 0.05
@@ -90,6 +90,14 @@ def test_a_reading_that_no_sensor_gives_is_named(tmp_path):
 def test_the_unit_of_a_period(period, unit):
     assert likely_unit(period) == unit
     assert bool(list(slow_rows(period))) == (period > 5.0)
+
+
+def test_two_drives_in_one_file_are_doubted_and_two_spans_are_not(tmp_path):
+    t = np.where(np.arange(T.size) < 100, T, T + 9e5)
+    doubts = load_recording(*write(tmp_path, t)).validate()
+    assert [sentence for sentence in doubts if "no rows come for 9e+05 s after row 100" in sentence]
+    assert list(pauses(t, [slice(0, 100), slice(100, 200), slice(0, 0)])) == []
+    assert list(pauses(np.where(np.arange(T.size) < 100, T, T + 500.0), [slice(0, 200)])) == []
 
 
 @pytest.mark.parametrize("sign", [1, -1])

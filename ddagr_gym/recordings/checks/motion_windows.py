@@ -8,6 +8,7 @@ specific force (f_x = dv/dt). Clocks are matched by the offsets of :mod:`.clock_
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -25,6 +26,8 @@ LEAST_TRAVEL = 0.15
 good lidar pose."""
 LARGEST_TURN = 2.0
 """Change of the travel's direction within half a window beyond which it may be a reversal [rad] (ours)."""
+LONGEST_HOLE = 2.5
+"""Periods between rows beyond which they are a gap, if it is longer than half a window (ours, as in :mod:`.timing`)."""
 
 GYRO, HEADING, COURSE, ENCODERS, COMMANDS, FORCE = "gyro", "heading", "course", "encoders", "commands", "force"
 POSITION = "position"
@@ -56,17 +59,18 @@ class MotionWindows:
 
 
 def motion_windows(recording: Recording, offsets: Mapping[str, Offset | None]) -> MotionWindows | None:
-    """Windows of a drive; None without the robot's geometry or where no span holds one.
+    """Windows of a drive; None without the robot's geometry or where no stretch without a gap holds one.
 
     Args:
         recording: any.
         offsets: of the clocks, by pair.
     """
-    geometry, instants = recording.meta.geometry, _instants(recording)
+    geometry, pieces = recording.meta.geometry, stretches(recording)
+    instants = _instants(recording, pieces)
     if geometry is None or not len(instants):
         return None
     late = {pair: known_lag(found) for pair, found in offsets.items()}
-    sample = _Sampler(recording, instants)
+    sample = _Sampler(recording, pieces, instants)
     rolled = {s: geometry.wheel_radius * r for s, r in _rolled(recording, sample, late).items()}
     heading = sample.values(unwrapped_heading(recording), late[POSE])
     position = np.stack([sample.values(recording[f"pose_{axis}"], late[POSE]) for axis in "xy"], axis=-1)
@@ -94,11 +98,29 @@ def _rolled(recording: Recording, sample: _Sampler, late: Mapping[str, float]) -
     return {source: np.stack([sample.integral(v, shift) for v in pair], axis=-1) for source, pair, shift in both}
 
 
-def _instants(recording: Recording) -> FloatArray:
-    """Beginning, middle and end of windows inside spans, one every half step, (n, 3) [s]."""
-    parts = [np.empty((0, 3))]
+def stretches(recording: Recording) -> tuple[slice, ...]:
+    """Rows of the spans between gaps: what happens inside a gap no window can tell.
+
+    Args:
+        recording: any.
+
+    Returns:
+        Slices in the order of time, each inside a span.
+    """
+    found: list[slice] = []
+    longest = max(STEP, LONGEST_HOLE * recording.period)
     for span in recording.spans():
-        first, last = recording.t[span.start], recording.t[span.stop - 1]
+        cuts = span.start + 1 + np.flatnonzero(np.diff(recording.t[span]) > longest)
+        edges = itertools.pairwise([span.start, *cuts.tolist(), span.stop])
+        found.extend(slice(first, end) for first, end in edges)
+    return tuple(found)
+
+
+def _instants(recording: Recording, pieces: tuple[slice, ...]) -> FloatArray:
+    """Beginning, middle and end of windows inside stretches, one every half step, (n, 3) [s]."""
+    parts = [np.empty((0, 3))]
+    for piece in pieces:
+        first, last = recording.t[piece.start], recording.t[piece.stop - 1]
         middle = np.arange(first + STEP, last - STEP + 1e-9, 0.5 * STEP)
         parts.append(np.stack([middle - STEP, middle, middle + STEP], axis=1))
     return np.concatenate(parts)
@@ -106,20 +128,22 @@ def _instants(recording: Recording) -> FloatArray:
 
 @dataclass(frozen=True)
 class _Sampler:
-    """Channels at the instants of windows, each inside the span of its window."""
+    """Channels at the instants of windows, each inside the stretch of its window."""
 
     recording: Recording
+    pieces: tuple[slice, ...]
     instants: FloatArray
 
     def values(self, values: FloatArray, late: float) -> FloatArray:
         """A channel that comes ``late`` seconds late, interpolated; NaN outside its samples, (n, 3)."""
         out = np.full(self.instants.shape, np.nan)
-        for span in self.recording.spans():
-            t, known = self.recording.t[span], np.isfinite(values[span])
-            inside = (self.instants[:, 0] >= t[0]) & (self.instants[:, 2] <= t[-1])
-            if np.count_nonzero(known) >= 2 and inside.any():
+        for piece in self.pieces:
+            t, known = self.recording.t[piece], np.isfinite(values[piece])
+            first = np.searchsorted(self.instants[:, 0], t[0])
+            inside = slice(first, np.searchsorted(self.instants[:, 2], t[-1], side="right"))
+            if np.count_nonzero(known) >= 2 and inside.start < inside.stop:
                 at = self.instants[inside] + late
-                out[inside] = np.interp(at, t[known], values[span][known], left=np.nan, right=np.nan)
+                out[inside] = np.interp(at, t[known], values[piece][known], left=np.nan, right=np.nan)
         return out
 
     def integral(self, values: FloatArray, late: float) -> FloatArray:
