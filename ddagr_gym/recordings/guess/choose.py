@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from ddagr_gym.recordings.checks.clock_offsets import Offset
 from ddagr_gym.recordings.checks.timing import SLOWEST
@@ -34,6 +34,7 @@ class Choice:
         others: what speaks against each of the others, by label.
         ambiguous: sentence where another one is as good; "" else.
         banks: of the wheels.
+        open_side: sentence where nothing has told yet which of the banks is the right one; "" else.
     """
 
     role: str
@@ -42,6 +43,7 @@ class Choice:
     others: Mapping[str, str] = field(default_factory=dict)
     ambiguous: str = ""
     banks: Banks | None = None
+    open_side: str = ""
 
 
 def best_of(
@@ -114,8 +116,7 @@ def sided(trials: Trials, wheels: Choice, imu: Choice) -> Choice:
         return wheels
     offset = trials.turning(imu.candidate, wheels.candidate)
     if offset is None or not goes_along(offset):
-        text = "wheels: neither names nor turns tell which side is right"
-        return Choice("wheels", wheels.candidate, wheels.why, wheels.others, text, wheels.banks)
+        return replace(wheels, open_side="wheels: neither names nor turns tell which side is right")
     banks = wheels.banks if offset.correlation > 0 else wheels.banks.exchanged()
     candidate = next(c for c in trials.contents.of("wheels") if c.topic == wheels.candidate.topic)
     why = (

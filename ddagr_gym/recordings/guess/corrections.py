@@ -8,8 +8,9 @@ from typing import Literal
 
 from ddagr_gym.recordings.checks.imu_findings import mounting_takes
 from ddagr_gym.recordings.checks.map_lines import Takes
-from ddagr_gym.recordings.checks.motion_windows import ENCODERS
+from ddagr_gym.recordings.checks.motion_windows import COMMANDS, ENCODERS
 from ddagr_gym.recordings.checks.wheels import BACKWARDS, RIGHT_AND_LEFT, wheel_takes, wheels_followed, wheels_of
+from ddagr_gym.recordings.guess.banks import Banks
 from ddagr_gym.recordings.guess.candidates import Candidate, as_wheels
 from ddagr_gym.recordings.guess.choose import Choice, choose_command, choose_imu, choose_pose
 from ddagr_gym.recordings.guess.trials import Trials
@@ -46,7 +47,7 @@ def corrected(trials: Trials, choices: Mapping[str, Choice]) -> Correction:
     if trials.geometry is None:
         return before
     after = _imu_corrected(_wheels_corrected(before))
-    return _chosen_again(after) if after.sentences else before
+    return _chosen_again(after) if after.sentences else after
 
 
 def _chosen_again(before: Correction) -> Correction:
@@ -62,23 +63,42 @@ def _chosen_again(before: Correction) -> Correction:
 
 
 def _wheels_corrected(before: Correction) -> Correction:
-    found, choice = before.trials.arbitration(before.candidates), before.choices["wheels"]
-    wheels = None if found is None else wheels_of(found.wheels[ENCODERS])
-    if wheels is None and found is not None and found.accused(ENCODERS):
-        wheels = wheels_followed(found.followed)
-    takes = wheel_takes(ENCODERS, wheels) if wheels else {}
-    if not takes or wheels is None or choice.candidate is None or choice.banks is None:
+    wheels, choice = _wheels_by_motion(before), before.choices["wheels"]
+    if wheels is None or choice.candidate is None or choice.banks is None:
         return before
+    takes = wheel_takes(ENCODERS, wheels)
+    exchanged = any(name != source for name, (source, _) in takes.items())
+    if exchanged or choice.open_side:
+        choice = _sides_by_motion(before.trials, choice, choice.banks.exchanged() if exchanged else choice.banks)
+    after = replace(before, trials=_with_signs(before.trials, takes), choices={**before.choices, "wheels": choice})
     pairs = zip(RIGHT_AND_LEFT, wheels, strict=True)
     sentence = "; ".join(_moved(bank, moved) for bank, moved in pairs if bank != moved)
-    if any(name != source for name, (source, _) in takes.items()):
-        banks = choice.banks.exchanged()
-        joints = next(c for c in before.trials.contents.of("wheels") if c.topic == choice.candidate.topic)
-        why = f"{' and '.join(banks.right)} right and {' and '.join(banks.left)} left by motion"
-        candidate = as_wheels(joints, banks.right, banks.left)
-        choice = replace(choice, candidate=candidate, banks=banks, why=why)
-    trials = _with_signs(before.trials, takes)
-    return Correction(trials, {**before.choices, "wheels": choice}, (*before.sentences, sentence))
+    return replace(after, sentences=(*before.sentences, sentence)) if takes else after
+
+
+def _wheels_by_motion(before: Correction) -> tuple[str, str] | None:
+    """What the right and the left wheels move as; None where that is not certain, or both move as one bank.
+
+    That encoders and commands agree confirms no side without another source of turning.
+    """
+    found = before.trials.arbitration(before.candidates)
+    if found is None:
+        return None
+    wheels = wheels_of(found.wheels[ENCODERS])
+    if wheels is None and found.accused(ENCODERS):
+        wheels = wheels_followed(found.followed)
+    if wheels is None or len({moved.removesuffix(BACKWARDS) for moved in wheels}) < len(RIGHT_AND_LEFT):
+        return None
+    witnesses = set(found.turning.majority) - {ENCODERS, COMMANDS}
+    return wheels if witnesses or wheel_takes(ENCODERS, wheels) else None
+
+
+def _sides_by_motion(trials: Trials, choice: Choice, banks: Banks) -> Choice:
+    """The wheels with the sides that their motion tells, which are open no more."""
+    joints = next(c for c in trials.contents.of("wheels") if choice.candidate and c.topic == choice.candidate.topic)
+    why = f"{' and '.join(banks.right)} right and {' and '.join(banks.left)} left by motion"
+    candidate = as_wheels(joints, banks.right, banks.left)
+    return replace(choice, candidate=candidate, banks=banks, why=why, open_side="")
 
 
 def _moved(bank: str, moved: str) -> str:

@@ -176,8 +176,7 @@ def _ambiguous(found: Contents, choices: Mapping[str, Choice], findings: tuple[C
     if found.why_receive:
         yield f"stamps: times of receipt are used, because {found.why_receive}"
     for choice in choices.values():
-        if choice.ambiguous:
-            yield choice.ambiguous
+        yield from filter(None, (choice.ambiguous, choice.open_side))
     for finding in findings:
         if finding.status is Status.SUSPICIOUS:
             yield f"the checks speak against {finding.channel}: {finding.meaning} {finding.remedy}".rstrip()

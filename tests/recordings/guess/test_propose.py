@@ -115,6 +115,29 @@ def test_two_wheels_the_first_of_which_is_the_left_one(drive, usual, proposed):
     assert (wheels.right, wheels.left) == (("motor_b",), ("motor_a",))
 
 
+@pytest.mark.parametrize("first", ["left", "right"])
+@pytest.mark.parametrize(("lacks", "told"), [((IMU,), True), ((IMU, ODOMETRY), False)])
+def test_sides_without_an_imu_are_either_told_by_motion_or_open(drive, usual, first, lacks, told, proposed):
+    second = "left" if first == "right" else "right"
+    messages = [message for message in without(usual, JOINTS) if message.kind not in lacks]
+    proposal = proposed([*messages, *drive.wheels(joints=[("a", first, 1), ("b", second, 1)])])
+    said = [sentence for sentence in proposal.ambiguous if "which side is right" in sentence]
+    assert len(said) == (not told)
+    assert ("by motion" in proposal.reasons["wheels"]) == told
+    if told:
+        wheels = proposal.topic_map.topics["wheels"]
+        assert (wheels.right, wheels.left) == ((("a",), ("b",)) if first == "right" else (("b",), ("a",)))
+    assert len(proposal.corrections) == (told and first == "left")
+
+
+def test_two_equal_wheels_stay_ambiguous_where_their_sides_are_open_too(drive, usual, proposed):
+    joints = [("a", "left", 1), ("b", "right", 1)]
+    twins = [*drive.wheels(joints=joints), *drive.wheels("/joint_states_too", joints=joints)]
+    proposal = proposed([*(m for m in usual if m.kind not in (JOINTS, IMU)), *twins], None)
+    assert any("are alike but for" in sentence for sentence in proposal.ambiguous)
+    assert any("which side is right" in sentence for sentence in proposal.ambiguous)
+
+
 def test_names_of_the_wrong_side_are_overruled_by_motion(drive, usual, proposed):
     joints = [(name, {"left": "right", "right": "left"}[bank], 1) for name, bank, _ in FOUR]
     proposal = proposed([*without(usual, JOINTS), *drive.wheels(joints=joints)])
