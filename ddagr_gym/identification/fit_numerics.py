@@ -1,6 +1,7 @@
 """Accuracy of the simulator inside a fit: settings each as coarse as what its residuals leave unexplained allows.
 
-All are smooth (no decision of the integrator jumps with a parameter), because sensitivities are finite differences.
+All are smooth (no decision of the integrator jumps with a parameter by more than its error), because sensitivities are
+finite differences.
 """
 
 from __future__ import annotations
@@ -41,9 +42,18 @@ def field_slope_numerics() -> Numerics:
 
 
 def block_mean_numerics() -> Numerics:
-    """For fits to block means (a diagnosis): smooth, steps of 20 ms, divided where their error estimate asks for it.
+    """For fits to block means (a diagnosis): steps of 20 ms, divided where their error estimate asks for it.
 
     Accelerations of starts, arcs, stops and spins are within 0.5 mm/s^2 (r.m.s.) of converged ones. Dividing at
-    launches instead (``Numerics.smooth()``) costs up to 1.5 times as much and errs by 2.3 mm/s^2.
+    launches instead (``Numerics.smooth()``) costs up to 1.5 times as much and errs by 2.3 mm/s^2. A wheel's derivative
+    is kept while its motion changes by less than 2 %, at two thirds of the time: sensitivities to soil and robot are as
+    close to converged ones as with a new derivative at every step (2 % off in the median, 0.16 and 0.2 at most).
     """
-    return replace(Numerics.smooth(), maximum_step=0.02, accepted_error=1e-4, launch_change=1e9, contact_nodes=5)
+    return replace(
+        Numerics.smooth(),
+        maximum_step=0.02,
+        accepted_error=1e-4,
+        launch_change=1e9,
+        jacobian_refresh=0.02,
+        contact_nodes=4,
+    )

@@ -31,7 +31,9 @@ def search_in_parts(session: DiagnosisSession, start: StartingModels, found: Sea
     if not spells:
         return {}, found
     session.progress(f"searching once more, {' and '.join(spells)} in a part of the drive")
-    again = search(session.during(spells), start)
+    first = found.steps[0] if found.steps else ()
+    known = {rival.name: rival for rival in first if rival.name not in spells}
+    again = search(session.during(spells), start, known=known)
     fall = found.chosen.fitted.cost - again.chosen.fitted.cost
     kept = spells_that_hold(spells, again.chosen.names, fall, dispersion_of(problem, again.chosen.fitted))
     return (kept, again) if kept else ({}, found)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -38,7 +39,14 @@ CLOSE = 0.6
 """Share of the best joint gain above which a rival is fitted to the end (ours: trial steps leave less open)."""
 
 
-def rivals_of(problem: Problem, model: ScannedModel, raw: Fitted, thresholds: Thresholds, most: int) -> list[Rival]:
+def rivals_of(
+    problem: Problem,
+    model: ScannedModel,
+    raw: Fitted,
+    thresholds: Thresholds,
+    most: int,
+    known: Mapping[str, Rival] = MappingProxyType({}),
+) -> list[Rival]:
     """Joint refits of the effects that pass the gate, best first: all for a few steps, the close ones to the end.
 
     Args:
@@ -47,6 +55,7 @@ def rivals_of(problem: Problem, model: ScannedModel, raw: Fitted, thresholds: Th
         raw: the nominal model with its sensitivities.
         thresholds: of the gate.
         most: effects that are tried.
+        known: refits that were made before, by name, which need not be made again.
     """
     ranked = _ranked(problem, model, raw, thresholds)
     large = bool(ranked) and ranked[0][0].gain > _LARGE
@@ -55,7 +64,9 @@ def rivals_of(problem: Problem, model: ScannedModel, raw: Fitted, thresholds: Th
     starts = [model.fitted, raw] if large else [model.fitted]
     tried = []
     for gain, terms in ranked[:most]:
-        if gain.gain > least:
+        if gain.name in known:
+            tried.append(known[gain.name])
+        elif gain.gain > least:
             trials = [_trial(problem, model, gain, terms, start) for start in starts]
             best_start = min(range(len(trials)), key=lambda k: trials[k].cost)
             # the start that serves the first rival serves the others
@@ -63,7 +74,10 @@ def rivals_of(problem: Problem, model: ScannedModel, raw: Fitted, thresholds: Th
             tried.append(rival_of(model, gain.name, trials[best_start]))
     tried = with_turning_centre(problem, model, raw, with_slower_loop(problem, model, tried))
     best = max((rival.gain for rival in tried), default=0.0)
-    rivals = [_finish(problem, model, rival, large) if rival.gain > CLOSE * best else rival for rival in tried]
+    rivals = [
+        _finish(problem, model, rival, large) if rival.gain > CLOSE * best and rival.name not in known else rival
+        for rival in tried
+    ]
     rivals = with_off_centre_load(problem, model, with_looped_encoders(problem, model, rivals))
     kept = [
         rival

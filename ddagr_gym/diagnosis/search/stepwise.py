@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from types import MappingProxyType
 
 from ddagr_gym.diagnosis.gates.thresholds import Thresholds
 from ddagr_gym.diagnosis.preprocessing.session import DiagnosisSession
@@ -38,6 +39,7 @@ def search(
     start: StartingModels,
     cache: StepCache = compute_without_cache,
     enough: Callable[[ScannedModel], bool] = lambda model: False,
+    known: Mapping[str, Rival] = MappingProxyType({}),
 ) -> SearchResult:
     """Scan the refitted nominal model, and add effects while one passes the gate (theory: diagnosis, section 6).
 
@@ -46,11 +48,12 @@ def search(
         start: its nominal models.
         cache: of the first scan and of each step, so that a search that was stopped goes on behind the last one.
         enough: whether no further effect is looked for beside a model.
+        known: refits of single effects that a search of the same windows has made, by name.
     """
     models = [cache("search nominal", partial(scan_model, session.problem, start.refitted, session.progress))]
     steps: list[tuple[Rival, ...]] = []
     while len(models[-1].names) < MOST_EFFECTS and not enough(models[-1]):
-        added = cache(f"search step {len(models)}", partial(_add_effect, session, start.raw, models, steps))
+        added = cache(f"search step {len(models)}", partial(_add_effect, session, start.raw, models, steps, known))
         if added is None or set(added[0].names) in [set(model.names) for model in models]:
             break
         models.append(added[0])
@@ -62,11 +65,15 @@ def search(
 
 
 def _add_effect(
-    session: DiagnosisSession, raw: Fitted, models: Sequence[ScannedModel], steps: Sequence[tuple[Rival, ...]]
+    session: DiagnosisSession,
+    raw: Fitted,
+    models: Sequence[ScannedModel],
+    steps: Sequence[tuple[Rival, ...]],
+    known: Mapping[str, Rival],
 ) -> tuple[ScannedModel, tuple[Rival, ...]] | None:
     """The model with one further effect and the refits that it was chosen from; None where none passes the gate."""
     problem, gates = session.problem, further_gates(session.gates, models)
-    tried = rivals_of(problem, models[-1], raw, gates, _MOST_RIVALS)
+    tried = rivals_of(problem, models[-1], raw, gates, _MOST_RIVALS, {} if models[-1].names else known)
     tried = [rival for rival in tried if rival.gain > gates.of(rival.name).gain]
     if not tried:
         return None
