@@ -26,6 +26,9 @@ _UNEVEN_BANKS = 0.3
 _ASIDE = 0.05
 """Distance of a hitch from the middle that is reported [m] (ours)."""
 
+_TAKEN_BACK = 0.1
+"""Rate at which an integral part takes a loss back, below which it is not reported [1/s] (ours: half the least)."""
+
 _UNBOUNDED = 1e5
 """Onsets and limits beyond it mean always, and none."""
 
@@ -93,7 +96,10 @@ def _droop(a: Amounts) -> str:
     of = "of both banks" if "shared" in a and a["shared"].value > 0.25 else "of axle torque"
     if "power" in a and a["power"].value > 0.5:
         of = "of both banks at 0.7 rad/s, in proportion to power and speed as with a weak battery"
-    return f"the motors slow down under load, by {quantity(a['droop'].scaled(1e3), 'mrad/s')} per N m {of}"
+    lost = f"the motors slow down under load, by {quantity(a['droop'].scaled(1e3), 'mrad/s')} per N m {of}"
+    if "recovery" not in a or a["recovery"].value < _TAKEN_BACK:
+        return lost
+    return f"{lost}, until an integral part takes it back, at {quantity(a['recovery'], '1/s')}"
 
 
 def _payload(a: Amounts) -> str:
@@ -140,6 +146,9 @@ def _saturation(a: Amounts) -> str:
         parts.append(f"turn no faster than {quantity(a['speed_limit'], 'rad/s')}")
     if a["acceleration_limit"].value < _UNBOUNDED:
         parts.append(f"change their speed by no more than {quantity(a['acceleration_limit'], 'rad/s²')}")
+    if "turning_limit" in a and a["turning_limit"].value < 1e3:
+        most = quantity(a["turning_limit"], "rad/s")
+        parts.append(f"differ from their mean by no more than {most}, a limit of the turning")
     return f"the banks {' and '.join(parts)}" if parts else "the banks have a limit that was not reached"
 
 

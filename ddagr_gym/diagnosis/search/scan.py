@@ -45,6 +45,7 @@ def drive_extent(problem: Problem, prediction: Array) -> DriveExtent:
         (float(y.min()), float(y.max())),
         float(np.abs(commands).max()),
         float(change),
+        0.5 * float(np.abs(commands[..., 0] - commands[..., 1]).max()),
     )
 
 

@@ -70,6 +70,7 @@ class DriveExtent:
         y: the same across [m].
         wheel_speed: largest bank speed [rad/s].
         wheel_acceleration: largest change of a bank speed per time [rad/s^2].
+        turning: largest commanded distance of a bank's speed from the mean of both [rad/s].
     """
 
     duration: float = 60.0
@@ -77,6 +78,7 @@ class DriveExtent:
     y: tuple[float, float] = (0.0, 10.0)
     wheel_speed: float = 1.0
     wheel_acceleration: float = 2.0
+    turning: float = 0.5
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,8 @@
-"""Motors that cannot turn, or cannot speed up, as fast as they are told."""
+"""Motors that cannot turn, or cannot speed up, as fast as they are told, and banks that may not differ as much."""
 
 from dataclasses import dataclass
 
+from ddagr_gym.jit import kernel
 from ddagr_gym.physics.effects.base import DriveExtent, Effect, Vector, size
 from ddagr_gym.physics.layout import MOTOR_RATE, MOTOR_TARGET, OMEGA, POINT_MOTORS
 
@@ -9,6 +10,7 @@ _NO_SPEED_LIMIT = 1e3  # [rad/s] the most that a robot may have as its maximum w
 _NO_ACCELERATION_LIMIT = 1e6  # [rad/s^2] far beyond any wheel's
 _HIGHEST_SPEED_LIMIT = 20.0  # [rad/s] that any of the preset robots would meet
 _HIGHEST_ACCELERATION_LIMIT = 200.0  # [rad/s^2], the same
+_LEAST_LIMIT = 0.01  # [rad/s], [rad/s^2]
 _BINDING = 0.95  # of what the drive reaches: limits above it cost less than 5 percent
 _PROBED = (0.9, 0.6)  # shares of the fastest that limits are tried at, ours: just binding, and cutting deep
 _PROBED_ACCELERATION = (
@@ -18,8 +20,19 @@ _PROBED_ACCELERATION = (
 )  # the greatest is that of a lag's first instant
 
 
+@kernel(inline=True)
+def _limit_turning(row: Vector, limit: float) -> None:
+    """Bring the speeds that the banks aim at to ``limit`` [rad/s] from their mean, which stays."""
+    mean = 0.5 * (row[MOTOR_TARGET] + row[MOTOR_TARGET + 1])
+    turning = row[MOTOR_TARGET] - mean
+    if abs(turning) > limit:
+        turning = limit if turning > 0.0 else -limit
+        row[MOTOR_TARGET], row[MOTOR_TARGET + 1] = mean + turning, mean - turning
+
+
 def limit_motors(row: Vector, parameters: Vector, memory: Vector) -> None:
-    """Clip the speed that each bank aims at, and the rate at which it may approach it."""
+    """Clip how the banks' aims differ, the speed that each aims at, and the rate at which it may approach it."""
+    _limit_turning(row, parameters[2])
     for bank in range(2):
         target = min(max(row[MOTOR_TARGET + bank], -parameters[0]), parameters[0])
         reach = parameters[1] / row[MOTOR_RATE + bank]
@@ -30,28 +43,33 @@ def limit_motors(row: Vector, parameters: Vector, memory: Vector) -> None:
 
 @dataclass(frozen=True)
 class MotorSaturation(Effect):
-    """Limits of bank speed (supply voltage) and of its rate of change (current, thus torque).
+    """Limits of bank speed (supply voltage), of its rate of change (current, thus torque) and of the commanded turning.
 
-    A limit that a drive never reaches changes nothing, so there is no derivative at neutral.
+    A drive controller that limits the yaw rate keeps the mean of the banks and lets them differ less. A limit that a
+    drive never reaches changes nothing, so there is no derivative at neutral.
 
     Attributes:
         speed_limit: largest bank speed; least: it cuts 5 percent off a drive's fastest (20 rad/s where none is known).
         acceleration_limit: largest change of bank speed per time; least: the same (200 rad/s^2).
+        turning_limit: largest distance of a bank's speed from the mean of both; least: as the speed's.
     """
 
     name = "motor_saturation"
     title = "Motor saturation"
     group = "commands and motors"
-    equation = "|omega_target| <= speed_limit; |d omega/dt| <= acceleration_limit"
+    equation = (
+        "|omega_target| <= speed_limit; |d omega/dt| <= acceleration_limit; before these |omega_target - mean of both| "
+        "<= turning_limit"
+    )
     source = "actuator saturation and rate limit (Astrom and Murray, Feedback Systems)"
-    signature = "encoders stay at a ceiling while commands rise; ramps of constant slope after large steps"
+    signature = "encoders stay at a ceiling while commands rise; ramps of constant slope after large steps; wide turns"
     confused_with = ("motor_droop", "motor_lag")
     differentiable = False
     actions = ((POINT_MOTORS, limit_motors),)
 
     speed_limit: float = size(
         "rad/s",
-        0.01,
+        _LEAST_LIMIT,
         _NO_SPEED_LIMIT,
         least=_NO_SPEED_LIMIT - _HIGHEST_SPEED_LIMIT,
         neutral=_NO_SPEED_LIMIT,
@@ -59,22 +77,38 @@ class MotorSaturation(Effect):
     )
     acceleration_limit: float = size(
         "rad/s^2",
-        0.01,
+        _LEAST_LIMIT,
         _NO_ACCELERATION_LIMIT,
         least=_NO_ACCELERATION_LIMIT - _HIGHEST_ACCELERATION_LIMIT,
         default=_NO_ACCELERATION_LIMIT,
         neutral=_NO_ACCELERATION_LIMIT,
         step=-0.05,
     )
+    turning_limit: float = size(
+        "rad/s",
+        _LEAST_LIMIT,
+        _NO_SPEED_LIMIT,
+        least=_NO_SPEED_LIMIT - _HIGHEST_SPEED_LIMIT,
+        default=_NO_SPEED_LIMIT,
+        neutral=_NO_SPEED_LIMIT,
+        step=-0.02,
+    )
 
     def is_meaningful(self, extent: DriveExtent) -> bool:
         """Whether a limit cuts at least 5 percent off what the drive would reach."""
         slow = self.speed_limit <= _BINDING * extent.wheel_speed
+        slow = slow or self.turning_limit <= _BINDING * extent.turning
         return slow or self.acceleration_limit <= _BINDING * extent.wheel_acceleration
 
     @classmethod
     def probes(cls, extent: DriveExtent) -> tuple[Effect, ...]:
         """Limits somewhat and well below what the drive reaches, one at a time."""
-        slow = [cls(max(share * extent.wheel_speed, 0.01)) for share in _PROBED]
-        limits = [max(share * extent.wheel_acceleration, 0.01) for share in _PROBED_ACCELERATION]
-        return (*slow, *(cls(_NO_SPEED_LIMIT, limit) for limit in limits))
+        slow = [cls(limit) for limit in _below(extent.wheel_speed, _PROBED)]
+        late = [cls(_NO_SPEED_LIMIT, limit) for limit in _below(extent.wheel_acceleration, _PROBED_ACCELERATION)]
+        wide = [cls(_NO_SPEED_LIMIT, turning_limit=limit) for limit in _below(extent.turning, _PROBED)]
+        return (*slow, *late, *wide)
+
+
+def _below(reached: float, shares: tuple[float, ...]) -> list[float]:
+    """Limits at shares of what a drive reaches."""
+    return [max(share * reached, _LEAST_LIMIT) for share in shares]

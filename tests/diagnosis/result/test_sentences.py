@@ -88,6 +88,7 @@ def test_every_effect_has_a_clause_with_its_main_size(name):
         (text("encoder_scale", right=(0.97, "-"), left=(1.0, "-"), loop=(1.0, "-")), "and the speed loop believes it"),
         (text("motor_droop", droop=(0.002, "rad/(s N m)"), shared=(0.4, "-")), "2.0 mrad/s per N m of both banks"),
         (text("motor_droop", droop=(0.002, "rad/(s N m)"), power=(0.9, "-")), "both banks at 0.7 rad/s, in proportion"),
+        (text("motor_droop", droop=(0.002, "rad/(s N m)"), recovery=(0.5, "1/s")), "takes it back, at 0.50 1/s"),
         (text("motor_lag", lag=(0.4, "s"), slowing=(0.1, "-")), "0.40 s more slowly, mostly while they speed up"),
         (text("towed_drag", force=(60.0, "N"), hitch_distance=(0.5, "m"), rope=(0.8, "m")), "on a rope of 0.8 m"),
         (text("wheel_radius_mismatch", difference=(-0.02, "-")), "the left wheels are 2.0 % larger than the right"),
@@ -98,6 +99,13 @@ def test_every_effect_has_a_clause_with_its_main_size(name):
         (text("soil_change", strength=(0.8, "-"), stiffness=(1.0, "-"), onset=(12.0, "s")), "model's from 12 s on"),
         (text("payload", mass=(25.0, "kg"), x=(0.0, "m"), y=(0.0, "m"), height=(0.6, "m")), "25 kg heavier, above"),
         (text("motor_saturation", speed_limit=(0.8, "rad/s"), acceleration_limit=(1e6, "rad/s^2")), "faster than 0.80"),
+        (
+            text(
+                "motor_saturation", speed_limit=(1e3, "rad/s"), acceleration_limit=(1e6, "rad/s^2"),
+                turning_limit=(0.3, "rad/s"),
+            ),
+            "the banks differ from their mean by no more than 0.30 rad/s, a limit of the turning",
+        ),
         (
             text("sensor_hold", duration=(0.1, "s"), gyro=(1.0, "-"), accelerometer=(0.0, "-")),
             "repeated for 0.10 s (gyro)",

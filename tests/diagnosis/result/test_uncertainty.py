@@ -156,7 +156,7 @@ def test_of_limits_the_mildest_that_shows_stands_as_it_is() -> None:
     mildest = next(k for k in speeds if candidates[k].probes[0].as_mapping()["parameters"]["speed_limit"] == values[-1])
     assert least_of(candidates, all_of_them | {mildest: 0.99 * enough})["speed_limit"] == pytest.approx(values[-2])
     nothing = least_of(candidates, dict.fromkeys(all_of_them, 0.99 * enough))
-    assert nothing == {"speed_limit": np.inf, "acceleration_limit": np.inf}
+    assert nothing == {"speed_limit": np.inf, "acceleration_limit": np.inf, "turning_limit": np.inf}
 
 
 def test_what_a_nuisance_would_take_over_comes_on_top() -> None:

@@ -28,7 +28,9 @@ VERDICT_NAMES = {
     "imu_lever_arm encoder_scale pose_latency sensor_hold",
 }
 KINDS = effect_kinds()
-EXTENT = DriveExtent(duration=2.4, x=(-0.1, 0.4), y=(-0.1, 0.3), wheel_speed=0.85, wheel_acceleration=0.45)
+EXTENT = DriveExtent(
+    duration=2.4, x=(-0.1, 0.4), y=(-0.1, 0.3), wheel_speed=0.85, wheel_acceleration=0.45, turning=0.25
+)
 MAY_CHANGE = {
     layout.POINT_COMMANDS: [(layout.COMMAND, 2)],
     layout.POINT_MOTORS: [(layout.MOTOR_TARGET, 2), (layout.MOTOR_RATE, 2)],
