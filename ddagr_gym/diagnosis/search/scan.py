@@ -20,6 +20,7 @@ from ddagr_gym.diagnosis.search.sensor_effects import Drives, acts_on_readings_o
 from ddagr_gym.identification.gauss_newton import Fitted
 from ddagr_gym.identification.nuisances import absorbed_sizes
 from ddagr_gym.identification.problem import Problem
+from ddagr_gym.parameters import STANDARD_GRAVITY, Robot
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.effects.base import DriveExtent
 from ddagr_gym.physics.effects.registry import absolute_effect_kinds
@@ -46,7 +47,13 @@ def drive_extent(problem: Problem, prediction: Array) -> DriveExtent:
         float(np.abs(commands).max()),
         float(change),
         0.5 * float(np.abs(commands[..., 0] - commands[..., 1]).max()),
+        _traction(problem.robot),
     )
+
+
+def _traction(robot: Robot) -> float:
+    """Acceleration that a torque as of half the robot's weight at the rim gives an unloaded bank [rad/s^2]."""
+    return 0.5 * robot.drivetrain.load_compliance * robot.mass * STANDARD_GRAVITY * robot.outer_radius
 
 
 def touched(probe: Effect, problem: Problem, prediction: Array) -> NDArray[np.bool_]:

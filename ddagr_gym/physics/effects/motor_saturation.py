@@ -4,13 +4,21 @@ from dataclasses import dataclass
 
 from ddagr_gym.jit import kernel
 from ddagr_gym.physics.effects.base import DriveExtent, Effect, Vector, size
-from ddagr_gym.physics.layout import MOTOR_RATE, MOTOR_TARGET, OMEGA, POINT_MOTORS
+from ddagr_gym.physics.layout import (
+    ACCELERATION_LIMIT,
+    DRIVETRAIN,
+    MOTOR_RATE,
+    MOTOR_TARGET,
+    OMEGA,
+    POINT_MOTORS,
+    POWER_LIMIT,
+)
 
 _NO_SPEED_LIMIT = 1e3  # [rad/s] the most that a robot may have as its maximum wheel speed
-_NO_ACCELERATION_LIMIT = 1e6  # [rad/s^2] far beyond any wheel's
+_NO_ACCELERATION_LIMIT = 1e6  # [rad/s^2] far beyond any wheel's; of power [rad^2/s^3] likewise
 _HIGHEST_SPEED_LIMIT = 20.0  # [rad/s] that any of the preset robots would meet
 _HIGHEST_ACCELERATION_LIMIT = 200.0  # [rad/s^2], the same
-_LEAST_LIMIT = 0.01  # [rad/s], [rad/s^2]
+_LEAST_LIMIT = 0.01  # [rad/s], [rad/s^2], [rad^2/s^3]
 _BINDING = 0.95  # of what the drive reaches: limits above it cost less than 5 percent
 _PROBED = (0.9, 0.6)  # shares of the fastest that limits are tried at, ours: just binding, and cutting deep
 _PROBED_ACCELERATION = (
@@ -18,6 +26,10 @@ _PROBED_ACCELERATION = (
     0.6,
     0.3,
 )  # the greatest is that of a lag's first instant
+
+
+_PROBED_TORQUE = (0.3, 0.15, 0.08)  # shares of full traction, ours: a turn on the spot takes a fifth on soft soil
+_PROBED_POWER = (0.2, 0.1, 0.05)  # shares of full traction at the fastest, ours
 
 
 @kernel(inline=True)
@@ -31,8 +43,10 @@ def _limit_turning(row: Vector, limit: float) -> None:
 
 
 def limit_motors(row: Vector, parameters: Vector, memory: Vector) -> None:
-    """Clip how the banks' aims differ, the speed that each aims at, and the rate at which it may approach it."""
+    """Clip how the banks' aims differ, the speed that each aims at, the rate of its approach, and what motors give."""
     _limit_turning(row, parameters[2])
+    row[DRIVETRAIN + ACCELERATION_LIMIT] = min(row[DRIVETRAIN + ACCELERATION_LIMIT], parameters[3])
+    row[DRIVETRAIN + POWER_LIMIT] = min(row[DRIVETRAIN + POWER_LIMIT], parameters[4])
     for bank in range(2):
         target = min(max(row[MOTOR_TARGET + bank], -parameters[0]), parameters[0])
         reach = parameters[1] / row[MOTOR_RATE + bank]
@@ -43,15 +57,18 @@ def limit_motors(row: Vector, parameters: Vector, memory: Vector) -> None:
 
 @dataclass(frozen=True)
 class MotorSaturation(Effect):
-    """Limits of bank speed (supply voltage), of its rate of change (current, thus torque) and of the commanded turning.
+    """Limits of bank speed (supply voltage), of its rate of change, of torque and power, and of the commanded turning.
 
-    A drive controller that limits the yaw rate keeps the mean of the banks and lets them differ less. A limit that a
-    drive never reaches changes nothing, so there is no derivative at neutral.
+    A drive controller that limits the yaw rate keeps the mean of the banks and lets them differ less. Torque and power
+    carry the ground's load as well, in a robot whose banks the ground resists; in others they limit the rate of change.
+    A limit that a drive never reaches changes nothing, so there is no derivative at neutral.
 
     Attributes:
         speed_limit: largest bank speed; least: it cuts 5 percent off a drive's fastest (20 rad/s where none is known).
         acceleration_limit: largest change of bank speed per time; least: the same (200 rad/s^2).
         turning_limit: largest distance of a bank's speed from the mean of both; least: as the speed's.
+        torque_limit: largest acceleration that the motor's torque gives an unloaded bank; least: that of full traction.
+        power_limit: largest product of that acceleration and the speed; least: the same at the fastest.
     """
 
     name = "motor_saturation"
@@ -59,7 +76,7 @@ class MotorSaturation(Effect):
     group = "commands and motors"
     equation = (
         "|omega_target| <= speed_limit; |d omega/dt| <= acceleration_limit; before these |omega_target - mean of both| "
-        "<= turning_limit"
+        "<= turning_limit; acceleration that the motor gives <= min(torque_limit, power_limit / omega)"
     )
     source = "actuator saturation and rate limit (Astrom and Murray, Feedback Systems)"
     signature = "encoders stay at a ceiling while commands rise; ramps of constant slope after large steps; wide turns"
@@ -94,11 +111,31 @@ class MotorSaturation(Effect):
         step=-0.02,
     )
 
+    torque_limit: float = size(
+        "rad/s^2",
+        _LEAST_LIMIT,
+        _NO_ACCELERATION_LIMIT,
+        least=_NO_ACCELERATION_LIMIT - _HIGHEST_ACCELERATION_LIMIT,
+        default=_NO_ACCELERATION_LIMIT,
+        neutral=_NO_ACCELERATION_LIMIT,
+        step=-0.02,
+    )
+    power_limit: float = size(
+        "rad^2/s^3",
+        _LEAST_LIMIT,
+        _NO_ACCELERATION_LIMIT,
+        least=_NO_ACCELERATION_LIMIT - _HIGHEST_ACCELERATION_LIMIT,
+        default=_NO_ACCELERATION_LIMIT,
+        neutral=_NO_ACCELERATION_LIMIT,
+        step=-0.01,
+    )
+
     def is_meaningful(self, extent: DriveExtent) -> bool:
-        """Whether a limit cuts at least 5 percent off what the drive would reach."""
-        slow = self.speed_limit <= _BINDING * extent.wheel_speed
-        slow = slow or self.turning_limit <= _BINDING * extent.turning
-        return slow or self.acceleration_limit <= _BINDING * extent.wheel_acceleration
+        """Whether a limit cuts at least 5 percent off what the drive would reach, or is less than full traction."""
+        reached = (extent.wheel_speed, extent.wheel_acceleration, extent.turning)
+        limits = (self.speed_limit, self.acceleration_limit, self.turning_limit)
+        weak = self.torque_limit <= extent.traction or self.power_limit <= extent.traction * extent.wheel_speed
+        return weak or any(limit <= _BINDING * most for limit, most in zip(limits, reached, strict=True))
 
     @classmethod
     def probes(cls, extent: DriveExtent) -> tuple[Effect, ...]:
@@ -106,7 +143,19 @@ class MotorSaturation(Effect):
         slow = [cls(limit) for limit in _below(extent.wheel_speed, _PROBED)]
         late = [cls(_NO_SPEED_LIMIT, limit) for limit in _below(extent.wheel_acceleration, _PROBED_ACCELERATION)]
         wide = [cls(_NO_SPEED_LIMIT, turning_limit=limit) for limit in _below(extent.turning, _PROBED)]
-        return (*slow, *late, *wide)
+        return (*slow, *late, *wide, *cls._weak(extent))
+
+    @classmethod
+    def _weak(cls, extent: DriveExtent) -> tuple[Effect, ...]:
+        """Limits of torque and power; none where the ground has no influence on the banks."""
+        if extent.traction == 0.0:
+            return ()
+        torques = _below(extent.traction, _PROBED_TORQUE)
+        powers = _below(extent.traction * extent.wheel_speed, _PROBED_POWER)
+        return (
+            *(cls(_NO_SPEED_LIMIT, torque_limit=limit) for limit in torques),
+            *(cls(_NO_SPEED_LIMIT, power_limit=limit) for limit in powers),
+        )
 
 
 def _below(reached: float, shares: tuple[float, ...]) -> list[float]:

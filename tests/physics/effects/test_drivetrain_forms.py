@@ -59,6 +59,33 @@ def test_a_limit_of_the_turning_matters_where_the_drive_turns_as_much():
     assert probed == pytest.approx([0.36, 0.24])
 
 
+@pytest.mark.parametrize(("form", "part", "most"), [("torque", "acceleration", 0.5), ("power", "power", 0.2)])
+def test_limits_of_torque_and_power_are_those_of_a_robots_drivetrain(robot, soil, form, part, most):
+    """Banks that the ground resists: the limit holds against its load."""
+    loop = {"integral_rate": 10.0, "load_compliance": 1.0 / 60.0}
+    loaded = replace(robot, drivetrain=Drivetrain(**loop))
+    effects = [f"motor_saturation=1000,{form}_limit={most}"]
+    limited = speeds(simulate(loaded, soil, TURNS, effects=effects, sensors=IDEAL))
+    np.testing.assert_array_equal(limited, robot_speeds(robot, soil, **loop, **{f"{part}_limit": most}))
+    assert np.abs(limited - speeds(simulate(loaded, soil, TURNS, sensors=IDEAL))).max() > 0.05
+
+
+def test_a_higher_limit_of_the_torque_leaves_the_robots_own(robot, soil):
+    own = replace(robot, drivetrain=Drivetrain(load_compliance=0.01, acceleration_limit=0.5))
+    limited = simulate(own, soil, TURNS, effects=["motor_saturation=1000,torque_limit=2"], sensors=IDEAL)
+    np.testing.assert_array_equal(speeds(limited), speeds(simulate(own, soil, TURNS, sensors=IDEAL)))
+
+
+def test_torque_and_power_are_probed_where_the_ground_resists_the_banks():
+    for traction, count in ((0.0, 0), (3.8, 3)):
+        probes = MotorSaturation.probes(DriveExtent(traction=traction))
+        for name in ("torque_limit", "power_limit"):
+            assert sum(getattr(probe, name) < 1e5 for probe in probes) == count
+    weak = MotorSaturation(1e3, torque_limit=1.0)
+    assert weak.is_meaningful(DriveExtent(traction=3.8))
+    assert not weak.is_meaningful(DriveExtent())
+
+
 @pytest.mark.parametrize("recovery", [0.5, 2.0])
 def test_without_load_recovery_is_the_integral_part_of_a_loop(drive, recovery):
     """A step of (k s + k_i)/(s^2 + k s + k_i) with k_i = k recovery."""
