@@ -121,9 +121,10 @@ def test_of_two_directions_the_one_that_shows_worst_counts() -> None:
 
 def test_of_two_ways_to_act_the_usual_one_counts() -> None:
     kind = effect_kind("motor_droop")
-    step = kind.parameter("droop").metadata["step"]
-    least = least_of(candidates_of(kind, EXTENT, 0), {0: 900.0, 1: 100.0})
-    assert least == {"droop": pytest.approx(reaching(step, 900.0))}
+    step, recovery = (kind.parameter(name).metadata["step"] for name in ("droop", "recovery"))
+    least = least_of(candidates_of(kind, EXTENT, 0), {0: 900.0, 1: 400.0, 2: 100.0})
+    expected = {"droop": reaching(step, 900.0), "recovery": reaching(recovery, 400.0)}
+    assert least == pytest.approx(expected)
 
 
 def test_a_size_that_cannot_exist_is_not_detectable() -> None:
