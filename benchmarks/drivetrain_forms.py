@@ -3,9 +3,9 @@
     python -m benchmarks.drivetrain_forms [--library NAME] [--seeds N] [--parts PART ...]
 
 Drives of robots with one part more than the simulator under diagnosis, each on a soil of its own
-(:mod:`benchmarks.drivetrain_form_drives`), are searched with the shipped gates up to the first
-name. Answers are kept under the name of the library that gave them, so that another checkout's can stand beside them:
-``before`` is the library without the form that the part's name has now. Half a minute to two minutes for each search. Writes
+(:mod:`benchmarks.drivetrain_form_drives`), are searched with the shipped gates up to the first name. Answers are kept
+under the name of the library that gave them, so that another checkout's can stand beside them: ``before`` is the
+library without the form that the part's name has now. Half a minute to two minutes for each search. Writes
 ``benchmarks/results/drivetrain_forms.json`` and ``.png``; a run goes on after the answers that the file holds.
 """
 
