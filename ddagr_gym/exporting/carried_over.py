@@ -213,7 +213,8 @@ def _limits(simulated: Simulated) -> dict[str, float]:
     for effect in simulated.effects:
         if effect.name == "motor_saturation":
             speed = min(speed, float(getattr(effect, "speed_limit")))  # noqa: B009
-            acceleration = min(acceleration, float(getattr(effect, "acceleration_limit")))  # noqa: B009
+            given = [float(getattr(effect, name)) for name in ("acceleration_limit", "torque_limit")]
+            acceleration = min(acceleration, *given)
     compliance = drivetrain.load_compliance
     return {
         "speed_limit": speed,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from pathlib import Path
+from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -14,12 +15,15 @@ import ddagr_gym
 from ddagr_gym.cli import main
 from ddagr_gym.config import load_config
 from ddagr_gym.errors import InputError
-from ddagr_gym.exporting.carried_over import first_order
+from ddagr_gym.exporting.carried_over import _limits, first_order
 from ddagr_gym.exporting.friction import friction_of_turn, sliding_forces
 from ddagr_gym.exporting.gazebo_model import NAMESPACE
 from ddagr_gym.exporting.mujoco_model import mujoco_model
 from ddagr_gym.exporting.randomisation import RandomisationFile
+from ddagr_gym.parameters import Drivetrain
 from ddagr_gym.physics.effects import load_effects, save_effects
+from ddagr_gym.physics.effects.motor_saturation import MotorSaturation
+from ddagr_gym.presets import get_robot
 
 EFFECTS = (
     "gyro_scale=1.05", "command_delay=0.1", "motor_lag=0.1", "imu_tilt=0.05,pitch=-0.03",
@@ -211,3 +215,15 @@ def test_bad_input_is_one_sentence(diagnosis, tmp_path, capsys, words, said):
 def test_a_folder_without_an_answer(tmp_path):
     with pytest.raises(InputError, match="holds neither diagnosis"):
         ddagr_gym.export(tmp_path, "gazebo")
+
+
+def test_limits_are_the_lowest_of_robot_and_effect():
+    robot = dataclasses.replace(get_robot("ddagr"), drivetrain=Drivetrain(load_compliance=0.02, acceleration_limit=3.0))
+    for effect, expected in (
+        (MotorSaturation(0.9, torque_limit=0.5), (0.9, 0.5)),
+        (MotorSaturation(1e3, 2.0), (robot.maximum_wheel_speed, 2.0)),
+        (MotorSaturation(1e3, turning_limit=0.3), (robot.maximum_wheel_speed, 3.0)),
+    ):
+        found = _limits(SimpleNamespace(robot=robot, effects=(effect,)))
+        assert (found["speed_limit"], found["acceleration_limit"]) == expected
+        assert found["bank_inertia"] == pytest.approx(50.0)
