@@ -116,8 +116,8 @@ def test_prose_modules_are_there() -> None:
 
 
 def test_everything_that_a_diagnosis_computes_with_counts() -> None:
-    """Whatever its packages import of this one, but for files, settings and messages."""
-    names = {"errors", "extras", "files", "config", "presets", "validated", "version"}
+    """Whatever its packages import of this one, but for files, settings, messages and where results are kept."""
+    names = {"errors", "extras", "files", "config", "presets", "validated", "version", "tasks"}
     counted = {*module._FOLDERS, *(name.removesuffix(".py") for name in module._FILES), *names}
     imported = {
         name.split(".")[1]

@@ -76,7 +76,7 @@ def test_a_search_goes_on_behind_its_last_step(
         done.append("nominal")
         return scanned
 
-    def add(session: object, raw: object, models: list[ScannedModel], steps: object) -> Any:
+    def add(session: object, raw: object, models: list[ScannedModel], steps: object, known: object) -> Any:
         done.append(f"after {models[-1].names}")
         if not models[-1].names:
             return chosen, (Rival("slope", sloping.chosen, 9.0),)
