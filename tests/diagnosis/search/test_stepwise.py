@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 
 from ddagr_gym.diagnosis.gates.thresholds import Gate, Thresholds
+from ddagr_gym.diagnosis.mid_drive import again
 from ddagr_gym.diagnosis.search import rivals
 from ddagr_gym.diagnosis.search import starting_models as starts
 from ddagr_gym.diagnosis.search import stepwise as module
 from ddagr_gym.diagnosis.search.gains import Gain, gains
 from ddagr_gym.diagnosis.search.initial_guess import nuisance_answer
 from ddagr_gym.diagnosis.search.scan import scan
-from ddagr_gym.diagnosis.search.scanned_model import Rival, ScannedModel
+from ddagr_gym.diagnosis.search.scanned_model import Rival, ScannedModel, SearchResult
 from ddagr_gym.diagnosis.search.starting_models import StartingModels, starting_models
 from ddagr_gym.diagnosis.search.stepwise import search
 from ddagr_gym.diagnosis.setting import SHORT
@@ -25,6 +26,7 @@ from ddagr_gym.errors import InputError
 from ddagr_gym.identification.effect_parameters import effect_columns, effect_parameters
 from ddagr_gym.identification.gauss_newton import Fitted, cost_of, fit
 from ddagr_gym.identification.problem import Point, Problem
+from ddagr_gym.identification.spells import Spell
 from ddagr_gym.physics.effects.registry import effect_kind, parse_effect
 from ddagr_gym.recordings.schema import Recording
 from tests.diagnosis.conftest import Sloping, session_of
@@ -63,6 +65,39 @@ def test_a_guess_that_is_far_too_large_is_damped(sloping: Sloping, scanned: Scan
     guessed = rivals._damped_guess(sloping.problem, scanned, gain, scanned.terms, sloping.nominal)
     assert point.effects[0].angle < 2.0 * guessed.effects[0].angle
     assert cost_at(sloping, point) < sloping.nominal.cost
+
+
+def test_a_refit_that_is_known_is_not_made_again(
+    sloping: Sloping, scanned: ScannedModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refitted(*inputs: object) -> Fitted:
+        raise AssertionError("a refit")
+
+    known = Rival("slope", sloping.chosen, 50.0)
+    monkeypatch.setattr(rivals, "_trial", refitted)
+    monkeypatch.setattr(rivals, "_finish", refitted)
+    found = rivals.rivals_of(sloping.problem, scanned, sloping.nominal, THRESHOLDS, 4, {"slope": known})
+    assert found == [known]
+    with pytest.raises(AssertionError, match="a refit"):
+        rivals.rivals_of(sloping.problem, scanned, sloping.nominal, THRESHOLDS, 4)
+
+
+def test_refits_of_effects_in_a_part_of_the_drive_are_made_anew(
+    sloping: Sloping, scanned: ScannedModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    given: list[set[str]] = []
+
+    def searched(session: object, start: object, *, known: dict[str, Rival]) -> SearchResult:
+        given.append(set(known))
+        return found
+
+    first = (Rival("slope", sloping.chosen, 50.0), Rival("gyro_scale", sloping.chosen, 40.0))
+    found = SearchResult((scanned, replace(scanned, fitted=sloping.chosen)), (first,))
+    monkeypatch.setattr(again, "search", searched)
+    monkeypatch.setattr(again, "spells_of", lambda problem, fitted, progress: {"slope": Spell(0, 5.0)})
+    session = session_of(sloping.problem, sloping.recordings, THRESHOLDS)
+    again.search_in_parts(session, StartingModels(session, sloping.nominal, sloping.nominal), found)
+    assert given == [{"gyro_scale"}]
 
 
 def test_a_search_goes_on_behind_its_last_step(
