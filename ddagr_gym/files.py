@@ -69,6 +69,22 @@ def read_text(path: str | os.PathLike[str], maximum: int, refusal: Callable[[str
         raise refusal(f"it is not UTF-8 text, at byte {error.start}") from None
 
 
+def read_named_text(path: Path, maximum: int, remedy: str) -> str:
+    """Text of a file that its user named.
+
+    Args:
+        path: of a regular file.
+        maximum: of its size [bytes].
+        remedy: what the error says to do.
+
+    Raises:
+        InputError: no file, or one that :func:`read_text` refuses.
+    """
+    if not path.exists():
+        raise InputError(f"{path} does not exist: {remedy}.")
+    return read_text(path, maximum, lambda reason: InputError(f"{path} cannot be read ({reason}): {remedy}."))
+
+
 def read_bytes(path: str | os.PathLike[str], maximum: int, refusal: Callable[[str], InputError]) -> bytes:
     """Bytes of a regular file; arguments and errors are those of :func:`read_text`."""
     with _regular_file(path, maximum, refusal) as file:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.errors import InputError, unknown_name
-from ddagr_gym.files import read_text
+from ddagr_gym.files import read_named_text
 
 LARGEST_SPEED = 100.0
 """Commands beyond this are a mistake of units [rad/s]."""
@@ -174,8 +174,9 @@ def read_manoeuvre(path: Path) -> Manoeuvre:
         InputError: absent file, a pipe or a device, one beyond :data:`LARGEST_FILE`, missing column, or values that are
             not numbers in increasing time.
     """
+    text = read_named_text(path, LARGEST_FILE, f"give a CSV with columns {', '.join(COLUMNS)}")
     try:
-        rows = list(csv.DictReader(io.StringIO(_text(path))))
+        rows = list(csv.DictReader(io.StringIO(text)))
     except csv.Error as error:
         raise InputError(f"{path} is not a CSV file: {error}.") from None
     missing = [name for name in COLUMNS if not rows or name not in rows[0]]
@@ -186,13 +187,6 @@ def read_manoeuvre(path: Path) -> Manoeuvre:
     except (TypeError, ValueError) as error:
         raise InputError(f"{path} holds a value that is no number: {error}.") from None
     return _from_table(path, table)
-
-
-def _text(path: Path) -> str:
-    remedy = f"give a CSV with columns {', '.join(COLUMNS)}"
-    if not path.exists():
-        raise InputError(f"{path} does not exist: {remedy}.")
-    return read_text(path, LARGEST_FILE, lambda reason: InputError(f"{path} cannot be read ({reason}): {remedy}."))
 
 
 def _from_table(path: Path, table: NDArray[np.float64]) -> Manoeuvre:

@@ -81,18 +81,18 @@ def delay_commands(row: Array) -> None:
 
 
 @kernel(inline=True)
-def _limit_turning(row: Array) -> None:
-    """Bring the banks' commands closer to their mean where they differ by more than the robot carries out."""
-    mean = 0.5 * (row[COMMAND] + row[COMMAND + 1])
-    turning = min(max(row[COMMAND] - mean, -row[TURNING_LIMIT]), row[TURNING_LIMIT])
-    row[COMMAND], row[COMMAND + 1] = mean + turning, mean - turning
+def limit_turning(row: Array, right: int, limit: float) -> None:
+    """Bring the entries of both banks, from ``right`` on, to at most ``limit`` [rad/s] from their mean, which stays."""
+    mean = 0.5 * (row[right] + row[right + 1])
+    turning = min(max(row[right] - mean, -limit), limit)
+    row[right], row[right + 1] = mean + turning, mean - turning
 
 
 @kernel()
 def set_targets(row: Array) -> None:
     """Set points of the coming sample from the commands, and the drivetrain as the robot has it."""
     if row[TURNING_LIMIT] < NO_SPEED_LIMIT:
-        _limit_turning(row)
+        limit_turning(row, COMMAND, row[TURNING_LIMIT])
     for bank in range(2):
         limit = row[MAXIMUM_WHEEL_SPEED]
         row[COMMAND + bank] = min(max(row[COMMAND + bank], -limit), limit)

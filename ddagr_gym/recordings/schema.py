@@ -258,10 +258,20 @@ def split_at_gaps(t: FloatArray, spans: Ranges) -> Ranges:
     steps = np.concatenate([np.diff(t[a:b]) for a, b in spans] or [np.empty(0)])
     if not steps.size:
         return spans
-    limit = GAP_IN_PERIODS * float(np.median(steps))
+    return cut_at_gaps(t, spans, GAP_IN_PERIODS * float(np.median(steps)))
+
+
+def cut_at_gaps(t: FloatArray, spans: Ranges, longest: float) -> Ranges:
+    """Cut spans wherever more than ``longest`` [s] lies between rows.
+
+    Args:
+        t: time [s], (n,), increasing inside spans.
+        spans: index ranges.
+        longest: time between rows that is no gap [s].
+    """
     ranges: list[tuple[int, int]] = []
     for start, stop in spans:
-        cuts = start + 1 + np.flatnonzero(np.diff(t[start:stop]) > limit)
+        cuts = start + 1 + np.flatnonzero(np.diff(t[start:stop]) > longest)
         edges = [start, *cuts.tolist(), stop]
         ranges.extend(itertools.pairwise(edges))
     return tuple(ranges)

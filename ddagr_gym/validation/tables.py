@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.errors import InputError
-from ddagr_gym.files import read_text
+from ddagr_gym.files import read_named_text
 
 LARGEST = 500_000_000
 """Size of a table that is read, at most [bytes] (ours)."""
@@ -34,7 +34,7 @@ def read_columns(
             number.
     """
     file = Path(path)
-    reader = csv.DictReader(io.StringIO(_text(file)))
+    reader = csv.DictReader(io.StringIO(read_named_text(file, LARGEST, "give the folder of the reference data")))
     try:
         missing = [name for name in (*numbers, *texts) if name not in (reader.fieldnames or ())]
         rows = [] if missing else list(reader)
@@ -46,13 +46,6 @@ def read_columns(
         raise InputError(f"{file} has no rows: {_OTHER}.")
     values = {name: np.array([_number(file, i, name, row[name]) for i, row in enumerate(rows)]) for name in numbers}
     return values, {name: [row[name] for row in rows] for name in texts}
-
-
-def _text(file: Path) -> str:
-    remedy = "give the folder of the reference data"
-    if not file.exists():
-        raise InputError(f"{file} does not exist: {remedy}.")
-    return read_text(file, LARGEST, lambda reason: InputError(f"{file} cannot be read ({reason}): {remedy}."))
 
 
 def _number(file: Path, index: int, name: str, text: str | None) -> float:

@@ -1,8 +1,9 @@
 """Motors that cannot turn, or cannot speed up, as fast as they are told, and banks that may not differ as much."""
 
 from dataclasses import dataclass
+from typing import Any
 
-from ddagr_gym.jit import kernel
+from ddagr_gym.physics.drivetrain import limit_turning
 from ddagr_gym.physics.effects.base import DriveExtent, Effect, Vector, size
 from ddagr_gym.physics.layout import (
     ACCELERATION_LIMIT,
@@ -21,30 +22,15 @@ _HIGHEST_ACCELERATION_LIMIT = 200.0  # [rad/s^2], the same
 _LEAST_LIMIT = 0.01  # [rad/s], [rad/s^2], [rad^2/s^3]
 _BINDING = 0.95  # of what the drive reaches: limits above it cost less than 5 percent
 _PROBED = (0.9, 0.6)  # shares of the fastest that limits are tried at, ours: just binding, and cutting deep
-_PROBED_ACCELERATION = (
-    0.9,
-    0.6,
-    0.3,
-)  # the greatest is that of a lag's first instant
-
-
+_PROBED_ACCELERATION = (0.9, 0.6, 0.3)  # the greatest is that of a lag's first instant
 _PROBED_TORQUE = (0.3, 0.15, 0.08)  # shares of full traction, ours: a turn on the spot takes a fifth on soft soil
 _PROBED_POWER = (0.2, 0.1, 0.05)  # shares of full traction at the fastest, ours
 
 
-@kernel(inline=True)
-def _limit_turning(row: Vector, limit: float) -> None:
-    """Bring the speeds that the banks aim at to ``limit`` [rad/s] from their mean, which stays."""
-    mean = 0.5 * (row[MOTOR_TARGET] + row[MOTOR_TARGET + 1])
-    turning = row[MOTOR_TARGET] - mean
-    if abs(turning) > limit:
-        turning = limit if turning > 0.0 else -limit
-        row[MOTOR_TARGET], row[MOTOR_TARGET + 1] = mean + turning, mean - turning
-
-
 def limit_motors(row: Vector, parameters: Vector, memory: Vector) -> None:
     """Clip how the banks' aims differ, the speed that each aims at, the rate of its approach, and what motors give."""
-    _limit_turning(row, parameters[2])
+    if abs(row[MOTOR_TARGET] - row[MOTOR_TARGET + 1]) > 2.0 * parameters[2]:
+        limit_turning(row, MOTOR_TARGET, parameters[2])
     row[DRIVETRAIN + ACCELERATION_LIMIT] = min(row[DRIVETRAIN + ACCELERATION_LIMIT], parameters[3])
     row[DRIVETRAIN + POWER_LIMIT] = min(row[DRIVETRAIN + POWER_LIMIT], parameters[4])
     for bank in range(2):
@@ -53,6 +39,20 @@ def limit_motors(row: Vector, parameters: Vector, memory: Vector) -> None:
         if abs(target - row[OMEGA + bank]) > reach:
             target = row[OMEGA + bank] + (reach if target > row[OMEGA + bank] else -reach)
         row[MOTOR_TARGET + bank] = target
+
+
+def _limit(unit: str, none: float, highest: float, *, step: float, required: bool = False) -> Any:
+    """Field of a limit.
+
+    Args:
+        unit: SI.
+        none: limit that nothing reaches, which is neutral.
+        highest: that any of the preset robots would meet.
+        step: for finite differences.
+        required: whether it must be given.
+    """
+    default = None if required else none
+    return size(unit, _LEAST_LIMIT, none, least=none - highest, default=default, neutral=none, step=step)
 
 
 @dataclass(frozen=True)
@@ -84,51 +84,11 @@ class MotorSaturation(Effect):
     differentiable = False
     actions = ((POINT_MOTORS, limit_motors),)
 
-    speed_limit: float = size(
-        "rad/s",
-        _LEAST_LIMIT,
-        _NO_SPEED_LIMIT,
-        least=_NO_SPEED_LIMIT - _HIGHEST_SPEED_LIMIT,
-        neutral=_NO_SPEED_LIMIT,
-        step=-0.02,
-    )
-    acceleration_limit: float = size(
-        "rad/s^2",
-        _LEAST_LIMIT,
-        _NO_ACCELERATION_LIMIT,
-        least=_NO_ACCELERATION_LIMIT - _HIGHEST_ACCELERATION_LIMIT,
-        default=_NO_ACCELERATION_LIMIT,
-        neutral=_NO_ACCELERATION_LIMIT,
-        step=-0.05,
-    )
-    turning_limit: float = size(
-        "rad/s",
-        _LEAST_LIMIT,
-        _NO_SPEED_LIMIT,
-        least=_NO_SPEED_LIMIT - _HIGHEST_SPEED_LIMIT,
-        default=_NO_SPEED_LIMIT,
-        neutral=_NO_SPEED_LIMIT,
-        step=-0.02,
-    )
-
-    torque_limit: float = size(
-        "rad/s^2",
-        _LEAST_LIMIT,
-        _NO_ACCELERATION_LIMIT,
-        least=_NO_ACCELERATION_LIMIT - _HIGHEST_ACCELERATION_LIMIT,
-        default=_NO_ACCELERATION_LIMIT,
-        neutral=_NO_ACCELERATION_LIMIT,
-        step=-0.02,
-    )
-    power_limit: float = size(
-        "rad^2/s^3",
-        _LEAST_LIMIT,
-        _NO_ACCELERATION_LIMIT,
-        least=_NO_ACCELERATION_LIMIT - _HIGHEST_ACCELERATION_LIMIT,
-        default=_NO_ACCELERATION_LIMIT,
-        neutral=_NO_ACCELERATION_LIMIT,
-        step=-0.01,
-    )
+    speed_limit: float = _limit("rad/s", _NO_SPEED_LIMIT, _HIGHEST_SPEED_LIMIT, step=-0.02, required=True)
+    acceleration_limit: float = _limit("rad/s^2", _NO_ACCELERATION_LIMIT, _HIGHEST_ACCELERATION_LIMIT, step=-0.05)
+    turning_limit: float = _limit("rad/s", _NO_SPEED_LIMIT, _HIGHEST_SPEED_LIMIT, step=-0.02)
+    torque_limit: float = _limit("rad/s^2", _NO_ACCELERATION_LIMIT, _HIGHEST_ACCELERATION_LIMIT, step=-0.02)
+    power_limit: float = _limit("rad^2/s^3", _NO_ACCELERATION_LIMIT, _HIGHEST_ACCELERATION_LIMIT, step=-0.01)
 
     def is_meaningful(self, extent: DriveExtent) -> bool:
         """Whether a limit cuts at least 5 percent off what the drive would reach, or is less than full traction."""

@@ -8,7 +8,6 @@ specific force (f_x = dv/dt). Clocks are matched by the offsets of :mod:`.clock_
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -17,7 +16,8 @@ import numpy as np
 from ddagr_gym.recordings.checks.blocks import cut_blocks
 from ddagr_gym.recordings.checks.clock_offsets import ENCODER, POSE, RESPONSE, Offset, known_lag, unwrapped_heading
 from ddagr_gym.recordings.checks.signals import filled, integral, wrap
-from ddagr_gym.recordings.schema import FloatArray, Recording
+from ddagr_gym.recordings.checks.timing import LONGEST_HOLE
+from ddagr_gym.recordings.schema import FloatArray, Recording, cut_at_gaps
 
 STEP = 0.75
 """Half a window [s] (ours): three periods of encoders at 4 Hz, and less than half a turn at 4 rad/s."""
@@ -26,8 +26,6 @@ LEAST_TRAVEL = 0.15
 good lidar pose."""
 LARGEST_TURN = 2.0
 """Change of the travel's direction within half a window beyond which it may be a reversal [rad] (ours)."""
-LONGEST_HOLE = 2.5
-"""Periods between rows beyond which they are a gap, if it is longer than half a window (ours, as in :mod:`.timing`)."""
 
 GYRO, HEADING, COURSE, ENCODERS, COMMANDS, FORCE = "gyro", "heading", "course", "encoders", "commands", "force"
 POSITION = "position"
@@ -99,7 +97,7 @@ def _rolled(recording: Recording, sample: _Sampler, late: Mapping[str, float]) -
 
 
 def stretches(recording: Recording) -> tuple[slice, ...]:
-    """Rows of the spans between gaps: what happens inside a gap no window can tell.
+    """Rows of the spans between gaps longer than half a window: what happens inside a gap no window can tell.
 
     Args:
         recording: any.
@@ -107,13 +105,9 @@ def stretches(recording: Recording) -> tuple[slice, ...]:
     Returns:
         Slices in the order of time, each inside a span.
     """
-    found: list[slice] = []
+    spans = tuple((span.start, span.stop) for span in recording.spans())
     longest = max(STEP, LONGEST_HOLE * recording.period)
-    for span in recording.spans():
-        cuts = span.start + 1 + np.flatnonzero(np.diff(recording.t[span]) > longest)
-        edges = itertools.pairwise([span.start, *cuts.tolist(), span.stop])
-        found.extend(slice(first, end) for first, end in edges)
-    return tuple(found)
+    return tuple(slice(first, end) for first, end in cut_at_gaps(recording.t, spans, longest))
 
 
 def _instants(recording: Recording, pieces: tuple[slice, ...]) -> FloatArray:

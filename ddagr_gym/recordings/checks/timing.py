@@ -13,12 +13,15 @@ from ddagr_gym.recordings.schema import BoolArray, FloatArray, Recording
 
 CHECK = "timing"
 
+LONGEST_HOLE = 2.5
+"""Periods between rows beyond which they are a gap (ours)."""
+
 JITTER = Question(CHECK, (0.0, 0.3), "-", "Use the sensor's own stamps instead of the logger's.")
 """95 % quantile of |time step - median| over the median [-]."""
 GAP = Question(
     CHECK, (0.0, 0.02), "-", "Look for a logger that lost messages; segments around the gaps are used apart."
 )
-"""Share of the spans' time that gaps of more than 2.5 periods take [-]."""
+"""Share of the spans' time that gaps of more than :data:`LONGEST_HOLE` periods take [-]."""
 DUPLICATE = Question(CHECK, (0.0, 0.001), "-", "Look for rows that were logged twice.")
 """Share of rows whose time repeats the row before [-]."""
 HOLD = Question(
@@ -47,7 +50,7 @@ def _row_findings(recording: Recording) -> list[CheckFinding]:
     period = float(np.median(steps))
     jitter = float(np.quantile(np.abs(steps - period), 0.95)) / period
     across = np.concatenate([np.diff(recording.t[s]) for s in recording.spans()])
-    lost = float(np.sum(across[across > 2.5 * period] - period) / np.sum(across))
+    lost = float(np.sum(across[across > LONGEST_HOLE * period] - period) / np.sum(across))
     count = recording.meta.duplicates_dropped
     duplicates = count / (count + len(recording))
     return [
