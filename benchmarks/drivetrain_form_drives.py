@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ddagr_gym.identification.fitted_values import with_values
 from ddagr_gym.parameters import Drivetrain, Imu, PoseReceiver, Robot, Sensors, Soil, WheelEncoder
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.schema import Recording
@@ -59,15 +59,8 @@ def robot_with(parts: Mapping[str, float]) -> Robot:
 
 def true_soil(rng: np.random.Generator) -> Soil:
     """A soil beside the nominal one."""
-    soil = get_soil(SOIL)
-    strength, stiffness = math.exp(rng.normal(0.0, STRENGTH_SPREAD)), math.exp(rng.normal(0.0, STIFFNESS_SPREAD))
-    return replace(
-        soil,
-        cohesion=soil.cohesion * strength,
-        friction_angle=math.atan(math.tan(soil.friction_angle) * strength),
-        cohesive_modulus=soil.cohesive_modulus * stiffness,
-        frictional_modulus=soil.frictional_modulus * stiffness,
-    )
+    away = {"soil_strength": rng.normal(0.0, STRENGTH_SPREAD), "soil_stiffness": rng.normal(0.0, STIFFNESS_SPREAD)}
+    return with_values(get_robot(ROBOT), get_soil(SOIL), away)[1]
 
 
 def commands(rng: np.random.Generator) -> Array:

@@ -1,10 +1,10 @@
 """Which names and forms a diagnosis gives to parts of a drivetrain that its simulator lacks.
 
-    python -m benchmarks.drivetrain_forms [--library NAME] [--seeds N] [--parts PART ...]
+    python -m benchmarks.drivetrain_forms [--version NAME] [--seeds N] [--parts PART ...]
 
 Drives of robots with one part more than the simulator under diagnosis, each on a soil of its own
 (:mod:`benchmarks.drivetrain_form_drives`), are searched with the shipped gates up to the first name. Answers are kept
-under the name of the library that gave them, so that another checkout's can stand beside them: ``before`` is the
+under the version of the library that gave them, so that another checkout's can stand beside them: ``before`` is the
 library without the form that the part's name has now. Half a minute to two minutes for each search. Writes
 ``benchmarks/results/drivetrain_forms.json`` and ``.png``; a run goes on after the answers that the file holds.
 """
@@ -40,7 +40,8 @@ RESULT = Path(__file__).resolve().parent / "results" / "drivetrain_forms.json"
 SEEDS = 1
 WINDOW = 6.0
 """Length of the windows of the shipped gates [s]."""
-LIBRARIES = ("before", "after")
+VERSIONS = ("before", "after")
+"""Of the library: without the forms that parts of a drivetrain have now, and with them."""
 COLOURS = (palette.GREY, palette.BLUE)
 
 
@@ -106,7 +107,7 @@ def draw(summary: dict[str, Any], path: Path) -> None:
 def main(words: list[str] | None = None) -> None:
     """Command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--library", choices=LIBRARIES, default="after", help="whose answers these are")
+    parser.add_argument("--version", choices=VERSIONS, default="after", help="whose answers these are")
     parser.add_argument("--seeds", type=int, default=SEEDS)
     parser.add_argument("--parts", nargs="+", choices=list(PARTS), default=list(PARTS))
     parser.add_argument("--output", type=Path, default=RESULT)
@@ -115,7 +116,7 @@ def main(words: list[str] | None = None) -> None:
     gates = shipped_thresholds(ROBOT)
     if gates is None:
         raise RuntimeError(f"the package ships no gates for {ROBOT}")
-    own = answers.setdefault(given.library, {})
+    own = answers.setdefault(given.version, {})
     for name in given.parts:
         for seed in (str(seed) for seed in range(given.seeds)):
             if seed in own.setdefault(name, {}):

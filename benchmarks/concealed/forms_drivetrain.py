@@ -6,6 +6,8 @@ a corner, limits of the turning, loops that yield to the ground for a while, lim
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from .change import Array, Change, Rng, Site, form, with_motors
@@ -21,14 +23,14 @@ FOLDED_AT = 1.2
 """Speed at which a current that folds back has fallen to half [rad/s]."""
 
 
-def _mean_and_half(commands: Array) -> tuple[Array, Array]:
-    """Mean of the banks and what the right one is above it, (n,) each [rad/s]."""
-    return commands.mean(axis=1), 0.5 * (commands[:, 0] - commands[:, 1])
+def _of_turning(passed: Callable[[Array], Array]) -> Callable[[Array, Rng], Array]:
+    """Commands whose mean over the banks stays, and whose half difference (n,) becomes what ``passed`` makes of it."""
 
+    def command(commands: Array, r: Rng) -> Array:
+        mean, half = commands.mean(axis=1), passed(0.5 * (commands[:, 0] - commands[:, 1]))
+        return np.column_stack([mean + half, mean - half])
 
-def _banks(mean: Array, half: Array) -> Array:
-    """Commands (n, 2) right, left [rad/s]."""
-    return np.column_stack([mean + half, mean - half])
+    return command
 
 
 def _of_the_robot(plant: Plant, value: float) -> float:
@@ -111,16 +113,15 @@ def s_shaped_ramp(size: float, rng: Rng, site: Site) -> Change:
 def lag_in_turning(size: float, rng: Rng, site: Site) -> Change:
     """A drive controller that lets the robot turn later than it lets it go."""
 
-    def command(commands: Array, r: Rng) -> Array:
-        mean, half = _mean_and_half(commands)
+    def passed(half: Array) -> Array:
         slow, share = np.empty_like(half), STEP / (size + STEP)
         value = 0.0
         for k, wanted in enumerate(half):
             value += share * (wanted - value)
             slow[k] = value
-        return _banks(mean, slow)
+        return slow
 
-    return Change({"lag_of_turning": size}, command=command)
+    return Change({"lag_of_turning": size}, command=_of_turning(passed))
 
 
 @form(
@@ -179,12 +180,7 @@ def folding_current(size: float, rng: Rng, site: Site) -> Change:
 def turning_limit(size: float, rng: Rng, site: Site) -> Change:
     """A drive controller that bounds the yaw rate."""
     limit = 0.6 * (1.0 - size)
-
-    def command(commands: Array, r: Rng) -> Array:
-        mean, half = _mean_and_half(commands)
-        return _banks(mean, np.clip(half, -limit, limit))
-
-    return Change({"turning_limit": limit}, command=command)
+    return Change({"turning_limit": limit}, command=_of_turning(lambda half: np.clip(half, -limit, limit)))
 
 
 @form(
@@ -193,9 +189,5 @@ def turning_limit(size: float, rng: Rng, site: Site) -> Change:
 )  # fmt: skip
 def turning_deadband(size: float, rng: Rng, site: Site) -> Change:
     """A drive controller that overlooks small turns."""
-
-    def command(commands: Array, r: Rng) -> Array:
-        mean, half = _mean_and_half(commands)
-        return _banks(mean, np.where(np.abs(half) < size, 0.0, half))
-
+    command = _of_turning(lambda half: np.where(np.abs(half) < size, 0.0, half))
     return Change({"turning_deadband": size}, command=command)
