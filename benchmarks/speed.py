@@ -23,8 +23,9 @@ import numpy as np
 
 from benchmarks.speeds import accuracy, environments, kernel_share, kernel_time, memory, peers, workloads
 from benchmarks.speeds.figure import speed_figure
+from benchmarks.speeds.free_cores import turns_beside_control
 from benchmarks.speeds.tables import tables_of
-from benchmarks.speeds.timing import Contestant, race, ratio
+from benchmarks.speeds.timing import Contestant, race, ratio, spread
 from ddagr_gym.commands.output import make_folder, write_text
 from ddagr_gym.errors import InputError
 from ddagr_gym.version import __version__
@@ -163,16 +164,28 @@ def batch(actions: np.ndarray, effort: Effort) -> list[dict[str, Any]]:
 
 
 def two_threads(tables: dict[str, np.ndarray], effort: Effort) -> list[dict[str, Any]]:
-    """Rate of two threads over that of one, by the wall clock, in stepping alone: resets are of one thread."""
+    """Rate of two threads over that of one, by the wall clock, in stepping alone: resets are of one thread.
+
+    Turns count while two threads that share nothing have two cores to themselves, see :mod:`.free_cores`.
+    """
     found = []
     for workload, actions in tables.items():
         for count in effort.shared_batches:
             steps = max(2, min(FIRST_STEPS, 2 * effort.steps // count))
-            both = [environments.between_resets(f"{n}", actions, steps, count, n) for n in (1, 2)]
-            rates = race(both, effort.repeats)
-            gain = ratio(rates, "2", "1", clock="wall")
-            got = rates["2"].summary()["cpu_over_wall"]
-            found.append({"workload": workload, "environments": count, "gain": gain, "cores_got": got})
+            one, two = (environments.between_resets(f"{n}", actions, steps, count, n) for n in (1, 2))
+            turns = turns_beside_control(one, two, effort.repeats, 6 * effort.repeats)
+            free = turns["gain"][turns["free"]]
+            found.append(
+                {
+                    "workload": workload,
+                    "environments": count,
+                    "gain": spread(free) if free.size else None,
+                    "turns": int(free.size),
+                    "gain_of_all_turns": spread(turns["gain"]),
+                    "all_turns": int(turns["gain"].size),
+                    "second_core": spread(turns["second_core"]),
+                }
+            )
     return found
 
 

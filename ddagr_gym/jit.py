@@ -214,20 +214,84 @@ def stack_array(typing_context: Any, size: Any) -> Any:
 
 
 @intrinsic
-def claim(typing_context: Any, claims: Any, index: Any) -> Any:
-    """Whether this thread is the first to ask for ``index``: sets ``claims[index]`` to 1 atomically.
+def borrowed(typing_context: Any, value: Any) -> Any:
+    """The same array, or tuple with arrays in it, whose users are not counted; it must outlive the call.
+
+    Every view of an array counts one user more, and one less when it ends. Threads that share an array would wait for
+    each other at every count.
+    """
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return _uncounted(context, builder, value, arguments[0])
+
+    return value(value), generate
+
+
+def _uncounted(context: Any, builder: Any, kind: Any, value: Any) -> Any:
+    if isinstance(kind, types.BaseTuple):
+        kinds: Any = kind  # iterable, which numba's annotations do not say
+        items = [_uncounted(context, builder, k, builder.extract_value(value, i)) for i, k in enumerate(kinds)]
+        return context.make_tuple(builder, kind, items)
+    if not isinstance(kind, types.Array):
+        return value
+    array = context.make_array(kind)(context, builder, value)
+    array.meminfo = cgutils.get_null_value(array.meminfo.type)
+    array.parent = cgutils.get_null_value(array.parent.type)
+    return array._getvalue()
+
+
+@intrinsic
+def claim(typing_context: Any, claims: Any, index: Any, turn: Any) -> Any:
+    """Whether this thread is the first to ask for ``index`` in this turn: raises ``claims[index]`` to it, atomically.
+
+    One that is late, and asks for a turn that has been and gone, gets nothing.
 
     Args:
-        claims: (N,) int64, contiguous, 0 where nobody has asked.
+        claims: (N,) int64, contiguous: the last turn in which somebody asked.
         index: from 0 to N - 1, unchecked.
+        turn: int64, higher than all before.
     """
-    if claims != types.Array(types.int64, 1, "C") or not isinstance(index, types.Integer):
+    if claims != _COUNTS or not isinstance(index, types.Integer) or turn != types.int64:
         return None
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        array = context.make_array(claims)(context, builder, arguments[0])
-        place = builder.gep(array.data, [arguments[1]])
-        before = builder.atomic_rmw("xchg", place, ir.Constant(ir.IntType(64), 1), "acq_rel")
-        return builder.icmp_signed("==", before, ir.Constant(ir.IntType(64), 0))
+        place = _place(context, builder, arguments[0], arguments[1])
+        before = builder.atomic_rmw("max", place, arguments[2], "acq_rel")
+        return builder.icmp_signed("<", before, arguments[2])
 
-    return types.boolean(claims, index), generate
+    return types.boolean(claims, index, turn), generate
+
+
+@intrinsic
+def count_up(typing_context: Any, counts: Any) -> Any:
+    """Add 1 to ``counts[0]`` atomically: whoever reads it by :func:`count_of` sees all that was written before."""
+    if counts != _COUNTS:
+        return None
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        place = _place(context, builder, arguments[0], ir.Constant(ir.IntType(64), 0))
+        builder.atomic_rmw("add", place, ir.Constant(ir.IntType(64), 1), "acq_rel")
+        return context.get_dummy_value()
+
+    return types.void(counts), generate
+
+
+@intrinsic
+def count_of(typing_context: Any, counts: Any) -> Any:
+    """``counts[0]``, as the other threads have left it by now."""
+    if counts != _COUNTS:
+        return None
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        place = _place(context, builder, arguments[0], ir.Constant(ir.IntType(64), 0))
+        return builder.load_atomic(place, "acquire", 8)
+
+    return types.int64(counts), generate
+
+
+_COUNTS = types.Array(types.int64, 1, "C")
+
+
+def _place(context: Any, builder: Any, array: Any, index: Any) -> Any:
+    """Pointer to an entry of one that is of type ``_COUNTS``."""
+    return builder.gep(context.make_array(_COUNTS)(context, builder, array).data, [index])

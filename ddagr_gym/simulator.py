@@ -1,14 +1,12 @@
 """The simulator: functions of (state, command, noise, parameters) over a batch of environments.
 
 The environment, the command line, replay, diagnosis and the tests all run :class:`Simulator`; a single robot is a
-batch of one, so that single and vectorised runs agree to the bit. Its threads are no tasks of
-:mod:`ddagr_gym.tasks`: they share the rows of one batch at every call, and compiled steps do not hold Python's lock.
+batch of one, so that single and vectorised runs agree to the bit.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -22,9 +20,12 @@ from ddagr_gym.physics.effects import Effect, effect_table, load_effects
 from ddagr_gym.physics.numerics import step_numerics
 from ddagr_gym.physics.terrain import SoilField
 from ddagr_gym.physics.wheel_forces import finite_array, soil_vector
-from ddagr_gym.simulator_kernel import advance_rows, remember_rows, settle_rows
+from ddagr_gym.row_threads import RowThreads
+from ddagr_gym.sensors.normal_draws import FILL, GIVEN
+from ddagr_gym.simulator_kernel import remember_rows, settle_rows
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 INITIAL_STATE = ("x", "y", "yaw", "v_x", "v_y", "yaw_rate", "omega_right", "omega_left")
 """Names that an initial state may set; the others start at zero."""
@@ -64,8 +65,6 @@ _FORGOTTEN = (
     (layout.COMMAND_RING, layout.SIZE - layout.COMMAND_RING),
 )
 """First entries and sizes of what a reset sets to zero."""
-
-_WORTH_WAKING = 100  # (ours) samples of all rows together below which a thread that wakes up comes too late
 
 
 def _soils(soil: Soils) -> Array:
@@ -172,10 +171,8 @@ class Simulator:
         self.field_index = np.full(count, -1, dtype=np.int64)
         self._set_fields(fields)
         self._numerics = _plain(step_numerics(numerics))
-        threads = min(threads, count)
-        self._parts = np.linspace(0, count, threads + 1).astype(np.int64)
-        self._claims = np.zeros(count, dtype=np.int64)
-        self._pool = ThreadPoolExecutor(threads - 1) if threads > 1 else None
+        self._given = np.full(count, GIVEN, dtype=np.int64)
+        self._threads = RowThreads(count, threads)
 
     def _set_fields(self, fields: Sequence[SoilField]) -> None:
         if len({field.values.shape for field in fields}) > 1:
@@ -272,33 +269,27 @@ class Simulator:
         return self._points, self._addresses, self.effect_parameters, self.effect_memory
 
     def advance(
-        self, commands: Array, noise: Array, recorded: NDArray[np.int64], readings: Array, record: Array
+        self,
+        commands: Array,
+        noise: Array,
+        recorded: Integers,
+        readings: Array,
+        record: Array,
+        generators: Integers | None = None,
     ) -> None:
         """Advance all environments by the samples in ``noise``, without checks; see :func:`advance_rows`.
 
         Args:
             commands: (N, samples or 1, 2) right and left bank speed commands [rad/s].
-            noise: (N, samples, layout.NOISE_CHANNELS) standard normal draws.
+            noise: (N, samples, layout.NOISE_CHANNELS) standard normal draws; written where generators are given.
             recorded: (K,) row entries to record after each sample.
             readings: (N, samples, 8), written in the order of ``layout.READINGS``.
             record: (N, samples, K), written.
+            generators: (N,) of :meth:`NormalDraws.prepare`.
         """
-        stretch = (commands, noise, recorded, readings, record)
-        shared: tuple[Any, ...] = (self._claims, stretch, self._grids(), self._actions(), self._numerics)
-        self._claims[:] = 0
-        if self._pool is None or noise.shape[0] * noise.shape[1] < _WORTH_WAKING:
-            advance_rows(self.rows, self._parts, 0, *shared)
-            return
-        helpers = [
-            self._pool.submit(advance_rows, self.rows, self._parts, part, *shared)
-            for part in range(1, len(self._parts) - 1)
-        ]
-        try:
-            advance_rows(self.rows, self._parts, 0, *shared)
-        finally:
-            for helper in helpers:
-                if not helper.cancel():  # one that has not begun has nothing left to do
-                    helper.result()
+        drawn = self._given if generators is None else generators
+        stretch = (commands, noise, FILL, drawn, recorded, readings, record)
+        self._threads.advance(self.rows, noise.shape[1], stretch, self._grids(), self._actions(), self._numerics)
 
     def step(
         self, commands: ArrayLike, noise: ArrayLike | None = None, *, recorded: Sequence[int] = (), samples: int = 1
@@ -337,8 +328,7 @@ class Simulator:
 
     def close(self) -> None:
         """Stop the threads; may be called again."""
-        if self._pool is not None:
-            self._pool.shutdown()
+        self._threads.close()
 
     @property
     def bogged(self) -> NDArray[np.bool_]:

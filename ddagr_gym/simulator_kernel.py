@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.jit import claim, kernel
+from ddagr_gym.jit import borrowed, claim, count_of, count_up, kernel
 from ddagr_gym.physics.body_dynamics import evaluate_forces, place_wheels, restore_body
 from ddagr_gym.physics.callbacks import EffectActions, actions_on, apply_effects
 from ddagr_gym.physics.drivetrain import (
@@ -53,6 +53,7 @@ from ddagr_gym.physics.layout import (
 from ddagr_gym.physics.numerics import StepNumerics, named_numerics
 from ddagr_gym.physics.terrain import SoilGrids, sample_soil
 from ddagr_gym.sensors.imu import read_imu
+from ddagr_gym.sensors.normal_draws import GIVEN, draw_normals
 from ddagr_gym.sensors.pose_receiver import read_pose
 from ddagr_gym.sensors.wheel_encoder import read_encoders
 
@@ -68,6 +69,8 @@ class Stretch(NamedTuple):
     Attributes:
         commands: (N, samples or 1, 2) bank speed commands; a single one for all samples [rad/s].
         noise: (N, samples, NOISE_CHANNELS) standard normal draws.
+        fill: address of the function that draws them.
+        generators: (N,) addresses of the generators to draw ``noise`` from; GIVEN where it has been written.
         recorded: (K,) row entries to record.
         readings: (N, samples, 8), written.
         record: (N, samples, K), written.
@@ -75,6 +78,8 @@ class Stretch(NamedTuple):
 
     commands: Array
     noise: Array
+    fill: int
+    generators: Integers
     recorded: Integers
     readings: Array
     record: Array
@@ -184,6 +189,8 @@ def _advance_row(
 ) -> None:
     """Advance row ``n`` by the samples of ``stretch``; ``actions`` are its own."""
     held = stretch.commands.shape[1] == 1
+    if stretch.generators[n] != GIVEN:
+        draw_normals(stretch.fill, stretch.generators[n], stretch.noise[n])
     for k in range(stretch.readings.shape[1]):
         _drive(row, stretch.commands[n, 0 if held else k], actions)
         _prepare_ground(row, grids, n, actions)
@@ -204,28 +211,45 @@ def _advance_row(
 
 @kernel()
 def advance_rows(
-    rows: Array, ends: Integers, part: int, claims: Integers,
+    rows: Array, ends: Integers, part: int, turn: int, claims: Integers, finished: Integers,
     stretch: Bundle, grids: Bundle, actions: Bundle, numerics: Bundle,
 ) -> None:  # fmt: skip
     """Advance by the samples of ``stretch`` all rows that no other thread has claimed, those of one part first.
 
     A thread goes up its own part, which its processor has in its cache from the step before, and then down the others'.
+    One that is late, after all of its turn has been done, changes nothing.
 
     Args:
         rows: (N, layout.SIZE), updated.
         ends: (P + 1,) first row of each part, and N.
         part: of this thread, from 0 to P - 1.
-        claims: (N,) 0; shared by the threads, 1 where one of them has taken the row.
+        turn: number of this call, the same for all threads and higher than before.
+        claims: (N,) turn in which some thread has last taken the row; shared by the threads.
+        finished: (1,) rows that have been advanced, counted from the first turn on; shared by the threads.
         stretch: fields of :class:`Stretch`.
         grids: fields of :class:`SoilGrids`.
         actions: fields of :class:`EffectActions` on N environments.
         numerics: fields of :class:`StepNumerics`.
     """
     parts, accuracy = ends.size - 1, named_numerics(numerics)
-    for turn in range(parts):
-        p = (part + turn) % parts
+    rows, stretch, grids, actions = borrowed(rows), borrowed(stretch), borrowed(grids), borrowed(actions)
+    for shift in range(parts):
+        p = (part + shift) % parts
         for i in range(ends[p + 1] - ends[p]):
-            n = ends[p] + i if turn == 0 else ends[p + 1] - 1 - i
-            if claim(claims, n):
+            n = ends[p] + i if shift == 0 else ends[p + 1] - 1 - i
+            if claim(claims, n, turn):
                 own = actions_on(EffectActions(*actions), n)
                 _advance_row(rows[n], n, Stretch(*stretch), SoilGrids(*grids), own, accuracy)
+                count_up(finished)
+
+
+@kernel()
+def wait_until_finished(finished: Integers, count: int, looks: int) -> bool:
+    """Whether the other threads' last rows, too, are finished, before one has looked so many times.
+
+    Looking costs this thread's time; being woken up would cost more than another thread takes for its last row.
+    """
+    look = 0
+    while look < looks and count_of(finished) < count:
+        look += 1
+    return look < looks

@@ -10,7 +10,7 @@ import pytest
 from numba.core.errors import NumbaError
 
 from ddagr_gym import jit
-from ddagr_gym.jit import claim, kernel, stack_array
+from ddagr_gym.jit import borrowed, claim, count_of, count_up, kernel, stack_array
 
 
 @kernel(cached=False)
@@ -58,23 +58,66 @@ def test_stack_array_needs_a_constant_size():
 
 
 @kernel(cached=False)
-def claim_all(claims, mine):
+def claim_all(claims, turn, mine):
     for i in range(claims.size):
-        mine[i] = claim(claims, i)
+        mine[i] = claim(claims, i, turn)
 
 
 def test_each_index_is_claimed_by_one_of_several_threads():
     claims, mine = np.zeros(200_000, dtype=np.int64), np.zeros((4, 200_000), dtype=bool)
-    claim_all(claims[:0], mine[0, :0])  # compiled before the threads start
+    claim_all(claims[:0], 1, mine[0, :0])  # compiled before the threads start
     with ThreadPoolExecutor(4) as pool:
-        list(pool.map(claim_all, [claims] * 4, mine))
+        list(pool.map(claim_all, [claims] * 4, [3] * 4, mine))
     assert (mine.sum(axis=0) == 1).all()
-    assert (claims == 1).all()
+    assert (claims == 3).all()
+
+
+def test_a_turn_that_has_been_claims_nothing():
+    claims, mine = np.array([4, 5, 6]), np.zeros(3, dtype=bool)
+    claim_all(claims, 5, mine)
+    assert mine.tolist() == [True, False, False]
+    assert claims.tolist() == [5, 5, 6]
 
 
 def test_claims_must_be_whole_numbers():
     with pytest.raises(NumbaError):
-        claim_all(np.zeros(3), np.zeros(3, dtype=bool))
+        claim_all(np.zeros(3), 1, np.zeros(3, dtype=bool))
+
+
+@kernel(cached=False)
+def count_many(counts, many):
+    for _ in range(many):
+        count_up(counts)
+    return count_of(counts)
+
+
+def test_threads_count_without_losing_any():
+    counts = np.zeros(1, dtype=np.int64)
+    count_many(counts, 0)
+    with ThreadPoolExecutor(4) as pool:
+        found = list(pool.map(count_many, [counts] * 4, [100_000] * 4))
+    assert counts[0] == max(found) == 400_000
+
+
+def test_counts_must_be_whole_numbers():
+    with pytest.raises(NumbaError):
+        count_many(np.zeros(1), 1)
+
+
+@kernel(cached=False)
+def write_borrowed(value, bundle):
+    value, bundle = borrowed(value), borrowed(bundle)
+    value[1:][0] = bundle[1][0][2] * bundle[0]
+    return value.size
+
+
+def test_borrowed_arrays_are_the_same_ones_and_outlive_it():
+    value, inner = np.zeros(3), np.arange(3.0)
+    users = sys.getrefcount(value)
+    for _ in range(10):
+        assert write_borrowed(value, (5, (inner, inner))) == 3
+    assert value.tolist() == [0.0, 10.0, 0.0]
+    assert sys.getrefcount(value) == users
 
 
 def test_unfused_function_gives_plain_arithmetic():

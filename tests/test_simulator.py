@@ -13,7 +13,6 @@ from ddagr_gym.parameters import STANDARD_GRAVITY, Imu, Numerics, PoseReceiver, 
 from ddagr_gym.physics import layout
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.simulator import INITIAL_STATE, TRUTH, Simulator, simulate
-from ddagr_gym.simulator_kernel import advance_rows
 
 ROBOT, SOIL = get_robot("ddagr"), get_soil("thesis_a1")
 SENSORS = Sensors(pose=PoseReceiver(rate=10.0))
@@ -108,23 +107,6 @@ def test_threads_that_help_each_other_give_the_same_bits():
     one, *others = (_batch(count, soils, threads=threads).step(commands, noise)[0] for threads in (1, 2, 4, 30))
     for other in others:
         assert np.array_equal(one, other, equal_nan=True)
-
-
-def test_a_row_that_another_thread_has_claimed_is_left_alone(monkeypatch):
-    """Also by a thread that has done its own part and helps with the others."""
-    batch = _batch(5, [get_soil("thesis_a1")] * 5, threads=2)
-    before = batch.rows.copy()
-    taken = np.array([0, 1, 0, 1, 0])
-
-    def with_claims(rows, parts, part, claims, *rest):
-        claims[:] = np.maximum(claims, taken)
-        return advance_rows(rows, parts, part, claims, *rest)
-
-    monkeypatch.setattr("ddagr_gym.simulator.advance_rows", with_claims)
-    batch.step(np.full((5, 2), 1.0), samples=30)
-    assert batch._claims.tolist() == [1] * 5
-    moved = (batch.rows != before).any(axis=1)
-    assert moved.tolist() == [True, False, True, False, True]
 
 
 def test_saved_rows_continue_to_the_same_bits_also_in_another_simulator():

@@ -59,11 +59,19 @@ def _batch(batch: dict[str, list[dict[str, Any]]]) -> str:
 
 def _two_threads(found: list[dict[str, Any]]) -> str:
     rows = [
-        (row["workload"], row["environments"], row["gain"]["median"], *row["gain"]["quartiles"], row["cores_got"])
+        (row["workload"], row["environments"], *_of_gain(row["gain"]), f"{row['turns']} of {row['all_turns']}",
+         row["gain_of_all_turns"]["median"], row["second_core"]["median"])
         for row in found
-    ]
-    header = ("workload", "environments", "two threads over one", "from", "to", "cores got")
+    ]  # fmt: skip
+    header = (
+        "workload", "environments", "two threads over one", "from", "to", "turns with two free cores", "in all turns",
+        "second core",
+    )  # fmt: skip
     return "Native batch between resets\n" + format_table(header, rows)
+
+
+def _of_gain(gain: dict[str, Any] | None) -> tuple[Any, ...]:
+    return ("-", "-", "-") if gain is None else (gain["median"], *gain["quartiles"])
 
 
 def _share(shares: dict[str, dict[str, float]]) -> str:

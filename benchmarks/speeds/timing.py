@@ -60,7 +60,7 @@ class Rates:
     def summary(self) -> dict[str, Any]:
         """For the results: median, quartiles, range, repeats, and CPU time over wall time."""
         return {
-            **_spread(self.values),
+            **spread(self.values),
             "range": [round(float(self.values.min()), 3), round(float(self.values.max()), 3)],
             "repeats": int(self.values.size),
             "cpu_over_wall": round(float(np.median(self.per_wall_second / self.per_cpu_second)), 3),
@@ -102,9 +102,10 @@ def ratio(rates: dict[str, Rates], name: str, to: str, *, clock: str = "") -> di
     """
     clocks = {"": "values", "cpu": "per_cpu_second", "wall": "per_wall_second"}
     first, second = (getattr(rates[n], clocks[clock]) for n in (name, to))
-    return {"of": name, "to": to, **_spread(first / second)}
+    return {"of": name, "to": to, **spread(first / second)}
 
 
-def _spread(values: np.ndarray) -> dict[str, Any]:
+def spread(values: np.ndarray) -> dict[str, Any]:
+    """Median and quartiles, for the results."""
     low, median, high = np.percentile(values, [25, 50, 75])
     return {"median": round(float(median), 3), "quartiles": [round(float(low), 3), round(float(high), 3)]}

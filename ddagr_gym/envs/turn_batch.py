@@ -18,6 +18,7 @@ from ddagr_gym.envs.settings import Episode, TurnSettings
 from ddagr_gym.errors import InputError
 from ddagr_gym.physics import layout
 from ddagr_gym.physics.effects.command_delay import CommandDelay
+from ddagr_gym.sensors.normal_draws import NormalDraws
 from ddagr_gym.simulator import Simulator
 
 Array = NDArray[np.float64]
@@ -61,6 +62,8 @@ class TurnBatch:
         self.commands = np.zeros((count, 2))
         """(N, 2) bank speed commands of the last interval [rad/s]."""
         self._noise = np.zeros((count, CONTROL_INTERVAL, layout.NOISE_CHANNELS))
+        self._draws = NormalDraws()
+        self._everyone = np.arange(count)
         self._outer_radius = np.zeros(count)
         self._weights = np.array(astuple(settings.reward))
         self.features = (
@@ -162,9 +165,10 @@ class TurnBatch:
             active: environments that draw noise; the others wait for a reset and their results mean nothing.
         """
         np.multiply(actions, self.command_limit, out=self.commands)
-        for n in range(self.count) if active is None else active:
-            rngs[n].standard_normal(out=self._noise[n])
-        self.simulator.advance(self.commands[:, None, :], self._noise, self._recorded, self.readings, self.record)
+        drawing = self._draws.prepare(rngs, self._everyone if active is None else active, self._noise)
+        self.simulator.advance(
+            self.commands[:, None, :], self._noise, self._recorded, self.readings, self.record, drawing
+        )
         kernel.judge_rows(
             self.tasks, self.simulator.rows, actions, self.readings, self.record, self._weights, self._outer_radius,
             self.terms, rewards, observations,

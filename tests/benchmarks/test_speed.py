@@ -9,7 +9,17 @@ import numpy as np
 import pytest
 
 from benchmarks import speed
-from benchmarks.speeds import accuracy, environments, kernel_share, kernel_time, memory, peers, tables, workloads
+from benchmarks.speeds import (
+    accuracy,
+    environments,
+    free_cores,
+    kernel_share,
+    kernel_time,
+    memory,
+    peers,
+    tables,
+    workloads,
+)
 from benchmarks.speeds.figure import speed_figure
 from benchmarks.speeds.timing import Contestant, Rates, race, ratio
 from ddagr_gym.parameters import Numerics
@@ -52,6 +62,29 @@ def test_ratios_are_paired_by_repeat_and_by_the_clock_asked_for():
     assert ratio(rates, "two", "one", clock="wall")["median"] == 3.0
     # several threads count by the wall clock, one by its processor time
     assert ratio(rates, "two", "one")["median"] == 1.5
+
+
+def test_turns_count_while_the_second_core_is_free(monkeypatch):
+    said = iter([1.0, 0.99, 0.98, 0.6, 0.7, 1.0, 0.96, 0.97, 0.5])
+    monkeypatch.setattr(free_cores.SecondCore, "measure", lambda self: next(said))
+    calls = []
+    one, two = (Contestant(name, lambda name=name: calls.append(name) or 1.0) for name in ("one", "two"))
+    found = free_cores.turns_beside_control(one, two, turns=2, most=10)
+    assert found["second_core"].tolist() == [0.99, 0.6, 0.7, 0.96]
+    assert found["free"].tolist() == [True, False, False, True]
+    assert found["gain"].shape == (4,)
+    assert calls == ["one", "two", *["two", "one", "one", "two"] * 2]
+
+
+def test_turns_without_a_free_core_are_no_more_than_asked_for(monkeypatch):
+    monkeypatch.setattr(free_cores.SecondCore, "measure", lambda self: 0.5)
+    one, two = Contestant("one", lambda: 1.0), Contestant("two", lambda: 1.0)
+    found = free_cores.turns_beside_control(one, two, turns=2, most=5)
+    assert found["free"].tolist() == [False] * 5
+
+
+def test_control_of_the_second_core_is_a_ratio_of_times():
+    assert 0.0 < free_cores.SecondCore(count=2, samples=50).measure() < 5.0
 
 
 def test_workloads_are_actions_that_differ_by_their_noise(actions):
