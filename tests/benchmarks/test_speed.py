@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ from benchmarks.speeds import (
 from benchmarks.speeds.figure import speed_figure
 from benchmarks.speeds.timing import Contestant, Rates, race, ratio
 from ddagr_gym.parameters import Numerics
+from ddagr_gym.physics import layout
 
 TINY = speed.Effort(
     repeats=2, steps=4, batches=(1, 2), shared_batches=(3,), evaluations=256, states=2, samples=20, resets=3
@@ -83,8 +85,23 @@ def test_turns_without_a_free_core_are_no_more_than_asked_for(monkeypatch):
     assert found["free"].tolist() == [False] * 5
 
 
-def test_control_of_the_second_core_is_a_ratio_of_times():
-    assert 0.0 < free_cores.SecondCore(count=2, samples=50).measure() < 5.0
+def test_control_of_the_second_core_is_the_time_of_one_thread_over_that_of_two(monkeypatch):
+    clock = iter([0.0, 3.0, 8.0])
+    control = free_cores.SecondCore(count=2, samples=5)
+    driven = []
+    monkeypatch.setattr(control, "_drive", driven.append)
+    monkeypatch.setattr(free_cores, "time", SimpleNamespace(perf_counter=lambda: next(clock)))
+    assert control.measure() == pytest.approx(3.0 / 5.0)
+    assert sorted(driven) == [0, 0, 1]
+
+
+def test_control_drives_two_batches_that_share_nothing():
+    control = free_cores.SecondCore(count=2, samples=5)
+    assert control.measure() > 0.0
+    first, second = (simulator.rows for simulator in control._simulators)
+    assert not np.shares_memory(first, second)
+    samples = [rows[:, layout.TIME] / rows[:, layout.SAMPLE_PERIOD] for rows in (first, second)]
+    np.testing.assert_allclose(samples, [[10.0, 10.0], [5.0, 5.0]])
 
 
 def test_workloads_are_actions_that_differ_by_their_noise(actions):
