@@ -1,8 +1,10 @@
 """Threads that share the rows of a batch: late, interrupted, ended and forked ones leave nothing wrong."""
 
 import copy
+import gc
 import os
 import threading
+import weakref
 
 import numpy as np
 import pytest
@@ -85,23 +87,33 @@ def test_an_interrupted_call_leaves_rows_alone_that_nobody_has_begun_and_the_nex
     assert all(_moved(batch, before))
 
 
-def test_helpers_end_with_the_batch_and_at_its_close():
-    def helpers():
-        return [thread for thread in threading.enumerate() if thread.name.startswith("rows of part")]
-
-    known = helpers()
+def test_helpers_of_a_batch_that_is_closed_or_gone_help_the_next_one(monkeypatch):
+    monkeypatch.setattr(row_threads, "_IDLE", [])
     batch = _batch(threads=3)
-    mine = [thread for thread in helpers() if thread not in known]
-    assert len(mine) == 2
+    first = list(batch._threads._helpers)
     batch.close()
     batch.close()
+    before = batch.rows.copy()
     batch.step(COMMANDS, samples=30)  # the calling thread does it all
+    assert all(_moved(batch, before))
     other = _batch(threads=2)
-    mine += [thread for thread in helpers() if thread not in known + mine]
+    assert other._threads._helpers[0] in first
+    other.step(COMMANDS, samples=30)
+    np.testing.assert_array_equal(other.rows, batch.rows)
     del other
-    for thread in mine:
-        thread.join(timeout=10)
-        assert not thread.is_alive()
+    gc.collect()
+    assert set(row_threads._IDLE) == set(first)
+
+
+def test_a_helper_that_is_given_back_holds_no_arrays(monkeypatch):
+    monkeypatch.setattr(row_threads, "_IDLE", [])
+    batch = _batch()
+    batch.step(COMMANDS, samples=30)
+    rows = weakref.ref(batch.rows)
+    batch._threads._helpers[0].wait()
+    del batch
+    gc.collect()
+    assert rows() is None
 
 
 def test_a_copy_has_helpers_of_its_own():
