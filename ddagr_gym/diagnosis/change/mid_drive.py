@@ -36,7 +36,7 @@ def name_in_parts(
     """
     last = named.models[-1]
     spells = spells_of(problem, last.fitted, progress)
-    if not spells and (last.conspicuous or last.pulled):
+    if not spells and not named.complete:
         spells = _of_scan(problem, named)
     if not spells:
         return problem, named
