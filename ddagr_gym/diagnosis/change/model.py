@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass
 
 from ddagr_gym.diagnosis.change.channel_rises import ChannelRise, channel_rises
 from ddagr_gym.diagnosis.change.drive_fit import moved_parameters
-from ddagr_gym.diagnosis.change.drive_scan import NAMED, DriveScan, scan_drive
+from ddagr_gym.diagnosis.change.drive_scan import NAMED, Compared, DriveScan, scan_drive
 from ddagr_gym.diagnosis.change.ordinary import Comparison
 from ddagr_gym.diagnosis.change.shifts import LEVEL, Pull, Shift, family_probability, shift_of
 from ddagr_gym.identification.gauss_newton import Fitted
@@ -117,7 +117,7 @@ def model_of(problem: Problem, fitted: Fitted, ordinary: Comparison, named: Sequ
     scores = scan.scores()
     beside = [key for key in scan.keys if key.startswith(NAMED)]
     in_ordinary = [key for shift in named for key in shift.compared.keys]
-    compared = [item for item in scan.compared if item.name not in ordinary.unnamed]
+    compared = _further(scan.compared, ordinary.unnamed, in_ordinary)
     found = [shift_of(item, scores, ordinary, beside, in_ordinary) for item in compared]
     shifts = sorted((item for item in found if item is not None), key=lambda item: (item.probability, -item.distance))
     pulls = tuple(
@@ -127,6 +127,14 @@ def model_of(problem: Problem, fitted: Fitted, ordinary: Comparison, named: Sequ
     misfit = {name: value for name, value in channel_misfit(problem, fitted).items() if name in CHANNELS}
     rises = channel_rises(misfit, ordinary.misfits, ordinary.expected)
     return Model(problem, fitted, scan, tuple(shifts), pulls, tuple(named), rises)
+
+
+def _further(library: Sequence[Compared], unnamed: Container[str], known: Sequence[str]) -> list[Compared]:
+    """Candidates that can be what changed beside those of some keys in ordinary drives.
+
+    A patch has the keys of a changed soil there, which is then no further effect.
+    """
+    return [item for item in library if item.name not in unnamed and not set(item.keys) & set(known)]
 
 
 def farthest(shifts: Sequence[Shift], tests: int) -> float:
