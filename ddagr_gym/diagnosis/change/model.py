@@ -10,6 +10,7 @@ from ddagr_gym.diagnosis.change.drive_fit import moved_parameters
 from ddagr_gym.diagnosis.change.drive_scan import NAMED, Compared, DriveScan, scan_drive
 from ddagr_gym.diagnosis.change.ordinary import Comparison
 from ddagr_gym.diagnosis.change.shifts import LEVEL, Pull, Shift, family_probability, shift_of
+from ddagr_gym.diagnosis.mid_drive.search_in_time import parts_tried
 from ddagr_gym.identification.gauss_newton import Fitted
 from ddagr_gym.identification.misfit import channel_misfit, projected_residual
 from ddagr_gym.identification.problem import Problem
@@ -55,8 +56,16 @@ class Model:
         return len(self.shifts) + len(self.pulls) + len(self.rises)
 
     def probability(self, shift: Shift | Pull | ChannelRise, looks: int = 1) -> float:
-        """Of an ordinary drive to show as much in any candidate or parameter, each looked at so many times."""
-        return family_probability(shift.probability, looks * self.tests)
+        """Of an ordinary drive to show as much in any candidate or parameter, each looked at so many times.
+
+        What is present in a part of the drives was looked at in every part: that these overlap matters little far out.
+        """
+        parts = self.parts_of(shift.compared.name) if isinstance(shift, Shift) else 1
+        return family_probability(shift.probability, looks * parts * self.tests)
+
+    def parts_of(self, name: str) -> int:
+        """In how many parts of the drives an effect was tried: 1 where it is present all along."""
+        return parts_tried(self.problem.blocked.windows) if name in self.problem.spells else 1
 
     @property
     def best(self) -> tuple[Shift, ...]:

@@ -177,7 +177,8 @@ def _next(
     explaining = _explaining(alarming, model)
     kept = [*alike, *explaining, *(item for item in soil if item not in explaining)]
     kept.sort(key=lambda item: -item[1].gain)
-    weights = equivalence_weights([rival for _, rival in kept], dispersion, rng, FORM_OF_GAIN)
+    parts = {rival.name: model.parts_of(rival.name) for _, rival in kept}
+    weights = equivalence_weights([rival for _, rival in kept], dispersion, rng, FORM_OF_GAIN, parts)
     for name in [rival.name for _, rival in soil] or _standing_out(alarming, model, weights):
         weights = _first(name, weights)
     weights = _everywhere_first(kept, weights)

@@ -91,6 +91,11 @@ def spell_gains(
     return sorted(best.values(), key=lambda item: -item.gain)
 
 
+def parts_tried(windows: WindowSet) -> int:
+    """Number of parts of drives in which an effect is tried; at least 1."""
+    return max(sum(1 for _ in _spells(windows)), 1)
+
+
 def _spells(windows: WindowSet) -> Iterator[Spell]:
     """Parts from or up to the start of each window, enough windows on both sides."""
     for number in np.unique(windows.recording):

@@ -11,7 +11,6 @@ import ddagr_gym
 from ddagr_gym.diagnosis.change.ordinary import OrdinaryRobot, Weighing
 from ddagr_gym.diagnosis.change.reference import OrdinaryDrive, scan_ordinary
 from ddagr_gym.identification.parameters import robot_parameters
-from ddagr_gym.physics.effects import Effect
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.schema import Recording
 
@@ -52,7 +51,7 @@ def steps(seed: int, seconds: float) -> np.ndarray:
     return np.array(rows[: int(seconds * RATE)])
 
 
-def drive(seed: int, *effects: str | Effect, seconds: float = 50.0) -> Recording:
+def drive(seed: int, *effects: str, seconds: float = 50.0) -> Recording:
     """A drive of the robot on another day: soil and motors differ a little, and what effects say."""
     rng = np.random.default_rng(1000 + seed)
     robot = get_robot("ddagr")

@@ -7,12 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from ddagr_gym.diagnosis.change.run import what_changed
 from ddagr_gym.diagnosis.change.soil_place import patch_of_change
 from ddagr_gym.physics.effects.gyro_bias import GyroBias
 from ddagr_gym.physics.effects.soil_change import SoilChange
-from ddagr_gym.physics.effects.soil_patch import SoilPatch
-from tests.diagnosis.change.conftest import drive
 
 ALONG = np.arange(10.0)
 """Middles of windows along a line [m]; each is a metre long."""
@@ -57,11 +54,3 @@ def test_there_is_no_patch_where_no_window_gains():
 def test_another_effect_has_no_patch():
     with pytest.raises(ValueError, match="gyro_bias"):
         patch_of_change(*fits(np.ones(len(ALONG)), GyroBias(0.1)))
-
-
-@pytest.mark.slow
-def test_a_patch_is_not_called_a_changed_soil_alone(ordinary_robot):
-    """Its place is in the drive; without the patch among the rivals the soil would have changed everywhere."""
-    patch = SoilPatch(0.4, 0.3, 1.5, 0.3, 0.6)  # this drive is in it from 18 to 30 s, and near its end
-    diagnosis = what_changed([drive(27, patch)], ordinary_robot, "field").diagnosis
-    assert "soil_patch" in diagnosis.findings[0].equivalence_set

@@ -7,8 +7,9 @@ import pytest
 
 from ddagr_gym.diagnosis.answer.onset import Onset, TimedSize
 from ddagr_gym.diagnosis.mid_drive import search_in_time
+from ddagr_gym.diagnosis.mid_drive.change_in_time import FEWEST_ASIDE
 from ddagr_gym.diagnosis.mid_drive.onsets import THRESHOLD, onsets_of, spells_of
-from ddagr_gym.diagnosis.mid_drive.search_in_time import ALIKE, SpellGain, best_spells, spell_gains
+from ddagr_gym.diagnosis.mid_drive.search_in_time import ALIKE, SpellGain, best_spells, parts_tried, spell_gains
 from ddagr_gym.diagnosis.result.sentences import onset_in_words
 from ddagr_gym.diagnosis.search.gains import gains
 from ddagr_gym.diagnosis.search.scan import scan
@@ -100,6 +101,13 @@ def test_effects_that_explain_about_alike_are_tried_in_parts_together(monkeypatc
     ]
     monkeypatch.setattr(search_in_time, "spell_gains", lambda *_: listed)
     assert best_spells(None, [], None, 1.0, 0.0) == {"towed_drag": Spell(0, 30.0), "viscous_drag": Spell(0, 34.0)}
+
+
+def test_parts_begin_or_end_where_enough_windows_are_on_either_side(biased):
+    windows = biased[0].blocked.windows
+    count = windows.count
+    assert parts_tried(windows) == 2 * (count - 2 * FEWEST_ASIDE + 1)
+    assert parts_tried(windows.subset(np.arange(2 * FEWEST_ASIDE - 1))) == 1
 
 
 def test_all_along_the_scan_in_parts_is_the_scan(biased, terms):
