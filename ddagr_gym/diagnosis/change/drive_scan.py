@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 
 NOT_COMPARED: Mapping[str, str] = {
     "sensor_hold": "repeated readings are seen in the values themselves, and no size of them is compared",
-    "soil_patch": "a place of one drive has no counterpart in others",
+    "soil_patch": "a place of one drive has no counterpart in others: tried only where a changed soil explains much",
 }
 """Effects that have no size which two drives share."""
 

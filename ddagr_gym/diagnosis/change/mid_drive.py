@@ -9,7 +9,7 @@ import numpy as np
 from ddagr_gym.diagnosis.change.naming import Named, name_changes
 from ddagr_gym.diagnosis.change.ordinary import Comparison
 from ddagr_gym.diagnosis.mid_drive.onsets import spells_of
-from ddagr_gym.diagnosis.mid_drive.search_in_time import best_spell, spells_that_hold
+from ddagr_gym.diagnosis.mid_drive.search_in_time import best_spells, spells_that_hold
 from ddagr_gym.identification.gauss_newton import Fitted
 from ddagr_gym.identification.misfit import dispersion_of
 from ddagr_gym.identification.problem import Problem
@@ -36,7 +36,7 @@ def name_in_parts(
     """
     last = named.models[-1]
     spells = spells_of(problem, last.fitted, progress)
-    if not spells and (last.conspicuous or last.pulled):
+    if not spells and not named.complete:
         spells = _of_scan(problem, named)
     if not spells:
         return problem, named
@@ -53,4 +53,4 @@ def _of_scan(problem: Problem, named: Named) -> dict[str, Spell]:
     scan, dispersion = first.scan, dispersion_of(problem, first.fitted)
     explained = (first.fitted.cost - last.fitted.cost) / dispersion
     candidates = [(item.candidate, [scan.keys.index(key) for key in item.keys]) for item in scan.compared]
-    return best_spell(scan.products, candidates, problem.blocked.windows, dispersion, explained)
+    return best_spells(scan.products, candidates, problem.blocked.windows, dispersion, explained)

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass
 
 from ddagr_gym.diagnosis.change.channel_rises import ChannelRise, channel_rises
 from ddagr_gym.diagnosis.change.drive_fit import moved_parameters
-from ddagr_gym.diagnosis.change.drive_scan import NAMED, DriveScan, scan_drive
+from ddagr_gym.diagnosis.change.drive_scan import NAMED, Compared, DriveScan, scan_drive
 from ddagr_gym.diagnosis.change.ordinary import Comparison
 from ddagr_gym.diagnosis.change.shifts import LEVEL, Pull, Shift, family_probability, shift_of
+from ddagr_gym.diagnosis.mid_drive.search_in_time import parts_tried
 from ddagr_gym.identification.gauss_newton import Fitted
 from ddagr_gym.identification.misfit import channel_misfit, projected_residual
 from ddagr_gym.identification.problem import Problem
@@ -55,8 +56,16 @@ class Model:
         return len(self.shifts) + len(self.pulls) + len(self.rises)
 
     def probability(self, shift: Shift | Pull | ChannelRise, looks: int = 1) -> float:
-        """Of an ordinary drive to show as much in any candidate or parameter, each looked at so many times."""
-        return family_probability(shift.probability, looks * self.tests)
+        """Of an ordinary drive to show as much in any candidate or parameter, each looked at so many times.
+
+        What is present in a part of the drives was looked at in every part: that these overlap matters little far out.
+        """
+        parts = self.parts_of(shift.compared.name) if isinstance(shift, Shift) else 1
+        return family_probability(shift.probability, looks * parts * self.tests)
+
+    def parts_of(self, name: str) -> int:
+        """In how many parts of the drives an effect was tried: 1 where it is present all along."""
+        return parts_tried(self.problem.blocked.windows) if name in self.problem.spells else 1
 
     @property
     def best(self) -> tuple[Shift, ...]:
@@ -117,7 +126,7 @@ def model_of(problem: Problem, fitted: Fitted, ordinary: Comparison, named: Sequ
     scores = scan.scores()
     beside = [key for key in scan.keys if key.startswith(NAMED)]
     in_ordinary = [key for shift in named for key in shift.compared.keys]
-    compared = [item for item in scan.compared if item.name not in ordinary.unnamed]
+    compared = _further(scan.compared, ordinary.unnamed, in_ordinary)
     found = [shift_of(item, scores, ordinary, beside, in_ordinary) for item in compared]
     shifts = sorted((item for item in found if item is not None), key=lambda item: (item.probability, -item.distance))
     pulls = tuple(
@@ -127,6 +136,14 @@ def model_of(problem: Problem, fitted: Fitted, ordinary: Comparison, named: Sequ
     misfit = {name: value for name, value in channel_misfit(problem, fitted).items() if name in CHANNELS}
     rises = channel_rises(misfit, ordinary.misfits, ordinary.expected)
     return Model(problem, fitted, scan, tuple(shifts), pulls, tuple(named), rises)
+
+
+def _further(library: Sequence[Compared], unnamed: Container[str], known: Sequence[str]) -> list[Compared]:
+    """Candidates that can be what changed beside those of some keys in ordinary drives.
+
+    A patch has the keys of a changed soil there, which is then no further effect.
+    """
+    return [item for item in library if item.name not in unnamed and not set(item.keys) & set(known)]
 
 
 def farthest(shifts: Sequence[Shift], tests: int) -> float:

@@ -19,12 +19,15 @@ from ddagr_gym.diagnosis.change.model import Model, model_of
 from ddagr_gym.diagnosis.change.ordinary import Comparison
 from ddagr_gym.diagnosis.change.refits import MOST_RIVALS, Refit, joint_refits
 from ddagr_gym.diagnosis.change.shifts import LEVEL, Shift, refitted_shift
+from ddagr_gym.diagnosis.mid_drive.search_in_time import LEAST_EVIDENCE
 from ddagr_gym.diagnosis.result.equivalence import equivalence_weights
 from ddagr_gym.diagnosis.search.scanned_model import Rival
 from ddagr_gym.identification.effect_parameters import effect_parameters
 from ddagr_gym.identification.gauss_newton import Fitted
 from ddagr_gym.identification.misfit import dispersion_of
 from ddagr_gym.identification.problem import Problem
+from ddagr_gym.physics.effects.soil_change import SoilChange
+from ddagr_gym.physics.effects.soil_patch import SoilPatch
 
 MOST_NAMES = 3
 """Effects that may be named together: as in a diagnosis."""
@@ -174,9 +177,11 @@ def _next(
     explaining = _explaining(alarming, model)
     kept = [*alike, *explaining, *(item for item in soil if item not in explaining)]
     kept.sort(key=lambda item: -item[1].gain)
-    weights = equivalence_weights([rival for _, rival in kept], dispersion, rng, FORM_OF_GAIN)
+    parts = {rival.name: model.parts_of(rival.name) for _, rival in kept}
+    weights = equivalence_weights([rival for _, rival in kept], dispersion, rng, FORM_OF_GAIN, parts)
     for name in [rival.name for _, rival in soil] or _standing_out(alarming, model, weights):
         weights = _first(name, weights)
+    weights = _everywhere_first(kept, weights)
     name = max(weights, key=weights.__getitem__)
     chosen = next(item for item in kept if item[1].name == name)
     rivals = (chosen[1], *(rival for _, rival in kept if rival is not chosen[1]))
@@ -214,6 +219,16 @@ def _standing_out(alarming: Sequence[Tried], model: Model, weights: Mapping[str,
     heaviest = max(weights, key=lambda name: weights[name])
     unsure = heaviest in [rival.name for _, rival in alarming] and heaviest not in sure
     return [max(found, key=lambda name: weights[name])] if found and unsure else []
+
+
+def _everywhere_first(kept: Sequence[Tried], weights: dict[str, float]) -> dict[str, float]:
+    """A changed soil before a patch of it that explains hardly more: a place that covers all of a drive is the same."""
+    gains = {rival.name: rival.gain for _, rival in kept}
+    if not {SoilPatch.name, SoilChange.name} <= weights.keys():
+        return weights
+    alike = gains[SoilPatch.name] < gains[SoilChange.name] + LEAST_EVIDENCE
+    ahead = weights[SoilPatch.name] == max(weights.values())
+    return _first(SoilChange.name, weights) if alike and ahead else weights
 
 
 def _first(name: str, weights: dict[str, float]) -> dict[str, float]:

@@ -3,7 +3,8 @@
 Large changes are not linear. A refit begins at the best of several multiples of the first step; where parameters of
 robot or ground have taken a change over, they are held to find it; and what the library calls alike to the best refit
 begins where that one ended. Where a fit moved the soil farther than ordinary drives do, a changed soil is refitted with
-all that tells soils apart, of which the effect has two sizes only.
+all that tells soils apart, of which the effect has two sizes only. Where a changed soil explains about as much as any,
+it is also refitted as one that changed in a place.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from ddagr_gym.diagnosis.change.drive_scan import NAMED, scan_drive
 from ddagr_gym.diagnosis.change.model import MOST_NEAR, Model, farthest
 from ddagr_gym.diagnosis.change.ordinary import Comparison, Scores
 from ddagr_gym.diagnosis.change.shifts import Shift, explained, shift_of, sizes_of
+from ddagr_gym.diagnosis.change.soil_place import patch_of_change
 from ddagr_gym.diagnosis.search.initial_guess import first_guess, same_lateness
 from ddagr_gym.diagnosis.search.scan import drive_extent
 from ddagr_gym.diagnosis.search.scanned_model import Rival
@@ -28,6 +30,7 @@ from ddagr_gym.identification.parameters import KIND_STIFFNESS_DEVIATION, soil_p
 from ddagr_gym.identification.problem import Point, Problem
 from ddagr_gym.physics.effects.registry import effect_kinds
 from ddagr_gym.physics.effects.soil_change import SoilChange
+from ddagr_gym.physics.effects.soil_patch import SoilPatch
 
 Array = NDArray[np.float64]
 
@@ -88,6 +91,7 @@ def joint_refits(model: Model, ordinary: Comparison, dispersion: float, progress
     beside = _refitted(problem, model, _started(problem, model, model.fitted.point, others), dispersion, progress)
     found = [Refit(problem, *item) for item in (*first, *again, *beside)]
     found += _with_another_soil(model, dispersion, progress)
+    found += _in_a_place(model, found, dispersion, progress)
     best: dict[str, Refit] = {}
     for item in sorted(found, key=lambda item: -item.rival.gain):
         best.setdefault(item.rival.name, item)
@@ -129,6 +133,27 @@ def _with_another_soil(model: Model, dispersion: float, progress: Callable[[str]
     return [Refit(problem, *item) for item in _refitted(problem, model, starts, dispersion, progress)]
 
 
+def _in_a_place(
+    model: Model, found: Sequence[Refit], dispersion: float, progress: Callable[[str], None]
+) -> list[Refit]:
+    """The refit of a patch of soil where a changed soil explains about as much as any; its factors have that shift."""
+    best = max((item.rival.gain for item in found), default=0.0)
+    soils = [item for item in found if item.rival.name == SoilChange.name and item.rival.gain >= ALIKE * best]
+    present = {effect.name for effect in model.fitted.point.effects}
+    if not soils or SoilPatch.name in present:
+        return []
+    changed = max(soils, key=lambda item: item.rival.gain)
+    at, patch = changed.rival.fitted.point, patch_of_change(model.fitted, changed.rival.fitted)
+    if patch is None:
+        return []
+    # the soil beside a patch is that of the ground, whose parameters move no farther than between ordinary drives
+    values = at.values if changed.problem is model.problem else model.fitted.point.values
+    start = replace(at, values=values, effects=(*at.effects[:-1], patch))
+    starts = {SoilPatch.name: (changed.shift, start)}
+    refits = _refitted(model.problem, model, starts, dispersion, progress)
+    return [Refit(model.problem, *item) for item in refits]
+
+
 def _by_gain(found: Sequence[tuple[Shift, Rival]]) -> list[tuple[Shift, Rival]]:
     return sorted(found, key=lambda item: -item[1].gain)
 
@@ -138,13 +163,13 @@ def _refitted(
 ) -> list[tuple[Shift, Rival]]:
     """Refits that explain anything by an effect that matters, the best first."""
     found = []
-    for shift, start in starts.values():
-        progress(f"refitting with {shift.compared.name}")
+    for name, (shift, start) in starts.items():
+        progress(f"refitting with {name}")
         fitted = fit(problem, start, iterations=ITERATIONS + 2, tolerance=FIELD_TOLERANCE, renewals=RENEWALS)
         gain = (model.fitted.cost - fitted.cost) / dispersion
         meaningful = fitted.point.effects[-1].is_meaningful(drive_extent(problem, fitted.prediction))
         if gain > 0.0 and meaningful:
-            found.append((shift, Rival(shift.compared.name, fitted, gain)))
+            found.append((shift, Rival(name, fitted, gain)))
     return _by_gain(found)
 
 

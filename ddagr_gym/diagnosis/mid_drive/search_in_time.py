@@ -27,6 +27,10 @@ Array = NDArray[np.float64]
 LEAST_EVIDENCE = 8.0
 """Fall of the cost over the dispersion that a part of the drives must explain more than all of them (ours)."""
 
+ALIKE = 0.6
+"""Share of the largest gain in a part of the drives from which another effect is tried in one too (ours: refits differ
+from first steps by a fifth)."""
+
 _FIRST_STEP = 0.5
 """Share of a refit's gain that a scan finds at least (ours)."""
 
@@ -87,6 +91,11 @@ def spell_gains(
     return sorted(best.values(), key=lambda item: -item.gain)
 
 
+def parts_tried(windows: WindowSet) -> int:
+    """Number of parts of drives in which an effect is tried; at least 1."""
+    return max(sum(1 for _ in _spells(windows)), 1)
+
+
 def _spells(windows: WindowSet) -> Iterator[Spell]:
     """Parts from or up to the start of each window, enough windows on both sides."""
     for number in np.unique(windows.recording):
@@ -131,14 +140,17 @@ def _reduced(products: InnerProducts, present: NDArray[np.bool_]) -> Reduced:
     return Reduced(part[1 + p :, 0] - cross @ answer[:, 0], part[1 + p :, 1 + p :] - cross @ answer[:, 1:], answer)
 
 
-def best_spell(
+def best_spells(
     products: InnerProducts,
     candidates: Sequence[tuple[Candidate, Sequence[int]]],
     windows: WindowSet,
     dispersion: float,
     explained: float,
 ) -> dict[str, Spell]:
-    """The effect that explains most where it is present in a part of the drives; empty where that is nothing to try.
+    """The effects that explain most where they are in a part of the drives, about alike; empty where none is to try.
+
+    That something began is known before what it was: an effect that may begin at any time is freer than one that may
+    not.
 
     Args:
         products: see :func:`spell_gains`, and the next ones.
@@ -148,7 +160,7 @@ def best_spell(
         explained: fall of the cost over the dispersion by the names that were found.
     """
     found = [item for item in spell_gains(products, candidates, windows, dispersion) if _is_worth(item, explained)]
-    return {found[0].name: found[0].spell} if found else {}
+    return {item.name: item.spell for item in found if item.gain >= ALIKE * found[0].gain}
 
 
 def _is_worth(found: SpellGain, explained: float) -> bool:

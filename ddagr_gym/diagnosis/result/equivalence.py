@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,11 @@ FORM = 0.08
 
 
 def equivalence_weights(
-    rivals: Sequence[Rival], dispersion: float, rng: np.random.Generator, form: float = FORM
+    rivals: Sequence[Rival],
+    dispersion: float,
+    rng: np.random.Generator,
+    form: float = FORM,
+    choices: Mapping[str, int] | None = None,
 ) -> dict[str, float]:
     """Weight of each rival as the better explanation, averaged over resamplings of the windows.
 
@@ -37,13 +41,16 @@ def equivalence_weights(
         dispersion: of the model before.
         rng: of the resampling.
         form: that share.
+        choices: by name, among how many forms of an effect the refitted one was chosen, each as likely before any data
+            (1 where it is missing).
 
     Returns:
         Weights that add up to 1, of the first rival and of all with :data:`LEAST_WEIGHT`.
     """
     windows = np.stack([rival.fitted.window_cost for rival in rivals])
     priors = np.array([rival.fitted.cost for rival in rivals]) - windows.sum(axis=1)
-    unusual = np.array([implausibility(rival.fitted.point.effects[-1]) for rival in rivals])
+    chosen = np.log([(choices or {}).get(rival.name, 1) for rival in rivals])
+    unusual = chosen + [implausibility(rival.fitted.point.effects[-1]) for rival in rivals]
     count = windows.shape[1]
     counts = rng.multinomial(count, np.full(count, 1.0 / count), size=DRAWS).astype(float)
     unit = max(form * rivals[0].gain, 1.0)

@@ -6,7 +6,17 @@ from types import SimpleNamespace
 
 import pytest
 
-from ddagr_gym.diagnosis.change.naming import Named, _absent, _explaining, _first, _is_share, _soil_alone, _standing_out
+from ddagr_gym.diagnosis.change.naming import (
+    LEAST_EVIDENCE,
+    Named,
+    _absent,
+    _everywhere_first,
+    _explaining,
+    _first,
+    _is_share,
+    _soil_alone,
+    _standing_out,
+)  # fmt: skip
 
 
 def tried(name: str, gain: float, left: float, probability: float, problem: str = "same"):
@@ -54,6 +64,19 @@ def test_a_name_that_comes_first_weighs_as_much_as_the_heaviest():
     assert list(found) == ["soil_change", "gyro_scale", "slope"]
     assert found["soil_change"] == found["gyro_scale"]
     assert sum(found.values()) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(("further", "first"), [(0.9, "soil_change"), (1.1, "soil_patch")])
+def test_a_patch_that_explains_hardly_more_than_a_changed_soil_comes_after_it(further, first):
+    patch = tried("soil_patch", 100.0 + further * LEAST_EVIDENCE, 0.9, 1e-6)
+    found = _everywhere_first([patch, tried("soil_change", 100.0, 0.9, 1e-6)], {"soil_patch": 0.7, "soil_change": 0.3})
+    assert max(found, key=found.__getitem__) == first
+    assert set(found) == {"soil_patch", "soil_change"}
+
+
+def test_a_changed_soil_that_is_no_rival_of_a_patch_does_not_come_back():
+    weights = {"soil_patch": 0.8, "slope": 0.2}
+    assert _everywhere_first([tried("soil_patch", 9.0, 0.9, 1e-6)], weights) == weights
 
 
 def by_itself(name: str, probability: float):

@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 
 from ddagr_gym.diagnosis.answer.onset import Onset, TimedSize
+from ddagr_gym.diagnosis.mid_drive import search_in_time
+from ddagr_gym.diagnosis.mid_drive.change_in_time import FEWEST_ASIDE
 from ddagr_gym.diagnosis.mid_drive.onsets import THRESHOLD, onsets_of, spells_of
-from ddagr_gym.diagnosis.mid_drive.search_in_time import best_spell, spell_gains
+from ddagr_gym.diagnosis.mid_drive.search_in_time import ALIKE, SpellGain, best_spells, parts_tried, spell_gains
 from ddagr_gym.diagnosis.result.sentences import onset_in_words
 from ddagr_gym.diagnosis.search.gains import gains
 from ddagr_gym.diagnosis.search.scan import scan
 from ddagr_gym.identification.gauss_newton import fit
+from ddagr_gym.identification.spells import Spell
 from ddagr_gym.physics.effects import load_effects
 from ddagr_gym.physics.effects.registry import effect_kinds
 
@@ -82,10 +85,29 @@ def test_the_scan_in_parts_finds_name_and_time(biased, terms):
     found = spell_gains(terms, candidates, windows, 1.0)
     assert found[0].name == "gyro_bias"
     assert found[0].gain > 1.5 * found[0].constant
-    spell = best_spell(terms, candidates, windows, 1.0, found[0].constant)["gyro_bias"]
+    spell = best_spells(terms, candidates, windows, 1.0, found[0].constant)["gyro_bias"]
     assert not spell.ends
     assert abs(spell.time - TIME) <= windows.duration
-    assert best_spell(terms, candidates, windows, 1.0, 10.0 * found[0].gain) == {}
+    assert best_spells(terms, candidates, windows, 1.0, 10.0 * found[0].gain) == {}
+
+
+def test_effects_that_explain_about_alike_are_tried_in_parts_together(monkeypatch):
+    """What might begin at any time is freer than a rival that might not."""
+    listed = [
+        SpellGain("towed_drag", Spell(0, 30.0), 500.0, 20.0),
+        SpellGain("viscous_drag", Spell(0, 34.0), 500.0 * ALIKE + 1.0, 20.0),
+        SpellGain("slope", Spell(0, 34.0), 490.0, 489.0),
+        SpellGain("payload", Spell(0, 30.0), 500.0 * ALIKE - 1.0, 20.0),
+    ]
+    monkeypatch.setattr(search_in_time, "spell_gains", lambda *_: listed)
+    assert best_spells(None, [], None, 1.0, 0.0) == {"towed_drag": Spell(0, 30.0), "viscous_drag": Spell(0, 34.0)}
+
+
+def test_parts_begin_or_end_where_enough_windows_are_on_either_side(biased):
+    windows = biased[0].blocked.windows
+    count = windows.count
+    assert parts_tried(windows) == 2 * (count - 2 * FEWEST_ASIDE + 1)
+    assert parts_tried(windows.subset(np.arange(2 * FEWEST_ASIDE - 1))) == 1
 
 
 def test_all_along_the_scan_in_parts_is_the_scan(biased, terms):

@@ -32,6 +32,15 @@ def test_equal_costs_share_equally_and_clear_ones_do_not() -> None:
     assert clear == {"gyro_scale": 1.0}
 
 
+def test_what_was_chosen_among_many_weighs_as_one_of_them() -> None:
+    cost = np.full(30, 10.0)
+    rivals = [rival("gyro_scale=1.05", cost), rival("imu_misalignment=0.1745", cost)]
+    even = equivalence_weights(rivals, 1.0, np.random.default_rng(1))
+    found = equivalence_weights(rivals, 1.0, np.random.default_rng(1), choices={"imu_misalignment": 9})
+    odds, before = (w["imu_misalignment"] / w["gyro_scale"] for w in (found, even))
+    assert odds == pytest.approx(before / 9.0)
+
+
 def test_one_window_in_favour_keeps_a_rival_alive() -> None:
     cost = np.full(30, 10.0)
     other = cost.copy()
