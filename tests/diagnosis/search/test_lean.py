@@ -91,7 +91,7 @@ def test_a_lean_is_no_accelerometer_bias_beside_what_makes_the_robot_lean(leanin
     problem, fitted = leaning
     terms = scan(problem, fitted, KINDS)
     bias = next(item.gain for item in gains(terms) if item.name == "accelerometer_bias")
-    gates = Thresholds({name: GATE for name in KINDS}, {}, 20, "a test")
+    gates = Thresholds(dict.fromkeys(KINDS, GATE), {}, 20, "a test")
     raised = stepwise.beyond_lean(gates, terms.imitated, 1.0)
     assert bias > 1.2 * gates.of("accelerometer_bias").gain
     assert bias < raised.of("accelerometer_bias").gain
