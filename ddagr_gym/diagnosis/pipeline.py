@@ -187,6 +187,8 @@ def diagnose(
             seconds=time.monotonic() - began,
         )
         return replace(made, diagnosis=answer)
+    if nominal is not None:
+        progress(f"a drivetrain explains {nominal.answer.explained:.0%} of the wheel speeds' errors: no answer")
     diagnosis, effects = steps.run("verdict", conclude, session, found, accepted)
     fit = None if names_only else steps.run("certification", certify, session, accepted)
     steps.begin("localisation")
