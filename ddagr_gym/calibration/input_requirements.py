@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -16,7 +17,7 @@ from ddagr_gym.errors import InputError
 from ddagr_gym.identification.windows import PERIOD_TOLERANCE
 from ddagr_gym.parameters import Robot
 from ddagr_gym.recordings.checks.travel import travelled_over_rolled
-from ddagr_gym.recordings.checks.turning import effective_track, gyro_against_pose
+from ddagr_gym.recordings.checks.turning import effective_track, gyro_against_pose, turns
 from ddagr_gym.recordings.schema import Recording
 
 NEEDED = ("command_right", "command_left", "encoder_right", "encoder_left", "yaw_rate")
@@ -55,10 +56,12 @@ class DriveScale:
     Attributes:
         travel: travelled over rolled distance [-]; None without poses or motion.
         track: effective over geometric track [-]; None without turns.
+        track_interval: of that one, 99 %; everything where it is not known.
     """
 
     travel: float | None
     track: float | None
+    track_interval: tuple[float, float]
 
 
 def check_drives(recordings: Sequence[Recording], robot: Robot) -> None:
@@ -156,14 +159,19 @@ def drive_scale(recording: Recording, rng: np.random.Generator) -> DriveScale:
         recording: with the geometry of the data sheet.
         rng: for the resampling of the checks.
     """
-    travel, track = travelled_over_rolled(recording, rng), effective_track(recording, rng)
-    return DriveScale(
-        None if travel is None else float(travel.values[0]), None if track is None else float(track.values[0])
-    )
+    travel = travelled_over_rolled(recording, rng)
+    # on a straight drive the track is a ratio of noise to noise
+    track = effective_track(recording, rng) if turns(recording) else None
+    travelled = None if travel is None else float(travel.values[0])
+    if track is None:
+        return DriveScale(travelled, None, (-math.inf, math.inf))
+    return DriveScale(travelled, float(track.values[0]), track.intervals[0])
 
 
 def check_scales(names: Sequence[str], scales: Sequence[DriveScale], robot: Robot) -> None:
     """Refuse drives that cannot be of this robot as its data sheet describes it, and two robots together.
+
+    A track counts against the robot where none in its interval is possible.
 
     Args:
         names: of the drives.
@@ -183,7 +191,8 @@ def check_scales(names: Sequence[str], scales: Sequence[DriveScale], robot: Robo
                 f"than slip and the data sheet of {robot.name} explain: give drives of this robot, or its own "
                 "data sheet with --robot FILE.yaml."
             )
-        if scale.track is not None and not 1.0 - radius - track <= scale.track <= WIDEST_TRACK:
+        narrowest, widest = scale.track_interval
+        if scale.track is not None and (widest < 1.0 - radius - track or narrowest > WIDEST_TRACK):
             raise InputError(
                 f"{name}: the gyro turns as if the track were {scale.track:.2f} times that of {robot.name}, which no "
                 "ground does: check the signs and units of gyro and encoders (`ddagr check`), or the robot."

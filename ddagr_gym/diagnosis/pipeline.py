@@ -33,6 +33,7 @@ from ddagr_gym.diagnosis.result.drivetrain_names import (
     CompletedNominal,
     beside_completed,
     drivetrain_is_missing,
+    is_an_answer,
     unlike_commands,
     with_drivetrain,
 )
@@ -175,7 +176,7 @@ def diagnose(
     accepted = accept(found, session.gates)
     unlike = {} if complete_nominal is None else unlike_commands(accepted.chosen, session.gates)
     nominal = complete_nominal(unlike) if complete_nominal is not None and unlike else None
-    if nominal is not None:
+    if nominal is not None and is_an_answer(nominal):
         made = _beside_drivetrain(session, standing(found, session.gates), nominal, steps)
         answer = replace(
             made.diagnosis,
@@ -186,6 +187,8 @@ def diagnose(
             seconds=time.monotonic() - began,
         )
         return replace(made, diagnosis=answer)
+    if nominal is not None:
+        progress(f"a drivetrain explains {nominal.answer.explained:.0%} of the wheel speeds' errors: no answer")
     diagnosis, effects = steps.run("verdict", conclude, session, found, accepted)
     fit = None if names_only else steps.run("certification", certify, session, accepted)
     steps.begin("localisation")

@@ -85,7 +85,27 @@ def test_wheels_of_another_size_are_refused_by_what_the_poses_travel(field_drive
 
 def test_a_track_below_the_geometric_one_is_refused():
     with pytest.raises(InputError, match=r"track were 0\.50 times"):
-        check_scales(["a"], [DriveScale(0.95, 0.5)], get_robot("ddagr"))
+        check_scales(["a"], [DriveScale(0.95, 0.5, (0.45, 0.55))], get_robot("ddagr"))
+
+
+def test_a_track_that_may_be_right_is_not_refused():
+    """Where a robot hardly turns the track is the inverse of a small number, and its interval says so."""
+    check_scales(["a"], [DriveScale(0.95, -18.0, (-629.0, 172.0))], get_robot("ddagr"))
+    with pytest.raises(InputError, match=r"track were 9\.00 times"):
+        check_scales(["a"], [DriveScale(0.95, 9.0, (7.0, 12.0))], get_robot("ddagr"))
+
+
+def test_a_straight_drive_says_nothing_of_the_track(field_drive):
+    """Its commands are those of a drive with turns, the same for both banks; the gyro reads noise."""
+    mean = 0.5 * (field_drive["command_right"] + field_drive["command_left"])
+    straight = ddagr_gym.simulate(np.stack([mean, mean], axis=1), rate=1.0 / field_drive.period, pose_rate=5.0)
+    scale = drive_scale(straight.recording, np.random.default_rng(0))
+    assert scale.travel is not None
+    assert scale.track is None
+    check_scales(["straight"], [scale], get_robot("ddagr"))
+    turned = drive_scale(field_drive, np.random.default_rng(0))
+    assert turned.track is not None
+    assert turned.track_interval[0] < turned.track < turned.track_interval[1]
 
 
 def test_a_gyro_against_encoders_and_poses_is_turned(field_drive):

@@ -108,12 +108,15 @@ def test_names_only_leaves_out_what_follows_the_verdict(stages: Stages) -> None:
     assert (outcome.diagnosis.fit, outcome.diagnosis.unnamed, outcome.diagnosis.next_drive) == (None, None, None)
 
 
-@pytest.mark.parametrize("told", [True, False])
+@pytest.mark.parametrize(
+    ("explained", "told"),
+    [(0.9, True), (None, False), pytest.param(0.3, False, id="most of the wheels' errors are left")],
+)
 def test_the_drivetrain_is_fitted_where_the_library_leaves_too_much_in_the_encoders(
-    stages: Stages, monkeypatch: pytest.MonkeyPatch, told: bool
+    stages: Stages, monkeypatch: pytest.MonkeyPatch, explained: float | None, told: bool
 ) -> None:
-    late = PoseLatency(0.2)
-    nominal = SimpleNamespace(robot=get_robot("warthog"), soil=get_soil("thesis_a1"), effects=(late,))
+    late, answer = PoseLatency(0.2), SimpleNamespace(explained=explained)
+    nominal = SimpleNamespace(robot=get_robot("warthog"), soil=get_soil("thesis_a1"), effects=(late,), answer=answer)
     stages.session.with_nominal = lambda robot, soil: SimpleNamespace(**{**vars(stages.session), "robot": robot})
     stages.session.progress = lambda line: None
     monkeypatch.setattr(pipeline, "unlike_commands", lambda accepted, gates: {"encoder_left": 9.0})
@@ -134,7 +137,7 @@ def test_the_drivetrain_is_fitted_where_the_library_leaves_too_much_in_the_encod
 
     def complete(misfit: Any) -> Any:
         asked.append(misfit)
-        return nominal if told else None
+        return None if explained is None else nominal
 
     outcome, _ = stages.run(complete_nominal=complete)
     assert asked == [{"encoder_left": 9.0}]

@@ -84,6 +84,8 @@ class Terms(InnerProducts):
         overlap: by effect, share of what it does that lies in the windows and channels in which the effects of the
             model act already (0 to 1); empty for a model without effects.
         absorbed: by effect, the size that a nuisance would take over without a trace.
+        imitated: by effect, what it would gain, times the dispersion, by the lean that the effects of the model add
+            and the simulator leaves out; empty where they add none.
     """
 
     candidates: tuple[Candidate, ...]
@@ -92,6 +94,7 @@ class Terms(InnerProducts):
     turned: tuple[int, ...] = ()
     overlap: Mapping[str, float] = field(default_factory=dict)
     absorbed: Mapping[str, float] = field(default_factory=dict)
+    imitated: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def placed(self) -> NDArray[np.bool_]:

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.diagnosis.search.candidates import Candidate, candidates_of
-from ddagr_gym.diagnosis.search.inner_products import Terms
+from ddagr_gym.diagnosis.search.inner_products import InnerProducts, Terms
+from ddagr_gym.diagnosis.search.lean import imitated_gains, lean_column
 from ddagr_gym.diagnosis.search.overlap import overlaps
 from ddagr_gym.diagnosis.search.sensor_effects import Drives, acts_on_readings_only, record_drives
 from ddagr_gym.identification.gauss_newton import Fitted
@@ -119,6 +120,8 @@ def scan(
             candidates.append(candidate)
             columns += [probe_column(problem, fitted, probe, drives) for probe in candidate.probes]
         progress(name)
+    lean = lean_column(problem, fitted)
+    columns += [] if lean is None else [lean]
     free = problem.open_at(fitted.point)
     raw = np.concatenate(
         [
@@ -130,14 +133,18 @@ def scan(
     projected = fitted.elimination.project(raw)
     overlap = overlaps(problem, fitted, candidates, projected[..., 1 + len(free) :])
     windows = problem.blocked.windows
+    normals = np.matmul(projected.transpose(0, 2, 1), projected)
+    precision, values = 1.0 / problem.prior[free] ** 2, fitted.point.values[free]
+    imitated = {} if lean is None else imitated_gains(InnerProducts(normals, precision, values), candidates)
     return Terms(
-        np.matmul(projected.transpose(0, 2, 1), projected),
-        1.0 / problem.prior[free] ** 2,
-        fitted.point.values[free],
+        normals if lean is None else normals[:, :-1, :-1],
+        precision,
+        values,
         tuple(candidates),
         windows.recording,
         windows.time,
         tuple(p.recording for p in problem.nuisances.parameters if p.heading and p.recording is not None),
         overlap,
         absorbed_sizes(problem.nuisances.parameters, fitted.point.values),
+        imitated,
     )

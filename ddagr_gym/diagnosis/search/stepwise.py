@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -11,6 +12,7 @@ from ddagr_gym.diagnosis.gates.thresholds import Thresholds
 from ddagr_gym.diagnosis.preprocessing.session import DiagnosisSession
 from ddagr_gym.diagnosis.search.initial_guess import with_whole_delay
 from ddagr_gym.diagnosis.search.rivals import CLOSE, rivals_of
+from ddagr_gym.diagnosis.search.scan import scan
 from ddagr_gym.diagnosis.search.scanned_model import Rival, ScannedModel, SearchResult, scan_model
 from ddagr_gym.diagnosis.search.starting_models import StartingModels
 from ddagr_gym.diagnosis.store import StepCache, compute_without_cache
@@ -18,6 +20,7 @@ from ddagr_gym.identification.gauss_newton import Fitted, fit
 from ddagr_gym.identification.misfit import channel_misfit, dispersion_of
 from ddagr_gym.identification.problem import Problem
 from ddagr_gym.identification.size_prior import implausibility
+from ddagr_gym.physics.effects.registry import effect_kind
 
 _FORM = 0.01
 """Share of what the named effects explain that a further one must explain besides its gate (ours, chosen on the
@@ -89,7 +92,8 @@ def further_gates(thresholds: Thresholds, models: Sequence[ScannedModel]) -> Thr
 
     What is left of another form of an effect lies in the windows and channels in which it acts: a further effect that
     acts elsewhere (:attr:`~ddagr_gym.diagnosis.search.inner_products.Terms.overlap`) need not explain it. Of a
-    named one the overlap with those before it counts.
+    named one the overlap with those before it counts. What named effects make the robot lean counts besides, see
+    :func:`beyond_lean`.
 
     Args:
         thresholds: of the null bank.
@@ -100,7 +104,26 @@ def further_gates(thresholds: Thresholds, models: Sequence[ScannedModel]) -> Thr
     overlap = {name: share for model in models for name, share in model.terms.overlap.items()}
     names = {*thresholds.gates, *overlap}
     shares = {name: _NEAR_FORM if name in near else _FORM * overlap.get(name, 1.0) for name in names}
-    return thresholds.raised({name: share * explained for name, share in shares.items()})
+    raised = thresholds.raised({name: share * explained for name, share in shares.items()})
+    return beyond_lean(raised, models[-1].terms.imitated, models[-1].dispersion)
+
+
+def beyond_lean(thresholds: Thresholds, imitated: Mapping[str, float], dispersion: float) -> Thresholds:
+    """Gates that an effect passes only if it still would without what the robot's lean reads.
+
+    The root of a gain is a size over its error: those of the effect and of the lean add up where both point the same
+    way.
+
+    Args:
+        thresholds: of further effects.
+        imitated: see :class:`~ddagr_gym.diagnosis.search.inner_products.Terms`.
+        dispersion: of the model that they are to join.
+    """
+    by = {}
+    for name, gain in imitated.items():
+        lean = gain / dispersion
+        by[name] = lean + 2.0 * math.sqrt(lean * thresholds.of(name).gain)
+    return thresholds.raised(by)
 
 
 def _explained(models: Sequence[ScannedModel]) -> float:
@@ -146,7 +169,10 @@ def _with_sizes(problem: Problem, fitted: Fitted) -> float:
 
 
 def _without_idle(session: DiagnosisSession, model: ScannedModel, gates: Thresholds) -> ScannedModel:
-    """Backward move: the effect whose removal costs less than its threshold goes."""
+    """Backward move: the effect whose removal costs less than its threshold goes.
+
+    The gate of the last one knows how the others make the robot lean; those of the others do not know what it adds.
+    """
     problem, effects = session.problem, model.fitted.point.effects
     if len(effects) < 2:
         return model
@@ -155,8 +181,16 @@ def _without_idle(session: DiagnosisSession, model: ScannedModel, gates: Thresho
         kept = (*effects[:number], *effects[number + 1 :])
         without = fit(problem, replace(model.fitted.point, effects=kept), iterations=4, reuse=model.fitted)
         loss = (without.cost - model.fitted.cost) / model.dispersion
-        losses.append((loss / gates.of(effect.name).gain, without))
+        known = number + 1 == len(effects) or not model.terms.imitated
+        own = gates if known else _beside(problem, gates, without, effect.name, model.dispersion)
+        losses.append((loss / own.of(effect.name).gain, without))
     least = min(losses, key=lambda item: item[0])
     if least[0] >= 1.0:
         return model
     return scan_model(problem, fit(problem, least[1].point, iterations=4), session.progress)
+
+
+def _beside(problem: Problem, gates: Thresholds, without: Fitted, name: str, dispersion: float) -> Thresholds:
+    """Gates that know how a model makes the robot lean which lacks an effect."""
+    terms = scan(problem, without, {name: effect_kind(name)})
+    return beyond_lean(gates, terms.imitated, dispersion)

@@ -42,7 +42,7 @@ class CommandDelay(Effect):
     equation = "command(t) -> command(t - delay (1 +- imbalance)), + on the right"
     source = "dead time, as of a transport lag (Astrom and Murray, Feedback Systems)"
     signature = "bank speeds follow commands late by a constant time, then at the usual rate"
-    confused_with = ("motor_lag", "sensor_hold")
+    confused_with = ("motor_lag", "motor_saturation", "sensor_hold")
     actions = ((POINT_COMMANDS, delay_command),)
 
     delay: float = size("s", 0.0, _LONGEST, least=0.02, step=0.008)

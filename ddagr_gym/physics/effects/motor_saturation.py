@@ -80,7 +80,7 @@ class MotorSaturation(Effect):
     )
     source = "actuator saturation and rate limit (Astrom and Murray, Feedback Systems)"
     signature = "encoders stay at a ceiling while commands rise; ramps of constant slope after large steps; wide turns"
-    confused_with = ("motor_droop", "motor_lag")
+    confused_with = ("command_delay", "motor_droop", "motor_lag")
     differentiable = False
     actions = ((POINT_MOTORS, limit_motors),)
 

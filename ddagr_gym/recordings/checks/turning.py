@@ -136,14 +136,15 @@ def _track_sums(recording: Recording, lag: float) -> list[FloatArray]:
     return sums
 
 
-def _turns(recording: Recording) -> bool:
+def turns(recording: Recording) -> bool:
+    """Whether a drive turns enough to tell a scale by."""
     rate = recording["yaw_rate"][np.isfinite(recording["yaw_rate"])]
     return bool(rate.size) and float(np.sqrt(np.mean(rate**2))) >= LEAST_TURN
 
 
 def _gyro_findings(recording: Recording, rng: np.random.Generator) -> list[CheckFinding]:
     pair = "yaw_rate to pose_yaw"
-    found = gyro_against_pose(recording, rng) if _turns(recording) else None
+    found = gyro_against_pose(recording, rng) if turns(recording) else None
     if found is None:
         why = "There are no turns with a pose to hold the gyro against."
         return [not_testable(CHECK, pair, why, "Record a pose with heading. " + _DRIVE)]
@@ -165,7 +166,7 @@ def _gyro_findings(recording: Recording, rng: np.random.Generator) -> list[Check
 
 def _track_findings(recording: Recording, rng: np.random.Generator) -> list[CheckFinding]:
     pair = "encoder to yaw_rate"
-    found = effective_track(recording, rng) if _turns(recording) else None
+    found = effective_track(recording, rng) if turns(recording) else None
     if found is None:
         missing = "The robot's wheel radius and track are not known." if recording.meta.geometry is None else ""
         why = missing or "Encoders and gyro share too few turns."

@@ -25,7 +25,7 @@ def model(*names: str, gain: float = 0.0, held_out: float = 0.0, **misfit: float
         held_out=dict.fromkeys(("slope", "gyro_bias"), held_out),
         misfit={"encoder_left": 0.5, "yaw_rate": 0.5} | misfit,
         dispersion=1.0,
-        terms=SimpleNamespace(overlap={}),
+        terms=SimpleNamespace(overlap={}, imitated={}),
         fitted=SimpleNamespace(cost=0.0, point=SimpleNamespace(effects=effects)),
     )
 

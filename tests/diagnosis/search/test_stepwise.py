@@ -167,7 +167,7 @@ def test_what_is_confused_with_a_named_effect_has_to_explain_more() -> None:
 
     def scanned(cost: float, *effects: str) -> Any:
         point = SimpleNamespace(effects=tuple(parse_effect(text) for text in effects))
-        terms = SimpleNamespace(overlap={"gyro_scale": 0.2, "soil_change": 0.2} if effects else {})
+        terms = SimpleNamespace(overlap={"gyro_scale": 0.2, "soil_change": 0.2} if effects else {}, imitated={})
         return SimpleNamespace(fitted=SimpleNamespace(cost=cost, point=point), dispersion=1.0, terms=terms)
 
     names = ("soil_change", "gyro_scale", "payload")
@@ -299,11 +299,22 @@ def test_a_fast_robot_is_simulated_coarsely_where_the_nominal_model_is_far_off(
         np.testing.assert_array_equal(refits[1].predict(refits[1].start()), exact)
 
 
+@pytest.mark.parametrize("shape", ["motor_lag", "motor_saturation"])
+def test_what_shapes_the_answer_to_a_command_has_to_explain_more_beside_a_delay(shape: str) -> None:
+    """They differ in how wheels answer a step: what is left of another form of one looks like another one."""
+    point = SimpleNamespace(effects=(parse_effect("command_delay=0.2"),))
+    terms = SimpleNamespace(overlap={shape: 0.4}, imitated={})
+    first = SimpleNamespace(fitted=SimpleNamespace(cost=3000.0, point=SimpleNamespace(effects=())), terms=terms)
+    delayed = SimpleNamespace(fitted=SimpleNamespace(cost=500.0, point=point), dispersion=1.0, terms=terms)
+    gates = Thresholds({shape: Gate(20.0, 0.0)}, {}, 20, "x")
+    assert module.further_gates(gates, [first, delayed]).of(shape).gain == pytest.approx(20.0 + 0.1 * 2500.0)
+
+
 def test_a_second_effect_keeps_the_overlap_it_had_before_it_was_named() -> None:
     def scanned(cost: float, overlap: dict[str, float], *effects: str) -> Any:
         point = SimpleNamespace(effects=tuple(parse_effect(text) for text in effects))
         fitted = SimpleNamespace(cost=cost, point=point)
-        return SimpleNamespace(fitted=fitted, dispersion=1.0, terms=SimpleNamespace(overlap=overlap))
+        return SimpleNamespace(fitted=fitted, dispersion=1.0, terms=SimpleNamespace(overlap=overlap, imitated={}))
 
     names = ("command_deadband", "accelerometer_bias", "of_ones_own")
     gates = Thresholds({name: Gate(10.0, 0.0) for name in names[:2]}, {}, 20, "x")

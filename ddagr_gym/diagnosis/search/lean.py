@@ -1,0 +1,82 @@
+"""What a robot that leans reads: wheels that sink unevenly tilt it, which the simulator leaves out.
+
+The ground of the simulator is even and its robot stays upright, whatever its wheels sink. A soil that differs from side
+to side or a centre of mass off the middle makes some wheels sink deeper, and the accelerometer of a real robot then
+reads a part of gravity that other names would explain as a bias or a tilted sensor.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ddagr_gym.diagnosis.search.candidates import Candidate
+from ddagr_gym.diagnosis.search.gains import best_multiples
+from ddagr_gym.diagnosis.search.inner_products import InnerProducts, Reduced
+from ddagr_gym.diagnosis.search.sensor_effects import acts_on_readings_only
+from ddagr_gym.identification.gauss_newton import Fitted
+from ddagr_gym.identification.problem import Problem
+from ddagr_gym.parameters import STANDARD_GRAVITY, Robot
+from ddagr_gym.physics import layout
+
+Array = NDArray[np.float64]
+
+_MINOR, _MAJOR = layout.WHEEL, layout.WHEEL + 8
+_ENTRIES = [first + wheel for first in (_MINOR, _MAJOR, layout.SINKAGE) for wheel in range(4)]
+
+
+def lean_column(problem: Problem, fitted: Fitted) -> Array | None:
+    """Weighted change of the block means by the lean that the effects of a model add, (W, M); None where they add none.
+
+    Args:
+        problem: what was fitted.
+        fitted: the model.
+    """
+    if all(acts_on_readings_only(effect) for effect in fitted.point.effects):
+        return None
+    leaning = fitted.prediction.copy()
+    added = _hub_heights(problem, fitted, True) - _hub_heights(problem, fitted, False)
+    leaning[..., :2] += gravity_read(problem.robot, added)
+    return problem.blocked.change(leaning, fitted.prediction)
+
+
+def gravity_read(robot: Robot, heights: Array) -> Array:
+    """(..., 2) specific force [m/s^2] along x and y of a robot whose hubs stand at heights (..., 4) [m].
+
+    A small-angle tilt of the plane of the four hubs: nose up reads forwards, left side up to the left.
+
+    Args:
+        robot: with the distances of its wheels.
+        heights: of the hubs, in the order of the wheels.
+    """
+    right_front, left_front, right_rear, left_rear = np.moveaxis(heights, -1, 0)
+    climb = (right_front + left_front - right_rear - left_rear) / (4.0 * robot.half_wheelbase)
+    bank = (left_front + left_rear - right_front - right_rear) / (4.0 * robot.half_track)
+    return STANDARD_GRAVITY * np.stack([climb, bank], axis=-1)
+
+
+def _hub_heights(problem: Problem, fitted: Fitted, with_effects: bool) -> Array:
+    """(W, T, 4) heights of the hubs above the untouched ground [m]."""
+    point = fitted.point if with_effects else replace(fitted.point, effects=())
+    record = problem.model.predict_recorded(point.values, point.states, _ENTRIES, point.effects)[1]
+    minor, major, sinkage = np.split(record, 3, axis=-1)
+    return np.asarray(minor + major - sinkage)
+
+
+def imitated_gains(products: InnerProducts, candidates: Sequence[Candidate]) -> dict[str, float]:
+    """What each effect would gain by readings that differ by the last column alone, times the dispersion.
+
+    Args:
+        products: of the candidates' columns and, behind them, that column.
+        candidates: of the library.
+    """
+    reduced = products.reduced()
+    others = Reduced(reduced.information[:-1, -1], reduced.information[:-1, :-1], reduced.nuisance[:, :-1])
+    found: dict[str, float] = {}
+    for candidate in candidates:
+        gain, _ = best_multiples(others, candidate)
+        found[candidate.name] = max(found.get(candidate.name, 0.0), gain)
+    return found
