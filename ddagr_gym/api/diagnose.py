@@ -264,11 +264,11 @@ class _Drivetrain:
     def complete(self, misfit: Mapping[str, float]) -> CompletedNominal | None:
         """The nominal simulator with the drivetrain that the recordings ask for; None where they cannot tell it."""
         from ddagr_gym.calibration.drivetrain_answer import drivetrain_answer, drivetrain_findings, late_poses
-        from ddagr_gym.calibration.run import calibrate_drives, ready_drives
+        from ddagr_gym.calibration.run import LittleExplainedError, calibrate_drives, ready_drives
         from ddagr_gym.calibration.settings import CalibrationSettings
-        from ddagr_gym.diagnosis.result.drivetrain_names import CompletedNominal
+        from ddagr_gym.diagnosis.result.drivetrain_names import LEAST_EXPLAINED, CompletedNominal
 
-        settings = CalibrationSettings(threads=self.threads, seed=self.seed)
+        settings = CalibrationSettings(threads=self.threads, seed=self.seed, least_explained=LEAST_EXPLAINED)
         if len(self.recordings) == 1:
             fitted, compared, settlings = (_ONE_DRIVE[name] for name in ("fitted", "compared", "settlings"))
             settings = replace(settings, fitted=fitted, compared=compared, settlings=settlings)
@@ -280,10 +280,14 @@ class _Drivetrain:
         except InputError as error:
             warnings.warn(f"the drivetrain cannot be fitted: {error}", InputWarning, stacklevel=2)
             return None
-        self.made = calibrate_drives(
-            *drives, soil_names={_GROUND: self.nominal.soil_name}, ready=ready,
-            cache=None if self.cache is None else Path(self.cache) / _GROUND, progress=self._say,
-        )  # fmt: skip
+        try:
+            self.made = calibrate_drives(
+                *drives, soil_names={_GROUND: self.nominal.soil_name}, ready=ready,
+                cache=None if self.cache is None else Path(self.cache) / _GROUND, progress=self._say,
+            )  # fmt: skip
+        except LittleExplainedError as error:
+            self._say(f"{error}: no answer")
+            return None
         found = self.made.calibration
         answer = drivetrain_answer(found, misfit)
         robot, soil = self.made.robot, self.made.soils[_GROUND]

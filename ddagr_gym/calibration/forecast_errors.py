@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -82,14 +82,10 @@ def all_forecasts(
     """
     fitted = model.problem.blocked.windows
     by_window = folds(data, fitted)
-    offsets = tuple(p for p in model.parameters if p.name in held)
-    nominal = np.array([held[p.name] for p in offsets])
-    soil = next(iter(data.soils.values()))
     found = []
     for forecast in made:
         windows = without_currents(forecast.windows)
-        sheet = WindowModel(data.robot, soil, windows, offsets, numerics=field_numerics(), threads=threads)
-        before = sheet.predict(nominal, windows.initial)
+        before = _by_data_sheet(data, model, windows, held, threads)
         predictions = {DATA_SHEET: before, CALIBRATED: forecast.prediction[..., : len(CHANNELS)]}
         kinematic = _kinematic(data, without_currents(fitted.subset(np.asarray(by_window != forecast.fold))))
         if kinematic is not None:
@@ -105,6 +101,38 @@ def all_forecasts(
             )
         )  # fmt: skip
     return tuple(found)
+
+
+def _by_data_sheet(
+    data: CalibrationData, model: FittedModel, windows: WindowSet, held: Mapping[str, float], threads: int
+) -> Array:
+    """Prediction (W, T, 8) of the robot of the data sheet on the nominal soils."""
+    offsets = tuple(p for p in model.parameters if p.name in held)
+    soil = next(iter(data.soils.values()))
+    sheet = WindowModel(data.robot, soil, windows, offsets, numerics=field_numerics(), threads=threads)
+    return sheet.predict(np.array([held[p.name] for p in offsets]), windows.initial)
+
+
+def explained_when_left_out(
+    data: CalibrationData, model: FittedModel, made: Iterable[Forecast], held: Mapping[str, float], threads: int
+) -> float:
+    """Share of the squared error of left-out wheel speeds that a model takes away from the data sheet's.
+
+    Args:
+        data: drives.
+        model: fitted.
+        made: its forecasts.
+        held: values of the parameters that carry the nominal soils.
+        threads: of the simulator.
+    """
+    before, after = 0.0, 0.0
+    for forecast in made:
+        windows = without_currents(forecast.windows)
+        measured = windows.measured[..., ENCODERS]
+        sheet = _by_data_sheet(data, model, windows, held, threads)
+        before += float(np.nansum((sheet[..., ENCODERS] - measured) ** 2))
+        after += float(np.nansum((forecast.prediction[..., ENCODERS] - measured) ** 2))
+    return 1.0 - after / before if before > 0.0 else 0.0
 
 
 def _currents(forecast: Forecast) -> tuple[Array, Array]:

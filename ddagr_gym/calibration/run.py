@@ -17,7 +17,7 @@ from ddagr_gym.calibration.current_evidence import current_evidence
 from ddagr_gym.calibration.drive_scatter import drive_estimates
 from ddagr_gym.calibration.effect_bank import ordinary_runs
 from ddagr_gym.calibration.fit_starts import fit_from_several
-from ddagr_gym.calibration.forecast_errors import Forecasts, all_forecasts, forecast_errors
+from ddagr_gym.calibration.forecast_errors import Forecasts, all_forecasts, explained_when_left_out, forecast_errors
 from ddagr_gym.calibration.identifiability import covariance, unidentified
 from ddagr_gym.calibration.independent_steps import IndependentSteps
 from ddagr_gym.calibration.input_requirements import check_drives, check_scales, drive_scale, with_gyro_forward
@@ -78,6 +78,18 @@ class Outcome:
     forecasts: tuple[Forecasts, ...]
     bank: tuple[NullRun, ...] = ()
     ordinary: Ordinary | None = None
+
+
+class LittleExplainedError(Exception):
+    """All parts together explain less of left-out wheel speeds than the settings ask for.
+
+    Attributes:
+        share: of their squared error that is taken away from the data sheet's.
+    """
+
+    def __init__(self, share: float) -> None:
+        super().__init__(f"all parts together explain {share:.0%} of the squared error of left-out wheel speeds")
+        self.share = share
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,6 +164,7 @@ def calibrate_drives(
 
     Raises:
         InputError: drives that cannot be calibrated, or a cache that holds something else.
+        LittleExplainedError: less than ``settings.least_explained`` is explained.
         FailedTasksError: some of the independent steps failed; the others are kept.
     """
     if runner is None:
@@ -221,12 +234,24 @@ def _select(
     store: StepStore,
     steps: IndependentSteps,
 ) -> Selection:
-    """Parts that forecasts of left-out drives ask for, by fits to some of the windows."""
+    """Parts that forecasts of left-out drives ask for, by fits to some of the windows; or LittleExplainedError."""
     windows, judged = data.spread(settings.compared), data.spread(settings.judged)
     rough = store.step("all parts", partial(_weigh, data, windows, model, held, settings.threads, steps))
     comparison = Comparison(data, windows, judged, rough.weights, settings.threads, settings.settlings)
     full = store.step("all parts forecast", partial(comparison.candidate, model, rough.standing, 0))
+    if settings.least_explained > 0.0:
+        explained = store.step("all parts explain", partial(_explained, comparison, model, held, rough.standing))
+        if explained < settings.least_explained:
+            raise LittleExplainedError(explained)
     return select_parts(comparison, model, full, store.step, steps.progress)
+
+
+def _explained(comparison: Comparison, model: RobotModel, held: Mapping[str, float], standing: Standing) -> float:
+    """Share of the squared error of left-out wheel speeds that all parts take away from the data sheet's."""
+    data, weights, threads = comparison.data, comparison.weights, comparison.threads
+    fitted = model_at(data, comparison.windows, model, weights, standing, threads)
+    made = forecasts(data, fitted, comparison.judged, weights, threads)
+    return explained_when_left_out(data, fitted, made, held, threads)
 
 
 def _weigh(

@@ -28,6 +28,8 @@ class CalibrationSettings:
         seed: of resampled intervals.
         supply_currents: also use currents that motors draw from their supply; their own always count. On simulated
             drives those of the supply, at 1 Hz, made nothing better known (benchmarks/motor_currents.py).
+        least_explained: share of the squared error of left-out wheel speeds that all parts together must take away from
+            the data sheet's; below it no single part is asked for.
     """
 
     window: float = 6.0
@@ -38,3 +40,4 @@ class CalibrationSettings:
     threads: int = 1
     seed: int = 0
     supply_currents: bool = False
+    least_explained: float = 0.0

@@ -8,6 +8,7 @@ import pytest
 
 import ddagr_gym
 from ddagr_gym.api import diagnose as door
+from ddagr_gym.calibration.run import LittleExplainedError
 from ddagr_gym.diagnosis import pipeline
 from ddagr_gym.diagnosis.search.scanned_model import SearchResult, scan_model
 from ddagr_gym.errors import InputError, InputWarning
@@ -67,6 +68,18 @@ def test_a_recording_that_cannot_tell_its_drivetrain_keeps_its_answer_and_says_w
     with pytest.warns(InputWarning, match="the drivetrain cannot be fitted: yard.csv has 3 windows"):
         result = ddagr_gym.diagnose(driven(40.0), names_only=True)
     assert result.diagnosis.drivetrain is None
+
+
+def test_a_drivetrain_that_explains_little_is_no_answer_and_that_is_said(asked, monkeypatch):
+    def fit(*inputs, **named):
+        assert 0.0 < inputs[4].least_explained < 0.5
+        raise LittleExplainedError(0.07)
+
+    monkeypatch.setattr("ddagr_gym.calibration.run.calibrate_drives", fit)
+    lines = []
+    result = ddagr_gym.diagnose(driven(70.0), names_only=True, progress=lines.append)
+    assert result.diagnosis.drivetrain is None
+    assert any("explain 7% of the squared error of left-out wheel speeds: no answer" in line for line in lines)
 
 
 def test_an_error_inside_the_fit_is_no_property_of_the_recording(asked, monkeypatch):

@@ -12,7 +12,7 @@ from ddagr_gym import cli
 from ddagr_gym.api.calibrate import CalibrationResult
 from ddagr_gym.calibration import files
 from ddagr_gym.calibration.result import CALIBRATED, DATA_SHEET
-from ddagr_gym.calibration.run import calibrate_drives
+from ddagr_gym.calibration.run import LittleExplainedError, calibrate_drives
 from ddagr_gym.calibration.settings import CalibrationSettings
 from ddagr_gym.config import load_config
 from ddagr_gym.errors import InputError
@@ -49,6 +49,17 @@ def folder(result, tmp_path_factory) -> Path:
 
 def holds(item, truth: float) -> bool:
     return item.interval is not None and item.interval[0] <= truth <= item.interval[1]
+
+
+@pytest.mark.slow
+def test_no_part_is_looked_for_where_all_together_explain_too_little(drives):
+    lines = []
+    asked = replace(FEW, least_explained=0.9999)
+    soils = {ground: get_soil("thesis_a1") for ground in GROUNDS}
+    with pytest.raises(LittleExplainedError) as raised:
+        calibrate_drives(drives, GROUNDS, get_robot("ddagr"), soils, asked, progress=lines.append)
+    assert 0.9 < raised.value.share < 0.9999
+    assert not any("without" in line for line in lines)
 
 
 @pytest.mark.slow

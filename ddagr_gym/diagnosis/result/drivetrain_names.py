@@ -25,6 +25,10 @@ EXPLAINED = 0.5
 """Share of the squared error of left-out wheel speeds from which a fitted drivetrain is an answer (ours: half, as the
 names of the library have to explain where much is left; six real drives: 0.83 to 0.93)."""
 
+LEAST_EXPLAINED = EXPLAINED / 2
+"""Share that all parts together must explain of what was left out, for each of them to be tried (ours: half of what an
+answer needs, since a part that is not there makes forecasts worse; trying all takes two thirds of the time)."""
+
 TOGETHER = 2
 """Effects of the library that are looked for before the whole drivetrain is asked for (ours: two at once are as many as
 the gates were chosen for; a third costs a quarter of the time)."""
