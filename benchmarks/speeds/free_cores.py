@@ -12,8 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.speeds.timing import Contestant
-from ddagr_gym.parameters import Robot
+from benchmarks.speeds.timing import Contestant, turn
 from ddagr_gym.physics import layout
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.simulator import Simulator
@@ -31,7 +30,7 @@ class SecondCore:
     """
 
     def __init__(self, count: int = 16, samples: int = 200) -> None:
-        robot: Robot = get_robot("ddagr")
+        robot = get_robot("ddagr")
         self._simulators = [Simulator(count), Simulator(count)]
         for simulator in self._simulators:
             for n in range(count):
@@ -75,19 +74,12 @@ def turns_beside_control(one: Contestant, two: Contestant, turns: int, most: int
     gains: list[float] = []
     seconds: list[float] = []
     for contestant in (one, two):
-        _seconds(contestant)
+        turn(contestant)
     while len(gains) < most and sum(s >= FREE for s in seconds) < turns:
         pair = (one, two) if len(gains) % 2 else (two, one)
         before = control.measure()
-        taken = {contestant.name: _seconds(contestant) for contestant in pair}
+        rates = {contestant.name: turn(contestant)[1] for contestant in pair}
         seconds.append(min(before, control.measure()))
-        gains.append(taken[one.name] / taken[two.name])
+        gains.append(rates[two.name] / rates[one.name])
     found = np.array(seconds)
     return {"gain": np.array(gains), "free": found >= FREE, "second_core": found}
-
-
-def _seconds(contestant: Contestant) -> float:
-    contestant.prepare()
-    start = time.perf_counter()
-    contestant.run()
-    return time.perf_counter() - start

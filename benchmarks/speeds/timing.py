@@ -75,16 +75,17 @@ def race(contestants: Sequence[Contestant], repeats: int) -> dict[str, Rates]:
         repeats: turns of each that count.
     """
     for contestant in contestants:
-        _turn(contestant)
+        turn(contestant)
     turns: dict[str, list[tuple[float, float]]] = {contestant.name: [] for contestant in contestants}
     for repeat in range(repeats):
         first = repeat % len(contestants)
         for contestant in (*contestants[first:], *contestants[:first]):
-            turns[contestant.name].append(_turn(contestant))
+            turns[contestant.name].append(turn(contestant))
     return {c.name: Rates(*np.array(turns[c.name]).T, threads=c.threads) for c in contestants}
 
 
-def _turn(contestant: Contestant) -> tuple[float, float]:
+def turn(contestant: Contestant) -> tuple[float, float]:
+    """Amounts per second of processor time and of wall time, of one turn."""
     contestant.prepare()
     wall, cpu = time.perf_counter(), time.process_time()
     amount = contestant.run()

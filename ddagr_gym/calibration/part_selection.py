@@ -10,15 +10,15 @@ dead time that forecasts as well.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
 from ddagr_gym.calibration.calibration_data import CalibrationData
-from ddagr_gym.calibration.joint_fit import OFFSET, Standing, fit_model
-from ddagr_gym.calibration.left_out import fold_sigma, forecast_loss, forecasts
+from ddagr_gym.calibration.joint_fit import OFFSET, FittedModel, Standing, fit_model
+from ddagr_gym.calibration.left_out import Forecast, fold_sigma, forecast_loss, forecasts
 from ddagr_gym.calibration.parts import PARTS, RobotModel, idle_parts
 from ddagr_gym.calibration.result import PartDecision
 from ddagr_gym.diagnosis.store import StepCache
@@ -96,17 +96,28 @@ class Comparison:
     threads: int
     settlings: int
 
-    def candidate(self, model: RobotModel, start: Standing, iterations: int = ITERATIONS) -> Candidate:
-        """A model, fitted from where another one stands, and its forecasts."""
+    def fitted(self, model: RobotModel, start: Standing, iterations: int = ITERATIONS) -> FittedModel:
+        """A model, fitted from where another one stands."""
         kept = {name: value for name, value in start.values.items() if name in model.free or name.startswith(OFFSET)}
-        fitted = fit_model(
+        return fit_model(
             self.data, self.windows, model, self.weights, kept, self.threads,
             states=start.states, iterations=iterations,
         )  # fmt: skip
+
+    def forecasts(self, fitted: FittedModel) -> tuple[Forecast, ...]:
+        """Of every fold, by a fitted model."""
+        return tuple(forecasts(self.data, fitted, self.judged, self.weights, self.threads))
+
+    def judge(self, fitted: FittedModel, made: Sequence[Forecast]) -> Candidate:
+        """A fitted model by its forecasts."""
         sigma = fold_sigma(self.data, self.windows, self.weights)
-        made = tuple(forecasts(self.data, fitted, self.judged, self.weights, self.threads))
         losses = {f.fold: forecast_loss(f, sigma[f.fold], self.weights.robust) for f in made}
         return Candidate(fitted.standing, losses, {f.fold: f.windows.count for f in made})
+
+    def candidate(self, model: RobotModel, start: Standing, iterations: int = ITERATIONS) -> Candidate:
+        """A model, fitted from where another one stands, and its forecasts."""
+        fitted = self.fitted(model, start, iterations)
+        return self.judge(fitted, self.forecasts(fitted))
 
 
 def worse_by(before: Candidate, after: Candidate) -> tuple[float, float]:

@@ -31,7 +31,7 @@ from ddagr_gym.calibration.joint_fit import (
 )
 from ddagr_gym.calibration.left_out import forecasts
 from ddagr_gym.calibration.ordinary_drives import Ordinary, ordinary_drives
-from ddagr_gym.calibration.part_selection import Comparison, Selection, select_parts
+from ddagr_gym.calibration.part_selection import Candidate, Comparison, Selection, select_parts
 from ddagr_gym.calibration.parts import RobotModel
 from ddagr_gym.calibration.residual_tables import spectra, unexplained
 from ddagr_gym.calibration.result import SCHEMA, SCHEMA_VERSION, Calibration, Covariance
@@ -238,20 +238,25 @@ def _select(
     windows, judged = data.spread(settings.compared), data.spread(settings.judged)
     rough = store.step("all parts", partial(_weigh, data, windows, model, held, settings.threads, steps))
     comparison = Comparison(data, windows, judged, rough.weights, settings.threads, settings.settlings)
-    full = store.step("all parts forecast", partial(comparison.candidate, model, rough.standing, 0))
-    if settings.least_explained > 0.0:
-        explained = store.step("all parts explain", partial(_explained, comparison, model, held, rough.standing))
-        if explained < settings.least_explained:
-            raise LittleExplainedError(explained)
+    asked = settings.least_explained > 0.0
+    full, explained = store.step(
+        "all parts forecast", partial(_all_parts, comparison, model, held, rough.standing, asked)
+    )
+    if explained is not None and explained < settings.least_explained:
+        raise LittleExplainedError(explained)
     return select_parts(comparison, model, full, store.step, steps.progress)
 
 
-def _explained(comparison: Comparison, model: RobotModel, held: Mapping[str, float], standing: Standing) -> float:
-    """Share of the squared error of left-out wheel speeds that all parts take away from the data sheet's."""
-    data, weights, threads = comparison.data, comparison.weights, comparison.threads
-    fitted = model_at(data, comparison.windows, model, weights, standing, threads)
-    made = forecasts(data, fitted, comparison.judged, weights, threads)
-    return explained_when_left_out(data, fitted, made, held, threads)
+def _all_parts(
+    comparison: Comparison, model: RobotModel, held: Mapping[str, float], standing: Standing, asked: bool
+) -> tuple[Candidate, float | None]:
+    """The model with all parts by its forecasts and, where asked, the share of the wheel speeds that these explain."""
+    fitted = comparison.fitted(model, standing, iterations=0)
+    made = comparison.forecasts(fitted)
+    candidate = comparison.judge(fitted, made)
+    if not asked:
+        return candidate, None
+    return candidate, explained_when_left_out(comparison.data, fitted, made, held, comparison.threads)
 
 
 def _weigh(
