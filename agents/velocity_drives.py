@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from benchmarks.lateral_scale import LateralScale
 from ddagr_gym.control.pid import PidGains
 from ddagr_gym.control.timing import CONTROL_INTERVAL, CONTROL_PERIOD
 from ddagr_gym.envs.constants import EPISODE_STEPS
@@ -34,6 +33,7 @@ from ddagr_gym.parameters import Sensors
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.effects.slope import Slope
 from ddagr_gym.physics.effects.soil_change import SoilChange
+from ddagr_gym.physics.lateral_scale import LateralScale
 from ddagr_gym.presets import ddagr
 from ddagr_gym.progress import Progress
 

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -22,7 +21,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from benchmarks.lateral_scale import LateralScale
+from benchmarks.plants import DEVELOPMENT_PLANTS
 from benchmarks.plants_figure import draw
 from ddagr_gym.envs.options import make_settings
 from ddagr_gym.envs.settings import Episode, TurnSettings
@@ -32,9 +31,6 @@ from ddagr_gym.evaluation.metrics import turn_metrics
 from ddagr_gym.evaluation.runs import drive_turn
 from ddagr_gym.evaluation.statistics import Interval, bootstrap, median_interval, wilson_interval
 from ddagr_gym.files import atomic_path
-from ddagr_gym.physics.effects import Effect
-from ddagr_gym.physics.effects.slope import Slope
-from ddagr_gym.physics.effects.soil_change import SoilChange
 from ddagr_gym.progress import Progress
 
 RESULT = Path(__file__).parent / "results" / "row_turn_plants.json"
@@ -42,53 +38,7 @@ CONTROLLERS = ("B1", "B4", "B6_flat", "B6", "true_path")
 _ROOT_SEED = 20_261_122
 _NOISE, _DRAW, _PLANT = range(3)  # last parts of the seeds
 
-Maker = Callable[[Episode, np.random.Generator], tuple[Episode, tuple[Effect, ...]]]
-
-
-@dataclass(frozen=True)
-class Plant:
-    """A robot and ground that differ from the nominal ones.
-
-    Attributes:
-        title: in tables and pictures.
-        change: (episode, rng) -> the episode and the effects in which it is driven.
-    """
-
-    title: str
-    change: Maker
-
-
-def _slope(degrees: float) -> Maker:
-    def change(episode: Episode, rng: np.random.Generator) -> tuple[Episode, tuple[Effect, ...]]:
-        return episode, (Slope(math.radians(degrees), float(rng.uniform(-math.pi, math.pi))),)
-
-    return change
-
-
-def _weaker(episode: Episode, rng: np.random.Generator) -> tuple[Episode, tuple[Effect, ...]]:
-    turn = episode.turn
-    half = (turn.run_in + 0.5 * turn.turn_length) / turn.speed
-    return episode, (SoilChange(0.7, 1.0, half),)
-
-
-def _late(episode: Episode, rng: np.random.Generator) -> tuple[Episode, tuple[Effect, ...]]:
-    return replace(episode, command_delay=episode.command_delay + 0.1), ()
-
-
-def _heavy(episode: Episode, rng: np.random.Generator) -> tuple[Episode, tuple[Effect, ...]]:
-    return replace(episode, robot=replace(episode.robot, mass=1.15 * episode.robot.mass)), ()
-
-
-PLANTS = {
-    "level": Plant("as modelled", lambda episode, rng: (episode, ())),
-    "slope_3": Plant("slope of 3 degrees", _slope(3.0)),
-    "slope_5": Plant("slope of 5 degrees", _slope(5.0)),
-    "weaker": Plant("strength x 0.7 from half of the turn on", _weaker),
-    "lateral_0.8": Plant("lateral forces x 0.8", lambda episode, rng: (episode, (LateralScale(0.8),))),
-    "lateral_1.2": Plant("lateral forces x 1.2", lambda episode, rng: (episode, (LateralScale(1.2),))),
-    "late": Plant("commands 0.1 s late", _late),
-    "heavy": Plant("mass + 15 %", _heavy),
-}
+PLANTS = DEVELOPMENT_PLANTS
 """The plants by name."""
 
 
@@ -103,7 +53,7 @@ class Outcome:
 def scenario(plant: str, number: int, root_seed: int = _ROOT_SEED) -> tuple[TurnSettings, Episode, int]:
     """Settings, episode and noise seed; soils, robots and sensors of a number are the same on every plant."""
     drawn = make_settings().draw(np.random.default_rng([root_seed, number, _DRAW]))
-    episode, effects = PLANTS[plant].change(drawn, np.random.default_rng([root_seed, number, _PLANT]))
+    episode, effects = PLANTS[plant].drawn(drawn, np.random.default_rng([root_seed, number, _PLANT]))
     seed = int(np.random.default_rng([root_seed, number, _NOISE]).integers(2**31))
     return make_settings(effects=effects), episode, seed
 

@@ -1,23 +1,33 @@
 """How the scenario sets S0 to S8, V (validation) and T (transfer) were drawn (theory: control, section 5).
 
 Sets are frozen once by ``ddagr freeze-scenarios`` and then read, never drawn again. V alone serves tuning and
-selection; the others are opened only after the claims of ``configs/evaluation/claims.yaml`` are written.
+selection; the others are opened only after the claims of ``configs/evaluation/claims.yaml`` are written. S1b to S8b and
+Tb are a second drawing of S1 to S8 and T, made once much had been learnt from the first. The sets named ``on_`` and
+:mod:`a plant <benchmarks.plants>` are the first sixty turns of S1b, on each plant.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from benchmarks.plants import DEVELOPMENT_PLANTS, FURTHER_PLANTS, Plant, unchanged
 from ddagr_gym.envs.options import make_settings
 from ddagr_gym.envs.settings import Episode, Randomisation, TurnSettings
 from ddagr_gym.evaluation.scenarios import GroundRecipe, Scenario, build_field
+from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.soil_laws import LAW, NOMINAL_LAW
 
-_ROOT_SEED = 20_261_120
+_ROOT_SEED, _SECOND_SEED = 20_261_120, 20_261_125
+_ON_PLANT = 1
+"""Last part of the seed of what a plant changes."""
+
+_AS_DRAWN = Plant("as drawn", unchanged)
+
+Draw = Callable[[np.random.Generator, int], tuple[Episode, GroundRecipe]]
 
 
 @dataclass(frozen=True)
@@ -28,15 +38,19 @@ class SetPlan:
         description: one line.
         count: scenarios in it.
         draw: (rng, number) -> episode without grid, and the recipe of its grid.
-        same_as: set whose scenarios these are, on the ground of another law.
+        same_as: set whose first scenarios these are, on the ground of another law or on a plant.
         law: name of the soil's law.
+        root_seed: of the drawing.
+        plant: how robot and ground are changed.
     """
 
     description: str
     count: int
-    draw: Callable[[np.random.Generator, int], tuple[Episode, GroundRecipe]]
+    draw: Draw
     same_as: str | None = None
     law: str = NOMINAL_LAW
+    root_seed: int = _ROOT_SEED
+    plant: Plant = _AS_DRAWN
 
 
 def _settings(soil: str, **changes: object) -> TurnSettings:
@@ -54,7 +68,7 @@ def _nominal(rng: np.random.Generator, number: int) -> tuple[Episode, GroundReci
     return settings.draw(rng), GroundRecipe()
 
 
-def _on(soil: str) -> Callable[[np.random.Generator, int], tuple[Episode, GroundRecipe]]:
+def _on(soil: str) -> Draw:
     def draw(rng: np.random.Generator, number: int) -> tuple[Episode, GroundRecipe]:
         return _settings(soil).draw(rng), _varied(rng)
 
@@ -98,22 +112,28 @@ def _slow_motors(rng: np.random.Generator, number: int) -> tuple[Episode, Ground
     return replace(episode, robot=robot, command_delay=float(rng.uniform(0.05, 0.25))), _varied(rng)
 
 
-def _mirrored(rng: np.random.Generator, number: int) -> tuple[Episode, GroundRecipe]:
+def _mirrored(root_seed: int) -> Draw:
     """Pairs: every odd scenario is the even one before it, mirrored; the sensors' noise is drawn anew."""
-    twin = np.random.default_rng([_ROOT_SEED, 7, number // 2])
-    episode = _settings("thesis_a1_range", side="left").draw(twin)
-    if number % 2:
-        turn, imu = replace(episode.turn, side="right"), episode.sensors.imu
-        along, across = imu.accelerometer_bias
-        imu = replace(imu, gyro_bias=-imu.gyro_bias, accelerometer_bias=(along, -across))
-        episode = replace(
-            episode,
-            turn=turn,
-            sensors=replace(episode.sensors, imu=imu),
-            lateral_offset=-episode.lateral_offset,
-            heading_offset=-episode.heading_offset,
-        )
-    return episode, GroundRecipe()
+
+    def draw(rng: np.random.Generator, number: int) -> tuple[Episode, GroundRecipe]:
+        twin = np.random.default_rng([root_seed, 7, number // 2])
+        episode = _settings("thesis_a1_range", side="left").draw(twin)
+        return (_mirror_image(episode) if number % 2 else episode), GroundRecipe()
+
+    return draw
+
+
+def _mirror_image(episode: Episode) -> Episode:
+    imu = episode.sensors.imu
+    along, across = imu.accelerometer_bias
+    imu = replace(imu, gyro_bias=-imu.gyro_bias, accelerometer_bias=(along, -across))
+    return replace(
+        episode,
+        turn=replace(episode.turn, side="right"),
+        sensors=replace(episode.sensors, imu=imu),
+        lateral_offset=-episode.lateral_offset,
+        heading_offset=-episode.heading_offset,
+    )
 
 
 def _other_geometry(rng: np.random.Generator, number: int) -> tuple[Episode, GroundRecipe]:
@@ -132,24 +152,61 @@ PLANS = {
     "S4": SetPlan("a soil step or patch in mid-turn", 100, _changing),
     "S5": SetPlan("sensor stress: biases, scales and noise at the data sheets' limits", 100, _stressed),
     "S6": SetPlan("motor rate 1.4 1/s and dead time 0.05 to 0.25 s", 100, _slow_motors),
-    "S7": SetPlan("mirrored pairs", 100, _mirrored),
+    "S7": SetPlan("mirrored pairs", 100, _mirrored(_ROOT_SEED)),
     "S8": SetPlan("other radii and speeds", 100, _other_geometry),
     "V": SetPlan("validation, in range: for tuning and selection only", 100, _on("thesis_a1_range")),
     "T": SetPlan("transfer: the first hundred of S1 on another soil law", 100, _on("thesis_a1_range"), "S1", LAW),
 }
-"""The sets by name."""
+"""The sets of the first drawing by name."""
+
+SECOND = (*(f"S{number}b" for number in range(1, 9)), "Tb")
+"""Names of the second drawing."""
+
+PLANT_COUNT = 60
+"""Scenarios on each plant."""
+
+
+def _second(name: str) -> SetPlan:
+    """Plan of a set of the first drawing, drawn again."""
+    plan = PLANS[name]
+    return replace(
+        plan,
+        description=f"second drawing, {plan.description}",
+        draw=_mirrored(_SECOND_SEED) if name == "S7" else plan.draw,
+        same_as=None if plan.same_as is None else f"{plan.same_as}b",
+        root_seed=_SECOND_SEED,
+    )
+
+
+def _on_plant(plant: Plant) -> SetPlan:
+    title = f"the first {PLANT_COUNT} of S1b on a plant: {plant.title}"
+    return SetPlan(title, PLANT_COUNT, PLANS["S1b"].draw, "S1b", plant.law, _SECOND_SEED, plant)
+
+
+PLANS |= {name: _second(name.removesuffix("b")) for name in SECOND}
+ON_PLANTS = {f"on_{name}": plant for name, plant in (DEVELOPMENT_PLANTS | FURTHER_PLANTS).items() if name != "level"}
+"""Plants by the names of their sets."""
+PLANS |= {name: _on_plant(plant) for name, plant in ON_PLANTS.items()}
 
 
 def draw_set(name: str) -> list[tuple[int, Episode, GroundRecipe]]:
     """Noise seed, episode and ground recipe of each scenario of a set, from seeds of the set's own."""
-    plan = PLANS[name]
-    number_of_set = list(PLANS).index(plan.same_as or name)
-    drawn = []
+    return [(seed, episode, recipe) for seed, episode, recipe, _ in _drawn(name)]
+
+
+def draw_effects(name: str) -> list[tuple[Effect, ...]]:
+    """Effects of each scenario of a set, without those of its soil's law."""
+    return [effects for *_, effects in _drawn(name)]
+
+
+def _drawn(name: str) -> Iterator[tuple[int, Episode, GroundRecipe, tuple[Effect, ...]]]:
+    plan, names = PLANS[name], list(PLANS)
     for number in range(plan.count):
-        rng = np.random.default_rng([_ROOT_SEED, number_of_set, number])
+        rng = np.random.default_rng([plan.root_seed, names.index(plan.same_as or name), number])
+        of_plant = np.random.default_rng([plan.root_seed, names.index(name), number, _ON_PLANT])
         episode, recipe = plan.draw(rng, number)
-        drawn.append((int(rng.integers(2**31)), replace(episode, field=None), recipe))
-    return drawn
+        changed, effects = plan.plant.change(episode, of_plant)
+        yield int(rng.integers(2**31)), replace(changed, field=None), recipe, effects
 
 
 def as_scenario(name: str, number: int, seed: int, episode: Episode, recipe: GroundRecipe) -> Scenario:

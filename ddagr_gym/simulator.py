@@ -251,7 +251,7 @@ class Simulator:
             speeds: (N, H, 2) bank speeds at the ends of these samples [rad/s], NaN where unknown: the integral parts of
                 speed loops grow by their errors. Without them the loops are taken to have settled at the start.
         """
-        on_motors = np.isin(self._points, (layout.POINT_COMMANDS, layout.POINT_MOTORS)).any()
+        on_motors = np.isin(self._points, (layout.POINT_COMMANDS, layout.POINT_SET_POINTS, layout.POINT_MOTORS)).any()
         if on_motors or self._remembers():
             known = np.full(past.shape, np.nan) if speeds is None else speeds
             remember_rows(self.rows, np.ascontiguousarray(past), np.ascontiguousarray(known), self._actions())

@@ -41,6 +41,7 @@ from ddagr_gym.physics.layout import (
     POINT_LOADS,
     POINT_MOTORS,
     POINT_READINGS,
+    POINT_SET_POINTS,
     POINT_SOIL,
     READING,
     SAMPLE_PERIOD,
@@ -94,6 +95,7 @@ def _drive(row: Array, command: Array, actions: EffectActions) -> None:
         delay_commands(row)
     apply_effects(POINT_COMMANDS, row, actions)
     set_targets(row)
+    apply_effects(POINT_SET_POINTS, row, actions)
     apply_effects(POINT_MOTORS, row, actions)
     mark_dynamic_banks(row)
 

@@ -33,7 +33,7 @@ class Arguments:
 
 def run(arguments: Arguments) -> None:
     """Draw and write."""
-    from benchmarks.scenario_sets import PLANS, draw_set
+    from benchmarks.scenario_sets import PLANS, draw_effects, draw_set
     from ddagr_gym.evaluation.scenarios import SUFFIX, save_scenarios
 
     for name in arguments.sets:
@@ -47,6 +47,7 @@ def run(arguments: Arguments) -> None:
     with Progress(len(arguments.sets), "freezing") as progress:
         for name in arguments.sets:
             plan = PLANS[name]
-            target = save_scenarios(name, plan.description, draw_set(name), arguments.output, plan.law)
+            drawn = draw_set(name)
+            target = save_scenarios(name, plan.description, drawn, arguments.output, plan.law, draw_effects(name))
             progress.advance()
             print(f"{target}: {plan.count} scenarios")

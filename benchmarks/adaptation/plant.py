@@ -79,11 +79,11 @@ class TruePlant:
 
     Args:
         truth: what is different.
-        number: of the field: its soil, its sensors' noise.
+        number: of the field: its soil, its places, its sensors' noise.
     """
 
     def __init__(self, truth: Truth, number: int = 1) -> None:
-        self._case = Case("development", number, "null", ())
+        self._case, self._seed = Case("development", number, "null", ()), _SEED + number - 1
         self.change = truth.change()
         self.noise: SensorNoise = field_noise(self._case, _SEED)
 
@@ -99,7 +99,7 @@ class TruePlant:
         return [self._record_one(number, name, folder) for number, name in enumerate(RECORDED)]
 
     def _record_one(self, number: int, name: str, folder: Path) -> Path:
-        rng = np.random.default_rng([_SEED, 1, number])
+        rng = np.random.default_rng([self._seed, 1, number])
         plant, commands = self.plant(rng), MANOEUVRES[name].commands(1.0 / SAMPLE_PERIOD)
         given = self._received(np.repeat(commands, SUBSTEPS, axis=0))
         truth = drive(plant, given, np.zeros(3), number * _PAUSE)
@@ -122,7 +122,7 @@ class TruePlant:
             turn: commanded.
             seed: of the place, the start and the noise.
         """
-        rng = np.random.default_rng([_SEED, 2, seed])
+        rng = np.random.default_rng([self._seed, 2, seed])
         run = _Run(self, turn, rng)
         controller.reset()
         observation, info = _first_observation(turn), run.info(np.zeros((SAMPLES, 5)))

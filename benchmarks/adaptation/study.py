@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,20 +12,26 @@ import ddagr_gym
 from benchmarks.adaptation.plant import TruePlant
 from benchmarks.adaptation.truths import TRUTHS, Truth
 from ddagr_gym.adaptation.corrected import Corrected
-from ddagr_gym.adaptation.run import Adapted, Effort, adapted
+from ddagr_gym.adaptation.measured_noise import measured_sensors
+from ddagr_gym.adaptation.run import Adapted, Effort, adapted, nominal_settings
 from ddagr_gym.adaptation.turns import Columns, CorrectedTurns, DrivenTurn, MeasuredTurns
 from ddagr_gym.api.adapt import corrected_by_diagnosis
 from ddagr_gym.control.row_turn import RowTurn
-from ddagr_gym.evaluation.adapted_controller import AdaptedSettings
 from ddagr_gym.evaluation.bundles import Bundle
 from ddagr_gym.evaluation.runs import Controller
 from ddagr_gym.files import atomic_path
+from ddagr_gym.parameters import Sensors
 from ddagr_gym.presets import ddagr, get_soil
+from ddagr_gym.recordings.load import load_recording
 
 ARMS = {"nominal": "nominal", "adapted": "adapted to the recordings", "told": "told the true effect"}
 """Controllers of the demonstration."""
 
-EFFORT = Effort(rounds=3, taught=6, stages=((4, 4), (2, 6)), selection=8, report=0)
+_STAGES = ((4, 4), (2, 6))
+EFFORT = {
+    "B4": Effort(rounds=3, taught=6, stages=_STAGES, selection=8, report=0),
+    "B6": Effort(stages=_STAGES, report=0),
+}
 """Of each adaptation; less than the command's, which searches for longer."""
 
 Say = Callable[[str], None]
@@ -36,10 +42,11 @@ class TrueTurns:
 
     Args:
         truth: what is different.
+        field: its number.
     """
 
-    def __init__(self, truth: Truth) -> None:
-        self.robot, self._plant = ddagr(), TruePlant(truth)
+    def __init__(self, truth: Truth, field: int = 1) -> None:
+        self.robot, self._plant = ddagr(), TruePlant(truth, field)
 
     def turn(self, number: int) -> RowTurn:
         """The commanded turn; even numbers to the left."""
@@ -50,43 +57,50 @@ class TrueTurns:
         return self._plant.turn(controller, self.turn(number), number)
 
 
-def diagnosed(truth: Truth, folder: Path) -> Corrected:
-    """What the diagnosis makes of recordings of a truth; kept in the folder."""
+def diagnosed(truth: Truth, field: int, controller: str, folder: Path) -> Corrected:
+    """What the diagnosis makes of recordings of a truth, kept in the folder, and their noise as ``adapt`` takes it."""
     if not (folder / "diagnosis" / "diagnosis.json").is_file():
-        drives = TruePlant(truth).record(folder / "recordings")
+        drives = TruePlant(truth, field).record(folder / "recordings")
         result = ddagr_gym.diagnose(drives, column_map="concealed", names_only=True, cache=folder / "diagnosis.parts")
         result.report(folder / "diagnosis", overwrite=True)
-    return corrected_by_diagnosis(folder / "diagnosis")
+    found = corrected_by_diagnosis(folder / "diagnosis")
+    return found if controller == "B4" else replace(found, sensors=recorded_sensors(folder))
 
 
-def tuned(corrected: Corrected, journal: Path) -> Adapted:
-    """Adaptation to a corrected simulator."""
+def recorded_sensors(folder: Path) -> Sensors:
+    """Sensors with the noise of a truth's recordings."""
+    paths = sorted((folder / "recordings").glob("*.csv"))
+    return measured_sensors([load_recording(path, "concealed", "ddagr") for path in paths], ddagr())
+
+
+def tuned(corrected: Corrected, controller: str, journal: Path) -> Adapted:
+    """Adaptation of a controller to a corrected simulator."""
     turns = MeasuredTurns(CorrectedTurns(corrected), journal)
-    return adapted(corrected, ddagr(), get_soil("thesis_a1"), turns, effort=EFFORT)
+    return adapted(corrected, ddagr(), get_soil("thesis_a1"), turns, controller=controller, effort=EFFORT[controller])
 
 
-def nominal() -> Bundle:
-    """The controller that knows the data sheet alone: B4."""
-    return Bundle(AdaptedSettings(), ddagr(), get_soil("thesis_a1"))
+def nominal(controller: str) -> Bundle:
+    """The controller that knows the data sheet alone."""
+    return Bundle(nominal_settings(controller), ddagr(), get_soil("thesis_a1"))
 
 
-def one_truth(truth: Truth, work: Path, turns: int, say: Say) -> dict[str, Any]:
+def one_truth(truth: Truth, field: int, controller: str, work: Path, turns: int, say: Say) -> dict[str, Any]:
     """Recordings, diagnosis, adaptation and turns of a truth; what is in the folder already is not made again."""
     folder = work / truth.name
     folder.mkdir(parents=True, exist_ok=True)
     say(f"{truth.name}: diagnosing")
-    found = diagnosed(truth, folder)
-    told = Corrected(ddagr(), get_soil("thesis_a1"), truth.named_effects())
+    found = diagnosed(truth, field, controller, folder)
+    told = Corrected(ddagr(), get_soil("thesis_a1"), truth.named_effects(), sensors=found.sensors)
     usable = "unknown" not in found.verdict
-    bundles, kept = {"nominal": nominal()}, {}
+    bundles, kept = {"nominal": nominal(controller)}, {}
     for arm, corrected in (("adapted", found), ("told", told)):
         if (arm == "adapted" and not usable) or (arm == "told" and not truth.effect):
             bundles[arm], kept[arm] = bundles["nominal"], "nominal"
             continue
         say(f"{truth.name}: tuning what is {ARMS[arm]}")
-        result = tuned(corrected, folder / f"{arm}.jsonl")
+        result = tuned(corrected, controller, folder / f"{controller}_{arm}.jsonl")
         bundles[arm], kept[arm] = result.bundle, result.kept
-    measured = MeasuredTurns(TrueTurns(truth), folder / "turns.jsonl")
+    measured = MeasuredTurns(TrueTurns(truth, field), folder / f"{controller}_turns.jsonl")
     driven: dict[str, list[DrivenTurn]] = {}
     for arm, bundle in bundles.items():
         say(f"{truth.name}: driving {turns} turns by the controller that is {ARMS[arm]}")
@@ -102,13 +116,15 @@ def one_truth(truth: Truth, work: Path, turns: int, say: Say) -> dict[str, Any]:
     }
 
 
-def run(names: Sequence[str], work: Path, turns: int, say: Say) -> dict[str, dict[str, Any]]:
-    """Every truth by name; each is kept as ``truth.json`` in its folder."""
-    found = {}
+def run(
+    names: Sequence[str], field: int, controller: str, work: Path, turns: int, say: Say
+) -> dict[str, dict[str, Any]]:
+    """Every truth of a field by name; each is kept in its folder in that of the field."""
+    found, place = {}, work / f"field_{field}"
     for name in names:
-        path = work / name / f"turns_{turns}.json"
+        path = place / name / f"{controller}_turns_{turns}.json"
         if not path.is_file():
-            result = one_truth(TRUTHS[name], work, turns, say)
+            result = one_truth(TRUTHS[name], field, controller, place, turns, say)
             with atomic_path(path) as temporary:
                 temporary.write_text(json.dumps(result), encoding="utf-8")
         found[name] = json.loads(path.read_text(encoding="utf-8"))

@@ -25,7 +25,7 @@ class Truth:
     Attributes:
         name: in files.
         title: in tables and pictures.
-        effect: name in the library; "" where nothing is different.
+        effect: name in the library; "" where it has none, or nothing is different.
         make: rng -> what is different in the other simulator.
         shapes: of the library's effect, from the other simulator's parameters.
     """
@@ -61,6 +61,11 @@ def _slope(degrees: float, uphill: float) -> Callable[[np.random.Generator], Cha
     return lambda rng: Change({"angle": angle, "uphill": uphill}, plant=lambda p: with_ground(p, **gradients))
 
 
+def _lateral(factor: float) -> Callable[[np.random.Generator], Change]:
+    """All lateral wheel forces times a factor, for which the library has no effect."""
+    return lambda rng: Change({"lateral": factor}, plant=lambda p: with_ground(p, lateral=factor))
+
+
 def _patch(x: float, y: float, radius: float, logarithm: float) -> Callable[[np.random.Generator], Change]:
     row = patch_row(DISC, (x, y), radius, 0.0, logarithm)
     known = {"ln_strength": logarithm, "ln_stiffness": 1.5 * logarithm, "x": x, "y": y, "radius": radius}
@@ -86,6 +91,8 @@ TRUTHS = {
         Truth("centre", "centre of mass 0.1 m off", "centre_of_mass_offset",
               _form("centre_of_mass_offset", "along", 0.1)),
         Truth("viscous", "viscous drag of 300 N s/m", "viscous_drag", _form("viscous_drag", "linear", 300.0)),
+        Truth("weak_sideways", "lateral forces x 0.8", "", _lateral(0.8)),
+        Truth("strong_sideways", "lateral forces x 1.2", "", _lateral(1.2)),
     )
 }  # fmt: skip
-"""The truths by name; sizes were fixed before the first run."""
+"""The truths by name; sizes were fixed before the first run with them."""

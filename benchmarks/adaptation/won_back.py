@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.adaptation.study import ARMS, as_turns
-from ddagr_gym.adaptation.files import deviations, sizes, summary
-from ddagr_gym.adaptation.turns import DrivenTurn
+from ddagr_gym.adaptation.files import deviations, summary
+from ddagr_gym.adaptation.turns import DrivenTurn, sizes
 from ddagr_gym.presets import ddagr
 
 Array = NDArray[np.float64]

@@ -210,7 +210,7 @@ def wheel_step(plant, state, work, wheel, aging, dt):  # type: ignore[no-untyped
     if ground.rut_mode == HEIGHT_GRID:
         wall = state.factors[wheel, WALL_LEFT if motion[1] > 0.0 else WALL_RIGHT]
         mode[4] += passive_pressure(soil, wall, contact)
-    mode[5] = 1.0 - ground.furrow * math.cos(2.0 * (state.pose[2] - ground.furrow_angle))
+    mode[5] = ground.lateral * (1.0 - ground.furrow * math.cos(2.0 * (state.pose[2] - ground.furrow_angle)))
     wheel_wrench(soil, work.profile, mode, motion, work.base)
     add_derivative(soil, work.profile, mode, motion, work.base, arm, bank, work.shifted, work.system)
     f_x, f_y = work.base[0] + sign * forward, work.base[1]

@@ -61,6 +61,7 @@ class Ground(NamedTuple):
     bulldozing_mode: int = 0  # 0 none, 1 immediate, 2 growing with the berm
     bulldozing_gain: float = 0.0  # multiple of the passive earth pressure [-]
     rebound: float = 0.2  # share of a rut's depth that springs back, mode 3 [-]
+    lateral: float = 1.0  # factor on all lateral wheel forces [-]
 
 
 @kernel

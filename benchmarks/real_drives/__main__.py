@@ -26,6 +26,7 @@ from benchmarks.real_drives.compare import (
     Compared,
     compare,
     errors_of,
+    gain_share,
     ratio_of,
 )
 from benchmarks.real_drives.figure import draw
@@ -68,14 +69,6 @@ def recordings_folder() -> Path:
     return folder
 
 
-def gain_share(item: Compared, seed: int, horizon: float) -> float | None:
-    """Share of what the learned model gains over the data sheet that the calibrated one gains, by heading."""
-    learned, calibrated = (ratio_of(item, model, DATA_SHEET, horizon, seed) for model in (LEARNED, CALIBRATED))
-    if learned is None or calibrated is None or learned["ratio"] >= 1.0:
-        return None
-    return (1.0 - calibrated["ratio"]) / (1.0 - learned["ratio"])
-
-
 def aims_of(item: Compared, seed: int, horizon: float = HORIZON) -> dict[str, Any]:
     """What the drive shows of each aim."""
     found: dict[str, Any] = {}
@@ -83,9 +76,9 @@ def aims_of(item: Compared, seed: int, horizon: float = HORIZON) -> dict[str, An
         ratio = ratio_of(item, model, baseline, horizon, seed)
         if ratio is not None:
             found[name] = {**ratio, "aim": most, "met": ratio["ratio"] <= most}
-    share = gain_share(item, seed, horizon)
+    share = gain_share(item, CALIBRATED, LEARNED, DATA_SHEET, horizon, seed)
     if share is not None:
-        found["share of the learned model's gain"] = {"ratio": share, "aim": 0.8, "met": share >= 0.8}
+        found["share of the learned model's gain"] = {**share, "aim": 0.8, "met": share["ratio"] >= 0.8}
     return found
 
 

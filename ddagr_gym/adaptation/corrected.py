@@ -11,7 +11,7 @@ import numpy as np
 from ddagr_gym.envs.options import make_settings
 from ddagr_gym.envs.settings import TurnSettings
 from ddagr_gym.errors import InputError
-from ddagr_gym.parameters import Robot, Soil
+from ddagr_gym.parameters import Robot, Sensors, Soil
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.effects.draws import draw_sizes
 
@@ -31,6 +31,7 @@ class Corrected:
         calibration: folder of a calibration, whose drives say how much robot and soil differ; None without one.
         ground: of the calibration.
         ordinary: effects that the calibration has of its own, of its sensors.
+        sensors: with the noise that recordings show.
     """
 
     robot: Robot
@@ -43,6 +44,7 @@ class Corrected:
     calibration: Path | None = None
     ground: str = ""
     ordinary: tuple[Effect, ...] = ()
+    sensors: Sensors = Sensors()
 
     @property
     def all_effects(self) -> tuple[Effect, ...]:
@@ -63,7 +65,7 @@ class Corrected:
 
     def settings(self, rng: np.random.Generator, radius: float, speed: float, side: str) -> TurnSettings:
         """Settings of the environment of one turn."""
-        turn = {"radius": radius, "speed": speed, "side": side}
+        turn = {"radius": radius, "speed": speed, "side": side, "sensors": self.sensors}
         effects = self.draw_effects(rng)
         if self.calibration is not None:
             return make_settings(calibration=self.calibration, ground=self.ground, effects=effects, **turn)  # type: ignore[arg-type]

@@ -10,7 +10,7 @@ import numpy as np
 
 from ddagr_gym.adaptation.corrected import Corrected
 from ddagr_gym.adaptation.run import Adapted
-from ddagr_gym.adaptation.turns import DrivenTurn
+from ddagr_gym.adaptation.turns import DrivenTurn, sizes
 from ddagr_gym.evaluation.statistics import Interval, median_interval, wilson_interval
 
 NAME = "adaptation.json"
@@ -18,11 +18,6 @@ SCHEMA = "ddagr-adaptation/1"
 
 NOT_REACHED = 1.0
 """Deviation that stands for a row that was not reached [m] (ours)."""
-
-
-def sizes(driven: Sequence[DrivenTurn]) -> np.ndarray:
-    """|e_R| of turns; 1 where there is no circle."""
-    return np.array([1.0 if item.error is None else min(abs(item.error), 1.0) for item in driven])
 
 
 def deviations(driven: Sequence[DrivenTurn], half_wheelbase: float) -> np.ndarray:

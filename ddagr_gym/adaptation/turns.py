@@ -54,6 +54,11 @@ class DrivenTurn:
     curvature: tuple[float, ...] | None
 
 
+def sizes(driven: Sequence[DrivenTurn]) -> Array:
+    """|e_R| of turns; 1 where there is no circle."""
+    return np.array([1.0 if item.error is None else min(abs(item.error), 1.0) for item in driven])
+
+
 class Turns(Protocol):
     """Where turns are driven."""
 

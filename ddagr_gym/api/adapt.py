@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ddagr_gym.api.inputs import Sources
+from ddagr_gym.api.inputs import Sources, recordings_from
 from ddagr_gym.api.nominal import RobotLike, SoilLike, robot_from, soil_from
 from ddagr_gym.api.results import Report, Table
 from ddagr_gym.errors import InputError, InputWarning, at_least
@@ -46,7 +46,7 @@ class AdaptationResult(Report):
 
     @property
     def kept(self) -> str:
-        """What is kept: "nominal", "known" or "taught"."""
+        """What is kept: "nominal", "known", or "tuned" (B6) or "taught" (B4)."""
         return self.adapted.kept
 
     @property
@@ -88,6 +88,7 @@ def adapt(
     diagnosis: str | os.PathLike[str] | None = None,
     calibration: str | os.PathLike[str] | None = None,
     ground: str = "",
+    controller: str = "B4",
     radius: float = 0.8,
     speed: float = 0.2,
     row_heading: float = 0.0,
@@ -99,12 +100,13 @@ def adapt(
     progress: Callable[[str], None] | None = None,
     cache: str | os.PathLike[str] | None = None,
 ) -> AdaptationResult:
-    """Diagnose recordings and tune the default controller, B4, on the simulator that they correct.
+    """Diagnose recordings and tune a controller on the simulator that they correct.
 
-    The controller gets the refitted robot, a prior of the refitted soil for its filter, and what was named: errors of
-    sensors and commands are taken from readings and commands, slope, load, delay and drag go into its model. Its
-    feed-forward is then taught, and its gains are searched, on turns in the corrected simulator, where sizes are drawn
-    from their intervals. What does worse there than the nominal controller is not kept.
+    The controller gets the refitted robot, a prior of the refitted soil for its filter, and what was named: errors
+    of sensors and commands are taken from readings and commands, and load, delay, slope and drag go into its model. The
+    filter of B6 reckons also with the noise of accelerometer and gyro that the recordings show, where recordings are
+    given. The gains are then searched, and B4 is taught a feed-forward, on turns in the corrected simulator, where
+    sizes are drawn from their intervals. What does worse there than the nominal controller is not kept.
 
     Args:
         recordings: one or several recordings of the robot on the ground in question; None with a diagnosis or
@@ -115,6 +117,7 @@ def adapt(
         calibration: folder that ``ddagr calibrate`` wrote, in place of robot and soil: alone, or with recordings that
             are compared with its ordinary drives.
         ground: of the calibration.
+        controller: B4, the force balance, or B6, the path tracker.
         radius: of the turns [m].
         speed: of the turns [m/s].
         row_heading: direction of the rows in the world of the recordings' poses [rad]; without poses that world begins
@@ -132,29 +135,35 @@ def adapt(
 
     Raises:
         InputError: recordings that cannot be diagnosed, a diagnosis that says "unknown", a turn that the robot cannot
-            make.
+            make, another controller.
         InputWarning: (a warning) the diagnosis is not complete, or names what the controller does not use.
 
     Examples:
         >>> import ddagr_gym
         >>> names = ("arcs", "s_weave")
         >>> drives = [ddagr_gym.simulate(name, effects="slope=0.05", pose_rate=5.0) for name in names]
-        >>> result = ddagr_gym.adapt(drives, turns=6)
+        >>> result = ddagr_gym.adapt(drives, controller="B4", turns=6)
         >>> result.kept
         'taught'
         >>> result.adapted.used
         ('slope',)
     """
-    from ddagr_gym.adaptation.run import Effort, adapted
+    from ddagr_gym.adaptation.measured_noise import measured_sensors
+    from ddagr_gym.adaptation.run import Effort, adapted, nominal_settings
     from ddagr_gym.adaptation.turns import CorrectedTurns, MeasuredTurns
 
     at_least(turns=(turns, 2), seed=(seed, 0), threads=(threads, 1))
     need("matplotlib", "jinja2")
+    nominal_settings(controller)
     _check_sources(recordings, diagnosis, calibration, ground)
     place = None if cache is None else Path(cache)
     if recordings is not None:
         options = {"seed": seed, "threads": threads, "column_map": column_map, "progress": progress}
         found = _diagnosed(recordings, robot, soil, calibration, ground, place, options)
+        if controller == "B6":
+            known = robot if calibration is None else None
+            taken = recordings_from(recordings, known, column_map)
+            found = replace(found, sensors=measured_sensors(taken, found.robot))
     elif diagnosis is not None:
         found = corrected_by_diagnosis(Path(diagnosis))
     else:
@@ -164,10 +173,12 @@ def adapt(
     nominal = (usable.robot, usable.soil) if calibration is not None else (robot_from(robot), soil_from(soil))
     effort = Effort(report=turns)
     simulated = CorrectedTurns(usable, radius, speed, seed)
-    with counting(effort.turns, "turns", progress) as counter:
+    with counting(effort.turns(controller), "turns", progress) as counter:
         measured = MeasuredTurns(simulated, None if place is None else place / _journal(usable, radius, speed, seed),
                                  counter.advance)  # fmt: skip
-        result = adapted(usable, *nominal, measured, row_heading=row_heading, effort=effort, seed=seed)
+        result = adapted(
+            usable, *nominal, measured, controller=controller, row_heading=row_heading, effort=effort, seed=seed
+        )
     return AdaptationResult(result, usable, simulated)
 
 

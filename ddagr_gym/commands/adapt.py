@@ -25,11 +25,12 @@ EXAMPLES = (
 class Arguments:
     """Tune the turning controller on what recordings show, and report it before and after.
 
-    Recordings are diagnosed; what was named, the refitted robot and the refitted soil make a corrected simulator. The
-    controller B4 gets them into its filter and its model, errors of sensors and commands are taken out, a feed-forward
-    is taught and gains are searched on turns in that simulator, with sizes drawn from their intervals. What does worse
-    there than the nominal controller is not kept. An adaptation that was stopped goes on when the command is given
-    again. Recordings that hold something without a name (verdict unknown) are refused, unless --anyway is given.
+    Recordings are diagnosed; what was named, the refitted robot and the refitted soil make a corrected simulator.
+    The controller gets them into its filter and its model, errors of sensors and commands are taken out, and gains
+    are searched (and B4 is taught a feed-forward) on turns in that simulator, with sizes drawn from their
+    intervals. What does worse there than the nominal controller is not kept. An adaptation that was stopped goes on
+    when the command is given again. Recordings that hold something without a name (verdict unknown) are refused,
+    unless --anyway is given.
 
     Attributes:
         runs: recordings (Parquet of `ddagr import`, or any source that it takes); none with a finished diagnosis.
@@ -41,6 +42,7 @@ class Arguments:
         calibration: folder that `ddagr calibrate` wrote, in place of robot and soil: alone, or with recordings that are
             compared with its ordinary drives (it needs --bank then).
         ground: of the calibration.
+        controller: that is adapted: B4, the force balance, or B6, the path tracker.
         radius: of the turns [m].
         speed: of the turns [m/s].
         row_heading: direction of the rows in the world of the recordings' poses [rad]; it matters for slopes.
@@ -59,6 +61,7 @@ class Arguments:
     diagnosis: Path | None = None
     calibration: Path | None = None
     ground: str = ""
+    controller: str = "B4"
     radius: float = 0.8
     speed: float = 0.2
     row_heading: float = 0.0
@@ -93,6 +96,17 @@ def run(arguments: Arguments) -> None:
 
 
 def _options(arguments: Arguments) -> dict[str, Any]:
-    names = ("diagnosis", "calibration", "ground", "radius", "speed", "row_heading", "turns", "anyway", "seed")
+    names = (
+        "diagnosis",
+        "calibration",
+        "ground",
+        "controller",
+        "radius",
+        "speed",
+        "row_heading",
+        "turns",
+        "anyway",
+        "seed",
+    )
     options = {name: getattr(arguments, name) for name in (*names, "threads")}
     return options | {"column_map": arguments.map or None}

@@ -86,10 +86,11 @@ def run(arguments: Arguments) -> None:
 
 def turn_step(arguments: Arguments, folder: Path) -> Section:
     """A row turn by the default controller on a drawn soil; figure, video and CSV into the folder."""
+    from ddagr_gym.evaluation.controllers import DEFAULT
     from ddagr_gym.evaluation.shown import estimated_track
 
     driven = _drive(arguments)
-    track = estimated_track(driven)
+    track = estimated_track(driven, DEFAULT)
     print("Writing the CSV, the figure and the video ...", flush=True)
     _write(folder, driven, track)
     html = """<video controls muted loop src="row_turn.mp4"></video>

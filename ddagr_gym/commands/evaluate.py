@@ -34,7 +34,8 @@ class Arguments:
         controllers: names, separated by commas: B0 to B6, upper bounds, trained policies or their files, folders of
             `ddagr adapt`; a * stands for any letters of the trained ones, so that ppo_ekf_seed_* are all training
             seeds, which are judged together.
-        scenarios: names of frozen sets, separated by commas: S0 to S8, V for tuning, T for another soil law.
+        scenarios: names of frozen sets, separated by commas: S0 to S8, V for tuning, T for another soil law, S1b to
+            S8b and Tb drawn a second time, on_slope_3 and others for robots and ground that differ.
         output: folder for report.html, summary.json, claims.json, the figure, episodes.parquet, and the dataset
             `episodes` by which it resumes.
         workers: processes, or processors of a local cluster.

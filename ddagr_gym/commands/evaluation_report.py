@@ -158,14 +158,15 @@ def _sources(arms: Sequence[Arm], sets: Sequence[SetNote]) -> list[tuple[str, st
 
 
 def _film(folder: Path, number: int, title: str, row: Mapping[str, Any], progress: Progress) -> Film:
-    from ddagr_gym.evaluation.controllers import needs_filter
+    from ddagr_gym.evaluation.controllers import estimates_path
     from ddagr_gym.evaluation.report_data import Film, arm_name, display_name
     from ddagr_gym.evaluation.shown import replayed
     from ddagr_gym.reporting.evaluation_film import film_turn
     from ddagr_gym.reporting.evaluation_tables import replay_command
 
     _, run = replayed(row["controller"], row["set"], row["number"])
-    run = _with_estimate(run) if needs_filter(row["controller"]) else run
+    name = row["controller"]
+    run = _with_estimate(run, name) if estimates_path(name) else run
     file = PurePosixPath(VIDEOS) / f"{number}_{_file_name(row)}.mp4"
     make_folder(folder / VIDEOS)
     turn, robot = run.episode.turn, run.episode.robot
@@ -183,11 +184,11 @@ def _file_name(row: Mapping[str, Any]) -> str:
     return f"{plain}_{row['set']}_{row['number']}"
 
 
-def _with_estimate(run: TurnRun) -> TurnRun:
+def _with_estimate(run: TurnRun, controller: str) -> TurnRun:
     """The run with the path that the filter estimates."""
     from ddagr_gym.evaluation.shown import estimated_track
 
-    x, y, _ = estimated_track(run).T
+    x, y, _ = estimated_track(run, controller).T
     return replace(run, columns=run.columns | {"estimated_x": x, "estimated_y": y})
 
 
@@ -201,7 +202,7 @@ def replay_scenario(text: str, folder: Path) -> None:
     Raises:
         InputError: the text names nothing.
     """
-    from ddagr_gym.evaluation.controllers import needs_filter
+    from ddagr_gym.evaluation.controllers import estimates_path
     from ddagr_gym.evaluation.shown import parse_replay, replayed
     from ddagr_gym.recordings.storage import save_drive
     from ddagr_gym.reporting.evaluation_film import film_turn
@@ -211,7 +212,7 @@ def replay_scenario(text: str, folder: Path) -> None:
     row, run = replayed(controller, set_name, number)
     make_folder(folder)
     stem = _file_name(row)
-    seen = _with_estimate(run) if needs_filter(controller) else run
+    seen = _with_estimate(run, controller) if estimates_path(controller) else run
     name, turn, robot = f"{set_name} {number}", run.episode.turn, run.episode.robot
     turn_figure(seen.columns, turn, folder / f"{stem}.png", robot=robot, soil_name=f"soil {name}")
     save_drive(folder / f"{stem}.parquet", run.columns, robot)

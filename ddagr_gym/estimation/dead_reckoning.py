@@ -73,10 +73,10 @@ def _filter_of(model: FilterModel | InertialModel | LearnedModel) -> Filter | In
 def _motion(own: Filter | InertialFilter | LearnedFilter, command: Array, samples: Array) -> Array:
     """Estimated velocities (K, 3) after each sample."""
     if not isinstance(own, Filter):
-        return own.run(command[None], np.ascontiguousarray(samples))[0][:, :3]
+        return own.run(np.atleast_2d(command), np.ascontiguousarray(samples))[0][:, :3]
     motion = np.empty((len(samples), 3))
     for k, sample in enumerate(samples):
-        own.step(command, sample)
+        own.step(command if command.ndim == 1 else command[k], sample)
         motion[k] = own.state[:3]
     return motion
 
@@ -100,16 +100,32 @@ class DeadReckoning:
         self._period = flat.sample_period
         self.reset(0.0, 0.0, 0.0)
 
-    def reset(self, x: float, y: float, yaw: float) -> None:
-        """Forget everything; the robot is at rest at a place [m] with a heading [rad]."""
+    def reset(self, x: float, y: float, yaw: float, gravity: ArrayLike = (0.0, 0.0)) -> None:
+        """Forget everything; the robot is at rest.
+
+        Args:
+            x, y: place [m].
+            yaw: heading [rad].
+            gravity: its pull along body x and y [m/s^2], as the inertial filter begins with it; no other knows any.
+        """
         self._pose = np.array([x, y, yaw])
         if isinstance(self._filter, InertialFilter):
-            self._filter.reset(self._pose)
+            self._filter.reset(self._pose, gravity)
         else:
             self._filter.reset()
 
+    def pushed(self, push: ArrayLike) -> None:
+        """From now on the inertial filter takes a push (3,) for known: F_x/m, F_y/m [m/s^2], M/I [rad/s^2].
+
+        Raises:
+            InputError: another filter, which has no place for it.
+        """
+        if not isinstance(self._filter, InertialFilter):
+            raise InputError("only the inertial filter can be told of a push: give an InertialModel.")
+        self._filter.known_push[:] = push
+
     def update(self, command: ArrayLike, samples: ArrayLike) -> Reckoned:
-        """Through samples (K, 5) in the order of ``CHANNELS`` under one command (2,) [rad/s]."""
+        """Through samples (K, 5) in the order of ``CHANNELS`` under one command (2,), or one each (K, 2) [rad/s]."""
         drive, readings = np.asarray(command, dtype=np.float64), np.asarray(samples, dtype=np.float64)
         before = self._filter.state[:3].copy()
         self._integrate(_motion(self._filter, drive, readings), before)

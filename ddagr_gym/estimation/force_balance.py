@@ -30,6 +30,7 @@ class _Arc(NamedTuple):
         soil: parameters of the law.
         pull_x: gravity along body x [m/s^2].
         pull_y: gravity along body y [m/s^2].
+        turning: of what else turns the robot, M [N m].
     """
 
     speed: float
@@ -41,6 +42,7 @@ class _Arc(NamedTuple):
     soil: LawParameters
     pull_x: float
     pull_y: float
+    turning: float
 
 
 @kernel()
@@ -48,7 +50,7 @@ def _imbalance(arc: _Arc, unknown: Array, result: Array) -> None:
     """Sums of F_x, F_y and M_z less what the steady arc needs, at rim speeds and v_y (theory: control, eq. (4))."""
     result[0] = arc.mass * arc.rate * unknown[2] + arc.mass * arc.pull_x
     result[1] = -arc.mass * arc.rate * arc.speed + arc.mass * arc.pull_y
-    result[2] = 0.0
+    result[2] = arc.turning
     for wheel in range(4):
         x = arc.half_wheelbase if wheel < 2 else -arc.half_wheelbase
         y = arc.half_track if wheel % 2 else -arc.half_track
@@ -91,7 +93,12 @@ def _solve(arc: _Arc, unknown: Array) -> bool:
 
 
 def arc_bank_speeds(
-    model: FilterModel, parameters: ArrayLike, speed: float, curvature: float, gravity: tuple[float, float] = (0.0, 0.0)
+    model: FilterModel,
+    parameters: ArrayLike,
+    speed: float,
+    curvature: float,
+    gravity: tuple[float, float] = (0.0, 0.0),
+    turning: float = 0.0,
 ) -> tuple[float, float] | None:
     """Right and left bank speeds [rad/s] that hold a steady arc by the law, or None where it has no such solution.
 
@@ -100,7 +107,8 @@ def arc_bank_speeds(
         parameters: (4,) a1 [N], a2 [-], b [N/rad], Rc [N].
         speed: v_x [m/s].
         curvature: yaw rate over speed [1/m], counter-clockwise positive.
-        gravity: its pull along body x and y [m/s^2], 0 on the level.
+        gravity: its pull along body x and y [m/s^2], 0 on the level; and what else pulls.
+        turning: moment of what else pulls, about the body origin, over the yaw inertia [rad/s^2].
     """
     robot = model.robot
     spread = 1.3 * robot.half_track * curvature  # effective over geometric track of most soils
@@ -108,7 +116,8 @@ def arc_bank_speeds(
     limit, rate, stiffness, resistance = np.asarray(parameters, dtype=np.float64)
     soil = LawParameters(limit, rate, stiffness, resistance, model.rest_speed, model.reversal_speed)
     law, length, width = float(model.law), robot.half_wheelbase, robot.half_track
-    arc = _Arc(speed, speed * curvature, robot.mass, length, width, law, soil, float(gravity[0]), float(gravity[1]))
+    pull_x, pull_y, moment = float(gravity[0]), float(gravity[1]), robot.yaw_inertia * float(turning)
+    arc = _Arc(speed, speed * curvature, robot.mass, length, width, law, soil, pull_x, pull_y, moment)
     if not _solve(arc, unknown):
         return None
     radius = model.outer_radius
@@ -132,7 +141,7 @@ def arc_speed_rows(
         unknown[2] = 0.0
         own = parameters[n]
         soil = LawParameters(own[0], own[1], own[2], own[3], rest_speed, reversal_speed)
-        arc = _Arc(speeds[n], speeds[n] * curvatures[n], robot[0], robot[1], robot[2], law, soil, 0.0, 0.0)
+        arc = _Arc(speeds[n], speeds[n] * curvatures[n], robot[0], robot[1], robot[2], law, soil, 0.0, 0.0, 0.0)
         found = _solve(arc, unknown)
         banks[n, 0] = unknown[0] if found else speeds[n] * (1.0 + fallback * spread)
         banks[n, 1] = unknown[1] if found else speeds[n] * (1.0 - fallback * spread)

@@ -6,7 +6,7 @@ Theory: filter, section 9.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -39,6 +39,7 @@ class InertialKnowledge(Validated):
         launch_floor: that of the velocities at rest [m/s].
         known_pull: while gravity along the robot less the accelerometer's bias is not known this well, slip is also
             taken to be as small as at launch [m/s^2]; 0.13 s of standing are enough.
+        vibration: further noise of the accelerometer per speed of the rims [(m/s^2)/(m/s)].
         largest_acceleration: of the robot; a reading of the accelerometer that says more counts as missing [m/s^2].
         unknown_acceleration: random walk of the velocities where the accelerometer is missing [m/s^2/sqrt(Hz)].
         gravity_deviation: initial, of either component of gravity along the ground [m/s^2].
@@ -57,6 +58,7 @@ class InertialKnowledge(Validated):
     launch_slip: float = bounded("-", 0.0, 10.0, default=0.3)
     launch_floor: float = bounded("m/s", 0.0, 10.0, default=2e-3, open_low=True)
     known_pull: float = bounded("m/s^2", 0.0, 1e3, default=0.008, open_low=True)
+    vibration: float = bounded("1/s", 0.0, 100.0, default=0.0)
     largest_acceleration: float = bounded("m/s^2", 0.0, 1e3, default=5.0, open_low=True)
     unknown_acceleration: float = bounded("m/s^2/sqrt(Hz)", 0.0, 1e3, default=0.1)
     gravity_deviation: float = bounded("m/s^2", 0.0, 10.0, default=0.6, open_low=True)
@@ -83,14 +85,20 @@ class InertialModel:
     knowledge: InertialKnowledge = InertialKnowledge()
 
     @classmethod
-    def of(cls, robot: Robot, sensors: Sensors) -> InertialModel:
+    def of(cls, robot: Robot, sensors: Sensors, prior: SoilPrior | None = None) -> InertialModel:
         """Model of a robot with its instruments, and what turns on simulated plants chose of the rest.
 
         The lateral law is not taken as known (``coupling_deviation``): bulldozing and side walls change it by a fifth.
+
+        Args:
+            robot: of the filter.
+            sensors: likewise.
+            prior: of the soil, but for ``coupling_deviation``; that of all soils where it is left out.
         """
         noise = FilterNoise.from_sensors(sensors, acceleration=5e-4, yaw_acceleration=0.02, soil=0.05)
-        prior = SoilPrior(coupling_deviation=0.15)
-        return cls(FilterModel.of(robot, sensors, noise=noise, prior=prior))
+        prior = replace(prior or SoilPrior(), coupling_deviation=0.15)
+        knowledge = InertialKnowledge(vibration=sensors.imu.accelerometer_vibration)
+        return cls(FilterModel.of(robot, sensors, noise=noise, prior=prior), knowledge)
 
     def initial(self) -> tuple[Array, Array]:
         """State (15,) at rest and covariance (15, 15) before any sample."""
@@ -114,6 +122,7 @@ class InertialModel:
         packed[layout.LAUNCH_SLIP] = own.launch_slip
         packed[layout.LAUNCH_FLOOR] = own.launch_floor
         packed[layout.KNOWN_PULL] = own.known_pull**2
+        packed[layout.VIBRATION] = own.vibration
         packed[layout.LARGEST_ACCELERATION] = own.largest_acceleration
         packed[layout.UNKNOWN_ACCELERATION] = own.unknown_acceleration**2
         packed[layout.GRAVITY_WALK] = own.gravity_walk**2
@@ -160,10 +169,21 @@ class InertialFilter:
         """(3, 3); a view."""
         return _pose_covariances(self._work[None, layout.POSE :])[0]
 
-    def reset(self, pose: ArrayLike = (0.0, 0.0, 0.0)) -> None:
-        """Start again from the prior, at rest at a known pose x, y [m], yaw [rad]."""
+    @property
+    def known_push(self) -> Array:
+        """(3,) what pushes the robot besides wheels and gravity: F_x/m, F_y/m [m/s^2], M/I [rad/s^2]; a view."""
+        return self._work[layout.KNOWN_PUSH : layout.KNOWN_PUSH + 3]
+
+    def reset(self, pose: ArrayLike = (0.0, 0.0, 0.0), gravity: ArrayLike = (0.0, 0.0)) -> None:
+        """Start again from the prior, at rest, without a known push.
+
+        Args:
+            pose: known, x, y [m], yaw [rad].
+            gravity: mean of its pull along body x and y [m/s^2]; the model's knowledge has its deviation.
+        """
         self._work[:] = 0.0
         self.state[:], self.covariance[:] = self.model.initial()
+        self.state[layout.GRAVITY : layout.GRAVITY + 2] = gravity
         self.pose[:] = pose
         self._count = 0
 

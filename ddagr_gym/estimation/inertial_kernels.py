@@ -27,6 +27,7 @@ from ddagr_gym.estimation.inertial_layout import (
     GRAVITY_WALK,
     INERTIAL_STATE_SIZE,
     KNOWN_PULL,
+    KNOWN_PUSH,
     LARGEST_ACCELERATION,
     LAST_RATE,
     LAUNCH_FLOOR,
@@ -42,6 +43,7 @@ from ddagr_gym.estimation.inertial_layout import (
     PULL_KNOWN,
     SUMMED,
     UNKNOWN_ACCELERATION,
+    VIBRATION,
     Q,
 )
 from ddagr_gym.estimation.inertial_pose import add_pose_noise, advance_pose
@@ -89,6 +91,16 @@ def _felt(model: Array, work: Array, axis: int) -> float:
     """Specific force at the body origin [m/s^2], by the sample in READING; of the lever arm the centripetal part."""
     turn = work[X + 2]
     return work[READING + FORCE_CHANNEL + axis] + turn * turn * model[IMU_POSITION + axis]
+
+
+@kernel()
+def _reading_variance(model: Array, work: Array) -> float:
+    """Of either axis of the accelerometer, which shakes with the robot [m^2/s^4] (theory: wheel model, eq. (35))."""
+    if model[VIBRATION] == 0.0:  # the variance itself, to the bit
+        return model[MEASUREMENT + FORCE_CHANNEL]
+    speed = 0.5 * model[OUTER_RADIUS] * (abs(work[X + OMEGA]) + abs(work[X + OMEGA + 1]))
+    deviation = math.sqrt(model[MEASUREMENT + FORCE_CHANNEL]) + model[VIBRATION] * speed
+    return deviation * deviation
 
 
 @kernel()
@@ -165,7 +177,7 @@ def predict_inertial(model: Array, work: Array, right: float, left: float, durat
         work[MEAN_FORCE] += f_x
         work[MEAN_FORCE + 1] += f_y
         work[SUMMED] += 1.0
-        noise = model[MEASUREMENT + FORCE_CHANNEL] * duration * duration + model[PROCESS] * duration
+        noise = _reading_variance(model, work) * duration * duration + model[PROCESS] * duration
     else:
         f_x = work[X + ACCELEROMETER_BIAS] - work[X + GRAVITY]
         f_y = work[X + ACCELEROMETER_BIAS + 1] - work[X + GRAVITY + 1] + work[X + 2] * work[X]
@@ -207,8 +219,9 @@ def balance_forces(model: Array, work: Array, duration: float) -> None:
         if axis < 2:
             work[ROW + ACCELEROMETER_BIAS + axis] = 1.0
             felt = work[MEAN_FORCE + axis] / count - work[X + ACCELEROMETER_BIAS + axis]
+        innovation = felt - work[KNOWN_PUSH + axis] - work[FORCE + axis]
         variance = model[BALANCE + axis]
-        use_innovation(model, work, felt - work[FORCE + axis], row_column(work), variance, model[BALANCE_LEARNING])
+        use_innovation(model, work, innovation, row_column(work), variance, model[BALANCE_LEARNING])
     work[MEAN_FORCE] = work[MEAN_FORCE + 1] = work[SUMMED] = 0.0
     work[LAST_RATE] = work[X + 2]
 

@@ -23,8 +23,10 @@ from ddagr_gym.estimation import BatchFilter, FilterModel
 from ddagr_gym.estimation.filter_model import SoilPrior
 from ddagr_gym.estimation.force_balance import arc_bank_speeds
 from ddagr_gym.estimation.layout import CHANNEL_SIZE, PARAMETER, PARAMETER_SIZE
+from ddagr_gym.evaluation.adapted_tracker import TrackerSettings
 from ddagr_gym.evaluation.known_physics import KnownPhysics
 from ddagr_gym.evaluation.ladder_gains import LoopSettings, ladder_gains
+from ddagr_gym.evaluation.received_commands import ReceivedCommands
 from ddagr_gym.parameters import STANDARD_GRAVITY, Sensors
 from ddagr_gym.validated import Validated, bounded
 
@@ -60,18 +62,22 @@ class AdaptedSettings(Validated):
     """What ``controller.yaml`` of a bundle holds.
 
     Attributes:
+        tracker: of the path tracker B6; it is B4 that drives, with the three that follow, where it is left out.
         gains: of the loop on the estimated curvature.
         left: feed-forward of turns to the left.
         right: the same to the right.
         row_heading: of the rows in the world of the recordings' poses [rad].
         soil_prior: of the filter; that of all soils when it is left out.
+        sensors: with the noise that the filter reckons with.
     """
 
+    tracker: TrackerSettings | None = None
     gains: LoopSettings = field(default_factory=lambda: ladder_gains().force_balance)
     left: FeedForward = FeedForward()
     right: FeedForward = FeedForward()
     row_heading: float = bounded("rad", -7.0, 7.0, default=0.0)
     soil_prior: SoilPrior | None = None
+    sensors: Sensors = Sensors()
 
     def side(self, sign: float) -> FeedForward:
         """Feed-forward of turns to a side."""
@@ -95,6 +101,7 @@ class AdaptedController(FeedbackController):
         super().__init__(known.robot, settings.gains.gains, track_ratio, settings.gains.lead_factor * lead)
         self._settings, self._known, self._sensors = settings, known, sensors
         self._filters: dict[int, BatchFilter] = {}
+        self._sent = ReceivedCommands(known)
         self.reset()
 
     def reset(self) -> None:
@@ -102,7 +109,7 @@ class AdaptedController(FeedbackController):
         super().reset()
         self._filter: BatchFilter | None = None
         self._heading, self._odometer, self._run_in = 0.0, 0.0, 0.0
-        self._sent = np.zeros((0, 2))
+        self._sent.reset()
 
     def __call__(self, observation: ArrayLike, info: Any = None) -> NDArray[np.float32]:
         """Action (2,), right and left bank speed over the robot's maximum."""
@@ -140,23 +147,12 @@ class AdaptedController(FeedbackController):
         readings = self._known.readings.undo(samples[:, :CHANNEL_SIZE])
         readings[:, 3:5] *= self._known.radius_factors
         gravity = np.array(self._known.gravity(self._settings.row_heading + self._heading))
-        drag = np.array(self._known.drag(*self._filter.states[0, :3]))
+        drag = np.array(self._known.drag(*self._filter.states[0, :3])[:2])
         readings[:, :2] -= drag
         self._heading += float(readings[:, 2].sum()) * period
         self._odometer += float(readings[:, 3:5].sum()) * 0.5 * period * self.robot.outer_radius
-        received = self._received(command, len(samples)) * self._known.radius_factors
+        received = self._sent.through(command, len(samples))
         self._filter.step(received[None], readings[None], _attitude(gravity + drag), duration=period)
-
-    def _received(self, command: Array, count: int) -> Array:
-        """Commands (count, 2) that the motors get at each sample of an interval."""
-        self._sent = np.concatenate([self._sent, np.repeat(command[None], count, axis=0)])[-_LONGEST:]
-        late = np.round(np.array(self._known.delay) * count / CONTROL_PERIOD).astype(int)
-        banks = []
-        for bank in range(2):
-            rows = len(self._sent) - count + np.arange(count) - late[bank]
-            banks.append(np.where(rows >= 0, self._sent[np.maximum(rows, 0), bank], 0.0))
-        got: Array = np.column_stack(banks) @ self._known.commands.matrix.T + self._known.commands.offset
-        return got
 
     def _seen(self, given: TurnObservation) -> TurnObservation:
         """The observation by corrected readings."""
@@ -170,7 +166,7 @@ class AdaptedController(FeedbackController):
         state = self._filter.states[0]
         soil = np.exp(state[PARAMETER : PARAMETER + PARAMETER_SIZE])
         pull = np.array(self._known.gravity(self._settings.row_heading + self._heading))
-        pull += self._known.drag(speed, 0.0, speed * curvature)
+        pull += self._known.drag(speed, 0.0, speed * curvature)[:2]
         found = arc_bank_speeds(self._filter.model, soil, speed, curvature, (float(pull[0]), float(pull[1])))
         return found or self.bank_speeds(speed, curvature)
 
@@ -193,10 +189,6 @@ class AdaptedController(FeedbackController):
         assert self._filter is not None
         v_x, _, yaw_rate = self._filter.states[0, :3]
         return curvature_error(feed_forward, float(yaw_rate), float(v_x), seen.target_speed)
-
-
-_LONGEST = 256
-"""Samples of commands that are kept: two seconds at the sensors' nominal rate, longer than any delay."""
 
 
 def _attitude(pull: Sequence[float] | Array) -> Array:

@@ -9,13 +9,15 @@ from pathlib import Path
 
 from ddagr_gym.config import dump_config, load_config
 from ddagr_gym.control.constant_speeds import ConstantSpeeds
+from ddagr_gym.control.path_tracker import PathTracker
 from ddagr_gym.control.row_turn import RowTurn
 from ddagr_gym.errors import InputError
 from ddagr_gym.evaluation.adapted_controller import AdaptedController, AdaptedSettings
+from ddagr_gym.evaluation.adapted_tracker import adapted_tracker
 from ddagr_gym.evaluation.calibration import calibrate_constant_speeds
 from ddagr_gym.evaluation.known_physics import KnownPhysics, known_physics
 from ddagr_gym.files import write_text
-from ddagr_gym.parameters import Robot, Sensors, Soil
+from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.physics.effects import Effect, load_effects, save_effects
 from ddagr_gym.presets import get_robot, get_soil
 
@@ -41,16 +43,34 @@ class Bundle:
     _constants: dict[tuple[float, float], ConstantSpeeds] = field(default_factory=dict, repr=False)
 
     @property
+    def adapted_from(self) -> str:
+        """Name of the nominal controller: B6 or B4."""
+        return "B4" if self.settings.tracker is None else "B6"
+
+    @property
     def known(self) -> KnownPhysics:
         """What the effects mean for the controller."""
         return known_physics(self.robot, self.effects)
 
-    def controller(self, turn: RowTurn) -> AdaptedController:
+    @property
+    def used(self) -> tuple[str, ...]:
+        """Names of effects that filter and controller know themselves."""
+        return self.known.used
+
+    def controller(self, turn: RowTurn) -> AdaptedController | PathTracker:
         """Controller of a commanded turn; InputError where the robot cannot turn so on this soil."""
-        known = self.known
-        constants = self._steady(known.robot, turn)
+        known, settings = self.known, self.settings
+        constants = self.constants(turn)
         ratio = constants.track_ratio(turn, known.robot)
-        return AdaptedController(self.settings, known, Sensors(), ratio, constants.lead)
+        if settings.tracker is None:
+            return AdaptedController(settings, known, settings.sensors, ratio, constants.lead)
+        return adapted_tracker(
+            settings.tracker, known, settings.sensors, settings.soil_prior, ratio, constants.lead, settings.row_heading
+        )
+
+    def constants(self, turn: RowTurn) -> ConstantSpeeds:
+        """Constant speeds of the robot as it is known, which serve where the estimated soil has no solution."""
+        return self._steady(self.known.robot, turn)
 
     def _steady(self, robot: Robot, turn: RowTurn) -> ConstantSpeeds:
         key = (turn.radius, turn.speed)

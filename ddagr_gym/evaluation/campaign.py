@@ -68,7 +68,7 @@ def scenario_settings(scenario: Scenario, ekf_features: bool = False) -> TurnSet
         speed=turn.speed,
         run_in=turn.run_in,
         run_out=turn.run_out,
-        effects=ground_effects(scenario.law),
+        effects=(*ground_effects(scenario.law), *scenario.effects),
         ekf_features=ekf_features,
     )
 
@@ -83,7 +83,7 @@ def drive_scenario(controller: str, scenario: Scenario) -> TurnRun:
 def drive_scenarios(controller: str, scenarios: Sequence[Scenario]) -> list[TurnRun]:
     """Scenarios of one set by one controller, side by side where it can; the runs are those of one by one."""
     runs: dict[int, TurnRun] = {}
-    for places in _places_by_grid(scenarios).values():
+    for places in _alike(scenarios).values():
         group = [scenarios[place] for place in places]
         batch = find_batch(controller, len(group))
         if batch is None:
@@ -95,12 +95,13 @@ def drive_scenarios(controller: str, scenarios: Sequence[Scenario]) -> list[Turn
     return [runs[place] for place in range(len(scenarios))]
 
 
-def _places_by_grid(scenarios: Sequence[Scenario]) -> dict[Any, list[int]]:
-    """Places of scenarios whose soil grids have the same shape, as those of one batch must."""
+def _alike(scenarios: Sequence[Scenario]) -> dict[Any, list[int]]:
+    """Places of scenarios with the same effects whose soil grids have the same shape, as those of one batch must."""
     groups: dict[Any, list[int]] = {}
     for place, scenario in enumerate(scenarios):
         field = scenario.episode.field
-        groups.setdefault(None if field is None else field.values.shape, []).append(place)
+        shape = None if field is None else field.values.shape
+        groups.setdefault((shape, scenario.effects), []).append(place)
     return groups
 
 

@@ -80,16 +80,16 @@ class KnownPhysics:
         across = -math.sin(yaw) * x + math.cos(yaw) * y
         return -STANDARD_GRAVITY * along / level, -STANDARD_GRAVITY * across / level
 
-    def drag(self, v_x: float, v_y: float, yaw_rate: float) -> tuple[float, float]:
-        """Force per mass of what holds the robot back along body x and y [m/s^2]."""
+    def drag(self, v_x: float, v_y: float, yaw_rate: float) -> tuple[float, float, float]:
+        """What holds the robot back: force per mass along body x and y [m/s^2], moment over yaw inertia [rad/s^2]."""
         if not self.drags:
-            return 0.0, 0.0
+            return 0.0, 0.0, 0.0
         row = _row(self.robot)
         row[layout.V_X : layout.V_X + 3] = [v_x, v_y, yaw_rate]
         for action, effect in _actions(self.drags, layout.POINT_BODY_FORCES):
             action(row, effect.vector(), np.zeros(layout.EFFECT_MEMORY))
-        force = row[layout.BODY_FORCE : layout.BODY_FORCE + 2] / self.robot.mass
-        return float(force[0]), float(force[1])
+        force_x, force_y, moment = row[layout.BODY_FORCE : layout.BODY_FORCE + 3].tolist()
+        return force_x / self.robot.mass, force_y / self.robot.mass, moment / self.robot.yaw_inertia
 
 
 def known_physics(robot: Robot, effects: Sequence[Effect] = ()) -> KnownPhysics:

@@ -27,7 +27,8 @@ from ddagr_gym.control.row_turn import RowTurn
 from ddagr_gym.envs.settings import Episode
 from ddagr_gym.errors import InputError, unknown_name
 from ddagr_gym.files import MAXIMUM_JSON, atomic_path, parse_json, read_bytes
-from ddagr_gym.parameters import Robot, Sensors, Soil
+from ddagr_gym.parameters import Drivetrain, Robot, Sensors, Soil
+from ddagr_gym.physics.effects import Effect, build_effect, effect_kind
 from ddagr_gym.physics.soil_laws import NOMINAL_LAW
 from ddagr_gym.physics.terrain import SoilField
 from ddagr_gym.presets import get_robot
@@ -55,6 +56,7 @@ class Scenario:
         seed: of the sensor noise.
         episode: what is driven.
         law: name of the soil's law, see :mod:`ddagr_gym.physics.soil_laws`.
+        effects: what else the turn is driven in, of the library.
     """
 
     set_name: str
@@ -62,6 +64,7 @@ class Scenario:
     seed: int
     episode: Episode
     law: str = NOMINAL_LAW
+    effects: tuple[Effect, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -133,11 +136,14 @@ def _grid_sum(field: SoilField | None) -> float:
     return float(np.log1p(np.abs(values)) @ np.cos(np.arange(values.size)) + np.log1p(np.abs(values)).sum())
 
 
-def _to_json(seed: int, episode: Episode, recipe: GroundRecipe) -> dict[str, Any]:
+def _to_json(seed: int, episode: Episode, recipe: GroundRecipe, effects: Sequence[Effect] = ()) -> dict[str, Any]:
     robot, imu, soil = episode.robot, episode.sensors.imu, episode.soils
     assert not isinstance(soil, tuple)  # the plans draw one soil for all wheels
-    named = {"name": robot.name} | {key: getattr(robot, key) for key in ROBOT_FIELDS}
-    return {
+    named: dict[str, Any] = {"name": robot.name} | {key: getattr(robot, key) for key in ROBOT_FIELDS}
+    if robot.drivetrain != get_robot(robot.name).drivetrain:
+        named["drivetrain"] = asdict(robot.drivetrain)
+    added = {"effects": [effect.as_mapping() for effect in effects]} if effects else {}
+    return added | {
         "seed": seed,
         "turn": asdict(episode.turn),
         "robot": named,
@@ -154,6 +160,8 @@ def _to_json(seed: int, episode: Episode, recipe: GroundRecipe) -> dict[str, Any
 
 def _from_json(set_name: str, number: int, item: Mapping[str, Any], law: str) -> Scenario:
     given = dict(item["robot"])
+    if "drivetrain" in given:
+        given["drivetrain"] = Drivetrain(**given["drivetrain"])
     robot: Robot = replace(get_robot(given.pop("name")), **given)
     soil, turn, recipe = Soil(**item["soil"]), RowTurn(**item["turn"]), GroundRecipe(**item["ground"])
     imu: dict[str, Any] = {
@@ -181,7 +189,8 @@ def _from_json(set_name: str, number: int, item: Mapping[str, Any], law: str) ->
         heading_offset=item["heading_offset"],
         field=field,
     )
-    return Scenario(set_name, number, item["seed"], episode, law)
+    effects = tuple(build_effect(effect_kind(one["name"]), one["parameters"]) for one in item.get("effects", ()))
+    return Scenario(set_name, number, item["seed"], episode, law, effects)
 
 
 def scenario_folder() -> Path:
@@ -266,6 +275,7 @@ def save_scenarios(
     drawn: Sequence[tuple[int, Episode, GroundRecipe]],
     folder: Path | None = None,
     law: str = NOMINAL_LAW,
+    effects: Sequence[Sequence[Effect]] | None = None,
 ) -> Path:
     """Freeze a set: (noise seed, episode without grid, recipe of the grid) each.
 
@@ -275,11 +285,13 @@ def save_scenarios(
         drawn: the scenarios.
         folder: of the file; that of the shipped sets by default.
         law: name of the soil's law.
+        effects: of each scenario; none by default.
 
     Returns:
         The file.
     """
-    items = json.loads(json.dumps([_to_json(*item) for item in drawn]))
+    added = [()] * len(drawn) if effects is None else effects
+    items = json.loads(json.dumps([_to_json(*item, own) for item, own in zip(drawn, added, strict=True)]))
     content = {
         "format": FORMAT,
         "name": name,

@@ -11,8 +11,15 @@ from numpy.typing import NDArray
 from ddagr_gym.errors import InputError, unknown_name
 from ddagr_gym.estimation import run_filter
 from ddagr_gym.estimation.dead_reckoning import integrate_track
+from ddagr_gym.estimation.inertial_filter import run_inertial_track
 from ddagr_gym.evaluation.campaign import drive_scenario, episode_row, nominal_filter
-from ddagr_gym.evaluation.controllers import find_controller, needs_filter
+from ddagr_gym.evaluation.controllers import (
+    DEFAULT,
+    estimates_path,
+    find_controller,
+    has_inertial_filter,
+    inertial_model,
+)
 from ddagr_gym.evaluation.metrics import headland_samples
 from ddagr_gym.evaluation.report_data import (
     Evaluation,
@@ -59,15 +66,22 @@ def parse_replay(text: str) -> tuple[str, str, int]:
     return controller, set_name, number
 
 
-def estimated_track(run: TurnRun) -> Array:
+def estimated_track(run: TurnRun, controller: str = "") -> Array:
     """Pose by the filter after each sample (T, 3): x, y [m], yaw [rad], from the known start.
 
-    The filter is run over the drive's readings anew; its speeds and yaw rate are integrated.
+    The filter is run over the drive's readings anew: the inertial one, with the nominal robot, where it is that of the
+    controller; else that of the features, whose speeds and yaw rate are integrated.
+
+    Args:
+        run: the drive.
+        controller: its name.
     """
     episode = run.episode
+    start = (-episode.turn.run_in, episode.lateral_offset, episode.heading_offset)
+    if has_inertial_filter(controller):
+        return run_inertial_track(inertial_model(), run.columns, start)[0]
     states = run_filter(nominal_filter(), run.columns).states
     track = integrate_track(states[:, 0], states[:, 1], states[:, 2], nominal_filter().sample_period)
-    start = (-episode.turn.run_in, episode.lateral_offset, episode.heading_offset)
     return np.column_stack([body_to_world(track[:, :2], *start), track[:, 2] + start[2]])
 
 
@@ -78,7 +92,7 @@ def shown_drive(row: Row, run: TurnRun, with_estimate: bool) -> ShownDrive:
     path = np.column_stack([columns["true_x"], columns["true_y"]])
     estimate, error = None, None
     if with_estimate:
-        whole = estimated_track(run)[:, :2]
+        whole = estimated_track(run, row["controller"])[:, :2]
         end = window.stop - 1 if window is not None and crossed else len(path) - 1
         length = float(np.hypot(*np.diff(path[: end + 1], axis=0).T).sum())
         error = float(np.hypot(*(whole[end] - path[end]))) / max(length, 1e-3)
@@ -130,14 +144,14 @@ def tracked_rows(evaluation: Evaluation, most: int = 3) -> list[Row]:
     rows = []
     for name in main_arms(evaluation, 2 * MOST_ARMS):
         mine = sorted(_first_run(evaluation.rows_of(name, evaluation.judged)), key=size_of)
-        if mine and needs_filter(mine[0]["controller"]):
+        if mine and estimates_path(mine[0]["controller"]):
             rows.append(mine[(len(mine) - 1) // 2])
     return _important(evaluation, rows, most)
 
 
 def _important(evaluation: Evaluation, rows: list[Row], most: int) -> list[Row]:
     best = best_arm(evaluation)
-    wanted = ("B4", best.name if best else "", evaluation.headline)
+    wanted = (DEFAULT, best.name if best else "", evaluation.headline)
     ranked = sorted(rows, key=lambda row: arm_name(row) not in wanted)[:most]
     return [row for row in rows if row in ranked]
 

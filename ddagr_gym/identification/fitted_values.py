@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import fields, replace
 
 from ddagr_gym.identification.parameters import drivetrain_of
 from ddagr_gym.parameters import Robot, Soil
@@ -13,7 +13,7 @@ _ROBOT = ("mass", "yaw_inertia", "half_wheelbase", "half_track", "motor_rate", "
 """Fields of a robot whose nuisance is the logarithm of a factor."""
 
 
-def with_values(robot: Robot, soil: Soil, values: Mapping[str, float]) -> tuple[Robot, Soil]:
+def with_values(robot: Robot, soil: Soil, values: Mapping[str, float], *, held: bool = False) -> tuple[Robot, Soil]:
     """Robot and soil with nuisance parameters at values, as :mod:`ddagr_gym.identification.nuisances` defines them.
 
     Args:
@@ -21,8 +21,12 @@ def with_values(robot: Robot, soil: Soil, values: Mapping[str, float]) -> tuple[
         soil: nominal.
         values: by name; those that are missing are at their nominal value. Biases and clocks belong to a recording and
             are left out.
+        held: take a soil that leaves its bounds at them, as for draws around a fit.
+
+    Raises:
+        InputError: the values are no robot, or no soil.
     """
-    return _robot(robot, values), _soil(soil, values)
+    return _robot(robot, values), _soil(soil, values, held)
 
 
 def _robot(robot: Robot, values: Mapping[str, float]) -> Robot:
@@ -40,23 +44,33 @@ def _robot(robot: Robot, values: Mapping[str, float]) -> Robot:
     return replace(robot, wheels=wheels, drivetrain=drivetrain, side_slip_lead=lead, **factors)
 
 
-def _soil(soil: Soil, values: Mapping[str, float]) -> Soil:
+def _soil(soil: Soil, values: Mapping[str, float], held: bool) -> Soil:
     def factor(*names: str) -> float:
         return math.exp(sum(values.get(name, 0.0) for name in names))
 
-    def shifted(nominal: float, name: str, low: float) -> float:
-        return min(max(nominal + values.get(name, 0.0), low), 1.0)
+    def shifted(field: str, name: str) -> float:
+        return _held_in_bounds(field, float(getattr(soil, field)) + values.get(name, 0.0))
 
     strong = factor("soil_strength", "friction")
-    return replace(
-        soil,
-        cohesion=soil.cohesion * factor("soil_strength"),
-        friction_angle=math.atan(math.tan(soil.friction_angle) * strong),
-        sinkage_exponent=soil.sinkage_exponent * factor("sinkage_exponent"),
-        cohesive_modulus=soil.cohesive_modulus * factor("soil_stiffness"),
-        frictional_modulus=soil.frictional_modulus * factor("soil_stiffness"),
-        shear_modulus=soil.shear_modulus * factor("shear_modulus"),
-        peak_stress_coefficient_0=shifted(soil.peak_stress_coefficient_0, "stress_peak", 0.0),
-        peak_stress_coefficient_1=shifted(soil.peak_stress_coefficient_1, "stress_peak_slip", -1.0),
-        exit_angle_ratio=shifted(soil.exit_angle_ratio, "exit_angle_ratio", 0.0),
-    )
+    changed = {
+        "cohesion": soil.cohesion * factor("soil_strength"),
+        "friction_angle": math.atan(math.tan(soil.friction_angle) * strong),
+        "sinkage_exponent": soil.sinkage_exponent * factor("sinkage_exponent"),
+        "cohesive_modulus": soil.cohesive_modulus * factor("soil_stiffness"),
+        "frictional_modulus": soil.frictional_modulus * factor("soil_stiffness"),
+        "shear_modulus": soil.shear_modulus * factor("shear_modulus"),
+        "peak_stress_coefficient_0": shifted("peak_stress_coefficient_0", "stress_peak"),
+        "peak_stress_coefficient_1": shifted("peak_stress_coefficient_1", "stress_peak_slip"),
+        "exit_angle_ratio": shifted("exit_angle_ratio", "exit_angle_ratio"),
+    }
+    if held:
+        changed = {field: _held_in_bounds(field, value) for field, value in changed.items()}
+    return replace(soil, **changed)
+
+
+_BOUNDS = {item.name: item.metadata for item in fields(Soil)}
+
+
+def _held_in_bounds(field: str, value: float) -> float:
+    """A number of a soil, or the nearest bound where it leaves what a soil may be."""
+    return float(min(max(value, _BOUNDS[field]["low"]), _BOUNDS[field]["high"]))

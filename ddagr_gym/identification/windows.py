@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.errors import InputError
+from ddagr_gym.recordings.pose_frames import frames_apart
 from ddagr_gym.recordings.schema import Recording
 
 Array = NDArray[np.float64]
@@ -59,6 +60,8 @@ class WindowSet:
             one stands for them.
         speeds: (W, H + T, 2) recorded bank speeds between their samples [rad/s], NaN where unknown; the first H belong
             to the past.
+        frames_apart: whether stretches of a drive have poses in frames of their own, so that nothing can be said of
+            directions and places in the world.
     """
 
     period: float
@@ -72,6 +75,7 @@ class WindowSet:
     ahead: int = 0
     unknown: NDArray[np.int64] = field(default_factory=lambda: np.zeros(1, dtype=np.int64))
     speeds: Array = field(default_factory=lambda: np.full((1, 1, 2), np.nan))
+    frames_apart: bool = False
 
     def __post_init__(self) -> None:
         """One count for all windows, by default none, stands for each of them, and so do unknown speeds.
@@ -242,8 +246,9 @@ def _stack(
         for n, s, drive in zip(number, start, commands[:, max(kept[0] - 1, 0)], strict=True)
     ]
     return WindowSet(
-        period, number, start, time, commands, kept[0], measured, np.stack(guesses), kept[1], unknown, speeds
-    )
+        period, number, start, time, commands, kept[0], measured, np.stack(guesses), kept[1], unknown, speeds,
+        any(frames_apart(recording) for recording in recordings),
+    )  # fmt: skip
 
 
 def _common_period(recordings: Sequence[Recording]) -> float:

@@ -186,8 +186,17 @@ SOIL_PARAMETERS = (
 ) = range(9)
 
 # Points at which effects act, in the order of a sample
-POINT_COMMANDS, POINT_MOTORS, POINT_LOADS, POINT_SOIL, POINT_WHEEL_FORCES, POINT_BODY_FORCES, POINT_READINGS = range(7)
-POINTS = ("commands", "motors", "loads", "soil", "wheel_forces", "body_forces", "readings")
+(
+    POINT_COMMANDS,
+    POINT_SET_POINTS,
+    POINT_MOTORS,
+    POINT_LOADS,
+    POINT_SOIL,
+    POINT_WHEEL_FORCES,
+    POINT_BODY_FORCES,
+    POINT_READINGS,
+) = range(8)
+POINTS = ("commands", "set_points", "motors", "loads", "soil", "wheel_forces", "body_forces", "readings")
 
 EFFECT_PARAMETERS = 8  # floats per effect and environment
 EFFECT_MEMORY = 132  # floats that an effect may keep between samples, zero after a reset

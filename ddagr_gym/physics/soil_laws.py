@@ -28,6 +28,7 @@ from dataclasses import dataclass
 from ddagr_gym.errors import unknown_name
 from ddagr_gym.jit import kernel
 from ddagr_gym.physics.effects.base import Effect, Vector, size
+from ddagr_gym.physics.lateral_scale import LateralScale
 from ddagr_gym.physics.layout import (
     EXTRA_AXLE_TORQUE,
     EXTRA_FORCE_X,
@@ -154,7 +155,12 @@ class CrustAndResidual(Effect):
     strength: float = size("-", 0.1, 3.0, least=0.05, default=1.0, neutral=1.0)
 
 
-LAWS: dict[str, tuple[Effect, ...]] = {NOMINAL_LAW: (), LAW: (CrustAndResidual(),)}
+LAWS: dict[str, tuple[Effect, ...]] = {
+    NOMINAL_LAW: (),
+    LAW: (CrustAndResidual(),),
+    "lateral_0.8": (LateralScale(0.8),),
+    "lateral_1.2": (LateralScale(1.2),),
+}
 """Effects that turn the simulator's own soil law into the one of a name."""
 
 

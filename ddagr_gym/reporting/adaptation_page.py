@@ -47,6 +47,8 @@ def write_page(folder: Path, adapted: Adapted, corrected: Corrected, turns: Corr
             "sentence": corrected.sentence,
             "kept": text.kept_sentence(adapted),
             "turns": len(adapted.after),
+            "controller": adapted.bundle.adapted_from,
+            "tried": text.TRIED[adapted.bundle.adapted_from],
             "paths": embedded(figures.path_figure(before, after, commanded), "Paths of turns before and after"),
             "errors": embedded(figures.error_figure(adapted), "Radius and lateral errors before and after"),
             "outcome_header": text.OUTCOME_HEADER,

@@ -16,10 +16,19 @@ _KEPT = {
     "nominal": "The nominal controller is kept: neither knowledge nor tuning made it better there.",
     "known": "Kept is the nominal controller with what was named put into its filter and its model.",
     "taught": "Kept is the controller with what was named, a feed-forward that was taught, and the gains of a search.",
+    "tuned": "Kept is the controller with what was named, and the gains of a search.",
 }
+
+TRIED = {
+    "B4": "Taught: with a feed-forward and gains besides. The best is kept.",
+    "B6": "Tuned: with gains besides. What only knows is kept, unless another is better beyond doubt.",
+}
+"""What else was tried and what is kept, by the controller that was adapted."""
 
 _READ_OFF = "into the filter and the model, and taught"
 _TAUGHT = "taught by turns alone: filter and model have no place for it"
+_TUNED = "tuned by turns alone: filter and model have no place for it"
+_NO_PLACE = "not taken: the filter and the model have no place for it"
 _LEFT = "not taken: the nominal controller is kept"
 
 
@@ -44,7 +53,7 @@ def taken_rows(adapted: Adapted, corrected: Corrected) -> list[tuple[str, str]]:
     """What became of every named effect, and of the refitted robot and soil."""
     if adapted.kept == "nominal":
         return [(item.title, _LEFT) for item in corrected.all_effects] + [("refitted robot and soil", _LEFT)]
-    rest = _TAUGHT if adapted.kept == "taught" else "not taken: the filter and the model have no place for it"
+    rest = {"taught": _TAUGHT, "tuned": _TUNED}.get(adapted.kept, _NO_PLACE)
     read_off = _READ_OFF if adapted.kept == "taught" else "into the filter and the model"
     rows = [(item.title, read_off if item.name in adapted.used else rest) for item in corrected.all_effects]
     return [*rows, ("refitted robot", "into the filter and the model"), ("refitted soil", "the filter's prior")]

@@ -16,7 +16,7 @@ PAGE = Path(__file__).parent / "effects.md"
 
 POINTS = {
     getattr(layout, f"POINT_{name.upper()}"): name
-    for name in ("commands", "motors", "loads", "soil", "wheel_forces", "body_forces", "readings")
+    for name in ("commands", "set_points", "motors", "loads", "soil", "wheel_forces", "body_forces", "readings")
 }
 
 

@@ -10,10 +10,10 @@ import pytest
 
 from ddagr_gym.adaptation import turns as turns_module
 from ddagr_gym.adaptation.corrected import Corrected
-from ddagr_gym.adaptation.files import as_json, deviations, sizes, summary
-from ddagr_gym.adaptation.run import adapted, refitted_prior, score
+from ddagr_gym.adaptation.files import as_json, deviations, summary
+from ddagr_gym.adaptation.run import ADAPTABLE, adapted, refitted_prior, score, surely_better
 from ddagr_gym.adaptation.teaching import taught
-from ddagr_gym.adaptation.turns import CorrectedTurns, DrivenTurn, MeasuredTurns
+from ddagr_gym.adaptation.turns import CorrectedTurns, DrivenTurn, MeasuredTurns, sizes
 from ddagr_gym.errors import InputError
 from ddagr_gym.evaluation.adapted_controller import NODES, AdaptedSettings
 from ddagr_gym.evaluation.bundles import Bundle
@@ -100,7 +100,7 @@ def test_teaching_removes_what_a_slope_does(on_a_slope):
 
 def test_the_best_is_kept_and_told(on_a_slope, little):
     turns = MeasuredTurns(CorrectedTurns(on_a_slope))
-    found = adapted(on_a_slope, ddagr(), get_soil("thesis_a1"), turns, effort=little)
+    found = adapted(on_a_slope, ddagr(), get_soil("thesis_a1"), turns, controller="B4", effort=little)
     assert found.kept == min(found.scores, key=found.scores.get)
     assert found.kept != "nominal"  # which fails all turns on this slope
     assert found.used == ("slope",)
@@ -110,29 +110,67 @@ def test_the_best_is_kept_and_told(on_a_slope, little):
     assert written["after"]["success"]["value"] >= written["before"]["success"]["value"]
 
 
-def test_knowledge_that_misleads_is_not_kept(little, on_a_slope):
+@pytest.mark.parametrize("controller", ADAPTABLE)
+def test_knowledge_that_misleads_is_not_kept(controller, little, on_a_slope):
     """The turns are those of a robot whose gyro is right; the diagnosis says that it is not."""
     right = replace(on_a_slope, effects=(), intervals=())
     wrong = replace(right, effects=load_effects(["gyro_scale=1.3"]))
     turns = MeasuredTurns(CorrectedTurns(right))
-    found = adapted(wrong, ddagr(), get_soil("thesis_a1"), turns, effort=replace(little, taught=0, report=0))
+    effort = replace(little, taught=0, report=0)
+    found = adapted(wrong, ddagr(), get_soil("thesis_a1"), turns, controller=controller, effort=effort)
     assert found.scores["known"] > found.scores["nominal"]
     assert found.kept == "nominal"
     assert found.used == ()
     assert as_json(found, wrong)["after"] is None
 
 
-def test_the_counted_turns_are_those_that_are_asked_for(on_a_slope, little):
+@pytest.mark.parametrize("controller", ADAPTABLE)
+def test_the_counted_turns_are_those_that_are_asked_for(controller, on_a_slope, little):
     asked = []
     turns = MeasuredTurns(CorrectedTurns(on_a_slope), progress=lambda: asked.append(1))
-    adapted(on_a_slope, ddagr(), get_soil("thesis_a1"), turns, effort=little)
-    assert len(asked) == little.turns
+    adapted(on_a_slope, ddagr(), get_soil("thesis_a1"), turns, controller=controller, effort=little)
+    assert len(asked) == little.turns(controller)
+
+
+def test_the_tracker_keeps_gains_that_are_better_there(little):
+    """A gyro that reads too much, which the tracker knows, and motors that are late, which only turns can tell."""
+    effects = load_effects(["gyro_scale=1.08"])
+    corrected = Corrected(ddagr(), get_soil("thesis_a1"), effects, ({},), ("gyro_scale",), sentence="A test.")
+    turns = MeasuredTurns(CorrectedTurns(corrected))
+    found = adapted(corrected, ddagr(), get_soil("thesis_a1"), turns, controller="B6", effort=little)
+    assert set(found.scores) == {"nominal", "known", "tuned"}
+    assert found.kept in ("known", "tuned")
+    assert found.used == ("gyro_scale",)
+    assert found.bundle.adapted_from == "B6"
+    assert abs(found.after[0].heading) < 0.5 * abs(found.before[0].heading)
+    assert set(found.search["best"]) == {"proportional", "course", "ahead"}
+
+
+@pytest.mark.parametrize(
+    ("gained", "sure"),
+    [((0.01, 0.01, 0.01, 0.01), True), ((0.05, -0.04, 0.03, 0.0), False), ((-0.01,) * 4, False), ((0.0,) * 4, False)],
+)
+def test_gains_are_better_where_their_turns_can_tell(gained, sure):
+    """By hand: means 0.01, 0.01, -0.01 and 0; t at 95 % for 4 turns is 2.35, and the second mean's error is 0.02."""
+    driven = [turn(error=0.06 - value) for value in gained]
+    assert surely_better(driven, [turn(error=0.06)] * 4) is sure
+
+
+def test_a_failed_turn_costs_more_than_any_error():
+    failed = [turn(error=0.0, success=False)] * 3
+    assert surely_better([turn(error=None)] * 3, failed) is False
+    assert surely_better([turn(error=0.5), turn(error=0.6), turn(error=0.7)], failed)
+
+
+def test_another_controller_is_one_sentence(on_a_slope):
+    with pytest.raises(InputError, match="'B5'"):
+        adapted(on_a_slope, ddagr(), get_soil("thesis_a1"), MeasuredTurns(CorrectedTurns(on_a_slope)), controller="B5")
 
 
 def test_the_prior_follows_the_soil():
     soil = get_soil("thesis_a1")
     strong = replace(soil, cohesion=2.0 * soil.cohesion, friction_angle=1.3 * soil.friction_angle)
-    weak_prior, strong_prior = (refitted_prior(ddagr(), item) for item in (soil, strong))
+    weak_prior, strong_prior = (refitted_prior(ddagr(), item, 0.5) for item in (soil, strong))
     assert strong_prior.traction_limit_over_load > 1.2 * weak_prior.traction_limit_over_load
 
 

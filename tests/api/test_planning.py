@@ -20,7 +20,7 @@ def table():
     """Of three effects and one drive."""
     few = {name: registry.effect_kinds()[name] for name in ("slope", "gyro_scale", "imu_tilt")}
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("ddagr_gym.diagnosis.search.scan.absolute_effect_kinds", lambda: few)
+        patch.setattr("ddagr_gym.diagnosis.search.scan.absolute_effect_kinds", lambda frames_apart: few)
         return ddagr_gym.isolability(SHORT, ("imu", "encoders"))
 
 

@@ -31,7 +31,8 @@ def turns(errors):
 
 def test_truths_are_told_in_the_librarys_terms():
     named = {name: truth.named_effects() for name, truth in TRUTHS.items()}
-    assert named.pop("nothing") == ()
+    for nameless in ("nothing", "weak_sideways", "strong_sideways"):
+        assert named.pop(nameless) == ()
     assert all(len(effects) == 1 and effects[0].name == TRUTHS[name].effect for name, effects in named.items())
     assert {TRUTHS[name].effect for name in named} <= set(effect_kinds())
     (slope,) = named["slope"]
@@ -103,9 +104,21 @@ def test_a_late_command_comes_late(monkeypatch):
     assert (ways[0][-1] - ways[1][-1]) / 0.2 == pytest.approx(0.16, abs=0.04)
 
 
+def test_lateral_forces_are_scaled_and_nothing_else():
+    """The wheels' lateral forces in a turn follow the factor, so that the robot drifts further on weaker ground."""
+    ways = {}
+    for name in ("weak_sideways", "nothing", "strong_sideways"):
+        plant = TruePlant(TRUTHS[name]).plant(np.random.default_rng(0))
+        commands = np.tile([1.4, 0.2], (6 * round(1.0 / SAMPLE_PERIOD) * SUBSTEPS, 1))
+        ways[name] = drive(plant, commands, np.zeros(3))
+    turned = {name: abs(way["yaw"][-1]) for name, way in ways.items()}
+    assert turned["weak_sideways"] > 1.03 * turned["nothing"]
+    assert turned["strong_sideways"] < 0.98 * turned["nothing"]
+
+
 def test_a_turn_in_a_truth_is_judged_as_others_are():
     own = TrueTurns(TRUTHS["nothing"])
-    columns = own.drive(nominal().controller(own.turn(0)), 0)
+    columns = own.drive(nominal("B4").controller(own.turn(0)), 0)
     found = judged(columns, own.turn(0), own.robot, 0)
     assert found.success
     assert abs(found.error) < 0.1
@@ -126,8 +139,23 @@ def test_what_is_won_back_by_hand():
     assert worse["loses"]
 
 
-def test_published_figures_are_of_their_turns():
-    result = json.loads(command.RESULT.read_text())
+def test_fields_differ_in_soil_places_and_noise():
+    first, second = (TruePlant(TRUTHS["nothing"], number) for number in (1, 2))
+    assert first.noise != second.noise
+    one, other = (plant.turn(_Straight(), RowTurn(run_in=0.5), 3)["true_x"] for plant in (first, second))
+    assert not np.array_equal(one[:50], other[:50])
+
+
+def test_what_no_published_file_is_of_wants_a_name(capsys):
+    with pytest.raises(SystemExit) as ended:
+        command.main(["--controller", "B4", "--field", "2"])
+    assert ended.value.code == 2
+    assert "B4 on field 2" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("published", command.RESULTS.values(), ids=lambda path: path.stem)
+def test_published_figures_are_of_their_turns(published):
+    result = json.loads(published.read_text())
     assert len(result["truths"]) >= 8
     found = {name: {**item, "turns": result["turns"][name]} for name, item in result["truths"].items()}
     again = json.loads(json.dumps(result_of(found)))

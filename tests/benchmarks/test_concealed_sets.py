@@ -48,6 +48,7 @@ def test_kept_result_is_that_of_the_kept_sets() -> None:
             "concealed_sixth.json",
             "concealed_seventh.json",
             "concealed_eighth.json",
+            "concealed_ninth.json",
             "concealed.json",
         )
     ]

@@ -84,7 +84,9 @@ def test_errors_are_drawn_and_held_against_the_aims(windows: WindowSet, tmp_path
     aims = aims_of(item, 0, horizon=1.0)
     assert aims["calibrated over effective track with delay and lag"]["ratio"] == pytest.approx(0.5)
     assert aims["calibrated over effective track with delay and lag"]["met"]
-    assert aims["share of the learned model's gain"]["ratio"] == pytest.approx(0.75 / 0.875)
+    share = aims["share of the learned model's gain"]
+    # every window's errors are in the same ratios, so that nothing is uncertain
+    assert [share[key] for key in ("ratio", "low", "high")] == pytest.approx([0.75 / 0.875] * 3)
     draw(rows, tmp_path / "real_drives.png")
     assert (tmp_path / "real_drives.png").stat().st_size > 10_000
 

@@ -12,7 +12,7 @@ from ddagr_gym.commands.demo import Arguments
 from ddagr_gym.commands.output import Section
 from ddagr_gym.control.row_turn import RowTurn
 from ddagr_gym.envs.options import make_settings
-from ddagr_gym.evaluation.controllers import find_controller
+from ddagr_gym.evaluation.controllers import DEFAULT, find_controller
 from ddagr_gym.evaluation.runs import drive_turn
 from ddagr_gym.evaluation.shown import estimated_track
 from ddagr_gym.parameters import Imu, PoseReceiver, Sensors
@@ -120,7 +120,7 @@ def test_figure_and_film_of_the_turn_show_the_estimate(monkeypatch, driven, tmp_
     monkeypatch.setattr("ddagr_gym.rendering.video.write_video", lambda path, frames: filmed.extend(frames))
     monkeypatch.setattr("ddagr_gym.reporting.figures.turn_figure", lambda columns, *_, **__: seen.append(columns))
     section = demo.turn_step(Arguments(), tmp_path)
-    track = estimated_track(driven)
+    track = estimated_track(driven, DEFAULT)
     np.testing.assert_array_equal(np.column_stack([seen[0]["estimated_x"], seen[0]["estimated_y"]]), track[:, :2])
     np.testing.assert_array_equal(filmed[-1].estimated_track, track[:, :2])
     true = np.array([driven.columns[f"true_{axis}"][-1] for axis in "xy"])

@@ -25,7 +25,7 @@ def test_writes_table_json_and_figure(tmp_path, capsys, monkeypatch, drive_csv):
     from ddagr_gym.physics.effects import registry
 
     few = {name: registry.effect_kinds()[name] for name in ("slope", "gyro_scale", "imu_tilt")}
-    monkeypatch.setattr("ddagr_gym.diagnosis.search.scan.absolute_effect_kinds", lambda: few)
+    monkeypatch.setattr("ddagr_gym.diagnosis.search.scan.absolute_effect_kinds", lambda frames_apart: few)
     folder = tmp_path / "out"
     arguments = ["isolability", "--manoeuvres", str(drive_csv), "--sensors", "imu", "encoders"]
     assert main([*arguments, "--output", str(folder)]) == 0
@@ -47,7 +47,7 @@ def test_without_output_the_table_is_printed_and_nothing_written(tmp_path, capsy
     from ddagr_gym.physics.effects import registry
 
     few = {name: registry.effect_kinds()[name] for name in ("slope", "gyro_scale")}
-    monkeypatch.setattr("ddagr_gym.diagnosis.search.scan.absolute_effect_kinds", lambda: few)
+    monkeypatch.setattr("ddagr_gym.diagnosis.search.scan.absolute_effect_kinds", lambda frames_apart: few)
     monkeypatch.chdir(tmp_path)
     assert main(["isolability", "--manoeuvres", str(drive_csv), "--sensors", "imu", "encoders"]) == 0
     said = capsys.readouterr().out

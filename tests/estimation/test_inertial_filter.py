@@ -1,7 +1,7 @@
 """The inertial filter: gravity on slopes, none on the level, covariance, bits, cost."""
 
 import math
-import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -20,7 +20,9 @@ from ddagr_gym.estimation import (
     run_filter,
     run_inertial_filter,
 )
+from ddagr_gym.estimation.columns import stack_columns
 from ddagr_gym.estimation.inertial_layout import GRAVITY, INERTIAL_STATE, PATCH_AHEAD
+from ddagr_gym.estimation.layout import COMMANDS
 from ddagr_gym.evaluation.controllers import find_controller
 from ddagr_gym.evaluation.runs import drive_turn
 from ddagr_gym.parameters import STANDARD_GRAVITY, Sensors
@@ -166,15 +168,40 @@ def test_dead_reckoning_follows_the_true_path(sloping):
     assert found.yaw == pytest.approx(columns["true_yaw"][-1], abs=0.03)
 
 
-def test_a_sample_costs_at_most_twice_that_of_the_flat_filter(level):
-    commands, readings = readings_of(level.columns)
-    flat, inertial = BatchFilter(FilterModel.of(ROBOT, Sensors()), 1), InertialFilter(MODEL)
+def test_a_known_push_is_no_force_of_the_wheels(level):
+    """Readings with it, told of it, are readings without it on ground that slopes as much (straight on)."""
+    push = np.array([-0.4, 0.1, 0.0])
+    columns = {name: values[:300].copy() for name, values in level.columns.items() if len(values) > 300}
+    commands, readings = stack_columns(columns, COMMANDS, np.nan), stack_columns(columns, CHANNELS, np.nan)
+    told, plain = InertialFilter(MODEL), InertialFilter(MODEL)
+    told.known_push[:] = push
+    plain.reset(gravity=push[:2])
+    without = readings.copy()
+    without[:, :2] -= push[:2]
+    first, second = told.run(commands, readings)[0], plain.run(commands, without)[0]
+    second[:, GRAVITY : GRAVITY + 2] -= push[:2]
+    scale = np.abs(first).max(axis=0)
+    np.testing.assert_allclose(first / scale, second / scale, atol=0.05)
+    told.reset()
+    assert not told.known_push.any()
 
-    def cost(run):
-        start = time.process_time()
-        run()
-        return time.process_time() - start
 
-    runs = (lambda: flat.step(commands[None], readings[None]), lambda: inertial.run(commands, readings))
-    costs = np.array([[cost(run) for run in runs] for _ in range(15)])[3:]
-    assert np.median(costs[:, 1] / costs[:, 0]) < 2.0  # 1.1 where nothing else runs
+def test_an_accelerometer_that_shakes_with_speed_counts_for_less_on_the_way(level):
+    """At rest it tells gravity as well as a still one (wheel model, eq. (35))."""
+    imu = replace(Sensors().imu, accelerometer_vibration=0.6)
+    models = MODEL, InertialModel.of(ROBOT, replace(Sensors(), imu=imu))
+    commands, readings = stack_columns(level.columns, COMMANDS, np.nan), stack_columns(level.columns, CHANNELS, np.nan)
+    deviations = []
+    for model in models:
+        own = InertialFilter(model)
+        for part in (slice(0, 80), slice(80, None)):
+            own.run(commands[part], readings[part])
+            deviations.append(math.sqrt(own.covariance[GRAVITY, GRAVITY]))
+    at_rest, driven_off, still_at_rest, shaking = deviations
+    assert still_at_rest == pytest.approx(at_rest, rel=0.01)
+    assert shaking > 1.5 * driven_off
+
+
+def test_no_other_filter_takes_a_push():
+    with pytest.raises(InputError, match="only the inertial filter"):
+        DeadReckoning(FilterModel.of(ROBOT, Sensors())).pushed((0.1, 0.0, 0.0))

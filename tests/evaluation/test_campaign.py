@@ -1,10 +1,12 @@
 """Frozen scenarios and the campaign over them."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from benchmarks.plants import WEAK_MOTORS
 from benchmarks.scenario_sets import PLANS, as_scenario, draw_set
 from ddagr_gym.errors import InputError
 from ddagr_gym.evaluation import campaign
@@ -15,6 +17,7 @@ from ddagr_gym.evaluation.campaign import (
     episode_row,
     plan,
     run_campaign,
+    scenario_settings,
     wanted_episodes,
 )
 from ddagr_gym.evaluation.controllers import (
@@ -29,6 +32,7 @@ from ddagr_gym.evaluation.controllers import (
 from ddagr_gym.evaluation.dataset import EpisodeDataset
 from ddagr_gym.evaluation.scenarios import load_scenarios, save_scenarios, scenario_names
 from ddagr_gym.evaluation.summary import summaries
+from ddagr_gym.physics.effects.slope import Slope
 from ddagr_gym.physics.soil_laws import LAW
 from ddagr_gym.policies.archive import Policy, save_policy
 from ddagr_gym.policies.design import PolicyDesign
@@ -59,6 +63,34 @@ def test_a_set_reads_back_as_it_was_drawn(frozen):
         assert loaded.episode.soils == expected.episode.soils
         assert loaded.episode.sensors == expected.episode.sensors
         np.testing.assert_array_equal(loaded.episode.field.values, expected.episode.field.values)
+
+
+def test_effects_and_drivetrain_of_a_scenario_read_back(frozen):
+    drawn = draw_set("V")
+    weak = [
+        (seed, replace(episode, robot=replace(episode.robot, drivetrain=WEAK_MOTORS)), recipe)
+        for seed, episode, recipe in drawn
+    ]
+    effects = [(Slope(0.05, 1.0 + number),) for number in range(len(weak))]
+    save_scenarios("S1", "on a slope", weak, effects=effects)
+    loaded = load_scenarios("S1")
+    assert [scenario.effects for scenario in loaded] == effects
+    assert {scenario.episode.robot.drivetrain for scenario in loaded} == {WEAK_MOTORS}
+    assert [scenario.effects for scenario in load_scenarios("V")] == [()] * len(drawn)
+    assert scenario_settings(loaded[1]).effects == effects[1]
+
+
+def test_turns_with_other_effects_are_driven_apart(frozen):
+    """A batch has one set of effects: each turn must come out as if driven alone."""
+    drawn = draw_set("V")
+    save_scenarios("S1", "on slopes", drawn, effects=[(Slope(0.05, 2.0 * number),) for number in range(len(drawn))])
+    scenarios = load_scenarios("S1")
+    together = drive_scenarios("ppo_raw", scenarios)
+    alone = [drive_scenarios("ppo_raw", [scenario])[0] for scenario in scenarios]
+    for first, second in zip(together, alone, strict=True):
+        assert first.ending == second.ending
+        np.testing.assert_array_equal(first.columns["true_x"], second.columns["true_x"])
+    assert not np.array_equal(together[0].columns["true_x"][:50], together[1].columns["true_x"][:50])
 
 
 def test_unknown_set_lists_the_names(frozen):

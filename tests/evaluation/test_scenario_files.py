@@ -3,15 +3,16 @@
 import gzip
 import json
 import os
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from benchmarks.scenario_sets import PLANS
+from benchmarks.scenario_sets import ON_PLANTS, PLANS, PLANT_COUNT, SECOND
 from ddagr_gym.errors import InputError
 from ddagr_gym.evaluation import scenarios as scenario_module
 from ddagr_gym.evaluation.scenarios import load_scenarios, scenario_folder, scenario_names, set_hash
-from ddagr_gym.physics.soil_laws import LAW, NOMINAL_LAW
+from ddagr_gym.physics.soil_laws import LAW
 
 FROZEN = {
     "S0": "ad22ca6c05158da86a53f51f3a0dc9c72da30b66cec531b42c34fccb61f21aeb",
@@ -23,14 +24,38 @@ FROZEN = {
     "S6": "a8f674f43be8c6887d6700e94bd7021ba59f7a1189c6570ed5f947514784615d",
     "S7": "714da2b52c4b880fbba6338d99d9cd1250492b1b0a7280d2cb621bc781a766cb",
     "S8": "0d0293cbfbd00226efc645d31d9690d1bdd5bcba4088637f889fa0af01e2671e",
-    "T": "00057621c05909b59c88a823ae743346b35edb6c2359a6b0b68d76537de6e717",
     "V": "c79874aeb0f75d69fc7bab288a65a244eeea4af50defd8de7b0a0b95952a968a",
+    "T": "00057621c05909b59c88a823ae743346b35edb6c2359a6b0b68d76537de6e717",
+    "S1b": "e8716611c76fd4631eb06cfc2821aec44606fcc114e1ad165448be751d94d3f0",
+    "S2b": "d5ae016fdcdbf6c650faf30eafa0edd6135221f953a579f1f5dd9566d99b6151",
+    "S3b": "880eb13dd60f27e3fb157737a3509031e628a256f2255f2ad6fa80f65012fae4",
+    "S4b": "9001c4711824f990347c139a0566dd679687bece9027ffc97dd3ab46988a2e72",
+    "S5b": "cb70b9d78431610f1a33c0bf03834949b1d0843b05628b97f339f227f58bc9b1",
+    "S6b": "b7498584b4256f35f94a97db0524f3a56d5f7c95b49e10777d25ad43905a26b8",
+    "S7b": "e66923f14e846a9fc4c21831ffd64d5017e8d0dcfb5ea319336f95f75ad7e113",
+    "S8b": "8601cece71ca32d766351dece042f8835e644525fb9dcf76f88152f6ab3085d5",
+    "Tb": "9a827d926bc6fabfc9b3fe25d739c11f2c5be5fe17f19c298bd4492d30facf0a",
+    "on_slope_3": "7d2546c9782e6a90e645ca98d15f17a30ea6509a35f5d486238b8d8674ccaf43",
+    "on_slope_5": "cdd76432e0c7c4af0121234e87e0777ed29bce91ae140c231d3fbedcb879242e",
+    "on_weaker": "df11b4b0792cd1188359db8755982873f43dcb036d9e97db6ac34a95ebb284f9",
+    "on_lateral_0.8": "06ecab0c7d39e0e5067a35f0db01c41732196234385777159f8e6dcb867c4c3c",
+    "on_lateral_1.2": "f6cfd7871f9cfb2fac954b01093eb9159c5ab44b8a9c483bf856da2b2fdbbb5b",
+    "on_late": "1e5ac37e166ecc828887cdf28905d55c028488ed97b755c14cb2c88627ac96e7",
+    "on_heavy": "a3317bf52aacc3f70f7b66c8a1296e2e4000339d1f58c6696ab97daa6e29d038",
+    "on_ruts": "c6dc7676ae3f4568e1bc3d12c8855c70ea7a9c433d0d882191c312a41f17e006",
+    "on_slip_sinkage": "535f250bf3988bc9fba1daf9f55417aef643e89a13dcbce3110eaca26df05b28",
+    "on_bulldozing": "47efe4045ed5a4500064b5308daad96a74960d79a7f76db2ba345345eda753d5",
+    "on_payload": "addb9e23c3fe52a3be4496f8bf62782eb369fb2e2c6712f43703ea21398a82b7",
+    "on_slow": "daf5cc069d2cc4c8835f4e3e14e865bb2b4c5a5896b5142bca36cccb1b1f4ff2",
+    "on_weak_motors": "3814cc9dec4343c78a1e9b8febb262d9e5a79a37c6d13e63b4a75f762566ccb3",
+    "on_split": "bb724075c3b00dc5a22a563352c7826df0dadc7630482af63a858954c6f7db90",
+    "on_patch": "6d9345b6f3db4832715554646f300f9ba4e4c266107a9e73ea4de743f3ecc0b1",
 }
 """SHA-256 of every set on the day it was frozen; no change of a set is ever right."""
 
 
 def test_all_sets_are_there():
-    assert scenario_names() == tuple(FROZEN)
+    assert scenario_names() == tuple(sorted(FROZEN))
     assert set(FROZEN) == set(PLANS)
 
 
@@ -39,11 +64,12 @@ def test_set_is_the_one_that_was_frozen(name):
     assert set_hash(name) == FROZEN[name]
     scenarios = load_scenarios(name)  # checks the soil grids
     assert len(scenarios) == PLANS[name].count
-    assert {scenario.law for scenario in scenarios} == {LAW if name == "T" else NOMINAL_LAW}
+    assert {scenario.law for scenario in scenarios} == {PLANS[name].law}
+    assert (PLANS[name].law == LAW) == (name in ("T", "Tb"))
 
 
 def test_files_are_small():
-    assert sum(path.stat().st_size for path in scenario_folder().iterdir()) < 500_000
+    assert sum(path.stat().st_size for path in scenario_folder().iterdir()) < 1_000_000
 
 
 def test_validation_shares_nothing_with_the_test_sets():
@@ -55,15 +81,40 @@ def test_validation_shares_nothing_with_the_test_sets():
         assert not seeds & {scenario.seed for scenario in others}
 
 
-def test_transfer_drives_the_turns_of_s1():
-    for other, first in zip(load_scenarios("T"), load_scenarios("S1"), strict=False):
+@pytest.mark.parametrize("drawing", ["", "b"])
+def test_transfer_drives_the_turns_of_s1(drawing):
+    for other, first in zip(load_scenarios(f"T{drawing}"), load_scenarios(f"S1{drawing}"), strict=False):
         assert other.seed == first.seed
         assert other.episode.soils == first.episode.soils
         np.testing.assert_array_equal(other.episode.field.values, first.episode.field.values)
 
 
-def test_pairs_of_s7_are_mirror_images():
-    scenarios = load_scenarios("S7")
+@pytest.mark.parametrize("name", ON_PLANTS)
+def test_plants_are_driven_by_the_turns_of_s1b(name):
+    """Same soils, starts and noise on every plant, and something that differs from S1b."""
+    pairs = list(zip(load_scenarios(name), load_scenarios("S1b"), strict=False))
+    assert len(pairs) == PLANT_COUNT
+    for other, first in pairs:
+        assert other.seed == first.seed
+        assert other.episode.soils == first.episode.soils
+        assert other.episode.lateral_offset == first.episode.lateral_offset
+        changed = replace(other, set_name=first.set_name, episode=first.episode)
+        assert (
+            changed != first
+            or other.episode.robot != first.episode.robot
+            or (other.episode.command_delay != first.episode.command_delay)
+        )
+
+
+def test_the_second_drawing_shares_nothing_with_the_first():
+    for name in SECOND:
+        seeds = {scenario.seed for scenario in load_scenarios(name)}
+        assert not seeds & {scenario.seed for scenario in load_scenarios(name.removesuffix("b"))}
+
+
+@pytest.mark.parametrize("name", ["S7", "S7b"])
+def test_pairs_of_s7_are_mirror_images(name):
+    scenarios = load_scenarios(name)
     for left, right in zip(scenarios[::2], scenarios[1::2], strict=True):
         assert (left.episode.turn.side, right.episode.turn.side) == ("left", "right")
         assert left.episode.soils == right.episode.soils
@@ -73,9 +124,10 @@ def test_pairs_of_s7_are_mirror_images():
         assert mine.accelerometer_bias[1] == -other.accelerometer_bias[1]
 
 
-def test_s6_and_s8_leave_the_training_range():
-    assert {scenario.episode.robot.motor_rate for scenario in load_scenarios("S6")} == {1.4}
-    radii = [scenario.episode.turn.radius for scenario in load_scenarios("S8")]
+@pytest.mark.parametrize("drawing", ["", "b"])
+def test_s6_and_s8_leave_the_training_range(drawing):
+    assert {scenario.episode.robot.motor_rate for scenario in load_scenarios(f"S6{drawing}")} == {1.4}
+    radii = [scenario.episode.turn.radius for scenario in load_scenarios(f"S8{drawing}")]
     assert min(radii) >= 0.65
     assert max(radii) <= 1.2
     assert np.ptp(radii) > 0.4

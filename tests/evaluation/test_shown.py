@@ -5,6 +5,7 @@ import pytest
 
 from ddagr_gym.errors import InputError
 from ddagr_gym.evaluation.campaign import drive_scenario, episode_row
+from ddagr_gym.evaluation.controllers import estimates_path
 from ddagr_gym.evaluation.report_data import Arm, Evaluation, SetNote
 from ddagr_gym.evaluation.scenarios import load_scenarios
 from ddagr_gym.evaluation.shown import (
@@ -82,6 +83,15 @@ def test_a_drive_is_repeated_to_the_bit_and_its_estimate_agrees_with_the_metric(
     assert np.hypot(*(track[0, :2] - [run.columns["true_x"][0], run.columns["true_y"][0]])) < 1e-3
     # heading by the gyro: within the filter's own bias of the true half turn
     assert abs(track[-1, 2]) == pytest.approx(abs(run.columns["true_yaw"][-1]), abs=0.05)
+
+
+def test_the_estimate_of_a_tracker_is_that_of_its_own_filter():
+    _, run = replayed("B6", "V", 3)
+    true = np.column_stack([run.columns["true_x"], run.columns["true_y"]])
+    own, other = (np.hypot(*(estimated_track(run, name)[-1, :2] - true[-1])) for name in ("B6", "B4"))
+    assert own < 0.05
+    assert own != other
+    assert [estimates_path(name) for name in ("B6", "B4", "B1")] == [True, True, False]
 
 
 def test_infeasible_soils_are_listed_once(evaluation):

@@ -136,7 +136,9 @@ def test_field_range_covers_most_published_field_soils():
     assert not covered[9]  # heavy clay at 25 percent moisture, 1 MPa
 
 
+@pytest.mark.slow
 def test_draws_are_fast_enough_for_a_reset(robot):
+    """Slow, since a time says little on a busy machine."""
     distribution, rng = get_distribution("field"), np.random.default_rng(4)
     durations = []
     for _ in range(60):

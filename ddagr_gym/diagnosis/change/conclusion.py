@@ -19,10 +19,11 @@ from ddagr_gym.diagnosis.answer.change import (
 )
 from ddagr_gym.diagnosis.answer.verdict import NONE, UNKNOWN, Diagnosis, Estimate, Finding, GatesUsed, Options
 from ddagr_gym.diagnosis.change.drive_scan import NAMED, NOT_COMPARED
+from ddagr_gym.diagnosis.change.left_out import probability_of_ordinary
 from ddagr_gym.diagnosis.change.model import FORM, Model
 from ddagr_gym.diagnosis.change.naming import Named, Step
 from ddagr_gym.diagnosis.change.ordinary import OrdinaryRobot
-from ddagr_gym.diagnosis.change.shifts import LEVEL, POWER, Pull, Shift, sizes_of
+from ddagr_gym.diagnosis.change.shifts import LEVEL, POWER, Pull, Shift, family_probability, sizes_of
 from ddagr_gym.diagnosis.preprocessing.mended_recordings import MendedRecordings
 from ddagr_gym.diagnosis.result.conclusion import data_source, reversed_gyro_findings
 from ddagr_gym.diagnosis.result.sentences import change_headline
@@ -33,6 +34,7 @@ from ddagr_gym.identification.misfit import channel_misfit
 from ddagr_gym.identification.problem import Problem
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.effects.gyro_sign import GyroSign
+from ddagr_gym.physics.layout import POINT_READINGS
 from ddagr_gym.version import __version__
 
 
@@ -57,7 +59,7 @@ def conclude_change(
     turned = mended.reversed_gyro is not None and not _usually_reversed(ordinary)
     seen = tuple(reversed_gyro_findings(mended.reversed_gyro)) if turned else ()
     findings = (*seen, *(_finding(named, k) for k in range(len(named.steps))))
-    complete = named.complete
+    complete = named.complete and not (ground and forecast_badly(named, certified))
     verdict = tuple(item.name for item in findings) or ((NONE,) if complete else (UNKNOWN,))
     change = _change(problem, ordinary, ground, named, certified)
     diagnosis = Diagnosis(
@@ -86,6 +88,23 @@ def conclude_change(
         change=change,
     )  # fmt: skip
     return diagnosis, (*((GyroSign(1.0),) if turned else ()), *named.models[-1].fitted.point.effects)
+
+
+def forecast_badly(named: Named, certified: ChangeCertificate | None) -> bool:
+    """Whether forecasts with what is named stay worse than ordinary drives have them: that is not all that changed.
+
+    They are one test more beside those of effects, parameters and channels. Nothing is said where a name is about a
+    sensor, by whose readings the forecasts start.
+
+    Args:
+        named: what changed, against drives on the same ground.
+        certified: forecasts; None where those of ordinary drives are not known.
+    """
+    last = named.models[-1]
+    points = {point for effect in last.fitted.point.effects for point, _ in effect.acting}
+    if certified is None or not named.steps or POINT_READINGS in points:
+        return False
+    return family_probability(probability_of_ordinary(certified), last.tests + 1) < LEVEL
 
 
 def _usually_reversed(ordinary: OrdinaryRobot) -> bool:

@@ -88,9 +88,10 @@ def library(problem: Problem, fitted: Fitted) -> tuple[Compared, ...]:
     """
     extent = drive_extent(problem, fitted.prediction)
     assumed = {effect.name for effect in fitted.point.effects}
+    apart = problem.blocked.windows.frames_apart
     found: list[Compared] = []
     for name, kind in effect_kinds().items():
-        if name in NOT_COMPARED or name in assumed:
+        if name in NOT_COMPARED or name in assumed or (kind.needs_one_frame and apart):
             continue
         number = 0
         for candidate in candidates_of(kind, extent, 0):

@@ -74,6 +74,22 @@ def certificate(without: Array, corrected: Array, ordinary: Array) -> ChangeCert
     )
 
 
+def probability_of_ordinary(certificate: ChangeCertificate) -> float:
+    """Of as few well forecast windows in an ordinary drive, whose windows are like those of the others.
+
+    Of W further values those below the k-th of V are beta-binomial, with k and V + 1 - k (S. S. Wilks, Ann. Math. Stat.
+    12 (1941) 91); the q-quantile is the one with k = 1 + q (V - 1), between two whole ones.
+
+    Args:
+        certificate: of the drives.
+    """
+    from scipy.stats import betabinom
+
+    place = 1.0 + certificate.expected * (certificate.ordinary_windows - 1.0)
+    above = certificate.ordinary_windows + 1.0 - place
+    return float(betabinom.cdf(certificate.as_well, certificate.windows, place, above))
+
+
 def _quartiles(losses: Array) -> tuple[float, float, float]:
     low, middle, high = (float(value) for value in np.quantile(losses, (0.25, 0.5, 0.75)))
     return low, middle, high

@@ -21,11 +21,11 @@ from ddagr_gym.diagnosis.change.model import MOST_NEAR, Model, farthest
 from ddagr_gym.diagnosis.change.ordinary import Comparison, Scores
 from ddagr_gym.diagnosis.change.shifts import Shift, explained, shift_of, sizes_of
 from ddagr_gym.diagnosis.change.soil_place import patch_of_change
-from ddagr_gym.diagnosis.search.initial_guess import first_guess, same_lateness
+from ddagr_gym.diagnosis.search.initial_guess import first_guess, same_lateness, with_whole_lag
 from ddagr_gym.diagnosis.search.scan import drive_extent
 from ddagr_gym.diagnosis.search.scanned_model import Rival
 from ddagr_gym.identification.fit_numerics import FIELD_TOLERANCE
-from ddagr_gym.identification.gauss_newton import fit
+from ddagr_gym.identification.gauss_newton import Fitted, fit
 from ddagr_gym.identification.parameters import KIND_STIFFNESS_DEVIATION, soil_parameters
 from ddagr_gym.identification.problem import Point, Problem
 from ddagr_gym.physics.effects.registry import effect_kinds
@@ -165,12 +165,23 @@ def _refitted(
     found = []
     for name, (shift, start) in starts.items():
         progress(f"refitting with {name}")
-        fitted = fit(problem, start, iterations=ITERATIONS + 2, tolerance=FIELD_TOLERANCE, renewals=RENEWALS)
+        fitted = _to_the_end(problem, start)
         gain = (model.fitted.cost - fitted.cost) / dispersion
         meaningful = fitted.point.effects[-1].is_meaningful(drive_extent(problem, fitted.prediction))
         if gain > 0.0 and meaningful:
             found.append((shift, Rival(name, fitted, gain)))
     return _by_gain(found)
+
+
+def _to_the_end(problem: Problem, start: Point) -> Fitted:
+    """The fit from a start, and from where it ends with the lag of motors whole, where that explains more."""
+    fitted = _fit(problem, start)
+    whole = with_whole_lag(problem, fitted.point)
+    return fitted if whole is None else min(fitted, _fit(problem, whole), key=lambda item: item.cost)
+
+
+def _fit(problem: Problem, start: Point) -> Fitted:
+    return fit(problem, start, iterations=ITERATIONS + 2, tolerance=FIELD_TOLERANCE, renewals=RENEWALS)
 
 
 def _alike(problem: Problem, model: Model, refits: Sequence[Rival]) -> Starts:

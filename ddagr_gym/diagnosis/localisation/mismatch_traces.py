@@ -94,10 +94,13 @@ def piece_values(problem: Problem, fitted: Fitted) -> Pieces:
         "command_change": _command_change(problem, sample_piece),
         "time": start,
     }
+    if windows.frames_apart:
+        del values["heading"]
     shape = values["speed"].shape
     recording = np.repeat(windows.recording[:, None], shape[1], axis=1).ravel()
     x, y = mean(prediction[..., 5]), mean(prediction[..., 6])
-    return Pieces(recording, {name: item.ravel() for name, item in values.items()}, x.ravel(), y.ravel())
+    raveled = {name: item.ravel() for name, item in values.items()}
+    return Pieces(recording, raveled, x.ravel(), y.ravel(), windows.frames_apart)
 
 
 def _command_change(problem: Problem, sample_piece: NDArray[np.int64]) -> Array:

@@ -64,12 +64,14 @@ class Pieces:
         values: (n,) by name of CONDITIONS; NaN where unknown.
         x: (n,) world [m].
         y: (n,) the same.
+        frames_apart: whether the places are in several frames, so that none is sought.
     """
 
     recording: Integers
     values: Mapping[str, Array]
     x: Array
     y: Array
+    frames_apart: bool = False
 
 
 def shifted(weight: Array, recording: Integers, rng: np.random.Generator, count: int) -> Array:
@@ -100,7 +102,8 @@ def shares(weight: Array, pieces: Pieces, rng: np.random.Generator) -> tuple[Ope
         known = np.isfinite(values)
         if known.all() and np.ptp(values) > 0.0:
             found.append(_ordered(name, every, values, np.full(len(values), 1.0 / len(values))))
-    found.append(_places(every, pieces))
+    if not pieces.frames_apart:
+        found.append(_places(every, pieces))
     return _with_p(found)
 
 

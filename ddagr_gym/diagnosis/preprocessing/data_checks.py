@@ -11,13 +11,14 @@ from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.recordings.checks.across import across_runs
 from ddagr_gym.recordings.checks.findings import CheckFinding, Status
 from ddagr_gym.recordings.checks.run import check_recording
+from ddagr_gym.recordings.pose_frames import frames_apart
 from ddagr_gym.recordings.schema import Recording
 
 STUCK = "stuck"
 """Family of checks on channels that never change."""
 
 FRAMES = "frames"
-"""Doubt about the frames of poses, which no check of numbers can settle."""
+"""Doubt about the frames of poses."""
 
 
 def data_doubts(recordings: Sequence[Recording], rng: np.random.Generator) -> tuple[DataDoubt, ...]:
@@ -32,21 +33,16 @@ def data_doubts(recordings: Sequence[Recording], rng: np.random.Generator) -> tu
     for report in reports:
         found += [DataDoubt(report.source, "", "schema", sentence) for sentence in report.sentences]
         found += [_doubt(report.source, finding) for finding in report.suspicious]
-    found += [_frames_doubt(recording) for recording in recordings if _has_stretches(recording)]
+    found += [_frames_doubt(recording) for recording in recordings if frames_apart(recording)]
     together = across_runs(recordings, reports)
     return (*found, *(_doubt("", finding) for finding in together if finding.status is Status.SUSPICIOUS))
 
 
-def _has_stretches(recording: Recording) -> bool:
-    """Whether poses come in stretches whose frames need not be the same."""
-    return len(recording.meta.spans) > 1 and recording.has("pose_x", "pose_y", "pose_yaw")
-
-
 def _frames_doubt(recording: Recording) -> DataDoubt:
     sentence = (
-        f"It consists of {len(recording.meta.spans)} stretches, and their poses are taken to be in one frame. "
-        "If each begins in a frame of its own, what is said of directions and places is wrong (slope, soil patches, "
-        "tilt of the ground): give the stretches as files of their own then."
+        f"It consists of {len(recording.meta.spans)} stretches whose poses are in frames of their own: the robot would "
+        "have jumped between them. Nothing is said of directions and places in the world, and slopes and soil patches "
+        "are not tried. Give poses in one frame if there are any."
     )
     return DataDoubt(recording.meta.source, "pose_yaw", FRAMES, sentence)
 

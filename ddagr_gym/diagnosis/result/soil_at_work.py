@@ -137,7 +137,7 @@ def _scaled(problem: Problem, soil: Soil, named: Mapping[str, float], strength: 
         "soil_strength": named.get("soil_strength", 0.0) + math.log(strength),
         "soil_stiffness": named.get("soil_stiffness", 0.0) + math.log(stiffness),
     }
-    return with_values(problem.robot, soil, changed)[1]
+    return with_values(problem.robot, soil, changed, held=True)[1]
 
 
 def _models(problem: Problem, fitted: Fitted, number: int, draws: Resampled) -> list[tuple[Array, Effect]]:

@@ -262,6 +262,39 @@ def with_whole_delay(problem: Problem, point: Point) -> Point:
     return _handed_over(point, place, tuple(a or b for a, b in zip(longer, point.effects, strict=True)))
 
 
+def with_whole_lag(problem: Problem, point: Point) -> Point | None:
+    """The same predictions with all of a slower answer in motor_lag, the motors' rate back at its nominal value.
+
+    A lag l with the share p in a second pole and a rate k are two time constants, 1/k + (1 - p) l and p l: k and l are
+    split by the rate's prior alone. Finite differences to both are wrong by a little of what they have in common, which
+    looks like knowledge of the split, so that a fit ends far from the prior.
+
+    Args:
+        problem: with the nuisances.
+        point: fitted.
+
+    Returns:
+        None where no lag is assumed, the rate is no nuisance or has not moved, or no lag says the same.
+    """
+    names = [parameter.name for parameter in problem.nuisances.parameters]
+    if "motor_rate" not in names or point.values[place := names.index("motor_rate")] == 0.0:
+        return None
+    later = math.expm1(-float(point.values[place])) / problem.robot.motor_rate
+    whole = [_longer(effect, later) if isinstance(effect, MotorLag) else None for effect in point.effects]
+    if not any(whole):
+        return None
+    return _handed_over(point, place, tuple(a or b for a, b in zip(whole, point.effects, strict=True)))
+
+
+def _longer(motors: MotorLag, later: float) -> MotorLag | None:
+    """Motors whose loop is slower by some time, with the same second pole; None where no lag says that."""
+    second, lag = motors.second_pole * max(motors.lag, 0.0), motors.lag + later
+    data = MotorLag.parameter("lag").metadata
+    if not (data["low"] <= lag <= data["high"] and 0.0 <= second <= max(lag, 0.0)):
+        return None
+    return MotorLag(lag, second / lag if lag > 0.0 else 0.0, motors.slowing)
+
+
 def _later(delay: CommandDelay, shift: float) -> CommandDelay | None:
     """A delay of both banks that is longer by a shift; None where there is none yet, or more than there may be."""
     if delay.delay <= 0.0:

@@ -104,7 +104,8 @@ def scan(
     Args:
         problem: what was fitted.
         fitted: the fit, with or without effects.
-        kinds: effects to try, by default all that need no drives from before; those assumed already are left out.
+        kinds: effects to try, by default all that need no drives from before, and no common frame of the poses where
+            there is none; those assumed already are left out.
         progress: called with the name of each effect when it is done.
     """
     extent = drive_extent(problem, fitted.prediction)
@@ -112,7 +113,8 @@ def scan(
     candidates: list[Candidate] = []
     columns: list[Array] = []
     drives = record_drives(problem, fitted.point)
-    for name, kind in (absolute_effect_kinds() if kinds is None else kinds).items():
+    tried = absolute_effect_kinds(problem.blocked.windows.frames_apart) if kinds is None else kinds
+    for name, kind in tried.items():
         # repeated readings are found in the values themselves (ddagr_gym.diagnosis.preprocessing.repeated_readings)
         if name in assumed or name == "sensor_hold":
             continue

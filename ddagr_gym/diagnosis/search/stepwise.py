@@ -78,13 +78,22 @@ def _add_effect(
     problem, gates = session.problem, further_gates(session.gates, models)
     tried = rivals_of(problem, models[-1], raw, gates, _MOST_RIVALS, {} if models[-1].names else known)
     tried = [rival for rival in tried if rival.gain > gates.of(rival.name).gain]
-    if not tried:
-        return None
-    session.progress(f"joint refit with {tried[0].name}")
-    best = _swap(problem, tried[0].fitted, steps)
-    point = with_whole_delay(problem, best.point)
-    more = scan_model(problem, fit(problem, point, iterations=8, renewals=2, first=best), session.progress)
-    return _without_idle(session, more, gates), tuple(tried)
+    for number, rival in enumerate(tried):
+        session.progress(f"joint refit with {rival.name}")
+        joint = _joint(problem, rival, steps)
+        if joint.cost < models[-1].fitted.cost:
+            more = scan_model(problem, joint, session.progress)
+            return _without_idle(session, more, gates), tuple(tried[number:])
+    return None
+
+
+def _joint(problem: Problem, rival: Rival, steps: Sequence[tuple[Rival, ...]]) -> Fitted:
+    """A rival fitted to the end with sensitivities of its own.
+
+    Its cost may be above that of the trial steps, which counted with sensitivities of the model before.
+    """
+    best = _swap(problem, rival.fitted, steps)
+    return fit(problem, with_whole_delay(problem, best.point), iterations=8, renewals=2, first=best)
 
 
 def further_gates(thresholds: Thresholds, models: Sequence[ScannedModel]) -> Thresholds:

@@ -2,14 +2,14 @@
 
 A sample of the simulator runs through these points; an effect is attached to one or more of them::
 
-    commands -> motors -> loads -> soil -> [ wheel_forces -> body_forces ] -> readings
-                                           several times per integrator step
+    commands -> set_points -> motors -> loads -> soil -> [ wheel_forces -> body_forces ] -> readings
+                                                         several times per integrator step
 
 ==============  ====================================  ==============================================================
 point           what an effect may change there       effects
 ==============  ====================================  ==============================================================
-commands        COMMAND                               command_delay, command_deadband, command_gain,
-                                                      encoder_scale (in the loop)
+commands        COMMAND                               command_deadband, command_gain, encoder_scale (in the loop)
+set_points      MOTOR_TARGET (after limits and ramp)  command_delay
 motors          MOTOR_TARGET, MOTOR_RATE, DRIVETRAIN  motor_lag, motor_droop, motor_saturation
 loads           MASS ... SLOPE, WHEEL (restored at    slope, payload, centre_of_mass_offset, wheel_radius_mismatch,
                 each sample), TOWED                   towed_drag (the load on its rope)

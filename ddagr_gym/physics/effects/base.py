@@ -112,6 +112,8 @@ class Effect(Validated):
     """Whether only the bounds of the sizes exist in nature (a sign); values between serve sensitivities."""
     needs_earlier_drives: ClassVar[bool] = False
     """Whether only drives from before say what is usual, so that a diagnosis against a nominal model leaves it out."""
+    needs_one_frame: ClassVar[bool] = False
+    """Whether it acts by direction or place in the world, so that poses in several frames cannot show it."""
     actions: ClassVar[tuple[tuple[int, Action], ...]]
     """(point, function) pairs, called in this order at their points; each has a memory of its own."""
 

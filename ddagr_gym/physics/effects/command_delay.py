@@ -1,29 +1,35 @@
-"""Dead time between the command and the motors."""
+"""Dead time between the command and the motors.
+
+It acts on what ramps and limits have made of the commands: a shift in time may come before or after them, but of a ramp
+that a step of the command sets off between two samples only the sample is left, so that all dead times between two
+samples would be one.
+"""
 
 from dataclasses import dataclass
 
 from ddagr_gym.physics.effects.base import DriveExtent, Effect, Vector, shape, size
 from ddagr_gym.physics.history import fill_node, push, recall, ring_is_empty, ring_stride
-from ddagr_gym.physics.layout import COMMAND, OMEGA, POINT_COMMANDS, SAMPLE_PERIOD
+from ddagr_gym.physics.layout import MOTOR_TARGET, OMEGA, POINT_SET_POINTS, SAMPLE_PERIOD
 
 _LONGEST = 0.49  # [s]
 _NODES = 64  # every sample at 125 Hz and below
 
 
-def delay_command(row: Vector, parameters: Vector, memory: Vector) -> None:
-    """Commands of ``parameters[0]`` seconds ago, ``parameters[1]`` of it more on the right and less on the left."""
+def delay_set_points(row: Vector, parameters: Vector, memory: Vector) -> None:
+    """Set points of ``parameters[0]`` seconds ago, ``parameters[1]`` of it more on the right and less on the left."""
     period = row[SAMPLE_PERIOD]
     stride = ring_stride(_LONGEST, period, _NODES)
     if ring_is_empty(memory, 2, _NODES):
-        # before the first sample the commands are taken to have equalled the bank speeds
+        # before the first sample the set points are taken to have equalled the bank speeds
         for k in range(1, _NODES):
             for bank in range(2):
                 fill_node(memory, 2, _NODES, k, stride, bank, row[OMEGA + bank])
-    push(memory, 2, _NODES, stride, row[COMMAND : COMMAND + 2])
+    push(memory, 2, _NODES, stride, row[MOTOR_TARGET : MOTOR_TARGET + 2])
     for bank in range(2):
         share = 1.0 + parameters[1] if bank == 0 else 1.0 - parameters[1]
         delay = min(parameters[0] * share, _LONGEST)
-        row[COMMAND + bank] = recall(memory, 2, _NODES, stride, bank, delay / period, row[COMMAND + bank])
+        present = row[MOTOR_TARGET + bank]
+        row[MOTOR_TARGET + bank] = recall(memory, 2, _NODES, stride, bank, delay / period, present)
 
 
 @dataclass(frozen=True)
@@ -43,7 +49,7 @@ class CommandDelay(Effect):
     source = "dead time, as of a transport lag (Astrom and Murray, Feedback Systems)"
     signature = "bank speeds follow commands late by a constant time, then at the usual rate"
     confused_with = ("motor_lag", "motor_saturation", "sensor_hold")
-    actions = ((POINT_COMMANDS, delay_command),)
+    actions = ((POINT_SET_POINTS, delay_set_points),)
 
     delay: float = size("s", 0.0, _LONGEST, least=0.02, step=0.008)
     imbalance: float = shape("-", -1.0, 1.0, default=0.0, step=0.05)

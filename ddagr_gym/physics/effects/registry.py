@@ -43,9 +43,16 @@ def effect_kinds() -> dict[str, type[Effect]]:
     return kinds
 
 
-def absolute_effect_kinds() -> dict[str, type[Effect]]:
-    """Effects by name that a diagnosis against a nominal model looks for, without drives from before."""
-    return {name: kind for name, kind in effect_kinds().items() if not kind.needs_earlier_drives}
+def absolute_effect_kinds(frames_apart: bool = False) -> dict[str, type[Effect]]:
+    """Effects by name that a diagnosis against a nominal model looks for, without drives from before.
+
+    Args:
+        frames_apart: whether stretches of the drives have poses in frames of their own.
+    """
+    kinds = effect_kinds().items()
+    return {
+        name: kind for name, kind in kinds if not (kind.needs_earlier_drives or (frames_apart and kind.needs_one_frame))
+    }
 
 
 def effect_kind(name: object) -> type[Effect]:

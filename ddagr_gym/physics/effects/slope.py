@@ -24,6 +24,7 @@ class Slope(Effect):
     """
 
     name = "slope"
+    needs_one_frame = True
     title = "Sloping ground"
     group = "ground"
     equation = "g_body = g (-sin a cos(yaw - d), sin a sin(yaw - d), -cos a); wheel loads follow"

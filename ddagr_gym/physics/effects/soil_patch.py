@@ -38,6 +38,7 @@ class SoilPatch(Effect):
     """
 
     name = "soil_patch"
+    needs_one_frame = True
     title = "Soil patch"
     group = "ground"
     equation = (

@@ -12,6 +12,7 @@ from ddagr_gym.diagnosis.preprocessing.data_checks import data_doubts, dead_chan
 from ddagr_gym.diagnosis.result.sentences import dead_in_words
 from ddagr_gym.diagnosis.review import review
 from ddagr_gym.recordings.schema import Recording
+from tests.recordings.test_pose_frames import in_a_frame_of_its_own
 
 _NOTHING = EffectLocation((), 0.0, (), (), None, "")
 NOWHERE = Localisation({}, None, _NOTHING, _NOTHING, {}, ())
@@ -49,10 +50,12 @@ def test_zeros_logged_as_readings_are_found_and_named(sound: Recording) -> None:
 def test_stretches_whose_poses_may_be_in_frames_of_their_own(sound: Recording) -> None:
     half = len(sound) // 2
     parts = replace(sound, meta=replace(sound.meta, spans=((0, half), (half, len(sound)))))
-    told = [doubt for doubt in doubts(parts, sound) if doubt.finding == "frames"]
+    assert not any(doubt.finding == "frames" for doubt in doubts(parts, sound))
+    moved = in_a_frame_of_its_own(parts, half)
+    told = [doubt for doubt in doubts(moved, sound) if doubt.finding == "frames"]
     assert [doubt.recording for doubt in told] == [sound.meta.source]
     assert "2 stretches" in told[0].sentence
-    without = replace(parts, channels={k: v for k, v in parts.channels.items() if not k.startswith("pose")})
+    without = replace(moved, channels={k: v for k, v in moved.channels.items() if not k.startswith("pose")})
     assert not any(doubt.finding == "frames" for doubt in doubts(without))
 
 

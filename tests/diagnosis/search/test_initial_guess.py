@@ -19,6 +19,7 @@ from ddagr_gym.diagnosis.search.initial_guess import (
     slower_loop,
     turned_to_agree,
     with_whole_delay,
+    with_whole_lag,
 )
 from ddagr_gym.diagnosis.search.inner_products import Terms
 from ddagr_gym.diagnosis.search.scan import scan
@@ -27,7 +28,9 @@ from ddagr_gym.identification.problem import Point, Problem
 from ddagr_gym.physics.effects import load_effects
 from ddagr_gym.physics.effects.base import DriveExtent
 from ddagr_gym.physics.effects.registry import effect_kind, effect_kinds
+from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.schema import Recording
+from ddagr_gym.simulator import simulate
 
 EXTENT = DriveExtent(60.0, (-3.0, 3.0), (-2.0, 4.0), 1.2, 3.0)
 
@@ -86,6 +89,41 @@ def test_without_a_delay_rows_mean_what_they_meant(effects: tuple[str, ...]) -> 
 @pytest.mark.parametrize(("value", "effects"), [(-0.2, ()), (0.893, ()), (-0.893, ("motor_lag=0.1",))])
 def test_ordinary_loops_fast_ones_and_those_with_a_lag_stay(value: float, effects: tuple[str, ...]) -> None:
     assert loop(value, *effects) is None
+
+
+def slow(value: float, *effects: str) -> Point | None:
+    names = (SimpleNamespace(name="mass"), SimpleNamespace(name="motor_rate"))
+    problem: Any = SimpleNamespace(
+        nuisances=SimpleNamespace(parameters=names), robot=SimpleNamespace(motor_rate=get_robot("ddagr").motor_rate)
+    )
+    return with_whole_lag(problem, Point(np.array([0.01, value]), np.zeros((1, 8)), load_effects(effects)))
+
+
+@pytest.mark.parametrize("value", [-0.3, 0.2])
+@pytest.mark.parametrize("second_pole", [0.0, 0.4])
+def test_a_whole_lag_says_the_same_beside_the_rate_of_data_sheets(value: float, second_pole: float) -> None:
+    """Whatever the commands are: both are the same two time constants."""
+    told = slow(value, "gyro_scale=1.1", f"motor_lag=0.25,second_pole={second_pole}")
+    assert told is not None
+    assert told.values.tolist() == [0.01, 0.0]
+    robot, soil, commands = get_robot("ddagr"), get_soil("thesis_a1"), np.repeat([[0.3, 0.9], [0.8, -0.2]], 60, axis=0)
+    changed = replace(robot, motor_rate=robot.motor_rate * math.exp(value))
+    before = simulate(changed, soil, commands, effects=(f"motor_lag=0.25,second_pole={second_pole}",))
+    after = simulate(robot, soil, commands, effects=told.effects[1:])
+    np.testing.assert_allclose(after["true_omega_right"], before["true_omega_right"], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("value", "effects"),
+    [
+        (-0.3, ("gyro_scale=1.1",)),
+        (0.0, ("motor_lag=0.2",)),
+        (1.5, ("motor_lag=0.05",)),
+        (0.6, ("motor_lag=0.2,second_pole=1",)),
+    ],
+)
+def test_a_lag_stays_where_no_other_says_the_same(value: float, effects: tuple[str, ...]) -> None:
+    assert slow(value, *effects) is None
 
 
 def told_again(*effects: str) -> Point | None:

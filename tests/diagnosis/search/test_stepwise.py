@@ -134,6 +134,26 @@ def test_a_search_goes_on_behind_its_last_step(
     assert found.steps[0][0].fitted.point.effects == sloping.chosen.point.effects
 
 
+@pytest.mark.parametrize("better", [(), ("payload",), ("slope", "payload")])
+def test_an_effect_that_explains_nothing_once_it_is_fitted_to_the_end_is_not_added(
+    sloping: Sloping, scanned: ScannedModel, monkeypatch: pytest.MonkeyPatch, better: tuple[str, ...]
+) -> None:
+    """Trial steps count with sensitivities of the model before, by which they may promise what is not there."""
+    tried = [Rival(name, sloping.chosen, gain) for name, gain in (("slope", 60.0), ("payload", 50.0))]
+
+    def joint(problem: Problem, rival: Rival, steps: object) -> Fitted:
+        return replace(sloping.chosen, cost=sloping.nominal.cost * (0.5 if rival.name in better else 1.05))
+
+    monkeypatch.setattr(module, "rivals_of", lambda *inputs: tried)
+    monkeypatch.setattr(module, "_joint", joint)
+    monkeypatch.setattr(module, "scan_model", lambda problem, fitted, progress: replace(scanned, fitted=fitted))
+    session = session_of(sloping.problem, sloping.recordings, THRESHOLDS)
+    added = module._add_effect(session, sloping.nominal, [scanned], [], {})
+    assert (() if added is None else tuple(rival.name for rival in added[1])) == (
+        ("slope", "payload") if "slope" in better else better
+    )
+
+
 def test_loops_are_told_from_delays(drive, problem_of) -> None:
     """Both are late by the same time; only one rounds the corner of a step."""
     for truth, other in (("motor_lag=0.25,second_pole=1", "command_delay"), ("command_delay=0.2", "motor_lag")):

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from ddagr_gym.parameters import Imu, Sensors, WheelEncoder
 from ddagr_gym.physics import layout
 from ddagr_gym.physics.effects import parse_effect
+from ddagr_gym.simulator import simulate
 
 PERIOD = 0.008
 RATE = 4.5
@@ -47,12 +50,30 @@ def test_delay_of_a_ramp_is_exact_at_every_rate(act, turning_row, sample_rate, d
     memory = np.zeros(layout.EFFECT_MEMORY)
     for k in range(int(1.5 * sample_rate)):
         time = k / sample_rate
-        row[layout.COMMAND : layout.COMMAND + 2] = (0.3 * time, -0.1 * time)
+        row[layout.MOTOR_TARGET : layout.MOTOR_TARGET + 2] = (0.3 * time, -0.1 * time)
         changed = act(effect, row, memory)
         if time > 0.7:
-            np.testing.assert_allclose(
-                changed[layout.COMMAND : layout.COMMAND + 2], (0.3 * (time - delay), -0.1 * (time - delay)), atol=1e-12
-            )
+            late = changed[layout.MOTOR_TARGET : layout.MOTOR_TARGET + 2]
+            np.testing.assert_allclose(late, (0.3 * (time - delay), -0.1 * (time - delay)), atol=1e-12)
+
+
+@pytest.mark.parametrize("samples", [5.25, 5.9])
+def test_behind_a_ramp_every_dead_time_between_two_samples_is_another(robot, soil, ideal_sensors, steps, samples):
+    ramped = replace(robot, drivetrain=replace(robot.drivetrain, command_ramp=1.0))
+    shorter, late, longer = (
+        simulate(ramped, soil, steps, effects=[f"command_delay={number * PERIOD}"], sensors=ideal_sensors)[
+            "true_omega_left"
+        ]
+        for number in (5, samples, 6)
+    )
+    np.testing.assert_allclose(late, (6 - samples) * shorter + (samples - 5) * longer, atol=1e-12)
+    assert np.abs(longer - shorter).max() > 1e-3
+
+
+def test_motors_get_the_late_set_point_in_whatever_order_effects_are_given(drive, steps):
+    effects = ["motor_droop=5e-3", "command_delay=0.2"]
+    one, other = (drive(order, steps)["true_omega_right"] for order in (effects, effects[::-1]))
+    np.testing.assert_array_equal(one, other)
 
 
 def test_before_the_first_command_the_delay_holds_the_bank_speeds(drive):

@@ -1,0 +1,34 @@
+"""Robot and soil with the values of a fit."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from ddagr_gym.errors import InputError
+from ddagr_gym.identification.fitted_values import with_values
+
+
+def test_strength_scales_cohesion_and_the_tangent_of_friction(robot, soil):
+    changed = with_values(robot, soil, {"soil_strength": math.log(0.8)})[1]
+    assert changed.cohesion == pytest.approx(0.8 * soil.cohesion)
+    assert math.tan(changed.friction_angle) == pytest.approx(0.8 * math.tan(soil.friction_angle))
+
+
+@pytest.mark.parametrize(
+    ("values", "field", "bound"),
+    [
+        ({"soil_strength": 4.0}, "friction_angle", 1.2),
+        ({"sinkage_exponent": 3.0}, "sinkage_exponent", 3.0),
+        ({"exit_angle_ratio": 2.0}, "exit_angle_ratio", 1.0),
+        ({"exit_angle_ratio": -2.0}, "exit_angle_ratio", 0.0),
+    ],
+)
+def test_a_draw_that_no_soil_has_is_taken_at_the_bound(robot, soil, values, field, bound):
+    assert getattr(with_values(robot, soil, values, held=True)[1], field) == bound
+
+
+def test_a_fit_that_no_soil_has_is_refused(robot, soil):
+    with pytest.raises(InputError, match="sinkage_exponent"):
+        with_values(robot, soil, {"sinkage_exponent": 3.0})
