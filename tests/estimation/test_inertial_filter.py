@@ -1,4 +1,4 @@
-"""The inertial filter: gravity on slopes, none on the level, covariance, bits, cost."""
+"""The inertial filter: gravity on slopes, none on the level, covariance, bits."""
 
 import math
 from dataclasses import replace
