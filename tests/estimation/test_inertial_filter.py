@@ -10,7 +10,6 @@ from ddagr_gym.envs.options import make_settings
 from ddagr_gym.errors import InputError
 from ddagr_gym.estimation import (
     CHANNELS,
-    BatchFilter,
     DeadReckoning,
     FilterModel,
     InertialBatch,
