@@ -190,7 +190,7 @@ def draw_controller(rng: Rng, episode: Episode) -> tuple[Controller, bool]:
     kind, gains = float(rng.random()), _drawn_gains(rng)
     name = "B6" if kind < 0.6 else "B4" if kind < 0.85 else "B1"
     if name == "B6":
-        model = InertialModel.of(ddagr(), Sensors())
+        model = InertialModel.of(ddagr(), Sensors()).with_known_vibration()
         inner = make_path_tracker(DeadReckoning(model), model.flat, int(rng.integers(6, 16)))(episode.turn, gains)
         standing = 0
     else:
@@ -239,7 +239,7 @@ def _drive(seed: Sequence[int], plan: Plan) -> dict[str, Array]:
 
 def as_drives(columns: Sequence[Mapping[str, Array]]) -> Drives:
     """Turns as the learned estimator sees them; the filter beside it knows the nominal robot and sensors."""
-    model = InertialModel.of(ddagr(), Sensors())
+    model = InertialModel.of(ddagr(), Sensors()).with_known_vibration()
     radius, prior = model.flat.outer_radius, model.flat.soil_prior.logs(model.flat.wheel_load)[0]
     count = len(columns)
     commands, readings, truth, present = _blocks(columns)

@@ -5,6 +5,7 @@ Theory: filter, section 9.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -39,7 +40,9 @@ class InertialKnowledge(Validated):
         launch_floor: that of the velocities at rest [m/s].
         known_pull: while gravity along the robot less the accelerometer's bias is not known this well, slip is also
             taken to be as small as at launch [m/s^2]; 0.13 s of standing are enough.
-        vibration: further noise of the accelerometer per speed of the rims [(m/s^2)/(m/s)].
+        vibration: further noise of the accelerometer per speed of the rims [(m/s^2)/(m/s)]; the least that is taken.
+        vibration_weight: how many blocks of readings that counts for, where more is learnt on the way; infinite:
+            nothing is learnt (theory: filter, eq. (13d)).
         largest_acceleration: of the robot; a reading of the accelerometer that says more counts as missing [m/s^2].
         unknown_acceleration: random walk of the velocities where the accelerometer is missing [m/s^2/sqrt(Hz)].
         gravity_deviation: initial, of either component of gravity along the ground [m/s^2].
@@ -59,6 +62,7 @@ class InertialKnowledge(Validated):
     launch_floor: float = bounded("m/s", 0.0, 10.0, default=2e-3, open_low=True)
     known_pull: float = bounded("m/s^2", 0.0, 1e3, default=0.008, open_low=True)
     vibration: float = bounded("1/s", 0.0, 100.0, default=0.0)
+    vibration_weight: float = 10.0
     largest_acceleration: float = bounded("m/s^2", 0.0, 1e3, default=5.0, open_low=True)
     unknown_acceleration: float = bounded("m/s^2/sqrt(Hz)", 0.0, 1e3, default=0.1)
     gravity_deviation: float = bounded("m/s^2", 0.0, 10.0, default=0.6, open_low=True)
@@ -70,6 +74,8 @@ class InertialKnowledge(Validated):
     def _check(self) -> None:
         if self.balance_interval < 1:
             raise InputError(f"InertialKnowledge.balance_interval is {self.balance_interval}: give 1 or more.")
+        if not self.vibration_weight > 0.0:
+            raise InputError(f"InertialKnowledge.vibration_weight is {self.vibration_weight:g}: give more than 0.")
 
 
 @dataclass(frozen=True)
@@ -89,6 +95,7 @@ class InertialModel:
         """Model of a robot with its instruments, and what turns on simulated plants chose of the rest.
 
         The lateral law is not taken as known (``coupling_deviation``): bulldozing and side walls change it by a fifth.
+        How much the accelerometer shakes is learnt on the way where the sensors say nothing of it.
 
         Args:
             robot: of the filter.
@@ -98,7 +105,12 @@ class InertialModel:
         noise = FilterNoise.from_sensors(sensors, acceleration=5e-4, yaw_acceleration=0.02, soil=0.05)
         prior = replace(prior or SoilPrior(), coupling_deviation=0.15)
         knowledge = InertialKnowledge(vibration=sensors.imu.accelerometer_vibration)
-        return cls(FilterModel.of(robot, sensors, noise=noise, prior=prior), knowledge)
+        model = cls(FilterModel.of(robot, sensors, noise=noise, prior=prior), knowledge)
+        return model.with_known_vibration() if knowledge.vibration > 0.0 else model
+
+    def with_known_vibration(self) -> InertialModel:
+        """The same, whose accelerometer shakes just as much as it is told; nothing is learnt of it on the way."""
+        return replace(self, knowledge=replace(self.knowledge, vibration_weight=math.inf))
 
     def initial(self) -> tuple[Array, Array]:
         """State (15,) at rest and covariance (15, 15) before any sample."""
@@ -123,6 +135,7 @@ class InertialModel:
         packed[layout.LAUNCH_FLOOR] = own.launch_floor
         packed[layout.KNOWN_PULL] = own.known_pull**2
         packed[layout.VIBRATION] = own.vibration
+        packed[layout.VIBRATION_WEIGHT] = own.vibration_weight
         packed[layout.LARGEST_ACCELERATION] = own.largest_acceleration
         packed[layout.UNKNOWN_ACCELERATION] = own.unknown_acceleration**2
         packed[layout.GRAVITY_WALK] = own.gravity_walk**2
@@ -173,6 +186,11 @@ class InertialFilter:
     def known_push(self) -> Array:
         """(3,) what pushes the robot besides wheels and gravity: F_x/m, F_y/m [m/s^2], M/I [rad/s^2]; a view."""
         return self._work[layout.KNOWN_PUSH : layout.KNOWN_PUSH + 3]
+
+    @property
+    def vibration(self) -> float:
+        """Noise of the accelerometer per speed of the rims [(m/s^2)/(m/s)], as far as it is known by now."""
+        return max(self.model.knowledge.vibration, float(self._work[layout.VIBRATION_LEARNT]))
 
     def reset(self, pose: ArrayLike = (0.0, 0.0, 0.0), gravity: ArrayLike = (0.0, 0.0)) -> None:
         """Start again from the prior, at rest, without a known push.

@@ -43,7 +43,6 @@ from ddagr_gym.estimation.inertial_layout import (
     PULL_KNOWN,
     SUMMED,
     UNKNOWN_ACCELERATION,
-    VIBRATION,
     Q,
 )
 from ddagr_gym.estimation.inertial_pose import add_pose_noise, advance_pose
@@ -53,6 +52,7 @@ from ddagr_gym.estimation.inertial_update import (
     row_column,
     use_innovation,
 )
+from ddagr_gym.estimation.inertial_vibration import reading_deviation, rim_speed, watch_vibration
 from ddagr_gym.estimation.layout import (
     ACCELEROMETER_BIAS,
     CHANNEL_SIZE,
@@ -91,16 +91,6 @@ def _felt(model: Array, work: Array, axis: int) -> float:
     """Specific force at the body origin [m/s^2], by the sample in READING; of the lever arm the centripetal part."""
     turn = work[X + 2]
     return work[READING + FORCE_CHANNEL + axis] + turn * turn * model[IMU_POSITION + axis]
-
-
-@kernel()
-def _reading_variance(model: Array, work: Array) -> float:
-    """Of either axis of the accelerometer, which shakes with the robot [m^2/s^4] (theory: wheel model, eq. (35))."""
-    if model[VIBRATION] == 0.0:  # the variance itself, to the bit
-        return model[MEASUREMENT + FORCE_CHANNEL]
-    speed = 0.5 * model[OUTER_RADIUS] * (abs(work[X + OMEGA]) + abs(work[X + OMEGA + 1]))
-    deviation = math.sqrt(model[MEASUREMENT + FORCE_CHANNEL]) + model[VIBRATION] * speed
-    return deviation * deviation
 
 
 @kernel()
@@ -172,12 +162,14 @@ def predict_inertial(model: Array, work: Array, right: float, left: float, durat
     """
     before = work[X], work[X + 1], work[X + 2]
     lag_right, lag_left = right - work[X + OMEGA], left - work[X + OMEGA + 1]
-    if _believed(model, work):
+    believed = _believed(model, work)
+    if believed:
         f_x, f_y = _felt(model, work, 0), _felt(model, work, 1)
         work[MEAN_FORCE] += f_x
         work[MEAN_FORCE + 1] += f_y
         work[SUMMED] += 1.0
-        noise = _reading_variance(model, work) * duration * duration + model[PROCESS] * duration
+        deviation = reading_deviation(model, work, rim_speed(model, work))
+        noise = deviation * deviation * duration * duration + model[PROCESS] * duration
     else:
         f_x = work[X + ACCELEROMETER_BIAS] - work[X + GRAVITY]
         f_y = work[X + ACCELEROMETER_BIAS + 1] - work[X + GRAVITY + 1] + work[X + 2] * work[X]
@@ -187,6 +179,7 @@ def predict_inertial(model: Array, work: Array, right: float, left: float, durat
     _add_noise(model, work, lag_right, lag_left, noise, duration)
     add_pose_noise(work, noise, duration * model[PROCESS + 2], duration)
     _limit(model, work)
+    watch_vibration(model, work, believed, duration)
 
 
 @kernel()

@@ -75,7 +75,7 @@ class LearnedModel:
     @classmethod
     def of(cls, robot: Robot, sensors: Sensors, estimator: str = DEFAULT_ESTIMATOR) -> LearnedModel:
         """Model of a robot with its instruments, and a published estimator or a file (:func:`find_network`)."""
-        return cls(InertialModel.of(robot, sensors), find_network(estimator))
+        return cls(InertialModel.of(robot, sensors).with_known_vibration(), find_network(estimator))
 
     @property
     def flat(self) -> FilterModel:

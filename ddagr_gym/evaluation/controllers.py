@@ -290,7 +290,7 @@ def controller_version(name: str) -> str:
     if name == "B6":
         return f"{text} {inertial_model()!r} {SETTLING}"
     if name == "B6_learned":
-        return f"{text} {InertialModel.of(ddagr(), Sensors())!r} {learned_model().network.digest()}"
+        return f"{text} {learned_model().inertial!r} {learned_model().network.digest()}"
     return text
 
 

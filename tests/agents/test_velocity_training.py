@@ -114,7 +114,7 @@ def test_training_sees_what_the_estimator_sees_when_it_runs(tmp_path):
     drives = as_drives([columns])
     network = training(tmp_path, "correction").network()
     torch.manual_seed(0)
-    batch = LearnedBatch(LearnedModel(InertialModel.of(ddagr(), Sensors()), network), 1)
+    batch = LearnedBatch(LearnedModel(InertialModel.of(ddagr(), Sensors()).with_known_vibration(), network), 1)
     names = ("specific_force_x", "specific_force_y", "yaw_rate", "encoder_right", "encoder_left")
     readings = np.column_stack([columns[name] for name in names])
     commands = np.column_stack([columns["command_right"], columns["command_left"]])

@@ -1,0 +1,124 @@
+"""How much the accelerometer shakes, learnt by the inertial filter on the way."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ddagr_gym.envs.options import make_settings
+from ddagr_gym.errors import InputError
+from ddagr_gym.estimation import (
+    CHANNELS,
+    InertialBatch,
+    InertialFilter,
+    InertialKnowledge,
+    InertialModel,
+    LearnedModel,
+)
+from ddagr_gym.estimation.columns import stack_columns
+from ddagr_gym.estimation.layout import COMMANDS
+from ddagr_gym.evaluation.controllers import find_controller
+from ddagr_gym.evaluation.runs import drive_turn
+from ddagr_gym.parameters import Sensors
+from ddagr_gym.presets import get_robot
+
+ROBOT = get_robot("ddagr")
+MODEL = InertialModel.of(ROBOT, Sensors())
+KNOWN = InertialModel.of(ROBOT, replace(Sensors(), imu=replace(Sensors().imu, accelerometer_vibration=0.3)))
+
+
+@pytest.fixture(scope="module")
+def turn():
+    """Commands (T, 2) and readings (T, 5) of a turn whose accelerometer does not shake, and the rims' speed (T,)."""
+    settings = make_settings(randomisation=False, side="left", soil="thesis_a1")
+    columns = drive_turn(find_controller("B6", settings.draw(np.random.default_rng(0)).turn), settings, 5).columns
+    commands, readings = stack_columns(columns, COMMANDS, np.nan), stack_columns(columns, CHANNELS, np.nan)
+    speed = 0.5 * ROBOT.outer_radius * np.abs(readings[:, 3:5]).sum(axis=1)
+    return commands, readings, np.nan_to_num(speed)
+
+
+def shaken(turn, vibration, seed=3, correlation=0.0):
+    """Readings of the deviation that wheel model, eq. (35), has; what is added may hang together between samples."""
+    _, readings, speed = turn
+    still = Sensors().imu.accelerometer_noise
+    added = np.sqrt((still + vibration * speed) ** 2 - still**2)
+    noise = np.random.default_rng(seed).standard_normal((len(readings), 2))
+    for k in range(1, len(noise)):
+        noise[k] = correlation * noise[k - 1] + np.sqrt(1.0 - correlation**2) * noise[k]
+    found = readings.copy()
+    found[:, :2] += added[:, None] * noise
+    return found
+
+
+def learnt(turn, readings, model=MODEL):
+    own = InertialFilter(model)
+    own.run(turn[0], readings)
+    return own
+
+
+@pytest.mark.parametrize("vibration", [0.3, 1.0, 3.0])
+def test_a_vibration_is_learnt(turn, vibration):
+    found = [learnt(turn, shaken(turn, vibration, seed)).vibration for seed in range(4)]
+    # Ten blocks speak for none, and outliers are cut at 2.5 deviations
+    assert np.mean(found) == pytest.approx(vibration, rel=0.25)
+
+
+def test_noise_that_hangs_together_counts_for_more(turn):
+    white, together = (learnt(turn, shaken(turn, 0.5, correlation=share)).vibration for share in (0.0, 0.8))
+    assert together > 1.5 * white
+
+
+def test_no_vibration_is_next_to_none(turn):
+    assert learnt(turn, turn[1]).vibration < 0.06  # 12 mm/s^2 at 0.2 m/s beside 31 of the data sheet
+
+
+def test_it_is_known_before_the_turn(turn):
+    before = 400  # samples: standing and two seconds on the way
+    assert learnt((turn[0][:before], turn[1]), shaken(turn, 1.0)[:before]).vibration > 0.4
+
+
+def test_side_slip_of_a_robot_that_shakes_is_surer_and_better(turn):
+    readings = shaken(turn, 1.0, correlation=0.6)
+    states = {}
+    for name, model in (("learnt", MODEL), ("taken as stated", MODEL.with_known_vibration())):
+        own = InertialFilter(model)
+        states[name] = own.run(turn[0], readings)[0][:, :2]
+    still = InertialFilter(MODEL.with_known_vibration()).run(turn[0], turn[1])[0][:, :2]
+    errors = {name: np.sqrt(np.mean((found - still) ** 2)) for name, found in states.items()}
+    assert errors["learnt"] < 0.8 * errors["taken as stated"]
+
+
+def test_what_is_stated_is_not_learnt(turn):
+    readings = shaken(turn, 2.0)
+    assert learnt(turn, readings, KNOWN).vibration == 0.3
+    assert learnt(turn, readings, MODEL.with_known_vibration()).vibration == 0.0
+    assert LearnedModel.of(ROBOT, Sensors()).inertial == MODEL.with_known_vibration()
+
+
+def test_it_is_forgotten_at_a_reset(turn):
+    own = learnt(turn, shaken(turn, 1.0))
+    own.reset()
+    assert own.vibration == 0.0
+
+
+def test_gaps_and_jolts_are_no_vibration(turn):
+    readings = turn[1].copy()
+    readings[::97, :2] = np.nan
+    readings[50::211, 1] += 3.0
+    assert learnt(turn, readings).vibration < 0.25
+
+
+def test_alone_and_in_a_batch_to_the_bit(turn):
+    commands, readings = turn[0], shaken(turn, 1.0)
+    batch, alone = InertialBatch(MODEL, 2), InertialFilter(MODEL)
+    for first in range(0, 600, 10):
+        part = readings[first : first + 10]
+        alone.run(commands[first : first + 1], part)
+        batch.step(np.tile(commands[first], (2, 1)), np.stack([part, turn[1][first : first + 10]]))
+    np.testing.assert_array_equal(batch.states[0], alone.state)
+    assert (batch.states[1] != alone.state).any()
+
+
+def test_bad_weight():
+    with pytest.raises(InputError, match="vibration_weight is 0"):
+        InertialKnowledge(vibration_weight=0.0)
