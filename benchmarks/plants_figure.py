@@ -16,6 +16,7 @@ _COLOURS = (
     palette.GREY, palette.ORANGE, palette.SKY_BLUE, palette.BLUE, palette.PALE, palette.GREEN, palette.PURPLE,
     palette.VERMILLION, palette.INK,
 )  # fmt: skip
+_FEW = 12  # plants whose titles have room side by side
 _SHARE = 0.8  # of the room between plants that bars take
 
 
@@ -45,9 +46,9 @@ def draw(plants: Mapping[str, Mapping[str, Any]], titles: Mapping[str, str], pat
         upper.set(yscale="log", ylim=(0.2, 120.0), ylabel="|radius error| [%]")
         upper.set_title("Median with its 95 % interval; the dash is the 95th percentile")
         lower.set(ylim=(0.0, 105.0), ylabel="success [%]")
-        lower.set_xticks(
-            places, [titles[plant].replace(" from", "\nfrom") for plant in plants], rotation=18, ha="right"
-        )
+        few = len(plants) <= _FEW
+        words = [titles[plant].replace(" from", "\nfrom") if few else titles[plant] for plant in plants]
+        lower.set_xticks(places, words, rotation=18 if few else 40, ha="right", rotation_mode="anchor")
         figure.legend(
             *upper.get_legend_handles_labels(), loc="outside lower center", ncols=min(len(names), 5), frameon=False
         )
