@@ -62,7 +62,7 @@ _FORGOTTEN = (
     (layout.LAST_COUNT, 2),
     (layout.SINKAGE, 4),
     (layout.INTEGRAL, 3),
-    (layout.COMMAND_RING, layout.SIZE - layout.COMMAND_RING),
+    (layout.TARGET_RING, layout.SIZE - layout.TARGET_RING),
 )
 """First entries and sizes of what a reset sets to zero."""
 

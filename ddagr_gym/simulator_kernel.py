@@ -18,7 +18,7 @@ from ddagr_gym.physics.body_dynamics import evaluate_forces, place_wheels, resto
 from ddagr_gym.physics.callbacks import EffectActions, actions_on, apply_effects
 from ddagr_gym.physics.drivetrain import (
     bank_acceleration,
-    delay_commands,
+    delay_targets,
     follows_past,
     mark_dynamic_banks,
     set_targets,
@@ -91,10 +91,10 @@ def _drive(row: Array, command: Array, actions: EffectActions) -> None:
     """Commands and motor loops for the coming sample."""
     row[COMMAND] = command[0]
     row[COMMAND + 1] = command[1]
-    if row[COMMAND_DELAY] > 0.0:
-        delay_commands(row)
     apply_effects(POINT_COMMANDS, row, actions)
     set_targets(row)
+    if row[COMMAND_DELAY] > 0.0:
+        delay_targets(row)
     apply_effects(POINT_SET_POINTS, row, actions)
     apply_effects(POINT_MOTORS, row, actions)
     mark_dynamic_banks(row)

@@ -33,6 +33,7 @@ Array = NDArray[np.float64]
 _BLOCK = 0.08  # time over which readings are averaged [s]: vibration hangs together over some samples
 _MEMORY = 10.0  # time in which what was seen is forgotten [s]
 _OUTLIER = 2.5  # deviations from which on a block counts as one of so many: jolts are no vibration
+_BEYOND = 1.5  # of the deviation that is known, from which on more is believed: motion scatters a little, too
 _OF_THREE = 1.5  # variance of the middle one of three blocks about the mean of its neighbours, over that of a block
 
 
@@ -98,4 +99,5 @@ def _count_scatter(model: Array, work: Array, variance: float, speed: float) -> 
     known = resting + model[VIBRATION] * usual
     weight = model[VIBRATION_WEIGHT]
     mean = (weight * known * known + work[SCATTER]) / (weight + work[SCATTER_WEIGHT])
-    work[VIBRATION_LEARNT] = max(math.sqrt(mean) - resting, 0.0) / usual
+    deviation = math.sqrt(mean)
+    work[VIBRATION_LEARNT] = (deviation - resting) / usual if deviation > _BEYOND * known else 0.0

@@ -1,6 +1,6 @@
 """From a bank's speed command to its acceleration (theory: drivetrain, section 1).
 
-    r = ramp(deadband(limit_turning(u(t - delay))))
+    r = ramp(deadband(limit_turning(u)))(t - delay)
     d omega/dt = limit(k_omega (r - omega) + z) + T/J - viscous omega - friction sgn(omega),  dz/dt = k_i (r - omega)
 
 T is the torque of the ground on the bank's wheels. With the defaults of :class:`ddagr_gym.parameters.Drivetrain` only
@@ -25,9 +25,7 @@ from ddagr_gym.physics.layout import (
     COMMAND,
     COMMAND_DEADBAND,
     COMMAND_DELAY,
-    COMMAND_NODES,
     COMMAND_RAMP,
-    COMMAND_RING,
     COULOMB_FRICTION,
     DRIVETRAIN,
     DYNAMIC_BANKS,
@@ -47,6 +45,8 @@ from ddagr_gym.physics.layout import (
     SAMPLE_PERIOD,
     SET_POINT,
     SIZE,
+    TARGET_NODES,
+    TARGET_RING,
     TURNING_LIMIT,
     VISCOUS_RATE,
     WHEEL,
@@ -64,20 +64,24 @@ _STICTION_SPEED = 0.02  # [rad/s] over which Coulomb friction builds up, ours: a
 
 
 @kernel()
-def delay_commands(row: Array) -> None:
-    """Put the commands of ``COMMAND_DELAY`` [s] ago in place of the present ones, interpolated between samples."""
+def delay_targets(row: Array) -> None:
+    """Put the set points of ``COMMAND_DELAY`` [s] ago in place of the present ones, interpolated between samples.
+
+    A shift in time may come before or after limits and ramp; behind them a ramp that begins between two samples stays
+    one.
+    """
     period = row[SAMPLE_PERIOD]
-    ring = row[COMMAND_RING:SIZE]
-    stride = ring_stride(LONGEST_DELAY, period, COMMAND_NODES)
-    if ring_is_empty(ring, 2, COMMAND_NODES):
-        # before the first sample the commands are taken to have equalled the bank speeds
-        for k in range(1, COMMAND_NODES):
+    ring = row[TARGET_RING:SIZE]
+    stride = ring_stride(LONGEST_DELAY, period, TARGET_NODES)
+    if ring_is_empty(ring, 2, TARGET_NODES):
+        # before the first sample the set points are taken to have equalled the bank speeds
+        for k in range(1, TARGET_NODES):
             for bank in range(2):
-                fill_node(ring, 2, COMMAND_NODES, k, stride, bank, row[OMEGA + bank])
-    push(ring, 2, COMMAND_NODES, stride, row[COMMAND : COMMAND + 2])
+                fill_node(ring, 2, TARGET_NODES, k, stride, bank, row[OMEGA + bank])
+    push(ring, 2, TARGET_NODES, stride, row[MOTOR_TARGET : MOTOR_TARGET + 2])
     for bank in range(2):
         samples = min(row[COMMAND_DELAY], LONGEST_DELAY) / period
-        row[COMMAND + bank] = recall(ring, 2, COMMAND_NODES, stride, bank, samples, row[COMMAND + bank])
+        row[MOTOR_TARGET + bank] = recall(ring, 2, TARGET_NODES, stride, bank, samples, row[MOTOR_TARGET + bank])
 
 
 @kernel(inline=True)

@@ -131,8 +131,8 @@ POSE_POSITION_NOISE = _block()
 POSE_YAW_NOISE = _block()
 NEXT_POSE_TIME = _block()
 
-COMMAND_NODES = 128  # every sample of the longest delay at 125 Hz and below
-COMMAND_RING = _block(2 * COMMAND_NODES + 3)  # past commands, see :mod:`ddagr_gym.physics.history`
+TARGET_NODES = 128  # every sample of the longest delay at 125 Hz and below
+TARGET_RING = _block(2 * TARGET_NODES + 3)  # past set points, see :mod:`ddagr_gym.physics.history`
 
 SIZE = _next
 """Entries of a row."""

@@ -68,8 +68,9 @@ def test_noise_that_hangs_together_counts_for_more(turn):
     assert together > 1.5 * white
 
 
-def test_no_vibration_is_next_to_none(turn):
-    assert learnt(turn, turn[1]).vibration < 0.06  # 12 mm/s^2 at 0.2 m/s beside 31 of the data sheet
+def test_without_vibration_the_filter_is_to_the_bit_what_it_is_without_learning(turn):
+    learning, plain = InertialFilter(MODEL), InertialFilter(MODEL.with_known_vibration())
+    np.testing.assert_array_equal(learning.run(*turn[:2])[0], plain.run(*turn[:2])[0])
 
 
 def test_it_is_known_before_the_turn(turn):
@@ -77,15 +78,21 @@ def test_it_is_known_before_the_turn(turn):
     assert learnt((turn[0][:before], turn[1]), shaken(turn, 1.0)[:before]).vibration > 0.4
 
 
-def test_side_slip_of_a_robot_that_shakes_is_surer_and_better(turn):
-    readings = shaken(turn, 1.0, correlation=0.6)
-    states = {}
-    for name, model in (("learnt", MODEL), ("taken as stated", MODEL.with_known_vibration())):
-        own = InertialFilter(model)
-        states[name] = own.run(turn[0], readings)[0][:, :2]
-    still = InertialFilter(MODEL.with_known_vibration()).run(turn[0], turn[1])[0][:, :2]
-    errors = {name: np.sqrt(np.mean((found - still) ** 2)) for name, found in states.items()}
-    assert errors["learnt"] < 0.8 * errors["taken as stated"]
+def test_side_slip_of_a_robot_that_shakes_is_better(turn):
+    still = InertialFilter(MODEL).run(turn[0], turn[1])[0][:, 1]
+    errors = {True: [], False: []}
+    for seed in range(5):
+        readings = shaken(turn, 0.3, seed, correlation=0.6)
+        for learns in errors:
+            own = InertialFilter(MODEL if learns else MODEL.with_known_vibration())
+            errors[learns].append(np.sqrt(np.mean((own.run(turn[0], readings)[0][:, 1] - still) ** 2)))
+    assert np.median(errors[True]) < 0.8 * np.median(errors[False])
+    assert max(errors[True]) < 0.5 * max(errors[False])  # without, the filter loses the robot in one of them
+
+
+def test_nothing_is_believed_within_half_of_the_deviation(turn):
+    assert learnt(turn, shaken(turn, 0.04)).vibration == 0.0
+    assert learnt(turn, shaken(turn, 0.3)).vibration > 0.15
 
 
 def test_what_is_stated_is_not_learnt(turn):

@@ -113,6 +113,21 @@ def test_commands_act_after_the_delay_and_the_ramp_and_outside_the_deadband():
     np.testing.assert_allclose(dead["true_omega_right"], prompt["true_omega_right"], atol=1e-12)
 
 
+@pytest.mark.parametrize("samples", [5.25, 5.9])
+def test_a_dead_time_before_a_ramp_is_one_behind_it_also_between_samples(samples):
+    """As the effect ``command_delay``, which has a memory of its own."""
+    commands, delay = _steps((0.5, 1.0, 0.5), (0.5, 0.2, -0.4)), samples / 125.0
+    of_robot = _drive(_with(DDAGR, command_ramp=1.0, command_delay=delay), commands)
+    of_effect = _drive(_with(DDAGR, command_ramp=1.0), commands, effects=[f"command_delay={delay}"])
+    shorter, longer = (
+        _drive(_with(DDAGR, command_ramp=1.0, command_delay=number / 125.0), commands)["true_omega_left"]
+        for number in (5, 6)
+    )
+    np.testing.assert_allclose(of_robot["true_omega_left"], of_effect["true_omega_left"], atol=1e-12)
+    between = (6 - samples) * shorter + (samples - 5) * longer
+    np.testing.assert_allclose(of_robot["true_omega_left"], between, atol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("command", "reached"),
     [((1.5, -1.5), (0.4, -0.4)), ((1.6, 0.0), (1.2, 0.4)), ((-1.0, 0.6), (-0.6, 0.2)), ((1.5, 0.9), (1.5, 0.9))],
