@@ -153,7 +153,7 @@ def draw(answers: Sequence[dict[str, Any]], path: Path) -> None:
         panel.set_yticks(range(len(answers)), [item["case"] for item in answers], fontsize=9)
         panel.set(
             ylim=(len(answers) - 0.4, -0.6),
-            xlim=(0.0, 3.0),
+            xlim=(0.0, max(1, *(len(item["sets"]) for item in answers)) + 0.05),
             xlabel="names said, one unit each; share: weight in its set",
         )
         panel.set_title("green: right; orange: front against rear the other way round; grey: another name", fontsize=9)
@@ -169,7 +169,7 @@ def _draw_sets(panel: Any, place: int, item: dict[str, Any]) -> None:
             right, other = name in item["truth"], name in (RUTS, OFFSET)
             colour = palette.GREEN if right else palette.VERMILLION if other else palette.GREY
             panel.barh(place, weight, left=begin, height=0.7, color=colour, alpha=0.5, edgecolor=palette.INK)
-            panel.text(begin + 0.01, place, name, va="center", fontsize=7, clip_on=True)
+            panel.text(begin + 0.01, place, name.replace("_", " "), va="center", fontsize=7, clip_on=True)
             begin += weight
 
 
