@@ -51,7 +51,8 @@ def test_parts_are_named_and_the_pages_say_so(asked, tmp_path):
     # with one drive a heavier load and a softer soil do nearly the same: the size is known to a factor
     assert LOAD / 3.0 < float(found["load"].parameters["load_compliance"]) < 3.0 * LOAD
     assert result.diagnosis.drivetrain.explained > 0.8
-    assert result.robot.drivetrain.command_delay == pytest.approx(DELAY, abs=0.03)
+    # the refit of the whole robot that follows may trade some of it for the motors' rate
+    assert result.robot.drivetrain.command_delay == pytest.approx(DELAY, abs=0.05)
     folder = result.report(tmp_path / "answer")
     page = (folder / "index.html").read_text()
     assert "Between command and wheel" in page
