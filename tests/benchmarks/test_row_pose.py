@@ -56,5 +56,5 @@ def test_kept_result_says_what_the_pose_gains():
     assert len(found) == 8
     assert all(own["across"]["value"] < 1.0 for own in found.values())
     assert all(own["along"]["interval"][0] < 1.0 for own in found.values())
-    assert found["level"]["across"]["interval"][1] < 1.0
+    assert found["late"]["across"]["interval"][1] < 1.0
     assert found["slope_3"]["heading"]["interval"][1] < 0.5
