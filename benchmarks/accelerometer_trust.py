@@ -17,7 +17,7 @@ About fifteen minutes of one core. Writes ``benchmarks/results/accelerometer_tru
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -26,7 +26,7 @@ from typing import Any
 from benchmarks.adaptation.study import TrueTurns, nominal
 from benchmarks.adaptation.truths import TRUTHS
 from benchmarks.plants_figure import draw
-from benchmarks.row_turn_plants import PLANTS, Outcome, scenario, summary
+from benchmarks.row_turn_plants import PLANTS, Outcome, cell, driven_on, scenario, summary
 from ddagr_gym.adaptation.turns import judged
 from ddagr_gym.control.row_turn import RowTurn
 from ddagr_gym.errors import at_least
@@ -35,7 +35,6 @@ from ddagr_gym.evaluation.metrics import turn_metrics
 from ddagr_gym.evaluation.runs import Controller, drive_turn
 from ddagr_gym.files import write_json
 from ddagr_gym.parameters import Sensors
-from ddagr_gym.progress import Progress
 
 RESULT = Path(__file__).resolve().parent / "results" / "accelerometer_trust.json"
 STATED = Sensors().imu.accelerometer_noise
@@ -65,34 +64,19 @@ def tracker(turn: RowTurn, arm: str) -> Controller:
     return adapted_tracker(settings, bundle.known, believed, None, ratio, constants.lead)
 
 
-def on_own(plant: str, arm: str, number: int) -> Outcome:
+def on_own(arm: str, plant: str, number: int) -> Outcome:
     """One turn on a development plant."""
     settings, episode, seed = scenario(plant, number)
     run = drive_turn(tracker(episode.turn, arm), settings, seed, episode)
     return Outcome(turn_metrics(run.columns, episode.turn, episode.robot).turn.error, run.success)
 
 
-def on_other(field: int, truth: str, arm: str, number: int) -> Outcome:
+def on_other(field: int, arm: str, truth: str, number: int) -> Outcome:
     """One turn in a truth of the blind benchmark's simulator."""
     turns = TrueTurns(TRUTHS[truth], field)
     turn = turns.turn(number)
     found = judged(turns.drive(tracker(turn, arm), number), turn, turns.robot, number)
     return Outcome(found.error, found.success)
-
-
-def driven(
-    names: Sequence[str], drive: Callable[[str, str, int], Outcome], turns: int, advance: Callable[[], None]
-) -> dict[str, dict[str, list[Outcome]]]:
-    """{plant: {arm: outcomes}}, the same turns for every arm."""
-    found: dict[str, dict[str, list[Outcome]]] = {}
-    for name in names:
-        found[name] = {}
-        for arm in ARMS:
-            found[name][arm] = []
-            for number in range(turns):
-                found[name][arm].append(drive(name, arm, number))
-                advance()
-    return found
 
 
 def summaries(found: Mapping[str, Mapping[str, Sequence[Outcome]]]) -> dict[str, dict[str, dict[str, Any]]]:
@@ -109,7 +93,7 @@ def table(result: Mapping[str, Any]) -> str:
     for simulator in SIMULATORS:
         for name, found in result[simulator].items():
             title = titles().get(name, "**all together**")
-            lines.append(f"| {SIMULATORS[simulator]} | {title} | {' | '.join(_cell(found[arm]) for arm in ARMS)} |")
+            lines.append(f"| {SIMULATORS[simulator]} | {title} | {' | '.join(cell(found[arm]) for arm in ARMS)} |")
     return "\n".join(lines)
 
 
@@ -121,15 +105,6 @@ def titles() -> dict[str, str]:
     return {name: PLANTS[name].title for name in OWN} | {name: truth.title for name, truth in TRUTHS.items()}
 
 
-def _cell(found: Mapping[str, Any]) -> str:
-    median, tail, made = (found[key] for key in ("radius_error_median", "radius_error_p95", "success_rate"))
-    low, high = made["interval"]
-    return (
-        f"{100 * median['value']:.1f} / {100 * tail['value']:.1f} / {100 * made['value']:.0f} "
-        f"({100 * low:.0f} to {100 * high:.0f})"
-    )
-
-
 def main(words: Sequence[str] | None = None) -> int:
     """Command line; returns the exit code."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -138,9 +113,8 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument("--output", type=Path, default=RESULT, help="JSON file; the picture lies beside it")
     given = parser.parse_args(words)
     at_least(**{"--turns": (given.turns, 2), "--field": (given.field, 1)})
-    with Progress(len(ARMS) * (len(OWN) + len(TRUTHS)) * given.turns, "driving") as progress:
-        own = driven(OWN, on_own, given.turns, progress.advance)
-        other = driven(tuple(TRUTHS), partial(on_other, given.field), given.turns, progress.advance)
+    own = dict(driven_on(OWN, tuple(ARMS), given.turns, on_own))
+    other = dict(driven_on(tuple(TRUTHS), tuple(ARMS), given.turns, partial(on_other, given.field)))
     result = {
         "command": "python -m benchmarks.accelerometer_trust", "field": given.field,
         "own": summaries(own), "other": summaries(other),

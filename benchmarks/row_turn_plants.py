@@ -107,16 +107,20 @@ def table(result: Mapping[str, Any]) -> str:
     names = list(next(iter(result["plants"].values())))
     lines = [f"| plant | {' | '.join(names)} |", "|---" * (len(names) + 1) + "|"]
     for plant, found in result["plants"].items():
-        cells = []
-        for name in names:
-            low, high = found[name]["success_rate"]["interval"]
-            values = [found[name][key]["value"] for key in ("radius_error_median", "radius_error_p95", "success_rate")]
-            cells.append(
-                f"{100 * values[0]:.1f} / {100 * values[1]:.1f} / {100 * values[2]:.0f} "
-                f"({100 * low:.0f} to {100 * high:.0f})"
-            )
-        lines.append(f"| {PLANTS[plant].title} | {' | '.join(cells)} |")
+        lines.append(f"| {PLANTS[plant].title} | {' | '.join(cell(found[name]) for name in names)} |")
     return "\n".join(lines)
+
+
+def cell(found: Mapping[str, Any]) -> str:
+    """Of a table: median / 95th percentile of |e_R|, success with its interval, in percent; a dash for none."""
+
+    def percent(value: float | None, digits: int) -> str:
+        return "-" if value is None else f"{100.0 * value:.{digits}f}"
+
+    errors = [percent(found[key]["value"], 1) for key in ("radius_error_median", "radius_error_p95")]
+    success = found["success_rate"]
+    low, high = (percent(end, 0) for end in success["interval"])
+    return f"{errors[0]} / {errors[1]} / {percent(success['value'], 0)} ({low} to {high})"
 
 
 Driven = TypeVar("Driven")

@@ -25,6 +25,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.commits import commit_of
+from benchmarks.row_turn_plants import cell
 from benchmarks.row_turns import CHECKOUT, rounded
 from benchmarks.scenario_sets import ON_PLANTS, PLANS, SECOND
 from benchmarks.second_sets_figure import draw
@@ -121,19 +122,9 @@ def table(result: Mapping[str, Any]) -> str:
     names = list(result["controllers"])
     lines = [f"| set | turns | {' | '.join(names)} |", "|---" * (len(names) + 2) + "|"]
     for name, found in result["sets"].items():
-        cells = [_cell(found[arm]) for arm in names]
+        cells = [cell(found[arm]) for arm in names]
         lines.append(f"| {title(name)} | {found[names[0]]['episodes']} | {' | '.join(cells)} |")
     return "\n".join(lines)
-
-
-def _cell(found: Mapping[str, Any]) -> str:
-    def percent(value: float | None, digits: int) -> str:
-        return "-" if value is None else f"{100.0 * value:.{digits}f}"
-
-    errors = [percent(found[key]["value"], 1) for key in ("radius_error_median", "radius_error_p95")]
-    success = found["success_rate"]
-    low, high = (percent(end, 0) for end in success["interval"])
-    return f"{errors[0]} / {errors[1]} / {percent(success['value'], 0)} ({low} to {high})"
 
 
 def for_picture(result: Mapping[str, Any]) -> dict[str, dict[str, Any]]:

@@ -18,7 +18,7 @@ from ddagr_gym.physics.body_dynamics import evaluate_forces, place_wheels, resto
 from ddagr_gym.physics.callbacks import EffectActions, actions_on, apply_effects
 from ddagr_gym.physics.drivetrain import (
     bank_acceleration,
-    delay_targets,
+    delay_by_dead_time,
     follows_past,
     mark_dynamic_banks,
     set_targets,
@@ -94,7 +94,7 @@ def _drive(row: Array, command: Array, actions: EffectActions) -> None:
     apply_effects(POINT_COMMANDS, row, actions)
     set_targets(row)
     if row[COMMAND_DELAY] > 0.0:
-        delay_targets(row)
+        delay_by_dead_time(row)
     apply_effects(POINT_SET_POINTS, row, actions)
     apply_effects(POINT_MOTORS, row, actions)
     mark_dynamic_banks(row)

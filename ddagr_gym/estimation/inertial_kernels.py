@@ -52,7 +52,7 @@ from ddagr_gym.estimation.inertial_update import (
     row_column,
     use_innovation,
 )
-from ddagr_gym.estimation.inertial_vibration import reading_deviation, rim_speed, watch_vibration
+from ddagr_gym.estimation.inertial_vibration import reading_deviation, rim_advance, rim_speed, watch_vibration
 from ddagr_gym.estimation.layout import (
     ACCELEROMETER_BIAS,
     CHANNEL_SIZE,
@@ -301,7 +301,7 @@ def inertial_sample(
     correct_inertial(model, work, at_rest(model, work, command[0], command[1]))
     interval = int(model[BALANCE_INTERVAL])
     if number % interval == 0:
-        speed = 0.5 * model[OUTER_RADIUS] * (work[X + OMEGA] + work[X + OMEGA + 1])
+        speed = rim_advance(model, work)
         known = _pull_known(model, work)
         if abs(speed) < model[LAUNCH_SPEED]:
             _roll(model, work, speed)

@@ -44,6 +44,12 @@ def rim_speed(model: Array, work: Array) -> float:
 
 
 @kernel(inline=True)
+def rim_advance(model: Array, work: Array) -> float:
+    """Mean rim speed of both banks, negative backwards [m/s]."""
+    return 0.5 * model[OUTER_RADIUS] * (work[X + OMEGA] + work[X + OMEGA + 1])
+
+
+@kernel(inline=True)
 def reading_deviation(model: Array, work: Array, speed: float) -> float:
     """Of either axis of the accelerometer at a speed of the rims [m/s^2] (theory: wheel model, eq. (35))."""
     vibration = max(model[VIBRATION], work[VIBRATION_LEARNT])
@@ -65,8 +71,7 @@ def watch_vibration(model: Array, work: Array, believed: bool, duration: float) 
     if not believed:
         work[BLOCK_SUM] = work[BLOCK_COUNT] = work[BLOCKS_IN_ROW] = 0.0
         return
-    advance = 0.5 * model[OUTER_RADIUS] * (work[X + OMEGA] + work[X + OMEGA + 1])
-    work[BLOCK_SUM] += work[READING + FORCE_CHANNEL + 1] - work[X + 2] * advance
+    work[BLOCK_SUM] += work[READING + FORCE_CHANNEL + 1] - work[X + 2] * rim_advance(model, work)
     work[BLOCK_COUNT] += 1.0
     if work[BLOCK_COUNT] * duration > _BLOCK - 0.5 * duration:
         _end_block(model, work)

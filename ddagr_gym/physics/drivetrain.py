@@ -64,24 +64,38 @@ _STICTION_SPEED = 0.02  # [rad/s] over which Coulomb friction builds up, ours: a
 
 
 @kernel()
-def delay_targets(row: Array) -> None:
-    """Put the set points of ``COMMAND_DELAY`` [s] ago in place of the present ones, interpolated between samples.
+def delay_targets(row: Array, ring: Array, nodes: int, longest: float, right: float, left: float) -> None:
+    """Put set points of some time ago in place of the present ones, interpolated between samples.
 
     A shift in time may come before or after limits and ramp; behind them a ramp that begins between two samples stays
     one.
+
+    Args:
+        row: of the simulator.
+        ring: memory of past set points, see :mod:`ddagr_gym.physics.history`.
+        nodes: of the ring.
+        longest: delay that it reaches back [s]; longer ones count as this.
+        right: delay of the right bank [s].
+        left: of the left bank [s].
     """
     period = row[SAMPLE_PERIOD]
-    ring = row[TARGET_RING:SIZE]
-    stride = ring_stride(LONGEST_DELAY, period, TARGET_NODES)
-    if ring_is_empty(ring, 2, TARGET_NODES):
+    stride = ring_stride(longest, period, nodes)
+    if ring_is_empty(ring, 2, nodes):
         # before the first sample the set points are taken to have equalled the bank speeds
-        for k in range(1, TARGET_NODES):
+        for k in range(1, nodes):
             for bank in range(2):
-                fill_node(ring, 2, TARGET_NODES, k, stride, bank, row[OMEGA + bank])
-    push(ring, 2, TARGET_NODES, stride, row[MOTOR_TARGET : MOTOR_TARGET + 2])
+                fill_node(ring, 2, nodes, k, stride, bank, row[OMEGA + bank])
+    push(ring, 2, nodes, stride, row[MOTOR_TARGET : MOTOR_TARGET + 2])
     for bank in range(2):
-        samples = min(row[COMMAND_DELAY], LONGEST_DELAY) / period
-        row[MOTOR_TARGET + bank] = recall(ring, 2, TARGET_NODES, stride, bank, samples, row[MOTOR_TARGET + bank])
+        samples = min(right if bank == 0 else left, longest) / period
+        row[MOTOR_TARGET + bank] = recall(ring, 2, nodes, stride, bank, samples, row[MOTOR_TARGET + bank])
+
+
+@kernel()
+def delay_by_dead_time(row: Array) -> None:
+    """The same by the robot's own ``COMMAND_DELAY`` [s], of both banks."""
+    delay = row[COMMAND_DELAY]
+    delay_targets(row, row[TARGET_RING:SIZE], TARGET_NODES, LONGEST_DELAY, delay, delay)
 
 
 @kernel(inline=True)

@@ -18,7 +18,7 @@ _SPEED_OVER = 0.5
 """Time over which speeds are taken from poses [s] (ours)."""
 
 
-def has_stretches_with_poses(recording: Recording) -> bool:
+def _has_stretches_with_poses(recording: Recording) -> bool:
     """Whether poses come in several stretches."""
     return len(recording.meta.spans) > 1 and recording.has("pose_x", "pose_y", "pose_yaw")
 
@@ -29,7 +29,7 @@ def frames_apart(recording: Recording) -> bool:
     They have where one begins farther from the end of the one before than the robot can have gone in between, at
     :data:`FASTER` times the highest speed that the poses show within stretches.
     """
-    if not has_stretches_with_poses(recording):
+    if not _has_stretches_with_poses(recording):
         return False
     places = np.stack([recording["pose_x"], recording["pose_y"]], axis=1)
     known = [s.start + np.flatnonzero(np.isfinite(places[s]).all(axis=1)) for s in recording.spans()]

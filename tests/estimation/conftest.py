@@ -1,11 +1,14 @@
-"""A robot for the filter's tests: the thesis's, Table 6.1."""
+"""A robot for the filter's tests, the thesis's (Table 6.1), and a turn of it."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
+from ddagr_gym.envs.options import make_settings
 from ddagr_gym.estimation import FilterModel, layout
+from ddagr_gym.evaluation.controllers import find_controller
+from ddagr_gym.evaluation.runs import drive_turn
 from ddagr_gym.presets import get_robot
 
 
@@ -17,6 +20,24 @@ def robot():
 @pytest.fixture(scope="session")
 def model(robot):
     return FilterModel(robot)
+
+
+@pytest.fixture(scope="session")
+def driven():
+    """Function (effects) -> a turn of the nominal robot by B6, which stands for 0.8 s first."""
+
+    def drive(effects=()):
+        settings = make_settings(randomisation=False, side="left", soil="thesis_a1", effects=effects)
+        tracker = find_controller("B6", settings.draw(np.random.default_rng(0)).turn)
+        return drive_turn(tracker, settings, 5)
+
+    return drive
+
+
+@pytest.fixture(scope="session")
+def level(driven):
+    """Such a turn on level ground."""
+    return driven()
 
 
 @pytest.fixture

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ddagr_gym.envs.options import make_settings
 from ddagr_gym.errors import InputError
 from ddagr_gym.estimation import (
     CHANNELS,
@@ -22,8 +21,6 @@ from ddagr_gym.estimation import (
 from ddagr_gym.estimation.columns import stack_columns
 from ddagr_gym.estimation.inertial_layout import GRAVITY, INERTIAL_STATE, PATCH_AHEAD
 from ddagr_gym.estimation.layout import COMMANDS
-from ddagr_gym.evaluation.controllers import find_controller
-from ddagr_gym.evaluation.runs import drive_turn
 from ddagr_gym.parameters import STANDARD_GRAVITY, Sensors
 from ddagr_gym.physics.effects.slope import Slope
 from ddagr_gym.presets import get_robot
@@ -33,20 +30,8 @@ MODEL = InertialModel.of(ROBOT, Sensors())
 ANGLE, DIRECTION = math.radians(3.0), 0.7
 
 
-def driven(effects=()):
-    """A turn of the nominal robot, which stands for 0.8 s first."""
-    settings = make_settings(randomisation=False, side="left", soil="thesis_a1", effects=effects)
-    tracker = find_controller("B6", settings.draw(np.random.default_rng(0)).turn)
-    return drive_turn(tracker, settings, 5)
-
-
 @pytest.fixture(scope="module")
-def level():
-    return driven()
-
-
-@pytest.fixture(scope="module")
-def sloping():
+def sloping(driven):
     return driven((Slope(ANGLE, DIRECTION),))
 
 

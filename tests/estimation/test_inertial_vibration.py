@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ddagr_gym.envs.options import make_settings
 from ddagr_gym.errors import InputError
 from ddagr_gym.estimation import (
     CHANNELS,
@@ -17,8 +16,6 @@ from ddagr_gym.estimation import (
 )
 from ddagr_gym.estimation.columns import stack_columns
 from ddagr_gym.estimation.layout import COMMANDS
-from ddagr_gym.evaluation.controllers import find_controller
-from ddagr_gym.evaluation.runs import drive_turn
 from ddagr_gym.parameters import Sensors
 from ddagr_gym.presets import get_robot
 
@@ -28,10 +25,9 @@ KNOWN = InertialModel.of(ROBOT, replace(Sensors(), imu=replace(Sensors().imu, ac
 
 
 @pytest.fixture(scope="module")
-def turn():
+def turn(level):
     """Commands (T, 2) and readings (T, 5) of a turn whose accelerometer does not shake, and the rims' speed (T,)."""
-    settings = make_settings(randomisation=False, side="left", soil="thesis_a1")
-    columns = drive_turn(find_controller("B6", settings.draw(np.random.default_rng(0)).turn), settings, 5).columns
+    columns = level.columns
     commands, readings = stack_columns(columns, COMMANDS, np.nan), stack_columns(columns, CHANNELS, np.nan)
     speed = 0.5 * ROBOT.outer_radius * np.abs(readings[:, 3:5]).sum(axis=1)
     return commands, readings, np.nan_to_num(speed)

@@ -7,9 +7,9 @@ samples would be one.
 
 from dataclasses import dataclass
 
+from ddagr_gym.physics.drivetrain import delay_targets
 from ddagr_gym.physics.effects.base import DriveExtent, Effect, Vector, shape, size
-from ddagr_gym.physics.history import fill_node, push, recall, ring_is_empty, ring_stride
-from ddagr_gym.physics.layout import MOTOR_TARGET, OMEGA, POINT_SET_POINTS, SAMPLE_PERIOD
+from ddagr_gym.physics.layout import POINT_SET_POINTS
 
 _LONGEST = 0.49  # [s]
 _NODES = 64  # every sample at 125 Hz and below
@@ -17,19 +17,8 @@ _NODES = 64  # every sample at 125 Hz and below
 
 def delay_set_points(row: Vector, parameters: Vector, memory: Vector) -> None:
     """Set points of ``parameters[0]`` seconds ago, ``parameters[1]`` of it more on the right and less on the left."""
-    period = row[SAMPLE_PERIOD]
-    stride = ring_stride(_LONGEST, period, _NODES)
-    if ring_is_empty(memory, 2, _NODES):
-        # before the first sample the set points are taken to have equalled the bank speeds
-        for k in range(1, _NODES):
-            for bank in range(2):
-                fill_node(memory, 2, _NODES, k, stride, bank, row[OMEGA + bank])
-    push(memory, 2, _NODES, stride, row[MOTOR_TARGET : MOTOR_TARGET + 2])
-    for bank in range(2):
-        share = 1.0 + parameters[1] if bank == 0 else 1.0 - parameters[1]
-        delay = min(parameters[0] * share, _LONGEST)
-        present = row[MOTOR_TARGET + bank]
-        row[MOTOR_TARGET + bank] = recall(memory, 2, _NODES, stride, bank, delay / period, present)
+    right, left = parameters[0] * (1.0 + parameters[1]), parameters[0] * (1.0 - parameters[1])
+    delay_targets(row, memory, _NODES, _LONGEST, right, left)
 
 
 @dataclass(frozen=True)
