@@ -175,9 +175,9 @@ def late_poses(table: Table) -> Table:
     return late(table, layout_of(table).pose, LATE_POSES)
 
 
-def late_sensors(table: Table) -> Table:
-    """Everything but the commands late: the robot seems to answer that much later, as with a dead time."""
-    return late(table, [name for name in table if name not in layout_of(table).commands], LATE_SENSORS)
+def late_sensors(table: Table, seconds: float = LATE_SENSORS) -> Table:
+    """Everything but the commands late [s]: the robot seems to answer that much later, as with a dead time."""
+    return late(table, [name for name in table if name not in layout_of(table).commands], seconds)
 
 
 def scaled(table: Table, names: Sequence[str], factor: float) -> Table:

@@ -1,6 +1,6 @@
 """How much two ordinary drives differ in a simulator that shares no code with the package's, driven in other ways.
 
-    python -m benchmarks.independent_pairs [--pairs N] [--workers N] [--cluster ADDRESS]
+    python -m benchmarks.independent_pairs [--pairs N] [--workers N] [--cluster ADDRESS] [--summary]
 
 Pairs in which nothing changed, of the open set of :mod:`benchmarks.changed_pairs` (seed 1; half of them with a
 structure that no effect of the library has): three drives before and one after, with other manoeuvres on another patch
@@ -13,8 +13,9 @@ distributions with which the package judges them (equations (2) of :mod:`ddagr_g
 * prior deviations by which drives move each parameter of robot and soil,
 * deviations of what is left of each channel,
 
-and the most degrees of freedom with which no more than 5 % of the pairs raise any alarm. Written are the sizes and a
-picture (``benchmarks/results/independent_pairs.json``, ``.png``); ``python -m benchmarks.simulated_pairs --summary``
+and the most degrees of freedom with which no more than 5 % of the pairs raise any alarm. Beside them stands the least
+change of each effect that this comparison could show if ordinary drives differed by the noise of their readings alone:
+the floor for drives of that length. Written are the sizes and a picture (``benchmarks/results/independent_pairs.json``, ``.png``); ``python -m benchmarks.simulated_pairs --summary``
 puts them into what the package ships. A run goes on after the pairs that it finished before.
 """
 
@@ -46,8 +47,11 @@ from ddagr_gym.diagnosis.change.shifts import (
     Pull,
     Sizes,
     away_from,
+    distance_at,
+    distance_found,
     family_probability,
     probability_of,
+    single_level,
     sizes_of,
 )
 from ddagr_gym.diagnosis.preprocessing.mended_recordings import mend_recordings
@@ -69,6 +73,8 @@ DIGITS = 4
 """Of the sizes that are written."""
 LEAST_MOVE, MOST_MOVE = 1.0, 10.0
 """Of the prior deviations that are tried."""
+MANY = 1e6
+"""Degrees of freedom of what is known for sure."""
 LEAST_RISE, MOST_RISE = 0.1, 3.0
 """Of the deviations of a channel's logarithm that are tried."""
 
@@ -212,8 +218,7 @@ def alarms(pairs: Sequence[Mapping[str, Any]], expected: ExpectedScatter) -> flo
     """Share of pairs of which anything is out of the ordinary; arguments as of :func:`probabilities`."""
     raised = []
     for pair in pairs:
-        tests = len(pair["effects"]) + len(pair["moved"][0]) + len(pair["misfits"][0])
-        raised.append(family_probability(min(probabilities(pair, expected).values()), tests) < LEVEL)
+        raised.append(family_probability(min(probabilities(pair, expected).values()), _tests(pair)) < LEVEL)
     return float(np.mean(raised))
 
 
@@ -235,13 +240,43 @@ def crossed_alarms(pairs: Sequence[Mapping[str, Any]]) -> float:
     return float(np.mean(found))
 
 
+def least_by_noise(pairs: Sequence[Mapping[str, Any]]) -> dict[str, list[float]]:
+    """Least change of every size of each effect, in least sizes that matter, if drives differed by noise alone.
+
+    It passes the limit of all tests with the usual power in half of the pairs; of an effect with several candidates
+    the first one counts.
+
+    Args:
+        pairs: of :func:`compared`.
+    """
+    found: dict[str, list[Array]] = {}
+    for pair in pairs:
+        tests, seen = _tests(pair), set[str]()
+        for item in pair["effects"]:
+            if item["has_sizes"] and item["effect"] not in seen:
+                seen.add(item["effect"])
+                found.setdefault(item["effect"], []).append(_least_by_noise(item, tests))
+    return {name: rounded(np.median(values, axis=0), 3) for name, values in sorted(found.items())}
+
+
+def _least_by_noise(item: Mapping[str, Any], tests: int) -> Array:
+    here, *others = (np.array(drive["within"]) for drive in item["drives"])
+    noise = here + np.mean(others, axis=0) / len(others)
+    limit = distance_at(single_level(tests), len(here), MANY)
+    return np.asarray(distance_found(limit, len(here), MANY) / np.sqrt(np.diag(np.linalg.inv(noise))))
+
+
+def _tests(pair: Mapping[str, Any]) -> int:
+    return len(pair["effects"]) + len(pair["moved"][0]) + len(pair["misfits"][0])
+
+
 def draw(pairs: Sequence[Mapping[str, Any]], expected: ExpectedScatter, path: Path) -> None:
     """How probable the sizes, moves and rises of every pair are, against the limit of all of them together."""
     from matplotlib.figure import Figure
 
     found = [probabilities(pair, expected) for pair in pairs]
     names = list(dict.fromkeys(name for item in found for name in item))[::-1]
-    tests = max(len(pair["effects"]) + len(pair["moved"][0]) + len(pair["misfits"][0]) for pair in pairs)
+    tests = max(map(_tests, pairs))
     with house_style():
         figure = Figure(figsize=(7.5, 1.0 + 0.22 * len(names)), layout="constrained")
         axis = figure.subplots()
@@ -267,6 +302,7 @@ def summary(pairs: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
         "rises": _sorted(expected.rises),
         "false_alarms": alarms(known, expected),
         "false_alarms_crossed": crossed_alarms(known),
+        "least_by_noise": least_by_noise(known),
     }
 
 
@@ -286,10 +322,19 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--workers", type=int, default=2, help="processes")
     parser.add_argument("--parts", type=Path, default=RESULT.with_suffix(".parts"), help="folder of finished pairs")
     parser.add_argument("--cluster", default="", help="local, or the address of a Ray cluster")
+    parser.add_argument("--summary", action="store_true", help="only what follows from the pairs that are written")
     given = parser.parse_args(arguments)
+    if given.summary:
+        _write(json.loads(RESULT.read_text())["pairs"])
+        return
     tasks = [Task(pair.name, compared, (pair,), key=pair.name) for pair in ordinary_pairs(given.pairs)]
     with TaskRunner(given.workers, cluster=given.cluster) as runner:
         pairs = run_tasks(tasks, "pairs", runner, ResultStore(given.parts))
+    _write(pairs)
+
+
+def _write(pairs: Sequence[Mapping[str, Any]]) -> None:
+    """Results and picture of pairs."""
     found = summary(pairs)
     body = {"command": COMMAND, "seed": SEED, **found, "pairs": pairs}
     write_text(RESULT, json.dumps(body, separators=(",", ":")) + "\n")

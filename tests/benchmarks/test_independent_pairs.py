@@ -10,6 +10,7 @@ from benchmarks.independent_pairs import (
     alarms,
     draw,
     expectation_of,
+    least_by_noise,
     moves_of,
     ordinary_pairs,
     probabilities,
@@ -105,3 +106,27 @@ def test_a_cluster_needs_its_extra(tmp_path, monkeypatch):
     with pytest.raises(InputError, match="'ray', which is not installed"):
         independent_pairs.main(["--pairs", "1", "--parts", str(tmp_path / "parts"), "--cluster", "local"])
     assert not (tmp_path / "parts").exists()
+
+
+def test_noise_alone_asks_for_a_change_of_several_of_its_deviations():
+    pairs = [synthetic(number, np.random.default_rng(number)) for number in range(5)]
+    found = least_by_noise(pairs)
+    deviation = WITHIN * np.sqrt(1.0 + 1.0 / 3.0)
+    assert list(found) == ["payload"]
+    # two-sided limits of some tests at 5 % in all are 2.2 to 3.2 deviations, and 80 % power takes 0.84 more
+    assert 3.0 * deviation < found["payload"][0] < 4.1 * deviation
+
+
+def test_the_floor_of_noise_grows_with_it():
+    pairs = [synthetic(number, np.random.default_rng(number)) for number in range(5)]
+    louder = [
+        {
+            **pair,
+            "effects": [
+                {**item, "drives": [{**drive, "within": [[4.0 * drive["within"][0][0]]]} for drive in item["drives"]]}
+                for item in pair["effects"]
+            ],
+        }
+        for pair in pairs
+    ]
+    assert least_by_noise(louder)["payload"][0] == pytest.approx(2.0 * least_by_noise(pairs)["payload"][0], rel=5e-3)
