@@ -15,8 +15,9 @@ distributions with which the package judges them (equations (2) of :mod:`ddagr_g
 
 and the most degrees of freedom with which no more than 5 % of the pairs raise any alarm. Beside them stands the least
 change of each effect that this comparison could show if ordinary drives differed by the noise of their readings alone:
-the floor for drives of that length. Written are the sizes and a picture (``benchmarks/results/independent_pairs.json``, ``.png``); ``python -m benchmarks.simulated_pairs --summary``
-puts them into what the package ships. A run goes on after the pairs that it finished before.
+the floor for drives of that length. Written are the sizes and a picture (``benchmarks/results/independent_pairs.json``,
+``.png``); ``python -m benchmarks.simulated_pairs --summary`` puts them into what the package ships. A run goes on after
+the pairs that it finished before.
 """
 
 from __future__ import annotations
