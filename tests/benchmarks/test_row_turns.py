@@ -126,4 +126,4 @@ def test_the_claims_of_the_record_are_those_of_today(committed):
 
 
 def test_the_page_of_results_says_what_the_record_says(committed, repository):
-    assert row_turns.results_table(committed) in (repository / "docs" / "results.md").read_text()
+    assert row_turns.results_table(committed) in (repository / "docs/results/row_turns.md").read_text()

@@ -67,4 +67,4 @@ def test_the_record_obeys_its_rules(committed):
 
 
 def test_the_page_of_results_says_what_the_record_says(committed, repository):
-    assert table(committed) in (repository / "docs" / "results.md").read_text()
+    assert table(committed) in (repository / "docs/results/row_turns.md").read_text()
