@@ -119,7 +119,8 @@ def card(record: dict[str, Any], description: str, inputs: int) -> str:
             "",
             "It knows this robot, these sensors at 125 Hz and commands every ten samples. Slopes, soil that changes "
             "and scaled lateral forces were in its training; another law of the soil was not. Where it fails, and how "
-            "it compares with the filters, is in `benchmarks/results/learned_estimator.json` and `docs/results/filter.md`.",
+            "it compares with the filters, is in `benchmarks/results/learned_estimator.json` and "
+            "`docs/results/filter.md`.",
             "",
         ]
     )

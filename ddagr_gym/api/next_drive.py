@@ -15,6 +15,7 @@ from ddagr_gym.files import write_json
 
 if TYPE_CHECKING:
     from ddagr_gym.api.diagnosis_result import DiagnosisResult
+    from ddagr_gym.diagnosis.answer.drivetrain import DrivetrainAnswer
     from ddagr_gym.diagnosis.answer.next_drive_plan import NextDrivePlan
     from ddagr_gym.diagnosis.answer.verdict import Diagnosis
     from ddagr_gym.diagnosis.setting import Setting
@@ -101,7 +102,8 @@ def next_drive(
     """Name the drive that would tell the remaining explanations of a diagnosis apart.
 
     Every rival is simulated at its fitted size over every built-in manoeuvre; the others imitate it as well as they
-    can, with soil and robot refitted. Manoeuvres are ranked by what is left per minute of driving.
+    can, with soil and robot refitted. Manoeuvres are ranked by what is left per minute of driving. Of a diagnosis that
+    names parts of the drivetrain the answer says which of them are in doubt, and which driving tells them.
 
     Args:
         diagnosis_or_rivals: result of :func:`ddagr_gym.diagnose`, folder or diagnosis.json of a diagnosis; or a list of
@@ -125,11 +127,15 @@ def next_drive(
         >>> result.separates
         (('slope', 'accelerometer_bias'),)
     """
+    from ddagr_gym.diagnosis.answer.drivetrain import DrivetrainAnswer
+    from ddagr_gym.diagnosis.planning.drivetrain_drive import drivetrain_drive
     from ddagr_gym.diagnosis.planning.next_drive import next_drive as planned
     from ddagr_gym.diagnosis.preprocessing.session import be_silent
 
     at_least(seed=(seed, 0), threads=(threads, 1))
     question = _question(diagnosis_or_rivals)
+    if isinstance(question, DrivetrainAnswer):
+        return NextDriveResult(drivetrain_drive(question))
     answer = planned(
         robot_from(question.robot if robot is None else robot),
         soil_from(question.soil if soil is None else soil),
@@ -153,7 +159,7 @@ class _Question:
     setting: Setting
 
 
-def _question(given: QuestionLike) -> _Question:
+def _question(given: QuestionLike) -> _Question | DrivetrainAnswer:
     from ddagr_gym.api.diagnosis_result import DiagnosisResult
     from ddagr_gym.diagnosis.result.files import load
 
@@ -167,9 +173,11 @@ def _question(given: QuestionLike) -> _Question:
     return _of_rivals(given)
 
 
-def _of_diagnosis(diagnosis: Diagnosis, robot: RobotLike, soil: SoilLike) -> _Question:
+def _of_diagnosis(diagnosis: Diagnosis, robot: RobotLike, soil: SoilLike) -> _Question | DrivetrainAnswer:
     from ddagr_gym.diagnosis.planning.next_drive import rivals_of_diagnosis, sensors_of_diagnosis, setting_of_diagnosis
 
+    if diagnosis.drivetrain is not None:
+        return diagnosis.drivetrain
     setting = setting_of_diagnosis(diagnosis)
     return _Question(rivals_of_diagnosis(diagnosis), sensors_of_diagnosis(diagnosis), robot, soil, setting)
 

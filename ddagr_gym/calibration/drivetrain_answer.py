@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from ddagr_gym.calibration.part_selection import least_growth
+from ddagr_gym.calibration.parts import part_named
 from ddagr_gym.calibration.result import (
     CALIBRATED,
     DATA_SHEET,
@@ -83,10 +84,8 @@ def _finding(part: PartDecision, parameters: list[CalibratedParameter], folds: i
     error = part.error or 0.0
     estimates = {p.name: Estimate(p.value, p.unit, p.interval) for p in parameters if p.value is not None}
     score = part.growth / error if error > 0.0 else 0.0
-    return Finding(
-        part.name, estimates, part.growth, least_growth(error, folds), score, part.growth,
-        {}, {part.name: 1.0},
-    )  # fmt: skip
+    gate = least_growth(error, folds, part_named(part.name).usual)
+    return Finding(part.name, estimates, part.growth, gate, score, part.growth, {}, {part.name: 1.0})
 
 
 def _comparisons(calibration: Calibration) -> list[ForecastComparison]:

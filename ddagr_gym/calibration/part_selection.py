@@ -2,7 +2,8 @@
 
 Every part is taken out in turn, what is fitted least often first. It stays out unless the forecasts of the left-out
 drives become worse by 2 % and by more than the standard error of that change between drives (the one-standard-error
-rule; L. Breiman et al., Classification and Regression Trees, 1984, section 3.4.3), with Student's t for few drives.
+rule; L. Breiman et al., Classification and Regression Trees, 1984, section 3.4.3), with Student's t for few drives. Of
+what nearly every robot has, the dead time, 2 % are enough: there the burden of proof is on its absence.
 A part is missed only by a fit that is settled, or that has had steps enough.
 What acts through parts that have all gone goes with them. A ramp that stayed where the dead time went gives way to a
 dead time that forecasts as well.
@@ -21,16 +22,13 @@ from ddagr_gym.calibration.joint_fit import OFFSET, FittedModel, Standing, fit_m
 from ddagr_gym.calibration.left_out import Forecast, fold_sigma, forecast_loss, forecasts
 from ddagr_gym.calibration.parts import PARTS, RobotModel, idle_parts
 from ddagr_gym.calibration.result import PartDecision
+from ddagr_gym.diagnosis.answer.drivetrain import LEAST_GROWTH
 from ddagr_gym.diagnosis.store import StepCache
 from ddagr_gym.identification.residual_weights import Weights
 from ddagr_gym.identification.windows import WindowSet
 
 CONFIDENCE = 0.84
 """One-sided, with which a part must help: one standard error where there are many drives."""
-
-LEAST_GROWTH = 0.02
-"""Growth of the losses below which a part does not matter however sure it is (ours): ramp, limits and load that a
-simulated robot did not have were sure to 0.2 to 1.5 %."""
 
 ITERATIONS = 8
 """Steps of a fit without one part, from where the fit with it stands (ours): with 3 the fits of a simulated robot were
@@ -138,25 +136,27 @@ def surely_above(folds: int) -> float:
     return float(stdtrit(folds - 1, CONFIDENCE))
 
 
-def least_growth(error: float, folds: int) -> float:
-    """Growth of the losses above which a part is missed: surely above 0, and enough to matter.
+def least_growth(error: float, folds: int, usual: bool = False) -> float:
+    """Growth of the losses above which a part is missed: enough to matter, and surely above 0 unless it is usual.
 
     Args:
         error: standard error of the growth.
         folds: that were left out.
+        usual: whether nearly every robot has the part.
     """
-    return max(LEAST_GROWTH, surely_above(folds) * error)
+    return LEAST_GROWTH if usual else max(LEAST_GROWTH, surely_above(folds) * error)
 
 
-def is_missed(growth: float, error: float, folds: int) -> bool:
-    """Whether forecasts without a part are surely worse, and by enough to matter.
+def is_missed(growth: float, error: float, folds: int, usual: bool = False) -> bool:
+    """Whether forecasts without a part are worse by enough.
 
     Args:
         growth: of the losses without it.
         error: standard error of the growth.
         folds: that were left out.
+        usual: whether nearly every robot has the part.
     """
-    return growth > least_growth(error, folds)
+    return growth > least_growth(error, folds, usual)
 
 
 def select_parts(
@@ -180,9 +180,9 @@ def select_parts(
         if not model.free & set(part.parameters):
             continue
         progress(f"forecasts of left-out drives without {part.title}")
-        tried = _settled(comparison, model, left_out | {part.name}, best, cache)
+        tried = _settled(comparison, model, left_out | {part.name}, best, cache, part.usual)
         growth, error = worse_by(best, tried)
-        kept = is_missed(growth, error, len(tried.losses))
+        kept = is_missed(growth, error, len(tried.losses), part.usual)
         decisions.append(PartDecision(part.name, kept, growth, error))
         if not kept:
             best, left_out = tried, left_out | {part.name}
@@ -211,13 +211,13 @@ def _fitted_without(
 
 
 def _settled(
-    comparison: Comparison, model: RobotModel, left_out: frozenset[str], best: Candidate, cache: StepCache
+    comparison: Comparison, model: RobotModel, left_out: frozenset[str], best: Candidate, cache: StepCache, usual: bool
 ) -> Candidate:
     """A model without some parts, fitted from where another one stands; further while it seems to miss them."""
     tried = _fitted_without(comparison, model, left_out, best.standing, cache)
     for time in range(comparison.settlings):
         growth, error = worse_by(best, tried)
-        missed = is_missed(growth, error, len(tried.losses))
+        missed = is_missed(growth, error, len(tried.losses), usual)
         if not missed or tried.standing.converged or growth > HOPELESS:
             break
         tried = _fitted_without(comparison, model, left_out, tried.standing, cache, f", settling {time + 1}")
@@ -247,7 +247,7 @@ def _delay_for_ramp(
     without = model.without(neither, robot)
     prompt = cache("neither dead time nor ramp", partial(comparison.candidate, without, late.standing))
     missed, its_error = worse_by(late, prompt)
-    if not is_missed(missed, its_error, len(late.losses)):
+    if not is_missed(missed, its_error, len(late.losses), usual=True):
         return best, left_out, decisions
     changed = {DELAY: PartDecision(DELAY, True, missed, its_error), RAMP: PartDecision(RAMP, False, growth, error)}
     return late, exchanged, [changed.get(item.name, item) for item in decisions]

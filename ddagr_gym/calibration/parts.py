@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 
-from ddagr_gym.diagnosis.answer.drivetrain import PART_TITLES
+from ddagr_gym.diagnosis.answer.drivetrain import HARD, PART_DRIVES, PART_TITLES
 from ddagr_gym.identification.parameters import ModelParameter, robot_parameters
 from ddagr_gym.parameters import Drivetrain, Robot
 from ddagr_gym.physics import layout
@@ -59,6 +59,7 @@ class Part:
         parameters: names of its parameters.
         helps: drive from which they can be identified, for a reader.
         needs: names of parts without any of which it does nothing; empty where it needs none.
+        usual: whether nearly every robot has it: it stays unless forecasts without it are as good.
     """
 
     name: str
@@ -66,13 +67,12 @@ class Part:
     parameters: tuple[str, ...]
     helps: str
     needs: tuple[str, ...] = ()
+    usual: bool = False
 
 
-_STEPS = "steps of the commands held for 3 s or more, with wheel speeds recorded at 10 Hz or more"
-_FULL = "straight pieces at the highest speed that the robot takes, commanded beyond it"
-_HARD = "full reversals of the commands on firm ground, with wheel speeds recorded at 10 Hz or more"
-_SPINS = "turns on the spot on loose ground at the highest yaw rate that the robot takes, commanded beyond it"
-_TURNS = "turns on the spot and wide arcs on firm ground, each held for 3 s or more"
+def _of_drivetrain(name: str, parameters: tuple[str, ...], needs: tuple[str, ...] = (), usual: bool = False) -> Part:
+    return Part(name, PART_TITLES[name], parameters, PART_DRIVES[name], needs, usual)
+
 
 PARTS = (
     Part(
@@ -81,37 +81,26 @@ PARTS = (
         ("gyro_scale",),
         "a drive with poses in which the robot turns by several revolutions to both sides",
     ),
-    Part("inertia", "mass and yaw inertia", ("mass", "yaw_inertia"), f"quick reversals of turning: {_HARD}"),
+    Part("inertia", "mass and yaw inertia", ("mass", "yaw_inertia"), f"quick reversals of turning: {HARD}"),
     Part(
         "geometry",
         "wheels and their places",
         ("half_wheelbase", "half_track", "half_width", "outer_radius"),
         "slow straight pieces and slow arcs to both sides on firm ground, with poses",
     ),
-    Part("no_load_speed", PART_TITLES["no_load_speed"], ("no_load_speed",), _FULL),
-    Part("torque_limit", PART_TITLES["torque_limit"], ("acceleration_limit",), _HARD),
-    Part("friction", PART_TITLES["friction"], ("viscous_rate", "coulomb_friction"), f"coasting, and {_FULL}"),
-    Part("integral_limit", PART_TITLES["integral_limit"], ("integral_limit",), f"{_TURNS}, and {_FULL}", ("integral",)),
-    Part(
-        "limit_imbalance",
-        PART_TITLES["limit_imbalance"],
-        ("limit_imbalance",),
-        _HARD,
-        ("torque_limit", "no_load_speed", "power_limit"),
-    ),
-    Part("command_ramp", PART_TITLES["command_ramp"], ("command_ramp",), _HARD),
-    Part("power_limit", PART_TITLES["power_limit"], ("power_limit",), _FULL),
-    Part("turning_limit", PART_TITLES["turning_limit"], ("turning_limit",), _SPINS),
-    Part("speed_limit", PART_TITLES["speed_limit"], ("maximum_wheel_speed",), _FULL),
-    Part("integral", PART_TITLES["integral"], ("integral_rate",), _TURNS),
-    Part("load", PART_TITLES["load"], ("load_compliance",), _TURNS),
-    Part("speed_loop", PART_TITLES["speed_loop"], ("motor_rate",), _STEPS),
-    Part(
-        "command_delay",
-        PART_TITLES["command_delay"],
-        ("command_delay",),
-        f"{_STEPS}, out of steady driving and with the time before each step recorded",
-    ),
+    _of_drivetrain("no_load_speed", ("no_load_speed",)),
+    _of_drivetrain("torque_limit", ("acceleration_limit",)),
+    _of_drivetrain("friction", ("viscous_rate", "coulomb_friction")),
+    _of_drivetrain("integral_limit", ("integral_limit",), ("integral",)),
+    _of_drivetrain("limit_imbalance", ("limit_imbalance",), ("torque_limit", "no_load_speed", "power_limit")),
+    _of_drivetrain("command_ramp", ("command_ramp",)),
+    _of_drivetrain("power_limit", ("power_limit",)),
+    _of_drivetrain("turning_limit", ("turning_limit",)),
+    _of_drivetrain("speed_limit", ("maximum_wheel_speed",)),
+    _of_drivetrain("integral", ("integral_rate",)),
+    _of_drivetrain("load", ("load_compliance",)),
+    _of_drivetrain("speed_loop", ("motor_rate",)),
+    _of_drivetrain("command_delay", ("command_delay",), usual=True),
 )
 """In the order in which their removal is tried: what the fewest robots need comes first."""
 
@@ -137,6 +126,11 @@ def idle_parts(left_out: frozenset[str], robot: Robot) -> frozenset[str]:
     stated |= {"integral"} if robot.drivetrain.integral_rate > 0.0 else set()
     absent = left_out - stated
     return frozenset(part.name for part in PARTS if part.needs and set(part.needs) <= absent) - left_out
+
+
+def part_named(name: str) -> Part:
+    """Part of a name."""
+    return next(part for part in PARTS if part.name == name)
 
 
 def part_of(parameter: str) -> Part:

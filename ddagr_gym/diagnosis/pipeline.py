@@ -24,6 +24,7 @@ from ddagr_gym.diagnosis.localisation.mismatch_traces import trace_mismatch
 from ddagr_gym.diagnosis.localisation.repeat_spans import where_readings_repeat
 from ddagr_gym.diagnosis.mid_drive.again import onsets_of_names, search_in_parts
 from ddagr_gym.diagnosis.mid_drive.onsets import with_onsets
+from ddagr_gym.diagnosis.planning.drivetrain_drive import drivetrain_drive
 from ddagr_gym.diagnosis.planning.next_drive import plan_next_drive
 from ddagr_gym.diagnosis.preprocessing.data_checks import data_doubts
 from ddagr_gym.diagnosis.preprocessing.session import DiagnosisSession, Progress, be_silent, prepare
@@ -180,6 +181,7 @@ def diagnose(
         made = _beside_drivetrain(session, standing(found, session.gates), nominal, steps)
         answer = replace(
             made.diagnosis,
+            next_drive=None if names_only else drivetrain_drive(nominal.answer),
             checks=checks,
             robot=robot.name,
             soil=soil_name,

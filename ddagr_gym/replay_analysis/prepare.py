@@ -14,6 +14,9 @@ from ddagr_gym.identification.recording_noise import RecordingNoise, dead_channe
 from ddagr_gym.identification.timing_repair import aligned_poses, bridged
 from ddagr_gym.identification.windows import WindowSet, cut_runs, cut_windows
 from ddagr_gym.parameters import Robot
+from ddagr_gym.physics.effects import Effect
+from ddagr_gym.physics.effects.pose_latency import PoseLatency
+from ddagr_gym.physics.effects.sensor_hold import SensorHold
 from ddagr_gym.recordings.schema import Recording, RobotGeometry
 from ddagr_gym.replay_analysis.fitting import LATEST_CLOCK
 
@@ -85,7 +88,13 @@ class Prepared:
         )  # fmt: skip
 
 
-def prepare(recordings: Sequence[Recording], robot: Robot, rng: np.random.Generator, swapped: bool = False) -> Prepared:
+def prepare(
+    recordings: Sequence[Recording],
+    robot: Robot,
+    rng: np.random.Generator,
+    swapped: bool = False,
+    effects: Sequence[Effect] = (),
+) -> Prepared:
     """Correct clocks, judge noise, split.
 
     Args:
@@ -93,6 +102,8 @@ def prepare(recordings: Sequence[Recording], robot: Robot, rng: np.random.Genera
         robot: that drove.
         rng: for the interval of the poses' lateness.
         swapped: let training and judging part change their roles.
+        effects: of the simulator; a lateness of the poses among them is taken from the recordings where they do not
+            tell their own (see :func:`simulated_effects`).
 
     Raises:
         InputError: a recording of another robot, or without time.
@@ -106,7 +117,9 @@ def prepare(recordings: Sequence[Recording], robot: Robot, rng: np.random.Genera
         if not np.isfinite(recording.period):
             raise InputError(f"{recording.meta.source} has {len(recording)} rows: a replay needs a drive.")
     noise = tuple(recording_noise(recording, rng) for recording in recordings)
-    even = [aligned_poses(bridged(r), n.pose_lateness) for r, n in zip(recordings, noise, strict=True)]
+    known = sum(effect.latency for effect in effects if isinstance(effect, PoseLatency))
+    late = [item.pose_lateness or known for item in noise]
+    even = [aligned_poses(bridged(r), time) for r, time in zip(recordings, late, strict=True)]
     dead = sorted({name for recording in recordings for name in dead_channels(recording)})
     return Prepared(
         tuple(even),
@@ -114,19 +127,33 @@ def prepare(recordings: Sequence[Recording], robot: Robot, rng: np.random.Genera
         tuple(split_recording(recording, swapped) for recording in even),
         RobotGeometry.of(robot),
         tuple(dead),
-        tuple(_notes(recordings, noise, dead)),
+        tuple(_notes(recordings, noise, late, dead)),
     )
 
 
-def _notes(recordings: Sequence[Recording], noise: Sequence[RecordingNoise], dead: Sequence[str]) -> Iterator[str]:
+def simulated_effects(effects: Sequence[Effect]) -> tuple[Effect, ...]:
+    """Effects that the simulator has in a replay: all but those of when readings come.
+
+    Poses that come late are moved back in the recordings instead: a window begins with its first readings, so that a
+    simulated lateness would stand still for its own length first. Held readings count when they are new; when that is
+    a simulated hold does not know.
+    """
+    return tuple(effect for effect in effects if not isinstance(effect, PoseLatency | SensorHold))
+
+
+def _notes(
+    recordings: Sequence[Recording], noise: Sequence[RecordingNoise], late: Sequence[float], dead: Sequence[str]
+) -> Iterator[str]:
     for name in dead:
         yield f"{name} never changes and was left out of every fit: stuck, or zeros logged as data."
-    for recording, item in zip(recordings, noise, strict=True):
+    for recording, item, moved in zip(recordings, noise, late, strict=True):
         if item.opposed:
             yield f"{recording.meta.source}: gyro and poses turn opposite ways, see ddagr check; nothing was corrected."
         if item.pose_lateness > 0.0:
             scatter = "" if item.opposed else f"; their lateness scatters by about {item.pose_jitter:.2f} s"
-            late = f"{item.pose_lateness:.2f} s behind the gyro and were moved back{scatter}"
-            yield f"{recording.meta.source}: poses come {late}."
+            how = f"{item.pose_lateness:.2f} s behind the gyro and were moved back{scatter}"
+            yield f"{recording.meta.source}: poses come {how}."
+        elif moved > 0.0:
+            yield f"{recording.meta.source}: poses were moved back by {moved:.2f} s, as an effect says."
         for sentence in recording.validate():
             yield f"{recording.meta.source}: {sentence}"

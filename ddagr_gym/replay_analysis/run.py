@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.replay_analysis.drive_mode import STEPS, DriveModeResult, ReplaySettings, replay_drive_mode
-from ddagr_gym.replay_analysis.prepare import DRIVES, Prepared, prepare
+from ddagr_gym.replay_analysis.prepare import DRIVES, Prepared, prepare, simulated_effects
 from ddagr_gym.replay_analysis.report import SCHEMA, SCHEMA_VERSION, ReplayReport, RunReport
 
 SHORTEST_WINDOW = 0.2
@@ -70,11 +70,12 @@ def replay_run(
     if not SHORTEST_WINDOW <= settings.window <= LONGEST_WINDOW:
         raise InputError(f"the window is {settings.window:g} s: give {SHORTEST_WINDOW:g} to {LONGEST_WINDOW:g} s.")
     before = time.process_time()
-    prepared = prepare(recordings, robot, np.random.default_rng(settings.seed), settings.swapped)
+    prepared = prepare(recordings, robot, np.random.default_rng(settings.seed), settings.swapped, settings.effects)
+    simulated = replace(settings, effects=simulated_effects(settings.effects))
     found: dict[str, DriveModeResult] = {}
     values: dict[str, float] = {}
     for drive_by in reversed(DRIVES):
-        replayed = replay_drive_mode(prepared, robot, soil, drive_by, settings, values, advance)
+        replayed = replay_drive_mode(prepared, robot, soil, drive_by, simulated, values, advance)
         if replayed is not None:
             found[drive_by], values = replayed
     if not found:

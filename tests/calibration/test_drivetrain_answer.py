@@ -87,7 +87,9 @@ def test_errors_stand_side_by_side_and_what_is_left_is_that_of_the_wheels():
 def test_the_gain_of_a_part_is_what_forecasts_lose_without_it_and_its_gate_what_chance_would_lose():
     delay, load = drivetrain_findings(calibration())
     assert (delay.name, load.name) == ("command_delay", "load")
-    assert (delay.gain, delay.gate) == (0.2, pytest.approx(surely_above(2) * 0.05))
+    # nearly every robot has a dead time: what matters is enough there
+    assert (delay.gain, delay.gate) == (0.2, LEAST_GROWTH)
+    assert (load.gain, load.gate) == (0.5, pytest.approx(surely_above(2) * 0.1))
     assert delay.parameters["command_delay"].interval == (0.1, 0.3)
 
 

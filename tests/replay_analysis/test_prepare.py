@@ -5,8 +5,11 @@ import pytest
 
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.data_split import held_out, training
+from ddagr_gym.physics.effects.gyro_bias import GyroBias
+from ddagr_gym.physics.effects.pose_latency import PoseLatency
+from ddagr_gym.physics.effects.sensor_hold import SensorHold
 from ddagr_gym.presets import get_robot
-from ddagr_gym.replay_analysis.prepare import prepare
+from ddagr_gym.replay_analysis.prepare import prepare, simulated_effects
 
 
 def prepared(recordings, robot, **more):
@@ -84,3 +87,17 @@ def test_the_track_is_fitted_to_poses_by_the_poses_noise_where_the_gyro_is_dead(
     assert "yaw_rate" in found.dead
     seen = found.windows(2.0, "encoders", part=training)
     assert fit_baselines(found, robot, "encoders", seen).effective_track.track_ratio == pytest.approx(ratio, rel=0.05)
+
+
+def test_a_lateness_that_an_effect_says_is_taken_from_the_recordings_once(make_recording, robot):
+    t = np.arange(0.0, 100.0, 0.05)
+    # a drive that only goes straight does not tell how late its poses are
+    recording = make_recording(pose_x=0.2 * (t - 0.4), pose_y=np.zeros(t.size), pose_yaw=np.zeros(t.size))
+    late = PoseLatency(0.4)
+    found = prepared([recording], robot, effects=(late, GyroBias(0.01)))
+    assert found.noise[0].pose_lateness == 0.0
+    assert any("moved back by 0.40 s, as an effect says" in note for note in found.notes)
+    moved = found.recordings[0]["pose_x"]
+    known = np.isfinite(moved)
+    np.testing.assert_allclose(moved[known], 0.2 * t[known], atol=1e-9)
+    assert simulated_effects((late, SensorHold(0.2), GyroBias(0.01))) == (GyroBias(0.01),)

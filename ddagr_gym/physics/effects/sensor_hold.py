@@ -7,24 +7,33 @@ from ddagr_gym.physics.effects.base import DriveExtent, Effect, Vector, shape, s
 from ddagr_gym.physics.layout import NOISE_CHANNELS, POINT_READINGS, READING, SAMPLE_PERIOD, TIME
 
 _STARTED = NOISE_CHANNELS
+_AGE = _STARTED + 1  # samples since each reading was new
 _SENSOR_OF_READING = (0, 0, 1, 2, 2, 3, 3, 3)  # accelerometer, gyro, encoders, pose, in the order of layout.READINGS
 _PROBED_DURATIONS = (0.05, 0.25)  # [s], ours: as of sensors at 20 Hz and at 4 Hz
 
 
 def hold_readings(row: Vector, parameters: Vector, memory: Vector) -> None:
-    """Repeat the last readings of the chosen sensors while a hold lasts; a NaN (no new fix) stays one."""
+    """Repeat the last readings of the chosen sensors while a hold lasts; a NaN (no new fix) stays one.
+
+    Without intervals a reading is held from when it was new: a slow sensor's next one may come between two samples of
+    the others.
+    """
     period = row[SAMPLE_PERIOD]
     repeats = math.floor(parameters[0] / period + 0.5)
-    cycle = max(math.floor(parameters[1] / period + 0.5), repeats + 1.0)
+    cycle = math.floor(parameters[1] / period + 0.5)
     since = math.floor(row[TIME] / period + 0.5) - math.floor(parameters[2] / period + 0.5)
-    holding = since >= 0.0 and 0.0 < since % cycle <= repeats
+    at_intervals = cycle > repeats
     for j in range(NOISE_CHANNELS):
+        memory[_AGE + j] += 1.0
+        place = since % cycle if at_intervals else memory[_AGE + j]
         known = memory[_STARTED] == 1.0 and not math.isnan(memory[j])
-        if holding and known and parameters[3 + _SENSOR_OF_READING[j]] >= 0.5:
+        holding = known and since > 0.0 and 0.0 < place <= repeats
+        if holding and parameters[3 + _SENSOR_OF_READING[j]] >= 0.5:
             if not math.isnan(row[READING + j]):
                 row[READING + j] = memory[j]
         elif not (known and math.isnan(row[READING + j])):
             memory[j] = row[READING + j]
+            memory[_AGE + j] = 0.0
     memory[_STARTED] = 1.0
 
 

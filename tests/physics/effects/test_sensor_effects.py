@@ -188,3 +188,14 @@ def test_held_pose_repeats_the_last_fix_and_keeps_its_gaps(drive, turns, ideal_s
     fixes = held[np.isfinite(held)]
     assert np.unique(fixes).size < 0.6 * fixes.size
     assert set(fixes) <= set(plain[np.isfinite(plain)])
+
+
+@pytest.mark.parametrize(("share", "passed"), [(0.9, 1), (1.5, 2), (2.5, 3)])
+def test_of_a_slow_receiver_every_fix_after_the_hold_is_new(drive, turns, share, passed):
+    rate = 10.0
+    sensors = Sensors(pose=PoseReceiver(rate=rate))
+    effect = f"sensor_hold={share / rate},accelerometer=0,gyro=0,encoders=0"
+    held, plain = (drive(effects, turns, sensors=sensors)["pose_x"] for effects in ([effect], ()))
+    held, plain = (values[np.isfinite(values)] for values in (held, plain))
+    first = np.arange(len(plain)) // passed * passed
+    np.testing.assert_array_equal(held, plain[first])
