@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
-from ddagr_gym.errors import InputError
+from ddagr_gym.errors import InputError, unknown_name
 from ddagr_gym.validated import Validated, bounded, check_number
 
 STANDARD_GRAVITY = 9.80665
@@ -119,6 +119,13 @@ class Drivetrain(Validated):
     turning_limit: float = bounded("rad/s", 0.0, 1e3, default=1e3, open_low=True)
 
 
+UNCERTAIN = (
+    "mass", "yaw_inertia", "half_wheelbase", "half_track", "motor_rate", "maximum_wheel_speed", "half_width",
+    "outer_radius",
+)  # fmt: skip
+"""Fields of a robot and its wheels that may be uncertain; those of its drivetrain may, too."""
+
+
 @dataclass(frozen=True)
 class Robot(Validated):
     """Four-wheel skid-steer robot. Wheels 1 front right, 2 front left, 3 rear right, 4 rear left.
@@ -138,7 +145,8 @@ class Robot(Validated):
         drivetrain: what else stands between commands and wheels; nothing by default.
         side_slip_lead: how far ahead of its hub, in its direction of travel, a wheel's sideways velocity counts [m]
             (theory: wheel model, eq. (1a)).
-        standard_deviations: uncertainty of fields by name, in their units; absent means taken as exact.
+        standard_deviations: uncertainty of fields by name, in their units, of those in :data:`UNCERTAIN` and of the
+            drivetrain; absent means taken as exact.
         source: where the values come from.
     """
 
@@ -163,7 +171,10 @@ class Robot(Validated):
             object.__setattr__(self, "wheels", tuple(self.wheels) * 4)
         if len(self.wheels) != 4:
             raise InputError(f"Robot.wheels has {len(self.wheels)} wheels: give one wheel for all, or four.")
+        uncertain = (*UNCERTAIN, *(item.name for item in fields(Drivetrain)))
         for name, deviation in self.standard_deviations.items():
+            if name not in uncertain:
+                raise unknown_name("entry of standard_deviations", name, uncertain)
             check_number(f"Robot.standard_deviations[{name!r}]", deviation, _DEVIATION)
         x, y, height = self.centre_of_mass
         if abs(x) >= self.half_wheelbase or abs(y) >= self.half_track or height < 0:

@@ -1,7 +1,7 @@
 """Parameter classes: valid presets pass, every bad value is one sentence that names field, value and remedy."""
 
 import math
-from dataclasses import FrozenInstanceError, fields
+from dataclasses import FrozenInstanceError, fields, replace
 
 import numpy as np
 import pytest
@@ -151,3 +151,10 @@ def test_wheel_positions_follow_the_numbering():
 def test_every_physical_field_states_its_unit():
     for kind in (TorusWheel, Soil, Imu, WheelEncoder, PoseReceiver):
         assert all("unit" in field.metadata for field in fields(kind)), kind
+
+
+def test_what_cannot_be_uncertain_is_no_standard_deviation():
+    refusal = _refusal(ROBOT, standard_deviations={"mas": 1.0})
+    assert refusal == "unknown entry of standard_deviations 'mas': did you mean 'mass'."
+    known = replace(ROBOT, standard_deviations={"half_width": 0.01, "command_delay": 0.1})
+    assert set(known.standard_deviations) == {"half_width", "command_delay"}

@@ -23,6 +23,14 @@ _KEPT = frozenset(
 """Shapes that a diagnosis leaves at their defaults: free, they let one effect stand for another (a payload that is not
 at the centre is a centre of mass offset too), and drives hardly show them."""
 
+
+
+def at_kept_shapes(effect: Effect) -> Effect:
+    """An effect with the shapes that fits leave alone at their defaults."""
+    kept = {name: effect.parameter(name).default for kind, name in _KEPT if kind == effect.name}
+    return effect.with_values(**kept) if kept else effect
+
+
 _NEVER = 1e5
 """Onset [s] at which an effect holds always, or never."""
 

@@ -114,13 +114,21 @@ def test_zeros_of_a_robot_that_often_stops_are_no_repeats(rate: int) -> None:
 def test_readings_that_the_map_left_out_count_as_held() -> None:
     held = drive({"encoder_right": 5, "encoder_left": 5})
     clean = without_repeats(held, find_repeated_readings([held]))
-    by_map = clean.with_meta(held={"encoder_right": 0.1, "encoder_left": 0.1})
+    by_map = clean.with_meta(held={"encoder_right": 0.0, "encoder_left": 0.0})
     assert find_repeated_readings([by_map]) == ()
     assert readings_left_out([clean]) == ()
     (found,) = readings_left_out([by_map])
     assert found.sensor == "encoders"
     assert found.share == pytest.approx(0.8, abs=0.02)
     assert found.duration == pytest.approx(4 * PERIOD, rel=0.01)
+
+
+@pytest.mark.parametrize(("stated", "named"), [(0.1, False), (0.08, False), (0.05, True)])
+def test_a_sensor_that_keeps_the_period_of_its_map_is_known_to_be_slow(stated: float, named: bool) -> None:
+    held = drive({"encoder_right": 5, "encoder_left": 5})
+    clean = without_repeats(held, find_repeated_readings([held]))
+    by_map = clean.with_meta(held={"encoder_right": stated, "encoder_left": stated})
+    assert bool(readings_left_out([by_map])) is named
 
 
 def test_a_map_that_leaves_out_hardly_anything_holds_nothing() -> None:
