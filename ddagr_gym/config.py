@@ -200,7 +200,7 @@ def _has_default(item: dataclasses.Field[Any]) -> bool:
 
 def _closest(name: str, known: Mapping[str, Any]) -> str:
     close = difflib.get_close_matches(name, known, n=3, cutoff=0.4)
-    return f"did you mean {', '.join(map(repr, close))}?" if close else f"known are {', '.join(known)}"
+    return f"did you mean {', '.join(map(repr, close))}" if close else f"known are {', '.join(known)}"
 
 
 def _convert_union(value: Any, members: tuple[Any, ...], place: str) -> Any:

@@ -14,18 +14,19 @@ class InputWarning(UserWarning):
     """Input that is used as it is, though something about it makes results doubtful. Commands print it as one line."""
 
 
-def unknown_name(kind: str, name: object, known: Iterable[str]) -> InputError:
+def unknown_name(kind: str, name: object, known: Iterable[str], where: str = "") -> InputError:
     """Error for a name that is not in a registry, listing the closest ones.
 
     Args:
         kind: what the name stands for, singular ("soil", "robot").
         name: the offending value.
         known: the valid names.
+        where: how to see all of them, as the rest of the sentence.
     """
     names = sorted(known)
     close = difflib.get_close_matches(str(name), names, n=3, cutoff=0.4)
     hint = f"did you mean {', '.join(repr(c) for c in close)}" if close else f"choose one of {', '.join(names)}"
-    return InputError(f"unknown {kind} {name!r}: {hint}.")
+    return InputError(f"unknown {kind} {name!r}: {hint}{f'; {where}' if where else ''}.")
 
 
 def at_least(**bounds: tuple[float | None, float]) -> None:

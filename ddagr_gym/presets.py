@@ -143,7 +143,7 @@ def get_robot(name: str) -> Robot:
     if is_file(name):
         return load_config(name, Robot)
     if name not in _ROBOTS:
-        raise unknown_name("robot", name, _ROBOTS)
+        raise unknown_name("robot", name, _ROBOTS, "`ddagr robots` lists all")
     stored = _robot(name)
     return replace(stored, standard_deviations=dict(stored.standard_deviations))
 
@@ -157,5 +157,5 @@ def get_soil(name: str) -> Soil:
     if is_file(name):
         return load_config(name, Soil)
     if name not in soil_names():
-        raise unknown_name("soil", name, soil_names())
+        raise unknown_name("soil", name, soil_names(), "`ddagr soils` lists all")
     return _SOILS[name][0]() if name in _SOILS else _published(name)

@@ -348,13 +348,13 @@ def _gates(given: ThresholdsLike | None, nominal: Nominal, soil_uncertainty: flo
 
     What a simulator lacks is not judged by real drives of which it may lack the same.
     """
-    from ddagr_gym.diagnosis.gates.threshold_files import default_thresholds
+    from ddagr_gym.diagnosis.gates.threshold_files import default_thresholds, shipped_thresholds
 
-    found = thresholds_from(given, nominal.robot, nominal.soil_name, soil_uncertainty)
-    if found is not None and (given is not None or not found.of_ordinary_drives):
-        return found
+    shipped = shipped_thresholds(nominal.robot.name) if given is None else None
     simulated = default_thresholds(_SIMULATED)
-    return thresholds_from(simulated, nominal.robot, nominal.soil_name, soil_uncertainty) or simulated
+    if given is None:
+        given = simulated if shipped is None or shipped.of_ordinary_drives else shipped
+    return thresholds_from(given, nominal.robot, nominal.soil_name, soil_uncertainty) or simulated
 
 
 def _window(window: float | None, gates: Thresholds) -> float:

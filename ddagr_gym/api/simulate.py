@@ -184,6 +184,8 @@ def _commands(manoeuvre: Any, rate: float) -> tuple[Any, str]:
 
 
 def _sensors(rate: float, pose_rate: float, noise: bool) -> Sensors:
+    if pose_rate > rate:
+        raise InputError(f"pose_rate is {pose_rate:g} Hz: give at most the {rate:g} Hz of the other sensors.")
     imu, encoder, pose = Imu(sample_rate=rate), WheelEncoder(), PoseReceiver(rate=pose_rate)
     if not noise:
         imu = replace(imu, accelerometer_noise=0.0, gyro_noise=0.0, accelerometer_resolution=0.0, gyro_resolution=0.0)

@@ -50,7 +50,7 @@ def run(arguments: Arguments) -> None:
     import ddagr_gym
 
     if (arguments.diagnosis is None) == (not arguments.rival):
-        raise InputError("give either a diagnosis or some --rival name=size, not both.")
+        raise InputError("give either the folder of a diagnosis, or some --rival name=size.")
     result = ddagr_gym.next_drive(
         arguments.rival if arguments.diagnosis is None else arguments.diagnosis,
         arguments.robot,

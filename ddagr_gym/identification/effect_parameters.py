@@ -24,7 +24,6 @@ _KEPT = frozenset(
 at the centre is a centre of mass offset too), and drives hardly show them."""
 
 
-
 def at_kept_shapes(effect: Effect) -> Effect:
     """An effect with the shapes that fits leave alone at their defaults."""
     kept = {name: effect.parameter(name).default for kind, name in _KEPT if kind == effect.name}

@@ -106,7 +106,7 @@ def save_drive(path: Path, columns: Mapping[str, NDArray[np.float64]], robot: Ro
         robot: that drove.
     """
     if path.suffix.lower() == ".parquet":
-        save_parquet(Recording.from_columns(columns, robot), path)
+        save_parquet(Recording.from_columns(columns, robot, source=path.name), path)
         return
     with atomic_path(path) as temporary:
         table = np.column_stack(list(columns.values()))

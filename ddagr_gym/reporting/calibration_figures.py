@@ -168,6 +168,8 @@ def _draw_error(axis: Any, place: float, item: ForecastError) -> None:
 
 def spectrum_figure(calibration: Calibration) -> Figure:
     """Spectra of the residuals on left-out drives, before and after."""
+    from matplotlib.ticker import LogLocator, NullFormatter
+
     figure = blank(2.6, 2.0 * _WIDTH)
     panels = figure.subplots(1, max(len(calibration.spectra), 1), squeeze=False)[0]
     for axis, item in zip(panels, calibration.spectra, strict=False):
@@ -176,6 +178,10 @@ def spectrum_figure(calibration: Calibration) -> Figure:
             axis.loglog(item.frequency, density, color=colour, ls=line, label=MODEL_LABELS[model])
         axis.set_title(item.channel.replace("_", " "))
         axis.set_xlabel("frequency [Hz]")
+        axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.xaxis.set_major_formatter("{x:g}")
+        for scale in (axis.xaxis, axis.yaxis):
+            scale.set_minor_formatter(NullFormatter())
     panels[0].set_ylabel("residual [(rad/s)²/Hz]")
     panels[0].legend()
     return figure

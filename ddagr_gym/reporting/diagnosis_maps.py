@@ -134,7 +134,7 @@ def _forces(evidence: Evidence, cells: Array, longest: float, title: str) -> Fig
                 x[chosen], y[chosen], (force_x * shorten)[chosen], (force_y * shorten)[chosen], color=colour,
                 angles="xy", scale_units="xy", scale=longest / reach, width=width, zorder=3,
             )  # fmt: skip
-            axes.quiverkey(arrows, 0.86, 1.05, key, f"{key:g} N", labelpos="E") if colour == BEFORE else None
+            axes.quiverkey(arrows, 0.8, 0.05, key, f"{key:g} N", labelpos="E") if colour == BEFORE else None
     axes.set_aspect("equal", adjustable="datalim")
     axes.set(xlabel="x [m]", ylabel="y [m]", title=title)
     return figure

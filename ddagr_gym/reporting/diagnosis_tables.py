@@ -284,11 +284,11 @@ def next_drive(item: NextDrivePlan | None) -> dict[str, Any] | None:
     if item is None:
         return None
     return {
-        "manoeuvre": (item.manoeuvre or "No drive of the standard ones").replace("_", " "),
+        "manoeuvre": item.manoeuvre or "No drive of the standard ones",
         "why": item.why,
         "separates": [" from ".join(in_sentence(name) for name in pair) for pair in item.separates],
         "gain_rate": number(item.power, 2) if item.manoeuvre else "",
-        "alternatives": [other.manoeuvre.replace("_", " ") for other in item.alternatives],
+        "alternatives": [other.manoeuvre for other in item.alternatives],
     }
 
 

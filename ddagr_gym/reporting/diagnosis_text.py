@@ -45,7 +45,7 @@ def outcome_text(diagnosis: Diagnosis) -> str:
     if diagnosis.fit is not None:
         parts += _fit_texts(diagnosis.fit)
     if diagnosis.next_drive is not None:
-        manoeuvre = diagnosis.next_drive.manoeuvre.replace("_", " ")
+        manoeuvre = diagnosis.next_drive.manoeuvre
         parts.append(f"Next drive: {manoeuvre or 'none'}. {diagnosis.next_drive.why}")
     return "\n\n".join(parts)
 

@@ -85,7 +85,7 @@ def test_the_answer_comes_first_and_every_section_is_there(page):
     assert headings[1] == "The recordings themselves"
     assert len(headings) == len(set(headings)) == 14
     for words in (
-        "slopes 3.7 ± 0.3 degrees, rising towards 32 ± 3 degrees", "uphill", "71 %", "square both ways",
+        "slopes 3.7 ± 0.3 degrees, rising towards 32 ± 3 degrees", "uphill", "71 %", "square_both_ways",
         "sloping ground from accelerometer bias", "over the closest other explanation by 0.97",
         "0.57 degrees", "none, however large", "120 null drives", "f" * 64,
         "p = 0.0040", "85 % to 95 %",

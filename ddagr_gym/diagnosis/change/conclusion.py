@@ -34,6 +34,7 @@ from ddagr_gym.identification.misfit import channel_misfit
 from ddagr_gym.identification.problem import Problem
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.effects.gyro_sign import GyroSign
+from ddagr_gym.physics.effects.sensor_hold import SensorHold
 from ddagr_gym.physics.layout import POINT_READINGS
 from ddagr_gym.version import __version__
 
@@ -220,11 +221,16 @@ def _change(
         shifts,
         parameters,
         hidden,
-        {**ordinary.comparison(ground).unnamed, **NOT_COMPARED},
+        {**ordinary.comparison(ground).unnamed, **_not_compared(ordinary)},
         BEFORE if ordinary.given else CALIBRATION,
         certified,
         _channel_shifts(first, last),
     )
+
+
+def _not_compared(ordinary: OrdinaryRobot) -> Mapping[str, str]:
+    """Effects without a size that drives share; readings that repeat longer than in drives from before are named."""
+    return {name: why for name, why in NOT_COMPARED.items() if not (ordinary.given and name == SensorHold.name)}
 
 
 def _channel_shifts(first: Model, last: Model) -> tuple[ChannelShift, ...]:

@@ -130,8 +130,8 @@ class Origin:
             return ""
         options = f"--robot {robot} --soil {soil} --soil-uncertainty {soil_uncertainty:g}"
         return (
-            f"the thresholds were made for {', '.join(others)}: make others with `ddagr null-bank RUN... {options}` "
-            "and give them as --thresholds."
+            f"the thresholds were made for {', '.join(others)}: make others with `ddagr null-bank RUN... {options} "
+            "--output BANK.json` and give them as --thresholds BANK.json."
         )
 
 

