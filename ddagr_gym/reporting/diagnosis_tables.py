@@ -42,7 +42,7 @@ def _of_drive(diagnosis: Diagnosis, seconds: float) -> str:
     total, recordings = sum(item.seconds for item in diagnosis.data), _recordings(len(diagnosis.recordings))
     if seconds > _NEARLY_ALL * total:
         return f"of drive in {recordings}"
-    return f"compared, spread over {total:.0f} s in {recordings}"
+    return f"compared, in windows evenly chosen from {total:.0f} s in {recordings}"
 
 
 _NEARLY_ALL = 0.7

@@ -21,7 +21,7 @@ from ddagr_gym.diagnosis.change.model import MOST_NEAR, Model, farthest
 from ddagr_gym.diagnosis.change.ordinary import Comparison, Scores
 from ddagr_gym.diagnosis.change.shifts import Shift, explained, shift_of, sizes_of
 from ddagr_gym.diagnosis.change.soil_place import patch_of_change
-from ddagr_gym.diagnosis.search.initial_guess import first_guess, same_lateness, with_whole_lag
+from ddagr_gym.diagnosis.search.initial_guess import first_guess, of_usual_shape, same_lateness, with_whole_lag
 from ddagr_gym.diagnosis.search.scan import drive_extent
 from ddagr_gym.diagnosis.search.scanned_model import Rival
 from ddagr_gym.identification.fit_numerics import FIELD_TOLERANCE
@@ -174,10 +174,10 @@ def _refitted(
 
 
 def _to_the_end(problem: Problem, start: Point) -> Fitted:
-    """The fit from a start, and from where it ends with the lag of motors whole, where that explains more."""
+    """The fit from a start, and from where it ends with the lag of motors whole or a load's usual hitch; the best."""
     fitted = _fit(problem, start)
-    whole = with_whole_lag(problem, fitted.point)
-    return fitted if whole is None else min(fitted, _fit(problem, whole), key=lambda item: item.cost)
+    others = (with_whole_lag(problem, fitted.point), of_usual_shape(fitted.point))
+    return min([fitted, *(_fit(problem, point) for point in others if point)], key=lambda item: item.cost)
 
 
 def _fit(problem: Problem, start: Point) -> Fitted:

@@ -17,16 +17,14 @@ from ddagr_gym.diagnosis.search.equivalents import (
     with_turning_centre,
 )
 from ddagr_gym.diagnosis.search.gains import Gain
-from ddagr_gym.diagnosis.search.initial_guess import first_guess, nuisance_answer, turned_to_agree
+from ddagr_gym.diagnosis.search.initial_guess import first_guess, nuisance_answer, of_usual_shape, turned_to_agree
 from ddagr_gym.diagnosis.search.inner_products import Terms
 from ddagr_gym.diagnosis.search.scan import drive_extent
 from ddagr_gym.diagnosis.search.scanned_model import Rival, ScannedModel, rival_of, scan_model
 from ddagr_gym.diagnosis.search.starting_models import FAR_OFF
-from ddagr_gym.identification.effect_parameters import at_kept_shapes
 from ddagr_gym.identification.gauss_newton import DAMPING, Fitted, cost_of, fit
 from ddagr_gym.identification.problem import Point, Problem
 from ddagr_gym.identification.size_prior import implausibility
-from ddagr_gym.physics.effects.towed_drag import TowedDrag
 
 _HOPELESS = 0.4
 """Share of the best linear gain below which no joint refit is tried (ours: linear and joint gains differ by less)."""
@@ -145,16 +143,9 @@ def _cost(fitted: Fitted) -> float:
 
 
 def _of_usual_shape(problem: Problem, fitted: Fitted) -> list[Fitted]:
-    """The same with the last effect's shape at its default, where the scan chose another one that no fit moves.
-
-    Soil and robot can stand for the rest of it there: of a load towed at half a metre the scan made a third of it at a
-    metre, and the refit stayed there although it left more than the truth.
-    """
-    *others, effect = fitted.point.effects
-    usual = at_kept_shapes(effect)
-    if effect.name != TowedDrag.name or usual == effect:
-        return []
-    return [fit(problem, replace(fitted.point, effects=(*others, usual)), iterations=6, renewals=1, first=fitted)]
+    """The fit from the default shape of the last effect, where the scan chose another one."""
+    point = of_usual_shape(fitted.point)
+    return [] if point is None else [fit(problem, point, iterations=6, renewals=1, first=fitted)]
 
 
 def _trial(problem: Problem, model: ScannedModel, gain: Gain, terms: Terms, start: Fitted) -> Fitted:

@@ -15,6 +15,7 @@ from ddagr_gym.diagnosis.search.gains import Gain, gains
 from ddagr_gym.diagnosis.search.initial_guess import (
     first_guess,
     looped_encoders,
+    of_usual_shape,
     same_lateness,
     slower_loop,
     turned_to_agree,
@@ -27,7 +28,9 @@ from ddagr_gym.identification.gauss_newton import Fitted, fit
 from ddagr_gym.identification.problem import Point, Problem
 from ddagr_gym.physics.effects import load_effects
 from ddagr_gym.physics.effects.base import DriveExtent
+from ddagr_gym.physics.effects.gyro_bias import GyroBias
 from ddagr_gym.physics.effects.registry import effect_kind, effect_kinds
+from ddagr_gym.physics.effects.towed_drag import TowedDrag
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.simulator import simulate
@@ -273,3 +276,12 @@ def test_other_effects_and_quick_motors_have_no_lateness_to_translate(effect: st
 
 def test_a_lag_longer_than_any_dead_time_becomes_the_longest() -> None:
     assert same_lateness(load_effects(("motor_lag=2",))[0]) == load_effects(("command_delay=0.49",))[0]
+
+
+def test_only_a_load_with_an_unusual_hitch_has_another_start():
+    state = np.zeros((1, 8))
+    usual, far = TowedDrag(20.0), TowedDrag(20.0, hitch_distance=1.0)
+    point = Point(np.zeros(2), state, (GyroBias(0.1), far))
+    assert of_usual_shape(point).effects == (GyroBias(0.1), usual)
+    assert of_usual_shape(Point(np.zeros(2), state, (usual,))) is None
+    assert of_usual_shape(Point(np.zeros(2), state, (far, GyroBias(0.1)))) is None
