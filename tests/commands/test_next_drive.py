@@ -35,7 +35,7 @@ def test_rivals_by_hand(tmp_path, capsys, small_bank):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ([], "either a diagnosis or"),
+        ([], "either the folder of a diagnosis"),
         (["nowhere"], "ddagr diagnose"),
         (["--rival", "slope=0.1", "--seed", "-1"], "seed is -1: give at least 0"),
         (["--rival", "slop=0.1"], "slope"),
