@@ -46,7 +46,7 @@ PIECE = 90.0
 STEP = 6.0
 """Length of a step of a drive in steps [s]."""
 KNOWN, UNKNOWN = "known", "unknown"
-DELAYS = {KNOWN: (0.1, 0.15, 0.2), UNKNOWN: (0.15, 0.2, 0.3)}
+DELAYS = {KNOWN: (0.1, 0.15, 0.2), UNKNOWN: (0.3,)}
 """Delays by what is said of the ground [s]; the aims are 0.15 and 0.3 s."""
 
 

@@ -42,14 +42,14 @@ def test_a_name_or_unknown_in_a_piece_is_a_false_alarm():
 
 
 def test_delays_are_scored_by_what_is_said_of_the_ground():
-    change = late_by(0.15)
+    change, longer = late_by(0.15), late_by(0.3)
     cases = [
         answer(change.name, change.effect, "sand", truth=change.effect),
-        answer(change.name, "none", "", truth=change.effect),
+        answer(longer.name, "none", "", truth=longer.effect),
     ]
     found = figures(cases)
     assert found[f"delay of 0.15 s, ground {KNOWN}"]["value"] == 1.0
-    assert found[f"delay of 0.15 s, ground {UNKNOWN}"]["value"] == 0.0
+    assert found[f"delay of 0.3 s, ground {UNKNOWN}"]["value"] == 0.0
     assert {name for name in found if name.startswith("delay")} == {
         f"delay of {delay:g} s, ground {ground}" for ground, delays in DELAYS.items() for delay in delays
     }
