@@ -21,7 +21,13 @@ from ddagr_gym.diagnosis.change.model import MOST_NEAR, Model, farthest
 from ddagr_gym.diagnosis.change.ordinary import Comparison, Scores
 from ddagr_gym.diagnosis.change.shifts import Shift, explained, shift_of, sizes_of
 from ddagr_gym.diagnosis.change.soil_place import patch_of_change
-from ddagr_gym.diagnosis.search.initial_guess import first_guess, of_usual_shape, same_lateness, with_whole_lag
+from ddagr_gym.diagnosis.search.initial_guess import (
+    first_guess,
+    of_usual_shape,
+    same_lateness,
+    usual_or,
+    with_whole_lag,
+)
 from ddagr_gym.diagnosis.search.scan import drive_extent
 from ddagr_gym.diagnosis.search.scanned_model import Rival
 from ddagr_gym.identification.fit_numerics import FIELD_TOLERANCE
@@ -165,7 +171,7 @@ def _refitted(
     found = []
     for name, (shift, start) in starts.items():
         progress(f"refitting with {name}")
-        fitted = _to_the_end(problem, start)
+        fitted = _to_the_end(problem, start, model.fitted.cost)
         gain = (model.fitted.cost - fitted.cost) / dispersion
         meaningful = fitted.point.effects[-1].is_meaningful(drive_extent(problem, fitted.prediction))
         if gain > 0.0 and meaningful:
@@ -173,11 +179,19 @@ def _refitted(
     return _by_gain(found)
 
 
-def _to_the_end(problem: Problem, start: Point) -> Fitted:
-    """The fit from a start, and from where it ends with the lag of motors whole or a load's usual hitch; the best."""
+def _to_the_end(problem: Problem, start: Point, before: float) -> Fitted:
+    """The fit from a start, and from where it ends with the lag of motors whole or a load's usual hitch.
+
+    Args:
+        problem: to fit.
+        start: where the fit begins.
+        before: cost of the model without what may have changed.
+    """
     fitted = _fit(problem, start)
-    others = (with_whole_lag(problem, fitted.point), of_usual_shape(fitted.point))
-    return min([fitted, *(_fit(problem, point) for point in others if point)], key=lambda item: item.cost)
+    whole, usual = with_whole_lag(problem, fitted.point), of_usual_shape(fitted.point)
+    if whole is not None:
+        return min(fitted, _fit(problem, whole), key=lambda item: item.cost)
+    return fitted if usual is None else usual_or(fitted, _fit(problem, usual), before)
 
 
 def _fit(problem: Problem, start: Point) -> Fitted:

@@ -17,7 +17,13 @@ from ddagr_gym.diagnosis.search.equivalents import (
     with_turning_centre,
 )
 from ddagr_gym.diagnosis.search.gains import Gain
-from ddagr_gym.diagnosis.search.initial_guess import first_guess, nuisance_answer, of_usual_shape, turned_to_agree
+from ddagr_gym.diagnosis.search.initial_guess import (
+    first_guess,
+    nuisance_answer,
+    of_usual_shape,
+    turned_to_agree,
+    usual_or,
+)
 from ddagr_gym.diagnosis.search.inner_products import Terms
 from ddagr_gym.diagnosis.search.scan import drive_extent
 from ddagr_gym.diagnosis.search.scanned_model import Rival, ScannedModel, rival_of, scan_model
@@ -134,18 +140,16 @@ def _finish(problem: Problem, model: ScannedModel, rival: Rival, large: bool) ->
         fitted = fit(problem, point, iterations=6, renewals=1, first=known)
     else:
         fitted = fit(problem, point, iterations=6, renewals=2, reuse=known)
-    fits = [fitted, known, *_of_usual_shape(problem, min(fitted, known, key=_cost))]
-    return rival_of(model, rival.name, min(fits, key=_cost))
+    best = min(fitted, known, key=lambda trial: trial.cost)
+    return rival_of(model, rival.name, _of_usual_shape(problem, best, model.fitted.cost))
 
 
-def _cost(fitted: Fitted) -> float:
-    return fitted.cost
-
-
-def _of_usual_shape(problem: Problem, fitted: Fitted) -> list[Fitted]:
-    """The fit from the default shape of the last effect, where the scan chose another one."""
+def _of_usual_shape(problem: Problem, fitted: Fitted, before: float) -> Fitted:
+    """The fit with the usual shape of the last effect, where that is no worse than the library's form is known."""
     point = of_usual_shape(fitted.point)
-    return [] if point is None else [fit(problem, point, iterations=6, renewals=1, first=fitted)]
+    if point is None:
+        return fitted
+    return usual_or(fitted, fit(problem, point, iterations=6, renewals=1, first=fitted), before)
 
 
 def _trial(problem: Problem, model: ScannedModel, gain: Gain, terms: Terms, start: Fitted) -> Fitted:

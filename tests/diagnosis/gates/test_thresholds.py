@@ -239,7 +239,8 @@ def test_mismatch_says_both_values_and_the_remedy(run: tuple[str, str, float], s
     warning = ORIGIN.mismatch(*run)
     assert f" made for {said}: " in warning
     robot, soil, soil_uncertainty = run
-    remedy = f"ddagr null-bank RUN... --robot {robot} --soil {soil} --soil-uncertainty {soil_uncertainty:g} --output BANK.json`"
+    options = f"--robot {robot} --soil {soil} --soil-uncertainty {soil_uncertainty:g}"
+    remedy = f"ddagr null-bank RUN... {options} --output BANK.json`"
     assert remedy in warning
 
 

@@ -19,6 +19,7 @@ from ddagr_gym.diagnosis.search.initial_guess import (
     same_lateness,
     slower_loop,
     turned_to_agree,
+    usual_or,
     with_whole_delay,
     with_whole_lag,
 )
@@ -285,3 +286,9 @@ def test_only_a_load_with_an_unusual_hitch_has_another_start():
     assert of_usual_shape(point).effects == (GyroBias(0.1), usual)
     assert of_usual_shape(Point(np.zeros(2), state, (usual,))) is None
     assert of_usual_shape(Point(np.zeros(2), state, (far, GyroBias(0.1)))) is None
+
+
+@pytest.mark.parametrize(("cost", "chosen"), [(90.0, "usual"), (107.9, "usual"), (108.1, "best"), (150.0, "best")])
+def test_the_usual_hitch_is_taken_unless_it_explains_less_by_more_than_a_fifth(cost, chosen):
+    best, usual = SimpleNamespace(cost=90.0), SimpleNamespace(cost=cost)
+    assert usual_or(best, usual, 180.0) is (usual if chosen == "usual" else best)
