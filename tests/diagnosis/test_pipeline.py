@@ -115,7 +115,7 @@ def test_names_only_leaves_out_what_follows_the_verdict(stages: Stages) -> None:
 def test_the_drivetrain_is_fitted_where_the_library_leaves_too_much_in_the_encoders(
     stages: Stages, monkeypatch: pytest.MonkeyPatch, explained: float | None, told: bool
 ) -> None:
-    late, answer = PoseLatency(0.2), SimpleNamespace(explained=explained)
+    late, answer = PoseLatency(0.2), SimpleNamespace(explained=explained, parts=())
     nominal = SimpleNamespace(robot=get_robot("warthog"), soil=get_soil("thesis_a1"), effects=(late,), answer=answer)
     stages.session.with_nominal = lambda robot, soil: SimpleNamespace(**{**vars(stages.session), "robot": robot})
     stages.session.progress = lambda line: None
@@ -145,6 +145,9 @@ def test_the_drivetrain_is_fitted_where_the_library_leaves_too_much_in_the_encod
     assert outcome.nominal[0].name == ("warthog" if told else "ddagr")
     assert ("certify" in stages.called) is not told
     assert (late in outcome.effects) is told
+    if told:
+        assert outcome.diagnosis.next_drive is not None
+        assert "ddagr calibrate" in outcome.diagnosis.next_drive.why
 
 
 def test_a_stopped_diagnosis_goes_on_behind_its_last_step(stages: Stages, tmp_path: Path) -> None:
