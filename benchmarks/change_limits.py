@@ -14,8 +14,6 @@ cases in the folder of parts.
 
 from __future__ import annotations
 
-import argparse
-import json
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -29,11 +27,19 @@ from numpy.typing import NDArray
 from benchmarks.altered_changes import CONTROL, Change, Table, late_sensors, numbers
 from benchmarks.score_concealed import share
 from benchmarks.what_changed import RESULT as CHANGES_RESULT
-from benchmarks.what_changed import Drive, answer, drives, is_right, is_sure_and_wrong
+from benchmarks.what_changed import (
+    Drive,
+    answer,
+    answered,
+    drives,
+    is_right,
+    is_sure_and_wrong,
+    parser_of,
+    write_figures,
+)
 from ddagr_gym.calibration.ordinary_robot import load_ordinary_robot
 from ddagr_gym.diagnosis.change.ordinary import OrdinaryRobot
 from ddagr_gym.errors import InputError
-from ddagr_gym.files import write_json
 from ddagr_gym.rendering import palette
 from ddagr_gym.reporting.figures import house_style
 
@@ -163,32 +169,17 @@ def draw(found: Mapping[str, Any], path: Path) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Ask, score, draw."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("calibration", type=Path, help="folder that `ddagr calibrate --bank` wrote")
-    parser.add_argument("--parts", type=Path, default=RESULT.with_suffix(".parts"), help="folder of finished cases")
-    parser.add_argument("--output", type=Path, default=RESULT)
-    parser.add_argument("--threads", type=int, default=2)
-    parser.add_argument("--summary", action="store_true", help="only the score of the cases that are finished")
-    given = parser.parse_args(arguments)
+    given = parser_of(__doc__, RESULT).parse_args(arguments)
     try:
         ordinary = load_ordinary_robot(given.calibration)
     except InputError as error:
         print(f"{error}", file=sys.stderr)
         return 2
-    cases = []
-    for question in questions():
-        part = given.parts / ordinary.digest[:12] / f"{question.name}.json"
-        if not part.exists() and not given.summary:
-            part.parent.mkdir(parents=True, exist_ok=True)
-            write_json(part, question.answer(ordinary, given.threads))
-        if part.exists():
-            cases.append(json.loads(part.read_text()))
-            print(question.name, cases[-1].get("verdict", "refused"), cases[-1].get("seconds", ""), flush=True)
+    asked = ((question.name, partial(question.answer, ordinary, given.threads)) for question in questions())
+    cases = answered(asked, given.parts / ordinary.digest[:12], not given.summary)
     found = figures(cases)
-    write_json(given.output, {"command": COMMAND, "figures": found, "cases": cases})
+    write_figures(given.output, COMMAND, found, cases)
     draw(found, given.output.with_suffix(".png"))
-    for name, entry in found.items():
-        print(f"{name}: {entry['value']} {entry['interval']} of {entry['count']}")
     return 0
 
 

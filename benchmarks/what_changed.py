@@ -19,7 +19,7 @@ import argparse
 import json
 import sys
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -228,37 +228,78 @@ def _words(case: Mapping[str, Any]) -> str:
     return said if case["complete"] else f"{said} …"
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Write, compare, score."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+def parser_of(description: str | None, result: Path) -> argparse.ArgumentParser:
+    """Options of a benchmark that asks about drives against a calibration.
+
+    Args:
+        description: of the command.
+        result: file of its figures.
+    """
+    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("calibration", type=Path, help="folder that `ddagr calibrate --bank` wrote")
-    parser.add_argument("--drives", nargs="+", choices=tuple(DRIVES), default=tuple(DRIVES))
-    parser.add_argument("--changes", nargs="+", choices=tuple(ALL), default=tuple(ALL))
-    parser.add_argument("--parts", type=Path, default=RESULT.with_suffix(".parts"), help="folder of finished cases")
-    parser.add_argument("--output", type=Path, default=RESULT)
+    parser.add_argument("--parts", type=Path, default=result.with_suffix(".parts"), help="folder of finished cases")
+    parser.add_argument("--output", type=Path, default=result)
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--summary", action="store_true", help="only the score of the cases that are finished")
+    return parser
+
+
+def answered(
+    questions: Iterable[tuple[str, Callable[[], dict[str, Any]]]], folder: Path, ask: bool
+) -> list[dict[str, Any]]:
+    """Answers, each kept in a folder as it is made, so that a run goes on after those that are there.
+
+    Args:
+        questions: name of the answer's file, and what makes it.
+        folder: of the answers.
+        ask: whether missing ones are made; else they are left out.
+    """
+    found = []
+    for name, make in questions:
+        part = folder / f"{name}.json"
+        if not part.exists() and ask:
+            part.parent.mkdir(parents=True, exist_ok=True)
+            write_json(part, make())
+        if part.exists():
+            found.append(json.loads(part.read_text()))
+            print(name, found[-1].get("verdict", "refused"), found[-1].get("seconds", ""), flush=True)
+    return found
+
+
+def write_figures(path: Path, command: str, scored: Mapping[str, Any], cases: Sequence[Mapping[str, Any]]) -> None:
+    """Write the figures of cases with these, and print them.
+
+    Args:
+        path: of the JSON file.
+        command: that makes it.
+        scored: figures by name.
+        cases: answers.
+    """
+    write_json(path, {"command": command, "figures": scored, "cases": cases})
+    for name, entry in scored.items():
+        print(f"{name}: {entry['value']} {entry['interval']} of {entry['count']}")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Write, compare, score."""
+    parser = parser_of(__doc__, RESULT)
+    parser.add_argument("--drives", nargs="+", choices=tuple(DRIVES), default=tuple(DRIVES))
+    parser.add_argument("--changes", nargs="+", choices=tuple(ALL), default=tuple(ALL))
     given = parser.parse_args(arguments)
     try:
         ordinary = load_ordinary_robot(given.calibration)
     except InputError as error:
         print(f"{error}", file=sys.stderr)
         return 2
-    cases, by_name = [], drives()
-    for change in given.changes:
-        for drive in given.drives:
-            part = given.parts / ordinary.digest[:12] / f"{drive.replace('/', '_')} {change}.json"
-            if not part.exists() and not given.summary:
-                part.parent.mkdir(parents=True, exist_ok=True)
-                write_json(part, answer(by_name[drive], ALL[change], ordinary, given.threads))
-            if part.exists():
-                cases.append(json.loads(part.read_text()))
-                print(drive, change, cases[-1].get("verdict", "refused"), cases[-1].get("seconds", ""), flush=True)
-    scored = figures(cases)
-    write_json(given.output, {"command": "python -m benchmarks.what_changed", "figures": scored, "cases": cases})
+    by_name = drives()
+    questions = (
+        (f"{drive.replace('/', '_')} {change}", partial(answer, by_name[drive], ALL[change], ordinary, given.threads))
+        for change in given.changes
+        for drive in given.drives
+    )
+    cases = answered(questions, given.parts / ordinary.digest[:12], not given.summary)
+    write_figures(given.output, "python -m benchmarks.what_changed", figures(cases), cases)
     draw(cases, given.output.with_suffix(".png"))
-    for name, entry in scored.items():
-        print(f"{name}: {entry['value']} {entry['interval']} of {entry['count']}")
     return 0
 
 

@@ -125,6 +125,8 @@ UNCERTAIN = (
 )  # fmt: skip
 """Fields of a robot and its wheels that may be uncertain; those of its drivetrain may, too."""
 
+_DEVIATIONS = (*UNCERTAIN, *(item.name for item in fields(Drivetrain)))
+
 
 @dataclass(frozen=True)
 class Robot(Validated):
@@ -171,10 +173,9 @@ class Robot(Validated):
             object.__setattr__(self, "wheels", tuple(self.wheels) * 4)
         if len(self.wheels) != 4:
             raise InputError(f"Robot.wheels has {len(self.wheels)} wheels: give one wheel for all, or four.")
-        uncertain = (*UNCERTAIN, *(item.name for item in fields(Drivetrain)))
         for name, deviation in self.standard_deviations.items():
-            if name not in uncertain:
-                raise unknown_name("entry of standard_deviations", name, uncertain)
+            if name not in _DEVIATIONS:
+                raise unknown_name("entry of standard_deviations", name, _DEVIATIONS)
             check_number(f"Robot.standard_deviations[{name!r}]", deviation, _DEVIATION)
         x, y, height = self.centre_of_mass
         if abs(x) >= self.half_wheelbase or abs(y) >= self.half_track or height < 0:

@@ -350,11 +350,12 @@ def _gates(given: ThresholdsLike | None, nominal: Nominal, soil_uncertainty: flo
     """
     from ddagr_gym.diagnosis.gates.threshold_files import default_thresholds, shipped_thresholds
 
-    shipped = shipped_thresholds(nominal.robot.name) if given is None else None
-    simulated = default_thresholds(_SIMULATED)
     if given is None:
-        given = simulated if shipped is None or shipped.of_ordinary_drives else shipped
-    return thresholds_from(given, nominal.robot, nominal.soil_name, soil_uncertainty) or simulated
+        given = shipped_thresholds(nominal.robot.name)
+        if given is None or given.of_ordinary_drives:
+            given = default_thresholds(_SIMULATED)
+    found = thresholds_from(given, nominal.robot, nominal.soil_name, soil_uncertainty)
+    return found or default_thresholds(_SIMULATED)
 
 
 def _window(window: float | None, gates: Thresholds) -> float:

@@ -23,13 +23,6 @@ _KEPT = frozenset(
 """Shapes that a diagnosis leaves at their defaults: free, they let one effect stand for another (a payload that is not
 at the centre is a centre of mass offset too), and drives hardly show them."""
 
-
-def at_kept_shapes(effect: Effect) -> Effect:
-    """An effect with the shapes that fits leave alone at their defaults."""
-    kept = {name: effect.parameter(name).default for kind, name in _KEPT if kind == effect.name}
-    return effect.with_values(**kept) if kept else effect
-
-
 _NEVER = 1e5
 """Onset [s] at which an effect holds always, or never."""
 
@@ -80,6 +73,12 @@ def effect_parameters(effects: Sequence[Effect], fixed: frozenset[str] = frozens
             neutral = data["neutral"] if of_size else 0.0
             found.append(EffectParameter(number, name, data["step"], data["low"], data["high"], neutral, scale))
     return tuple(found)
+
+
+def at_kept_shapes(effect: Effect) -> Effect:
+    """An effect with the shapes that fits leave alone at their defaults."""
+    kept = {name: effect.parameter(name).default for kind, name in _KEPT if kind == effect.name}
+    return effect.with_values(**kept) if kept else effect
 
 
 def moved(effects: tuple[Effect, ...], parameters: Sequence[EffectParameter], values: Array) -> tuple[Effect, ...]:

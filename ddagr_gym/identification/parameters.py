@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.errors import InputError
-from ddagr_gym.parameters import Drivetrain, Robot, Soil
+from ddagr_gym.parameters import UNCERTAIN, Drivetrain, Robot, Soil
 from ddagr_gym.physics import layout
 
 Array = NDArray[np.float64]
@@ -177,16 +177,8 @@ def robot_parameters(robot: Robot) -> tuple[ModelParameter, ...]:
 
     Parts of its drivetrain that may be nothing (a delay, a compliance) are changes in their units, within its bounds.
     """
-    nominal = {
-        "mass": robot.mass,
-        "yaw_inertia": robot.yaw_inertia,
-        "half_wheelbase": robot.half_wheelbase,
-        "half_track": robot.half_track,
-        "motor_rate": robot.motor_rate,
-        "maximum_wheel_speed": robot.maximum_wheel_speed,
-        "half_width": robot.wheels[0].half_width,
-        "outer_radius": robot.wheels[0].major_radius,
-    }
+    of_wheel = {"half_width": robot.wheels[0].half_width, "outer_radius": robot.wheels[0].major_radius}
+    nominal = {name: of_wheel[name] if name in of_wheel else getattr(robot, name) for name in UNCERTAIN}
     body = tuple(
         _log(name, _ROBOT_ENTRIES[name], deviation / nominal[name], max(1.6, 4.0 * deviation / nominal[name]))
         for name, deviation in robot.standard_deviations.items()

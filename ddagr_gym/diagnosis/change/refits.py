@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,9 +24,8 @@ from ddagr_gym.diagnosis.change.shifts import Shift, explained, shift_of, sizes_
 from ddagr_gym.diagnosis.change.soil_place import patch_of_change
 from ddagr_gym.diagnosis.search.initial_guess import (
     first_guess,
-    of_usual_shape,
     same_lateness,
-    usual_or,
+    with_usual_shape,
     with_whole_lag,
 )
 from ddagr_gym.diagnosis.search.scan import drive_extent
@@ -188,10 +188,10 @@ def _to_the_end(problem: Problem, start: Point, before: float) -> Fitted:
         before: cost of the model without what may have changed.
     """
     fitted = _fit(problem, start)
-    whole, usual = with_whole_lag(problem, fitted.point), of_usual_shape(fitted.point)
+    whole = with_whole_lag(problem, fitted.point)
     if whole is not None:
         return min(fitted, _fit(problem, whole), key=lambda item: item.cost)
-    return fitted if usual is None else usual_or(fitted, _fit(problem, usual), before)
+    return with_usual_shape(fitted, before, partial(_fit, problem))
 
 
 def _fit(problem: Problem, start: Point) -> Fitted:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -92,30 +92,23 @@ def _directed(candidate: Candidate, multiples: Sequence[float]) -> Effect:
     return probe.with_values(**{size: length, "direction": math.atan2(y, x)})
 
 
-def of_usual_shape(point: Point) -> Point | None:
-    """A point whose last effect, a towed load, is hitched where loads usually are; None where it is, or for others.
+def with_usual_shape(best: Fitted, before: float, refitted: Callable[[Point], Fitted]) -> Fitted:
+    """A fit whose last effect, a towed load, is hitched where loads usually are, if that explains about as much.
 
-    The scan chooses between two hitches, and no fit moves them.
-
-    Args:
-        point: with effects.
-    """
-    *others, effect = point.effects
-    usual = at_kept_shapes(effect)
-    return None if effect.name != TowedDrag.name or usual == effect else replace(point, effects=(*others, usual))
-
-
-def usual_or(best: Fitted, usual: Fitted, before: float) -> Fitted:
-    """The fit with a load's usual hitch, unless it explains less by more than a fifth; else the best one.
-
-    Of a load farther behind less force steadies the robot as much, and soil stands for the rest: in drives of another
-    simulator, whose loads hung at 0.55 and 0.6 m, the least was left with 0.8 m and six tenths of the force.
+    The scan chooses between two hitches, and no fit moves them. Of a load farther behind less force steadies the robot
+    as much, and soil stands for the rest: in drives of another simulator, whose loads hung at 0.55 and 0.6 m, the least
+    was left with 0.8 m and six tenths of the force. Other effects, and a load that hangs there, stay as they are.
 
     Args:
-        best: fit that leaves least.
-        usual: with the usual hitch.
-        before: cost without the load.
+        best: fit that leaves least, with effects.
+        before: cost without its last effect.
+        refitted: gives the fit from a point.
     """
+    *others, effect = best.point.effects
+    shape = at_kept_shapes(effect)
+    if effect.name != TowedDrag.name or shape == effect:
+        return best
+    usual = refitted(replace(best.point, effects=(*others, shape)))
     return usual if usual.cost - best.cost <= _FORM_OF_SHAPE * (before - best.cost) else best
 
 

@@ -20,9 +20,8 @@ from ddagr_gym.diagnosis.search.gains import Gain
 from ddagr_gym.diagnosis.search.initial_guess import (
     first_guess,
     nuisance_answer,
-    of_usual_shape,
     turned_to_agree,
-    usual_or,
+    with_usual_shape,
 )
 from ddagr_gym.diagnosis.search.inner_products import Terms
 from ddagr_gym.diagnosis.search.scan import drive_extent
@@ -141,15 +140,10 @@ def _finish(problem: Problem, model: ScannedModel, rival: Rival, large: bool) ->
     else:
         fitted = fit(problem, point, iterations=6, renewals=2, reuse=known)
     best = min(fitted, known, key=lambda trial: trial.cost)
-    return rival_of(model, rival.name, _of_usual_shape(problem, best, model.fitted.cost))
-
-
-def _of_usual_shape(problem: Problem, fitted: Fitted, before: float) -> Fitted:
-    """The fit with the usual shape of the last effect, where that is no worse than the library's form is known."""
-    point = of_usual_shape(fitted.point)
-    if point is None:
-        return fitted
-    return usual_or(fitted, fit(problem, point, iterations=6, renewals=1, first=fitted), before)
+    found = with_usual_shape(
+        best, model.fitted.cost, lambda start: fit(problem, start, iterations=6, renewals=1, first=best)
+    )
+    return rival_of(model, rival.name, found)
 
 
 def _trial(problem: Problem, model: ScannedModel, gain: Gain, terms: Terms, start: Fitted) -> Fitted:

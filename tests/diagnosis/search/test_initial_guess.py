@@ -15,11 +15,10 @@ from ddagr_gym.diagnosis.search.gains import Gain, gains
 from ddagr_gym.diagnosis.search.initial_guess import (
     first_guess,
     looped_encoders,
-    of_usual_shape,
     same_lateness,
     slower_loop,
     turned_to_agree,
-    usual_or,
+    with_usual_shape,
     with_whole_delay,
     with_whole_lag,
 )
@@ -279,16 +278,27 @@ def test_a_lag_longer_than_any_dead_time_becomes_the_longest() -> None:
     assert same_lateness(load_effects(("motor_lag=2",))[0]) == load_effects(("command_delay=0.49",))[0]
 
 
-def test_only_a_load_with_an_unusual_hitch_has_another_start():
-    state = np.zeros((1, 8))
+def fitted_with(cost: float, *effects: Any) -> Any:
+    return SimpleNamespace(cost=cost, point=Point(np.zeros(2), np.zeros((1, 8)), effects))
+
+
+def test_only_a_load_with_an_unusual_hitch_has_another_start() -> None:
     usual, far = TowedDrag(20.0), TowedDrag(20.0, hitch_distance=1.0)
-    point = Point(np.zeros(2), state, (GyroBias(0.1), far))
-    assert of_usual_shape(point).effects == (GyroBias(0.1), usual)
-    assert of_usual_shape(Point(np.zeros(2), state, (usual,))) is None
-    assert of_usual_shape(Point(np.zeros(2), state, (far, GyroBias(0.1)))) is None
+    started = []
+
+    def refitted(point: Point) -> Any:
+        started.append(point.effects)
+        return fitted_with(90.0, *point.effects)
+
+    for effects in ((usual,), (far, GyroBias(0.1))):
+        stays = fitted_with(90.0, *effects)
+        assert with_usual_shape(stays, 180.0, refitted) is stays
+    assert started == []
+    with_usual_shape(fitted_with(90.0, GyroBias(0.1), far), 180.0, refitted)
+    assert started == [(GyroBias(0.1), usual)]
 
 
 @pytest.mark.parametrize(("cost", "chosen"), [(90.0, "usual"), (107.9, "usual"), (108.1, "best"), (150.0, "best")])
-def test_the_usual_hitch_is_taken_unless_it_explains_less_by_more_than_a_fifth(cost, chosen):
-    best, usual = SimpleNamespace(cost=90.0), SimpleNamespace(cost=cost)
-    assert usual_or(best, usual, 180.0) is (usual if chosen == "usual" else best)
+def test_the_usual_hitch_is_taken_unless_it_explains_less_by_more_than_a_fifth(cost: float, chosen: str) -> None:
+    best, usual = fitted_with(90.0, TowedDrag(20.0, hitch_distance=1.0)), fitted_with(cost, TowedDrag(40.0))
+    assert with_usual_shape(best, 180.0, lambda point: usual) is (usual if chosen == "usual" else best)
