@@ -17,12 +17,13 @@ from typing import Any
 
 from benchmarks.row_turn_plants import scenario
 from ddagr_gym.control.pid import PidGains
+from ddagr_gym.control.tracker_settings import LoopSettings
 from ddagr_gym.envs.settings import Episode, TurnSettings
 from ddagr_gym.errors import InputError, unknown_name
 from ddagr_gym.evaluation.campaign import scenario_settings
 from ddagr_gym.evaluation.controllers import EKF_CONTROLLERS, find_controller
 from ddagr_gym.evaluation.gain_search import Outcome, SearchBox, Wanted, episodes_of, objective, search_box
-from ddagr_gym.evaluation.ladder_gains import LadderGains, LoopSettings, ladder_gains
+from ddagr_gym.evaluation.ladder_gains import LadderGains, ladder_gains
 from ddagr_gym.evaluation.metrics import turn_metrics
 from ddagr_gym.evaluation.runs import drive_turn
 from ddagr_gym.evaluation.scenarios import load_scenarios

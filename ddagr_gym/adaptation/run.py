@@ -14,15 +14,15 @@ from ddagr_gym.adaptation.corrected import Corrected
 from ddagr_gym.adaptation.teaching import taught
 from ddagr_gym.adaptation.turns import DrivenTurn, MeasuredTurns, sizes
 from ddagr_gym.control.pid import PidGains
+from ddagr_gym.control.tracker_settings import LoopSettings, TrackerSettings
 from ddagr_gym.errors import unknown_name
 from ddagr_gym.estimation.filter_model import SoilPrior
 from ddagr_gym.estimation.force_laws import ForceLaw
 from ddagr_gym.evaluation.adapted_controller import AdaptedSettings
-from ddagr_gym.evaluation.adapted_tracker import TrackerSettings
 from ddagr_gym.evaluation.bundles import Bundle
 from ddagr_gym.evaluation.force_law_fits import fit_law, true_forces, turn_states
 from ddagr_gym.evaluation.gain_search import Outcome, SearchBox, Wanted, episodes_of, objective, search_box
-from ddagr_gym.evaluation.ladder_gains import LoopSettings, ladder_gains
+from ddagr_gym.evaluation.ladder_gains import ladder_gains, tracker_settings
 from ddagr_gym.parameters import STANDARD_GRAVITY, Robot, Soil
 
 _TEACHING, _SELECTION, _REPORT = 1000, 2000, 3000
@@ -150,7 +150,7 @@ def nominal_settings(controller: str) -> AdaptedSettings:
     """
     if controller not in ADAPTABLE:
         raise unknown_name("controller that can be adapted", controller, ADAPTABLE)
-    return AdaptedSettings(tracker=TrackerSettings.shipped() if controller == "B6" else None)
+    return AdaptedSettings(tracker=tracker_settings() if controller == "B6" else None)
 
 
 def _improved(known: Bundle, turns: MeasuredTurns, effort: Effort, seed: int) -> tuple[str, Bundle, dict[str, Any]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -120,16 +120,49 @@ def _side_slip(at: MotionEstimate) -> float:
     return math.atan2(at.v_y, at.v_x)
 
 
-class PathTracker(TurnController):
-    """Follows the commanded path by the estimated pose; theory: control, eq. (7).
+class PathErrors(NamedTuple):
+    """Where a motion leads, against the commanded path.
 
-    Needs the raw samples (``info_level="full"``), of which it reads nothing but sensors and its own command.
+    Attributes:
+        distance: along the path [m].
+        lateral: to the left of the path [m].
+        to_go: along the path to the next row's start line [m], negative behind it.
+        yaw: heading [rad].
+        direction: of the path there [rad].
+        side_slip: angle from the nose to the direction of motion [rad], counter-clockwise positive.
+    """
+
+    distance: float
+    lateral: float
+    to_go: float
+    yaw: float
+    direction: float
+    side_slip: float
+
+    def course_error(self, side_slip: float) -> float:
+        """Error of the course against the path (-pi, pi] [rad], where the course is that much off the nose [rad]."""
+        return wrap_angle(self.yaw + side_slip - self.direction)
+
+
+def path_errors(turn: RowTurn, at: MotionEstimate, ahead: float = 0.0) -> PathErrors:
+    """Errors against the commanded path of a motion that goes on for a time ``ahead`` [s]."""
+    x, y, yaw = carried(at, ahead)
+    distance, lateral = turn.project(x, y)
+    to_go = turn.run_in + turn.turn_length - float(distance)
+    direction = float(turn.heading(distance))
+    return PathErrors(float(distance), float(lateral), to_go, yaw, direction, _side_slip(at))
+
+
+class PathFollower(TurnController):
+    """Steers by an estimated motion along the commanded path; theory: control, eq. (7).
+
+    :meth:`begin` an episode, then each control period ask for the :meth:`wanted` curvature and for the :meth:`action`
+    that drives it.
 
     Args:
         robot: nominal robot.
         gains: the loop's output is a curvature [1/m], its error the cross-track error [m].
         course_gain: curvature per course error [1/(m rad)].
-        estimator: of the pose.
         steady_arc: steady bank speeds by the estimate.
         track_ratio: see :class:`TurnController`; serves where the estimated soil has no solution.
         lead: heading by which the feed-forward runs ahead, for the motors' lag [rad].
@@ -142,14 +175,13 @@ class PathTracker(TurnController):
     """
 
     def __init__(
-        self, robot: Robot, gains: PidGains, course_gain: float, estimator: MotionEstimator, steady_arc: SteadyArc,
-        track_ratio: float = 1.0, lead: float = 0.0, standing: int = 0, ahead: float = 0.0,
-        side_slip_share: float = 1.0, aligning: float = 0.0,
+        self, robot: Robot, gains: PidGains, course_gain: float, steady_arc: SteadyArc, track_ratio: float = 1.0,
+        lead: float = 0.0, standing: int = 0, ahead: float = 0.0, side_slip_share: float = 1.0, aligning: float = 0.0,
         largest_side_slip: float = math.pi,
     ) -> None:  # fmt: skip
         super().__init__(robot, track_ratio, lead, course_gain)
         self._pid = Pid(gains, CONTROL_PERIOD)
-        self._estimator, self._steady_arc = estimator, steady_arc
+        self._steady_arc = steady_arc
         self._standing, self._ahead = standing, ahead
         self._side_slip_share, self._aligning = side_slip_share, aligning
         self._largest_side_slip = largest_side_slip
@@ -162,22 +194,23 @@ class PathTracker(TurnController):
         self._turn: RowTurn | None = None
         self._estimate: MotionEstimate | None = None
 
-    def __call__(self, observation: ArrayLike, info: Any = None) -> NDArray[np.float32]:
-        """Action (2,), right and left bank speed over the robot's maximum."""
-        if info is None or "samples" not in info:
-            raise InputError('this controller needs the raw samples: make the environment with info_level="full".')
-        seen = decode(observation)
-        if self._turn is None:
-            self._turn = commanded_turn(seen)
-            self._estimator.reset(-self._turn.run_in, 0.0, 0.0)
-            self._estimate = self._estimator.present()
-        else:
-            self._estimate = self._estimator.update(info["command"], info["samples"])
+    def begin(self, seen: TurnObservation) -> RowTurn:
+        """Start an episode at its first observation; the turn that this commands."""
+        self.reset()
+        self._turn = commanded_turn(seen)
+        return self._turn
+
+    def wanted(self, seen: TurnObservation, at: MotionEstimate) -> float | None:
+        """Curvature to drive now [1/m], or None while it stands."""
+        self._estimate = at
         if self._stood < self._standing:
             self._stood += 1
-            return np.zeros(2, dtype=np.float32)
-        curvature = self.curvature(seen, self.phase(seen), info)
-        speeds = self._within_limits(self._estimate, seen.target_speed, curvature)
+            return None
+        return self.curvature(seen, self.phase(seen), None)
+
+    def action(self, at: MotionEstimate, speed: float, curvature: float) -> NDArray[np.float32]:
+        """Action (2,) for a speed [m/s] and a curvature [1/m], right and left bank speed over the robot's maximum."""
+        speeds = self._within_limits(at, speed, curvature)
         return np.clip(np.array(speeds) / self.robot.maximum_wheel_speed, -1.0, 1.0).astype(np.float32)
 
     def _within_limits(self, at: MotionEstimate, speed: float, curvature: float) -> tuple[float, float]:
@@ -193,14 +226,48 @@ class PathTracker(TurnController):
         at = self._estimate
         assert self._turn is not None
         assert at is not None
-        x, y, yaw = carried(at, self._ahead)
-        distance, lateral = self._turn.project(x, y)
-        to_go = self._turn.run_in + self._turn.turn_length - float(distance)
-        aside, slope = aligning_path(to_go, self._aligning)
-        side_slip = min(max(_side_slip(at), -self._largest_side_slip), self._largest_side_slip)
-        course = yaw + self._side_slip_share * side_slip * (1.0 - slope)
-        error = wrap_angle(float(course - self._turn.heading(distance)))
-        feed_forward = float(self._turn.curvature(distance + self.lead * seen.target_radius))
-        correction = self._pid.update(-float(lateral) - side_slip * aside) - self.heading_gain * error
+        errors = path_errors(self._turn, at, self._ahead)
+        aside, slope = aligning_path(errors.to_go, self._aligning)
+        side_slip = min(max(errors.side_slip, -self._largest_side_slip), self._largest_side_slip)
+        error = errors.course_error(self._side_slip_share * side_slip * (1.0 - slope))
+        feed_forward = float(self._turn.curvature(errors.distance + self.lead * seen.target_radius))
+        correction = self._pid.update(-errors.lateral - side_slip * aside) - self.heading_gain * error
         largest = _LARGEST_CORRECTION / seen.target_radius
         return feed_forward + min(max(correction, -largest), largest)
+
+
+class PathTracker(PathFollower):
+    """B6: a :class:`PathFollower` with an estimator of its own.
+
+    Needs the raw samples (``info_level="full"``), of which it reads nothing but sensors and its own command.
+
+    Args:
+        robot: nominal robot.
+        gains: as of :class:`PathFollower`, like ``course_gain``, ``steady_arc`` and ``options``.
+        course_gain: likewise.
+        estimator: of the pose.
+        steady_arc: likewise.
+        options: likewise.
+    """
+
+    def __init__(
+        self, robot: Robot, gains: PidGains, course_gain: float, estimator: MotionEstimator, steady_arc: SteadyArc,
+        *options: Any, **named: Any,
+    ) -> None:  # fmt: skip
+        super().__init__(robot, gains, course_gain, steady_arc, *options, **named)
+        self._estimator = estimator
+
+    def __call__(self, observation: ArrayLike, info: Any = None) -> NDArray[np.float32]:
+        """Action (2,), right and left bank speed over the robot's maximum."""
+        if info is None or "samples" not in info:
+            raise InputError('this controller needs the raw samples: make the environment with info_level="full".')
+        seen = decode(observation)
+        if self._turn is None:
+            self._estimator.reset(-self.begin(seen).run_in, 0.0, 0.0)
+            at = self._estimator.present()
+        else:
+            at = self._estimator.update(info["command"], info["samples"])
+        curvature = self.wanted(seen, at)
+        if curvature is None:
+            return np.zeros(2, dtype=np.float32)
+        return self.action(at, seen.target_speed, curvature)

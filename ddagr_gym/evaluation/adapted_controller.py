@@ -17,15 +17,15 @@ from numpy.typing import ArrayLike, NDArray
 from ddagr_gym.control.observation import TurnObservation, decode
 from ddagr_gym.control.row_turn import Phase
 from ddagr_gym.control.timing import CONTROL_INTERVAL, CONTROL_PERIOD
+from ddagr_gym.control.tracker_settings import LoopSettings, TrackerSettings
 from ddagr_gym.control.turn_controller import FeedbackController, curvature_error
 from ddagr_gym.errors import InputError
 from ddagr_gym.estimation import BatchFilter, FilterModel
 from ddagr_gym.estimation.filter_model import SoilPrior
 from ddagr_gym.estimation.force_balance import arc_bank_speeds
 from ddagr_gym.estimation.layout import CHANNEL_SIZE, PARAMETER, PARAMETER_SIZE
-from ddagr_gym.evaluation.adapted_tracker import TrackerSettings
 from ddagr_gym.evaluation.known_physics import KnownPhysics
-from ddagr_gym.evaluation.ladder_gains import LoopSettings, ladder_gains
+from ddagr_gym.evaluation.ladder_gains import ladder_gains
 from ddagr_gym.evaluation.received_commands import ReceivedCommands
 from ddagr_gym.parameters import STANDARD_GRAVITY, Sensors
 from ddagr_gym.validated import Validated, bounded

@@ -2,66 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ddagr_gym.control.path_tracker import MotionEstimate, PathTracker
 from ddagr_gym.control.timing import CONTROL_INTERVAL, CONTROL_PERIOD
+from ddagr_gym.control.tracker_settings import SETTLING, STANDING, TrackerSettings
 from ddagr_gym.estimation.dead_reckoning import DeadReckoning, Reckoned
 from ddagr_gym.estimation.filter_model import SoilPrior
 from ddagr_gym.estimation.force_balance import arc_bank_speeds
 from ddagr_gym.estimation.inertial_filter import InertialModel
 from ddagr_gym.estimation.layout import CHANNEL_SIZE
 from ddagr_gym.evaluation.known_physics import KnownPhysics
-from ddagr_gym.evaluation.ladder_gains import LoopSettings, ladder_gains
 from ddagr_gym.evaluation.received_commands import ReceivedCommands
 from ddagr_gym.parameters import Sensors
-from ddagr_gym.validated import Validated, bounded
 
 Array = NDArray[np.float64]
-
-STANDING = 10
-"""Control periods for which the path tracker stands before it drives, 0.8 s: 100 samples tell gravity to 3 mm/s^2."""
 
 SLOPE_DEVIATION = 0.05
 """Of either component of gravity along ground whose slope is known [m/s^2] (ours): 0.3 degrees, as far as a diagnosis
 of three drives leaves a slope of 3 degrees open."""
-
-SETTLING = 3.0
-"""Time in which the path tracker's pose takes over what its filter learns later of the way so far [s]; chosen by turns
-on development plants with seeds of their own, for the error of the radius (docs/results)."""
-
-
-@dataclass(frozen=True)
-class TrackerSettings(Validated):
-    """Gains of a path tracker (theory: control, eq. (7) and (7a)); see :meth:`shipped` for those of B6.
-
-    Attributes:
-        loop: curvature per cross-track error, and the lead factor.
-        course: curvature per course error [1/(m rad)].
-        ahead: time by which the errors run ahead, without delays that are known [s].
-        side_slip: share of the side slip in the course [-].
-        aligning: distance over which the nose turns into the next row [m].
-        largest_slip: side slip that counts at most [rad].
-    """
-
-    loop: LoopSettings
-    course: float = bounded("1/(m rad)", 0.0, 1e3)
-    ahead: float = bounded("s", 0.0, 5.0)
-    side_slip: float = bounded("-", 0.0, 2.0)
-    aligning: float = bounded("m", 0.0, 10.0)
-    largest_slip: float = bounded("rad", 0.0, 3.2)
-
-    @classmethod
-    def shipped(cls) -> TrackerSettings:
-        """Those of B6."""
-        gains = ladder_gains()
-        return cls(
-            gains.path_tracker, gains.path_tracker_course, gains.path_tracker_ahead, gains.path_tracker_side_slip,
-            gains.path_tracker_aligning, gains.path_tracker_largest_slip,
-        )  # fmt: skip
 
 
 class CorrectedReckoning:

@@ -19,6 +19,7 @@ from ddagr_gym.control.radial_pid import RadialPid
 from ddagr_gym.control.rolling import RollingWithoutSlip
 from ddagr_gym.control.row_turn import RowTurn
 from ddagr_gym.control.timing import CONTROL_PERIOD
+from ddagr_gym.control.tracker_settings import SETTLING, STANDING, LoopSettings
 from ddagr_gym.control.true_curvature import TrueCurvature
 from ddagr_gym.control.true_path import TruePath
 from ddagr_gym.control.true_soil import TrueSoil
@@ -29,9 +30,8 @@ from ddagr_gym.estimation.dead_reckoning import DeadReckoning
 from ddagr_gym.estimation.force_balance import arc_bank_speeds
 from ddagr_gym.estimation.inertial_filter import InertialModel
 from ddagr_gym.estimation.learned_filter import LearnedModel
-from ddagr_gym.evaluation.adapted_tracker import SETTLING, STANDING
 from ddagr_gym.evaluation.calibration import calibrate_constant_speeds
-from ddagr_gym.evaluation.ladder_gains import LadderGains, LoopSettings, ladder_gains
+from ddagr_gym.evaluation.ladder_gains import LadderGains, ladder_gains
 from ddagr_gym.evaluation.policy_seeds import arm_and_seed, policy_version
 from ddagr_gym.evaluation.runs import BatchController, Controller
 from ddagr_gym.parameters import Sensors

@@ -8,21 +8,7 @@ from pathlib import Path
 
 from ddagr_gym.config import configs_dir, load_config
 from ddagr_gym.control.model_predictive import PredictiveSettings
-from ddagr_gym.control.pid import PidGains
-from ddagr_gym.validated import Validated, bounded
-
-
-@dataclass(frozen=True)
-class LoopSettings(Validated):
-    """A closed loop of the ladder.
-
-    Attributes:
-        gains: of the loop.
-        lead_factor: heading before the end of the turn at which it straightens, over that of the constant speeds.
-    """
-
-    gains: PidGains
-    lead_factor: float = bounded("-", 0.0, 5.0, default=1.0)
+from ddagr_gym.control.tracker_settings import LoopSettings, TrackerSettings
 
 
 @dataclass(frozen=True)
@@ -66,6 +52,15 @@ class LadderGains:
 def ladder_gains() -> LadderGains:
     """Gains of ``configs/evaluation/ladder_gains.yaml``, where the search writes its result."""
     return load_config(gains_file(), LadderGains)
+
+
+def tracker_settings() -> TrackerSettings:
+    """Gains of B6, of :func:`ladder_gains`."""
+    gains = ladder_gains()
+    return TrackerSettings(
+        gains.path_tracker, gains.path_tracker_course, gains.path_tracker_ahead, gains.path_tracker_side_slip,
+        gains.path_tracker_aligning, gains.path_tracker_largest_slip,
+    )  # fmt: skip
 
 
 def gains_file() -> Path:
