@@ -129,9 +129,9 @@ class Training:
     def validate(self, model: BaseAlgorithm, normalise: VecNormalize) -> ValidationResult:
         """Drive the validation scenarios without exploration."""
         policy = archive_of(model, normalise, self.settings, self.seed)
-        needs = self.settings.design.needs_filter
+        design = self.settings.design
         # the judge's settings, not the training's: rewards are then comparable between arms
-        return drive_all(policy, self.settings.design, make_settings(ekf_features=needs), self.validation)
+        return drive_all(policy, design, make_settings(**design.environment), self.validation)
 
 
 class _Course(BaseCallback):

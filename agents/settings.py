@@ -11,7 +11,7 @@ from typing import Any, Literal
 from ddagr_gym.envs.calibrated_draws import EFFECTS, load_draws
 from ddagr_gym.envs.settings import Randomisation, RewardWeights
 from ddagr_gym.errors import InputError
-from ddagr_gym.estimation import FilterModel
+from ddagr_gym.estimation import FilterModel, InertialModel
 from ddagr_gym.parameters import Drivetrain, Sensors
 from ddagr_gym.physics.effects import load_effects
 from ddagr_gym.policies.design import PolicyDesign
@@ -52,7 +52,7 @@ class TaskSettings(Validated):
             "speed": self.speed,
             "reward": self.reward,
             "effects": self.effects,
-            "ekf_features": design.needs_filter,
+            **design.environment,
         }
 
     def _robot_and_soil(self) -> dict[str, Any]:
@@ -160,6 +160,11 @@ class TrainingSettings:
         if content["filter"]["robot"]["drivetrain"] == asdict(Drivetrain()):
             # one without parts is no part: digests of before robots had one stay as they were
             del content["filter"]["robot"]["drivetrain"]
+        if self.design.tracker is None:
+            # likewise before policies had one
+            del content["design"]["tracker"]
+        else:
+            content["inertial"] = asdict(InertialModel.of(ddagr(), Sensors()).knowledge)
         if not content["filter"]["robot"]["side_slip_lead"]:
             del content["filter"]["robot"]["side_slip_lead"]
         calibration, ground = (content["task"].pop(name) for name in ("calibration", "ground"))

@@ -26,7 +26,7 @@ from benchmarks.plants_figure import draw
 from ddagr_gym.envs.options import make_settings
 from ddagr_gym.envs.settings import Episode, TurnSettings
 from ddagr_gym.errors import InputError, unknown_name
-from ddagr_gym.evaluation.controllers import controller_names, find_controller, needs_filter
+from ddagr_gym.evaluation.controllers import controller_names, find_controller, observation_options
 from ddagr_gym.evaluation.metrics import turn_metrics
 from ddagr_gym.evaluation.runs import drive_turn
 from ddagr_gym.evaluation.statistics import Interval, bootstrap, median_interval, wilson_interval
@@ -61,7 +61,7 @@ def scenario(plant: str, number: int, root_seed: int = _ROOT_SEED) -> tuple[Turn
 def drive(controller: str, plant: str, number: int) -> Outcome:
     """One turn."""
     settings, episode, seed = scenario(plant, number)
-    settings = replace(settings, ekf_features=needs_filter(controller))
+    settings = replace(settings, **observation_options(controller))
     run = drive_turn(find_controller(controller, episode.turn), settings, seed, episode)
     return Outcome(turn_metrics(run.columns, episode.turn, episode.robot).turn.error, run.success)
 

@@ -46,6 +46,26 @@ medians; their standard deviations say how much has been observed."""
 FEATURE_SCALES = np.array([entry[2] for entry in EKF_FEATURES])
 
 
+PATH_FEATURES = (
+    ("estimated_x", "m", 1.0),
+    ("estimated_y", "m", 1.0),
+    ("estimated_yaw", "rad", math.pi),
+    ("estimated_v_y", "m/s", 0.25),
+    ("gravity_x", "m/s^2", 1.0),
+    ("gravity_y", "m/s^2", 1.0),
+    ("cross_track_error", "m", 0.1),
+    ("course_error", "rad", 0.5),
+    ("path_to_go", "m", 1.0),
+    ("path_curvature", "1/m", 1.0),
+)
+"""Entries that the inertial filter's pose appends behind :data:`EKF_FEATURES`, in the same form: pose in the frame of
+the rows, velocity to the left, pull of gravity along the body's axes, and by
+:func:`~ddagr_gym.control.path_tracker.path_errors` the distance to the left of the commanded path, the direction of
+motion against the path's, the way to the next row's start line and the path's curvature there."""
+
+PATH_SCALES = np.array([entry[2] for entry in PATH_FEATURES])
+
+
 class TurnObservation(NamedTuple):
     """An observation in its units; see :data:`OBSERVATION`."""
 

@@ -194,6 +194,16 @@ class PathFollower(TurnController):
         self._turn: RowTurn | None = None
         self._estimate: MotionEstimate | None = None
 
+    def memory(self) -> tuple[float, float, float]:
+        """What it remembers besides the turn, see :meth:`restore`."""
+        return (float(self._stood), *self._pid.memory())
+
+    def restore(self, turn: RowTurn, memory: tuple[float, float, float]) -> None:
+        """On a turn, back to what :meth:`memory` gave."""
+        self.reset()
+        self._turn, self._stood = turn, int(memory[0])
+        self._pid.restore(memory[1], memory[2])
+
     def begin(self, seen: TurnObservation) -> RowTurn:
         """Start an episode at its first observation; the turn that this commands."""
         self.reset()

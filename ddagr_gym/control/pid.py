@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from ddagr_gym.validated import Validated, bounded
@@ -34,6 +35,14 @@ class Pid:
         """Forget the integral and the last error."""
         self._integral = 0.0
         self._last: float | None = None
+
+    def memory(self) -> tuple[float, float]:
+        """Integral and last error, NaN where there is none; see :meth:`restore`."""
+        return self._integral, math.nan if self._last is None else self._last
+
+    def restore(self, integral: float, last: float) -> None:
+        """Back to what :meth:`memory` gave."""
+        self._integral, self._last = integral, None if math.isnan(last) else last
 
     def update(self, error: float) -> float:
         """Output for an error; the integral stands still while it would push further into the limit."""

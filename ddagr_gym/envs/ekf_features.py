@@ -72,6 +72,9 @@ class EkfFeatureBatch:
         InputError: another kind.
     """
 
+    size = FEATURE_COUNT
+    """Features of a robot."""
+
     def __init__(self, robot: Robot, sensors: Sensors, count: int, kind: str = "flat") -> None:
         model = FilterModel.of(robot, sensors)
         self.filter: BatchFilter | InertialBatch | LearnedBatch = BatchFilter(model, count)
@@ -86,6 +89,13 @@ class EkfFeatureBatch:
     def reset(self, chosen: Sequence[int] | NDArray[np.int64]) -> None:
         """Forget the episodes of the ``chosen`` environments; the robot is at rest."""
         self.filter.reset(np.asarray(chosen, dtype=np.int64))
+
+    def begin(self, chosen: Sequence[int] | NDArray[np.int64], observations: NDArray[np.float32]) -> None:
+        """See the first observations (n, entries) of the ``chosen`` environments, after their reset; nothing to note."""
+
+    def remembered(self) -> dict[str, NDArray[np.generic]]:
+        """The arrays that it goes on from."""
+        return {name: getattr(self.filter, name) for name in self.filter.REMEMBERED}
 
     def update(self, commands: Array, readings: Array) -> None:
         """Filter the samples of one control interval.

@@ -84,6 +84,7 @@ def make_settings(
     filter: str = "flat",
     calibration: str | Path | None = None,
     ground: str = "",
+    path_features: bool = False,
 ) -> TurnSettings:
     """Settings from what ``gym.make("DDAGR-Turn-v0", ...)`` takes; see :class:`ddagr_gym.envs.TurnEnv`.
 
@@ -126,6 +127,7 @@ def make_settings(
         ekf_features=ekf_features,
         filter=filter,
         calibrated=calibrated,
+        path_features=path_features,
     )
 
 

@@ -116,6 +116,7 @@ class TurnSettings(Validated):
         filter: makes the features: "flat" takes the ground for level, "inertial" knows slopes, "learned" is that with
             its velocities corrected by a trained network.
         calibrated: robots and soils of a calibration, drawn instead of ``robot`` and ``soil``.
+        path_features: append the inertial filter's pose and its errors on the commanded path as well.
     """
 
     robot: Robot = field(default_factory=ddagr)
@@ -133,8 +134,14 @@ class TurnSettings(Validated):
     ekf_features: bool = False
     calibrated: CalibratedDraws | None = None
     filter: str = "flat"
+    path_features: bool = False
 
     def _check(self) -> None:
+        if self.path_features and self.filter != "inertial":
+            raise InputError(
+                f"path_features needs the inertial filter's pose and the filter is {self.filter!r}: give "
+                'ekf_features=True, filter="inertial" too.'
+            )
         if check_filter(self.filter) != "flat" and not self.ekf_features:
             raise InputError(f"the filter is {self.filter!r} and nothing shows it: give ekf_features=True too.")
         if self.side != "random" and self.side not in SIDES:

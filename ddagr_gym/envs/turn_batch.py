@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from ddagr_gym.control.observation import OBSERVATION
 from ddagr_gym.control.timing import CONTROL_INTERVAL
 from ddagr_gym.envs import turn_kernel as kernel
-from ddagr_gym.envs.ekf_features import FEATURE_COUNT, EkfFeatureBatch
+from ddagr_gym.envs.ekf_features import EkfFeatureBatch
+from ddagr_gym.envs.path_features import PathFeatureBatch
 from ddagr_gym.envs.settings import Episode, TurnSettings
 from ddagr_gym.errors import InputError
 from ddagr_gym.physics import layout
@@ -66,10 +67,8 @@ class TurnBatch:
         self._everyone = np.arange(count)
         self._outer_radius = np.zeros(count)
         self._weights = np.array(astuple(settings.reward))
-        self.features = (
-            EkfFeatureBatch(settings.robot, settings.sensors, count, settings.filter) if settings.ekf_features else None
-        )
-        entries = len(OBSERVATION) + (FEATURE_COUNT if settings.ekf_features else 0)
+        self.features = feature_batch(settings, count) if settings.ekf_features else None
+        entries = len(OBSERVATION) + (0 if self.features is None else self.features.size)
         self.observation_space = spaces.Box(-kernel.OBSERVATION_LIMIT, kernel.OBSERVATION_LIMIT, (entries,), np.float32)
         self.command_limit = settings.robot.maximum_wheel_speed
 
@@ -139,7 +138,8 @@ class TurnBatch:
         indices = np.asarray(chosen, dtype=np.int64)
         kernel.observe_start(self.tasks, indices, self._outer_radius, observations)
         if self.features is not None:
-            features = np.empty((self.count, FEATURE_COUNT), dtype=np.float32)
+            self.features.begin(indices, observations[indices])
+            features = np.empty((self.count, self.features.size), dtype=np.float32)
             self.features.write(features)
             observations[indices, len(OBSERVATION) :] = features[indices]
 
@@ -181,6 +181,13 @@ class TurnBatch:
     def endings(self) -> NDArray[np.int64]:
         """(N,) numbered ending of each environment, 0 while it runs."""
         return np.asarray(self.tasks[:, kernel.ENDING].astype(np.int64))
+
+
+def feature_batch(settings: TurnSettings, count: int) -> EkfFeatureBatch:
+    """What appends to the observation the estimates that the settings name."""
+    if settings.path_features:
+        return PathFeatureBatch(settings.robot, settings.sensors, count)
+    return EkfFeatureBatch(settings.robot, settings.sensors, count, settings.filter)
 
 
 def check_action(action: Any, shape: tuple[int, ...]) -> Array:

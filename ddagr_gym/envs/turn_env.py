@@ -53,7 +53,9 @@ class TurnEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     ``ekf_features=True``, or the id ``DDAGR-Turn-EKF-v0``, appends the twelve entries of
     :data:`ddagr_gym.control.observation.EKF_FEATURES`: what the filter makes of the raw samples. ``filter="inertial"``
     takes the inertial filter, which knows slopes, instead of the one that takes the ground for level, and
-    ``filter="learned"`` that filter with its velocities corrected by a trained network.
+    ``filter="learned"`` that filter with its velocities corrected by a trained network. With ``filter="inertial"``,
+    ``path_features=True`` appends the ten entries of :data:`ddagr_gym.control.observation.PATH_FEATURES`: the estimated
+    pose, and its errors on the commanded path.
 
     ## Reward
     Weighted sum of named terms, :data:`ddagr_gym.envs.turn_kernel.TERMS`; weights by ``reward=RewardWeights(...)``.
@@ -75,7 +77,7 @@ class TurnEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     ## Arguments
     ``robot, soil, radius, side, run_in, run_out, speed, sensors, randomisation, reward, effects, numerics,
-    ekf_features, filter, calibration, ground`` as in :func:`ddagr_gym.envs.options.make_settings`; ``render_mode``,
+    ekf_features, filter, calibration, ground, path_features`` as in :func:`ddagr_gym.envs.options.make_settings`; ``render_mode``,
     ``info_level``. ``reset(options={"episode": e})``
     repeats a given :class:`Episode`; ``env.unwrapped.episode`` is the present one.
 

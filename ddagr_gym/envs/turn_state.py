@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from ddagr_gym.envs.ekf_features import EkfFeatureBatch
 from ddagr_gym.envs.turn_vector_env import TurnVectorEnv
 from ddagr_gym.errors import InputError
-from ddagr_gym.estimation import BatchFilter, InertialBatch, LearnedBatch
 
 _SIMULATOR = ("rows", "effect_parameters", "effect_memory", "field_index", "_fields", "_field_geometry")
 _BATCH = ("tasks", "readings", "record", "terms", "commands", "_outer_radius")
@@ -20,8 +20,8 @@ def _arrays(owner: object, names: tuple[str, ...]) -> dict[str, Any]:
     return {name: getattr(owner, name).copy() for name in names}
 
 
-def _filter_arrays(own: BatchFilter | InertialBatch | LearnedBatch) -> dict[str, Any]:
-    return _arrays(own, own.REMEMBERED)
+def _filter_arrays(own: EkfFeatureBatch) -> dict[str, Any]:
+    return {name: array.copy() for name, array in own.remembered().items()}
 
 
 def save_state(env: TurnVectorEnv) -> dict[str, Any]:
@@ -31,7 +31,7 @@ def save_state(env: TurnVectorEnv) -> dict[str, Any]:
         "simulator": _arrays(batch.simulator, _SIMULATOR),
         "batch": _arrays(batch, _BATCH),
         "environment": _arrays(env, _ENVIRONMENT),
-        "filter": None if batch.features is None else _filter_arrays(batch.features.filter),
+        "filter": None if batch.features is None else _filter_arrays(batch.features),
         "episodes": list(batch.episodes),
         "seeds": list(env._seeds),
         "generators": [copy.deepcopy(rng.bit_generator.state) for rng in env._rngs],
@@ -49,7 +49,7 @@ def restore_state(env: TurnVectorEnv, state: dict[str, Any]) -> None:
     """
     batch = env.batch
     known = () if state["filter"] is None else tuple(state["filter"])
-    wanted = () if batch.features is None else batch.features.filter.REMEMBERED
+    wanted = () if batch.features is None else tuple(batch.features.remembered())
     if len(state["episodes"]) != batch.count or known != wanted:
         raise InputError(
             f"the state is of {len(state['episodes'])} environments"
@@ -62,8 +62,8 @@ def restore_state(env: TurnVectorEnv, state: dict[str, Any]) -> None:
         for name, value in state[part].items():
             getattr(owner, name)[...] = value
     if batch.features is not None:
-        for name, value in state["filter"].items():
-            getattr(batch.features.filter, name)[...] = value
+        for name, array in batch.features.remembered().items():
+            array[...] = state["filter"][name]
     batch.episodes = list(state["episodes"])
     env._seeds = list(state["seeds"])
     env._rngs = [_generator(item) for item in state["generators"]]

@@ -64,6 +64,26 @@ def integrate_track(
     return np.column_stack([x, y, yaw])
 
 
+def led_on(pose: Array, motion: Array, before: Array, period: float) -> Array:
+    """Pose (3,) to which velocities lead.
+
+    Args:
+        pose: x, y [m], yaw [rad] at the start.
+        motion: v_x, v_y [m/s] and yaw rate [rad/s] after each sample (K, 3).
+        before: likewise at the start (3,).
+        period: between samples [s].
+    """
+    x, y, turned = integrate_track(motion[:, 0], motion[:, 1], motion[:, 2], period, before)[-1]
+    cosine, sine = math.cos(pose[2]), math.sin(pose[2])
+    return pose + np.array([cosine * x - sine * y, sine * x + cosine * y, turned])
+
+
+def settled(own: Array, filtered: Array, time: float, settling: float) -> Array:
+    """Pose (3,) that has approached the filter's for a time [s]; ``settling`` as of :class:`DeadReckoning`."""
+    kept = math.exp(-time / settling) if settling > 0.0 else 0.0
+    return (1.0 - kept) * filtered + kept * own
+
+
 def _filter_of(model: FilterModel | InertialModel | LearnedModel) -> Filter | InertialFilter | LearnedFilter:
     if isinstance(model, LearnedModel):
         return LearnedFilter(model)
@@ -128,20 +148,10 @@ class DeadReckoning:
         """Through samples (K, 5) in the order of ``CHANNELS`` under one command (2,), or one each (K, 2) [rad/s]."""
         drive, readings = np.asarray(command, dtype=np.float64), np.asarray(samples, dtype=np.float64)
         before = self._filter.state[:3].copy()
-        self._integrate(_motion(self._filter, drive, readings), before)
+        self._pose = led_on(self._pose, _motion(self._filter, drive, readings), before, self._period)
         if isinstance(self._filter, InertialFilter):
-            self._settle(self._filter.pose, len(readings) * self._period)
+            self._pose = settled(self._pose, self._filter.pose, len(readings) * self._period, self._settling)
         return self.present()
-
-    def _settle(self, pose: Array, time: float) -> None:
-        """Approach the filter's pose for a time [s]."""
-        kept = math.exp(-time / self._settling) if self._settling > 0.0 else 0.0
-        self._pose = (1.0 - kept) * pose + kept * self._pose
-
-    def _integrate(self, motion: Array, before: Array) -> None:
-        x, y, turned = integrate_track(motion[:, 0], motion[:, 1], motion[:, 2], self._period, before)[-1]
-        cosine, sine = math.cos(self._pose[2]), math.sin(self._pose[2])
-        self._pose += [cosine * x - sine * y, sine * x + cosine * y, turned]
 
     def present(self) -> Reckoned:
         """What is known now."""

@@ -23,7 +23,7 @@ from ddagr_gym.evaluation.controllers import (
     find_batch,
     find_controller,
     is_policy,
-    needs_filter,
+    observation_options,
 )
 from ddagr_gym.evaluation.dataset import IDENTITY, EpisodeDataset, Key, episode_key
 from ddagr_gym.evaluation.estimator_metrics import estimator_errors
@@ -59,8 +59,14 @@ class Episodes:
         return f"{self.controller} on {self.set_name} {self.numbers[0]} to {self.numbers[-1]}"
 
 
-def scenario_settings(scenario: Scenario, ekf_features: bool = False) -> TurnSettings:
-    """Settings of the environment in which a scenario is driven; the episode itself is frozen."""
+def scenario_settings(scenario: Scenario, ekf_features: bool = False, **observed: Any) -> TurnSettings:
+    """Settings of the environment in which a scenario is driven; the episode itself is frozen.
+
+    Args:
+        scenario: to drive.
+        ekf_features: see :func:`ddagr_gym.envs.options.make_settings`, as ``observed``.
+        observed: what else the observation holds.
+    """
     turn = scenario.episode.turn
     return make_settings(
         radius=turn.radius,
@@ -70,13 +76,14 @@ def scenario_settings(scenario: Scenario, ekf_features: bool = False) -> TurnSet
         run_out=turn.run_out,
         effects=(*ground_effects(scenario.law), *scenario.effects),
         ekf_features=ekf_features,
+        **observed,
     )
 
 
 def drive_scenario(controller: str, scenario: Scenario) -> TurnRun:
     """One scenario by one controller."""
     made = find_controller(controller, scenario.episode.turn)
-    settings = scenario_settings(scenario, needs_filter(controller))
+    settings = scenario_settings(scenario, **observation_options(controller))
     return drive_turn(made, settings, scenario.seed, scenario.episode)
 
 
@@ -89,7 +96,7 @@ def drive_scenarios(controller: str, scenarios: Sequence[Scenario]) -> list[Turn
         if batch is None:
             driven = [drive_scenario(controller, item) for item in group]
         else:
-            settings = scenario_settings(group[0], needs_filter(controller))
+            settings = scenario_settings(group[0], **observation_options(controller))
             driven = drive_turns(batch, settings, [item.seed for item in group], [item.episode for item in group])
         runs |= dict(zip(places, driven, strict=True))
     return [runs[place] for place in range(len(scenarios))]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -245,6 +246,15 @@ def needs_filter(name: str) -> bool:
 
         return policy_needs_filter(name)
     return name in EKF_CONTROLLERS
+
+
+def observation_options(name: str) -> dict[str, Any]:
+    """What the environment must be given so that its observation holds what this controller reads."""
+    if is_policy(name):
+        from ddagr_gym.policies.controller import policy_environment
+
+        return policy_environment(name)
+    return {"ekf_features": needs_filter(name)}
 
 
 def has_inertial_filter(name: str) -> bool:

@@ -32,8 +32,8 @@ class PolicyController:
     ) -> None:
         if estimate not in ESTIMATES:
             raise unknown_name("estimate", estimate, ESTIMATES)
-        if estimate not in OF_EVERY_POLICY and not policy.design.needs_filter:
-            raise InputError(f"estimate {estimate!r}: this policy does not see the filter, give only its name.")
+        if estimate not in OF_EVERY_POLICY and policy.design.features != "ekf":
+            raise InputError(f"estimate {estimate!r}: this policy does not see the filter of level ground, give only its name.")
         nominal = ddagr() if robot is None else robot
         self.policy = policy
         self._alone = PolicyBatch(policy, 1, estimate == "feed_forward", nominal, sensors)
@@ -54,6 +54,7 @@ class PolicyController:
         size = self.policy.design.observation_size
         if given.shape != (size,):
             needed = "DDAGR-Turn-EKF-v0" if self.policy.design.needs_filter else "DDAGR-Turn-v0"
+            needed += ' with filter="inertial", path_features=True' if self.policy.design.features == "path" else ""
             raise InputError(f"observation has shape {given.shape}: this policy needs {needed}, ({size},).")
         return np.asarray(self._alone(self._estimate(given, info)[None])[0])
 
@@ -122,16 +123,22 @@ def policy_needs_filter(name: str) -> bool:
     return find_policy(split_estimate(name)[0]).design.needs_filter
 
 
+def policy_environment(name: str) -> dict[str, Any]:
+    """What the environment must be given for this policy."""
+    return find_policy(split_estimate(name)[0]).design.environment
+
+
 def policy_title(name: str) -> str:
     """What a policy is, in a phrase."""
     stem, estimate = split_estimate(name)
     if estimate not in ESTIMATES:
         raise unknown_name("estimate", estimate, ESTIMATES)
     design = find_policy(stem).design
-    sees = "the filter's features" if design.needs_filter else "raw sensors"
+    sees = {"raw": "raw sensors", "ekf": "the filter's features", "path": "the estimated path errors"}[design.features]
     history = f" and {design.frames} instants" if design.frames > 1 else ""
     replaced = "" if estimate == "live" else f", {ESTIMATES[estimate][1]}"
-    acts = "bank speeds" if design.action == "absolute" else "a correction of the feed-forward"
+    corrected = "path tracker" if design.features == "path" else "feed-forward"
+    acts = "bank speeds" if design.action == "absolute" else f"a correction of the {corrected}"
     return f"learned policy: {sees}{history} to {acts}{replaced}"
 
 

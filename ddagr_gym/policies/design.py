@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
-from ddagr_gym.control.observation import EKF_FEATURES, OBSERVATION
+from ddagr_gym.control.observation import EKF_FEATURES, OBSERVATION, PATH_FEATURES
+from ddagr_gym.control.tracker_settings import TrackerSettings
 from ddagr_gym.errors import InputError
 from ddagr_gym.validated import Validated, bounded
 
@@ -42,6 +43,34 @@ FILTER_INPUTS = (
 """Inputs of the arm with the filter: its features, and dead reckoning with them, without and with sideslip, against the
 commanded path and against the reference of :mod:`ddagr_gym.policies.reckoning`."""
 
+PATH_INPUTS = (
+    "estimated_speed",
+    "estimated_side_speed",
+    "estimated_yaw_rate",
+    "log_traction_limit",
+    "log_traction_rate",
+    "log_lateral_stiffness",
+    "log_motion_resistance",
+    "estimated_slip_outer",
+    "estimated_slip_inner",
+    "deviation_log_traction_limit",
+    "deviation_log_traction_rate",
+    "deviation_log_lateral_stiffness",
+    "deviation_log_motion_resistance",
+    "gravity_x",
+    "gravity_y",
+    "path_cross_track_error",
+    "path_course_error",
+    "path_to_go",
+    "path_curvature",
+    "tracker_curvature",
+)
+"""Inputs of the arm with the path: what the inertial filter estimates of motion, soil and ground, the errors of its pose
+on the commanded path, and the curvature that the path tracker asks for."""
+
+Features = Literal["raw", "ekf", "path"]
+FEATURES: tuple[Features, ...] = ("raw", "ekf", "path")
+
 
 @dataclass(frozen=True)
 class PolicyDesign(Validated):
@@ -50,11 +79,12 @@ class PolicyDesign(Validated):
     All inputs are dimensionless (by R* and the reference speed) and mirrored, so that every turn is one to the left.
 
     Attributes:
-        features: "raw" sees the sensors and the task, "ekf" the filter's features besides.
+        features: "raw" sees the sensors and the task, "ekf" the filter's features besides, "path" those of the inertial
+            filter with its pose on the commanded path.
         action: "correction": outputs are a correction of curvature and one of speed on the feed-forward; "absolute":
             outputs are the bank speeds, outer and inner. The feed-forward is the force balance: with features "ekf" at
             the filter's estimate, for a curvature that follows a dead-reckoned reference; with "raw" at the filter's
-            prior, for the commanded curvature.
+            prior, for the commanded curvature. With "path" it is the path tracker, feed-forward and feedback.
         frames: how many past instants of the inputs are seen, the present one included.
         frame_interval: control steps between them.
         curvature_scale: correction of curvature at output 1, over 1/R* [-].
@@ -65,9 +95,10 @@ class PolicyDesign(Validated):
         heading_gain: of "raw", curvature of the feed-forward per heading error on straights [1/(m rad)].
         offset_gain: of "ekf", curvature over 1/R* per distance over R* from the reference [-].
         course_gain: of "ekf", curvature over 1/R* per course error [1/rad].
+        tracker: of "path", gains of the path tracker.
     """
 
-    features: Literal["raw", "ekf"] = "ekf"
+    features: Features = "ekf"
     action: Literal["correction", "absolute"] = "correction"
     frames: int = 1
     frame_interval: int = 4
@@ -78,33 +109,45 @@ class PolicyDesign(Validated):
     heading_gain: float = bounded("1/(m rad)", 0.0, 50.0, default=1.0)
     offset_gain: float = bounded("-", 0.0, 100.0, default=1.0)
     course_gain: float = bounded("1/rad", 0.0, 100.0, default=4.0)
+    tracker: TrackerSettings | None = None
 
     def _check(self) -> None:
         for name, value, most in (("frames", self.frames, 64), ("frame_interval", self.frame_interval, 100)):
             if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= most:
                 raise InputError(f"PolicyDesign.{name} is {value!r}: give a whole number from 1 to {most}.")
         for field, choice, allowed in (
-            ("features", self.features, ("raw", "ekf")),
+            ("features", self.features, FEATURES),
             ("action", self.action, ("correction", "absolute")),
         ):
             if choice not in allowed:
                 raise InputError(f"PolicyDesign.{field} is {choice!r}: give {' or '.join(map(repr, allowed))}.")
 
+        if (self.features == "path") != (self.tracker is not None):
+            raise InputError(f"PolicyDesign.tracker is {self.tracker!r}: give gains with features 'path', and only then.")
+
     @property
     def needs_filter(self) -> bool:
-        """Whether the environment must append the filter's features."""
-        return self.features == "ekf"
+        """Whether the environment must append a filter's features."""
+        return self.features != "raw"
+
+    @property
+    def environment(self) -> dict[str, Any]:
+        """What the environment must be given for these features."""
+        if self.features == "path":
+            return {"ekf_features": True, "filter": "inertial", "path_features": True}
+        return {"ekf_features": self.needs_filter}
 
     @property
     def observation_size(self) -> int:
         """Entries of the environment's observation."""
-        return len(OBSERVATION) + (len(EKF_FEATURES) if self.needs_filter else 0)
+        appended = {"raw": 0, "ekf": len(EKF_FEATURES), "path": len(EKF_FEATURES) + len(PATH_FEATURES)}
+        return len(OBSERVATION) + appended[self.features]
 
     @property
     def frame_inputs(self) -> tuple[str, ...]:
         """Names of the inputs of one instant."""
-        names = (*SENSOR_INPUTS, *MEMORY_INPUTS, *TASK_INPUTS)
-        return (*names, *FILTER_INPUTS) if self.needs_filter else names
+        appended: dict[Features, tuple[str, ...]] = {"raw": (), "ekf": FILTER_INPUTS, "path": PATH_INPUTS}
+        return (*SENSOR_INPUTS, *MEMORY_INPUTS, *TASK_INPUTS, *appended[self.features])
 
     @property
     def inputs(self) -> tuple[str, ...]:

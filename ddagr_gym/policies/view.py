@@ -12,13 +12,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.control.observation import FEATURE_SCALES, OBSERVATION, SCALES
+from ddagr_gym.control.observation import FEATURE_SCALES, OBSERVATION, PATH_SCALES, SCALES
 from ddagr_gym.control.timing import CONTROL_PERIOD
 from ddagr_gym.estimation import FilterModel
 from ddagr_gym.estimation.force_balance import arc_bank_speed_rows
 from ddagr_gym.parameters import Robot, Sensors
 from ddagr_gym.policies.design import PolicyDesign
 from ddagr_gym.policies.reckoning import Reckoning
+from ddagr_gym.policies.tracking import TrackedPaths
 
 Array = NDArray[np.float64]
 Inputs = NDArray[np.float32]
@@ -65,19 +66,25 @@ class PolicyView:
         self._behind = np.zeros(count)
         self._response = np.zeros(count)
         self._frames = np.zeros((count, depth, len(design.frame_inputs)))
+        self._scales = np.concatenate([SCALES, FEATURE_SCALES, PATH_SCALES])[: design.observation_size]
+        self._paths = None if design.tracker is None else TrackedPaths(design.tracker, robot, sensors, count)
 
     def _memories(self) -> tuple[NDArray[Any], ...]:
         own = (self._fresh, self._outputs, self._integral, self._behind, self._response, self._frames)
         return (*own, *self._reckoning.memories())
 
-    def memory(self) -> tuple[NDArray[Any], ...]:
+    def memory(self) -> tuple[Any, ...]:
         """Copies of everything that is remembered between steps; see :meth:`restore`."""
-        return tuple(array.copy() for array in self._memories())
+        paths = () if self._paths is None else (self._paths.memory(),)
+        return (*(array.copy() for array in self._memories()), *paths)
 
-    def restore(self, memory: tuple[NDArray[Any], ...]) -> None:
+    def restore(self, memory: tuple[Any, ...]) -> None:
         """Back to what :meth:`memory` gave."""
-        for array, saved in zip(self._memories(), memory, strict=True):
+        own = self._memories()
+        for array, saved in zip(own, memory[: len(own)], strict=True):
             array[...] = saved
+        if self._paths is not None:
+            self._paths.restore(memory[len(own)])
 
     def reset(self, chosen: NDArray[np.int64] | None = None) -> None:
         """Forget the episodes of ``chosen`` rows, all by default."""
@@ -93,10 +100,13 @@ class PolicyView:
             (n, inputs).
         """
         rows = np.arange(self.count) if chosen is None else chosen
-        given = np.asarray(observations, dtype=np.float64)
-        seen = given[:, :_BASE] * SCALES
-        features = given[:, _BASE:] * FEATURE_SCALES if self.design.needs_filter else None
+        whole = np.asarray(observations, dtype=np.float64) * self._scales
+        seen = whole[:, :_BASE]
+        features = whole[:, _BASE:] if self.design.needs_filter else None
         self._start(rows, seen)
+        if self._paths is not None:
+            self._paths.start(rows[self._fresh[rows]], seen[self._fresh[rows]])
+            self._paths.observe(rows, whole)
         self._measure_response(rows, seen)
         frame = self._frame(rows, seen, features)
         self._frames[rows, 1:] = self._frames[rows, :-1]
@@ -137,7 +147,9 @@ class PolicyView:
             self._response[rows],
             *self._task(rows, seen),
         ]
-        if features is not None:
+        if self._paths is not None and features is not None:
+            columns += self._tracked(seen, features, self._paths.curvatures[rows])
+        elif features is not None:
             columns += self._filtered(rows, seen, features)
         return np.stack(columns, axis=1)
 
@@ -192,6 +204,28 @@ class PolicyView:
             (math.pi - self._reckoning.references[rows, 2]) / math.pi,
         ]
 
+    @staticmethod
+    def _tracked(seen: Array, features: Array, wanted: Array) -> list[Array]:
+        """Inputs of the path, see :data:`~ddagr_gym.policies.design.PATH_INPUTS`."""
+        side, radius, speed = seen[:, 7], seen[:, 8], seen[:, 9]
+        path = features[:, len(FEATURE_SCALES) :]
+        return [
+            features[:, 0] / speed,
+            side * path[:, 3] / speed,
+            side * features[:, 1] * radius / speed,
+            *features[:, 2:6].T,
+            *_outer_inner(side, features[:, 6], features[:, 7]),
+            *features[:, 8:12].T,
+            path[:, 4] / _FORCE_SCALE,
+            side * path[:, 5] / _FORCE_SCALE,
+            # a hundredth of R* and half a degree are what matters
+            10.0 * side * path[:, 6] / radius,
+            10.0 * side * path[:, 7],
+            path[:, 8] / radius,
+            side * path[:, 9] * radius,
+            side * wanted * radius,
+        ]
+
     def _reckon(self, rows: NDArray[np.int64], seen: Array, forward: Array, rate: Array) -> None:
         moved = ~self._fresh[rows]
         radius, lateral = seen[:, 8], seen[:, 7] * seen[:, 1]
@@ -212,9 +246,18 @@ class PolicyView:
         seen = given[:, :_BASE] * SCALES
         if self.design.action == "absolute":
             right, left = _outer_inner(seen[:, 7], self._outputs[:, 0], self._outputs[:, 1])
-            return np.stack([right, left], axis=1).astype(np.float32)
+            driving = 1.0 if self._paths is None else np.where(self._paths.standing, 0.0, 1.0)
+            return (np.stack([right, left]) * driving).T.astype(np.float32)
+        if self._paths is not None:
+            return self._corrected(self._paths, seen)
         banks = self._feed_forward(seen, given) / self._limit
         return np.clip(banks, -1.0, 1.0).astype(np.float32)
+
+    def _corrected(self, paths: TrackedPaths, seen: Array) -> NDArray[np.float32]:
+        """The path tracker's actions (N, 2) for its curvature and speed, each corrected."""
+        bend = seen[:, 7] * self.design.curvature_scale * self._outputs[:, 0] / seen[:, 8]
+        pace = 1.0 + self.design.speed_scale * self._outputs[:, 1]
+        return paths.act(pace * seen[:, 9], paths.curvatures + bend)
 
     def _feed_forward(self, seen: Array, given: Array) -> Array:
         """Bank speeds (N, 2) right, left [rad/s] of the corrected arc at the estimated, or the nominal, soil."""

@@ -11,7 +11,7 @@ from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import NDArray
 
 from ddagr_gym.deprecation import renamed
-from ddagr_gym.envs.ekf_features import FEATURE_COUNT, EkfFeatureBatch
+from ddagr_gym.envs.turn_batch import feature_batch
 from ddagr_gym.envs.turn_kernel import OBSERVATION_LIMIT
 from ddagr_gym.errors import InputError
 
@@ -27,23 +27,27 @@ class EKFObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArg
     Args:
         env: a :class:`ddagr_gym.envs.TurnEnv` made with ``info_level="full"``.
         filter: "flat" takes the ground for level, "inertial" knows slopes, "learned" corrects it by a network.
+        path_features: also append :data:`ddagr_gym.control.observation.PATH_FEATURES`, pose and path errors.
 
     Raises:
-        InputError: an unknown filter; at the first reset of an environment without raw samples in its info.
+        InputError: an unknown filter, or path features by another than the inertial one; at the first reset of an
+            environment without raw samples in its info.
     """
 
-    def __init__(self, env: gymnasium.Env[Any, Any], filter: str = "flat") -> None:
-        RecordConstructorArgs.__init__(self, filter=filter)
+    def __init__(self, env: gymnasium.Env[Any, Any], filter: str = "flat", path_features: bool = False) -> None:
+        RecordConstructorArgs.__init__(self, filter=filter, path_features=path_features)
         gymnasium.Wrapper.__init__(self, env)
+        settings = self.get_wrapper_attr("settings").with_values(
+            ekf_features=True, filter=filter, path_features=path_features
+        )
+        self._features = feature_batch(settings, 1)
         (entries,) = env.observation_space.shape or (0,)
         self.observation_space = spaces.Box(
-            -OBSERVATION_LIMIT, OBSERVATION_LIMIT, (entries + FEATURE_COUNT,), np.float32
+            -OBSERVATION_LIMIT, OBSERVATION_LIMIT, (entries + self._features.size,), np.float32
         )
-        settings = self.get_wrapper_attr("settings")
-        self._features = EkfFeatureBatch(settings.robot, settings.sensors, 1, filter)
 
     def _with_features(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
-        features = np.empty((1, FEATURE_COUNT), dtype=np.float32)
+        features = np.empty((1, self._features.size), dtype=np.float32)
         self._features.write(features)
         return np.concatenate([observation, features[0]])
 
@@ -53,6 +57,7 @@ class EKFObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArg
         if "samples" not in info:
             raise InputError('EKFObservation needs the raw samples: make the environment with info_level="full".')
         self._features.reset([0])
+        self._features.begin([0], observation[None])
         return self._with_features(observation), info
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:

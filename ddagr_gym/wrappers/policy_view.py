@@ -20,7 +20,7 @@ class PolicyViewVecEnv(VecEnvWrapper):
     Observations are the design's inputs, actions its two outputs in [-1, 1].
 
     Args:
-        venv: the batch, made with ``ekf_features=design.needs_filter``.
+        venv: the batch, made with ``**design.environment``.
         design: wiring.
     """
 
