@@ -165,6 +165,8 @@ class TrainingSettings:
             del content["design"]["tracker"]
         else:
             content["inertial"] = asdict(InertialModel.of(ddagr(), Sensors()).knowledge)
+        if not self.task.randomisation.slope:
+            del content["task"]["randomisation"]["slope"]
         if not content["filter"]["robot"]["side_slip_lead"]:
             del content["filter"]["robot"]["side_slip_lead"]
         calibration, ground = (content["task"].pop(name) for name in ("calibration", "ground"))

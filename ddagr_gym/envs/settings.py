@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
@@ -33,6 +34,7 @@ class Randomisation(Validated):
         heading_offset: of the start [rad].
         soil_variation: of soil strength along the drive, relative [-]; 0 for one soil everywhere.
         correlation_length: of that variation [m].
+        slope: largest inclination of the ground [rad], drawn uniformly from 0, rising towards any direction.
     """
 
     mass: float = bounded("-", 0.0, 0.3, default=0.03)
@@ -45,6 +47,7 @@ class Randomisation(Validated):
     heading_offset: float = bounded("rad", 0.0, 0.3, default=0.01)
     soil_variation: float = bounded("-", 0.0, 0.5, default=0.05)
     correlation_length: float = bounded("m", 0.05, 100.0, default=0.5)
+    slope: float = bounded("rad", 0.0, 0.3, default=0.0)
 
     @classmethod
     def none(cls) -> Randomisation:
@@ -82,6 +85,7 @@ class Episode:
         heading_offset: [rad].
         field: soil by place instead of ``soils``.
         rejected_soils: immobilising draws before this one.
+        slope: inclination of the ground and direction of steepest ascent [rad].
     """
 
     turn: RowTurn
@@ -93,6 +97,7 @@ class Episode:
     heading_offset: float = 0.0
     field: SoilField | None = None
     rejected_soils: int = 0
+    slope: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -175,7 +180,13 @@ class TurnSettings(Validated):
             heading_offset=float(spread.heading_offset * rng.standard_normal()),
             field=self._draw_field(soil, turn, rng),
             rejected_soils=rejected,
+            slope=self._draw_slope(rng),
         )
+
+    def _draw_slope(self, rng: np.random.Generator) -> tuple[float, float]:
+        """Inclination and direction of steepest ascent [rad]; nothing is drawn where all ground is level."""
+        most = self.randomisation.slope
+        return (float(rng.uniform(0.0, most)), float(rng.uniform(-math.pi, math.pi))) if most else (0.0, 0.0)
 
     def _draw_soil(self, rng: np.random.Generator, robot: Robot) -> tuple[Soil, int]:
         """Soil of an episode, and how many draws before it were rejected."""

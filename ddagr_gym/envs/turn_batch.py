@@ -18,7 +18,9 @@ from ddagr_gym.envs.path_features import PathFeatureBatch
 from ddagr_gym.envs.settings import Episode, TurnSettings
 from ddagr_gym.errors import InputError
 from ddagr_gym.physics import layout
+from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.effects.command_delay import CommandDelay
+from ddagr_gym.physics.effects.slope import Slope
 from ddagr_gym.sensors.normal_draws import NormalDraws
 from ddagr_gym.simulator import Simulator
 
@@ -51,8 +53,10 @@ class TurnBatch:
     def __init__(self, settings: TurnSettings, count: int = 1, threads: int = 1, recorded: Sequence[int] = ()) -> None:
         self.settings = settings
         self.count = count
+        self._sloping = settings.randomisation.slope > 0.0
+        drawn: tuple[Effect, ...] = (CommandDelay(0.0), Slope(0.0)) if self._sloping else (CommandDelay(0.0),)
         self.simulator = Simulator(
-            count, numerics=settings.numerics, effects=(CommandDelay(0.0), *settings.effects), threads=threads
+            count, numerics=settings.numerics, effects=(*drawn, *settings.effects), threads=threads
         )
         self.tasks = np.zeros((count, kernel.TASK_SIZE))
         self.episodes: list[Episode | None] = [None] * count
@@ -123,6 +127,10 @@ class TurnBatch:
         self.simulator.configure(n, episode.robot, soils, episode.sensors)
         self.simulator.set_field(n, episode.field)
         self.simulator.effect_parameters[n, 0, 0] = episode.command_delay
+        if self._sloping:
+            self.simulator.effect_parameters[n, 1, :2] = episode.slope
+        elif episode.slope[0]:
+            raise InputError(f"the episode's ground slopes by {episode.slope[0]:g} rad: give a randomisation of slope.")
         turn = episode.turn
         task = self.tasks[n]
         task[:] = 0.0

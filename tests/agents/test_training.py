@@ -30,6 +30,7 @@ from ddagr_gym.envs.calibrated_draws import EFFECTS, CalibratedDraws, GroundDraw
 from ddagr_gym.envs.calibrated_draws import NAME as DRAWS
 from ddagr_gym.envs.options import make_settings
 from ddagr_gym.errors import InputError
+from ddagr_gym.evaluation.ladder_gains import tracker_settings
 from ddagr_gym.evaluation.metrics import turn_metrics
 from ddagr_gym.evaluation.runs import drive_turn
 from ddagr_gym.parameters import Drivetrain
@@ -52,6 +53,7 @@ PPO = TrainingSettings(
     ppo=PpoSettings(rollout=8, batch=16, epochs=2, hidden=(8, 8)),
 )
 SAC = replace(PPO, algorithm="sac", steps=64, sac=SacSettings(start=16, batch=16, gradient_steps=2, hidden=(8, 8)))
+PATH = replace(PPO, design=PolicyDesign(features="path", tracker=tracker_settings()))
 MAKE = {"ppo": make_ppo, "sac": make_sac}
 
 
@@ -73,7 +75,7 @@ class Killed(BaseException):
     """Stands for a signal in the middle of a rollout."""
 
 
-@pytest.mark.parametrize("settings", [PPO, SAC], ids=["ppo", "sac"])
+@pytest.mark.parametrize("settings", [PPO, SAC, PATH], ids=["ppo", "sac", "path"])
 def test_a_killed_training_goes_on_to_the_bit(tmp_path, monkeypatch, settings):
     whole = train_here(settings, tmp_path / "whole")
     calls = []

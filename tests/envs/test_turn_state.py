@@ -22,7 +22,8 @@ def drive(env, steps, seed):
 
 
 @pytest.mark.parametrize("options", [{}, {"ekf_features": True}, {"ekf_features": True, "filter": "inertial"},
-                                     {"ekf_features": True, "filter": "learned"}])  # fmt: skip
+                                     {"ekf_features": True, "filter": "learned"},
+                                     {"ekf_features": True, "filter": "inertial", "path_features": True}])  # fmt: skip
 def test_a_fresh_batch_goes_on_to_the_bit(options):
     arguments = {"num_envs": 3, "max_episode_steps": 12, "autoreset_mode": "SameStep", **options}
     env = TurnVectorEnv(**arguments)
