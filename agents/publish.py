@@ -201,6 +201,12 @@ def _outputs(settings: TrainingSettings) -> str:
     design = settings.design
     if design.action == "absolute":
         return "speeds of the outer and the inner bank, over the robot's maximum."
+    if design.features == "path":
+        return (
+            f"corrections of curvature (up to {design.curvature_scale:g}/R*) and of speed (up to "
+            f"{100 * design.speed_scale:g} %) that the path tracker (B6) wants, feed-forward and feedback kept. "
+            "`@feed_forward` after the name drives without the network."
+        )
     base = (
         "the filter's estimate, for a curvature that follows a dead-reckoned reference (gains "
         f"{design.offset_gain:g} and {design.course_gain:g})"

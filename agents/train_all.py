@@ -20,6 +20,9 @@ PUBLISHED = (
     "ppo_ekf_fixed",
     "ppo_ekf_absolute",
     "sac_ekf",
+    "ppo_path",
+    "ppo_path_wide",
+    "ppo_path_absolute",
 )
 """Configurations in the order in which they are trained; the headline arm first."""
 
