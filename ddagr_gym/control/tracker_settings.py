@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from ddagr_gym.control.pid import PidGains
 from ddagr_gym.validated import Validated, bounded
 
-
 STANDING = 10
 """Control periods for which the path tracker stands before it drives, 0.8 s: 100 samples tell gravity to 3 mm/s^2."""
 

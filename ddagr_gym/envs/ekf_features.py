@@ -91,7 +91,7 @@ class EkfFeatureBatch:
         self.filter.reset(np.asarray(chosen, dtype=np.int64))
 
     def begin(self, chosen: Sequence[int] | NDArray[np.int64], observations: NDArray[np.float32]) -> None:
-        """See the first observations (n, entries) of the ``chosen`` environments, after their reset; nothing to note."""
+        """See the first observations (n, entries) of the ``chosen`` environments after their reset; nothing to note."""
 
     def remembered(self) -> dict[str, NDArray[np.generic]]:
         """The arrays that it goes on from."""

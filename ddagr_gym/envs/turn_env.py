@@ -77,8 +77,8 @@ class TurnEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     ## Arguments
     ``robot, soil, radius, side, run_in, run_out, speed, sensors, randomisation, reward, effects, numerics,
-    ekf_features, filter, calibration, ground, path_features`` as in :func:`ddagr_gym.envs.options.make_settings`; ``render_mode``,
-    ``info_level``. ``reset(options={"episode": e})``
+    ekf_features, filter, path_features, calibration, ground`` as in
+    :func:`ddagr_gym.envs.options.make_settings`; ``render_mode``, ``info_level``. ``reset(options={"episode": e})``
     repeats a given :class:`Episode`; ``env.unwrapped.episode`` is the present one.
 
     ## Versions

@@ -245,7 +245,7 @@ class InertialBatch:
         count: N.
     """
 
-    REMEMBERED = ("works", "_counts")
+    REMEMBERED: tuple[str, ...] = ("works", "_counts")
     """Arrays that it goes on from."""
 
     def __init__(self, model: InertialModel, count: int = 1) -> None:

@@ -33,7 +33,9 @@ class PolicyController:
         if estimate not in ESTIMATES:
             raise unknown_name("estimate", estimate, ESTIMATES)
         if estimate not in OF_EVERY_POLICY and policy.design.features != "ekf":
-            raise InputError(f"estimate {estimate!r}: this policy does not see the filter of level ground, give only its name.")
+            raise InputError(
+                f"estimate {estimate!r}: this policy does not see the filter of level ground, give only its name."
+            )
         nominal = ddagr() if robot is None else robot
         self.policy = policy
         self._alone = PolicyBatch(policy, 1, estimate == "feed_forward", nominal, sensors)

@@ -65,8 +65,8 @@ PATH_INPUTS = (
     "path_curvature",
     "tracker_curvature",
 )
-"""Inputs of the arm with the path: what the inertial filter estimates of motion, soil and ground, the errors of its pose
-on the commanded path, and the curvature that the path tracker asks for."""
+"""Inputs of the arm with the path: what the inertial filter estimates of motion, soil and ground, the errors of its
+pose on the commanded path, and the curvature that the path tracker asks for."""
 
 Features = Literal["raw", "ekf", "path"]
 FEATURES: tuple[Features, ...] = ("raw", "ekf", "path")
@@ -123,7 +123,9 @@ class PolicyDesign(Validated):
                 raise InputError(f"PolicyDesign.{field} is {choice!r}: give {' or '.join(map(repr, allowed))}.")
 
         if (self.features == "path") != (self.tracker is not None):
-            raise InputError(f"PolicyDesign.tracker is {self.tracker!r}: give gains with features 'path', and only then.")
+            raise InputError(
+                f"PolicyDesign.tracker is {self.tracker!r}: give gains with features 'path', and only then."
+            )
 
     @property
     def needs_filter(self) -> bool:

@@ -23,8 +23,8 @@ from ddagr_gym.parameters import Robot, Sensors
 Array = NDArray[np.float64]
 
 _LEAD = 0.057
-"""Heading before the end of the turn at which two constant speeds straighten [rad]: 0.0562 to 0.0572 on the nominal soil
-at radii of 0.66 to 1.1 m."""
+"""Heading before the end of the turn at which two constant speeds straighten [rad]: 0.056 to 0.057 on the nominal soil
+at radii of 0.66 to 1.1 m (:func:`ddagr_gym.evaluation.controllers.nominal_constants`)."""
 _TRACK_RATIO = 1.3
 """Effective over geometric track [-]: 1.26 to 1.34 there."""
 

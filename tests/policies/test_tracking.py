@@ -33,8 +33,8 @@ START = {"side": 1.0, "target_radius": 0.8, "target_speed": 0.2, "heading_to_go"
 TURNING = {"estimated_x": 0.6, "estimated_y": 0.35, "estimated_yaw": 1.0, "estimated_v_x": 0.2, "estimated_v_y": -0.01,
            "estimated_yaw_rate": 0.25, "run_in_to_go": 0.0, "heading_to_go": 2.0, "cross_track_error": -0.02,
            "course_error": 0.05, "path_curvature": 1.25, "gravity_x": 0.1, "gravity_y": 0.2}  # fmt: skip
-MIRRORED = ("side", "yaw_rate", "specific_force_y", "estimated_y", "estimated_yaw", "estimated_v_y", "estimated_yaw_rate",
-            "cross_track_error", "course_error", "path_curvature", "gravity_y")  # fmt: skip
+MIRRORED = ("side", "yaw_rate", "specific_force_y", "estimated_y", "estimated_yaw", "estimated_v_y",
+            "estimated_yaw_rate", "cross_track_error", "course_error", "path_curvature", "gravity_y")  # fmt: skip
 
 
 def observation(**values):
