@@ -4,8 +4,9 @@
 
 Drives :data:`CONTROLLERS` on the validation set V and on the sets of :mod:`benchmarks.second_sets` (about twenty
 minutes of one core; started again with the same folder, it goes on), and writes
-``benchmarks/results/path_policies.json`` and a picture beside it. Turns that no upper bound makes are left out. B4 and ppo_ekf stand there as
-``benchmarks/results/second_sets.json`` has them, as long as scenarios and controllers are the same.
+``benchmarks/results/path_policies.json`` and a picture beside it. Turns that no upper bound makes are left out.
+B4 and ppo_ekf stand there as ``benchmarks/results/second_sets.json`` has them, as long as scenarios and controllers
+are the same.
 
 ``ppo_path@feed_forward`` is the path tracker of these policies with the network silent. Its turns differ from B6's by
 rounding and by the numbers that B6 has calibrated for each turn: how far the two are apart says what differs by chance.

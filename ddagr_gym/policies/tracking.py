@@ -7,6 +7,7 @@ constant speeds on the nominal soil stand in place of those that B6 has calibrat
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -91,9 +92,13 @@ class TrackedPaths:
 
     def observe(self, rows: NDArray[np.int64], seen: Array) -> None:
         """See ``rows`` once a control period (n, entries) in SI units, and note the curvature that each wants."""
-        for n, values in zip(rows.tolist(), seen, strict=True):
-            at = self._at[n] = self._motion(values)
-            wanted = self._followers[n].wanted(TurnObservation(*values[:_BASE].tolist()), at)
+        self.follow(rows, seen, [self._motion(values) for values in seen])
+
+    def follow(self, rows: NDArray[np.int64], seen: Array, motions: Sequence[Reckoned]) -> None:
+        """As :meth:`observe`, by the motions of ``rows`` in place of those that the observations say."""
+        for n, values, at in zip(rows.tolist(), seen[:, :_BASE].tolist(), motions, strict=True):
+            self._at[n] = at
+            wanted = self._followers[n].wanted(TurnObservation(*values), at)
             self.standing[n] = wanted is None
             self.curvatures[n] = 0.0 if wanted is None else wanted
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ddagr_gym.control.observation import FEATURE_SCALES, OBSERVATION, PATH_SCALES, SCALES
 from ddagr_gym.control.timing import CONTROL_PERIOD
+from ddagr_gym.errors import InputError
 from ddagr_gym.estimation import FilterModel
 from ddagr_gym.estimation.force_balance import arc_bank_speed_rows
 from ddagr_gym.parameters import Robot, Sensors
@@ -69,6 +70,22 @@ class PolicyView:
         self._scales = np.concatenate([SCALES, FEATURE_SCALES, PATH_SCALES])[: design.observation_size]
         self._paths = None if design.tracker is None else TrackedPaths(design.tracker, robot, sensors, count)
 
+    @property
+    def paths(self) -> TrackedPaths:
+        """Path trackers of a design with features "path".
+
+        Raises:
+            InputError: another design.
+        """
+        if self._paths is None:
+            raise InputError(f"the design has features {self.design.features!r}: only 'path' has a path tracker.")
+        return self._paths
+
+    def si(self, observations: NDArray[np.floating]) -> Array:
+        """Observations (n, entries) in SI units."""
+        found: Array = np.asarray(observations, dtype=np.float64) * self._scales
+        return found
+
     def _memories(self) -> tuple[NDArray[Any], ...]:
         own = (self._fresh, self._outputs, self._integral, self._behind, self._response, self._frames)
         return (*own, *self._reckoning.memories())
@@ -100,7 +117,7 @@ class PolicyView:
             (n, inputs).
         """
         rows = np.arange(self.count) if chosen is None else chosen
-        whole = np.asarray(observations, dtype=np.float64) * self._scales
+        whole = self.si(observations)
         seen = whole[:, :_BASE]
         features = whole[:, _BASE:] if self.design.needs_filter else None
         self._start(rows, seen)
