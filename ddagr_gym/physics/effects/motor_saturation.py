@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-from ddagr_gym.physics.drivetrain import limit_turning
+from ddagr_gym.physics.drivetrain import carry_load, limit_turning
 from ddagr_gym.physics.effects.base import DriveExtent, Effect, Vector, size
 from ddagr_gym.physics.layout import (
     ACCELERATION_LIMIT,
@@ -31,6 +31,8 @@ def limit_motors(row: Vector, parameters: Vector, memory: Vector) -> None:
     """Clip how the banks' aims differ, the speed that each aims at, the rate of its approach, and what motors give."""
     if abs(row[MOTOR_TARGET] - row[MOTOR_TARGET + 1]) > 2.0 * parameters[2]:
         limit_turning(row, MOTOR_TARGET, parameters[2])
+    if parameters[3] < _NO_ACCELERATION_LIMIT or parameters[4] < _NO_ACCELERATION_LIMIT:
+        carry_load(row)
     row[DRIVETRAIN + ACCELERATION_LIMIT] = min(row[DRIVETRAIN + ACCELERATION_LIMIT], parameters[3])
     row[DRIVETRAIN + POWER_LIMIT] = min(row[DRIVETRAIN + POWER_LIMIT], parameters[4])
     for bank in range(2):
@@ -60,7 +62,8 @@ class MotorSaturation(Effect):
     """Limits of bank speed (supply voltage), of its rate of change, of torque and power, and of the commanded turning.
 
     A drive controller that limits the yaw rate keeps the mean of the banks and lets them differ less. Torque and power
-    carry the ground's load as well, in a robot whose banks the ground resists; in others they limit the rate of change.
+    carry the ground's load as well. In a robot whose banks the ground does not resist they do so up to these limits,
+    with the inertia of the robot's mass at the rim.
     A limit that a drive never reaches changes nothing, so there is no derivative at neutral.
 
     Attributes:
@@ -107,9 +110,7 @@ class MotorSaturation(Effect):
 
     @classmethod
     def _weak(cls, extent: DriveExtent) -> tuple[Effect, ...]:
-        """Limits of torque and power; none where the ground has no influence on the banks."""
-        if extent.traction == 0.0:
-            return ()
+        """Limits of torque and power."""
         torques = _below(extent.traction, _PROBED_TORQUE)
         powers = _below(extent.traction * extent.wheel_speed, _PROBED_POWER)
         return (
