@@ -20,10 +20,8 @@ from ddagr_gym.physics.history import fill_node, push, recall, ring_is_empty, ri
 from ddagr_gym.physics.layout import (
     ACCELERATION_LIMIT,
     AXLE_TORQUE,
-    BASE_BODY,
     BASE_DRIVETRAIN,
     BASE_MOTOR_RATE,
-    BASE_WHEEL,
     COMMAND,
     COMMAND_DEADBAND,
     COMMAND_DELAY,
@@ -44,6 +42,7 @@ from ddagr_gym.physics.layout import (
     NO_LOAD_SPEED,
     OMEGA,
     POWER_LIMIT,
+    RIM_INERTIA,
     SAMPLE_PERIOD,
     SET_POINT,
     SIZE,
@@ -264,17 +263,10 @@ def integral_growth(row: Array, bank: int) -> float:
 
 
 @kernel(inline=True)
-def usual_inertia(row: Array, bank: int) -> float:
-    """J [kg m^2] of a bank where none is known: that of the robot's mass at the rim."""
-    rim = row[BASE_WHEEL + bank] + row[BASE_WHEEL + 8 + bank]
-    return row[BASE_BODY] * rim * rim
-
-
-@kernel(inline=True)
-def bank_inertia(row: Array, bank: int) -> float:
+def bank_inertia(row: Array) -> float:
     """J [kg m^2]; where the ground has no influence, any will do."""
     compliance = row[DRIVETRAIN + LOAD_COMPLIANCE]
-    return 1.0 / compliance if compliance > 0.0 else usual_inertia(row, bank)
+    return 1.0 / compliance if compliance > 0.0 else row[RIM_INERTIA]
 
 
 @kernel()
@@ -284,7 +276,7 @@ def carry_load(row: Array) -> None:
     Banks that the ground resists already (1/J > 0) stay as they are.
     """
     if row[DRIVETRAIN + LOAD_COMPLIANCE] == 0.0:
-        row[DRIVETRAIN + LOAD_COMPLIANCE] = 1.0 / usual_inertia(row, 0)
+        row[DRIVETRAIN + LOAD_COMPLIANCE] = 1.0 / row[RIM_INERTIA]
         row[LOAD_CARRIED] = 1.0
 
 

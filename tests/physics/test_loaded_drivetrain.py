@@ -205,7 +205,8 @@ def test_default_numerics_follow_the_converged_solution(robot, soil, inertia, sc
     assert np.sqrt(np.mean(error**2, axis=1)).max() < 1e-3 * scale
 
 
-def test_order_is_two_where_a_motor_that_carries_the_load_is_at_its_limit():
+def test_order_is_nearly_two_where_a_motor_reaches_its_limit_under_load():
+    """Reaching it is a kink inside a step."""
     state = {"v_x": 0.5, "omega_right": 1.5, "omega_left": 1.5}
 
     def end(substeps):
@@ -213,16 +214,17 @@ def test_order_is_two_where_a_motor_that_carries_the_load_is_at_its_limit():
             section_nodes=16, contact_nodes=16, jacobian_contact_nodes=8, substeps=substeps, launch_substeps=1,
             launch_change=1e9, accepted_error=1e9, jacobian_refresh=0.0, sinkage_tolerance=1e-12,
         )  # fmt: skip
-        weak = {"effects": ["motor_saturation=1000,torque_limit=0.5"], "numerics": numerics}
+        weak = {"effects": ["motor_saturation=1000,torque_limit=7.5"], "numerics": numerics}
         drive = _drive(DDAGR, np.tile((1.8, 1.7), (40, 1)), initial_state=state, **weak)
         return np.array([drive[name][-1] for name in MOTION])
 
     exact = end(64)
     errors = [np.linalg.norm(end(substeps) - exact) for substeps in (1, 2, 4, 8)]
-    assert -np.polyfit(np.log2([1, 2, 4, 8]), np.log2(errors), 1)[0] == pytest.approx(2.15, abs=0.35)
+    assert -np.polyfit(np.log2([1, 2, 4, 8]), np.log2(errors), 1)[0] > 1.5
+    assert errors[0] < 2e-4
 
 
-@pytest.mark.parametrize("limit", ["torque_limit=2.0", "torque_limit=0.8", "power_limit=0.6"])
+@pytest.mark.parametrize("limit", ["torque_limit=30", "torque_limit=12", "power_limit=9"])
 def test_default_numerics_follow_motors_that_reach_their_limit_under_load(limit):
     commands = _steps((1.0, 0.7, 0.7), (2.0, -0.6, 0.6), (1.5, 0.0, 1.2), (1.0, 0.0, 0.0), (1.0, -0.7, 0.7))
     weak = {"effects": [f"motor_saturation=1000,{limit}"]}

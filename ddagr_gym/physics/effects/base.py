@@ -71,7 +71,7 @@ class DriveExtent:
         wheel_speed: largest bank speed [rad/s].
         wheel_acceleration: largest change of a bank speed per time [rad/s^2].
         turning: largest commanded distance of a bank's speed from the mean of both [rad/s].
-        traction: acceleration that a torque as of half the robot's weight at the rim gives an unloaded bank [rad/s^2].
+        traction: torque of half the robot's weight at the rim [N m].
     """
 
     duration: float = 60.0
@@ -80,7 +80,7 @@ class DriveExtent:
     wheel_speed: float = 1.0
     wheel_acceleration: float = 2.0
     turning: float = 0.5
-    traction: float = 16.0
+    traction: float = 250.0
 
 
 @dataclass(frozen=True)
