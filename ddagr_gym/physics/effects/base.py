@@ -113,6 +113,8 @@ class Effect(Validated):
     """Whether only drives from before say what is usual, so that a diagnosis against a nominal model leaves it out."""
     needs_one_frame: ClassVar[bool] = False
     """Whether it acts by direction or place in the world, so that poses in several frames cannot show it."""
+    load_sizes: ClassVar[tuple[str, ...]] = ()
+    """Sizes that are a torque or power of the motors: the readings show them only by what the ground resists with."""
     actions: ClassVar[tuple[tuple[int, Action], ...]]
     """(point, function) pairs, called in this order at their points; each has a memory of its own."""
 

@@ -89,6 +89,7 @@ class MotorSaturation(Effect):
     signature = "encoders stay at a ceiling while commands rise; ramps of constant slope after large steps; wide turns"
     confused_with = ("command_delay", "motor_droop", "motor_lag")
     differentiable = False
+    load_sizes = ("torque_limit", "power_limit")
     actions = ((POINT_MOTORS, limit_motors),)
 
     speed_limit: float = _limit("rad/s", _NO_SPEED_LIMIT, _HIGHEST_SPEED_LIMIT, step=-0.02, required=True)
