@@ -3,9 +3,10 @@
     r = ramp(deadband(limit_turning(u)))(t - delay)
     d omega/dt = limit(k_omega (r - omega) + z) + T/J - viscous omega - friction sgn(omega),  dz/dt = k_i (r - omega)
 
-T is the torque of the ground on the bank's wheels; a loop that carries it asks for -T/J besides. With the defaults of :class:`ddagr_gym.parameters.Drivetrain` only
-the first-order loop d omega/dt = k_omega (r - omega) is left, which is solved exactly and does not depend on the body;
-otherwise the bank speeds are advanced together with the body's velocities.
+T is the torque of the ground on the bank's wheels; a loop that carries it asks for -T/J besides. With the defaults of
+:class:`ddagr_gym.parameters.Drivetrain` only the first-order loop d omega/dt = k_omega (r - omega) is left, which is
+solved exactly and does not depend on the body; otherwise the bank speeds are advanced together with the body's
+velocities.
 """
 
 from __future__ import annotations

@@ -12,9 +12,7 @@ from ddagr_gym.physics.effects.registry import effect_kind
 NAME = "motor_saturation"
 
 
-@pytest.mark.parametrize(
-    ("field", "limit"), [("torque_limit", 35.0), ("power_limit", 15.0), ("turning_limit", 0.35)]
-)
+@pytest.mark.parametrize(("field", "limit"), [("torque_limit", 35.0), ("power_limit", 15.0), ("turning_limit", 0.35)])
 def test_the_kind_of_limit_and_about_its_size_are_found(drive, problem_of, field, limit):
     problem = problem_of(drive((f"{NAME}=1000,{field}={limit}",)))
     raw = fit(problem, iterations=0)
