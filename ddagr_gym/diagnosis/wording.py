@@ -150,11 +150,9 @@ def _saturation(a: Amounts) -> str:
         most = quantity(a["turning_limit"], "rad/s")
         parts.append(f"differ from their mean by no more than {most}, a limit of the turning")
     if "torque_limit" in a and a["torque_limit"].value < _UNBOUNDED:
-        most = quantity(a["torque_limit"], "rad/s²")
-        parts.append(f"have no more torque than speeds them up by {most} without load, a limit of the torque")
+        parts.append(f"have no more torque than {quantity(a['torque_limit'], 'N m')} each, a limit of the torque")
     if "power_limit" in a and a["power_limit"].value < _UNBOUNDED:
-        most = quantity(a["power_limit"], "rad²/s³")
-        parts.append(f"have no more power than {most} by their inertia, a limit of the power")
+        parts.append(f"have no more power than {quantity(a['power_limit'], 'W')} each, a limit of the power")
     return f"the banks {' and '.join(parts)}" if parts else "the banks have a limit that was not reached"
 
 

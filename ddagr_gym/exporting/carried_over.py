@@ -23,6 +23,7 @@ from ddagr_gym.exporting.working_point import (
     steady_drives,
 )
 from ddagr_gym.physics.effects import Effect
+from ddagr_gym.physics.effects.motor_saturation import NO_TORQUE_LIMIT, MotorSaturation
 
 Array = NDArray[np.float64]
 
@@ -208,14 +209,15 @@ def _friction(simulated: Simulated, drives: SteadyDrives, radius: float, along: 
 
 def _limits(simulated: Simulated) -> dict[str, float]:
     """Limits of speed and acceleration, and inertia of a bank."""
-    drivetrain = simulated.robot.drivetrain
-    speed, acceleration = simulated.robot.maximum_wheel_speed, drivetrain.acceleration_limit
-    for effect in simulated.effects:
-        if effect.name == "motor_saturation":
-            speed = min(speed, float(getattr(effect, "speed_limit")))  # noqa: B009
-            given = [float(getattr(effect, name)) for name in ("acceleration_limit", "torque_limit")]
-            acceleration = min(acceleration, *given)
+    robot, drivetrain = simulated.robot, simulated.robot.drivetrain
+    speed, acceleration = robot.maximum_wheel_speed, drivetrain.acceleration_limit
     compliance = drivetrain.load_compliance
+    for effect in simulated.effects:
+        if isinstance(effect, MotorSaturation):
+            if effect.torque_limit < NO_TORQUE_LIMIT:
+                compliance = compliance or 1.0 / robot.rim_inertia
+                acceleration = min(acceleration, compliance * effect.torque_limit)
+            speed, acceleration = min(speed, effect.speed_limit), min(acceleration, effect.acceleration_limit)
     return {
         "speed_limit": speed,
         "acceleration_limit": acceleration if acceleration < NO_LIMIT else math.inf,

@@ -68,7 +68,7 @@ def _work(row: Array, defect: Array, change: Array) -> float:
     work = row[MASS] * (defect[0] * change[0] + defect[1] * change[1]) + row[YAW_INERTIA] * defect[2] * change[2]
     if moving_entries(row) == 5:
         for bank in range(2):
-            work += bank_inertia(row, bank) * defect[3 + bank] * change[3 + bank]
+            work += bank_inertia(row) * defect[3 + bank] * change[3 + bank]
     return work
 
 

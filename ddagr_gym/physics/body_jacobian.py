@@ -13,11 +13,9 @@ from numpy.typing import NDArray
 from ddagr_gym.jit import kernel, stack_array
 from ddagr_gym.physics.body_dynamics import extra_forces, hub_x, hub_y, set_kinematics, side_slip_x, sum_extra
 from ddagr_gym.physics.callbacks import EffectActions
-from ddagr_gym.physics.drivetrain import bank_damping, moving_entries
+from ddagr_gym.physics.drivetrain import bank_damping, felt_compliance, moving_entries
 from ddagr_gym.physics.layout import (
-    DRIVETRAIN,
     LOAD,
-    LOAD_COMPLIANCE,
     MASS,
     POINT_BODY_FORCES,
     POINT_WHEEL_FORCES,
@@ -70,9 +68,11 @@ def _eliminate_banks(row: Array, step: float, system: Array, drive: Array, banks
     for i in range(4):
         if row[LOAD + i] > 0.0 and stiffness_of(row, i) > 0.0:
             _add_torque_jacobian(row, i, banks)
-    for j in range(BANKS):
-        banks[j] *= row[DRIVETRAIN + LOAD_COMPLIANCE]
     for bank in range(2):
+        compliance = felt_compliance(row, bank)
+        for k in range(3):
+            banks[3 * bank + k] *= compliance
+        banks[6 + bank] *= compliance
         damping = min(banks[6 + bank], 0.0) + bank_damping(row, bank)
         banks[6 + bank] = 1.0 / (1.0 - step * damping)
         for j in range(3):

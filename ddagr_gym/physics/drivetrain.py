@@ -3,9 +3,10 @@
     r = ramp(deadband(limit_turning(u)))(t - delay)
     d omega/dt = limit(k_omega (r - omega) + z) + T/J - viscous omega - friction sgn(omega),  dz/dt = k_i (r - omega)
 
-T is the torque of the ground on the bank's wheels. With the defaults of :class:`ddagr_gym.parameters.Drivetrain` only
-the first-order loop d omega/dt = k_omega (r - omega) is left, which is solved exactly and does not depend on the body;
-otherwise the bank speeds are advanced together with the body's velocities.
+T is the torque of the ground on the bank's wheels; a loop that carries it asks for -T/J besides. With the defaults of
+:class:`ddagr_gym.parameters.Drivetrain` only the first-order loop d omega/dt = k_omega (r - omega) is left, which is
+solved exactly and does not depend on the body; otherwise the bank speeds are advanced together with the body's
+velocities.
 """
 
 from __future__ import annotations
@@ -34,14 +35,15 @@ from ddagr_gym.physics.layout import (
     INTEGRAL_LIMIT,
     INTEGRAL_RATE,
     LIMIT_IMBALANCE,
+    LOAD_CARRIED,
     LOAD_COMPLIANCE,
-    MASS,
     MAXIMUM_WHEEL_SPEED,
     MOTOR_RATE,
     MOTOR_TARGET,
     NO_LOAD_SPEED,
     OMEGA,
     POWER_LIMIT,
+    RIM_INERTIA,
     SAMPLE_PERIOD,
     SET_POINT,
     SIZE,
@@ -49,7 +51,6 @@ from ddagr_gym.physics.layout import (
     TARGET_RING,
     TURNING_LIMIT,
     VISCOUS_RATE,
-    WHEEL,
     WHEEL_ANGLE,
 )
 
@@ -123,6 +124,7 @@ def set_targets(row: Array) -> None:
         row[MOTOR_RATE + bank] = row[BASE_MOTOR_RATE]
     for j in range(9):
         row[DRIVETRAIN + j] = row[BASE_DRIVETRAIN + j]
+    row[LOAD_CARRIED] = 0.0
 
 
 @kernel(inline=True)
@@ -186,7 +188,8 @@ def advance_motors(row: Array, duration: float) -> None:
 @kernel(inline=True)
 def _wanted(row: Array, bank: int) -> float:
     """Acceleration that the speed loop asks for [rad/s^2]."""
-    return row[MOTOR_RATE + bank] * (row[MOTOR_TARGET + bank] - row[OMEGA + bank]) + row[INTEGRAL + bank]
+    wanted = row[MOTOR_RATE + bank] * (row[MOTOR_TARGET + bank] - row[OMEGA + bank]) + row[INTEGRAL + bank]
+    return wanted - row[LOAD_CARRIED] * _load(row, bank)
 
 
 @kernel(inline=True)
@@ -240,6 +243,16 @@ def bank_damping(row: Array, bank: int) -> float:
 
 
 @kernel()
+def felt_compliance(row: Array, bank: int) -> float:
+    """Derivative of :func:`bank_acceleration` by the ground's torque [1/(kg m^2)]: none while the loop carries it."""
+    compliance = row[DRIVETRAIN + LOAD_COMPLIANCE]
+    if row[LOAD_CARRIED] == 0.0:
+        return compliance
+    wanted = _wanted(row, bank)
+    return compliance if abs(wanted) > _limit(row, bank, wanted) else 0.0
+
+
+@kernel()
 def integral_growth(row: Array, bank: int) -> float:
     """dz/dt of the loop's integral part [rad/s^3] (theory: drivetrain, eq. (3))."""
     error = row[MOTOR_TARGET + bank] - row[OMEGA + bank]
@@ -251,11 +264,21 @@ def integral_growth(row: Array, bank: int) -> float:
 
 
 @kernel(inline=True)
-def bank_inertia(row: Array, bank: int) -> float:
-    """J [kg m^2]; where the ground has no influence, any will do: that of the robot's mass at the rim."""
+def bank_inertia(row: Array) -> float:
+    """J [kg m^2]; where the ground has no influence, any will do."""
     compliance = row[DRIVETRAIN + LOAD_COMPLIANCE]
-    rim = row[WHEEL + bank] + row[WHEEL + 8 + bank]
-    return 1.0 / compliance if compliance > 0.0 else row[MASS] * rim * rim
+    return 1.0 / compliance if compliance > 0.0 else row[RIM_INERTIA]
+
+
+@kernel()
+def carry_load(row: Array) -> None:
+    """Let ideal loops feel the limits of their motors under the ground's load, which they carry as far as these allow.
+
+    Banks that the ground resists already (1/J > 0) stay as they are.
+    """
+    if row[DRIVETRAIN + LOAD_COMPLIANCE] == 0.0:
+        row[DRIVETRAIN + LOAD_COMPLIANCE] = 1.0 / row[RIM_INERTIA]
+        row[LOAD_CARRIED] = 1.0
 
 
 @kernel()

@@ -73,6 +73,7 @@ MOTOR_TARGET = _block(2)  # speed that the motor loop aims at [rad/s]
 MOTOR_RATE = _block(2)  # its rate k_omega [1/s]
 SET_POINT = _block(2)  # command after the ramp [rad/s]
 DRIVETRAIN = _block(9)  # as the motor effects leave it, in the order of DRIVETRAIN_PARAMETERS
+LOAD_CARRIED = _block()  # 1 where the loop carries the ground's load up to the limits of the motor, as a tight one
 DYNAMIC_BANKS = _block()  # 1 where any of these differs from that of the ideal loop
 
 # Body, as the load effects leave it
@@ -90,6 +91,7 @@ HALF_TRACK = _block()
 SIDE_SLIP_LEAD = _block()  # [m]
 BASE_MOTOR_RATE = _block()
 BASE_DRIVETRAIN = _block(9)
+RIM_INERTIA = _block()  # of the robot's mass at the rim [kg m^2]
 COMMAND_DELAY = _block()  # [s]
 COMMAND_DEADBAND = _block()  # [rad/s]
 TURNING_LIMIT = _block()  # [rad/s]

@@ -12,6 +12,7 @@ from ddagr_gym.physics.layout import (
     DRIVETRAIN,
     DRIVETRAIN_PARAMETERS,
     INTEGRAL,
+    LOAD_CARRIED,
     MOTOR_RATE,
     MOTOR_TARGET,
     OMEGA,
@@ -27,6 +28,7 @@ RECORDED: tuple[int, ...] = (
     *range(INTEGRAL, INTEGRAL + 2),
     *range(AXLE_TORQUE, AXLE_TORQUE + 4),
     *range(DRIVETRAIN, DRIVETRAIN + len(DRIVETRAIN_PARAMETERS)),
+    LOAD_CARRIED,
 )
 """Entries of a row that the torque depends on; the bank speeds come first."""
 

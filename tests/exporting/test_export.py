@@ -220,7 +220,7 @@ def test_a_folder_without_an_answer(tmp_path):
 def test_limits_are_the_lowest_of_robot_and_effect():
     robot = dataclasses.replace(get_robot("ddagr"), drivetrain=Drivetrain(load_compliance=0.02, acceleration_limit=3.0))
     for effect, expected in (
-        (MotorSaturation(0.9, torque_limit=0.5), (0.9, 0.5)),
+        (MotorSaturation(0.9, torque_limit=25.0), (0.9, 0.5)),
         (MotorSaturation(1e3, 2.0), (robot.maximum_wheel_speed, 2.0)),
         (MotorSaturation(1e3, turning_limit=0.3), (robot.maximum_wheel_speed, 3.0)),
     ):

@@ -205,6 +205,37 @@ def test_default_numerics_follow_the_converged_solution(robot, soil, inertia, sc
     assert np.sqrt(np.mean(error**2, axis=1)).max() < 1e-3 * scale
 
 
+def test_order_is_nearly_two_where_a_motor_reaches_its_limit_under_load():
+    """Reaching it is a kink inside a step."""
+    state = {"v_x": 0.5, "omega_right": 1.5, "omega_left": 1.5}
+
+    def end(substeps):
+        numerics = Numerics(
+            section_nodes=16, contact_nodes=16, jacobian_contact_nodes=8, substeps=substeps, launch_substeps=1,
+            launch_change=1e9, accepted_error=1e9, jacobian_refresh=0.0, sinkage_tolerance=1e-12,
+        )  # fmt: skip
+        weak = {"effects": ["motor_saturation=1000,torque_limit=7.5"], "numerics": numerics}
+        drive = _drive(DDAGR, np.tile((1.8, 1.7), (40, 1)), initial_state=state, **weak)
+        return np.array([drive[name][-1] for name in MOTION])
+
+    exact = end(64)
+    errors = [np.linalg.norm(end(substeps) - exact) for substeps in (1, 2, 4, 8)]
+    assert -np.polyfit(np.log2([1, 2, 4, 8]), np.log2(errors), 1)[0] > 1.5
+    assert errors[0] < 2e-4
+
+
+@pytest.mark.parametrize("limit", ["torque_limit=30", "torque_limit=12", "power_limit=9"])
+def test_default_numerics_follow_motors_that_reach_their_limit_under_load(limit):
+    commands = _steps((1.0, 0.7, 0.7), (2.0, -0.6, 0.6), (1.5, 0.0, 1.2), (1.0, 0.0, 0.0), (1.0, -0.7, 0.7))
+    weak = {"effects": [f"motor_saturation=1000,{limit}"]}
+    drives = [_drive(DDAGR, commands, numerics=numerics, **weak) for numerics in (Numerics(), Numerics.finest())]
+    error = np.array([np.abs(drives[0][name] - drives[1][name]) for name in MOTION])
+    free = _drive(DDAGR, commands)
+    assert np.abs(free["true_omega_right"] - drives[1]["true_omega_right"]).max() > 0.05
+    assert error[6:].max() < 1e-2
+    assert np.sqrt(np.mean(error**2, axis=1)).max() < 1e-3
+
+
 def test_no_drive_takes_energy_from_the_ground_or_gives_any():
     """Banks that are told to stand only lose energy, as the body does (passivity)."""
     robot = _with(replace(DDAGR, motor_rate=0.05), load_compliance=0.1, viscous_rate=0.01, coulomb_friction=0.05)

@@ -137,7 +137,8 @@ def valleys(
     """
     first = len(linear.here) - len(parameters)
     chosen = factors(fitted.point.effects, parameters)
-    covariance: Array = np.asarray(np.linalg.inv(linear.information), dtype=np.float64)
+    # a shape without a prior that nothing shows has no covariance: it stays where it is
+    covariance: Array = np.asarray(np.linalg.pinv(linear.information, hermitian=True), dtype=np.float64)
     found = []
     for number in range(len(fitted.point.effects)):
         places = [first + k for k, p in enumerate(parameters) if p.effect == number and chosen[k]]

@@ -24,12 +24,14 @@ from ddagr_gym.diagnosis.search.initial_guess import (
     with_usual_shape,
 )
 from ddagr_gym.diagnosis.search.inner_products import Terms
+from ddagr_gym.diagnosis.search.limit_guess import is_limit, limit_guesses
 from ddagr_gym.diagnosis.search.scan import drive_extent
 from ddagr_gym.diagnosis.search.scanned_model import Rival, ScannedModel, rival_of, scan_model
 from ddagr_gym.diagnosis.search.starting_models import FAR_OFF
 from ddagr_gym.identification.gauss_newton import DAMPING, Fitted, cost_of, fit
 from ddagr_gym.identification.problem import Point, Problem
 from ddagr_gym.identification.size_prior import implausibility
+from ddagr_gym.physics.effects import Effect
 
 _HOPELESS = 0.4
 """Share of the best linear gain below which no joint refit is tried (ours: linear and joint gains differ by less)."""
@@ -152,11 +154,12 @@ def _trial(problem: Problem, model: ScannedModel, gain: Gain, terms: Terms, star
     Where something large is missing, a nominal refit bends soil and robot to make up for it, so far that no step leads
     back: then the raw nominal model is a better start than the refitted one.
     """
-    candidate = terms.candidates[gain.candidate]
-    effect = first_guess(candidate, gain.multiples)
-    point = replace(start.point, effects=(*model.fitted.point.effects, effect))
-    point = turned_to_agree(problem, terms, gain, point)
-    fitted = fit(problem, point, iterations=TRIAL_STEPS, renewals=2, reuse=start)
+    candidate, others = terms.candidates[gain.candidate], model.fitted.point.effects
+    trials = []
+    for effect in _guesses(problem, start, others, gain, terms):
+        point = turned_to_agree(problem, terms, gain, replace(start.point, effects=(*others, effect)))
+        trials.append(fit(problem, point, iterations=TRIAL_STEPS, renewals=2, reuse=start))
+    fitted = min(trials, key=lambda trial: trial.cost)
     scanned_here = (terms is model.terms) == (start is model.fitted)
     if fitted.cost < model.fitted.cost or not (scanned_here and candidate.has_sizes):
         return fitted
@@ -164,6 +167,14 @@ def _trial(problem: Problem, model: ScannedModel, gain: Gain, terms: Terms, star
     point = _damped_guess(problem, model, gain, terms, start)
     again = fit(problem, point, iterations=TRIAL_STEPS, renewals=2, reuse=start)
     return min(fitted, again, key=lambda trial: trial.cost)
+
+
+def _guesses(problem: Problem, start: Fitted, others: Sequence[Effect], gain: Gain, terms: Terms) -> list[Effect]:
+    """Effects that a few steps begin at."""
+    candidate = terms.candidates[gain.candidate]
+    if is_limit(candidate):
+        return limit_guesses(problem, start, others, [item for item in terms.candidates if item.name == gain.name])
+    return [first_guess(candidate, gain.multiples)]
 
 
 def _damped_guess(problem: Problem, model: ScannedModel, gain: Gain, terms: Terms, start: Fitted) -> Point:

@@ -53,8 +53,8 @@ def drive_extent(problem: Problem, prediction: Array) -> DriveExtent:
 
 
 def _traction(robot: Robot) -> float:
-    """Acceleration that a torque as of half the robot's weight at the rim gives an unloaded bank [rad/s^2]."""
-    return 0.5 * robot.drivetrain.load_compliance * robot.mass * STANDARD_GRAVITY * robot.outer_radius
+    """Torque of half the robot's weight at the rim [N m]."""
+    return 0.5 * robot.mass * STANDARD_GRAVITY * robot.outer_radius
 
 
 def touched(probe: Effect, problem: Problem, prediction: Array) -> NDArray[np.bool_]:

@@ -71,8 +71,7 @@ class DriveExtent:
         wheel_speed: largest bank speed [rad/s].
         wheel_acceleration: largest change of a bank speed per time [rad/s^2].
         turning: largest commanded distance of a bank's speed from the mean of both [rad/s].
-        traction: acceleration that a torque as of half the robot's weight at the rim gives an unloaded bank [rad/s^2];
-            0 where the ground has no influence on the banks.
+        traction: torque of half the robot's weight at the rim [N m].
     """
 
     duration: float = 60.0
@@ -81,7 +80,7 @@ class DriveExtent:
     wheel_speed: float = 1.0
     wheel_acceleration: float = 2.0
     turning: float = 0.5
-    traction: float = 0.0
+    traction: float = 250.0
 
 
 @dataclass(frozen=True)
@@ -114,6 +113,8 @@ class Effect(Validated):
     """Whether only drives from before say what is usual, so that a diagnosis against a nominal model leaves it out."""
     needs_one_frame: ClassVar[bool] = False
     """Whether it acts by direction or place in the world, so that poses in several frames cannot show it."""
+    load_sizes: ClassVar[tuple[str, ...]] = ()
+    """Sizes that are a torque or power of the motors: the readings show them only by what the ground resists with."""
     actions: ClassVar[tuple[tuple[int, Action], ...]]
     """(point, function) pairs, called in this order at their points; each has a memory of its own."""
 

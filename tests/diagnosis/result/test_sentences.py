@@ -109,9 +109,9 @@ def test_every_effect_has_a_clause_with_its_main_size(name):
         (
             text(
                 "motor_saturation", speed_limit=(1e3, "rad/s"), acceleration_limit=(1e6, "rad/s^2"),
-                torque_limit=(0.6, "rad/s^2"), power_limit=(1e6, "rad^2/s^3"),
+                torque_limit=(45.0, "N m"), power_limit=(1e6, "W"),
             ),
-            "the banks have no more torque than speeds them up by 0.60 rad/s² without load, a limit of the torque",
+            "the banks have no more torque than 45 N m each, a limit of the torque",
         ),
         (
             text("sensor_hold", duration=(0.1, "s"), gyro=(1.0, "-"), accelerometer=(0.0, "-")),

@@ -181,3 +181,14 @@ def test_an_interval_is_widened_holds_its_value_and_stays_above_the_least():
     assert widened((1.0, 1.6), 1.3, 0.4, 0.0) == pytest.approx((0.8, 1.8))
     assert widened((0.1, 0.3), 0.2, 0.6, 0.0)[0] == 0.0
     assert widened((1.0, 1.2), 0.5, 0.0, 0.0)[0] == 0.5
+
+
+def test_a_shape_that_nothing_shows_stays_where_it_is(drive, problem_of):
+    """A bank's release shows with a loss below 1 only: the information about it is exactly zero."""
+    deadband = parse_effect("command_deadband=0.1,loss=1.0,release=1.0")
+    problem = problem_of(drive(("command_deadband=0.1",), seconds=12.0))
+    found = fit(problem, replace(problem.start(), effects=(deadband,)), iterations=2, renewals=1)
+    drawn = resampled_parameters(problem, found, np.random.default_rng(1))
+    assert np.ptp(drawn.of(0, "release")) == 0.0
+    assert np.isfinite(drawn.effects).all()
+    assert np.median(drawn.of(0, "width")) == pytest.approx(0.1, abs=0.01)

@@ -12,7 +12,7 @@ from ddagr_gym.physics import layout
 from ddagr_gym.physics.effects import parse_effect
 from ddagr_gym.physics.effects.base import DriveExtent
 from ddagr_gym.physics.effects.motor_saturation import MotorSaturation
-from ddagr_gym.simulator import simulate
+from ddagr_gym.simulator import Simulator, simulate
 from tests.physics.effects.conftest import IDEAL
 
 PERIOD = 0.008
@@ -62,9 +62,9 @@ def test_a_limit_of_the_turning_matters_where_the_drive_turns_as_much():
 @pytest.mark.parametrize(("form", "part", "most"), [("torque", "acceleration", 0.5), ("power", "power", 0.2)])
 def test_limits_of_torque_and_power_are_those_of_a_robots_drivetrain(robot, soil, form, part, most):
     """Banks that the ground resists: the limit holds against its load."""
-    loop = {"integral_rate": 10.0, "load_compliance": 1.0 / 60.0}
+    loop = {"integral_rate": 10.0, "load_compliance": 1.0 / 64.0}
     loaded = replace(robot, drivetrain=Drivetrain(**loop))
-    effects = [f"motor_saturation=1000,{form}_limit={most}"]
+    effects = [f"motor_saturation=1000,{form}_limit={64.0 * most}"]
     limited = speeds(simulate(loaded, soil, TURNS, effects=effects, sensors=IDEAL))
     np.testing.assert_array_equal(limited, robot_speeds(robot, soil, **loop, **{f"{part}_limit": most}))
     assert np.abs(limited - speeds(simulate(loaded, soil, TURNS, sensors=IDEAL))).max() > 0.05
@@ -72,18 +72,64 @@ def test_limits_of_torque_and_power_are_those_of_a_robots_drivetrain(robot, soil
 
 def test_a_higher_limit_of_the_torque_leaves_the_robots_own(robot, soil):
     own = replace(robot, drivetrain=Drivetrain(load_compliance=0.01, acceleration_limit=0.5))
-    limited = simulate(own, soil, TURNS, effects=["motor_saturation=1000,torque_limit=2"], sensors=IDEAL)
+    limited = simulate(own, soil, TURNS, effects=["motor_saturation=1000,torque_limit=200"], sensors=IDEAL)
     np.testing.assert_array_equal(speeds(limited), speeds(simulate(own, soil, TURNS, sensors=IDEAL)))
 
 
-def test_torque_and_power_are_probed_where_the_ground_resists_the_banks():
-    for traction, count in ((0.0, 0), (3.8, 3)):
-        probes = MotorSaturation.probes(DriveExtent(traction=traction))
-        for name in ("torque_limit", "power_limit"):
-            assert sum(getattr(probe, name) < 1e5 for probe in probes) == count
-    weak = MotorSaturation(1e3, torque_limit=1.0)
-    assert weak.is_meaningful(DriveExtent(traction=3.8))
-    assert not weak.is_meaningful(DriveExtent())
+def test_torque_and_power_are_probed_at_shares_of_full_traction():
+    probes = MotorSaturation.probes(DriveExtent(traction=200.0, wheel_speed=0.5))
+    torques = [probe.torque_limit for probe in probes if probe.torque_limit < 1e5]
+    powers = [probe.power_limit for probe in probes if probe.power_limit < 1e5]
+    assert torques == pytest.approx([60.0, 30.0, 16.0])
+    assert powers == pytest.approx([20.0, 10.0, 5.0])
+    weak = MotorSaturation(1e3, torque_limit=210.0)
+    assert weak.is_meaningful(DriveExtent(traction=250.0))
+    assert not weak.is_meaningful(DriveExtent(traction=200.0))
+
+
+SPIN = np.repeat([(0.0, 0.0), (0.6, -0.6)], [30, 900], axis=0)
+
+
+def loads(robot, soil, commands, effects=()):
+    """Bank speeds (T, 2) and torques of the ground about the axles of each bank (T, 2) [N m]."""
+    simulator = Simulator(1, effects=effects)
+    simulator.configure(0, robot, soil, IDEAL)
+    simulator.reset()
+    entries = (*range(layout.OMEGA, layout.OMEGA + 2), *range(layout.AXLE_TORQUE, layout.AXLE_TORQUE + 4))
+    record = simulator.step(commands[None], recorded=entries)[1][0]
+    return record[:, :2], record[:, 2:4] + record[:, 4:6]
+
+
+def test_an_ideal_loop_carries_the_load_up_to_its_limit(robot, soil):
+    """What it never reaches changes nothing but the order of the time step."""
+    speed, torque = loads(robot, soil, SPIN)
+    most = np.abs(torque).max()
+    limit = 1.5 * most + robot.rim_inertia * robot.motor_rate * 0.6
+    limited, _ = loads(robot, soil, SPIN, [f"motor_saturation=1000,torque_limit={limit}"])
+    np.testing.assert_allclose(limited, speed, atol=1e-4)
+
+
+@pytest.mark.parametrize("share", [0.9, 0.7])
+def test_a_weak_ideal_loop_turns_as_fast_as_the_ground_lets_its_torque(robot, soil, share):
+    _, torque = loads(robot, soil, SPIN)
+    most = share * np.abs(torque[-1]).min()
+    effect = f"motor_saturation=1000,torque_limit={most}"
+    limited, found = loads(robot, soil, SPIN, [effect])
+    np.testing.assert_allclose(np.abs(found[-1]), most, rtol=1e-3)
+    assert 0.0 < abs(limited[-1, 0]) < 0.55
+
+
+def test_power_is_torque_times_speed_of_a_weak_ideal_loop(robot, soil):
+    _, torque = loads(robot, soil, SPIN)
+    power = 0.4 * np.abs(torque[-1]).min() * 0.6
+    effect = f"motor_saturation=1000,power_limit={power}"
+    speed, found = loads(robot, soil, SPIN, [effect])
+    np.testing.assert_allclose(np.abs(speed[-1] * found[-1]), power, rtol=2e-2)
+
+
+def test_a_loop_too_weak_for_the_ground_stands_still(robot, soil):
+    limited, _ = loads(robot, soil, SPIN, ["motor_saturation=1000,torque_limit=0.7"])
+    assert np.abs(limited[-1]).max() < 0.01
 
 
 @pytest.mark.parametrize("recovery", [0.5, 2.0])

@@ -34,7 +34,7 @@ EXTENT = DriveExtent(
 MAY_CHANGE = {
     layout.POINT_COMMANDS: [(layout.COMMAND, 2)],
     layout.POINT_SET_POINTS: [(layout.MOTOR_TARGET, 2)],
-    layout.POINT_MOTORS: [(layout.MOTOR_TARGET, 2), (layout.MOTOR_RATE, 2), (layout.DRIVETRAIN, 9)],
+    layout.POINT_MOTORS: [(layout.MOTOR_TARGET, 2), (layout.MOTOR_RATE, 2), (layout.DRIVETRAIN, 10)],
     layout.POINT_LOADS: [(layout.MASS, 7), (layout.WHEEL, 12), (layout.TOWED, 2)],
     # kinematics are a function of the motion, and renewed before each use
     layout.POINT_SOIL: [(layout.SOIL, 36), (layout.WHEEL_V_X, 12), (layout.SLIP_RATIO, 4)],
