@@ -54,9 +54,11 @@ def _pair(a: Amounts, names: tuple[str, str], parts: tuple[str, str], least: flo
 
 
 def _compass(amount: Amount, flip: bool = False) -> str:
+    """A direction beyond -180 and up to 180 degrees, or the opposite one."""
     degrees = amount.scaled(DEGREES)
-    turns = 360.0 * math.floor((degrees.value + 180.0 * flip) / 360.0) - 180.0 * flip
-    return quantity(degrees.scaled(1.0, -turns), "degrees")
+    turns = 360.0 * math.ceil((degrees.value + 180.0 * flip - 180.0) / 360.0) - 180.0 * flip
+    turned = degrees.scaled(1.0, -turns)
+    return f"{'−' if turned.value < 0.0 else ''}{quantity(turned, 'degrees')}"
 
 
 def _slope(a: Amounts) -> str:

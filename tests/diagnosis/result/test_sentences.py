@@ -83,7 +83,9 @@ def test_every_effect_has_a_clause_with_its_main_size(name):
     ("clause", "words"),
     [
         (text("slope", angle=(-0.02, "rad"), direction=(0.0, "rad")), "1.1 degrees, rising towards 180 degrees"),
-        (text("slope", angle=(0.02, "rad"), direction=(-1.5708, "rad")), "towards 270 degrees"),
+        (text("slope", angle=(0.02, "rad"), direction=(6.28, "rad")), "1.1 degrees, rising towards −0.18 degrees"),
+        (text("slope", angle=(0.02, "rad"), direction=(-3.0, "rad")), "1.1 degrees, rising towards −172 degrees"),
+        (text("slope", angle=(0.02, "rad"), direction=(-1.5708, "rad")), "towards −90 degrees"),
         (text("encoder_scale", right=(0.97, "-"), left=(1.0, "-")), "the right encoder reads 3.0 % too little"),
         (text("encoder_scale", right=(0.97, "-"), left=(1.0, "-"), loop=(1.0, "-")), "and the speed loop believes it"),
         (text("motor_droop", droop=(0.002, "rad/(s N m)"), shared=(0.4, "-")), "2.0 mrad/s per N m of both banks"),
