@@ -1,19 +1,18 @@
 """Weak motors on soft ground: what a diagnosis says of limits of torque and power that the ground's load meets.
 
-    python -m benchmarks.motor_limits [--version NAME] [--seeds N [N ...]] [--workers N] [--parts DIR]
+    python -m benchmarks.motor_limits [--seeds N [N ...]] [--workers N] [--parts DIR]
 
 Cases of the project's own blind generator, which shares no code with the library, in sets of public seeds: all singles
 and doubles whose motors have a limit of torque or power, or a current that folds back with speed, and a dozen in which
-nothing is missing. Answers are kept under the version of the library that gave them; ``before`` is the library whose
-ideal speed loops felt no load (run this file with the other checkout before this one on PYTHONPATH). Written are the
-answers, counts and a picture (``benchmarks/results/motor_limits.json``, ``.png``). A minute of a core a case.
+nothing is missing. Written are the answers, counts and a picture (``benchmarks/results/motor_limits.json``, ``.png``);
+a run goes on after the answers in the folder of parts. A minute of a core a case.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -37,8 +36,6 @@ NAME, FORMS = "motor_saturation", ("torque limit", "power limit", "current folds
 LIMITS = ("torque_limit", "power_limit")
 NULLS = 12
 """Cases of the first seed in which nothing is missing."""
-VERSIONS = ("before", "now")
-COLOURS = {"before": palette.GREY, "now": palette.BLUE}
 ENCODERS = ("encoder_right", "encoder_left")
 
 Answer = dict[str, Any]
@@ -126,35 +123,28 @@ def _ratio_of_power(item: Answer) -> float | None:
     return float(found["value"] / true) if true and found and found["unit"] == "W" else None
 
 
-def draw(answers: Mapping[str, Sequence[Answer]], path: Path) -> None:
-    """Misfit of the encoders of every case whose motors are weak: nominal, and corrected by each library.
+def draw(answers: Sequence[Answer], path: Path) -> None:
+    """Misfit of the encoders of every case whose motors are weak, nominal and corrected.
 
     Args:
-        answers: by version.
+        answers: of :func:`answer`.
         path: of the PNG.
     """
     from matplotlib.figure import Figure
 
-    every = {item["case"]: item for items in answers.values() for item in items if item["form"]}
-    order = sorted(every, key=lambda name: (every[name]["form"], every[name]["kind"], name))
+    weak = sorted((item for item in answers if item["form"]), key=lambda i: (i["form"], i["kind"], i["case"]))
     with house_style():
-        figure = Figure(figsize=(9.0, 1.4 + 0.3 * len(order)), layout="constrained")
+        figure = Figure(figsize=(9.0, 1.4 + 0.3 * len(weak)), layout="constrained")
         panel = figure.subplots()
-        for name, items in answers.items():
-            own = {item["case"]: item for item in items if item["case"] in every}
-            rows = [order.index(case) for case in own]
-            left = [item["encoders_over_limit"]["corrected"] for item in own.values()]
-            right = [_is_right(item) for item in own.values()]
-            for sure, marker in ((True, "o"), (False, "X")):
-                chosen = [k for k, value in enumerate(right) if value is sure]
-                label = f"{name}: {'right' if sure else 'wrong or not all'}"
-                x, y = [left[k] for k in chosen], [rows[k] for k in chosen]
-                panel.scatter(x, y, marker=marker, color=COLOURS[name], s=42, alpha=0.8, label=label)
-        nominal = [every[case]["encoders_over_limit"]["nominal"] for case in order]
-        panel.plot(nominal, range(len(order)), "k|", markersize=11, label="nothing corrected")
+        for label, right, marker in (("all names right", True, "o"), ("not all, or none", False, "X")):
+            rows = [row for row, item in enumerate(weak) if _is_right(item) is right]
+            left = [weak[row]["encoders_over_limit"]["corrected"] for row in rows]
+            panel.scatter(left, rows, marker=marker, color=palette.BLUE, s=42, alpha=0.8, label=label)
+        nominal = [item["encoders_over_limit"]["nominal"] for item in weak]
+        panel.plot(nominal, range(len(weak)), "k|", markersize=11, label="nothing corrected")
         panel.axvline(1.0, color="black", linewidth=0.8)
-        panel.set_yticks(range(len(order)), [_words(every[case]) for case in order], fontsize=8)
-        panel.set(xscale="log", xlabel="misfit of the encoders over its limit [-]", ylim=(len(order) - 0.4, -0.6))
+        panel.set_yticks(range(len(weak)), [_words(item) for item in weak], fontsize=8)
+        panel.set(xscale="log", xlabel="misfit of the encoders over its limit [-]", ylim=(len(weak) - 0.4, -0.6))
         panel.legend(loc="lower center", bbox_to_anchor=(0.4, 1.0), ncols=3, fontsize=8)
         write_atomically(path, lambda to: figure.savefig(to, format="png", dpi=110))
 
@@ -167,18 +157,15 @@ def _words(item: Answer) -> str:
 def main(words: Sequence[str] | None = None) -> None:
     """Command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--version", choices=VERSIONS, default="now", help="whose answers these are")
     parser.add_argument("--seeds", type=int, nargs="+", default=list(SEEDS))
     parser.add_argument("--parts", type=Path, default=RESULT.with_suffix(".parts"), help="folder of finished answers")
     parser.add_argument("--output", type=Path, default=RESULT, help="JSON; the picture has the same name")
     parser.add_argument("--workers", type=int, default=2)
     given = parser.parse_args(words)
-    tasks = [Task(f"{s} {c.name}", answer, (s, c), key=f"{given.version}-{s}-{c.name}") for s, c in cases(given.seeds)]
+    tasks = [Task(f"{s} {c.name}", answer, (s, c), key=f"{s}-{c.name}") for s, c in cases(given.seeds)]
     with TaskRunner(given.workers) as runner:
-        found = run_tasks(tasks, "cases", runner, ResultStore(given.parts))
-    answers = json.loads(given.output.read_text())["answers"] if given.output.exists() else {}
-    answers = {name: (answers | {given.version: found})[name] for name in VERSIONS if name in {*answers, given.version}}
-    counts = {name: summary(items) for name, items in answers.items()}
+        answers = run_tasks(tasks, "cases", runner, ResultStore(given.parts))
+    counts = summary(answers)
     write_json(given.output, {"command": "python -m benchmarks.motor_limits", "summary": counts, "answers": answers})
     draw(answers, given.output.with_suffix(".png"))
     print(json.dumps(counts, indent=1))
