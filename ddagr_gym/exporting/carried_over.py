@@ -68,6 +68,7 @@ class CarriedOver:
     )
     speed_limit: float = _quantity("rad/s", 1, "largest bank speed command that is followed", _FOUND)
     acceleration_limit: float = _quantity("rad/s^2", 1, "of an unloaded bank; none where it is infinite", _FOUND)
+    torque_limit: float = _quantity("N m", 1, "of a bank at its wheels; none where it is infinite", _FOUND)
     bank_inertia: float = _quantity("kg m^2", 1, "of a bank, seen at its wheels; 0 where it is not known", _FOUND)
     rolling_radius: float = _quantity("m", 2, "speed over mean bank speed, straight ahead", _MEASURED)
     effective_track: float = _quantity(
@@ -208,19 +209,21 @@ def _friction(simulated: Simulated, drives: SteadyDrives, radius: float, along: 
 
 
 def _limits(simulated: Simulated) -> dict[str, float]:
-    """Limits of speed and acceleration, and inertia of a bank."""
-    robot, drivetrain = simulated.robot, simulated.robot.drivetrain
-    speed, acceleration = robot.maximum_wheel_speed, drivetrain.acceleration_limit
-    compliance = drivetrain.load_compliance
+    """Limits of speed, acceleration and torque, and inertia of a bank."""
+    drivetrain = simulated.robot.drivetrain
+    speed, acceleration = simulated.robot.maximum_wheel_speed, drivetrain.acceleration_limit
+    compliance, torque = drivetrain.load_compliance, math.inf
     for effect in simulated.effects:
         if isinstance(effect, MotorSaturation):
-            if effect.torque_limit < NO_TORQUE_LIMIT:
-                compliance = compliance or 1.0 / robot.rim_inertia
-                acceleration = min(acceleration, compliance * effect.torque_limit)
             speed, acceleration = min(speed, effect.speed_limit), min(acceleration, effect.acceleration_limit)
+            torque = effect.torque_limit if effect.torque_limit < NO_TORQUE_LIMIT else torque
+    if compliance > 0.0:
+        torque = min(torque, acceleration / compliance) if acceleration < NO_LIMIT else torque
+        acceleration = min(acceleration, compliance * torque)
     return {
         "speed_limit": speed,
         "acceleration_limit": acceleration if acceleration < NO_LIMIT else math.inf,
+        "torque_limit": torque,
         "bank_inertia": 1.0 / compliance if compliance > 0.0 else 0.0,
     }
 

@@ -112,8 +112,8 @@ def _add_wheel(model: Element, found: CarriedOver, name: str, place: tuple[float
     _put(axis, "xyz", "0 1 0")
     limit = SubElement(axis, "limit")
     _put(limit, "velocity", found.speed_limit)
-    if math.isfinite(found.acceleration_limit) and found.bank_inertia > 0.0:
-        _put(limit, "effort", 0.5 * found.bank_inertia * found.acceleration_limit)
+    if math.isfinite(found.torque_limit):
+        _put(limit, "effort", 0.5 * found.torque_limit)
 
 
 def _add_drive(model: Element, found: CarriedOver) -> None:

@@ -184,7 +184,7 @@ def _add_actuators(model: Element, found: CarriedOver) -> None:
     gain = loop_gain(found)
     samples = max(math.ceil(found.command_delay / TIMESTEP), 1)
     delay = {"delay": _text(found.command_delay), "nsample": str(samples)} if found.command_delay > TIMESTEP else {}
-    torque = found.acceleration_limit * wheel_inertia(found)
+    torque = min(found.acceleration_limit * wheel_inertia(found), 0.5 * found.torque_limit)
     force = {"forcerange": _text(-torque, torque)} if math.isfinite(torque) else {}
     for name, _, left in WHEELS:
         scale = found.command_gain_left if left > 0 else found.command_gain_right

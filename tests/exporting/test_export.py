@@ -227,3 +227,9 @@ def test_limits_are_the_lowest_of_robot_and_effect():
         found = _limits(SimpleNamespace(robot=robot, effects=(effect,)))
         assert (found["speed_limit"], found["acceleration_limit"]) == expected
         assert found["bank_inertia"] == pytest.approx(50.0)
+        assert found["torque_limit"] == pytest.approx(50.0 * expected[1])
+
+
+def test_a_torque_limit_of_ideal_banks_stays_a_torque():
+    found = _limits(SimpleNamespace(robot=get_robot("ddagr"), effects=(MotorSaturation(1e3, torque_limit=25.0),)))
+    assert (found["acceleration_limit"], found["torque_limit"], found["bank_inertia"]) == (np.inf, 25.0, 0.0)
