@@ -190,11 +190,6 @@ class Robot(Validated):
         return math.fsum(wheel.outer_radius for wheel in self.wheels) / len(self.wheels)
 
     @property
-    def rim_inertia(self) -> float:
-        """Inertia of the robot's mass at the rim [kg m^2]: that of a bank where none is known."""
-        return self.mass * self.outer_radius**2
-
-    @property
     def wheel_x(self) -> tuple[float, float, float, float]:
         """Hub positions forward of the body origin [m]."""
         half = self.half_wheelbase

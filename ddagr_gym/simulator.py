@@ -115,7 +115,6 @@ def build_row(robot: Robot, soil: Soils, sensors: Sensors) -> Array:
         layout.BASE_MOTOR_RATE: robot.motor_rate,
         layout.MAXIMUM_WHEEL_SPEED: robot.maximum_wheel_speed,
         layout.BASE_DRIVETRAIN: [getattr(robot.drivetrain, name) for name in layout.DRIVETRAIN_PARAMETERS],
-        layout.RIM_INERTIA: robot.rim_inertia,
         layout.COMMAND_DELAY: robot.drivetrain.command_delay,
         layout.COMMAND_DEADBAND: robot.drivetrain.command_deadband,
         layout.TURNING_LIMIT: robot.drivetrain.turning_limit,

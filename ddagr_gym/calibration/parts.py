@@ -165,7 +165,7 @@ def complete_robot(robot: Robot) -> Robot:
         "command_delay": DELAY_DEVIATION,
         "integral_rate": INTEGRAL_DEVIATION,
         # at most as heavy as if each bank had to turn half of the robot's mass at its rim
-        "load_compliance": 2.0 / robot.rim_inertia,
+        "load_compliance": 2.0 / (robot.mass * robot.outer_radius**2),
         "viscous_rate": VISCOUS_DEVIATION,
         "coulomb_friction": top / FRICTION_TIME,
         "limit_imbalance": IMBALANCE_DEVIATION,

@@ -21,8 +21,10 @@ from ddagr_gym.physics.history import fill_node, push, recall, ring_is_empty, ri
 from ddagr_gym.physics.layout import (
     ACCELERATION_LIMIT,
     AXLE_TORQUE,
+    BASE_BODY,
     BASE_DRIVETRAIN,
     BASE_MOTOR_RATE,
+    BASE_WHEEL,
     COMMAND,
     COMMAND_DEADBAND,
     COMMAND_DELAY,
@@ -43,7 +45,6 @@ from ddagr_gym.physics.layout import (
     NO_LOAD_SPEED,
     OMEGA,
     POWER_LIMIT,
-    RIM_INERTIA,
     SAMPLE_PERIOD,
     SET_POINT,
     SIZE,
@@ -264,10 +265,19 @@ def integral_growth(row: Array, bank: int) -> float:
 
 
 @kernel(inline=True)
+def rim_inertia(row: Array) -> float:
+    """Inertia of the robot's mass at the rim [kg m^2]: that of a bank where none is known."""
+    radius = 0.0
+    for wheel in range(4):
+        radius += 0.25 * (row[BASE_WHEEL + wheel] + row[BASE_WHEEL + 8 + wheel])
+    return row[BASE_BODY] * radius * radius
+
+
+@kernel(inline=True)
 def bank_inertia(row: Array) -> float:
     """J [kg m^2]; where the ground has no influence, any will do."""
     compliance = row[DRIVETRAIN + LOAD_COMPLIANCE]
-    return 1.0 / compliance if compliance > 0.0 else row[RIM_INERTIA]
+    return 1.0 / compliance if compliance > 0.0 else rim_inertia(row)
 
 
 @kernel()
@@ -277,7 +287,7 @@ def carry_load(row: Array) -> None:
     Banks that the ground resists already (1/J > 0) stay as they are.
     """
     if row[DRIVETRAIN + LOAD_COMPLIANCE] == 0.0:
-        row[DRIVETRAIN + LOAD_COMPLIANCE] = 1.0 / row[RIM_INERTIA]
+        row[DRIVETRAIN + LOAD_COMPLIANCE] = 1.0 / rim_inertia(row)
         row[LOAD_CARRIED] = 1.0
 
 

@@ -91,7 +91,6 @@ HALF_TRACK = _block()
 SIDE_SLIP_LEAD = _block()  # [m]
 BASE_MOTOR_RATE = _block()
 BASE_DRIVETRAIN = _block(9)
-RIM_INERTIA = _block()  # of the robot's mass at the rim [kg m^2]
 COMMAND_DELAY = _block()  # [s]
 COMMAND_DEADBAND = _block()  # [rad/s]
 TURNING_LIMIT = _block()  # [rad/s]

@@ -104,7 +104,7 @@ def test_an_ideal_loop_carries_the_load_up_to_its_limit(robot, soil):
     """What it never reaches changes nothing but the order of the time step."""
     speed, torque = loads(robot, soil, SPIN)
     most = np.abs(torque).max()
-    limit = 1.5 * most + robot.rim_inertia * robot.motor_rate * 0.6
+    limit = 1.5 * most + robot.mass * robot.outer_radius**2 * robot.motor_rate * 0.6
     limited, _ = loads(robot, soil, SPIN, [f"motor_saturation=1000,torque_limit={limit}"])
     np.testing.assert_allclose(limited, speed, atol=1e-4)
 
