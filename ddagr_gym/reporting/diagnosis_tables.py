@@ -16,6 +16,7 @@ from ddagr_gym.diagnosis.result.sentences import when
 from ddagr_gym.diagnosis.result.soil_words import finding_in_words
 from ddagr_gym.diagnosis.wording import CHANNEL_NAMES, in_sentence, range_in_words, title
 from ddagr_gym.reporting.drivetrain_section import drivetrain_tiles
+from ddagr_gym.reporting.shown_parameters import shown_parameters
 from ddagr_gym.reporting.soil_table import soil_section
 
 if TYPE_CHECKING:
@@ -105,7 +106,7 @@ def finding_card(finding: Finding, recordings: Sequence[str]) -> dict[str, Any]:
         finding: of the diagnosis.
         recordings: names of the sources.
     """
-    name, parameters = finding.name, amounts(finding.parameters)
+    name, parameters = finding.name, amounts(shown_parameters(finding))
     sentence = finding_in_words(finding)
     equivalents = _equivalents(name, finding.equivalence_set)
     where = finding.where

@@ -13,6 +13,7 @@ from ddagr_gym.reporting.drivetrain_section import (
     part_rows,
     remaining_in_words,
 )
+from ddagr_gym.reporting.shown_parameters import shown_parameters
 from ddagr_gym.reporting.text_table import format_table
 
 if TYPE_CHECKING:
@@ -66,7 +67,7 @@ def _finding_rows(finding: Finding) -> Iterator[tuple[str, ...]]:
     none = "nothing else" if finding.gate > 0.0 else "seen in the values"
     gated = (f"{finding.gain:.1f}", f"{finding.gate:.1f}") if max(finding.gain, finding.gate) > 0.0 else ("–", "–")
     whole = (*gated, ", ".join(others) or none)
-    for number, (name, estimate) in enumerate(finding.parameters.items()):
+    for number, (name, estimate) in enumerate(shown_parameters(finding).items()):
         interval = "" if estimate.interval is None else f"{estimate.interval[0]:.3g} to {estimate.interval[1]:.3g}"
         first = number == 0
         label = f"{finding.name if first else ''} {name}".strip()
