@@ -147,7 +147,7 @@ class PathStudent:
         inputs, labels = np.concatenate(self._inputs), np.concatenate(self._labels)
         if number < _STATISTICS:
             self._mean, self._deviation = inputs.mean(0, dtype=float), inputs.std(0, dtype=float) + _LEAST_DEVIATION
-        normal = np.clip((inputs - self._mean) / self._deviation, -10.0, 10.0)
+        normal = np.clip((inputs - self._mean) / self._deviation, -Policy.clip, Policy.clip)
         seen, wanted = torch.as_tensor(normal, dtype=torch.float32), torch.as_tensor(labels, dtype=torch.float32)
         for group in optimiser.param_groups:
             group["lr"] = self.how.learning_rate * max(1.0 - number / self.how.rounds, 0.05)

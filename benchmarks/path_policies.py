@@ -23,7 +23,7 @@ from typing import Any
 from benchmarks.commits import commit_of
 from benchmarks.row_turn_plants import cell
 from benchmarks.row_turns import CHECKOUT, rounded
-from benchmarks.second_sets import KEPT, SETS, mean_over_sets, title, version_of
+from benchmarks.second_sets import KEPT, SETS, for_picture, mean_over_sets, title, version_of
 from benchmarks.second_sets import RESULT as SECOND_RESULT
 from benchmarks.second_sets_figure import draw
 from ddagr_gym.errors import InputError
@@ -114,21 +114,6 @@ def table(result: Mapping[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def for_picture(result: Mapping[str, Any]) -> dict[str, Found]:
-    """Metrics of the picture, {set: {arm: metrics}}, with a failure as 1; V has no record of :data:`BEFORE`."""
-    keys = ("radius_error_median", "success_rate")
-    return {
-        name: {arm: {key: {"value": _at_most_one(own[key])} for key in keys} for arm, own in found.items()}
-        for name, found in result["sets"].items()
-        if name != VALIDATION
-    }
-
-
-def _at_most_one(metric: Mapping[str, Any]) -> float:
-    value = metric["value"]
-    return 1.0 if value is None else min(value, 1.0)
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Drive, compare, write."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -145,7 +130,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error(str(error))
     result = result_of({name: before.get(name, {}) | arms for name, arms in own.items()})
     write_json(given.output, result)
-    draw(for_picture(result), {name: label(name) for name in SETS}, given.output.with_suffix(".png"))
+    second = {"sets": {name: found for name, found in result["sets"].items() if name != VALIDATION}}
+    draw(for_picture(second), {name: label(name) for name in SETS}, given.output.with_suffix(".png"))
     print(table(result))
     print(json.dumps(result["means"], indent=1))
     return 0

@@ -13,9 +13,7 @@ from ddagr_gym.validated import Validated, bounded
 TASK_INPUTS = ("turning", "leaving", "heading_to_go", "run_in_to_go", "target_radius", "target_speed")
 SENSOR_INPUTS = ("specific_force_x", "specific_force_y", "yaw_rate", "encoder_outer", "encoder_inner")
 MEMORY_INPUTS = ("last_command_outer", "last_command_inner", "correction_0", "correction_1", "response_time")
-FILTER_INPUTS = (
-    "estimated_speed",
-    "estimated_yaw_rate",
+SOIL_INPUTS = (
     "log_traction_limit",
     "log_traction_rate",
     "log_lateral_stiffness",
@@ -26,6 +24,13 @@ FILTER_INPUTS = (
     "deviation_log_traction_rate",
     "deviation_log_lateral_stiffness",
     "deviation_log_motion_resistance",
+)
+"""What any filter estimates of the soil, and the slips: of the arms with one."""
+
+FILTER_INPUTS = (
+    "estimated_speed",
+    "estimated_yaw_rate",
+    *SOIL_INPUTS,
     "curvature_error",
     "curvature_error_integral",
     "cross_track_error",
@@ -47,16 +52,7 @@ PATH_INPUTS = (
     "estimated_speed",
     "estimated_side_speed",
     "estimated_yaw_rate",
-    "log_traction_limit",
-    "log_traction_rate",
-    "log_lateral_stiffness",
-    "log_motion_resistance",
-    "estimated_slip_outer",
-    "estimated_slip_inner",
-    "deviation_log_traction_limit",
-    "deviation_log_traction_rate",
-    "deviation_log_lateral_stiffness",
-    "deviation_log_motion_resistance",
+    *SOIL_INPUTS,
     "gravity_x",
     "gravity_y",
     "path_cross_track_error",

@@ -197,14 +197,10 @@ class PolicyView:
         heading = self._reckoning.poses[rows, 2]
         by_heading, by_course = (self._reckoning.path_errors(rows, radius, sideslip) for sideslip in (False, True))
         offset, course_error = self._reckoning.reference_errors(rows)
-        outer, inner = _outer_inner(side, features[:, 6], features[:, 7])
         return [
             forward / speed,
             rate * radius / speed,
-            *features[:, 2:6].T,
-            outer,
-            inner,
-            *features[:, 8:12].T,
+            *_soil(side, features),
             error,
             self._integral[rows],
             # a hundredth of R* and half a degree are what matters
@@ -230,9 +226,7 @@ class PolicyView:
             features[:, 0] / speed,
             side * path[:, 3] / speed,
             side * features[:, 1] * radius / speed,
-            *features[:, 2:6].T,
-            *_outer_inner(side, features[:, 6], features[:, 7]),
-            *features[:, 8:12].T,
+            *_soil(side, features),
             path[:, 4] / _FORCE_SCALE,
             side * path[:, 5] / _FORCE_SCALE,
             # a hundredth of R* and half a degree are what matters
@@ -302,6 +296,11 @@ class PolicyView:
         back = self.design.offset_gain * offset / radius + self.design.course_gain * course_error
         back = np.clip(back, -_LARGEST_STEERING, _LARGEST_STEERING)
         return (turning - back) / radius
+
+
+def _soil(side: Array, features: Array) -> list[Array]:
+    """Inputs :data:`~ddagr_gym.policies.design.SOIL_INPUTS` of a filter's features (n, entries) in SI units."""
+    return [*features[:, 2:6].T, *_outer_inner(side, features[:, 6], features[:, 7]), *features[:, 8:12].T]
 
 
 def _outer_inner(side: Array, right: Array, left: Array) -> tuple[Array, Array]:

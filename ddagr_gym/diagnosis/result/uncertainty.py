@@ -45,8 +45,8 @@ STRUCTURE_OF_LIMIT = 0.02
 
 STRUCTURE_OF_LOAD = 0.5
 """The same of a limit of torque or power (ours): nothing measures a torque, only the speed at which the ground resists
-with as much, and another soil law resists a turn with other torques (found over true power in four development drives:
-1.3 to 1.9)."""
+with as much, and another soil law resists a turn with other torques (found over true power in five development cases:
+1.2 to 1.7, benchmarks/motor_limits.py)."""
 
 
 @dataclass(frozen=True, eq=False)

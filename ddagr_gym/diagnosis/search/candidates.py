@@ -44,6 +44,11 @@ class Candidate:
         """Whether its multiples are sizes; a flip or a limit keeps the size of its probe whatever its multiple."""
         return self.whole is None and self.probes[0].differentiable
 
+    @property
+    def is_limit(self) -> bool:
+        """Whether it keeps the size of its probe whatever its multiple, and is no flip."""
+        return self.whole is None and not self.probes[0].differentiable
+
 
 def candidates_of(kind: type[Effect], extent: DriveExtent, first: int) -> list[Candidate]:
     """Candidates of one kind: up to two probes span it; more are grouped by their shapes (place, onset).

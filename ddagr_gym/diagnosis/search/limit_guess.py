@@ -17,11 +17,6 @@ _KINDS = 2
 """Of limits that are refitted (ours): a refit costs about as much as the comparison of all of them."""
 
 
-def is_limit(candidate: Candidate) -> bool:
-    """Whether a candidate is a limit, which keeps the size of its probe whatever its multiple."""
-    return candidate.whole is None and not candidate.probes[0].differentiable
-
-
 def limit_guesses(
     problem: Problem, start: Fitted, others: Sequence[Effect], candidates: Sequence[Candidate]
 ) -> list[Effect]:

@@ -24,7 +24,7 @@ from ddagr_gym.diagnosis.search.initial_guess import (
     with_usual_shape,
 )
 from ddagr_gym.diagnosis.search.inner_products import Terms
-from ddagr_gym.diagnosis.search.limit_guess import is_limit, limit_guesses
+from ddagr_gym.diagnosis.search.limit_guess import limit_guesses
 from ddagr_gym.diagnosis.search.scan import drive_extent
 from ddagr_gym.diagnosis.search.scanned_model import Rival, ScannedModel, rival_of, scan_model
 from ddagr_gym.diagnosis.search.starting_models import FAR_OFF
@@ -172,7 +172,7 @@ def _trial(problem: Problem, model: ScannedModel, gain: Gain, terms: Terms, star
 def _guesses(problem: Problem, start: Fitted, others: Sequence[Effect], gain: Gain, terms: Terms) -> list[Effect]:
     """Effects that a few steps begin at."""
     candidate = terms.candidates[gain.candidate]
-    if is_limit(candidate):
+    if candidate.is_limit:
         return limit_guesses(problem, start, others, [item for item in terms.candidates if item.name == gain.name])
     return [first_guess(candidate, gain.multiples)]
 

@@ -10,7 +10,8 @@ point           what an effect may change there       effects
 ==============  ====================================  ==============================================================
 commands        COMMAND                               command_deadband, command_gain, encoder_scale (in the loop)
 set_points      MOTOR_TARGET (after limits and ramp)  command_delay
-motors          MOTOR_TARGET, MOTOR_RATE, DRIVETRAIN  motor_lag, motor_droop, motor_saturation
+motors          MOTOR_TARGET, MOTOR_RATE, DRIVETRAIN, motor_lag, motor_droop, motor_saturation
+                LOAD_CARRIED
 loads           MASS ... SLOPE, WHEEL (restored at    slope, payload, centre_of_mass_offset, wheel_radius_mismatch,
                 each sample), TOWED                   towed_drag (the load on its rope)
 soil            SOIL (restored at each sample)        soil_change, soil_split, soil_patch, slip_sinkage, multipass

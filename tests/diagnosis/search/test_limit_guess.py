@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from ddagr_gym.diagnosis.search.limit_guess import is_limit, limit_guesses
+from ddagr_gym.diagnosis.search.limit_guess import limit_guesses
 from ddagr_gym.diagnosis.search.scan import scan
 from ddagr_gym.identification.gauss_newton import cost_of, fit
 from ddagr_gym.physics.effects.registry import effect_kind
@@ -28,4 +28,4 @@ def test_only_what_has_no_derivative_and_no_sign_is_a_limit(drive, problem_of):
     problem = problem_of(drive(seconds=8.0))
     nominal = fit(problem, iterations=0)
     kinds = {name: effect_kind(name) for name in (NAME, "gyro_sign", "motor_lag")}
-    assert {item.name for item in scan(problem, nominal, kinds).candidates if is_limit(item)} == {NAME}
+    assert {item.name for item in scan(problem, nominal, kinds).candidates if item.is_limit} == {NAME}
