@@ -167,8 +167,9 @@ class TrainingSettings:
             content["inertial"] = asdict(InertialModel.of(ddagr(), Sensors()).knowledge)
         if not self.task.randomisation.slope:
             del content["task"]["randomisation"]["slope"]
-        if not content["filter"]["robot"]["side_slip_lead"]:
-            del content["filter"]["robot"]["side_slip_lead"]
+        for name in ("side_slip_lead", "sinkage_tilt"):
+            if not content["filter"]["robot"][name]:
+                del content["filter"]["robot"][name]
         calibration, ground = (content["task"].pop(name) for name in ("calibration", "ground"))
         if calibration:
             # what a calibration says counts, not its path

@@ -147,6 +147,8 @@ class Robot(Validated):
         drivetrain: what else stands between commands and wheels; nothing by default.
         side_slip_lead: how far ahead of its hub, in its direction of travel, a wheel's sideways velocity counts [m]
             (theory: wheel model, eq. (1a)).
+        sinkage_tilt: share of the tilt by unequal sinkage of the wheels that the accelerometer feels as gravity: 1 for
+            a stiff frame, 0 to leave it out (theory: wheel model, eq. (35a)).
         standard_deviations: uncertainty of fields by name, in their units, of those in :data:`UNCERTAIN` and of the
             drivetrain; absent means taken as exact.
         source: where the values come from.
@@ -163,6 +165,7 @@ class Robot(Validated):
     maximum_wheel_speed: float = bounded("rad/s", 0.0, 1e3, default=2.0, open_low=True)
     drivetrain: Drivetrain = Drivetrain()
     side_slip_lead: float = bounded("m", -0.5, 0.5, default=0.0)
+    sinkage_tilt: float = bounded("-", 0.0, 1.0, default=0.0)
     standard_deviations: Mapping[str, float] = field(default_factory=dict)
     source: str = ""
 

@@ -112,6 +112,7 @@ def build_row(robot: Robot, soil: Soils, sensors: Sensors) -> Array:
         layout.HALF_WHEELBASE: robot.half_wheelbase,
         layout.HALF_TRACK: robot.half_track,
         layout.SIDE_SLIP_LEAD: robot.side_slip_lead,
+        layout.SINKAGE_TILT: robot.sinkage_tilt,
         layout.BASE_MOTOR_RATE: robot.motor_rate,
         layout.MAXIMUM_WHEEL_SPEED: robot.maximum_wheel_speed,
         layout.BASE_DRIVETRAIN: [getattr(robot.drivetrain, name) for name in layout.DRIVETRAIN_PARAMETERS],

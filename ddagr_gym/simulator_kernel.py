@@ -31,6 +31,7 @@ from ddagr_gym.physics.layout import (
     COMMAND_DELAY,
     DERIVATIVE_VALID,
     DYNAMIC_BANKS,
+    FELT_DEPTH,
     GRAVITY,
     MEAN_SPECIFIC_FORCE,
     MEAN_YAW_ACCELERATION,
@@ -129,6 +130,8 @@ def _prepare_ground(row: Array, grids: SoilGrids, n: int, actions: EffectActions
     apply_effects(POINT_LOADS, row, actions)
     place_wheels(row)
     sample_soil(row, grids, n)
+    for i in range(4):
+        row[FELT_DEPTH + i] = 1.0
     apply_effects(POINT_SOIL, row, actions)
 
 

@@ -116,15 +116,19 @@ def bic_thresholds(problem: Problem, candidates: Sequence[Candidate]) -> Thresho
 def parameter_counts(candidates: Sequence[Candidate]) -> dict[str, int]:
     """Parameters that a scan fits, by effect: multiples fitted together, and shapes in which the candidates differ.
 
-    A direction is two multiples; a flip or a limit is one; a patch has a place besides its sizes.
+    A direction is two multiples; a flip or a limit is one; a patch has a place besides its sizes, a band a bearing and
+    one size: of the two forms the one with more parameters counts.
 
     Args:
         candidates: of the scan.
     """
-    by_name: dict[str, list[Candidate]] = {}
+    by_form: dict[tuple[str, bool], list[Candidate]] = {}
     for candidate in candidates:
-        by_name.setdefault(candidate.name, []).append(candidate)
-    return {name: max(len(c.columns) for c in found) + _shapes_tried(found) for name, found in by_name.items()}
+        by_form.setdefault((candidate.name, candidate.is_band), []).append(candidate)
+    counts: dict[str, int] = {}
+    for (name, _), found in by_form.items():
+        counts[name] = max(counts.get(name, 0), max(len(c.columns) for c in found) + _shapes_tried(found))
+    return counts
 
 
 def _shapes_tried(candidates: Sequence[Candidate]) -> int:

@@ -61,6 +61,13 @@ def _compass(amount: Amount, flip: bool = False) -> str:
     return f"{'−' if turned.value < 0.0 else ''}{quantity(turned, 'degrees')}"
 
 
+def _line(amount: Amount) -> str:
+    """Direction of a line, which has no front end: beyond -90 and up to 90 degrees from the x axis."""
+    degrees = amount.scaled(DEGREES)
+    turned = degrees.scaled(1.0, -180.0 * math.ceil((degrees.value - 90.0) / 180.0))
+    return f"{'−' if turned.value < 0.0 else ''}{quantity(turned, 'degrees')} from the x axis"
+
+
 def _slope(a: Amounts) -> str:
     angle = quantity(a["angle"].scaled(DEGREES), "degrees")
     towards = _compass(a["direction"], a["angle"].value < 0.0)
@@ -81,7 +88,10 @@ def _soil_change(a: Amounts) -> str:
 
 def _soil_patch(a: Amounts) -> str:
     place = f"({fixed(a['centre_x'].value, 2)}, {fixed(a['centre_y'].value, 2)}) m"
-    return f"the soil is {_soil(a)} within {quantity(a['radius'], 'm')} of {place}"
+    if "half_length" not in a or a["half_length"].value == 0.0:
+        return f"the soil is {_soil(a)} within {quantity(a['radius'], 'm')} of {place}"
+    width = quantity(a["radius"].scaled(2.0), "m")
+    return f"the soil is {_soil(a)} in a band {width} wide that runs at {_line(a['bearing'])} through {place}"
 
 
 def _encoder_scale(a: Amounts) -> str:
@@ -158,7 +168,13 @@ def _saturation(a: Amounts) -> str:
     return f"the banks {' and '.join(parts)}" if parts else "the banks have a limit that was not reached"
 
 
+def _of_turning(a: Amounts) -> bool:
+    return "turning" in a and a["turning"].value > 0.5
+
+
 def _lag(a: Amounts) -> str:
+    if _of_turning(a):
+        return f"the robot's turning answers {quantity(a['lag'], 's')} more slowly, its speed as it should"
     slower = a["lag"].value >= 0.0
     share = a["second_pole"].value if slower and "second_pole" in a else 0.0
     pole = " (mostly by a second pole)" if share >= 0.5 else ""
@@ -168,7 +184,14 @@ def _lag(a: Amounts) -> str:
 
 def _deadband(a: Amounts) -> str:
     loss = " and larger ones lose as much" if a["loss"].value >= 0.5 else ""
+    if _of_turning(a):
+        return f"turns of less than {quantity(a['width'], 'rad/s')} about the banks' mean are not made{loss}"
     return f"commands below {quantity(a['width'], 'rad/s')} move nothing{loss}"
+
+
+def _bulldozing(a: Amounts) -> str:
+    heaped = " once they have heaped it up" if "way" in a and a["way"].value > 0.0 else ""
+    return f"wheels that slide sideways push soil ({quantity(a['scale'])} times the theoretical pressure{heaped})"
 
 
 def _hold(a: Amounts) -> str:
@@ -259,9 +282,7 @@ SENTENCES: Mapping[str, Callable[[Amounts], str]] = {
         f"the IMU is turned {_towards(a['yaw'], ('to the left', 'to the right'), DEGREES, 'degrees')}"
     ),
     "imu_tilt": _tilt,
-    "lateral_bulldozing": lambda a: (
-        f"wheels that slide sideways push soil ({quantity(a['scale'])} times the theoretical pressure)"
-    ),
+    "lateral_bulldozing": _bulldozing,
     "motor_droop": _droop,
     "motor_lag": _lag,
     "motor_saturation": _saturation,

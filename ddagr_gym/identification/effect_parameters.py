@@ -18,6 +18,8 @@ _KEPT = frozenset(
     {
         ("payload", "x"), ("payload", "y"), ("payload", "height"), ("lateral_bulldozing", "density"),
         ("soil_patch", "edge"), ("towed_drag", "hitch_distance"), ("encoder_scale", "loop"),
+        ("lateral_bulldozing", "angle"), ("lateral_bulldozing", "way"), ("motor_lag", "turning"),
+        ("command_deadband", "turning"),
     }
 )  # fmt: skip
 """Shapes that a diagnosis leaves at their defaults: free, they let one effect stand for another (a payload that is not
@@ -51,7 +53,8 @@ class EffectParameter:
 
 
 def effect_parameters(effects: Sequence[Effect], fixed: frozenset[str] = frozenset()) -> tuple[EffectParameter, ...]:
-    """Fields of effects that a fit moves: all with a step, but none of a categorical effect and no flags.
+    """Fields of effects that a fit moves: all with a step, but none of a categorical effect, no flags and nothing that
+    is idle where an effect stands.
 
     Args:
         effects: assumed.
@@ -64,7 +67,7 @@ def effect_parameters(effects: Sequence[Effect], fixed: frozenset[str] = frozens
         for name in (*effect.size_names(), *effect.shape_names()):
             data = effect.parameter(name).metadata
             at_neutral = not effect.differentiable and getattr(effect, name) == data["neutral"]
-            if (effect.name, name) in _KEPT:
+            if (effect.name, name) in _KEPT or name in effect.idle_shapes:
                 continue
             if data["step"] == 0.0 or name in fixed or abs(getattr(effect, name)) > _NEVER or at_neutral:
                 continue

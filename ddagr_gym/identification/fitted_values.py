@@ -40,8 +40,9 @@ def _robot(robot: Robot, values: Mapping[str, float]) -> Robot:
         for wheel in robot.wheels
     )
     lead = robot.side_slip_lead + values.get("side_slip_lead", 0.0)
+    tilt = min(max(robot.sinkage_tilt + values.get("sinkage_tilt", 0.0), 0.0), 1.0)
     drivetrain = drivetrain_of(robot, values)
-    return replace(robot, wheels=wheels, drivetrain=drivetrain, side_slip_lead=lead, **factors)
+    return replace(robot, wheels=wheels, drivetrain=drivetrain, side_slip_lead=lead, sinkage_tilt=tilt, **factors)
 
 
 def _soil(soil: Soil, values: Mapping[str, float], held: bool) -> Soil:

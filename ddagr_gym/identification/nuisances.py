@@ -43,6 +43,7 @@ class NuisancePriors:
         peak: coefficients of the stress peak, absolute.
         side_slip_lead: where the sideways velocity of a wheel counts, over its radius; two published ways to direct the
             shear stress (against the sliding velocity, against the displacement) differ by 0.06.
+        sinkage_tilt: share of the tilt by unequal sinkage that the accelerometer feels, absolute.
         gyro_bias: of a recording [rad/s].
         accelerometer_bias: of a recording [m/s^2].
         local_strength: as strength, of one window against the field.
@@ -60,6 +61,7 @@ class NuisancePriors:
     exponent: float = 0.15
     peak: float = 0.1
     side_slip_lead: float = 0.05
+    sinkage_tilt: float = 1.0
     gyro_bias: float = 2e-4
     accelerometer_bias: float = 0.01
     local_strength: float = 0.05
@@ -164,6 +166,16 @@ def _side_slip_lead(robot: Robot, priors: NuisancePriors) -> ModelParameter:
     return ModelParameter(LEAD, "m", (layout.SIDE_SLIP_LEAD,), False, deviation, step, -most, most)
 
 
+TILT = "sinkage_tilt"
+"""Parameter of how far the accelerometer feels the tilt by unequal sinkage."""
+
+
+def _sinkage_tilt(robot: Robot, priors: NuisancePriors) -> ModelParameter:
+    """From none to all of it; simulators that leave it out and robots with a stiff frame both exist."""
+    low, high = -robot.sinkage_tilt, 1.0 - robot.sinkage_tilt
+    return ModelParameter(TILT, "-", (layout.SINKAGE_TILT,), False, priors.sinkage_tilt, 0.2, low, high)
+
+
 def nuisances(
     robot: Robot,
     recordings: int,
@@ -191,6 +203,7 @@ def nuisances(
         *soil,
         *_structural(priors),
         _side_slip_lead(robot, priors),
+        _sinkage_tilt(robot, priors),
         *robot_parameters(robot),
         command_shift(period),
         *sensor_parameters(recordings, priors.gyro_bias, priors.accelerometer_bias),

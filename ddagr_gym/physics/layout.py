@@ -89,6 +89,7 @@ BASE_WHEEL = _block(12)
 HALF_WHEELBASE = _block()  # [m]
 HALF_TRACK = _block()
 SIDE_SLIP_LEAD = _block()  # [m]
+SINKAGE_TILT = _block()  # share of the tilt by unequal sinkage that the accelerometer feels [-]
 BASE_MOTOR_RATE = _block()
 BASE_DRIVETRAIN = _block(9)
 COMMAND_DELAY = _block()  # [s]
@@ -102,6 +103,8 @@ WHEEL_X = _block(4)  # hub, world [m]
 WHEEL_Y = _block(4)
 SOIL = _block(36)  # nine parameters x 4, in the order of SOIL_PARAMETERS
 BASE_SOIL = _block(36)
+FELT_DEPTH = _block(4)  # factor on a wheel's sinkage as the robot's tilt shows it; restored to 1 at each sample
+HEAPED = _block(4)  # way to the side per way ahead that has heaped soil up: left by a soil effect to that on wheels
 TOWED = _block(2)  # where a load on a rope lies, world [m]: left by a load effect to the body force effect
 
 # Means over a sample, and readings

@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.diagnosis.answer.evidence import Evidence
+from ddagr_gym.diagnosis.answer.location import Place
 from ddagr_gym.diagnosis.answer.verdict import Finding
+from ddagr_gym.frames import body_to_world
 from ddagr_gym.rendering import palette
 from ddagr_gym.reporting.diagnosis_figures import BEFORE, MODELS, MOST_PATHS, Figure, blank_figure, thinned
 
@@ -60,13 +62,10 @@ def _map(evidence: Evidence, size: Array, top: float, title: str, findings: Sequ
 
 
 def _draw_places(axes: Any, evidence: Evidence, findings: Sequence[Finding]) -> None:
-    """Circles of places, and an arrow uphill in the corner where a slope was named."""
-    from matplotlib.patches import Circle
-
+    """Discs and bands, and an arrow uphill in the corner where a slope was named."""
     for finding in findings:
         for place in () if finding.where is None else finding.where.places:
-            centre = (place.x, place.y)
-            axes.add_patch(Circle(centre, place.radius, facecolor=palette.BED, edgecolor=palette.GREY, zorder=0.5))
+            _draw_place(axes, place, facecolor=palette.BED, edgecolor=palette.GREY, zorder=0.5)
         parameters = finding.parameters
         if finding.name == "slope" and "direction" in parameters:
             turned = np.pi * (parameters["angle"].value < 0.0)
@@ -78,6 +77,23 @@ def _draw_places(axes: Any, evidence: Evidence, findings: Sequence[Finding]) -> 
                 arrowprops={"arrowstyle": "-|>", "color": palette.INK, "linewidth": 1.4},
             )  # fmt: skip
             axes.text(0.9, 0.76, "uphill", transform=axes.transAxes, ha="center", va="top", fontsize=7.5)
+
+
+def _draw_place(axes: Any, place: Place, **style: Any) -> None:
+    """A disc, or a band as far as the axes go: it may be longer than the drives."""
+    from matplotlib.patches import Circle, Polygon
+
+    if place.half_length == 0.0:
+        axes.add_patch(Circle((place.x, place.y), place.radius, **style))
+    else:
+        axes.add_artist(Polygon(_outline(place), **style))
+
+
+def _outline(place: Place) -> Array:
+    """(n, 2) corners of a band with its round ends [m]."""
+    angle = np.linspace(-0.5, 0.5, 17) * np.pi
+    front = np.stack([place.half_length + place.radius * np.cos(angle), place.radius * np.sin(angle)], axis=1)
+    return body_to_world(np.concatenate([front, -front]), place.x, place.y, place.bearing)
 
 
 def wrench_figures(evidence: Evidence) -> tuple[Figure, Figure]:

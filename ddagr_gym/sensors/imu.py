@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.jit import kernel
+from ddagr_gym.parameters import STANDARD_GRAVITY
 from ddagr_gym.physics.layout import (
     ACCELEROMETER_BIAS,
     ACCELEROMETER_NOISE,
@@ -19,16 +20,21 @@ from ddagr_gym.physics.layout import (
     ACCELEROMETER_RESOLUTION,
     ACCELEROMETER_SCALE,
     ACCELEROMETER_VIBRATION,
+    FELT_DEPTH,
     GYRO_BIAS,
     GYRO_NOISE,
     GYRO_RANGE,
     GYRO_RESOLUTION,
     GYRO_SCALE,
+    HALF_TRACK,
+    HALF_WHEELBASE,
     IMU_MOUNTING_YAW,
     IMU_POSITION,
     MEAN_SPECIFIC_FORCE,
     MEAN_YAW_ACCELERATION,
     READING,
+    SINKAGE,
+    SINKAGE_TILT,
     V_X,
     V_Y,
     YAW_RATE,
@@ -43,6 +49,20 @@ def digitise(value: float, resolution: float, limit: float) -> float:
     return min(max(value, -limit), limit)
 
 
+@kernel(inline=True)
+def gravity_by_sinkage(row: NDArray[np.float64]) -> tuple[float, float]:
+    """Gravity's share along x and y [m/s^2] of a body that leans towards its deeper wheels.
+
+    Theory: wheel model, eq. (35a).
+    """
+    lean = 0.25 * row[SINKAGE_TILT] * STANDARD_GRAVITY
+    right_front, left_front = row[FELT_DEPTH] * row[SINKAGE], row[FELT_DEPTH + 1] * row[SINKAGE + 1]
+    right_rear, left_rear = row[FELT_DEPTH + 2] * row[SINKAGE + 2], row[FELT_DEPTH + 3] * row[SINKAGE + 3]
+    nose_down = (right_front + left_front - right_rear - left_rear) / row[HALF_WHEELBASE]
+    left_down = (left_front + left_rear - right_front - right_rear) / row[HALF_TRACK]
+    return lean * nose_down, lean * left_down
+
+
 @kernel()
 def read_imu(row: NDArray[np.float64], noise: NDArray[np.float64]) -> None:
     """Write READING[0:3]. ``noise``: standard normal draws for specific force x, y and yaw rate.
@@ -55,6 +75,10 @@ def read_imu(row: NDArray[np.float64], noise: NDArray[np.float64]) -> None:
     y = row[IMU_POSITION + 1]
     force_x = row[MEAN_SPECIFIC_FORCE] - turn * y - rate * rate * x
     force_y = row[MEAN_SPECIFIC_FORCE + 1] + turn * x - rate * rate * y
+    if row[SINKAGE_TILT] != 0.0:
+        along_x, along_y = gravity_by_sinkage(row)
+        force_x -= along_x
+        force_y -= along_y
     cosine = math.cos(row[IMU_MOUNTING_YAW])
     sine = math.sin(row[IMU_MOUNTING_YAW])
     speed = math.sqrt(row[V_X] * row[V_X] + row[V_Y] * row[V_Y])

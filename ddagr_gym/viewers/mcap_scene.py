@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ddagr_gym.diagnosis.answer.location import Place
 from ddagr_gym.diagnosis.answer.verdict import Diagnosis
 from ddagr_gym.rendering import palette
 from ddagr_gym.viewers.annotations import Annotation
@@ -106,11 +107,11 @@ def _turn(yaw: float) -> messages.Quaternion:
     return Quaternion(x=0.0, y=0.0, z=float(np.sin(0.5 * yaw)), w=float(np.cos(0.5 * yaw)))
 
 
-def _pose(x: float, y: float, z: float) -> messages.Pose:
-    """Place without a turn."""
+def _pose(x: float, y: float, z: float, yaw: float = 0.0) -> messages.Pose:
+    """Place, turned about the vertical."""
     from foxglove.messages import Pose, Vector3
 
-    return Pose(position=Vector3(x=x, y=y, z=z), orientation=_turn(0.0))
+    return Pose(position=Vector3(x=x, y=y, z=z), orientation=_turn(yaw))
 
 
 def _colour(code: str, opacity: float = 1.0) -> messages.Color:
@@ -176,17 +177,25 @@ def _first(places: Array) -> tuple[float, float]:
 
 
 def _place_entities(stamp: messages.Timestamp, diagnosis: Diagnosis) -> list[messages.SceneEntity]:
-    """A disc and a text for each place that a finding is bound to."""
-    from foxglove.messages import CylinderPrimitive, SceneEntity, Vector3
+    """A disc or a band, and a text, for each place that a finding is bound to."""
+    from foxglove.messages import SceneEntity
 
     entities = []
     for finding in diagnosis.findings:
         for number, place in enumerate(() if finding.where is None else finding.where.places):
-            disc = CylinderPrimitive(
-                pose=_pose(place.x, place.y, -0.02), size=Vector3(x=2.0 * place.radius, y=2.0 * place.radius, z=0.01),
-                bottom_scale=1.0, top_scale=1.0, color=_colour(palette.PALE_ORANGE, 0.4),
-            )  # fmt: skip
             text = _text(finding.name, place.x, place.y)
             name = f"{finding.name} place {number + 1}"
-            entities.append(SceneEntity(timestamp=stamp, frame_id=WORLD, id=name, cylinders=[disc], texts=[text]))
+            entities.append(SceneEntity(timestamp=stamp, frame_id=WORLD, id=name, texts=[text], **_shape(place)))
     return entities
+
+
+def _shape(place: Place) -> dict[str, Any]:
+    """The primitives of a disc, or of a band."""
+    from foxglove.messages import CubePrimitive, CylinderPrimitive, Vector3
+
+    pose, colour = _pose(place.x, place.y, -0.02, place.bearing), _colour(palette.PALE_ORANGE, 0.4)
+    length = 2.0 * (place.half_length + place.radius)
+    size = Vector3(x=length, y=2.0 * place.radius, z=0.01)
+    if place.half_length > 0.0:
+        return {"cubes": [CubePrimitive(pose=pose, size=size, color=colour)]}
+    return {"cylinders": [CylinderPrimitive(pose=pose, size=size, bottom_scale=1.0, top_scale=1.0, color=colour)]}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -32,3 +33,9 @@ def test_a_draw_that_no_soil_has_is_taken_at_the_bound(robot, soil, values, fiel
 def test_a_fit_that_no_soil_has_is_refused(robot, soil):
     with pytest.raises(InputError, match="sinkage_exponent"):
         with_values(robot, soil, {"sinkage_exponent": 3.0})
+
+
+@pytest.mark.parametrize(("own", "found", "kept"), [(0.0, 0.7, 0.7), (0.8, -0.5, 0.3), (0.8, 0.9, 1.0)])
+def test_what_is_felt_of_a_tilt_by_sinkage_is_kept_within_none_and_all(robot, soil, own, found, kept):
+    changed = with_values(replace(robot, sinkage_tilt=own), soil, {"sinkage_tilt": found})[0]
+    assert changed.sinkage_tilt == pytest.approx(kept)

@@ -1,6 +1,7 @@
 """Accelerometer and gyro: specific force at the sensor's place and axes, then what the device does to it."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +10,8 @@ from hypothesis import strategies as st
 
 from ddagr_gym.parameters import STANDARD_GRAVITY, Imu, Numerics, Sensors
 from ddagr_gym.physics import layout
+from ddagr_gym.physics.effects.soil_patch import SoilPatch
+from ddagr_gym.physics.effects.soil_split import SoilSplit
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.sensors.imu import digitise, read_imu
 from ddagr_gym.simulator import build_row, simulate
@@ -128,3 +131,47 @@ def test_default_noise_is_the_data_sheets():
         assert drive[name].std() == pytest.approx(math.sqrt(noise**2 + step**2 / 12), rel=0.05)
         assert abs(drive[name].mean()) < 4 * noise / math.sqrt(5000)
         np.testing.assert_allclose(drive[name] / step, np.round(drive[name] / step), atol=1e-6)
+
+
+def _leaning(sinkage, share=1.0):
+    row = build_row(replace(get_robot("ddagr"), sinkage_tilt=share), get_soil("thesis_a1"), Sensors(imu=IDEAL))
+    row[layout.SINKAGE : layout.SINKAGE + 4] = sinkage
+    row[layout.FELT_DEPTH : layout.FELT_DEPTH + 4] = 1.0
+    read_imu(row, np.zeros(3))
+    return row[layout.READING : layout.READING + 3].copy()
+
+
+@pytest.mark.parametrize("share", [0.0, 0.4, 1.0])
+def test_a_robot_that_sinks_unevenly_feels_gravity(share):
+    """Front deeper: nose down, the x axis points down and reads -g sin; left deeper: the same of y."""
+    robot, deeper = get_robot("ddagr"), 0.01
+    nose_down = deeper / (2 * robot.half_wheelbase)
+    left_down = deeper / (2 * robot.half_track)
+    expected = -share * STANDARD_GRAVITY * np.array([nose_down, left_down])
+    np.testing.assert_allclose(_leaning((0.02, 0.02, 0.01, 0.01), share), [expected[0], 0.0, 0.0], atol=1e-12)
+    np.testing.assert_allclose(_leaning((0.01, 0.02, 0.01, 0.02), share), [0.0, expected[1], 0.0], atol=1e-12)
+    np.testing.assert_array_equal(_leaning((0.02, 0.02, 0.02, 0.02), share), 0.0)
+
+
+def test_a_patch_under_the_left_wheels_is_left_out_of_the_tilt():
+    """It is felt no longer than relief; what its stiffness adds to the depth is taken back."""
+    robot = replace(get_robot("ddagr"), sinkage_tilt=1.0)
+    ideal = {"sensors": Sensors(imu=IDEAL), "initial_state": {"y": 0.0}}
+    beside = SoilPatch(1.0, 0.5, centre_y=1.0, radius=1.0, edge=0.05, half_length=100.0)
+    columns = [
+        simulate(robot, get_soil("thesis_a1"), np.full((250, 2), 0.7), effects=effects, **ideal)
+        for effects in ([], [beside], [SoilSplit(1.0, 0.5)])
+    ]
+    felt = [abs(drive["specific_force_y"][-20:].mean()) for drive in columns]
+    assert columns[1]["true_sinkage_2"][-1] > 1.2 * columns[1]["true_sinkage_1"][-1]
+    assert max(felt[:2]) < 0.2 * felt[2]
+
+
+def test_softer_soil_under_the_left_wheels_is_felt_in_a_drive():
+    robot = replace(get_robot("ddagr"), sinkage_tilt=1.0)
+    commands = np.full((250, 2), 0.7)
+    drive = simulate(robot, get_soil("thesis_a1"), commands, sensors=Sensors(imu=IDEAL), effects=[SoilSplit(1.0, 0.5)])
+    left, right = (np.mean([drive[f"true_sinkage_{wheel}"][-1] for wheel in bank]) for bank in ((2, 4), (1, 3)))
+    roll = (left - right) / (2 * robot.half_track)
+    assert roll > 3e-3
+    assert drive["specific_force_y"][-20:].mean() == pytest.approx(-STANDARD_GRAVITY * roll, rel=0.02, abs=2e-3)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from ddagr_gym.diagnosis.answer.location import Place
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.gauss_newton import fit
 from ddagr_gym.identification.misfit import channel_misfit
@@ -16,6 +18,7 @@ from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.viewers.drive_traces import MODELS, PAUSE, drive_traces
 from ddagr_gym.viewers.mcap_file import check_mcap_path, layout_path, write_mcap
 from ddagr_gym.viewers.mcap_numbers import NumberTopics
+from ddagr_gym.viewers.mcap_scene import _shape
 from tests.viewers.conftest import CLOCK
 from tests.viewers.reading import read
 
@@ -152,6 +155,12 @@ def test_findings_and_places_are_in_the_scene(written):
     assert any("60 % of its gain" in text for text in texts)
     (disc,) = [disc for entity in update.entities for disc in entity.cylinders]
     assert (disc.pose.position.x, disc.pose.position.y, disc.size.x) == pytest.approx((1.0, 0.5, 0.8))
+
+
+def test_a_band_is_as_long_as_it_is_and_turned():
+    (box,) = _shape(Place(1.0, 0.5, 0.4, half_length=3.0, bearing=math.pi))["cubes"]
+    assert "size=Some(Vector3 { x: 6.8, y: 0.8" in repr(box)
+    assert "Quaternion { x: 0.0, y: 0.0, z: 1.0, w: 6" in repr(box)  # the cosine of 90 degrees is 6e-17
 
 
 def test_the_answer_is_attached(answered, written):

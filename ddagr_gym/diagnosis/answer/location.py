@@ -78,14 +78,16 @@ class OperatingConditionShare:
 
 @dataclass(frozen=True)
 class Place:
-    """A round place in which something acts.
+    """A disc or a band in which something acts.
 
     Attributes:
         x: of its centre, world [m].
         y: the same.
-        radius: [m].
+        radius: [m]; of a band half its width.
         share: of the gain in it; null for a place that was fitted.
         time_share: share of the driven time in it; null the same.
+        half_length: of the middle line of a band, without its round ends [m]; 0 for a disc.
+        bearing: of that line, from the world's x axis counter-clockwise [rad].
     """
 
     x: float
@@ -93,6 +95,8 @@ class Place:
     radius: float
     share: float | None = None
     time_share: float | None = None
+    half_length: float = 0.0
+    bearing: float = 0.0
 
 
 @dataclass(frozen=True)

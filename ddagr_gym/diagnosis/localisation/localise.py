@@ -45,6 +45,7 @@ _ROUGH = 1.25
 percent of the squares away, and noise is known to about as much)."""
 
 _PLACE = ("centre_x", "centre_y", "radius")
+_LINE = ("half_length", "bearing")
 
 
 def locate(session: DiagnosisSession, found: SearchResult, traces: MismatchTraces) -> Localisation:
@@ -130,11 +131,12 @@ def _where(
 
 
 def _fitted_place(effect: Effect) -> tuple[Place, ...]:
-    """Centre and radius of an effect that has them."""
+    """Centre and radius of an effect that has them, and the middle line of one that may be long."""
     values = effect.as_mapping()["parameters"]
     if not set(_PLACE) <= set(values):
         return ()
-    return (Place(*(float(values[name]) for name in _PLACE)),)
+    line = {name: float(values[name]) for name in _LINE if name in values}
+    return (Place(*(float(values[name]) for name in _PLACE), **line),)
 
 
 def _standing_place(lying: Sequence[OperatingConditionShare]) -> tuple[Place, ...]:

@@ -18,8 +18,8 @@ _ONLY = 0.95
 """Share of the weight from which "only" is said instead of "mostly", which means more than half (ours)."""
 
 
-class Disc(Protocol):
-    """A round place."""
+class Patch(Protocol):
+    """A disc, or a band with round ends."""
 
     @property
     def x(self) -> float: ...  # noqa: D102
@@ -27,9 +27,11 @@ class Disc(Protocol):
     def y(self) -> float: ...  # noqa: D102
     @property
     def radius(self) -> float: ...  # noqa: D102
+    @property
+    def half_length(self) -> float: ...  # noqa: D102
 
 
-def phrase_of(lying: Sequence[OperatingConditionShare], fitted: Sequence[Disc] = (), covered: float = 0.0) -> str:
+def phrase_of(lying: Sequence[OperatingConditionShare], fitted: Sequence[Patch] = (), covered: float = 0.0) -> str:
     """What stands out, in words.
 
     Args:
@@ -39,7 +41,9 @@ def phrase_of(lying: Sequence[OperatingConditionShare], fitted: Sequence[Disc] =
     """
     if fitted:
         place = fitted[0]
-        return f"within {number(place.radius)} m of ({number(place.x)}, {number(place.y)}) m"
+        where = f"({number(place.x)}, {number(place.y)}) m"
+        of = f"the middle line of a band through {where}" if place.half_length > 0.0 else where
+        return f"within {number(place.radius)} m of {of}"
     if not lying or not lying[0].stands_out:
         return EVERYWHERE if covered >= _MOST_OF_IT else NOWHERE_MORE
     first = lying[0]

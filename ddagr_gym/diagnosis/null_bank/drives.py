@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,8 +93,9 @@ def _drive(
 ) -> Recording:
     commands = template.commands[number]
     x, y, yaw = template.starts[number]
+    tilting = replace(robot, sinkage_tilt=world.tilt)
     parts = simulate(
-        robot, soil, world.reading.commands(commands), sensors=ideal_sensors(template.period / PARTS),
+        tilting, soil, world.reading.commands(commands), sensors=ideal_sensors(template.period / PARTS),
         effects=world.changes, field=world.field, numerics=world.numerics,
         initial_state={"x": x, "y": y, "yaw": yaw},
     )  # fmt: skip

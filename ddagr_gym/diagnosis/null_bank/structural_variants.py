@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ddagr_gym.diagnosis.null_bank.readings import Reading, draw_reading
 from ddagr_gym.parameters import Numerics, Soil
 from ddagr_gym.physics.effects.base import Effect, Vector, size
+from ddagr_gym.physics.effects.motor_lag import slow_turning
 from ddagr_gym.physics.effects.soil_factors import scale_soil
 from ddagr_gym.physics.layout import (
     MOTOR_RATE,
@@ -128,6 +129,21 @@ class SecondOrderMotors(Effect):
 
 
 @dataclass(frozen=True)
+class YieldingLoop(Effect):
+    """Speed loop that yields a little to the ground, which resists turns the most."""
+
+    name = "null_yielding_loop"
+    title = "A loop that yields in turns"
+    group = "commands and motors"
+    equation = "the difference of both banks' commands trails by a few milliseconds"
+    source = "ours"
+    signature = "none that a refit leaves"
+    actions = ((POINT_MOTORS, slow_turning),)
+
+    lag: float = size("s", 0.0, 0.05, least=0.01)
+
+
+@dataclass(frozen=True)
 class Relief(Effect):
     """Small waves of the ground, one length or a spectrum."""
 
@@ -167,6 +183,7 @@ class NullWorld:
         changes: structural changes.
         numerics: of its integrator.
         reading: how it is commanded and read.
+        tilt: share of the tilt by unequal sinkage that its accelerometer feels.
     """
 
     kind: str
@@ -174,6 +191,7 @@ class NullWorld:
     changes: tuple[Effect, ...]
     numerics: Numerics
     reading: Reading
+    tilt: float
 
 
 def draw_world(kind: str, soil: Soil, reach: float, rng: np.random.Generator) -> NullWorld:
@@ -188,7 +206,8 @@ def draw_world(kind: str, soil: Soil, reach: float, rng: np.random.Generator) ->
     spread = float(rng.uniform(0.05, 0.1)) if kind in ("all", "patchy") else float(rng.uniform(0.02, 0.04))
     numerics = replace(Numerics(), maximum_step=float(rng.choice([0.004, 0.01])))
     field = _field(_other(soil, rng), reach, spread, rng)
-    return NullWorld(kind, field, _changes(kind, rng), numerics, draw_reading(kind, rng))
+    changes, reading = _changes(kind, rng), draw_reading(kind, rng)
+    return NullWorld(kind, field, changes, numerics, reading, float(rng.uniform(0.0, 1.0)))
 
 
 def _changes(kind: str, rng: np.random.Generator) -> tuple[Effect, ...]:
@@ -201,6 +220,7 @@ def _changes(kind: str, rng: np.random.Generator) -> tuple[Effect, ...]:
     if every or kind in ("motor loop", "plain"):
         # shorter than the least delay that counts as one
         changes.append(SecondOrderMotors(float(rng.uniform(0.005, 0.02))))
+        changes.append(YieldingLoop(float(rng.uniform(0.0, 0.015))))
     if every or kind == "relief":
         changes.append(_relief(rng.uniform(0.003, 0.01), rng.uniform(0.4, 1.5, 2), 1, rng))
     if kind == "rough":

@@ -78,13 +78,15 @@ def least_detectable(terms: Terms, thresholds: Thresholds, dispersion: float) ->
     """Distance of each size from neutral that passes the gate nine times in ten, by effect and field.
 
     Of an effect that may act at any time or in any way, the usual one counts, which is its default (a change of soil
-    from the beginning on); of one that has a place, the median over the places that the drives touch. Of a limit stands
+    from the beginning on); of one that has a place, the median over the discs that the drives touch. Of a limit stands
     the mildest of the tried ones that shows, as it is, and of a reversed sign 1. What a nuisance can take over (see
     :attr:`Terms.absorbed`) comes on top.
     """
     information = np.diag(terms.reduced().information)
     found: dict[str, dict[str, list[tuple[Candidate, Effect, float]]]] = {}
     for candidate in terms.candidates:
+        if candidate.is_band:
+            continue
         gate = thresholds.of(candidate.name).detectable * dispersion
         shown = [
             (probe, detectable(candidate, k, float(information[candidate.columns[k]]), gate))

@@ -40,6 +40,11 @@ class Candidate:
         return len(self.probes) > 1 and "direction" in self.probes[0].shape_names()
 
     @property
+    def is_band(self) -> bool:
+        """Whether its probes are bands of ground."""
+        return bool(self.probes[0].as_mapping()["parameters"].get("half_length", 0.0) > 0.0)
+
+    @property
     def has_sizes(self) -> bool:
         """Whether its multiples are sizes; a flip or a limit keeps the size of its probe whatever its multiple."""
         return self.whole is None and self.probes[0].differentiable

@@ -254,9 +254,9 @@ def same_lateness(effect: Effect) -> Effect | None:
         effect: to translate.
 
     Returns:
-        None for other effects, and for motors that are quicker than the nominal ones.
+        None for other effects, for motors that are quicker than the nominal ones, and where the turning alone is late.
     """
-    if isinstance(effect, MotorLag) and effect.lag > 0.0:
+    if isinstance(effect, MotorLag) and effect.lag > 0.0 and not effect.turning:
         return CommandDelay(min(effect.lag, CommandDelay.parameter("delay").metadata["high"]))
     if isinstance(effect, CommandDelay) and effect.delay > 0.0:
         return MotorLag(effect.delay, 1.0)
@@ -316,7 +316,7 @@ def _longer(motors: MotorLag, later: float) -> MotorLag | None:
     """Motors whose loop is slower by some time, with the same second pole; None where no lag says that."""
     second, lag = motors.second_pole * max(motors.lag, 0.0), motors.lag + later
     data = MotorLag.parameter("lag").metadata
-    if not (data["low"] <= lag <= data["high"] and 0.0 <= second <= max(lag, 0.0)):
+    if motors.turning or not (data["low"] <= lag <= data["high"] and 0.0 <= second <= max(lag, 0.0)):
         return None
     return MotorLag(lag, second / lag if lag > 0.0 else 0.0, motors.slowing)
 

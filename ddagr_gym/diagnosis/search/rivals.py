@@ -25,6 +25,7 @@ from ddagr_gym.diagnosis.search.initial_guess import (
 )
 from ddagr_gym.diagnosis.search.inner_products import Terms
 from ddagr_gym.diagnosis.search.limit_guess import limit_guesses
+from ddagr_gym.diagnosis.search.patch_guess import patch_guesses
 from ddagr_gym.diagnosis.search.scan import drive_extent
 from ddagr_gym.diagnosis.search.scanned_model import Rival, ScannedModel, rival_of, scan_model
 from ddagr_gym.diagnosis.search.starting_models import FAR_OFF
@@ -32,6 +33,7 @@ from ddagr_gym.identification.gauss_newton import DAMPING, Fitted, cost_of, fit
 from ddagr_gym.identification.problem import Point, Problem
 from ddagr_gym.identification.size_prior import implausibility
 from ddagr_gym.physics.effects import Effect
+from ddagr_gym.physics.effects.soil_patch import SoilPatch
 
 _HOPELESS = 0.4
 """Share of the best linear gain below which no joint refit is tried (ours: linear and joint gains differ by less)."""
@@ -174,6 +176,8 @@ def _guesses(problem: Problem, start: Fitted, others: Sequence[Effect], gain: Ga
     candidate = terms.candidates[gain.candidate]
     if candidate.is_limit:
         return limit_guesses(problem, start, others, [item for item in terms.candidates if item.name == gain.name])
+    if candidate.name == SoilPatch.name:
+        return patch_guesses(terms)
     return [first_guess(candidate, gain.multiples)]
 
 

@@ -25,6 +25,7 @@ from ddagr_gym.parameters import STANDARD_GRAVITY, Robot
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.effects.base import DriveExtent
 from ddagr_gym.physics.effects.registry import absolute_effect_kinds
+from ddagr_gym.physics.effects.soil_patch import from_middle_line
 
 Array = NDArray[np.float64]
 
@@ -64,7 +65,8 @@ def touched(probe: Effect, problem: Problem, prediction: Array) -> NDArray[np.bo
     names = probe.shape_names()
     if {"centre_x", "centre_y", "radius", "edge"} <= set(names):
         place = probe.as_mapping()["parameters"]
-        distance = np.hypot(prediction[..., 5] - place["centre_x"], prediction[..., 6] - place["centre_y"])
+        x, y = prediction[..., 5] - place["centre_x"], prediction[..., 6] - place["centre_y"]
+        distance = from_middle_line(x, y, place.get("half_length", 0.0), place.get("bearing", 0.0))
         result &= distance.min(axis=1) < place["radius"] + _NEAR_PATCH + 4.0 * place["edge"]
     if "onset" in names:
         result &= windows.time + windows.duration > probe.as_mapping()["parameters"]["onset"] - _BEFORE_ONSET

@@ -15,6 +15,7 @@ motors          MOTOR_TARGET, MOTOR_RATE, DRIVETRAIN, motor_lag, motor_droop, mo
 loads           MASS ... SLOPE, WHEEL (restored at    slope, payload, centre_of_mass_offset, wheel_radius_mismatch,
                 each sample), TOWED                   towed_drag (the load on its rope)
 soil            SOIL (restored at each sample)        soil_change, soil_split, soil_patch, slip_sinkage, multipass
+                FELT_DEPTH (restored), HEAPED         soil_patch; lateral_bulldozing (the soil beside the wheels)
 wheel_forces    EXTRA_* of each wheel                 lateral_bulldozing
 body_forces     BODY_FORCE                            towed_drag, viscous_drag
 readings        READING                               gyro_*, accelerometer_*, imu_*, encoder_scale, pose_latency,

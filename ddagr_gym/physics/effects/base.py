@@ -179,6 +179,11 @@ class Effect(Validated):
         return self.actions
 
     @property
+    def idle_shapes(self) -> frozenset[str]:
+        """Shapes that no fit moves where the effect stands, because nothing would show it."""
+        return frozenset()
+
+    @property
     def soils(self) -> Mapping[str, tuple[float, float]]:
         """Factors on strength and stiffness of the soils that it tells apart, by where they are, in words.
 

@@ -3,7 +3,8 @@
 import math
 from dataclasses import dataclass
 
-from ddagr_gym.physics.effects.base import DriveExtent, Effect, Vector, shape, size
+from ddagr_gym.jit import kernel
+from ddagr_gym.physics.effects.base import Action, DriveExtent, Effect, Vector, shape, size
 from ddagr_gym.physics.layout import COMMAND, OMEGA, POINT_COMMANDS
 
 _STARTED = 2  # entry of the memory behind the two banks'
@@ -11,24 +12,39 @@ _USUAL = 0.12  # share of the fastest command that a threshold for small ones is
 _EDGE = 0.1  # share of the band over which a command that passes whole sets in, ours
 
 
+@kernel(inline=True)
+def what_passes(command: float, speed: float, parameters: Vector, memory: Vector, which: int) -> float:
+    """What a dead zone lets through of a command; ``memory[which]`` says which way it moves, at first by ``speed``."""
+    width = parameters[0]
+    if memory[_STARTED] == 0.0:
+        memory[which] = math.copysign(1.0, speed) if abs(speed) > 0.5 * parameters[2] * width else 0.0
+    edge = width * (parameters[2] if memory[which] * command > 0.0 else 1.0)
+    inside = min(max((abs(command) / edge - 1.0 + _EDGE) / _EDGE, 0.0), 1.0)
+    passing = inside * inside * (3.0 - 2.0 * inside)
+    memory[which] = math.copysign(1.0, command) if abs(command) > edge else 0.0
+    return math.copysign(passing * max(abs(command) - parameters[1] * width, 0.0), command)
+
+
 def lose_small_commands(row: Vector, parameters: Vector, memory: Vector) -> None:
     """Dead zone of half width ``parameters[0]``; ``parameters[1]`` of it is lost beyond as well.
 
     A bank that moves stops below the share ``parameters[2]`` of the width; ``memory[:2]`` says which way each moves.
     """
-    width = parameters[0]
-    if width <= 0.0:
+    if parameters[0] <= 0.0:
         return
     for bank in range(2):
-        command = row[COMMAND + bank]
-        if memory[_STARTED] == 0.0:
-            speed = row[OMEGA + bank]
-            memory[bank] = math.copysign(1.0, speed) if abs(speed) > 0.5 * parameters[2] * width else 0.0
-        edge = width * (parameters[2] if memory[bank] * command > 0.0 else 1.0)
-        inside = min(max((abs(command) / edge - 1.0 + _EDGE) / _EDGE, 0.0), 1.0)
-        passing = inside * inside * (3.0 - 2.0 * inside)
-        memory[bank] = math.copysign(1.0, command) if abs(command) > edge else 0.0
-        row[COMMAND + bank] = math.copysign(passing * max(abs(command) - parameters[1] * width, 0.0), command)
+        row[COMMAND + bank] = what_passes(row[COMMAND + bank], row[OMEGA + bank], parameters, memory, bank)
+    memory[_STARTED] = 1.0
+
+
+def lose_small_turns(row: Vector, parameters: Vector, memory: Vector) -> None:
+    """The same of half the difference of both banks' commands; their mean goes through as it is."""
+    if parameters[0] <= 0.0:
+        return
+    mean = 0.5 * (row[COMMAND] + row[COMMAND + 1])
+    turned = 0.5 * (row[OMEGA] - row[OMEGA + 1])
+    turning = what_passes(row[COMMAND] - mean, turned, parameters, memory, 0)
+    row[COMMAND], row[COMMAND + 1] = mean + turning, mean - turning
     memory[_STARTED] = 1.0
 
 
@@ -36,11 +52,14 @@ def lose_small_commands(row: Vector, parameters: Vector, memory: Vector) -> None
 class CommandDeadband(Effect):
     """Small commands have no effect, and larger ones lose the same amount (a dead zone) or nothing (a threshold).
 
+    A drive controller that takes a speed and a turn may overlook small turns alone.
+
     Attributes:
         width: half width of the dead zone; least: 3 percent of the 0.7 rad/s of a row turn.
         loss: share of the width that commands beyond it lose: 1 for friction, 0 for a driver's threshold.
         release: share of the width below which a bank that moves stops; less than 1 where breaking loose takes more.
             It shows with a loss below 1 only: else nothing is left of commands below the width.
+        turning: 1 where half the difference of both banks' commands goes through the dead zone, 0 for each bank's.
     """
 
     name = "command_deadband"
@@ -50,14 +69,26 @@ class CommandDeadband(Effect):
     source = "dead zone (Tao and Kokotovic, IEEE Trans. Automatic Control 39 (1994) 59)"
     signature = "encoders miss a constant amount of every command, all of a small one"
     confused_with = ("command_gain", "motor_droop")
-    actions = ((POINT_COMMANDS, lose_small_commands),)
+    actions = ((POINT_COMMANDS, lose_small_commands), (POINT_COMMANDS, lose_small_turns))
 
     width: float = size("rad/s", 0.0, 1.0, least=0.02)
     loss: float = shape("-", 0.0, 1.0, default=1.0, step=-0.05)
     release: float = shape("-", 0.1, 1.0, default=1.0, step=-0.1)
+    turning: float = shape("-", 0.0, 1.0, default=0.0, step=1.0)
+
+    @property
+    def acting(self) -> tuple[tuple[int, Action], ...]:
+        """On the turning, or on each bank."""
+        return self.actions[1:] if self.turning > 0.0 else self.actions[:1]
 
     @classmethod
     def probes(cls, extent: DriveExtent) -> tuple[Effect, ...]:
-        """A narrow dead zone, and thresholds that show where commands come near them, without and with sticking."""
-        wide = min(_USUAL * extent.wheel_speed, 0.5 * cls.parameter("width").metadata["high"])
-        return (cls(cls.parameter("width").metadata["step"]), cls(wide, 0.0), cls(wide, 0.0, 0.5))
+        """A narrow dead zone, and thresholds that show where commands come near them: plain, sticking, of turns."""
+        most = 0.5 * cls.parameter("width").metadata["high"]
+        wide, turn = (min(_USUAL * fastest, most) for fastest in (extent.wheel_speed, extent.turning))
+        return (
+            cls(cls.parameter("width").metadata["step"]),
+            cls(wide, 0.0),
+            cls(wide, 0.0, 0.5),
+            cls(turn, 0.0, turning=1.0),
+        )

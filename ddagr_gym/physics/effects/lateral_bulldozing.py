@@ -5,11 +5,16 @@ from dataclasses import dataclass
 
 from ddagr_gym.jit import kernel
 from ddagr_gym.parameters import STANDARD_GRAVITY
-from ddagr_gym.physics.effects.base import Effect, Vector, shape, size
+from ddagr_gym.physics.body_dynamics import set_kinematics
+from ddagr_gym.physics.effects.base import Action, DriveExtent, Effect, Vector, shape, size
 from ddagr_gym.physics.layout import (
     EXTRA_FORCE_Y,
     EXTRA_YAW_MOMENT,
+    HEAPED,
+    OMEGA,
+    POINT_SOIL,
     POINT_WHEEL_FORCES,
+    SAMPLE_PERIOD,
     SINKAGE,
     SOIL,
     SOIL_COHESION,
@@ -22,7 +27,11 @@ from ddagr_gym.physics.layout import (
     YAW_RATE,
 )
 
-_MOBILISING_ANGLE = 0.05  # [rad] slip angle at which 70 percent of the pressure acts, ours
+_AT_ONCE = 0.05  # tangent of the slip angle at which 70 percent of the pressure acts, of soil against the flank, ours
+_HEAPED_UP = (0.2, 0.8)  # the same of soil that has to be heaped up first, ours
+_WAY = 0.3  # [m] over which a wheel leaves behind what it has heaped up, about its contact length, ours
+_SHORTEST_WAY = 1e-3  # [m], ours
+_STARTED = 4  # entry of the memory behind the four wheels'
 _REST_SPEED = 1e-3  # [m/s], ours: the same at rest
 
 
@@ -38,11 +47,33 @@ def passive_resistance(cohesion: float, tangent: float, unit_weight: float) -> t
     return 2.0 * cohesion * root, unit_weight * root * root * (1.0 + root * tangent)
 
 
+def heap_soil_up(row: Vector, parameters: Vector, memory: Vector) -> None:
+    """Way to the side per way ahead, followed over the way ``parameters[3]``, into HEAPED and ``memory[:4]``."""
+    set_kinematics(row)
+    for i in range(4):
+        rim = abs((row[WHEEL + i] + row[WHEEL + 8 + i]) * row[OMEGA + i % 2])
+        travel = max(rim, abs(row[WHEEL_V_X + i]))
+        aside = abs(row[WHEEL_V_Y + i]) / (travel + _REST_SPEED)
+        if memory[_STARTED] == 0.0:
+            memory[i] = aside
+        passed = travel * row[SAMPLE_PERIOD]
+        memory[i] += (1.0 - math.exp(-passed / max(parameters[3], _SHORTEST_WAY))) * (aside - memory[i])
+        row[HEAPED + i] = memory[i]
+    memory[_STARTED] = 1.0
+
+
+@kernel(inline=True)
+def mobilised(aside: float, angle: float) -> float:
+    """Share of the pressure that acts at a way to the side per way ahead."""
+    return aside / math.sqrt(aside * aside + angle * angle)
+
+
 def push_soil_aside(row: Vector, parameters: Vector, memory: Vector) -> None:
     """Lateral force on each wheel at the middle of its submerged flank, against the lateral velocity there.
 
     The flank's depth is taken as a parabola over the contact length sqrt(2 R0 z) in front and its exit_angle_ratio
-    behind, whose mean is 2/3 and mean square 8/15 of the depth's.
+    behind, whose mean is 2/3 and mean square 8/15 of the depth's. Where there is a way of heaping up, the pressure is
+    that of the soil in HEAPED.
     """
     for i in range(4):
         soil = SOIL + 9 * i
@@ -60,7 +91,9 @@ def push_soil_aside(row: Vector, parameters: Vector, memory: Vector) -> None:
         forward = travel / math.sqrt(travel * travel + _REST_SPEED * _REST_SPEED)
         arm = 0.375 * front * (1.0 - row[soil + SOIL_EXIT_RATIO]) * forward
         v_y = row[WHEEL_V_Y + i] + arm * row[YAW_RATE]
-        rolling = _MOBILISING_ANGLE * max(abs(rim), abs(row[WHEEL_V_X + i]))
+        if parameters[3] > 0.0:
+            full *= mobilised(row[HEAPED + i], parameters[2])
+        rolling = (_AT_ONCE if parameters[3] > 0.0 else parameters[2]) * max(abs(rim), abs(row[WHEEL_V_X + i]))
         force = -full * v_y / math.sqrt(v_y * v_y + rolling * rolling + _REST_SPEED * _REST_SPEED)
         row[EXTRA_FORCE_Y + i] += force
         row[EXTRA_YAW_MOMENT + i] += arm * force
@@ -71,21 +104,41 @@ class LateralBulldozing(Effect):
     """Passive earth pressure of cohesive-frictional soil on the submerged flank of each wheel.
 
     It takes cohesion and friction from the soil under the wheel. Full pressure needs some sideways motion: it is
-    mobilised over the slip angle, so that the force keeps its independence of speed and stays smooth.
+    mobilised over the slip angle, so that the force keeps its independence of speed and stays smooth. Soil that
+    stands against the flank resists at once. Loose soil is heaped up first and left behind as the wheel rolls on, so
+    that the berm, and with it the force, grows with the way to the side per way ahead: a large angle.
 
     Attributes:
         scale: times the theoretical pressure, 1 for all of it; least: 0.25, some percent of a wheel's lateral force.
         density: of the soil in bulk.
+        angle: tangent of the slip angle at which 70 percent of the pressure acts.
+        way: over which a wheel leaves behind what it has heaped up; 0 for pressure by the slip angle of the moment.
     """
 
     name = "lateral_bulldozing"
     title = "Lateral bulldozing"
     group = "ground"
-    equation = "F_y = -scale integral (D1 c h + D1 D2 density g h^2/2) dx v_y/|v_y|, h the flank's depth along x"
+    equation = (
+        "F_y = -scale integral (D1 c h + D1 D2 density g h^2/2) dx v_y/sqrt(v_y^2 + angle^2 v_x^2), h the flank's "
+        "depth along x; with a way times b/sqrt(b^2 + angle^2), way db/ds = |v_y/v_x| - b, s the way ahead"
+    )
     source = "Hegedus (1960), as in Ishigami et al., J. Field Robotics 24 (2007) 233"
     signature = "turns slower and wider, the more the deeper it sinks; nothing in straight drives"
     confused_with = ("gyro_scale", "soil_change", "towed_drag")
-    actions = ((POINT_WHEEL_FORCES, push_soil_aside),)
+    actions = ((POINT_WHEEL_FORCES, push_soil_aside), (POINT_SOIL, heap_soil_up))
 
     scale: float = size("-", 0.0, 10.0, least=0.25, step=0.25)
     density: float = shape("kg/m^3", 200.0, 2500.0, default=1500.0, step=100.0)
+    angle: float = shape("-", 0.005, 2.0, default=_AT_ONCE, step=0.05)
+    way: float = shape("m", 0.0, 5.0, default=0.0, step=0.1)
+
+    @property
+    def acting(self) -> tuple[tuple[int, Action], ...]:
+        """Without a way of heaping up the force alone."""
+        return self.actions if self.way > 0.0 else self.actions[:1]
+
+    @classmethod
+    def probes(cls, extent: DriveExtent) -> tuple[Effect, ...]:
+        """Soil that stands against the flank, and soil that has to be heaped up."""
+        step = cls.parameter("scale").metadata["step"]
+        return (cls(step), *(cls(step, angle=angle, way=_WAY) for angle in _HEAPED_UP))

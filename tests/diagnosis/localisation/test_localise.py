@@ -8,6 +8,7 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
+from ddagr_gym.diagnosis.answer.location import Place
 from ddagr_gym.diagnosis.gates.thresholds import Thresholds
 from ddagr_gym.diagnosis.localisation.effect_timeline import (
     ScoreProcess,
@@ -19,7 +20,7 @@ from ddagr_gym.diagnosis.localisation.effect_timeline import (
     spans,
     time_share,
 )
-from ddagr_gym.diagnosis.localisation.localise import channel_shares, locate
+from ddagr_gym.diagnosis.localisation.localise import _fitted_place, channel_shares, locate
 from ddagr_gym.diagnosis.localisation.mismatch_traces import piece_values, trace_mismatch
 from ddagr_gym.diagnosis.localisation.operating_condition_words import NOWHERE_MORE, phrase_of, uneven_phrase
 from ddagr_gym.diagnosis.localisation.operating_conditions import Pieces, shares, uneven
@@ -234,6 +235,13 @@ def test_a_place_that_holds_the_weight_stands_out():
     assert np.hypot(x - 3.0, y - np.sin(3.0)) < 0.5
     assert radius <= 1.5
     assert phrase_of(lying).startswith("only within")
+
+
+def test_a_fitted_band_is_a_place_with_a_line():
+    band = parse_effect("soil_patch=0.8,centre_x=1.5,centre_y=-0.2,radius=0.9,half_length=7,bearing=2")
+    places = _fitted_place(band)
+    assert places == (Place(1.5, -0.2, 0.9, half_length=7.0, bearing=2.0),)
+    assert phrase_of((), places) == "within 0.90 m of the middle line of a band through (1.5, −0.20) m"
 
 
 def test_a_range_of_headings_may_wrap_around():

@@ -23,6 +23,10 @@ def text(name, **parameters):
     return describe(name, {key: Amount(*value) for key, value in parameters.items()})
 
 
+PATCH = {
+    "strength": (0.8, "-"), "stiffness": (1.0, "-"), "centre_x": (1.5, "m"), "centre_y": (-0.2, "m"),
+    "radius": (0.9, "m"),
+}  # fmt: skip
 SLOPE = {"angle": (0.06458, "rad", (0.0593, 0.0698)), "direction": (0.5585, "rad", (0.49, 0.63))}
 
 
@@ -99,6 +103,12 @@ def test_every_effect_has_a_clause_with_its_main_size(name):
         (text("accelerometer_sign", flip_x=(0.0, "-"), flip_y=(1.0, "-")), "accelerometer's sideways axis is reversed"),
         (text("soil_change", strength=(0.8, "-"), stiffness=(1.0, "-"), onset=(-1e6, "s")), "20 % weaker than the"),
         (text("soil_change", strength=(0.8, "-"), stiffness=(1.0, "-"), onset=(12.0, "s")), "model's from 12 s on"),
+        (text("soil_patch", **PATCH), "the soil is 20 % weaker within 0.90 m of (1.50, −0.20) m"),
+        (text("soil_patch", **PATCH, half_length=(0.0, "m"), bearing=(0.3, "rad")), "weaker within 0.90 m of (1.50"),
+        (
+            text("soil_patch", **PATCH, half_length=(7.0, "m"), bearing=(2.0, "rad", (1.9, 2.1))),
+            "20 % weaker in a band 1.8 m wide that runs at −65 ± 6 degrees from the x axis through (1.50, −0.20) m",
+        ),
         (text("payload", mass=(25.0, "kg"), x=(0.0, "m"), y=(0.0, "m"), height=(0.6, "m")), "25 kg heavier, above"),
         (text("motor_saturation", speed_limit=(0.8, "rad/s"), acceleration_limit=(1e6, "rad/s^2")), "faster than 0.80"),
         (
@@ -123,6 +133,20 @@ def test_every_effect_has_a_clause_with_its_main_size(name):
 )  # fmt: skip
 def test_directions_signs_and_factors_in_words(clause, words):
     assert words in clause
+
+
+def test_what_a_drive_controller_does_to_turns_alone_is_said_of_turns():
+    lag = {"lag": (0.3, "s"), "second_pole": (0.0, "-"), "slowing": (1.0, "-")}
+    assert "turning answers 0.30 s more slowly" in text("motor_lag", **lag, turning=(1.0, "-"))
+    assert text("motor_lag", **lag, turning=(0.0, "-")).startswith("the motors answer")
+    width = {"width": (0.2, "rad/s"), "loss": (0.0, "-")}
+    assert "turns of less than 0.20 rad/s" in text("command_deadband", **width, turning=(1.0, "-"))
+    assert text("command_deadband", **width, turning=(0.0, "-")).startswith("commands below")
+
+
+def test_soil_that_is_heaped_up_is_said_to_be():
+    assert "heaped it up" in text("lateral_bulldozing", scale=(2.0, "-"), angle=(0.8, "-"), way=(0.3, "m"))
+    assert "heaped" not in text("lateral_bulldozing", scale=(2.0, "-"), angle=(0.05, "-"), way=(0.0, "m"))
 
 
 def test_encoders_outside_the_speed_loop_are_believed_by_nobody():

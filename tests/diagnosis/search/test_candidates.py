@@ -1,5 +1,7 @@
 """Probes of every effect of the library make candidates, and candidates make valid first guesses."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,7 @@ from ddagr_gym.diagnosis.search.initial_guess import first_guess
 from ddagr_gym.identification.size_prior import TYPICAL_MULTIPLE, size_penalty
 from ddagr_gym.physics.effects.base import DriveExtent
 from ddagr_gym.physics.effects.registry import effect_kinds, parse_effect
+from ddagr_gym.physics.effects.soil_patch import from_middle_line
 
 EXTENT = DriveExtent(60.0, (-3.0, 3.0), (-2.0, 4.0), 1.2, 3.0)
 
@@ -23,6 +26,19 @@ def test_every_probe_is_in_one_candidate_and_guesses_are_valid(name: str) -> Non
         guess = first_guess(candidate, [2.0] * len(candidate.probes))
         assert type(guess) is kind
         assert not guess.is_neutral
+
+
+def test_every_place_of_the_area_lies_in_a_disc_and_in_a_band_of_each_bearing() -> None:
+    """Half a cell in from the corners, where discs of 0.6 cells leave a gap between them."""
+    probes = [candidate.probes[0] for candidate in candidates_of(effect_kinds()["soil_patch"], EXTENT, 0)]
+    forms: dict[tuple[float, float], list] = {}
+    for probe in probes:
+        forms.setdefault((probe.half_length, probe.bearing), []).append(probe)
+    assert [half_length for half_length, _ in forms] == [0.0] + 4 * [pytest.approx(math.hypot(6.0, 6.0))]
+    x, y = (ends.ravel() for ends in np.meshgrid(np.linspace(-2.25, 2.25, 4), np.linspace(-1.25, 3.25, 4)))
+    for (half_length, bearing), patches in forms.items():
+        away = [from_middle_line(x - p.centre_x, y - p.centre_y, half_length, bearing) - p.radius for p in patches]
+        assert np.min(away, axis=0).max() < 1e-9
 
 
 def test_slope_is_guessed_from_two_components() -> None:

@@ -269,7 +269,7 @@ def test_a_dead_time_and_a_second_pole_trail_commands_alike(drive: Callable[...,
     assert behind[1] == pytest.approx(behind[0], rel=0.1)
 
 
-@pytest.mark.parametrize("effect", ["slope=0.1", "motor_lag=-0.02", "command_delay=0"])
+@pytest.mark.parametrize("effect", ["slope=0.1", "motor_lag=-0.02", "motor_lag=0.2,turning=1", "command_delay=0"])
 def test_other_effects_and_quick_motors_have_no_lateness_to_translate(effect: str) -> None:
     assert same_lateness(load_effects((effect,))[0]) is None
 

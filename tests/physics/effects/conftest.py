@@ -61,7 +61,7 @@ def act():
 
     def run(effect, row, memory=None):
         changed = row.copy()
-        for _, action in effect.actions:
+        for _, action in sorted(effect.acting, key=lambda item: item[0]):
             action(changed, effect.vector(), np.zeros(layout.EFFECT_MEMORY) if memory is None else memory)
         return changed
 

@@ -313,3 +313,32 @@ def test_a_drive_that_begins_in_motion_is_not_stuck(turning_row):
     row[layout.COMMAND : layout.COMMAND + 2] = 0.08, 0.08
     effect.actions[0][1](row, effect.vector(), np.zeros(layout.EFFECT_MEMORY))
     assert tuple(row[layout.COMMAND : layout.COMMAND + 2]) == (0.08, 0.0)
+
+
+def test_a_late_turning_leaves_the_mean_and_answers_as_a_filter_before_the_loop(drive):
+    lag, commands = 0.3, np.zeros((300, 2))
+    commands[70:] = (0.8, 0.4)
+    late, prompt = drive([f"motor_lag={lag},turning=1"], commands), drive((), commands)
+    mean, half = ((late["true_omega_right"] + sign * late["true_omega_left"]) / 2 for sign in (1, -1))
+    np.testing.assert_allclose(mean, (prompt["true_omega_right"] + prompt["true_omega_left"]) / 2, atol=1e-12)
+    time = PERIOD * np.arange(1, 231)
+    left = (lag * np.exp(-time / lag) - np.exp(-time * RATE) / RATE) / (lag - 1 / RATE)
+    np.testing.assert_allclose(half[70:], 0.2 * (1 - left), atol=0.2 * (PERIOD / lag) ** 2 / 12)
+
+
+def test_a_turn_that_goes_on_from_the_start_is_not_late(drive):
+    state = {"v_x": 0.14, "omega_right": 0.6, "omega_left": 0.4}
+    columns = drive(["motor_lag=0.3,turning=1"], np.tile((0.6, 0.4), (40, 1)), initial_state=state)
+    np.testing.assert_allclose(columns["true_omega_right"], 0.6, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("command", "passed"),
+    [((0.55, 0.45), (0.5, 0.5)), ((0.45, 0.55), (0.5, 0.5)), ((0.7, 0.3), (0.7, 0.3)), ((0.05, 0.03), (0.04, 0.04))],
+)
+def test_small_turns_are_overlooked_and_the_speed_stays(act, turning_row, command, passed):
+    row = turning_row.copy()
+    row[layout.OMEGA : layout.OMEGA + 2] = 0.0
+    row[layout.COMMAND : layout.COMMAND + 2] = command
+    received = act(parse_effect("command_deadband=0.1,loss=0,turning=1"), row)
+    np.testing.assert_allclose(received[layout.COMMAND : layout.COMMAND + 2], passed, atol=1e-12)

@@ -9,10 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ddagr_gym.identification.effect_parameters import effect_parameters
 from ddagr_gym.parameters import STANDARD_GRAVITY
 from ddagr_gym.physics import layout
 from ddagr_gym.physics.effects import parse_effect
 from ddagr_gym.physics.effects.lateral_bulldozing import passive_resistance
+from ddagr_gym.physics.effects.soil_patch import SoilPatch, from_middle_line
 
 SPEED = st.floats(-1.5, 1.5)
 STRENGTH = (layout.SOIL_COHESION, layout.SOIL_FRICTION_TANGENT)
@@ -115,6 +117,55 @@ def test_patch_acts_on_the_wheels_in_it(act, turning_row):
     np.testing.assert_allclose(soil_factors(patched, row, STIFFNESS), [1, 2.0, 1, 1], atol=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("ahead", "aside", "half_length", "share"),
+    [
+        (0.0, 0.0, 50.0, 1.0),  # on the middle line
+        (7.0, 0.2, 50.0, 0.5),  # on the rim, far from the centre
+        (7.0, 0.3, 50.0, 0.0),
+        (3.2, 0.0, 3.0, 0.5),  # on the rim of the round end
+        (3.12, 0.16, 3.0, 0.5),  # the same, 0.12 and 0.16 m from the end of the line
+        (3.3, 0.0, 3.0, 0.0),
+        (-3.1, 0.0, 3.0, 1.0),  # half way from the other end to its rim
+    ],
+)
+def test_band_acts_on_the_wheels_in_it(act, turning_row, ahead, aside, half_length, share):
+    """The front left wheel, from the centre of a band across the diagonal to the rear right wheel; radius 0.2 m."""
+    row = turning_row.copy()
+    (x, y), rear = row[[layout.WHEEL_X + 1, layout.WHEEL_Y + 1]], row[[layout.WHEEL_X + 2, layout.WHEEL_Y + 2]]
+    bearing = math.atan2(y - rear[1], x - rear[0]) + math.pi / 2
+    cosine, sine = math.cos(bearing), math.sin(bearing)
+    band = SoilPatch(
+        0.5, 3.0, x - ahead * cosine + aside * sine, y - ahead * sine - aside * cosine, 0.2, 0.02, half_length, bearing
+    )
+    patched = act(band, row)
+    np.testing.assert_allclose(soil_factors(patched, row, STRENGTH), [1, 1 - 0.5 * share, 1, 1], atol=1e-4)
+    np.testing.assert_allclose(soil_factors(patched, row, STIFFNESS), [1, 1 + 2.0 * share, 1, 1], atol=1e-3)
+    away = from_middle_line(np.array([ahead]), np.array([aside]), half_length, 0.0)[0]
+    assert away == pytest.approx(math.hypot(max(abs(ahead) - half_length, 0.0), aside))
+
+
+def test_patch_without_length_is_the_disc_to_the_bit(drive):
+    commands = np.tile((0.8, 0.3), (100, 1))
+    disc = drive(["soil_patch=0.6,centre_x=0.4,centre_y=0.1,radius=0.3"], commands)
+    turned = drive(["soil_patch=0.6,centre_x=0.4,centre_y=0.1,radius=0.3,half_length=0,bearing=1.1"], commands)
+    assert_same_drive(turned, disc, 0.0)
+
+
+def test_fits_move_what_shows_of_a_disc_and_of_a_band():
+    """A band is not shown where it lies along itself: the coordinate along which it runs is left alone."""
+    moved = {
+        text: [item.field for item in effect_parameters([parse_effect(f"soil_patch=0.6,{text}")])]
+        for text in ("bearing=0.5", "half_length=9,bearing=0.5", "half_length=9,bearing=-1.2")
+    }
+    rest = ["strength", "stiffness"]
+    assert list(moved.values()) == [
+        [*rest, "centre_x", "centre_y", "radius"],
+        [*rest, "centre_y", "radius", "bearing"],
+        [*rest, "centre_x", "radius", "bearing"],
+    ]
+
+
 @given(friction=st.floats(0.0, 45.0), cohesion=st.floats(0.0, 5e4), depth=st.floats(1e-3, 0.2))
 def test_bulldozing_pressure_is_hegedus_as_printed(friction, cohesion, depth):
     """Ishigami et al. (2007), with the angles that the effect's closed form has resolved."""
@@ -182,6 +233,36 @@ def test_bulldozing_takes_power(turning_row, v_x, v_y, yaw_rate, omega, depth):
     for wheel in range(4):
         power = row[layout.EXTRA_FORCE_Y + wheel] * v_y + row[layout.EXTRA_YAW_MOMENT + wheel] * yaw_rate
         assert power <= 1e-12
+
+
+def sliding_row(row, v_x, v_y):
+    """The body and all wheels move alike, the wheels locked."""
+    row = skidding_row(row, 0.02, v_x=v_x, v_y=v_y, omega=0.0)
+    row[layout.V_X], row[layout.V_Y], row[layout.OMEGA : layout.OMEGA + 2] = v_x, v_y, 0.0
+    return row
+
+
+def side_force(act, row, effect: str, v_y: float) -> float:
+    return float(-act(parse_effect(effect), sliding_row(row, 0.3, v_y))[layout.EXTRA_FORCE_Y])
+
+
+def test_soil_that_is_heaped_up_first_resists_by_how_far_aside_it_is_pushed(act, turning_row):
+    at_once = [side_force(act, turning_row, "lateral_bulldozing=1", v_y) for v_y in (0.03, 0.06)]
+    heaped = [side_force(act, turning_row, "lateral_bulldozing=1,angle=0.8,way=0.3", v_y) for v_y in (0.03, 0.06)]
+    assert at_once[1] / at_once[0] < 1.15
+    assert heaped[1] / heaped[0] == pytest.approx(2.0, rel=0.15)
+    assert heaped[1] < 0.3 * at_once[1]
+
+
+def test_a_heap_follows_over_its_way(turning_row):
+    effect = parse_effect("lateral_bulldozing=1,angle=0.8,way=0.3")
+    heap_up, memory = effect.actions[1][1], np.zeros(layout.EFFECT_MEMORY)
+    straight, aside = (sliding_row(turning_row, 0.3, v_y) for v_y in (0.0, 0.15))
+    heap_up(straight, effect.vector(), memory)
+    samples = round(0.3 / 0.3 / aside[layout.SAMPLE_PERIOD])
+    for _ in range(samples):
+        heap_up(aside, effect.vector(), memory)
+    np.testing.assert_allclose(aside[layout.HEAPED : layout.HEAPED + 4], 0.5 * (1 - np.exp(-1.0)), rtol=0.01)
 
 
 def test_bulldozing_slows_turns_and_leaves_straight_drives(drive, straight):

@@ -37,7 +37,13 @@ MAY_CHANGE = {
     layout.POINT_MOTORS: [(layout.MOTOR_TARGET, 2), (layout.MOTOR_RATE, 2), (layout.DRIVETRAIN, 10)],
     layout.POINT_LOADS: [(layout.MASS, 7), (layout.WHEEL, 12), (layout.TOWED, 2)],
     # kinematics are a function of the motion, and renewed before each use
-    layout.POINT_SOIL: [(layout.SOIL, 36), (layout.WHEEL_V_X, 12), (layout.SLIP_RATIO, 4)],
+    layout.POINT_SOIL: [
+        (layout.SOIL, 36),
+        (layout.WHEEL_V_X, 12),
+        (layout.SLIP_RATIO, 4),
+        (layout.HEAPED, 4),
+        (layout.FELT_DEPTH, 4),
+    ],
     layout.POINT_WHEEL_FORCES: [(layout.EXTRA_FORCE_X, 16)],
     layout.POINT_BODY_FORCES: [(layout.BODY_FORCE, 3)],
     layout.POINT_READINGS: [(layout.READING, 8)],
@@ -203,9 +209,9 @@ class TestEveryEffect:
         assert not any(probe.is_neutral for probe in kind.probes(EXTENT))
         if kind.name == "sensor_hold":  # poses come at 10 Hz: only the longer hold covers one
             seen.pop(3)
-        if kind.name == "command_deadband":  # its thresholds lie below these commands
-            assert seen[1:] == [0.0, 0.0]
-            seen = seen[:1]
+        if kind.name == "command_deadband":  # its thresholds lie below these commands, that of turns above their turn
+            assert seen[1:3] == [0.0, 0.0]
+            seen = [seen[0], seen[3]]
         assert min(seen) > 1e-3
 
     def test_readings_follow_the_sizes_smoothly(self, name, drive, gentle):
