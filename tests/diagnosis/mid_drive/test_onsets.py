@@ -39,8 +39,8 @@ def biased(plain, problem_of):
 @pytest.fixture(scope="module")
 def constant(biased):
     """The same with a bias that holds all along, which is what a search without time finds."""
-    problem, nominal = biased
-    return fit(problem, replace(nominal.point, effects=load_effects(f"gyro_bias={0.5 * BIAS}")), first=nominal)
+    problem, _ = biased
+    return fit(problem, replace(problem.start(), effects=load_effects(f"gyro_bias={0.5 * BIAS}")))
 
 
 def test_a_bias_that_begins_is_timed(biased, constant):

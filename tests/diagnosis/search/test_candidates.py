@@ -52,8 +52,8 @@ def test_slope_is_guessed_from_two_components() -> None:
 def test_forms_of_a_motor_lag_are_tried_one_by_one() -> None:
     """Free to split the lag by any sign, one candidate would fit any loop of second order that is as fast."""
     found = candidates_of(effect_kinds()["motor_lag"], EXTENT, 0)
-    forms = [(len(c.probes), c.probes[0].second_pole, c.probes[0].slowing) for c in found]
-    assert forms == [(1, 0.0, 1.0), (1, 1.0, 1.0), (1, 0.0, 0.0)]
+    forms = [(len(c.probes), *(getattr(c.probes[0], name) for name in c.probes[0].shape_names())) for c in found]
+    assert forms == [(1, 0.0, 1.0, 0.0), (1, 1.0, 1.0, 0.0), (1, 0.0, 0.0, 0.0), (1, 0.0, 1.0, 1.0)]
 
 
 def test_sign_is_guessed_as_reversed() -> None:
