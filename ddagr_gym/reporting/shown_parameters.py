@@ -1,4 +1,4 @@
-"""Which parameters of a finding are shown: limits that nothing reaches, and shapes that are switched off, say nothing."""
+"""Which parameters of a finding are shown: limits that nothing reaches, and shapes switched off, say nothing."""
 
 from __future__ import annotations
 

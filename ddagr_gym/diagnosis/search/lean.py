@@ -1,8 +1,8 @@
-"""What a robot that leans reads: wheels that sink unevenly tilt it, which the simulator leaves out.
+"""What a robot that leans reads beyond what the simulator knows of it.
 
-The ground of the simulator is even and its robot stays upright, whatever its wheels sink. A soil that differs from side
-to side or a centre of mass off the middle makes some wheels sink deeper, and the accelerometer of a real robot then
-reads a part of gravity that other names would explain as a bias or a tilted sensor.
+Wheels that sink unevenly tilt a robot, and its accelerometer reads a part of gravity that other names would explain as
+a bias or a tilted sensor. The simulator's robot feels a share of that (theory: wheel model, eq. (35a)), which is
+fitted, and nothing of a patch. What is left is counted against further effects.
 """
 
 from __future__ import annotations
@@ -25,11 +25,14 @@ from ddagr_gym.physics import layout
 Array = NDArray[np.float64]
 
 _MINOR, _MAJOR = layout.WHEEL, layout.WHEEL + 8
-_ENTRIES = [first + wheel for first in (_MINOR, _MAJOR, layout.SINKAGE) for wheel in range(4)]
+_BY_WHEEL = (_MINOR, _MAJOR, layout.SINKAGE, layout.FELT_DEPTH)
+_ENTRIES = [*(first + wheel for first in _BY_WHEEL for wheel in range(4)), layout.SINKAGE_TILT]
 
 
 def lean_column(problem: Problem, fitted: Fitted) -> Array | None:
-    """Weighted change of the block means by the lean that the effects of a model add, (W, M); None where they add none.
+    """Weighted change of the block means by the lean that the effects of a model add and the simulator does not feel.
+
+    (W, M); None where they add none.
 
     Args:
         problem: what was fitted.
@@ -59,11 +62,11 @@ def gravity_read(robot: Robot, heights: Array) -> Array:
 
 
 def _hub_heights(problem: Problem, fitted: Fitted, with_effects: bool) -> Array:
-    """(W, T, 4) heights of the hubs above the untouched ground [m]."""
+    """(W, T, 4) heights of the hubs above the untouched ground [m], less the share of sinkage that is felt already."""
     point = fitted.point if with_effects else replace(fitted.point, effects=())
     record = problem.model.predict_recorded(point.values, point.states, _ENTRIES, point.effects)[1]
-    minor, major, sinkage = np.split(record, 3, axis=-1)
-    return np.asarray(minor + major - sinkage)
+    minor, major, sinkage, felt_depth = np.split(record[..., :-1], len(_BY_WHEEL), axis=-1)
+    return np.asarray(minor + major - sinkage * (1.0 - record[..., -1:] * felt_depth))
 
 
 def imitated_gains(products: InnerProducts, candidates: Sequence[Candidate]) -> dict[str, float]:

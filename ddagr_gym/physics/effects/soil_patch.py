@@ -23,7 +23,8 @@ _BEARINGS = 4  # of the bands that are tried, evenly over half a turn
 def place_patch(row: Vector, parameters: Vector, memory: Vector) -> None:
     """Scale the soil of the wheels in the patch; its rim is a smooth step.
 
-    The depth that it adds, by N ~ k z^(n + 1) of a torus, is no tilt that is felt: relief tilts a robot as briefly and as much.
+    The depth that it adds, by N ~ k z^(n + 1) of a torus, is no tilt that is felt: relief tilts a robot as briefly and
+    as much.
     """
     half_length = parameters[6]
     cosine, sine = math.cos(parameters[7]), math.sin(parameters[7])

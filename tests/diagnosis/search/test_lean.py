@@ -12,6 +12,7 @@ from ddagr_gym.diagnosis.search.lean import gravity_read, lean_column
 from ddagr_gym.diagnosis.search.scan import scan
 from ddagr_gym.diagnosis.setting import Setting, make_problem
 from ddagr_gym.identification.gauss_newton import Fitted, fit
+from ddagr_gym.identification.nuisances import TILT, NuisancePriors
 from ddagr_gym.identification.problem import Problem
 from ddagr_gym.parameters import STANDARD_GRAVITY, Imu, Sensors
 from ddagr_gym.physics.effects import load_effects
@@ -56,9 +57,13 @@ def driven(leans: bool) -> Recording:
     return Recording.from_columns(columns, robot)
 
 
-def offset_model(leans: bool) -> tuple[Problem, Fitted]:
+LEVEL = NuisancePriors(sinkage_tilt=1e-6)
+"""Of a simulator whose robot feels no lean."""
+
+
+def offset_model(leans: bool, priors: NuisancePriors = LEVEL) -> tuple[Problem, Fitted]:
     recording = driven(leans)
-    problem = make_problem(get_robot("ddagr"), get_soil("thesis_a1"), [recording], Setting())
+    problem = make_problem(get_robot("ddagr"), get_soil("thesis_a1"), [recording], Setting(priors=priors))
     raw = fit(problem, iterations=0)
     return problem, fit(problem, replace(raw.point, effects=load_effects(OFFSET)), iterations=4, renewals=2)
 
@@ -97,6 +102,15 @@ def test_a_lean_is_no_accelerometer_bias_beside_what_makes_the_robot_lean(leanin
     assert bias < raised.of("accelerometer_bias").gain
     assert terms.imitated["accelerometer_bias"] == pytest.approx(bias, rel=0.5)
     assert raised.of("encoder_scale").gain < 1.2 * gates.of("encoder_scale").gain
+
+
+def test_a_lean_that_the_simulator_feels_is_no_bias_and_raises_no_gate() -> None:
+    problem, fitted = offset_model(True, NuisancePriors())
+    share = fitted.point.values[[p.name for p in problem.nuisances.parameters].index(TILT)]
+    assert share > 0.8
+    terms = scan(problem, fitted, KINDS)
+    assert next(item.gain for item in gains(terms) if item.name == "accelerometer_bias") < 0.5 * GATE.gain
+    assert terms.imitated["accelerometer_bias"] < 0.1 * GATE.gain
 
 
 def test_gates_rise_by_the_lean_as_sizes_over_their_errors_add_up() -> None:
