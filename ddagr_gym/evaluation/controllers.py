@@ -298,7 +298,8 @@ def controller_version(name: str) -> str:
         return bundle_version(name)
     text = f"{name} {ladder_gains()!r}"
     if name == "B6":
-        return f"{text} {inertial_model()!r} {SETTLING}"
+        # a robot that feels no tilt by its sinkage is what it was before robots had that field
+        return f"{text} {inertial_model()!r} {SETTLING}".replace(", sinkage_tilt=0.0", "")
     if name == "B6_learned":
         return f"{text} {learned_model().inertial!r} {learned_model().network.digest()}"
     return text
