@@ -298,11 +298,15 @@ def controller_version(name: str) -> str:
         return bundle_version(name)
     text = f"{name} {ladder_gains()!r}"
     if name == "B6":
-        # a robot that feels no tilt by its sinkage is what it was before robots had that field
-        return f"{text} {inertial_model()!r} {SETTLING}".replace(", sinkage_tilt=0.0", "")
+        return f"{text} {_model_text(inertial_model())} {SETTLING}"
     if name == "B6_learned":
-        return f"{text} {learned_model().inertial!r} {learned_model().network.digest()}"
+        return f"{text} {_model_text(learned_model().inertial)} {learned_model().network.digest()}"
     return text
+
+
+def _model_text(model: InertialModel) -> str:
+    """All that a filter knows; a robot that feels no tilt by its sinkage reads as before robots had that field."""
+    return repr(model).replace(", sinkage_tilt=0.0", "")
 
 
 def find_controller(name: str, turn: RowTurn, gains: LadderGains | None = None) -> Controller:
