@@ -1,6 +1,7 @@
 """Rates over several sealed sets together: a target that one set meets or misses by a case says little by itself.
 
-    python -m benchmarks.concealed_sets RESULTS/concealed_{fifth,sixth,seventh,eighth,ninth}.json RESULTS/concealed.json
+    python -m benchmarks.concealed_sets RESULTS/concealed_{fifth,sixth,seventh,eighth,ninth,tenth}.json \\
+        RESULTS/concealed.json
 
 with benchmarks/results for RESULTS.
 

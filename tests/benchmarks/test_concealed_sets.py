@@ -49,6 +49,7 @@ def test_kept_result_is_that_of_the_kept_sets() -> None:
             "concealed_seventh.json",
             "concealed_eighth.json",
             "concealed_ninth.json",
+            "concealed_tenth.json",
             "concealed.json",
         )
     ]
