@@ -101,10 +101,17 @@ def delay_by_dead_time(row: Array) -> None:
 
 
 @kernel(inline=True)
+def mean_and_turning(row: Array, right: int) -> tuple[float, float]:
+    """Mean of the entries of both banks, from ``right`` on, and how far the right one is from it."""
+    mean = 0.5 * (row[right] + row[right + 1])
+    return mean, row[right] - mean
+
+
+@kernel(inline=True)
 def limit_turning(row: Array, right: int, limit: float) -> None:
     """Bring the entries of both banks, from ``right`` on, to at most ``limit`` [rad/s] from their mean, which stays."""
-    mean = 0.5 * (row[right] + row[right + 1])
-    turning = min(max(row[right] - mean, -limit), limit)
+    mean, turning = mean_and_turning(row, right)
+    turning = min(max(turning, -limit), limit)
     row[right], row[right + 1] = mean + turning, mean - turning
 
 

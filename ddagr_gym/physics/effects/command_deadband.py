@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 
 from ddagr_gym.jit import kernel
+from ddagr_gym.physics.drivetrain import mean_and_turning
 from ddagr_gym.physics.effects.base import Action, DriveExtent, Effect, Vector, shape, size
 from ddagr_gym.physics.layout import COMMAND, OMEGA, POINT_COMMANDS
 
@@ -41,9 +42,9 @@ def lose_small_turns(row: Vector, parameters: Vector, memory: Vector) -> None:
     """The same of half the difference of both banks' commands; their mean goes through as it is."""
     if parameters[0] <= 0.0:
         return
-    mean = 0.5 * (row[COMMAND] + row[COMMAND + 1])
+    mean, wanted = mean_and_turning(row, COMMAND)
     turned = 0.5 * (row[OMEGA] - row[OMEGA + 1])
-    turning = what_passes(row[COMMAND] - mean, turned, parameters, memory, 0)
+    turning = what_passes(wanted, turned, parameters, memory, 0)
     row[COMMAND], row[COMMAND + 1] = mean + turning, mean - turning
     memory[_STARTED] = 1.0
 

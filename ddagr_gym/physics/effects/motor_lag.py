@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 
 from ddagr_gym.jit import kernel
+from ddagr_gym.physics.drivetrain import mean_and_turning
 from ddagr_gym.physics.effects.base import Action, DriveExtent, Effect, Vector, shape, size
 from ddagr_gym.physics.layout import MOTOR_RATE, MOTOR_TARGET, OMEGA, POINT_MOTORS, SAMPLE_PERIOD
 
@@ -59,8 +60,7 @@ def slow_motors(row: Vector, parameters: Vector, memory: Vector) -> None:
 
 def slow_turning(row: Vector, parameters: Vector, memory: Vector) -> None:
     """Filter half the difference of both banks' targets by ``parameters[0]``; their mean goes through as it is."""
-    mean = 0.5 * (row[MOTOR_TARGET] + row[MOTOR_TARGET + 1])
-    turning = row[MOTOR_TARGET] - mean
+    mean, turning = mean_and_turning(row, MOTOR_TARGET)
     if memory[_TURNING_STARTED] == 0.0:
         memory[0] = 0.5 * (row[OMEGA] - row[OMEGA + 1])
     if parameters[0] > 0.0:
