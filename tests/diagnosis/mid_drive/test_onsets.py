@@ -14,6 +14,7 @@ from ddagr_gym.diagnosis.result.sentences import onset_in_words
 from ddagr_gym.diagnosis.search.gains import gains
 from ddagr_gym.diagnosis.search.scan import scan
 from ddagr_gym.identification.gauss_newton import fit
+from ddagr_gym.identification.nuisances import TILT
 from ddagr_gym.identification.spells import Spell
 from ddagr_gym.physics.effects import load_effects
 from ddagr_gym.physics.effects.registry import effect_kinds
@@ -33,14 +34,15 @@ def biased(plain, problem_of):
     late = plain.t >= TIME
     channels = {**plain.channels, "yaw_rate": plain["yaw_rate"] + BIAS * late}
     problem = problem_of(replace(plain, channels=channels))
+    problem.prior[[p.name for p in problem.nuisances.parameters].index(TILT)] = 0.0  # known to be none
     return problem, fit(problem, iterations=4)
 
 
 @pytest.fixture(scope="module")
 def constant(biased):
     """The same with a bias that holds all along, which is what a search without time finds."""
-    problem, _ = biased
-    return fit(problem, replace(problem.start(), effects=load_effects(f"gyro_bias={0.5 * BIAS}")))
+    problem, nominal = biased
+    return fit(problem, replace(nominal.point, effects=load_effects(f"gyro_bias={0.5 * BIAS}")), first=nominal)
 
 
 def test_a_bias_that_begins_is_timed(biased, constant):

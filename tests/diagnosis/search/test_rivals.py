@@ -34,4 +34,4 @@ def test_a_load_that_the_scan_put_too_far_behind_is_found_at_its_hitch(drive, pr
     assert effect.hitch_distance == TowedDrag(FORCE).hitch_distance
     # soil that resists more explains a part of the drag in so short a drive
     assert 0.6 * FORCE < effect.force < 1.2 * FORCE
-    assert found.cost < fit(problem, there.point).cost + 0.5
+    assert fit(problem, found.point).cost < fit(problem, there.point).cost
