@@ -50,17 +50,28 @@ def digitise(value: float, resolution: float, limit: float) -> float:
 
 
 @kernel(inline=True)
-def gravity_by_sinkage(row: NDArray[np.float64]) -> tuple[float, float]:
-    """Gravity's share along x and y [m/s^2] of a body that leans towards its deeper wheels.
+def gravity_of_lean(
+    right_front: float, left_front: float, right_rear: float, left_rear: float,
+    half_wheelbase: float, half_track: float,
+) -> tuple[float, float]:  # fmt: skip
+    """Gravity [m/s^2] along x and y of a body whose wheels stand at these depths [m]: it leans to the deeper ones.
 
-    Theory: wheel model, eq. (35a).
+    Theory: wheel model, eq. (35a); heights in place of depths give what the accelerometer reads.
     """
-    lean = 0.25 * row[SINKAGE_TILT] * STANDARD_GRAVITY
-    right_front, left_front = row[FELT_DEPTH] * row[SINKAGE], row[FELT_DEPTH + 1] * row[SINKAGE + 1]
-    right_rear, left_rear = row[FELT_DEPTH + 2] * row[SINKAGE + 2], row[FELT_DEPTH + 3] * row[SINKAGE + 3]
-    nose_down = (right_front + left_front - right_rear - left_rear) / row[HALF_WHEELBASE]
-    left_down = (left_front + left_rear - right_front - right_rear) / row[HALF_TRACK]
-    return lean * nose_down, lean * left_down
+    nose_down = (right_front + left_front - right_rear - left_rear) / (4.0 * half_wheelbase)
+    left_down = (left_front + left_rear - right_front - right_rear) / (4.0 * half_track)
+    return STANDARD_GRAVITY * nose_down, STANDARD_GRAVITY * left_down
+
+
+@kernel(inline=True)
+def gravity_by_sinkage(row: NDArray[np.float64]) -> tuple[float, float]:
+    """Gravity along x and y [m/s^2] of a body that leans as its sinkages say, as far as it is felt."""
+    along_x, along_y = gravity_of_lean(
+        row[FELT_DEPTH] * row[SINKAGE], row[FELT_DEPTH + 1] * row[SINKAGE + 1],
+        row[FELT_DEPTH + 2] * row[SINKAGE + 2], row[FELT_DEPTH + 3] * row[SINKAGE + 3],
+        row[HALF_WHEELBASE], row[HALF_TRACK],
+    )  # fmt: skip
+    return row[SINKAGE_TILT] * along_x, row[SINKAGE_TILT] * along_y
 
 
 @kernel()

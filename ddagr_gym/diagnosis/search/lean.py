@@ -19,8 +19,9 @@ from ddagr_gym.diagnosis.search.inner_products import InnerProducts, Reduced
 from ddagr_gym.diagnosis.search.sensor_effects import acts_on_readings_only
 from ddagr_gym.identification.gauss_newton import Fitted
 from ddagr_gym.identification.problem import Problem
-from ddagr_gym.parameters import STANDARD_GRAVITY, Robot
+from ddagr_gym.parameters import Robot
 from ddagr_gym.physics import layout
+from ddagr_gym.sensors.imu import gravity_of_lean
 
 Array = NDArray[np.float64]
 
@@ -55,10 +56,8 @@ def gravity_read(robot: Robot, heights: Array) -> Array:
         robot: with the distances of its wheels.
         heights: of the hubs, in the order of the wheels.
     """
-    right_front, left_front, right_rear, left_rear = np.moveaxis(heights, -1, 0)
-    climb = (right_front + left_front - right_rear - left_rear) / (4.0 * robot.half_wheelbase)
-    bank = (left_front + left_rear - right_front - right_rear) / (4.0 * robot.half_track)
-    return STANDARD_GRAVITY * np.stack([climb, bank], axis=-1)
+    gravity = gravity_of_lean(*np.moveaxis(heights, -1, 0), robot.half_wheelbase, robot.half_track)
+    return np.stack(gravity, axis=-1)
 
 
 def _hub_heights(problem: Problem, fitted: Fitted, with_effects: bool) -> Array:
