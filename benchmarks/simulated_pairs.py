@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 
 from benchmarks.independent_pairs import RESULT as INDEPENDENT
 from benchmarks.pair_scatter import DEGREES, MOST, least_scatter, log_density, most_likely, rounded
-from ddagr_gym.diagnosis.change.before_drives import DAY, SAME_GROUND, WINDOW, JointFit, day_parameters, joint_fit
+from ddagr_gym.diagnosis.change.before_drives import DAY, WINDOW, JointFit, day_parameters, joint_fit
 from ddagr_gym.diagnosis.change.drive_fit import change_problem, change_windows, fit_nominal
 from ddagr_gym.diagnosis.change.drive_scan import DriveScan, Priors, scan_drive
 from ddagr_gym.diagnosis.change.measured_scatter import PATH
@@ -136,16 +136,23 @@ def pair_of(number: int, robot: Robot, soil: Soil) -> dict[str, Any]:
     joint = joint_fit(mend_recordings([before]), robot, soil, WINDOW, np.random.default_rng(number), 1)
     scans = [_scan(joint, drive) for drive in (before, after, elsewhere)]
     same = _differences(scans[0], scans[1], None)
-    wide = uncertain_parameters(joint.soil, day_parameters(joint.robot), None, joint.weighing, 1)
+    wide = uncertain_parameters(joint.soil, day_parameters(joint.robot), None, joint.weighing, 1, _slopes(joint))
     other = _differences(scans[0], scans[2], np.array([p.prior for p in wide]))
     return {"pair": number, "kind": KINDS[number % len(KINDS)], SAME: same, OTHER: other}
 
 
 def _scan(joint: JointFit, drive: Recording) -> DriveScan:
     windows = change_windows(mend_recordings([drive]).recordings, joint.robot, joint.weighing)
-    parameters = uncertain_parameters(joint.soil, day_parameters(joint.robot), SAME_GROUND, joint.weighing, 1)
-    problem = change_problem(joint.robot, joint.soil, windows, parameters, joint.weighing, 1)
+    parameters = uncertain_parameters(
+        joint.soil, day_parameters(joint.robot), joint.same_ground, joint.weighing, 1, _slopes(joint)
+    )
+    known = () if joint.slope is None else joint.slope.effects
+    problem = change_problem(joint.robot, joint.soil, windows, parameters, joint.weighing, 1, known)
     return scan_drive(problem, fit_nominal(problem))
+
+
+def _slopes(joint: JointFit) -> tuple[float, ...]:
+    return () if joint.slope is None else joint.slope.deviations
 
 
 def _priors(scan: DriveScan, deviations: Array | None) -> Priors | None:

@@ -47,6 +47,7 @@ from ddagr_gym.diagnosis.store import StepStore
 from ddagr_gym.diagnosis.unnamed.terms import unnamed_terms
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.physics.effects import Effect
+from ddagr_gym.physics.effects.slope import Slope
 from ddagr_gym.recordings.schema import Recording
 
 STEPS = ("checks", "search", "verdict", "certification", "localisation", "unnamed terms", "next drive", "evidence")
@@ -267,15 +268,19 @@ def _options(session: DiagnosisSession, names_only: bool, robot_file: str) -> Op
 
 
 def effect_intervals(diagnosis: Diagnosis, effects: Sequence[Effect]) -> list[Mapping[str, tuple[float, float]]]:
-    """Intervals of the parameters of effects that a diagnosis names, in their order; parts of a drivetrain have none.
+    """Intervals of the parameters of effects, in their order; parts of a drivetrain have none.
+
+    A slope on top of that of drives from before has none either: the finding's is that of the change.
 
     Args:
         diagnosis: with its findings.
-        effects: that it names.
+        effects: that it names, and what drives from before had.
     """
-    found = {finding.name: finding.parameters for finding in diagnosis.findings}
+    sloping = diagnosis.change is not None and diagnosis.change.slope is not None
+    found = {item.name: item.parameters for item in diagnosis.findings if not (sloping and item.name == Slope.name)}
     return [
-        {name: e.interval for name, e in found[effect.name].items() if e.interval is not None} for effect in effects
+        {name: e.interval for name, e in found.get(effect.name, {}).items() if e.interval is not None}
+        for effect in effects
     ]
 
 

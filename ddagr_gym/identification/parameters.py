@@ -160,6 +160,22 @@ def soil_parameters(
     )
 
 
+_SLOPE = 5
+"""Place of the ground's gradient behind mass, yaw inertia and centre of mass."""
+
+
+def slope_parameters(deviations: Sequence[float]) -> tuple[ModelParameter, ...]:
+    """Gradient of the ground along the world's axes, with its standard deviations [-] (theory: wheel model, eq. (23)).
+
+    Args:
+        deviations: along x and y.
+    """
+    return tuple(
+        ModelParameter(f"slope_{axis}", "-", (layout.BASE_BODY + _SLOPE + k,), False, deviation, 1e-3, -0.6, 0.6)
+        for k, (axis, deviation) in enumerate(zip("xy", deviations, strict=True))
+    )
+
+
 _ROBOT_ENTRIES = {
     "mass": (layout.BASE_BODY,),
     "yaw_inertia": (layout.BASE_BODY + 1,),

@@ -107,17 +107,16 @@ class Problem:
         self.model = WindowModel(
             robot, soil, blocked.windows, nuisances.parameters, imposed=imposed,
             numerics=block_mean_numerics() if numerics is None else numerics, threads=threads,
-            delay=delay, currents=currents,
+            delay=delay, currents=currents, known=known,
         )  # fmt: skip
         self._slopes = None if slopes is None else WindowModel(
             robot, soil, blocked.windows, nuisances.parameters, imposed=imposed, numerics=slopes, threads=threads,
-            delay=delay, currents=currents,
+            delay=delay, currents=currents, known=known,
         )  # fmt: skip
         self.prior = np.array([p.prior for p in nuisances.parameters])
         self.low = np.array([p.low for p in nuisances.parameters])
         self.high = np.array([p.high for p in nuisances.parameters])
         self.local_prior = np.array([*STATE_PRIOR, *(unknown.deviation for unknown in nuisances.local)])
-        self._known = tuple(known)
         self._robust = robust
 
     def subset(self, chosen: NDArray[np.int64] | Chosen) -> Problem:
@@ -207,12 +206,12 @@ class Problem:
 
     def predict(self, point: Point) -> Array:
         """(W, T, 8)."""
-        return self.model.predict(point.values, point.states, (*self._known, *point.effects))
+        return self.model.predict(point.values, point.states, point.effects)
 
     def _varied_prediction(self, point: Point) -> Array:
         """The same where it only serves a sensitivity."""
         model = self._slopes or self.model
-        return model.predict(point.values, point.states, (*self._known, *point.effects))
+        return model.predict(point.values, point.states, point.effects)
 
     def varied_from(self, point: Point, base: Array) -> Array:
         """(W, T, 8) what predictions for sensitivities are held against: that at a point, by the same numerics."""
@@ -360,9 +359,9 @@ class Problem:
             by_parameter: (W, M, P) sensitivities, of which those with a local unknown count.
             unmoved: see :meth:`varied_from`; simulated when it is None.
         """
-        model, effects = self._slopes or self.model, (*self._known, *point.effects)
+        model = self._slopes or self.model
         unmoved = self.varied_from(point, base) if unmoved is None else unmoved
-        changes = model.state_derivatives(point.values, point.states, unmoved, effects)
+        changes = model.state_derivatives(point.values, point.states, unmoved, point.effects)
         by_state = np.nan_to_num(self.blocked.derivative(changes, unmoved))
         local = [
             by_parameter[..., unknown.parameter]

@@ -78,6 +78,7 @@ class WindowModel:
         threads: see :class:`Simulator`.
         delay: by which the commands act late, besides the shift parameters [s]; negative where their clock is late.
         currents: how motor currents follow, where the windows compare them; they are channels 8 and 9 then.
+        known: missing physics that is taken as it is, beside the effects that a prediction is asked for with.
     """
 
     def __init__(
@@ -92,8 +93,10 @@ class WindowModel:
         threads: int = 1,
         delay: float = 0.0,
         currents: CurrentModel | None = None,
+        known: Sequence[Effect] = (),
     ) -> None:
         self.windows = windows
+        self._known = tuple(known)
         self.currents = currents
         self.parameters = tuple(parameters)
         self._numerics = Numerics.smooth() if numerics is None else numerics
@@ -144,7 +147,7 @@ class WindowModel:
             entries: (K,) of :mod:`ddagr_gym.physics.layout`.
             effects: see there.
         """
-        chosen = tuple(e for e in effects if not (self._imposed and e.group == _MOTORS))
+        chosen = tuple(e for e in (*self._known, *effects) if not (self._imposed and e.group == _MOTORS))
         simulator = Simulator(self.windows.count, numerics=self._numerics, effects=chosen, threads=self._threads)
         simulator.rows[:] = self._row
         self._silence(simulator)
@@ -165,12 +168,12 @@ class WindowModel:
         return readings, record
 
     def _silence(self, simulator: Simulator) -> None:
-        """Make effects neutral in the windows in which they are absent."""
+        """Make effects neutral in the windows in which they are absent; those that are known are in all of them."""
         first = 0
         for effect in simulator.effects:
             actions = slice(first, first + len(effect.acting))
             first = actions.stop
-            if effect.name in self.spells:
+            if effect.name in self.spells and effect not in self._known:
                 sizes = {name: effect.parameter(name).metadata["neutral"] for name in effect.size_names()}
                 absent = ~self.spells[effect.name].in_windows(self.windows)
                 simulator.effect_parameters[absent, actions] = effect.with_values(**sizes).vector()

@@ -54,6 +54,7 @@ def _context(diagnosis: Diagnosis) -> dict[str, Any]:
         "sides": _sides(diagnosis, change),
         "before": change.against == BEFORE,
         "certificate": text.certified(diagnosis),
+        "slope": text.slope_before(change),
         "ground": change.ground,
         "windows": change.windows,
         "usual": "" if change.certificate is None else f"{100.0 * change.certificate.expected:.0f}",

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from ddagr_gym.diagnosis.answer.amounts import number
 from ddagr_gym.diagnosis.result.sentences import certificate_in_words
 from ddagr_gym.diagnosis.wording import CHANNEL_NAMES, title
+from ddagr_gym.physics.effects.slope import Slope
 from ddagr_gym.reporting.diagnosis_text import FINDING_HEADER, finding_rows
 from ddagr_gym.reporting.text_table import format_table
 
@@ -34,7 +35,7 @@ def change_text(diagnosis: Diagnosis) -> str:
     parts = [diagnosis.sentence]
     if diagnosis.findings:
         parts.append(format_table(FINDING_HEADER, finding_rows(diagnosis)))
-    parts += [line for line in (certified(diagnosis),) if line]
+    parts += [line for line in (certified(diagnosis), slope_before(change)) if line]
     rows = [row for item in change.shifts[:SHOWN] for row in _rows(item)]
     parts.append(format_table(SHIFT_HEADER, rows))
     further = len(change.shifts) - SHOWN
@@ -78,6 +79,18 @@ def not_compared(change: Change) -> list[str]:
     """Effects that were not looked for, with the reason, and those of which no size would have been found."""
     lines = [f"{title(name)}: {reason}." for name, reason in change.not_compared.items()]
     return [*lines, *(f"{title(name)}: such a drive would show no size of it." for name in change.hidden)]
+
+
+def slope_before(change: Change) -> str:
+    """What the ground of the drives before slopes by; "" where that is less than matters, or not known."""
+    found = change.slope
+    if found is None or found.angle < Slope.parameter("angle").metadata["least"]:
+        return ""
+    angle, direction, deviation = (math.degrees(value) for value in (found.angle, found.direction, found.deviation))
+    return (
+        f"The ground of the drives before slopes by {angle:.1f} degrees, rising towards {direction:.0f} degrees from "
+        f"the x axis; it is taken to slope so in the drives after too (to {deviation:.1f} degrees)."
+    )
 
 
 def certified(diagnosis: Diagnosis) -> str:

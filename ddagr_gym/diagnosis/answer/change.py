@@ -97,6 +97,21 @@ class ChannelShift:
 
 
 @dataclass(frozen=True)
+class SlopeBefore:
+    """Slope of the ground in the drives before.
+
+    Attributes:
+        angle: of inclination [rad].
+        direction: of steepest ascent, from the world's x axis counter-clockwise [rad].
+        deviation: by which the angle may be another one in the drives after [rad].
+    """
+
+    angle: float
+    direction: float
+    deviation: float
+
+
+@dataclass(frozen=True)
 class ChangeCertificate:
     """How well the drives are forecast with what changed, beside how well ordinary ones are.
 
@@ -148,6 +163,8 @@ class Change:
         certificate: whether the drives are forecast as well with what changed as ordinary ones are; null where the
             calibration was made before that was kept.
         channels: what is left of each channel; only where drives from before on the same ground were given.
+        slope: of the ground in drives from before, taken to be there in the drives after too; a `slope` that is named
+            comes on top of it. Null where the poses do not tell it.
     """
 
     ground: str
@@ -162,3 +179,4 @@ class Change:
     against: str = CALIBRATION
     certificate: ChangeCertificate | None = None
     channels: tuple[ChannelShift, ...] = ()
+    slope: SlopeBefore | None = None

@@ -8,7 +8,7 @@ difference.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,6 +19,7 @@ from ddagr_gym.diagnosis.change.measured_scatter import measured_scatter
 from ddagr_gym.diagnosis.change.ordinary import (
     LEAST_ACCELEROMETER_BIAS,
     LEAST_GYRO_BIAS,
+    GroundSlope,
     OrdinaryRobot,
     Reference,
     Weighing,
@@ -29,13 +30,13 @@ from ddagr_gym.diagnosis.preprocessing.input_requirements import content_hash
 from ddagr_gym.diagnosis.preprocessing.mended_recordings import MendedRecordings, mend_recordings
 from ddagr_gym.diagnosis.setting import HISTORY
 from ddagr_gym.identification.fitted_values import with_values
-from ddagr_gym.identification.gauss_newton import Fitted
+from ddagr_gym.identification.gauss_newton import Fitted, linearised
 from ddagr_gym.identification.parameters import ModelParameter, robot_parameters
 from ddagr_gym.identification.problem import Problem
 from ddagr_gym.identification.recording_noise import recording_noise
 from ddagr_gym.identification.relative_readings import usual_turning
 from ddagr_gym.identification.residual_weights import UNKNOWN_GYRO_BIAS, Weights, noise_weights
-from ddagr_gym.identification.windows import CHANNELS
+from ddagr_gym.identification.windows import CHANNELS, WindowSet
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.recordings.schema import Recording
 
@@ -61,6 +62,15 @@ SAME_GROUND = {"soil_strength": 0.05, "soil_stiffness": 0.1, "shear_modulus": 0.
 """Deviations of a ground's parameters from one drive on it to another: those of one window against its field in
 :class:`~ddagr_gym.identification.nuisances.NuisancePriors`, and of a surveyed one's shear."""
 
+SLOPES = ("slope_x", "slope_y")
+"""Parameters of the ground's gradient."""
+
+SAME_SLOPE = 0.005
+"""Deviation of the ground's gradient from one drive on it to another (ours): 0.3 degrees."""
+
+SLOPE_OF_FIELDS = 0.05
+"""Deviation of a field's gradient (ours): 3 degrees."""
+
 OF_ANOTHER_GROUND = "on another ground it is another one in any case"
 SOIL_EFFECTS = ("soil_change", "soil_split", "slip_sinkage", "multipass", "lateral_bulldozing")
 """Effects that say how a ground gives way."""
@@ -74,11 +84,28 @@ class JointFit:
         robot: with fitted parameters.
         soil: the same.
         weighing: of the drives.
+        deviations: with which they tell every parameter, by name.
+        gradient: of the ground along the world's axes [-]; None where the poses do not tell it.
     """
 
     robot: Robot
     soil: Soil
     weighing: Weighing
+    deviations: Mapping[str, float]
+    gradient: tuple[float, float] | None = None
+
+    @property
+    def slope(self) -> GroundSlope | None:
+        """Slope of the ground; None where the poses do not tell it."""
+        if self.gradient is None:
+            return None
+        x, y = (float(np.hypot(SAME_SLOPE, self.deviations[name])) for name in SLOPES)
+        return GroundSlope(self.gradient, (x, y))
+
+    @property
+    def same_ground(self) -> dict[str, float]:
+        """Deviations of the soil of a drive on the same ground from the fitted one, by parameter."""
+        return {name: float(np.hypot(own, self.deviations[name])) for name, own in SAME_GROUND.items()}
 
 
 def robot_of_before(
@@ -114,8 +141,8 @@ def robot_of_before(
     for recording in mended.recordings:
         progress(f"every effect of the library in {recording.meta.source}")
         drive = OrdinaryDrive(
-            recording.meta.source, GROUND, False, recording, joint.robot, joint.soil, parameters, SAME_GROUND,
-            mended.reversed_gyro is not None,
+            recording.meta.source, GROUND, False, recording, joint.robot, joint.soil, parameters, joint.same_ground,
+            mended.reversed_gyro is not None, joint.slope,
         )  # fmt: skip
         scanned.append(scan_pieces(drive, joint.weighing, most, threads))
     scatter = measured_scatter()
@@ -123,7 +150,7 @@ def robot_of_before(
         joint.robot,
         {GROUND: joint.soil},
         parameters,
-        {GROUND: SAME_GROUND},
+        {GROUND: joint.same_ground},
         joint.weighing,
         tuple(as_left_out(found[0], len(recordings)) for found in scanned),
         digest=hashlib.sha256("".join(content_hash(item) for item in recordings).encode()).hexdigest(),
@@ -132,6 +159,7 @@ def robot_of_before(
         other_scatter=scatter.other_ground,
         unnamed=dict.fromkeys(SOIL_EFFECTS, OF_ANOTHER_GROUND),
         given=True,
+        slope=joint.slope,
     )
 
 
@@ -154,7 +182,7 @@ def day_parameters(robot: Robot) -> tuple[ModelParameter, ...]:
 def joint_fit(
     mended: MendedRecordings, robot: Robot, soil: Soil, window: float, rng: np.random.Generator, threads: int
 ) -> JointFit:
-    """One robot and one soil fitted to drives, first by the sensors' noise, then by what that leaves.
+    """One robot and one soil fitted to drives, by what the nominal ones leave and then by what that fit leaves.
 
     Args:
         mended: drives.
@@ -172,7 +200,8 @@ def joint_fit(
     )
     windows = change_windows(mended.recordings, robot, blank)
     blank = replace(blank, turning=usual_turning(windows))
-    parameters = uncertain_parameters(soil, robot_parameters(robot), None, blank, len(noise))
+    slopes = 2 * (SLOPE_OF_FIELDS,) if _in_one_frame(mended.recordings, windows) else ()
+    parameters = uncertain_parameters(soil, robot_parameters(robot), None, blank, len(noise), slopes)
     of_noise = noise_weights(noise, windows, imposed=False, dead=(), unfitted=())
 
     def problem_of(weights: Weights) -> Problem:
@@ -180,11 +209,27 @@ def joint_fit(
         return change_problem(robot, soil, windows, parameters, weighing, threads)
 
     first = problem_of(of_noise)
-    problem = problem_of(misfit_of_compared(first.blocked, first.predict(first.start()), of_noise))
-    fitted = fit_nominal(problem)
+    begun = fit_nominal(problem_of(misfit_of_compared(first.blocked, first.predict(first.start()), of_noise)))
+    # a nominal model that is far off leaves so much that it weighs nothing
+    problem = problem_of(misfit_of_compared(first.blocked, begun.prediction, of_noise))
+    fitted = fit_nominal(problem, begun.point)
     values = {p.name: float(value) for p, value in zip(parameters, fitted.point.values, strict=True)}
     left = misfit_of_compared(problem.blocked, fitted.prediction, of_noise)
-    return JointFit(*with_values(robot, soil, values), _weighing(blank, left, _biases(fitted, len(noise))))
+    weighing = _weighing(blank, left, _biases(fitted, len(noise)))
+    gradient = (values[SLOPES[0]], values[SLOPES[1]]) if slopes else None
+    return JointFit(*with_values(robot, soil, values), weighing, _deviations(problem, fitted), gradient)
+
+
+def _in_one_frame(recordings: Sequence[Recording], windows: WindowSet) -> bool:
+    """Whether directions mean the same in all drives: they have headings in one frame."""
+    return not windows.frames_apart and all(recording.has("pose_yaw") for recording in recordings)
+
+
+def _deviations(problem: Problem, fitted: Fitted) -> dict[str, float]:
+    """Deviations of the free parameters, by name: the larger ones of the information and of the windows' scatter."""
+    names = [p.name for p, free in zip(problem.nuisances.parameters, problem.free, strict=True) if free]
+    found = np.maximum(*linearised(problem, fitted).deviations())
+    return dict(zip(names, found.tolist(), strict=True))
 
 
 def _biases(fitted: Fitted, recordings: int) -> Array:

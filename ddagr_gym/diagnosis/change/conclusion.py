@@ -16,13 +16,14 @@ from ddagr_gym.diagnosis.answer.change import (
     EffectShift,
     ParameterShift,
     SizeShift,
+    SlopeBefore,
 )
 from ddagr_gym.diagnosis.answer.verdict import NONE, UNKNOWN, Diagnosis, Estimate, Finding, GatesUsed, Options
 from ddagr_gym.diagnosis.change.drive_scan import NAMED, NOT_COMPARED
 from ddagr_gym.diagnosis.change.left_out import probability_of_ordinary
 from ddagr_gym.diagnosis.change.model import FORM, Model
 from ddagr_gym.diagnosis.change.naming import Named, Step
-from ddagr_gym.diagnosis.change.ordinary import OrdinaryRobot
+from ddagr_gym.diagnosis.change.ordinary import GroundSlope, OrdinaryRobot
 from ddagr_gym.diagnosis.change.shifts import LEVEL, POWER, Pull, Shift, family_probability, sizes_of
 from ddagr_gym.diagnosis.preprocessing.mended_recordings import MendedRecordings
 from ddagr_gym.diagnosis.result.conclusion import data_source, reversed_gyro_findings
@@ -47,7 +48,7 @@ def conclude_change(
     named: Named,
     certified: ChangeCertificate | None = None,
 ) -> tuple[Diagnosis, tuple[Effect, ...]]:
-    """The answer, without checks of the data and time, and the effects that it names.
+    """The answer, without checks of the data and time, and the effects that it names beside what drives before had.
 
     Args:
         problem: of the drives.
@@ -88,7 +89,8 @@ def conclude_change(
         options=Options(window=ordinary.weighing.window, robot_file=ordinary.source or None),
         change=change,
     )  # fmt: skip
-    return diagnosis, (*((GyroSign(1.0),) if turned else ()), *named.models[-1].fitted.point.effects)
+    effects = (*((GyroSign(1.0),) if turned else ()), *named.models[-1].fitted.point.effects)
+    return diagnosis, effects if ordinary.slope is None else ordinary.slope.with_named(effects)
 
 
 def forecast_badly(named: Named, certified: ChangeCertificate | None) -> bool:
@@ -221,16 +223,23 @@ def _change(
         shifts,
         parameters,
         hidden,
-        {**ordinary.comparison(ground).unnamed, **_not_compared(ordinary)},
+        _not_compared(ordinary, ordinary.comparison(ground).unnamed),
         BEFORE if ordinary.given else CALIBRATION,
         certified,
         _channel_shifts(first, last),
+        None if ordinary.slope is None else _slope_before(ordinary.slope),
     )
 
 
-def _not_compared(ordinary: OrdinaryRobot) -> Mapping[str, str]:
-    """Effects without a size that drives share; readings that repeat longer than in drives from before are named."""
-    return {name: why for name, why in NOT_COMPARED.items() if not (ordinary.given and name == SensorHold.name)}
+def _slope_before(slope: GroundSlope) -> SlopeBefore:
+    (lying,) = slope.effects
+    return SlopeBefore(lying.angle, lying.direction, float(np.hypot(*slope.deviations)))
+
+
+def _not_compared(ordinary: OrdinaryRobot, unnamed: Mapping[str, str]) -> Mapping[str, str]:
+    """Effects that could not be named, with the reason; readings that repeat longer than before are seen in values."""
+    never = {name: why for name, why in NOT_COMPARED.items() if not (ordinary.given and name == SensorHold.name)}
+    return {**{name: why for name, why in unnamed.items() if name not in NOT_COMPARED}, **never}
 
 
 def _channel_shifts(first: Model, last: Model) -> tuple[ChannelShift, ...]:

@@ -22,6 +22,7 @@ from ddagr_gym.identification.residual_weights import Weights, weights_by_residu
 from ddagr_gym.identification.timing_repair import aligned_poses, bridged
 from ddagr_gym.identification.windows import WindowSet, cut_windows, with_presumed_past
 from ddagr_gym.parameters import Robot, Soil
+from ddagr_gym.physics.effects import Effect
 from ddagr_gym.recordings.schema import Recording
 
 Array = NDArray[np.float64]
@@ -87,6 +88,7 @@ def change_problem(
     parameters: tuple[ModelParameter, ...],
     weighing: Weighing,
     threads: int,
+    known: Sequence[Effect] = (),
 ) -> Problem:
     """The fit of windows with the weights of ordinary drives.
 
@@ -97,10 +99,11 @@ def change_problem(
         parameters: that may move.
         weighing: of ordinary drives.
         threads: of the simulator.
+        known: what ordinary drives have and the robot has not, such as a slope of their ground.
     """
     return Problem(
         robot, soil, compared_windows(windows, weighing, robot), Nuisances(parameters), robust=weighing.robust,
-        threads=threads, numerics=field_numerics(),
+        threads=threads, numerics=field_numerics(), known=known,
     )  # fmt: skip
 
 

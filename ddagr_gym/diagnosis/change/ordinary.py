@@ -16,10 +16,13 @@ from ddagr_gym.identification.parameters import (
     ModelParameter,
     robot_parameters,
     sensor_parameters,
+    slope_parameters,
     soil_parameters,
 )
 from ddagr_gym.parameters import Robot, Soil
+from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.effects.registry import effect_kinds
+from ddagr_gym.physics.effects.slope import Slope
 from ddagr_gym.recordings.schema import Recording
 
 Array = NDArray[np.float64]
@@ -49,6 +52,29 @@ class SensorBias:
     drive: str
     ground: str
     value: Array
+
+
+@dataclass(frozen=True)
+class GroundSlope:
+    """Slope of the ground of drives from before.
+
+    Attributes:
+        gradient: along the world's axes x and y [-].
+        deviations: of another drive's on the same ground from it.
+    """
+
+    gradient: tuple[float, float]
+    deviations: tuple[float, float]
+
+    @property
+    def effects(self) -> tuple[Slope]:
+        """As missing physics of a robot that is taken to stand level."""
+        return (Slope.of_gradient(*self.gradient),)
+
+    def with_named(self, effects: Sequence[Effect]) -> tuple[Effect, ...]:
+        """Named effects on this ground: a slope among them comes on top of it, so that there is one."""
+        x, y = np.add(self.gradient, np.sum([e.gradient for e in effects if isinstance(e, Slope)], axis=0))
+        return (*(e for e in effects if not isinstance(e, Slope)), Slope.of_gradient(float(x), float(y)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,6 +251,8 @@ class OrdinaryRobot:
         other_scatter: expected between drives on two grounds.
         unnamed: effects that cannot be named on an unknown ground, with the reason.
         given: whether the drives were given as those from before, without a calibration.
+        slope: of the ground in drives from before, which is taken to be there in later ones too; None where their poses
+            do not tell it.
     """
 
     robot: Robot
@@ -240,6 +268,12 @@ class OrdinaryRobot:
     other_scatter: ExpectedScatter = field(default_factory=ExpectedScatter)
     unnamed: Mapping[str, str] = field(default_factory=dict)
     given: bool = False
+    slope: GroundSlope | None = None
+
+    @property
+    def known(self) -> tuple[Effect, ...]:
+        """What ordinary drives have and the robot has not."""
+        return () if self.slope is None else self.slope.effects
 
     def uncertain(self, ground: str, recordings: Sequence[Recording]) -> tuple[ModelParameter, ...]:
         """All that may differ between ordinary drives, for drives on one ground ("" for an unknown one)."""
@@ -252,6 +286,7 @@ class OrdinaryRobot:
             self.soil_deviations.get(ground) if ground else None,
             self.weighing.on(ground),
             len(recordings),
+            self.slope.deviations if self.slope and ground else (),
         )
 
     def comparison(self, ground: str) -> Comparison:
@@ -320,8 +355,9 @@ def uncertain_parameters(
     deviations: Mapping[str, float] | None,
     weighing: Weighing,
     recordings: int,
+    slopes: Sequence[float] = (),
 ) -> tuple[ModelParameter, ...]:
-    """Soil, robot and biases as a fit moves them.
+    """Soil, slope of the ground, robot and biases as a fit moves them.
 
     Args:
         soil: of the ground.
@@ -329,10 +365,12 @@ def uncertain_parameters(
         deviations: of the soil's parameters; None for a ground of which only the kind is known.
         weighing: of the drives.
         recordings: how many.
+        slopes: deviations of the ground's gradient along the world's axes; none where it stays as it is.
     """
     kind = soil_parameters(soil, KIND_STIFFNESS_DEVIATION)
     made = kind if deviations is None else tuple(replace(p, prior=deviations[p.name]) for p in kind)
-    return (*made, *robot, *sensor_parameters(recordings, weighing.gyro_bias, weighing.accelerometer_bias))
+    ground = (*made, *(slope_parameters(slopes) if slopes else ()))
+    return (*ground, *robot, *sensor_parameters(recordings, weighing.gyro_bias, weighing.accelerometer_bias))
 
 
 def of_another_logger(robot: Sequence[ModelParameter], period: float) -> tuple[ModelParameter, ...]:

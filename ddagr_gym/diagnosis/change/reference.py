@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ddagr_gym.diagnosis.change.drive_fit import change_problem, change_windows, fit_nominal, moved_parameters
 from ddagr_gym.diagnosis.change.drive_scan import DriveScan, Priors, scan_drive
 from ddagr_gym.diagnosis.change.left_out import left_out_losses
-from ddagr_gym.diagnosis.change.ordinary import Reference, Weighing, uncertain_parameters
+from ddagr_gym.diagnosis.change.ordinary import GroundSlope, Reference, Weighing, uncertain_parameters
 from ddagr_gym.identification.misfit import channel_misfit
 from ddagr_gym.identification.parameters import ModelParameter
 from ddagr_gym.parameters import Robot, Soil
@@ -34,6 +34,7 @@ class OrdinaryDrive:
         parameters: of the robot that may differ between drives.
         deviations: of the soil on its ground, by parameter.
         reversed_gyro: whether its gyro turned the wrong way, which was mended.
+        slope: of its ground; None where that is not known.
     """
 
     name: str
@@ -45,6 +46,7 @@ class OrdinaryDrive:
     parameters: tuple[ModelParameter, ...]
     deviations: Mapping[str, float]
     reversed_gyro: bool = False
+    slope: GroundSlope | None = None
 
 
 def scan_ordinary(drive: OrdinaryDrive, weighing: Weighing, threads: int = 1) -> Reference:
@@ -70,11 +72,12 @@ def scan_pieces(drive: OrdinaryDrive, weighing: Weighing, most: int, threads: in
     known = weighing if drive.alone else weighing.on(drive.ground, drive.name)
     windows = change_windows([drive.recording], drive.robot, known)
     deviations = None if drive.alone else drive.deviations
-    parameters = uncertain_parameters(drive.soil, drive.parameters, deviations, known, 1)
-    problem = change_problem(drive.robot, drive.soil, windows, parameters, known, threads)
+    slopes, lying = ((), ()) if drive.slope is None else (drive.slope.deviations, drive.slope.effects)
+    parameters = uncertain_parameters(drive.soil, drive.parameters, deviations, known, 1, slopes)
+    problem = change_problem(drive.robot, drive.soil, windows, parameters, known, threads, lying)
     fitted = fit_nominal(problem)
     scan = scan_drive(problem, fitted)
-    wide = uncertain_parameters(drive.soil, drive.parameters, None, weighing, 1)
+    wide = uncertain_parameters(drive.soil, drive.parameters, None, weighing, 1, slopes)
     other = _of_unknown_ground(scan, wide, known.offsets - weighing.offsets)
     whole = replace(
         _reference(drive, scan, other, left_out_losses(problem, fitted)),

@@ -157,7 +157,10 @@ def fit_ordinary(
     windows = change_windows(mended.recordings, ordinary.robot, weighing)
     soils = ordinary.soils if not ground else {ground: ordinary.soils[ground]}
     parameters = ordinary.uncertain(ground, mended.recordings)
-    problems = [change_problem(ordinary.robot, soil, windows, parameters, weighing, threads) for soil in soils.values()]
+    problems = [
+        change_problem(ordinary.robot, soil, windows, parameters, weighing, threads, ordinary.known)
+        for soil in soils.values()
+    ]
     found = [(problem, fit_nominal(problem)) for problem in problems]
     return min(found, key=lambda item: item[1].cost)
 

@@ -1,5 +1,7 @@
 """Ground that slopes: gravity fixed in the world, which turns with the heading where a bias does not."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass
 
@@ -42,6 +44,22 @@ class Slope(Effect):
 
     angle: float = size("rad", -0.6, 0.6, least=0.0087)
     direction: float = shape("rad", -7.0, 7.0, default=0.0, step=0.05)
+
+    @classmethod
+    def of_gradient(cls, x: float, y: float) -> Slope:
+        """The incline that rises by so much per metre along the world's axes.
+
+        Args:
+            x: along the world's x axis [-].
+            y: along its y axis [-].
+        """
+        return cls(math.atan(math.hypot(x, y)), math.atan2(y, x))
+
+    @property
+    def gradient(self) -> tuple[float, float]:
+        """Rise per metre along the world's axes [-]."""
+        steepness = math.tan(self.angle)
+        return steepness * math.cos(self.direction), steepness * math.sin(self.direction)
 
     @classmethod
     def probes(cls, extent: DriveExtent) -> tuple[Effect, ...]:

@@ -8,14 +8,25 @@ import numpy as np
 import pytest
 
 import ddagr_gym
-from ddagr_gym.diagnosis.change.before_drives import DAY, SOIL_EFFECTS, as_left_out, day_parameters, robot_of_before
+from ddagr_gym.diagnosis.change.before_drives import (
+    DAY,
+    SAME_SLOPE,
+    SOIL_EFFECTS,
+    as_left_out,
+    day_parameters,
+    joint_fit,
+    robot_of_before,
+)
 from ddagr_gym.diagnosis.change.measured_scatter import measured_scatter
-from ddagr_gym.diagnosis.change.ordinary import Reference
+from ddagr_gym.diagnosis.change.ordinary import GroundSlope, Reference
 from ddagr_gym.diagnosis.change.run import what_changed_since
+from ddagr_gym.diagnosis.preprocessing.mended_recordings import mend_recordings
 from ddagr_gym.diagnosis.result.files import as_mapping, validate
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.parameters import robot_parameters
+from ddagr_gym.physics.effects.gyro_bias import GyroBias
 from ddagr_gym.physics.effects.registry import effect_kinds
+from ddagr_gym.physics.effects.slope import Slope
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.reporting.change_page import write_page
 from ddagr_gym.reporting.change_text import change_text
@@ -74,6 +85,45 @@ def test_nothing_is_named_where_nothing_changed(before, seed):
     least = {item.effect: item.sizes for item in change.shifts}
     assert 0.0 < least["gyro_bias"]["bias"].least_detectable < 0.02
     assert change.certificate.as_well >= 0.6 * change.certificate.windows
+
+
+def test_the_ground_of_drives_before_is_told_with_its_slope():
+    """A nominal robot that stands level would take a slope for fifteen times the stiffness."""
+    sloping = drive(1, "slope=0.06,direction=0.8", seconds=24.0)
+    known = joint_fit(mend_recordings([sloping]), ROBOT, SOIL, 2.0, np.random.default_rng(0), 1)
+    truth = Slope(0.06, 0.8).gradient
+    for told, deviation, true in zip(known.gradient, known.slope.deviations, truth, strict=True):
+        assert abs(told - true) < 0.002 < SAME_SLOPE <= deviation < 0.008
+    stiffness = np.log(known.soil.frictional_modulus / SOIL.frictional_modulus)
+    assert abs(stiffness) < 3.0 * known.deviations["soil_stiffness"] < 1.5
+    assert known.same_ground["soil_stiffness"] > max(known.deviations["soil_stiffness"], 0.1)
+
+
+def test_a_drive_without_headings_tells_no_slope():
+    level = drive(1, seconds=24.0)
+    blind = replace(level, channels={name: v for name, v in level.channels.items() if not name.startswith("pose")})
+    assert joint_fit(mend_recordings([blind]), ROBOT, SOIL, 2.0, np.random.default_rng(0), 1).slope is None
+
+
+def test_a_slope_that_is_named_comes_on_top_of_that_before():
+    ground = GroundSlope(Slope(0.05, 0.0).gradient, (0.005, 0.005))
+    bias, (both,) = GyroBias(0.01), ground.with_named([Slope(0.05, np.pi)])
+    assert both.angle == pytest.approx(0.0, abs=1e-12)
+    assert ground.with_named([bias]) == (bias, Slope.of_gradient(*ground.gradient))
+    assert ground.effects[0].angle == pytest.approx(0.05)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [31, 32])
+def test_a_slope_before_and_after_is_no_change(seed):
+    """Driven in another way, so that the slope does something else to a soil that stands for it."""
+    sloping = "slope=0.06,direction=0.8"
+    outcome, known = what_changed_since([drive(seed, sloping)], [drive(1, sloping)], ROBOT, SOIL, same_ground=True)
+    assert outcome.diagnosis.verdict == ("none",)
+    slope = outcome.diagnosis.change.slope
+    assert slope.angle == pytest.approx(0.06, abs=0.003)
+    assert "slopes by 3.4 degrees, rising towards 4" in change_text(outcome.diagnosis)
+    assert outcome.effects == known.known
 
 
 @pytest.mark.slow
