@@ -156,9 +156,15 @@ def _estimates(model: Model, number: int, step: Step) -> dict[str, Estimate]:
         form = 0.0 if neutral is None else FORM * (value - neutral)
         variance = within + between.get(name, 0.0) + form**2
         half = quantile * math.sqrt(variance) if variance >= 0.0 else math.nan
-        interval = (value - half, value + half) if math.isfinite(half) and effect.differentiable else None
-        found[name] = Estimate(value, str(effect.parameter(name).metadata["unit"]), interval)
+        found[name] = _that_exists(effect, name, value, half if effect.differentiable else math.nan)
     return found
+
+
+def _that_exists(effect: Effect, name: str, value: float, half: float) -> Estimate:
+    """A size with its interval, inside the bounds of what exists; no interval where half of it is not known."""
+    about = effect.parameter(name).metadata
+    value, low, high = np.clip((value, value - half, value + half), about["low"], about["high"]).tolist()
+    return Estimate(value, str(about["unit"]), (low, high) if math.isfinite(half) else None)
 
 
 def _quantile(degrees: float) -> float:
