@@ -39,8 +39,9 @@ def check_ground_name(ground: str) -> None:
 def as_text(calibration: Calibration) -> str:
     """JSON of a calibration; null stands for numbers that are not finite."""
     content = asdict(calibration)
-    if calibration.currents is None:
-        del content["currents"]
+    for name in ("currents", "imu"):
+        if content[name] is None:
+            del content[name]
     return json.dumps(_finite(content), indent=1, allow_nan=False) + "\n"
 
 

@@ -276,6 +276,50 @@ class CurrentEvidence:
 
 
 @dataclass(frozen=True)
+class MountingSize:
+    """How the IMU is mounted in one respect.
+
+    Attributes:
+        name: imu_yaw (turned counter-clockwise), imu_x and imu_y (place from the body's origin, forward and to the
+            left), imu_roll and imu_pitch (tilted, left side up and nose down).
+        unit: of the value.
+        value: fitted; 0 where it is not kept.
+        interval: 90 %, between drives; null where it is not kept.
+        kept: whether the drives support it and it is large enough to matter.
+        growth: relative growth of the loss of the accelerometers of left-out drives without it; null for a tilt, which
+            is what drives have in common.
+        error: standard error of that growth between drives; null likewise.
+        helps: drive that would determine it; "" where it is kept.
+    """
+
+    name: str
+    unit: str
+    value: float
+    interval: tuple[float, float] | None
+    kept: bool
+    growth: float | None
+    error: float | None
+    helps: str
+
+
+@dataclass(frozen=True)
+class ImuMounting:
+    """How the IMU is mounted, by what its accelerometer reads of the calibrated simulator's motion.
+
+    Attributes:
+        sizes: turning, place and tilt.
+        readings: means of a quarter of a second that it was fitted to.
+        before: root mean square of what is left of them with each drive's own bias alone [m/s^2].
+        after: the same with the mounting.
+    """
+
+    sizes: tuple[MountingSize, ...]
+    readings: int
+    before: float
+    after: float
+
+
+@dataclass(frozen=True)
 class Calibration:
     """The whole answer.
 
@@ -298,6 +342,7 @@ class Calibration:
         seed: of resampled intervals.
         seconds: that the calibration took.
         currents: of the motors; None, and not in the file, where none was used.
+        imu: how the IMU is mounted; None where its accelerometer was read in fewer than two drives, or halves of one.
     """
 
     schema: str
@@ -318,6 +363,7 @@ class Calibration:
     seed: int
     seconds: float
     currents: CurrentEvidence | None = None
+    imu: ImuMounting | None = None
 
     def parameter(self, name: str) -> CalibratedParameter:
         """Parameter by name; KeyError where there is none."""

@@ -19,6 +19,7 @@ from ddagr_gym.calibration.effect_bank import ordinary_runs
 from ddagr_gym.calibration.fit_starts import fit_from_several
 from ddagr_gym.calibration.forecast_errors import Forecasts, all_forecasts, explained_when_left_out, forecast_errors
 from ddagr_gym.calibration.identifiability import covariance, unidentified
+from ddagr_gym.calibration.imu_mounting import imu_mounting
 from ddagr_gym.calibration.independent_steps import IndependentSteps
 from ddagr_gym.calibration.input_requirements import check_drives, check_scales, drive_scale, with_gyro_forward
 from ddagr_gym.calibration.joint_fit import (
@@ -209,6 +210,7 @@ def calibrate_drives(
         seed=settings.seed,
         seconds=time.monotonic() - began,
         currents=current_evidence(data, model, compared),
+        imu=imu_mounting(data, model),
     )
     found = {ground: fitted_soil(data, ground, model.values) for ground in data.drives_on}
     calibrated = calibrated_robot(data, model, calibration)

@@ -9,13 +9,16 @@ from dataclasses import dataclass, fields, replace
 from ddagr_gym.calibration.calibration_data import CalibrationData
 from ddagr_gym.calibration.joint_fit import FittedModel
 from ddagr_gym.calibration.parts import LIMITS, RobotModel, is_stated, part_of
-from ddagr_gym.calibration.result import CalibratedParameter, Calibration
+from ddagr_gym.calibration.result import CalibratedParameter, Calibration, ImuMounting
 from ddagr_gym.envs.calibrated_draws import CalibratedDraws, GroundDraws
 from ddagr_gym.identification.fitted_values import with_values
 from ddagr_gym.identification.parameters import ModelParameter
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.effects.gyro_scale import GyroScale
+from ddagr_gym.physics.effects.imu_lever_arm import ImuLeverArm
+from ddagr_gym.physics.effects.imu_misalignment import ImuMisalignment
+from ddagr_gym.physics.effects.imu_tilt import ImuTilt
 from ddagr_gym.presets import firm_ground
 
 SOIL_PARAMETERS = ("soil_strength", "soil_stiffness", "shear_modulus", "exit_angle_ratio")
@@ -210,7 +213,23 @@ def calibrated_effects(calibration: Calibration) -> tuple[Effect, ...]:
     """What was calibrated and has no place in a robot or a soil: sensors."""
     named = {item.name: item for item in calibration.parameters if item.calibrated}
     scale = named["gyro_scale"].value if "gyro_scale" in named else None
-    return () if scale is None else (GyroScale(scale),)
+    turning = () if scale is None else (GyroScale(scale),)
+    return (*turning, *mounting_effects(calibration.imu))
+
+
+def mounting_effects(found: ImuMounting | None) -> tuple[Effect, ...]:
+    """What was kept of a mounting as missing physics of a simulator, in the order in which it acts on the readings."""
+    if found is None:
+        return ()
+    sizes = {item.name: item.value for item in found.sizes if item.kept}
+    effects: list[Effect] = []
+    if "imu_x" in sizes:
+        effects.append(ImuLeverArm(sizes["imu_x"], sizes["imu_y"]))
+    if "imu_yaw" in sizes:
+        effects.append(ImuMisalignment(sizes["imu_yaw"]))
+    if "imu_roll" in sizes or "imu_pitch" in sizes:
+        effects.append(ImuTilt(sizes.get("imu_roll", 0.0), sizes.get("imu_pitch", 0.0)))
+    return tuple(effects)
 
 
 def calibrated_draws(calibration: Calibration, robot: Robot, soils: Mapping[str, Soil]) -> CalibratedDraws:

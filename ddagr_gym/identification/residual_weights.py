@@ -26,7 +26,7 @@ UNKNOWN_GYRO_BIAS = 0.005
 LEAST_GYRO_BIAS = 2e-4
 """Least prior [rad/s]: the bias of a gyro wanders by so much in a drive (ours)."""
 
-_NORMAL = 1.4826
+MAD_TO_DEVIATION = 1.4826
 """Standard deviation of a normal variable over the median of its size."""
 
 _STRONGEST = 0.98
@@ -113,7 +113,7 @@ def weights_by_residuals(left: Array, before: Weights) -> Weights:
         known = np.isfinite(residual)
         if known.sum() < _FEWEST or not np.isfinite(sigma[..., k]).any():
             continue
-        size = _NORMAL * float(np.median(np.abs(residual[known])))
+        size = MAD_TO_DEVIATION * float(np.median(np.abs(residual[known])))
         limit = 3.0 * size
         root = _root(successive_correlation(np.clip(residual, -limit, limit)))
         sigma[..., k] = np.maximum(sigma[..., k], size * root)

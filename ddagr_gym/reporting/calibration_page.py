@@ -74,6 +74,7 @@ def _context(calibration: Calibration, forecasts: Sequence[Forecasts]) -> dict[s
         "usage": [_usage(calibration, number) for number in range(len(calibration.drives))],
         "usage_header": ("drive", "ground", "under command [s]", "fitted [s]", "forecast [s]", "poses late by [s]"),
         "currents": _currents(calibration, forecasts),
+        "mounting": _mounting(calibration),
         "seconds": f"{calibration.seconds:.0f}",
         "models": [text.MODEL_LABELS[name] for name in MODELS],
     }
@@ -88,6 +89,19 @@ _ALL = (
     ("position", 5.0),
 )
 """Errors of the table on the page."""
+
+
+def _mounting(calibration: Calibration) -> dict[str, Any] | None:
+    """Table of how the IMU is mounted, and what of its readings that explains; None where that was not asked."""
+    found = calibration.imu
+    if found is None:
+        return None
+    return {
+        "header": text.MOUNTING_HEADER,
+        "rows": text.mounting_rows(found),
+        "before": f"{found.before:.2f}",
+        "after": f"{found.after:.2f}",
+    }
 
 
 _KINDS = {"motor": "the motors' own current", "supply": "the current that the motors draw from their supply"}

@@ -13,6 +13,7 @@ from ddagr_gym.calibration.result import (
     CalibratedParameter,
     Calibration,
     ForecastError,
+    ImuMounting,
 )
 from ddagr_gym.reporting.text_table import format_table
 
@@ -31,6 +32,17 @@ FORECAST_HEADER = ("left-out drive", "soil from", "error", "unit", *(MODEL_LABEL
 
 PART_HEADER = ("part", "kept", "forecasts without it are worse by", "standard error")
 """Of :func:`part_rows`."""
+
+MOUNTING_HEADER = ("IMU", "calibrated", "90 %", "unit", "left-out drives are worse without it by", "standard error", "")
+"""Of :func:`mounting_rows`."""
+
+_MOUNTING = {
+    "imu_yaw": "turned about the vertical",
+    "imu_x": "place, forward",
+    "imu_y": "place, to the left",
+    "imu_roll": "tilted, left side up",
+    "imu_pitch": "tilted, nose down",
+}
 
 SHOWN = (("wheel_speed", None), ("heading", 5.0), ("position", 5.0))
 """Errors of the short table: metric and horizon."""
@@ -119,6 +131,22 @@ def part_rows(calibration: Calibration) -> list[tuple[str, ...]]:
     ]
 
 
+def mounting_rows(mounting: ImuMounting) -> list[tuple[str, ...]]:
+    """How the IMU is mounted, under :data:`MOUNTING_HEADER`."""
+    return [
+        (
+            _MOUNTING[item.name],
+            f"{item.value:.3g}" if item.kept else "as stated",
+            "" if item.interval is None else f"{item.interval[0]:.3g} to {item.interval[1]:.3g}",
+            item.unit,
+            "" if item.growth is None else f"{100.0 * item.growth:+.1f} %",
+            "" if item.error is None else f"{100.0 * item.error:.1f} %",
+            "" if item.kept else f"to determine it: {item.helps}",
+        )
+        for item in mounting.sizes
+    ]
+
+
 def forecast_rows(calibration: Calibration, shown: Sequence[tuple[str, float | None]] = SHOWN) -> list[tuple[str, ...]]:
     """Errors on left-out drives under :data:`FORECAST_HEADER`; median of wheel speeds, else root mean square."""
     rows = []
@@ -184,6 +212,7 @@ def summary(calibration: Calibration) -> str:
     parts += [f"note: {drive.source}: {note}" for drive in calibration.drives for note in drive.notes]
     parts += ["", format_table(PARAMETER_HEADER, parameter_rows(calibration))]
     parts += ["", format_table(PART_HEADER, part_rows(calibration))]
+    parts += [] if calibration.imu is None else ["", format_table(MOUNTING_HEADER, mounting_rows(calibration.imu))]
     parts += ["", format_table(FORECAST_HEADER, forecast_rows(calibration))]
     parts += ["", format_table(UNEXPLAINED_HEADER, unexplained_rows(calibration))]
     lines = refused_lines(calibration)

@@ -45,9 +45,16 @@ def steps(seed: int, seconds: float) -> np.ndarray:
     return np.array(rows[: int(seconds * RATE)])
 
 
-def drive(ground: str, seed: int, seconds: float = 120.0, name: str = "", robot: Robot | None = None) -> Recording:
+def drive(
+    ground: str,
+    seed: int,
+    seconds: float = 120.0,
+    name: str = "",
+    robot: Robot | None = None,
+    effects: tuple[str, ...] = (),
+) -> Recording:
     made = ddagr_gym.simulate(
-        steps(seed, seconds), robot or true_robot(), true_soil(ground), f"command_delay={DELAY}", rate=RATE,
+        steps(seed, seconds), robot or true_robot(), true_soil(ground), [f"command_delay={DELAY}", *effects], rate=RATE,
         pose_rate=5.0, seed=seed,
     )  # fmt: skip
     return made.recording.with_meta(source=name or f"{ground}_{seed}.csv")

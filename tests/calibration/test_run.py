@@ -17,6 +17,7 @@ from ddagr_gym.calibration.settings import CalibrationSettings
 from ddagr_gym.config import load_config
 from ddagr_gym.errors import InputError
 from ddagr_gym.parameters import Robot
+from ddagr_gym.physics.effects import load_effects
 from ddagr_gym.presets import get_robot, get_soil
 from tests.calibration.conftest import DELAY, MOTOR_RATE, STRENGTH, drive, true_robot
 
@@ -49,6 +50,25 @@ def folder(result, tmp_path_factory) -> Path:
 
 def holds(item, truth: float) -> bool:
     return item.interval is not None and item.interval[0] <= truth <= item.interval[1]
+
+
+@pytest.mark.slow
+def test_an_imu_that_sits_where_it_is_stated_is_left_there(result, folder):
+    assert not any(item.kept for item in result.calibration.imu.sizes)
+    assert files.load(folder) == result.calibration
+    assert "How the IMU is mounted" in (folder / "calibration.html").read_text()
+
+
+@pytest.mark.slow
+def test_the_mounting_of_an_imu_is_found_and_written_as_effects(tmp_path):
+    sits = ("imu_lever_arm=0.4,y=-0.25", "imu_misalignment=0.12", "imu_tilt=0,pitch=0.03")
+    moved = [drive(ground, seed, effects=sits) for ground, seed in (("field", 1), ("field", 2), ("track", 3))]
+    found = CalibrationResult(calibrated(moved))
+    arm, turned, tilted = load_effects(found.report(tmp_path / "CAL") / "effects.yaml")
+    assert (arm.x, arm.y) == (pytest.approx(0.4, abs=0.02), pytest.approx(-0.25, abs=0.02))
+    assert turned.yaw == pytest.approx(0.12, abs=0.01)
+    assert (tilted.roll, tilted.pitch) == (0.0, pytest.approx(0.03, abs=0.002))
+    assert "turned about the vertical" in str(found)
 
 
 @pytest.mark.slow
