@@ -4,7 +4,8 @@
 
 A change is written into one drive of 60 s, on another day than the drive before it: soil and motors differ a little.
 Nulls are pairs of structurally different worlds (:mod:`benchmarks.simulated_pairs`, of numbers that the shipped scatter
-was not measured with), on the same ground and on two grounds. Written are the answers and a picture
+was not measured with), on the same ground and on two grounds; and pairs with something that the nominal robot lacks
+before as after, such as a slope of the field, driven in another way each time. Written are the answers and a picture
 (``benchmarks/results/changes_since.json``, ``.png``); a run goes on after the cases that the file holds.
 """
 
@@ -57,6 +58,26 @@ CHANGES = (
 NULLS = range(100, 103)
 """Numbers of pairs in which nothing changed."""
 
+COMMON = (
+    "slope=0.06,direction=0.8",
+    "slope=0.04,direction=2.5",
+    "slope=0.1,direction=-1",
+    "towed_drag=150",
+    "payload=30",
+    "centre_of_mass_offset=0.1",
+    "multipass=1",
+    "lateral_bulldozing=4",
+    "soil_split=0.7",
+    "viscous_drag=100",
+    "command_delay=0.15",
+    "imu_misalignment=0.2",
+    "encoder_scale=1.05",
+)
+"""What the nominal robot or its ground lacks before as after."""
+
+FIRST_COMMON = 200
+"""Number of the first of these pairs."""
+
 
 @dataclass(frozen=True, eq=False)
 class Case:
@@ -100,6 +121,10 @@ def _changed(number: int, effect: str) -> tuple[Recording, Recording]:
     return drive(2 * number), drive(2 * number + 1, effect)
 
 
+def _in_both(number: int, effect: str) -> tuple[Recording, Recording]:
+    return drive(2 * number, effect), drive(2 * number + 1, effect)
+
+
 def _ordinary(number: int, same_ground: bool) -> tuple[Recording, Recording]:
     before, after, elsewhere = drives_of(number, get_robot("ddagr"), get_soil("thesis_a1"))
     return before, after if same_ground else elsewhere
@@ -120,7 +145,11 @@ def cases() -> list[Case]:
         for number in NULLS
         for same in (True, False)
     ]
-    return [*changes, *nulls]
+    common = [
+        Case(f"before and after: {effect}", True, partial(_in_both, FIRST_COMMON + number, effect))
+        for number, effect in enumerate(COMMON)
+    ]
+    return [*changes, *nulls, *common]
 
 
 def answer(case: Case) -> dict[str, Any]:

@@ -23,6 +23,7 @@ from ddagr_gym.diagnosis.change.ordinary import (
     OrdinaryRobot,
     Reference,
     Weighing,
+    in_one_frame,
     uncertain_parameters,
 )
 from ddagr_gym.diagnosis.change.reference import OrdinaryDrive, scan_pieces
@@ -36,7 +37,7 @@ from ddagr_gym.identification.problem import Problem
 from ddagr_gym.identification.recording_noise import recording_noise
 from ddagr_gym.identification.relative_readings import usual_turning
 from ddagr_gym.identification.residual_weights import UNKNOWN_GYRO_BIAS, Weights, noise_weights
-from ddagr_gym.identification.windows import CHANNELS, WindowSet
+from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.recordings.schema import Recording
 
@@ -200,7 +201,7 @@ def joint_fit(
     )
     windows = change_windows(mended.recordings, robot, blank)
     blank = replace(blank, turning=usual_turning(windows))
-    slopes = 2 * (SLOPE_OF_FIELDS,) if _in_one_frame(mended.recordings, windows) else ()
+    slopes = 2 * (SLOPE_OF_FIELDS,) if in_one_frame(mended.recordings) else ()
     parameters = uncertain_parameters(soil, robot_parameters(robot), None, blank, len(noise), slopes)
     of_noise = noise_weights(noise, windows, imposed=False, dead=(), unfitted=())
 
@@ -218,11 +219,6 @@ def joint_fit(
     weighing = _weighing(blank, left, _biases(fitted, len(noise)))
     gradient = (values[SLOPES[0]], values[SLOPES[1]]) if slopes else None
     return JointFit(*with_values(robot, soil, values), weighing, _deviations(problem, fitted), gradient)
-
-
-def _in_one_frame(recordings: Sequence[Recording], windows: WindowSet) -> bool:
-    """Whether directions mean the same in all drives: they have headings in one frame."""
-    return not windows.frames_apart and all(recording.has("pose_yaw") for recording in recordings)
 
 
 def _deviations(problem: Problem, fitted: Fitted) -> dict[str, float]:

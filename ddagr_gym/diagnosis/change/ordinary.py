@@ -23,6 +23,7 @@ from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.effects.registry import effect_kinds
 from ddagr_gym.physics.effects.slope import Slope
+from ddagr_gym.recordings.pose_frames import frames_apart
 from ddagr_gym.recordings.schema import Recording
 
 Array = NDArray[np.float64]
@@ -72,9 +73,17 @@ class GroundSlope:
         return (Slope.of_gradient(*self.gradient),)
 
     def with_named(self, effects: Sequence[Effect]) -> tuple[Effect, ...]:
-        """Named effects on this ground: a slope among them comes on top of it, so that there is one."""
-        x, y = np.add(self.gradient, np.sum([e.gradient for e in effects if isinstance(e, Slope)], axis=0))
+        """Named effects on this ground: a slope among them comes on top of it; one too small to matter is left out."""
+        further = [e.gradient for e in effects if isinstance(e, Slope)]
+        if not further and not self.matters:
+            return tuple(effects)
+        x, y = np.add(self.gradient, np.sum(further, axis=0))
         return (*(e for e in effects if not isinstance(e, Slope)), Slope.of_gradient(float(x), float(y)))
+
+    @property
+    def matters(self) -> bool:
+        """Whether anybody would care."""
+        return self.effects[0].angle >= float(Slope.parameter("angle").metadata["least"])
 
 
 @dataclass(frozen=True, eq=False)
@@ -289,6 +298,10 @@ class OrdinaryRobot:
             self.slope.deviations if self.slope and ground else (),
         )
 
+    def seen_by(self, recordings: Sequence[Recording]) -> OrdinaryRobot:
+        """The same for drives that may not know where they head: a slope has no direction in them."""
+        return self if self.slope is None or in_one_frame(recordings) else replace(self, slope=None)
+
     def comparison(self, ground: str) -> Comparison:
         """What drives on a ground that is known or ("") not are compared with."""
         moved, new = tuple(item.moved for item in self.references), dict.fromkeys(self._unscanned, NEWER)
@@ -371,6 +384,11 @@ def uncertain_parameters(
     made = kind if deviations is None else tuple(replace(p, prior=deviations[p.name]) for p in kind)
     ground = (*made, *(slope_parameters(slopes) if slopes else ()))
     return (*ground, *robot, *sensor_parameters(recordings, weighing.gyro_bias, weighing.accelerometer_bias))
+
+
+def in_one_frame(recordings: Sequence[Recording]) -> bool:
+    """Whether directions mean the same in all drives: they have headings, each in one frame."""
+    return all(recording.has("pose_yaw") and not frames_apart(recording) for recording in recordings)
 
 
 def of_another_logger(robot: Sequence[ModelParameter], period: float) -> tuple[ModelParameter, ...]:

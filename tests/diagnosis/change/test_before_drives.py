@@ -18,7 +18,7 @@ from ddagr_gym.diagnosis.change.before_drives import (
     robot_of_before,
 )
 from ddagr_gym.diagnosis.change.measured_scatter import measured_scatter
-from ddagr_gym.diagnosis.change.ordinary import GroundSlope, Reference
+from ddagr_gym.diagnosis.change.ordinary import GroundSlope, OrdinaryRobot, Reference
 from ddagr_gym.diagnosis.change.run import what_changed_since
 from ddagr_gym.diagnosis.preprocessing.mended_recordings import mend_recordings
 from ddagr_gym.diagnosis.result.files import as_mapping, validate
@@ -103,11 +103,17 @@ def test_a_drive_without_headings_tells_no_slope():
     level = drive(1, seconds=24.0)
     blind = replace(level, channels={name: v for name, v in level.channels.items() if not name.startswith("pose")})
     assert joint_fit(mend_recordings([blind]), ROBOT, SOIL, 2.0, np.random.default_rng(0), 1).slope is None
+    known = OrdinaryRobot(ROBOT, {}, (), {}, None, (), slope=GroundSlope((0.06, 0.0), (0.01, 0.01)))
+    assert known.seen_by([level]) is known
+    assert known.seen_by([level, blind]).known == ()
 
 
 def test_a_slope_that_is_named_comes_on_top_of_that_before():
     ground = GroundSlope(Slope(0.05, 0.0).gradient, (0.005, 0.005))
     bias, (both,) = GyroBias(0.01), ground.with_named([Slope(0.05, np.pi)])
+    level = GroundSlope((0.0001, 0.0), (0.005, 0.005))
+    assert level.with_named([bias]) == (bias,)
+    assert level.with_named([Slope(0.02, 0.0)])[0].angle == pytest.approx(0.0201, abs=1e-5)
     assert both.angle == pytest.approx(0.0, abs=1e-12)
     assert ground.with_named([bias]) == (bias, Slope.of_gradient(*ground.gradient))
     assert ground.effects[0].angle == pytest.approx(0.05)
