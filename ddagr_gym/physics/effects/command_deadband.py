@@ -85,8 +85,10 @@ class CommandDeadband(Effect):
     @classmethod
     def probes(cls, extent: DriveExtent) -> tuple[Effect, ...]:
         """A narrow dead zone, and thresholds that show where commands come near them: plain, sticking, of turns."""
-        most = 0.5 * cls.parameter("width").metadata["high"]
-        wide, turn = (min(_USUAL * fastest, most) for fastest in (extent.wheel_speed, extent.turning))
+        width = cls.parameter("width").metadata
+        # of drives that never turn too, whose scans are held against others
+        shares = (_USUAL * fastest for fastest in (extent.wheel_speed, extent.turning))
+        wide, turn = (min(max(share, width["least"]), 0.5 * width["high"]) for share in shares)
         return (
             cls(cls.parameter("width").metadata["step"]),
             cls(wide, 0.0),

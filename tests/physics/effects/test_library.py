@@ -326,3 +326,17 @@ def test_probes_exist_for_the_fastest_and_the_slowest_drives(name):
     for speed in (1e-3, 0.3, 40.0):
         extent = DriveExtent(600.0, (-500.0, 500.0), (-500.0, 500.0), speed, 10.0 * speed)
         assert not any(probe.is_neutral for probe in KINDS[name].probes(extent))
+
+
+STRAIGHT = DriveExtent(duration=60.0, x=(0.0, 5.0), y=(0.0, 0.0), wheel_speed=1.5, wheel_acceleration=3.0, turning=0.0)
+STANDING = DriveExtent(duration=60.0, x=(0.0, 0.0), y=(0.0, 0.0), wheel_speed=0.0, wheel_acceleration=0.0, turning=0.0)
+
+
+@pytest.mark.parametrize("extent", [STRAIGHT, STANDING], ids=["straight", "standing"])
+@pytest.mark.parametrize("name", KINDS)
+def test_drives_that_never_turn_have_the_probes_of_all_others(name, extent):
+    """Scans of several drives are held against each other probe by probe."""
+    kind = KINDS[name]
+    assert not any(probe.is_neutral for probe in kind.probes(extent))
+    if name not in ("soil_patch", "motor_saturation"):  # theirs lie where the drive was, and below what it reached
+        assert [p.shape_names() for p in kind.probes(extent)] == [p.shape_names() for p in kind.probes(EXTENT)]
