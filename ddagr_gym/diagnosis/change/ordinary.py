@@ -72,6 +72,12 @@ class GroundSlope:
         """As missing physics of a robot that is taken to stand level."""
         return (Slope.of_gradient(*self.gradient),)
 
+    @property
+    def turned(self) -> GroundSlope:
+        """The same in axes that may be any."""
+        x, y = np.hypot(np.hypot(*self.gradient), self.deviations).tolist()
+        return GroundSlope((0.0, 0.0), (x, y))
+
     def with_named(self, effects: Sequence[Effect]) -> tuple[Effect, ...]:
         """Named effects on this ground: a slope among them comes on top of it; one too small to matter is left out."""
         further = [e.gradient for e in effects if isinstance(e, Slope)]
@@ -299,8 +305,15 @@ class OrdinaryRobot:
         )
 
     def seen_by(self, recordings: Sequence[Recording]) -> OrdinaryRobot:
-        """The same for drives that may not know where they head: a slope has no direction in them."""
-        return self if self.slope is None or in_one_frame(recordings) else replace(self, slope=None)
+        """The same for drives that may not know where they head.
+
+        In a drive without headings the ground slopes as steeply as before, in a direction that is not known; of several
+        of them, or of stretches in frames of their own, nothing is said of it.
+        """
+        if self.slope is None or in_one_frame(recordings):
+            return self
+        alone = len(recordings) == 1 and not frames_apart(recordings[0])
+        return replace(self, slope=self.slope.turned if alone else None)
 
     def comparison(self, ground: str) -> Comparison:
         """What drives on a ground that is known or ("") not are compared with."""

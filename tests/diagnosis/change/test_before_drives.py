@@ -106,6 +106,9 @@ def test_a_drive_without_headings_tells_no_slope():
     known = OrdinaryRobot(ROBOT, {}, (), {}, None, (), slope=GroundSlope((0.06, 0.0), (0.01, 0.01)))
     assert known.seen_by([level]) is known
     assert known.seen_by([level, blind]).known == ()
+    alone = known.seen_by([blind]).slope
+    assert alone.gradient == (0.0, 0.0)
+    assert alone.deviations == (pytest.approx(np.hypot(0.06, 0.01)),) * 2
 
 
 def test_a_slope_that_is_named_comes_on_top_of_that_before():
