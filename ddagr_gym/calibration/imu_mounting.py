@@ -262,7 +262,7 @@ def _tilt(name: str, whole: _Fit, groups: Integers) -> MountingSize:
     """The tilt that all drives have in common; what differs between them is their ground."""
     axis, sign = TILTS[name]
     found = sign * np.array([whole.biases[g][axis] for g in groups.tolist()]) / STANDARD_GRAVITY
-    half = _quantile(len(found) - 1) * float(found.std(ddof=1)) / np.sqrt(len(found))
+    half = float(_quantile(len(found) - 1) * found.std(ddof=1) / np.sqrt(len(found)))
     value = float(found.mean())
     kept = abs(value) >= LEAST[name] and abs(value) > half
     interval = (value - half, value + half)
