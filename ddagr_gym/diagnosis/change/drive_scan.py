@@ -6,7 +6,7 @@ drive, so that drives can be compared.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -21,7 +21,7 @@ from ddagr_gym.diagnosis.search.sensor_effects import record_drives
 from ddagr_gym.identification.effect_parameters import effect_columns, effect_parameters
 from ddagr_gym.identification.gauss_newton import Fitted
 from ddagr_gym.identification.problem import Problem
-from ddagr_gym.physics.effects import Effect
+from ddagr_gym.physics.effects import DriveExtent, Effect
 from ddagr_gym.physics.effects.registry import effect_kinds
 
 Array = NDArray[np.float64]
@@ -69,12 +69,17 @@ def _least_information(probe: Effect) -> float:
     return float((away / probe.reach(name)) ** 2)
 
 
-def _compared(candidate: Candidate, number: int) -> Compared | None:
-    """A candidate with its keys; None for one that belongs to a time of the drive."""
-    for probe in candidate.probes:
-        onset = probe.as_mapping()["parameters"].get("onset")
-        if onset is not None and onset != probe.parameter("onset").default:
-            return None
+def _of_any_drive(kind: type[Effect]) -> list[Effect]:
+    """Probes that every drive has: those of two drives that differ in all respects."""
+    one = DriveExtent()
+    other = DriveExtent(0.717 * one.duration, (-9.0, -1.0), (-8.0, -2.0), 0.7, 1.3, 0.3, 170.0)
+    return [probe for probe in kind.probes(one) if probe in kind.probes(other)]
+
+
+def _compared(candidate: Candidate, number: int, usual: Sequence[Effect]) -> Compared | None:
+    """A candidate with its keys; None for one whose probes belong to the drive: to a time of it, or to its speeds."""
+    if candidate.has_sizes and not all(probe in usual for probe in candidate.probes):
+        return None
     keys = tuple(f"{candidate.name} {number + k}" for k in range(len(candidate.probes)))
     return Compared(candidate, keys)
 
@@ -93,9 +98,9 @@ def library(problem: Problem, fitted: Fitted) -> tuple[Compared, ...]:
     for name, kind in effect_kinds().items():
         if name in NOT_COMPARED or name in assumed or (kind.needs_one_frame and apart):
             continue
-        number = 0
+        number, usual = 0, _of_any_drive(kind)
         for candidate in candidates_of(kind, extent, 0):
-            item = _compared(candidate, number)
+            item = _compared(candidate, number, usual)
             number += len(candidate.probes)
             found += [] if item is None else [item]
     return tuple(found)
