@@ -22,22 +22,16 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.blind_cases import SEEDS, SET, Answer, answers_to, diagnosed, idle_cases
 from benchmarks.concealed.cases import Case, plan
-from benchmarks.concealed.simulate import simulate_case
 from benchmarks.concealed_names import any_right, rightly_named
-from benchmarks.mid_drive_drives import as_recording
-from ddagr_gym.api.diagnose import diagnose
 from ddagr_gym.errors import InputError
 from ddagr_gym.files import write_json
-from ddagr_gym.presets import get_robot
 from ddagr_gym.recordings.files import write_atomically
 from ddagr_gym.rendering import palette
 from ddagr_gym.reporting.figures import house_style
-from ddagr_gym.tasks import ResultStore, Task, TaskRunner, run_tasks
 
 RESULT = Path(__file__).resolve().parent / "results" / "effect_forms.json"
-SET = "ninth"
-SEEDS = (2001, 2002, 2003, 2004)
 FORMS = (
     "multipass/alignment",
     "multipass/rut map",
@@ -58,8 +52,6 @@ LOOKS = {
     "nothing": ("no name", ".", "black"),
 }
 """Words, marker and colour by :func:`kind_of_answer`."""
-
-Answer = dict[str, Any]
 
 
 def forms_of(case: Case) -> list[str]:
@@ -84,8 +76,7 @@ def cases(forms: Sequence[str], seeds: Sequence[int], nulls: int) -> list[tuple[
     if absent := sorted(wanted - known):
         raise InputError(f"no case has the form {absent[0]!r}: choose from {', '.join(sorted(known))}, or all.")
     found = [(seed, case) for seed, case in asked if not wanted.isdisjoint(forms_of(case))]
-    idle = [(seeds[0], case) for case in plan(SET, seeds[0]) if case.kind.endswith("null")]
-    return found + idle[:nulls]
+    return found + idle_cases(seeds[0], nulls)
 
 
 def answer(seed: int, case: Case) -> Answer:
@@ -95,10 +86,7 @@ def answer(seed: int, case: Case) -> Answer:
         seed: of its set.
         case: of it.
     """
-    logs, label = simulate_case(case, seed)
-    robot = get_robot("ddagr")
-    drives = [as_recording(log, robot, run) for run, log in logs.items()]
-    found = diagnose(drives, robot=robot, soil="thesis_a1", names_only=True).outcome.diagnosis
+    found, label = diagnosed(seed, case)
     return {
         "case": f"{seed} {case.name}",
         "kind": case.kind,
@@ -193,9 +181,7 @@ def main(words: Sequence[str] | None = None) -> None:
         chosen = cases(given.forms, given.seeds, given.nulls)
     except InputError as error:
         parser.error(str(error))
-    tasks = [Task(f"{s} {c.name}", answer, (s, c), key=f"{s}-{c.name}") for s, c in chosen]
-    with TaskRunner(given.workers) as runner:
-        answers = run_tasks(tasks, "cases", runner, ResultStore(given.parts))
+    answers = answers_to(chosen, answer, given.workers, given.parts)
     counts = summary(answers)
     write_json(given.output, {"command": "python -m benchmarks.effect_forms", "summary": counts, "answers": answers})
     draw(answers, given.output.with_suffix(".png"))

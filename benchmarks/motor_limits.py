@@ -18,34 +18,25 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.blind_cases import SEEDS, SET, Answer, answers_to, diagnosed, idle_cases
 from benchmarks.concealed.cases import Case, plan
-from benchmarks.concealed.simulate import simulate_case
-from benchmarks.mid_drive_drives import as_recording
-from ddagr_gym.api.diagnose import diagnose
 from ddagr_gym.files import write_json
-from ddagr_gym.presets import get_robot
 from ddagr_gym.recordings.files import write_atomically
 from ddagr_gym.rendering import palette
 from ddagr_gym.reporting.figures import house_style
-from ddagr_gym.tasks import ResultStore, Task, TaskRunner, run_tasks
 
 RESULT = Path(__file__).resolve().parent / "results" / "motor_limits.json"
-SET = "ninth"
-SEEDS = (2001, 2002, 2003, 2004)
 NAME, FORMS = "motor_saturation", ("torque limit", "power limit", "current folds back")
 LIMITS = ("torque_limit", "power_limit")
 NULLS = 12
 """Cases of the first seed in which nothing is missing."""
 ENCODERS = ("encoder_right", "encoder_left")
 
-Answer = dict[str, Any]
-
 
 def cases(seeds: Sequence[int]) -> list[tuple[int, Case]]:
     """Seed and case, those in which nothing is missing last."""
     weak = [(seed, case) for seed in seeds for case in plan(SET, seed) if _is_weak(case)]
-    nulls = [(seeds[0], case) for case in plan(SET, seeds[0]) if case.kind.endswith("null")]
-    return weak + nulls[:NULLS]
+    return weak + idle_cases(seeds[0], NULLS)
 
 
 def _is_weak(case: Case) -> bool:
@@ -59,10 +50,7 @@ def answer(seed: int, case: Case) -> Answer:
         seed: of its set.
         case: of it.
     """
-    logs, label = simulate_case(case, seed)
-    robot = get_robot("ddagr")
-    drives = [as_recording(log, robot, run) for run, log in logs.items()]
-    found = diagnose(drives, robot=robot, soil="thesis_a1", names_only=True).outcome.diagnosis
+    found, label = diagnosed(seed, case)
     misfit = found.misfit
     return {
         "case": f"{seed} {case.name}",
@@ -162,9 +150,7 @@ def main(words: Sequence[str] | None = None) -> None:
     parser.add_argument("--output", type=Path, default=RESULT, help="JSON; the picture has the same name")
     parser.add_argument("--workers", type=int, default=2)
     given = parser.parse_args(words)
-    tasks = [Task(f"{s} {c.name}", answer, (s, c), key=f"{s}-{c.name}") for s, c in cases(given.seeds)]
-    with TaskRunner(given.workers) as runner:
-        answers = run_tasks(tasks, "cases", runner, ResultStore(given.parts))
+    answers = answers_to(cases(given.seeds), answer, given.workers, given.parts)
     counts = summary(answers)
     write_json(given.output, {"command": "python -m benchmarks.motor_limits", "summary": counts, "answers": answers})
     draw(answers, given.output.with_suffix(".png"))

@@ -23,7 +23,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -53,6 +53,7 @@ from ddagr_gym.diagnosis.preprocessing.mended_recordings import mend_recordings
 from ddagr_gym.diagnosis.result.detectable import least_multiple
 from ddagr_gym.diagnosis.wording import title
 from ddagr_gym.files import write_json
+from ddagr_gym.identification.parameters import ModelParameter
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.schema import Recording
@@ -136,23 +137,22 @@ def pair_of(number: int, robot: Robot, soil: Soil) -> dict[str, Any]:
     joint = joint_fit(mend_recordings([before]), robot, soil, WINDOW, np.random.default_rng(number), 1)
     scans = [_scan(joint, drive) for drive in (before, after, elsewhere)]
     same = _differences(scans[0], scans[1], None)
-    wide = uncertain_parameters(joint.soil, day_parameters(joint.robot), None, joint.weighing, 1, _slopes(joint))
+    wide = _uncertain(joint, None)
     other = _differences(scans[0], scans[2], np.array([p.prior for p in wide]))
     return {"pair": number, "kind": KINDS[number % len(KINDS)], SAME: same, OTHER: other}
 
 
 def _scan(joint: JointFit, drive: Recording) -> DriveScan:
     windows = change_windows(mend_recordings([drive]).recordings, joint.robot, joint.weighing)
-    parameters = uncertain_parameters(
-        joint.soil, day_parameters(joint.robot), joint.same_ground, joint.weighing, 1, _slopes(joint)
-    )
+    parameters = _uncertain(joint, joint.same_ground)
     known = () if joint.slope is None else joint.slope.effects
     problem = change_problem(joint.robot, joint.soil, windows, parameters, joint.weighing, 1, known)
     return scan_drive(problem, fit_nominal(problem))
 
 
-def _slopes(joint: JointFit) -> tuple[float, ...]:
-    return () if joint.slope is None else joint.slope.deviations
+def _uncertain(joint: JointFit, soil: Mapping[str, float] | None) -> tuple[ModelParameter, ...]:
+    slopes = () if joint.slope is None else joint.slope.deviations
+    return uncertain_parameters(joint.soil, day_parameters(joint.robot), soil, joint.weighing, 1, slopes)
 
 
 def _priors(scan: DriveScan, deviations: Array | None) -> Priors | None:

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -141,20 +142,26 @@ def mounting_from(readings: Readings) -> ImuMounting:
         readings: of drives, or of the halves of one.
     """
     groups = np.unique(readings.group)
+
+    @cache
+    def without(group: int | None, parts: frozenset[str]) -> _Fit:
+        """Fit of some parts without one of the groups; of all of them for None."""
+        return _Fit.of(readings if group is None else readings.chosen(readings.group != group), parts)
+
     kept: frozenset[str] = frozenset((YAW, PLACE))
     decided: dict[str, tuple[float, float]] = {}
     for part in (YAW, PLACE):
-        decided[part] = _growth(readings, kept, part)
+        decided[part] = _growth(readings, without, kept, part)
         mean, error = decided[part]
-        values = _Fit.of(readings, kept).values
+        values = without(None, kept).values
         large = any(abs(values[name]) >= LEAST[name] for name, (own, _) in SIZES.items() if own == part)
         if not (large and mean > surely_above(groups.size) * error):
             kept -= {part}
-    whole = _Fit.of(readings, kept)
-    without = [_Fit.of(readings.chosen(readings.group != g), kept) for g in groups]
-    sizes = [_size(name, whole, without, kept, decided) for name in SIZES]
+    whole = without(None, kept)
+    left_out = [without(group, kept) for group in groups.tolist()]
+    sizes = [_size(name, whole, left_out, kept, decided) for name in SIZES]
     tilts = [_tilt(name, whole, groups) for name in TILTS]
-    before = _Fit.of(readings, frozenset())
+    before = without(None, frozenset())
     return ImuMounting((*sizes, *tilts), len(readings.group), before.left, whole.left)
 
 
@@ -222,13 +229,14 @@ def _scale(residual: Array) -> float:
     return max(float(MAD_TO_DEVIATION * np.median(away)), 1e-6)
 
 
-def _growth(readings: Readings, parts: frozenset[str], part: str) -> tuple[float, float]:
+def _growth(
+    readings: Readings, without: Callable[[int, frozenset[str]], _Fit], parts: frozenset[str], part: str
+) -> tuple[float, float]:
     """Mean growth over groups of the loss of left-out ones without a part, and its standard error."""
     growth = []
-    for group in np.unique(readings.group):
-        out = readings.group == group
-        fits = [_Fit.of(readings.chosen(~out), chosen) for chosen in (parts, parts - {part})]
-        losses = [_left_out_loss(readings.chosen(out), fit, fits[0].scale) for fit in fits]
+    for group in np.unique(readings.group).tolist():
+        fits = [without(group, chosen) for chosen in (parts, parts - {part})]
+        losses = [_left_out_loss(readings.chosen(readings.group == group), fit, fits[0].scale) for fit in fits]
         growth.append(losses[1] / losses[0] - 1.0)
     return float(np.mean(growth)), float(np.std(growth, ddof=1) / np.sqrt(len(growth)))
 
@@ -240,7 +248,7 @@ def _left_out_loss(readings: Readings, fit: _Fit, scale: float) -> float:
 
 
 def _size(
-    name: str, whole: _Fit, without: Sequence[_Fit], kept: frozenset[str], decided: dict[str, tuple[float, float]]
+    name: str, whole: _Fit, left_out: Sequence[_Fit], kept: frozenset[str], decided: dict[str, tuple[float, float]]
 ) -> MountingSize:
     """A size with its interval, by the larger of two deviations: over the groups, and of independent readings.
 
@@ -250,7 +258,7 @@ def _size(
     growth, error = decided[part]
     if part not in kept:
         return MountingSize(name, unit, 0.0, None, False, growth, error, HELPS[part])
-    jackknife = np.array([fit.values[name] for fit in without])
+    jackknife = np.array([fit.values[name] for fit in left_out])
     count = len(jackknife)
     deviation = float(np.sqrt((count - 1) / count * ((jackknife - jackknife.mean()) ** 2).sum()))
     half = max(_quantile(count - 1) * deviation, _quantile(np.inf) * whole.deviations[name])

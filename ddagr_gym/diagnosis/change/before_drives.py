@@ -15,15 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.diagnosis.change.drive_fit import change_problem, change_windows, fit_nominal, misfit_of_compared
+from ddagr_gym.diagnosis.change.ground_slope import GroundSlope, in_one_frame
 from ddagr_gym.diagnosis.change.measured_scatter import measured_scatter
 from ddagr_gym.diagnosis.change.ordinary import (
     LEAST_ACCELEROMETER_BIAS,
     LEAST_GYRO_BIAS,
-    GroundSlope,
     OrdinaryRobot,
     Reference,
     Weighing,
-    in_one_frame,
     uncertain_parameters,
 )
 from ddagr_gym.diagnosis.change.reference import OrdinaryDrive, scan_pieces

@@ -20,10 +20,11 @@ from ddagr_gym.diagnosis.answer.change import (
 )
 from ddagr_gym.diagnosis.answer.verdict import NONE, UNKNOWN, Diagnosis, Estimate, Finding, GatesUsed, Options
 from ddagr_gym.diagnosis.change.drive_scan import NAMED, NOT_COMPARED
+from ddagr_gym.diagnosis.change.ground_slope import GroundSlope
 from ddagr_gym.diagnosis.change.left_out import probability_of_ordinary
 from ddagr_gym.diagnosis.change.model import FORM, Model
 from ddagr_gym.diagnosis.change.naming import Named, Step
-from ddagr_gym.diagnosis.change.ordinary import GroundSlope, OrdinaryRobot
+from ddagr_gym.diagnosis.change.ordinary import OrdinaryRobot
 from ddagr_gym.diagnosis.change.shifts import LEVEL, POWER, Pull, Shift, family_probability, sizes_of
 from ddagr_gym.diagnosis.preprocessing.mended_recordings import MendedRecordings
 from ddagr_gym.diagnosis.result.conclusion import data_source, reversed_gyro_findings

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.diagnosis.change.expected_scatter import EXPECTED_DRIVES, ExpectedScatter
+from ddagr_gym.diagnosis.change.ground_slope import GroundSlope, in_one_frame
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.nuisances import NuisancePriors
 from ddagr_gym.identification.parameters import (
@@ -22,7 +23,6 @@ from ddagr_gym.identification.parameters import (
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.effects.registry import effect_kinds
-from ddagr_gym.physics.effects.slope import Slope
 from ddagr_gym.recordings.pose_frames import frames_apart
 from ddagr_gym.recordings.schema import Recording
 
@@ -53,43 +53,6 @@ class SensorBias:
     drive: str
     ground: str
     value: Array
-
-
-@dataclass(frozen=True)
-class GroundSlope:
-    """Slope of the ground of drives from before.
-
-    Attributes:
-        gradient: along the world's axes x and y [-].
-        deviations: of another drive's on the same ground from it.
-    """
-
-    gradient: tuple[float, float]
-    deviations: tuple[float, float]
-
-    @property
-    def effects(self) -> tuple[Slope]:
-        """As missing physics of a robot that is taken to stand level."""
-        return (Slope.of_gradient(*self.gradient),)
-
-    @property
-    def turned(self) -> GroundSlope:
-        """The same in axes that may be any."""
-        x, y = np.hypot(np.hypot(*self.gradient), self.deviations).tolist()
-        return GroundSlope((0.0, 0.0), (x, y))
-
-    def with_named(self, effects: Sequence[Effect]) -> tuple[Effect, ...]:
-        """Named effects on this ground: a slope among them comes on top of it; one too small to matter is left out."""
-        further = [e.gradient for e in effects if isinstance(e, Slope)]
-        if not further and not self.matters:
-            return tuple(effects)
-        x, y = np.add(self.gradient, np.sum(further, axis=0))
-        return (*(e for e in effects if not isinstance(e, Slope)), Slope.of_gradient(float(x), float(y)))
-
-    @property
-    def matters(self) -> bool:
-        """Whether anybody would care."""
-        return self.effects[0].angle >= float(Slope.parameter("angle").metadata["least"])
 
 
 @dataclass(frozen=True, eq=False)
@@ -397,11 +360,6 @@ def uncertain_parameters(
     made = kind if deviations is None else tuple(replace(p, prior=deviations[p.name]) for p in kind)
     ground = (*made, *(slope_parameters(slopes) if slopes else ()))
     return (*ground, *robot, *sensor_parameters(recordings, weighing.gyro_bias, weighing.accelerometer_bias))
-
-
-def in_one_frame(recordings: Sequence[Recording]) -> bool:
-    """Whether directions mean the same in all drives: they have headings, each in one frame."""
-    return all(recording.has("pose_yaw") and not frames_apart(recording) for recording in recordings)
 
 
 def of_another_logger(robot: Sequence[ModelParameter], period: float) -> tuple[ModelParameter, ...]:

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from ddagr_gym.diagnosis.change.drive_fit import change_problem, change_windows, fit_nominal, moved_parameters
 from ddagr_gym.diagnosis.change.drive_scan import DriveScan, Priors, scan_drive
+from ddagr_gym.diagnosis.change.ground_slope import GroundSlope
 from ddagr_gym.diagnosis.change.left_out import left_out_losses
-from ddagr_gym.diagnosis.change.ordinary import GroundSlope, Reference, Weighing, uncertain_parameters
+from ddagr_gym.diagnosis.change.ordinary import Reference, Weighing, uncertain_parameters
 from ddagr_gym.identification.misfit import channel_misfit
 from ddagr_gym.identification.parameters import ModelParameter
 from ddagr_gym.parameters import Robot, Soil

@@ -17,8 +17,9 @@ from ddagr_gym.diagnosis.change.before_drives import (
     joint_fit,
     robot_of_before,
 )
+from ddagr_gym.diagnosis.change.ground_slope import GroundSlope
 from ddagr_gym.diagnosis.change.measured_scatter import measured_scatter
-from ddagr_gym.diagnosis.change.ordinary import GroundSlope, OrdinaryRobot, Reference
+from ddagr_gym.diagnosis.change.ordinary import OrdinaryRobot, Reference
 from ddagr_gym.diagnosis.change.run import what_changed_since
 from ddagr_gym.diagnosis.preprocessing.mended_recordings import mend_recordings
 from ddagr_gym.diagnosis.result.files import as_mapping, validate
