@@ -36,6 +36,19 @@ def channel_misfit(problem: Problem, fitted: Fitted) -> dict[str, float]:
     return found | {name: float(value) for name, value in zip(names, local, strict=True)}
 
 
+def channel_scatter(problem: Problem, fitted: Fitted) -> dict[str, float]:
+    """Relative standard error of :func:`channel_misfit` by the scatter of windows, of every channel with samples."""
+    blocked = problem.blocked
+    residual = projected_residual(problem, fitted)
+    squares = (blocked.by_channel(residual) ** 2).sum(axis=1)
+    found = {}
+    for k, name in enumerate(CHANNELS):
+        here = squares[blocked.by_channel(blocked.mask)[..., k].any(axis=1), k]
+        if here.size > 1 and here.mean() > 0.0:
+            found[name] = float(here.std(ddof=1) / (here.mean() * np.sqrt(here.size)))
+    return found
+
+
 def dispersion_of(problem: Problem, fitted: Fitted) -> float:
     """Mean square of the weighted residuals of the fit, at least 1 (theory: diagnosis, eq. (1))."""
     unknowns: int = fitted.elimination.basis.shape[2] * problem.blocked.windows.count

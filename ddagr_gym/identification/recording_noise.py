@@ -24,6 +24,9 @@ TIMING_PIECE = 10.0
 LEAST_CORRELATION = 0.5
 """Correlation of gyro and poses below which nothing is known of their clocks (ours)."""
 
+SURE = 2.0
+"""Standard deviations by which the growth of a heading's error with the yaw rate must stand out (ours)."""
+
 WIDEST_LATENESS = 0.8
 """Width of the interval of the poses' lateness [s] beyond which it is not known (ours)."""
 
@@ -102,9 +105,28 @@ def _timing(recording: Recording, lateness: float) -> tuple[float, float]:
         rates.append(np.interp(at, recording.t[span], np.nan_to_num(recording["yaw_rate"][span])))
     if not misfits:
         return 0.0, 0.0
-    scatter = float(np.sqrt(np.mean(np.concatenate(misfits) ** 2)))
-    rate = float(np.sqrt(np.mean(np.concatenate(rates) ** 2)))
-    return (scatter / rate if rate > INSTRUMENT_NOISE["yaw_rate"] else 0.0), scatter
+    square, rate = np.concatenate(misfits) ** 2, np.concatenate(rates)
+    return _jitter(square, rate), float(np.sqrt(np.mean(square)))
+
+
+def _jitter(square: Array, rate: Array) -> float:
+    """Scatter of the time of headings [s]: errors that it makes grow with the yaw rate, those of a compass do not.
+
+    0 where the yaw rate hardly varies, or the growth is not sure: in a straight drive a heading's noise would pass for
+    any scatter of its time.
+
+    Args:
+        square: (n,) squared errors of the heading [rad^2].
+        rate: (n,) yaw rates [rad/s].
+    """
+    turning = rate**2 - np.mean(rate**2)
+    power = float(turning @ turning)
+    if square.size < 4 or power == 0.0:
+        return 0.0
+    slope = float(turning @ square) / power
+    rest = square - square.mean() - slope * turning
+    deviation = float(np.sqrt(((turning * rest) ** 2).sum())) / power
+    return float(np.sqrt(slope)) if slope > SURE * deviation else 0.0
 
 
 def _pieces(recording: Recording, seconds: float) -> Iterator[slice]:

@@ -58,6 +58,38 @@ def test_the_lateness_of_poses_is_found(moving, lateness):
     assert not found.opposed
 
 
+def _with_poses(make_recording, scatter, compass, turning):
+    """Poses whose time scatters and whose heading is noisy, of a drive of 200 s at 1 m/s that turns so fast [rad/s]."""
+    rng = np.random.default_rng(7)
+    t = np.arange(0.0, 200.0, 0.05)
+    rate = turning * np.repeat(rng.uniform(-1.0, 1.0, 40), 100)
+    heading = (np.cumsum(rate) - 0.5 * rate) * 0.05
+    known = np.arange(t.size) % 4 == 0
+    read = np.interp(t + scatter * rng.normal(size=t.size), t, heading) + compass * rng.normal(size=t.size)
+    return make_recording(
+        seconds=200.0,
+        yaw_rate=rate + rng.normal(0.0, 0.002, t.size),
+        encoder_right=np.full(t.size, 4.0),
+        encoder_left=np.full(t.size, 4.0),
+        pose_x=np.where(known, t, np.nan),
+        pose_y=np.where(known, 0.0, np.nan),
+        pose_yaw=np.where(known, np.angle(np.exp(1j * read)), np.nan),
+    )
+
+
+def test_the_scatter_of_the_poses_time_is_told_from_the_noise_of_their_heading(make_recording):
+    found = recording_noise(_with_poses(make_recording, 0.1, 0.01, 1.0), np.random.default_rng(1))
+    assert found.pose_jitter == pytest.approx(0.1, rel=0.25)
+    assert found.channels["pose_x"].sigma == pytest.approx(0.1, rel=0.25)
+
+
+@pytest.mark.parametrize("turning", [1.0, 0.02, 0.0])
+def test_a_noisy_compass_says_nothing_of_the_time_and_so_of_places(make_recording, turning):
+    found = recording_noise(_with_poses(make_recording, 0.0, 0.01, turning), np.random.default_rng(1))
+    assert found.channels["pose_x"].sigma < 0.05
+    assert found.channels["pose_yaw"].sigma == pytest.approx(0.01, rel=0.2)
+
+
 def test_a_gyro_against_the_poses_is_noticed(moving):
     assert recording_noise(moving(sign=-1.0), np.random.default_rng(1)).opposed
 

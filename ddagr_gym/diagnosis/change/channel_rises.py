@@ -5,7 +5,9 @@ has the mean m in n ordinary drives, and a deviation s that is drawn towards the
 
     s^2 = (d0 F_c^2 + sum (ln r_ci - m)^2)/(d0 + n - 1),    t = (ln r_c - m)/(s sqrt(1 + 1/n)),                     (1)
 
-and t is compared with Student's distribution of d0 + n - 1 degrees of freedom, to one side: less is no change.
+and t is compared with Student's distribution of d0 + n - 1 degrees of freedom, to one side: less is no change. Where
+the windows of ordinary drives say that r_c itself is known less well, their relative standard error stands for s: what
+a model lacks before as after shows more in one manoeuvre than in another.
 """
 
 from __future__ import annotations
@@ -56,7 +58,10 @@ class ChannelRise:
 
 
 def channel_rises(
-    misfit: Mapping[str, float], ordinary: Sequence[Mapping[str, float]], expected: ExpectedScatter
+    misfit: Mapping[str, float],
+    ordinary: Sequence[Mapping[str, float]],
+    expected: ExpectedScatter,
+    errors: Sequence[Mapping[str, float]] = (),
 ) -> tuple[ChannelRise, ...]:
     """Rises of all channels that the drive and ordinary ones have; none without ordinary drives.
 
@@ -64,6 +69,7 @@ def channel_rises(
         misfit: mean square by channel that a fit leaves of the drive.
         ordinary: the same of each ordinary drive.
         expected: scatter before any data.
+        errors: relative standard errors of the ordinary drives' mean squares by channel.
     """
     found = []
     for name, value in misfit.items():
@@ -72,6 +78,8 @@ def channel_rises(
             continue
         degrees = expected.degrees + known.size - 1.0
         square = expected.degrees * expected.rise(name) ** 2 + float(((known - known.mean()) ** 2).sum())
-        deviation = float(np.sqrt(square / degrees * (1.0 + 1.0 / known.size)))
+        within = [item[name] ** 2 for item in errors if name in item]
+        square = max(square / degrees, float(np.mean(within)) if within else 0.0)
+        deviation = float(np.sqrt(square * (1.0 + 1.0 / known.size)))
         found.append(ChannelRise(name, float(np.exp(known.mean())), value, deviation, degrees))
     return tuple(found)

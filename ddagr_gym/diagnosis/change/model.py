@@ -134,7 +134,7 @@ def model_of(problem: Problem, fitted: Fitted, ordinary: Comparison, named: Sequ
         for name, moved in moved_parameters(problem, fitted).items()
     )
     misfit = {name: value for name, value in channel_misfit(problem, fitted).items() if name in CHANNELS}
-    rises = channel_rises(misfit, ordinary.misfits, ordinary.expected)
+    rises = channel_rises(misfit, ordinary.misfits, ordinary.expected, ordinary.misfit_errors)
     return Model(problem, fitted, scan, tuple(shifts), pulls, tuple(named), rises)
 
 

@@ -150,6 +150,7 @@ class Comparison:
         unnamed: effects that cannot be what changed, with the reason.
         moved: by how many of its prior deviations the fit to each ordinary drive moved every parameter.
         misfits: mean square of what fits leave of the channels of each drive from before on the same ground; else none.
+        misfit_errors: relative standard errors of these by the windows of the drive.
     """
 
     drives: tuple[Scores, ...]
@@ -158,6 +159,7 @@ class Comparison:
     unnamed: Mapping[str, str] = field(default_factory=dict)
     moved: tuple[Mapping[str, float], ...] = ()
     misfits: tuple[Mapping[str, float], ...] = ()
+    misfit_errors: tuple[Mapping[str, float], ...] = ()
 
     @property
     def degrees(self) -> float:
@@ -196,6 +198,7 @@ class Reference:
         moved: by how many of its prior deviations the fit moved every parameter; none in files of before.
         column_map: by which it was read; "" where that is not known.
         misfit: mean square of what the fit leaves of each channel; none in files of calibrations.
+        misfit_error: relative standard error of that by the windows.
     """
 
     drive: str
@@ -209,6 +212,7 @@ class Reference:
     moved: Mapping[str, float] = field(default_factory=dict)
     column_map: str = ""
     misfit: Mapping[str, float] = field(default_factory=dict)
+    misfit_error: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -283,14 +287,12 @@ class OrdinaryRobot:
         moved, new = tuple(item.moved for item in self.references), dict.fromkeys(self._unscanned, NEWER)
         if ground:
             drives, pieces = ([item.known_ground for item in found] for found in (self.references, self.pieces))
-            return Comparison(tuple(drives), tuple(pieces), self.known_scatter, new, moved, self._misfits)
+            # of calibrations' drives, on several grounds, it is not known how far channels differ between grounds
+            known = [item for item in self.references if item.misfit] if self.given else []
+            misfits, errors = tuple(item.misfit for item in known), tuple(item.misfit_error for item in known)
+            return Comparison(tuple(drives), tuple(pieces), self.known_scatter, new, moved, misfits, errors)
         drives, pieces = ([item.other_ground for item in found] for found in (self.references, self.pieces))
         return Comparison(tuple(drives), tuple(pieces), self.other_scatter, {**self.unnamed, **new}, moved)
-
-    @property
-    def _misfits(self) -> tuple[Mapping[str, float], ...]:
-        """Of drives from before on the same ground: how far channels differ between grounds is not known."""
-        return tuple(item.misfit for item in self.references if item.misfit) if self.given else ()
 
     @property
     def _unscanned(self) -> list[str]:

@@ -13,7 +13,7 @@ from ddagr_gym.diagnosis.change.drive_scan import DriveScan, Priors, scan_drive
 from ddagr_gym.diagnosis.change.ground_slope import GroundSlope
 from ddagr_gym.diagnosis.change.left_out import left_out_losses
 from ddagr_gym.diagnosis.change.ordinary import Reference, Weighing, uncertain_parameters
-from ddagr_gym.identification.misfit import channel_misfit
+from ddagr_gym.identification.misfit import channel_misfit, channel_scatter
 from ddagr_gym.identification.parameters import ModelParameter
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.recordings.schema import Recording
@@ -84,6 +84,7 @@ def scan_pieces(drive: OrdinaryDrive, weighing: Weighing, most: int, threads: in
         _reference(drive, scan, other, left_out_losses(problem, fitted)),
         moved=moved_parameters(problem, fitted),
         misfit=channel_misfit(problem, fitted),
+        misfit_error=channel_scatter(problem, fitted),
     )
     pieces = scan.pieces(most)
     return [whole, *(_reference(drive, piece, other, np.zeros(0)) for piece in pieces if len(pieces) > 1)]

@@ -54,6 +54,15 @@ def test_false_alarms_keep_their_level():
     assert np.mean(np.array(probabilities) < 0.05) == pytest.approx(0.05, abs=0.015)
 
 
+def test_ordinary_drives_whose_windows_differ_say_less_of_their_mean():
+    errors = [{"yaw_rate": 0.5}, {"yaw_rate": 0.4}, {"pose_x": 9.0}]
+    (plain,) = channel_rises({"yaw_rate": 2.0}, BEFORE, EXPECTED)
+    (wide,) = channel_rises({"yaw_rate": 2.0}, BEFORE, EXPECTED, errors)
+    assert wide.deviation == pytest.approx(np.sqrt((0.5**2 + 0.4**2) / 2.0 * (1.0 + 1.0 / 3.0)))
+    (same,) = channel_rises({"yaw_rate": 2.0}, BEFORE, EXPECTED, [{"yaw_rate": 0.01}])
+    assert same == plain
+
+
 def test_a_channel_that_ordinary_drives_lack_says_nothing():
     assert channel_rises({"yaw_rate": 2.0, "pose_x": 1.0}, [{"encoder_left": 1.0}], EXPECTED) == ()
     assert channel_rises({"yaw_rate": 2.0}, [], EXPECTED) == ()
