@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from ddagr_gym.calibration.calibration_data import CalibrationData
 from ddagr_gym.calibration.joint_fit import FittedModel
+from ddagr_gym.calibration.left_out import folds
 from ddagr_gym.calibration.part_selection import surely_above
 from ddagr_gym.calibration.result import ImuMounting, MountingSize
 from ddagr_gym.identification.least_squares import huber_loss
@@ -84,7 +85,7 @@ class Readings:
     Attributes:
         measured: (N, 2) specific force [m/s^2].
         motion: (N, 4) specific force of the body's origin, yaw acceleration, yaw rate.
-        group: (N,) drive, or half of the only one.
+        group: (N,) drive, or quarter of the only one.
     """
 
     measured: Array
@@ -97,7 +98,7 @@ class Readings:
 
 
 def imu_mounting(data: CalibrationData, model: FittedModel) -> ImuMounting | None:
-    """Mounting of the IMU; None where fewer than two drives, or halves of one, read accelerations.
+    """Mounting of the IMU; None where fewer than two drives, or quarters of one, read accelerations.
 
     Args:
         data: drives.
@@ -118,9 +119,7 @@ def readings_of(data: CalibrationData, model: FittedModel) -> Readings:
     length = max(1, round(BLOCK / windows.period))
     measured, motion = (_means(values, length) for values in (windows.measured[..., columns], record))
     count = measured.shape[1]
-    group = np.repeat(windows.recording, count)
-    if data.count == 1:
-        group = np.repeat(np.arange(windows.count) >= windows.count // 2, count).astype(np.int64)
+    group = np.repeat(folds(data, windows), count)
     measured, motion = measured.reshape(-1, 2), motion.reshape(-1, len(_ENTRIES))
     known = np.isfinite(measured).all(axis=1) & np.isfinite(motion).all(axis=1)
     many = [g for g in np.unique(group) if np.count_nonzero(known & (group == g)) >= FEWEST_READINGS]
@@ -139,7 +138,7 @@ def mounting_from(readings: Readings) -> ImuMounting:
     """Mounting from readings of two groups or more.
 
     Args:
-        readings: of drives, or of the halves of one.
+        readings: of drives, or of the quarters of one.
     """
     groups = np.unique(readings.group)
 
