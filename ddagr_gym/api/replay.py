@@ -139,18 +139,20 @@ def replay(
         True
     """
     from ddagr_gym.physics.effects import load_effects
+    from ddagr_gym.recordings.pose_frames import in_one_frame
     from ddagr_gym.replay_analysis.drive_mode import ReplaySettings
     from ddagr_gym.replay_analysis.run import make_report, replay_run, steps
 
     at_least(threads=(threads, 1), seed=(seed, 0))
+    slopes: tuple[Effect, ...] = ()
     if calibration is not None:
-        robot, soil, known = _calibrated(Path(calibration), ground, robot, soil)
+        robot, soil, known, slopes = _calibrated(Path(calibration), ground, robot, soil)
         effects = (*known, *load_effects(effects))
     elif ground:
         raise InputError(f"the ground is {ground!r} and there is no calibration: name its folder with --calibration.")
     soil = "thesis_a1" if soil is None else soil
-    added = load_effects(effects)
     found = recordings_from(recordings, robot, column_map)
+    added = (*load_effects(effects), *(slopes if in_one_frame(found) else ()))
     nominal = driven_robot(robot, found)
     settings = ReplaySettings(window, refit, added, threads=threads, seed=seed)
     groups = [found] if together else [(recording,) for recording in found]
@@ -161,17 +163,19 @@ def replay(
 
 def _calibrated(
     folder: Path, ground: str, robot: RobotLike | None, soil: SoilLike | None
-) -> tuple[Robot, Path, tuple[Effect, ...]]:
-    """Robot, soil file and sensors of a calibration; InputError where robot or soil are given besides."""
-    from ddagr_gym.calibration.files import load_robot, load_soil, soil_file
+) -> tuple[Robot, Path, tuple[Effect, ...], tuple[Effect, ...]]:
+    """Robot, soil file, sensors and slope of a calibration; InputError where robot or soil are given besides."""
+    from ddagr_gym.calibration.files import load, load_robot, load_soil, soil_file
     from ddagr_gym.envs.calibrated_draws import EFFECTS
     from ddagr_gym.physics.effects import load_effects
+    from ddagr_gym.physics.effects.slope import Slope
 
     if robot is not None or soil is not None:
         given = "robot" if robot is not None else "soil"
         raise InputError(f"a calibration and a {given} are given: leave out one of them, {folder} has both.")
     chosen, _ = load_soil(folder, ground)
-    return load_robot(folder), folder / soil_file(chosen), load_effects(folder / EFFECTS)
+    slopes = tuple(Slope.of_gradient(*item.gradient) for item in load(folder).slopes if item.ground == chosen)
+    return load_robot(folder), folder / soil_file(chosen), load_effects(folder / EFFECTS), slopes
 
 
 def driven_robot(robot: RobotLike | None, recordings: Sequence[Recording]) -> Robot:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ddagr_gym.calibration.ground_slopes import slopes_of
 from ddagr_gym.calibration.settings import HISTORY, CalibrationSettings
+from ddagr_gym.diagnosis.change.ground_slope import GroundSlope
 from ddagr_gym.diagnosis.preprocessing.mended_recordings import mend_recordings
 from ddagr_gym.diagnosis.wording import in_sentence
 from ddagr_gym.errors import InputError
@@ -45,6 +47,7 @@ class CalibrationData:
         windows: all of them, in the order of the drives and of time.
         notes: of each drive, sentences on what was mended.
         currents: how the motors' currents follow, None where none is compared; the windows hold them then.
+        slopes: of the grounds that surely slope.
     """
 
     robot: Robot
@@ -54,6 +57,7 @@ class CalibrationData:
     windows: WindowSet
     notes: tuple[tuple[str, ...], ...]
     currents: CurrentModel | None = None
+    slopes: Mapping[str, GroundSlope] = field(default_factory=dict)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -124,7 +128,8 @@ def prepare_drives(
     windows = with_presumed_past(windows)
     if currents is not None:
         windows = with_currents(windows, prepared.recordings)
-    return CalibrationData(robot, dict(soils), prepared, tuple(grounds), windows, notes, currents)
+    data = CalibrationData(robot, dict(soils), prepared, tuple(grounds), windows, notes, currents)
+    return replace(data, slopes=slopes_of(prepared.recordings, windows, data.drives_on, robot.outer_radius))
 
 
 def _mended(recording: Recording, seed: int) -> tuple[Recording, tuple[str, ...]]:

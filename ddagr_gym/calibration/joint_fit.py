@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from ddagr_gym.identification.parameters import (
     ModelParameter,
     per_group,
     sensor_parameters,
+    slope_parameters,
     soil_entries,
     soil_parameters,
 )
@@ -53,7 +54,7 @@ LAST_ITERATIONS = 12
 """Steps of a fit that begins at the values of another one (ours)."""
 
 OFFSET = "offset_"
-"""Begins the names of parameters that carry the nominal soil of a ground; they are always held."""
+"""Begins the names of parameters that carry the nominal soil and the slope of a ground; they are always held."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,8 +112,11 @@ def complete_model(data: CalibrationData) -> tuple[RobotModel, dict[str, float]]
     """The joint model with all parts, and the values at which parameters that never move are held.
 
     Soils of the grounds differ from the first one's by offsets that are held; what is fitted of a ground acts on top.
+    Slopes that the accelerometers tell are held too.
     """
     offsets, held = _soil_offsets(data)
+    slopes, gradients = _slope_offsets(data)
+    offsets, held = [*offsets, *slopes], held | gradients
     by_ground = [
         per_group(p, {ground: drives})
         for ground, drives in data.drives_on.items()
@@ -139,6 +143,17 @@ def _soil_offsets(data: CalibrationData) -> tuple[list[ModelParameter], dict[str
                 scope = frozenset(drives)
                 parameters.append(ModelParameter(name, "", entry, False, 0.0, 1.0, -np.inf, np.inf, scope))
                 values[name] = float(difference)
+    return parameters, values
+
+
+def _slope_offsets(data: CalibrationData) -> tuple[list[ModelParameter], dict[str, float]]:
+    parameters, values = [], {}
+    for ground, slope in data.slopes.items():
+        scope = frozenset(data.drives_on[ground])
+        for parameter, gradient in zip(slope_parameters((0.0, 0.0)), slope.gradient, strict=True):
+            name = f"{OFFSET}{parameter.name}_{ground}"
+            parameters.append(replace(parameter, name=name, scope=scope))
+            values[name] = gradient
     return parameters, values
 
 

@@ -177,6 +177,7 @@ def _without(
         parameters=parameters,
         deviations=soil_deviations(calibration)[ground],
         reversed_gyro=any(MENDED_SIGN in note for note in data.notes[number]),
+        slope=data.slopes.get(ground),
     )
 
 
@@ -195,12 +196,12 @@ def left_of(item: OrdinaryDrive, blank: Weighing, noise: RecordingNoise, dead: S
     """Weights and biases by a first fit with those of the sensors' noise; workers call it by name."""
     windows = change_windows([item.recording], item.robot, blank)
     weights = noise_weights([noise], windows, imposed=False, dead=dead, unfitted=())
-    parameters = uncertain_parameters(item.soil, item.parameters, item.deviations, blank, 1)
+    parameters = uncertain_parameters(item.soil, item.parameters, item.deviations, blank, 1, item.slopes)
     first = replace(blank, sigma=weights.sigma, robust=weights.robust)
-    problem = change_problem(item.robot, item.soil, windows, parameters, first, threads)
+    problem = change_problem(item.robot, item.soil, windows, parameters, first, threads, item.lying)
     rough = misfit_of_compared(problem.blocked, problem.predict(problem.start()), weights)
     second = replace(blank, sigma=rough.sigma, robust=rough.robust)
-    problem = change_problem(item.robot, item.soil, windows, parameters, second, threads)
+    problem = change_problem(item.robot, item.soil, windows, parameters, second, threads, item.lying)
     fitted = fit_nominal(problem)
     left = misfit_of_compared(problem.blocked, fitted.prediction, weights)
     return _Left(left.sigma[0, 0], left.robust, SensorBias(item.name, item.ground, fitted.point.values[-3:]))

@@ -8,6 +8,7 @@ from pathlib import Path
 from ddagr_gym.calibration.effect_bank import NAME, load_ordinary
 from ddagr_gym.calibration.files import load, load_robot, load_soil
 from ddagr_gym.calibration.ordinary_drives import robot_deviations, soil_deviations, uncertain_robot
+from ddagr_gym.diagnosis.change.ground_slope import GroundSlope
 from ddagr_gym.diagnosis.change.ordinary import OrdinaryRobot
 
 
@@ -32,4 +33,5 @@ def load_ordinary_robot(folder: Path) -> OrdinaryRobot:
         ordinary.references,
         folder.name,
         hashlib.sha256((folder / NAME).read_bytes()).hexdigest(),
+        slopes={item.ground: GroundSlope(item.gradient, item.deviations) for item in calibration.slopes},
     )

@@ -320,6 +320,21 @@ class ImuMounting:
 
 
 @dataclass(frozen=True)
+class SlopeOfGround:
+    """Slope of a ground, by what the accelerometers read beside the motion.
+
+    Attributes:
+        ground: its name.
+        gradient: rise per metre along the axes x and y of the poses [-].
+        deviations: of that of a further drive on it.
+    """
+
+    ground: str
+    gradient: tuple[float, float]
+    deviations: tuple[float, float]
+
+
+@dataclass(frozen=True)
 class Calibration:
     """The whole answer.
 
@@ -342,7 +357,8 @@ class Calibration:
         seed: of resampled intervals.
         seconds: that the calibration took.
         currents: of the motors; None, and not in the file, where none was used.
-        imu: how the IMU is mounted; None where its accelerometer was read in fewer than two drives, or halves of one.
+        imu: how the IMU is mounted; None where its accelerometer was read in fewer than two drives, or quarters of one.
+        slopes: of the grounds that surely slope; the others are taken to be level.
     """
 
     schema: str
@@ -364,6 +380,7 @@ class Calibration:
     seconds: float
     currents: CurrentEvidence | None = None
     imu: ImuMounting | None = None
+    slopes: tuple[SlopeOfGround, ...] = ()
 
     def parameter(self, name: str) -> CalibratedParameter:
         """Parameter by name; KeyError where there is none."""

@@ -35,7 +35,7 @@ from ddagr_gym.calibration.ordinary_drives import Ordinary, ordinary_drives
 from ddagr_gym.calibration.part_selection import Candidate, Comparison, Selection, select_parts
 from ddagr_gym.calibration.parts import RobotModel
 from ddagr_gym.calibration.residual_tables import spectra, unexplained
-from ddagr_gym.calibration.result import SCHEMA, SCHEMA_VERSION, Calibration, Covariance
+from ddagr_gym.calibration.result import SCHEMA, SCHEMA_VERSION, Calibration, Covariance, SlopeOfGround
 from ddagr_gym.calibration.settings import CalibrationSettings
 from ddagr_gym.calibration.simulator_values import calibrated_robot, fitted_soil
 from ddagr_gym.calibration.summary import drive_summaries, parameter_results
@@ -211,6 +211,7 @@ def calibrate_drives(
         seconds=time.monotonic() - began,
         currents=current_evidence(data, model, compared),
         imu=imu_mounting(data, model),
+        slopes=tuple(SlopeOfGround(ground, s.gradient, s.deviations) for ground, s in data.slopes.items()),
     )
     found = {ground: fitted_soil(data, ground, model.values) for ground in data.drives_on}
     calibrated = calibrated_robot(data, model, calibration)

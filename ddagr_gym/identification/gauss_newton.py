@@ -34,6 +34,9 @@ length."""
 _LONGEST = 3.0
 """Prior standard deviations that a parameter moves in one step (ours): beyond, the derivatives are of no use."""
 
+_SPOILT = 1.2
+"""Factor on a window's cost from which the linear step of its state has failed (ours)."""
+
 _EFFECT_RENEWALS = 5
 """Steps in which derivatives to effects are computed anew (ours): they are less linear than nuisances, and fewer."""
 
@@ -276,11 +279,7 @@ def _step(problem: Problem, here: _Iterate, parameters: Sequence[EffectParameter
         effects = moved(point.effects, parameters, after_step[len(free) :])
         start = problem.moved(replace(point, effects=effects), values)
         stepped = replace(start, states=start.states + damping * states)
-        if problem.nuisances.local:
-            tried, predicted, after = _best_by_window(problem, stepped, start, elimination, shares)
-        else:
-            tried, predicted = stepped, problem.predict(stepped)
-            after = cost_of(problem, tried, predicted, elimination)[0]
+        tried, predicted, after = _best_by_window(problem, stepped, start, elimination, shares)
         if after < here.cost:
             return replace(here, point=tried, prediction=predicted, cost=after)
     return here
@@ -291,7 +290,8 @@ def _best_by_window(
 ) -> tuple[Point, Array, float]:
     """A trial with the initial states of another one in the windows that it would make worse, where those are better.
 
-    Windows share nothing but the parameters; one near rest whose linear step fails must not stop all others.
+    Windows share nothing but the parameters; one near rest whose linear step fails must not stop all others. Where
+    windows have no unknowns but their states, a little worse is what the parameters cost them.
 
     Args:
         problem: what to fit.
@@ -303,7 +303,8 @@ def _best_by_window(
     prediction = problem.predict(trial)
     costs = cost_of(problem, trial, prediction, elimination)[1]
     states = trial.states.copy()
-    doubtful = np.flatnonzero(~(costs <= before))
+    rise = 1.0 if problem.nuisances.local else _SPOILT
+    doubtful = np.flatnonzero(~(costs <= rise * before))
     if doubtful.size:
         part = problem.subset(doubtful)
         again = replace(other, states=other.states[doubtful])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -51,3 +52,12 @@ def _highest_speed(t: np.ndarray, places: np.ndarray) -> float:
         return 0.0
     gone = np.linalg.norm(places[later[chosen]] - places[chosen], axis=1)
     return float((gone / (t[later[chosen]] - t[chosen])).max())
+
+
+def in_one_frame(recordings: Sequence[Recording]) -> bool:
+    """Whether directions mean the same in all drives: they have headings, each in one frame.
+
+    Args:
+        recordings: of one ground.
+    """
+    return all(recording.has("pose_yaw") and not frames_apart(recording) for recording in recordings)

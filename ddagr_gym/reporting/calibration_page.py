@@ -75,6 +75,8 @@ def _context(calibration: Calibration, forecasts: Sequence[Forecasts]) -> dict[s
         "usage_header": ("drive", "ground", "under command [s]", "fitted [s]", "forecast [s]", "poses late by [s]"),
         "currents": _currents(calibration, forecasts),
         "mounting": _mounting(calibration),
+        "slope_header": text.SLOPE_HEADER,
+        "slopes": text.slope_rows(calibration.slopes),
         "seconds": f"{calibration.seconds:.0f}",
         "models": [text.MODEL_LABELS[name] for name in MODELS],
     }

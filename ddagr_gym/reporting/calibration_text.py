@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from ddagr_gym.calibration.parts import PARTS
@@ -14,7 +15,9 @@ from ddagr_gym.calibration.result import (
     Calibration,
     ForecastError,
     ImuMounting,
+    SlopeOfGround,
 )
+from ddagr_gym.physics.effects.slope import Slope
 from ddagr_gym.reporting.text_table import format_table
 
 PARAMETER_HEADER = ("parameter", "unit", "data sheet", "calibrated", "90 %", "between drives", "")
@@ -35,6 +38,9 @@ PART_HEADER = ("part", "kept", "forecasts without it are worse by", "standard er
 
 MOUNTING_HEADER = ("IMU", "calibrated", "90 %", "unit", "left-out drives are worse without it by", "standard error", "")
 """Of :func:`mounting_rows`."""
+
+SLOPE_HEADER = ("ground", "slopes by [deg]", "rising towards [deg from the x axis]", "as an effect")
+"""Of :func:`slope_rows`."""
 
 _MOUNTING = {
     "imu_yaw": "turned about the vertical",
@@ -147,6 +153,18 @@ def mounting_rows(mounting: ImuMounting) -> list[tuple[str, ...]]:
     ]
 
 
+def slope_rows(slopes: Sequence[SlopeOfGround]) -> list[tuple[str, ...]]:
+    """Slopes of the grounds, under :data:`SLOPE_HEADER`."""
+    rows: list[tuple[str, ...]] = []
+    for item in slopes:
+        effect = Slope.of_gradient(*item.gradient)
+        deviation = math.degrees(math.hypot(*item.deviations) / math.sqrt(2.0))
+        angle, direction = math.degrees(effect.angle), math.degrees(effect.direction)
+        code = f"slope={effect.angle:.3g},direction={effect.direction:.3g}"
+        rows.append((item.ground, f"{angle:.1f} ± {deviation:.1f}", f"{direction:.0f}", code))
+    return rows
+
+
 def forecast_rows(calibration: Calibration, shown: Sequence[tuple[str, float | None]] = SHOWN) -> list[tuple[str, ...]]:
     """Errors on left-out drives under :data:`FORECAST_HEADER`; median of wheel speeds, else root mean square."""
     rows = []
@@ -213,6 +231,7 @@ def summary(calibration: Calibration) -> str:
     parts += ["", format_table(PARAMETER_HEADER, parameter_rows(calibration))]
     parts += ["", format_table(PART_HEADER, part_rows(calibration))]
     parts += [] if calibration.imu is None else ["", format_table(MOUNTING_HEADER, mounting_rows(calibration.imu))]
+    parts += ["", format_table(SLOPE_HEADER, slope_rows(calibration.slopes))] if calibration.slopes else []
     parts += ["", format_table(FORECAST_HEADER, forecast_rows(calibration))]
     parts += ["", format_table(UNEXPLAINED_HEADER, unexplained_rows(calibration))]
     lines = refused_lines(calibration)

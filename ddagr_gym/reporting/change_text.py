@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from ddagr_gym.diagnosis.answer.amounts import number
+from ddagr_gym.diagnosis.answer.change import BEFORE
 from ddagr_gym.diagnosis.result.sentences import certificate_in_words
 from ddagr_gym.diagnosis.wording import CHANNEL_NAMES, title
 from ddagr_gym.physics.effects.slope import Slope
@@ -82,14 +83,15 @@ def not_compared(change: Change) -> list[str]:
 
 
 def slope_before(change: Change) -> str:
-    """What the ground of the drives before slopes by; "" where that is less than matters, or not known."""
+    """What the known ground slopes by; "" where that is less than matters, or not known."""
     found = change.slope
     if found is None or found.angle < Slope.parameter("angle").metadata["least"]:
         return ""
     angle, direction, deviation = (math.degrees(value) for value in (found.angle, found.direction, found.deviation))
+    known, asked = ("drives before", "the drives after") if change.against == BEFORE else ("ordinary drives", "these")
     return (
-        f"The ground of the drives before slopes by {angle:.1f} degrees, rising towards {direction:.0f} degrees from "
-        f"the x axis; it is taken to slope so in the drives after too (to {deviation:.1f} degrees)."
+        f"The ground of the {known} slopes by {angle:.1f} degrees, rising towards {direction:.0f} degrees from "
+        f"the x axis; it is taken to slope so in {asked} too (to {deviation:.1f} degrees)."
     )
 
 

@@ -9,6 +9,7 @@ import pytest
 
 from ddagr_gym.control.manoeuvres import MANOEUVRES
 from ddagr_gym.errors import InputError
+from ddagr_gym.identification import gauss_newton
 from ddagr_gym.identification.block_means import sample_windows
 from ddagr_gym.identification.fit_numerics import field_numerics, field_slope_numerics
 from ddagr_gym.identification.gauss_newton import cost_of, fit, fit_states, linearised
@@ -23,7 +24,7 @@ from ddagr_gym.identification.parameters import (
 )
 from ddagr_gym.identification.problem import Point, Problem
 from ddagr_gym.identification.window_model import WindowModel
-from ddagr_gym.identification.windows import CHANNELS, cut_windows
+from ddagr_gym.identification.windows import CHANNELS, STATE, cut_windows
 from ddagr_gym.parameters import Imu, PoseReceiver, Sensors
 from ddagr_gym.recordings.schema import RobotGeometry
 from ddagr_gym.simulator import simulate
@@ -69,6 +70,23 @@ def test_the_known_soil_and_motor_are_found(one_drive):
     assert (errors <= np.maximum(3.0 * spread, [0.02, 0.01])).all()
     start = problem.start()
     assert fitted.cost < cost_of(problem, start, problem.predict(start), fitted.elimination)[0]
+
+
+def test_a_window_whose_state_would_be_spoilt_does_not_stop_the_others(one_drive):
+    """A robot at rest shows nothing of a yaw rate that it begins with: its linear step may be any length."""
+    problem = one_drive(robust=ROBUST)
+    settled = fit(problem)
+    before = settled.window_cost
+    states = settled.point.states.copy()
+    states[0, STATE.index("yaw_rate")] += 2.0
+    states[1, STATE.index("yaw")] += 1e-4
+    trial = replace(settled.point, states=states)
+    spoilt = cost_of(problem, trial, problem.predict(trial), settled.elimination)[1]
+    assert spoilt[0] > 1.2 * before[0] and 1.2 * before[1] > spoilt[1] > before[1]
+    taken, _, total = gauss_newton._best_by_window(problem, trial, settled.point, settled.elimination, before)
+    np.testing.assert_array_equal(taken.states[0], settled.point.states[0])
+    np.testing.assert_array_equal(taken.states[1:], states[1:])
+    assert total == pytest.approx(settled.cost + spoilt[1] - before[1])
 
 
 def test_coarse_sensitivities_find_the_same_values(one_drive):

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.diagnosis.change.drive_fit import change_problem, change_windows, fit_nominal, misfit_of_compared
-from ddagr_gym.diagnosis.change.ground_slope import GroundSlope, in_one_frame
+from ddagr_gym.diagnosis.change.ground_slope import SLOPE_OF_FIELDS, GroundSlope
 from ddagr_gym.diagnosis.change.measured_scatter import measured_scatter
 from ddagr_gym.diagnosis.change.ordinary import (
     LEAST_ACCELEROMETER_BIAS,
@@ -38,6 +38,7 @@ from ddagr_gym.identification.relative_readings import usual_turning
 from ddagr_gym.identification.residual_weights import UNKNOWN_GYRO_BIAS, Weights, noise_weights
 from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.parameters import Robot, Soil
+from ddagr_gym.recordings.pose_frames import in_one_frame
 from ddagr_gym.recordings.schema import Recording
 
 Array = NDArray[np.float64]
@@ -64,12 +65,6 @@ SAME_GROUND = {"soil_strength": 0.05, "soil_stiffness": 0.1, "shear_modulus": 0.
 
 SLOPES = ("slope_x", "slope_y")
 """Parameters of the ground's gradient."""
-
-SAME_SLOPE = 0.005
-"""Deviation of the ground's gradient from one drive on it to another (ours): 0.3 degrees."""
-
-SLOPE_OF_FIELDS = 0.05
-"""Deviation of a field's gradient (ours): 3 degrees."""
 
 OF_ANOTHER_GROUND = "on another ground it is another one in any case"
 SOIL_EFFECTS = ("soil_change", "soil_split", "slip_sinkage", "multipass", "lateral_bulldozing")
@@ -99,8 +94,7 @@ class JointFit:
         """Slope of the ground; None where the poses do not tell it."""
         if self.gradient is None:
             return None
-        x, y = (float(np.hypot(SAME_SLOPE, self.deviations[name])) for name in SLOPES)
-        return GroundSlope(self.gradient, (x, y))
+        return GroundSlope.estimated(self.gradient, [self.deviations[name] for name in SLOPES])
 
     @property
     def same_ground(self) -> dict[str, float]:
@@ -159,7 +153,7 @@ def robot_of_before(
         other_scatter=scatter.other_ground,
         unnamed=dict.fromkeys(SOIL_EFFECTS, OF_ANOTHER_GROUND),
         given=True,
-        slope=joint.slope,
+        slopes={} if joint.slope is None else {GROUND: joint.slope},
     )
 
 

@@ -234,7 +234,7 @@ def _change(
         BEFORE if ordinary.given else CALIBRATION,
         certified,
         _channel_shifts(first, last),
-        None if ordinary.slope is None else _slope_before(ordinary.slope),
+        _slope_before(ordinary.slope) if ordinary.slope and ground else None,
     )
 
 

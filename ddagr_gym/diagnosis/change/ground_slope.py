@@ -1,4 +1,4 @@
-"""Slope of the ground in drives from before, which is taken to be there in later ones too."""
+"""Slope of the ground in ordinary drives, which is taken to be there in later ones on it too."""
 
 from __future__ import annotations
 
@@ -9,13 +9,17 @@ import numpy as np
 
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.effects.slope import Slope
-from ddagr_gym.recordings.pose_frames import frames_apart
-from ddagr_gym.recordings.schema import Recording
+
+SAME_SLOPE = 0.005
+"""Deviation of the ground's gradient from one drive on it to another (ours): 0.3 degrees."""
+
+SLOPE_OF_FIELDS = 0.05
+"""Deviation of a field's gradient (ours): 3 degrees."""
 
 
 @dataclass(frozen=True)
 class GroundSlope:
-    """Slope of the ground of drives from before.
+    """Slope of the ground of ordinary drives.
 
     Attributes:
         gradient: along the world's axes x and y [-].
@@ -24,6 +28,22 @@ class GroundSlope:
 
     gradient: tuple[float, float]
     deviations: tuple[float, float]
+
+    @classmethod
+    def estimated(cls, gradient: Sequence[float], deviations: Sequence[float]) -> GroundSlope:
+        """A gradient as drives tell it; that of another drive may be another one.
+
+        Args:
+            gradient: along the world's axes [-].
+            deviations: with which it is known.
+        """
+        x, y = (float(np.hypot(SAME_SLOPE, deviation)) for deviation in deviations)
+        return cls((float(gradient[0]), float(gradient[1])), (x, y))
+
+    @classmethod
+    def of_any_field(cls) -> GroundSlope:
+        """That of a field of which nothing is known."""
+        return cls((0.0, 0.0), (SLOPE_OF_FIELDS, SLOPE_OF_FIELDS))
 
     @property
     def effects(self) -> tuple[Slope]:
@@ -48,8 +68,3 @@ class GroundSlope:
     def matters(self) -> bool:
         """Whether anybody would care."""
         return self.effects[0].angle >= float(Slope.parameter("angle").metadata["least"])
-
-
-def in_one_frame(recordings: Sequence[Recording]) -> bool:
-    """Whether directions mean the same in all drives: they have headings, each in one frame."""
-    return all(recording.has("pose_yaw") and not frames_apart(recording) for recording in recordings)

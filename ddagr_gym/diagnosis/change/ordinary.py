@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.diagnosis.change.expected_scatter import EXPECTED_DRIVES, ExpectedScatter
-from ddagr_gym.diagnosis.change.ground_slope import GroundSlope, in_one_frame
+from ddagr_gym.diagnosis.change.ground_slope import GroundSlope
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.nuisances import NuisancePriors
 from ddagr_gym.identification.parameters import (
@@ -23,7 +23,7 @@ from ddagr_gym.identification.parameters import (
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.effects.registry import effect_kinds
-from ddagr_gym.recordings.pose_frames import frames_apart
+from ddagr_gym.recordings.pose_frames import frames_apart, in_one_frame
 from ddagr_gym.recordings.schema import Recording
 
 Array = NDArray[np.float64]
@@ -233,8 +233,8 @@ class OrdinaryRobot:
         other_scatter: expected between drives on two grounds.
         unnamed: effects that cannot be named on an unknown ground, with the reason.
         given: whether the drives were given as those from before, without a calibration.
-        slope: of the ground in drives from before, which is taken to be there in later ones too; None where their poses
-            do not tell it.
+        slopes: of grounds that are known to slope, or whose drives tell how far they do.
+        slope: of the ground of drives that are asked about (:meth:`seen_by`); None where nothing is said of it.
     """
 
     robot: Robot
@@ -250,11 +250,12 @@ class OrdinaryRobot:
     other_scatter: ExpectedScatter = field(default_factory=ExpectedScatter)
     unnamed: Mapping[str, str] = field(default_factory=dict)
     given: bool = False
+    slopes: Mapping[str, GroundSlope] = field(default_factory=dict)
     slope: GroundSlope | None = None
 
     @property
     def known(self) -> tuple[Effect, ...]:
-        """What ordinary drives have and the robot has not."""
+        """What drives that are asked about share with ordinary ones and the robot has not."""
         return () if self.slope is None else self.slope.effects
 
     def uncertain(self, ground: str, recordings: Sequence[Recording]) -> tuple[ModelParameter, ...]:
@@ -268,19 +269,26 @@ class OrdinaryRobot:
             self.soil_deviations.get(ground) if ground else None,
             self.weighing.on(ground),
             len(recordings),
-            self.slope.deviations if self.slope and ground else (),
+            self.slope.deviations if self.slope else (),
         )
 
-    def seen_by(self, recordings: Sequence[Recording]) -> OrdinaryRobot:
-        """The same for drives that may not know where they head.
+    def seen_by(self, recordings: Sequence[Recording], ground: str) -> OrdinaryRobot:
+        """The same for drives on a ground, which may not know where they head.
 
-        In a drive without headings the ground slopes as steeply as before, in a direction that is not known; of several
-        of them, or of stretches in frames of their own, nothing is said of it.
+        Where some grounds slope, an unknown one may as well. In a drive without headings the ground slopes as steeply
+        as it is known to, in a direction that is not; of several of them, or of stretches in frames of their own,
+        nothing is said of it.
+
+        Args:
+            recordings: that are asked about.
+            ground: of them; "" where it is not known.
         """
-        if self.slope is None or in_one_frame(recordings):
-            return self
-        alone = len(recordings) == 1 and not frames_apart(recordings[0])
-        return replace(self, slope=self.slope.turned if alone else None)
+        unknown = GroundSlope.of_any_field() if self.slopes else None
+        slope = self.slopes.get(ground) if ground else unknown
+        if slope is not None and not in_one_frame(recordings):
+            alone = len(recordings) == 1 and not frames_apart(recordings[0])
+            slope = slope.turned if alone else None
+        return replace(self, slope=slope)
 
     def comparison(self, ground: str) -> Comparison:
         """What drives on a ground that is known or ("") not are compared with."""
@@ -328,6 +336,7 @@ class OrdinaryRobot:
             self,
             robot=own.robot,
             soils={**soils, own.ground: own.soil} if beside else soils,
+            slopes={ground: slope for ground, slope in self.slopes.items() if beside or ground != own.ground},
             parameters=tuple(replace(p, prior=priors[p.name]) for p in robot_parameters(own.robot) if p.name in priors),
             soil_deviations=deviations,
             weighing=self.weighing.without(drive),

@@ -16,6 +16,7 @@ from ddagr_gym.diagnosis.change.ordinary import Reference, Weighing, uncertain_p
 from ddagr_gym.identification.misfit import channel_misfit, channel_scatter
 from ddagr_gym.identification.parameters import ModelParameter
 from ddagr_gym.parameters import Robot, Soil
+from ddagr_gym.physics.effects import Effect
 from ddagr_gym.recordings.schema import Recording
 
 Array = NDArray[np.float64]
@@ -49,6 +50,16 @@ class OrdinaryDrive:
     reversed_gyro: bool = False
     slope: GroundSlope | None = None
 
+    @property
+    def slopes(self) -> tuple[float, ...]:
+        """Deviations of the ground's gradient; none where nothing is said of it."""
+        return () if self.slope is None else self.slope.deviations
+
+    @property
+    def lying(self) -> tuple[Effect, ...]:
+        """The slope as missing physics of a robot that is taken to stand level; none where nothing is said of it."""
+        return () if self.slope is None else self.slope.effects
+
 
 def scan_ordinary(drive: OrdinaryDrive, weighing: Weighing, threads: int = 1) -> Reference:
     """What an ordinary drive says of every effect, with its ground known and not.
@@ -73,13 +84,13 @@ def scan_pieces(drive: OrdinaryDrive, weighing: Weighing, most: int, threads: in
     known = weighing if drive.alone else weighing.on(drive.ground, drive.name)
     windows = change_windows([drive.recording], drive.robot, known)
     deviations = None if drive.alone else drive.deviations
-    slopes, lying = ((), ()) if drive.slope is None else (drive.slope.deviations, drive.slope.effects)
-    parameters = uncertain_parameters(drive.soil, drive.parameters, deviations, known, 1, slopes)
-    problem = change_problem(drive.robot, drive.soil, windows, parameters, known, threads, lying)
+    parameters = uncertain_parameters(drive.soil, drive.parameters, deviations, known, 1, drive.slopes)
+    problem = change_problem(drive.robot, drive.soil, windows, parameters, known, threads, drive.lying)
     fitted = fit_nominal(problem)
     scan = scan_drive(problem, fitted)
-    wide = uncertain_parameters(drive.soil, drive.parameters, None, weighing, 1, slopes)
-    other = _of_unknown_ground(scan, wide, known.offsets - weighing.offsets)
+    anywhere = GroundSlope.of_any_field().deviations if drive.slope else ()
+    wide = uncertain_parameters(drive.soil, drive.parameters, None, weighing, 1, anywhere)
+    other = _of_unknown_ground(scan, wide, known.offsets - weighing.offsets, drive.slope)
     whole = replace(
         _reference(drive, scan, other, left_out_losses(problem, fitted)),
         moved=moved_parameters(problem, fitted),
@@ -90,10 +101,15 @@ def scan_pieces(drive: OrdinaryDrive, weighing: Weighing, most: int, threads: in
     return [whole, *(_reference(drive, piece, other, np.zeros(0)) for piece in pieces if len(pieces) > 1)]
 
 
-def _of_unknown_ground(scan: DriveScan, wide: Sequence[ModelParameter], leaning: Array) -> Priors:
-    """Deviations of what may differ where the ground is not known, and the middle of the biases from there on."""
+def _of_unknown_ground(
+    scan: DriveScan, wide: Sequence[ModelParameter], leaning: Array, slope: GroundSlope | None
+) -> Priors:
+    """Deviations of what may differ where the ground is not known, and the middle of biases and slope from there on."""
     middle = np.zeros(len(wide))
     middle[-len(leaning) :] = -leaning
+    if slope is not None:
+        first = [p.name for p in wide].index("slope_x")
+        middle[first : first + 2] = np.negative(slope.gradient)
     return Priors(np.array([wide[k].prior for k in scan.free]), middle[scan.free])
 
 

@@ -77,7 +77,7 @@ def what_changed(
     began = time.monotonic()
     check_comparable(recordings, ordinary, ground)
     mended = mend_recordings(recordings, seed)
-    ordinary = ordinary.seen_by(mended.recordings)
+    ordinary = ordinary.seen_by(mended.recordings, ground)
     progress("fitting the robot of the ordinary drives")
     problem, fitted = fit_ordinary(mended, ordinary, ground, threads)
     rng = np.random.default_rng(seed)

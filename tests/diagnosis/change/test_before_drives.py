@@ -10,14 +10,14 @@ import pytest
 import ddagr_gym
 from ddagr_gym.diagnosis.change.before_drives import (
     DAY,
-    SAME_SLOPE,
+    GROUND,
     SOIL_EFFECTS,
     as_left_out,
     day_parameters,
     joint_fit,
     robot_of_before,
 )
-from ddagr_gym.diagnosis.change.ground_slope import GroundSlope
+from ddagr_gym.diagnosis.change.ground_slope import SAME_SLOPE, SLOPE_OF_FIELDS, GroundSlope
 from ddagr_gym.diagnosis.change.measured_scatter import measured_scatter
 from ddagr_gym.diagnosis.change.ordinary import OrdinaryRobot, Reference
 from ddagr_gym.diagnosis.change.run import what_changed_since
@@ -104,12 +104,20 @@ def test_a_drive_without_headings_tells_no_slope():
     level = drive(1, seconds=24.0)
     blind = replace(level, channels={name: v for name, v in level.channels.items() if not name.startswith("pose")})
     assert joint_fit(mend_recordings([blind]), ROBOT, SOIL, 2.0, np.random.default_rng(0), 1).slope is None
-    known = OrdinaryRobot(ROBOT, {}, (), {}, None, (), slope=GroundSlope((0.06, 0.0), (0.01, 0.01)))
-    assert known.seen_by([level]) is known
-    assert known.seen_by([level, blind]).known == ()
-    alone = known.seen_by([blind]).slope
+    before = GroundSlope((0.06, 0.0), (0.01, 0.01))
+    known = OrdinaryRobot(ROBOT, {}, (), {}, None, (), slopes={GROUND: before})
+    assert known.seen_by([level], GROUND).slope is before
+    assert known.seen_by([level, blind], GROUND).known == ()
+    alone = known.seen_by([blind], GROUND).slope
     assert alone.gradient == (0.0, 0.0)
     assert alone.deviations == (pytest.approx(np.hypot(0.06, 0.01)),) * 2
+
+
+def test_another_ground_may_slope_as_any_where_slopes_are_told():
+    level = drive(1, seconds=24.0)
+    known = OrdinaryRobot(ROBOT, {}, (), {}, None, (), slopes={GROUND: GroundSlope((0.06, 0.0), (0.01, 0.01))})
+    assert known.seen_by([level], "").slope == GroundSlope((0.0, 0.0), (SLOPE_OF_FIELDS, SLOPE_OF_FIELDS))
+    assert OrdinaryRobot(ROBOT, {}, (), {}, None, ()).seen_by([level], "").slope is None
 
 
 def test_a_slope_that_is_named_comes_on_top_of_that_before():
@@ -133,7 +141,7 @@ def test_a_slope_before_and_after_is_no_change(seed):
     slope = outcome.diagnosis.change.slope
     assert slope.angle == pytest.approx(0.06, abs=0.003)
     assert "slopes by 3.4 degrees, rising towards 4" in change_text(outcome.diagnosis)
-    assert outcome.effects == known.known
+    assert outcome.effects == known.slopes[GROUND].effects
 
 
 @pytest.mark.slow
