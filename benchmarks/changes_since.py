@@ -100,8 +100,14 @@ class Case:
     size: float = 0.0
 
 
-def drive(seed: int, effect: str = "") -> Recording:
-    """A drive on a day of its own: commands held for 2 to 4 s, soil and motors that differ a little."""
+def drive(seed: int, effect: str = "", seconds: float = SECONDS) -> Recording:
+    """A drive on a day of its own: commands held for 2 to 4 s, soil and motors that differ a little.
+
+    Args:
+        seed: of everything random.
+        effect: that acts in it, as ``ddagr simulate --effect`` takes it.
+        seconds: that it lasts.
+    """
     rng = np.random.default_rng([SEED, seed])
     robot, soil = get_robot("ddagr"), get_soil("thesis_a1")
     robot = replace(robot, motor_rate=robot.motor_rate * float(np.exp(MOTORS * rng.normal())))
@@ -109,9 +115,9 @@ def drive(seed: int, effect: str = "") -> Recording:
     angle = float(np.arctan(factor * np.tan(soil.friction_angle)))
     soil = replace(soil, cohesion=factor * soil.cohesion, friction_angle=angle)
     rows: list[Array] = []
-    while len(rows) < SECONDS * RATE:
+    while len(rows) < seconds * RATE:
         rows += [rng.uniform(-1.6, 1.6, 2)] * int(rng.uniform(2.0, 4.0) * RATE)
-    commands = np.array(rows[: int(SECONDS * RATE)])
+    commands = np.array(rows[: int(seconds * RATE)])
     effects = (effect,) if effect else ()
     made = ddagr_gym.simulate(commands, robot, soil, effects, rate=RATE, pose_rate=5.0, seed=seed)
     return made.recording.with_meta(source=f"drive_{seed}")
