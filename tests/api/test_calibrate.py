@@ -13,7 +13,8 @@ from ddagr_gym.calibration import run
 def drives():
     commands = np.repeat(np.random.default_rng(0).uniform(-1.5, 1.5, (3, 24, 2)), 60, axis=1)
     made = [ddagr_gym.simulate(own, rate=20.0, pose_rate=5.0).recording for own in commands]
-    return [made[0].with_meta(source=name, start_time=start) for name, start in (("c", 5.0), ("a", 9.0), ("b", 5.0))]
+    metas = (("c", 5.0), ("a", 9.0), ("b", 5.0))
+    return [r.with_meta(source=name, start_time=start) for r, (name, start) in zip(made, metas, strict=True)]
 
 
 @pytest.mark.parametrize("order", [(0, 1, 2), (2, 1, 0), (1, 2, 0)])
