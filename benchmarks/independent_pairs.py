@@ -89,8 +89,9 @@ def compared(pair: Pair) -> dict[str, Any]:
     """What the drives of a pair say of every effect, parameter and channel, as JSON has it."""
     robot = get_robot(pair.robot)
     before, after = recordings_of(pair, SEED)
-    known = robot_of_before(before, robot, get_soil(SOIL))
-    problem, fitted = fit_ordinary(mend_recordings(after), known, GROUND)
+    mended = mend_recordings(after)
+    known = robot_of_before(before, robot, get_soil(SOIL)).seen_by(mended.recordings, GROUND)
+    problem, fitted = fit_ordinary(mended, known, GROUND)
     scan = scan_drive(problem, fitted)
     scores = scan.scores()
     effects = []
