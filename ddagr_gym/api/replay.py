@@ -152,7 +152,7 @@ def replay(
         raise InputError(f"the ground is {ground!r} and there is no calibration: name its folder with --calibration.")
     soil = "thesis_a1" if soil is None else soil
     found = recordings_from(recordings, robot, column_map)
-    added = (*load_effects(effects), *(slopes if in_one_frame(found) else ()))
+    added = (*load_effects(effects), *(slopes if slopes and in_one_frame(found) else ()))
     nominal = driven_robot(robot, found)
     settings = ReplaySettings(window, refit, added, threads=threads, seed=seed)
     groups = [found] if together else [(recording,) for recording in found]
