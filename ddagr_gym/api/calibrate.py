@@ -143,8 +143,7 @@ def calibrate(
     identify keeps the data sheet's value.
 
     Args:
-        recordings: ordinary drives of one robot: recordings, tables, paths of files or folders. They are taken in the
-            order of their start times, then of their names.
+        recordings: ordinary drives of one robot: recordings, tables, paths of files or folders.
         robot: its data sheet: name, YAML file or object.
         soil: nominal one: name, YAML file or object, or one of these for each ground by its name.
         grounds: drives on each ground by its name, as numbers, paths or objects; all on one where it is None.
@@ -196,10 +195,7 @@ def calibrate(
     check_map(found, np.random.default_rng(seed))
     names = [recording.meta.source for recording in found]
     numbers = {ground: [_number(drive, given, found) for drive in drives] for ground, drives in (grounds or {}).items()}
-    listed = grounds_of(names, numbers)
-    # sums in another order may end in another of several minima
-    order = sorted(range(len(found)), key=lambda number: (found[number].meta.start_time, names[number]))
-    found, by_drive = tuple(found[number] for number in order), [listed[number] for number in order]
+    by_drive = grounds_of(names, numbers)
     for ground in dict.fromkeys(by_drive):
         check_ground_name(ground)
     soils = _soils(soil, by_drive)
