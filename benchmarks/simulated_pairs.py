@@ -36,6 +36,7 @@ from benchmarks.pair_scatter import DEGREES, MOST, least_scatter, log_density, m
 from ddagr_gym.diagnosis.change.before_drives import DAY, WINDOW, JointFit, day_parameters, joint_fit
 from ddagr_gym.diagnosis.change.drive_fit import change_problem, change_windows, fit_nominal
 from ddagr_gym.diagnosis.change.drive_scan import DriveScan, Priors, scan_drive
+from ddagr_gym.diagnosis.change.ground_slope import deviations_of, effects_of
 from ddagr_gym.diagnosis.change.measured_scatter import PATH
 from ddagr_gym.diagnosis.change.ordinary import Scores, uncertain_parameters
 from ddagr_gym.diagnosis.change.shifts import (
@@ -145,13 +146,13 @@ def pair_of(number: int, robot: Robot, soil: Soil) -> dict[str, Any]:
 def _scan(joint: JointFit, drive: Recording) -> DriveScan:
     windows = change_windows(mend_recordings([drive]).recordings, joint.robot, joint.weighing)
     parameters = _uncertain(joint, joint.same_ground)
-    known = () if joint.slope is None else joint.slope.effects
+    known = effects_of(joint.slope)
     problem = change_problem(joint.robot, joint.soil, windows, parameters, joint.weighing, 1, known)
     return scan_drive(problem, fit_nominal(problem))
 
 
 def _uncertain(joint: JointFit, soil: Mapping[str, float] | None) -> tuple[ModelParameter, ...]:
-    slopes = () if joint.slope is None else joint.slope.deviations
+    slopes = deviations_of(joint.slope)
     return uncertain_parameters(joint.soil, day_parameters(joint.robot), soil, joint.weighing, 1, slopes)
 
 

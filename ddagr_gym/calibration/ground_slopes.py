@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.diagnosis.change.ground_slope import GroundSlope
+from ddagr_gym.identification.data_split import parts_of_time
 from ddagr_gym.identification.least_squares import huber_roots
 from ddagr_gym.identification.residual_weights import MAD_TO_DEVIATION
 from ddagr_gym.identification.windows import CHANNELS, STATE, WindowSet
@@ -123,8 +124,8 @@ def _parts(windows: WindowSet) -> Integers:
     found = np.zeros(windows.count, dtype=np.int64)
     for number in np.unique(windows.recording):
         rows = windows.recording == number
-        ends = np.linspace(windows.time[rows].min(), windows.time[rows].max(), QUARTERS + 1)[1:-1]
-        found[rows] = QUARTERS * number + np.searchsorted(ends, windows.time[rows])
+        time = windows.time[rows]
+        found[rows] = QUARTERS * number + parts_of_time(time, time, QUARTERS)
     return found
 
 

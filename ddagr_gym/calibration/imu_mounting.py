@@ -20,11 +20,12 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from ddagr_gym.calibration.accelerometer_results import ImuMounting, MountingSize
 from ddagr_gym.calibration.calibration_data import CalibrationData
+from ddagr_gym.calibration.ground_slopes import LIMIT
 from ddagr_gym.calibration.joint_fit import FittedModel
 from ddagr_gym.calibration.left_out import folds
 from ddagr_gym.calibration.part_selection import surely_above
-from ddagr_gym.calibration.result import ImuMounting, MountingSize
 from ddagr_gym.identification.least_squares import huber_loss
 from ddagr_gym.identification.residual_weights import MAD_TO_DEVIATION
 from ddagr_gym.identification.windows import CHANNELS
@@ -45,9 +46,6 @@ FEWEST_READINGS = 40
 
 FARTHEST = 3.0
 """Of the sensor from the body's origin [m] (ours)."""
-
-LIMIT = 1.5
-"""Residual from which the loss is linear, in deviations (ours: Huber's 95 % efficiency is at 1.35)."""
 
 LEVEL = 0.9
 """Of intervals."""

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ddagr_gym.calibration.calibration_data import CalibrationData
 from ddagr_gym.calibration.joint_fit import FittedModel, fit_model
 from ddagr_gym.calibration.parts import RobotModel
+from ddagr_gym.identification.data_split import parts_of_time
 from ddagr_gym.identification.gauss_newton import linearised
 from ddagr_gym.identification.least_squares import Linearised, huber_loss
 from ddagr_gym.identification.residual_weights import Weights, residuals
@@ -63,9 +64,7 @@ def folds(data: CalibrationData, windows: WindowSet) -> Integers:
     """(W,) fold of each window: its drive, or of a single drive the quarter of its time."""
     if data.count > 1:
         return windows.recording
-    whole = data.windows.time
-    ends = np.linspace(whole.min(), whole.max(), len(QUARTERS) + 1)[1:-1]
-    return np.asarray(np.searchsorted(ends, windows.time), dtype=np.int64)
+    return parts_of_time(windows.time, data.windows.time, len(QUARTERS))
 
 
 def fold_name(data: CalibrationData, fold: int) -> str:

@@ -20,6 +20,7 @@ from ddagr_gym.calibration.result import Calibration
 from ddagr_gym.calibration.settings import HISTORY
 from ddagr_gym.calibration.simulator_values import SOIL_PARAMETERS, fitted_robot, fitted_soil
 from ddagr_gym.diagnosis.change.drive_fit import change_problem, change_windows, fit_nominal, misfit_of_compared
+from ddagr_gym.diagnosis.change.ground_slope import deviations_of, effects_of
 from ddagr_gym.diagnosis.change.ordinary import (
     LEAST_ACCELEROMETER_BIAS,
     LEAST_GYRO_BIAS,
@@ -196,12 +197,12 @@ def left_of(item: OrdinaryDrive, blank: Weighing, noise: RecordingNoise, dead: S
     """Weights and biases by a first fit with those of the sensors' noise; workers call it by name."""
     windows = change_windows([item.recording], item.robot, blank)
     weights = noise_weights([noise], windows, imposed=False, dead=dead, unfitted=())
-    parameters = uncertain_parameters(item.soil, item.parameters, item.deviations, blank, 1, item.slopes)
+    parameters = uncertain_parameters(item.soil, item.parameters, item.deviations, blank, 1, deviations_of(item.slope))
     first = replace(blank, sigma=weights.sigma, robust=weights.robust)
-    problem = change_problem(item.robot, item.soil, windows, parameters, first, threads, item.lying)
+    problem = change_problem(item.robot, item.soil, windows, parameters, first, threads, effects_of(item.slope))
     rough = misfit_of_compared(problem.blocked, problem.predict(problem.start()), weights)
     second = replace(blank, sigma=rough.sigma, robust=rough.robust)
-    problem = change_problem(item.robot, item.soil, windows, parameters, second, threads, item.lying)
+    problem = change_problem(item.robot, item.soil, windows, parameters, second, threads, effects_of(item.slope))
     fitted = fit_nominal(problem)
     left = misfit_of_compared(problem.blocked, fitted.prediction, weights)
     return _Left(left.sigma[0, 0], left.robust, SensorBias(item.name, item.ground, fitted.point.values[-3:]))

@@ -232,8 +232,12 @@ def _later(
     comparison: Comparison, model: RobotModel, left_out: frozenset[str], best: Candidate, cache: StepCache
 ) -> Candidate:
     """A model without the ramp from a longer dead time: a fit from a short one does not reach what the ramp did."""
-    standing = replace(best.standing, values={**best.standing.values, DELAY: TRIED_DELAY})
-    return _fitted_without(comparison, model, left_out | {RAMP}, standing, cache, f", dead time from {TRIED_DELAY:g}")
+    stage = f", dead time from {TRIED_DELAY:g}"
+    return _fitted_without(comparison, model, left_out | {RAMP}, _late_start(best), cache, stage)
+
+
+def _late_start(best: Candidate) -> Standing:
+    return replace(best.standing, values={**best.standing.values, DELAY: TRIED_DELAY})
 
 
 def _growth(before: Candidate, after: Candidate) -> float:
@@ -254,9 +258,9 @@ def _delay_for_ramp(
     worse.
     """
     robot = comparison.data.robot
-    standing = replace(best.standing, values={**best.standing.values, DELAY: TRIED_DELAY})
     exchanged, neither = (left_out - {DELAY}) | {RAMP}, left_out | {RAMP}
-    late = cache("a dead time for the ramp", partial(comparison.candidate, model.without(exchanged, robot), standing))
+    with_delay = partial(comparison.candidate, model.without(exchanged, robot), _late_start(best))
+    late = cache("a dead time for the ramp", with_delay)
     growth, error = worse_by(best, late)
     if is_missed(growth, error, len(late.losses)):
         return best, left_out, decisions

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ddagr_gym.calibration.accelerometer_results import SlopeOfGround
 from ddagr_gym.calibration.calibration_data import CalibrationData, prepare_drives
 from ddagr_gym.calibration.current_evidence import current_evidence
 from ddagr_gym.calibration.drive_scatter import drive_estimates
@@ -35,7 +36,7 @@ from ddagr_gym.calibration.ordinary_drives import Ordinary, ordinary_drives
 from ddagr_gym.calibration.part_selection import Candidate, Comparison, Selection, select_parts
 from ddagr_gym.calibration.parts import RobotModel
 from ddagr_gym.calibration.residual_tables import spectra, unexplained
-from ddagr_gym.calibration.result import SCHEMA, SCHEMA_VERSION, Calibration, Covariance, SlopeOfGround
+from ddagr_gym.calibration.result import SCHEMA, SCHEMA_VERSION, Calibration, Covariance
 from ddagr_gym.calibration.settings import CalibrationSettings
 from ddagr_gym.calibration.simulator_values import calibrated_robot, fitted_soil
 from ddagr_gym.calibration.summary import drive_summaries, parameter_results

@@ -6,10 +6,11 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 
+from ddagr_gym.calibration.accelerometer_results import ImuMounting
 from ddagr_gym.calibration.calibration_data import CalibrationData
 from ddagr_gym.calibration.joint_fit import FittedModel
 from ddagr_gym.calibration.parts import LIMITS, RobotModel, is_stated, part_of
-from ddagr_gym.calibration.result import CalibratedParameter, Calibration, ImuMounting
+from ddagr_gym.calibration.result import CalibratedParameter, Calibration
 from ddagr_gym.envs.calibrated_draws import CalibratedDraws, GroundDraws
 from ddagr_gym.identification.fitted_values import with_values
 from ddagr_gym.identification.parameters import ModelParameter

@@ -135,3 +135,15 @@ def evenly(count: int, most: int) -> Integers:
     if not count:
         return np.zeros(0, dtype=np.int64)
     return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(np.int64))
+
+
+def parts_of_time(time: NDArray[np.float64], whole: NDArray[np.float64], count: int) -> Integers:
+    """Which of so many equally long parts of a whole each time is in.
+
+    Args:
+        time: (N,) [s].
+        whole: times from the first to the last of which the parts go [s].
+        count: of the parts.
+    """
+    ends = np.linspace(whole.min(), whole.max(), count + 1)[1:-1]
+    return np.asarray(np.searchsorted(ends, time), dtype=np.int64)

@@ -26,27 +26,29 @@ def channel_misfit(problem: Problem, fitted: Fitted) -> dict[str, float]:
     About 1 where the model is right and the noise is estimated well; unknowns of the windows take a share away. The
     local unknowns count as channels of their own: what they have to make up for is misfit too.
     """
-    blocked = problem.blocked
     residual = projected_residual(problem, fitted)
-    squares = (blocked.by_channel(residual) ** 2).sum(axis=(0, 1))
-    counts = blocked.by_channel(blocked.mask).sum(axis=(0, 1))
+    squares, counts = (values.sum(axis=0) for values in _squares(problem, residual))
     found = {name: float(squares[k] / counts[k]) for k, name in enumerate(CHANNELS) if counts[k] > 0}
-    local = (residual[:, blocked.mask.shape[1] + len(STATE) :] ** 2).mean(axis=0)
+    local = (residual[:, problem.blocked.mask.shape[1] + len(STATE) :] ** 2).mean(axis=0)
     names = [unknown.name for unknown in problem.nuisances.local]
     return found | {name: float(value) for name, value in zip(names, local, strict=True)}
 
 
 def channel_scatter(problem: Problem, fitted: Fitted) -> dict[str, float]:
     """Relative standard error of :func:`channel_misfit` by the scatter of windows, of every channel with samples."""
-    blocked = problem.blocked
-    residual = projected_residual(problem, fitted)
-    squares = (blocked.by_channel(residual) ** 2).sum(axis=1)
+    squares, counts = _squares(problem, projected_residual(problem, fitted))
     found = {}
     for k, name in enumerate(CHANNELS):
-        here = squares[blocked.by_channel(blocked.mask)[..., k].any(axis=1), k]
+        here = squares[counts[:, k] > 0, k]
         if here.size > 1 and here.mean() > 0.0:
             found[name] = float(here.std(ddof=1) / (here.mean() * np.sqrt(here.size)))
     return found
+
+
+def _squares(problem: Problem, residual: Array) -> tuple[Array, Array]:
+    """(W, 8) sums of the squares of every channel, and (W, 8) numbers of its samples."""
+    blocked = problem.blocked
+    return (blocked.by_channel(residual) ** 2).sum(axis=1), blocked.by_channel(blocked.mask).sum(axis=1)
 
 
 def dispersion_of(problem: Problem, fitted: Fitted) -> float:

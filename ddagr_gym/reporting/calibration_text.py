@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from ddagr_gym.calibration.accelerometer_results import ImuMounting, SlopeOfGround
 from ddagr_gym.calibration.parts import PARTS
 from ddagr_gym.calibration.result import (
     CALIBRATED,
@@ -14,8 +15,6 @@ from ddagr_gym.calibration.result import (
     CalibratedParameter,
     Calibration,
     ForecastError,
-    ImuMounting,
-    SlopeOfGround,
 )
 from ddagr_gym.physics.effects.slope import Slope
 from ddagr_gym.reporting.text_table import format_table

@@ -68,3 +68,13 @@ class GroundSlope:
     def matters(self) -> bool:
         """Whether anybody would care."""
         return self.effects[0].angle >= float(Slope.parameter("angle").metadata["least"])
+
+
+def effects_of(slope: GroundSlope | None) -> tuple[Slope, ...]:
+    """Missing physics of a robot that is taken to stand level; none where nothing is said of a slope."""
+    return () if slope is None else slope.effects
+
+
+def deviations_of(slope: GroundSlope | None) -> tuple[float, ...]:
+    """Deviations of the gradient along the world's axes; none where nothing is said of a slope."""
+    return () if slope is None else slope.deviations

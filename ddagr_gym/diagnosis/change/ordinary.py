@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.diagnosis.change.expected_scatter import EXPECTED_DRIVES, ExpectedScatter
-from ddagr_gym.diagnosis.change.ground_slope import GroundSlope
+from ddagr_gym.diagnosis.change.ground_slope import GroundSlope, deviations_of, effects_of
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.nuisances import NuisancePriors
 from ddagr_gym.identification.parameters import (
@@ -256,7 +256,7 @@ class OrdinaryRobot:
     @property
     def known(self) -> tuple[Effect, ...]:
         """What drives that are asked about share with ordinary ones and the robot has not."""
-        return () if self.slope is None else self.slope.effects
+        return effects_of(self.slope)
 
     def uncertain(self, ground: str, recordings: Sequence[Recording]) -> tuple[ModelParameter, ...]:
         """All that may differ between ordinary drives, for drives on one ground ("" for an unknown one)."""
@@ -269,7 +269,7 @@ class OrdinaryRobot:
             self.soil_deviations.get(ground) if ground else None,
             self.weighing.on(ground),
             len(recordings),
-            self.slope.deviations if self.slope else (),
+            deviations_of(self.slope),
         )
 
     def seen_by(self, recordings: Sequence[Recording], ground: str) -> OrdinaryRobot:

@@ -10,13 +10,12 @@ from numpy.typing import NDArray
 
 from ddagr_gym.diagnosis.change.drive_fit import change_problem, change_windows, fit_nominal, moved_parameters
 from ddagr_gym.diagnosis.change.drive_scan import DriveScan, Priors, scan_drive
-from ddagr_gym.diagnosis.change.ground_slope import GroundSlope
+from ddagr_gym.diagnosis.change.ground_slope import GroundSlope, deviations_of, effects_of
 from ddagr_gym.diagnosis.change.left_out import left_out_losses
 from ddagr_gym.diagnosis.change.ordinary import Reference, Weighing, uncertain_parameters
 from ddagr_gym.identification.misfit import channel_misfit, channel_scatter
 from ddagr_gym.identification.parameters import ModelParameter
 from ddagr_gym.parameters import Robot, Soil
-from ddagr_gym.physics.effects import Effect
 from ddagr_gym.recordings.schema import Recording
 
 Array = NDArray[np.float64]
@@ -50,16 +49,6 @@ class OrdinaryDrive:
     reversed_gyro: bool = False
     slope: GroundSlope | None = None
 
-    @property
-    def slopes(self) -> tuple[float, ...]:
-        """Deviations of the ground's gradient; none where nothing is said of it."""
-        return () if self.slope is None else self.slope.deviations
-
-    @property
-    def lying(self) -> tuple[Effect, ...]:
-        """The slope as missing physics of a robot that is taken to stand level; none where nothing is said of it."""
-        return () if self.slope is None else self.slope.effects
-
 
 def scan_ordinary(drive: OrdinaryDrive, weighing: Weighing, threads: int = 1) -> Reference:
     """What an ordinary drive says of every effect, with its ground known and not.
@@ -84,8 +73,8 @@ def scan_pieces(drive: OrdinaryDrive, weighing: Weighing, most: int, threads: in
     known = weighing if drive.alone else weighing.on(drive.ground, drive.name)
     windows = change_windows([drive.recording], drive.robot, known)
     deviations = None if drive.alone else drive.deviations
-    parameters = uncertain_parameters(drive.soil, drive.parameters, deviations, known, 1, drive.slopes)
-    problem = change_problem(drive.robot, drive.soil, windows, parameters, known, threads, drive.lying)
+    parameters = uncertain_parameters(drive.soil, drive.parameters, deviations, known, 1, deviations_of(drive.slope))
+    problem = change_problem(drive.robot, drive.soil, windows, parameters, known, threads, effects_of(drive.slope))
     fitted = fit_nominal(problem)
     scan = scan_drive(problem, fitted)
     anywhere = GroundSlope.of_any_field().deviations if drive.slope else ()
