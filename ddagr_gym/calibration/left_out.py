@@ -1,9 +1,10 @@
 """Forecasts of drives that were left out of the fit.
 
-A fit to the other drives is one Gauss-Newton step from the joint one: their residuals and sensitivities are known
-there, and leaving one drive of several out moves the parameters little. What belongs to the left-out drive alone (the
-soil of a ground that no other drive is on, its gyro bias) is fitted to the first half of it, and the second half is
-forecast.
+A fit to the other drives is one Gauss-Newton step from the joint one: its sensitivities are known, and leaving one
+drive of several out moves the parameters little. Of this step the share is taken by which the other drives are read
+best: where they hardly tell parameters apart, the linear problem moves these far. What belongs to the left-out drive
+alone (the soil of a ground that no other drive is on, its gyro bias) is fitted to the first half of it, and the second
+half is forecast.
 """
 
 from __future__ import annotations
@@ -18,8 +19,9 @@ from ddagr_gym.calibration.calibration_data import CalibrationData
 from ddagr_gym.calibration.joint_fit import FittedModel, fit_model
 from ddagr_gym.calibration.parts import RobotModel
 from ddagr_gym.identification.data_split import parts_of_time
-from ddagr_gym.identification.gauss_newton import linearised
-from ddagr_gym.identification.least_squares import Linearised, huber_loss
+from ddagr_gym.identification.gauss_newton import Fitted, values_after_step
+from ddagr_gym.identification.least_squares import huber_loss
+from ddagr_gym.identification.problem import Point
 from ddagr_gym.identification.residual_weights import Weights, residuals
 from ddagr_gym.identification.windows import CHANNELS, WindowSet
 
@@ -29,9 +31,6 @@ Integers = NDArray[np.int64]
 
 OWN_ITERATIONS = 5
 """Steps of the fit of what belongs to a left-out drive alone (ours): few parameters, and few windows."""
-
-LONGEST = 3.0
-"""Prior deviations that a parameter moves at most when a drive is left out: that of the joint fit's steps."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,23 +77,28 @@ def first_half(windows: WindowSet, chosen: Booleans) -> Booleans:
     return np.asarray(chosen & (windows.time < middle))
 
 
-def values_without(model: FittedModel, linear: Linearised, out: Booleans) -> Array:
+def values_without(model: FittedModel, out: Booleans) -> Array:
     """Values (P,) of a model's parameters as fitted without some windows; what acts in those alone is left as it is.
 
     Args:
         model: fitted to all windows.
-        linear: problem there.
         out: (W,) windows that are left out.
     """
-    free = np.array([k for k, p in enumerate(model.parameters) if p.prior > 0.0])
-    common = np.flatnonzero([_acts(model, k, ~out) for k in free])
-    part = Linearised(
-        linear.residual[~out], linear.sensitivity[~out][..., common], linear.here[common], linear.expected[common],
-        linear.deviation[common], linear.low[common], linear.high[common],
-    )  # fmt: skip
-    values = model.fitted.point.values.copy()
-    values[free[common]] = part.after(part.step(part.information, part.gradient, LONGEST))
-    return values
+    alone = np.array([not _acts(model, k, ~out) for k in range(len(model.parameters))])
+    problem = model.problem.subset(~out).holding(alone)
+    return values_after_step(problem, _in_windows(model.fitted, ~out))
+
+
+def _in_windows(fitted: Fitted, chosen: Booleans) -> Fitted:
+    """Where a fit stands in some of its windows, with its sensitivities there."""
+    return replace(
+        fitted,
+        point=Point(fitted.point.values, fitted.point.states[chosen], fitted.point.effects),
+        prediction=fitted.prediction[chosen],
+        elimination=fitted.elimination.subset(chosen),
+        by_parameter=fitted.by_parameter[chosen],
+        window_cost=fitted.window_cost[chosen],
+    )
 
 
 def _acts(model: FittedModel, parameter: int, rows: Booleans) -> bool:
@@ -134,12 +138,11 @@ def forecasts(
         weights: of the fit.
         threads: of the simulator.
     """
-    linear = linearised(model.problem, model.fitted)
     fitted = model.problem.blocked.windows
     by_window, by_judged = folds(data, fitted), folds(data, judged)
     for fold in np.unique(by_judged):
         out, inside = by_window == fold, by_judged == fold
-        values = values_without(model, linear, out)
+        values = values_without(model, out)
         alone = data.count > 1 and len(data.drives_on[data.grounds[int(fold)]]) == 1
         if alone:
             values = _with_own(data, model, values, out, weights, threads)

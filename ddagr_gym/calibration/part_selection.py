@@ -1,9 +1,10 @@
 """Which parts of the robot its drives support, by forecasts of left-out drives (backward elimination).
 
 Every part is taken out in turn, what is fitted least often first. It stays out unless the forecasts of the left-out
-drives become worse by 2 % and by more than the standard error of that change between drives (the one-standard-error
-rule; L. Breiman et al., Classification and Regression Trees, 1984, section 3.4.3), with Student's t for few drives. Of
-what nearly every robot has, the dead time, 2 % are enough: there the burden of proof is on its absence.
+drives become worse than the best so far by 2 % and by more than the standard error of that change between drives (the
+one-standard-error rule; L. Breiman et al., Classification and Regression Trees, 1984, section 3.4.3), with Student's t
+for few drives: of all parts together no more than that is given away. Of what nearly every robot has, the dead time,
+2 % are enough: there the burden of proof is on its absence.
 A part is missed only by a fit that is settled, or that has had steps enough.
 What acts through parts that have all gone goes with them. Ramp and dead time stand for each other: a fit without the
 ramp is also tried from a longer dead time, and a ramp that stayed where the dead time went gives way to a dead time
@@ -171,25 +172,26 @@ def select_parts(
 
     Args:
         comparison: what models are fitted to and forecast.
-        model: with all parts.
+        model: with all parts that may be taken out.
         full: the same, fitted.
         cache: of models that are fitted already.
         progress: called with a line of text for each part.
     """
-    best, left_out, decisions = full, frozenset[str](), []
+    best, least, left_out, decisions = full, full, frozenset[str](), []
     for part in PARTS:
         if not model.free & set(part.parameters):
             continue
         progress(f"forecasts of left-out drives without {part.title}")
-        tried = _settled(comparison, model, left_out | {part.name}, best, cache, part.usual)
-        growth, error = worse_by(best, tried)
+        tried = _settled(comparison, model, left_out | {part.name}, best, least, cache, part.usual)
+        growth, error = worse_by(least, tried)
         if part.name == RAMP and DELAY not in left_out and is_missed(growth, error, len(tried.losses)):
-            tried = min(tried, _later(comparison, model, left_out, best, cache), key=partial(_growth, best))
-            growth, error = worse_by(best, tried)
+            tried = min(tried, _later(comparison, model, left_out, best, cache), key=partial(_growth, least))
+            growth, error = worse_by(least, tried)
         kept = is_missed(growth, error, len(tried.losses), part.usual)
         decisions.append(PartDecision(part.name, kept, growth, error))
         if not kept:
             best, left_out = tried, left_out | {part.name}
+            least = min(least, best, key=partial(_growth, full))
     if DELAY in left_out and RAMP not in left_out:
         progress("forecasts of left-out drives with a dead time in place of the ramp")
         best, left_out, decisions = _delay_for_ramp(comparison, model, best, left_out, decisions, cache)
@@ -215,12 +217,21 @@ def _fitted_without(
 
 
 def _settled(
-    comparison: Comparison, model: RobotModel, left_out: frozenset[str], best: Candidate, cache: StepCache, usual: bool
+    comparison: Comparison,
+    model: RobotModel,
+    left_out: frozenset[str],
+    best: Candidate,
+    least: Candidate,
+    cache: StepCache,
+    usual: bool,
 ) -> Candidate:
-    """A model without some parts, fitted from where another one stands; further while it seems to miss them."""
+    """A model without some parts, fitted from where the best one stands; further while it seems to miss them.
+
+    It does where its forecasts are worse than those of the candidate with the least losses.
+    """
     tried = _fitted_without(comparison, model, left_out, best.standing, cache)
     for time in range(comparison.settlings):
-        growth, error = worse_by(best, tried)
+        growth, error = worse_by(least, tried)
         missed = is_missed(growth, error, len(tried.losses), usual)
         if not missed or tried.standing.converged or growth > HOPELESS:
             break

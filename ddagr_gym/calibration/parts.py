@@ -60,6 +60,7 @@ class Part:
         helps: drive from which they can be identified, for a reader.
         needs: names of parts without any of which it does nothing; empty where it needs none.
         usual: whether nearly every robot has it: it stays unless forecasts without it are as good.
+        on_data_sheet: whether a data sheet states its values: these hold until all else is fitted.
     """
 
     name: str
@@ -68,6 +69,7 @@ class Part:
     helps: str
     needs: tuple[str, ...] = ()
     usual: bool = False
+    on_data_sheet: bool = False
 
 
 def _of_drivetrain(name: str, parameters: tuple[str, ...], needs: tuple[str, ...] = (), usual: bool = False) -> Part:
@@ -80,13 +82,21 @@ PARTS = (
         "scale of the gyro",
         ("gyro_scale",),
         "a drive with poses in which the robot turns by several revolutions to both sides",
+        on_data_sheet=True,
     ),
-    Part("inertia", "mass and yaw inertia", ("mass", "yaw_inertia"), f"quick reversals of turning: {HARD}"),
+    Part(
+        "inertia",
+        "mass and yaw inertia",
+        ("mass", "yaw_inertia"),
+        f"quick reversals of turning: {HARD}",
+        on_data_sheet=True,
+    ),
     Part(
         "geometry",
         "wheels and their places",
         ("half_wheelbase", "half_track", "half_width", "outer_radius"),
         "slow straight pieces and slow arcs to both sides on firm ground, with poses",
+        on_data_sheet=True,
     ),
     _of_drivetrain("no_load_speed", ("no_load_speed",)),
     _of_drivetrain("torque_limit", ("acceleration_limit",)),
@@ -102,7 +112,10 @@ PARTS = (
     _of_drivetrain("speed_loop", ("motor_rate",)),
     _of_drivetrain("command_delay", ("command_delay",), usual=True),
 )
-"""In the order in which their removal is tried: what the fewest robots need comes first."""
+"""In the order in which they are tried: what the fewest robots need comes first."""
+
+DATA_SHEET_PARTS = frozenset(part.name for part in PARTS if part.on_data_sheet)
+"""Names of the parts whose values a data sheet states."""
 
 LIMITS = {
     "turning_limit": "turning_limit",

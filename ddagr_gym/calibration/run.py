@@ -17,6 +17,7 @@ from ddagr_gym.calibration.calibration_data import CalibrationData, prepare_driv
 from ddagr_gym.calibration.current_evidence import current_evidence
 from ddagr_gym.calibration.drive_scatter import drive_estimates
 from ddagr_gym.calibration.effect_bank import ordinary_runs
+from ddagr_gym.calibration.final_parts import decide_with_all_windows
 from ddagr_gym.calibration.fit_starts import fit_from_several
 from ddagr_gym.calibration.forecast_errors import Forecasts, all_forecasts, explained_when_left_out, forecast_errors
 from ddagr_gym.calibration.identifiability import covariance, unidentified
@@ -27,14 +28,13 @@ from ddagr_gym.calibration.joint_fit import (
     LAST_ITERATIONS,
     Standing,
     complete_model,
-    fit_model,
     model_at,
     weigh_and_fit,
 )
 from ddagr_gym.calibration.left_out import forecasts
 from ddagr_gym.calibration.ordinary_drives import Ordinary, ordinary_drives
 from ddagr_gym.calibration.part_selection import Candidate, Comparison, Selection, select_parts
-from ddagr_gym.calibration.parts import RobotModel
+from ddagr_gym.calibration.parts import DATA_SHEET_PARTS, RobotModel
 from ddagr_gym.calibration.residual_tables import spectra, unexplained
 from ddagr_gym.calibration.result import SCHEMA, SCHEMA_VERSION, Calibration, Covariance
 from ddagr_gym.calibration.settings import CalibrationSettings
@@ -83,7 +83,7 @@ class Outcome:
 
 
 class LittleExplainedError(Exception):
-    """All parts together explain less of left-out wheel speeds than the settings ask for.
+    """All parts of the drivetrain together explain less of left-out wheel speeds than the settings ask for.
 
     Attributes:
         share: of their squared error that is taken away from the data sheet's.
@@ -183,8 +183,19 @@ def calibrate_drives(
     selection = _select(data, complete, held, settings, store, steps)
     kept = complete.without(selection.left_out, robot)
     progress("joint fit")
-    final = store.step("joint fit", partial(_final_fit, data, kept, selection.standing.values, settings))
     windows = data.spread(settings.fitted)
+    first = store.step(
+        "joint fit", partial(_joint_fit, data, windows, kept, selection.standing.values, settings.threads)
+    )
+    comparison = Comparison(
+        data, windows, data.spread(settings.judged), first.weights, settings.threads, settings.settlings
+    )
+    selection = decide_with_all_windows(
+        comparison, complete, replace(selection, standing=first.standing), store.step, progress
+    )
+    kept = complete.without(selection.left_out, robot)
+    progress("parameters that the drives identify")
+    final = store.step("identified", partial(_identified, comparison, kept, selection.standing))
     kept = kept.held(frozenset(final.refused), robot)
     model = model_at(data, windows, kept, final.weights, final.standing, settings.threads)
     progress("every drive by itself")
@@ -238,7 +249,12 @@ def _select(
     store: StepStore,
     steps: IndependentSteps,
 ) -> Selection:
-    """Parts that forecasts of left-out drives ask for, by fits to some of the windows; or LittleExplainedError."""
+    """Parts, but those of the data sheet, that forecasts of left-out drives ask for, by fits to some of the windows.
+
+    Raises:
+        LittleExplainedError: less than ``settings.least_explained`` is explained.
+    """
+    model = model.without(DATA_SHEET_PARTS, data.robot)
     windows, judged = data.spread(settings.compared), data.spread(settings.judged)
     rough = store.step("all parts", partial(_weigh, data, windows, model, held, settings.threads, steps))
     comparison = Comparison(data, windows, judged, rough.weights, settings.threads, settings.settlings)
@@ -248,13 +264,14 @@ def _select(
     )
     if explained is not None and explained < settings.least_explained:
         raise LittleExplainedError(explained)
-    return select_parts(comparison, model, full, store.step, steps.progress)
+    found = select_parts(comparison, model, full, store.step, steps.progress)
+    return replace(found, left_out=found.left_out | DATA_SHEET_PARTS)
 
 
 def _all_parts(
     comparison: Comparison, model: RobotModel, held: Mapping[str, float], standing: Standing, asked: bool
 ) -> tuple[Candidate, float | None]:
-    """The model with all parts by its forecasts and, where asked, the share of the wheel speeds that these explain."""
+    """The model with all these parts by its forecasts; where asked, the share of the wheel speeds that they explain."""
     fitted = comparison.fitted(model, standing, iterations=0)
     made = comparison.forecasts(fitted)
     candidate = comparison.judge(fitted, made)
@@ -275,21 +292,21 @@ def _weigh(
     return FinalFit(found.standing, weights, {})
 
 
-def _final_fit(
-    data: CalibrationData, model: RobotModel, start: Mapping[str, float], settings: CalibrationSettings
+def _joint_fit(
+    data: CalibrationData, windows: WindowSet, model: RobotModel, start: Mapping[str, float], threads: int
 ) -> FinalFit:
-    """Fit of the parts that are kept; then again with the data sheet's values where the drives identify nothing."""
-    windows = data.spread(settings.fitted)
-    found, weights = weigh_and_fit(data, windows, model, start, settings.threads, LAST_ITERATIONS)
-    refused = unidentified(found)
+    found, weights = weigh_and_fit(data, windows, model, start, threads, LAST_ITERATIONS)
+    return FinalFit(found.standing, weights, {})
+
+
+def _identified(comparison: Comparison, model: RobotModel, standing: Standing) -> FinalFit:
+    """The fit of the parts that are kept, again with the data sheet's values where the drives identify nothing."""
+    refused = unidentified(comparison.fitted(model, standing, iterations=0))
     if refused:
-        values = {name: 0.0 if name in refused else value for name, value in found.values.items()}
-        held = model.held(frozenset(refused), data.robot)
-        states = found.fitted.point.states
-        found = fit_model(
-            data, windows, held, weights, values, settings.threads, states=states, iterations=LAST_ITERATIONS
-        )
-    return FinalFit(found.standing, weights, refused)
+        values = {name: 0.0 if name in refused else value for name, value in standing.values.items()}
+        held = model.held(frozenset(refused), comparison.data.robot)
+        standing = comparison.fitted(held, replace(standing, values=values), LAST_ITERATIONS).standing
+    return FinalFit(standing, comparison.weights, refused)
 
 
 def _key(

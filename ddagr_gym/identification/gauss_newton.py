@@ -260,13 +260,9 @@ def _step(problem: Problem, here: _Iterate, parameters: Sequence[EffectParameter
     """
     point, elimination, least = here.point, here.elimination, tolerance * here.cost
     raw = _raw_columns(problem, here)
-    linear = _linearised(problem, here, raw, parameters)
-    gradient = linear.gradient
-    change = linear.step(linear.information, gradient, _LONGEST)
-    explained = elimination.explain(raw)
-    states = explained[:, :_STATES, 0] - explained[:, :_STATES, 1:] @ change
+    linear, change, states = _whole_step(problem, here, raw, parameters)
     shares = problem.losses(_counted(problem, elimination, raw[..., 0]))
-    promised = float(gradient @ change)
+    promised = float(linear.gradient @ change)
     if not problem.nuisances.local:
         promised += elimination.explained_square(raw[..., 0])
     free = np.flatnonzero(problem.free)
@@ -283,6 +279,42 @@ def _step(problem: Problem, here: _Iterate, parameters: Sequence[EffectParameter
         if after < here.cost:
             return replace(here, point=tried, prediction=predicted, cost=after)
     return here
+
+
+def _whole_step(
+    problem: Problem, here: _Iterate, raw: Array, parameters: Sequence[EffectParameter]
+) -> tuple[Linearised, Array, Array]:
+    """The linearised problem of raw columns, its step (P,) and that of the states (W, 8)."""
+    linear = _linearised(problem, here, raw, parameters)
+    change = linear.step(linear.information, linear.gradient, _LONGEST)
+    explained = here.elimination.explain(raw)
+    return linear, change, explained[:, :_STATES, 0] - explained[:, :_STATES, 1:] @ change
+
+
+def values_after_step(problem: Problem, known: Fitted) -> Array:
+    """Nuisances (P,) after the share of one step, by known sensitivities, that lowers the cost most; or as they are.
+
+    In each window the states count that are better, those that go with the step or those before it.
+
+    Args:
+        problem: what to fit, without effects.
+        known: where it stands, fitted to this or to another problem on the same windows.
+    """
+    here = _begun(problem, known.point, (), known)
+    linear, change, states = _whole_step(problem, here, _raw_columns(problem, here), ())
+    least, best = here.cost, known.point.values
+    for damping in DAMPING:
+        values = known.point.values.copy()
+        values[problem.free] = linear.after(damping * change)
+        still = problem.moved(known.point, values)
+        both = (still, replace(still, states=still.states + damping * states))
+        shares = [cost_of(problem, p, problem.predict(p), here.elimination)[1] for p in both]
+        cost = float(np.minimum(*shares).sum()) + _prior_cost(problem, still)
+        if cost < least:
+            least, best = cost, values
+        elif best is not known.point.values:
+            break
+    return best
 
 
 def _best_by_window(

@@ -58,19 +58,31 @@ def test_a_step_that_fails_is_named_and_the_others_are_kept(tmp_path):
     assert [store.has(f"drive {n}") for n in (1, 2, 3)] == [True, False, True]
 
 
-def test_starts_share_what_they_have_in_common(monkeypatch):
+def test_starts_share_what_they_have_in_common_and_the_best_is_weighed_again(monkeypatch):
     shared, sent = [], []
     states = SimpleNamespace(fitted=SimpleNamespace(point=SimpleNamespace(states="states")), values={"a": 1.0})
     monkeypatch.setattr(fit_starts, "rough_fit", lambda *_: (states, "weights"))
     monkeypatch.setattr(fit_starts, "start_values", lambda *_: {})
-    monkeypatch.setattr(fit_starts, "fit_model", lambda *given, **_: given[4])
-    tried = [(2.0, None), (1.0, SimpleNamespace(values={"best": 1.0}, states=None)), (3.0, None)]
+    monkeypatch.setattr(fit_starts, "first_weights", lambda *_: "noise")
+    monkeypatch.setattr(fit_starts, "weights_by_drive", lambda windows, left, noise: f"weights of {left}")
+    monkeypatch.setattr(fit_starts, "fit_model", lambda *given, **_: made(given[3], given[4]))
+
+    def made(weights, values):
+        return SimpleNamespace(
+            fitted=SimpleNamespace(prediction=f"fit {values['fits'] + 1} with {weights}"),
+            standing=SimpleNamespace(values={"fits": values["fits"] + 1}, states=None),
+        )
+
+    tried = [(2.0, None), (1.0, SimpleNamespace(values={"fits": 0}, states=None)), (3.0, None)]
     steps = SimpleNamespace(
         runner=SimpleNamespace(share=lambda value: shared.append(value) or "handle"),
         results=lambda label, tasks: sent.extend(tasks) or tried,
     )
     model = SimpleNamespace(parameters=())
-    assert fit_starts.fit_from_several("data", "windows", model, {}, 1, steps) == ({"best": 1.0}, "weights")
+    found, weights = fit_starts.fit_from_several("data", "windows", model, {}, 1, steps)
+    assert found.standing.values == {"fits": 1 + fit_starts.WEIGHINGS}
+    # weighed by what the fit before left, in turn
+    assert weights == "weights of fit 2 with weights of fit 1 with weights"
     assert shared == [("data", "windows", model, "weights", 1, "states")]
     assert [task.arguments for task in sent] == [
         ("handle", {"a": 1.0} | change) for change in ({}, *fit_starts.OTHER_STARTS)

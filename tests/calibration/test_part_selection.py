@@ -99,6 +99,14 @@ def test_a_dead_time_that_forecasts_as_well_takes_the_place_of_a_ramp(delay_alon
     assert kept == {name: name not in left_out for name in BOTH}
 
 
+def test_parts_that_are_missed_a_little_each_are_not_all_given_away():
+    losses = Losses({RAMP: 1.015, DELAY: 1.015, BOTH: 1.03})
+    found = select_parts(losses, Made(), candidate(1.0, 1.01, 0.99), lambda name, make: make(), lambda line: None)
+    assert found.left_out & BOTH == RAMP
+    growth = {item.name: item.growth for item in found.decisions}
+    assert (growth["command_ramp"], growth["command_delay"]) == (pytest.approx(0.015), pytest.approx(0.03))
+
+
 @pytest.mark.parametrize(("name", "kept"), [("command_delay", True), ("command_ramp", False)])
 def test_the_dead_time_is_kept_where_it_matters_and_another_part_only_where_that_is_sure(name, kept):
     out = frozenset({name})

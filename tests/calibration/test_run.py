@@ -27,6 +27,12 @@ FEW = CalibrationSettings(fitted=10, compared=6, judged=12)
 TURNING_LIMIT = 0.6
 """Of a robot whose controller limits the yaw rate [rad/s]."""
 
+RAMP = 1.0
+"""By which the commands of a robot change [rad/s^2]."""
+
+WIDER = 1.1
+"""Factor on the track of a robot whose data sheet is wrong."""
+
 GROUNDS = ("field", "field", "track")
 
 
@@ -227,3 +233,28 @@ def test_a_limit_of_the_commanded_turning_is_found():
     kept = {part.name for part in found.calibration.parts if part.kept}
     assert {"speed_loop", "command_delay", "turning_limit"} <= kept
     assert found.robot.drivetrain.turning_limit == pytest.approx(TURNING_LIMIT, rel=0.02)
+
+
+@pytest.mark.slow
+def test_a_ramp_of_the_commands_is_kept():
+    """A robot that takes a second and a half to its commanded speed in equal steps has no dead time in its stead."""
+    robot = true_robot()
+    shaped = replace(robot, drivetrain=replace(robot.drivetrain, command_ramp=RAMP))
+    found = calibrated([drive(ground, seed, robot=shaped) for seed, ground in enumerate(GROUNDS, 1)])
+    kept = {part.name for part in found.calibration.parts if part.kept}
+    assert {"speed_loop", "command_delay", "command_ramp"} <= kept
+    assert found.robot.drivetrain.command_ramp == pytest.approx(RAMP, rel=0.05)
+    assert found.robot.drivetrain.command_delay == pytest.approx(DELAY, rel=0.05)
+
+
+@pytest.mark.slow
+def test_wheels_that_are_not_as_on_the_data_sheet_are_found():
+    sheet = replace(
+        get_robot("ddagr"), standard_deviations={**get_robot("ddagr").standard_deviations, "half_track": 0.05}
+    )
+    robot = replace(true_robot(), half_track=WIDER * sheet.half_track)
+    soils = {ground: get_soil("thesis_a1") for ground in GROUNDS}
+    made = [drive(ground, seed, robot=robot) for seed, ground in enumerate(GROUNDS, 1)]
+    found = calibrate_drives(made, GROUNDS, sheet, soils, FEW)
+    assert {part.name for part in found.calibration.parts if part.kept} >= {"geometry", "speed_loop", "command_delay"}
+    assert found.robot.half_track == pytest.approx(robot.half_track, rel=0.02)

@@ -1,0 +1,98 @@
+"""Parts that are decided with all windows, once the others are fitted.
+
+Few windows of each drive mislead about two kinds of parts. Values that the data sheet states, of wheels, masses and
+gyro, move far where a model lacks something else: they hold until the other parts are fitted, and are free only where
+forecasts of left-out drives gain by that (forward selection). And a ramp of the commands that few windows asked for is
+kept only if all of them miss it, also from a longer dead time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from ddagr_gym.calibration.joint_fit import LAST_ITERATIONS, Standing
+from ddagr_gym.calibration.part_selection import (
+    DELAY,
+    RAMP,
+    TRIED_DELAY,
+    Candidate,
+    Comparison,
+    Selection,
+    is_missed,
+    worse_by,
+)
+from ddagr_gym.calibration.parts import PARTS, RobotModel
+from ddagr_gym.calibration.result import PartDecision
+from ddagr_gym.diagnosis.store import StepCache
+
+Fit = Callable[[frozenset[str], Standing, str], Candidate]
+"""Model without some parts, fitted from a start and forecast; the text names it among the finished steps."""
+
+
+def decide_with_all_windows(
+    comparison: Comparison,
+    model: RobotModel,
+    selected: Selection,
+    cache: StepCache,
+    progress: Callable[[str], None],
+) -> Selection:
+    """A selection without a ramp that all windows do not miss, and with values of the data sheet that they correct.
+
+    Args:
+        comparison: all windows that are fitted, and those that are forecast.
+        model: with all parts.
+        selected: by few windows, of the parts that no data sheet states; it stands where the joint fit does.
+        cache: of models that are fitted already.
+        progress: called with a line of text for each part.
+    """
+
+    def fit(left_out: frozenset[str], start: Standing, stage: str) -> Candidate:
+        return cache(f"all windows, {stage}", lambda: _settled(comparison, model, left_out, start))
+
+    left_out, decisions = selected.left_out, list(selected.decisions)
+    without = model.without(left_out, comparison.data.robot)
+    found = cache("all windows, as selected", lambda: comparison.candidate(without, selected.standing, iterations=0))
+    best = replace(found, standing=selected.standing)
+    if RAMP not in left_out:
+        progress("forecasts with all windows without the ramp of the commands")
+        best, left_out, decisions = _without_ramp(fit, best, left_out, decisions)
+    for part in PARTS:
+        if not part.on_data_sheet or not model.free & set(part.parameters):
+            continue
+        progress(f"forecasts with all windows with {part.title} free")
+        tried = fit(left_out - {part.name}, best.standing, f"with {part.name}")
+        growth, error = worse_by(tried, best)
+        kept = is_missed(growth, error, len(best.losses))
+        decisions.append(PartDecision(part.name, kept, growth, error))
+        if kept:
+            best, left_out = tried, left_out - {part.name}
+    return Selection(left_out, tuple(decisions), best.standing)
+
+
+def _without_ramp(
+    fit: Fit, best: Candidate, left_out: frozenset[str], decisions: list[PartDecision]
+) -> tuple[Candidate, frozenset[str], list[PartDecision]]:
+    """Without the ramp, from the dead time as it is and from a longer one, unless both are missed."""
+    delay = best.standing.values.get(DELAY)
+    starts = [(best.standing, "without the ramp")]
+    if DELAY not in left_out and delay is not None and delay < TRIED_DELAY:
+        late = replace(best.standing, values={**best.standing.values, DELAY: TRIED_DELAY})
+        starts.append((late, f"without the ramp, dead time from {TRIED_DELAY:g}"))
+    tried = [fit(left_out | {RAMP}, start, stage) for start, stage in starts]
+    least = min(tried, key=lambda candidate: worse_by(best, candidate)[0])
+    growth, error = worse_by(best, least)
+    kept = is_missed(growth, error, len(least.losses))
+    changed = [PartDecision(RAMP, kept, growth, error) if item.name == RAMP else item for item in decisions]
+    return (best, left_out, changed) if kept else (least, left_out | {RAMP}, changed)
+
+
+def _settled(comparison: Comparison, model: RobotModel, left_out: frozenset[str], start: Standing) -> Candidate:
+    """A model without some parts, fitted until it is settled or has had steps enough, and its forecasts."""
+    without = model.without(left_out, comparison.data.robot)
+    fitted = comparison.fitted(without, start, LAST_ITERATIONS)
+    for _ in range(comparison.settlings):
+        if fitted.fitted.converged:
+            break
+        fitted = comparison.fitted(without, fitted.standing, LAST_ITERATIONS)
+    return comparison.judge(fitted, comparison.forecasts(fitted))

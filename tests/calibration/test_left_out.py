@@ -1,0 +1,98 @@
+"""Fits without one drive, from where the joint fit stands."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ddagr_gym.calibration.calibration_data import CalibrationData
+from ddagr_gym.calibration.joint_fit import FittedModel, complete_model, fit_model, weigh_and_fit
+from ddagr_gym.calibration.left_out import values_without
+from ddagr_gym.calibration.parts import PARTS
+from ddagr_gym.calibration.run import ready_drives
+from ddagr_gym.calibration.settings import CalibrationSettings
+from ddagr_gym.identification.gauss_newton import fit, fit_states
+from ddagr_gym.identification.problem import Point, Problem
+from ddagr_gym.identification.residual_weights import Weights
+from ddagr_gym.presets import get_robot, get_soil
+from tests.calibration.conftest import drive, true_robot
+
+SETTINGS = CalibrationSettings(fitted=4, compared=4, judged=4)
+
+KEPT = frozenset({"speed_loop", "command_delay"})
+
+OUT = 1
+"""Drive that is left out, on the same ground as the first."""
+
+QUICK = 2.9
+"""Rate of its motors [1/s]; that of the others is 2.5."""
+
+
+@pytest.fixture(scope="module")
+def data() -> CalibrationData:
+    """Of three drives of which one is by quicker motors: the others' fit is elsewhere without it."""
+    quick = replace(true_robot(), motor_rate=QUICK)
+    drives = [drive("field", 1), drive("field", 2, robot=quick), drive("track", 3)]
+    grounds = ("field", "field", "track")
+    soils = {ground: get_soil("thesis_a1") for ground in grounds}
+    return ready_drives(drives, grounds, get_robot("ddagr"), soils, SETTINGS)
+
+
+@pytest.fixture(scope="module")
+def fitted(data) -> tuple[FittedModel, Weights]:
+    complete, held = complete_model(data)
+    model = complete.without(frozenset(part.name for part in PARTS) - KEPT, data.robot)
+    return weigh_and_fit(data, data.spread(SETTINGS.fitted), model, {**held, "command_delay": 0.1}, 1)
+
+
+@pytest.fixture(scope="module")
+def joint(fitted) -> FittedModel:
+    return fitted[0]
+
+
+@pytest.fixture(scope="module")
+def out(joint) -> np.ndarray:
+    return joint.problem.blocked.windows.recording == OUT
+
+
+def others(model: FittedModel, out: np.ndarray) -> Problem:
+    """The fit of the windows that stay, with the bias of the drive that does not held."""
+    names = np.array([p.name for p in model.parameters])
+    return model.problem.subset(~out).holding(names == f"gyro_bias_{OUT + 1}")
+
+
+def cost(model: FittedModel, values: np.ndarray, out: np.ndarray) -> float:
+    """Loss of the windows that stay with values, their states at their best, and the priors' share."""
+    problem = others(model, out)
+    states, prediction = fit_states(problem, values, 4)
+    free = problem.free
+    loss = problem.losses(problem.residual(Point(values, states), prediction)).sum()
+    return float(loss + 0.5 * ((values[free] / problem.prior[free]) ** 2).sum())
+
+
+def test_it_comes_to_what_a_fit_of_the_other_drives_comes_to(joint, out):
+    problem, begin = others(joint, out), joint.fitted.point
+    full = fit(problem, Point(begin.values, begin.states[~out]), iterations=20, renewals=20)
+    k = [p.name for p in joint.parameters].index("motor_rate")
+    moved = full.point.values[k] - begin.values[k]
+    assert moved < -0.05
+    assert values_without(joint, out)[k] - begin.values[k] == pytest.approx(moved, rel=0.2)
+
+
+def test_what_acts_in_the_left_out_drive_alone_is_left_as_it_is(joint, out):
+    names = [p.name for p in joint.parameters]
+    moved = values_without(joint, out) != joint.fitted.point.values
+    assert not moved[names.index(f"gyro_bias_{OUT + 1}")]
+    assert moved[names.index("motor_rate")]
+    assert moved[names.index("soil_strength_field")]
+
+
+def test_no_step_is_taken_by_which_the_other_drives_are_read_worse(data, fitted, out):
+    """Where the sensitivities are of another point, the linear problem says nothing of the way."""
+    joint, weights = fitted
+    far = {**joint.values, "motor_rate": 1.0, "command_delay": 0.9}
+    begun = fit_model(data, data.spread(SETTINGS.fitted), joint.model, weights, far, 1, iterations=0)
+    found = values_without(begun, out)
+    assert cost(begun, found, out) <= cost(begun, begun.fitted.point.values, out)
