@@ -73,26 +73,28 @@ def decide_with_all_windows(
 def _without_ramp(
     fit: Fit, best: Candidate, left_out: frozenset[str], decisions: list[PartDecision]
 ) -> tuple[Candidate, frozenset[str], list[PartDecision]]:
-    """Without the ramp, from the dead time as it is and from a longer one, unless both are missed."""
+    """Without the ramp, from the dead time as it is or else from a longer one, unless it is missed from both."""
     delay = best.standing.values.get(DELAY)
     starts = [(best.standing, "without the ramp")]
     if DELAY not in left_out and delay is not None and delay < TRIED_DELAY:
         late = replace(best.standing, values={**best.standing.values, DELAY: TRIED_DELAY})
         starts.append((late, f"without the ramp, dead time from {TRIED_DELAY:g}"))
-    tried = [fit(left_out | {RAMP}, start, stage) for start, stage in starts]
-    least = min(tried, key=lambda candidate: worse_by(best, candidate)[0])
-    growth, error = worse_by(best, least)
+    found: list[tuple[float, float, Candidate]] = []
+    for start, stage in starts:
+        tried = fit(left_out | {RAMP}, start, stage)
+        found.append((*worse_by(best, tried), tried))
+        if not is_missed(*found[-1][:2], len(tried.losses)):
+            break
+    growth, error, least = min(found, key=lambda item: item[0])
     kept = is_missed(growth, error, len(least.losses))
     changed = [PartDecision(RAMP, kept, growth, error) if item.name == RAMP else item for item in decisions]
     return (best, left_out, changed) if kept else (least, left_out | {RAMP}, changed)
 
 
 def _settled(comparison: Comparison, model: RobotModel, left_out: frozenset[str], start: Standing) -> Candidate:
-    """A model without some parts, fitted until it is settled or has had steps enough, and its forecasts."""
+    """A model without some parts, fitted until it is settled or has had twice the steps, and its forecasts."""
     without = model.without(left_out, comparison.data.robot)
     fitted = comparison.fitted(without, start, LAST_ITERATIONS)
-    for _ in range(comparison.settlings):
-        if fitted.fitted.converged:
-            break
+    if not fitted.fitted.converged:
         fitted = comparison.fitted(without, fitted.standing, LAST_ITERATIONS)
     return comparison.judge(fitted, comparison.forecasts(fitted))
