@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 from ddagr_gym.calibration.joint_fit import LAST_ITERATIONS, Standing
 from ddagr_gym.calibration.part_selection import (
@@ -20,6 +21,8 @@ from ddagr_gym.calibration.part_selection import (
     Comparison,
     Selection,
     is_missed,
+    late_start,
+    mean_growth,
     worse_by,
 )
 from ddagr_gym.calibration.parts import PARTS, RobotModel
@@ -74,21 +77,17 @@ def _without_ramp(
     fit: Fit, best: Candidate, left_out: frozenset[str], decisions: list[PartDecision]
 ) -> tuple[Candidate, frozenset[str], list[PartDecision]]:
     """Without the ramp, from the dead time as it is or else from a longer one, unless it is missed from both."""
-    delay = best.standing.values.get(DELAY)
-    starts = [(best.standing, "without the ramp")]
-    if DELAY not in left_out and delay is not None and delay < TRIED_DELAY:
-        late = replace(best.standing, values={**best.standing.values, DELAY: TRIED_DELAY})
-        starts.append((late, f"without the ramp, dead time from {TRIED_DELAY:g}"))
-    found: list[tuple[float, float, Candidate]] = []
-    for start, stage in starts:
-        tried = fit(left_out | {RAMP}, start, stage)
-        found.append((*worse_by(best, tried), tried))
-        if not is_missed(*found[-1][:2], len(tried.losses)):
-            break
-    growth, error, least = min(found, key=lambda item: item[0])
-    kept = is_missed(growth, error, len(least.losses))
+    without = left_out | {RAMP}
+    tried = fit(without, best.standing, "without the ramp")
+    growth, error = worse_by(best, tried)
+    short = DELAY not in left_out and best.standing.values[DELAY] < TRIED_DELAY
+    if short and is_missed(growth, error, len(tried.losses)):
+        late = fit(without, late_start(best), f"without the ramp, dead time from {TRIED_DELAY:g}")
+        tried = min(tried, late, key=partial(mean_growth, best))
+        growth, error = worse_by(best, tried)
+    kept = is_missed(growth, error, len(tried.losses))
     changed = [PartDecision(RAMP, kept, growth, error) if item.name == RAMP else item for item in decisions]
-    return (best, left_out, changed) if kept else (least, left_out | {RAMP}, changed)
+    return (best, left_out, changed) if kept else (tried, without, changed)
 
 
 def _settled(comparison: Comparison, model: RobotModel, left_out: frozenset[str], start: Standing) -> Candidate:

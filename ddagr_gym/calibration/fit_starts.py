@@ -144,15 +144,15 @@ def fit_from_several(
     ]
     tried = steps.results("fit of all parts from several starts", tasks)
     _, best = min(tried, key=lambda item: item[0])
-    fitted = settled_fit(data, windows, model, weights, best, threads)
+    fitted = _settled_fit(data, windows, model, weights, best, threads)
     noise = first_weights(data, windows)
     for _ in range(WEIGHINGS):
         weights = weights_by_drive(windows, fitted.fitted.prediction, noise)
-        fitted = settled_fit(data, windows, model, weights, fitted.standing, threads)
+        fitted = _settled_fit(data, windows, model, weights, fitted.standing, threads)
     return fitted, weights
 
 
-def settled_fit(
+def _settled_fit(
     data: CalibrationData,
     windows: WindowSet,
     model: RobotModel,

@@ -19,9 +19,8 @@ from ddagr_gym.calibration.calibration_data import CalibrationData
 from ddagr_gym.calibration.joint_fit import FittedModel, fit_model
 from ddagr_gym.calibration.parts import RobotModel
 from ddagr_gym.identification.data_split import parts_of_time
-from ddagr_gym.identification.gauss_newton import Fitted, values_after_step
+from ddagr_gym.identification.gauss_newton import values_after_step
 from ddagr_gym.identification.least_squares import huber_loss
-from ddagr_gym.identification.problem import Point
 from ddagr_gym.identification.residual_weights import Weights, residuals
 from ddagr_gym.identification.windows import CHANNELS, WindowSet
 
@@ -86,19 +85,7 @@ def values_without(model: FittedModel, out: Booleans) -> Array:
     """
     alone = np.array([not _acts(model, k, ~out) for k in range(len(model.parameters))])
     problem = model.problem.subset(~out).holding(alone)
-    return values_after_step(problem, _in_windows(model.fitted, ~out))
-
-
-def _in_windows(fitted: Fitted, chosen: Booleans) -> Fitted:
-    """Where a fit stands in some of its windows, with its sensitivities there."""
-    return replace(
-        fitted,
-        point=Point(fitted.point.values, fitted.point.states[chosen], fitted.point.effects),
-        prediction=fitted.prediction[chosen],
-        elimination=fitted.elimination.subset(chosen),
-        by_parameter=fitted.by_parameter[chosen],
-        window_cost=fitted.window_cost[chosen],
-    )
+    return values_after_step(problem, model.fitted.subset(~out))
 
 
 def _acts(model: FittedModel, parameter: int, rows: Booleans) -> bool:

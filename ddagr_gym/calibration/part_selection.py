@@ -185,13 +185,13 @@ def select_parts(
         tried = _settled(comparison, model, left_out | {part.name}, best, least, cache, part.usual)
         growth, error = worse_by(least, tried)
         if part.name == RAMP and DELAY not in left_out and is_missed(growth, error, len(tried.losses)):
-            tried = min(tried, _later(comparison, model, left_out, best, cache), key=partial(_growth, least))
+            tried = min(tried, _later(comparison, model, left_out, best, cache), key=partial(mean_growth, least))
             growth, error = worse_by(least, tried)
         kept = is_missed(growth, error, len(tried.losses), part.usual)
         decisions.append(PartDecision(part.name, kept, growth, error))
         if not kept:
             best, left_out = tried, left_out | {part.name}
-            least = min(least, best, key=partial(_growth, full))
+            least = min(least, best, key=partial(mean_growth, full))
     if DELAY in left_out and RAMP not in left_out:
         progress("forecasts of left-out drives with a dead time in place of the ramp")
         best, left_out, decisions = _delay_for_ramp(comparison, model, best, left_out, decisions, cache)
@@ -244,14 +244,16 @@ def _later(
 ) -> Candidate:
     """A model without the ramp from a longer dead time: a fit from a short one does not reach what the ramp did."""
     stage = f", dead time from {TRIED_DELAY:g}"
-    return _fitted_without(comparison, model, left_out | {RAMP}, _late_start(best), cache, stage)
+    return _fitted_without(comparison, model, left_out | {RAMP}, late_start(best), cache, stage)
 
 
-def _late_start(best: Candidate) -> Standing:
+def late_start(best: Candidate) -> Standing:
+    """Where a candidate stands, but for a longer dead time."""
     return replace(best.standing, values={**best.standing.values, DELAY: TRIED_DELAY})
 
 
-def _growth(before: Candidate, after: Candidate) -> float:
+def mean_growth(before: Candidate, after: Candidate) -> float:
+    """That of :func:`worse_by` alone."""
     return worse_by(before, after)[0]
 
 
@@ -270,7 +272,7 @@ def _delay_for_ramp(
     """
     robot = comparison.data.robot
     exchanged, neither = (left_out - {DELAY}) | {RAMP}, left_out | {RAMP}
-    with_delay = partial(comparison.candidate, model.without(exchanged, robot), _late_start(best))
+    with_delay = partial(comparison.candidate, model.without(exchanged, robot), late_start(best))
     late = cache("a dead time for the ramp", with_delay)
     growth, error = worse_by(best, late)
     if is_missed(growth, error, len(late.losses)):

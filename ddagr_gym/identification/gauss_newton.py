@@ -67,6 +67,17 @@ class Fitted:
     converged: bool
     window_cost: Array
 
+    def subset(self, chosen: NDArray[np.int64] | NDArray[np.bool_]) -> Fitted:
+        """The same in some of its windows, with its sensitivities there; the cost remains that of all."""
+        return replace(
+            self,
+            point=replace(self.point, states=self.point.states[chosen]),
+            prediction=self.prediction[chosen],
+            elimination=self.elimination.subset(chosen),
+            by_parameter=self.by_parameter[chosen],
+            window_cost=self.window_cost[chosen],
+        )
+
 
 def cost_of(problem: Problem, point: Point, prediction: Array, elimination: Elimination) -> tuple[float, Array]:
     """Cost, and the windows' shares of it (W,); infinite where predictions fail.
@@ -260,35 +271,53 @@ def _step(problem: Problem, here: _Iterate, parameters: Sequence[EffectParameter
     """
     point, elimination, least = here.point, here.elimination, tolerance * here.cost
     raw = _raw_columns(problem, here)
-    linear, change, states = _whole_step(problem, here, raw, parameters)
+    step = _WholeStep.of(problem, here, raw, parameters)
     shares = problem.losses(_counted(problem, elimination, raw[..., 0]))
-    promised = float(linear.gradient @ change)
+    promised = float(step.linear.gradient @ step.change)
     if not problem.nuisances.local:
         promised += elimination.explained_square(raw[..., 0])
-    free = np.flatnonzero(problem.free)
     for damping in DAMPING:
         if damping < 1.0 and damping * promised < least:
             break
-        values = point.values.copy()
-        after_step = linear.after(damping * change)
-        values[free] = after_step[: len(free)]
-        effects = moved(point.effects, parameters, after_step[len(free) :])
-        start = problem.moved(replace(point, effects=effects), values)
-        stepped = replace(start, states=start.states + damping * states)
+        stepped, start = step.share(problem, point, parameters, damping)
         tried, predicted, after = _best_by_window(problem, stepped, start, elimination, shares)
         if after < here.cost:
             return replace(here, point=tried, prediction=predicted, cost=after)
     return here
 
 
-def _whole_step(
-    problem: Problem, here: _Iterate, raw: Array, parameters: Sequence[EffectParameter]
-) -> tuple[Linearised, Array, Array]:
-    """The linearised problem of raw columns, its step (P,) and that of the states (W, 8)."""
-    linear = _linearised(problem, here, raw, parameters)
-    change = linear.step(linear.information, linear.gradient, _LONGEST)
-    explained = here.elimination.explain(raw)
-    return linear, change, explained[:, :_STATES, 0] - explained[:, :_STATES, 1:] @ change
+@dataclass(frozen=True, eq=False)
+class _WholeStep:
+    """A step of which shares are tried.
+
+    Attributes:
+        linear: the linearised problem.
+        change: (P,) of its parameters.
+        states: (W, 8) of the initial states.
+    """
+
+    linear: Linearised
+    change: Array
+    states: Array
+
+    @classmethod
+    def of(cls, problem: Problem, here: _Iterate, raw: Array, parameters: Sequence[EffectParameter]) -> _WholeStep:
+        """That of raw columns."""
+        linear = _linearised(problem, here, raw, parameters)
+        change = linear.step(linear.information, linear.gradient, _LONGEST)
+        explained = here.elimination.explain(raw)
+        return cls(linear, change, explained[:, :_STATES, 0] - explained[:, :_STATES, 1:] @ change)
+
+    def share(
+        self, problem: Problem, point: Point, parameters: Sequence[EffectParameter], damping: float
+    ) -> tuple[Point, Point]:
+        """The point after a share of it, and the same with the initial states as they were."""
+        free = np.flatnonzero(problem.free)
+        after = self.linear.after(damping * self.change)
+        values = point.values.copy()
+        values[free] = after[: len(free)]
+        start = problem.moved(replace(point, effects=moved(point.effects, parameters, after[len(free) :])), values)
+        return replace(start, states=start.states + damping * self.states), start
 
 
 def values_after_step(problem: Problem, known: Fitted) -> Array:
@@ -301,20 +330,17 @@ def values_after_step(problem: Problem, known: Fitted) -> Array:
         known: where it stands, fitted to this or to another problem on the same windows.
     """
     here = _begun(problem, known.point, (), known)
-    linear, change, states = _whole_step(problem, here, _raw_columns(problem, here), ())
-    least, best = here.cost, known.point.values
+    step = _WholeStep.of(problem, here, _raw_columns(problem, here), ())
+    every_window = np.zeros(problem.blocked.windows.count)
+    best = here
     for damping in DAMPING:
-        values = known.point.values.copy()
-        values[problem.free] = linear.after(damping * change)
-        still = problem.moved(known.point, values)
-        both = (still, replace(still, states=still.states + damping * states))
-        shares = [cost_of(problem, p, problem.predict(p), here.elimination)[1] for p in both]
-        cost = float(np.minimum(*shares).sum()) + _prior_cost(problem, still)
-        if cost < least:
-            least, best = cost, values
-        elif best is not known.point.values:
+        stepped, start = step.share(problem, known.point, (), damping)
+        tried, predicted, cost = _best_by_window(problem, stepped, start, here.elimination, every_window)
+        if cost < best.cost:
+            best = replace(here, point=tried, prediction=predicted, cost=cost)
+        elif best is not here:
             break
-    return best
+    return best.point.values
 
 
 def _best_by_window(
@@ -330,7 +356,7 @@ def _best_by_window(
         trial: with the linear step of the states.
         other: the same with other states.
         elimination: of the local unknowns.
-        before: (W,) costs of the windows before the step.
+        before: (W,) costs of the windows before the step; 0 where the other states are tried in any case.
     """
     prediction = problem.predict(trial)
     costs = cost_of(problem, trial, prediction, elimination)[1]

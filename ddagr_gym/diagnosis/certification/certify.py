@@ -123,14 +123,8 @@ def refitted_on(problem: Problem, fitted: Fitted, fold: Fold) -> Point:
         unseen = parameter.scope is not None and parameter.scope <= fold.unseen
         if unseen and not parameter.heading:
             values[k] = 0.0
-    start = Point(values, fitted.point.states[chosen], fitted.point.effects)
-    reuse = replace(
-        fitted,
-        prediction=fitted.prediction[chosen],
-        by_parameter=fitted.by_parameter[chosen],
-        elimination=fitted.elimination.subset(chosen),
-        window_cost=fitted.window_cost[chosen],
-    )
+    reuse = fitted.subset(chosen)
+    start = replace(reuse.point, values=values)
     part = problem.subset(chosen).with_held_headings()
     return fit(part, start, iterations=_REFIT_STEPS, renewals=1, reuse=reuse).point
 
