@@ -1,6 +1,6 @@
 """Calibrate a Warthog with its ordinary drives and forecast each of them from the others, beside other models.
 
-    python -m benchmarks.real_drives [--threads 2] [--cache FOLDER] [--calibration FOLDER] [--output FOLDER]
+    python -m benchmarks.real_drives [--threads 2] [--cache FOLDER] [--calibration FOLDER] [--bank] [--output FOLDER]
 
 Six ordinary drives of NorLab's Warthog are read from ``shared/recordings``: two on asphalt, two on sand, one on grass
 and one on gravel (its gyro has the wrong sign, which the calibration finds and turns). The soil of grass and gravel is
@@ -89,10 +89,11 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--cache", type=Path, help="folder of finished steps, to go on after an interruption")
     parser.add_argument("--calibration", type=Path, help="folder for the calibration itself, as of `ddagr calibrate`")
+    parser.add_argument("--bank", action="store_true", help="with the bank that benchmarks.what_changed needs")
     parser.add_argument("--output", type=Path, default=RESULTS)
     given = parser.parse_args(arguments)
     folder = make_folder(given.output)
-    result = _calibrated(given.threads, given.seed, given.cache)
+    result = calibrated_drives(given.threads, given.seed, given.cache, given.bank)
     if given.calibration is not None:
         result.report(given.calibration)
     outcome = result.outcome
@@ -120,7 +121,15 @@ def main(arguments: list[str] | None = None) -> None:
     print(f"written: {folder / 'real_drives.json'} and real_drives.png; models by commands: {', '.join(BY_COMMANDS)}")
 
 
-def _calibrated(threads: int, seed: int, cache: Path | None) -> CalibrationResult:
+def calibrated_drives(threads: int, seed: int, cache: Path | None, bank: bool = False) -> CalibrationResult:
+    """The robot as the ordinary drives show it.
+
+    Args:
+        threads: of the simulator.
+        seed: of resampled intervals.
+        cache: folder of finished steps; None keeps nothing.
+        bank: whether every drive is also scanned for every effect of the library.
+    """
     from ddagr_gym import load_recording
 
     folder = recordings_folder()
@@ -131,7 +140,7 @@ def _calibrated(threads: int, seed: int, cache: Path | None) -> CalibrationResul
         grounds.setdefault(ground, []).append(number)
     return calibrate(
         loaded, robot="warthog", soil=SOILS, grounds=grounds, seed=seed, threads=threads, cache=cache,
-        progress=lambda line: print(line, flush=True),
+        bank=bank, progress=lambda line: print(line, flush=True),
     )  # fmt: skip
 
 

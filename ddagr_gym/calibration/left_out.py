@@ -9,18 +9,20 @@ half is forecast.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.calibration.calibration_data import CalibrationData
-from ddagr_gym.calibration.joint_fit import FittedModel, fit_model
+from ddagr_gym.calibration.joint_fit import LAST_ITERATIONS, FittedModel, fit_model
 from ddagr_gym.calibration.parts import RobotModel
 from ddagr_gym.identification.data_split import parts_of_time
-from ddagr_gym.identification.gauss_newton import values_after_step
+from ddagr_gym.identification.fit_numerics import FIELD_TOLERANCE
+from ddagr_gym.identification.gauss_newton import fit, values_after_step
 from ddagr_gym.identification.least_squares import huber_loss
+from ddagr_gym.identification.problem import Point, Problem
 from ddagr_gym.identification.residual_weights import Weights, residuals
 from ddagr_gym.identification.windows import CHANNELS, WindowSet
 
@@ -83,9 +85,22 @@ def values_without(model: FittedModel, out: Booleans) -> Array:
         model: fitted to all windows.
         out: (W,) windows that are left out.
     """
+    return values_after_step(_of_others(model, out), model.fitted.subset(~out))
+
+
+def refitted_without(model: FittedModel, out: Booleans) -> Array:
+    """The same as :func:`values_without` by a fit of its own, of some minutes, from where the model stands."""
+    start = Point(model.fitted.point.values, model.fitted.point.states[~out])
+    found = fit(
+        _of_others(model, out), start, iterations=LAST_ITERATIONS, tolerance=FIELD_TOLERANCE, renewals=LAST_ITERATIONS
+    )
+    return found.point.values
+
+
+def _of_others(model: FittedModel, out: Booleans) -> Problem:
+    """The fit of the windows that stay, with what acts in the others alone held."""
     alone = np.array([not _acts(model, k, ~out) for k in range(len(model.parameters))])
-    problem = model.problem.subset(~out).holding(alone)
-    return values_after_step(problem, model.fitted.subset(~out))
+    return model.problem.subset(~out).holding(alone)
 
 
 def _acts(model: FittedModel, parameter: int, rows: Booleans) -> bool:
@@ -114,7 +129,12 @@ def _with_own(
 
 
 def forecasts(
-    data: CalibrationData, model: FittedModel, judged: WindowSet, weights: Weights, threads: int
+    data: CalibrationData,
+    model: FittedModel,
+    judged: WindowSet,
+    weights: Weights,
+    threads: int,
+    without: Callable[[FittedModel, Booleans], Array] = values_without,
 ) -> Iterator[Forecast]:
     """Forecast of every fold by the model fitted without it.
 
@@ -124,12 +144,13 @@ def forecasts(
         judged: windows to forecast.
         weights: of the fit.
         threads: of the simulator.
+        without: the model's parameters as fitted without some windows.
     """
     fitted = model.problem.blocked.windows
     by_window, by_judged = folds(data, fitted), folds(data, judged)
     for fold in np.unique(by_judged):
         out, inside = by_window == fold, by_judged == fold
-        values = values_without(model, out)
+        values = without(model, out)
         alone = data.count > 1 and len(data.drives_on[data.grounds[int(fold)]]) == 1
         if alone:
             values = _with_own(data, model, values, out, weights, threads)

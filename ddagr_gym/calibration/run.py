@@ -26,6 +26,7 @@ from ddagr_gym.calibration.independent_steps import IndependentSteps
 from ddagr_gym.calibration.input_requirements import check_drives, check_scales, drive_scale, with_gyro_forward
 from ddagr_gym.calibration.joint_fit import (
     LAST_ITERATIONS,
+    FittedModel,
     Standing,
     complete_model,
     model_at,
@@ -67,6 +68,8 @@ class Outcome:
         soils: calibrated, by ground.
         data: drives as they were fitted.
         forecasts: of the left-out drives.
+        model: fitted to some windows of all drives.
+        weights: of the residuals of that fit.
         bank: what each drive does to every effect of the library beside the robot calibrated without it; empty where
             that was not asked for.
         ordinary: what a comparison of other drives with these needs; None with a single drive, or where no bank was
@@ -78,6 +81,8 @@ class Outcome:
     soils: Mapping[str, Soil]
     data: CalibrationData
     forecasts: tuple[Forecasts, ...]
+    model: FittedModel
+    weights: Weights
     bank: tuple[NullRun, ...] = ()
     ordinary: Ordinary | None = None
 
@@ -233,7 +238,7 @@ def calibrate_drives(
         if with_bank and data.count > 1
         else None
     )
-    return Outcome(calibration, calibrated, found, data, compared, bank, ordinary)
+    return Outcome(calibration, calibrated, found, data, compared, model, final.weights, bank, ordinary)
 
 
 def _rng(settings: CalibrationSettings) -> np.random.Generator:

@@ -9,7 +9,7 @@ import pytest
 
 from ddagr_gym.calibration.calibration_data import CalibrationData
 from ddagr_gym.calibration.joint_fit import FittedModel, complete_model, fit_model, weigh_and_fit
-from ddagr_gym.calibration.left_out import values_without
+from ddagr_gym.calibration.left_out import forecasts, refitted_without, values_without
 from ddagr_gym.calibration.parts import PARTS
 from ddagr_gym.calibration.run import ready_drives
 from ddagr_gym.calibration.settings import CalibrationSettings
@@ -79,6 +79,21 @@ def test_it_comes_to_what_a_fit_of_the_other_drives_comes_to(joint, out):
     moved = full.point.values[k] - begin.values[k]
     assert moved < -0.05
     assert values_without(joint, out)[k] - begin.values[k] == pytest.approx(moved, rel=0.2)
+    assert refitted_without(joint, out)[k] - begin.values[k] == pytest.approx(moved, rel=0.02)
+
+
+def test_forecasts_may_come_from_fits_of_their_own(data, fitted):
+    """Two drives have another one on their ground: they are forecast with what their fits without them found."""
+    joint, weights = fitted
+    judged = data.spread(SETTINGS.judged)
+    stepped, refitted = (
+        list(forecasts(data, joint, judged, weights, 1, way)) for way in (values_without, refitted_without)
+    )
+    by_window = joint.problem.blocked.windows.recording
+    for one, other in zip(stepped[:2], refitted[:2], strict=True):
+        np.testing.assert_array_equal(one.values, values_without(joint, by_window == one.fold))
+        np.testing.assert_array_equal(other.values, refitted_without(joint, by_window == one.fold))
+        assert not np.array_equal(one.prediction, other.prediction)
 
 
 def test_what_acts_in_the_left_out_drive_alone_is_left_as_it_is(joint, out):
