@@ -27,6 +27,7 @@ from ddagr_gym.calibration.run import Outcome
 from ddagr_gym.calibration.settings import CalibrationSettings
 from ddagr_gym.files import write_json
 from ddagr_gym.rendering import palette
+from ddagr_gym.replay_analysis.horizons import sample_errors
 from ddagr_gym.replay_analysis.intervals import error_statistics
 from ddagr_gym.reporting.figures import house_style
 
@@ -62,9 +63,8 @@ def forecasts_by(outcome: Outcome, name: str, settings: CalibrationSettings) -> 
 def row_of(outcome: Outcome, name: str, forecast: Forecast, seed: int) -> dict[str, Any]:
     """Median error of the wheel speeds of one forecast [rad/s] with its 95 % interval."""
     windows = forecast.windows
-    errors = (forecast.prediction - windows.measured)[..., ENCODERS].reshape(windows.count, -1)
-    clusters = np.repeat(np.arange(windows.count), errors.shape[1])
-    found = error_statistics(errors.ravel(), clusters, np.random.default_rng(seed))
+    errors, clusters = sample_errors(windows, forecast.prediction, ENCODERS)
+    found = error_statistics(errors, clusters, np.random.default_rng(seed))
     return {
         "drive": outcome.data.names[int(windows.recording[0])], "fit": name, "count": found.count,
         "median": found.median, "interval": found.median_interval,

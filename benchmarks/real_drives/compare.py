@@ -24,7 +24,7 @@ from ddagr_gym.identification.fit_numerics import field_numerics
 from ddagr_gym.identification.residual_weights import ROBUST
 from ddagr_gym.identification.window_model import WindowModel
 from ddagr_gym.identification.windows import CHANNELS, WindowSet, cut_windows
-from ddagr_gym.replay_analysis.horizons import METRICS, horizon_errors
+from ddagr_gym.replay_analysis.horizons import METRICS, horizon_errors, sample_errors
 from ddagr_gym.replay_analysis.intervals import RESAMPLES, error_statistics
 from ddagr_gym.replay_analysis.kinematic import KinematicModel, fit_motor, fit_track
 
@@ -139,9 +139,8 @@ def errors_of(item: Compared, seed: int) -> list[dict[str, Any]]:
 
 def _encoder_row(item: Compared, model: str, prediction: Array, seed: int) -> dict[str, Any]:
     """Residual of all encoder samples; by window, so that the interval knows that they belong together."""
-    difference = (prediction - item.windows.measured)[..., _ENCODERS].reshape(item.windows.count, -1)
-    clusters = np.repeat(np.arange(item.windows.count), difference.shape[1])
-    return _row(item, model, "encoder", None, "rad/s", difference.ravel(), seed, clusters)
+    errors, clusters = sample_errors(item.windows, prediction, _ENCODERS)
+    return _row(item, model, "encoder", None, "rad/s", errors, seed, clusters)
 
 
 def _row(

@@ -22,7 +22,7 @@ from ddagr_gym.identification.windows import CHANNELS, WindowSet
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.recordings.channels import CURRENTS
-from ddagr_gym.replay_analysis.horizons import METRICS, horizon_errors
+from ddagr_gym.replay_analysis.horizons import METRICS, horizon_errors, sample_errors
 from ddagr_gym.replay_analysis.intervals import error_statistics
 from ddagr_gym.replay_analysis.kinematic import KinematicModel, fit_motor, fit_track
 
@@ -172,13 +172,10 @@ def _shortened(windows: WindowSet, samples: int) -> WindowSet:
 
 def _samples(item: Forecasts, model: str, prediction: Array, seed: int) -> list[ForecastError]:
     """Errors of all samples of the encoders and of the gyro."""
-    difference = prediction - item.windows.measured
     made = []
-    for metric, channels, unit in (("wheel_speed", list(ENCODERS), "rad/s"), ("yaw_rate", [_GYRO], "rad/s")):
-        errors = difference[..., channels].reshape(item.windows.count, -1)
-        clusters = np.repeat(np.arange(item.windows.count), errors.shape[1])
-        known = np.isfinite(errors.ravel())
-        made.append(_error(item, model, metric, None, unit, errors.ravel()[known], clusters[known], seed))
+    for metric, channels, unit in (("wheel_speed", ENCODERS, "rad/s"), ("yaw_rate", [_GYRO], "rad/s")):
+        errors, clusters = sample_errors(item.windows, prediction, channels)
+        made.append(_error(item, model, metric, None, unit, errors, clusters, seed))
     return made
 
 

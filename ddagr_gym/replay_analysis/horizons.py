@@ -7,6 +7,8 @@ its start suggest, the same for every model.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,6 +16,7 @@ from ddagr_gym.frames import rotation_matrix, wrap_angle
 from ddagr_gym.identification.windows import CHANNELS, WindowSet
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 HORIZONS = (1.0, 5.0, 30.0)
 """[s] (ours): a manoeuvre's beginning, a turn, and a row; each about five times the one before."""
@@ -120,3 +123,18 @@ def start_headings(windows: WindowSet) -> Array:
     start = np.where(known, np.exp(1j * (np.nan_to_num(yaw) - turned)), 0.0).sum(axis=1)
     heading = np.where(with_gyro, np.angle(start), windows.initial[:, 2])
     return np.where(known.any(axis=1), heading, np.nan)
+
+
+def sample_errors(windows: WindowSet, prediction: Array, channels: Sequence[int]) -> tuple[Array, Integers]:
+    """Errors of all samples of some channels, NaN where there is no reading, and the window of each.
+
+    Args:
+        windows: that were predicted.
+        prediction: (W, T, 8).
+        channels: their numbers.
+
+    Returns:
+        Errors and windows, both (W T C,): errors in one window belong together.
+    """
+    errors = (prediction - windows.measured)[..., list(channels)].reshape(windows.count, -1)
+    return errors.ravel(), np.repeat(np.arange(windows.count), errors.shape[1])
