@@ -16,6 +16,7 @@ from ddagr_gym.diagnosis.wording import in_sentence
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.data_split import evenly
 from ddagr_gym.identification.motor_currents import CurrentModel, current_model, with_currents
+from ddagr_gym.identification.window_model import RUN_IN
 from ddagr_gym.identification.windows import WindowSet, cut_windows, with_presumed_past
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.recordings.channels import CURRENTS
@@ -113,6 +114,7 @@ def prepare_drives(
         wheel_radius=robot.outer_radius,
         half_track=robot.half_track,
         history=HISTORY,
+        run_in=RUN_IN,
     )
     for number, recording in enumerate(prepared.recordings):
         count = int(np.count_nonzero(windows.recording == number))

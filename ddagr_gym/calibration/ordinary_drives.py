@@ -37,6 +37,7 @@ from ddagr_gym.identification.recording_noise import RecordingNoise
 from ddagr_gym.identification.relative_readings import usual_turning
 from ddagr_gym.identification.residual_weights import UNKNOWN_GYRO_BIAS, noise_weights
 from ddagr_gym.identification.timing_repair import aligned_poses
+from ddagr_gym.identification.window_model import RUN_IN
 from ddagr_gym.parameters import Robot
 from ddagr_gym.tasks import Task
 
@@ -133,7 +134,7 @@ def ordinary_drives(
     noise = [data.prepared.noise[int(forecast.windows.recording[0])] for forecast in made]
     blank = Weighing(
         data.windows.duration, HISTORY, _lateness(data), _gyro_scale(calibration), *_UNKNOWN,
-        turning=usual_turning(data.windows),
+        turning=usual_turning(data.windows), run_in=RUN_IN,
     )  # fmt: skip
     # two rounds of tasks need them
     drives = [steps.runner.share(item) for item in without]

@@ -48,6 +48,7 @@ def ordinary_from_mapping(mapping: Mapping[str, Any]) -> Ordinary:
         accelerometer_bias=float(given["accelerometer_bias"]),
         offsets=_array(given.get("offsets", [0.0, 0.0, 0.0])),
         turning=given.get("turning"),
+        run_in=float(given.get("run_in", 0.0)),
         biases=tuple(
             SensorBias(str(item["drive"]), str(item["ground"]), _array(item["value"]))
             for item in given.get("biases", ())

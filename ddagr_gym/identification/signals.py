@@ -15,6 +15,12 @@ _STEADY = 0.8
 _STEADY_CHANGE = 0.02
 """Change of a bank's command that still counts as none [rad/s] (ours)."""
 
+_FARTHEST_SAMPLE = 0.6
+"""Time to the next wheel speed up to which one in between is interpolated [s] (ours: encoders that come at 1 Hz)."""
+
+_GUESS_ROWS = 12
+"""Rows to either side of a start from which its state is guessed (ours: poses at 5 Hz come every ten rows at 50 Hz)."""
+
 
 def travel_speed(recording: Recording, wheel_radius: float) -> Array:
     """Rim speed (n,) averaged over the banks [m/s], from the encoders or else the commands; 0 where unknown.
@@ -55,3 +61,22 @@ def steady_rows(recording: Recording) -> NDArray[np.bool_]:
         lowest = minimum_filter1d(known, size, origin=(size - 1) // 2)
         steady &= highest - lowest < _STEADY_CHANGE
     return steady
+
+
+def bank_speeds(recording: Recording) -> Array:
+    """(n, 2) speeds of both banks, right and left, on lines between their samples; NaN where unknown [rad/s]."""
+    return np.stack([_near_samples(recording, name) for name in ("encoder_right", "encoder_left")], axis=1)
+
+
+def _near_samples(recording: Recording, name: str) -> Array:
+    """Channel with missing samples filled linearly inside spans; NaN far from a sample."""
+    filled = np.full(len(recording), np.nan)
+    for span in recording.spans():
+        values, t = recording[name][span], recording.t[span]
+        known = np.isfinite(values)
+        if not known.any():
+            continue
+        near = np.abs(t[:, None] - t[known][np.searchsorted(t[known], t).clip(1, known.sum() - 1)[:, None] + [-1, 0]])
+        line = np.interp(t, t[known], values[known])
+        filled[span] = np.where(near.min(axis=1) <= _FARTHEST_SAMPLE, line, np.nan)
+    return filled

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
@@ -10,6 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.errors import InputError
+from ddagr_gym.identification.first_states import ROWS, guess_state
+from ddagr_gym.identification.signals import bank_speeds
+from ddagr_gym.recordings.continued import RowsOfSegment, rows_by_segment
 from ddagr_gym.recordings.pose_frames import frames_apart
 from ddagr_gym.recordings.schema import Recording
 
@@ -29,12 +31,6 @@ CHANNELS = (
 
 STATE = ("x", "y", "yaw", "v_x", "v_y", "yaw_rate", "omega_right", "omega_left")
 """Initial state of a window; the first three only shift the pose while the ground is the same everywhere."""
-
-_FARTHEST_SAMPLE = 0.6
-"""Time to the next wheel speed up to which one in between is interpolated [s] (ours: encoders that come at 1 Hz)."""
-
-_GUESS_ROWS = 12
-"""Rows to either side of a start from which its state is guessed (ours: poses at 5 Hz come every ten rows at 50 Hz)."""
 
 PERIOD_TOLERANCE = 0.02
 """Relative difference of sample periods that still counts as equal."""
@@ -62,6 +58,8 @@ class WindowSet:
             to the past.
         frames_apart: whether stretches of a drive have poses in frames of their own, so that nothing can be said of
             directions and places in the world.
+        run_in: what was driven right before those windows before which enough is known; None where that was not asked
+            for.
     """
 
     period: float
@@ -76,6 +74,7 @@ class WindowSet:
     unknown: NDArray[np.int64] = field(default_factory=lambda: np.zeros(1, dtype=np.int64))
     speeds: Array = field(default_factory=lambda: np.full((1, 1, 2), np.nan))
     frames_apart: bool = False
+    run_in: RunIn | None = None
 
     def __post_init__(self) -> None:
         """One count for all windows, by default none, stands for each of them, and so do unknown speeds.
@@ -136,7 +135,30 @@ class WindowSet:
     def subset(self, chosen: NDArray[np.int64] | NDArray[np.bool_]) -> WindowSet:
         """Only the chosen windows."""
         names = ("recording", "start", "time", "commands", "measured", "initial", "unknown", "speeds")
-        return replace(self, **{name: getattr(self, name)[chosen] for name in names})
+        found = replace(self, **{name: getattr(self, name)[chosen] for name in names})
+        if self.run_in is None:
+            return found
+        return replace(found, run_in=self.run_in.subset(np.arange(self.count)[chosen]))
+
+
+@dataclass(frozen=True, eq=False)
+class RunIn:
+    """What was driven right before windows: from it a simulation knows what a drivetrain holds at their start.
+
+    Attributes:
+        windows: that end where others begin; nothing is compared with them.
+        leads_to: (M,) the window that follows each.
+    """
+
+    windows: WindowSet
+    leads_to: NDArray[np.int64]
+
+    def subset(self, chosen: NDArray[np.int64]) -> RunIn:
+        """Of chosen windows (K,), by number, some of which may come several times."""
+        place = np.full(int(max(self.leads_to.max(initial=0), chosen.max(initial=0))) + 1, -1)
+        place[self.leads_to] = np.arange(len(self.leads_to))
+        rows = place[chosen]
+        return RunIn(self.windows.subset(rows[rows >= 0]), np.flatnonzero(rows >= 0))
 
 
 def cut_windows(
@@ -149,6 +171,7 @@ def cut_windows(
     drive_by: str = "commands",
     history: float = 0.5,
     ahead: float = 0.0,
+    run_in: float = 0.0,
 ) -> WindowSet:
     """Windows of ``duration`` inside the segments of recordings of one sample period.
 
@@ -161,6 +184,7 @@ def cut_windows(
         drive_by: "commands", or "encoders" to impose the recorded wheel speeds.
         history: commands kept from before the start [s].
         ahead: commands kept from after the end [s].
+        run_in: also keep that much of what was driven right before, where it is known [s].
 
     Raises:
         InputError: periods differ, no window fits, or commands or encoders are absent.
@@ -168,21 +192,30 @@ def cut_windows(
     period = _common_period(recordings)
     samples = max(round(duration / period), 2)
     step = samples if stride is None else max(round(stride / period), 1)
-    past, later = round(history / period), round(ahead / period)
-    parts = []
+    past, later, before = round(history / period), round(ahead / period), round(run_in / period)
+    parts: list[_Part] = []
+    earlier: dict[int, _Part] = {}
     for number, recording in enumerate(recordings):
-        drive, speeds = _drive(recording, drive_by), _bank_speeds(recording)
+        driven = (_drive(recording, drive_by), bank_speeds(recording))
         due = 0
-        for segment in recording.segments():
-            for first in range(max(segment.start, due), segment.stop - samples, step):
-                part = _window(recording, number, (drive, speeds), first, samples, (past, later), segment)
-                if part is not None:
-                    parts.append(part)
-                    due = first + step
+        for rows in rows_by_segment(recording, past + before + ROWS):
+            for first in range(max(rows.segment.start, due), rows.segment.stop - samples, step):
+                part = _window(recording, number, driven, first, samples, (past, later), rows)
+                if part is None:
+                    continue
+                run = _run_in(recording, number, driven, first, before, past, rows)
+                if run is not None:
+                    earlier[len(parts)] = run
+                parts.append(part)
+                due = first + step
     if not parts:
         names = ", ".join(r.meta.source for r in recordings)
         raise InputError(f"{names}: no window of {duration:g} s fits into valid {drive_by}: choose a shorter one.")
-    return _stack(recordings, parts, period, (past, later), wheel_radius, half_track)
+    windows = _stack(recordings, parts, period, (past, later), wheel_radius, half_track)
+    if not earlier:
+        return windows
+    stacked = _stack(recordings, list(earlier.values()), period, (past, 0), wheel_radius, half_track)
+    return replace(windows, run_in=RunIn(stacked, np.array(list(earlier), dtype=np.int64)))
 
 
 def cut_runs(
@@ -213,15 +246,16 @@ def cut_runs(
     past, later = round(history / period), round(ahead / period)
     by_length: dict[int, list[_Part]] = {}
     for number, recording in enumerate(recordings):
-        drive, speeds = _drive(recording, drive_by), _bank_speeds(recording)
-        for segment in recording.segments():
+        drive, speeds = _drive(recording, drive_by), bank_speeds(recording)
+        for rows in rows_by_segment(recording, past + ROWS):
+            segment = rows.segment
             known = np.isfinite(drive[segment]).all(axis=1)
             edges = segment.start + np.flatnonzero(np.diff(np.concatenate([[False], known, [False]]).astype(int)))
             for first, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
                 samples = stop - first - 1
                 if samples <= 1:
                     continue
-                part = _window(recording, number, (drive, speeds), first, samples, (past, later), segment)
+                part = _window(recording, number, (drive, speeds), first, samples, (past, later), rows)
                 if part is not None and samples * period >= shortest - 0.5 * period:
                     by_length.setdefault(samples, []).append(part)
     return tuple(
@@ -229,7 +263,7 @@ def cut_runs(
     )
 
 
-_Part = tuple[int, int, float, Array, Array, int, Array]
+_Part = tuple[int, int, float, Array, Array, int, Array, RowsOfSegment]
 
 
 def _stack(
@@ -240,10 +274,11 @@ def _stack(
     wheel_radius: float,
     half_track: float,
 ) -> WindowSet:
-    number, start, time, commands, measured, unknown, speeds = (np.array(column) for column in zip(*parts, strict=True))
+    *columns, rows = zip(*parts, strict=True)
+    number, start, time, commands, measured, unknown, speeds = (np.array(column) for column in columns)
     guesses = [
-        _guess(recordings[n], int(s), drive, wheel_radius, half_track)
-        for n, s, drive in zip(number, start, commands[:, max(kept[0] - 1, 0)], strict=True)
+        guess_state(recordings[n], int(s), own, drive, wheel_radius, half_track)
+        for n, s, own, drive in zip(number, start, rows, commands[:, max(kept[0] - 1, 0)], strict=True)
     ]
     return WindowSet(
         period, number, start, time, commands, kept[0], measured, np.stack(guesses), kept[1], unknown, speeds,
@@ -266,26 +301,7 @@ def _drive(recording: Recording, drive_by: str) -> Array:
         return np.stack(recording.held_commands(), axis=1)
     if drive_by != "encoders":
         raise InputError(f"drive_by is {drive_by!r}: give 'commands' or 'encoders'.")
-    return _bank_speeds(recording)
-
-
-def _bank_speeds(recording: Recording) -> Array:
-    """(n, 2) recorded speeds between their samples; NaN where unknown."""
-    return np.stack([_interpolated(recording, name) for name in ("encoder_right", "encoder_left")], axis=1)
-
-
-def _interpolated(recording: Recording, name: str) -> Array:
-    """Channel with missing samples filled linearly inside spans; NaN far from a sample."""
-    filled = np.full(len(recording), np.nan)
-    for span in recording.spans():
-        values, t = recording[name][span], recording.t[span]
-        known = np.isfinite(values)
-        if not known.any():
-            continue
-        near = np.abs(t[:, None] - t[known][np.searchsorted(t[known], t).clip(1, known.sum() - 1)[:, None] + [-1, 0]])
-        line = np.interp(t, t[known], values[known])
-        filled[span] = np.where(near.min(axis=1) <= _FARTHEST_SAMPLE, line, np.nan)
-    return filled
+    return bank_speeds(recording)
 
 
 def _window(
@@ -295,57 +311,56 @@ def _window(
     first: int,
     samples: int,
     kept: tuple[int, int],
-    segment: slice,
+    rows: RowsOfSegment,
 ) -> _Part | None:
     past, later = kept
     drive, speeds = driven
-    rows = np.arange(first + 1 - past, first + 1 + samples + later)
-    commands = drive[np.clip(rows, segment.start, segment.stop - 1)]
+    at, known = rows.at(np.arange(first + 1 - past, first + 1 + samples + later))
+    commands = drive[at]
     if not np.isfinite(commands[past : past + samples]).all():
         return None
-    # before the first known command of the segment the robot is taken to have had that one
-    known = np.isfinite(commands).all(axis=1)
-    first_known = int(np.argmax(known))
-    commands = commands[np.maximum.accumulate(np.where(known, np.arange(len(rows)), first_known))]
-    unknown = max(int((rows < segment.start).sum()), first_known)
+    commands, first_given = _held(commands)
+    unknown = max(int((~known).sum()), first_given)
     inside = slice(first + 1, first + 1 + samples)
     measured = np.stack([recording[name][inside] for name in CHANNELS], axis=1)
-    rows = rows[: past + samples]
-    turned = np.where((rows >= segment.start)[:, None], speeds[np.maximum(rows, 0)], np.nan)
-    return number, first, float(recording.t[first]), commands, measured, unknown, turned
+    at, known = at[: past + samples], known[: past + samples]
+    turned = np.where(known[:, None], speeds[at], np.nan)
+    return number, first, float(recording.t[first]), commands, measured, unknown, turned, rows
 
 
-def _guess(recording: Recording, row: int, drive: Array, wheel_radius: float, half_track: float) -> Array:
-    """Initial state from the samples around the start; without encoders the banks turn as they are driven."""
-    starts = [a for a, _ in recording.meta.spans]
-    rows = _rows_near(row, recording.meta.spans[bisect_right(starts, row) - 1])
-    value = {name: _near(recording, name, row, rows) for name in CHANNELS}
-    right, left = (
-        value[name] if np.isfinite(value[name]) else drive[bank]
-        for bank, name in enumerate(("encoder_right", "encoder_left"))
-    )
-    yaw_rate = value["yaw_rate"]
-    if not np.isfinite(yaw_rate):
-        yaw_rate = wheel_radius * (right - left) / (2.0 * half_track) / 1.5
-    speed = wheel_radius * (right + left) / 2.0
-    state = np.array(
-        [value["pose_x"], value["pose_y"], value["pose_yaw"], speed, 0.0, yaw_rate, right, left], dtype=np.float64
-    )
-    return np.nan_to_num(state)
+def _held(commands: Array) -> tuple[Array, int]:
+    """Commands (n, 2) where unknown ones are those before, and how many there are before the first known one.
+
+    The robot is taken to have had that one before it.
+    """
+    given = np.isfinite(commands).all(axis=1)
+    first = int(np.argmax(given))
+    return commands[np.maximum.accumulate(np.where(given, np.arange(len(commands)), first))], first
 
 
-def _rows_near(row: int, span: tuple[int, int]) -> slice:
-    """Rows of the span near ``row``."""
-    return slice(max(span[0], row - _GUESS_ROWS), min(span[1], row + _GUESS_ROWS + 1))
-
-
-def _near(recording: Recording, name: str, row: int, rows: slice) -> float:
-    """Channel at ``row``, interpolated between its samples in ``rows``; NaN without any."""
-    if name not in recording.channels:
-        return np.nan
-    values, t = recording.channels[name][rows], recording.t[rows]
-    known = np.isfinite(values)
-    return float(np.interp(recording.t[row], t[known], values[known])) if known.any() else np.nan
+def _run_in(
+    recording: Recording,
+    number: int,
+    driven: tuple[Array, Array],
+    first: int,
+    samples: int,
+    past: int,
+    rows: RowsOfSegment,
+) -> _Part | None:
+    """What was driven in so many samples before a window's first row; None where that is not known."""
+    drive, speeds = driven
+    at, known = rows.at(np.arange(first + 1 - samples - past, first + 1))
+    commands = drive[at]
+    needed = slice(past - 1 if past else 0, None)
+    whole = known[needed].all() and np.isfinite(commands[needed]).all() and np.isfinite(speeds[at[needed]]).all()
+    if not samples or not whole:
+        return None
+    commands, first_given = _held(np.where(known[:, None], commands, np.nan))
+    turned = np.where(known[:, None], speeds[at], np.nan)
+    start = int(at[needed][0])
+    nothing = np.full((samples, len(CHANNELS)), np.nan)
+    alone = RowsOfSegment(rows.segment, rows.before[:0])
+    return number, start, float(recording.t[start]), commands, nothing, first_given, turned, alone
 
 
 def with_presumed_past(windows: WindowSet) -> WindowSet:
@@ -358,4 +373,7 @@ def with_presumed_past(windows: WindowSet) -> WindowSet:
     unknown = rows[None, :, None] < windows.unknown[:, None, None]
     banks = slice(STATE.index("omega_right"), STATE.index("omega_left") + 1)
     commands = np.where(unknown, windows.initial[:, None, banks], windows.commands)
-    return replace(windows, commands=commands, unknown=np.zeros(windows.count, dtype=np.int64))
+    earlier = windows.run_in
+    if earlier is not None:
+        earlier = replace(earlier, windows=with_presumed_past(earlier.windows))
+    return replace(windows, commands=commands, unknown=np.zeros(windows.count, dtype=np.int64), run_in=earlier)

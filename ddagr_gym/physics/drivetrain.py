@@ -61,7 +61,7 @@ LONGEST_DELAY = 1.0  # [s] of a command, ours: as long as commands are remembere
 NO_LIMIT = 1e6  # [rad/s^2] far beyond any wheel's
 NO_SPEED_LIMIT = 1e3  # [rad/s] likewise
 NO_POWER_LIMIT = 1e6  # [rad^2/s^3] likewise
-_STANDING = 0.05  # [rad/s] below which a bank counts as standing, ours: 15 mm/s of a 0.3 m wheel
+_SLOW_SHARE = 0.06  # of the highest wheel speed, at which a settled loop holds half of its load (ours: 1 of 17 rad/s)
 _STICTION_SPEED = 0.02  # [rad/s] over which Coulomb friction builds up, ours: a fortieth of a row turn's wheel speed
 
 
@@ -152,11 +152,16 @@ def _load(row: Array, bank: int) -> float:
 
 @kernel()
 def _settle_integrals(row: Array) -> None:
-    """Integral parts after a reset: those that carry the present load, or nothing where a bank stands."""
+    """Integral parts after a reset: those that carry the present load, ever less of it the nearer a bank is to rest.
+
+    What a bank near rest turns against may have either sign, and a loop that stands holds nothing.
+    """
+    slow = _SLOW_SHARE * row[MAXIMUM_WHEEL_SPEED]
     for bank in range(2):
-        if abs(row[OMEGA + bank]) > _STANDING:
-            most = row[DRIVETRAIN + INTEGRAL_LIMIT]
-            row[INTEGRAL + bank] = min(max(_resistance(row, bank) - _load(row, bank), -most), most)
+        squared = row[OMEGA + bank] * row[OMEGA + bank]
+        carried = squared / (squared + slow * slow) * (_resistance(row, bank) - _load(row, bank))
+        most = row[DRIVETRAIN + INTEGRAL_LIMIT]
+        row[INTEGRAL + bank] = min(max(carried, -most), most)
     row[INTEGRAL_KNOWN] = 1.0
 
 

@@ -12,6 +12,7 @@ from ddagr_gym.errors import InputError
 from ddagr_gym.identification.data_split import Split, evenly, split_recording
 from ddagr_gym.identification.recording_noise import RecordingNoise, dead_channels, recording_noise
 from ddagr_gym.identification.timing_repair import aligned_poses, bridged
+from ddagr_gym.identification.window_model import RUN_IN
 from ddagr_gym.identification.windows import WindowSet, cut_runs, cut_windows
 from ddagr_gym.parameters import Robot
 from ddagr_gym.physics.effects import Effect
@@ -73,6 +74,7 @@ class Prepared:
             windows = cut_windows(
                 self.recordings, duration, stride=stride, wheel_radius=self.geometry.wheel_radius,
                 half_track=self.geometry.half_track, drive_by=drive_by, history=LATEST_CLOCK, ahead=LATEST_CLOCK,
+                run_in=RUN_IN if drive_by == "commands" else 0.0,
             )  # fmt: skip
         except InputError:
             return None

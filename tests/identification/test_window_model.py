@@ -193,3 +193,50 @@ def test_derivatives_agree_with_central_differences(robot, soil, windows):
     central = (up - down) / 0.04
     k = CHANNELS.index("yaw_rate")
     np.testing.assert_allclose(by_value[..., k, 0], central[..., k], atol=0.1 * np.abs(central[..., k]).max())
+
+
+@pytest.fixture(scope="module")
+def winding(robot, soil):
+    """Steps of 6 s of a robot whose loops wind up, as one recording, and the true integral parts at every row."""
+    from ddagr_gym.recordings.schema import Recording
+    from ddagr_gym.simulator import Simulator
+
+    own = replace(robot, drivetrain=Drivetrain(command_delay=0.1, load_compliance=0.05, integral_rate=1.5))
+    rng = np.random.default_rng(3)
+    commands = np.repeat(rng.uniform(-1.8, 1.8, (8, 2)), 120, axis=0)
+    simulator = Simulator(numerics=Numerics.smooth())
+    simulator.configure(0, own, soil, ideal_sensors(0.05))
+    simulator.reset()
+    readings, record = simulator.step(commands[None], recorded=(layout.INTEGRAL, layout.INTEGRAL + 1))
+    names = ("specific_force_x", "specific_force_y", "yaw_rate", "encoder_right", "encoder_left")
+    columns = {name: readings[0, :, k] for k, name in enumerate(names)}
+    columns |= {"t": 0.05 * np.arange(960), "command_right": commands[:, 0], "command_left": commands[:, 1]}
+    return own, Recording.from_columns(columns, own), record[0]
+
+
+def test_integral_parts_at_a_start_are_those_that_the_drive_before_left(soil, winding):
+    own, recording, truth = winding
+    cut = cut_windows(
+        [recording], 2.0, wheel_radius=own.outer_radius, half_track=own.half_track, history=0.5, run_in=4.0
+    )
+    known = cut.run_in.leads_to
+    found = WindowModel(own, soil, cut).first_integrals(np.zeros(0))
+    assert np.isnan(found[: known[0]]).all()
+    settled = WindowModel(own, soil, replace(cut, run_in=None))
+    _, record = settled.predict_recorded(np.zeros(0), cut.initial, (layout.INTEGRAL, layout.INTEGRAL + 1))
+    error = np.abs(found[known] - truth[cut.start[known]])
+    without = np.abs(record[known, 0] - truth[cut.start[known] + 1])
+    assert np.median(error) < 0.6 * np.median(without)
+    np.testing.assert_array_equal(
+        WindowModel(own, soil, cut).predict(np.zeros(0), cut.initial),
+        WindowModel(own, soil, cut).predict(np.zeros(0), cut.initial, (), found),
+    )
+
+
+def test_robots_without_an_integral_part_need_nothing_before_their_windows(robot, soil, winding):
+    _, recording, _ = winding
+    cut = cut_windows([recording], 2.0, wheel_radius=robot.outer_radius, half_track=robot.half_track, run_in=4.0)
+    model = WindowModel(robot, soil, cut)
+    assert np.isnan(model.first_integrals(np.zeros(0))).all()
+    alone = WindowModel(robot, soil, replace(cut, run_in=None))
+    np.testing.assert_array_equal(model.predict(np.zeros(0), cut.initial), alone.predict(np.zeros(0), cut.initial))

@@ -130,3 +130,28 @@ def test_speeds_are_those_of_the_rows_and_shorter_windows_keep_what_is_left(coun
     short = replace(windows, measured=windows.measured[:, :10])
     np.testing.assert_array_equal(short.speeds, windows.speeds[:, : windows.history + 10])
     np.testing.assert_array_equal(short.past_speeds, windows.past_speeds)
+
+
+def test_what_was_driven_right_before_is_kept_where_it_is_known(counting):
+    speeds = 0.1 * np.arange(2000)
+    windows = cut_windows([counting(encoder_right=speeds, encoder_left=speeds)], 2.0, run_in=3.0, **GEOMETRY)
+    run_in = windows.run_in
+    assert run_in is not None
+    # before 3.5 s, of which 0.5 s are its own history, less is known; the row before the first command is none
+    assert run_in.leads_to.tolist() == list(range(2, windows.count))
+    assert (run_in.windows.samples, run_in.windows.run_in) == (60, None)
+    np.testing.assert_array_equal(run_in.windows.start + 60, windows.start[2:])
+    np.testing.assert_array_equal(run_in.windows.drive()[0, :, 0], np.arange(21, 81))
+    np.testing.assert_allclose(run_in.windows.initial[:, 6], 0.1 * run_in.windows.start)
+
+
+def test_chosen_windows_keep_what_was_driven_before_them(counting):
+    speeds = 0.1 * np.arange(2000)
+    windows = cut_windows([counting(encoder_right=speeds, encoder_left=speeds)], 2.0, run_in=3.0, **GEOMETRY)
+    chosen = windows.subset(np.array([7, 0, 3, 7]))
+    assert chosen.run_in is not None
+    assert chosen.run_in.leads_to.tolist() == [0, 2, 3]
+    np.testing.assert_array_equal(chosen.run_in.windows.start + 60, chosen.start[[0, 2, 3]])
+    none = windows.subset(np.arange(windows.count) < 2)
+    assert none.run_in is not None
+    assert not len(none.run_in.leads_to)

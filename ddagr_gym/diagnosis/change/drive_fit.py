@@ -57,8 +57,9 @@ def change_windows(recordings: Sequence[Recording], robot: Robot, weighing: Weig
     """
     even = [_as_ordinary(aligned_poses(bridged(r), weighing.lateness), weighing) for r in recordings]
     windows = cut_windows(
-        even, weighing.window, wheel_radius=robot.outer_radius, half_track=robot.half_track, history=weighing.history
-    )
+        even, weighing.window, wheel_radius=robot.outer_radius, half_track=robot.half_track, history=weighing.history,
+        run_in=weighing.run_in,
+    )  # fmt: skip
     if windows.count < FEWEST_WINDOWS:
         names = ", ".join(recording.meta.source for recording in recordings)
         raise InputError(

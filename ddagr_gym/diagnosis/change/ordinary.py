@@ -72,6 +72,7 @@ class Weighing:
         biases: the same of each ordinary drive; none where that is not known.
         turning: usual yaw rate per difference of the wheel speeds, by which readings are compared relative to each
             other (:mod:`ddagr_gym.identification.relative_readings`); None where they are compared one by one.
+        run_in: kept of what was driven right before a window [s].
     """
 
     window: float
@@ -85,6 +86,7 @@ class Weighing:
     offsets: Array = field(default_factory=lambda: np.zeros(3))
     turning: float | None = None
     biases: tuple[SensorBias, ...] = ()
+    run_in: float = 0.0
 
     def on(self, ground: str, drive: str = "") -> Weighing:
         """The same for a drive on a known ground, where accelerometers lean as in the other drives on it.
