@@ -20,8 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.real_drives.__main__ import DRIVES, SOILS, recordings_folder
-from ddagr_gym import load_recording
+from benchmarks.real_drives.__main__ import DRIVES, SOILS, load_drives
 from ddagr_gym.api.nominal import robot_from, soil_from
 from ddagr_gym.calibration.calibration_data import CalibrationData
 from ddagr_gym.calibration.files import load_robot, load_soil
@@ -46,11 +45,9 @@ ALONE, BEFORE = "each step alone", "commands before"
 
 def ordinary_drives(threads: int) -> CalibrationData:
     """The drives of :mod:`benchmarks.real_drives`, mended as a calibration does."""
-    folder = recordings_folder()
-    loaded = [load_recording(folder / f"{n}.csv.gz", column_map=m, robot="warthog") for n, (_, m) in DRIVES.items()]
     grounds = [ground for ground, _ in DRIVES.values()]
     soils = {ground: soil_from(name) for ground, name in SOILS.items()}
-    return ready_drives(loaded, grounds, robot_from("warthog"), soils, CalibrationSettings(threads=threads))
+    return ready_drives(load_drives(), grounds, robot_from("warthog"), soils, CalibrationSettings(threads=threads))
 
 
 def variants(data: CalibrationData) -> dict[str, WindowSet]:

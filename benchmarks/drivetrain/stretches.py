@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.errors import InputError
+from ddagr_gym.recordings.continued import first_and_last, goes_on
 from ddagr_gym.recordings.schema import Recording
 
 Array = NDArray[np.float64]
@@ -69,9 +70,7 @@ class _Piece:
 
     def ends(self) -> tuple[Array, Array]:
         """First and last reading (2,) of both encoders; NaN where there is none."""
-        known = [column[np.isfinite(column)] for column in self.encoders.T]
-        first, last = ([c[at] if len(c) else np.nan for c in known] for at in (0, -1))
-        return np.array(first), np.array(last)
+        return first_and_last(self.encoders)
 
 
 def find_stretches(recording: Recording) -> list[Stretch]:
@@ -108,10 +107,7 @@ def _pieces(recording: Recording) -> Iterator[_Piece]:
 
 
 def _goes_on(before: _Piece, after: _Piece) -> bool:
-    change = np.abs(after.ends()[0] - before.ends()[1])
-    same = np.array_equal(after.commands[0], before.commands[-1])
-    one = bool((after.commands == after.commands[0]).all())
-    return bool((change < GOES_ON).all()) and (same or one)
+    return goes_on((before.commands, after.commands), (before.encoders, after.encoders), GOES_ON)
 
 
 def _joined(pieces: list[_Piece], period: float) -> Iterator[_Piece]:

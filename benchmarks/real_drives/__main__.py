@@ -34,6 +34,7 @@ from ddagr_gym import calibrate
 from ddagr_gym.api.calibrate import CalibrationResult
 from ddagr_gym.calibration.result import CALIBRATED, DATA_SHEET, KINEMATIC
 from ddagr_gym.commands.output import make_folder, write_text
+from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.version import __version__
 
 CHECKOUT = Path(__file__).resolve().parents[2]
@@ -121,6 +122,17 @@ def main(arguments: list[str] | None = None) -> None:
     print(f"written: {folder / 'real_drives.json'} and real_drives.png; models by commands: {', '.join(BY_COMMANDS)}")
 
 
+def load_drives() -> list[Recording]:
+    """Recordings of the ordinary drives, in the order of DRIVES."""
+    from ddagr_gym import load_recording
+
+    folder = recordings_folder()
+    return [
+        load_recording(folder / f"{name}.csv.gz", column_map=column_map, robot="warthog")
+        for name, (_, column_map) in DRIVES.items()
+    ]
+
+
 def calibrated_drives(threads: int, seed: int, cache: Path | None, bank: bool = False) -> CalibrationResult:
     """The robot as the ordinary drives show it.
 
@@ -130,16 +142,11 @@ def calibrated_drives(threads: int, seed: int, cache: Path | None, bank: bool = 
         cache: folder of finished steps; None keeps nothing.
         bank: whether every drive is also scanned for every effect of the library.
     """
-    from ddagr_gym import load_recording
-
-    folder = recordings_folder()
     grounds: dict[str, list[int]] = {}
-    loaded = []
-    for number, (name, (ground, column_map)) in enumerate(DRIVES.items()):
-        loaded.append(load_recording(folder / f"{name}.csv.gz", column_map=column_map, robot="warthog"))
+    for number, (ground, _) in enumerate(DRIVES.values()):
         grounds.setdefault(ground, []).append(number)
     return calibrate(
-        loaded, robot="warthog", soil=SOILS, grounds=grounds, seed=seed, threads=threads, cache=cache,
+        load_drives(), robot="warthog", soil=SOILS, grounds=grounds, seed=seed, threads=threads, cache=cache,
         bank=bank, progress=lambda line: print(line, flush=True),
     )  # fmt: skip
 

@@ -31,21 +31,22 @@ def guess_state(
         wheel_radius: [m].
         half_track: for the yaw rate where no gyro is [m].
     """
-    x, y, yaw = (_near(recording, name, row) for name in _POSE)
-    banks = [_speed_near(recording, f"encoder_{bank}", row, rows) for bank in ("right", "left")]
+    near = _rows_near(recording, row)
+    x, y, yaw = (_near(recording, name, row, near) for name in _POSE)
+    banks = [_speed_near(recording, f"encoder_{bank}", row, rows, near) for bank in ("right", "left")]
     right, left = (speed if np.isfinite(speed) else drive[n] for n, speed in enumerate(banks))
-    yaw_rate = _near(recording, "yaw_rate", row)
+    yaw_rate = _near(recording, "yaw_rate", row, near)
     if not np.isfinite(yaw_rate):
         yaw_rate = wheel_radius * (right - left) / (2.0 * half_track) / 1.5
     speed = wheel_radius * (right + left) / 2.0
     return np.nan_to_num(np.array([x, y, yaw, speed, 0.0, yaw_rate, right, left], dtype=np.float64))
 
 
-def _speed_near(recording: Recording, name: str, row: int, rows: RowsOfSegment) -> float:
+def _speed_near(recording: Recording, name: str, row: int, rows: RowsOfSegment, near: slice) -> float:
     """A bank speed at ``row``; where the drive went on from an earlier step, between its reading and the first here."""
     around = np.arange(row - ROWS, row + ROWS + 1)
     if around[0] >= rows.segment.start or not len(rows.before):
-        return _near(recording, name, row)
+        return _near(recording, name, row, near)
     at, known = rows.at(around)
     known &= around < rows.segment.stop
     at[1:] = np.where(at[1:] == at[:-1], -1, at[1:])
@@ -55,11 +56,10 @@ def _speed_near(recording: Recording, name: str, row: int, rows: RowsOfSegment) 
     return float(np.interp(row, around[known][read], values[read])) if read.any() else np.nan
 
 
-def _near(recording: Recording, name: str, row: int) -> float:
-    """Channel at ``row``, interpolated between its samples near it; NaN without any."""
+def _near(recording: Recording, name: str, row: int, rows: slice) -> float:
+    """Channel at ``row``, interpolated between its samples in ``rows``; NaN without any."""
     if name not in recording.channels:
         return np.nan
-    rows = _rows_near(recording, row)
     values, t = recording.channels[name][rows], recording.t[rows]
     known = np.isfinite(values)
     return float(np.interp(recording.t[row], t[known], values[known])) if known.any() else np.nan

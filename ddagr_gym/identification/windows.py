@@ -138,7 +138,7 @@ class WindowSet:
         found = replace(self, **{name: getattr(self, name)[chosen] for name in names})
         if self.run_in is None:
             return found
-        return replace(found, run_in=self.run_in.subset(np.arange(self.count)[chosen]))
+        return replace(found, run_in=self.run_in.subset(np.arange(self.count)[chosen], self.count))
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,9 +153,9 @@ class RunIn:
     windows: WindowSet
     leads_to: NDArray[np.int64]
 
-    def subset(self, chosen: NDArray[np.int64]) -> RunIn:
-        """Of chosen windows (K,), by number, some of which may come several times."""
-        place = np.full(int(max(self.leads_to.max(initial=0), chosen.max(initial=0))) + 1, -1)
+    def subset(self, chosen: NDArray[np.int64], count: int) -> RunIn:
+        """Of chosen windows (K,), by number among ``count``, some of which may come several times."""
+        place = np.full(count, -1)
         place[self.leads_to] = np.arange(len(self.leads_to))
         rows = place[chosen]
         return RunIn(self.windows.subset(rows[rows >= 0]), np.flatnonzero(rows >= 0))

@@ -18,8 +18,6 @@ Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 Booleans = NDArray[np.bool_]
 
-BANKS = ("right", "left")
-
 LARGEST_CHANGE = 0.12
 """Change of both bank speeds over a break below which the drive went on, as a share of the fast ones of the recording
 (ours): readings of a steady speed scatter by half of it on sand, a stop in between changes most of them by more."""
@@ -65,17 +63,20 @@ def rows_by_segment(recording: Recording, most: int) -> Iterator[RowsOfSegment]:
     """
     restarts = {span.start for span in recording.spans()}
     commands = np.stack(recording.held_commands(), axis=1)
-    speeds = np.stack([recording[f"encoder_{bank}"] for bank in BANKS], axis=1)
+    speeds = np.stack([recording["encoder_right"], recording["encoder_left"]], axis=1)
     change = _largest_change(speeds)
     before = np.zeros(0, dtype=np.int64)
     last: slice | None = None
     for segment in recording.segments():
-        on = last is not None and segment.start in restarts and _goes_on(commands, speeds, last, segment, change)
-        if last is not None and on:
+        if (
+            last is None
+            or segment.start not in restarts
+            or not goes_on((commands[last], commands[segment]), (speeds[last], speeds[segment]), change)
+        ):
+            before = before[:0]
+        else:
             earlier = np.arange(last.stop - 1, last.start - 1, -1)
             before = np.concatenate([earlier[:1], earlier, before])[:most]
-        else:
-            before = before[:0]
         yield RowsOfSegment(segment, before)
         last = segment
 
@@ -85,15 +86,27 @@ def _largest_change(speeds: Array) -> float:
     return LARGEST_CHANGE * float(np.percentile(known, _FAST)) if known.size else 0.0
 
 
-def _goes_on(commands: Array, speeds: Array, before: slice, after: slice, change: float) -> bool:
-    """Whether both wheel speeds go on, and the commands do or are new at the start and stay."""
-    given = commands[after]
-    same = np.array_equal(given[0], commands[before][-1])
+def goes_on(commands: tuple[Array, Array], speeds: tuple[Array, Array], change: float) -> bool:
+    """Whether both wheel speeds go on over a break, and the commands do or are new after it and stay.
+
+    Args:
+        commands: of both banks before and after it, (n, 2) and (m, 2) [rad/s].
+        speeds: likewise, NaN where there is no reading [rad/s].
+        change: largest one of a speed that goes on [rad/s].
+    """
+    given = commands[1]
+    same = np.array_equal(given[0], commands[0][-1])
     stays = bool((given == given[0]).all())
-    return bool((np.abs(_end(speeds[after], 0) - _end(speeds[before], -1)) < change).all()) and (same or stays)
+    jump = first_and_last(speeds[1])[0] - first_and_last(speeds[0])[1]
+    return bool((np.abs(jump) < change).all()) and (same or stays)
 
 
-def _end(speeds: Array, at: int) -> Array:
-    """First (0) or last (-1) known speed of both banks (2,); NaN where there is none."""
+def first_and_last(speeds: Array) -> tuple[Array, Array]:
+    """First and last known speed of both banks (2,) each; NaN where there is none.
+
+    Args:
+        speeds: (n, 2), NaN where there is no reading [rad/s].
+    """
     known = [column[np.isfinite(column)] for column in speeds.T]
-    return np.array([column[at] if len(column) else np.nan for column in known])
+    first, last = ([column[at] if len(column) else np.nan for column in known] for at in (0, -1))
+    return np.array(first), np.array(last)
