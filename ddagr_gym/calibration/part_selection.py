@@ -3,8 +3,9 @@
 Every part is taken out in turn, what is fitted least often first. It stays out unless the forecasts of the left-out
 drives become worse than the best so far by 2 % and by more than the standard error of that change between drives (the
 one-standard-error rule; L. Breiman et al., Classification and Regression Trees, 1984, section 3.4.3), with Student's t
-for few drives: of all parts together no more than that is given away. Of what nearly every robot has, the dead time,
-2 % are enough: there the burden of proof is on its absence.
+for few drives: of all parts together no more than that is given away. Nor is more than 4 % where drives differ too much
+to be sure: a robot is calibrated to forecast. Of what nearly every robot has, the dead time, 2 % are enough: there the
+burden of proof is on its absence.
 A part is missed only by a fit that is settled, or that has had steps enough.
 What acts through parts that have all gone goes with them. Ramp and dead time stand for each other: a fit without the
 ramp is also tried from a longer dead time, and a ramp that stayed where the dead time went gives way to a dead time
@@ -24,6 +25,7 @@ from ddagr_gym.calibration.joint_fit import OFFSET, FittedModel, Standing, fit_m
 from ddagr_gym.calibration.left_out import Forecast, fold_sigma, forecast_loss, forecasts
 from ddagr_gym.calibration.parts import PARTS, RobotModel, idle_parts
 from ddagr_gym.calibration.result import PartDecision
+from ddagr_gym.calibration.settings import CalibrationSettings
 from ddagr_gym.diagnosis.answer.drivetrain import LEAST_GROWTH
 from ddagr_gym.diagnosis.store import StepCache
 from ddagr_gym.identification.residual_weights import Weights
@@ -87,6 +89,7 @@ class Comparison:
         weights: of the residuals.
         threads: of the simulator.
         settlings: times that a fit without a part goes on, where its forecasts are worse and it is not settled.
+        most_given_away: growth of the losses above which a part is missed, sure or not.
     """
 
     data: CalibrationData
@@ -95,6 +98,15 @@ class Comparison:
     weights: Weights
     threads: int
     settlings: int
+    most_given_away: float = np.inf
+
+    @classmethod
+    def of(
+        cls, data: CalibrationData, windows: WindowSet, weights: Weights, settings: CalibrationSettings
+    ) -> Comparison:
+        """What fits to some windows are compared by, with a calibration's settings."""
+        judged = data.spread(settings.judged)
+        return cls(data, windows, judged, weights, settings.threads, settings.settlings, settings.most_given_away)
 
     def fitted(self, model: RobotModel, start: Standing, iterations: int = ITERATIONS) -> FittedModel:
         """A model, fitted from where another one stands."""
@@ -138,18 +150,19 @@ def surely_above(folds: int) -> float:
     return float(stdtrit(folds - 1, CONFIDENCE))
 
 
-def least_growth(error: float, folds: int, usual: bool = False) -> float:
+def least_growth(error: float, folds: int, usual: bool = False, most: float = np.inf) -> float:
     """Growth of the losses above which a part is missed: enough to matter, and surely above 0 unless it is usual.
 
     Args:
         error: standard error of the growth.
         folds: that were left out.
         usual: whether nearly every robot has the part.
+        most: growth that is not given away, sure or not.
     """
-    return LEAST_GROWTH if usual else max(LEAST_GROWTH, surely_above(folds) * error)
+    return LEAST_GROWTH if usual else max(LEAST_GROWTH, min(surely_above(folds) * error, most))
 
 
-def is_missed(growth: float, error: float, folds: int, usual: bool = False) -> bool:
+def is_missed(growth: float, error: float, folds: int, usual: bool = False, most: float = np.inf) -> bool:
     """Whether forecasts without a part are worse by enough.
 
     Args:
@@ -157,8 +170,9 @@ def is_missed(growth: float, error: float, folds: int, usual: bool = False) -> b
         error: standard error of the growth.
         folds: that were left out.
         usual: whether nearly every robot has the part.
+        most: growth that is not given away, sure or not.
     """
-    return growth > least_growth(error, folds, usual)
+    return growth > least_growth(error, folds, usual, most)
 
 
 def select_parts(
@@ -184,10 +198,14 @@ def select_parts(
         progress(f"forecasts of left-out drives without {part.title}")
         tried = _settled(comparison, model, left_out | {part.name}, best, least, cache, part.usual)
         growth, error = worse_by(least, tried)
-        if part.name == RAMP and DELAY not in left_out and is_missed(growth, error, len(tried.losses)):
+        if (
+            part.name == RAMP
+            and DELAY not in left_out
+            and is_missed(growth, error, len(tried.losses), most=comparison.most_given_away)
+        ):
             tried = min(tried, _later(comparison, model, left_out, best, cache), key=partial(mean_growth, least))
             growth, error = worse_by(least, tried)
-        kept = is_missed(growth, error, len(tried.losses), part.usual)
+        kept = is_missed(growth, error, len(tried.losses), part.usual, comparison.most_given_away)
         decisions.append(PartDecision(part.name, kept, growth, error))
         if not kept:
             best, left_out = tried, left_out | {part.name}
@@ -232,7 +250,7 @@ def _settled(
     tried = _fitted_without(comparison, model, left_out, best.standing, cache)
     for time in range(comparison.settlings):
         growth, error = worse_by(least, tried)
-        missed = is_missed(growth, error, len(tried.losses), usual)
+        missed = is_missed(growth, error, len(tried.losses), usual, comparison.most_given_away)
         if not missed or tried.standing.converged or growth > HOPELESS:
             break
         tried = _fitted_without(comparison, model, left_out, tried.standing, cache, f", settling {time + 1}")
@@ -275,7 +293,7 @@ def _delay_for_ramp(
     with_delay = partial(comparison.candidate, model.without(exchanged, robot), late_start(best))
     late = cache("a dead time for the ramp", with_delay)
     growth, error = worse_by(best, late)
-    if is_missed(growth, error, len(late.losses)):
+    if is_missed(growth, error, len(late.losses), most=comparison.most_given_away):
         return best, left_out, decisions
     without = model.without(neither, robot)
     prompt = cache("neither dead time nor ramp", partial(comparison.candidate, without, late.standing))

@@ -192,9 +192,7 @@ def calibrate_drives(
     first = store.step(
         "joint fit", partial(_joint_fit, data, windows, kept, selection.standing.values, settings.threads)
     )
-    comparison = Comparison(
-        data, windows, data.spread(settings.judged), first.weights, settings.threads, settings.settlings
-    )
+    comparison = Comparison.of(data, windows, first.weights, settings)
     selection = decide_with_all_windows(
         comparison, complete, replace(selection, standing=first.standing), store.step, progress
     )
@@ -260,9 +258,9 @@ def _select(
         LittleExplainedError: less than ``settings.least_explained`` is explained.
     """
     model = model.without(DATA_SHEET_PARTS, data.robot)
-    windows, judged = data.spread(settings.compared), data.spread(settings.judged)
+    windows = data.spread(settings.compared)
     rough = store.step("all parts", partial(_weigh, data, windows, model, held, settings.threads, steps))
-    comparison = Comparison(data, windows, judged, rough.weights, settings.threads, settings.settlings)
+    comparison = Comparison.of(data, windows, rough.weights, settings)
     asked = settings.least_explained > 0.0
     full, explained = store.step(
         "all parts forecast", partial(_all_parts, comparison, model, held, rough.standing, asked)

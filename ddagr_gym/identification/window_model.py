@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ddagr_gym.identification.fit_numerics import run_in_numerics
 from ddagr_gym.identification.motor_currents import CurrentModel
 from ddagr_gym.identification.parameters import ModelParameter
 from ddagr_gym.identification.spells import Spell
@@ -196,6 +197,7 @@ class WindowModel:
         if run_in is None or not len(run_in.leads_to) or not self._has_integral(values):
             return found
         before = self.on(run_in.windows)
+        before._numerics = run_in_numerics(self._numerics)
         _, record = before.predict_recorded(values, run_in.windows.initial, _INTEGRALS, effects)
         found[run_in.leads_to] = record[:, -1]
         return found
