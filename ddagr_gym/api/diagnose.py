@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -269,9 +268,7 @@ class _Drivetrain:
         from ddagr_gym.calibration.settings import CalibrationSettings
         from ddagr_gym.diagnosis.result.drivetrain_names import LEAST_EXPLAINED, CompletedNominal
 
-        settings = CalibrationSettings(
-            threads=self.threads, seed=self.seed, least_explained=LEAST_EXPLAINED, most_given_away=math.inf
-        )
+        settings = CalibrationSettings(threads=self.threads, seed=self.seed, least_explained=LEAST_EXPLAINED)
         if len(self.recordings) == 1:
             fitted, compared, settlings = (_ONE_DRIVE[name] for name in ("fitted", "compared", "settlings"))
             settings = replace(settings, fitted=fitted, compared=compared, settlings=settlings)

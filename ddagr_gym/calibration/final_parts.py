@@ -2,8 +2,8 @@
 
 Few windows of each drive mislead about two kinds of parts. Values that the data sheet states, of wheels, masses and
 gyro, move far where a model lacks something else: they hold until the other parts are fitted, and are free only where
-forecasts of left-out drives surely gain by that (forward selection). And a ramp of the commands that few windows asked
-for is kept only if all of them miss it, also from a longer dead time.
+forecasts of left-out drives gain by that (forward selection). And a ramp of the commands that few windows asked for is
+kept only if all of them miss it, also from a longer dead time.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def decide_with_all_windows(
     best = replace(found, standing=selected.standing)
     if RAMP not in left_out:
         progress("forecasts with all windows without the ramp of the commands")
-        best, left_out, decisions = _without_ramp(fit, best, left_out, decisions, comparison.most_given_away)
+        best, left_out, decisions = _without_ramp(fit, best, left_out, decisions)
     for part in PARTS:
         if not part.on_data_sheet or not model.free & set(part.parameters):
             continue
@@ -74,18 +74,18 @@ def decide_with_all_windows(
 
 
 def _without_ramp(
-    fit: Fit, best: Candidate, left_out: frozenset[str], decisions: list[PartDecision], most: float
+    fit: Fit, best: Candidate, left_out: frozenset[str], decisions: list[PartDecision]
 ) -> tuple[Candidate, frozenset[str], list[PartDecision]]:
     """Without the ramp, from the dead time as it is or else from a longer one, unless it is missed from both."""
     without = left_out | {RAMP}
     tried = fit(without, best.standing, "without the ramp")
     growth, error = worse_by(best, tried)
     short = DELAY not in left_out and best.standing.values[DELAY] < TRIED_DELAY
-    if short and is_missed(growth, error, len(tried.losses), most=most):
+    if short and is_missed(growth, error, len(tried.losses)):
         late = fit(without, late_start(best), f"without the ramp, dead time from {TRIED_DELAY:g}")
         tried = min(tried, late, key=partial(mean_growth, best))
         growth, error = worse_by(best, tried)
-    kept = is_missed(growth, error, len(tried.losses), most=most)
+    kept = is_missed(growth, error, len(tried.losses))
     changed = [PartDecision(RAMP, kept, growth, error) if item.name == RAMP else item for item in decisions]
     return (best, left_out, changed) if kept else (tried, without, changed)
 

@@ -3,9 +3,8 @@
 Every part is taken out in turn, what is fitted least often first. It stays out unless the forecasts of the left-out
 drives become worse than the best so far by 2 % and by more than the standard error of that change between drives (the
 one-standard-error rule; L. Breiman et al., Classification and Regression Trees, 1984, section 3.4.3), with Student's t
-for few drives: of all parts together no more than that is given away. Nor is more than 4 % where drives differ too much
-to be sure: a robot is calibrated to forecast. Of what nearly every robot has, the dead time, 2 % are enough: there the
-burden of proof is on its absence.
+for few drives: of all parts together no more than that is given away. Of what nearly every robot has, the dead time,
+2 % are enough: there the burden of proof is on its absence.
 A part is missed only by a fit that is settled, or that has had steps enough.
 What acts through parts that have all gone goes with them. Ramp and dead time stand for each other: a fit without the
 ramp is also tried from a longer dead time, and a ramp that stayed where the dead time went gives way to a dead time
@@ -89,7 +88,6 @@ class Comparison:
         weights: of the residuals.
         threads: of the simulator.
         settlings: times that a fit without a part goes on, where its forecasts are worse and it is not settled.
-        most_given_away: growth of the losses above which a part is missed, sure or not.
     """
 
     data: CalibrationData
@@ -98,15 +96,13 @@ class Comparison:
     weights: Weights
     threads: int
     settlings: int
-    most_given_away: float = np.inf
 
     @classmethod
     def of(
         cls, data: CalibrationData, windows: WindowSet, weights: Weights, settings: CalibrationSettings
     ) -> Comparison:
         """What fits to some windows are compared by, with a calibration's settings."""
-        judged = data.spread(settings.judged)
-        return cls(data, windows, judged, weights, settings.threads, settings.settlings, settings.most_given_away)
+        return cls(data, windows, data.spread(settings.judged), weights, settings.threads, settings.settlings)
 
     def fitted(self, model: RobotModel, start: Standing, iterations: int = ITERATIONS) -> FittedModel:
         """A model, fitted from where another one stands."""
@@ -150,19 +146,18 @@ def surely_above(folds: int) -> float:
     return float(stdtrit(folds - 1, CONFIDENCE))
 
 
-def least_growth(error: float, folds: int, usual: bool = False, most: float = np.inf) -> float:
+def least_growth(error: float, folds: int, usual: bool = False) -> float:
     """Growth of the losses above which a part is missed: enough to matter, and surely above 0 unless it is usual.
 
     Args:
         error: standard error of the growth.
         folds: that were left out.
         usual: whether nearly every robot has the part.
-        most: growth that is not given away, sure or not.
     """
-    return LEAST_GROWTH if usual else max(LEAST_GROWTH, min(surely_above(folds) * error, most))
+    return LEAST_GROWTH if usual else max(LEAST_GROWTH, surely_above(folds) * error)
 
 
-def is_missed(growth: float, error: float, folds: int, usual: bool = False, most: float = np.inf) -> bool:
+def is_missed(growth: float, error: float, folds: int, usual: bool = False) -> bool:
     """Whether forecasts without a part are worse by enough.
 
     Args:
@@ -170,9 +165,8 @@ def is_missed(growth: float, error: float, folds: int, usual: bool = False, most
         error: standard error of the growth.
         folds: that were left out.
         usual: whether nearly every robot has the part.
-        most: growth that is not given away, sure or not.
     """
-    return growth > least_growth(error, folds, usual, most)
+    return growth > least_growth(error, folds, usual)
 
 
 def select_parts(
@@ -198,14 +192,10 @@ def select_parts(
         progress(f"forecasts of left-out drives without {part.title}")
         tried = _settled(comparison, model, left_out | {part.name}, best, least, cache, part.usual)
         growth, error = worse_by(least, tried)
-        if (
-            part.name == RAMP
-            and DELAY not in left_out
-            and is_missed(growth, error, len(tried.losses), most=comparison.most_given_away)
-        ):
+        if part.name == RAMP and DELAY not in left_out and is_missed(growth, error, len(tried.losses)):
             tried = min(tried, _later(comparison, model, left_out, best, cache), key=partial(mean_growth, least))
             growth, error = worse_by(least, tried)
-        kept = is_missed(growth, error, len(tried.losses), part.usual, comparison.most_given_away)
+        kept = is_missed(growth, error, len(tried.losses), part.usual)
         decisions.append(PartDecision(part.name, kept, growth, error))
         if not kept:
             best, left_out = tried, left_out | {part.name}
@@ -250,7 +240,7 @@ def _settled(
     tried = _fitted_without(comparison, model, left_out, best.standing, cache)
     for time in range(comparison.settlings):
         growth, error = worse_by(least, tried)
-        missed = is_missed(growth, error, len(tried.losses), usual, comparison.most_given_away)
+        missed = is_missed(growth, error, len(tried.losses), usual)
         if not missed or tried.standing.converged or growth > HOPELESS:
             break
         tried = _fitted_without(comparison, model, left_out, tried.standing, cache, f", settling {time + 1}")
@@ -293,7 +283,7 @@ def _delay_for_ramp(
     with_delay = partial(comparison.candidate, model.without(exchanged, robot), late_start(best))
     late = cache("a dead time for the ramp", with_delay)
     growth, error = worse_by(best, late)
-    if is_missed(growth, error, len(late.losses), most=comparison.most_given_away):
+    if is_missed(growth, error, len(late.losses)):
         return best, left_out, decisions
     without = model.without(neither, robot)
     prompt = cache("neither dead time nor ramp", partial(comparison.candidate, without, late.standing))

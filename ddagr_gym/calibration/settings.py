@@ -24,8 +24,6 @@ class CalibrationSettings:
         settlings: times that a fit without a part goes on, where its forecasts are worse and it is not settled (ours):
             with the wheels' places of a Warthog as on its data sheet, forecasts of its six drives were 4 % worse after
             8 steps and 2 % better after 16.
-        most_given_away: growth of the losses of left-out drives above which a part is missed, sure or not (ours): twice
-            what matters at all. Infinite where a part is only named if that is sure.
         threads: of the simulator.
         seed: of resampled intervals.
         supply_currents: also use currents that motors draw from their supply; their own always count. On simulated
@@ -39,7 +37,6 @@ class CalibrationSettings:
     compared: int = 12
     judged: int = 100
     settlings: int = 3
-    most_given_away: float = 0.04
     threads: int = 1
     seed: int = 0
     supply_currents: bool = False

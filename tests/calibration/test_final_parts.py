@@ -45,7 +45,6 @@ class Windows:
     fits: int = 0
 
     data = SimpleNamespace(robot=WARTHOG)
-    most_given_away = np.inf
 
     def candidate(self, model: RobotModel, start: Standing, iterations: int) -> Candidate:
         assert iterations == 0

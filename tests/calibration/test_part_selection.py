@@ -58,7 +58,6 @@ class Losses:
 
     data = SimpleNamespace(robot=get_robot("warthog"))
     settlings = 3
-    most_given_away = np.inf
 
     def __init__(self, losses: dict[frozenset[str], float]) -> None:
         self.losses = losses
@@ -108,21 +107,11 @@ def test_parts_that_are_missed_a_little_each_are_not_all_given_away():
     assert (growth["command_ramp"], growth["command_delay"]) == (pytest.approx(0.015), pytest.approx(0.03))
 
 
-@pytest.mark.parametrize(
-    ("name", "most", "kept"),
-    [
-        ("command_delay", np.inf, True),
-        ("command_ramp", np.inf, False),
-        ("command_ramp", 0.05, False),
-        ("command_ramp", 0.03, True),
-    ],
-)
-def test_a_part_is_kept_where_that_is_sure_or_where_too_much_would_be_given_away(name, most, kept):
+@pytest.mark.parametrize(("name", "kept"), [("command_delay", True), ("command_ramp", False)])
+def test_the_dead_time_is_kept_where_it_matters_and_another_part_only_where_that_is_sure(name, kept):
     out = frozenset({name})
 
     class Scattered(Losses):
-        most_given_away = most
-
         def candidate(self, model, start):
             # worse by 4 % in the mean, in one fold alone
             return candidate(1.16, 1.0, 1.0, 1.0) if out <= model.out else candidate(1.0, 1.0, 1.0, 1.0)
