@@ -37,8 +37,8 @@ STATE_ENTRIES = (
 
 RUN_IN = 4.0
 """What was driven right before a window, from which a simulation finds the integral parts at its start [s] (ours): on
-one drive of a Warthog on asphalt median errors of the wheel speeds fall by 10 % with it, by 15 % with all of a step of
-6 s, on others by less (benchmarks/run_in.py)."""
+one drive of a Warthog on asphalt median errors of the wheel speeds fall by 7 % with it, by 11 % with all of a step of
+6 s, on most others by less (benchmarks/run_in.py)."""
 
 _MOVING_STATE = range(3, len(STATE))
 _OMEGA = slice(6, 8)
