@@ -32,7 +32,6 @@ from ddagr_gym.calibration.joint_fit import (
     model_at,
     weigh_and_fit,
 )
-from ddagr_gym.calibration.left_out import forecasts
 from ddagr_gym.calibration.ordinary_drives import Ordinary, ordinary_drives
 from ddagr_gym.calibration.part_selection import Candidate, Comparison, Selection, select_parts
 from ddagr_gym.calibration.parts import DATA_SHEET_PARTS, RobotModel
@@ -204,7 +203,7 @@ def calibrate_drives(
     progress("every drive by itself")
     estimates = store.step("drives", partial(drive_estimates, data, model, final.weights, settings.threads))
     progress("forecasts of left-out drives")
-    made = tuple(forecasts(data, model, data.spread(settings.judged), final.weights, settings.threads))
+    made = comparison.forecasts(model)
     compared = all_forecasts(data, model, made, held, settings.threads)
     calibration = Calibration(
         schema=SCHEMA,

@@ -13,6 +13,9 @@ from ddagr_gym.parameters import Numerics
 FIELD_TOLERANCE = 5e-4
 """Relative gain of a step that ends a fit to field drives (ours): far below the deviations of the parameters."""
 
+RUN_IN_STEP = 0.05
+"""Longest step of the integrator before a window [s] (ours)."""
+
 
 def field_numerics() -> Numerics:
     """For fits to samples of field drives (a replay): smooth, with steps of up to 25 ms.
@@ -50,9 +53,7 @@ def run_in_numerics(numerics: Numerics) -> Numerics:
     Args:
         numerics: of the windows.
     """
-    slopes = field_slope_numerics()
-    step = max(numerics.maximum_step, slopes.maximum_step)
-    return replace(numerics, maximum_step=step, contact_nodes=min(numerics.contact_nodes, slopes.contact_nodes))
+    return replace(numerics, maximum_step=max(numerics.maximum_step, RUN_IN_STEP))
 
 
 def block_mean_numerics() -> Numerics:
