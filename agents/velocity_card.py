@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from agents.velocity_drives import Plan
-from agents.velocity_training import VelocityTraining
+from agents.velocity_training import ESTIMATED, Variant, VelocityTraining
 from ddagr_gym.estimation.learned_inputs import SENSOR_INPUTS
 from ddagr_gym.estimation.learned_network import VelocityNetwork, save_network
 from ddagr_gym.files import atomic_path, make_folder, write_json, write_text
@@ -29,7 +29,7 @@ def publish_estimator(training: VelocityTraining, network: VelocityNetwork, plan
     }
     write_json(folder / "training.json", record)
     draw_training(record, folder / "training.png")
-    write_text(folder / "README.md", card(record, training.variant.description, len(network.description.inputs)))
+    write_text(folder / "README.md", card(record, training.variant))
 
 
 def draw_training(record: dict[str, Any], path: Path) -> None:
@@ -58,19 +58,22 @@ def draw_training(record: dict[str, Any], path: Path) -> None:
             figure.savefig(temporary, dpi=130.0, metadata={"Software": None})
 
 
-def card(record: dict[str, Any], description: str, inputs: int) -> str:
-    """Card in Markdown."""
-    settings, last, plan = record["settings"], record["course"][-1], record["plan"]
-    shares = ", ".join(f"{key.replace('_', ' ')} {100.0 * value:.0f} %" for key, value in plan.items())
-    v_x, v_y = record["calibration"]
-    filtered = "" if inputs == len(SENSOR_INPUTS) else ", and the inertial filter's state, deviations and innovations"
+def card(record: dict[str, Any], variant: Variant) -> str:
+    """Card in Markdown.
+
+    Args:
+        record: of the training; ``note`` where it went otherwise than the settings say.
+        variant: that was trained.
+    """
+    drawn = [] if len(record["course"]) < 2 else ["![Course of training](training.png)", ""]
     return "\n".join(
         [
-            f"# {record['name']}: learned estimator that {description}",
+            f"# {record['name']}: learned estimator that {variant.description}",
             "",
-            "A recurrent network (gated recurrent unit) that estimates forward speed and side slip of a DDAGR robot in "
-            "a row turn, with their covariance, from gyro, accelerometer, encoders and commands. It learnt from "
-            "simulated turns alone and has never seen a robot's own recording.",
+            f"A recurrent network (gated recurrent units) that estimates forward speed and side slip"
+            f"{' and the place' if variant.place else ''} of a DDAGR robot in a row turn, with their covariance, from "
+            "gyro, accelerometer, encoders and commands. It learnt from simulated turns alone and has never seen a "
+            "robot's own recording.",
             "",
             "## Use",
             "",
@@ -87,34 +90,17 @@ def card(record: dict[str, Any], description: str, inputs: int) -> str:
             "",
             "## What it sees",
             "",
-            f"{inputs} inputs every 0.08 s: means of the last ten samples' halves (25 Hz), commands, heading by the "
-            f"gyro, means over the rest before the drive{filtered}.",
+            _inputs(variant),
             "",
             "## How it was trained",
             "",
-            f"- {settings['turns']} simulated turns, numbers 0 to {settings['turns'] - 1} of the seed "
-            f"{settings['root_seed']}; the next {settings['validation']} are its validation. No scenario of a frozen "
-            "set took part.",
-            "- Driven by B6 (60 %), B4 (25 %) and two constant speeds (15 %), their gains times a half to two, their "
-            "commands wandering in most turns; 0.3 to 1.3 s of standing first.",
-            f"- Shares of turns: {shares}. Slopes up to 6 degrees, lateral forces x 0.75 to 1.3, strength and "
-            "stiffness x 0.6 to 1.6 from some time on, dead time up to 0.25 s, mass x 0.9 to 1.25, variation of the "
-            "soil up to 10 %.",
-            f"- Gaussian likelihood of v_x and v_y with their correlation; {settings['units']} units, "
-            f"{settings['epochs']} passes, seed {settings['seed']}; turns mirrored at random; "
-            f"{record['cpu_seconds']} CPU seconds.",
+            *_training(record),
             "",
             "## Validation",
             "",
-            f"On {settings['validation']} turns of the same draws, while driving: v_x {last['v_x_rmse_mm_s']:.1f} mm/s "
-            f"(median {last['v_x_median_mm_s']:.1f}), v_y {last['v_y_rmse_mm_s']:.1f} mm/s "
-            f"(median {last['v_y_median_mm_s']:.1f}); of 90 % intervals {100 * last['v_x_covered']:.0f} and "
-            f"{100 * last['v_y_covered']:.0f} % were covered. Calibrated by the factors {v_x:.2f} and {v_y:.2f} on the "
-            "deviations, with which 90 % are covered on these turns. Root mean squares are those of the few turns on "
-            "which the robot gets stuck or the filter diverges.",
+            _validation(record, variant),
             "",
-            "![Course of training](training.png)",
-            "",
+            *drawn,
             "## Limits",
             "",
             "It knows this robot, these sensors at 125 Hz and commands every ten samples. Slopes, soil that changes "
@@ -123,4 +109,56 @@ def card(record: dict[str, Any], description: str, inputs: int) -> str:
             "`docs/results/filter.md`.",
             "",
         ]
+    )
+
+
+def _inputs(variant: Variant) -> str:
+    filtered = (
+        "" if variant.inputs == SENSOR_INPUTS else ", and the inertial filter's state, deviations and innovations"
+    )
+    carried = ", and the pose that it carries" if variant.place else ""
+    return (
+        f"{len(variant.inputs)} inputs every 0.08 s: means of the last ten samples' halves (25 Hz), commands, heading "
+        f"by the gyro, means over the rest before the drive{filtered}{carried}."
+    )
+
+
+def _training(record: dict[str, Any]) -> list[str]:
+    """Lines of a list."""
+    settings, plan = record["settings"], record["plan"]
+    shares = ", ".join(f"{key.replace('_', ' ')} {100.0 * value:.0f} %" for key, value in plan.items())
+    near = settings.get("near", 0)
+    further = f" {near} more of the task as it is, of the seed {settings['root_seed'] + 1}." if near else ""
+    layers = settings.get("layers", 1)
+    units = f"{settings['units']} units" if layers == 1 else f"{layers} layers of {settings['units']} units"
+    return [
+        f"- {settings['turns']} simulated turns, numbers 0 to {settings['turns'] - 1} of the seed "
+        f"{settings['root_seed']}; the next {settings['validation']} are its validation.{further} No scenario of a "
+        "frozen set took part.",
+        *([f"- {record['note']}"] if "note" in record else []),
+        "- Driven by B6 (60 %), B4 (25 %) and two constant speeds (15 %), their gains times a half to two, their "
+        "commands wandering in most turns; 0.3 to 1.3 s of standing first.",
+        f"- Shares of turns: {shares}. Slopes up to 6 degrees, lateral forces x 0.75 to 1.3, strength and "
+        "stiffness x 0.6 to 1.6 from some time on, dead time up to 0.25 s, mass x 0.9 to 1.25, variation of the "
+        "soil up to 10 %.",
+        f"- Gaussian likelihood of each pair with its correlation; {units}, "
+        f"{settings['epochs']} passes, seed {settings['seed']}; turns mirrored at random; "
+        f"{record['cpu_seconds']} seconds of {record.get('device', 'a CPU core')}.",
+    ]
+
+
+def _validation(record: dict[str, Any], variant: Variant) -> str:
+    last = record["course"][-1]
+    told = [(name, unit, unit.replace("_", "/")) for name, unit in ESTIMATED[: 4 if variant.place else 2]]
+    errors = ", ".join(
+        f"{name} {last[f'{name}_rmse_{unit}']:.1f} {text} (median {last[f'{name}_median_{unit}']:.1f})"
+        for name, unit, text in told
+    )
+    covered = ", ".join(f"{100 * last[f'{name}_covered']:.0f}" for name, _, _ in told)
+    factors = ", ".join(f"{factor:.2f}" for factor in record["calibration"])
+    return (
+        f"On {record['settings']['validation']} turns of the same draws, while driving: {errors}; of 90 % intervals "
+        f"{covered} % were covered. Calibrated by the factors {factors} on the deviations, with which 90 % are covered "
+        "on these turns. Root mean squares are those of the few turns on which the robot gets stuck or the filter "
+        "diverges."
     )

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
+from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +26,7 @@ from ddagr_gym.envs.settings import Episode, Randomisation, TurnSettings
 from ddagr_gym.errors import InputError
 from ddagr_gym.estimation import CHANNELS, DeadReckoning, InertialBatch, InertialModel
 from ddagr_gym.estimation.layout import COMMANDS
-from ddagr_gym.estimation.learned_inputs import INPUTS, MEMORY_SIZE, block_inputs, mean_rim_speed
+from ddagr_gym.estimation.learned_inputs import INPUTS, MEMORY_SIZE, Filtered, block_inputs, mean_rim_speed
 from ddagr_gym.evaluation.controllers import find_controller, make_path_tracker
 from ddagr_gym.evaluation.ladder_gains import LadderGains, ladder_gains
 from ddagr_gym.evaluation.runs import Controller, drive_turn
@@ -71,6 +73,10 @@ class Plan:
     sloping: float = 0.55
     lateral: float = 0.50
     changing: float = 0.40
+
+
+NOMINAL = Plan(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+"""The task as it is: no turn differs."""
 
 
 def draw_turn(rng: Rng, plan: Plan = Plan()) -> tuple[TurnSettings, Episode]:
@@ -209,6 +215,7 @@ class Drives:
         truth: (D, B, 2) true v_x, v_y [m/s].
         rims: (D, B) mean rim speed [m/s].
         filtered: (D, B, 2) the inertial filter's v_x and v_y [m/s].
+        places: (D, B, 2) true x and y from where it started, along its first heading [m].
         driving: (D, B) 1 from the first command on, 0 at rest before it and after the end.
         present: (D, B) 1 up to the end.
     """
@@ -217,6 +224,7 @@ class Drives:
     truth: NDArray[np.float32]
     rims: NDArray[np.float32]
     filtered: NDArray[np.float32]
+    places: NDArray[np.float32]
     driving: NDArray[np.float32]
     present: NDArray[np.float32]
 
@@ -242,7 +250,7 @@ def as_drives(columns: Sequence[Mapping[str, Array]]) -> Drives:
     model = InertialModel.of(ddagr(), Sensors()).with_known_vibration()
     radius, prior = model.flat.outer_radius, model.flat.soil_prior.logs(model.flat.wheel_load)[0]
     count = len(columns)
-    commands, readings, truth, present = _blocks(columns)
+    commands, readings, truth, places, present = _blocks(columns)
     batch, memory = InertialBatch(model, count), np.zeros((count, MEMORY_SIZE))
     inputs = np.zeros((count, EPISODE_STEPS, len(INPUTS)), dtype=np.float32)
     rims = np.zeros((count, EPISODE_STEPS), dtype=np.float32)
@@ -250,21 +258,19 @@ def as_drives(columns: Sequence[Mapping[str, Array]]) -> Drives:
     for k in range(EPISODE_STEPS):
         given = np.ascontiguousarray(readings[:, k])
         innovations = batch.step(commands[:, k], given)
-        states = batch.states
-        inputs[:, k] = block_inputs(
-            memory, commands[:, k], given, states, batch.covariances, innovations, model.flat.sample_period, radius,
-            prior,
-        )  # fmt: skip
-        rims[:, k], filtered[:, k] = mean_rim_speed(given, radius), states[:, :2]
+        own = Filtered(batch.states, batch.covariances, innovations, batch.poses, batch.pose_covariances)
+        inputs[:, k] = block_inputs(memory, commands[:, k], given, own, model.flat.sample_period, radius, prior)
+        rims[:, k], filtered[:, k] = mean_rim_speed(given, radius), batch.states[:, :2]
     begun = np.maximum.accumulate((np.abs(commands) > 0.0).any(axis=2), axis=1)
     driving = (begun * present).astype(np.float32)
-    return Drives(inputs, truth.astype(np.float32), rims, filtered, driving, present.astype(np.float32))
+    single = (part.astype(np.float32) for part in (places, driving, present))
+    return Drives(inputs, truth.astype(np.float32), rims, filtered, *single)
 
 
-def _blocks(columns: Sequence[Mapping[str, Array]]) -> tuple[Array, Array, Array, Array]:
-    """Commands (D, B, 2), readings (D, B, K, 5), true velocities (D, B, 2), presence (D, B)."""
+def _blocks(columns: Sequence[Mapping[str, Array]]) -> tuple[Array, Array, Array, Array, Array]:
+    """Commands (D, B, 2), readings (D, B, K, 5), true velocities and places (D, B, 2), presence (D, B)."""
     shape = (len(columns), EPISODE_STEPS)
-    commands, truth, present = np.zeros((*shape, 2)), np.zeros((*shape, 2)), np.zeros(shape)
+    commands, truth, places, present = *(np.zeros((*shape, 2)) for _ in range(3)), np.zeros(shape)
     readings = np.zeros((*shape, CONTROL_INTERVAL, len(CHANNELS)))
     for d, own in enumerate(columns):
         blocks = len(own["t"]) // CONTROL_INTERVAL
@@ -274,35 +280,69 @@ def _blocks(columns: Sequence[Mapping[str, Array]]) -> tuple[Array, Array, Array
         ends = slice(CONTROL_INTERVAL - 1, size, CONTROL_INTERVAL)
         commands[d, :blocks] = np.column_stack([own[name][ends] for name in COMMANDS])
         truth[d, :blocks] = np.column_stack([own["true_v_x"][ends], own["true_v_y"][ends]])
+        places[d, :blocks] = _from_start(own)[ends]
         present[d, :blocks] = 1.0
-    return commands, readings, truth, present
+    return commands, readings, truth, places, present
 
 
-def make_drives(count: int, root_seed: int, folder: Path, plan: Plan = Plan()) -> Drives:
+def _from_start(columns: Mapping[str, Array]) -> Array:
+    """True x and y (T, 2) from where a robot started, along its first heading [m]; it stands at the first sample."""
+    x, y, yaw = (columns[f"true_{name}"] for name in ("x", "y", "yaw"))
+    cosine, sine, along, across = math.cos(yaw[0]), math.sin(yaw[0]), x - x[0], y - y[0]
+    return np.column_stack([cosine * along + sine * across, cosine * across - sine * along])
+
+
+def make_drives(count: int, root_seed: int, folder: Path, plan: Plan = Plan(), workers: int = 1) -> Drives:
     """Turns 0 to ``count - 1`` of a root seed; parts that the folder holds are not driven again.
+
+    Args:
+        count: of turns.
+        root_seed: of all.
+        folder: of the parts.
+        plan: of the draws.
+        workers: processes that drive; the turns are the same with any number.
 
     Raises:
         InputError: the folder holds turns of another seed or plan.
     """
     _check_same(folder, {"root_seed": root_seed, "plan": asdict(plan), "inputs": list(INPUTS)})
-    parts = []
+    wanted = [range(first, min(first + PART, count)) for first in range(0, count, PART)]
+    files = [folder / f"turns_{numbers[0]}_to_{numbers[-1]}.npz" for numbers in wanted]
+    missing = [(numbers, file) for numbers, file in zip(wanted, files, strict=True) if not file.is_file()]
     with Progress(count, "driving") as progress:
-        for first in range(0, count, PART):
-            numbers = range(first, min(first + PART, count))
-            file = folder / f"turns_{first}_to_{numbers[-1]}.npz"
-            if not file.is_file():
-                columns = []
-                for number in numbers:
-                    columns.append(_drive([root_seed, number], plan))
-                    progress.advance()
-                own = as_drives(columns)
-                with atomic_path(file) as temporary:
-                    np.savez(temporary, **{item.name: getattr(own, item.name) for item in fields(own)})
-            else:
-                progress.advance(len(numbers))
-            with np.load(file, allow_pickle=False) as stored:
-                parts.append(Drives(**{name: stored[name] for name in stored.files}))
+        progress.advance(count - sum(len(numbers) for numbers, _ in missing))
+        for made in _each(partial(_make_part, root_seed, plan), missing, workers):
+            progress.advance(made)
+    parts = []
+    for file in files:
+        with np.load(file, allow_pickle=False) as stored:
+            parts.append(Drives(**{name: stored[name] for name in stored.files}))
+    return joined_drives(parts)
+
+
+def joined_drives(parts: Sequence[Drives]) -> Drives:
+    """The drives of all parts, in their order."""
     return Drives(*(np.concatenate([getattr(part, item.name) for part in parts]) for item in fields(Drives)))
+
+
+def _make_part(root_seed: int, plan: Plan, part: tuple[range, Path]) -> int:
+    """Drive the turns of one part into its file; their number."""
+    numbers, file = part
+    own = as_drives([_drive([root_seed, number], plan) for number in numbers])
+    with atomic_path(file) as temporary:
+        np.savez(temporary, **{item.name: getattr(own, item.name) for item in fields(own)})
+    return len(numbers)
+
+
+def _each(
+    make: Callable[[tuple[range, Path]], int], parts: Sequence[tuple[range, Path]], workers: int
+) -> Iterator[int]:
+    """What ``make`` returns for each part, as they are finished."""
+    if workers == 1 or len(parts) < 2:
+        yield from map(make, parts)
+        return
+    with get_context("spawn").Pool(min(workers, len(parts))) as pool:
+        yield from pool.imap_unordered(make, parts)
 
 
 def _check_same(folder: Path, settings: Mapping[str, Any]) -> None:

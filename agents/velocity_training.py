@@ -1,4 +1,4 @@
-"""Supervised training of the learned estimator's network, along whole turns to v_x, v_y with their covariance."""
+"""Supervised training of the learned estimator's network, along whole turns to velocities and place with covariance."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import json
 import math
 import time
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -18,15 +18,17 @@ from scipy.stats import norm
 from agents.velocity_drives import Drives
 from ddagr_gym.control.timing import CONTROL_INTERVAL
 from ddagr_gym.errors import InputError
-from ddagr_gym.estimation.learned_inputs import INPUTS, SENSOR_INPUTS
+from ddagr_gym.estimation.learned_inputs import FILTER_INPUTS, INPUTS, SENSOR_INPUTS
 from ddagr_gym.estimation.learned_network import (
     FORMAT,
     LARGEST_CORRELATION,
     LARGEST_LOG,
     LEAST_LOG,
     OUTPUTS,
+    PLACE_SCALE,
     VELOCITY_SCALE,
     NetworkDescription,
+    RecurrentLayer,
     VelocityNetwork,
     velocity_base,
 )
@@ -38,10 +40,53 @@ from ddagr_gym.version import __version__
 Array = NDArray[np.float64]
 Tensor = torch.Tensor
 
+ESTIMATED = (("v_x", "mm_s"), ("v_y", "mm_s"), ("x", "mm"), ("y", "mm"))
+"""What networks estimate, with units of their errors in a record."""
 DEVIATIONS = float(norm.ppf(0.95))
 """Standard deviations either side that hold 90 %."""
 _LEAST_DEVIATION = 1e-4  # of an input, in its unit: one that hardly changes is not blown up
+_MOST_ROWS = 1_000_000  # from which the inputs' deviations are taken
 _GATE = 5.0  # standard deviations beyond which an error counts linearly (P. Huber, 1964)
+
+
+@dataclass(frozen=True)
+class VelocitySettings:
+    """Of a training.
+
+    Attributes:
+        turns: that are learnt from, drawn by the plan.
+        near: further ones of the task as it is, drawn with the next root seed.
+        validation: turns of the plan after them for course and calibration.
+        root_seed: of the turns.
+        seed: of the network and the order of turns.
+        units: of its memory.
+        layers: of units.
+        epochs: passes over the turns.
+        batch: turns in one step.
+        learning_rate: at the start; it falls to a fiftieth on a cosine.
+        rest_weight: of an instant at rest in the loss; 1 while driving.
+        clip: of normalised inputs.
+    """
+
+    turns: int = 2300
+    near: int = 0
+    validation: int = 200
+    root_seed: int = 20_261_240
+    seed: int = 0
+    units: int = 48
+    layers: int = 1
+    epochs: int = 8
+    batch: int = 25
+    learning_rate: float = 3e-3
+    rest_weight: float = 0.05
+    clip: float = 8.0
+
+    def __post_init__(self) -> None:
+        for name in ("turns", "validation", "units", "layers", "epochs", "batch"):
+            if getattr(self, name) < 1:
+                raise InputError(f"{name} is {getattr(self, name)}: give at least 1.")
+        if self.near < 0:
+            raise InputError(f"near is {self.near}: give 0 or more.")
 
 
 @dataclass(frozen=True)
@@ -52,73 +97,48 @@ class Variant:
         description: one line.
         inputs: names.
         base: of ``learned_network.BASES``.
+        place: whether it corrects the place that the inertial filter carries.
+        settings: of its training.
     """
 
     description: str
     inputs: tuple[str, ...]
     base: str
+    place: bool = False
+    settings: VelocitySettings = field(default_factory=VelocitySettings)
 
 
+_BESIDE = SENSOR_INPUTS + FILTER_INPUTS
+_LONG = VelocitySettings(
+    turns=7760, near=7780, root_seed=77_001, units=128, layers=2, epochs=80, batch=128, learning_rate=3e-3
+)
 VARIANTS = {
-    "correction": Variant("corrects the inertial filter, whose estimate and innovations it sees", INPUTS, "filter"),
+    "correction": Variant("corrects the inertial filter, whose estimate and innovations it sees", _BESIDE, "filter"),
     "alone": Variant("sees sensors and commands alone, no force law", SENSOR_INPUTS, "rim"),
-    "features": Variant("sees the inertial filter, does not correct it", INPUTS, "rim"),
+    "features": Variant("sees the inertial filter, does not correct it", _BESIDE, "rim"),
+    "pose": Variant("corrects velocities and place of the inertial filter", INPUTS, "filter", True, _LONG),
 }
 """The published estimators by name."""
-
-
-@dataclass(frozen=True)
-class VelocitySettings:
-    """Of a training.
-
-    Attributes:
-        turns: that are learnt from.
-        validation: turns after them for course and calibration.
-        root_seed: of the turns.
-        seed: of the network and the order of turns.
-        units: of its memory.
-        epochs: passes over the turns.
-        batch: turns in one step.
-        learning_rate: at the start; it falls to a fiftieth on a cosine.
-        rest_weight: of an instant at rest in the loss; 1 while driving.
-        clip: of normalised inputs.
-    """
-
-    turns: int = 2300
-    validation: int = 200
-    root_seed: int = 20_261_240
-    seed: int = 0
-    units: int = 48
-    epochs: int = 8
-    batch: int = 25
-    learning_rate: float = 3e-3
-    rest_weight: float = 0.05
-    clip: float = 8.0
-
-    def __post_init__(self) -> None:
-        for name in ("turns", "validation", "units", "epochs", "batch"):
-            if getattr(self, name) < 1:
-                raise InputError(f"{name} is {getattr(self, name)}: give at least 1.")
 
 
 class VelocityModel(torch.nn.Module):
     """The network as torch trains it; ``VelocityNetwork`` is what numpy runs."""
 
-    def __init__(self, inputs: int, units: int) -> None:
+    def __init__(self, inputs: int, units: int, layers: int = 1, outputs: int = OUTPUTS) -> None:
         super().__init__()
-        self.memory = torch.nn.GRU(inputs, units, batch_first=True)
-        self.output = torch.nn.Linear(units, OUTPUTS)
+        self.memory = torch.nn.GRU(inputs, units, layers, batch_first=True)
+        self.output = torch.nn.Linear(units, outputs)
         torch.nn.init.zeros_(self.output.weight)
         torch.nn.init.zeros_(self.output.bias)
 
     def forward(self, inputs: Tensor) -> Tensor:
-        """Outputs (D, B, 5) for normalised inputs (D, B, I)."""
+        """Outputs (D, B, O) for normalised inputs (D, B, I)."""
         found: Tensor = self.output(self.memory(inputs)[0])
         return found
 
 
 def gaussian_loss(outputs: Tensor, wanted: Tensor, weights: Tensor) -> Tensor:
-    """Weighted mean of the negative log-likelihood of ``wanted`` (D, B, 2), velocities over VELOCITY_SCALE.
+    """Weighted mean of the negative log-likelihood of ``wanted`` (D, B, 2), velocities or places over their scale.
 
     Beyond _GATE standard deviations errors count linearly: turns on which the filter diverges would decide all.
     """
@@ -134,12 +154,21 @@ def gaussian_loss(outputs: Tensor, wanted: Tensor, weights: Tensor) -> Tensor:
 
 
 def fixed_loss(outputs: Tensor, wanted: Tensor, weights: Tensor) -> Tensor:
-    """Weighted mean of Huber's loss of the velocities at a fixed deviation, VELOCITY_SCALE.
+    """Weighted mean of Huber's loss of the velocities or places at a fixed deviation, their scale.
 
     Beside the likelihood, which alone widens the deviations before it learns the velocities (M. Seitzer et al., 2022).
     """
     errors = torch.nn.functional.huber_loss(outputs[..., :2], wanted, reduction="none").sum(dim=-1)
     return (weights * errors).sum() / weights.sum()
+
+
+def total_loss(outputs: Tensor, wanted: Tensor, weights: Tensor) -> Tensor:
+    """Both losses of every pair: ``outputs`` (D, B, OUTPUTS each), ``wanted`` (D, B, 2 each)."""
+    losses = []
+    for pair in range(wanted.shape[-1] // 2):
+        own, due = outputs[..., OUTPUTS * pair : OUTPUTS * (pair + 1)], wanted[..., 2 * pair : 2 * pair + 2]
+        losses.append(gaussian_loss(own, due, weights) + fixed_loss(own, due, weights))
+    return torch.stack(losses).sum()
 
 
 def mirror(names: tuple[str, ...]) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
@@ -148,7 +177,8 @@ def mirror(names: tuple[str, ...]) -> tuple[NDArray[np.intp], NDArray[np.float32
     for name in names:
         other = name.replace("right", "?").replace("left", "right").replace("?", "left")
         places.append(names.index(other))
-        odd = ("force_y", "yaw_rate", "sine", "centripetal", "filter_v_y", "gyro_bias", "bias_y", "gravity_y")
+        odd = ("force_y", "yaw_rate", "sine", "centripetal", "filter_v_y", "gyro_bias", "bias_y", "gravity_y",
+               "pose_y", "pose_turned")  # fmt: skip
         signs.append(-1.0 if any(part in name for part in odd) and "deviation" not in name else 1.0)
     return np.array(places), np.array(signs, dtype=np.float32)
 
@@ -162,16 +192,22 @@ class VelocityTraining:
         drives: that are learnt from.
         validation: drives that it is judged and calibrated on.
         folder: of its own.
+        device: of torch. Other devices give other bits.
     """
 
-    def __init__(self, name: str, settings: VelocitySettings, drives: Drives, validation: Drives, folder: Path) -> None:
+    def __init__(
+        self, name: str, settings: VelocitySettings, drives: Drives, validation: Drives, folder: Path,
+        device: str = "cpu",
+    ) -> None:  # fmt: skip
         self.name, self.variant, self.settings, self.folder = name, VARIANTS[name], settings, make_folder(folder)
         self._places = np.array([INPUTS.index(item) for item in self.variant.inputs])
         self._mean, self._deviation = self._statistics(drives)
+        self._device = torch.device(device)
         self._drives, self._validation = self._tensors(drives), self._tensors(validation)
         torch.set_num_threads(1)
         torch.manual_seed(settings.seed)
-        self.model = VelocityModel(len(self._places), settings.units)
+        outputs = 2 * OUTPUTS if self.variant.place else OUTPUTS
+        self.model = VelocityModel(len(self._places), settings.units, settings.layers, outputs).to(self._device)
         self._optimiser = torch.optim.Adam(self.model.parameters(), lr=settings.learning_rate)
         self._mirror = mirror(self.variant.inputs)
         self.course: list[dict[str, float]] = []
@@ -182,22 +218,28 @@ class VelocityTraining:
 
         By quantiles: a filter that diverges must not decide them.
         """
-        seen = drives.inputs[drives.driving > 0.0][:, self._places].astype(np.float64)
+        rows = drives.inputs[drives.driving > 0.0]
+        seen = rows[:: 1 + len(rows) // _MOST_ROWS][:, self._places].astype(np.float64)
         places, signs = mirror(self.variant.inputs)
         both = np.concatenate([seen, seen[:, places] * signs])
         low, middle, high = np.quantile(both, [0.05, 0.5, 0.95], axis=0)
         return middle, np.maximum((high - low) / (2.0 * DEVIATIONS), _LEAST_DEVIATION)
 
     def _tensors(self, drives: Drives) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        """Inputs, wanted velocities over their scale, weights, and whether it drives."""
-        inputs = torch.from_numpy(drives.inputs[..., self._places])
+        """Inputs, wanted velocities and places over their scale, weights, and whether it drives."""
         base = velocity_base(self.variant.base, drives.rims, drives.filtered)
-        wanted = torch.from_numpy((drives.truth - base) / np.float32(VELOCITY_SCALE))
-        rest = self.settings.rest_weight * (drives.present - drives.driving)
-        return inputs, wanted, torch.from_numpy(drives.driving + rest), torch.from_numpy(drives.driving)
+        wanted = (drives.truth - base) / np.float32(VELOCITY_SCALE)
+        if self.variant.place:
+            carried = drives.inputs[..., [INPUTS.index("pose_x"), INPUTS.index("pose_y")]]
+            wanted = np.concatenate([wanted, (drives.places - carried) / np.float32(PLACE_SCALE)], axis=-1)
+        weights = drives.driving + self.settings.rest_weight * (drives.present - drives.driving)
+        parts = (drives.inputs[..., self._places], wanted, weights, drives.driving)
+        inputs, due, weight, driving = (torch.from_numpy(np.ascontiguousarray(part)) for part in parts)
+        return inputs.to(self._device), due.to(self._device), weight.to(self._device), driving.to(self._device)
 
     def _normal(self, inputs: Tensor) -> Tensor:
-        mean, deviation = (torch.from_numpy(a.astype(np.float32)) for a in (self._mean, self._deviation))
+        numbers = (self._mean, self._deviation)
+        mean, deviation = (torch.from_numpy(a.astype(np.float32)).to(self._device) for a in numbers)
         return ((inputs - mean) / deviation).clamp(-self.settings.clip, self.settings.clip)
 
     def run(self) -> VelocityNetwork:
@@ -208,7 +250,7 @@ class VelocityTraining:
             while len(self.course) < self.settings.epochs:
                 self._keep_epoch()
                 progress.advance()
-        return self.network(self._calibration())
+        return self.network(self.calibration())
 
     def _keep_epoch(self) -> None:
         """One more pass, judged and kept."""
@@ -229,10 +271,11 @@ class VelocityTraining:
             rate = settings.learning_rate * (0.02 + 0.98 * 0.5 * (1.0 + math.cos(math.pi * share)))
             for group in self._optimiser.param_groups:
                 group["lr"] = rate * min(1.0, (number * len(batches) + k + 1) / 20.0)
-            inputs, wanted, weights, _ = (part[torch.from_numpy(chosen)] for part in self._drives)
+            places = torch.from_numpy(chosen).to(self._device)
+            inputs, wanted, weights, _ = (part[places] for part in self._drives)
             inputs, wanted = self._mirrored(inputs, wanted, rng.random(len(chosen)) < 0.5)
             outputs = self.model(self._normal(inputs))
-            loss = gaussian_loss(outputs, wanted, weights) + fixed_loss(outputs, wanted, weights)
+            loss = total_loss(outputs, wanted, weights)
             self._optimiser.zero_grad()
             loss.backward()  # type: ignore[no-untyped-call]
             torch.nn.utils.clip_grad_norm_(self.model.parameters(), 1.0)
@@ -241,48 +284,61 @@ class VelocityTraining:
         return total
 
     def _mirrored(self, inputs: Tensor, wanted: Tensor, chosen: NDArray[np.bool_]) -> tuple[Tensor, Tensor]:
-        places, signs = self._mirror
-        swapped = inputs[chosen][..., torch.from_numpy(places)] * torch.from_numpy(signs)
-        inputs[chosen] = swapped
-        wanted[chosen, :, 1] *= -1.0
+        places, signs = (torch.from_numpy(part).to(self._device) for part in self._mirror)
+        rows = torch.from_numpy(chosen).to(self._device)
+        inputs[rows] = inputs[rows][..., places] * signs
+        wanted[rows, :, 1::2] *= -1.0
         return inputs, wanted
 
     def _predicted(self) -> tuple[Array, Array]:
-        """Errors [m/s] and deviations [m/s] (M, 2) at the validation's driving instants."""
+        """Errors and deviations [m/s, then m] (M, 2 or 4) at the validation's driving instants."""
         inputs, wanted, _, driving = self._validation
         with torch.no_grad():
             outputs = self.model(self._normal(inputs))
-        errors = (outputs[..., :2] - wanted)[driving > 0.0].double().numpy() * VELOCITY_SCALE
-        logs = outputs[..., 2:4].clamp(LEAST_LOG, LARGEST_LOG)[driving > 0.0].double().numpy()
-        return errors, VELOCITY_SCALE * np.exp(logs)
+        firsts = OUTPUTS * np.arange(wanted.shape[-1] // 2)
+        means, spreads = (np.ravel([firsts + first, firsts + first + 1], order="F") for first in (0, 2))
+        own, due = outputs[driving > 0.0].double().cpu().numpy(), wanted[driving > 0.0].double().cpu().numpy()
+        errors = (own[:, means] - due) * self._scales
+        logs = own[:, spreads].clip(LEAST_LOG, LARGEST_LOG)
+        return errors, self._scales * np.exp(logs)
+
+    @property
+    def _scales(self) -> Array:
+        """Of what is estimated [m/s, then m]."""
+        found = 2 * [VELOCITY_SCALE] + (2 * [PLACE_SCALE] if self.variant.place else [])
+        return np.array(found)
 
     def judged(self) -> dict[str, float]:
-        """Root mean square and median errors [mm/s] and coverage of 90 % [-] on the validation turns."""
+        """Root mean square and median errors [mm/s, mm] and coverage of 90 % [-] on the validation turns."""
         errors, deviations = self._predicted()
         inside = np.abs(errors) <= DEVIATIONS * deviations
         found = {}
-        for i, name in enumerate(("v_x", "v_y")):
-            found[f"{name}_rmse_mm_s"] = 1e3 * float(np.sqrt(np.mean(errors[:, i] ** 2)))
-            found[f"{name}_median_mm_s"] = 1e3 * float(np.median(np.abs(errors[:, i])))
+        for i, (name, unit) in enumerate(ESTIMATED[: errors.shape[1]]):
+            found[f"{name}_rmse_{unit}"] = 1e3 * float(np.sqrt(np.mean(errors[:, i] ** 2)))
+            found[f"{name}_median_{unit}"] = 1e3 * float(np.median(np.abs(errors[:, i])))
             found[f"{name}_covered"] = float(inside[:, i].mean())
         return found
 
-    def _calibration(self) -> tuple[float, float]:
+    def calibration(self) -> tuple[float, ...]:
         """Factors on the deviations with which 90 % of the validation's errors are inside."""
         errors, deviations = self._predicted()
-        v_x, v_y = np.quantile(np.abs(errors) / deviations, 0.90, axis=0) / DEVIATIONS
-        return float(v_x), float(v_y)
+        return tuple((np.quantile(np.abs(errors) / deviations, 0.90, axis=0) / DEVIATIONS).tolist())
 
-    def network(self, calibration: tuple[float, float] = (1.0, 1.0)) -> VelocityNetwork:
+    def network(self, calibration: tuple[float, ...] | None = None) -> VelocityNetwork:
         """As numpy runs it."""
+        settings, variant = self.settings, self.variant
         described = NetworkDescription(
-            FORMAT, self.name, self.variant.inputs, self.variant.base, CONTROL_INTERVAL, Sensors().period, calibration,
-            asdict(self.settings) | {"version": __version__},
+            FORMAT, self.name, variant.inputs, variant.base, CONTROL_INTERVAL, Sensors().period,
+            calibration or tuple(np.ones(len(self._scales)).tolist()), asdict(settings) | {"version": __version__},
+            settings.layers, variant.place,
         )  # fmt: skip
-        gru, output = self.model.memory, self.model.output
-        weights = (gru.weight_ih_l0, gru.weight_hh_l0, gru.bias_ih_l0, gru.bias_hh_l0, output.weight, output.bias)
-        arrays = (weight.detach().numpy().copy() for weight in weights)
-        return VelocityNetwork(described, *arrays, self._mean, self._deviation, self.settings.clip)
+        numbers = {name: value.detach().cpu().numpy().copy() for name, value in self.model.state_dict().items()}
+        kinds = ("weight_ih", "weight_hh", "bias_ih", "bias_hh")
+        layers = tuple(
+            RecurrentLayer(*(numbers[f"memory.{kind}_l{place}"] for kind in kinds)) for place in range(settings.layers)
+        )
+        output = (numbers["output.weight"], numbers["output.bias"])
+        return VelocityNetwork(described, layers, *output, self._mean, self._deviation, settings.clip)
 
     def _keep(self) -> None:
         state = {"model": self.model.state_dict(), "optimiser": self._optimiser.state_dict()}
@@ -299,7 +355,7 @@ class VelocityTraining:
         file = self.folder / "checkpoint.pt"
         if not file.is_file():
             return
-        state: Mapping[str, Any] = torch.load(file, weights_only=True)
+        state: Mapping[str, Any] = torch.load(file, weights_only=True, map_location=self._device)
         record = json.loads(state["record"])
         if record["settings"] != asdict(self.settings) or record["name"] != self.name:
             raise InputError(f"{file} is of a training with other settings: give another folder.")

@@ -3,7 +3,8 @@
 Sets are frozen once by ``ddagr freeze-scenarios`` and then read, never drawn again. V alone serves tuning and
 selection; the others are opened only after the claims of ``configs/evaluation/claims.yaml`` are written. S1b to S8b and
 Tb are a second drawing of S1 to S8 and T, made once much had been learnt from the first. The sets named ``on_`` and
-:mod:`a plant <benchmarks.plants>` are the first sixty turns of S1b, on each plant.
+:mod:`a plant <benchmarks.plants>` are the first sixty turns of S1b, on each plant. S1c to S8c, Tc and the same names
+with ``_c`` at their end are a third drawing, made once the networks that correct the inertial filter had been trained.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from ddagr_gym.evaluation.scenarios import GroundRecipe, Scenario, build_field
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.soil_laws import LAW, NOMINAL_LAW
 
-_ROOT_SEED, _SECOND_SEED = 20_261_120, 20_261_125
+_ROOT_SEED, _SECOND_SEED, _THIRD_SEED = 20_261_120, 20_261_125, 20_261_127
 _ON_PLANT = 1
 """Last part of the seed of what a plant changes."""
 
@@ -166,27 +167,36 @@ PLANT_COUNT = 60
 """Scenarios on each plant."""
 
 
-def _second(name: str) -> SetPlan:
+def _again(name: str, drawing: str, ordinal: str, root_seed: int) -> SetPlan:
     """Plan of a set of the first drawing, drawn again."""
     plan = PLANS[name]
     return replace(
         plan,
-        description=f"second drawing, {plan.description}",
-        draw=_mirrored(_SECOND_SEED) if name == "S7" else plan.draw,
-        same_as=None if plan.same_as is None else f"{plan.same_as}b",
-        root_seed=_SECOND_SEED,
+        description=f"{ordinal} drawing, {plan.description}",
+        draw=_mirrored(root_seed) if name == "S7" else plan.draw,
+        same_as=None if plan.same_as is None else f"{plan.same_as}{drawing}",
+        root_seed=root_seed,
     )
 
 
-def _on_plant(plant: Plant) -> SetPlan:
-    title = f"the first {PLANT_COUNT} of S1b on a plant: {plant.title}"
-    return SetPlan(title, PLANT_COUNT, PLANS["S1b"].draw, "S1b", plant.law, _SECOND_SEED, plant)
+def _on_plant(plant: Plant, in_range: str) -> SetPlan:
+    title = f"the first {PLANT_COUNT} of {in_range} on a plant: {plant.title}"
+    plan = PLANS[in_range]
+    return SetPlan(title, PLANT_COUNT, plan.draw, in_range, plant.law, plan.root_seed, plant)
 
 
-PLANS |= {name: _second(name.removesuffix("b")) for name in SECOND}
-ON_PLANTS = {f"on_{name}": plant for name, plant in (DEVELOPMENT_PLANTS | FURTHER_PLANTS).items() if name != "level"}
+_OTHER_PLANTS = {name: plant for name, plant in (DEVELOPMENT_PLANTS | FURTHER_PLANTS).items() if name != "level"}
+PLANS |= {name: _again(name.removesuffix("b"), "b", "second", _SECOND_SEED) for name in SECOND}
+ON_PLANTS = {f"on_{name}": plant for name, plant in _OTHER_PLANTS.items()}
 """Plants by the names of their sets."""
-PLANS |= {name: _on_plant(plant) for name, plant in ON_PLANTS.items()}
+PLANS |= {name: _on_plant(plant, "S1b") for name, plant in ON_PLANTS.items()}
+
+THIRD = (*(f"S{number}c" for number in range(1, 9)), "Tc")
+"""Names of the third drawing."""
+PLANS |= {name: _again(name.removesuffix("c"), "c", "third", _THIRD_SEED) for name in THIRD}
+ON_PLANTS_AGAIN = {f"on_{name}_c": plant for name, plant in _OTHER_PLANTS.items()}
+"""Plants by the names of their sets of the third drawing."""
+PLANS |= {name: _on_plant(plant, "S1c") for name, plant in ON_PLANTS_AGAIN.items()}
 
 
 def draw_set(name: str) -> list[tuple[int, Episode, GroundRecipe]]:

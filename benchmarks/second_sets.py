@@ -20,14 +20,14 @@ import argparse
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from benchmarks.commits import commit_of
 from benchmarks.row_turn_plants import cell
 from benchmarks.row_turns import CHECKOUT, rounded
-from benchmarks.scenario_sets import ON_PLANTS, PLANS, SECOND
+from benchmarks.scenario_sets import ON_PLANTS, ON_PLANTS_AGAIN, PLANS, SECOND
 from benchmarks.second_sets_figure import draw
 from ddagr_gym.config import configs_dir
 from ddagr_gym.errors import InputError
@@ -36,14 +36,13 @@ from ddagr_gym.evaluation.claims import check_claims, load_claims
 from ddagr_gym.evaluation.controllers import controller_version, is_deployable
 from ddagr_gym.evaluation.dataset import EPISODES
 from ddagr_gym.evaluation.scenarios import set_hash
-from ddagr_gym.evaluation.summary import summaries
+from ddagr_gym.evaluation.summary import BASELINES, summaries
 from ddagr_gym.files import make_folder, write_json
 from ddagr_gym.progress import Progress
 
 RESULT = Path(__file__).resolve().parent / "results" / "second_sets.json"
 CONTROLLERS = ("B1", "B4", "B6_flat", "B6", "B6_learned", "ppo_ekf", "ppo_history", "ppo_raw", "true_path")
 SETS = (*SECOND, *ON_PLANTS)
-FORMER_DEFAULT = "B4"
 WITHIN = 0.01
 """Success that counts as equal [-]."""
 
@@ -56,52 +55,87 @@ KEPT = (
 Summary = Mapping[str, Mapping[str, Mapping[str, Any]]]
 
 
+@dataclass(frozen=True)
+class Reading:
+    """A drawing of scenario sets, and what is decided on it.
+
+    Attributes:
+        command: that makes it.
+        sets: names.
+        in_range: name of the set in range.
+        controllers: that drive it.
+        former: default that another controller may replace.
+        claims: file, in the folder ``evaluation`` of the configurations.
+        result: file.
+    """
+
+    command: str
+    sets: tuple[str, ...]
+    in_range: str
+    controllers: tuple[str, ...]
+    former: str
+    claims: str
+    result: Path
+
+
+READING = Reading(
+    "python -m benchmarks.second_sets FOLDER", SETS, "S1b", CONTROLLERS, "B4", "second_claims.yaml", RESULT
+)
+"""Of the second drawing."""
+
+
 def mean_over_sets(summary: Summary, arm: str, metric: str, sets: Sequence[str]) -> float:
     """Mean of a metric's values over sets; a failure counts as 1."""
     values = [summary[arm][name][metric]["value"] for name in sets]
     return sum(1.0 if value is None else min(value, 1.0) for value in values) / len(sets)
 
 
-def default_by_rule(summary: Summary, sets: Sequence[str] = SETS, former: str = FORMER_DEFAULT) -> dict[str, Any]:
+def default_by_rule(summary: Summary, reading: Reading = READING) -> dict[str, Any]:
     """The default by the rule above, and what it was chosen by.
 
     Args:
         summary: of :func:`ddagr_gym.evaluation.summary.summaries`; every arm on all sets.
-        sets: that count.
-        former: default that another one may replace.
+        reading: names the sets that count, and the default that another one may replace.
     """
+    sets, former = reading.sets, reading.former
     arms = [arm for arm in summary if is_deployable(arm)]
     success = {arm: mean_over_sets(summary, arm, "success_rate", sets) for arm in arms}
     error = {arm: mean_over_sets(summary, arm, "radius_error_median", sets) for arm in arms}
     best = [arm for arm in arms if success[arm] >= max(success.values()) - WITHIN]
     chosen = min(best, key=error.__getitem__)
     if chosen != former:
-        closer = summary[chosen]["S1b"][f"improvement_over_{former}"]["interval"]
+        closer = summary[chosen][reading.in_range][f"improvement_over_{former}"]["interval"]
         chosen = former if closer[1] < 0.5 else chosen
     return {"chosen": chosen, "mean_success": success, "mean_radius_error_median": error}
 
 
-def driven(folder: Path, controllers: Sequence[str], workers: int) -> dict[str, dict[str, Any]]:
+def driven(
+    folder: Path, controllers: Sequence[str], workers: int, reading: Reading = READING
+) -> dict[str, dict[str, Any]]:
     """Summaries of the controllers on all sets, by episodes that the folder holds or that are driven now."""
-    total = len(wanted_episodes(with_bounds(controllers), SETS))
+    sets = reading.sets
+    total = len(wanted_episodes(with_bounds(controllers), sets))
     with Progress(total, "driving") as progress:
-        rows = run_campaign(controllers, SETS, folder / EPISODES, processes=workers, progress=progress.advance)
-    return summaries(rows)
+        rows = run_campaign(controllers, sets, folder / EPISODES, processes=workers, progress=progress.advance)
+    return summaries(rows, tuple(dict.fromkeys([*BASELINES, reading.former])))
 
 
-def result_of(summary: Summary, controllers: Sequence[str]) -> dict[str, Any]:
+def result_of(summary: Summary, controllers: Sequence[str], reading: Reading = READING) -> dict[str, Any]:
     """As it is written: claims, the default by the rule, hashes, and the metrics that are kept, {set: {arm: ...}}."""
-    claims = check_claims(load_claims(configs_dir() / "evaluation" / "second_claims.yaml"), summary)
+    claims = check_claims(load_claims(configs_dir() / "evaluation" / reading.claims), summary)
+    metrics = dict.fromkeys([*KEPT, f"improvement_over_{reading.former}"])
     kept = {
-        name: {arm: {key: summary[arm][name][key] for key in KEPT if key in summary[arm][name]} for arm in controllers}
-        for name in SETS
+        name: {
+            arm: {key: summary[arm][name][key] for key in metrics if key in summary[arm][name]} for arm in controllers
+        }
+        for name in reading.sets
     }
     return {
-        "command": "python -m benchmarks.second_sets FOLDER",
+        "command": reading.command,
         "commit": commit_of(CHECKOUT),
-        "scenarios": {name: set_hash(name) for name in SETS},
+        "scenarios": {name: set_hash(name) for name in reading.sets},
         "controllers": {name: version_of(name) for name in controllers},
-        "default": rounded(default_by_rule(summary)),
+        "default": rounded(default_by_rule(summary, reading)),
         "claims": [rounded(asdict(claim)) for claim in claims],
         "sets": rounded(kept),
     }
@@ -114,7 +148,8 @@ def version_of(name: str) -> str:
 
 def title(name: str) -> str:
     """Of a set, in tables and pictures."""
-    return f"{name}: {ON_PLANTS[name].title if name in ON_PLANTS else PLANS[name].description.partition(', ')[2]}"
+    plant = (ON_PLANTS | ON_PLANTS_AGAIN).get(name)
+    return f"{name}: {PLANS[name].description.partition(', ')[2] if plant is None else plant.title}"
 
 
 def table(result: Mapping[str, Any]) -> str:
@@ -141,25 +176,25 @@ def _at_most_one(metric: Mapping[str, Any]) -> dict[str, Any]:
     return {"value": value, "interval": interval}
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def main(arguments: Sequence[str] | None = None, reading: Reading = READING, about: str | None = __doc__) -> int:
     """Drive, check, choose, write."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(description=about, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path, help="of the episodes")
-    parser.add_argument("--controllers", default=",".join(CONTROLLERS), help="names, separated by commas")
+    parser.add_argument("--controllers", default=",".join(reading.controllers), help="names, separated by commas")
     parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--output", type=Path, default=RESULT)
+    parser.add_argument("--output", type=Path, default=reading.result)
     given = parser.parse_args(arguments)
     controllers = given.controllers.split(",")
-    missing = {"B1", FORMER_DEFAULT} - set(controllers)
+    missing = {"B1", "B4", reading.former} - set(controllers)
     if missing:
         parser.error(f"--controllers lacks {min(missing)}, against which the others are compared")
     try:
-        summary = driven(make_folder(given.folder), controllers, given.workers)
+        summary = driven(make_folder(given.folder), controllers, given.workers, reading)
     except InputError as error:
         parser.error(str(error))
-    result = result_of(summary, controllers)
+    result = result_of(summary, controllers, reading)
     write_json(given.output, result)
-    draw(for_picture(result), {name: title(name) for name in SETS}, given.output.with_suffix(".png"))
+    draw(for_picture(result), {name: title(name) for name in reading.sets}, given.output.with_suffix(".png"))
     print(table(result))
     print(json.dumps(result["default"], indent=1))
     for claim in result["claims"]:

@@ -1,6 +1,7 @@
 """Where a robot is by its own filter, from a known start on.
 
-The inertial filter carries the pose along; of the others the estimated velocities are integrated.
+The inertial filter carries the pose along, and a network may correct it; of the others the estimated velocities are
+integrated.
 """
 
 from __future__ import annotations
@@ -73,9 +74,14 @@ def led_on(pose: Array, motion: Array, before: Array, period: float) -> Array:
         before: likewise at the start (3,).
         period: between samples [s].
     """
-    x, y, turned = integrate_track(motion[:, 0], motion[:, 1], motion[:, 2], period, before)[-1]
-    cosine, sine = math.cos(pose[2]), math.sin(pose[2])
-    return pose + np.array([cosine * x - sine * y, sine * x + cosine * y, turned])
+    return placed(pose, integrate_track(motion[:, 0], motion[:, 1], motion[:, 2], period, before)[-1])
+
+
+def placed(start: Array, pose: Array) -> Array:
+    """Pose (3,) in the world of one that is seen from a start (3,): x, y [m], yaw [rad]."""
+    x, y, turned = pose
+    cosine, sine = math.cos(start[2]), math.sin(start[2])
+    return start + np.array([cosine * x - sine * y, sine * x + cosine * y, turned])
 
 
 def settled(own: Array, filtered: Array, time: float, settling: float) -> Array:
@@ -106,9 +112,9 @@ class DeadReckoning:
 
     Args:
         model: what the filter knows; its kind chooses the filter.
-        settling: time in which what the inertial filter learns later of the way so far comes into the pose [s]: a
-            controller would follow each correction at once, and a circle with a step in it is none (ours). 0: at
-            once, the pose is the filter's; infinite: never, the velocities are integrated as they come.
+        settling: time in which what the inertial filter, or a network beside it, learns later of the way so far comes
+            into the pose [s]: a controller would follow each correction at once, and a circle with a step in it is none
+            (ours). 0: at once, the pose is the filter's; infinite: never, the velocities are integrated as they come.
     """
 
     def __init__(self, model: FilterModel | InertialModel | LearnedModel, settling: float = 0.0) -> None:
@@ -129,6 +135,7 @@ class DeadReckoning:
             gravity: its pull along body x and y [m/s^2], as the inertial filter begins with it; no other knows any.
         """
         self._pose = np.array([x, y, yaw])
+        self._start = self._pose.copy()
         if isinstance(self._filter, InertialFilter):
             self._filter.reset(self._pose, gravity)
         else:
@@ -149,9 +156,18 @@ class DeadReckoning:
         drive, readings = np.asarray(command, dtype=np.float64), np.asarray(samples, dtype=np.float64)
         before = self._filter.state[:3].copy()
         self._pose = led_on(self._pose, _motion(self._filter, drive, readings), before, self._period)
-        if isinstance(self._filter, InertialFilter):
-            self._pose = settled(self._pose, self._filter.pose, len(readings) * self._period, self._settling)
+        carried = self._carried()
+        if carried is not None:
+            self._pose = settled(self._pose, carried, len(readings) * self._period, self._settling)
         return self.present()
+
+    def _carried(self) -> Array | None:
+        """Pose (3,) that the filter or its network carries along; None of one that knows velocities alone."""
+        if isinstance(self._filter, InertialFilter):
+            return self._filter.pose
+        if isinstance(self._filter, LearnedFilter) and self._filter.model.network.description.place:
+            return placed(self._start, self._filter.pose)
+        return None
 
     def present(self) -> Reckoned:
         """What is known now."""

@@ -1,4 +1,4 @@
-"""The learned estimator: velocities by a trained network, all else by the inertial filter.
+"""The learned estimator: velocities and, by some networks, place by a trained network, all else by the inertial filter.
 
 Theory: filter, section 11.
 """
@@ -18,7 +18,7 @@ from ddagr_gym.estimation.columns import stack_columns
 from ddagr_gym.estimation.filter_model import FilterModel
 from ddagr_gym.estimation.inertial_filter import InertialBatch, InertialFilter, InertialModel
 from ddagr_gym.estimation.layout import CHANNELS, COMMANDS
-from ddagr_gym.estimation.learned_inputs import MEMORY_SIZE, block_inputs, mean_rim_speed
+from ddagr_gym.estimation.learned_inputs import MEMORY_SIZE, Filtered, block_inputs, mean_rim_speed
 from ddagr_gym.estimation.learned_network import VelocityNetwork, load_network, velocity_base
 from ddagr_gym.files import shipped_folder
 from ddagr_gym.parameters import Robot, Sensors
@@ -58,7 +58,7 @@ class LearnedModel:
 
     Attributes:
         inertial: of the filter that runs beside the network and makes soil, gravity and yaw rate.
-        network: of the velocities.
+        network: of velocities and place.
     """
 
     inertial: InertialModel
@@ -83,39 +83,43 @@ class LearnedModel:
         return self.inertial.flat
 
 
-class _Velocities:
-    """The network of N robots and what it remembers of them."""
+class _Corrections:
+    """The network of N robots, what it remembers of them and what it says."""
 
     def __init__(self, model: LearnedModel, count: int) -> None:
         flat = model.inertial.flat
         self.network = model.network
         self.estimates = np.zeros((count, 2))
         self.covariances = np.zeros((count, 2, 2))
-        self.units = np.zeros((count, model.network.units), dtype=np.float32)
+        self.places = np.zeros((count, 2))
+        self.place_covariances = np.zeros((count, 2, 2))
+        self.units = model.network.new_memory(count)
         self.blocks = np.zeros((count, MEMORY_SIZE))
         self._chosen = model.network.chosen
         self._period, self._outer_radius = flat.sample_period, flat.outer_radius
         self._prior = flat.soil_prior.logs(flat.wheel_load)[0]
 
     def reset(self, chosen: NDArray[np.intp], covariance: Array) -> None:
-        """Forget robots; they are at rest with a covariance (2, 2)."""
-        for own in (self.estimates, self.units, self.blocks):
+        """Forget robots; they are at rest with a covariance (2, 2) of the velocities, and stand where they start."""
+        for own in (self.estimates, self.places, self.place_covariances, self.units, self.blocks):
             own[chosen] = 0.0
         self.covariances[chosen] = covariance
 
-    def update(self, commands: Array, readings: Array, states: Array, covariances: Array, innovations: Array) -> None:
+    def update(self, commands: Array, readings: Array, filtered: Filtered) -> None:
         """Through one block (:func:`~ddagr_gym.estimation.learned_inputs.block_inputs`)."""
-        samples = self.network.description.samples
-        if readings.shape[1] != samples:
-            raise InputError(f"{readings.shape[1]} samples under one command: the network takes {samples} at a time.")
-        inputs = block_inputs(
-            self.blocks, commands, readings, states, covariances, innovations, self._period, self._outer_radius,
-            self._prior,
-        )  # fmt: skip
+        described = self.network.description
+        if readings.shape[1] != described.samples:
+            raise InputError(
+                f"{readings.shape[1]} samples under one command: the network takes {described.samples} at a time."
+            )
+        inputs = block_inputs(self.blocks, commands, readings, filtered, self._period, self._outer_radius, self._prior)
         outputs = self.network.step(inputs[:, self._chosen], self.units)
         rim = mean_rim_speed(readings, self._outer_radius)
-        base = velocity_base(self.network.description.base, rim, states[:, :2])
+        base = velocity_base(described.base, rim, filtered.states[:, :2])
         self.estimates[:], self.covariances[:] = self.network.estimate(outputs, base)
+        self.places[:], self.place_covariances[:] = filtered.poses[:, :2], filtered.pose_covariances[:, :2, :2]
+        if described.place:
+            self.places[:], self.place_covariances[:] = self.network.place(outputs, filtered.poses[:, :2])
 
 
 class LearnedBatch:
@@ -128,19 +132,21 @@ class LearnedBatch:
         count: N.
     """
 
-    REMEMBERED = ("works", "counts", "estimates", "velocity_covariances", "units", "blocks")
+    REMEMBERED = (
+        "works", "counts", "estimates", "velocity_covariances", "places", "place_covariances", "units", "blocks",
+    )  # fmt: skip
     """Arrays that it goes on from."""
 
     def __init__(self, model: LearnedModel, count: int = 1) -> None:
         self.model = model
         self.count = count
         self._inertial = InertialBatch(model.inertial, count)
-        self._velocities = _Velocities(model, count)
+        self._corrections = _Corrections(model, count)
         self.works, self.counts = self._inertial.works, self._inertial._counts
-        own = self._velocities
-        self.estimates, self.velocity_covariances, self.units, self.blocks = (
-            own.estimates, own.covariances, own.units, own.blocks,
-        )  # fmt: skip
+        own = self._corrections
+        self.estimates, self.velocity_covariances = own.estimates, own.covariances
+        self.places, self.place_covariances = own.places, own.place_covariances
+        self.units, self.blocks = own.units, own.blocks
         self.reset()
 
     @property
@@ -155,11 +161,18 @@ class LearnedBatch:
         """(N, 15, 15) of the inertial filter, with the network's for v_x and v_y; a copy."""
         return with_velocity_block(self._inertial.covariances, self.velocity_covariances)
 
+    @property
+    def poses(self) -> Array:
+        """(N, 3) x, y [m] and continuous yaw [rad] since the start; a copy."""
+        found = self._inertial.poses
+        found[:, :2] = self.places
+        return found
+
     def reset(self, chosen: ArrayLike | None = None) -> None:
         """Start from the prior, at rest; ``chosen``: indices of robots, all by default."""
         indices = np.arange(self.count) if chosen is None else np.atleast_1d(np.asarray(chosen))
         self._inertial.reset(indices)
-        self._velocities.reset(indices, self.model.inertial.initial()[1][:2, :2])
+        self._corrections.reset(indices, self.model.inertial.initial()[1][:2, :2])
 
     def step(self, commands: ArrayLike, readings: ArrayLike) -> Array:
         """Through the samples of one block.
@@ -178,7 +191,10 @@ class LearnedBatch:
         samples = np.ascontiguousarray(readings, dtype=np.float64)
         innovations = self._inertial.step(drive, samples)
         inertial = self._inertial
-        self._velocities.update(drive, samples, inertial.states, inertial.covariances, innovations)
+        filtered = Filtered(
+            inertial.states, inertial.covariances, innovations, inertial.poses, inertial.pose_covariances
+        )
+        self._corrections.update(drive, samples, filtered)
         return innovations
 
 
@@ -199,25 +215,37 @@ class LearnedFilter:
     def __init__(self, model: LearnedModel) -> None:
         self.model = model
         self._inertial = InertialFilter(model.inertial)
-        self._velocities = _Velocities(model, 1)
+        self._corrections = _Corrections(model, 1)
         self.reset()
 
     @property
     def state(self) -> Array:
         """(15,) of the inertial filter, with the network's v_x and v_y; a copy."""
         found = self._inertial.state.copy()
-        found[:2] = self._velocities.estimates[0]
+        found[:2] = self._corrections.estimates[0]
         return found
 
     @property
     def covariance(self) -> Array:
         """(15, 15) of the inertial filter, with the network's for v_x and v_y; a copy."""
-        return with_velocity_block(self._inertial.covariance[None].copy(), self._velocities.covariances)[0]
+        return with_velocity_block(self._inertial.covariance[None].copy(), self._corrections.covariances)[0]
+
+    @property
+    def pose(self) -> Array:
+        """(3,) x, y [m] and continuous yaw [rad] since the start; a copy."""
+        found = self._inertial.pose.copy()
+        found[:2] = self._corrections.places[0]
+        return found
+
+    @property
+    def place_covariance(self) -> Array:
+        """(2, 2) of x and y [m^2]; a copy."""
+        return self._corrections.place_covariances[0].copy()
 
     def reset(self) -> None:
         """Start again from the prior, at rest."""
         self._inertial.reset()
-        self._velocities.reset(np.arange(1), self.model.inertial.initial()[1][:2, :2])
+        self._corrections.reset(np.arange(1), self.model.inertial.initial()[1][:2, :2])
 
     def run(self, commands: Array, readings: Array) -> tuple[Array, Array]:
         """Through the samples of one block.
@@ -230,12 +258,15 @@ class LearnedFilter:
             States after each sample (K, 15), in which the network's velocities lie on a line from block to block, and
             the inertial filter's standardised innovations (K, 5).
         """
-        before = self._velocities.estimates[0].copy()
+        before = self._corrections.estimates[0].copy()
         states, innovations = self._inertial.run(commands, np.ascontiguousarray(readings))
         own = self._inertial
-        self._velocities.update(commands, readings[None], own.state[None], own.covariance[None], innovations[None])
+        filtered = Filtered(
+            own.state[None], own.covariance[None], innovations[None], own.pose[None], own.pose_covariance[None]
+        )
+        self._corrections.update(commands, readings[None], filtered)
         share = np.arange(1.0, len(readings) + 1.0)[:, None] / len(readings)
-        states[:, :2] = before + share * (self._velocities.estimates[0] - before)
+        states[:, :2] = before + share * (self._corrections.estimates[0] - before)
         return states, innovations
 
 

@@ -6,6 +6,8 @@ others.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -37,7 +39,10 @@ FILTER_INPUTS = (
 )  # fmt: skip
 """From the inertial filter: its state, logs of standard deviations, and mean standardised innovations of a block."""
 
-INPUTS = SENSOR_INPUTS + FILTER_INPUTS
+POSE_INPUTS = ("pose_x", "pose_y", "pose_turned", "pose_deviation_x", "pose_deviation_y", "pose_deviation_turned")
+"""The pose that the inertial filter carries, from where it started [m, m, rad], and logs of its standard deviations."""
+
+INPUTS = SENSOR_INPUTS + FILTER_INPUTS + POSE_INPUTS
 """All of them, in the order of :func:`block_inputs`."""
 
 REST_SAMPLES = 125.0
@@ -55,9 +60,27 @@ MEMORY_SIZE = 6
 """Heading by the gyro [rad], sums of three channels at rest, samples in them, and whether it has moved."""
 
 
+class Filtered(NamedTuple):
+    """What the inertial filters of N robots say after a block of K samples.
+
+    Attributes:
+        states: (N, 15).
+        covariances: (N, 15, 15).
+        innovations: standardised (N, K, 5); NaN: no sample.
+        poses: (N, 3) x, y [m], yaw [rad] from where they started.
+        pose_covariances: (N, 3, 3).
+    """
+
+    states: Array
+    covariances: Array
+    innovations: Array
+    poses: Array
+    pose_covariances: Array
+
+
 def block_inputs(
-    memory: Array, commands: Array, readings: Array, states: Array, covariances: Array, innovations: Array,
-    period: float, outer_radius: float, prior: Array,
+    memory: Array, commands: Array, readings: Array, filtered: Filtered, period: float, outer_radius: float,
+    prior: Array,
 ) -> Array:  # fmt: skip
     """Inputs (N, len(INPUTS)) after a block, whose samples enter the memory.
 
@@ -65,9 +88,7 @@ def block_inputs(
         memory: (N, MEMORY_SIZE), zero before the first block; changed.
         commands: (N, 2) right and left bank speed commands [rad/s].
         readings: (N, K, 5) samples in the order of ``CHANNELS``, K even; NaN: no sample.
-        states: of the inertial filter after the block (N, 15).
-        covariances: (N, 15, 15).
-        innovations: standardised (N, K, 5); NaN: no sample.
+        filtered: by the inertial filters.
         period: between samples [s].
         outer_radius: of the wheels [m].
         prior: logs of the soil's parameters (4,) before driving.
@@ -80,9 +101,8 @@ def block_inputs(
     rim = mean_rim_speed(readings, outer_radius)
     count = memory[:, _COUNT : _COUNT + 1]
     heading = memory[:, _HEADING]
-    logs = states[:, _STATES]
+    logs = filtered.states[:, _STATES]
     logs[:, 3 : 3 + PARAMETER_SIZE] -= prior
-    variances = np.diagonal(covariances, axis1=1, axis2=2)[:, _DEVIATIONS]
     return np.concatenate(
         [
             halves.reshape(len(halves), -1),
@@ -91,11 +111,19 @@ def block_inputs(
             memory[:, _SUM] / np.maximum(count, 1.0),
             count / REST_SAMPLES,
             logs,
-            0.5 * np.log(np.maximum(variances, _LEAST_VARIANCE)),
-            np.clip(_means(innovations), -_LARGEST_INNOVATION, _LARGEST_INNOVATION),
+            _log_deviations(filtered.covariances)[:, _DEVIATIONS],
+            np.clip(_means(filtered.innovations), -_LARGEST_INNOVATION, _LARGEST_INNOVATION),
+            filtered.poses,
+            _log_deviations(filtered.pose_covariances),
         ],
         axis=1,
     )
+
+
+def _log_deviations(covariances: Array) -> Array:
+    """Logs of standard deviations (N, S) from covariances (N, S, S)."""
+    variances = np.diagonal(covariances, axis1=1, axis2=2)
+    return np.asarray(0.5 * np.log(np.maximum(variances, _LEAST_VARIANCE)))
 
 
 def mean_rim_speed(readings: Array, outer_radius: float) -> Array:

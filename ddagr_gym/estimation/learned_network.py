@@ -1,12 +1,14 @@
 """The recurrent network of the learned estimator as plain numbers: numpy runs it, one npz file holds it.
 
-A gated recurrent unit (K. Cho et al., 2014, in the form of ``torch.nn.GRU``) and one linear layer on its memory h::
+Gated recurrent units (K. Cho et al., 2014, in the form of ``torch.nn.GRU``), each layer on the memory of the one before
+it, and one linear layer on the last memory h::
 
     r = sigmoid(W_ir x + b_ir + W_hr h + b_hr),  z = sigmoid(W_iz x + b_iz + W_hz h + b_hz)
     n = tanh(W_in x + b_in + r (W_hn h + b_hn)),  h <- (1 - z) n + z h,  o = W_o h + b_o
 
-The five outputs o are two velocities over VELOCITY_SCALE, the logs of two standard deviations over it, and atanh of the
-correlation over LARGEST_CORRELATION.
+The first five outputs o are two velocities over VELOCITY_SCALE, the logs of two standard deviations over it, and atanh
+of the correlation over LARGEST_CORRELATION. A network that corrects the place too has five more: the same of x and y,
+over PLACE_SCALE.
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ import math
 import os
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,14 +31,19 @@ from ddagr_gym.number_files import read_arrays, take_array, take_description, wr
 Array = NDArray[np.float64]
 Weights = NDArray[np.float32]
 
-FORMAT = 1
-"""Of the files; another number is refused."""
+FORMAT = 2
+"""Of the files that are written."""
+FORMATS = (1, FORMAT)
+"""That are read; another number is refused. The first had one layer and corrected no place."""
 VELOCITY_SCALE = 0.01
 """Of the outputs that are velocities [m/s]."""
+PLACE_SCALE = 0.02
+"""Of the outputs that are places [m]."""
 LEAST_LOG, LARGEST_LOG = math.log(0.02), math.log(50.0)
-"""Of a standard deviation over VELOCITY_SCALE: 0.2 mm/s to 0.5 m/s."""
+"""Of a standard deviation over its scale: 0.2 mm/s to 0.5 m/s, 0.4 mm to 1 m."""
 LARGEST_CORRELATION = 0.98
 OUTPUTS = 5
+"""Of a pair of numbers with its covariance."""
 BASES = ("rim", "filter")
 """What the velocities are added to: the mean rim speed and no side slip, or the inertial filter's."""
 
@@ -45,7 +52,7 @@ LARGEST_SLIP_SPEED, LARGEST_SIDE_SPEED = 0.35, 0.25
 filter that diverges must not take the network with it."""
 
 _KIND = "an estimator's network"
-_MOST_UNITS = 512
+_MOST_UNITS, _MOST_LAYERS = 512, 4
 
 
 @dataclass(frozen=True)
@@ -59,8 +66,10 @@ class NetworkDescription:
         base: of BASES.
         samples: of a block.
         sample_period: between them [s].
-        calibration: factors on the standard deviations of v_x and v_y.
+        calibration: factors on the standard deviations of v_x and v_y, and of x and y where it corrects them.
         training: where it comes from.
+        layers: of gated recurrent units.
+        place: whether it corrects the place that the inertial filter carries.
     """
 
     format: int
@@ -69,8 +78,45 @@ class NetworkDescription:
     base: str
     samples: int
     sample_period: float
-    calibration: tuple[float, float]
+    calibration: tuple[float, ...]
     training: dict[str, Any]
+    layers: int = 1
+    place: bool = False
+
+    @property
+    def outputs(self) -> int:
+        """Of the last layer: O."""
+        return 2 * OUTPUTS if self.place else OUTPUTS
+
+
+class RecurrentLayer(NamedTuple):
+    """Gated recurrent units.
+
+    Attributes:
+        input_weight: (3 H, I) of r, z, n in this order.
+        memory_weight: (3 H, H).
+        input_bias: (3 H,).
+        memory_bias: (3 H,).
+    """
+
+    input_weight: Weights
+    memory_weight: Weights
+    input_bias: Weights
+    memory_bias: Weights
+
+    def step(self, inputs: Weights, memory: Weights) -> Weights:
+        """Memory (N, H) after inputs (N, I)."""
+        # a product for each row: its bits do not depend on how many rows there are
+        by_input = (inputs[:, None] @ self.input_weight.T)[:, 0] + self.input_bias
+        by_memory = (memory[:, None] @ self.memory_weight.T)[:, 0] + self.memory_bias
+        units = memory.shape[1]
+        reset, keep = (
+            1.0 / (1.0 + np.exp(-(by_input[:, part] + by_memory[:, part])))
+            for part in (slice(units), slice(units, 2 * units))
+        )
+        candidate = np.tanh(by_input[:, 2 * units :] + reset * by_memory[:, 2 * units :])
+        kept: Weights = (1.0 - keep) * candidate + keep * memory
+        return kept
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,22 +125,16 @@ class VelocityNetwork:
 
     Attributes:
         description: what it is.
-        input_weight: (3 H, I) of r, z, n in this order.
-        memory_weight: (3 H, H).
-        input_bias: (3 H,).
-        memory_bias: (3 H,).
-        output_weight: (5, H).
-        output_bias: (5,).
+        layers: L of them, each sees the memory of the one before.
+        output_weight: (O, H).
+        output_bias: (O,).
         mean: (I,) subtracted from the inputs.
         deviation: (I,) that they are divided by.
         clip: of the normalised inputs.
     """
 
     description: NetworkDescription
-    input_weight: Weights
-    memory_weight: Weights
-    input_bias: Weights
-    memory_bias: Weights
+    layers: tuple[RecurrentLayer, ...]
     output_weight: Weights
     output_bias: Weights
     mean: Array
@@ -104,44 +144,57 @@ class VelocityNetwork:
     @property
     def units(self) -> int:
         """H."""
-        return self.memory_weight.shape[1]
+        return self.output_weight.shape[1]
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Its numbers by the names that they have in a file; layers after the first have a number."""
+        found: dict[str, NDArray[Any]] = {}
+        for place, layer in enumerate(self.layers):
+            found |= {_numbered(name, place): value for name, value in layer._asdict().items()}
+        return found | {name: getattr(self, name) for name in _OWN}
 
     def digest(self) -> str:
         """SHA-256 of its numbers and its description."""
-        parts = [getattr(self, name).tobytes() for name in _shapes(0, 0)]
-        return hashlib.sha256(b"".join([*parts, repr((self.description, self.clip)).encode()])).hexdigest()
+        parts = [value.tobytes() for value in self.arrays().values()]
+        described = repr((self.description, self.clip)).replace(", layers=1, place=False", "")  # as format 1 had it
+        return hashlib.sha256(b"".join([*parts, described.encode()])).hexdigest()
 
     @property
     def chosen(self) -> NDArray[np.intp]:
         """Places of its inputs among all INPUTS."""
         return np.array([INPUTS.index(name) for name in self.description.inputs])
 
+    def new_memory(self, count: int) -> Weights:
+        """Of N robots that have seen nothing (N, L, H)."""
+        return np.zeros((count, len(self.layers), self.units), dtype=np.float32)
+
     def step(self, inputs: Array, memory: Weights) -> Weights:
-        """Outputs (N, 5) for inputs (N, I); ``memory`` (N, H), zero at the start, is changed."""
-        normal = np.clip((inputs - self.mean) / self.deviation, -self.clip, self.clip).astype(np.float32)
-        # a product for each row: its bits do not depend on how many rows there are
-        by_input = (normal[:, None] @ self.input_weight.T)[:, 0] + self.input_bias
-        by_memory = (memory[:, None] @ self.memory_weight.T)[:, 0] + self.memory_bias
-        units = self.units
-        reset, keep = (
-            1.0 / (1.0 + np.exp(-(by_input[:, part] + by_memory[:, part])))
-            for part in (slice(units), slice(units, 2 * units))
-        )
-        candidate = np.tanh(by_input[:, 2 * units :] + reset * by_memory[:, 2 * units :])
-        memory[:] = (1.0 - keep) * candidate + keep * memory
-        outputs: Weights = (memory[:, None] @ self.output_weight.T)[:, 0] + self.output_bias
+        """Outputs (N, O) for inputs (N, I); ``memory`` (N, L, H) of :meth:`new_memory` is changed."""
+        seen = np.clip((inputs - self.mean) / self.deviation, -self.clip, self.clip).astype(np.float32)
+        for place, layer in enumerate(self.layers):
+            seen = memory[:, place] = layer.step(seen, memory[:, place])
+        outputs: Weights = (seen[:, None] @ self.output_weight.T)[:, 0] + self.output_bias
         return outputs
 
     def estimate(self, outputs: Weights, base: Array) -> tuple[Array, Array]:
-        """v_x, v_y (N, 2) [m/s] and covariances (N, 2, 2) of outputs (N, 5) on a base (N, 2) [m/s]."""
-        raw = outputs.astype(np.float64)
-        deviations = VELOCITY_SCALE * np.exp(np.clip(raw[:, 2:4], LEAST_LOG, LARGEST_LOG))
-        deviations *= self.description.calibration
-        covariances = np.empty((len(raw), 2, 2))
-        covariances[:, [0, 1], [0, 1]] = deviations**2
-        shared = LARGEST_CORRELATION * np.tanh(raw[:, 4]) * deviations.prod(axis=1)
-        covariances[:, 0, 1] = covariances[:, 1, 0] = shared
-        return base + VELOCITY_SCALE * raw[:, :2], covariances
+        """v_x, v_y (N, 2) [m/s] and covariances (N, 2, 2) of outputs (N, O) on a base (N, 2) [m/s]."""
+        return _pair(outputs[:, :OUTPUTS], VELOCITY_SCALE, self.description.calibration[:2], base)
+
+    def place(self, outputs: Weights, base: Array) -> tuple[Array, Array]:
+        """x, y (N, 2) [m] and covariances (N, 2, 2) of outputs (N, O) on those of the inertial filter (N, 2) [m]."""
+        return _pair(outputs[:, OUTPUTS:], PLACE_SCALE, self.description.calibration[2:], base)
+
+
+def _pair(outputs: Weights, scale: float, calibration: tuple[float, ...], base: Array) -> tuple[Array, Array]:
+    """Two numbers (N, 2) and their covariances (N, 2, 2) of outputs (N, OUTPUTS)."""
+    raw = outputs.astype(np.float64)
+    deviations = scale * np.exp(np.clip(raw[:, 2:4], LEAST_LOG, LARGEST_LOG))
+    deviations *= calibration
+    covariances = np.empty((len(raw), 2, 2))
+    covariances[:, [0, 1], [0, 1]] = deviations**2
+    shared = LARGEST_CORRELATION * np.tanh(raw[:, 4]) * deviations.prod(axis=1)
+    covariances[:, 0, 1] = covariances[:, 1, 0] = shared
+    return base + scale * raw[:, :2], covariances
 
 
 def velocity_base(base: str, rim: Array, filtered: Array) -> Array:
@@ -160,8 +213,7 @@ def velocity_base(base: str, rim: Array, filtered: Array) -> Array:
 
 def save_network(network: VelocityNetwork, path: str | os.PathLike[str]) -> Path:
     """Write a network; the same one gives the same bytes."""
-    arrays: dict[str, NDArray[Any]] = {name: getattr(network, name) for name in _shapes(0, 0)}
-    return write_arrays(path, arrays, asdict(network.description) | {"clip": network.clip})
+    return write_arrays(path, network.arrays(), asdict(network.description) | {"clip": network.clip})
 
 
 def load_network(path: str | os.PathLike[str]) -> VelocityNetwork:
@@ -176,24 +228,40 @@ def load_network(path: str | os.PathLike[str]) -> VelocityNetwork:
     units = int(np.size(arrays.get("input_bias", ()))) // 3
     if not 1 <= units <= _MOST_UNITS:
         raise InputError(f"{file} has {units} units: 1 to {_MOST_UNITS} expected.")
-    shapes = _shapes(len(described.inputs), units)
+    shapes = _shapes(described, units)
     found = {name: take_array(file, arrays, name, *wanted, _KIND) for name, wanted in shapes.items()}
     if arrays:
         raise InputError(f"{file}: {sorted(arrays)[0]!r} is not part of {_KIND}.")
     if not (found["deviation"] > 0.0).all():
         raise InputError(f"{file}: deviation holds values that are not positive.")
-    return VelocityNetwork(described, **found, clip=clip)
+    layers = tuple(
+        RecurrentLayer(*(found[_numbered(name, place)] for name in RecurrentLayer._fields))
+        for place in range(described.layers)
+    )
+    return VelocityNetwork(described, layers, **{name: found[name] for name in _OWN}, clip=clip)
 
 
-def _shapes(inputs: int, units: int) -> dict[str, tuple[tuple[int, ...], type[np.floating[Any]]]]:
+_OWN = ("output_weight", "output_bias", "mean", "deviation")
+
+
+def _numbered(name: str, place: int) -> str:
+    """Name in a file of an array of a layer."""
+    return name if place == 0 else f"{name}_{place + 1}"
+
+
+def _shapes(described: NetworkDescription, units: int) -> dict[str, tuple[tuple[int, ...], type[np.floating[Any]]]]:
     """Shape and type of every array."""
-    return {
-        "input_weight": ((3 * units, inputs), np.float32),
-        "memory_weight": ((3 * units, units), np.float32),
-        "input_bias": ((3 * units,), np.float32),
-        "memory_bias": ((3 * units,), np.float32),
-        "output_weight": ((OUTPUTS, units), np.float32),
-        "output_bias": ((OUTPUTS,), np.float32),
+    found: dict[str, tuple[tuple[int, ...], type[np.floating[Any]]]] = {}
+    seen = len(described.inputs)
+    for place in range(described.layers):
+        wanted = ((3 * units, seen), (3 * units, units), (3 * units,), (3 * units,))
+        names = (_numbered(name, place) for name in RecurrentLayer._fields)
+        found |= {name: (shape, np.float32) for name, shape in zip(names, wanted, strict=True)}
+        seen = units
+    inputs, outputs = len(described.inputs), described.outputs
+    return found | {
+        "output_weight": ((outputs, units), np.float32),
+        "output_bias": ((outputs,), np.float32),
         "mean": ((inputs,), np.float64),
         "deviation": ((inputs,), np.float64),
     }
@@ -205,18 +273,20 @@ def _description(file: Path, stored: bytes) -> tuple[NetworkDescription, float]:
         clip = float(content.pop("clip"))
         content["inputs"], content["calibration"] = tuple(content["inputs"]), tuple(content["calibration"])
         described = NetworkDescription(**content)
-        low, high = (float(value) for value in described.calibration)
-        samples, period = int(described.samples), float(described.sample_period)
+        factors = [float(value) for value in described.calibration]
+        samples, period, layers = int(described.samples), float(described.sample_period), int(described.layers)
     except (ValueError, AttributeError, KeyError, TypeError, RecursionError):
         raise InputError(f"{file} is not {_KIND}: its description is incomplete.") from None
-    if described.format != FORMAT:
-        raise InputError(f"{file} has format {described.format!r}: this version reads {FORMAT}.")
+    if described.format not in FORMATS:
+        raise InputError(f"{file} has format {described.format!r}: this version reads up to {FORMAT}.")
     if described.base not in BASES:
         raise unknown_name("base", str(described.base), BASES)
     unknown = [name for name in described.inputs if name not in INPUTS]
     if unknown or not described.inputs:
         raise InputError(f"{file}: its inputs are not those of this version: train anew.")
-    if not (min(low, high, clip, period) > 0.0 and max(low, high, clip, period) < 1e6):
+    if len(factors) != (4 if described.place else 2) or not 1 <= layers <= _MOST_LAYERS:
+        raise InputError(f"{file}: {len(factors)} factors of calibration and {layers} layers do not fit together.")
+    if not (min(*factors, clip, period) > 0.0 and max(*factors, clip, period) < 1e6):
         raise InputError(f"{file}: clip, calibration and sample period must be positive.")
     if not 2 <= samples <= 1000 or samples % 2:
         raise InputError(f"{file} has {samples} samples in a block: give an even number up to 1000.")

@@ -30,7 +30,7 @@ from ddagr_gym.estimation import FilterModel
 from ddagr_gym.estimation.dead_reckoning import DeadReckoning
 from ddagr_gym.estimation.force_balance import arc_bank_speeds
 from ddagr_gym.estimation.inertial_filter import InertialModel
-from ddagr_gym.estimation.learned_filter import LearnedModel
+from ddagr_gym.estimation.learned_filter import DEFAULT_ESTIMATOR, LearnedModel
 from ddagr_gym.evaluation.calibration import calibrate_constant_speeds
 from ddagr_gym.evaluation.ladder_gains import LadderGains, ladder_gains
 from ddagr_gym.evaluation.policy_seeds import arm_and_seed, policy_version
@@ -93,10 +93,10 @@ def inertial_model() -> InertialModel:
     return InertialModel.of(ddagr(), Sensors())
 
 
-@lru_cache(maxsize=1)
-def learned_model() -> LearnedModel:
-    """The learned estimator that knows the nominal robot and sensors."""
-    return LearnedModel.of(ddagr(), Sensors())
+@lru_cache(maxsize=4)
+def learned_model(estimator: str = DEFAULT_ESTIMATOR) -> LearnedModel:
+    """A learned estimator that knows the nominal robot and sensors."""
+    return LearnedModel.of(ddagr(), Sensors(), estimator)
 
 
 def make_path_tracker(estimator: MotionEstimator, flat: FilterModel, standing: int) -> _Maker:
@@ -168,7 +168,10 @@ DEFAULT = "B6"
 EKF_CONTROLLERS = ("B4", "B5")
 """Controllers that need the filter's features in the observation."""
 
-INERTIAL_CONTROLLERS = ("B6", "B6_learned")
+_ESTIMATORS = {"B6_learned": DEFAULT_ESTIMATOR, "B6_pose": "pose"}
+"""Learned estimators of path trackers."""
+
+INERTIAL_CONTROLLERS = ("B6", *_ESTIMATORS)
 """Controllers with an inertial filter of their own."""
 
 BOUNDS = ("true_curvature", "true_soil", "true_path")
@@ -190,8 +193,12 @@ _LADDER: dict[str, tuple[_Maker, str]] = {
         "path tracker by the pose of the filter that takes the ground for level",
     ),
     "B6_learned": (
-        lambda turn, gains: _reckoned_tracker(learned_model(), STANDING)(turn, gains),
+        lambda turn, gains: _reckoned_tracker(learned_model(_ESTIMATORS["B6_learned"]), STANDING)(turn, gains),
         "B6 by the velocities of the learned estimator",
+    ),
+    "B6_pose": (
+        lambda turn, gains: _reckoned_tracker(learned_model(_ESTIMATORS["B6_pose"]), STANDING)(turn, gains),
+        "B6 by velocities and place that a network corrects",
     ),
     "true_curvature": (_make_true_curvature, "upper bound, not deployable: PI on the true curvature"),
     "true_soil": (_make_true_soil, "upper bound, not deployable: B4 with the true soil and the true curvature"),
@@ -299,8 +306,10 @@ def controller_version(name: str) -> str:
     text = f"{name} {ladder_gains()!r}"
     if name == "B6":
         return f"{text} {_model_text(inertial_model())} {SETTLING}"
-    if name == "B6_learned":
-        return f"{text} {_model_text(learned_model().inertial)} {learned_model().network.digest()}"
+    if name in _ESTIMATORS:
+        model = learned_model(_ESTIMATORS[name])
+        settling = f" {SETTLING}" if model.network.description.place else ""
+        return f"{text} {_model_text(model.inertial)} {model.network.digest()}{settling}"
     return text
 
 

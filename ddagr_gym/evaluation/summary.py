@@ -189,8 +189,8 @@ def _profile(errors: Array) -> dict[str, list[float]] | None:
     return {name: getattr(found, name).tolist() for name in ("thresholds", "share", "low", "high")}
 
 
-def summaries(rows: Rows) -> dict[str, dict[str, Any]]:
-    """``{arm: {set: summary}}``, with ``improvement_over_B1`` and ``_B4`` where those were driven on the set too."""
+def summaries(rows: Rows, baselines: Sequence[str] = BASELINES) -> dict[str, dict[str, Any]]:
+    """``{arm: {set: summary}}``, with ``improvement_over_`` each baseline where that was driven on the set too."""
     result: dict[str, dict[str, Any]] = {}
     for arm in dict.fromkeys(arm_name(row) for row in rows):
         mine = [row for row in rows if arm_name(row) == arm]
@@ -199,7 +199,7 @@ def summaries(rows: Rows) -> dict[str, dict[str, Any]]:
             for name in dict.fromkeys(row["set"] for row in mine)
         }
         for name, summary in result[arm].items():
-            for baseline in BASELINES:
+            for baseline in baselines:
                 found = improvement(rows, arm, baseline, name) if arm != baseline else None
                 if found is not None:
                     summary[f"improvement_over_{baseline}"] = found

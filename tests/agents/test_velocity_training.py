@@ -32,7 +32,8 @@ def made_up(count=24, blocks=30, seed=0) -> Drives:
     truth = np.zeros((count, blocks, 2), dtype=np.float32)
     truth[..., 1] = 0.03 * inputs[..., INPUTS.index("yaw_rate_second")]
     zeros, ones = np.zeros((count, blocks), dtype=np.float32), np.ones((count, blocks), dtype=np.float32)
-    return Drives(inputs, truth, zeros, np.zeros_like(truth), ones, ones)
+    places = np.cumsum(0.08 * truth, axis=1)
+    return Drives(inputs, truth, zeros, np.zeros_like(truth), places, ones, ones)
 
 
 def training(folder, name="alone", epochs=3, **changes) -> VelocityTraining:
@@ -48,7 +49,7 @@ def test_numpy_gives_what_torch_gives(tmp_path, name):
     inputs = made_up(5, seed=3).inputs[..., network.chosen]
     with torch.no_grad():
         wanted = own.model(own._normal(torch.from_numpy(inputs))).numpy()
-    memory = np.zeros((5, network.units), dtype=np.float32)
+    memory = network.new_memory(5)
     found = np.stack([network.step(inputs[:, k].astype(float), memory) for k in range(inputs.shape[1])], axis=1)
     assert np.abs(wanted).max() > 1.0
     assert found == pytest.approx(wanted, abs=2e-5)
@@ -118,11 +119,11 @@ def test_training_sees_what_the_estimator_sees_when_it_runs(tmp_path):
     names = ("specific_force_x", "specific_force_y", "yaw_rate", "encoder_right", "encoder_left")
     readings = np.column_stack([columns[name] for name in names])
     commands = np.column_stack([columns["command_right"], columns["command_left"]])
-    memory = np.zeros((1, network.units), dtype=np.float32)
+    memory, places = network.new_memory(1), network.chosen
     for k in range(100):
         block = slice(10 * k, 10 * k + 10)
         batch.step(commands[10 * k : 10 * k + 1], readings[None, block])
-        network.step(drives.inputs[:, k].astype(float), memory)
+        network.step(drives.inputs[:, k, places].astype(float), memory)
     assert batch.units == pytest.approx(memory, abs=1e-4)
     assert VELOCITY_SCALE == 0.01
 

@@ -9,11 +9,12 @@ import pytest
 from ddagr_gym.errors import InputError
 from ddagr_gym.estimation import InertialModel, LearnedBatch, LearnedFilter, LearnedModel, run_learned_filter
 from ddagr_gym.estimation.learned_filter import estimator_names, find_network
-from ddagr_gym.estimation.learned_inputs import INPUTS, MEMORY_SIZE, SENSOR_INPUTS, block_inputs
+from ddagr_gym.estimation.learned_inputs import INPUTS, MEMORY_SIZE, SENSOR_INPUTS, Filtered, block_inputs
 from ddagr_gym.estimation.learned_network import (
     FORMAT,
     OUTPUTS,
     NetworkDescription,
+    RecurrentLayer,
     VelocityNetwork,
     load_network,
     save_network,
@@ -26,18 +27,25 @@ from ddagr_gym.presets import ddagr
 BLOCK = 10
 
 
-def make_network(inputs=INPUTS, base="filter", units=6, seed=0, size=0.3) -> VelocityNetwork:
+def make_network(inputs=INPUTS, base="filter", units=6, seed=0, size=0.3, layers=1, place=False) -> VelocityNetwork:
     rng = np.random.default_rng(seed)
 
     def drawn(*shape):
         return (size * rng.standard_normal(shape)).astype(np.float32)
 
     count = len(inputs)
-    described = NetworkDescription(FORMAT, "drawn", inputs, base, BLOCK, Sensors().period, (1.5, 0.5), {"seed": seed})
-    return VelocityNetwork(
-        described, drawn(3 * units, count), drawn(3 * units, units), drawn(3 * units), drawn(3 * units),
-        drawn(OUTPUTS, units), drawn(OUTPUTS), np.zeros(count), np.ones(count),
-    )  # fmt: skip
+    calibration = (1.5, 0.5, 2.0, 1.0) if place else (1.5, 0.5)
+    described = NetworkDescription(
+        FORMAT, "drawn", inputs, base, BLOCK, Sensors().period, calibration, {"seed": seed}, layers, place
+    )
+    own = tuple(
+        RecurrentLayer(
+            drawn(3 * units, count if first else units), drawn(3 * units, units), drawn(3 * units), drawn(3 * units)
+        )
+        for first in [True] + (layers - 1) * [False]
+    )
+    outputs = described.outputs
+    return VelocityNetwork(described, own, drawn(outputs, units), drawn(outputs), np.zeros(count), np.ones(count))
 
 
 def make_model(**changes) -> LearnedModel:
@@ -103,10 +111,10 @@ def inputs_of(commands, readings):
     """Inputs after every block, beside a filter that says nothing."""
     memory, found = np.zeros((1, MEMORY_SIZE)), []
     for command, block in zip(commands, readings, strict=True):
-        given = block_inputs(
-            memory, command[None], block[None], np.zeros((1, 15)), np.eye(15)[None], np.zeros((1, BLOCK, 5)), 0.008,
-            0.3, np.zeros(4),
-        )  # fmt: skip
+        silent = Filtered(
+            np.zeros((1, 15)), np.eye(15)[None], np.zeros((1, BLOCK, 5)), np.zeros((1, 3)), np.eye(3)[None]
+        )
+        given = block_inputs(memory, command[None], block[None], silent, 0.008, 0.3, np.zeros(4))
         found.append(dict(zip(INPUTS, given[0], strict=True)))
     return found
 
@@ -202,10 +210,10 @@ def test_a_recording_is_filtered_block_by_block():
 
 
 def test_published_estimators_are_small_and_whole():
-    assert estimator_names() == ("alone", "correction", "features")
+    assert estimator_names() == ("alone", "correction", "features", "pose")
     for name in estimator_names():
         folder = Path(shipped_folder("estimators")) / name
-        assert (folder / "network.npz").stat().st_size < 200_000
+        assert (folder / "network.npz").stat().st_size < 800_000
         network = find_network(name)
         assert network.description.name == name
         assert "filter_v_x" not in network.description.inputs or name != "alone"

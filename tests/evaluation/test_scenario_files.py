@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.scenario_sets import ON_PLANTS, PLANS, PLANT_COUNT, SECOND
+from benchmarks.scenario_sets import ON_PLANTS, ON_PLANTS_AGAIN, PLANS, PLANT_COUNT, SECOND, THIRD
 from ddagr_gym.errors import InputError
 from ddagr_gym.evaluation import scenarios as scenario_module
 from ddagr_gym.evaluation.scenarios import load_scenarios, scenario_folder, scenario_names, set_hash
@@ -50,6 +50,30 @@ FROZEN = {
     "on_weak_motors": "3814cc9dec4343c78a1e9b8febb262d9e5a79a37c6d13e63b4a75f762566ccb3",
     "on_split": "bb724075c3b00dc5a22a563352c7826df0dadc7630482af63a858954c6f7db90",
     "on_patch": "6d9345b6f3db4832715554646f300f9ba4e4c266107a9e73ea4de743f3ecc0b1",
+    "S1c": "b2e2431ac89f46ad235eafa6c5bebf03b02c27bbff7653323baf0928cac6f8df",
+    "S2c": "ea5ffdf5fdb11c1553a3531d781745e6e9835f97a70927ea387302dfc0d5a4f5",
+    "S3c": "e07e9cf3dba6d2848625fb7e8f9347b8731517d6fd5cd44320ab4c952aa90df4",
+    "S4c": "fbe204a46a0a14076f6dfa96da85cda221d4d49fa61b2fca7de60385907257c3",
+    "S5c": "3b8bcd88c49fbe46faecce510a0efe5a41cd4818484d34e06c0b5b0f3402f0a5",
+    "S6c": "90c49a042fa1aabfd1c1c3506d7d9cc571f59dd590fae22a80e8b025ec44496c",
+    "S7c": "44f505d017f9c6ac8746a94e7ab90bcc2c01a9626a97f1ca2111b893941a1b13",
+    "S8c": "a7b15727f4ee87c9c6dfa4f330b4d57719944d69e83572bf93c19a9ef1c48039",
+    "Tc": "a505b61083fab3c838045c12769089eae4fc94c37710eb5a4bcb6cca9c4717e4",
+    "on_slope_3_c": "f3cd418ec5e9a22d234c80c688bcac41319c67bb5b4bd8d873a32d3ec1dfb46f",
+    "on_slope_5_c": "11a2334af961864652426bd0b6c16e6d50539cb03d6e426efbba9688d5b14aa8",
+    "on_weaker_c": "927c23c5479883a6d9b981dfb488dcaec257488408f20f073b1daecbb7dffdf3",
+    "on_lateral_0.8_c": "5d76b6cedf6372fb3665a463407c97715a0a55127fa9a720a585e5888b51fd17",
+    "on_lateral_1.2_c": "2107eae8d26f1ddd5227378dd91f618fc8f5be082acfd6e2a42db2df731d8022",
+    "on_late_c": "6e00868766dd77b564e5df81155ea8d9dd32790fdab5939eeba43e5705554569",
+    "on_heavy_c": "322bf34ec9d964345037c646bc72e21a268cdd39ab97eeeaf29ace30b0f42a16",
+    "on_ruts_c": "af27c3395f6fe3be57d65c2b18dc6fd422b8205e26013e2f5e6d7d5f79bfd189",
+    "on_slip_sinkage_c": "d2027f7c207162da6aaf481930a0c6a47a601746a67cb5e6469a34dd53af3b40",
+    "on_bulldozing_c": "cd8d49f0981355cd6d40eb25a0defebcb0d61f7076eb0d476583ddebfaffaf59",
+    "on_payload_c": "36d7ca924c75dd1e1ab14c31f9857debf04015ff373acb14815b7776d93a9a24",
+    "on_slow_c": "fde279ec1f57bb0b23815e4c58ab7f3a82091bdebde667c97f9fbea05140d99a",
+    "on_weak_motors_c": "788f0dfeb257ad75b6700de96f583c4b8f029708796f4ab40b85245fb07fdb7f",
+    "on_split_c": "fe0d37483fc958cf9b2d859cf3ca4d9e7a84a61be7aa2a550a1a3745f4b6f983",
+    "on_patch_c": "f15a24d4c7f27ddff0cd8c640cb99489774aba2198098ca14c1d930a7db2df2b",
 }
 """SHA-256 of every set on the day it was frozen; no change of a set is ever right."""
 
@@ -65,11 +89,11 @@ def test_set_is_the_one_that_was_frozen(name):
     scenarios = load_scenarios(name)  # checks the soil grids
     assert len(scenarios) == PLANS[name].count
     assert {scenario.law for scenario in scenarios} == {PLANS[name].law}
-    assert (PLANS[name].law == LAW) == (name in ("T", "Tb"))
+    assert (PLANS[name].law == LAW) == (name in ("T", "Tb", "Tc"))
 
 
 def test_files_are_small():
-    assert sum(path.stat().st_size for path in scenario_folder().iterdir()) < 1_000_000
+    assert sum(path.stat().st_size for path in scenario_folder().iterdir()) < 1_500_000
 
 
 def test_validation_shares_nothing_with_the_test_sets():
@@ -81,7 +105,7 @@ def test_validation_shares_nothing_with_the_test_sets():
         assert not seeds & {scenario.seed for scenario in others}
 
 
-@pytest.mark.parametrize("drawing", ["", "b"])
+@pytest.mark.parametrize("drawing", ["", "b", "c"])
 def test_transfer_drives_the_turns_of_s1(drawing):
     for other, first in zip(load_scenarios(f"T{drawing}"), load_scenarios(f"S1{drawing}"), strict=False):
         assert other.seed == first.seed
@@ -89,10 +113,11 @@ def test_transfer_drives_the_turns_of_s1(drawing):
         np.testing.assert_array_equal(other.episode.field.values, first.episode.field.values)
 
 
-@pytest.mark.parametrize("name", ON_PLANTS)
-def test_plants_are_driven_by_the_turns_of_s1b(name):
-    """Same soils, starts and noise on every plant, and something that differs from S1b."""
-    pairs = list(zip(load_scenarios(name), load_scenarios("S1b"), strict=False))
+@pytest.mark.parametrize(("name", "in_range"), [*((name, "S1b") for name in ON_PLANTS),
+                                              *((name, "S1c") for name in ON_PLANTS_AGAIN)])  # fmt: skip
+def test_plants_are_driven_by_the_turns_in_range(name, in_range):
+    """Same soils, starts and noise on every plant, and something that differs."""
+    pairs = list(zip(load_scenarios(name), load_scenarios(in_range), strict=False))
     assert len(pairs) == PLANT_COUNT
     for other, first in pairs:
         assert other.seed == first.seed
@@ -106,13 +131,14 @@ def test_plants_are_driven_by_the_turns_of_s1b(name):
         )
 
 
-def test_the_second_drawing_shares_nothing_with_the_first():
-    for name in SECOND:
-        seeds = {scenario.seed for scenario in load_scenarios(name)}
-        assert not seeds & {scenario.seed for scenario in load_scenarios(name.removesuffix("b"))}
+@pytest.mark.parametrize("name", [*SECOND, *THIRD])
+def test_a_later_drawing_shares_nothing_with_the_others(name):
+    seeds = {scenario.seed for scenario in load_scenarios(name)}
+    for drawing in {"", "b", "c"} - {name[-1]}:
+        assert not seeds & {scenario.seed for scenario in load_scenarios(name[:-1] + drawing)}
 
 
-@pytest.mark.parametrize("name", ["S7", "S7b"])
+@pytest.mark.parametrize("name", ["S7", "S7b", "S7c"])
 def test_pairs_of_s7_are_mirror_images(name):
     scenarios = load_scenarios(name)
     for left, right in zip(scenarios[::2], scenarios[1::2], strict=True):
@@ -124,7 +150,7 @@ def test_pairs_of_s7_are_mirror_images(name):
         assert mine.accelerometer_bias[1] == -other.accelerometer_bias[1]
 
 
-@pytest.mark.parametrize("drawing", ["", "b"])
+@pytest.mark.parametrize("drawing", ["", "b", "c"])
 def test_s6_and_s8_leave_the_training_range(drawing):
     assert {scenario.episode.robot.motor_rate for scenario in load_scenarios(f"S6{drawing}")} == {1.4}
     radii = [scenario.episode.turn.radius for scenario in load_scenarios(f"S8{drawing}")]
