@@ -24,7 +24,8 @@ def publish_estimator(training: VelocityTraining, network: VelocityNetwork, plan
         "settings": asdict(training.settings),
         "plan": asdict(plan),
         "calibration": network.description.calibration,
-        "cpu_seconds": round(training.cpu_seconds),
+        "seconds": round(training.seconds),
+        "device": training.device,
         "course": training.course,
     }
     write_json(folder / "training.json", record)
@@ -41,15 +42,16 @@ def draw_training(record: dict[str, Any], path: Path) -> None:
 
         figure = Figure(figsize=(7.4, 3.0), layout="constrained")
         errors, covered = figure.subplots(1, 2)
-        for name, colour in (("v_x", palette.BLUE), ("v_y", palette.ORANGE)):
+        colours = (palette.BLUE, palette.ORANGE, palette.GREEN, palette.PURPLE)
+        for (name, unit), colour in zip(ESTIMATED, colours, strict=True):
+            if f"{name}_covered" not in course[0]:
+                continue
             for kind, style, label in (("median", "-", name), ("rmse", ":", f"{name}, root mean square")):
                 errors.plot(
-                    passes, [entry[f"{name}_{kind}_mm_s"] for entry in course], style, color=colour, label=label
+                    passes, [entry[f"{name}_{kind}_{unit}"] for entry in course], style, color=colour, label=label
                 )
             covered.plot(passes, [100.0 * entry[f"{name}_covered"] for entry in course], color=colour, label=name)
-        errors.set(
-            xlabel="passes over the turns", title="error on validation [mm/s], median", yscale="log", ylim=(1.0, 100.0)
-        )
+        errors.set(xlabel="passes over the turns", title="error on validation [mm/s; mm], median", yscale="log")
         errors.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
         covered.axhline(90.0, color=palette.VERMILLION, linestyle=(0, (4, 2)), linewidth=1.0)
         covered.set(xlabel="passes over the turns", title="covered of 90 % [%], before calibration")
@@ -62,7 +64,7 @@ def card(record: dict[str, Any], variant: Variant) -> str:
     """Card in Markdown.
 
     Args:
-        record: of the training; ``note`` where it went otherwise than the settings say.
+        record: of the training; ``turns`` in words where they are not those of the settings.
         variant: that was trained.
     """
     drawn = [] if len(record["course"]) < 2 else ["![Course of training](training.png)", ""]
@@ -78,12 +80,14 @@ def card(record: dict[str, Any], variant: Variant) -> str:
             "## Use",
             "",
             "```python",
-            "from ddagr_gym.estimation import LearnedModel, run_learned_filter",
+            f"from ddagr_gym.estimation import LearnedModel, {'reckoned_track, ' if variant.place else ''}"
+            "run_learned_filter",
             "from ddagr_gym.parameters import Sensors",
             "from ddagr_gym.presets import ddagr",
             "",
             f'model = LearnedModel.of(ddagr(), Sensors(), "{record["name"]}")',
             "states, velocities, covariances = run_learned_filter(model, columns)",
+            *(["poses = reckoned_track(model, columns)"] if variant.place else []),
             "```",
             "",
             "`network.npz` holds weights, normalisation and a JSON description, no pickle; numpy runs it.",
@@ -127,15 +131,12 @@ def _training(record: dict[str, Any]) -> list[str]:
     """Lines of a list."""
     settings, plan = record["settings"], record["plan"]
     shares = ", ".join(f"{key.replace('_', ' ')} {100.0 * value:.0f} %" for key, value in plan.items())
-    near = settings.get("near", 0)
-    further = f" {near} more of the task as it is, of the seed {settings['root_seed'] + 1}." if near else ""
     layers = settings.get("layers", 1)
     units = f"{settings['units']} units" if layers == 1 else f"{layers} layers of {settings['units']} units"
+    turns = record.get("turns", _turns(settings))
+    device = "a GPU" if record.get("device", "cpu") == "cuda" else "a CPU core"
     return [
-        f"- {settings['turns']} simulated turns, numbers 0 to {settings['turns'] - 1} of the seed "
-        f"{settings['root_seed']}; the next {settings['validation']} are its validation.{further} No scenario of a "
-        "frozen set took part.",
-        *([f"- {record['note']}"] if "note" in record else []),
+        f"- {turns} No scenario of a frozen set took part.",
         "- Driven by B6 (60 %), B4 (25 %) and two constant speeds (15 %), their gains times a half to two, their "
         "commands wandering in most turns; 0.3 to 1.3 s of standing first.",
         f"- Shares of turns: {shares}. Slopes up to 6 degrees, lateral forces x 0.75 to 1.3, strength and "
@@ -143,8 +144,18 @@ def _training(record: dict[str, Any]) -> list[str]:
         "soil up to 10 %.",
         f"- Gaussian likelihood of each pair with its correlation; {units}, "
         f"{settings['epochs']} passes, seed {settings['seed']}; turns mirrored at random; "
-        f"{record['cpu_seconds']} seconds of {record.get('device', 'a CPU core')}.",
+        f"{record['seconds']} seconds of {device}.",
     ]
+
+
+def _turns(settings: dict[str, Any]) -> str:
+    """Turns that a training learnt from, by its settings."""
+    seed, near = settings["root_seed"], settings.get("near", 0)
+    further = f" {near} more are of the task as it is, of the seed {seed + 1}." if near else ""
+    return (
+        f"{settings['turns']} simulated turns, numbers 0 to {settings['turns'] - 1} of the seed {seed}; the next "
+        f"{settings['validation']} are its validation.{further}"
+    )
 
 
 def _validation(record: dict[str, Any], variant: Variant) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import time
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
@@ -24,6 +25,8 @@ from ddagr_gym.estimation.learned_network import (
     LARGEST_CORRELATION,
     LARGEST_LOG,
     LEAST_LOG,
+    MOST_LAYERS,
+    MOST_UNITS,
     OUTPUTS,
     PLACE_SCALE,
     VELOCITY_SCALE,
@@ -85,6 +88,9 @@ class VelocitySettings:
         for name in ("turns", "validation", "units", "layers", "epochs", "batch"):
             if getattr(self, name) < 1:
                 raise InputError(f"{name} is {getattr(self, name)}: give at least 1.")
+        for name, most in (("units", MOST_UNITS), ("layers", MOST_LAYERS)):
+            if getattr(self, name) > most:
+                raise InputError(f"{name} is {getattr(self, name)}: give {most} at most.")
         if self.near < 0:
             raise InputError(f"near is {self.near}: give 0 or more.")
 
@@ -137,6 +143,15 @@ class VelocityModel(torch.nn.Module):
         return found
 
 
+def exact_device(name: str) -> torch.device:
+    """Device of torch on which the same training gives the same numbers, in single precision throughout."""
+    if name != "cpu":
+        os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:2")  # what torch asks of recurrent layers
+        torch.use_deterministic_algorithms(True)
+        torch.backends.cuda.matmul.allow_tf32 = torch.backends.cudnn.allow_tf32 = False
+    return torch.device(name)
+
+
 def gaussian_loss(outputs: Tensor, wanted: Tensor, weights: Tensor) -> Tensor:
     """Weighted mean of the negative log-likelihood of ``wanted`` (D, B, 2), velocities or places over their scale.
 
@@ -177,7 +192,7 @@ def mirror(names: tuple[str, ...]) -> tuple[NDArray[np.intp], NDArray[np.float32
     for name in names:
         other = name.replace("right", "?").replace("left", "right").replace("?", "left")
         places.append(names.index(other))
-        odd = ("force_y", "yaw_rate", "sine", "centripetal", "filter_v_y", "gyro_bias", "bias_y", "gravity_y",
+        odd = ("force_y", "yaw_rate", "heading_sine", "centripetal", "filter_v_y", "gyro_bias", "bias_y", "gravity_y",
                "pose_y", "pose_turned")  # fmt: skip
         signs.append(-1.0 if any(part in name for part in odd) and "deviation" not in name else 1.0)
     return np.array(places), np.array(signs, dtype=np.float32)
@@ -202,7 +217,7 @@ class VelocityTraining:
         self.name, self.variant, self.settings, self.folder = name, VARIANTS[name], settings, make_folder(folder)
         self._places = np.array([INPUTS.index(item) for item in self.variant.inputs])
         self._mean, self._deviation = self._statistics(drives)
-        self._device = torch.device(device)
+        self.device, self._device = device, exact_device(device)
         self._drives, self._validation = self._tensors(drives), self._tensors(validation)
         torch.set_num_threads(1)
         torch.manual_seed(settings.seed)
@@ -211,7 +226,7 @@ class VelocityTraining:
         self._optimiser = torch.optim.Adam(self.model.parameters(), lr=settings.learning_rate)
         self._mirror = mirror(self.variant.inputs)
         self.course: list[dict[str, float]] = []
-        self.cpu_seconds = 0.0
+        self.seconds = 0.0
 
     def _statistics(self, drives: Drives) -> tuple[Array, Array]:
         """Median and deviation of the inputs while driving, of turns to both sides alike.
@@ -254,11 +269,15 @@ class VelocityTraining:
 
     def _keep_epoch(self) -> None:
         """One more pass, judged and kept."""
-        begun = time.process_time()
+        begun = self._clock()
         loss = self._epoch(len(self.course))
-        self.cpu_seconds += time.process_time() - begun
+        self.seconds += self._clock() - begun
         self.course.append({"loss": loss, **self.judged()})
         self._keep()
+
+    def _clock(self) -> float:
+        """Time of the processor that trains [s]."""
+        return time.process_time() if self.device == "cpu" else time.monotonic()
 
     def _epoch(self, number: int) -> float:
         """One pass; its order and mirrored turns depend on the seed and its number alone."""
@@ -348,7 +367,7 @@ class VelocityTraining:
     def _record(self) -> dict[str, Any]:
         return {
             "name": self.name, "settings": asdict(self.settings), "course": self.course,
-            "cpu_seconds": self.cpu_seconds,
+            "seconds": self.seconds, "device": self.device,
         }  # fmt: skip
 
     def _resume(self) -> None:
@@ -357,8 +376,9 @@ class VelocityTraining:
             return
         state: Mapping[str, Any] = torch.load(file, weights_only=True, map_location=self._device)
         record = json.loads(state["record"])
-        if record["settings"] != asdict(self.settings) or record["name"] != self.name:
+        mine = self._record()
+        if any(record[name] != mine[name] for name in ("name", "settings", "device")):
             raise InputError(f"{file} is of a training with other settings: give another folder.")
         self.model.load_state_dict(state["model"])
         self._optimiser.load_state_dict(state["optimiser"])
-        self.course, self.cpu_seconds = record["course"], record["cpu_seconds"]
+        self.course, self.seconds = record["course"], record["seconds"]

@@ -4,7 +4,8 @@
 
 Turns of B6 on the development scenarios of ``benchmarks.row_turn_plants`` and on the frozen set T, the first ones of
 each; every estimator sees the same samples. From the end of standing to the next row: root mean square errors of v_x
-and v_y, coverage of 90 % intervals, NEES over 2, and the pose to which the velocities lead. On level ground and where
+and v_y, coverage of 90 % intervals, NEES over 2, the pose to which the velocities lead, and the place that the inertial
+filter carries along, or that a network makes of it, which later readings correct. On level ground and where
 the soil weakens, the first eight turns are those of ``benchmarks.velocity_bound``, whose bound is read from its file.
 The networks learnt from turns of other seeds on the same kinds of plant; set T is another law of the soil, which was
 not in their training. About two minutes of one core. Writes ``results/learned_estimator.json`` and a picture beside it.
@@ -31,7 +32,8 @@ from benchmarks.velocity_bound.study import MOTION, exit_instant
 from benchmarks.velocity_bound.summary import EXIT, root_ratio
 from ddagr_gym.control.timing import CONTROL_INTERVAL
 from ddagr_gym.errors import InputError
-from ddagr_gym.estimation import LearnedModel, run_learned_filter
+from ddagr_gym.estimation import InertialModel, LearnedModel, run_inertial_track, run_learned_filter
+from ddagr_gym.estimation.dead_reckoning import reckoned_track
 from ddagr_gym.evaluation.campaign import scenario_settings
 from ddagr_gym.evaluation.controllers import find_controller
 from ddagr_gym.evaluation.runs import TurnRun, drive_turn
@@ -65,11 +67,25 @@ def _learned(name: str, run: TurnRun) -> Estimated:
 ESTIMATORS: dict[str, tuple[str, Callable[[TurnRun], Estimated]]] = {
     "flat": ("filter, ground level", partial(_filtered, "flat", flat_velocities)),
     "inertial": ("inertial filter", partial(_filtered, "inertial", inertial_velocities)),
+    "pose": ("inertial filter, velocities and place corrected by a network", partial(_learned, "pose")),
     "correction": ("inertial filter, corrected by a network", partial(_learned, "correction")),
     "features": ("network that sees the inertial filter", partial(_learned, "features")),
     "alone": ("network that sees sensors and commands", partial(_learned, "alone")),
 }
 """By name: title and estimate."""
+
+
+def _inertial_track(columns: Columns, start: Array) -> Array:
+    model = InertialModel.of(ddagr(), Sensors()).with_known_vibration()
+    return run_inertial_track(model, columns, start)[0]
+
+
+def _corrected_track(columns: Columns, start: Array) -> Array:
+    return reckoned_track(LearnedModel.of(ddagr(), Sensors(), "pose"), columns, start)
+
+
+CARRIED: dict[str, Callable[[Columns, Array], Array]] = {"inertial": _inertial_track, "pose": _corrected_track}
+"""Poses (T, 3) from a known start, of the estimators that carry a place, by name."""
 
 
 def drive(plant: str, number: int) -> TurnRun:
@@ -84,7 +100,8 @@ def drive(plant: str, number: int) -> TurnRun:
 
 def judge(run: TurnRun) -> dict[str, Any]:
     """Of every estimator what :func:`judge_velocities` tells up to the next row, or to the end of a turn that never
-    reaches it; ``exit``: squared errors of the pose there [m^2, rad^2], None where it was not reached."""
+    reaches it; ``exit``: squared errors of the pose there [m^2, rad^2], None where it was not reached; ``carried``:
+    those of the pose that an estimator carries, of those that do."""
     reached = exit_instant(run)
     blocks = len(run.columns["t"]) // CONTROL_INTERVAL if reached is None else reached + 1
     columns = {name: values[: blocks * CONTROL_INTERVAL] for name, values in run.columns.items()}
@@ -95,6 +112,11 @@ def judge(run: TurnRun) -> dict[str, Any]:
         own = judge_velocities(velocities[:blocks], covariances[:blocks], columns)
         errors = placed_motion(motion[: len(truth)], run.episode)[-1, 3:] - truth[-1, 3:]
         found[name] = own | {"exit": None if reached is None else (errors**2).tolist()}
+        if name in CARRIED and reached is not None:
+            turn = run.episode
+            start = np.array([-turn.turn.run_in, turn.lateral_offset, turn.heading_offset])
+            errors = CARRIED[name](columns, start)[-1] - truth[-1, 3:]
+            found[name]["carried"] = (errors**2).tolist()
     return found
 
 
@@ -122,6 +144,10 @@ def plant_table(drives: Sequence[Mapping[str, Any]], bound: Mapping[str, Any] | 
         figures["nees"] = interval(np.array([np.mean(item["nees"]) for item in own]), np.mean, rng)
         for i, (key, (unit, size)) in enumerate(EXIT.items()):
             figures[f"exit_{key}_{unit}"] = root_ratio(size**2 * ends[:, i], None, rng) if len(ends) else None
+        carried = np.array([item["carried"] for item in own if "carried" in item])
+        for i, (key, (unit, size)) in enumerate(EXIT.items()):
+            if len(carried):
+                figures[f"carried_{key}_{unit}"] = root_ratio(size**2 * carried[:, i], None, rng)
         table[name] = figures
     return table
 
@@ -139,20 +165,31 @@ def study(plants: Sequence[str], scenarios: int) -> dict[str, Any]:
 
 def table(result: Mapping[str, Any]) -> str:
     """Markdown: a row a plant and estimator."""
-    names = ("plant", "estimator", "v_x, v_y [mm/s]", "covered of 90 %: v_x, v_y", "NEES", "exit along, across [mm]")
-    lines = [f"| {' | '.join(names)} |", "|---" * 6 + "|"]
+    names = (
+        "plant", "estimator", "v_x, v_y [mm/s]", "covered of 90 %: v_x, v_y", "NEES",
+        "next row along, across [mm]: by its velocities", "by the pose that it carries",
+    )  # fmt: skip
+    lines = [f"| {' | '.join(names)} |", "|---" * len(names) + "|"]
     for plant, found in result["plants"].items():
         for name, own in found["estimators"].items():
             velocity = ", ".join(f"{own[f'{v}_mm_s']['value']:.1f}" for v in ("v_x", "v_y"))
             covered = ", ".join(f"{100 * own[f'{v}_covered']['value']:.0f}" for v in ("v_x", "v_y"))
-            ends = [own["exit_along_mm"], own["exit_across_mm"]]
-            pose = ", ".join("not reached" if item is None else f"{item['value']:.0f}" for item in ends)
+            pose, kept = (_places(own, kind) for kind in ("exit", "carried"))
             nees = f"{own['nees']['value']:.1f}"
-            lines.append(f"| {TITLES[plant]} | {ESTIMATORS[name][0]} | {velocity} | {covered} | {nees} | {pose} |")
+            cells = (TITLES[plant], ESTIMATORS[name][0], velocity, covered, nees, pose, kept)
+            lines.append(f"| {' | '.join(cells)} |")
         if found["bound"]:
             low = ", ".join(f"{found['bound'][f'{v}_mm_s']['value']:.2g}" for v in ("v_x", "v_y"))
-            lines.append(f"| {TITLES[plant]} | **bound** (first {result['bound_turns']} turns) | {low} | | | |")
+            lines.append(f"| {TITLES[plant]} | **bound** (first {result['bound_turns']} turns) | {low} | | | | |")
     return "\n".join(lines)
+
+
+def _places(figures: Mapping[str, Any], kind: str) -> str:
+    """Errors along and across at the next row in a table."""
+    ends = [figures.get(f"{kind}_{side}_mm") for side in ("along", "across")]
+    if kind == "carried" and None in ends:
+        return ""
+    return ", ".join("not reached" if item is None else f"{item['value']:.0f}" for item in ends)
 
 
 def main(words: Sequence[str] | None = None) -> int:

@@ -35,7 +35,8 @@ class Arguments:
             `ddagr adapt`; a * stands for any letters of the trained ones, so that ppo_ekf_seed_* are all training
             seeds, which are judged together.
         scenarios: names of frozen sets, separated by commas: S0 to S8, V for tuning, T for another soil law, S1b to
-            S8b and Tb drawn a second and S1c to Tc a third time, on_slope_3 and others for robots and ground that differ.
+            S8b and Tb drawn a second time, S1c to S8c and Tc a third time, on_slope_3, on_slope_3_c and others for
+            robots and ground that differ.
         output: folder for report.html, summary.json, claims.json, the figure, episodes.parquet, and the dataset
             `episodes` by which it resumes.
         workers: processes, or processors of a local cluster.

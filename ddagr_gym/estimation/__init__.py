@@ -40,7 +40,7 @@ recording; ``estimates`` for speeds, soil, slip and turn radius with their stand
 
 ``InertialFilter(InertialModel.of(robot, sensors))`` is for ground that slopes and soil that changes: its velocities
 follow the accelerometer, gravity is among its states, and it carries the pose along (theory: filter, section 9).
-``LearnedFilter`` takes its velocities from a trained network instead (section 11).
+``LearnedFilter`` takes its velocities from a trained network instead, and of some networks the place (section 11).
 """
 
 from ddagr_gym.estimation.closed_form import PlanarMotion, encoder_motion, symmetric_forward_speed
@@ -53,7 +53,7 @@ from ddagr_gym.estimation.consistency import (
     chi_square_band,
     normalised_estimation_error,
 )
-from ddagr_gym.estimation.dead_reckoning import DeadReckoning, Reckoned
+from ddagr_gym.estimation.dead_reckoning import DeadReckoning, Reckoned, reckoned_track
 from ddagr_gym.estimation.derived import Estimates, estimates, slip_ratio
 from ddagr_gym.estimation.filter import BatchFilter, Filter, FilterRun, roll_out, run_filter
 from ddagr_gym.estimation.filter_model import FilterModel, FilterNoise, SoilPrior
@@ -116,6 +116,7 @@ __all__ = [
     "estimator_names",
     "normalised_estimation_error",
     "predict",
+    "reckoned_track",
     "roll_out",
     "run_filter",
     "run_inertial_filter",

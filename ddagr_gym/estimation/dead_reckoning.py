@@ -7,17 +7,19 @@ integrated.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ddagr_gym.errors import InputError
+from ddagr_gym.estimation.columns import stack_columns
 from ddagr_gym.estimation.filter import Filter
 from ddagr_gym.estimation.filter_model import FilterModel
 from ddagr_gym.estimation.inertial_filter import InertialFilter, InertialModel
 from ddagr_gym.estimation.inertial_layout import GRAVITY
-from ddagr_gym.estimation.layout import PARAMETER, PARAMETER_SIZE
+from ddagr_gym.estimation.layout import CHANNELS, COMMANDS, PARAMETER, PARAMETER_SIZE
 from ddagr_gym.estimation.learned_filter import LearnedFilter, LearnedModel
 
 Array = NDArray[np.float64]
@@ -179,3 +181,23 @@ class DeadReckoning:
         x, y, yaw = self._pose.tolist()
         v_x, v_y, yaw_rate = state[:3].tolist()
         return Reckoned(x, y, yaw, v_x, v_y, yaw_rate, soil, pull)
+
+
+def reckoned_track(model: LearnedModel, columns: Mapping[str, ArrayLike], start: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
+    """Pose (T, 3) x, y [m], yaw [rad] after each sample by a learned estimator, on a line within a block.
+
+    After the last whole block the pose stays.
+
+    Args:
+        model: of the estimator.
+        columns: of a recording at the sensors' rate, whose commands change at every block.
+        start: pose at rest before the first sample.
+    """
+    commands, readings = stack_columns(columns, COMMANDS, np.nan), stack_columns(columns, CHANNELS, np.nan)
+    size = model.network.description.samples
+    ends = np.arange(size, len(readings) + 1, size)
+    reckoning, first = DeadReckoning(model), np.asarray(start, dtype=np.float64)
+    reckoning.reset(*first.tolist())
+    poses = [first, *(reckoning.update(commands[end - size], readings[end - size : end])[:3] for end in ends)]
+    instants = np.arange(1, len(readings) + 1)
+    return np.column_stack([np.interp(instants, [0, *ends], series) for series in np.array(poses).T])

@@ -52,7 +52,8 @@ LARGEST_SLIP_SPEED, LARGEST_SIDE_SPEED = 0.35, 0.25
 filter that diverges must not take the network with it."""
 
 _KIND = "an estimator's network"
-_MOST_UNITS, _MOST_LAYERS = 512, 4
+MOST_UNITS, MOST_LAYERS = 512, 4
+"""Of a network that is read."""
 
 
 @dataclass(frozen=True)
@@ -226,8 +227,8 @@ def load_network(path: str | os.PathLike[str]) -> VelocityNetwork:
     arrays = read_arrays(file, _KIND)
     described, clip = _description(file, take_description(file, arrays, _KIND))
     units = int(np.size(arrays.get("input_bias", ()))) // 3
-    if not 1 <= units <= _MOST_UNITS:
-        raise InputError(f"{file} has {units} units: 1 to {_MOST_UNITS} expected.")
+    if not 1 <= units <= MOST_UNITS:
+        raise InputError(f"{file} has {units} units: 1 to {MOST_UNITS} expected.")
     shapes = _shapes(described, units)
     found = {name: take_array(file, arrays, name, *wanted, _KIND) for name, wanted in shapes.items()}
     if arrays:
@@ -274,7 +275,7 @@ def _description(file: Path, stored: bytes) -> tuple[NetworkDescription, float]:
         content["inputs"], content["calibration"] = tuple(content["inputs"]), tuple(content["calibration"])
         described = NetworkDescription(**content)
         factors = [float(value) for value in described.calibration]
-        samples, period, layers = int(described.samples), float(described.sample_period), int(described.layers)
+        samples, period, layers = int(described.samples), float(described.sample_period), described.layers
     except (ValueError, AttributeError, KeyError, TypeError, RecursionError):
         raise InputError(f"{file} is not {_KIND}: its description is incomplete.") from None
     if described.format not in FORMATS:
@@ -284,8 +285,12 @@ def _description(file: Path, stored: bytes) -> tuple[NetworkDescription, float]:
     unknown = [name for name in described.inputs if name not in INPUTS]
     if unknown or not described.inputs:
         raise InputError(f"{file}: its inputs are not those of this version: train anew.")
-    if len(factors) != (4 if described.place else 2) or not 1 <= layers <= _MOST_LAYERS:
-        raise InputError(f"{file}: {len(factors)} factors of calibration and {layers} layers do not fit together.")
+    if type(layers) is not int or not 1 <= layers <= MOST_LAYERS or type(described.place) is not bool:
+        raise InputError(f"{file}: layers {layers!r}, place {described.place!r}: 1 to {MOST_LAYERS}, true or false.")
+    if len(factors) != (4 if described.place else 2):
+        raise InputError(f"{file} has {len(factors)} factors of calibration: 2, or 4 with a place, expected.")
+    if described.format == 1 and (layers > 1 or described.place):
+        raise InputError(f"{file} has format 1, in which there is one layer and no place: train anew.")
     if not (min(*factors, clip, period) > 0.0 and max(*factors, clip, period) < 1e6):
         raise InputError(f"{file}: clip, calibration and sample period must be positive.")
     if not 2 <= samples <= 1000 or samples % 2:

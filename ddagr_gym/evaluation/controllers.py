@@ -168,10 +168,10 @@ DEFAULT = "B6"
 EKF_CONTROLLERS = ("B4", "B5")
 """Controllers that need the filter's features in the observation."""
 
-_ESTIMATORS = {"B6_learned": DEFAULT_ESTIMATOR, "B6_pose": "pose"}
+LEARNED_ESTIMATORS = {"B6_learned": "correction", "B6_pose": "pose"}
 """Learned estimators of path trackers."""
 
-INERTIAL_CONTROLLERS = ("B6", *_ESTIMATORS)
+INERTIAL_CONTROLLERS = ("B6", *LEARNED_ESTIMATORS)
 """Controllers with an inertial filter of their own."""
 
 BOUNDS = ("true_curvature", "true_soil", "true_path")
@@ -193,11 +193,11 @@ _LADDER: dict[str, tuple[_Maker, str]] = {
         "path tracker by the pose of the filter that takes the ground for level",
     ),
     "B6_learned": (
-        lambda turn, gains: _reckoned_tracker(learned_model(_ESTIMATORS["B6_learned"]), STANDING)(turn, gains),
+        lambda turn, gains: _reckoned_tracker(learned_model(LEARNED_ESTIMATORS["B6_learned"]), STANDING)(turn, gains),
         "B6 by the velocities of the learned estimator",
     ),
     "B6_pose": (
-        lambda turn, gains: _reckoned_tracker(learned_model(_ESTIMATORS["B6_pose"]), STANDING)(turn, gains),
+        lambda turn, gains: _reckoned_tracker(learned_model(LEARNED_ESTIMATORS["B6_pose"]), STANDING)(turn, gains),
         "B6 by velocities and place that a network corrects",
     ),
     "true_curvature": (_make_true_curvature, "upper bound, not deployable: PI on the true curvature"),
@@ -306,8 +306,8 @@ def controller_version(name: str) -> str:
     text = f"{name} {ladder_gains()!r}"
     if name == "B6":
         return f"{text} {_model_text(inertial_model())} {SETTLING}"
-    if name in _ESTIMATORS:
-        model = learned_model(_ESTIMATORS[name])
+    if name in LEARNED_ESTIMATORS:
+        model = learned_model(LEARNED_ESTIMATORS[name])
         settling = f" {SETTLING}" if model.network.description.place else ""
         return f"{text} {_model_text(model.inertial)} {model.network.digest()}{settling}"
     return text

@@ -10,15 +10,17 @@ from numpy.typing import NDArray
 
 from ddagr_gym.errors import InputError, unknown_name
 from ddagr_gym.estimation import run_filter
-from ddagr_gym.estimation.dead_reckoning import integrate_track
+from ddagr_gym.estimation.dead_reckoning import integrate_track, reckoned_track
 from ddagr_gym.estimation.inertial_filter import run_inertial_track
 from ddagr_gym.evaluation.campaign import drive_scenario, episode_row, nominal_filter
 from ddagr_gym.evaluation.controllers import (
     DEFAULT,
+    LEARNED_ESTIMATORS,
     estimates_path,
     find_controller,
     has_inertial_filter,
     inertial_model,
+    learned_model,
 )
 from ddagr_gym.evaluation.metrics import headland_samples
 from ddagr_gym.evaluation.report_data import (
@@ -69,8 +71,9 @@ def parse_replay(text: str) -> tuple[str, str, int]:
 def estimated_track(run: TurnRun, controller: str = "") -> Array:
     """Pose by the filter after each sample (T, 3): x, y [m], yaw [rad], from the known start.
 
-    The filter is run over the drive's readings anew: the inertial one, with the nominal robot, where it is that of the
-    controller; else that of the features, whose speeds and yaw rate are integrated.
+    The filter is run over the drive's readings anew: the inertial one, with the nominal robot and the controller's
+    network where it has one, where it is that of the controller; else that of the features, whose speeds and yaw rate
+    are integrated.
 
     Args:
         run: the drive.
@@ -78,6 +81,8 @@ def estimated_track(run: TurnRun, controller: str = "") -> Array:
     """
     episode = run.episode
     start = (-episode.turn.run_in, episode.lateral_offset, episode.heading_offset)
+    if controller in LEARNED_ESTIMATORS:
+        return reckoned_track(learned_model(LEARNED_ESTIMATORS[controller]), run.columns, start)
     if has_inertial_filter(controller):
         return run_inertial_track(inertial_model(), run.columns, start)[0]
     states = run_filter(nominal_filter(), run.columns).states

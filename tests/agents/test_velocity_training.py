@@ -1,13 +1,16 @@
 """Training of the learned estimator: drawn turns, torch against numpy, going on after an interruption."""
 
 import json
+from dataclasses import fields
 
 import numpy as np
 import pytest
 
 torch = pytest.importorskip("torch", reason="needs the extra rl")
 
-from agents.velocity_drives import Drives, Plan, _drive, as_drives, draw_turn, make_drives  # noqa: E402
+from agents.train_velocity import PUBLISHED, learnt_and_judged, main  # noqa: E402
+from agents.velocity_card import card, publish_estimator  # noqa: E402
+from agents.velocity_drives import NOMINAL, Drives, Plan, _drive, as_drives, draw_turn, make_drives  # noqa: E402
 from agents.velocity_training import (  # noqa: E402
     VARIANTS,
     VelocitySettings,
@@ -18,8 +21,9 @@ from agents.velocity_training import (  # noqa: E402
 from ddagr_gym.errors import InputError  # noqa: E402
 from ddagr_gym.estimation import LearnedBatch, LearnedModel  # noqa: E402
 from ddagr_gym.estimation.inertial_filter import InertialModel  # noqa: E402
+from ddagr_gym.estimation.learned_filter import find_network  # noqa: E402
 from ddagr_gym.estimation.learned_inputs import INPUTS  # noqa: E402
-from ddagr_gym.estimation.learned_network import VELOCITY_SCALE  # noqa: E402
+from ddagr_gym.estimation.learned_network import VELOCITY_SCALE, load_network  # noqa: E402
 from ddagr_gym.evaluation.scenarios import load_scenarios, scenario_names  # noqa: E402
 from ddagr_gym.parameters import Sensors  # noqa: E402
 from ddagr_gym.presets import ddagr  # noqa: E402
@@ -89,12 +93,87 @@ def test_the_loss_is_the_gaussian_likelihood():
     assert gaussian_loss(outputs, wanted, torch.ones(1, 1)).item() == pytest.approx(likelihood)
 
 
+def test_a_network_learns_the_place_that_the_filter_misses(tmp_path):
+    drives, judged = made_up(), made_up(8, seed=1)
+    for own in (drives, judged):
+        own.inputs[..., INPUTS.index("pose_x")] = own.places[..., 0] - 0.05
+    settings = VelocitySettings(turns=24, validation=8, units=8, layers=2, epochs=40, batch=6, learning_rate=0.02)
+    network = (own := VelocityTraining("pose", settings, drives, judged, tmp_path)).run()
+    assert own.course[0]["x_rmse_mm"] > 25.0
+    assert own.course[-1]["x_rmse_mm"] < 20.0  # 50 mm without learning
+    assert network.description.place
+    assert len(network.description.calibration) == 4
+
+
+def test_near_turns_are_of_the_task_as_it_is():
+    settings, episode = draw_turn(np.random.default_rng(3), NOMINAL)
+    assert not settings.effects
+    assert (episode.turn.radius, episode.turn.speed) == (0.80, 0.20)
+
+
+def test_workers_drive_the_same_turns(tmp_path, monkeypatch):
+    monkeypatch.setattr("agents.velocity_drives.PART", 1)
+    alone, shared = make_drives(2, 11, tmp_path / "one"), make_drives(2, 11, tmp_path / "two", workers=2)
+    for item in fields(Drives):
+        assert np.array_equal(getattr(alone, item.name), getattr(shared, item.name))
+
+
+def test_near_turns_are_learnt_from_and_judge_nothing(tmp_path):
+    settings = VelocitySettings(turns=2, near=1, validation=1, root_seed=11)
+    learnt, judged = learnt_and_judged(settings, tmp_path, 1)
+    assert (len(learnt), len(judged)) == (3, 1)
+    wide = make_drives(3, 11, tmp_path / "drives_11")
+    assert np.array_equal(judged.inputs[0], wide.inputs[2])
+    near = make_drives(1, 12, tmp_path / "drives_12", NOMINAL)
+    assert np.array_equal(learnt.inputs[2], near.inputs[0])
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["--estimators", "place"], "place"),
+        (["--workers", "0"], "workers is 0"),
+        (["--layers", "5"], "4 at most"),
+        (["--near", "-1"], "near is -1"),
+    ],
+)
+def test_bad_words_are_one_sentence(tmp_path, capsys, words, says):
+    with pytest.raises(SystemExit, match="2"):
+        main(["--output", str(tmp_path), *words])
+    assert says in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", VARIANTS)
+def test_a_published_card_is_that_of_its_record(name):
+    folder = PUBLISHED / name
+    record = json.loads((folder / "training.json").read_text())
+    assert (folder / "README.md").read_text() == card(record, VARIANTS[name])
+    assert find_network(name).description.calibration == tuple(record["calibration"])
+
+
+def test_what_is_published_is_of_the_training(tmp_path):
+    drives = made_up()
+    drives.truth[..., 0] = 0.002 * np.random.default_rng(5).standard_normal(drives.truth.shape[:2])
+    drives.places[..., 0] = 0.1
+    settings = VelocitySettings(turns=24, validation=24, units=8, layers=2, epochs=3, batch=6)
+    own = VelocityTraining("pose", settings, drives, drives, tmp_path / "run")
+    network = own.run()
+    publish_estimator(own, network, Plan(), tmp_path / "pose")
+    kept = load_network(tmp_path / "pose" / "network.npz")
+    assert kept.description == network.description
+    assert all(np.array_equal(value, kept.arrays()[name]) for name, value in network.arrays().items())
+    assert "training.png" in (tmp_path / "pose" / "README.md").read_text()
+    assert "a CPU core" in (tmp_path / "pose" / "README.md").read_text()
+    assert (tmp_path / "pose" / "training.png").stat().st_size > 10_000
+
+
 def test_mirroring_twice_changes_nothing():
     places, signs = mirror(INPUTS)
     assert np.array_equal(places[places], np.arange(len(INPUTS)))
     assert np.array_equal(signs * signs[places], np.ones(len(INPUTS)))
     assert signs[INPUTS.index("filter_gravity_y")] == -1.0
     assert signs[INPUTS.index("filter_deviation_gravity_y")] == 1.0
+    assert [signs[INPUTS.index(f"pose_{name}")] for name in ("x", "y", "turned", "deviation_turned")] == [1, -1, -1, 1]
 
 
 def test_drawn_turns_are_made_again_and_kept(tmp_path):
@@ -112,9 +191,9 @@ def test_drawn_turns_are_made_again_and_kept(tmp_path):
 
 def test_training_sees_what_the_estimator_sees_when_it_runs(tmp_path):
     columns = _drive([11, 0], Plan())
+    columns |= turned(columns, 0.7)
     drives = as_drives([columns])
     network = training(tmp_path, "correction").network()
-    torch.manual_seed(0)
     batch = LearnedBatch(LearnedModel(InertialModel.of(ddagr(), Sensors()).with_known_vibration(), network), 1)
     names = ("specific_force_x", "specific_force_y", "yaw_rate", "encoder_right", "encoder_left")
     readings = np.column_stack([columns[name] for name in names])
@@ -125,7 +204,34 @@ def test_training_sees_what_the_estimator_sees_when_it_runs(tmp_path):
         batch.step(commands[10 * k : 10 * k + 1], readings[None, block])
         network.step(drives.inputs[:, k, places].astype(float), memory)
     assert batch.units == pytest.approx(memory, abs=1e-4)
+    present = int(drives.present.sum())
+    carried = drives.inputs[0, :present][:, [INPUTS.index("pose_x"), INPUTS.index("pose_y")]]
+    assert np.abs(carried[-1]).max() > 0.5
+    assert drives.places[0, :present] == pytest.approx(carried, abs=0.1)  # as far as the filter is off
     assert VELOCITY_SCALE == 0.01
+
+
+def turned(columns, angle):
+    """True pose of a drive in a world that is turned and moved."""
+    x, y, cosine, sine = columns["true_x"], columns["true_y"], np.cos(angle), np.sin(angle)
+    return {
+        "true_x": 3.0 + cosine * x - sine * y,
+        "true_y": sine * x + cosine * y,
+        "true_yaw": columns["true_yaw"] + angle,
+    }
+
+
+def test_the_mirror_of_a_turn_is_what_its_mirrored_readings_give():
+    """On level ground every sideways reading and the sides of wheels and commands are exchanged."""
+    columns = _drive([77_002, 2], NOMINAL)
+    other = dict(columns)
+    for right, left in (("command_right", "command_left"), ("encoder_right", "encoder_left")):
+        other[right], other[left] = columns[left], columns[right]
+    for name in ("specific_force_y", "yaw_rate"):
+        other[name] = -columns[name]
+    places, signs = mirror(INPUTS)
+    own, mirrored = as_drives([columns]).inputs, as_drives([other]).inputs
+    assert mirrored == pytest.approx(own[..., places] * signs, abs=0.02)
 
 
 def test_no_frozen_scenario_is_drawn_for_training():

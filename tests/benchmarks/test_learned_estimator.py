@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from benchmarks.learned_estimator import ESTIMATORS, TITLES, drive, judge, main, plant_table, table
+from benchmarks.learned_estimator import CARRIED, ESTIMATORS, TITLES, drive, judge, main, plant_table, table
 from ddagr_gym.evaluation.runs import TurnRun
 
 
@@ -29,6 +29,9 @@ def test_every_estimator_is_judged_on_the_same_turn(run):
         assert 0.0 < min(own["square"]) < max(own["square"]) < 0.05**2
         assert max(own["exit"]) < 0.5**2
     assert found["correction"]["square"] != found["inertial"]["square"]
+    assert {name for name, own in found.items() if "carried" in own} == set(CARRIED)
+    assert found["inertial"]["carried"] != found["inertial"]["exit"]
+    assert max(found["pose"]["carried"]) < 0.1**2
 
 
 def test_an_estimator_that_knows_the_truth_has_no_error(run, monkeypatch):
@@ -49,6 +52,10 @@ def test_the_table_has_ratios_to_the_bound():
     assert found["alone"]["v_y_mm_s"]["value"] == pytest.approx(4.0)
     assert found["alone"]["v_y_over_bound"]["value"] == pytest.approx(2.0)
     assert found["alone"]["exit_along_mm"]["value"] == pytest.approx(30.0)
+    for name in CARRIED:
+        assert "carried_along_mm" not in found[name]
+    carried = [{name: own | {"carried": own["exit"]} for name, own in item.items()} for item in drives]
+    assert plant_table(carried, bound, 8)["pose"]["carried_across_mm"]["value"] == pytest.approx(30.0)
     text = table({"bound_turns": 8, "plants": {"level": {"estimators": found, "bound": bound}}})
     assert len(text.splitlines()) == 2 + len(ESTIMATORS) + 1
     assert TITLES["level"] in text

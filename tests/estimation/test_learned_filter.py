@@ -7,7 +7,14 @@ import numpy as np
 import pytest
 
 from ddagr_gym.errors import InputError
-from ddagr_gym.estimation import InertialModel, LearnedBatch, LearnedFilter, LearnedModel, run_learned_filter
+from ddagr_gym.estimation import (
+    DeadReckoning,
+    InertialModel,
+    LearnedBatch,
+    LearnedFilter,
+    LearnedModel,
+    run_learned_filter,
+)
 from ddagr_gym.estimation.learned_filter import estimator_names, find_network
 from ddagr_gym.estimation.learned_inputs import INPUTS, MEMORY_SIZE, SENSOR_INPUTS, Filtered, block_inputs
 from ddagr_gym.estimation.learned_network import (
@@ -73,6 +80,47 @@ def test_a_batch_agrees_with_filters_of_one_to_the_bit():
         assert np.array_equal(batch.states[n], one.state)
         assert np.array_equal(batch.covariances[n], one.covariance)
     assert not np.array_equal(batch.states[0], batch.states[1])
+
+
+def test_layers_and_places_agree_in_a_batch_and_alone():
+    model = make_model(layers=2, place=True)
+    batch, one = LearnedBatch(model, 2), LearnedFilter(model)
+    commands, readings = drive()
+    for k in range(20):
+        batch.step(np.tile(commands[k], (2, 1)), np.tile(readings[k], (2, 1, 1)))
+        one.run(commands[k : k + 1], readings[k])
+    assert np.array_equal(batch.poses, np.tile(one.pose, (2, 1)))
+    assert np.array_equal(batch.place_covariances[1], one.place_covariance)
+    assert (np.linalg.eigvalsh(one.place_covariance) > 0.0).all()
+    assert (np.abs(one.pose[:2] - one._inertial.pose[:2]) > 1e-4).all()
+    assert one.pose[2] == one._inertial.pose[2]
+    one.reset()
+    assert not one.pose.any()
+
+
+def test_a_place_is_the_filters_where_the_network_corrects_none():
+    one = LearnedFilter(make_model())
+    commands, readings = drive()
+    for k in range(20):
+        one.run(commands[k : k + 1], readings[k])
+    assert np.array_equal(one.pose, one._inertial.pose)
+    assert np.abs(one.pose[:2]).min() > 1e-4
+
+
+def test_dead_reckoning_follows_a_corrected_place():
+    model = make_model(layers=2, place=True)
+    reckoning, one = DeadReckoning(model), LearnedFilter(model)
+    reckoning.reset(2.0, -1.0, 0.5 * np.pi)
+    commands, readings = drive()
+    for k in range(20):
+        found = reckoning.update(commands[k], readings[k])
+        one.run(commands[k : k + 1], readings[k])
+    x, y, yaw = one.pose
+    assert found[:3] == pytest.approx([2.0 - y, -1.0 + x, 0.5 * np.pi + yaw])
+    slow = DeadReckoning(model, np.inf)
+    for k in range(20):
+        integrated = slow.update(commands[k], readings[k])
+    assert abs(integrated.x - x) > 1e-4
 
 
 def test_only_the_velocities_are_the_networks():
@@ -151,8 +199,9 @@ def test_a_diverged_filter_does_not_take_the_network_along():
     assert base[1] == pytest.approx([0.18, 0.02])
 
 
-def test_a_file_gives_the_same_network(tmp_path):
-    network = make_network(SENSOR_INPUTS, "rim")
+@pytest.mark.parametrize("changes", [{}, {"layers": 3, "place": True}])
+def test_a_file_gives_the_same_network(tmp_path, changes):
+    network = make_network(SENSOR_INPUTS, "rim", **changes)
     file = save_network(network, tmp_path / "network.npz")
     again = load_network(file)
     assert again.digest() == network.digest()
@@ -167,11 +216,31 @@ def test_a_file_gives_the_same_network(tmp_path):
         ({"output_weight": np.zeros((4, 6), np.float32)}, "output_weight is float32 of shape"),
         ({"deviation": np.zeros(len(INPUTS))}, "not positive"),
         ({"output_bias": np.full(OUTPUTS, np.nan, np.float32)}, "not finite"),
+        ({"layers": make_network(layers=2).layers}, "is not part of"),
     ],
 )
 def test_a_damaged_file_is_refused(tmp_path, change, message):
     with pytest.raises(InputError, match=message):
         load_network(save_network(replace(make_network(), **change), tmp_path / "network.npz"))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"format": 3}, "reads up to 2"),
+        ({"place": True}, "2 factors of calibration"),
+        ({"place": 0}, "true or false"),
+        ({"layers": 9}, "1 to 4"),
+        ({"layers": 1.0}, "1 to 4"),
+        ({"format": 1, "layers": 2}, "format 1"),
+        ({"layers": 2}, "it has no 'input_weight_2'"),
+    ],
+)
+def test_a_description_that_does_not_fit_is_refused(tmp_path, change, message):
+    network = make_network()
+    wrong = replace(network, description=replace(network.description, **change))
+    with pytest.raises(InputError, match=message):
+        load_network(save_network(wrong, tmp_path / "network.npz"))
 
 
 def test_a_description_of_other_inputs_is_refused(tmp_path):

@@ -91,6 +91,10 @@ def test_the_estimate_of_a_tracker_is_that_of_its_own_filter():
     own, other = (np.hypot(*(estimated_track(run, name)[-1, :2] - true[-1])) for name in ("B6", "B4"))
     assert own < 0.05
     assert own != other
+    corrected = estimated_track(run, "B6_pose")
+    assert corrected.shape == (len(true), 3)
+    assert 0.0 < np.hypot(*(corrected[-1, :2] - true[-1])) < 0.05
+    assert np.hypot(*(corrected[-1, :2] - true[-1])) != own
     assert [estimates_path(name) for name in ("B6", "B4", "B1")] == [True, True, False]
 
 
