@@ -95,8 +95,8 @@ def turn_step(arguments: Arguments, folder: Path) -> Section:
     _write(folder, driven, track)
     html = """<video controls muted loop src="row_turn.mp4"></video>
 <div class="wide"><img src="row_turn.svg" alt="Path, speeds, yaw rate, slip and sinkage of the turn"></div>
-<p>Dotted: where the extended Kalman filter believes the robot to be. It knows the pose at the start, and from there on
-only accelerometer, gyro, encoders and the commands.</p>
+<p>Dotted: where the controller's filter believes the robot to be. It knows the pose at the start, and from there on
+only accelerometer, gyro, encoders and the commands; a network corrects it.</p>
 <p>Data: <a href="row_turn.csv">row_turn.csv</a> (sensor columns, and the truth as <code>true_...</code>).</p>"""
     return Section("A row turn on soft soil", _summary(driven, track), html)
 
