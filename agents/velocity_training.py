@@ -377,7 +377,7 @@ class VelocityTraining:
         state: Mapping[str, Any] = torch.load(file, weights_only=True, map_location=self._device)
         record = json.loads(state["record"])
         mine = self._record()
-        if any(record[name] != mine[name] for name in ("name", "settings", "device")):
+        if any(record.get(name) != mine[name] for name in ("name", "settings", "device")):
             raise InputError(f"{file} is of a training with other settings: give another folder.")
         self.model.load_state_dict(state["model"])
         self._optimiser.load_state_dict(state["optimiser"])

@@ -2,7 +2,7 @@
 
     python -m benchmarks.third_sets FOLDER [--workers 2]
 
-Drives :data:`CONTROLLERS` on S1c to S8c, Tc and the sets named ``on_``, a plant and ``_c`` (about an hour of one core;
+Drives :data:`CONTROLLERS` on S1c to S8c, Tc and the sets named ``on_``, a plant and ``_c`` (50 minutes of two cores;
 started again with the same folder, it goes on), checks ``configs/evaluation/third_claims.yaml``, and writes
 ``benchmarks/results/third_sets.json`` and a picture beside it. Turns that no upper bound makes are left out.
 

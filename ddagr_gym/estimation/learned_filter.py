@@ -1,4 +1,4 @@
-"""The learned estimator: velocities and, by some networks, place by a trained network, all else by the inertial filter.
+"""The learned estimator: velocities, and by some networks the place, of a trained network; the rest of a filter.
 
 Theory: filter, section 11.
 """
