@@ -22,7 +22,7 @@ import torch
 from agents.velocity_card import publish_estimator
 from agents.velocity_drives import NOMINAL, Drives, Plan, joined_drives, make_drives
 from agents.velocity_training import VARIANTS, VelocitySettings, VelocityTraining
-from ddagr_gym.errors import InputError, unknown_name
+from ddagr_gym.errors import InputError, at_least, unknown_name
 from ddagr_gym.estimation.learned_network import save_network
 
 PUBLISHED = Path(__file__).parent / "estimators"
@@ -61,10 +61,11 @@ def train_estimators(
         workers: processes that drive.
         device: of torch.
     """
+    drives: dict[VelocitySettings, tuple[Drives, Drives]] = {}
     for name, settings in chosen.items():
-        training = VelocityTraining(
-            name, settings, *learnt_and_judged(settings, output, workers), output / name, device
-        )
+        if settings not in drives:
+            drives = {settings: learnt_and_judged(settings, output, workers)}  # the others' turns are not kept
+        training = VelocityTraining(name, settings, *drives[settings], output / name, device)
         network = training.run()
         save_network(network, output / name / "network.npz")
         print(f"{name}: {training.course[-1]}, calibration {network.description.calibration}")
@@ -89,8 +90,7 @@ def main(words: Sequence[str] | None = None) -> int:
         for name in names:
             if name not in VARIANTS:
                 raise unknown_name("estimator", name, VARIANTS)
-        if given.workers < 1:
-            raise InputError(f"workers is {given.workers}: give at least 1.")
+        at_least(workers=(given.workers, 1))
         if given.device == "cuda" and not torch.cuda.is_available():
             raise InputError("torch finds no GPU: leave --device out.")
         chosen = {name: replace(VARIANTS[name].settings, **changes) for name in names}

@@ -8,10 +8,8 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
-from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -37,7 +35,7 @@ from ddagr_gym.physics.effects.slope import Slope
 from ddagr_gym.physics.effects.soil_change import SoilChange
 from ddagr_gym.physics.lateral_scale import LateralScale
 from ddagr_gym.presets import ddagr
-from ddagr_gym.progress import Progress
+from ddagr_gym.tasks import Task, TaskRunner, run_tasks
 
 Array = NDArray[np.float64]
 Rng = np.random.Generator
@@ -260,7 +258,7 @@ def as_drives(columns: Sequence[Mapping[str, Array]]) -> Drives:
         innovations = batch.step(commands[:, k], given)
         own = Filtered(batch.states, batch.covariances, innovations, batch.poses, batch.pose_covariances)
         inputs[:, k] = block_inputs(memory, commands[:, k], given, own, model.flat.sample_period, radius, prior)
-        rims[:, k], filtered[:, k] = mean_rim_speed(given, radius), batch.states[:, :2]
+        rims[:, k], filtered[:, k] = mean_rim_speed(given, radius), own.states[:, :2]
     begun = np.maximum.accumulate((np.abs(commands) > 0.0).any(axis=2), axis=1)
     driving = (begun * present).astype(np.float32)
     single = (part.astype(np.float32) for part in (places, driving, present))
@@ -309,10 +307,9 @@ def make_drives(count: int, root_seed: int, folder: Path, plan: Plan = Plan(), w
     wanted = [range(first, min(first + PART, count)) for first in range(0, count, PART)]
     files = [folder / f"turns_{numbers[0]}_to_{numbers[-1]}.npz" for numbers in wanted]
     missing = [(numbers, file) for numbers, file in zip(wanted, files, strict=True) if not file.is_file()]
-    with Progress(count, "driving") as progress:
-        progress.advance(count - sum(len(numbers) for numbers, _ in missing))
-        for made in _each(partial(_make_part, root_seed, plan), missing, workers):
-            progress.advance(made)
+    tasks = [Task(file.stem, _make_part, (root_seed, plan, numbers, file)) for numbers, file in missing]
+    with TaskRunner(min(workers, max(len(tasks), 1))) as runner:
+        run_tasks(tasks, "driving", runner)
     parts = []
     for file in files:
         with np.load(file, allow_pickle=False) as stored:
@@ -325,24 +322,11 @@ def joined_drives(parts: Sequence[Drives]) -> Drives:
     return Drives(*(np.concatenate([getattr(part, item.name) for part in parts]) for item in fields(Drives)))
 
 
-def _make_part(root_seed: int, plan: Plan, part: tuple[range, Path]) -> int:
-    """Drive the turns of one part into its file; their number."""
-    numbers, file = part
+def _make_part(root_seed: int, plan: Plan, numbers: range, file: Path) -> None:
+    """Drive the turns of one part into its file; workers call it by name."""
     own = as_drives([_drive([root_seed, number], plan) for number in numbers])
     with atomic_path(file) as temporary:
         np.savez(temporary, **{item.name: getattr(own, item.name) for item in fields(own)})
-    return len(numbers)
-
-
-def _each(
-    make: Callable[[tuple[range, Path]], int], parts: Sequence[tuple[range, Path]], workers: int
-) -> Iterator[int]:
-    """What ``make`` returns for each part, as they are finished."""
-    if workers == 1 or len(parts) < 2:
-        yield from map(make, parts)
-        return
-    with get_context("spawn").Pool(min(workers, len(parts))) as pool:
-        yield from pool.imap_unordered(make, parts)
 
 
 def _check_same(folder: Path, settings: Mapping[str, Any]) -> None:

@@ -18,7 +18,7 @@ from scipy.stats import norm
 
 from agents.velocity_drives import Drives
 from ddagr_gym.control.timing import CONTROL_INTERVAL
-from ddagr_gym.errors import InputError
+from ddagr_gym.errors import InputError, at_least
 from ddagr_gym.estimation.learned_inputs import FILTER_INPUTS, INPUTS, SENSOR_INPUTS
 from ddagr_gym.estimation.learned_network import (
     FORMAT,
@@ -85,14 +85,11 @@ class VelocitySettings:
     clip: float = 8.0
 
     def __post_init__(self) -> None:
-        for name in ("turns", "validation", "units", "layers", "epochs", "batch"):
-            if getattr(self, name) < 1:
-                raise InputError(f"{name} is {getattr(self, name)}: give at least 1.")
+        counted = ("turns", "validation", "units", "layers", "epochs", "batch")
+        at_least(near=(self.near, 0), **{name: (getattr(self, name), 1) for name in counted})
         for name, most in (("units", MOST_UNITS), ("layers", MOST_LAYERS)):
             if getattr(self, name) > most:
                 raise InputError(f"{name} is {getattr(self, name)}: give {most} at most.")
-        if self.near < 0:
-            raise InputError(f"near is {self.near}: give 0 or more.")
 
 
 @dataclass(frozen=True)

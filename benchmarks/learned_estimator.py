@@ -16,6 +16,7 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -32,12 +33,12 @@ from benchmarks.velocity_bound.study import MOTION, exit_instant
 from benchmarks.velocity_bound.summary import EXIT, root_ratio
 from ddagr_gym.control.timing import CONTROL_INTERVAL
 from ddagr_gym.errors import InputError
-from ddagr_gym.estimation import InertialModel, LearnedModel, run_inertial_track, run_learned_filter
-from ddagr_gym.estimation.dead_reckoning import reckoned_track
+from ddagr_gym.estimation import LearnedModel, run_learned_filter
 from ddagr_gym.evaluation.campaign import scenario_settings
 from ddagr_gym.evaluation.controllers import find_controller
 from ddagr_gym.evaluation.runs import TurnRun, drive_turn
 from ddagr_gym.evaluation.scenarios import load_scenarios
+from ddagr_gym.evaluation.shown import estimated_track
 from ddagr_gym.files import write_json
 from ddagr_gym.parameters import Sensors
 from ddagr_gym.presets import ddagr
@@ -75,17 +76,8 @@ ESTIMATORS: dict[str, tuple[str, Callable[[TurnRun], Estimated]]] = {
 """By name: title and estimate."""
 
 
-def _inertial_track(columns: Columns, start: Array) -> Array:
-    model = InertialModel.of(ddagr(), Sensors()).with_known_vibration()
-    return run_inertial_track(model, columns, start)[0]
-
-
-def _corrected_track(columns: Columns, start: Array) -> Array:
-    return reckoned_track(LearnedModel.of(ddagr(), Sensors(), "pose"), columns, start)
-
-
-CARRIED: dict[str, Callable[[Columns, Array], Array]] = {"inertial": _inertial_track, "pose": _corrected_track}
-"""Poses (T, 3) from a known start, of the estimators that carry a place, by name."""
+CARRIED = {"inertial": "B6", "pose": "B6_pose"}
+"""Controllers that follow the path by it, of the estimators that carry a place, by name."""
 
 
 def drive(plant: str, number: int) -> TurnRun:
@@ -113,9 +105,7 @@ def judge(run: TurnRun) -> dict[str, Any]:
         errors = placed_motion(motion[: len(truth)], run.episode)[-1, 3:] - truth[-1, 3:]
         found[name] = own | {"exit": None if reached is None else (errors**2).tolist()}
         if name in CARRIED and reached is not None:
-            turn = run.episode
-            start = np.array([-turn.turn.run_in, turn.lateral_offset, turn.heading_offset])
-            errors = CARRIED[name](columns, start)[-1] - truth[-1, 3:]
+            errors = estimated_track(replace(run, columns=columns), CARRIED[name])[-1] - truth[-1, 3:]
             found[name]["carried"] = (errors**2).tolist()
     return found
 

@@ -128,6 +128,10 @@ def _reckoned_tracker(model: FilterModel | InertialModel | LearnedModel, standin
     return make_path_tracker(DeadReckoning(model, SETTLING), flat, standing)
 
 
+def _make_learned_tracker(name: str, turn: RowTurn, gains: LadderGains) -> Controller:
+    return _reckoned_tracker(learned_model(LEARNED_ESTIMATORS[name]), STANDING)(turn, gains)
+
+
 def tracker_gains_by_hand(gains: LadderGains) -> LadderGains:
     """The path tracker's gains before they were searched, without look-ahead and aligning: those of B6_flat."""
     return replace(
@@ -193,11 +197,11 @@ _LADDER: dict[str, tuple[_Maker, str]] = {
         "path tracker by the pose of the filter that takes the ground for level",
     ),
     "B6_learned": (
-        lambda turn, gains: _reckoned_tracker(learned_model(LEARNED_ESTIMATORS["B6_learned"]), STANDING)(turn, gains),
+        lambda turn, gains: _make_learned_tracker("B6_learned", turn, gains),
         "B6 by the velocities of the learned estimator",
     ),
     "B6_pose": (
-        lambda turn, gains: _reckoned_tracker(learned_model(LEARNED_ESTIMATORS["B6_pose"]), STANDING)(turn, gains),
+        lambda turn, gains: _make_learned_tracker("B6_pose", turn, gains),
         "B6 by velocities and place that a network corrects",
     ),
     "true_curvature": (_make_true_curvature, "upper bound, not deployable: PI on the true curvature"),

@@ -1,4 +1,4 @@
-"""The second drawing and the frozen plants: which controller becomes the default by the rule, and what is kept."""
+"""The second and third drawing and the frozen plants: which controller is the default by the rule, and what is kept."""
 
 from __future__ import annotations
 
@@ -10,17 +10,25 @@ import pytest
 pytest.importorskip("matplotlib", reason="needs the extra report")
 pytest.importorskip("pyarrow", reason="needs the extra io")
 
-from benchmarks import second_sets
-from benchmarks.second_sets import READING, SETS, default_by_rule, table
-from benchmarks.third_sets import READING as THIRD
+from benchmarks import second_sets, third_sets
+from benchmarks.second_sets import READING, default_by_rule, table, title, version_of
 from ddagr_gym.config import configs_dir
 from ddagr_gym.evaluation.claims import check_claims, load_claims
+from ddagr_gym.evaluation.controllers import DEFAULT
 from ddagr_gym.evaluation.scenarios import set_hash
+
+CHOSEN = {second_sets.READING: third_sets.READING.former, third_sets.READING: DEFAULT}
+"""What each drawing decided."""
+
+
+@pytest.fixture(scope="module", params=CHOSEN, ids=["second", "third"])
+def reading(request):
+    return request.param
 
 
 @pytest.fixture(scope="module")
-def committed():
-    return json.loads(second_sets.RESULT.read_text())
+def committed(reading):
+    return json.loads(reading.result.read_text())
 
 
 def metrics(success, error, closer=(0.4, 0.6)):
@@ -50,23 +58,33 @@ def summary(**arms):
     ],
 )
 def test_the_rule_for_the_default(arms, chosen):
-    reading = replace(READING, sets=("S1b", "S2b"))
-    assert default_by_rule(summary(**arms), reading)["chosen"] == chosen
+    two = replace(READING, sets=("S1b", "S2b"))
+    assert default_by_rule(summary(**arms), two)["chosen"] == chosen
 
 
-def test_the_record_is_of_what_ships(committed):
-    assert committed["scenarios"] == {name: set_hash(name) for name in SETS}
-    for name, version in committed["controllers"].items():
-        assert second_sets.version_of(name) == version
+def test_the_record_is_of_what_ships(committed, reading):
+    assert committed["scenarios"] == {name: set_hash(name) for name in reading.sets}
+    assert committed["controllers"] == {name: version_of(name) for name in reading.controllers}
 
 
-def test_the_record_obeys_its_rules(committed):
+def test_the_record_obeys_its_rules(committed, reading):
     by_arm = {arm: {name: found[arm] for name, found in committed["sets"].items()} for arm in committed["controllers"]}
-    assert default_by_rule(by_arm)["chosen"] == committed["default"]["chosen"] == THIRD.former
-    claims = check_claims(load_claims(configs_dir() / "evaluation" / "second_claims.yaml"), by_arm)
+    assert default_by_rule(by_arm, reading)["chosen"] == committed["default"]["chosen"] == CHOSEN[reading]
+    claims = check_claims(load_claims(configs_dir() / "evaluation" / reading.claims), by_arm)
     assert [claim.verdict for claim in claims] == [claim["verdict"] for claim in committed["claims"]]
     assert "not driven" not in {claim.verdict for claim in claims}
 
 
 def test_the_page_of_results_says_what_the_record_says(committed, repository):
     assert table(committed) in (repository / "docs/results/row_turns.md").read_text()
+
+
+def test_titles_say_what_a_plant_is():
+    assert title("on_slope_3_c") == "on_slope_3_c: slope of 3 degrees"
+    assert title("S2c") == "S2c: weaker soils than the training range"
+
+
+def test_the_former_default_is_needed(capsys, tmp_path):
+    with pytest.raises(SystemExit, match="2"):
+        third_sets.main([str(tmp_path), "--controllers", "B1,B4,B6_pose"])
+    assert "lacks B6" in capsys.readouterr().err
