@@ -29,8 +29,8 @@ class CalibrationResult(Report):
     """A robot as its drives show it.
 
     ``report(folder)`` writes robot.yaml, a soil file for each ground, effects.yaml, draws.yaml (what
-    ``gym.make(calibration=folder)`` draws from), calibration.json, and a page, calibration.html; with
-    ``bank=True`` bank.json besides.
+    ``gym.make(calibration=folder)`` draws from), calibration.json, bank.json (what other drives are
+    compared with; not with ``bank=False``), and a page, calibration.html.
 
     Attributes:
         outcome: answer, calibrated robot and soils, and the forecasts behind them (:mod:`ddagr_gym.calibration.run`).
@@ -128,7 +128,7 @@ def calibrate(
     *,
     seed: int = 0,
     threads: int = 1,
-    bank: bool = False,
+    bank: bool = True,
     supply_currents: bool = False,
     processes: int = 1,
     cluster: str = "",
@@ -151,7 +151,7 @@ def calibrate(
         threads: of the simulator, in each process.
         supply_currents: also fit currents that motors draw from their supply; their own current is always fitted.
         bank: also diagnose every drive with the robot calibrated without it: what ordinary drives do to every effect of
-            the library, about a minute for each drive of 10 min.
+            the library, about a minute for each drive of 10 min. Without it no other drive can be compared with these.
         processes: for what does not depend on each other: the fits from several starts and, for the bank, the drives.
         cluster: a Ray cluster to run them on: "local" starts one of so many processors here, an address takes one that
             runs. The result is the same.

@@ -147,7 +147,7 @@ def diagnose(
         recordings: one or several recordings, tables with the schema's columns, paths of files or folders.
         robot: nominal: name, YAML file or object.
         soil: nominal: name, YAML file or object.
-        calibration: folder that ``ddagr calibrate --bank`` wrote: the robot, its grounds and its ordinary drives stand
+        calibration: folder that ``ddagr calibrate`` wrote: the robot, its grounds and its ordinary drives stand
             for robot, soil, thresholds and windows, which are left out then.
         ground: of the calibration that the recordings are on; "" for one of which only the kind is known, where far
             larger changes are hidden.

@@ -135,7 +135,7 @@ def diagnose_drives(
 
     Args:
         recordings: drives: recordings, tables, paths of files, or a folder.
-        calibration: folder that ``ddagr calibrate --bank`` wrote.
+        calibration: folder that ``ddagr calibrate`` wrote.
         ground: of the calibration that all drives are on; "" for one of which only the kind is known.
         seed: of the resampling.
         threads: of the simulator, in each process.

@@ -33,7 +33,7 @@ READ = (1, 2)
 """Versions that are read: the first one has no ordinary drives to compare others with."""
 
 _FAULT = "is no bank of drives"
-_REMEDY = "make it with `ddagr calibrate --bank`"
+_REMEDY = "make it with `ddagr calibrate`, without --no-bank"
 
 STRIDE = 18.0
 """Seconds between windows of 6 s (ours): a third of a drive, so that its scan takes about a minute."""
@@ -112,7 +112,7 @@ def load_ordinary(path: Path) -> Ordinary:
     if not body.get("ordinary"):
         raise InputError(
             f"{path} says nothing of the sizes of effects in ordinary drives: calibrate again with two drives or more "
-            "and --bank."
+            "and without --no-bank."
         )
     try:
         return ordinary_from_mapping(body["ordinary"])

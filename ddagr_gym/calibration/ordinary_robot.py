@@ -16,7 +16,7 @@ def load_ordinary_robot(folder: Path) -> OrdinaryRobot:
     """The calibrated robot of a folder with what its ordinary drives are like.
 
     Args:
-        folder: that ``ddagr calibrate --bank`` wrote.
+        folder: that ``ddagr calibrate`` wrote.
 
     Raises:
         InputError: no such folder, no bank in it, or one that an earlier version wrote.

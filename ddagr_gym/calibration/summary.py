@@ -20,7 +20,7 @@ from ddagr_gym.identification.windows import WindowSet
 from ddagr_gym.recordings.schema import Recording
 
 NOT_IDENTIFIED = "the drives do not identify it (it would be about as uncertain as before)."
-NOT_NEEDED = "forecasts of left-out drives are as good without it."
+NOT_NEEDED = "forecasts of left-out drives are worse without it by too little, or not at all."
 
 NO_SCATTER = Scatter(0, None, None, 0, 0)
 

@@ -40,7 +40,7 @@ class Arguments:
         soil: nominal soil (see `ddagr soils`), or the path of a YAML file with one's own.
         diagnosis: folder that `ddagr diagnose` wrote, in place of recordings.
         calibration: folder that `ddagr calibrate` wrote, in place of robot and soil: alone, or with recordings that are
-            compared with its ordinary drives (it needs --bank then).
+            compared with its ordinary drives (made without --no-bank then).
         ground: of the calibration.
         controller: that is adapted: B4, the force balance, or B6, the path tracker.
         radius: of the turns [m].

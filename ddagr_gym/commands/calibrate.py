@@ -40,13 +40,13 @@ class Arguments:
         map: shipped map by name or the path of one's own YAML file, for sources that are not imported yet.
         seed: of the resampled intervals.
         threads: of the simulator, in each process.
-        processes: for what does not depend on each other: the fits from several starts and, with --bank, the drives;
+        processes: for what does not depend on each other: the fits from several starts, and the drives of the bank;
             each holds the drives that it works on.
         cluster: a Ray cluster to run that on: "local" starts one of so many processors here, an address
             (ray://HOST:PORT) takes one that runs.
         supply_currents: also fit currents that motors draw from their supply; their own current is always fitted.
-        bank: also diagnose every drive with the robot calibrated without it, and write bank.json: what ordinary drives
-            do to every effect of the library.
+        bank: also diagnose every drive with the robot calibrated without it, and write bank.json, without which
+            nothing can be compared with the calibration: what ordinary drives do to every effect of the library.
         overwrite: replace an output folder that an earlier command wrote.
         maximum_rows: refuse a recording with more rows or messages.
         maximum_bytes: refuse a recording that unpacks to more bytes.
@@ -62,7 +62,7 @@ class Arguments:
     threads: int = 2
     processes: int = 1
     cluster: str = ""
-    bank: bool = False
+    bank: bool = True
     supply_currents: bool = False
     overwrite: bool = False
     maximum_rows: int = 2_000_000

@@ -27,6 +27,7 @@ def evaluation_step(folder: Path, scenarios: int = SCENARIOS, workers: int = 2) 
     from ddagr_gym.commands.evaluation_report import write_files, write_report
     from ddagr_gym.commands.output import format_table
     from ddagr_gym.evaluation.campaign import run_campaign
+    from ddagr_gym.evaluation.controllers import controller_title
     from ddagr_gym.evaluation.dataset import EPISODES
     from ddagr_gym.evaluation.summary import summaries
     from ddagr_gym.policies.shipped import selected_policies
@@ -40,10 +41,12 @@ def evaluation_step(folder: Path, scenarios: int = SCENARIOS, workers: int = 2) 
     summary: dict[str, Any] = summaries(rows)
     write_files(target, rows, summary)
     write_report(target, rows, summary, workers=workers)
+    named = "; ".join(f"<b>{name}</b>: {controller_title(name)}" for name in controllers)
     html = f"""<p>The first {scenarios} scenarios of set {SET}: a look, not a result. All of it:
 <code>ddagr evaluate --scenarios S1</code>.</p>
 <div class="wide"><a href="evaluation/{PAGE}"><img src="evaluation/{PICTURE}.png" alt="Turn radius error by controller">
 </a></div>
+<p>{named}. The error is of the turned radius, in percent of the commanded one.</p>
 <p>Everything about it, with paths, the filter's estimate and the worst turns: <a href="evaluation/{PAGE}">page</a>,
 <a href="evaluation/summary.json">summary</a>, <a href="evaluation/episodes.parquet">episodes</a>.</p>"""
     return Section("Which controller turns closest", format_table(*results_table(summary)), html)

@@ -45,7 +45,7 @@ class Arguments:
             drives.json, and a diagnosis.json of each.
         robot: nominal robot (see `ddagr robots`), or the path of a YAML file with one's own.
         soil: nominal soil (see `ddagr soils`), or the path of a YAML file with one's own.
-        calibration: folder that `ddagr calibrate --bank` wrote, whose robot, grounds and ordinary drives the recordings
+        calibration: folder that `ddagr calibrate` wrote, whose robot, grounds and ordinary drives the recordings
             are compared with; robot, soil, thresholds, window and stride are left out then.
         ground: of the calibration that the recordings are on; left out for one that it does not know.
         before: drives of the same robot from before, when it was ordinary, all on one ground; with them robot and soil

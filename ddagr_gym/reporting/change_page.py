@@ -9,7 +9,6 @@ from ddagr_gym.diagnosis.answer.change import BEFORE
 from ddagr_gym.files import write_text
 from ddagr_gym.reporting import change_figures as figures
 from ddagr_gym.reporting import change_text as text
-from ddagr_gym.reporting.diagnosis_text import FINDING_HEADER, finding_rows
 from ddagr_gym.reporting.figures import house_style
 from ddagr_gym.reporting.onset_figure import onset_figure, timed
 from ddagr_gym.reporting.page_template import embedded, page_template
@@ -87,8 +86,8 @@ def _context(diagnosis: Diagnosis) -> dict[str, Any]:
         else None,
         "channel_header": text.CHANNEL_HEADER,
         "channels": text.channel_rows(diagnosis),
-        "finding_header": FINDING_HEADER,
-        "findings": finding_rows(diagnosis),
+        "finding_header": text.CHANGED_HEADER,
+        "findings": text.changed_rows(diagnosis),
         "shift_header": text.SHIFT_HEADER,
         "shifts": text.shift_rows(diagnosis),
         "parameter_header": text.PARAMETER_HEADER,

@@ -10,12 +10,16 @@ from ddagr_gym.diagnosis.answer.change import BEFORE
 from ddagr_gym.diagnosis.result.sentences import certificate_in_words
 from ddagr_gym.diagnosis.wording import CHANNEL_NAMES, title
 from ddagr_gym.physics.effects.slope import Slope
-from ddagr_gym.reporting.diagnosis_text import FINDING_HEADER, finding_rows
+from ddagr_gym.reporting.diagnosis_text import finding_rows
+from ddagr_gym.reporting.parameter_units import unit_in_words
 from ddagr_gym.reporting.text_table import format_table
 
 if TYPE_CHECKING:
     from ddagr_gym.diagnosis.answer.change import Change, EffectShift, SizeShift
     from ddagr_gym.diagnosis.answer.verdict import Diagnosis
+
+CHANGED_HEADER = ("effect", "size", "90 % interval", "unit", "distance", "limit", "could also be")
+"""Columns of :func:`changed_rows`; distance and limit in standard deviations of what makes ordinary drives differ."""
 
 SHIFT_HEADER = ("effect", "size", "before", "shift", "deviation", "unit", "distance", "limit", "would be found from")
 """Columns of :func:`shift_rows`; distance and limit in standard deviations."""
@@ -35,7 +39,7 @@ def change_text(diagnosis: Diagnosis) -> str:
     change = _of(diagnosis)
     parts = [diagnosis.sentence]
     if diagnosis.findings:
-        parts.append(format_table(FINDING_HEADER, finding_rows(diagnosis)))
+        parts.append(format_table(CHANGED_HEADER, changed_rows(diagnosis)))
     parts += [line for line in (certified(diagnosis), slope_before(change)) if line]
     rows = [row for item in change.shifts[:SHOWN] for row in _rows(item)]
     parts.append(format_table(SHIFT_HEADER, rows))
@@ -44,6 +48,11 @@ def change_text(diagnosis: Diagnosis) -> str:
         parts.append(f"{further} effects more are less conspicuous; the page and diagnosis.json have all of them.")
     parts.append("\n".join(["Not looked for:", *(f"  {line}" for line in not_compared(change))]))
     return "\n\n".join(parts)
+
+
+def changed_rows(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
+    """One row per size of what is named, under :data:`CHANGED_HEADER`: gains are half the squares of distances."""
+    return finding_rows(diagnosis, lambda gain: math.sqrt(2.0 * gain))
 
 
 def shift_rows(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
@@ -59,7 +68,7 @@ def parameter_rows(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
             number(item.change),
             number(item.with_effects),
             f"± {number(item.expected_deviation)}",
-            "log of a factor" if item.unit == "-" else item.unit,
+            unit_in_words(item.name, item.unit),
         )
         for item in _of(diagnosis).parameters
     ]

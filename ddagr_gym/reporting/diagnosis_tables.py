@@ -42,7 +42,7 @@ def _of_drive(diagnosis: Diagnosis, seconds: float) -> str:
     """What the time that windows cover is of: of long drives they are some."""
     total, recordings = sum(item.seconds for item in diagnosis.data), _recordings(len(diagnosis.recordings))
     if seconds > _NEARLY_ALL * total:
-        return f"of drive in {recordings}"
+        return f"of {total:.0f} s compared, in {recordings}"
     return f"compared, in windows evenly chosen from {total:.0f} s in {recordings}"
 
 

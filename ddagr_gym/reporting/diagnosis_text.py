@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
 from ddagr_gym.reporting.drivetrain_section import (
@@ -56,16 +56,22 @@ def _doubt_line(doubt: DataDoubt) -> str:
     return f"  {place}: {doubt.sentence}" if place else f"  {doubt.sentence}"
 
 
-def finding_rows(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
-    """One row per parameter of each finding that is no part of the drivetrain, under :data:`FINDING_HEADER`."""
-    return [row for finding in other_findings(diagnosis) for row in _finding_rows(finding)]
+def finding_rows(diagnosis: Diagnosis, evidence: Callable[[float], float] = lambda gain: gain) -> list[tuple[str, ...]]:
+    """One row per parameter of each finding that is no part of the drivetrain, under :data:`FINDING_HEADER`.
+
+    Args:
+        diagnosis: the answer.
+        evidence: what is shown of a gain and of its gate.
+    """
+    return [row for finding in other_findings(diagnosis) for row in _finding_rows(finding, evidence)]
 
 
-def _finding_rows(finding: Finding) -> Iterator[tuple[str, ...]]:
+def _finding_rows(finding: Finding, evidence: Callable[[float], float]) -> Iterator[tuple[str, ...]]:
     """One row per parameter; what belongs to the whole finding is in the first."""
     others = [f"{name} {weight:.2f}" for name, weight in finding.equivalence_set.items() if name != finding.name]
     none = "nothing else" if finding.gate > 0.0 else "seen in the values"
-    gated = (f"{finding.gain:.1f}", f"{finding.gate:.1f}") if max(finding.gain, finding.gate) > 0.0 else ("–", "–")
+    seen = max(finding.gain, finding.gate) > 0.0
+    gated = tuple(f"{evidence(value):.1f}" if seen else "–" for value in (finding.gain, finding.gate))
     whole = (*gated, ", ".join(others) or none)
     for number, (name, estimate) in enumerate(shown_parameters(finding).items()):
         interval = "" if estimate.interval is None else f"{estimate.interval[0]:.3g} to {estimate.interval[1]:.3g}"

@@ -10,6 +10,7 @@ from ddagr_gym.replay_analysis.horizons import METRICS
 from ddagr_gym.replay_analysis.intervals import ErrorStatistics
 from ddagr_gym.replay_analysis.report import MODELS, DriveModeReport, ReplayReport, lead_errors
 from ddagr_gym.reporting.page_template import page_template
+from ddagr_gym.reporting.parameter_units import unit_in_words
 from ddagr_gym.reporting.replay_figures import MODEL_STYLES
 
 DRIVEN = {"commands": "commands", "encoders": "wheel speeds"}
@@ -92,7 +93,6 @@ def _parameter_table(mode: DriveModeReport) -> _Table | None:
     rows = []
     for p in mode.refit.parameters:
         doubt = "at its bound" if p.at_bound else "pulled" if abs(p.pull) > _PULLED else ""
-        unit = "ln factor" if p.unit == "-" else p.unit
         numbers = [f"{p.value:+.3g}", f"{p.window_deviation:.2g}", f"{p.prior:.2g}", f"{p.pull:+.1f}", doubt]
-        rows.append([f"{p.name.replace('_', ' ')} [{unit}]", *numbers])
+        rows.append([f"{p.name.replace('_', ' ')} [{unit_in_words(p.name, p.unit)}]", *numbers])
     return _Table(["refitted parameter, 0 is nominal", "value", "deviation", "prior", "value / prior", ""], rows)

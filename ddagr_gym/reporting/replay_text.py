@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ddagr_gym.replay_analysis.report import MODELS, DriveModeReport, ReplayReport, lead_errors
+from ddagr_gym.reporting.parameter_units import unit_in_words
 from ddagr_gym.reporting.text_table import format_table, short
 
 DRIVEN_BY = {"commands": "commands", "encoders": "wheel speeds"}
@@ -68,7 +69,7 @@ def _fit_text(mode: DriveModeReport) -> str:
     if mode.refit is None:
         return ""
     rows = [
-        (p.name, "ln factor" if p.unit == "-" else p.unit, f"{p.value:+.3f}", f"{p.window_deviation:.3f}",
+        (p.name, unit_in_words(p.name, p.unit), f"{p.value:+.3f}", f"{p.window_deviation:.3f}",
          f"{p.prior:.3f}", f"{p.pull:+.1f}", "at bound" if p.at_bound else "pulled" if abs(p.pull) > 3.0 else "")
         for p in mode.refit.parameters
     ]  # fmt: skip

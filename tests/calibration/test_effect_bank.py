@@ -80,11 +80,11 @@ def test_the_file_reads_back(made, tmp_path):
 
 
 def test_no_bank_is_said(tmp_path):
-    with pytest.raises(InputError, match="make it with `ddagr calibrate --bank`"):
+    with pytest.raises(InputError, match="make it with `ddagr calibrate`, without --no-bank"):
         load_runs(tmp_path / NAME)
     for text in ("[]", '{"runs": []}', '{"version": 1, "runs": [{}]}'):
         (tmp_path / NAME).write_text(text)
-        with pytest.raises(InputError, match="make it with `ddagr calibrate --bank`"):
+        with pytest.raises(InputError, match="make it with `ddagr calibrate`, without --no-bank"):
             load_runs(tmp_path / NAME)
     (tmp_path / NAME).write_text('{"version": 0, "runs": [{}]}')
     with pytest.raises(InputError, match="calibrate again"):

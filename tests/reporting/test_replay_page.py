@@ -84,6 +84,6 @@ def test_parameters_that_were_pulled_are_marked(value, bound, word):
     parameter = FittedParameter("soil_strength", "-", value, 0.1, 0.1, 0.2, value / 0.2, bound)
     refit = RefitReport((parameter,), 4, 2.0, 3, True, 1.0, 1.0)
     page = replay_page(report([mode([error(REFITTED), error(EFFECTIVE_TRACK)], refit=refit)]), {})
-    assert "soil strength [ln factor]" in page
+    assert "soil strength [log of a factor]" in page
     row = page[page.index("soil strength") :].split("</tr>")[0]
     assert ("pulled" in row, "at its bound" in row) == (word == "pulled", word == "bound")

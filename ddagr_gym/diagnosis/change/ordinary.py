@@ -37,7 +37,7 @@ LEAST_ACCELEROMETER_BIAS = 0.02
 SLOPE_ON_A_GROUND = 0.05
 """Deviation [m/s^2] of what accelerometers read too much between drives on one ground (ours): 0.3 degrees of slope."""
 
-NEWER = "the calibration is older than this effect: calibrate again with --bank"
+NEWER = "the calibration is older than this effect: calibrate again"
 
 
 @dataclass(frozen=True, eq=False)
