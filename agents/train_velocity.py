@@ -2,12 +2,13 @@
 
     python -m agents.train_velocity --output runs/velocity [--estimators correction,alone,features] [--publish]
     python -m agents.train_velocity --output runs/pose --estimators pose --workers 16 --device cuda [--publish]
+    python -m agents.train_velocity --output runs/pose_wide --estimators pose_wide --workers 2 [--publish]
 
 Drives the turns (see ``agents/velocity_drives.py``) and trains a network for each estimator; those of the first line
 learn from the same turns. The one of the second line learns from 15 540 turns, for which a GPU takes two minutes and a
-CPU core some hours. An interrupted run goes on where it was: turns are kept in parts of 50, trainings after every pass.
-With --publish the networks, records, pictures and cards go to agents/estimators. Same settings, same numbers on the
-same device.
+CPU core some hours. That of the third line learns on from it, within the hour on two cores. An interrupted run goes on
+where it was: turns are kept in parts of 50, trainings after every pass. With --publish
+the networks, records, pictures and cards go to agents/estimators. Same settings, same numbers on the same device.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from pathlib import Path
 import torch
 
 from agents.velocity_card import publish_estimator
-from agents.velocity_drives import NOMINAL, Drives, Plan, joined_drives, make_drives
+from agents.velocity_drives import NOMINAL, WIDE, Drives, Plan, joined_drives, make_drives
 from agents.velocity_training import VARIANTS, VelocitySettings, VelocityTraining
 from ddagr_gym.errors import InputError, at_least, unknown_name
 from ddagr_gym.estimation.learned_network import save_network
@@ -28,7 +29,7 @@ from ddagr_gym.estimation.learned_network import save_network
 PUBLISHED = Path(__file__).parent / "estimators"
 QUICK = ("correction", "alone", "features")
 """Estimators that a CPU core trains in minutes."""
-CHANGEABLE = ("turns", "near", "validation", "epochs", "units", "layers", "batch", "seed")
+CHANGEABLE = ("turns", "near", "wide", "validation", "epochs", "units", "layers", "batch", "seed")
 """Settings with an option of their own."""
 
 
@@ -46,6 +47,11 @@ def learnt_and_judged(settings: VelocitySettings, output: Path, workers: int) ->
     if settings.near:
         near = make_drives(settings.near, seed + 1, output / f"drives_{seed + 1}", NOMINAL, workers)
         learnt = joined_drives([learnt, near])
+    if settings.wide:
+        count = settings.wide + settings.validation
+        wide = make_drives(count, seed + 2, output / f"drives_{seed + 2}", WIDE, workers)
+        learnt = joined_drives([learnt, wide.part(slice(settings.wide))])
+        judged = joined_drives([judged, wide.part(slice(settings.wide, None))])
     return learnt, judged
 
 

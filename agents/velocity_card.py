@@ -6,7 +6,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from agents.velocity_drives import Plan
+from agents.velocity_drives import WIDE, Plan
 from agents.velocity_training import ESTIMATED, Variant, VelocityTraining
 from ddagr_gym.estimation.learned_inputs import SENSOR_INPUTS
 from ddagr_gym.estimation.learned_network import VelocityNetwork, save_network
@@ -28,6 +28,8 @@ def publish_estimator(training: VelocityTraining, network: VelocityNetwork, plan
         "device": training.device,
         "course": training.course,
     }
+    if training.settings.wide:
+        record["wide_plan"] = asdict(WIDE)
     write_json(folder / "training.json", record)
     draw_training(record, folder / "training.png")
     write_text(folder / "README.md", card(record, training.variant))
@@ -130,7 +132,7 @@ def _inputs(variant: Variant) -> str:
 def _training(record: dict[str, Any]) -> list[str]:
     """Lines of a list."""
     settings, plan = record["settings"], record["plan"]
-    shares = ", ".join(f"{key.replace('_', ' ')} {100.0 * value:.0f} %" for key, value in plan.items())
+    begun = settings.get("begun", "")
     layers = settings.get("layers", 1)
     units = f"{settings['units']} units" if layers == 1 else f"{layers} layers of {settings['units']} units"
     turns = record.get("turns", _turns(settings))
@@ -139,19 +141,45 @@ def _training(record: dict[str, Any]) -> list[str]:
         f"- {turns} No scenario of a frozen set took part.",
         "- Driven by B6 (60 %), B4 (25 %) and two constant speeds (15 %), their gains times a half to two, their "
         "commands wandering in most turns; 0.3 to 1.3 s of standing first.",
-        f"- Shares of turns: {shares}. Slopes up to 6 degrees, lateral forces x 0.75 to 1.3, strength and "
+        f"- Shares of turns: {_shares(plan)}. Slopes up to 6 degrees, lateral forces x 0.75 to 1.3, strength and "
         "stiffness x 0.6 to 1.6 from some time on, dead time up to 0.25 s, mass x 0.9 to 1.25, variation of the "
         "soil up to 10 %.",
+        *_wide_turns(record),
+        *(
+            [f"- It began with the weights of `{begun}`, at a learning rate of {settings['learning_rate']:g}."]
+            * bool(begun)
+        ),
         f"- Gaussian likelihood of each pair with its correlation; {units}, "
         f"{settings['epochs']} passes, seed {settings['seed']}; turns mirrored at random; "
         f"{record['seconds']} seconds of {device}.",
     ]
 
 
+def _shares(plan: dict[str, float]) -> str:
+    """Shares of turns that differ from the task, in words."""
+    return ", ".join(f"{key.replace('_', ' ')} {100.0 * value:.0f} %" for key, value in plan.items() if value)
+
+
+def _wide_turns(record: dict[str, Any]) -> list[str]:
+    """Line on the turns of the wide plan, where there are some."""
+    if "wide_plan" not in record:
+        return []
+    return [
+        f"- Of the wide turns: {_shares(record['wide_plan'])}. Motors of 60 to 100 N m, payloads of 5 to 50 kg at a "
+        "place on the platform, patches of strength x 0.5 to 1.6, one side stronger by up to a third, ruts, slip "
+        "sinkage or soil pushed aside."
+    ]
+
+
 def _turns(settings: dict[str, Any]) -> str:
     """Turns that a training learnt from, by its settings."""
-    seed, near = settings["root_seed"], settings.get("near", 0)
+    seed, near, wide = settings["root_seed"], settings.get("near", 0), settings.get("wide", 0)
     further = f" {near} more are of the task as it is, of the seed {seed + 1}." if near else ""
+    if wide:
+        further += (
+            f" {wide} more are of robots, grounds and sensors that differ more, of the seed {seed + 2}; the next "
+            f"{settings['validation']} of these are validation, too."
+        )
     return (
         f"{settings['turns']} simulated turns, numbers 0 to {settings['turns'] - 1} of the seed {seed}; the next "
         f"{settings['validation']} are its validation.{further}"
@@ -167,8 +195,10 @@ def _validation(record: dict[str, Any], variant: Variant) -> str:
     )
     covered = ", ".join(f"{100 * last[f'{name}_covered']:.0f}" for name, _, _ in told)
     factors = ", ".join(f"{factor:.2f}" for factor in record["calibration"])
+    settings = record["settings"]
+    count = settings["validation"] * (2 if settings.get("wide") else 1)
     return (
-        f"On {record['settings']['validation']} turns of the same draws, while driving: {errors}; of 90 % intervals "
+        f"On {count} turns of the same draws, while driving: {errors}; of 90 % intervals "
         f"{covered} % were covered. Calibrated by the factors {factors} on the deviations, with which 90 % are covered "
         "on these turns. Root mean squares are those of the few turns on which the robot gets stuck or the filter "
         "diverges."

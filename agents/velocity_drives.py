@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ddagr_gym.control.pid import PidGains
+from ddagr_gym.control.row_turn import RowTurn
 from ddagr_gym.control.timing import CONTROL_INTERVAL, CONTROL_PERIOD
 from ddagr_gym.envs.constants import EPISODE_STEPS
 from ddagr_gym.envs.options import make_settings
@@ -29,10 +30,16 @@ from ddagr_gym.evaluation.controllers import find_controller, make_path_tracker
 from ddagr_gym.evaluation.ladder_gains import LadderGains, ladder_gains
 from ddagr_gym.evaluation.runs import Controller, drive_turn
 from ddagr_gym.files import atomic_path, write_json
-from ddagr_gym.parameters import Sensors
+from ddagr_gym.parameters import Drivetrain, Sensors
 from ddagr_gym.physics.effects import Effect
+from ddagr_gym.physics.effects.lateral_bulldozing import LateralBulldozing
+from ddagr_gym.physics.effects.multipass import Multipass
+from ddagr_gym.physics.effects.payload import Payload
+from ddagr_gym.physics.effects.slip_sinkage import SlipSinkage
 from ddagr_gym.physics.effects.slope import Slope
 from ddagr_gym.physics.effects.soil_change import SoilChange
+from ddagr_gym.physics.effects.soil_patch import SoilPatch
+from ddagr_gym.physics.effects.soil_split import SoilSplit
 from ddagr_gym.physics.lateral_scale import LateralScale
 from ddagr_gym.presets import ddagr
 from ddagr_gym.tasks import Task, TaskRunner, run_tasks
@@ -60,6 +67,11 @@ class Plan:
         sloping: share on a slope.
         lateral: share with scaled lateral forces.
         changing: share with soil that changes during the drive.
+        weak: share with motors that the ground slows down, with a limited torque.
+        one_sided: share with a payload at a place on the platform.
+        patched: share with a patch of other soil on the turn.
+        split: share with another soil on one side than on the other.
+        worked: share with ruts, wheels that dig in, or soil that their sides push.
     """
 
     other_soil: float = 0.25
@@ -71,10 +83,21 @@ class Plan:
     sloping: float = 0.55
     lateral: float = 0.50
     changing: float = 0.40
+    weak: float = 0.0
+    one_sided: float = 0.0
+    patched: float = 0.0
+    split: float = 0.0
+    worked: float = 0.0
 
 
 NOMINAL = Plan(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 """The task as it is: no turn differs."""
+
+WIDE = Plan(
+    other_soil=0.25, other_size=0.30, stressed=0.35, slow=0.10, late=0.30, loaded=0.30, sloping=0.35, lateral=0.35,
+    changing=0.30, weak=0.12, one_sided=0.20, patched=0.12, split=0.15, worked=0.20,
+)  # fmt: skip
+"""Robots, grounds and sensors that trouble a network which learnt from :class:`Plan` as it is."""
 
 
 def draw_turn(rng: Rng, plan: Plan = Plan()) -> tuple[TurnSettings, Episode]:
@@ -97,7 +120,10 @@ def draw_turn(rng: Rng, plan: Plan = Plan()) -> tuple[TurnSettings, Episode]:
     if rng.random() < plan.loaded:
         mass = episode.robot.mass * float(rng.uniform(0.9, 1.25))
         episode = replace(episode, robot=replace(episode.robot, mass=mass))
-    return replace(settings, effects=_effects(episode, rng, plan)), episode
+    effects = _effects(episode, rng, plan)
+    if plan.weak and rng.random() < plan.weak:
+        episode = _weakened(episode, rng)
+    return replace(settings, effects=(*effects, *_further_effects(episode, rng, plan))), episode
 
 
 def _stressed(episode: Episode, rng: Rng) -> Episode:
@@ -127,6 +153,42 @@ def _effects(episode: Episode, rng: Rng, plan: Plan) -> tuple[Effect, ...]:
         duration = (turn.run_in + turn.turn_length + turn.run_out) / turn.speed
         found.append(SoilChange(float(strength), float(stiffness), float(rng.uniform(0.15, 0.85)) * duration))
     return tuple(found)
+
+
+def _weakened(episode: Episode, rng: Rng) -> Episode:
+    """Banks that the ground slows down; with less torque nobody turns."""
+    drivetrain = Drivetrain(
+        load_compliance=float(rng.uniform(0.1, 0.3)),
+        integral_rate=30.0,
+        integral_limit=12.0,
+        acceleration_limit=float(rng.uniform(12.0, 20.0)),
+        no_load_speed=4.0,
+    )
+    return replace(episode, robot=replace(episode.robot, drivetrain=drivetrain))
+
+
+def _further_effects(episode: Episode, rng: Rng, plan: Plan) -> list[Effect]:
+    """Effects drawn after all else, so that the draws of plans without them stay as they are."""
+    found: list[Effect] = []
+    if plan.one_sided and rng.random() < plan.one_sided:
+        x, y = (float(value) for value in rng.uniform((-0.25, -0.2), (0.25, 0.2)))
+        found.append(Payload(float(rng.uniform(5.0, 50.0)), x, y))
+    if plan.patched and rng.random() < plan.patched:
+        found.append(_patch(episode.turn, rng))
+    if plan.split and rng.random() < plan.split:
+        found.append(SoilSplit(float(np.exp(rng.uniform(-0.3, 0.3)))))
+    if plan.worked and rng.random() < plan.worked:
+        size, kind = float(rng.uniform(0.0, 0.5)), int(rng.integers(3))
+        found.append((Multipass(size), SlipSinkage(size), LateralBulldozing(3.0 * size))[kind])
+    return found
+
+
+def _patch(turn: RowTurn, rng: Rng) -> SoilPatch:
+    """Other soil between 30 and 150 degrees of the turn."""
+    angle = math.radians(float(rng.uniform(30.0, 150.0)))
+    x, y = turn.radius * math.sin(angle), turn.sign * turn.radius * (1.0 - math.cos(angle))
+    strength = float(np.exp(rng.uniform(math.log(0.5), math.log(1.6))))
+    return SoilPatch(strength, centre_x=x, centre_y=y, radius=float(rng.uniform(0.3, 0.7)), edge=0.1)
 
 
 class WanderingController:

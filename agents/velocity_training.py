@@ -19,6 +19,7 @@ from scipy.stats import norm
 from agents.velocity_drives import Drives
 from ddagr_gym.control.timing import CONTROL_INTERVAL
 from ddagr_gym.errors import InputError, at_least
+from ddagr_gym.estimation.learned_filter import find_network
 from ddagr_gym.estimation.learned_inputs import FILTER_INPUTS, INPUTS, SENSOR_INPUTS
 from ddagr_gym.estimation.learned_network import (
     FORMAT,
@@ -47,6 +48,8 @@ ESTIMATED = (("v_x", "mm_s"), ("v_y", "mm_s"), ("x", "mm"), ("y", "mm"))
 """What networks estimate, with units of their errors in a record."""
 DEVIATIONS = float(norm.ppf(0.95))
 """Standard deviations either side that hold 90 %."""
+_WEIGHTS = ("weight_ih", "weight_hh", "bias_ih", "bias_hh")
+"""What torch calls the numbers of a recurrent layer."""
 _LEAST_DEVIATION = 1e-4  # of an input, in its unit: one that hardly changes is not blown up
 _MOST_ROWS = 1_000_000  # from which the inputs' deviations are taken
 _GATE = 5.0  # standard deviations beyond which an error counts linearly (P. Huber, 1964)
@@ -59,7 +62,9 @@ class VelocitySettings:
     Attributes:
         turns: that are learnt from, drawn by the plan.
         near: further ones of the task as it is, drawn with the next root seed.
-        validation: turns of the plan after them for course and calibration.
+        wide: further ones of robots, grounds and sensors that differ more, drawn with the root seed after that.
+        validation: turns after those of the plan, and where there are wide ones as many after those, for course and
+            calibration.
         root_seed: of the turns.
         seed: of the network and the order of turns.
         units: of its memory.
@@ -69,10 +74,12 @@ class VelocitySettings:
         learning_rate: at the start; it falls to a fiftieth on a cosine.
         rest_weight: of an instant at rest in the loss; 1 while driving.
         clip: of normalised inputs.
+        begun: published estimator whose network goes on to learn; a new network where it is empty.
     """
 
     turns: int = 2300
     near: int = 0
+    wide: int = 0
     validation: int = 200
     root_seed: int = 20_261_240
     seed: int = 0
@@ -83,10 +90,11 @@ class VelocitySettings:
     learning_rate: float = 3e-3
     rest_weight: float = 0.05
     clip: float = 8.0
+    begun: str = ""
 
     def __post_init__(self) -> None:
         counted = ("turns", "validation", "units", "layers", "epochs", "batch")
-        at_least(near=(self.near, 0), **{name: (getattr(self, name), 1) for name in counted})
+        at_least(near=(self.near, 0), wide=(self.wide, 0), **{name: (getattr(self, name), 1) for name in counted})
         for name, most in (("units", MOST_UNITS), ("layers", MOST_LAYERS)):
             if getattr(self, name) > most:
                 raise InputError(f"{name} is {getattr(self, name)}: give {most} at most.")
@@ -115,11 +123,18 @@ _BESIDE = SENSOR_INPUTS + FILTER_INPUTS
 _LONG = VelocitySettings(
     turns=7760, near=7780, root_seed=77_001, units=128, layers=2, epochs=80, batch=128, learning_rate=3e-3
 )
+_LONGER = VelocitySettings(
+    turns=1500, near=2500, wide=4000, root_seed=78_001, units=128, layers=2, epochs=10, batch=128, learning_rate=1e-3,
+    begun="pose",
+)  # fmt: skip
 VARIANTS = {
     "correction": Variant("corrects the inertial filter, whose estimate and innovations it sees", _BESIDE, "filter"),
     "alone": Variant("sees sensors and commands alone, no force law", SENSOR_INPUTS, "rim"),
     "features": Variant("sees the inertial filter, does not correct it", _BESIDE, "rim"),
     "pose": Variant("corrects velocities and place of the inertial filter", INPUTS, "filter", True, _LONG),
+    "pose_wide": Variant(
+        "corrects as pose, from which it learnt on with worse sensors and motors", INPUTS, "filter", True, _LONGER
+    ),
 }
 """The published estimators by name."""
 
@@ -213,17 +228,40 @@ class VelocityTraining:
     ) -> None:  # fmt: skip
         self.name, self.variant, self.settings, self.folder = name, VARIANTS[name], settings, make_folder(folder)
         self._places = np.array([INPUTS.index(item) for item in self.variant.inputs])
-        self._mean, self._deviation = self._statistics(drives)
+        begun = find_network(settings.begun) if settings.begun else None
+        self._mean, self._deviation = self._statistics(drives) if begun is None else (begun.mean, begun.deviation)
         self.device, self._device = device, exact_device(device)
         self._drives, self._validation = self._tensors(drives), self._tensors(validation)
         torch.set_num_threads(1)
         torch.manual_seed(settings.seed)
         outputs = 2 * OUTPUTS if self.variant.place else OUTPUTS
         self.model = VelocityModel(len(self._places), settings.units, settings.layers, outputs).to(self._device)
+        if begun is not None:
+            self._go_on_from(begun)
         self._optimiser = torch.optim.Adam(self.model.parameters(), lr=settings.learning_rate)
         self._mirror = mirror(self.variant.inputs)
         self.course: list[dict[str, float]] = []
         self.seconds = 0.0
+
+    def _go_on_from(self, network: VelocityNetwork) -> None:
+        """Begin with the weights of a network that sees and estimates the same.
+
+        Raises:
+            InputError: it has other inputs, units or layers.
+        """
+        settings, own = self.settings, network.description
+        if (network.units, own.layers, own.inputs) != (settings.units, settings.layers, self.variant.inputs):
+            raise InputError(
+                f"{self.name} goes on from {settings.begun}, which has {own.layers} layers of {network.units} units: "
+                "leave --layers and --units out."
+            )
+        layers = {
+            f"memory.{kind}_l{place}": weight
+            for place, layer in enumerate(network.layers)
+            for kind, weight in zip(_WEIGHTS, layer, strict=True)
+        }
+        layers |= {"output.weight": network.output_weight, "output.bias": network.output_bias}
+        self.model.load_state_dict({name: torch.tensor(value, dtype=torch.float32) for name, value in layers.items()})
 
     def _statistics(self, drives: Drives) -> tuple[Array, Array]:
         """Median and deviation of the inputs while driving, of turns to both sides alike.
@@ -349,9 +387,9 @@ class VelocityTraining:
             settings.layers, variant.place,
         )  # fmt: skip
         numbers = {name: value.detach().cpu().numpy().copy() for name, value in self.model.state_dict().items()}
-        kinds = ("weight_ih", "weight_hh", "bias_ih", "bias_hh")
         layers = tuple(
-            RecurrentLayer(*(numbers[f"memory.{kind}_l{place}"] for kind in kinds)) for place in range(settings.layers)
+            RecurrentLayer(*(numbers[f"memory.{kind}_l{place}"] for kind in _WEIGHTS))
+            for place in range(settings.layers)
         )
         output = (numbers["output.weight"], numbers["output.bias"])
         return VelocityNetwork(described, layers, *output, self._mean, self._deviation, settings.clip)

@@ -4,7 +4,8 @@ Sets are frozen once by ``ddagr freeze-scenarios`` and then read, never drawn ag
 selection; the others are opened only after the claims of ``configs/evaluation/claims.yaml`` are written. S1b to S8b and
 Tb are a second drawing of S1 to S8 and T, made once much had been learnt from the first. The sets named ``on_`` and
 :mod:`a plant <benchmarks.plants>` are the first sixty turns of S1b, on each plant. S1c to S8c, Tc and the same names
-with ``_c`` at their end are a third drawing, made once the networks that correct the inertial filter had been trained.
+with ``_c`` at their end are a third drawing, made once the networks that correct the inertial filter had been trained;
+S1d to S8d, Td and ``_d`` are a fourth, made before the network of B6_pose_wide was chosen.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from ddagr_gym.evaluation.scenarios import GroundRecipe, Scenario, build_field
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.soil_laws import LAW, NOMINAL_LAW
 
-_ROOT_SEED, _SECOND_SEED, _THIRD_SEED = 20_261_120, 20_261_125, 20_261_127
+_ROOT_SEED, _SECOND_SEED, _THIRD_SEED, _FOURTH_SEED = 20_261_120, 20_261_125, 20_261_127, 20_261_128
 _ON_PLANT = 1
 """Last part of the seed of what a plant changes."""
 
@@ -197,6 +198,16 @@ PLANS |= {name: _again(name.removesuffix("c"), "c", "third", _THIRD_SEED) for na
 ON_PLANTS_AGAIN = {f"on_{name}_c": plant for name, plant in _OTHER_PLANTS.items()}
 """Plants by the names of their sets of the third drawing."""
 PLANS |= {name: _on_plant(plant, "S1c") for name, plant in ON_PLANTS_AGAIN.items()}
+
+FOURTH = (*(f"S{number}d" for number in range(1, 9)), "Td")
+"""Names of the fourth drawing."""
+PLANS |= {name: _again(name.removesuffix("d"), "d", "fourth", _FOURTH_SEED) for name in FOURTH}
+ON_PLANTS_FOURTH = {f"on_{name}_d": plant for name, plant in _OTHER_PLANTS.items()}
+"""Plants by the names of their sets of the fourth drawing."""
+PLANS |= {name: _on_plant(plant, "S1d") for name, plant in ON_PLANTS_FOURTH.items()}
+
+ALL_ON_PLANTS = ON_PLANTS | ON_PLANTS_AGAIN | ON_PLANTS_FOURTH
+"""Plants by the names of their sets."""
 
 
 def draw_set(name: str) -> list[tuple[int, Episode, GroundRecipe]]:

@@ -27,7 +27,7 @@ from typing import Any
 from benchmarks.commits import commit_of
 from benchmarks.row_turn_plants import cell
 from benchmarks.row_turns import CHECKOUT, rounded
-from benchmarks.scenario_sets import ON_PLANTS, ON_PLANTS_AGAIN, PLANS, SECOND
+from benchmarks.scenario_sets import ALL_ON_PLANTS, ON_PLANTS, PLANS, SECOND
 from benchmarks.second_sets_figure import draw
 from ddagr_gym.config import configs_dir
 from ddagr_gym.errors import InputError
@@ -148,7 +148,7 @@ def version_of(name: str) -> str:
 
 def title(name: str) -> str:
     """Of a set, in tables and pictures."""
-    plant = (ON_PLANTS | ON_PLANTS_AGAIN).get(name)
+    plant = ALL_ON_PLANTS.get(name)
     return f"{name}: {PLANS[name].description.partition(', ')[2] if plant is None else plant.title}"
 
 

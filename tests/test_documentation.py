@@ -157,7 +157,7 @@ def test_every_scenario_set_is_on_its_page(repository: Path, theory: dict[str, s
     sets = [
         path.name.removesuffix(".json.gz") for path in (repository / "configs" / "evaluation" / "scenarios").iterdir()
     ]
-    assert len(sets) == 59
+    assert len(sets) == 83
     for name in sets:
         assert re.search(rf"^\| {re.escape(name)} \| \d+ \| ", theory["control"], re.MULTILINE), name
 

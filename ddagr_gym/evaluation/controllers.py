@@ -172,7 +172,7 @@ DEFAULT = "B6_pose"
 EKF_CONTROLLERS = ("B4", "B5")
 """Controllers that need the filter's features in the observation."""
 
-LEARNED_ESTIMATORS = {"B6_learned": "correction", "B6_pose": "pose"}
+LEARNED_ESTIMATORS = {"B6_learned": "correction", "B6_pose": "pose", "B6_pose_wide": "pose_wide"}
 """Learned estimators of path trackers."""
 
 INERTIAL_CONTROLLERS = ("B6", *LEARNED_ESTIMATORS)
@@ -203,6 +203,10 @@ _LADDER: dict[str, tuple[_Maker, str]] = {
     "B6_pose": (
         lambda turn, gains: _make_learned_tracker("B6_pose", turn, gains),
         "B6 by velocities and place that a network corrects",
+    ),
+    "B6_pose_wide": (
+        lambda turn, gains: _make_learned_tracker("B6_pose_wide", turn, gains),
+        "B6_pose by a network that learnt on with worse sensors, motors and loads",
     ),
     "true_curvature": (_make_true_curvature, "upper bound, not deployable: PI on the true curvature"),
     "true_soil": (_make_true_soil, "upper bound, not deployable: B4 with the true soil and the true curvature"),

@@ -1,7 +1,7 @@
 """Training of the learned estimator: drawn turns, torch against numpy, going on after an interruption."""
 
 import json
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ torch = pytest.importorskip("torch", reason="needs the extra rl")
 
 from agents.train_velocity import PUBLISHED, learnt_and_judged, main  # noqa: E402
 from agents.velocity_card import card, publish_estimator  # noqa: E402
-from agents.velocity_drives import NOMINAL, Drives, Plan, _drive, as_drives, draw_turn, make_drives  # noqa: E402
+from agents.velocity_drives import NOMINAL, WIDE, Drives, Plan, _drive, as_drives, draw_turn, make_drives  # noqa: E402
 from agents.velocity_training import (  # noqa: E402
     VARIANTS,
     VelocitySettings,
@@ -128,6 +128,50 @@ def test_near_turns_are_learnt_from_and_judge_nothing(tmp_path):
     assert np.array_equal(learnt.inputs[2], near.inputs[0])
 
 
+def test_wide_turns_have_robots_and_grounds_that_others_have_not():
+    further = {"Payload", "SoilPatch", "SoilSplit", "Multipass", "SlipSinkage", "LateralBulldozing"}
+    seen, weak = {True: set(), False: set()}, {True: 0, False: 0}
+    for number in range(150):
+        for plan in (WIDE, Plan()):
+            settings, episode = draw_turn(np.random.default_rng([5, number]), plan)
+            seen[plan is WIDE] |= {type(effect).__name__ for effect in settings.effects}
+            weak[plan is WIDE] += episode.robot.drivetrain != ddagr().drivetrain
+    assert further <= seen[True]
+    assert not further & seen[False]
+    assert weak[True] > 5
+    assert weak[False] == 0
+
+
+def test_what_wide_turns_have_besides_is_drawn_last():
+    plain = replace(WIDE, weak=0.0, one_sided=0.0, patched=0.0, split=0.0, worked=0.0)
+    for number in range(20):
+        wide, plan = (draw_turn(np.random.default_rng([6, number]), own) for own in (WIDE, plain))
+        assert wide[1].soils == plan[1].soils
+        assert wide[1].sensors == plan[1].sensors
+        assert wide[0].effects[: len(plan[0].effects)] == plan[0].effects
+
+
+def test_wide_turns_are_learnt_from_and_judge_too(tmp_path):
+    settings = VelocitySettings(turns=1, wide=1, validation=1, root_seed=11)
+    learnt, judged = learnt_and_judged(settings, tmp_path, 1)
+    wide = make_drives(2, 13, tmp_path / "drives_13", WIDE)
+    assert (len(learnt), len(judged)) == (2, 2)
+    assert np.array_equal(learnt.inputs[1], wide.inputs[0])
+    assert np.array_equal(judged.inputs[1], wide.inputs[1])
+
+
+def test_a_training_goes_on_from_a_published_network(tmp_path):
+    settings = VelocitySettings(turns=24, validation=8, units=128, layers=2, epochs=1, batch=6, begun="pose")
+    own = VelocityTraining("pose_wide", settings, made_up(), made_up(8, seed=1), tmp_path)
+    before, published = own.network().arrays(), find_network("pose").arrays()
+    assert all(np.array_equal(before[name], published[name]) for name in published)
+    after = own.run().arrays()
+    assert not np.array_equal(after["output_weight"], published["output_weight"])
+    assert np.array_equal(after["mean"], published["mean"])
+    with pytest.raises(InputError, match="2 layers of 128 units"):
+        VelocityTraining("pose_wide", replace(settings, units=8), made_up(), made_up(8, seed=1), tmp_path)
+
+
 @pytest.mark.parametrize(
     ("words", "says"),
     [
@@ -135,6 +179,7 @@ def test_near_turns_are_learnt_from_and_judge_nothing(tmp_path):
         (["--workers", "0"], "workers is 0"),
         (["--layers", "5"], "4 at most"),
         (["--near", "-1"], "near is -1"),
+        (["--wide", "-1"], "wide is -1"),
     ],
 )
 def test_bad_words_are_one_sentence(tmp_path, capsys, words, says):

@@ -8,7 +8,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.scenario_sets import ON_PLANTS, ON_PLANTS_AGAIN, PLANS, PLANT_COUNT, SECOND, THIRD
+from benchmarks.scenario_sets import (
+    FOURTH,
+    ON_PLANTS,
+    ON_PLANTS_AGAIN,
+    ON_PLANTS_FOURTH,
+    PLANS,
+    PLANT_COUNT,
+    SECOND,
+    THIRD,
+)
 from ddagr_gym.errors import InputError
 from ddagr_gym.evaluation import scenarios as scenario_module
 from ddagr_gym.evaluation.scenarios import load_scenarios, scenario_folder, scenario_names, set_hash
@@ -74,6 +83,30 @@ FROZEN = {
     "on_weak_motors_c": "788f0dfeb257ad75b6700de96f583c4b8f029708796f4ab40b85245fb07fdb7f",
     "on_split_c": "fe0d37483fc958cf9b2d859cf3ca4d9e7a84a61be7aa2a550a1a3745f4b6f983",
     "on_patch_c": "f15a24d4c7f27ddff0cd8c640cb99489774aba2198098ca14c1d930a7db2df2b",
+    "S1d": "c13761845fd56ca89dab5a278bf4216b50aace5e05757e8546af77449b7c7a40",
+    "S2d": "d4f336966ab80296791ed7005a091b49dbda098ea1169a0bc40bdc77df6da0bf",
+    "S3d": "3ceb89d34d9a3765402a0344a911ea81776bb62e579379f56ad0eea8a4314728",
+    "S4d": "e40470f42e0f86f9a66f9910e530b70eb1879253da82fb077afcd83a1e34a929",
+    "S5d": "a264d5a38199e403e5b0d752729038991ec8c48da75c30919b4d57093860e130",
+    "S6d": "0ba9a1927a168ad13bc8f882b7cfbf9bf2510ea327cfaee3f0e3d765c2be0a6d",
+    "S7d": "b4d7c256397a1141382ededc4b1cab5730444569f2166f14197db215c02ee638",
+    "S8d": "abadae62a3529a07e2e2fc368e8638f0d7bb0c02448e719e27e32de31d15aced",
+    "Td": "9877189ffdb98331e2c942c51ed28053a2d962b9c778eda000f84512946f2a59",
+    "on_slope_3_d": "8ca65580f8a058513b8058f20db115145b334a0a48e9ea1230a9c75f7bdeaafb",
+    "on_slope_5_d": "817bdba07451eb6e6ca7306c5a1908ed8e10c7d706a8f4aabe0edd4d21ea6cc6",
+    "on_weaker_d": "aa6de18b7663e72ab6d7f1130d9a985afaf07ad058c08e66f3e72dbd39a0fa5c",
+    "on_lateral_0.8_d": "6eeca872d08e35e4968b8619d4f387b3133ee3400f5d1d4156d2366a8dd742c7",
+    "on_lateral_1.2_d": "dabe7bf050e1c1b2a705f7ba5f118400b869a8f3d78f2685d68ee919aba42357",
+    "on_late_d": "6b10b3959a5bd622698f47db1019a1df518774b53e012f5d3e2e4bbc6cefe4ef",
+    "on_heavy_d": "fc16c94239ac95c00274a2198bb8a8d158981d7214158e628d668753aa1a8c10",
+    "on_ruts_d": "e655fc838d4fa4e2cd27eddf6b9c0621b3ac960c4476fe19a09d61ed8ce95df5",
+    "on_slip_sinkage_d": "2c47dcb5beb84bbdca114557b225c77b00306a1e7341f3724fc197be58c831c0",
+    "on_bulldozing_d": "f04868d0ef6f3989fc4ba2cef014c83d19b6e2d1f413c85557e98d8dcfd5d4a5",
+    "on_payload_d": "e86b6149feb79adb7112c1a20876977f808ad854d297078ce03934b5eb40d520",
+    "on_slow_d": "898e1442539349983e27d2d57e3d11fee6c447b876cfcef7f10f050ee11f27fc",
+    "on_weak_motors_d": "673f0cdbb643ebbd7fb8343bb2a6790e7f9da751b60d031ba0c850599e84fc5a",
+    "on_split_d": "2b870b808df0e99629a6e70c2ba46bec72bfe99cf56ad805a0f692b6eb2da23d",
+    "on_patch_d": "69b815745f629eda1c43d81e105bad958d554da14dd6cfb4ff7cb2f8cd000d93",
 }
 """SHA-256 of every set on the day it was frozen; no change of a set is ever right."""
 
@@ -89,11 +122,11 @@ def test_set_is_the_one_that_was_frozen(name):
     scenarios = load_scenarios(name)  # checks the soil grids
     assert len(scenarios) == PLANS[name].count
     assert {scenario.law for scenario in scenarios} == {PLANS[name].law}
-    assert (PLANS[name].law == LAW) == (name in ("T", "Tb", "Tc"))
+    assert (PLANS[name].law == LAW) == (name in ("T", "Tb", "Tc", "Td"))
 
 
 def test_files_are_small():
-    assert sum(path.stat().st_size for path in scenario_folder().iterdir()) < 1_500_000
+    assert sum(path.stat().st_size for path in scenario_folder().iterdir()) < 2_000_000
 
 
 def test_validation_shares_nothing_with_the_test_sets():
@@ -105,7 +138,7 @@ def test_validation_shares_nothing_with_the_test_sets():
         assert not seeds & {scenario.seed for scenario in others}
 
 
-@pytest.mark.parametrize("drawing", ["", "b", "c"])
+@pytest.mark.parametrize("drawing", ["", "b", "c", "d"])
 def test_transfer_drives_the_turns_of_s1(drawing):
     for other, first in zip(load_scenarios(f"T{drawing}"), load_scenarios(f"S1{drawing}"), strict=False):
         assert other.seed == first.seed
@@ -114,7 +147,8 @@ def test_transfer_drives_the_turns_of_s1(drawing):
 
 
 @pytest.mark.parametrize(("name", "in_range"), [*((name, "S1b") for name in ON_PLANTS),
-                                              *((name, "S1c") for name in ON_PLANTS_AGAIN)])  # fmt: skip
+                                              *((name, "S1c") for name in ON_PLANTS_AGAIN),
+                                              *((name, "S1d") for name in ON_PLANTS_FOURTH)])  # fmt: skip
 def test_plants_are_driven_by_the_turns_in_range(name, in_range):
     """Same soils, starts and noise on every plant, and something that differs."""
     pairs = list(zip(load_scenarios(name), load_scenarios(in_range), strict=False))
@@ -131,10 +165,10 @@ def test_plants_are_driven_by_the_turns_in_range(name, in_range):
         )
 
 
-@pytest.mark.parametrize("name", [*SECOND, *THIRD])
+@pytest.mark.parametrize("name", [*SECOND, *THIRD, *FOURTH])
 def test_a_later_drawing_shares_nothing_with_the_others(name):
     seeds = {scenario.seed for scenario in load_scenarios(name)}
-    for drawing in {"", "b", "c"} - {name[-1]}:
+    for drawing in {"", "b", "c", "d"} - {name[-1]}:
         assert not seeds & {scenario.seed for scenario in load_scenarios(name[:-1] + drawing)}
 
 
@@ -150,7 +184,7 @@ def test_pairs_of_s7_are_mirror_images(name):
         assert mine.accelerometer_bias[1] == -other.accelerometer_bias[1]
 
 
-@pytest.mark.parametrize("drawing", ["", "b", "c"])
+@pytest.mark.parametrize("drawing", ["", "b", "c", "d"])
 def test_s6_and_s8_leave_the_training_range(drawing):
     assert {scenario.episode.robot.motor_rate for scenario in load_scenarios(f"S6{drawing}")} == {1.4}
     radii = [scenario.episode.turn.radius for scenario in load_scenarios(f"S8{drawing}")]
