@@ -132,7 +132,6 @@ def _inputs(variant: Variant) -> str:
 def _training(record: dict[str, Any]) -> list[str]:
     """Lines of a list."""
     settings, plan = record["settings"], record["plan"]
-    begun = settings.get("begun", "")
     layers = settings.get("layers", 1)
     units = f"{settings['units']} units" if layers == 1 else f"{layers} layers of {settings['units']} units"
     turns = record.get("turns", _turns(settings))
@@ -145,13 +144,19 @@ def _training(record: dict[str, Any]) -> list[str]:
         "stiffness x 0.6 to 1.6 from some time on, dead time up to 0.25 s, mass x 0.9 to 1.25, variation of the "
         "soil up to 10 %.",
         *_wide_turns(record),
-        *(
-            [f"- It began with the weights of `{begun}`, at a learning rate of {settings['learning_rate']:g}."]
-            * bool(begun)
-        ),
+        *_beginning(settings),
         f"- Gaussian likelihood of each pair with its correlation; {units}, "
         f"{settings['epochs']} passes, seed {settings['seed']}; turns mirrored at random; "
         f"{record['seconds']} seconds of {device}.",
+    ]
+
+
+def _beginning(settings: dict[str, Any]) -> list[str]:
+    """Line on the network that a training goes on from, where there is one."""
+    if not settings.get("begun"):
+        return []
+    return [
+        f"- It began with the weights of `{settings['begun']}`, at a learning rate of {settings['learning_rate']:g}."
     ]
 
 
@@ -165,8 +170,8 @@ def _wide_turns(record: dict[str, Any]) -> list[str]:
     if "wide_plan" not in record:
         return []
     return [
-        f"- Of the wide turns: {_shares(record['wide_plan'])}. Motors of 60 to 100 N m, payloads of 5 to 50 kg at a "
-        "place on the platform, patches of strength x 0.5 to 1.6, one side stronger by up to a third, ruts, slip "
+        f"- Of the wide turns: {_shares(record['wide_plan'])}. Motors of 40 to 200 N m a bank, payloads of 5 to 50 kg "
+        "at a place on the platform, patches of strength x 0.5 to 1.6, one side stronger by up to a third, ruts, slip "
         "sinkage or soil pushed aside."
     ]
 

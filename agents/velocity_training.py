@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 
 from agents.velocity_drives import Drives
+from agents.velocity_losses import mirror, total_loss
 from ddagr_gym.control.timing import CONTROL_INTERVAL
 from ddagr_gym.errors import InputError, at_least
 from ddagr_gym.estimation.learned_filter import find_network
 from ddagr_gym.estimation.learned_inputs import FILTER_INPUTS, INPUTS, SENSOR_INPUTS
 from ddagr_gym.estimation.learned_network import (
     FORMAT,
-    LARGEST_CORRELATION,
     LARGEST_LOG,
     LEAST_LOG,
     MOST_LAYERS,
@@ -52,7 +52,6 @@ _WEIGHTS = ("weight_ih", "weight_hh", "bias_ih", "bias_hh")
 """What torch calls the numbers of a recurrent layer."""
 _LEAST_DEVIATION = 1e-4  # of an input, in its unit: one that hardly changes is not blown up
 _MOST_ROWS = 1_000_000  # from which the inputs' deviations are taken
-_GATE = 5.0  # standard deviations beyond which an error counts linearly (P. Huber, 1964)
 
 
 @dataclass(frozen=True)
@@ -164,52 +163,6 @@ def exact_device(name: str) -> torch.device:
     return torch.device(name)
 
 
-def gaussian_loss(outputs: Tensor, wanted: Tensor, weights: Tensor) -> Tensor:
-    """Weighted mean of the negative log-likelihood of ``wanted`` (D, B, 2), velocities or places over their scale.
-
-    Beyond _GATE standard deviations errors count linearly: turns on which the filter diverges would decide all.
-    """
-    logs = outputs[..., 2:4].clamp(LEAST_LOG, LARGEST_LOG)
-    correlation = LARGEST_CORRELATION * torch.tanh(outputs[..., 4])
-    scaled = (wanted - outputs[..., :2]) * torch.exp(-logs)
-    free = 1.0 - correlation**2
-    squares = (scaled**2).sum(dim=-1) - 2.0 * correlation * scaled[..., 0] * scaled[..., 1]
-    distances = torch.sqrt(squares / free + 1e-12)
-    bounded = torch.where(distances < _GATE, distances**2, 2.0 * _GATE * distances - _GATE**2)
-    loss = logs.sum(dim=-1) + 0.5 * torch.log(free) + 0.5 * bounded
-    return (weights * loss).sum() / weights.sum()
-
-
-def fixed_loss(outputs: Tensor, wanted: Tensor, weights: Tensor) -> Tensor:
-    """Weighted mean of Huber's loss of the velocities or places at a fixed deviation, their scale.
-
-    Beside the likelihood, which alone widens the deviations before it learns the velocities (M. Seitzer et al., 2022).
-    """
-    errors = torch.nn.functional.huber_loss(outputs[..., :2], wanted, reduction="none").sum(dim=-1)
-    return (weights * errors).sum() / weights.sum()
-
-
-def total_loss(outputs: Tensor, wanted: Tensor, weights: Tensor) -> Tensor:
-    """Both losses of every pair: ``outputs`` (D, B, OUTPUTS each), ``wanted`` (D, B, 2 each)."""
-    losses = []
-    for pair in range(wanted.shape[-1] // 2):
-        own, due = outputs[..., OUTPUTS * pair : OUTPUTS * (pair + 1)], wanted[..., 2 * pair : 2 * pair + 2]
-        losses.append(gaussian_loss(own, due, weights) + fixed_loss(own, due, weights))
-    return torch.stack(losses).sum()
-
-
-def mirror(names: tuple[str, ...]) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
-    """Place and sign by which every input of a turn becomes that of the turn to the other side."""
-    places, signs = [], []
-    for name in names:
-        other = name.replace("right", "?").replace("left", "right").replace("?", "left")
-        places.append(names.index(other))
-        odd = ("force_y", "yaw_rate", "heading_sine", "centripetal", "filter_v_y", "gyro_bias", "bias_y", "gravity_y",
-               "pose_y", "pose_turned")  # fmt: skip
-        signs.append(-1.0 if any(part in name for part in odd) and "deviation" not in name else 1.0)
-    return np.array(places), np.array(signs, dtype=np.float32)
-
-
 class VelocityTraining:
     """One training that can be interrupted; every finished epoch is kept.
 
@@ -252,8 +205,8 @@ class VelocityTraining:
         settings, own = self.settings, network.description
         if (network.units, own.layers, own.inputs) != (settings.units, settings.layers, self.variant.inputs):
             raise InputError(
-                f"{self.name} goes on from {settings.begun}, which has {own.layers} layers of {network.units} units: "
-                "leave --layers and --units out."
+                f"{self.name} with {settings.layers} layers of {settings.units} units goes on from {settings.begun}, "
+                f"which has {own.layers} of {network.units}: leave --layers and --units out."
             )
         layers = {
             f"memory.{kind}_l{place}": weight
@@ -411,6 +364,7 @@ class VelocityTraining:
             return
         state: Mapping[str, Any] = torch.load(file, weights_only=True, map_location=self._device)
         record = json.loads(state["record"])
+        record["settings"] = asdict(VelocitySettings()) | record["settings"]
         mine = self._record()
         if any(record.get(name) != mine[name] for name in ("name", "settings", "device")):
             raise InputError(f"{file} is of a training with other settings: give another folder.")

@@ -5,7 +5,7 @@ selection; the others are opened only after the claims of ``configs/evaluation/c
 Tb are a second drawing of S1 to S8 and T, made once much had been learnt from the first. The sets named ``on_`` and
 :mod:`a plant <benchmarks.plants>` are the first sixty turns of S1b, on each plant. S1c to S8c, Tc and the same names
 with ``_c`` at their end are a third drawing, made once the networks that correct the inertial filter had been trained;
-S1d to S8d, Td and ``_d`` are a fourth, made before the network of B6_pose_wide was chosen.
+S1d to S8d, Td and ``_d`` are a fourth, opened once the network of B6_pose_wide had been trained.
 """
 
 from __future__ import annotations

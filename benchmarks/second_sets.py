@@ -67,6 +67,7 @@ class Reading:
         former: default that another controller may replace.
         claims: file, in the folder ``evaluation`` of the configurations.
         result: file.
+        against: further controllers with which the others are compared; B1, B4 and the former default always are.
     """
 
     command: str
@@ -76,6 +77,12 @@ class Reading:
     former: str
     claims: str
     result: Path
+    against: tuple[str, ...] = ()
+
+    @property
+    def compared(self) -> tuple[str, ...]:
+        """Controllers with which all others are compared."""
+        return tuple(dict.fromkeys([*BASELINES, self.former, *self.against]))
 
 
 READING = Reading(
@@ -117,13 +124,13 @@ def driven(
     total = len(wanted_episodes(with_bounds(controllers), sets))
     with Progress(total, "driving") as progress:
         rows = run_campaign(controllers, sets, folder / EPISODES, processes=workers, progress=progress.advance)
-    return summaries(rows, tuple(dict.fromkeys([*BASELINES, reading.former])))
+    return summaries(rows, reading.compared)
 
 
 def result_of(summary: Summary, controllers: Sequence[str], reading: Reading = READING) -> dict[str, Any]:
     """As it is written: claims, the default by the rule, hashes, and the metrics that are kept, {set: {arm: ...}}."""
     claims = check_claims(load_claims(configs_dir() / "evaluation" / reading.claims), summary)
-    metrics = dict.fromkeys([*KEPT, f"improvement_over_{reading.former}"])
+    metrics = dict.fromkeys([*KEPT, *(f"improvement_over_{name}" for name in reading.compared)])
     kept = {
         name: {
             arm: {key: summary[arm][name][key] for key in metrics if key in summary[arm][name]} for arm in controllers
@@ -185,7 +192,7 @@ def main(arguments: Sequence[str] | None = None, reading: Reading = READING, abo
     parser.add_argument("--output", type=Path, default=reading.result)
     given = parser.parse_args(arguments)
     controllers = given.controllers.split(",")
-    missing = {"B1", "B4", reading.former} - set(controllers)
+    missing = set(reading.compared) - set(controllers)
     if missing:
         parser.error(f"--controllers lacks {min(missing)}, against which the others are compared")
     try:

@@ -2,7 +2,7 @@
 
     python -m benchmarks.what_changed CALIBRATION [--drives ...] [--changes ...] [--parts FOLDER] [--summary]
 
-``CALIBRATION`` is the folder that ``ddagr calibrate --bank`` wrote of the six ordinary drives of a Warthog
+``CALIBRATION`` is the folder that ``ddagr calibrate`` wrote of the six ordinary drives of a Warthog
 (:data:`benchmarks.real_drives.__main__.DRIVES`), imported or not. Each drive is compared with the others alone: with
 the robot and the soil as calibrated without it (one Gauss-Newton step from the joint fit), and with the scatter of the
 other five. The ground is given as known where another ordinary drive was on it.
@@ -236,7 +236,7 @@ def parser_of(description: str | None, result: Path) -> argparse.ArgumentParser:
         result: file of its figures.
     """
     parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("calibration", type=Path, help="folder that `ddagr calibrate --bank` wrote")
+    parser.add_argument("calibration", type=Path, help="folder that `ddagr calibrate` wrote")
     parser.add_argument("--parts", type=Path, default=result.with_suffix(".parts"), help="folder of finished cases")
     parser.add_argument("--output", type=Path, default=result)
     parser.add_argument("--threads", type=int, default=2)

@@ -151,7 +151,7 @@ def calibrate(
         threads: of the simulator, in each process.
         supply_currents: also fit currents that motors draw from their supply; their own current is always fitted.
         bank: also diagnose every drive with the robot calibrated without it: what ordinary drives do to every effect of
-            the library, about a minute for each drive of 10 min. Without it no other drive can be compared with these.
+            the library, of two drives or more. Without it no other drive can be compared with these.
         processes: for what does not depend on each other: the fits from several starts and, for the bank, the drives.
         cluster: a Ray cluster to run them on: "local" starts one of so many processors here, an address takes one that
             runs. The result is the same.
@@ -175,7 +175,7 @@ def calibrate(
         >>> rng = np.random.default_rng(0)
         >>> steps = [np.repeat(rng.uniform(-1.5, 1.5, (24, 2)), 60, axis=0) for _ in range(2)]  # 3 s each, at 20 Hz
         >>> drives = [ddagr_gym.simulate(commands, robot, rate=20.0, pose_rate=5.0) for commands in steps]
-        >>> result = ddagr_gym.calibrate(drives, "ddagr", "thesis_a1")
+        >>> result = ddagr_gym.calibrate(drives, "ddagr", "thesis_a1", bank=False)
         >>> abs(result.robot.motor_rate - 3.0) < 0.05
         True
     """

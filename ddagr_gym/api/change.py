@@ -37,10 +37,9 @@ class ChangeResult(DiagnosisReport):
 
     def tables(self) -> Sequence[Table]:
         """Findings with sizes, and shifts of all effects."""
-        from ddagr_gym.reporting.change_text import SHIFT_HEADER, shift_rows
-        from ddagr_gym.reporting.diagnosis_text import FINDING_HEADER, finding_rows
+        from ddagr_gym.reporting.change_text import CHANGED_HEADER, SHIFT_HEADER, changed_rows, shift_rows
 
-        found = [Table(FINDING_HEADER, finding_rows(self.diagnosis))] if self.findings else []
+        found = [Table(CHANGED_HEADER, changed_rows(self.diagnosis))] if self.findings else []
         return [*found, Table(SHIFT_HEADER, shift_rows(self.diagnosis))]
 
     def __str__(self) -> str:

@@ -69,8 +69,8 @@ class Outcome:
         forecasts: of the left-out drives.
         model: fitted to some windows of all drives.
         weights: of the residuals of that fit.
-        bank: what each drive does to every effect of the library beside the robot calibrated without it; empty where
-            that was not asked for.
+        bank: what each drive does to every effect of the library beside the robot calibrated without it; empty with a
+            single drive, or where no bank was asked for.
         ordinary: what a comparison of other drives with these needs; None with a single drive, or where no bank was
             asked for.
     """
@@ -160,7 +160,7 @@ def calibrate_drives(
         settings: windows, threads and seed.
         data_sheet: name or file of the robot.
         soil_names: of the soils by ground.
-        with_bank: also scan every drive for every effect of the library.
+        with_bank: also scan every drive for every effect of the library, where there are two drives or more.
         ready: the same drives as :func:`ready_drives` leaves them; made of them where it is None.
         runner: of steps that do not depend on each other: the fits from several starts and, for the bank, the drives;
             this process where it is None. The result is the same to the bit.
@@ -229,11 +229,10 @@ def calibrate_drives(
     )
     found = {ground: fitted_soil(data, ground, model.values) for ground in data.drives_on}
     calibrated = calibrated_robot(data, model, calibration)
+    with_bank = with_bank and data.count > 1
     bank = ordinary_runs(data, model, made, settings.threads, steps) if with_bank else ()
     ordinary = (
-        ordinary_drives(data, model, made, calibration, calibrated, settings.threads, steps)
-        if with_bank and data.count > 1
-        else None
+        ordinary_drives(data, model, made, calibration, calibrated, settings.threads, steps) if with_bank else None
     )
     return Outcome(calibration, calibrated, found, data, compared, model, final.weights, bank, ordinary)
 

@@ -33,7 +33,7 @@ class Arguments:
     Attributes:
         drives: ordinary drives of one robot (Parquet of `ddagr import`, or any source that it takes), or folders.
         output: folder to write: robot.yaml and soil_GROUND.yaml for every --robot, --soil and gym.make, effects.yaml,
-            draws.yaml, calibration.json, and one page, calibration.html.
+            draws.yaml, bank.json (two drives or more), calibration.json, and one page, calibration.html.
         robot: its data sheet: a name (see `ddagr robots`), or the path of a YAML file with one's own.
         ground: NAME=DRIVE,DRIVE: drives on one ground; may be repeated. Without it all drives are on one ground.
         soil: nominal soil (see `ddagr soils`) of all grounds, or NAME=SOIL of one; may be repeated.
@@ -45,8 +45,8 @@ class Arguments:
         cluster: a Ray cluster to run that on: "local" starts one of so many processors here, an address
             (ray://HOST:PORT) takes one that runs.
         supply_currents: also fit currents that motors draw from their supply; their own current is always fitted.
-        bank: also diagnose every drive with the robot calibrated without it, and write bank.json, without which
-            nothing can be compared with the calibration: what ordinary drives do to every effect of the library.
+        bank: also diagnose every drive with the robot calibrated without it, and write bank.json: what ordinary drives
+            do to every effect of the library. Without it no other drive can be compared with the calibration.
         overwrite: replace an output folder that an earlier command wrote.
         maximum_rows: refuse a recording with more rows or messages.
         maximum_bytes: refuse a recording that unpacks to more bytes.

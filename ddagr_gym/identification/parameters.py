@@ -229,6 +229,16 @@ def drivetrain_of(robot: Robot, values: Mapping[str, float]) -> Drivetrain:
     return replace(own, **changed)
 
 
+def added_numbers() -> frozenset[str]:
+    """Names of pure numbers of robot and ground to which a fit adds its value, in place of a factor's logarithm."""
+    ground = (*soil_parameters(), *slope_parameters((0.0, 0.0)))
+    drivetrain = (item for item in fields(Drivetrain) if item.name in _DRIVETRAIN_ENTRIES and item.name not in _LIMITS)
+    return frozenset(
+        [item.name for item in ground if item.unit == "-" and not item.factor]
+        + [item.name for item in drivetrain if item.metadata["unit"] == "-"]
+    )
+
+
 _DRIVETRAIN_STEP = 0.02  # of the standard deviation, for finite differences (ours)
 
 DELAY_STEP = 0.05

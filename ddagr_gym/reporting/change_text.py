@@ -51,8 +51,11 @@ def change_text(diagnosis: Diagnosis) -> str:
 
 
 def changed_rows(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
-    """One row per size of what is named, under :data:`CHANGED_HEADER`: gains are half the squares of distances."""
-    return finding_rows(diagnosis, lambda gain: math.sqrt(2.0 * gain))
+    """One row per size of what is named, under :data:`CHANGED_HEADER`: gains are half the squares of distances.
+
+    What is seen in the values, and so has no gate, has no distance.
+    """
+    return finding_rows(diagnosis, lambda gain: math.sqrt(2.0 * gain), ungated=False)
 
 
 def shift_rows(diagnosis: Diagnosis) -> list[tuple[str, ...]]:

@@ -56,21 +56,24 @@ def _doubt_line(doubt: DataDoubt) -> str:
     return f"  {place}: {doubt.sentence}" if place else f"  {doubt.sentence}"
 
 
-def finding_rows(diagnosis: Diagnosis, evidence: Callable[[float], float] = lambda gain: gain) -> list[tuple[str, ...]]:
+def finding_rows(
+    diagnosis: Diagnosis, evidence: Callable[[float], float] = lambda gain: gain, ungated: bool = True
+) -> list[tuple[str, ...]]:
     """One row per parameter of each finding that is no part of the drivetrain, under :data:`FINDING_HEADER`.
 
     Args:
         diagnosis: the answer.
         evidence: what is shown of a gain and of its gate.
+        ungated: whether it is also shown of gains that had no gate to pass.
     """
-    return [row for finding in other_findings(diagnosis) for row in _finding_rows(finding, evidence)]
+    return [row for finding in other_findings(diagnosis) for row in _finding_rows(finding, evidence, ungated)]
 
 
-def _finding_rows(finding: Finding, evidence: Callable[[float], float]) -> Iterator[tuple[str, ...]]:
+def _finding_rows(finding: Finding, evidence: Callable[[float], float], ungated: bool) -> Iterator[tuple[str, ...]]:
     """One row per parameter; what belongs to the whole finding is in the first."""
     others = [f"{name} {weight:.2f}" for name, weight in finding.equivalence_set.items() if name != finding.name]
     none = "nothing else" if finding.gate > 0.0 else "seen in the values"
-    seen = max(finding.gain, finding.gate) > 0.0
+    seen = finding.gate > 0.0 or (ungated and finding.gain > 0.0)
     gated = tuple(f"{evidence(value):.1f}" if seen else "–" for value in (finding.gain, finding.gate))
     whole = (*gated, ", ".join(others) or none)
     for number, (name, estimate) in enumerate(shown_parameters(finding).items()):

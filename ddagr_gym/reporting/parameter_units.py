@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from ddagr_gym.identification.parameters import added_numbers
 
 
 def unit_in_words(name: str, unit: str) -> str:
@@ -14,13 +14,4 @@ def unit_in_words(name: str, unit: str) -> str:
     """
     if unit != "-":
         return unit
-    return "added, no unit" if name in _added() else "log of a factor"
-
-
-@lru_cache(maxsize=1)
-def _added() -> frozenset[str]:
-    """Names of the pure numbers to which changes are added."""
-    from ddagr_gym.identification.parameters import slope_parameters, soil_parameters
-
-    listed = (*soil_parameters(), *slope_parameters((0.0, 0.0)))
-    return frozenset(item.name for item in listed if item.unit == "-" and not item.factor)
+    return "added, no unit" if name in added_numbers() else "log of a factor"

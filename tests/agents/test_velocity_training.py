@@ -11,13 +11,8 @@ torch = pytest.importorskip("torch", reason="needs the extra rl")
 from agents.train_velocity import PUBLISHED, learnt_and_judged, main  # noqa: E402
 from agents.velocity_card import card, publish_estimator  # noqa: E402
 from agents.velocity_drives import NOMINAL, WIDE, Drives, Plan, _drive, as_drives, draw_turn, make_drives  # noqa: E402
-from agents.velocity_training import (  # noqa: E402
-    VARIANTS,
-    VelocitySettings,
-    VelocityTraining,
-    gaussian_loss,
-    mirror,
-)
+from agents.velocity_losses import gaussian_loss, mirror  # noqa: E402
+from agents.velocity_training import VARIANTS, VelocitySettings, VelocityTraining  # noqa: E402
 from ddagr_gym.errors import InputError  # noqa: E402
 from ddagr_gym.estimation import LearnedBatch, LearnedModel  # noqa: E402
 from ddagr_gym.estimation.inertial_filter import InertialModel  # noqa: E402
@@ -168,8 +163,19 @@ def test_a_training_goes_on_from_a_published_network(tmp_path):
     after = own.run().arrays()
     assert not np.array_equal(after["output_weight"], published["output_weight"])
     assert np.array_equal(after["mean"], published["mean"])
-    with pytest.raises(InputError, match="2 layers of 128 units"):
+    with pytest.raises(InputError, match="2 layers of 8 units goes on from pose, which has 2 of 128"):
         VelocityTraining("pose_wide", replace(settings, units=8), made_up(), made_up(8, seed=1), tmp_path)
+
+
+def test_turns_that_were_driven_before_plans_had_more_parts_are_kept(tmp_path):
+    make_drives(1, 11, tmp_path, NOMINAL)
+    stored = json.loads((tmp_path / "drives.json").read_text())
+    for name in ("weak", "one_sided", "patched", "split", "worked"):
+        del stored["plan"][name]
+    (tmp_path / "drives.json").write_text(json.dumps(stored))
+    assert len(make_drives(1, 11, tmp_path, NOMINAL)) == 1
+    with pytest.raises(InputError, match="another seed or plan"):
+        make_drives(1, 11, tmp_path, replace(NOMINAL, weak=0.1))
 
 
 @pytest.mark.parametrize(

@@ -279,7 +279,7 @@ def test_a_recording_is_filtered_block_by_block():
 
 
 def test_published_estimators_are_small_and_whole():
-    assert estimator_names() == ("alone", "correction", "features", "pose")
+    assert estimator_names() == ("alone", "correction", "features", "pose", "pose_wide")
     for name in estimator_names():
         folder = Path(shipped_folder("estimators")) / name
         assert (folder / "network.npz").stat().st_size < 800_000

@@ -87,7 +87,7 @@ def test_the_python_functions_work():
 def test_learned_estimators_run_without_torch():
     from ddagr_gym.estimation import estimator_names
 
-    assert estimator_names() == ("alone", "correction", "features", "pose")
+    assert estimator_names() == ("alone", "correction", "features", "pose", "pose_wide")
     environment = gymnasium.make("DDAGR-Turn-EKF-v0", filter="learned")
     environment.reset(seed=1)
     for command in (*[0.0] * 5, *[0.6] * 40):  # it stands first: that shows the filter beside it how the ground slopes
