@@ -74,6 +74,7 @@ ESTIMATORS: dict[str, Callable[[], Estimator]] = {
     "inertial": lambda: InertialBatch(InertialModel.of(ddagr(), Sensors())),
     "learned": lambda: LearnedBatch(LearnedModel.of(ddagr(), Sensors())),
     "learned, pose": lambda: LearnedBatch(LearnedModel.of(ddagr(), Sensors(), "pose")),
+    "learned, pose_wide": lambda: LearnedBatch(LearnedModel.of(ddagr(), Sensors(), "pose_wide")),
 }
 
 
@@ -123,7 +124,9 @@ def _summary(errors: Sequence[float]) -> dict[str, Any]:
     }
 
 
-_COLOURS = dict(zip(ESTIMATORS, (palette.GREY, palette.ORANGE, palette.BLUE, palette.VERMILLION), strict=True))
+_COLOURS = dict(
+    zip(ESTIMATORS, (palette.GREY, palette.ORANGE, palette.BLUE, palette.VERMILLION, palette.SKY_BLUE), strict=True)
+)
 
 
 def draw(slopes: Mapping[str, Mapping[str, Mapping[str, Any]]], path: Path) -> None:
@@ -136,7 +139,7 @@ def draw(slopes: Mapping[str, Mapping[str, Mapping[str, Any]]], path: Path) -> N
         for panel, (degrees, starts) in zip(panels, slopes.items(), strict=True):
             for number, (name, colour) in enumerate(_COLOURS.items()):
                 for place, found in enumerate(starts.values()):
-                    share, at = found[name]["share"], place + 0.2 * (number - 1.5)
+                    share, at = found[name]["share"], place + 0.16 * (number - 2.0)
                     panel.plot([at] * 2, [100.0 * v for v in share["interval"]], "-", color=colour, lw=1.2)
                     panel.plot(at, 100.0 * share["value"], "o", color=colour, ms=4.5, label="" if place else name)
             panel.set(title=f"slope of {degrees} degrees" if degrees != "0" else "level ground", ylim=(-3, 100))

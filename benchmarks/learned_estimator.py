@@ -69,6 +69,10 @@ ESTIMATORS: dict[str, tuple[str, Callable[[TurnRun], Estimated]]] = {
     "flat": ("filter, ground level", partial(_filtered, "flat", flat_velocities)),
     "inertial": ("inertial filter", partial(_filtered, "inertial", inertial_velocities)),
     "pose": ("inertial filter, velocities and place corrected by a network", partial(_learned, "pose")),
+    "pose_wide": (
+        "the same by a network that learnt on with worse sensors, motors and loads",
+        partial(_learned, "pose_wide"),
+    ),
     "correction": ("inertial filter, corrected by a network", partial(_learned, "correction")),
     "features": ("network that sees the inertial filter", partial(_learned, "features")),
     "alone": ("network that sees sensors and commands", partial(_learned, "alone")),
@@ -76,7 +80,7 @@ ESTIMATORS: dict[str, tuple[str, Callable[[TurnRun], Estimated]]] = {
 """By name: title and estimate."""
 
 
-CARRIED = {"inertial": "B6", "pose": "B6_pose"}
+CARRIED = {"inertial": "B6", "pose": "B6_pose", "pose_wide": "B6_pose_wide"}
 """Controllers that follow the path by it, of the estimators that carry a place, by name."""
 
 

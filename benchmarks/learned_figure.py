@@ -10,7 +10,9 @@ from ddagr_gym.recordings.files import write_atomically
 from ddagr_gym.rendering import palette
 from ddagr_gym.reporting.figures import house_style
 
-_COLOURS = (palette.BLUE, palette.ORANGE, palette.VERMILLION, palette.GREEN, palette.PURPLE, palette.GREY)
+_COLOURS = (
+    palette.BLUE, palette.ORANGE, palette.VERMILLION, palette.SKY_BLUE, palette.GREEN, palette.PURPLE, palette.GREY,
+)  # fmt: skip
 _SHARE = 0.75  # of the room between plants
 _PANELS = (
     ("v_x_mm_s", "forward speed: error [mm/s], rms; line: bound"),

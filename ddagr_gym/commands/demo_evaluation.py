@@ -7,7 +7,7 @@ from typing import Any
 
 from ddagr_gym.commands.output import Section
 
-LADDER = ("B0", "B1", "B2", "B3", "B4", "B6", "B6_pose")
+LADDER = ("B0", "B1", "B2", "B3", "B4", "B6", "B6_pose_wide")
 POLICIES = ("ppo_ekf", "ppo_history", "ppo_raw")
 """The ladder's arms (theory: control, section 3); ablations are in the full evaluation."""
 SET = "V"

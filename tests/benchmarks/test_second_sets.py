@@ -1,4 +1,4 @@
-"""The second and third drawing and the frozen plants: which controller is the default by the rule, and what is kept."""
+"""The second to fourth drawing and the frozen plants: which controller is the default by the rule, and what is kept."""
 
 from __future__ import annotations
 
@@ -10,18 +10,22 @@ import pytest
 pytest.importorskip("matplotlib", reason="needs the extra report")
 pytest.importorskip("pyarrow", reason="needs the extra io")
 
-from benchmarks import second_sets, third_sets
+from benchmarks import fourth_sets, second_sets, third_sets
 from benchmarks.second_sets import READING, default_by_rule, table, title, version_of
 from ddagr_gym.config import configs_dir
 from ddagr_gym.evaluation.claims import check_claims, load_claims
 from ddagr_gym.evaluation.controllers import DEFAULT
 from ddagr_gym.evaluation.scenarios import set_hash
 
-CHOSEN = {second_sets.READING: third_sets.READING.former, third_sets.READING: DEFAULT}
+CHOSEN = {
+    second_sets.READING: third_sets.READING.former,
+    third_sets.READING: fourth_sets.READING.former,
+    fourth_sets.READING: DEFAULT,
+}
 """What each drawing decided."""
 
 
-@pytest.fixture(scope="module", params=CHOSEN, ids=["second", "third"])
+@pytest.fixture(scope="module", params=CHOSEN, ids=["second", "third", "fourth"])
 def reading(request):
     return request.param
 
@@ -73,6 +77,15 @@ def test_the_record_obeys_its_rules(committed, reading):
     claims = check_claims(load_claims(configs_dir() / "evaluation" / reading.claims), by_arm)
     assert [claim.verdict for claim in claims] == [claim["verdict"] for claim in committed["claims"]]
     assert "not driven" not in {claim.verdict for claim in claims}
+
+
+def test_every_claim_can_be_checked(reading):
+    """Improvements are known over the controllers with which the reading compares."""
+    claims = load_claims(configs_dir() / "evaluation" / reading.claims)
+    asked = {item.metric.removeprefix("improvement_over_") for item in claims.claims if "improvement" in item.metric}
+    assert asked
+    assert asked <= set(reading.compared)
+    assert {name for item in claims.claims for name in item.sets} <= set(reading.sets)
 
 
 def test_the_page_of_results_says_what_the_record_says(committed, repository):
