@@ -206,7 +206,7 @@ _LADDER: dict[str, tuple[_Maker, str]] = {
     ),
     "B6_pose_wide": (
         lambda turn, gains: _make_learned_tracker("B6_pose_wide", turn, gains),
-        "B6_pose by a network that learnt on with worse sensors, motors and loads",
+        "B6 by velocities and place that a network corrects, which also learnt with worse sensors, motors and loads",
     ),
     "true_curvature": (_make_true_curvature, "upper bound, not deployable: PI on the true curvature"),
     "true_soil": (_make_true_soil, "upper bound, not deployable: B4 with the true soil and the true curvature"),
