@@ -43,16 +43,15 @@ def learnt_and_judged(settings: VelocitySettings, output: Path, workers: int) ->
     """
     seed = settings.root_seed
     drives = make_drives(settings.turns + settings.validation, seed, output / f"drives_{seed}", workers=workers)
-    learnt, judged = drives.part(slice(settings.turns)), drives.part(slice(settings.turns, None))
+    learnt, judged = [drives.part(slice(settings.turns))], [drives.part(slice(settings.turns, None))]
     if settings.near:
-        near = make_drives(settings.near, seed + 1, output / f"drives_{seed + 1}", NOMINAL, workers)
-        learnt = joined_drives([learnt, near])
+        learnt.append(make_drives(settings.near, seed + 1, output / f"drives_{seed + 1}", NOMINAL, workers))
     if settings.wide:
         count = settings.wide + settings.validation
         wide = make_drives(count, seed + 2, output / f"drives_{seed + 2}", WIDE, workers)
-        learnt = joined_drives([learnt, wide.part(slice(settings.wide))])
-        judged = joined_drives([judged, wide.part(slice(settings.wide, None))])
-    return learnt, judged
+        learnt.append(wide.part(slice(settings.wide)))
+        judged.append(wide.part(slice(settings.wide, None)))
+    return joined_drives(learnt), joined_drives(judged)
 
 
 def train_estimators(

@@ -186,7 +186,7 @@ def _further_effects(episode: Episode, rng: Rng, plan: Plan) -> list[Effect]:
 def _patch(turn: RowTurn, rng: Rng) -> SoilPatch:
     """Other soil between 30 and 150 degrees of the turn."""
     angle = math.radians(float(rng.uniform(30.0, 150.0)))
-    x, y = turn.radius * math.sin(angle), turn.sign * turn.radius * (1.0 - math.cos(angle))
+    x, y = turn.place_on_turn(angle).tolist()
     strength = float(np.exp(rng.uniform(math.log(0.5), math.log(1.6))))
     return SoilPatch(strength, centre_x=x, centre_y=y, radius=float(rng.uniform(0.3, 0.7)), edge=0.1)
 
@@ -395,6 +395,6 @@ def _check_same(folder: Path, settings: Mapping[str, Any]) -> None:
     file = folder / "drives.json"
     stored = json.loads(file.read_text(encoding="utf-8")) if file.is_file() else settings
     # what a plan had not when they were driven it had not in them
-    if stored | {"plan": asdict(Plan()) | stored["plan"]} != settings:
+    if stored | {"plan": asdict(Plan()) | stored.get("plan", {})} != settings:
         raise InputError(f"{folder} holds turns of another seed or plan: give another folder.")
     write_json(file, settings)

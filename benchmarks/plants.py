@@ -118,7 +118,7 @@ def patch(episode: Episode, rng: np.random.Generator) -> Changed:
     """A patch of strength x 0.55 on the turn, between 45 and 135 degrees of it."""
     turn = episode.turn
     angle = math.radians(float(rng.uniform(45.0, 135.0)))
-    x, y = turn.radius * math.sin(angle), turn.sign * turn.radius * (1.0 - math.cos(angle))
+    x, y = turn.place_on_turn(angle).tolist()
     return episode, (SoilPatch(0.55, centre_x=x, centre_y=y, radius=float(rng.uniform(0.3, 0.7)), edge=0.1),)
 
 

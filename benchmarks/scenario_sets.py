@@ -83,7 +83,7 @@ def _changing(rng: np.random.Generator, number: int) -> tuple[Episode, GroundRec
     turn = episode.turn
     angle = math.radians(float(rng.uniform(45.0, 135.0)))
     factor = float(rng.uniform(0.6, 0.8) if rng.integers(2) else rng.uniform(1.25, 1.6))
-    x, y = turn.radius * math.sin(angle), turn.sign * turn.radius * (1.0 - math.cos(angle))
+    x, y = turn.place_on_turn(angle).tolist()
     recipe = replace(_varied(rng), strength=factor, stiffness=factor)
     if rng.integers(2):
         return episode, replace(recipe, kind="step", x=0.5 * turn.radius)
@@ -161,9 +161,6 @@ PLANS = {
 }
 """The sets of the first drawing by name."""
 
-SECOND = (*(f"S{number}b" for number in range(1, 9)), "Tb")
-"""Names of the second drawing."""
-
 PLANT_COUNT = 60
 """Scenarios on each plant."""
 
@@ -187,24 +184,28 @@ def _on_plant(plant: Plant, in_range: str) -> SetPlan:
 
 
 _OTHER_PLANTS = {name: plant for name, plant in (DEVELOPMENT_PLANTS | FURTHER_PLANTS).items() if name != "level"}
-PLANS |= {name: _again(name.removesuffix("b"), "b", "second", _SECOND_SEED) for name in SECOND}
-ON_PLANTS = {f"on_{name}": plant for name, plant in _OTHER_PLANTS.items()}
-"""Plants by the names of their sets."""
-PLANS |= {name: _on_plant(plant, "S1b") for name, plant in ON_PLANTS.items()}
 
-THIRD = (*(f"S{number}c" for number in range(1, 9)), "Tc")
-"""Names of the third drawing."""
-PLANS |= {name: _again(name.removesuffix("c"), "c", "third", _THIRD_SEED) for name in THIRD}
-ON_PLANTS_AGAIN = {f"on_{name}_c": plant for name, plant in _OTHER_PLANTS.items()}
-"""Plants by the names of their sets of the third drawing."""
-PLANS |= {name: _on_plant(plant, "S1c") for name, plant in ON_PLANTS_AGAIN.items()}
 
-FOURTH = (*(f"S{number}d" for number in range(1, 9)), "Td")
-"""Names of the fourth drawing."""
-PLANS |= {name: _again(name.removesuffix("d"), "d", "fourth", _FOURTH_SEED) for name in FOURTH}
-ON_PLANTS_FOURTH = {f"on_{name}_d": plant for name, plant in _OTHER_PLANTS.items()}
-"""Plants by the names of their sets of the fourth drawing."""
-PLANS |= {name: _on_plant(plant, "S1d") for name, plant in ON_PLANTS_FOURTH.items()}
+def _drawn_again(letter: str, ordinal: str, root_seed: int, ending: str) -> tuple[tuple[str, ...], dict[str, Plant]]:
+    """Names of the sets of another drawing, and plants by the names of their sets; all their plans enter PLANS.
+
+    Args:
+        letter: that ends the names of the sets.
+        ordinal: of the drawing.
+        root_seed: of the drawing.
+        ending: of the names of the sets on plants.
+    """
+    names = (*(f"S{number}{letter}" for number in range(1, 9)), f"T{letter}")
+    plants = {f"on_{name}{ending}": plant for name, plant in _OTHER_PLANTS.items()}
+    PLANS.update({name: _again(name.removesuffix(letter), letter, ordinal, root_seed) for name in names})
+    PLANS.update({name: _on_plant(plant, f"S1{letter}") for name, plant in plants.items()})
+    return names, plants
+
+
+SECOND, ON_PLANTS = _drawn_again("b", "second", _SECOND_SEED, "")
+THIRD, ON_PLANTS_AGAIN = _drawn_again("c", "third", _THIRD_SEED, "_c")
+FOURTH, ON_PLANTS_FOURTH = _drawn_again("d", "fourth", _FOURTH_SEED, "_d")
+"""Names of the further drawings, and plants by the names of their sets; a set's draws depend on its place in PLANS."""
 
 ALL_ON_PLANTS = ON_PLANTS | ON_PLANTS_AGAIN | ON_PLANTS_FOURTH
 """Plants by the names of their sets."""

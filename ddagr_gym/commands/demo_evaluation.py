@@ -7,9 +7,9 @@ from typing import Any
 
 from ddagr_gym.commands.output import Section
 
-LADDER = ("B0", "B1", "B2", "B3", "B4", "B6", "B6_pose_wide")
+LADDER = ("B0", "B1", "B2", "B3", "B4", "B6")
 POLICIES = ("ppo_ekf", "ppo_history", "ppo_raw")
-"""The ladder's arms (theory: control, section 3); ablations are in the full evaluation."""
+"""The ladder's arms beside the default (theory: control, section 3); ablations are in the full evaluation."""
 SET = "V"
 SCENARIOS = 8
 """The first ones of the validation set: enough for a look, not for a result."""
@@ -27,13 +27,13 @@ def evaluation_step(folder: Path, scenarios: int = SCENARIOS, workers: int = 2) 
     from ddagr_gym.commands.evaluation_report import write_files, write_report
     from ddagr_gym.commands.output import format_table
     from ddagr_gym.evaluation.campaign import run_campaign
-    from ddagr_gym.evaluation.controllers import controller_title
+    from ddagr_gym.evaluation.controllers import DEFAULT, controller_title
     from ddagr_gym.evaluation.dataset import EPISODES
     from ddagr_gym.evaluation.summary import summaries
     from ddagr_gym.policies.shipped import selected_policies
     from ddagr_gym.reporting.evaluation_page import PAGE, PICTURE
 
-    controllers = [*LADDER, *(name for name in POLICIES if name in selected_policies())]
+    controllers = [*LADDER, DEFAULT, *(name for name in POLICIES if name in selected_policies())]
     print(f"Driving {len(controllers)} controllers over {scenarios} scenarios of set {SET} ...", flush=True)
     target = folder / "evaluation"
     target.mkdir()

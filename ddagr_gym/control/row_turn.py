@@ -151,15 +151,20 @@ class RowTurn(Validated):
         """Distance (...) [m] at ``time`` (...) [s] after a start at the commanded speed, at most the path's length."""
         return np.clip(self.speed * np.asarray(time, dtype=float), 0.0, self.length)
 
+    def place_on_turn(self, angle: ArrayLike) -> Array:
+        """Place (..., 2) [m] on the half circle where ``angle`` (...) [rad] of it have been turned, to either side."""
+        turned = np.asarray(angle, dtype=float)
+        x, y = self.radius * np.sin(turned), self.sign * self.radius * (1.0 - np.cos(turned))
+        return np.stack([x, y], axis=-1)
+
     def position(self, distance: ArrayLike) -> Array:
         """Commanded position (..., 2) [m]; before 0 and beyond the end the straights go on."""
         distance = np.asarray(distance, dtype=float)
-        turned = self._turned(distance)
         before = np.minimum(distance - self.run_in, 0.0)
         after = np.maximum(distance - self.run_in - self.turn_length, 0.0)
-        x = before + self.radius * np.sin(turned) - after
-        y = self.sign * self.radius * (1.0 - np.cos(turned))
-        return np.stack([x, y], axis=-1)
+        found = self.place_on_turn(self._turned(distance))
+        found[..., 0] = before + found[..., 0] - after
+        return found
 
     def sample(self, spacing: float = 0.02) -> ReferencePath:
         """The path at equal distances of at most ``spacing`` [m], both ends included."""

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -229,6 +230,7 @@ def drivetrain_of(robot: Robot, values: Mapping[str, float]) -> Drivetrain:
     return replace(own, **changed)
 
 
+@cache
 def added_numbers() -> frozenset[str]:
     """Names of pure numbers of robot and ground to which a fit adds its value, in place of a factor's logarithm."""
     ground = (*soil_parameters(), *slope_parameters((0.0, 0.0)))

@@ -10,13 +10,13 @@ from ddagr_gym.diagnosis.answer.change import BEFORE
 from ddagr_gym.diagnosis.result.sentences import certificate_in_words
 from ddagr_gym.diagnosis.wording import CHANNEL_NAMES, title
 from ddagr_gym.physics.effects.slope import Slope
-from ddagr_gym.reporting.diagnosis_text import finding_rows
+from ddagr_gym.reporting.diagnosis_text import AgainstGate, finding_rows
 from ddagr_gym.reporting.parameter_units import unit_in_words
 from ddagr_gym.reporting.text_table import format_table
 
 if TYPE_CHECKING:
     from ddagr_gym.diagnosis.answer.change import Change, EffectShift, SizeShift
-    from ddagr_gym.diagnosis.answer.verdict import Diagnosis
+    from ddagr_gym.diagnosis.answer.verdict import Diagnosis, Finding
 
 CHANGED_HEADER = ("effect", "size", "90 % interval", "unit", "distance", "limit", "could also be")
 """Columns of :func:`changed_rows`; distance and limit in standard deviations of what makes ordinary drives differ."""
@@ -51,11 +51,13 @@ def change_text(diagnosis: Diagnosis) -> str:
 
 
 def changed_rows(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
-    """One row per size of what is named, under :data:`CHANGED_HEADER`: gains are half the squares of distances.
+    """One row per size of what is named, under :data:`CHANGED_HEADER`."""
+    return finding_rows(diagnosis, _distance_and_limit)
 
-    What is seen in the values, and so has no gate, has no distance.
-    """
-    return finding_rows(diagnosis, lambda gain: math.sqrt(2.0 * gain), ungated=False)
+
+def _distance_and_limit(finding: Finding) -> AgainstGate:
+    """Gain and gate are half the squares of them; what is seen in the values has no gate, and no distance."""
+    return (math.sqrt(2.0 * finding.gain), math.sqrt(2.0 * finding.gate)) if finding.gate > 0.0 else None
 
 
 def shift_rows(diagnosis: Diagnosis) -> list[tuple[str, ...]]:

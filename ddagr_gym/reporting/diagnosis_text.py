@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from ddagr_gym.diagnosis.answer.certificate import Certificate
     from ddagr_gym.diagnosis.answer.verdict import DataDoubt, Diagnosis, Finding
 
+AgainstGate = tuple[float, float] | None
+"""What speaks for a finding, and what that had to pass; None where it is seen in the values."""
+
 FINDING_HEADER = ("effect", "size", "90 % interval", "unit", "gain", "gate", "could also be")
 
 FIT_HEADER = ("error on unseen drives", "raw", "refitted", "corrected", "black box", "ceiling", "unit")
@@ -56,25 +59,27 @@ def _doubt_line(doubt: DataDoubt) -> str:
     return f"  {place}: {doubt.sentence}" if place else f"  {doubt.sentence}"
 
 
+def _gain_and_gate(finding: Finding) -> AgainstGate:
+    return (finding.gain, finding.gate) if max(finding.gain, finding.gate) > 0.0 else None
+
+
 def finding_rows(
-    diagnosis: Diagnosis, evidence: Callable[[float], float] = lambda gain: gain, ungated: bool = True
+    diagnosis: Diagnosis, evidence: Callable[[Finding], AgainstGate] = _gain_and_gate
 ) -> list[tuple[str, ...]]:
     """One row per parameter of each finding that is no part of the drivetrain, under :data:`FINDING_HEADER`.
 
     Args:
         diagnosis: the answer.
-        evidence: what is shown of a gain and of its gate.
-        ungated: whether it is also shown of gains that had no gate to pass.
+        evidence: what speaks for a finding, as it is shown.
     """
-    return [row for finding in other_findings(diagnosis) for row in _finding_rows(finding, evidence, ungated)]
+    return [row for finding in other_findings(diagnosis) for row in _finding_rows(finding, evidence(finding))]
 
 
-def _finding_rows(finding: Finding, evidence: Callable[[float], float], ungated: bool) -> Iterator[tuple[str, ...]]:
+def _finding_rows(finding: Finding, evidence: AgainstGate) -> Iterator[tuple[str, ...]]:
     """One row per parameter; what belongs to the whole finding is in the first."""
     others = [f"{name} {weight:.2f}" for name, weight in finding.equivalence_set.items() if name != finding.name]
     none = "nothing else" if finding.gate > 0.0 else "seen in the values"
-    seen = finding.gate > 0.0 or (ungated and finding.gain > 0.0)
-    gated = tuple(f"{evidence(value):.1f}" if seen else "–" for value in (finding.gain, finding.gate))
+    gated = ("–", "–") if evidence is None else tuple(f"{value:.1f}" for value in evidence)
     whole = (*gated, ", ".join(others) or none)
     for number, (name, estimate) in enumerate(shown_parameters(finding).items()):
         interval = "" if estimate.interval is None else f"{estimate.interval[0]:.3g} to {estimate.interval[1]:.3g}"

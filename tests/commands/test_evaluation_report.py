@@ -8,6 +8,7 @@ from ddagr_gym.cli import main
 from ddagr_gym.commands import demo_evaluation, evaluation_report
 from ddagr_gym.commands.evaluation_report import assemble, write_report
 from ddagr_gym.evaluation.campaign import run_campaign
+from ddagr_gym.evaluation.controllers import DEFAULT
 from ddagr_gym.evaluation.dataset import EPISODES
 from ddagr_gym.evaluation.report_data import Arm
 from ddagr_gym.evaluation.summary import summaries
@@ -88,7 +89,7 @@ def test_the_demonstration_ends_with_a_page(monkeypatch, tmp_path):
     pytest.importorskip("imageio_ffmpeg", reason="needs the extra render")
     monkeypatch.setattr(shipped, "selected_policies", lambda: ())
     section = demo_evaluation.evaluation_step(tmp_path, scenarios=2, workers=1)
-    assert all(name in section.text for name in demo_evaluation.LADDER)
+    assert all(name in section.text for name in (*demo_evaluation.LADDER, DEFAULT))
     for link in ("evaluation/report.html", "evaluation/radius_error.png", "evaluation/summary.json"):
         assert link in section.html
         assert (tmp_path / link).is_file()

@@ -126,7 +126,7 @@ def test_set_is_the_one_that_was_frozen(name):
 
 
 def test_files_are_small():
-    assert sum(path.stat().st_size for path in scenario_folder().iterdir()) < 2_000_000
+    assert sum(path.stat().st_size for path in scenario_folder().iterdir()) < 1_700_000
 
 
 def test_validation_shares_nothing_with_the_test_sets():
