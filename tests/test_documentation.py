@@ -174,3 +174,10 @@ def test_glossary_explains_each_word_once(repository: Path):
     entries = re.findall(r"\*\*([^*]+)\*\*:", text)
     assert len(entries) > 60
     assert len(entries) == len(set(entries))
+
+
+def test_changelog_has_no_relative_links(repository: Path):
+    """It is read beside the README and as a page of the site, where relative paths differ."""
+    links = re.findall(r"\]\(([^)]+)\)", (repository / "CHANGELOG.md").read_text())
+    assert links
+    assert [link for link in links if not link.startswith("https://")] == []
