@@ -98,9 +98,9 @@ class CalibrationResult(Report):
         save(self.calibration, Path(path))
 
     def _fill(self, folder: Path, progress: Callable[[str], None] | None) -> None:
-        from ddagr_gym.calibration.effect_bank import NAME as BANK
-        from ddagr_gym.calibration.effect_bank import save_runs
         from ddagr_gym.calibration.files import NAME, ROBOT, soil_file
+        from ddagr_gym.calibration.ordinary_files import NAME as BANK
+        from ddagr_gym.calibration.ordinary_files import save_ordinary
         from ddagr_gym.calibration.simulator_values import calibrated_draws
         from ddagr_gym.config import dump_config
         from ddagr_gym.envs.calibrated_draws import EFFECTS
@@ -114,8 +114,8 @@ class CalibrationResult(Report):
         draws = calibrated_draws(self.calibration, self.robot, self.soils)
         (folder / DRAWS).write_text(dump_config(draws), encoding="utf-8")
         save_effects(folder / EFFECTS, self.effects, source=self.headline)
-        if self.outcome.bank:
-            save_runs(self.outcome.bank, folder / BANK, self.outcome.ordinary)
+        if self.outcome.ordinary is not None:
+            save_ordinary(self.outcome.ordinary, folder / BANK)
         self.to_json(folder / NAME)
         write_page(folder, self.calibration, self.outcome.forecasts)
 
@@ -150,8 +150,8 @@ def calibrate(
         seed: of the resampled intervals.
         threads: of the simulator, in each process.
         supply_currents: also fit currents that motors draw from their supply; their own current is always fitted.
-        bank: also diagnose every drive with the robot calibrated without it: what ordinary drives do to every effect of
-            the library, of two drives or more. Without it no other drive can be compared with these.
+        bank: also scan each drive for every effect of the library, with the robot calibrated without it: what ordinary
+            drives show of each. Of two drives or more; without it no other drive can be compared with these.
         processes: for what does not depend on each other: the fits from several starts and, for the bank, the drives.
         cluster: a Ray cluster to run them on: "local" starts one of so many processors here, an address takes one that
             runs. The result is the same.

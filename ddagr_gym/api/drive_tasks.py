@@ -107,8 +107,8 @@ def _task(item: Source, number: int) -> DriveTask:
 
 def setting_key(setting: Setting) -> str:
     """SHA-256 of all that an answer depends on besides the drive; the number of threads is not among it."""
-    from ddagr_gym.calibration.effect_bank import NAME as BANK
     from ddagr_gym.calibration.files import NAME, ROBOT
+    from ddagr_gym.calibration.ordinary_files import NAME as BANK
     from ddagr_gym.diagnosis.gates.source_digest import source_digest
 
     digest = hashlib.sha256(source_digest().encode())

@@ -1,9 +1,11 @@
-"""What a comparison needs of ordinary drives as JSON knows it: null stands for what is infinite."""
+"""``bank.json``: what a comparison needs of ordinary drives; null stands for what is infinite."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,12 +14,56 @@ from numpy.typing import NDArray
 from ddagr_gym.calibration.ordinary_drives import Ordinary
 from ddagr_gym.config import Config, dump_config, parse_config
 from ddagr_gym.diagnosis.change.ordinary import Reference, Scores, SensorBias, Weighing
+from ddagr_gym.errors import InputError
+from ddagr_gym.files import read_json, write_text
 from ddagr_gym.parameters import Robot, Soil
 
 Array = NDArray[np.float64]
 
+NAME = "bank.json"
+VERSION = 3
+READ = (2, 3)
+"""Versions that are read: the second one also holds scans that nothing reads."""
+
+_FAULT = "is no bank of drives"
+_REMEDY = "make it with `ddagr calibrate`, without --no-bank"
+
 DIGITS = 9
 """Of a number in the file (ours): estimates are known to a few."""
+
+
+def save_ordinary(ordinary: Ordinary, path: Path) -> None:
+    """Write ``bank.json``, whole or not at all."""
+    body = {"version": VERSION, "ordinary": ordinary_as_mapping(ordinary)}
+    write_text(path, json.dumps(body, allow_nan=False) + "\n")
+
+
+def load_ordinary(path: Path) -> Ordinary:
+    """Read what a comparison needs of the drives.
+
+    Raises:
+        InputError: no such file, another format, or one without it.
+    """
+    body = read_json(path, _FAULT, _REMEDY)
+    try:
+        version = body["version"]
+    except (KeyError, TypeError) as error:
+        raise _no_bank(path, error) from None
+    if version not in READ:
+        raise InputError(f"{path} has version {version!r}, this program reads {VERSION}: calibrate again.")
+    if not body.get("ordinary"):
+        raise InputError(
+            f"{path} says nothing of the sizes of effects in ordinary drives: calibrate again with two drives or more "
+            "and without --no-bank."
+        )
+    try:
+        return ordinary_from_mapping(body["ordinary"])
+    except (KeyError, TypeError, ValueError) as error:
+        raise _no_bank(path, error) from None
+
+
+def _no_bank(path: Path, error: Exception) -> InputError:
+    return InputError(f"{path} {_FAULT} ({error}): {_REMEDY}.")
 
 
 def ordinary_as_mapping(ordinary: Ordinary) -> dict[str, Any]:

@@ -16,7 +16,6 @@ from ddagr_gym.calibration.accelerometer_results import SlopeOfGround
 from ddagr_gym.calibration.calibration_data import CalibrationData, prepare_drives
 from ddagr_gym.calibration.current_evidence import current_evidence
 from ddagr_gym.calibration.drive_scatter import drive_estimates
-from ddagr_gym.calibration.effect_bank import ordinary_runs
 from ddagr_gym.calibration.final_parts import decide_with_all_windows
 from ddagr_gym.calibration.fit_starts import fit_from_several
 from ddagr_gym.calibration.forecast_errors import Forecasts, all_forecasts, explained_when_left_out, forecast_errors
@@ -41,7 +40,6 @@ from ddagr_gym.calibration.settings import CalibrationSettings
 from ddagr_gym.calibration.simulator_values import calibrated_robot, fitted_soil
 from ddagr_gym.calibration.summary import drive_summaries, parameter_results
 from ddagr_gym.diagnosis.gates.source_digest import code_digest, source_digest
-from ddagr_gym.diagnosis.gates.thresholds import NullRun
 from ddagr_gym.diagnosis.preprocessing.input_requirements import content_hash
 from ddagr_gym.diagnosis.store import StepStore
 from ddagr_gym.identification.residual_weights import Weights
@@ -69,8 +67,6 @@ class Outcome:
         forecasts: of the left-out drives.
         model: fitted to some windows of all drives.
         weights: of the residuals of that fit.
-        bank: what each drive does to every effect of the library beside the robot calibrated without it; empty with a
-            single drive, or where no bank was asked for.
         ordinary: what a comparison of other drives with these needs; None with a single drive, or where no bank was
             asked for.
     """
@@ -82,7 +78,6 @@ class Outcome:
     forecasts: tuple[Forecasts, ...]
     model: FittedModel
     weights: Weights
-    bank: tuple[NullRun, ...] = ()
     ordinary: Ordinary | None = None
 
 
@@ -160,7 +155,8 @@ def calibrate_drives(
         settings: windows, threads and seed.
         data_sheet: name or file of the robot.
         soil_names: of the soils by ground.
-        with_bank: also scan every drive for every effect of the library, where there are two drives or more.
+        with_bank: also scan every drive for every effect of the library with the robot calibrated without it, where
+            there are two drives or more.
         ready: the same drives as :func:`ready_drives` leaves them; made of them where it is None.
         runner: of steps that do not depend on each other: the fits from several starts and, for the bank, the drives;
             this process where it is None. The result is the same to the bit.
@@ -229,12 +225,12 @@ def calibrate_drives(
     )
     found = {ground: fitted_soil(data, ground, model.values) for ground in data.drives_on}
     calibrated = calibrated_robot(data, model, calibration)
-    with_bank = with_bank and data.count > 1
-    bank = ordinary_runs(data, model, made, settings.threads, steps) if with_bank else ()
     ordinary = (
-        ordinary_drives(data, model, made, calibration, calibrated, settings.threads, steps) if with_bank else None
+        ordinary_drives(data, model, made, calibration, calibrated, settings.threads, steps)
+        if with_bank and data.count > 1
+        else None
     )
-    return Outcome(calibration, calibrated, found, data, compared, model, final.weights, bank, ordinary)
+    return Outcome(calibration, calibrated, found, data, compared, model, final.weights, ordinary)
 
 
 def _rng(settings: CalibrationSettings) -> np.random.Generator:

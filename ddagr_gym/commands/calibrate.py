@@ -45,8 +45,8 @@ class Arguments:
         cluster: a Ray cluster to run that on: "local" starts one of so many processors here, an address
             (ray://HOST:PORT) takes one that runs.
         supply_currents: also fit currents that motors draw from their supply; their own current is always fitted.
-        bank: also diagnose every drive with the robot calibrated without it, and write bank.json: what ordinary drives
-            do to every effect of the library. Without it no other drive can be compared with the calibration.
+        bank: also scan each drive for every effect of the library, with the robot calibrated without it, and write
+            bank.json: what ordinary drives show of each. Without it other drives can be compared with nothing.
         overwrite: replace an output folder that an earlier command wrote.
         maximum_rows: refuse a recording with more rows or messages.
         maximum_bytes: refuse a recording that unpacks to more bytes.

@@ -8,8 +8,8 @@ from types import SimpleNamespace
 import pytest
 
 from ddagr_gym.calibration import files, fit_starts
-from ddagr_gym.calibration.effect_bank import save_runs
 from ddagr_gym.calibration.independent_steps import IndependentSteps
+from ddagr_gym.calibration.ordinary_files import save_ordinary
 from ddagr_gym.calibration.run import calibrate_drives
 from ddagr_gym.calibration.settings import CalibrationSettings
 from ddagr_gym.diagnosis.store import StepStore
@@ -101,7 +101,7 @@ def written(drives, folder, workers=1, cluster=""):
         made = calibrate_drives(
             drives, ["field"] * 2, get_robot("ddagr"), soil, FEW, with_bank=True, runner=runner, cache=folder / "steps"
         )
-    save_runs(made.bank, folder / "bank.json", made.ordinary)
+    save_ordinary(made.ordinary, folder / "bank.json")
     return files.as_text(replace(made.calibration, seconds=0.0)), (folder / "bank.json").read_bytes()
 
 

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ddagr_gym.calibration.effect_bank import load_ordinary, load_runs, save_runs
 from ddagr_gym.calibration.ordinary_drives import Ordinary, pooled
 from ddagr_gym.calibration.ordinary_drives import _Left as Left
+from ddagr_gym.calibration.ordinary_files import load_ordinary, save_ordinary
 from ddagr_gym.diagnosis.change.ordinary import Reference, Scores, SensorBias, Weighing
 from ddagr_gym.errors import InputError
 from ddagr_gym.presets import get_robot, get_soil
@@ -34,7 +34,7 @@ ORDINARY = Ordinary(
 
 
 def test_weights_and_scores_read_back(tmp_path):
-    save_runs((), tmp_path / "bank.json", ORDINARY)
+    save_ordinary(ORDINARY, tmp_path / "bank.json")
     found = load_ordinary(tmp_path / "bank.json")
     assert found.weighing.sigma.tolist() == WEIGHING.sigma.tolist()
     assert (found.weighing.lateness, found.weighing.turning) == (0.1, 0.2)
@@ -45,23 +45,36 @@ def test_weights_and_scores_read_back(tmp_path):
     assert (first.robot, first.soil) == (ROBOT, SOIL)
     assert first.moved == {"mass": 1.5}
     assert (found.references[1].robot, found.references[1].soil) == (None, None)
-    assert load_runs(tmp_path / "bank.json") == ()
 
 
-def test_a_bank_of_the_first_version_is_read_and_has_no_ordinary_drives(tmp_path):
+def test_a_bank_of_the_second_version_is_read(tmp_path):
     path = tmp_path / "bank.json"
-    path.write_text(json.dumps({"version": 1, "runs": []}))
-    assert load_runs(path) == ()
+    save_ordinary(ORDINARY, path)
+    body = json.loads(path.read_text())
+    path.write_text(json.dumps({**body, "version": 2, "runs": [{"kind": "real"}]}))
+    assert [item.drive for item in load_ordinary(path).references] == ["one.csv", "two.csv"]
+
+
+def test_a_bank_without_ordinary_drives_is_refused(tmp_path):
+    path = tmp_path / "bank.json"
+    path.write_text(json.dumps({"version": 2, "runs": [], "ordinary": None}))
     with pytest.raises(InputError, match="says nothing of the sizes of effects in ordinary drives: calibrate again"):
         load_ordinary(path)
+
+
+def test_no_bank_is_said(tmp_path):
+    with pytest.raises(InputError, match="make it with `ddagr calibrate`, without --no-bank"):
+        load_ordinary(tmp_path / "bank.json")
 
 
 @pytest.mark.parametrize(
     ("text", "said"),
     [
         ("{", "is no bank of drives"),
-        ('{"version": 9}', "has version 9, this program reads 2"),
-        ('{"version": 2, "runs": [], "ordinary": {"weighing": {}}}', "is no bank of drives"),
+        ("[]", "make it with `ddagr calibrate`, without --no-bank"),
+        ('{"ordinary": {}}', "make it with `ddagr calibrate`, without --no-bank"),
+        ('{"version": 1, "runs": []}', "has version 1, this program reads 3: calibrate again"),
+        ('{"version": 3, "ordinary": {"weighing": {}}}', "is no bank of drives"),
     ],
 )
 def test_what_is_no_bank_is_refused(text, said, tmp_path):

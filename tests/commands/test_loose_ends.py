@@ -8,7 +8,7 @@ import time
 import pytest
 
 from ddagr_gym.calibration import files as calibration_files
-from ddagr_gym.calibration.effect_bank import load_runs
+from ddagr_gym.calibration.ordinary_files import load_ordinary
 from ddagr_gym.cli import main
 from ddagr_gym.config import DEEPEST, find_config, parse_config
 from ddagr_gym.diagnosis.change.measured_scatter import measured_scatter
@@ -77,7 +77,7 @@ JSON_READERS = {
     "thresholds": load_thresholds,
     "diagnosis": diagnosis_files.load,
     "calibration": calibration_files.load,
-    "bank": load_runs,
+    "bank": load_ordinary,
     "drives": series_files.load,
     "scatter": measured_scatter,
 }
