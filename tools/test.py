@@ -25,6 +25,10 @@ EXAMPLES = (
 # pytest's exit code when a selection holds no test
 _NOTHING_SELECTED = 5
 
+# A file's tests stay in one process: what its fixtures make is made once. In the order of the files, so that none that
+# takes long comes last.
+_SHARED_OUT = ("--dist", "loadfile", "--no-loadscope-reorder")
+
 # import-linter has no module to run with -m
 _LINT_IMPORTS = """
 import sys
@@ -108,7 +112,7 @@ def _tool(root: Path, *words: str) -> Outcome:
 def _tests(root: Path, arguments: Arguments) -> Outcome:
     paths = [str(path.resolve()) for path in arguments.paths]
     marker = "slow" if arguments.slow else "not slow"
-    parallel = ["-n", str(arguments.workers)] if arguments.workers > 1 else []
+    parallel = ["-n", str(arguments.workers), *_SHARED_OUT] if arguments.workers > 1 else []
     return _pytest([sys.executable], root, "-m", marker, *parallel, *paths, may_be_empty=arguments.slow)
 
 
