@@ -332,15 +332,15 @@ def _bars(evidence: Evidence, number: int, recording: int) -> tuple[Array, Array
 
 
 def horizon_figure(horizons: Mapping[str, ModelErrors], channel: str) -> Figure:
-    """Held-out errors of one channel after each horizon: raw, refitted, corrected, and the ceiling.
+    """Held-out errors of one channel after each horizon: nominal, refitted, corrected, and the ceiling.
 
     Args:
         horizons: errors by horizon.
         channel: which.
     """
     models = (
-        ("raw", "nominal", RAW), ("refitted", "nominal, refitted", BEFORE), ("corrected", "corrected", AFTER),
-        ("ceiling", "flexible model (ceiling)", palette.GREEN),
+        ("raw", "nominal", RAW), ("refitted", "refitted", BEFORE), ("corrected", "corrected", AFTER),
+        ("ceiling", "ceiling", palette.GREEN),
     )  # fmt: skip
     figure = blank_figure(2.2, 2.9)
     axes = figure.subplots()

@@ -22,13 +22,13 @@ _PIXELS = 200
 
 
 def map_figures(evidence: Evidence, findings: Sequence[Finding] = ()) -> tuple[Figure, ...]:
-    """The drives coloured by their mismatch: as the simulator stands, refitted, corrected; on one scale.
+    """The drives coloured by their mismatch: nominal, refitted, corrected; on one scale.
 
     Args:
         evidence: of the diagnosis.
         findings: whose places and slopes are drawn.
     """
-    titles = ("The simulator as it stands", "Refitted, nothing added", "Corrected")
+    titles = ("Nominal", "Refitted", "Corrected")
     sizes = [np.sqrt(evidence.roughness(model).mean(axis=1)) for model, _, _ in MODELS]
     top = max(float(np.quantile(np.concatenate(sizes), 0.97)), 2.0)
     return tuple(_map(evidence, size, top, text, findings) for size, text in zip(sizes, titles, strict=True))
@@ -102,7 +102,7 @@ def wrench_figures(evidence: Evidence) -> tuple[Figure, Figure]:
     clear = [c[2:4][:, c[4] > 2.0] for c in cells]
     longest = max([float(np.quantile(np.hypot(*c), 0.9)) for c in clear if c.shape[1]], default=1.0)
     return (
-        _forces(evidence, cells[0], longest, "The simulator as it stands: force missing"),
+        _forces(evidence, cells[0], longest, "Nominal: force missing"),
         _forces(evidence, cells[1], longest, "Corrected: force still missing"),
     )
 

@@ -25,7 +25,7 @@ AgainstGate = tuple[float, float] | None
 
 FINDING_HEADER = ("effect", "size", "90 % interval", "unit", "gain", "gate", "could also be")
 
-FIT_HEADER = ("error on unseen drives", "raw", "refitted", "corrected", "black box", "ceiling", "unit")
+FIT_HEADER = ("error on unseen drives", "nominal", "refitted", "corrected", "black box", "ceiling", "unit")
 
 _SHOWN = ("position", "pose_yaw", "heading_by_gyro", "yaw_rate", "speed", "specific_force_x", "specific_force_y")
 """Channels whose errors are shown, in this order."""

@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 NOMINAL, REFITTED, CORRECTED = "nominal", "refitted", "corrected"
 MODELS = (NOMINAL, REFITTED, CORRECTED)
-"""The simulator as it stands; with its parameters fitted to the drives; with the named effects as well."""
+"""The nominal simulator; with its robot and soil fitted to the drives; with the named effects as well."""
 
 POSE = tuple(CHANNELS.index(name) for name in ("pose_x", "pose_y", "pose_yaw"))
 
