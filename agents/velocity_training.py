@@ -182,6 +182,7 @@ class VelocityTraining:
         self.name, self.variant, self.settings, self.folder = name, VARIANTS[name], settings, make_folder(folder)
         self._places = np.array([INPUTS.index(item) for item in self.variant.inputs])
         begun = find_network(settings.begun) if settings.begun else None
+        self._begun = "" if begun is None else begun.digest()
         self._mean, self._deviation = self._statistics(drives) if begun is None else (begun.mean, begun.deviation)
         self.device, self._device = device, exact_device(device)
         self._drives, self._validation = self._tensors(drives), self._tensors(validation)
@@ -355,7 +356,7 @@ class VelocityTraining:
     def _record(self) -> dict[str, Any]:
         return {
             "name": self.name, "settings": asdict(self.settings), "course": self.course,
-            "seconds": self.seconds, "device": self.device,
+            "seconds": self.seconds, "device": self.device, "begun": self._begun,
         }  # fmt: skip
 
     def _resume(self) -> None:
@@ -368,6 +369,8 @@ class VelocityTraining:
         mine = self._record()
         if any(record.get(name) != mine[name] for name in ("name", "settings", "device")):
             raise InputError(f"{file} is of a training with other settings: give another folder.")
+        if record.get("begun", mine["begun"]) != mine["begun"]:
+            raise InputError(f"{file} went on from another {self.settings.begun} than is here: give another folder.")
         self.model.load_state_dict(state["model"])
         self._optimiser.load_state_dict(state["optimiser"])
         self.course, self.seconds = record["course"], record["seconds"]

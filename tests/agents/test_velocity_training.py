@@ -167,6 +167,16 @@ def test_a_training_goes_on_from_a_published_network(tmp_path):
         VelocityTraining("pose_wide", replace(settings, units=8), made_up(), made_up(8, seed=1), tmp_path)
 
 
+def test_a_training_does_not_go_on_where_another_network_was_published_in_between(tmp_path, monkeypatch):
+    settings = VelocitySettings(turns=24, validation=8, units=128, layers=2, epochs=2, batch=6, begun="pose")
+    VelocityTraining("pose_wide", settings, made_up(), made_up(8, seed=1), tmp_path)._keep_epoch()
+    pose = find_network("pose")
+    other = replace(pose, output_bias=pose.output_bias + 1.0)
+    monkeypatch.setattr("agents.velocity_training.find_network", lambda name: other)
+    with pytest.raises(InputError, match="went on from another pose than is here: give another folder"):
+        VelocityTraining("pose_wide", settings, made_up(), made_up(8, seed=1), tmp_path).run()
+
+
 def test_turns_that_were_driven_before_plans_had_more_parts_are_kept(tmp_path):
     make_drives(1, 11, tmp_path, NOMINAL)
     stored = json.loads((tmp_path / "drives.json").read_text())
