@@ -25,8 +25,8 @@ EXAMPLES = (
 # pytest's exit code when a selection holds no test
 _NOTHING_SELECTED = 5
 
-# A file's tests stay in one process: what its fixtures make is made once. In the order of the files, so that none that
-# takes long comes last.
+# A file's tests stay in one process: what its fixtures make is made once. In the order of the files: sorted by their
+# number of tests, those with few that take long would come last.
 _SHARED_OUT = ("--dist", "loadfile", "--no-loadscope-reorder")
 
 # import-linter has no module to run with -m
