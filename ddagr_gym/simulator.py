@@ -17,6 +17,7 @@ from ddagr_gym.parameters import Numerics, Robot, Sensors, Soil
 from ddagr_gym.physics import layout
 from ddagr_gym.physics.drivetrain import NO_LIMIT
 from ddagr_gym.physics.effects import Effect, effect_table, load_effects
+from ddagr_gym.physics.force_record import ForceRecord, no_record
 from ddagr_gym.physics.numerics import step_numerics
 from ddagr_gym.physics.terrain import SoilField
 from ddagr_gym.physics.wheel_forces import finite_array, soil_vector
@@ -173,6 +174,7 @@ class Simulator:
         self._set_fields(fields)
         self._numerics = _plain(step_numerics(numerics))
         self._given = np.full(count, GIVEN, dtype=np.int64)
+        self._no_record = tuple(no_record(count))
         self._threads = RowThreads(count, threads)
 
     def _set_fields(self, fields: Sequence[SoilField]) -> None:
@@ -277,6 +279,7 @@ class Simulator:
         readings: Array,
         record: Array,
         generators: Integers | None = None,
+        forces: ForceRecord | None = None,
     ) -> None:
         """Advance all environments by the samples in ``noise``, without checks; see :func:`advance_rows`.
 
@@ -287,10 +290,12 @@ class Simulator:
             readings: (N, samples, 8), written in the order of ``layout.READINGS``.
             record: (N, samples, K), written.
             generators: (N,) of :meth:`NormalDraws.prepare`.
+            forces: that the environments keep, or follow.
         """
         drawn = self._given if generators is None else generators
         stretch = (commands, noise, FILL, drawn, recorded, readings, record)
-        self._threads.advance(self.rows, noise.shape[1], stretch, self._grids(), self._actions(), self._numerics)
+        shared = (stretch, self._grids(), self._actions(), self._numerics)
+        self._threads.advance(self.rows, noise.shape[1], *shared, self._no_record if forces is None else tuple(forces))
 
     def step(
         self, commands: ArrayLike, noise: ArrayLike | None = None, *, recorded: Sequence[int] = (), samples: int = 1

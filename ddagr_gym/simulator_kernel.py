@@ -25,6 +25,16 @@ from ddagr_gym.physics.drivetrain import (
     turn_banks,
     wind_up,
 )
+from ddagr_gym.physics.force_record import (
+    FOLLOWS,
+    RECORDS,
+    ForceRecord,
+    decision_at,
+    is_same_ground,
+    keep_decision,
+    keep_ground,
+    record_of,
+)
 from ddagr_gym.physics.integrators import advance_body
 from ddagr_gym.physics.layout import (
     COMMAND,
@@ -188,11 +198,28 @@ def remember_rows(rows: Array, past: Array, speeds: Array, actions: Bundle) -> N
         row[TIME], row[OMEGA], row[OMEGA + 1] = now, right, left
 
 
+@kernel()
+def _steps(row: Array, sample: int, accuracy: StepNumerics, record: ForceRecord) -> tuple[int, ForceRecord]:
+    """Steps of a sample, and the record that serves in it: nothing is extrapolated where the ground is another one."""
+    if record.state[0] == FOLLOWS:
+        steps = decision_at(record, 0)
+        record.state[2] += 1
+        limit = record.limit if is_same_ground(row, record, sample) else 0.0
+        return steps, ForceRecord(record.entries, record.decisions, record.grounds, record.state, limit)
+    steps = _division(row, accuracy)
+    if record.state[0] == RECORDS:
+        keep_ground(row, record, sample)
+        keep_decision(record, 0, steps)
+        record.state[2] += 1
+    return steps, record
+
+
 @kernel(inline=True)
 def _advance_row(
-    row: Array, n: int, stretch: Stretch, grids: SoilGrids, actions: EffectActions, accuracy: StepNumerics
-) -> None:
-    """Advance row ``n`` by the samples of ``stretch``; ``actions`` are its own."""
+    row: Array, n: int, stretch: Stretch, grids: SoilGrids, actions: EffectActions, accuracy: StepNumerics,
+    record: ForceRecord,
+) -> None:  # fmt: skip
+    """Advance row ``n`` by the samples of ``stretch``; ``actions`` and ``record`` are its own."""
     held = stretch.commands.shape[1] == 1
     if stretch.generators[n] != GIVEN:
         draw_normals(stretch.fill, stretch.generators[n], stretch.noise[n])
@@ -200,9 +227,9 @@ def _advance_row(
         _drive(row, stretch.commands[n, 0 if held else k], actions)
         _prepare_ground(row, grids, n, actions)
         v_x, v_y, yaw_rate = row[V_X], row[V_Y], row[YAW_RATE]
-        steps = _division(row, accuracy)
+        steps, here = _steps(row, k, accuracy, record)
         for _ in range(steps):
-            advance_body(row, row[SAMPLE_PERIOD] / steps, accuracy, actions)
+            advance_body(row, row[SAMPLE_PERIOD] / steps, accuracy, actions, here)
         _average_motion(row, v_x, v_y, yaw_rate)
         read_imu(row, stretch.noise[n, k, 0:3])
         read_encoders(row, stretch.noise[n, k, 3:5], row[SAMPLE_PERIOD])
@@ -217,7 +244,7 @@ def _advance_row(
 @kernel()
 def advance_rows(
     rows: Array, ends: Integers, part: int, turn: int, claims: Integers, finished: Integers,
-    stretch: Bundle, grids: Bundle, actions: Bundle, numerics: Bundle,
+    stretch: Bundle, grids: Bundle, actions: Bundle, numerics: Bundle, record: Bundle,
 ) -> None:  # fmt: skip
     """Advance by the samples of ``stretch`` all rows that no other thread has claimed, those of one part first.
 
@@ -235,16 +262,19 @@ def advance_rows(
         grids: fields of :class:`SoilGrids`.
         actions: fields of :class:`EffectActions` on N environments.
         numerics: fields of :class:`StepNumerics`.
+        record: fields of :class:`ForceRecord` on N environments.
     """
     parts, accuracy = ends.size - 1, named_numerics(numerics)
     rows, stretch, grids, actions = borrowed(rows), borrowed(stretch), borrowed(grids), borrowed(actions)
+    record = borrowed(record)
     for shift in range(parts):
         p = (part + shift) % parts
         for i in range(ends[p + 1] - ends[p]):
             n = ends[p] + i if shift == 0 else ends[p + 1] - 1 - i
             if claim(claims, n, turn):
                 own = actions_on(EffectActions(*actions), n)
-                _advance_row(rows[n], n, Stretch(*stretch), SoilGrids(*grids), own, accuracy)
+                kept = record_of(ForceRecord(*record), n)
+                _advance_row(rows[n], n, Stretch(*stretch), SoilGrids(*grids), own, accuracy, kept)
                 count_up(finished)
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ddagr_gym.identification.problem import Point, Problem
 from ddagr_gym.identification.size_prior import size_scale
+from ddagr_gym.identification.window_model import Reference
 from ddagr_gym.physics.effects import Effect
 
 Array = NDArray[np.float64]
@@ -98,14 +99,26 @@ def read(effects: Sequence[Effect], parameters: Sequence[EffectParameter]) -> Ar
     return np.array([getattr(effects[p.effect], p.field) for p in parameters], dtype=np.float64)
 
 
-def effect_columns(problem: Problem, point: Point, base: Array, parameters: Sequence[EffectParameter]) -> Array:
-    """Weighted sensitivity to effect parameters, (W, M, E)."""
+def effect_columns(
+    problem: Problem, point: Point, parameters: Sequence[EffectParameter], reference: Reference | None = None
+) -> Array:
+    """Weighted sensitivity to effect parameters, (W, M, E).
+
+    Args:
+        problem: what is fitted.
+        point: where the model stands.
+        parameters: of its effects.
+        reference: of :meth:`Problem.reference`; simulated when it is None.
+    """
     columns = np.empty((*problem.blocked.mask.shape, len(parameters)))
+    if not parameters:
+        return columns
     values = read(point.effects, parameters)
+    reference = problem.reference(point) if reference is None else reference
     for k, parameter in enumerate(parameters):
         step = parameter.step if parameter.low <= values[k] + parameter.step <= parameter.high else -parameter.step
         tried = values.copy()
         tried[k] += step
-        changed = problem.predict(replace(point, effects=moved(point.effects, parameters, tried)))
-        columns[..., k] = problem.blocked.change(changed, base) / step
+        changed = problem.varied(replace(point, effects=moved(point.effects, parameters, tried)), reference)
+        columns[..., k] = problem.blocked.change(changed, reference.prediction) / step
     return columns

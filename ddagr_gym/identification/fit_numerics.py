@@ -1,7 +1,7 @@
 """Accuracy of the simulator inside a fit: settings each as coarse as what its residuals leave unexplained allows.
 
 All are smooth (no decision of the integrator jumps with a parameter by more than its error), because sensitivities are
-finite differences.
+differences of simulations.
 """
 
 from __future__ import annotations
@@ -15,6 +15,23 @@ FIELD_TOLERANCE = 5e-4
 
 RUN_IN_STEP = 0.05
 """Longest step of the integrator before a window [s] (ours)."""
+
+
+FOLLOWED_CHANGE = 0.03
+"""Change of a wheel's velocity over its speed up to which sensitivities extrapolate its forces (ours)."""
+
+FOLLOWED_REFRESH = 0.001
+"""Change of a wheel's velocity over its speed from which the derivatives for that are renewed (ours)."""
+
+
+def reference_numerics(numerics: Numerics) -> Numerics:
+    """For a simulation whose forces others extrapolate: derivatives as accurate as the forces, and renewed often.
+
+    Args:
+        numerics: of the others.
+    """
+    refresh = min(numerics.jacobian_refresh, FOLLOWED_REFRESH)
+    return replace(numerics, jacobian_refresh=refresh, jacobian_contact_nodes=numerics.contact_nodes)
 
 
 def field_numerics() -> Numerics:
@@ -38,8 +55,8 @@ def far_off_numerics() -> Numerics:
 def field_slope_numerics() -> Numerics:
     """For the sensitivities of fits to many field drives (a calibration): one step of 50 ms, fewer nodes in a contact.
 
-    On drives of a Warthog sensitivities differ from those of :func:`field_numerics` by 5 % in the median, by 21 % at
-    most, and a Gauss-Newton step by 0.03 and 0.17 deviations of a parameter, at 0.55 times the cost.
+    On drives of a Warthog they err by 5 % in the median window and by 33 % in one of ten, those of
+    :func:`field_numerics` by 4 % and 23 % at 1.3 times the cost (benchmarks/sensitivities.py).
     """
     return replace(field_numerics(), maximum_step=0.05, contact_nodes=5)
 
@@ -61,8 +78,8 @@ def block_mean_numerics() -> Numerics:
 
     Accelerations of starts, arcs, stops and spins are within 0.5 mm/s^2 (r.m.s.) of converged ones. Dividing at
     launches instead (``Numerics.smooth()``) costs up to 1.5 times as much and errs by 2.3 mm/s^2. A wheel's derivative
-    is kept while its motion changes by less than 2 %, at two thirds of the time: sensitivities to soil and robot are as
-    close to converged ones as with a new derivative at every step (2 % off in the median, 0.16 and 0.2 at most).
+    is kept while its motion changes by less than 2 %, at two thirds of the time (:func:`reference_numerics` renews it
+    more often, since sensitivities are as right as the derivative).
 
     The derivative is that of the forces as they are summed, with as many nodes. With fewer, Newton's method fails in
     soils that resist within a hundredth of slip, to which refits come: on a robot whose battery had moved a prediction

@@ -24,6 +24,7 @@ from ddagr_gym.identification.effect_parameters import (
 from ddagr_gym.identification.least_squares import Elimination, Linearised
 from ddagr_gym.identification.problem import STATE_PRIOR, Point, Problem
 from ddagr_gym.identification.size_prior import size_penalty
+from ddagr_gym.identification.window_model import Reference
 
 Array = NDArray[np.float64]
 
@@ -146,16 +147,18 @@ def fit(
         # a step that fails with sensitivities of another point says nothing about this one
         converged = small and (fresh or reuse is not None)
         fresh = reuse is None and not converged and (done < renewals or small)
+        anew = bool(parameters) and done < max(renewals, _EFFECT_RENEWALS) and not converged
+        if not (fresh or anew):
+            continue
+        reference = problem.reference(here.point)
         if fresh:
-            here = _renewed(problem, here)
-        if parameters and done < max(renewals, _EFFECT_RENEWALS) and not converged:
-            if done < iterations:
-                here = replace(here, by_effect=effect_columns(problem, here.point, here.prediction, parameters))
-            if not fresh:
-                by_parameter = problem.heading_columns(here.point, here.prediction, here.by_parameter)
-                here = replace(here, by_parameter=by_parameter)
+            here = _renewed(problem, here, reference)
+        if anew and done < iterations:
+            here = replace(here, by_effect=effect_columns(problem, here.point, parameters, reference))
+        if anew and not fresh:
+            here = replace(here, by_parameter=problem.heading_columns(here.point, here.by_parameter, reference))
     if reuse is None and done and not converged and not fresh:
-        here = _renewed(problem, here)
+        here = _renewed(problem, here, problem.reference(here.point))
     cost, shares = cost_of(problem, here.point, here.prediction, here.elimination)
     return Fitted(here.point, here.prediction, cost, here.elimination, here.by_parameter, done, converged, shares)
 
@@ -187,19 +190,22 @@ def _begun(problem: Problem, point: Point, parameters: Sequence[EffectParameter]
     if not np.isfinite(prediction).all():
         point = replace(point, states=problem.starts(point.values))
         prediction = problem.predict(point)
+    reference = problem.reference(point) if known is None or parameters else None
     if known is not None:
-        by_parameter = problem.heading_columns(point, prediction, known.by_parameter)
+        by_parameter = problem.heading_columns(point, known.by_parameter, reference)
         elimination = known.elimination
     else:
-        by_parameter, elimination = _sensitivities(problem, point, prediction)
-    by_effect = effect_columns(problem, point, prediction, parameters)
+        by_parameter = problem.parameter_columns(point, prediction, reference)
+        elimination = problem.eliminate(point, prediction, by_parameter, reference)
+    by_effect = effect_columns(problem, point, parameters, reference)
     cost, _ = cost_of(problem, point, prediction, elimination)
     return _Iterate(point, prediction, cost, elimination, by_parameter, by_effect)
 
 
-def _renewed(problem: Problem, here: _Iterate) -> _Iterate:
+def _renewed(problem: Problem, here: _Iterate, reference: Reference) -> _Iterate:
     """The same point with its own sensitivities to the nuisances."""
-    by_parameter, elimination = _sensitivities(problem, here.point, here.prediction)
+    by_parameter = problem.parameter_columns(here.point, here.prediction, reference)
+    elimination = problem.eliminate(here.point, here.prediction, by_parameter, reference)
     cost, _ = cost_of(problem, here.point, here.prediction, elimination)
     return replace(here, cost=cost, elimination=elimination, by_parameter=by_parameter)
 
@@ -207,7 +213,7 @@ def _renewed(problem: Problem, here: _Iterate) -> _Iterate:
 def linearised(problem: Problem, fitted: Fitted) -> Linearised:
     """The linearised problem at a fit: its free nuisances, then the parameters of its effects."""
     parameters = effect_parameters(fitted.point.effects)
-    by_effect = effect_columns(problem, fitted.point, fitted.prediction, parameters)
+    by_effect = effect_columns(problem, fitted.point, parameters)
     here = _Iterate(fitted.point, fitted.prediction, fitted.cost, fitted.elimination, fitted.by_parameter, by_effect)
     return _linearised(problem, here, _raw_columns(problem, here), parameters)
 
@@ -224,7 +230,8 @@ def fit_states(problem: Problem, values: Array, iterations: int = 2) -> tuple[Ar
     prediction = problem.predict(point)
     cost = _losses(problem, problem.residual(point, prediction), prediction)
     for _ in range(iterations):
-        elimination = problem.eliminate(point, prediction, problem.local_columns(point, prediction))
+        reference = problem.reference(point)
+        elimination = problem.eliminate(point, prediction, problem.local_columns(point, reference), reference)
         change = elimination.explain(problem.residual(point, prediction)[..., None])[:, :_STATES, 0]
         tried = replace(point, states=point.states + change)
         changed = problem.predict(tried)
@@ -234,12 +241,6 @@ def fit_states(problem: Problem, values: Array, iterations: int = 2) -> tuple[Ar
         prediction = np.where(better[:, None, None], changed, prediction)
         cost = np.where(better, after, cost)
     return point.states, prediction
-
-
-def _sensitivities(problem: Problem, point: Point, prediction: Array) -> tuple[Array, Elimination]:
-    unmoved = problem.varied_from(point, prediction)
-    by_parameter = problem.parameter_columns(point, prediction, unmoved)
-    return by_parameter, problem.eliminate(point, prediction, by_parameter, unmoved)
 
 
 def _raw_columns(problem: Problem, here: _Iterate) -> Array:
@@ -323,7 +324,7 @@ class _WholeStep:
 def values_after_step(problem: Problem, known: Fitted) -> Array:
     """Nuisances (P,) after the share of one step, by known sensitivities, that lowers the cost most; or as they are.
 
-    In each window the states count that are better, those that go with the step or those before it.
+    A window that the states of the step make worse keeps those before it, where it is better with them.
 
     Args:
         problem: what to fit, without effects.
@@ -331,11 +332,11 @@ def values_after_step(problem: Problem, known: Fitted) -> Array:
     """
     here = _begun(problem, known.point, (), known)
     step = _WholeStep.of(problem, here, _raw_columns(problem, here), ())
-    every_window = np.zeros(problem.blocked.windows.count)
+    before = cost_of(problem, here.point, here.prediction, here.elimination)[1]
     best = here
     for damping in DAMPING:
         stepped, start = step.share(problem, known.point, (), damping)
-        tried, predicted, cost = _best_by_window(problem, stepped, start, here.elimination, every_window)
+        tried, predicted, cost = _best_by_window(problem, stepped, start, here.elimination, before)
         if cost < best.cost:
             best = replace(here, point=tried, prediction=predicted, cost=cost)
         elif best is not here:
@@ -356,7 +357,7 @@ def _best_by_window(
         trial: with the linear step of the states.
         other: the same with other states.
         elimination: of the local unknowns.
-        before: (W,) costs of the windows before the step; 0 where the other states are tried in any case.
+        before: (W,) costs of the windows before the step.
     """
     prediction = problem.predict(trial)
     costs = cost_of(problem, trial, prediction, elimination)[1]

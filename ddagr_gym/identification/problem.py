@@ -23,7 +23,7 @@ from ddagr_gym.identification.motor_currents import CurrentModel
 from ddagr_gym.identification.nuisances import SHIFT_AS_EFFECT, Nuisances
 from ddagr_gym.identification.parameters import disjoint_scopes
 from ddagr_gym.identification.spells import Spell
-from ddagr_gym.identification.window_model import WindowModel
+from ddagr_gym.identification.window_model import Reference, WindowModel
 from ddagr_gym.identification.windows import CHANNELS, WindowSet
 from ddagr_gym.parameters import Numerics, Robot, Soil
 from ddagr_gym.physics import layout
@@ -208,14 +208,14 @@ class Problem:
         """(W, T, 8)."""
         return self.model.predict(point.values, point.states, point.effects)
 
-    def _varied_prediction(self, point: Point) -> Array:
-        """The same where it only serves a sensitivity."""
+    def varied(self, point: Point, reference: Reference) -> Array:
+        """The same where it only serves a sensitivity, near a reference."""
         model = self._slopes or self.model
-        return model.predict(point.values, point.states, point.effects)
+        return model.predict(point.values, point.states, point.effects, near=reference)
 
-    def varied_from(self, point: Point, base: Array) -> Array:
-        """(W, T, 8) what predictions for sensitivities are held against: that at a point, by the same numerics."""
-        return base if self._slopes is None else self._varied_prediction(point)
+    def reference(self, point: Point) -> Reference:
+        """What predictions for sensitivities are held against: that at a point, by the same numerics."""
+        return (self._slopes or self.model).reference(point.values, point.states, point.effects)
 
     def residual(self, point: Point, prediction: Array) -> Array:
         """Weighted block residuals with the priors of the local unknowns below, (W, M + S)."""
@@ -250,7 +250,7 @@ class Problem:
         rows = np.zeros((columns.shape[0], len(self.local_prior), columns.shape[2]))
         return np.concatenate([columns, rows], axis=1)
 
-    def parameter_columns(self, point: Point, base: Array, unmoved: Array | None = None) -> Array:
+    def parameter_columns(self, point: Point, base: Array, reference: Reference | None = None) -> Array:
         """Weighted sensitivity to every nuisance parameter, (W, M, P).
 
         One simulation serves all parameters of scopes that do not overlap: a window sees one of them. So do headings,
@@ -259,7 +259,7 @@ class Problem:
         Args:
             point: where the model stands.
             base: (W, T, 8) prediction there.
-            unmoved: see :meth:`varied_from`; simulated when it is None.
+            reference: of :meth:`reference`; simulated when it is None.
         """
         columns = np.zeros((*self.blocked.mask.shape, len(self.prior)))
         simulated = []
@@ -273,21 +273,22 @@ class Problem:
                 columns[..., k] = self._bias_column(channel, base, parameter.acts_in(self.blocked.windows.recording))
             elif not parameter.heading and (self.prior[k] > 0.0 or k in self._varied):
                 simulated.append(k)
-        unmoved = self.varied_from(point, base) if unmoved is None else unmoved
+        reference = self.reference(point) if reference is None else reference
         for together in disjoint_scopes(self.nuisances.parameters, simulated):
             spans = np.array([self._difference(k, point.values[k]) for k in together])
-            begin = self._beside(point, together, spans[:, 0]) if spans[:, 0].any() else unmoved
-            change = self.blocked.change(self._beside(point, together, spans[:, 1]), begin)
+            centred = spans[:, 0].any()
+            begin = self._beside(point, together, spans[:, 0], reference) if centred else reference.prediction
+            change = self.blocked.change(self._beside(point, together, spans[:, 1], reference), begin)
             for k, (start, end) in zip(together, spans, strict=True):
                 acts = self.nuisances.parameters[k].acts_in(self.blocked.windows.recording)
                 columns[acts, :, k] = change[acts] / (end - start)
-        return self.heading_columns(point, base, columns)
+        return self.heading_columns(point, columns, reference)
 
-    def _beside(self, point: Point, chosen: Sequence[int], steps: Array) -> Array:
+    def _beside(self, point: Point, chosen: Sequence[int], steps: Array, reference: Reference) -> Array:
         """Prediction with some parameters beside a point."""
         moved = point.values.copy()
         moved[chosen] += steps
-        return self._varied_prediction(replace(point, values=moved))
+        return self.varied(replace(point, values=moved), reference)
 
     def _difference(self, k: int, value: float) -> tuple[float, float]:
         """Begin and end of the finite difference to parameter k, from its value.
@@ -300,14 +301,14 @@ class Problem:
             return max(-step, self.low[k] - value), min(step, self.high[k] - value)
         return 0.0, step if value + step <= max(self.high[k], _NEAR_BOUND) else -step
 
-    def local_columns(self, point: Point, base: Array) -> Array:
+    def local_columns(self, point: Point, reference: Reference) -> Array:
         """The sensitivities (W, M, P) to the parameters that have a local unknown; 0 for all others."""
         columns = np.zeros((*self.blocked.mask.shape, len(self.prior)))
-        unmoved = self.varied_from(point, base) if self._varied else base
         for index in self._varied:
             moved = point.values.copy()
             moved[index] += self.nuisances.parameters[index].step
-            change = self.blocked.change(self._varied_prediction(replace(point, values=moved)), unmoved)
+            varied = self.varied(replace(point, values=moved), reference)
+            change = self.blocked.change(varied, reference.prediction)
             columns[..., index] = change / self.nuisances.parameters[index].step
         return columns
 
@@ -316,7 +317,7 @@ class Problem:
         """Indices of the parameters that have a local unknown."""
         return [unknown.parameter for unknown in self.nuisances.local if unknown.parameter is not None]
 
-    def heading_columns(self, point: Point, base: Array, by_parameter: Array) -> Array:
+    def heading_columns(self, point: Point, by_parameter: Array, reference: Reference | None = None) -> Array:
         """Sensitivities (W, M, P) with those to the headings as they are with the effects of a point.
 
         One simulation serves all headings: every window belongs to one recording.
@@ -331,8 +332,8 @@ class Problem:
         step = self.nuisances.parameters[own[0]].step
         values = point.values.copy()
         values[own] += step
-        unmoved = self.varied_from(point, base)
-        change = self.blocked.change(self._varied_prediction(self.moved(point, values)), unmoved) / step
+        reference = self.reference(point) if reference is None else reference
+        change = self.blocked.change(self.varied(self.moved(point, values), reference), reference.prediction) / step
         for k in own:
             chosen = self.nuisances.parameters[k].acts_in(self.blocked.windows.recording)
             found[..., k] = np.where(chosen[:, None], change, 0.0)
@@ -350,19 +351,21 @@ class Problem:
         change = None if currents is None else currents.derivative(name, base, self.model.named(point.values))
         return None if change is None else self.blocked.derivative(change, base)
 
-    def eliminate(self, point: Point, base: Array, by_parameter: Array, unmoved: Array | None = None) -> Elimination:
+    def eliminate(
+        self, point: Point, base: Array, by_parameter: Array, reference: Reference | None = None
+    ) -> Elimination:
         """Basis of the local unknowns of each window at a point (theory: identification, eq. (7)).
 
         Args:
             point: where the model stands.
             base: (W, T, 8) prediction there.
             by_parameter: (W, M, P) sensitivities, of which those with a local unknown count.
-            unmoved: see :meth:`varied_from`; simulated when it is None.
+            reference: of :meth:`reference`; simulated when it is None.
         """
         model = self._slopes or self.model
-        unmoved = self.varied_from(point, base) if unmoved is None else unmoved
-        changes = model.state_derivatives(point.values, point.states, unmoved, point.effects)
-        by_state = np.nan_to_num(self.blocked.derivative(changes, unmoved))
+        reference = self.reference(point) if reference is None else reference
+        changes = model.state_derivatives(point.values, point.states, reference, point.effects)
+        by_state = np.nan_to_num(self.blocked.derivative(changes, reference.prediction))
         local = [
             by_parameter[..., unknown.parameter]
             if unknown.channel is None

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from copy import copy
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.identification.fit_numerics import run_in_numerics
+from ddagr_gym.identification.fit_numerics import FOLLOWED_CHANGE, reference_numerics, run_in_numerics
 from ddagr_gym.identification.motor_currents import CurrentModel
 from ddagr_gym.identification.parameters import ModelParameter
 from ddagr_gym.identification.spells import Spell
@@ -18,6 +19,7 @@ from ddagr_gym.parameters import Drivetrain, Imu, Numerics, PoseReceiver, Robot,
 from ddagr_gym.physics import layout
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.effects.base import GROUPS
+from ddagr_gym.physics.force_record import ForceRecord, new_record, to_follow
 from ddagr_gym.physics.motor_torque import RECORDED, motor_torques
 from ddagr_gym.simulator import Simulator, build_row
 
@@ -70,6 +72,23 @@ def pose_derivatives(states: Array, base: Array) -> Array:
     derivatives[..., 5, 2] = -(base[..., 6] - states[:, None, 1])
     derivatives[..., 6, 2] = base[..., 5] - states[:, None, 0]
     return derivatives
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """A prediction of windows, with what predictions near it need to be made fast.
+
+    Attributes:
+        prediction: (W, T, 8), or (W, T, 10) with the currents of the motors.
+        forces: of the wheels in the windows.
+        run_in: the same in what was driven right before them; None where that is not simulated.
+        integrals: (W, 2) of :meth:`WindowModel.first_integrals`.
+    """
+
+    prediction: Array
+    forces: ForceRecord
+    run_in: ForceRecord | None
+    integrals: Array
 
 
 class WindowModel:
@@ -127,7 +146,12 @@ class WindowModel:
         return other
 
     def predict(
-        self, values: Array, states: Array, effects: Sequence[Effect] = (), integrals: Array | None = None
+        self,
+        values: Array,
+        states: Array,
+        effects: Sequence[Effect] = (),
+        integrals: Array | None = None,
+        near: Reference | None = None,
     ) -> Array:
         """Channels of all windows, (W, T, 8), or (W, T, 10) with the currents of the motors.
 
@@ -136,12 +160,57 @@ class WindowModel:
             states: (W, 8) initial STATE.
             effects: missing physics.
             integrals: of :meth:`first_integrals` at these values and effects; found where it is None.
+            near: a prediction that hardly differs, whose forces are extrapolated.
         """
+        if near is None:
+            return self._channels(values, states, effects, integrals)
+        model = self._as_reference()
+        if integrals is None:
+            integrals = model._integrals_near(near.run_in, values, effects)
+        return model._channels(values, states, effects, integrals, to_follow(near.forces))
+
+    def _integrals_near(self, run_in: ForceRecord | None, values: Array, effects: Sequence[Effect]) -> Array:
+        return self.first_integrals(values, effects, None if run_in is None else to_follow(run_in))
+
+    def _as_reference(self) -> WindowModel:
+        """The same model as precise as a reference."""
+        model = copy(self)
+        model._numerics = reference_numerics(self._numerics)
+        return model
+
+    def _channels(
+        self,
+        values: Array,
+        states: Array,
+        effects: Sequence[Effect],
+        integrals: Array | None,
+        forces: ForceRecord | None = None,
+    ) -> Array:
+        entries = () if self.currents is None else RECORDED
+        readings, record = self.predict_recorded(values, states, entries, effects, integrals, forces)
         if self.currents is None:
-            return self.predict_recorded(values, states, (), effects, integrals)[0]
-        readings, record = self.predict_recorded(values, states, RECORDED, effects, integrals)
+            return readings
         currents = self.currents.currents(motor_torques(record), record[..., :2], self.named(values))
         return np.concatenate([readings, currents], axis=2)
+
+    def reference(self, values: Array, states: Array, effects: Sequence[Effect] = ()) -> Reference:
+        """A prediction with what others near it need to be made fast. Arguments as :meth:`predict`."""
+        model = self._as_reference()
+        run_in, before = None, self.windows.run_in
+        if before is not None and self._is_run_in(values):
+            run_in = model._new_record(before.windows, run_in_numerics(model._numerics))
+        integrals = model.first_integrals(values, effects, run_in)
+        forces = model._new_record(self.windows, model._numerics)
+        model._channels(values, states, effects, integrals, forces)
+        # what others are held against follows the record, too: extrapolation by nothing changes a little
+        integrals = model._integrals_near(run_in, values, effects)
+        prediction = model._channels(values, states, effects, integrals, to_follow(forces))
+        return Reference(prediction, forces, run_in, integrals)
+
+    @staticmethod
+    def _new_record(windows: WindowSet, numerics: Numerics) -> ForceRecord:
+        steps = max(numerics.substeps, math.ceil(windows.period / numerics.maximum_step - 1e-9))
+        return new_record(windows.count, windows.samples, steps, FOLLOWED_CHANGE)
 
     def named(self, values: Array) -> dict[str, float]:
         """Values (P,) of the parameters by name."""
@@ -154,6 +223,7 @@ class WindowModel:
         entries: Sequence[int],
         effects: Sequence[Effect] = (),
         integrals: Array | None = None,
+        forces: ForceRecord | None = None,
     ) -> tuple[Array, Array]:
         """Channels of all windows, (W, T, 8), and entries of the simulator's row at the samples, (W, T, K).
 
@@ -163,6 +233,7 @@ class WindowModel:
             entries: (K,) of :mod:`ddagr_gym.physics.layout`.
             effects: see there.
             integrals: see there.
+            forces: that are kept, or followed.
         """
         chosen = tuple(e for e in (*self._known, *effects) if not (self._imposed and e.group == _MOTORS))
         simulator = Simulator(self.windows.count, numerics=self._numerics, effects=chosen, threads=self._threads)
@@ -182,11 +253,13 @@ class WindowModel:
         recorded = np.asarray(entries, dtype=np.int64).reshape(-1)
         readings = np.empty((self.windows.count, self.windows.samples, len(CHANNELS)))
         record = np.empty((self.windows.count, self.windows.samples, recorded.size))
-        simulator.advance(commands, self._no_noise, recorded, readings, record)
+        simulator.advance(commands, self._no_noise, recorded, readings, record, forces=forces)
         simulator.close()
         return readings, record
 
-    def first_integrals(self, values: Array, effects: Sequence[Effect] = ()) -> Array:
+    def first_integrals(
+        self, values: Array, effects: Sequence[Effect] = (), forces: ForceRecord | None = None
+    ) -> Array:
         """Integral parts of the speed loops at the start of the windows, (W, 2) [rad/s^2]; NaN where unknown.
 
         They are what a simulation of what was driven right before leaves; the motion at the start itself is known from
@@ -194,13 +267,18 @@ class WindowModel:
         """
         found = np.full((self.windows.count, 2), np.nan)
         run_in = self.windows.run_in
-        if run_in is None or not len(run_in.leads_to) or not self._has_integral(values):
+        if run_in is None or not self._is_run_in(values):
             return found
         before = self.on(run_in.windows)
         before._numerics = run_in_numerics(self._numerics)
-        _, record = before.predict_recorded(values, run_in.windows.initial, _INTEGRALS, effects)
+        _, record = before.predict_recorded(values, run_in.windows.initial, _INTEGRALS, effects, forces=forces)
         found[run_in.leads_to] = record[:, -1]
         return found
+
+    def _is_run_in(self, values: Array) -> bool:
+        """Whether what was driven before the windows is simulated at these values of the parameters."""
+        run_in = self.windows.run_in
+        return run_in is not None and len(run_in.leads_to) > 0 and self._has_integral(values)
 
     def _has_integral(self, values: Array) -> bool:
         """Whether the speed loops have an integral part at these values of the parameters."""
@@ -245,14 +323,15 @@ class WindowModel:
         before = np.concatenate([start[:, None, _OMEGA], commands[:, :-1]], axis=1)
         return before + (commands - before) / (1.0 - np.exp(-IMPOSED_RATE_PERIODS)), start
 
-    def state_derivatives(self, values: Array, states: Array, base: Array, effects: Sequence[Effect] = ()) -> Array:
+    def state_derivatives(self, values: Array, states: Array, near: Reference, effects: Sequence[Effect] = ()) -> Array:
         """d prediction / d STATE, (W, T, 8, 8), by forward differences; the pose's own part is exact."""
+        base = near.prediction
         derivatives = np.zeros((*base.shape, len(STATE)))
         derivatives[..., :3] = pose_derivatives(states, base)
-        integrals = self.first_integrals(values, effects)
         # imposed wheel speeds leave nothing of the initial ones
         for k in range(3, _OMEGA.start) if self._imposed else _MOVING_STATE:
             moved = states.copy()
             moved[:, k] += STATE_STEPS[k]
-            derivatives[..., k] = (self.predict(values, moved, effects, integrals) - base) / STATE_STEPS[k]
+            varied = self.predict(values, moved, effects, near.integrals, near=near)
+            derivatives[..., k] = (varied - base) / STATE_STEPS[k]
         return derivatives

@@ -34,6 +34,18 @@ from ddagr_gym.physics.body_dynamics import (
 from ddagr_gym.physics.body_jacobian import BANKS, damping_inverse, solve_body, solve_with_banks
 from ddagr_gym.physics.callbacks import EffectActions
 from ddagr_gym.physics.drivetrain import advance_motors, bank_acceleration, integral_growth, moving_entries
+from ddagr_gym.physics.force_record import (
+    BACKWARD_EULER,
+    FOLLOWS,
+    RECORDS,
+    W_STEP,
+    ForceRecord,
+    decision_at,
+    keep_decision,
+    keep_entry,
+    take_entry,
+    take_entry_on_other_ground,
+)
 from ddagr_gym.physics.layout import (
     ACCELERATION,
     HALF_TRACK,
@@ -103,7 +115,37 @@ def _finish_banks(row: Array, step: float, start: Array) -> None:
 
 
 @kernel()
-def _w_step(row: Array, step: float, numerics: StepNumerics, actions: EffectActions) -> float:
+def _forces_at_stage(
+    row: Array,
+    refresh: float,
+    extrapolation: float,
+    numerics: StepNumerics,
+    actions: EffectActions,
+    record: ForceRecord,
+) -> None:
+    """Forces at the motion in ``row``: evaluated, or extrapolated from recorded ones or from the last ones.
+
+    Args:
+        row: the environment.
+        refresh: relative change of motion that renews a wheel's derivative.
+        extrapolation: change of a wheel's velocity over its speed up to which forces are extrapolated.
+        numerics: accuracy.
+        actions: effects on this environment.
+        record: of this environment; its limit is 0 where the ground is another one.
+    """
+    follows = record.state[0] == FOLLOWS
+    if follows and record.limit > 0.0:
+        take_entry(row, record)
+    elif follows:
+        take_entry_on_other_ground(row, record)
+    if not extrapolate_forces(row, record.limit if follows else extrapolation, actions):
+        evaluate_forces(row, -1.0 if follows else refresh, numerics, actions)
+    if record.state[0] == RECORDS:
+        keep_entry(row, record)
+
+
+@kernel()
+def _w_step(row: Array, step: float, numerics: StepNumerics, actions: EffectActions, record: ForceRecord) -> float:
     """One W-step; returns the size of the embedded error estimate [m/s]. Arguments as :func:`advance_body`."""
     inverse, drive, banks, drift = stack_array(9), stack_array(6), stack_array(BANKS), stack_array(3)
     start, first, second, right = stack_array(9), stack_array(5), stack_array(5), stack_array(5)
@@ -124,7 +166,7 @@ def _w_step(row: Array, step: float, numerics: StepNumerics, actions: EffectActi
     row[YAW] = yaw + step * yaw_rate
     row[TIME] += step
     refresh = numerics.jacobian_refresh if numerics.force_extrapolation > 0.0 else -1.0
-    evaluate_forces(row, refresh, numerics, actions)
+    _forces_at_stage(row, refresh, 0.0, numerics, actions, record)
     for j in range(3):
         right[j] = step * row[ACCELERATION + j] - 2.0 * first[j] - drift[j]
     if dynamic:
@@ -149,8 +191,7 @@ def _w_step(row: Array, step: float, numerics: StepNumerics, actions: EffectActi
             row[OMEGA + bank] = start[3 + bank] + 1.5 * first[3 + bank] + 0.5 * second[3 + bank]
             rim = row[WHEEL + bank] + row[WHEEL + 8 + bank]
             estimate = max(estimate, 0.5 * rim * abs(first[3 + bank] + second[3 + bank]))
-    if not extrapolate_forces(row, numerics.force_extrapolation, actions):
-        evaluate_forces(row, numerics.jacobian_refresh, numerics, actions)
+    _forces_at_stage(row, numerics.jacobian_refresh, numerics.force_extrapolation, numerics, actions, record)
     return estimate
 
 
@@ -177,7 +218,20 @@ def _copy(source: Array, target: Array) -> None:
 
 
 @kernel()
-def advance_body(row: Array, step: float, numerics: StepNumerics, actions: EffectActions) -> None:
+def _follow(row: Array, step: float, numerics: StepNumerics, actions: EffectActions, record: ForceRecord) -> None:
+    """One step divided and made as the recorded one was. Arguments as :func:`advance_body`."""
+    divisions = decision_at(record, 0)
+    for part in range(divisions):
+        if decision_at(record, 1 + part) == W_STEP:
+            _w_step(row, step / divisions, numerics, actions, record)
+        else:
+            tolerance = NEWTON_TOLERANCE + NEWTON_SHARE * _accepted(row, numerics.accepted_error)
+            backward_euler_step(row, step / divisions, tolerance, numerics, actions)
+    record.state[2] += 1 + divisions
+
+
+@kernel()
+def advance_body(row: Array, step: float, numerics: StepNumerics, actions: EffectActions, record: ForceRecord) -> None:
     """One step. Needs the forces at the present state in ``row`` and leaves those at the new one.
 
     Args:
@@ -185,23 +239,36 @@ def advance_body(row: Array, step: float, numerics: StepNumerics, actions: Effec
         step: h [s].
         numerics: accuracy.
         actions: effects on this environment.
+        record: of this environment.
     """
-    saved = stack_array(STEPPED)
+    if record.state[0] == FOLLOWS:
+        _follow(row, step, numerics, actions, record)
+        return
+    saved, entries = stack_array(STEPPED), record.state[1]
     _copy(row, saved)
     tolerance = NEWTON_TOLERANCE + NEWTON_SHARE * _accepted(row, numerics.accepted_error)
     divisions = 1
     done = 0
     while done < divisions:
-        estimate = _w_step(row, step / divisions, numerics, actions)
+        estimate = _w_step(row, step / divisions, numerics, actions, record)
         speed, accepted = _fastest(row), _accepted(row, numerics.accepted_error)
         if divisions == 1 and speed > FULL_ERROR_SPEED and not estimate <= accepted + LEAST_ERROR:
             _copy(saved, row)
-            divisions = numerics.launch_substeps
+            divisions, record.state[1] = numerics.launch_substeps, entries
             if divisions > 1:
                 continue
+        made = W_STEP
         if not estimate <= OVERSHOOT * accepted + LEAST_ERROR:
             _copy(saved, row)
+            record.state[1] = entries
             backward_euler_step(row, step / divisions, tolerance, numerics, actions)
+            made = BACKWARD_EULER
         done += 1
+        if record.state[0] == RECORDS:
+            keep_decision(record, done, made)
         if done < divisions:
             _copy(row, saved)
+            entries = record.state[1]
+    if record.state[0] == RECORDS:
+        keep_decision(record, 0, divisions)
+        record.state[2] += 1 + divisions

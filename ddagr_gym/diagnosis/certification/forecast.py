@@ -114,8 +114,9 @@ def past_elimination(forecasts: Forecasts, point: Point) -> Elimination:
     """Basis of what the unknowns before each start explain; ``point`` gives the model, its states do not count."""
     past = forecasts.past
     point = replace(point, states=past.starts(point.values))
-    base = past.predict(point)
-    return past.eliminate(point, base, past.local_columns(point, base))
+    reference = past.reference(point)
+    local = past.local_columns(point, reference)
+    return past.eliminate(point, past.predict(point), local, reference)
 
 
 def start_states(forecasts: Forecasts, point: Point, elimination: Elimination) -> Array:

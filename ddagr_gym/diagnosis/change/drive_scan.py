@@ -185,7 +185,7 @@ def scan_drive(problem: Problem, fitted: Fitted) -> DriveScan:
     drives = record_drives(problem, fitted.point)
     named = effect_parameters(fitted.point.effects)
     columns = [probe_column(problem, fitted, probe, drives) for item in compared for probe in item.candidate.probes]
-    by_effect = effect_columns(problem, fitted.point, fitted.prediction, named)
+    by_effect = effect_columns(problem, fitted.point, named)
     free = problem.open_at(fitted.point)
     raw = np.concatenate(
         [

@@ -134,7 +134,7 @@ def _raw(problem: Problem, model: ScannedModel, columns: Array) -> Array:
     fitted = model.fitted
     free = problem.open_at(fitted.point)
     parameters = effect_parameters(fitted.point.effects)
-    by_effect = effect_columns(problem, fitted.point, fitted.prediction, parameters)
+    by_effect = effect_columns(problem, fitted.point, parameters)
     sensitivities = np.concatenate([fitted.by_parameter[..., free], by_effect, columns], axis=2)
     residual = problem.residual(fitted.point, fitted.prediction)[..., None]
     return np.concatenate([residual, problem.padded(np.nan_to_num(sensitivities))], axis=2)

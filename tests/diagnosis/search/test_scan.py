@@ -32,7 +32,7 @@ def test_elimination_takes_away_what_the_unknowns_explain(drive, problem_of) -> 
     changed = problem.blocked.means(problem.model.predict(point.values, moved) - base)
     column = problem.padded(changed[..., None])
     # what is left of a change of the initial speed is what its prior alone resists
-    assert np.linalg.norm(elimination.project(column)) < 0.02 * np.linalg.norm(column)
+    assert np.linalg.norm(elimination.project(column)) < 0.03 * np.linalg.norm(column)
     residual = elimination.project(problem.residual(point, base)[..., None])
     assert np.abs(np.matmul(elimination.basis.transpose(0, 2, 1), residual)).max() < 1e-8
 
