@@ -1,6 +1,6 @@
 """Sensitivities of fits to real drives: simulated anew, and following a recorded simulation; how right, how fast.
 
-    python -m benchmarks.sensitivities [--windows 4] [--threads 1]
+    python -m benchmarks.sensitivities [--windows 6] [--threads 1]
 
 A fit asks how the readings of windows change with every parameter and with the speeds at their start. Each such
 sensitivity is the difference of two simulations: both made anew, or the second one extrapolating the wheel forces that

@@ -148,12 +148,11 @@ def fit(
         converged = small and (fresh or reuse is not None)
         fresh = reuse is None and not converged and (done < renewals or small)
         anew = bool(parameters) and done < max(renewals, _EFFECT_RENEWALS) and not converged
-        if not (fresh or anew):
-            continue
-        reference = problem.reference(here.point)
+        again = anew and done < iterations
+        reference = problem.reference(here.point) if fresh or again else None
         if fresh:
             here = _renewed(problem, here, reference)
-        if anew and done < iterations:
+        if again:
             here = replace(here, by_effect=effect_columns(problem, here.point, parameters, reference))
         if anew and not fresh:
             here = replace(here, by_parameter=problem.heading_columns(here.point, here.by_parameter, reference))
@@ -202,7 +201,7 @@ def _begun(problem: Problem, point: Point, parameters: Sequence[EffectParameter]
     return _Iterate(point, prediction, cost, elimination, by_parameter, by_effect)
 
 
-def _renewed(problem: Problem, here: _Iterate, reference: Reference) -> _Iterate:
+def _renewed(problem: Problem, here: _Iterate, reference: Reference | None) -> _Iterate:
     """The same point with its own sensitivities to the nuisances."""
     by_parameter = problem.parameter_columns(here.point, here.prediction, reference)
     elimination = problem.eliminate(here.point, here.prediction, by_parameter, reference)

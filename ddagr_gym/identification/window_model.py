@@ -14,7 +14,7 @@ from ddagr_gym.identification.fit_numerics import FOLLOWED_CHANGE, reference_num
 from ddagr_gym.identification.motor_currents import CurrentModel
 from ddagr_gym.identification.parameters import ModelParameter
 from ddagr_gym.identification.spells import Spell
-from ddagr_gym.identification.windows import CHANNELS, STATE, WindowSet
+from ddagr_gym.identification.windows import CHANNELS, STATE, RunIn, WindowSet
 from ddagr_gym.parameters import Drivetrain, Imu, Numerics, PoseReceiver, Robot, Sensors, Soil, WheelEncoder
 from ddagr_gym.physics import layout
 from ddagr_gym.physics.effects import Effect
@@ -196,9 +196,8 @@ class WindowModel:
     def reference(self, values: Array, states: Array, effects: Sequence[Effect] = ()) -> Reference:
         """A prediction with what others near it need to be made fast. Arguments as :meth:`predict`."""
         model = self._as_reference()
-        run_in, before = None, self.windows.run_in
-        if before is not None and self._is_run_in(values):
-            run_in = model._new_record(before.windows, run_in_numerics(model._numerics))
+        before = self._run_in_at(values)
+        run_in = None if before is None else model._new_record(before.windows, run_in_numerics(model._numerics))
         integrals = model.first_integrals(values, effects, run_in)
         forces = model._new_record(self.windows, model._numerics)
         model._channels(values, states, effects, integrals, forces)
@@ -266,8 +265,8 @@ class WindowModel:
         readings. Arguments as :meth:`predict`.
         """
         found = np.full((self.windows.count, 2), np.nan)
-        run_in = self.windows.run_in
-        if run_in is None or not self._is_run_in(values):
+        run_in = self._run_in_at(values)
+        if run_in is None:
             return found
         before = self.on(run_in.windows)
         before._numerics = run_in_numerics(self._numerics)
@@ -275,10 +274,10 @@ class WindowModel:
         found[run_in.leads_to] = record[:, -1]
         return found
 
-    def _is_run_in(self, values: Array) -> bool:
-        """Whether what was driven before the windows is simulated at these values of the parameters."""
+    def _run_in_at(self, values: Array) -> RunIn | None:
+        """What was driven before the windows, where it is simulated at these values of the parameters."""
         run_in = self.windows.run_in
-        return run_in is not None and len(run_in.leads_to) > 0 and self._has_integral(values)
+        return run_in if run_in is not None and len(run_in.leads_to) and self._has_integral(values) else None
 
     def _has_integral(self, values: Array) -> bool:
         """Whether the speed loops have an integral part at these values of the parameters."""

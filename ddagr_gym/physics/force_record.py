@@ -10,7 +10,7 @@ by more than a limit, where its soil or its geometry differs, and in backward Eu
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,6 @@ from ddagr_gym.physics.layout import LOAD, SINKAGE, SOIL, STEPPED, WHEEL
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-Bundle = tuple[Any, ...]
 
 ENTRY = STEPPED - LOAD
 """Values of a row that an evaluation leaves: kinematics, forces, sinkages, and the wheels' derivatives."""

@@ -80,7 +80,6 @@ def test_sensitivities_to_a_heading_are_those_of_its_own_windows_on_this_ground(
     names = [parameter.name for parameter in unfollowed.nuisances.parameters]
     place = names.index("heading_2")
     flat = unfollowed.start()
-    base = unfollowed.predict(flat)
     blank = np.zeros((*unfollowed.blocked.mask.shape, len(names)))
     of_a_slope = np.ones_like(blank)
     assert not unfollowed.heading_columns(flat, of_a_slope)[..., place].any()

@@ -193,14 +193,18 @@ def test_the_derivative_to_a_delay_spans_a_sample_to_both_sides_inside_its_bound
     problem = Problem(late, soil, one_drive().blocked, chosen, numerics=field_numerics())
     states = problem.start().states
 
-    def at(value: float) -> np.ndarray:
-        return problem.predict(Point(np.array([value]), states))
-
     point = Point(np.array([delay]), states)
-    expected = problem.blocked.change(at(end), at(begin)) / (end - begin)
-    found = problem.parameter_columns(point, at(delay))[..., 0]
-    assert np.linalg.norm(found - expected) < 0.05 * np.linalg.norm(expected)
+    reference = problem.reference(point)
+
+    def change(at) -> np.ndarray:
+        return problem.blocked.change(*(at(Point(np.array([value]), states)) for value in (end, begin))) / (end - begin)
+
+    found = problem.parameter_columns(point, problem.predict(point), reference)[..., 0]
+    expected = change(lambda there: problem.varied(there, reference))
+    np.testing.assert_allclose(found, expected, rtol=1e-9)
     assert np.abs(expected).max() > 1.0
+    anew = change(problem.predict)
+    assert np.linalg.norm(found - anew) < 0.05 * np.linalg.norm(anew)
 
 
 def test_headings_are_compared_on_the_circle(one_drive):
