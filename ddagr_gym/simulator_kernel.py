@@ -27,6 +27,7 @@ from ddagr_gym.physics.drivetrain import (
 )
 from ddagr_gym.physics.force_record import (
     FOLLOWS,
+    IDLE,
     RECORDS,
     ForceRecord,
     decision_at,
@@ -199,7 +200,7 @@ def remember_rows(rows: Array, past: Array, speeds: Array, actions: Bundle) -> N
 
 
 @kernel()
-def _steps(row: Array, sample: int, accuracy: StepNumerics, record: ForceRecord) -> tuple[int, ForceRecord]:
+def _recorded_steps(row: Array, sample: int, accuracy: StepNumerics, record: ForceRecord) -> tuple[int, ForceRecord]:
     """Steps of a sample, and the record that serves in it: nothing is extrapolated where the ground is another one."""
     if record.state[0] == FOLLOWS:
         steps = decision_at(record, 0)
@@ -227,9 +228,14 @@ def _advance_row(
         _drive(row, stretch.commands[n, 0 if held else k], actions)
         _prepare_ground(row, grids, n, actions)
         v_x, v_y, yaw_rate = row[V_X], row[V_Y], row[YAW_RATE]
-        steps, here = _steps(row, k, accuracy, record)
-        for _ in range(steps):
-            advance_body(row, row[SAMPLE_PERIOD] / steps, accuracy, actions, here)
+        if record.state[0] == IDLE:
+            steps = _division(row, accuracy)
+            for _ in range(steps):
+                advance_body(row, row[SAMPLE_PERIOD] / steps, accuracy, actions, None)
+        else:
+            steps, here = _recorded_steps(row, k, accuracy, record)
+            for _ in range(steps):
+                advance_body(row, row[SAMPLE_PERIOD] / steps, accuracy, actions, here)
         _average_motion(row, v_x, v_y, yaw_rate)
         read_imu(row, stretch.noise[n, k, 0:3])
         read_encoders(row, stretch.noise[n, k, 3:5], row[SAMPLE_PERIOD])

@@ -12,7 +12,7 @@ variance of the mean is that of G. Knapp and J. Hartung (Stat. Med. 22 (2003) 26
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,7 +23,7 @@ from ddagr_gym.calibration.joint_fit import FittedModel, fit_model
 from ddagr_gym.calibration.parts import RobotModel
 from ddagr_gym.calibration.result import Scatter
 from ddagr_gym.identification.gauss_newton import linearised
-from ddagr_gym.identification.parameters import OF_SENSORS, ModelParameter, per_group
+from ddagr_gym.identification.parameters import OF_SENSORS, ModelParameter, per_group, robot_parameters
 from ddagr_gym.identification.residual_weights import Weights
 
 Array = NDArray[np.float64]
@@ -42,16 +42,33 @@ _NARROWEST = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
+class DriveInformation:
+    """What one drive alone says of all parameters of the robot together, with those of its ground free.
+
+    Attributes:
+        information: (P, P) about their deviations from the joint values.
+        gradient: (P,) of the logarithm of the likelihood at these values.
+    """
+
+    information: Array
+    gradient: Array
+
+
+@dataclass(frozen=True, eq=False)
 class DriveEstimates:
     """Estimates of each calibrated parameter from each drive.
 
     Attributes:
         values: by parameter, (D,); NaN where the drive is on another ground or says nothing.
         variances: by parameter, (D,).
+        of_robot: (P,) names of the robot's parameters.
+        drives: (D,) what each says of these.
     """
 
     values: dict[str, Array]
     variances: dict[str, Array]
+    of_robot: tuple[str, ...]
+    drives: tuple[DriveInformation, ...]
 
 
 def drive_estimates(data: CalibrationData, model: FittedModel, weights: Weights, threads: int) -> DriveEstimates:
@@ -69,7 +86,7 @@ def drive_estimates(data: CalibrationData, model: FittedModel, weights: Weights,
     by_drive = RobotModel(model.model.robot, (*joint, *own))
     windows, states = model.problem.blocked.windows, model.fitted.point.states
     found = fit_model(data, windows, by_drive, weights, model.values, threads, states=states, iterations=ITERATIONS)
-    covariance = np.linalg.inv(linearised(found.problem, found.fitted).information)
+    covariance = np.asarray(np.linalg.inv(linearised(found.problem, found.fitted).information), dtype=np.float64)
     variance = dict(zip(found.free, np.diag(covariance), strict=True))
     values: dict[str, Array] = {}
     variances: dict[str, Array] = {}
@@ -77,7 +94,11 @@ def drive_estimates(data: CalibrationData, model: FittedModel, weights: Weights,
         pairs = [_freed(found.values.get(_own(p.name, d)), variance.get(_own(p.name, d)), p) for d in range(data.count)]
         values[p.name] = model.values[p.name] + np.array([deviation for deviation, _ in pairs])
         variances[p.name] = np.array([v for _, v in pairs])
-    return DriveEstimates(values, variances)
+    names = {p.name for p in robot_parameters(model.model.robot)}
+    of_robot = [p for p in moved if p.name in names]
+    places = {name: k for k, name in enumerate(found.free)}
+    drives = tuple(_information(of_robot, drive, found.values, covariance, places) for drive in range(data.count))
+    return DriveEstimates(values, variances, tuple(p.name for p in of_robot), drives)
 
 
 def _own(name: str, drive: int) -> str:
@@ -100,6 +121,26 @@ def _freed(deviation: float | None, variance: float | None, parameter: ModelPara
         return np.nan, np.nan
     alone = 1.0 / (1.0 / max(variance, _NARROWEST) - 1.0 / prior)
     return deviation * alone / variance, alone
+
+
+def _information(
+    parameters: Sequence[ModelParameter],
+    drive: int,
+    values: Mapping[str, float],
+    covariance: Array,
+    places: Mapping[str, int],
+) -> DriveInformation:
+    """What a drive alone says: its estimate with its covariance, freed of the priors as in equation (1)."""
+    own = [_own(p.name, drive) for p in parameters]
+    known = [k for k, name in enumerate(own) if name in places]
+    rows = [places[own[k]] for k in known]
+    inverse = np.linalg.inv(covariance[np.ix_(rows, rows)])
+    size, vectors = np.linalg.eigh(inverse - np.diag([parameters[k].prior ** -2.0 for k in known]))
+    information, gradient = np.zeros((len(own), len(own))), np.zeros(len(own))
+    # rounding may leave less than nothing
+    information[np.ix_(known, known)] = (vectors * np.maximum(size, 0.0)) @ vectors.T
+    gradient[known] = inverse @ np.array([values[own[k]] for k in known])
+    return DriveInformation(information, gradient)
 
 
 def between_variance(values: Array, variances: Array) -> float:

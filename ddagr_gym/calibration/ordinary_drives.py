@@ -7,31 +7,26 @@ a drive is no part of what that drive says.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.calibration.calibration_data import CalibrationData
+from ddagr_gym.calibration.drive_scatter import DriveEstimates
 from ddagr_gym.calibration.independent_steps import IndependentSteps
 from ddagr_gym.calibration.joint_fit import FittedModel
 from ddagr_gym.calibration.left_out import Forecast
 from ddagr_gym.calibration.result import Calibration
+from ddagr_gym.calibration.robots_on_grounds import GroundModel, ground_model
 from ddagr_gym.calibration.settings import HISTORY
 from ddagr_gym.calibration.simulator_values import SOIL_PARAMETERS, fitted_robot, fitted_soil
 from ddagr_gym.diagnosis.change.drive_fit import change_problem, change_windows, fit_nominal, misfit_of_compared
 from ddagr_gym.diagnosis.change.ground_slope import deviations_of, effects_of
-from ddagr_gym.diagnosis.change.ordinary import (
-    LEAST_ACCELEROMETER_BIAS,
-    LEAST_GYRO_BIAS,
-    Reference,
-    SensorBias,
-    Weighing,
-    field_deviations,
-    of_another_logger,
-    uncertain_parameters,
-)
+from ddagr_gym.diagnosis.change.ordinary import Reference, field_deviations, uncertain_parameters
 from ddagr_gym.diagnosis.change.reference import OrdinaryDrive, scan_ordinary
+from ddagr_gym.diagnosis.change.robot_on_ground import LEAST_SHARE, RobotOnGround
+from ddagr_gym.diagnosis.change.weighing import LEAST_ACCELEROMETER_BIAS, LEAST_GYRO_BIAS, SensorBias, Weighing
 from ddagr_gym.identification.parameters import ModelParameter, robot_parameters
 from ddagr_gym.identification.recording_noise import RecordingNoise
 from ddagr_gym.identification.relative_readings import usual_turning
@@ -57,10 +52,12 @@ class Ordinary:
     Attributes:
         weighing: of all drives.
         references: one for each drive.
+        on_grounds: the robot on each ground; none in files of before.
     """
 
     weighing: Weighing
     references: tuple[Reference, ...]
+    on_grounds: Mapping[str, RobotOnGround] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,15 +103,12 @@ def uncertain_robot(robot: Robot, deviations: Mapping[str, float]) -> tuple[Mode
     )
 
 
-LEAST_SHARE = 0.1
-"""Of the step of its finite difference, below which a parameter's deviation means nothing (ours)."""
-
-
 def ordinary_drives(
     data: CalibrationData,
     model: FittedModel,
     made: Sequence[Forecast],
     calibration: Calibration,
+    estimates: DriveEstimates,
     robot: Robot,
     threads: int,
     steps: IndependentSteps,
@@ -125,12 +119,15 @@ def ordinary_drives(
         data: drives.
         model: joint fit.
         made: forecasts of the left-out drives, with the values of the fit without each.
+        estimates: of the robot by each drive.
         calibration: the answer.
         robot: calibrated, with the deviations of another drive.
         threads: of the simulator.
         steps: run the drives.
     """
-    without = [_without(data, model, forecast, calibration, robot) for forecast in made]
+    deviations = {item.name: item.deviation or 0.0 for item in calibration.parameters}
+    together = _Drives(data, model, calibration, estimates, ground_model(estimates, data.grounds, deviations))
+    without = [together.without(forecast, robot) for forecast in made]
     noise = [data.prepared.noise[int(forecast.windows.recording[0])] for forecast in made]
     blank = Weighing(
         data.windows.duration, HISTORY, _lateness(data), _gyro_scale(calibration), *_UNKNOWN,
@@ -150,37 +147,67 @@ def ordinary_drives(
         Task(item.name, scan_ordinary, (drive, weighing, threads), f"ordinary {number}")
         for number, (item, drive) in enumerate(zip(without, drives, strict=True))
     ]
-    return Ordinary(weighing, tuple(steps.results("every effect of the library in each drive", tasks)))
+    references = tuple(steps.results("every effect of the library in each drive", tasks))
+    on_grounds = {ground: together.on(drives, model.values) for ground, drives in data.drives_on.items()}
+    return Ordinary(weighing, references, on_grounds)
 
 
 _UNKNOWN = (np.ones(8), np.ones(8), UNKNOWN_GYRO_BIAS, UNKNOWN_ACCELEROMETER_BIAS)
 
 
-def _without(
-    data: CalibrationData, model: FittedModel, forecast: Forecast, calibration: Calibration, robot: Robot
-) -> OrdinaryDrive:
-    """The left-out drive of a forecast and the robot that was fitted to the others."""
-    number = int(forecast.windows.recording[0])
-    ground = data.grounds[number]
-    values = forecast.values_of(model)
-    own = replace(fitted_robot(model.model.robot, values), standard_deviations=robot.standard_deviations)
-    recordings = data.prepared.recordings
-    parameters = uncertain_robot(own, robot_deviations(calibration))
-    if recordings[number].meta.column_map not in {r.meta.column_map for k, r in enumerate(recordings) if k != number}:
-        parameters = of_another_logger(parameters, recordings[number].period)
-    return OrdinaryDrive(
-        name=data.names[number],
-        ground=ground,
-        alone=len(data.drives_on[ground]) == 1,
-        # the drive's own lateness was taken out of its poses
-        recording=aligned_poses(recordings[number], -data.prepared.noise[number].pose_lateness),
-        robot=own,
-        soil=fitted_soil(data, ground, values),
-        parameters=parameters,
-        deviations=soil_deviations(calibration)[ground],
-        reversed_gyro=any(MENDED_SIGN in note for note in data.notes[number]),
-        slope=data.slopes.get(ground),
-    )
+@dataclass(frozen=True, eq=False)
+class _Drives:
+    """What the drives together say of robot and grounds.
+
+    Attributes:
+        data: the drives.
+        model: joint fit.
+        calibration: the answer.
+        estimates: of the robot by each drive.
+        by_ground: how that differs between grounds.
+    """
+
+    data: CalibrationData
+    model: FittedModel
+    calibration: Calibration
+    estimates: DriveEstimates
+    by_ground: GroundModel
+
+    def without(self, forecast: Forecast, robot: Robot) -> OrdinaryDrive:
+        """The left-out drive of a forecast and the robot that was fitted to the others.
+
+        Args:
+            forecast: of the drive.
+            robot: calibrated, with the deviations of another drive.
+        """
+        number = int(forecast.windows.recording[0])
+        data, ground = self.data, self.data.grounds[number]
+        values = forecast.values_of(self.model)
+        own = replace(fitted_robot(self.model.model.robot, values), standard_deviations=robot.standard_deviations)
+        recordings = data.prepared.recordings
+        maps = {recording.meta.column_map for k, recording in enumerate(recordings) if k != number}
+        beside = [drive for drive in data.drives_on[ground] if drive != number]
+        return OrdinaryDrive(
+            name=data.names[number],
+            ground=ground,
+            alone=not beside,
+            # the drive's own lateness was taken out of its poses
+            recording=aligned_poses(recordings[number], -data.prepared.noise[number].pose_lateness),
+            robot=own,
+            soil=fitted_soil(data, ground, values),
+            parameters=uncertain_robot(own, robot_deviations(self.calibration)),
+            deviations=soil_deviations(self.calibration)[ground],
+            reversed_gyro=any(MENDED_SIGN in note for note in data.notes[number]),
+            slope=data.slopes.get(ground),
+            on_ground=self.on(beside, values) if beside else RobotOnGround(),
+            logger=0.0 if recordings[number].meta.column_map in maps else recordings[number].period,
+        )
+
+    def on(self, drives: Sequence[int], values: Mapping[str, float]) -> RobotOnGround:
+        """The robot on the ground of some drives, as changes from values of a fit."""
+        joint = self.model.values
+        centre = {name: values[name] - joint[name] for name in self.by_ground.names}
+        return self.by_ground.on([self.estimates.drives[drive] for drive in drives], centre)
 
 
 def _lateness(data: CalibrationData) -> float:
@@ -196,14 +223,17 @@ def _gyro_scale(calibration: Calibration) -> float:
 
 def left_of(item: OrdinaryDrive, blank: Weighing, noise: RecordingNoise, dead: Sequence[str], threads: int) -> _Left:
     """Weights and biases by a first fit with those of the sensors' noise; workers call it by name."""
-    windows = change_windows([item.recording], item.robot, blank)
+    robot = item.robot_there
+    windows = change_windows([item.recording], robot, blank)
     weights = noise_weights([noise], windows, imposed=False, dead=dead, unfitted=())
-    parameters = uncertain_parameters(item.soil, item.parameters, item.deviations, blank, 1, deviations_of(item.slope))
+    parameters = uncertain_parameters(
+        item.soil, item.parameters_there, item.deviations, blank, 1, deviations_of(item.slope)
+    )
     first = replace(blank, sigma=weights.sigma, robust=weights.robust)
-    problem = change_problem(item.robot, item.soil, windows, parameters, first, threads, effects_of(item.slope))
+    problem = change_problem(robot, item.soil, windows, parameters, first, threads, effects_of(item.slope))
     rough = misfit_of_compared(problem.blocked, problem.predict(problem.start()), weights)
     second = replace(blank, sigma=rough.sigma, robust=rough.robust)
-    problem = change_problem(item.robot, item.soil, windows, parameters, second, threads, effects_of(item.slope))
+    problem = change_problem(robot, item.soil, windows, parameters, second, threads, effects_of(item.slope))
     fitted = fit_nominal(problem)
     left = misfit_of_compared(problem.blocked, fitted.prediction, weights)
     return _Left(left.sigma[0, 0], left.robust, SensorBias(item.name, item.ground, fitted.point.values[-3:]))

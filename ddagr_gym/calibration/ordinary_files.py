@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 
 from ddagr_gym.calibration.ordinary_drives import Ordinary
 from ddagr_gym.config import Config, dump_config, parse_config
-from ddagr_gym.diagnosis.change.ordinary import Reference, Scores, SensorBias, Weighing
+from ddagr_gym.diagnosis.change.ordinary import Reference, Scores
+from ddagr_gym.diagnosis.change.robot_on_ground import RobotOnGround
+from ddagr_gym.diagnosis.change.weighing import SensorBias, Weighing
 from ddagr_gym.errors import InputError
 from ddagr_gym.files import read_json, write_text
 from ddagr_gym.parameters import Robot, Soil
@@ -73,7 +75,11 @@ def ordinary_as_mapping(ordinary: Ordinary) -> dict[str, Any]:
     weighing["biases"] = [
         {"drive": item.drive, "ground": item.ground, "value": _plain(item.value)} for item in ordinary.weighing.biases
     ]
-    return {"weighing": weighing, "references": [_reference(item) for item in ordinary.references]}
+    return {
+        "weighing": weighing,
+        "references": [_reference(item) for item in ordinary.references],
+        "on_grounds": {ground: _on_ground(item) for ground, item in ordinary.on_grounds.items()},
+    }
 
 
 def ordinary_from_mapping(mapping: Mapping[str, Any]) -> Ordinary:
@@ -100,7 +106,8 @@ def ordinary_from_mapping(mapping: Mapping[str, Any]) -> Ordinary:
             for item in given.get("biases", ())
         ),
     )
-    return Ordinary(weighing, tuple(_reference_of(item) for item in mapping["references"]))
+    on_grounds = {str(ground): _on_ground_of(item) for ground, item in mapping.get("on_grounds", {}).items()}
+    return Ordinary(weighing, tuple(_reference_of(item) for item in mapping["references"]), on_grounds)
 
 
 def _plain(value: Any) -> Any:
@@ -126,6 +133,7 @@ def _reference(item: Reference) -> dict[str, Any]:
         "soil": None if item.soil is None else dump_config(item.soil),
         "moved": {name: _plain(value) for name, value in item.moved.items()},
         "column_map": item.column_map,
+        "on_ground": _on_ground(item.on_ground),
     }
 
 
@@ -141,7 +149,21 @@ def _reference_of(mapping: Mapping[str, Any]) -> Reference:
         _config_of(mapping.get("soil"), Soil),
         {str(name): float(value) for name, value in mapping.get("moved", {}).items()},
         str(mapping.get("column_map", "")),
+        on_ground=_on_ground_of(mapping.get("on_ground", {})),
     )
+
+
+def _on_ground(item: RobotOnGround) -> dict[str, dict[str, float]]:
+    return {name: {key: _plain(value) for key, value in getattr(item, name).items()} for name in _OF_GROUND}
+
+
+def _on_ground_of(mapping: Mapping[str, Mapping[str, float]]) -> RobotOnGround:
+    return RobotOnGround(
+        **{name: {str(key): float(value) for key, value in mapping.get(name, {}).items()} for name in _OF_GROUND}
+    )
+
+
+_OF_GROUND = ("changes", "deviations")
 
 
 def _config_of(text: str | None, kind: type[Config]) -> Config | None:

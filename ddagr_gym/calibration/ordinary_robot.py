@@ -34,4 +34,5 @@ def load_ordinary_robot(folder: Path) -> OrdinaryRobot:
         folder.name,
         hashlib.sha256((folder / NAME).read_bytes()).hexdigest(),
         slopes={item.ground: GroundSlope(item.gradient, item.deviations) for item in calibration.slopes},
+        on_grounds=ordinary.on_grounds,
     )

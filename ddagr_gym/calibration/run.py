@@ -226,7 +226,7 @@ def calibrate_drives(
     found = {ground: fitted_soil(data, ground, model.values) for ground in data.drives_on}
     calibrated = calibrated_robot(data, model, calibration)
     ordinary = (
-        ordinary_drives(data, model, made, calibration, calibrated, settings.threads, steps)
+        ordinary_drives(data, model, made, calibration, estimates, calibrated, settings.threads, steps)
         if with_bank and data.count > 1
         else None
     )

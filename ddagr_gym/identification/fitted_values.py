@@ -26,10 +26,11 @@ def with_values(robot: Robot, soil: Soil, values: Mapping[str, float], *, held: 
     Raises:
         InputError: the values are no robot, or no soil.
     """
-    return _robot(robot, values), _soil(soil, values, held)
+    return robot_with_values(robot, values), _soil(soil, values, held)
 
 
-def _robot(robot: Robot, values: Mapping[str, float]) -> Robot:
+def robot_with_values(robot: Robot, values: Mapping[str, float]) -> Robot:
+    """The same of a robot alone."""
     factors = {name: getattr(robot, name) * math.exp(values.get(name, 0.0)) for name in _ROBOT}
     wheels = tuple(
         replace(

@@ -121,7 +121,7 @@ def _forces_at_stage(
     extrapolation: float,
     numerics: StepNumerics,
     actions: EffectActions,
-    record: ForceRecord,
+    record: ForceRecord | None,
 ) -> None:
     """Forces at the motion in ``row``: evaluated, or extrapolated from recorded ones or from the last ones.
 
@@ -131,8 +131,12 @@ def _forces_at_stage(
         extrapolation: change of a wheel's velocity over its speed up to which forces are extrapolated.
         numerics: accuracy.
         actions: effects on this environment.
-        record: of this environment; its limit is 0 where the ground is another one.
+        record: of this environment, if it has one; its limit is 0 where the ground is another one.
     """
+    if record is None:
+        if not extrapolate_forces(row, extrapolation, actions):
+            evaluate_forces(row, refresh, numerics, actions)
+        return
     follows = record.state[0] == FOLLOWS
     if follows and record.limit > 0.0:
         take_entry(row, record)
@@ -145,7 +149,9 @@ def _forces_at_stage(
 
 
 @kernel()
-def _w_step(row: Array, step: float, numerics: StepNumerics, actions: EffectActions, record: ForceRecord) -> float:
+def _w_step(
+    row: Array, step: float, numerics: StepNumerics, actions: EffectActions, record: ForceRecord | None
+) -> float:
     """One W-step; returns the size of the embedded error estimate [m/s]. Arguments as :func:`advance_body`."""
     inverse, drive, banks, drift = stack_array(9), stack_array(6), stack_array(BANKS), stack_array(3)
     start, first, second, right = stack_array(9), stack_array(5), stack_array(5), stack_array(5)
@@ -231,7 +237,9 @@ def _follow(row: Array, step: float, numerics: StepNumerics, actions: EffectActi
 
 
 @kernel()
-def advance_body(row: Array, step: float, numerics: StepNumerics, actions: EffectActions, record: ForceRecord) -> None:
+def advance_body(
+    row: Array, step: float, numerics: StepNumerics, actions: EffectActions, record: ForceRecord | None
+) -> None:
     """One step. Needs the forces at the present state in ``row`` and leaves those at the new one.
 
     Args:
@@ -239,12 +247,20 @@ def advance_body(row: Array, step: float, numerics: StepNumerics, actions: Effec
         step: h [s].
         numerics: accuracy.
         actions: effects on this environment.
-        record: of this environment.
+        record: of this environment; None where it neither records nor follows, which is a kernel of its own.
     """
-    if record.state[0] == FOLLOWS:
+    if record is not None and record.state[0] == FOLLOWS:
         _follow(row, step, numerics, actions, record)
-        return
-    saved, entries = stack_array(STEPPED), record.state[1]
+    else:
+        _controlled_step(row, step, numerics, actions, record)
+
+
+@kernel()
+def _controlled_step(
+    row: Array, step: float, numerics: StepNumerics, actions: EffectActions, record: ForceRecord | None
+) -> None:
+    """One step divided and made as its errors ask for. Arguments as :func:`advance_body`."""
+    saved, entries = stack_array(STEPPED), _entries(record)
     _copy(row, saved)
     tolerance = NEWTON_TOLERANCE + NEWTON_SHARE * _accepted(row, numerics.accepted_error)
     divisions = 1
@@ -254,21 +270,46 @@ def advance_body(row: Array, step: float, numerics: StepNumerics, actions: Effec
         speed, accepted = _fastest(row), _accepted(row, numerics.accepted_error)
         if divisions == 1 and speed > FULL_ERROR_SPEED and not estimate <= accepted + LEAST_ERROR:
             _copy(saved, row)
-            divisions, record.state[1] = numerics.launch_substeps, entries
+            _back_to(record, entries)
+            divisions = numerics.launch_substeps
             if divisions > 1:
                 continue
         made = W_STEP
         if not estimate <= OVERSHOOT * accepted + LEAST_ERROR:
             _copy(saved, row)
-            record.state[1] = entries
+            _back_to(record, entries)
             backward_euler_step(row, step / divisions, tolerance, numerics, actions)
             made = BACKWARD_EULER
         done += 1
-        if record.state[0] == RECORDS:
-            keep_decision(record, done, made)
+        _keep(record, done, made)
         if done < divisions:
             _copy(row, saved)
-            entries = record.state[1]
-    if record.state[0] == RECORDS:
-        keep_decision(record, 0, divisions)
-        record.state[2] += 1 + divisions
+            entries = _entries(record)
+    _keep(record, 0, divisions)
+    _count(record, 1 + divisions)
+
+
+@kernel(inline=True)
+def _entries(record: ForceRecord | None) -> int:
+    """Evaluations that have been kept."""
+    return 0 if record is None else record.state[1]
+
+
+@kernel(inline=True)
+def _back_to(record: ForceRecord | None, entries: int) -> None:
+    """Forget the evaluations after so many."""
+    if record is not None:
+        record.state[1] = entries
+
+
+@kernel(inline=True)
+def _keep(record: ForceRecord | None, place: int, decision: int) -> None:
+    if record is not None and record.state[0] == RECORDS:
+        keep_decision(record, place, decision)
+
+
+@kernel(inline=True)
+def _count(record: ForceRecord | None, decisions: int) -> None:
+    """Go on behind so many decisions that were kept."""
+    if record is not None and record.state[0] == RECORDS:
+        record.state[2] += decisions

@@ -11,7 +11,9 @@ import pytest
 from ddagr_gym.calibration.ordinary_drives import Ordinary, pooled
 from ddagr_gym.calibration.ordinary_drives import _Left as Left
 from ddagr_gym.calibration.ordinary_files import load_ordinary, save_ordinary
-from ddagr_gym.diagnosis.change.ordinary import Reference, Scores, SensorBias, Weighing
+from ddagr_gym.diagnosis.change.ordinary import Reference, Scores
+from ddagr_gym.diagnosis.change.robot_on_ground import RobotOnGround
+from ddagr_gym.diagnosis.change.weighing import SensorBias, Weighing
 from ddagr_gym.errors import InputError
 from ddagr_gym.presets import get_robot, get_soil
 
@@ -28,8 +30,9 @@ ORDINARY = Ordinary(
     replace(WEIGHING, turning=0.2),
     (
         Reference("one.csv", "sand", False, scores(), scores(), robot=ROBOT, soil=SOIL, moved={"mass": 1.5}),
-        Reference("two.csv", "sand", False, scores(), scores()),
+        Reference("two.csv", "sand", False, scores(), scores(), on_ground=RobotOnGround({"a": 0.5}, {"a": 0.25})),
     ),
+    {"sand": RobotOnGround({"a": -0.5}, {"a": 0.125})},
 )
 
 
@@ -45,14 +48,19 @@ def test_weights_and_scores_read_back(tmp_path):
     assert (first.robot, first.soil) == (ROBOT, SOIL)
     assert first.moved == {"mass": 1.5}
     assert (found.references[1].robot, found.references[1].soil) == (None, None)
+    assert found.references[1].on_ground == ORDINARY.references[1].on_ground
+    assert found.on_grounds == ORDINARY.on_grounds
 
 
 def test_a_bank_of_the_second_version_is_read(tmp_path):
     path = tmp_path / "bank.json"
     save_ordinary(ORDINARY, path)
     body = json.loads(path.read_text())
+    del body["ordinary"]["on_grounds"], body["ordinary"]["references"][1]["on_ground"]
     path.write_text(json.dumps({**body, "version": 2, "runs": [{"kind": "real"}]}))
-    assert [item.drive for item in load_ordinary(path).references] == ["one.csv", "two.csv"]
+    found = load_ordinary(path)
+    assert [item.drive for item in found.references] == ["one.csv", "two.csv"]
+    assert (found.on_grounds, found.references[1].on_ground) == ({}, RobotOnGround())
 
 
 def test_a_bank_without_ordinary_drives_is_refused(tmp_path):

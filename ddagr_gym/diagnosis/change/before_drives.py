@@ -17,15 +17,9 @@ from numpy.typing import NDArray
 from ddagr_gym.diagnosis.change.drive_fit import change_problem, change_windows, fit_nominal, misfit_of_compared
 from ddagr_gym.diagnosis.change.ground_slope import SLOPE_OF_FIELDS, GroundSlope
 from ddagr_gym.diagnosis.change.measured_scatter import measured_scatter
-from ddagr_gym.diagnosis.change.ordinary import (
-    LEAST_ACCELEROMETER_BIAS,
-    LEAST_GYRO_BIAS,
-    OrdinaryRobot,
-    Reference,
-    Weighing,
-    uncertain_parameters,
-)
+from ddagr_gym.diagnosis.change.ordinary import OrdinaryRobot, Reference, uncertain_parameters
 from ddagr_gym.diagnosis.change.reference import OrdinaryDrive, scan_pieces
+from ddagr_gym.diagnosis.change.weighing import LEAST_ACCELEROMETER_BIAS, LEAST_GYRO_BIAS, Weighing
 from ddagr_gym.diagnosis.preprocessing.input_requirements import content_hash
 from ddagr_gym.diagnosis.preprocessing.mended_recordings import MendedRecordings, mend_recordings
 from ddagr_gym.diagnosis.setting import HISTORY

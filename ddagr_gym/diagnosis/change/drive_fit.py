@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.diagnosis.change.ordinary import Weighing
+from ddagr_gym.diagnosis.change.weighing import Weighing
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.block_means import BlockedWindows, sample_windows
 from ddagr_gym.identification.data_split import evenly

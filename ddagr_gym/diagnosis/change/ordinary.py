@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from ddagr_gym.diagnosis.change.expected_scatter import EXPECTED_DRIVES, ExpectedScatter
 from ddagr_gym.diagnosis.change.ground_slope import GroundSlope, deviations_of, effects_of
+from ddagr_gym.diagnosis.change.robot_on_ground import RobotOnGround
+from ddagr_gym.diagnosis.change.weighing import Weighing
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.nuisances import NuisancePriors
 from ddagr_gym.identification.parameters import (
@@ -28,94 +30,7 @@ from ddagr_gym.recordings.schema import Recording
 
 Array = NDArray[np.float64]
 
-LEAST_GYRO_BIAS = 2e-4
-"""Least prior [rad/s] (ours): the bias of a gyro wanders by so much in a drive."""
-
-LEAST_ACCELEROMETER_BIAS = 0.02
-"""Least prior [m/s^2] (ours): a tenth of a degree of slope under a drive."""
-
-SLOPE_ON_A_GROUND = 0.05
-"""Deviation [m/s^2] of what accelerometers read too much between drives on one ground (ours): 0.3 degrees of slope."""
-
 NEWER = "the calibration is older than this effect: calibrate again"
-
-
-@dataclass(frozen=True, eq=False)
-class SensorBias:
-    """What sensors read too much in an ordinary drive.
-
-    Attributes:
-        drive: name of its file.
-        ground: that it was on.
-        value: (3,) of gyro [rad/s] and accelerometers forward and to the left [m/s^2].
-    """
-
-    drive: str
-    ground: str
-    value: Array
-
-
-@dataclass(frozen=True, eq=False)
-class Weighing:
-    """How drives are cut and weighed, the same for ordinary drives and for those that are asked about.
-
-    Attributes:
-        window: length of the windows [s].
-        history: commands kept from before a window [s].
-        lateness: of the poses in ordinary drives [s], which are moved back by so much.
-        gyro_scale: calibrated scale of the gyro [-].
-        sigma: (8,) standard deviations of the channels' samples; infinite for those that no drive has.
-        robust: (8,) weighted residuals from which the loss is linear.
-        gyro_bias: between ordinary drives [rad/s].
-        accelerometer_bias: the same, slopes included [m/s^2].
-        offsets: (3,) what gyro [rad/s] and accelerometers [m/s^2] read too much in ordinary drives, which is taken off.
-        biases: the same of each ordinary drive; none where that is not known.
-        turning: usual yaw rate per difference of the wheel speeds, by which readings are compared relative to each
-            other (:mod:`ddagr_gym.identification.relative_readings`); None where they are compared one by one.
-        run_in: kept of what was driven right before a window [s].
-    """
-
-    window: float
-    history: float
-    lateness: float
-    gyro_scale: float
-    sigma: Array
-    robust: Array
-    gyro_bias: float
-    accelerometer_bias: float
-    offsets: Array = field(default_factory=lambda: np.zeros(3))
-    turning: float | None = None
-    biases: tuple[SensorBias, ...] = ()
-    run_in: float = 0.0
-
-    def on(self, ground: str, drive: str = "") -> Weighing:
-        """The same for a drive on a known ground, where accelerometers lean as in the other drives on it.
-
-        A robot that climbs out of the ruts that it makes leans back by degrees on sand and not on asphalt.
-
-        Args:
-            ground: of the drive; "" where it is not known.
-            drive: its name, if it is one of the ordinary ones.
-        """
-        here = [item.value for item in self.biases if ground and item.ground == ground and item.drive != drive]
-        if not here:
-            return self
-        offsets = np.array([self.offsets[0], *np.mean(here, axis=0)[1:]])
-        scatter = self._accelerometers_on_one_ground * float(np.sqrt(1.0 + 1.0 / len(here)))
-        return replace(self, offsets=offsets, accelerometer_bias=max(LEAST_ACCELEROMETER_BIAS, scatter))
-
-    def without(self, drive: str) -> Weighing:
-        """The same without what one of the drives says of biases."""
-        return replace(self, biases=tuple(item for item in self.biases if item.drive != drive))
-
-    @property
-    def _accelerometers_on_one_ground(self) -> float:
-        """Deviation of the accelerometers' biases between drives on one ground, drawn towards what is expected."""
-        grounds = {item.ground for item in self.biases}
-        groups = [np.array([item.value[1:] for item in self.biases if item.ground == ground]) for ground in grounds]
-        square = sum(float(((group - group.mean(axis=0)) ** 2).sum()) for group in groups)
-        degrees = sum(2.0 * (len(group) - 1) for group in groups)
-        return float(np.sqrt((EXPECTED_DRIVES * SLOPE_ON_A_GROUND**2 + square) / (EXPECTED_DRIVES + degrees)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,6 +112,7 @@ class Reference:
         losses: (W,) of windows as forecast by fits without them, by the known ground; none in files of before.
         robot: that was calibrated without the drive; None in files of before.
         soil: of its ground as calibrated without it, likewise.
+        on_ground: the robot on its ground without the drive; nothing where no other drive was on it.
         moved: by how many of its prior deviations the fit moved every parameter; none in files of before.
         column_map: by which it was read; "" where that is not known.
         misfit: mean square of what the fit leaves of each channel; none in files of calibrations.
@@ -215,6 +131,7 @@ class Reference:
     column_map: str = ""
     misfit: Mapping[str, float] = field(default_factory=dict)
     misfit_error: Mapping[str, float] = field(default_factory=dict)
+    on_ground: RobotOnGround = field(default_factory=RobotOnGround)
 
 
 @dataclass(frozen=True, eq=False)
@@ -237,6 +154,7 @@ class OrdinaryRobot:
         given: whether the drives were given as those from before, without a calibration.
         slopes: of grounds that are known to slope, or whose drives tell how far they do.
         slope: of the ground of drives that are asked about (:meth:`seen_by`); None where nothing is said of it.
+        on_grounds: the robot on each ground, as the drives on it tell.
     """
 
     robot: Robot
@@ -254,6 +172,14 @@ class OrdinaryRobot:
     given: bool = False
     slopes: Mapping[str, GroundSlope] = field(default_factory=dict)
     slope: GroundSlope | None = None
+    on_grounds: Mapping[str, RobotOnGround] = field(default_factory=dict)
+
+    def robot_on(self, ground: str) -> Robot:
+        """The robot on a ground ("" for an unknown one)."""
+        return self._on(ground).robot(self.robot)
+
+    def _on(self, ground: str) -> RobotOnGround:
+        return self.on_grounds.get(ground, RobotOnGround())
 
     @property
     def known(self) -> tuple[Effect, ...]:
@@ -265,9 +191,10 @@ class OrdinaryRobot:
         soil = next(iter(self.soils.values())) if not ground else self.soils[ground]
         known = {item.column_map for item in self.references}
         other = any(recording.meta.column_map not in known for recording in recordings)
+        parameters = self._on(ground).parameters(self.robot, self.parameters)
         return uncertain_parameters(
             soil,
-            of_another_logger(self.parameters, recordings[0].period) if other else self.parameters,
+            of_another_logger(parameters, recordings[0].period) if other else parameters,
             self.soil_deviations.get(ground) if ground else None,
             self.weighing.on(ground),
             len(recordings),
@@ -343,6 +270,7 @@ class OrdinaryRobot:
             soil_deviations=deviations,
             weighing=self.weighing.without(drive),
             references=others,
+            on_grounds={own.ground: own.on_ground} if beside else {},
         )
 
     @property

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,9 @@ from ddagr_gym.diagnosis.change.drive_fit import change_problem, change_windows,
 from ddagr_gym.diagnosis.change.drive_scan import DriveScan, Priors, scan_drive
 from ddagr_gym.diagnosis.change.ground_slope import GroundSlope, deviations_of, effects_of
 from ddagr_gym.diagnosis.change.left_out import left_out_losses
-from ddagr_gym.diagnosis.change.ordinary import Reference, Weighing, uncertain_parameters
+from ddagr_gym.diagnosis.change.ordinary import Reference, of_another_logger, uncertain_parameters
+from ddagr_gym.diagnosis.change.robot_on_ground import RobotOnGround
+from ddagr_gym.diagnosis.change.weighing import Weighing
 from ddagr_gym.identification.misfit import channel_misfit, channel_scatter
 from ddagr_gym.identification.parameters import ModelParameter
 from ddagr_gym.parameters import Robot, Soil
@@ -32,10 +34,12 @@ class OrdinaryDrive:
         recording: mended, poses where they came.
         robot: calibrated without the drive.
         soil: of its ground, without the drive.
-        parameters: of the robot that may differ between drives.
+        parameters: of the robot that may differ between drives, wherever they are.
         deviations: of the soil on its ground, by parameter.
         reversed_gyro: whether its gyro turned the wrong way, which was mended.
         slope: of its ground; None where that is not known.
+        on_ground: the robot on its ground, without the drive; nothing where no other drive was on it.
+        logger: period of the rows [s] where no other drive was read with its column map; else 0.
     """
 
     name: str
@@ -48,6 +52,23 @@ class OrdinaryDrive:
     deviations: Mapping[str, float]
     reversed_gyro: bool = False
     slope: GroundSlope | None = None
+    on_ground: RobotOnGround = field(default_factory=RobotOnGround)
+    logger: float = 0.0
+
+    @property
+    def robot_there(self) -> Robot:
+        """The robot on the drive's ground."""
+        return self.on_ground.robot(self.robot)
+
+    @property
+    def parameters_there(self) -> tuple[ModelParameter, ...]:
+        """Of the robot on the drive's ground, with what may differ between drives on it."""
+        return of_another_logger(self.on_ground.parameters(self.robot, self.parameters), self.logger)
+
+    @property
+    def parameters_anywhere(self) -> tuple[ModelParameter, ...]:
+        """Of the robot, with what may differ between drives wherever they are."""
+        return of_another_logger(self.parameters, self.logger)
 
 
 def scan_ordinary(drive: OrdinaryDrive, weighing: Weighing, threads: int = 1) -> Reference:
@@ -71,15 +92,17 @@ def scan_pieces(drive: OrdinaryDrive, weighing: Weighing, most: int, threads: in
         threads: of the simulator.
     """
     known = weighing if drive.alone else weighing.on(drive.ground, drive.name)
-    windows = change_windows([drive.recording], drive.robot, known)
+    robot = drive.robot_there
+    windows = change_windows([drive.recording], robot, known)
     deviations = None if drive.alone else drive.deviations
-    parameters = uncertain_parameters(drive.soil, drive.parameters, deviations, known, 1, deviations_of(drive.slope))
-    problem = change_problem(drive.robot, drive.soil, windows, parameters, known, threads, effects_of(drive.slope))
+    slopes = deviations_of(drive.slope)
+    parameters = uncertain_parameters(drive.soil, drive.parameters_there, deviations, known, 1, slopes)
+    problem = change_problem(robot, drive.soil, windows, parameters, known, threads, effects_of(drive.slope))
     fitted = fit_nominal(problem)
     scan = scan_drive(problem, fitted)
     anywhere = GroundSlope.of_any_field().deviations if drive.slope else ()
-    wide = uncertain_parameters(drive.soil, drive.parameters, None, weighing, 1, anywhere)
-    other = _of_unknown_ground(scan, wide, known.offsets - weighing.offsets, drive.slope)
+    wide = uncertain_parameters(drive.soil, drive.parameters_anywhere, None, weighing, 1, anywhere)
+    other = _of_unknown_ground(scan, wide, known.offsets - weighing.offsets, drive)
     whole = replace(
         _reference(drive, scan, other, left_out_losses(problem, fitted)),
         moved=moved_parameters(problem, fitted),
@@ -90,15 +113,16 @@ def scan_pieces(drive: OrdinaryDrive, weighing: Weighing, most: int, threads: in
     return [whole, *(_reference(drive, piece, other, np.zeros(0)) for piece in pieces if len(pieces) > 1)]
 
 
-def _of_unknown_ground(
-    scan: DriveScan, wide: Sequence[ModelParameter], leaning: Array, slope: GroundSlope | None
-) -> Priors:
-    """Deviations of what may differ where the ground is not known, and the middle of biases and slope from there on."""
+def _of_unknown_ground(scan: DriveScan, wide: Sequence[ModelParameter], leaning: Array, drive: OrdinaryDrive) -> Priors:
+    """Deviations of what may differ where the ground is not known, and the middle of robot, biases and slope there."""
+    place = {p.name: k for k, p in enumerate(wide)}
     middle = np.zeros(len(wide))
     middle[-len(leaning) :] = -leaning
-    if slope is not None:
-        first = [p.name for p in wide].index("slope_x")
-        middle[first : first + 2] = np.negative(slope.gradient)
+    for name, change in drive.on_ground.changes_of(drive.robot).items():
+        if name in place:
+            middle[place[name]] = -change
+    if drive.slope is not None:
+        middle[place["slope_x"]], middle[place["slope_y"]] = np.negative(drive.slope.gradient)
     return Priors(np.array([wide[k].prior for k in scan.free]), middle[scan.free])
 
 
@@ -112,5 +136,6 @@ def _reference(drive: OrdinaryDrive, scan: DriveScan, other: Priors, losses: Arr
         losses,
         drive.robot,
         drive.soil,
+        on_ground=drive.on_ground,
         column_map=drive.recording.meta.column_map,
     )

@@ -155,12 +155,12 @@ def fit_ordinary(
         threads: of the simulator.
     """
     weighing = ordinary.weighing.on(ground)
-    windows = change_windows(mended.recordings, ordinary.robot, weighing)
+    robot = ordinary.robot_on(ground)
+    windows = change_windows(mended.recordings, robot, weighing)
     soils = ordinary.soils if not ground else {ground: ordinary.soils[ground]}
     parameters = ordinary.uncertain(ground, mended.recordings)
     problems = [
-        change_problem(ordinary.robot, soil, windows, parameters, weighing, threads, ordinary.known)
-        for soil in soils.values()
+        change_problem(robot, soil, windows, parameters, weighing, threads, ordinary.known) for soil in soils.values()
     ]
     found = [(problem, fit_nominal(problem)) for problem in problems]
     return min(found, key=lambda item: item[1].cost)

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 import ddagr_gym
-from ddagr_gym.diagnosis.change.ordinary import OrdinaryRobot, Weighing
+from ddagr_gym.diagnosis.change.ordinary import OrdinaryRobot
 from ddagr_gym.diagnosis.change.reference import OrdinaryDrive, scan_ordinary
+from ddagr_gym.diagnosis.change.weighing import Weighing
 from ddagr_gym.identification.parameters import robot_parameters
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.schema import Recording

@@ -8,15 +8,9 @@ import numpy as np
 import pytest
 
 from ddagr_gym.diagnosis.change.expected_scatter import EXPECTED_DRIVES
-from ddagr_gym.diagnosis.change.ordinary import (
-    SLOPE_ON_A_GROUND,
-    OrdinaryRobot,
-    Reference,
-    Scores,
-    SensorBias,
-    Weighing,
-    field_deviations,
-)
+from ddagr_gym.diagnosis.change.ordinary import OrdinaryRobot, Reference, Scores, field_deviations
+from ddagr_gym.diagnosis.change.robot_on_ground import RobotOnGround
+from ddagr_gym.diagnosis.change.weighing import SLOPE_ON_A_GROUND, SensorBias, Weighing
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.parameters import robot_parameters
 from ddagr_gym.physics.effects.registry import effect_kinds
@@ -69,6 +63,24 @@ def test_what_cannot_be_left_out_is_refused(robot):
         old.without("a")
     with pytest.raises(InputError, match="with two drives or more"):
         replace(robot, references=robot.references[:1]).without("a")
+
+
+def test_on_a_known_ground_the_robot_is_that_of_the_drives_on_it(robot):
+    there = RobotOnGround({"yaw_inertia": 0.3}, {"yaw_inertia": 0.01})
+    known = replace(robot, on_grounds={"sand": there})
+    assert known.robot_on("sand").yaw_inertia == pytest.approx(ROBOT.yaw_inertia * np.exp(0.3))
+    assert known.robot_on("yard") == known.robot_on("") == ROBOT
+    asked = [recording("steps")]
+    priors = [{p.name: p.prior for p in known.uncertain(ground, asked)}["yaw_inertia"] for ground in ("sand", "yard")]
+    assert priors == [0.01, 0.02]
+
+
+def test_without_a_drive_its_ground_is_as_the_others_on_it_tell(robot):
+    there = RobotOnGround({"yaw_inertia": -0.1}, {"yaw_inertia": 0.015})
+    references = (robot.references[0], replace(robot.references[1], on_ground=there), robot.references[2])
+    known = replace(robot, references=references, on_grounds=dict.fromkeys(("sand", "yard"), RobotOnGround()))
+    assert known.without("bb").on_grounds == {"sand": there}
+    assert known.without("ccc").on_grounds == {}
 
 
 BIASES = (
