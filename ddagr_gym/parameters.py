@@ -90,6 +90,7 @@ class Drivetrain(Validated):
         command_delay: dead time between a command and the set point of the loop [s].
         command_deadband: smallest command that moves the bank; smaller ones count as zero [rad/s].
         command_ramp: largest change of the set point per time [rad/s^2].
+        command_filter: time constant of a first-order filter that smooths the set point behind the ramp [s].
         integral_rate: k_i, growth of the loop's integral part per speed error [1/s^2].
         integral_limit: largest integral part [rad/s^2].
         load_compliance: 1/J, one over the rotating inertia of a bank seen at its wheels [1/(kg m^2)]: how much a torque
@@ -107,6 +108,7 @@ class Drivetrain(Validated):
     command_delay: float = bounded("s", 0.0, 1.0, default=0.0)
     command_deadband: float = bounded("rad/s", 0.0, 100.0, default=0.0)
     command_ramp: float = bounded("rad/s^2", 0.0, 1e6, default=1e6, open_low=True)
+    command_filter: float = bounded("s", 0.0, 5.0, default=0.0)
     integral_rate: float = bounded("1/s^2", 0.0, 1e4, default=0.0)
     integral_limit: float = bounded("rad/s^2", 0.0, 1e6, default=1e6, open_low=True)
     load_compliance: float = bounded("1/(kg m^2)", 0.0, 1e3, default=0.0)

@@ -121,6 +121,7 @@ def build_row(robot: Robot, soil: Soils, sensors: Sensors) -> Array:
         layout.COMMAND_DEADBAND: robot.drivetrain.command_deadband,
         layout.TURNING_LIMIT: robot.drivetrain.turning_limit,
         layout.COMMAND_RAMP: robot.drivetrain.command_ramp,
+        layout.COMMAND_FILTER: robot.drivetrain.command_filter,
         layout.BASE_SOIL: _soils(soil),
         **_sensor_entries(sensors),
     }
@@ -240,6 +241,7 @@ class Simulator:
             self.rows[np.ix_(indices, np.arange(index, index + size))] = 0.0
         for bank in range(2):
             self.rows[indices, layout.SET_POINT + bank] = self.rows[indices, layout.OMEGA + bank]
+            self.rows[indices, layout.FILTERED + bank] = self.rows[indices, layout.OMEGA + bank]
         self.effect_memory[indices] = 0.0
         settle_rows(self.rows, indices, self._grids(), self._actions(), self._numerics)
 
@@ -263,7 +265,8 @@ class Simulator:
         """Whether any drivetrain depends on commands of the past."""
         ramps = self.rows[:, layout.COMMAND_RAMP] < NO_LIMIT
         integral = self.rows[:, layout.BASE_DRIVETRAIN + layout.INTEGRAL_RATE] > 0.0
-        return bool((ramps | integral | (self.rows[:, layout.COMMAND_DELAY] > 0.0)).any())
+        late = self.rows[:, [layout.COMMAND_DELAY, layout.COMMAND_FILTER]].max(axis=1) > 0.0
+        return bool((ramps | integral | late).any())
 
     def _grids(self) -> tuple[Any, ...]:
         return self._fields, self._field_geometry, self.field_index

@@ -15,6 +15,9 @@ GYRO_SCALE_DEVIATION = 0.03
 DELAY_DEVIATION = 0.3
 """Prior of the dead time between command and wheels [s] (ours): 0.2 to 0.43 s on a Husky and a Warthog."""
 
+FILTER_DEVIATION = 0.3
+"""Prior of the time constant of a filter of the commands [s] (ours): as long as a dead time may be."""
+
 INTEGRAL_DEVIATION = 5.0
 """Prior of the loop's integral rate [1/s^2] (ours): 0.7 to 4.5 1/s^2 on a Warthog."""
 
@@ -104,6 +107,7 @@ PARTS = (
     _of_drivetrain("integral_limit", ("integral_limit",), ("integral",)),
     _of_drivetrain("limit_imbalance", ("limit_imbalance",), ("torque_limit", "no_load_speed", "power_limit")),
     _of_drivetrain("command_ramp", ("command_ramp",)),
+    _of_drivetrain("command_filter", ("command_filter",)),
     _of_drivetrain("power_limit", ("power_limit",)),
     _of_drivetrain("turning_limit", ("turning_limit",)),
     _of_drivetrain("speed_limit", ("maximum_wheel_speed",)),
@@ -176,6 +180,7 @@ def complete_robot(robot: Robot) -> Robot:
     drivetrain = replace(robot.drivetrain, **limits)
     deviations = {
         "command_delay": DELAY_DEVIATION,
+        "command_filter": FILTER_DEVIATION,
         "integral_rate": INTEGRAL_DEVIATION,
         # at most as heavy as if each bank had to turn half of the robot's mass at its rim
         "load_compliance": 2.0 / (robot.mass * robot.outer_radius**2),

@@ -1,4 +1,4 @@
-"""The robot on each ground: the joint values, drawn to what the drives on that ground tell (theory: diagnosis, eq. (15c)).
+"""The robot on each ground: the joint values, drawn to what the drives on that ground tell (diagnosis, eq. (15c)).
 
 Parameters x of the robot in drive i on ground g are random effects about the joint values m,
 

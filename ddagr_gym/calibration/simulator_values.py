@@ -46,6 +46,7 @@ _UNITS = {
     "command_delay": "s",
     "turning_limit": "rad/s",
     "command_ramp": "rad/s^2",
+    "command_filter": "s",
     "integral_rate": "1/s^2",
     "integral_limit": "rad/s^2",
     "load_compliance": "1/(kg m^2)",

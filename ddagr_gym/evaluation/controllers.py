@@ -322,8 +322,8 @@ def controller_version(name: str) -> str:
 
 
 def _model_text(model: InertialModel) -> str:
-    """All that a filter knows; a robot that feels no tilt by its sinkage reads as before robots had that field."""
-    return repr(model).replace(", sinkage_tilt=0.0", "")
+    """All that a filter knows; a robot with neither of the fields that robots got later reads as before."""
+    return repr(model).replace(", sinkage_tilt=0.0", "").replace(", command_filter=0.0", "")
 
 
 def find_controller(name: str, turn: RowTurn, gains: LadderGains | None = None) -> Controller:

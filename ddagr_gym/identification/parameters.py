@@ -209,6 +209,7 @@ _DRIVETRAIN_ENTRIES = {
     "command_deadband": layout.COMMAND_DEADBAND,
     "turning_limit": layout.TURNING_LIMIT,
     "command_ramp": layout.COMMAND_RAMP,
+    "command_filter": layout.COMMAND_FILTER,
     **{name: layout.BASE_DRIVETRAIN + k for k, name in enumerate(layout.DRIVETRAIN_PARAMETERS)},
 }
 _LIMITS = ("turning_limit", "command_ramp", "integral_limit", "acceleration_limit", "no_load_speed", "power_limit")

@@ -1,6 +1,6 @@
 """From a bank's speed command to its acceleration (theory: drivetrain, section 1).
 
-    r = ramp(deadband(limit_turning(u)))(t - delay)
+    r = filter(ramp(deadband(limit_turning(u))))(t - delay)
     d omega/dt = limit(k_omega (r - omega) + z) + T/J - viscous omega - friction sgn(omega),  dz/dt = k_i (r - omega)
 
 T is the torque of the ground on the bank's wheels; a loop that carries it asks for -T/J besides. With the defaults of
@@ -28,10 +28,12 @@ from ddagr_gym.physics.layout import (
     COMMAND,
     COMMAND_DEADBAND,
     COMMAND_DELAY,
+    COMMAND_FILTER,
     COMMAND_RAMP,
     COULOMB_FRICTION,
     DRIVETRAIN,
     DYNAMIC_BANKS,
+    FILTERED,
     INTEGRAL,
     INTEGRAL_KNOWN,
     INTEGRAL_LIMIT,
@@ -115,6 +117,26 @@ def limit_turning(row: Array, right: int, limit: float) -> None:
     row[right], row[right + 1] = mean + turning, mean - turning
 
 
+@kernel(inline=True)
+def lagged_mean(behind: float, lag: float, period: float) -> tuple[float, float]:
+    """Distance from a held input that a first-order filter has on average over a sample, and at its end."""
+    decay = math.exp(-period / lag)
+    return behind * (1.0 - decay) * lag / period, behind * decay
+
+
+@kernel(inline=True)
+def _smoothed(row: Array, bank: int) -> float:
+    """Mean over the sample of the filter's answer to the set point, which is held: as the loop's target, so that a
+    filter that is shorter than a sample counts in proportion to its length."""
+    target = row[SET_POINT + bank]
+    if row[COMMAND_FILTER] <= 0.0:
+        row[FILTERED + bank] = target
+        return target
+    mean, end = lagged_mean(row[FILTERED + bank] - target, row[COMMAND_FILTER], row[SAMPLE_PERIOD])
+    row[FILTERED + bank] = target + end
+    return target + mean
+
+
 @kernel()
 def set_targets(row: Array) -> None:
     """Set points of the coming sample from the commands, and the drivetrain as the robot has it."""
@@ -128,7 +150,7 @@ def set_targets(row: Array) -> None:
             most = row[COMMAND_RAMP] * row[SAMPLE_PERIOD]
             target = row[SET_POINT + bank] + min(max(target - row[SET_POINT + bank], -most), most)
         row[SET_POINT + bank] = target
-        row[MOTOR_TARGET + bank] = target
+        row[MOTOR_TARGET + bank] = _smoothed(row, bank)
         row[MOTOR_RATE + bank] = row[BASE_MOTOR_RATE]
     for j in range(9):
         row[DRIVETRAIN + j] = row[BASE_DRIVETRAIN + j]
@@ -319,7 +341,8 @@ def motor_torque(row: Array, bank: int) -> float:
 @kernel()
 def follows_past(row: Array) -> bool:
     """Whether the drivetrain depends on the bank speeds of earlier samples."""
-    return row[COMMAND_DELAY] > 0.0 or row[COMMAND_RAMP] < NO_LIMIT or row[DYNAMIC_BANKS] != 0.0
+    shaped = row[COMMAND_DELAY] > 0.0 or row[COMMAND_FILTER] > 0.0 or row[COMMAND_RAMP] < NO_LIMIT
+    return shaped or row[DYNAMIC_BANKS] != 0.0
 
 
 @kernel()

@@ -72,6 +72,7 @@ COMMAND = _block(2)  # bank speed commands after the command effects [rad/s]
 MOTOR_TARGET = _block(2)  # speed that the motor loop aims at [rad/s]
 MOTOR_RATE = _block(2)  # its rate k_omega [1/s]
 SET_POINT = _block(2)  # command after the ramp [rad/s]
+FILTERED = _block(2)  # set point after the filter, at the end of a sample [rad/s]
 DRIVETRAIN = _block(9)  # as the motor effects leave it, in the order of DRIVETRAIN_PARAMETERS
 LOAD_CARRIED = _block()  # 1 where the loop carries the ground's load up to the limits of the motor, as a tight one
 DYNAMIC_BANKS = _block()  # 1 where any of these differs from that of the ideal loop
@@ -96,6 +97,7 @@ COMMAND_DELAY = _block()  # [s]
 COMMAND_DEADBAND = _block()  # [rad/s]
 TURNING_LIMIT = _block()  # [rad/s]
 COMMAND_RAMP = _block()  # [rad/s^2]
+COMMAND_FILTER = _block()  # [s]
 MAXIMUM_WHEEL_SPEED = _block()  # [rad/s]
 
 # Ground under each wheel

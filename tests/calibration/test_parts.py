@@ -51,7 +51,14 @@ def test_every_parameter_belongs_to_one_part(name):
 def test_what_may_be_nothing_starts_above_it():
     parameters = shared_parameters(complete_robot(get_robot("warthog")))
     start = first_values(parameters)
-    assert {"command_delay", "integral_rate", "load_compliance", "viscous_rate", "coulomb_friction"} == set(start)
+    assert {
+        "command_delay",
+        "command_filter",
+        "integral_rate",
+        "load_compliance",
+        "viscous_rate",
+        "coulomb_friction",
+    } == set(start)
     assert all(value > 0.0 for value in start.values())
 
 

@@ -113,6 +113,33 @@ def test_commands_act_after_the_delay_and_the_ramp_and_outside_the_deadband():
     np.testing.assert_allclose(dead["true_omega_right"], prompt["true_omega_right"], atol=1e-12)
 
 
+def test_a_filter_of_the_commands_is_a_second_pole_before_the_loop():
+    """As the effect ``motor_lag`` with all of its lag in a second pole, which has a memory of its own."""
+    commands = _steps((0.5, 1.0, 0.5), (0.5, 0.2, -0.4))
+    of_robot = _drive(_with(DDAGR, command_filter=0.3), commands)
+    of_effect = _drive(DDAGR, commands, effects=["motor_lag=0.3,second_pole=1"])
+    np.testing.assert_allclose(of_robot["true_omega_right"], of_effect["true_omega_right"], atol=1e-12)
+    time = np.arange(1, 63) / 125.0
+    rate = DDAGR.motor_rate
+    answer = 1.0 - (rate * np.exp(-time / 0.3) - np.exp(-rate * time) / 0.3) / (rate - 1.0 / 0.3)
+    np.testing.assert_allclose(of_robot["true_omega_right"][:62], answer, atol=2e-3)
+
+
+def test_a_filter_and_a_dead_time_may_come_in_any_order():
+    late = _drive(_with(DDAGR, command_filter=0.3, command_delay=0.4), _steps((1.0, 1.0, 0.5)))
+    prompt = _drive(_with(DDAGR, command_filter=0.3), _steps((1.0, 1.0, 0.5)))
+    np.testing.assert_allclose(late["true_omega_left"][50:], prompt["true_omega_left"][:-50], atol=1e-12)
+
+
+def test_a_short_filter_counts_in_proportion_to_its_length():
+    commands = _steps((1.0, 1.0, 0.5))
+    plain, short, shorter = (
+        _drive(_with(DDAGR, command_filter=tau), commands)["true_omega_right"] for tau in (0.0, 4e-4, 2e-4)
+    )
+    np.testing.assert_allclose(plain - short, 2.0 * (plain - shorter), atol=2e-5)
+    assert np.abs(plain - short).max() > 1e-3
+
+
 @pytest.mark.parametrize("samples", [5.25, 5.9])
 def test_a_dead_time_before_a_ramp_is_one_behind_it_also_between_samples(samples):
     """As the effect ``command_delay``, which has a memory of its own."""

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 
 from ddagr_gym.jit import kernel
-from ddagr_gym.physics.drivetrain import mean_and_turning
+from ddagr_gym.physics.drivetrain import lagged_mean, mean_and_turning
 from ddagr_gym.physics.effects.base import Action, DriveExtent, Effect, Vector, shape, size
 from ddagr_gym.physics.layout import MOTOR_RATE, MOTOR_TARGET, OMEGA, POINT_MOTORS, SAMPLE_PERIOD
 
@@ -14,13 +14,6 @@ _TURNING_STARTED = 1  # the same behind the lagged turning
 _STARTING = 0.1  # of the wanted change counts as the way in which a bank turns, so that it has one at rest, ours
 _SLOW = 0.02  # [rad/s], ours: speeding up or slowing down, made differentiable
 _PROBED = ((0.0, 1.0), (1.0, 1.0), (0.0, 0.0), (0.0, 1.0, 1.0))  # second pole, slowing, turning: corners that differ
-
-
-@kernel(inline=True)
-def lagged_mean(behind: float, lag: float, period: float) -> tuple[float, float]:
-    """Distance from a held input that a first-order filter has on average over a sample, and at its end."""
-    decay = math.exp(-period / lag)
-    return behind * (1.0 - decay) * lag / period, behind * decay
 
 
 @kernel(inline=True)
