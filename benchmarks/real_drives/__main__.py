@@ -94,6 +94,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--output", type=Path, default=RESULTS)
     given = parser.parse_args(arguments)
     folder = make_folder(given.output)
+    went_on = given.cache is not None and given.cache.exists()
     result = calibrated_drives(given.threads, given.seed, given.cache, given.bank)
     if given.calibration is not None:
         result.report(given.calibration)
@@ -106,7 +107,8 @@ def main(arguments: list[str] | None = None) -> None:
     answer = outcome.calibration
     results = {
         "version": __version__,
-        "seconds_of_calibration": round(answer.seconds, 1),
+        # of one that went on after an interruption it is not known how long all of it took
+        "seconds_of_calibration": None if went_on else round(answer.seconds, 1),
         "parameters": [
             {"name": p.name, "value": p.value, "data_sheet": p.data_sheet, "unit": p.unit, "calibrated": p.calibrated}
             for p in answer.parameters
