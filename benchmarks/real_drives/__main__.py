@@ -113,6 +113,7 @@ def main(arguments: list[str] | None = None) -> None:
             {"name": p.name, "value": p.value, "data_sheet": p.data_sheet, "unit": p.unit, "calibrated": p.calibrated}
             for p in answer.parameters
         ],
+        "parts": [{"name": p.name, "kept": p.kept, "growth": p.growth, "error": p.error} for p in answer.parts],
         "aims": {item.drive: aims_of(item, given.seed) for item in compared},
         "errors": rows,
     }

@@ -27,6 +27,7 @@ FEW = CalibrationSettings(fitted=10, compared=6, judged=12)
 TURNING_LIMIT = 0.6
 """Of a robot whose controller limits the yaw rate [rad/s]."""
 
+FILTER = 0.5  # [s]
 RAMP = 1.0
 """By which the commands of a robot change [rad/s^2]."""
 
@@ -245,6 +246,18 @@ def test_a_ramp_of_the_commands_is_kept():
     assert {"speed_loop", "command_delay", "command_ramp"} <= kept
     assert found.robot.drivetrain.command_ramp == pytest.approx(RAMP, rel=0.05)
     assert found.robot.drivetrain.command_delay == pytest.approx(DELAY, rel=0.05)
+
+
+@pytest.mark.slow
+def test_a_filter_of_the_commands_is_found():
+    """Neither a ramp nor a dead time nor a slower loop stands for it."""
+    robot = true_robot()
+    smooth = replace(robot, drivetrain=replace(robot.drivetrain, command_filter=FILTER))
+    found = calibrated([drive(ground, seed, robot=smooth) for seed, ground in enumerate(GROUNDS, 1)])
+    kept = {part.name for part in found.calibration.parts if part.kept}
+    assert {"speed_loop", "command_delay", "command_filter"} <= kept
+    assert "command_ramp" not in kept
+    assert found.robot.drivetrain.command_filter == pytest.approx(FILTER, rel=0.1)
 
 
 @pytest.mark.slow
