@@ -25,9 +25,8 @@ from ddagr_gym.diagnosis.change.drive_fit import change_problem, change_windows,
 from ddagr_gym.diagnosis.change.ground_slope import deviations_of, effects_of
 from ddagr_gym.diagnosis.change.ordinary import Reference, field_deviations, uncertain_parameters
 from ddagr_gym.diagnosis.change.reference import OrdinaryDrive, scan_ordinary
-from ddagr_gym.diagnosis.change.robot_on_ground import LEAST_SHARE, RobotOnGround
+from ddagr_gym.diagnosis.change.robot_on_ground import RobotOnGround, uncertain_robot
 from ddagr_gym.diagnosis.change.weighing import LEAST_ACCELEROMETER_BIAS, LEAST_GYRO_BIAS, SensorBias, Weighing
-from ddagr_gym.identification.parameters import ModelParameter, robot_parameters
 from ddagr_gym.identification.recording_noise import RecordingNoise
 from ddagr_gym.identification.relative_readings import usual_turning
 from ddagr_gym.identification.residual_weights import UNKNOWN_GYRO_BIAS, noise_weights
@@ -92,15 +91,6 @@ def soil_deviations(calibration: Calibration) -> dict[str, dict[str, float]]:
         if item.calibrated and item.ground and base in SOIL_PARAMETERS and item.scatter.same_ground is not None:
             found[item.ground][base] = float(np.hypot(item.deviation or 0.0, item.scatter.same_ground))
     return found
-
-
-def uncertain_robot(robot: Robot, deviations: Mapping[str, float]) -> tuple[ModelParameter, ...]:
-    """Calibrated parameters of a robot with the priors of another drive; a gyro's scale is no part of the robot."""
-    return tuple(
-        replace(p, prior=max(deviations[p.name], LEAST_SHARE * p.step))
-        for p in robot_parameters(robot)
-        if p.name in deviations
-    )
 
 
 def ordinary_drives(

@@ -6,10 +6,11 @@ import hashlib
 from pathlib import Path
 
 from ddagr_gym.calibration.files import load, load_robot, load_soil
-from ddagr_gym.calibration.ordinary_drives import robot_deviations, soil_deviations, uncertain_robot
+from ddagr_gym.calibration.ordinary_drives import robot_deviations, soil_deviations
 from ddagr_gym.calibration.ordinary_files import NAME, load_ordinary
 from ddagr_gym.diagnosis.change.ground_slope import GroundSlope
 from ddagr_gym.diagnosis.change.ordinary import OrdinaryRobot
+from ddagr_gym.diagnosis.change.robot_on_ground import uncertain_robot
 
 
 def load_ordinary_robot(folder: Path) -> OrdinaryRobot:

@@ -224,14 +224,18 @@ def test_the_page_stands_alone(folder):
     assert page.count("<figure>") == 3 + 4
 
 
+def calibrated_with(**drivetrain):
+    """What drives of a robot with further parts of its drivetrain say, and the parts that are kept."""
+    robot = true_robot()
+    robot = replace(robot, drivetrain=replace(robot.drivetrain, **drivetrain))
+    found = calibrated([drive(ground, seed, robot=robot) for seed, ground in enumerate(GROUNDS, 1)])
+    return found, {part.name for part in found.calibration.parts if part.kept}
+
+
 @pytest.mark.slow
 def test_a_limit_of_the_commanded_turning_is_found():
     """Half of the turns of these steps are cut by the robot's controller; its data sheet does not say so."""
-    robot = true_robot()
-    limited = replace(robot, drivetrain=replace(robot.drivetrain, turning_limit=TURNING_LIMIT))
-    made = [drive(ground, seed, robot=limited) for seed, ground in enumerate(GROUNDS, 1)]
-    found = calibrated(made)
-    kept = {part.name for part in found.calibration.parts if part.kept}
+    found, kept = calibrated_with(turning_limit=TURNING_LIMIT)
     assert {"speed_loop", "command_delay", "turning_limit"} <= kept
     assert found.robot.drivetrain.turning_limit == pytest.approx(TURNING_LIMIT, rel=0.02)
 
@@ -239,10 +243,7 @@ def test_a_limit_of_the_commanded_turning_is_found():
 @pytest.mark.slow
 def test_a_ramp_of_the_commands_is_kept():
     """A robot that takes a second and a half to its commanded speed in equal steps has no dead time in its stead."""
-    robot = true_robot()
-    shaped = replace(robot, drivetrain=replace(robot.drivetrain, command_ramp=RAMP))
-    found = calibrated([drive(ground, seed, robot=shaped) for seed, ground in enumerate(GROUNDS, 1)])
-    kept = {part.name for part in found.calibration.parts if part.kept}
+    found, kept = calibrated_with(command_ramp=RAMP)
     assert {"speed_loop", "command_delay", "command_ramp"} <= kept
     assert found.robot.drivetrain.command_ramp == pytest.approx(RAMP, rel=0.05)
     assert found.robot.drivetrain.command_delay == pytest.approx(DELAY, rel=0.05)
@@ -251,14 +252,11 @@ def test_a_ramp_of_the_commands_is_kept():
 @pytest.mark.slow
 def test_a_filter_of_the_commands_is_found():
     """Neither a ramp nor a dead time stands for it; a loop and a filter in series may share their lag otherwise."""
-    robot = true_robot()
-    smooth = replace(robot, drivetrain=replace(robot.drivetrain, command_filter=FILTER))
-    found = calibrated([drive(ground, seed, robot=smooth) for seed, ground in enumerate(GROUNDS, 1)])
-    kept = {part.name for part in found.calibration.parts if part.kept}
+    found, kept = calibrated_with(command_filter=FILTER)
     assert {"speed_loop", "command_delay", "command_filter"} <= kept
     assert "command_ramp" not in kept
     lag = found.robot.drivetrain.command_filter + 1.0 / found.robot.motor_rate
-    assert lag == pytest.approx(FILTER + 1.0 / robot.motor_rate, rel=0.05)
+    assert lag == pytest.approx(FILTER + 1.0 / true_robot().motor_rate, rel=0.05)
     assert found.robot.drivetrain.command_delay == pytest.approx(DELAY, abs=0.05)
 
 

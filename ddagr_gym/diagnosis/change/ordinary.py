@@ -10,14 +10,13 @@ from numpy.typing import NDArray
 
 from ddagr_gym.diagnosis.change.expected_scatter import EXPECTED_DRIVES, ExpectedScatter
 from ddagr_gym.diagnosis.change.ground_slope import GroundSlope, deviations_of, effects_of
-from ddagr_gym.diagnosis.change.robot_on_ground import RobotOnGround
+from ddagr_gym.diagnosis.change.robot_on_ground import RobotOnGround, uncertain_robot
 from ddagr_gym.diagnosis.change.weighing import Weighing
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.nuisances import NuisancePriors
 from ddagr_gym.identification.parameters import (
     KIND_STIFFNESS_DEVIATION,
     ModelParameter,
-    robot_parameters,
     sensor_parameters,
     slope_parameters,
     soil_parameters,
@@ -260,13 +259,12 @@ class OrdinaryRobot:
         deviations = dict(self.soil_deviations)
         if beside == 1:
             deviations[own.ground] = field_deviations()
-        priors = {p.name: p.prior for p in self.parameters}
         return replace(
             self,
             robot=own.robot,
             soils={**soils, own.ground: own.soil} if beside else soils,
             slopes={ground: slope for ground, slope in self.slopes.items() if beside or ground != own.ground},
-            parameters=tuple(replace(p, prior=priors[p.name]) for p in robot_parameters(own.robot) if p.name in priors),
+            parameters=uncertain_robot(own.robot, {p.name: p.prior for p in self.parameters}),
             soil_deviations=deviations,
             weighing=self.weighing.without(drive),
             references=others,

@@ -5,14 +5,26 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
 from ddagr_gym.identification.fitted_values import robot_with_values
 from ddagr_gym.identification.parameters import ModelParameter, robot_parameters
 from ddagr_gym.parameters import Robot
 
 LEAST_SHARE = 0.1
 """Of the step of its finite difference, below which a parameter's deviation means nothing (ours)."""
+
+
+def uncertain_robot(robot: Robot, deviations: Mapping[str, float]) -> tuple[ModelParameter, ...]:
+    """Parameters of a robot with the deviations that another drive may have, by name, as priors; those alone.
+
+    Args:
+        robot: calibrated.
+        deviations: by parameter; what is no part of the robot, as a gyro's scale, is passed over.
+    """
+    return tuple(
+        replace(p, prior=max(deviations[p.name], LEAST_SHARE * p.step))
+        for p in robot_parameters(robot)
+        if p.name in deviations
+    )
 
 
 @dataclass(frozen=True)
@@ -46,9 +58,5 @@ class RobotOnGround:
         """
         if not self.deviations:
             return tuple(anywhere)
-        widest = {p.name: p.prior for p in anywhere}
-        return tuple(
-            replace(p, prior=min(widest[p.name], max(self.deviations.get(p.name, np.inf), LEAST_SHARE * p.step)))
-            for p in robot_parameters(self.robot(robot))
-            if p.name in widest
-        )
+        narrower = {p.name: min(p.prior, self.deviations.get(p.name, p.prior)) for p in anywhere}
+        return uncertain_robot(self.robot(robot), narrower)
