@@ -2,8 +2,8 @@
 
 Few windows of each drive mislead about two kinds of parts. Values that the data sheet states, of wheels, masses and
 gyro, move far where a model lacks something else: they hold until the other parts are fitted, and are free only where
-forecasts of left-out drives gain by that (forward selection). And a ramp of the commands that few windows asked for is
-kept only if all of them miss it, also from a longer dead time.
+forecasts of left-out drives gain by that, in all channels (forward selection). And a ramp of the commands that few
+windows asked for is kept only if all of them miss it, also from a longer dead time.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def decide_with_all_windows(
             continue
         progress(f"forecasts with all windows with {part.title} free")
         tried = fit(left_out - {part.name}, best.standing, f"with {part.name}")
-        growth, error = worse_by(tried, best)
+        growth, error = worse_by(tried.by_all_channels, best.by_all_channels)
         kept = is_missed(growth, error, len(best.losses))
         decisions.append(PartDecision(part.name, kept, growth, error))
         if kept:

@@ -25,6 +25,7 @@ from ddagr_gym.identification.least_squares import huber_loss
 from ddagr_gym.identification.problem import Point, Problem
 from ddagr_gym.identification.residual_weights import Weights, residuals
 from ddagr_gym.identification.windows import CHANNELS, WindowSet
+from ddagr_gym.recordings.channels import CURRENTS
 
 Array = NDArray[np.float64]
 Booleans = NDArray[np.bool_]
@@ -160,17 +161,21 @@ def forecasts(
         yield Forecast(int(fold), chosen, values, model.problem.model_of(chosen).predict(values, chosen.initial))
 
 
-def forecast_loss(forecast: Forecast, sigma: Array, robust: Array) -> float:
+def forecast_loss(forecast: Forecast, sigma: Array, robust: Array, of_wheels: bool = False) -> float:
     """Mean robust loss of a forecast's samples.
 
     Args:
         forecast: of one fold.
         sigma: (8,) of the channels, infinite for those that do not count.
         robust: (8,) weighted residual from which the loss is linear.
+        of_wheels: only of what the drivetrain moves by itself, encoders and the motors' currents, if there is any.
     """
     weighted = residuals(forecast.windows, forecast.prediction) / sigma
     weighted = np.where(np.isfinite(forecast.prediction), weighted, BROKEN)
     known = np.isfinite(forecast.windows.measured) & np.isfinite(sigma)
+    if of_wheels:
+        wheels = known & np.isin(np.arange(known.shape[2]), WHEELS)
+        known = wheels if wheels.any() else known
     return float(np.mean(huber_loss(weighted, np.broadcast_to(robust, weighted.shape))[known]))
 
 
@@ -185,3 +190,5 @@ def fold_sigma(data: CalibrationData, windows: WindowSet, weights: Weights) -> d
 
 
 ENCODERS = (CHANNELS.index("encoder_right"), CHANNELS.index("encoder_left"))
+WHEELS = (*ENCODERS, *range(len(CHANNELS), len(CHANNELS) + len(CURRENTS)))
+"""Channels of the drivetrain alone; currents are not always there."""

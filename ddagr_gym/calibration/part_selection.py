@@ -5,6 +5,9 @@ drives become worse than the best so far by 2 % and by more than the standard er
 one-standard-error rule; L. Breiman et al., Classification and Regression Trees, 1984, section 3.4.3), with Student's t
 for few drives: of all parts together no more than that is given away. Of what nearly every robot has, the dead time,
 2 % are enough: there the burden of proof is on its absence.
+Forecasts are compared in what a drivetrain moves by itself, wheel speeds and the motors' currents: yaw rate and place
+follow from them through the soil, whose own errors a wrong wheel speed may make up for, and places are the integral of
+both, so that few large errors decide there.
 A part is missed only by a fit that is settled, or that has had steps enough.
 What acts through parts that have all gone goes with them. Ramp and dead time stand for each other: a fit without the
 ramp is also tried from a longer dead time, and a ramp that stayed where the dead time went gives way to a dead time
@@ -53,13 +56,20 @@ class Candidate:
 
     Attributes:
         standing: where its fit stands.
-        losses: of the forecasts of each fold.
+        losses: of the forecasts of each fold, by which it is judged.
         counts: windows of each fold that were forecast.
+        of_all_channels: losses by all channels.
     """
 
     standing: Standing
     losses: dict[int, float]
     counts: dict[int, int]
+    of_all_channels: dict[int, float]
+
+    @property
+    def by_all_channels(self) -> Candidate:
+        """The same, judged by all channels."""
+        return replace(self, losses=self.of_all_channels)
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,10 +127,11 @@ class Comparison:
         return tuple(forecasts(self.data, fitted, self.judged, self.weights, self.threads))
 
     def judge(self, fitted: FittedModel, made: Sequence[Forecast]) -> Candidate:
-        """A fitted model by its forecasts."""
-        sigma = fold_sigma(self.data, self.windows, self.weights)
-        losses = {f.fold: forecast_loss(f, sigma[f.fold], self.weights.robust) for f in made}
-        return Candidate(fitted.standing, losses, {f.fold: f.windows.count for f in made})
+        """A fitted model by its forecasts of the wheels' motion."""
+        sigma, robust = fold_sigma(self.data, self.windows, self.weights), self.weights.robust
+        wheels = {f.fold: forecast_loss(f, sigma[f.fold], robust, of_wheels=True) for f in made}
+        channels = {f.fold: forecast_loss(f, sigma[f.fold], robust) for f in made}
+        return Candidate(fitted.standing, wheels, {f.fold: f.windows.count for f in made}, channels)
 
     def candidate(self, model: RobotModel, start: Standing, iterations: int = ITERATIONS) -> Candidate:
         """A model, fitted from where another one stands, and its forecasts."""

@@ -36,12 +36,14 @@ class Windows:
         without_ramp: loss without it, by the dead time at the start [s].
         gains: share by which the loss falls with a part of the data sheet.
         slow: fits after which one is settled.
+        only_places: whether the losses are of places alone, and wheel speeds are forecast alike by all.
     """
 
     with_ramp: float = 1.0
     without_ramp: dict[float, float] = field(default_factory=lambda: {0.1: 1.3, TRIED_DELAY: 1.3})
     gains: dict[str, float] = field(default_factory=dict)
     slow: int = 1
+    only_places: bool = False
     fits: int = 0
 
     data = SimpleNamespace(robot=WARTHOG)
@@ -68,7 +70,8 @@ class Windows:
         for name, share in self.gains.items():
             loss *= 1.0 - share if name in free else 1.0
         losses = {fold: loss * (1.0 + 1e-3 * fold) for fold in range(DRIVES)}
-        return Candidate(fitted.standing, losses, dict.fromkeys(losses, 1))
+        wheels = dict.fromkeys(losses, 1.0) if self.only_places else losses
+        return Candidate(fitted.standing, wheels, dict.fromkeys(losses, 1), losses)
 
 
 def decided(windows: Windows, out: frozenset[str], start: Standing) -> tuple[Selection, dict[str, PartDecision]]:
@@ -104,6 +107,13 @@ def test_a_ramp_that_was_not_selected_is_not_tried():
     assert windows.fits == len(DATA_SHEET_PARTS)
     assert decisions["command_ramp"] == PartDecision("command_ramp", False, 0.05, 0.01)
     assert found.left_out == NO_RAMP | DATA_SHEET_PARTS
+
+
+def test_places_alone_decide_on_the_data_sheet_and_not_on_the_ramp():
+    losses = {0.1: 1.3, TRIED_DELAY: 1.3}
+    windows = Windows(without_ramp=losses, gains={"half_track": 0.05}, only_places=True)
+    _, decisions = decided(windows, NOTHING, standing(0.1))
+    assert (decisions["command_ramp"].kept, decisions["geometry"].kept) == (False, True)
 
 
 def test_a_dead_time_that_is_long_already_is_not_tried_from_a_shorter_one():

@@ -9,13 +9,14 @@ import pytest
 
 from ddagr_gym.calibration.calibration_data import CalibrationData
 from ddagr_gym.calibration.joint_fit import FittedModel, complete_model, fit_model, weigh_and_fit
-from ddagr_gym.calibration.left_out import forecasts, refitted_without, values_without
+from ddagr_gym.calibration.left_out import forecast_loss, forecasts, refitted_without, values_without
 from ddagr_gym.calibration.parts import PARTS
 from ddagr_gym.calibration.run import ready_drives
 from ddagr_gym.calibration.settings import CalibrationSettings
 from ddagr_gym.identification.gauss_newton import fit, fit_states
 from ddagr_gym.identification.problem import Point, Problem
 from ddagr_gym.identification.residual_weights import Weights
+from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.presets import get_robot, get_soil
 from tests.calibration.conftest import drive, true_robot
 
@@ -111,3 +112,20 @@ def test_no_step_is_taken_by_which_the_other_drives_are_read_worse(data, fitted,
     begun = fit_model(data, data.spread(SETTINGS.fitted), joint.model, weights, far, 1, iterations=0)
     found = values_without(begun, out)
     assert cost(begun, found, out) <= cost(begun, begun.fitted.point.values, out)
+
+
+@pytest.mark.parametrize(("channel", "of_wheels"), [("encoder_left", True), ("pose_x", False), ("yaw_rate", False)])
+def test_a_loss_of_wheels_is_of_their_speeds_alone(data, fitted, channel, of_wheels):
+    joint, weights = fitted
+    made = next(iter(forecasts(data, joint, data.spread(SETTINGS.judged), weights, 1)))
+    off = made.prediction.copy()
+    off[..., CHANNELS.index(channel)] += 1.0
+    sigma = weights.sigma[0, 0]
+
+    def losses(forecast):
+        return [forecast_loss(forecast, sigma, weights.robust, wheels) for wheels in (False, True)]
+
+    (whole, wheels), (whole_off, wheels_off) = losses(made), losses(replace(made, prediction=off))
+    assert whole_off > whole
+    assert (wheels_off > wheels) is of_wheels
+    assert wheels_off == wheels or of_wheels

@@ -20,7 +20,8 @@ from ddagr_gym.presets import get_robot
 
 def candidate(*losses: float, counts: tuple[int, ...] = (), settled: bool = True) -> Candidate:
     standing = Standing({}, np.zeros((0, 8)), settled)
-    return Candidate(standing, dict(enumerate(losses)), dict(enumerate(counts or (1,) * len(losses))))
+    by_fold = dict(enumerate(losses))
+    return Candidate(standing, by_fold, dict(enumerate(counts or (1,) * len(losses))), by_fold)
 
 
 def test_equal_drives_have_the_mean_and_its_standard_error():
