@@ -125,7 +125,11 @@ def disjoint_scopes(parameters: Sequence[ModelParameter], chosen: Sequence[int])
     return together
 
 
-def _log(name: str, entries: Sequence[int], prior: float, limit: float = 1.6) -> ModelParameter:
+_LOG_LIMIT = 1.6
+"""Largest logarithm of a factor (ours): five times more or less is another soil, or another robot."""
+
+
+def _log(name: str, entries: Sequence[int], prior: float, limit: float = _LOG_LIMIT) -> ModelParameter:
     return ModelParameter(name, "-", tuple(entries), True, prior, 0.02, -limit, limit)
 
 
@@ -147,18 +151,27 @@ def soil_parameters(
     """Soil: strength varies by some ten percent (0.26 over published sands), stiffness and shear modulus by more.
 
     Args:
-        soil: nominal one, which bounds the exit angle ratio; bounds that suit any preset's by default.
+        soil: nominal one, of which a fit makes no soil that cannot be; bounds that suit any preset's by default.
         stiffness_deviation: prior of the logarithm of the stiffness.
     """
     strength = soil_entries(layout.SOIL_COHESION) + soil_entries(layout.SOIL_FRICTION_TANGENT)
     stiffness = soil_entries(layout.SOIL_COHESIVE_MODULUS) + soil_entries(layout.SOIL_FRICTIONAL_MODULUS)
     low, high = (-0.85, 0.1) if soil is None else (-soil.exit_angle_ratio, 1.0 - soil.exit_angle_ratio)
+    strongest = _LOG_LIMIT if soil is None else min(_LOG_LIMIT, _to_steepest(soil))
     return (
-        _log("soil_strength", strength, 0.3),
-        _log("soil_stiffness", stiffness, stiffness_deviation, max(1.6, 3.0 * stiffness_deviation)),
+        replace(_log("soil_strength", strength, 0.3), high=strongest),
+        _log("soil_stiffness", stiffness, stiffness_deviation, max(_LOG_LIMIT, 3.0 * stiffness_deviation)),
         _log("shear_modulus", soil_entries(layout.SOIL_SHEAR_MODULUS), 0.5),
         ModelParameter("exit_angle_ratio", "-", soil_entries(layout.SOIL_EXIT_RATIO), False, 0.2, 0.02, low, high),
     )
+
+
+def _to_steepest(soil: Soil) -> float:
+    """Logarithm of the factor of a soil's strength at which its friction is the most that a soil may have."""
+    most = next(item.metadata["high"] for item in fields(Soil) if item.name == "friction_angle")
+    own = math.tan(soil.friction_angle)
+    # a hair less, since a tangent and its inverse round
+    return math.log(math.tan(most) / own) - 1e-9 if own > 0.0 else math.inf
 
 
 _SLOPE = 5

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from ddagr_gym.identification.fitted_values import with_values
 from ddagr_gym.identification.parameters import (
     command_shift,
     robot_parameters,
@@ -14,7 +15,7 @@ from ddagr_gym.identification.parameters import (
 )
 from ddagr_gym.parameters import Sensors
 from ddagr_gym.physics import layout
-from ddagr_gym.presets import get_robot
+from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.simulator import build_row
 
 
@@ -45,6 +46,17 @@ def test_the_exit_angle_ratio_is_added_and_stays_between_0_and_1(rows, soil):
     assert rows[0, entry] == pytest.approx(before + 0.05)
     assert before + parameter.low == pytest.approx(0.0)
     assert before + parameter.high == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("name", ["firm_ground", "lete_sand_wong", "thesis_a1"])
+def test_a_soil_at_its_bounds_can_be_built(name, robot):
+    soil = get_soil(name)
+    for parameter in soil_parameters(soil):
+        for value in (parameter.low, parameter.high):
+            with_values(robot, soil, {parameter.name: value})
+    strength = named(soil_parameters(soil))["soil_strength"]
+    friction = with_values(robot, soil, {"soil_strength": strength.high})[1].friction_angle
+    assert (friction == pytest.approx(1.2, abs=1e-6)) is (name != "thesis_a1")
 
 
 def test_zero_is_nominal(rows, robot, soil):
