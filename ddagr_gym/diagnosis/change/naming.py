@@ -21,11 +21,14 @@ from ddagr_gym.diagnosis.change.refits import MOST_RIVALS, Refit, joint_refits
 from ddagr_gym.diagnosis.change.shifts import LEVEL, Shift, refitted_shift
 from ddagr_gym.diagnosis.mid_drive.search_in_time import LEAST_EVIDENCE
 from ddagr_gym.diagnosis.result.equivalence import equivalence_weights
+from ddagr_gym.diagnosis.search.initial_guess import same_lateness
 from ddagr_gym.diagnosis.search.scanned_model import Rival
 from ddagr_gym.identification.effect_parameters import effect_parameters
 from ddagr_gym.identification.gauss_newton import Fitted
 from ddagr_gym.identification.misfit import dispersion_of
 from ddagr_gym.identification.problem import Problem
+from ddagr_gym.physics.effects.command_delay import CommandDelay
+from ddagr_gym.physics.effects.motor_lag import MotorLag
 from ddagr_gym.physics.effects.soil_change import SoilChange
 from ddagr_gym.physics.effects.soil_patch import SoilPatch
 
@@ -181,7 +184,7 @@ def _next(
     weights = equivalence_weights([rival for _, rival in kept], dispersion, rng, FORM_OF_GAIN, parts)
     for name in [rival.name for _, rival in soil] or _standing_out(alarming, model, weights):
         weights = _first(name, weights)
-    weights = _everywhere_first(kept, weights)
+    weights = _dead_time_first(kept, _everywhere_first(kept, weights))
     name = max(weights, key=weights.__getitem__)
     chosen = next(item for item in kept if item[1].name == name)
     rivals = (chosen[1], *(rival for _, rival in kept if rival is not chosen[1]))
@@ -231,6 +234,24 @@ def _everywhere_first(kept: Sequence[Tried], weights: dict[str, float]) -> dict[
     return _first(SoilChange.name, weights) if alike and ahead else weights
 
 
+def _dead_time_first(kept: Sequence[Tried], weights: dict[str, float]) -> dict[str, float]:
+    """A dead time before a lag beside which no less is out of the ordinary, however much more the lag explains.
+
+    No robot's lateness has the form of either. What a lag's further sizes explain beyond a dead time, they explain of
+    ordinary drives too, unless something is out of the ordinary beside the dead time.
+    """
+    after = {rival.name: model for model, rival in kept}
+    if not {MotorLag.name, CommandDelay.name} <= after.keys() or max(weights, key=weights.__getitem__) != MotorLag.name:
+        return weights
+    as_good = after[CommandDelay.name].left <= after[MotorLag.name].left
+    return _first(CommandDelay.name, {CommandDelay.name: 0.0, **weights}) if as_good else weights
+
+
+def _is_late(rival: Rival) -> bool:
+    """Whether it says by how much the wheels are late, in any form."""
+    return same_lateness(rival.fitted.point.effects[-1]) is not None
+
+
 def _first(name: str, weights: dict[str, float]) -> dict[str, float]:
     """Weights in which a name comes first and none weighs more."""
     raised = {name: max(weights.values()), **{other: weight for other, weight in weights.items() if other != name}}
@@ -250,7 +271,8 @@ def _compared_beside(
     for item in refitted:
         shift, rival = item.shift, item.rival
         far = rival.gain < CLOSE * max((other.gain for after, other in alarming if after.left <= 1.0), default=0.0)
-        if far and item.problem is model.problem:
+        another_form = _is_late(rival) and any(_is_late(other) for _, other in alarming)
+        if far and item.problem is model.problem and not another_form:
             continue
         progress(f"comparing every effect beside {rival.name}")
         after = model_of(item.problem, rival.fitted, ordinary, (*model.named, shift))

@@ -10,6 +10,7 @@ from ddagr_gym.diagnosis.change.naming import (
     LEAST_EVIDENCE,
     Named,
     _absent,
+    _dead_time_first,
     _everywhere_first,
     _explaining,
     _first,
@@ -77,6 +78,24 @@ def test_a_patch_that_explains_hardly_more_than_a_changed_soil_comes_after_it(fu
 def test_a_changed_soil_that_is_no_rival_of_a_patch_does_not_come_back():
     weights = {"soil_patch": 0.8, "slope": 0.2}
     assert _everywhere_first([tried("soil_patch", 9.0, 0.9, 1e-6)], weights) == weights
+
+
+LAG = {"motor_lag": 0.93, "gyro_bias": 0.07}
+
+
+@pytest.mark.parametrize(("left", "first"), [(0.6, "command_delay"), (0.7, "command_delay"), (0.8, "motor_lag")])
+def test_a_dead_time_comes_before_a_lag_that_leaves_no_less_out_of_the_ordinary(left, first):
+    found = _dead_time_first([tried("motor_lag", 62.0, 0.7, 1e-5), tried("command_delay", 35.0, left, 1e-6)], LAG)
+    assert max(found, key=found.__getitem__) == first
+    assert set(found) == ({"command_delay", *LAG} if first == "command_delay" else set(LAG))
+    assert sum(found.values()) == pytest.approx(1.0)
+
+
+def test_a_dead_time_comes_before_no_other_name():
+    delay = tried("command_delay", 35.0, 0.1, 1e-6)
+    weights = {"gyro_bias": 0.6, "motor_lag": 0.4}
+    assert _dead_time_first([delay, tried("motor_lag", 62.0, 0.7, 1e-5)], weights) == weights
+    assert _dead_time_first([tried("motor_lag", 62.0, 0.7, 1e-5)], LAG) == LAG
 
 
 def by_itself(name: str, probability: float):
