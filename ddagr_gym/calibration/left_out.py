@@ -161,22 +161,22 @@ def forecasts(
         yield Forecast(int(fold), chosen, values, model.problem.model_of(chosen).predict(values, chosen.initial))
 
 
-def forecast_loss(forecast: Forecast, sigma: Array, robust: Array, of_wheels: bool = False) -> float:
-    """Mean robust loss of a forecast's samples.
+def forecast_losses(forecast: Forecast, sigma: Array, robust: Array) -> tuple[float, float]:
+    """Mean robust losses of a forecast's samples: of all channels, and of what the drivetrain moves by itself.
+
+    The latter are encoders and the motors' currents; all channels where none of them counts.
 
     Args:
         forecast: of one fold.
         sigma: (8,) of the channels, infinite for those that do not count.
         robust: (8,) weighted residual from which the loss is linear.
-        of_wheels: only of what the drivetrain moves by itself, encoders and the motors' currents, if there is any.
     """
     weighted = residuals(forecast.windows, forecast.prediction) / sigma
     weighted = np.where(np.isfinite(forecast.prediction), weighted, BROKEN)
     known = np.isfinite(forecast.windows.measured) & np.isfinite(sigma)
-    if of_wheels:
-        wheels = known & np.isin(np.arange(known.shape[2]), WHEELS)
-        known = wheels if wheels.any() else known
-    return float(np.mean(huber_loss(weighted, np.broadcast_to(robust, weighted.shape))[known]))
+    wheels = known & np.isin(np.arange(known.shape[2]), WHEELS)
+    losses = huber_loss(weighted, np.broadcast_to(robust, weighted.shape))
+    return float(np.mean(losses[known])), float(np.mean(losses[wheels if wheels.any() else known]))
 
 
 BROKEN = 100.0

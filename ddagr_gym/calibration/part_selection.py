@@ -24,7 +24,7 @@ import numpy as np
 
 from ddagr_gym.calibration.calibration_data import CalibrationData
 from ddagr_gym.calibration.joint_fit import OFFSET, FittedModel, Standing, fit_model
-from ddagr_gym.calibration.left_out import Forecast, fold_sigma, forecast_loss, forecasts
+from ddagr_gym.calibration.left_out import Forecast, fold_sigma, forecast_losses, forecasts
 from ddagr_gym.calibration.parts import PARTS, RobotModel, idle_parts
 from ddagr_gym.calibration.result import PartDecision
 from ddagr_gym.calibration.settings import CalibrationSettings
@@ -129,9 +129,9 @@ class Comparison:
     def judge(self, fitted: FittedModel, made: Sequence[Forecast]) -> Candidate:
         """A fitted model by its forecasts of the wheels' motion."""
         sigma, robust = fold_sigma(self.data, self.windows, self.weights), self.weights.robust
-        wheels = {f.fold: forecast_loss(f, sigma[f.fold], robust, of_wheels=True) for f in made}
-        channels = {f.fold: forecast_loss(f, sigma[f.fold], robust) for f in made}
-        return Candidate(fitted.standing, wheels, {f.fold: f.windows.count for f in made}, channels)
+        found = {f.fold: forecast_losses(f, sigma[f.fold], robust) for f in made}
+        of_all, of_wheels = ({fold: losses[k] for fold, losses in found.items()} for k in (0, 1))
+        return Candidate(fitted.standing, of_wheels, {f.fold: f.windows.count for f in made}, of_all)
 
     def candidate(self, model: RobotModel, start: Standing, iterations: int = ITERATIONS) -> Candidate:
         """A model, fitted from where another one stands, and its forecasts."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import fields, replace
+from dataclasses import replace
 
-from ddagr_gym.identification.parameters import drivetrain_of
+from ddagr_gym.identification.parameters import SOIL_BOUNDS, drivetrain_of
 from ddagr_gym.parameters import Robot, Soil
 
 _ROBOT = ("mass", "yaw_inertia", "half_wheelbase", "half_track", "motor_rate", "maximum_wheel_speed")
@@ -70,9 +70,6 @@ def _soil(soil: Soil, values: Mapping[str, float], held: bool) -> Soil:
     return replace(soil, **changed)
 
 
-_BOUNDS = {item.name: item.metadata for item in fields(Soil)}
-
-
 def _held_in_bounds(field: str, value: float) -> float:
     """A number of a soil, or the nearest bound where it leaves what a soil may be."""
-    return float(min(max(value, _BOUNDS[field]["low"]), _BOUNDS[field]["high"]))
+    return float(min(max(value, SOIL_BOUNDS[field]["low"]), SOIL_BOUNDS[field]["high"]))

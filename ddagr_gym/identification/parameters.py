@@ -125,6 +125,9 @@ def disjoint_scopes(parameters: Sequence[ModelParameter], chosen: Sequence[int])
     return together
 
 
+SOIL_BOUNDS = {item.name: item.metadata for item in fields(Soil)}
+"""By field of a soil, the "low" and the "high" that it may have."""
+
 _LOG_LIMIT = 1.6
 """Largest logarithm of a factor (ours): five times more or less is another soil, or another robot."""
 
@@ -168,8 +171,7 @@ def soil_parameters(
 
 def _to_steepest(soil: Soil) -> float:
     """Logarithm of the factor of a soil's strength at which its friction is the most that a soil may have."""
-    most = next(item.metadata["high"] for item in fields(Soil) if item.name == "friction_angle")
-    own = math.tan(soil.friction_angle)
+    most, own = SOIL_BOUNDS["friction_angle"]["high"], math.tan(soil.friction_angle)
     # a hair less, since a tangent and its inverse round
     return math.log(math.tan(most) / own) - 1e-9 if own > 0.0 else math.inf
 
@@ -210,7 +212,7 @@ def robot_parameters(robot: Robot) -> tuple[ModelParameter, ...]:
     of_wheel = {"half_width": robot.wheels[0].half_width, "outer_radius": robot.wheels[0].major_radius}
     nominal = {name: of_wheel[name] if name in of_wheel else getattr(robot, name) for name in UNCERTAIN}
     body = tuple(
-        _log(name, _ROBOT_ENTRIES[name], deviation / nominal[name], max(1.6, 4.0 * deviation / nominal[name]))
+        _log(name, _ROBOT_ENTRIES[name], deviation / nominal[name], max(_LOG_LIMIT, 4.0 * deviation / nominal[name]))
         for name, deviation in robot.standard_deviations.items()
         if name in nominal and deviation > 0.0
     )

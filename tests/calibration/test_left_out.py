@@ -9,7 +9,7 @@ import pytest
 
 from ddagr_gym.calibration.calibration_data import CalibrationData
 from ddagr_gym.calibration.joint_fit import FittedModel, complete_model, fit_model, weigh_and_fit
-from ddagr_gym.calibration.left_out import forecast_loss, forecasts, refitted_without, values_without
+from ddagr_gym.calibration.left_out import forecast_losses, forecasts, refitted_without, values_without
 from ddagr_gym.calibration.parts import PARTS
 from ddagr_gym.calibration.run import ready_drives
 from ddagr_gym.calibration.settings import CalibrationSettings
@@ -121,11 +121,8 @@ def test_a_loss_of_wheels_is_of_their_speeds_alone(data, fitted, channel, of_whe
     off = made.prediction.copy()
     off[..., CHANNELS.index(channel)] += 1.0
     sigma = weights.sigma[0, 0]
-
-    def losses(forecast):
-        return [forecast_loss(forecast, sigma, weights.robust, wheels) for wheels in (False, True)]
-
-    (whole, wheels), (whole_off, wheels_off) = losses(made), losses(replace(made, prediction=off))
+    whole, wheels = forecast_losses(made, sigma, weights.robust)
+    whole_off, wheels_off = forecast_losses(replace(made, prediction=off), sigma, weights.robust)
     assert whole_off > whole
     assert (wheels_off > wheels) is of_wheels
     assert wheels_off == wheels or of_wheels

@@ -244,7 +244,7 @@ def _dead_time_first(kept: Sequence[Tried], weights: dict[str, float]) -> dict[s
     if not {MotorLag.name, CommandDelay.name} <= after.keys() or max(weights, key=weights.__getitem__) != MotorLag.name:
         return weights
     as_good = after[CommandDelay.name].left <= after[MotorLag.name].left
-    return _first(CommandDelay.name, {CommandDelay.name: 0.0, **weights}) if as_good else weights
+    return _first(CommandDelay.name, weights) if as_good else weights
 
 
 def _is_late(rival: Rival) -> bool:
