@@ -9,9 +9,9 @@ Forecasts are compared in what a drivetrain moves by itself, wheel speeds and th
 follow from them through the soil, whose own errors a wrong wheel speed may make up for, and places are the integral of
 both, so that few large errors decide there.
 A part is missed only by a fit that is settled, or that has had steps enough.
-What acts through parts that have all gone goes with them. Ramp and dead time stand for each other: a fit without the
-ramp is also tried from a longer dead time, and a ramp that stayed where the dead time went gives way to a dead time
-that forecasts as well.
+What acts through parts that have all gone goes with them. Ramp, filter and dead time of the commands stand for one
+another: a fit without ramp or filter is also tried from a longer dead time, and one of them that stayed where the dead
+time went gives way to a dead time that forecasts as well.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ import numpy as np
 from ddagr_gym.calibration.calibration_data import CalibrationData
 from ddagr_gym.calibration.joint_fit import OFFSET, FittedModel, Standing, fit_model
 from ddagr_gym.calibration.left_out import Forecast, fold_sigma, forecast_losses, forecasts
-from ddagr_gym.calibration.parts import PARTS, RobotModel, idle_parts
+from ddagr_gym.calibration.parts import PARTS, RobotModel, idle_parts, part_named
 from ddagr_gym.calibration.result import PartDecision
 from ddagr_gym.calibration.settings import CalibrationSettings
 from ddagr_gym.diagnosis.answer.drivetrain import LEAST_GROWTH
@@ -43,11 +43,11 @@ not settled, and parts were kept that it does not have."""
 HOPELESS = 0.1
 """Growth of the losses from which no further steps are spent on a fit without a part (ours)."""
 
-DELAY, RAMP = "command_delay", "command_ramp"
-"""Parts that can stand for each other."""
+DELAY, RAMP, FILTER = "command_delay", "command_ramp", "command_filter"
+"""Parts that can stand for one another."""
 
 TRIED_DELAY = 0.3
-"""From which the fit with a dead time in place of a ramp starts [s]: of a Husky and a Warthog (0.2 to 0.43 s)."""
+"""From which the fit with a dead time in place of them starts [s]: of a Husky and a Warthog (0.2 to 0.43 s)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,17 +203,20 @@ def select_parts(
         progress(f"forecasts of left-out drives without {part.title}")
         tried = _settled(comparison, model, left_out | {part.name}, best, least, cache, part.usual)
         growth, error = worse_by(least, tried)
-        if part.name == RAMP and DELAY not in left_out and is_missed(growth, error, len(tried.losses)):
-            tried = min(tried, _later(comparison, model, left_out, best, cache), key=partial(mean_growth, least))
+        late_too = part.name in (RAMP, FILTER) and DELAY not in left_out
+        if late_too and is_missed(growth, error, len(tried.losses)):
+            later = _later(comparison, model, left_out | {part.name}, best, cache)
+            tried = min(tried, later, key=partial(mean_growth, least))
             growth, error = worse_by(least, tried)
         kept = is_missed(growth, error, len(tried.losses), part.usual)
         decisions.append(PartDecision(part.name, kept, growth, error))
         if not kept:
             best, left_out = tried, left_out | {part.name}
             least = min(least, best, key=partial(mean_growth, full))
-    if DELAY in left_out and RAMP not in left_out:
-        progress("forecasts of left-out drives with a dead time in place of the ramp")
-        best, left_out, decisions = _delay_for_ramp(comparison, model, best, left_out, decisions, cache)
+    for name in (RAMP, FILTER):
+        if DELAY in left_out and name not in left_out and name in model.free:
+            progress(f"forecasts of left-out drives with a dead time in place of the {part_named(name).title}")
+            best, left_out, decisions = _delay_for(name, comparison, model, best, left_out, decisions, cache)
     idle = idle_parts(left_out, comparison.data.robot)
     if idle:
         left_out |= idle
@@ -261,9 +264,9 @@ def _settled(
 def _later(
     comparison: Comparison, model: RobotModel, left_out: frozenset[str], best: Candidate, cache: StepCache
 ) -> Candidate:
-    """A model without the ramp from a longer dead time: a fit from a short one does not reach what the ramp did."""
+    """A model without ramp or filter from a longer dead time: a fit from a short one does not reach what they did."""
     stage = f", dead time from {TRIED_DELAY:g}"
-    return _fitted_without(comparison, model, left_out | {RAMP}, late_start(best), cache, stage)
+    return _fitted_without(comparison, model, left_out, late_start(best), cache, stage)
 
 
 def late_start(best: Candidate) -> Standing:
@@ -276,7 +279,8 @@ def mean_growth(before: Candidate, after: Candidate) -> float:
     return worse_by(before, after)[0]
 
 
-def _delay_for_ramp(
+def _delay_for(
+    part: str,
     comparison: Comparison,
     model: RobotModel,
     best: Candidate,
@@ -284,22 +288,22 @@ def _delay_for_ramp(
     decisions: list[PartDecision],
     cache: StepCache,
 ) -> tuple[Candidate, frozenset[str], list[PartDecision]]:
-    """A dead time in place of the ramp where forecasts do not suffer: both make the wheels late.
+    """A dead time in place of ramp or filter where forecasts do not suffer: all make the wheels late.
 
-    Nearly every robot has a dead time and few have a ramp. It is kept as any other part is, if forecasts without it are
-    worse.
+    Nearly every robot has a dead time and few have the others. It is kept as any other part is, if forecasts without it
+    are worse.
     """
     robot = comparison.data.robot
-    exchanged, neither = (left_out - {DELAY}) | {RAMP}, left_out | {RAMP}
+    exchanged, neither = (left_out - {DELAY}) | {part}, left_out | {part}
     with_delay = partial(comparison.candidate, model.without(exchanged, robot), late_start(best))
-    late = cache("a dead time for the ramp", with_delay)
+    late = cache(f"{DELAY} for {part}", with_delay)
     growth, error = worse_by(best, late)
     if is_missed(growth, error, len(late.losses)):
         return best, left_out, decisions
     without = model.without(neither, robot)
-    prompt = cache("neither dead time nor ramp", partial(comparison.candidate, without, late.standing))
+    prompt = cache(f"neither {DELAY} nor {part}", partial(comparison.candidate, without, late.standing))
     missed, its_error = worse_by(late, prompt)
     if not is_missed(missed, its_error, len(late.losses), usual=True):
         return best, left_out, decisions
-    changed = {DELAY: PartDecision(DELAY, True, missed, its_error), RAMP: PartDecision(RAMP, False, growth, error)}
+    changed = {DELAY: PartDecision(DELAY, True, missed, its_error), part: PartDecision(part, False, growth, error)}
     return late, exchanged, [changed.get(item.name, item) for item in decisions]

@@ -46,12 +46,13 @@ def test_few_drives_must_show_more():
 class Made:
     """A model that knows which parts are out; its losses follow from that."""
 
-    def __init__(self, out: frozenset[str] = frozenset()) -> None:
+    def __init__(self, out: frozenset[str] = frozenset(), late: str = "command_ramp") -> None:
         self.out = out
-        self.free = {"command_delay", "command_ramp"} - out
+        self.late = late
+        self.free = {"command_delay", late} - out
 
     def without(self, parts: frozenset[str], robot: object) -> Made:
-        return Made(frozenset(parts))
+        return Made(frozenset(parts), self.late)
 
 
 class Losses:
@@ -65,7 +66,7 @@ class Losses:
         self.started_at: list[float | None] = []
 
     def candidate(self, model: Made, start: Standing) -> Candidate:
-        loss = self.losses[model.out & {"command_delay", "command_ramp"}]
+        loss = self.losses[model.out & {"command_delay", model.late}]
         self.started_at.append(start.values.get("command_delay"))
         return candidate(loss, 1.01 * loss, 0.99 * loss)
 
@@ -77,16 +78,17 @@ DELAY, RAMP, BOTH = (
 )
 
 
+@pytest.mark.parametrize("late", ["command_ramp", "command_filter"])
 @pytest.mark.parametrize(
-    ("delay_alone", "neither", "left_out"),
-    [(1.0, 1.5, RAMP), (1.2, 1.5, DELAY), (1.0, 1.0, BOTH)],
+    ("delay_alone", "neither", "stays"),
+    [(1.0, 1.5, "command_delay"), (1.2, 1.5, "late"), (1.0, 1.0, "nothing")],
 )
-def test_a_dead_time_that_forecasts_as_well_takes_the_place_of_a_ramp(delay_alone, neither, left_out):
-    # from a short dead time the ramp is missed, and the dead time is not
-    losses = Losses({frozenset(): 1.0, RAMP: delay_alone, DELAY: 1.0, BOTH: neither})
+def test_a_dead_time_that_forecasts_as_well_takes_the_place_of_ramp_or_filter(late, delay_alone, neither, stays):
+    alone, both = frozenset({late}), frozenset({late, "command_delay"})
+    # from a short dead time the part is missed, and the dead time is not
+    losses = Losses({frozenset(): 1.0, alone: delay_alone, DELAY: 1.0, both: neither})
     full = candidate(1.0, 1.01, 0.99)
-    begin = {RAMP: 1.1}
-    first = Losses({**losses.losses, **begin})
+    first = Losses({**losses.losses, alone: 1.1})
 
     class Once(Losses):
         def candidate(self, model, start):
@@ -94,10 +96,11 @@ def test_a_dead_time_that_forecasts_as_well_takes_the_place_of_a_ramp(delay_alon
                 return losses.candidate(model, start)
             return first.candidate(model, start)
 
-    found = select_parts(Once({}), Made(), full, lambda name, make: make(), lambda line: None)
-    assert found.left_out & BOTH == left_out
-    kept = {item.name: item.kept for item in found.decisions if item.name in BOTH}
-    assert kept == {name: name not in left_out for name in BOTH}
+    found = select_parts(Once({}), Made(late=late), full, lambda name, make: make(), lambda line: None)
+    left = {"command_delay": alone, "late": DELAY, "nothing": both}[stays]
+    assert found.left_out & both == left
+    kept = {item.name: item.kept for item in found.decisions if item.name in both}
+    assert kept == {name: name not in left for name in both}
 
 
 def test_parts_that_are_missed_a_little_each_are_not_all_given_away():

@@ -22,6 +22,7 @@ from ddagr_gym.identification.effect_parameters import effect_columns, effect_pa
 from ddagr_gym.identification.gauss_newton import Fitted
 from ddagr_gym.identification.problem import Problem
 from ddagr_gym.physics.effects import DriveExtent, Effect
+from ddagr_gym.physics.effects.command_delay import CommandDelay
 from ddagr_gym.physics.effects.registry import effect_kinds
 
 Array = NDArray[np.float64]
@@ -174,6 +175,31 @@ def scattered(gradients: Array) -> Array:
     return np.asarray(away.T @ away * count / (count - 1))
 
 
+def with_dead_time_of_robot(
+    problem: Problem, fitted: Fitted, probes: Sequence[Effect], columns: Sequence[Array]
+) -> list[Array]:
+    """Columns of probes, those of later commands by the robot's own dead time where the fit may move it.
+
+    A dead time as an effect and that of the robot are one quantity, but its derivative jumps where it ends at a sample.
+    By different finite differences a scan would tell one from the other, and know what nobody can.
+
+    Args:
+        problem: what was fitted.
+        fitted: the model.
+        probes: effects at a size.
+        columns: (W, M) change of the block means by each.
+    """
+    parameters, free = problem.nuisances.parameters, problem.open_at(fitted.point).tolist()
+    own = [k for k in free if parameters[k].name == CommandDelay.name]
+    found = {(probe.delay, probe.imbalance): k for k, probe in enumerate(probes) if isinstance(probe, CommandDelay)}
+    made = list(columns)
+    for (delay, imbalance), k in found.items() if own else ():
+        # a bank alone: both, and half of what it differs by from the other one
+        apart = columns[k] - columns[found[delay, -imbalance]]
+        made[k] = delay * fitted.by_parameter[..., own[0]] + 0.5 * apart
+    return made
+
+
 def scan_drive(problem: Problem, fitted: Fitted) -> DriveScan:
     """Scan the library at a fit; parameters of its effects are columns of their own.
 
@@ -184,7 +210,9 @@ def scan_drive(problem: Problem, fitted: Fitted) -> DriveScan:
     compared = library(problem, fitted)
     drives = record_drives(problem, fitted.point)
     named = effect_parameters(fitted.point.effects)
-    columns = [probe_column(problem, fitted, probe, drives) for item in compared for probe in item.candidate.probes]
+    probes = [probe for item in compared for probe in item.candidate.probes]
+    columns = [probe_column(problem, fitted, probe, drives) for probe in probes]
+    columns = with_dead_time_of_robot(problem, fitted, probes, columns)
     by_effect = effect_columns(problem, fitted.point, named)
     free = problem.open_at(fitted.point)
     raw = np.concatenate(
