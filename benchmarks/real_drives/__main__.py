@@ -21,6 +21,7 @@ import numpy as np
 from benchmarks.real_drives.compare import (
     BY_COMMANDS,
     CALIBRATED_BY_SPEEDS,
+    LATENESS_KNOWN,
     LEARNED,
     TRACK_BY_SPEEDS,
     Compared,
@@ -56,6 +57,7 @@ HORIZON = 5.0  # [s] of the aims
 AIMS = (
     ("calibrated over calibrated by wheel speeds", CALIBRATED, CALIBRATED_BY_SPEEDS, 1.5),
     ("calibrated over effective track with delay and lag", CALIBRATED, KINEMATIC, 0.8),
+    ("lateness of each command known, over calibrated by wheel speeds", LATENESS_KNOWN, CALIBRATED_BY_SPEEDS, 1.5),
     ("by wheel speeds: calibrated over effective track", CALIBRATED_BY_SPEEDS, TRACK_BY_SPEEDS, 1.0),
 )
 """Name, model, baseline, and the largest ratio of their root mean square heading errors that is aimed at."""
@@ -115,6 +117,7 @@ def main(arguments: list[str] | None = None) -> None:
         ],
         "parts": [{"name": p.name, "kept": p.kept, "growth": p.growth, "error": p.error} for p in answer.parts],
         "aims": {item.drive: aims_of(item, given.seed) for item in compared},
+        "lateness": {item.drive: item.lateness.figures for item in compared if item.lateness is not None},
         "errors": rows,
     }
     write_text(folder / "real_drives.json", json.dumps(results, indent=1, default=_plain) + "\n")

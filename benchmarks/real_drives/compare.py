@@ -1,8 +1,9 @@
 """Models beside the calibrated simulator on the same left-out windows, and the errors of all of them.
 
-By commands: the data sheet's simulator, the calibrated one, a kinematic model without slip, one with an effective track
-that is given a delay, a lag and a ceiling as well, and a learned one (:mod:`benchmarks.real_drives.learned`). By wheel
-speeds: the calibrated simulator and an effective track.
+By commands: the data sheet's simulator, the calibrated one, the same as if the lateness of every command were known
+(:mod:`benchmarks.real_drives.lateness`), a kinematic model without slip, one with an effective track that is given a
+delay, a lag and a ceiling as well, and a learned one (:mod:`benchmarks.real_drives.learned`). By wheel speeds: the
+calibrated simulator and an effective track.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.real_drives.lateness import Lateness, lateness_of
 from benchmarks.real_drives.learned import learned_forecast, training_windows
 from ddagr_gym.calibration.calibration_data import CalibrationData
 from ddagr_gym.calibration.forecast_errors import ITSELF, Forecasts
@@ -32,6 +34,7 @@ Array = NDArray[np.float64]
 
 ROLLING = "kinematic without slip"
 LEARNED = "learned"
+LATENESS_KNOWN = "calibrated, lateness of each command known"
 CALIBRATED_BY_SPEEDS = "calibrated, by wheel speeds"
 TRACK_BY_SPEEDS = "effective track, by wheel speeds"
 HORIZONS = (1.0, 5.0)
@@ -51,6 +54,7 @@ class Compared:
         soil_from: where its soil was fitted.
         windows: that were forecast.
         predictions: (W, T, 8) by model; those by wheel speeds have NaN in windows without them.
+        lateness: how late the commands of each window act; None where that was not looked at.
     """
 
     drive: str
@@ -58,6 +62,7 @@ class Compared:
     soil_from: str
     windows: WindowSet
     predictions: dict[str, Array]
+    lateness: Lateness | None = None
 
 
 def compare(outcome: Outcome, item: Forecasts, seed: int) -> Compared:
@@ -77,7 +82,9 @@ def compare(outcome: Outcome, item: Forecasts, seed: int) -> Compared:
     predictions[ROLLING] = KinematicModel(robot.outer_radius, robot.half_track, 1.0, motor).predict(windows)
     predictions[LEARNED] = learned_forecast(training, windows, robot.outer_radius, seed)
     predictions |= by_wheel_speeds(data, item, training)
-    return Compared(item.drive, item.ground, item.soil_from, windows, predictions)
+    lateness = lateness_of(item)
+    predictions[LATENESS_KNOWN] = lateness.prediction
+    return Compared(item.drive, item.ground, item.soil_from, windows, predictions, lateness)
 
 
 def by_wheel_speeds(data: CalibrationData, item: Forecasts, training: WindowSet) -> dict[str, Array]:

@@ -6,7 +6,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks.real_drives.compare import BY_COMMANDS, CALIBRATED_BY_SPEEDS, ROLLING, TRACK_BY_SPEEDS
+from benchmarks.real_drives.compare import (
+    BY_COMMANDS,
+    CALIBRATED_BY_SPEEDS,
+    LATENESS_KNOWN,
+    ROLLING,
+    TRACK_BY_SPEEDS,
+)
 from ddagr_gym.calibration.result import CALIBRATED, DATA_SHEET, KINEMATIC
 from ddagr_gym.recordings.files import write_atomically
 from ddagr_gym.rendering import palette
@@ -18,6 +24,7 @@ STYLE = {
     KINEMATIC: (palette.ORANGE, "effective track, delay, lag"),
     CALIBRATED: (palette.BLUE, "calibrated simulator"),
     "learned": (palette.GREEN, "learned (GRU)"),
+    LATENESS_KNOWN: (palette.PURPLE, "calibrated, lateness of each command known"),
     TRACK_BY_SPEEDS: (palette.PALE_ORANGE, "by wheel speeds: effective track"),
     CALIBRATED_BY_SPEEDS: (palette.SKY_BLUE, "by wheel speeds: calibrated simulator"),
 }
@@ -39,7 +46,7 @@ def draw(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
     """
     drives = list(dict.fromkeys(row["drive"] for row in rows))
     grounds = {row["drive"]: row["ground"] for row in rows}
-    models = (*BY_COMMANDS, TRACK_BY_SPEEDS, CALIBRATED_BY_SPEEDS)
+    models = (*BY_COMMANDS, LATENESS_KNOWN, TRACK_BY_SPEEDS, CALIBRATED_BY_SPEEDS)
     with house_style():
         from matplotlib.figure import Figure
 

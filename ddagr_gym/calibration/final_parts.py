@@ -9,8 +9,9 @@ windows asked for is kept only if all of them miss it, also from a longer dead t
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from functools import partial
+
+import numpy as np
 
 from ddagr_gym.calibration.joint_fit import LAST_ITERATIONS, Standing
 from ddagr_gym.calibration.part_selection import (
@@ -29,8 +30,9 @@ from ddagr_gym.calibration.parts import PARTS, RobotModel
 from ddagr_gym.calibration.result import PartDecision
 from ddagr_gym.diagnosis.store import StepCache
 
-Fit = Callable[[frozenset[str], Standing, str], Candidate]
-"""Model without some parts, fitted from a start and forecast; the text names it among the finished steps."""
+Fit = Callable[[frozenset[str], Standing, float, str], Candidate]
+"""Model without some parts, fitted from a start unless its cost cannot come near that of a rival, and forecast; the
+text names it among the finished steps."""
 
 
 def decide_with_all_windows(
@@ -50,13 +52,11 @@ def decide_with_all_windows(
         progress: called with a line of text for each part.
     """
 
-    def fit(left_out: frozenset[str], start: Standing, stage: str) -> Candidate:
-        return cache(f"all windows, {stage}", lambda: _settled(comparison, model, left_out, start))
+    def fit(left_out: frozenset[str], start: Standing, rival: float, stage: str) -> Candidate:
+        return cache(f"all windows, {stage}", lambda: _settled(comparison, model, left_out, start, rival))
 
     left_out, decisions = selected.left_out, list(selected.decisions)
-    without = model.without(left_out, comparison.data.robot)
-    found = cache("all windows, as selected", lambda: comparison.candidate(without, selected.standing, iterations=0))
-    best = replace(found, standing=selected.standing)
+    best = fit(left_out, selected.standing, np.inf, "as selected")
     if RAMP not in left_out:
         progress("forecasts with all windows without the ramp of the commands")
         best, left_out, decisions = _without_ramp(fit, best, left_out, decisions)
@@ -64,7 +64,7 @@ def decide_with_all_windows(
         if not part.on_data_sheet or not model.free & set(part.parameters):
             continue
         progress(f"forecasts with all windows with {part.title} free")
-        tried = fit(left_out - {part.name}, best.standing, f"with {part.name}")
+        tried = fit(left_out - {part.name}, best.standing, best.cost, f"with {part.name}")
         growth, error = worse_by(tried.by_all_channels, best.by_all_channels)
         kept = is_missed(growth, error, len(best.losses))
         decisions.append(PartDecision(part.name, kept, growth, error))
@@ -78,11 +78,11 @@ def _without_ramp(
 ) -> tuple[Candidate, frozenset[str], list[PartDecision]]:
     """Without the ramp, from the dead time as it is or else from a longer one, unless it is missed from both."""
     without = left_out | {RAMP}
-    tried = fit(without, best.standing, "without the ramp")
+    tried = fit(without, best.standing, best.cost, "without the ramp")
     growth, error = worse_by(best, tried)
     short = DELAY not in left_out and best.standing.values[DELAY] < TRIED_DELAY
     if short and is_missed(growth, error, len(tried.losses)):
-        late = fit(without, late_start(best), f"without the ramp, dead time from {TRIED_DELAY:g}")
+        late = fit(without, late_start(best), best.cost, f"without the ramp, dead time from {TRIED_DELAY:g}")
         tried = min(tried, late, key=partial(mean_growth, best))
         growth, error = worse_by(best, tried)
     kept = is_missed(growth, error, len(tried.losses))
@@ -90,10 +90,10 @@ def _without_ramp(
     return (best, left_out, changed) if kept else (tried, without, changed)
 
 
-def _settled(comparison: Comparison, model: RobotModel, left_out: frozenset[str], start: Standing) -> Candidate:
-    """A model without some parts, fitted until it is settled or has had twice the steps, and its forecasts."""
+def _settled(
+    comparison: Comparison, model: RobotModel, left_out: frozenset[str], start: Standing, rival: float
+) -> Candidate:
+    """A model without some parts, fitted until it is settled, hopeless or has had twice the steps, and forecast."""
     without = model.without(left_out, comparison.data.robot)
-    fitted = comparison.fitted(without, start, LAST_ITERATIONS)
-    if not fitted.fitted.converged:
-        fitted = comparison.fitted(without, fitted.standing, LAST_ITERATIONS)
+    fitted = comparison.fitted(without, start, 2 * LAST_ITERATIONS, rival)
     return comparison.judge(fitted, comparison.forecasts(fitted))

@@ -225,6 +225,7 @@ def fit_model(
     states: Array | None = None,
     iterations: int = ITERATIONS,
     tolerance: float = FIELD_TOLERANCE,
+    give_up: Callable[[float, float], bool] = lambda before, after: False,
 ) -> FittedModel:
     """Fit parameters to windows with given weights.
 
@@ -238,11 +239,12 @@ def fit_model(
         states: (W, 8) initial states to start from; the windows' first guess by default.
         iterations: most steps, with coarse sensitivities; 0 only computes fine ones at the start.
         tolerance: relative gain of a step that ends the fit.
+        give_up: called with the cost before and after each step; the fit ends where it says so.
     """
     slopes = field_slope_numerics() if iterations > 0 else None
     problem = make_problem(data, windows, model, weights, threads, slopes)
     point = point_at(problem, start, states)
-    found = fit(problem, point, iterations=iterations, tolerance=tolerance, renewals=iterations)
+    found = fit(problem, point, iterations=iterations, tolerance=tolerance, renewals=iterations, give_up=give_up)
     return FittedModel(model, problem, found)
 
 

@@ -8,7 +8,7 @@ for few drives: of all parts together no more than that is given away. Of what n
 Forecasts are compared in what a drivetrain moves by itself, wheel speeds and the motors' currents: yaw rate and place
 follow from them through the soil, whose own errors a wrong wheel speed may make up for, and places are the integral of
 both, so that few large errors decide there.
-A part is missed only by a fit that is settled, or that has had steps enough.
+A part is missed only by a fit that is settled, that has had steps enough, or that stays far above the fit with it.
 What acts through parts that have all gone goes with them. Ramp, filter and dead time of the commands stand for one
 another: a fit without ramp or filter is also tried from a longer dead time, and one of them that stayed where the dead
 time went gives way to a dead time that forecasts as well.
@@ -43,6 +43,9 @@ not settled, and parts were kept that it does not have."""
 HOPELESS = 0.1
 """Growth of the losses from which no further steps are spent on a fit without a part (ours)."""
 
+SLOW = 0.1
+"""Share of a hopeless fit's growth that each step must take off lest it end (ours): all steps would take off half."""
+
 DELAY, RAMP, FILTER = "command_delay", "command_ramp", "command_filter"
 """Parts that can stand for one another."""
 
@@ -59,12 +62,14 @@ class Candidate:
         losses: of the forecasts of each fold, by which it is judged.
         counts: windows of each fold that were forecast.
         of_all_channels: losses by all channels.
+        cost: of the fit itself.
     """
 
     standing: Standing
     losses: dict[int, float]
     counts: dict[int, int]
     of_all_channels: dict[int, float]
+    cost: float
 
     @property
     def by_all_channels(self) -> Candidate:
@@ -114,12 +119,21 @@ class Comparison:
         """What fits to some windows are compared by, with a calibration's settings."""
         return cls(data, windows, data.spread(settings.judged), weights, settings.threads, settings.settlings)
 
-    def fitted(self, model: RobotModel, start: Standing, iterations: int = ITERATIONS) -> FittedModel:
-        """A model, fitted from where another one stands."""
+    def fitted(
+        self, model: RobotModel, start: Standing, iterations: int = ITERATIONS, rival: float = np.inf
+    ) -> FittedModel:
+        """A model, fitted from where another one stands, unless its cost cannot come near that of a rival.
+
+        Args:
+            model: to fit.
+            start: where another one stands.
+            iterations: most steps.
+            rival: cost of the model that it is compared with.
+        """
         kept = {name: value for name, value in start.values.items() if name in model.free or name.startswith(OFFSET)}
         return fit_model(
             self.data, self.windows, model, self.weights, kept, self.threads,
-            states=start.states, iterations=iterations,
+            states=start.states, iterations=iterations, give_up=partial(is_hopeless, rival),
         )  # fmt: skip
 
     def forecasts(self, fitted: FittedModel) -> tuple[Forecast, ...]:
@@ -131,12 +145,27 @@ class Comparison:
         sigma, robust = fold_sigma(self.data, self.windows, self.weights), self.weights.robust
         found = {f.fold: forecast_losses(f, sigma[f.fold], robust) for f in made}
         of_all, of_wheels = ({fold: losses[k] for fold, losses in found.items()} for k in (0, 1))
-        return Candidate(fitted.standing, of_wheels, {f.fold: f.windows.count for f in made}, of_all)
+        counts = {f.fold: f.windows.count for f in made}
+        return Candidate(fitted.standing, of_wheels, counts, of_all, fitted.fitted.cost)
 
-    def candidate(self, model: RobotModel, start: Standing, iterations: int = ITERATIONS) -> Candidate:
-        """A model, fitted from where another one stands, and its forecasts."""
-        fitted = self.fitted(model, start, iterations)
+    def candidate(
+        self, model: RobotModel, start: Standing, iterations: int = ITERATIONS, rival: float = np.inf
+    ) -> Candidate:
+        """A model, fitted from where another one stands, and its forecasts; arguments as of :meth:`fitted`."""
+        fitted = self.fitted(model, start, iterations, rival)
         return self.judge(fitted, self.forecasts(fitted))
+
+
+def is_hopeless(rival: float, before: float, after: float) -> bool:
+    """Whether a step leaves a fit far above the cost of a rival, and hardly nearer to it.
+
+    Args:
+        rival: its cost.
+        before: cost before the step.
+        after: cost after it.
+    """
+    gap = after - rival
+    return gap > HOPELESS * rival and before - after < SLOW * gap
 
 
 def worse_by(before: Candidate, after: Candidate) -> tuple[float, float]:
@@ -220,7 +249,7 @@ def select_parts(
     idle = idle_parts(left_out, comparison.data.robot)
     if idle:
         left_out |= idle
-        best = _fitted_without(comparison, model, left_out, best.standing, cache)
+        best = _fitted_without(comparison, model, left_out, best.standing, best.cost, cache)
         decisions = [replace(item, kept=item.kept and item.name not in idle) for item in decisions]
     return Selection(left_out, tuple(decisions), best.standing)
 
@@ -230,12 +259,14 @@ def _fitted_without(
     model: RobotModel,
     left_out: frozenset[str],
     start: Standing,
+    rival: float,
     cache: StepCache,
     stage: str = "",
 ) -> Candidate:
     """A model without some parts, fitted from a start; ``stage`` tells fits of the same parts apart in the cache."""
     without = model.without(left_out, comparison.data.robot)
-    return cache(f"without {' '.join(sorted(left_out))}{stage}", partial(comparison.candidate, without, start))
+    made = partial(comparison.candidate, without, start, rival=rival)
+    return cache(f"without {' '.join(sorted(left_out))}{stage}", made)
 
 
 def _settled(
@@ -251,13 +282,14 @@ def _settled(
 
     It does where its forecasts are worse than those of the candidate with the least losses.
     """
-    tried = _fitted_without(comparison, model, left_out, best.standing, cache)
+    tried = _fitted_without(comparison, model, left_out, best.standing, best.cost, cache)
     for time in range(comparison.settlings):
         growth, error = worse_by(least, tried)
         missed = is_missed(growth, error, len(tried.losses), usual)
         if not missed or tried.standing.converged or growth > HOPELESS:
             break
-        tried = _fitted_without(comparison, model, left_out, tried.standing, cache, f", settling {time + 1}")
+        stage = f", settling {time + 1}"
+        tried = _fitted_without(comparison, model, left_out, tried.standing, best.cost, cache, stage)
     return tried
 
 
@@ -266,7 +298,7 @@ def _later(
 ) -> Candidate:
     """A model without ramp or filter from a longer dead time: a fit from a short one does not reach what they did."""
     stage = f", dead time from {TRIED_DELAY:g}"
-    return _fitted_without(comparison, model, left_out, late_start(best), cache, stage)
+    return _fitted_without(comparison, model, left_out, late_start(best), best.cost, cache, stage)
 
 
 def late_start(best: Candidate) -> Standing:
@@ -295,13 +327,14 @@ def _delay_for(
     """
     robot = comparison.data.robot
     exchanged, neither = (left_out - {DELAY}) | {part}, left_out | {part}
-    with_delay = partial(comparison.candidate, model.without(exchanged, robot), late_start(best))
+    with_delay = partial(comparison.candidate, model.without(exchanged, robot), late_start(best), rival=best.cost)
     late = cache(f"{DELAY} for {part}", with_delay)
     growth, error = worse_by(best, late)
     if is_missed(growth, error, len(late.losses)):
         return best, left_out, decisions
     without = model.without(neither, robot)
-    prompt = cache(f"neither {DELAY} nor {part}", partial(comparison.candidate, without, late.standing))
+    made = partial(comparison.candidate, without, late.standing, rival=late.cost)
+    prompt = cache(f"neither {DELAY} nor {part}", made)
     missed, its_error = worse_by(late, prompt)
     if not is_missed(missed, its_error, len(late.losses), usual=True):
         return best, left_out, decisions

@@ -119,6 +119,7 @@ def fit(
     first: Fitted | None = None,
     fixed: frozenset[str] = frozenset(),
     progress: Callable[[], None] = lambda: None,
+    give_up: Callable[[float, float], bool] = lambda before, after: False,
 ) -> Fitted:
     """Fit from ``start`` (the nominal model by default).
 
@@ -133,16 +134,18 @@ def fit(
         first: fit at ``start`` whose nuisance sensitivities serve for the first step only.
         fixed: names of effect parameters to leave alone.
         progress: called after each step.
+        give_up: called with the cost before and after each step; the fit ends where it says so.
     """
     known = reuse or first
     parameters = effect_parameters(() if start is None else start.effects, fixed)
     here = _begun(problem, problem.start() if start is None else start, parameters, known)
-    converged, done, fresh = False, 0, known is None
-    while done < iterations and not converged:
+    converged, done, fresh, hopeless = False, 0, known is None, False
+    while done < iterations and not (converged or hopeless):
         done += 1
         before = here.cost
         here = _step(problem, here, parameters, tolerance)
         progress()
+        hopeless = give_up(before, here.cost)
         small = before - here.cost < tolerance * here.cost
         # a step that fails with sensitivities of another point says nothing about this one
         converged = small and (fresh or reuse is not None)

@@ -12,6 +12,7 @@ import pytest
 from benchmarks.real_drives.__main__ import aims_of
 from benchmarks.real_drives.compare import CALIBRATED_BY_SPEEDS, LEARNED, Compared, by_wheel_speeds, errors_of, ratio_of
 from benchmarks.real_drives.figure import draw
+from benchmarks.real_drives.lateness import lateness_of
 from benchmarks.real_drives.learned import examples, learned_forecast, scales_of, training_windows
 from ddagr_gym.calibration.forecast_errors import Forecasts
 from ddagr_gym.calibration.result import CALIBRATED, DATA_SHEET, KINEMATIC
@@ -104,6 +105,24 @@ def test_forecasts_by_wheel_speeds_use_the_values_without_the_drive(drives: list
         sizes.append(float(np.sqrt(np.nanmean((found[..., CHANNELS.index("yaw_rate")] - gyro) ** 2))))
     right, other_soil, other_gyro = sizes
     assert right < 0.7 * min(other_soil, other_gyro)
+
+
+def test_lateness_of_each_command_is_found_by_a_robot_with_another(windows: WindowSet):
+    """Commands that act after 0.3 s are told so by a robot of 0.1 s; where nothing moves, nothing is told."""
+    early = replace(ROBOT, drivetrain=replace(ROBOT.drivetrain, command_delay=0.1))
+    judged = windows.subset(np.flatnonzero(windows.recording == 0)[:12])
+    still = judged.measured.copy()
+    still[0, :, :] = still[0, :1, :]
+    item = Forecasts(
+        "a.csv", "clay", "other drives", replace(judged, measured=still), {}, early, get_soil("thesis_a1"), ()
+    )
+    found = lateness_of(item, threads=1)
+    assert np.isnan(found.dead_times[0])
+    known = found.dead_times[np.isfinite(found.dead_times)]
+    assert len(known) == found.figures["windows"] > 6
+    np.testing.assert_allclose(known, 0.3, atol=0.021)
+    assert found.figures["quartiles"][1] == pytest.approx(0.3, abs=0.001)
+    assert found.figures["calibrated"] == 0.1
 
 
 def test_learned_model_predicts_a_drive_that_it_has_not_seen(windows: WindowSet):

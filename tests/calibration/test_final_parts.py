@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from ddagr_gym.calibration.final_parts import _settled, decide_with_all_windows
+from ddagr_gym.calibration.final_parts import decide_with_all_windows
 from ddagr_gym.calibration.joint_fit import Standing
 from ddagr_gym.calibration.part_selection import TRIED_DELAY, Candidate, Selection
 from ddagr_gym.calibration.parts import DATA_SHEET_PARTS, RobotModel, complete_robot, shared_parameters
@@ -23,8 +23,8 @@ WARTHOG = get_robot("warthog")
 ALL_PARTS = RobotModel(complete_robot(WARTHOG), shared_parameters(complete_robot(WARTHOG)))
 
 
-def standing(delay: float, fits: int = 0, settled: bool = True) -> Standing:
-    return Standing({"command_delay": delay, "fits": fits}, np.zeros((0, 8)), settled)
+def standing(delay: float) -> Standing:
+    return Standing({"command_delay": delay}, np.zeros((0, 8)), True)
 
 
 @dataclass
@@ -35,29 +35,22 @@ class Windows:
         with_ramp: loss with the ramp, as selected.
         without_ramp: loss without it, by the dead time at the start [s].
         gains: share by which the loss falls with a part of the data sheet.
-        slow: fits after which one is settled.
         only_places: whether the losses are of places alone, and wheel speeds are forecast alike by all.
     """
 
     with_ramp: float = 1.0
     without_ramp: dict[float, float] = field(default_factory=lambda: {0.1: 1.3, TRIED_DELAY: 1.3})
     gains: dict[str, float] = field(default_factory=dict)
-    slow: int = 1
     only_places: bool = False
     fits: int = 0
 
     data = SimpleNamespace(robot=WARTHOG)
 
-    def candidate(self, model: RobotModel, start: Standing, iterations: int) -> Candidate:
-        assert iterations == 0
-        return self.judge(SimpleNamespace(model=model, standing=start), ())
-
-    def fitted(self, model: RobotModel, start: Standing, iterations: int) -> SimpleNamespace:
+    def fitted(self, model: RobotModel, start: Standing, iterations: int, rival: float) -> SimpleNamespace:
         self.fits += 1
-        done = start.values["fits"] + 1
-        settled = done >= self.slow
-        reached = standing(start.values["command_delay"], done, settled)
-        return SimpleNamespace(model=model, standing=reached, fitted=SimpleNamespace(converged=settled))
+        # what is compared with has no rival itself
+        assert rival == (np.inf if self.fits == 1 else 1.0)
+        return SimpleNamespace(model=model, standing=start)
 
     def forecasts(self, fitted: SimpleNamespace) -> tuple[()]:
         return ()
@@ -71,7 +64,7 @@ class Windows:
             loss *= 1.0 - share if name in free else 1.0
         losses = {fold: loss * (1.0 + 1e-3 * fold) for fold in range(DRIVES)}
         wheels = dict.fromkeys(losses, 1.0) if self.only_places else losses
-        return Candidate(fitted.standing, wheels, dict.fromkeys(losses, 1), losses)
+        return Candidate(fitted.standing, wheels, dict.fromkeys(losses, 1), losses, 1.0)
 
 
 def decided(windows: Windows, out: frozenset[str], start: Standing) -> tuple[Selection, dict[str, PartDecision]]:
@@ -104,7 +97,7 @@ def test_a_ramp_stays_only_if_all_windows_miss_it(losses, kept, growth):
 def test_a_ramp_that_was_not_selected_is_not_tried():
     windows = Windows(without_ramp={0.1: 1.0})
     found, decisions = decided(windows, NO_RAMP, standing(0.1))
-    assert windows.fits == len(DATA_SHEET_PARTS)
+    assert windows.fits == 1 + len(DATA_SHEET_PARTS)
     assert decisions["command_ramp"] == PartDecision("command_ramp", False, 0.05, 0.01)
     assert found.left_out == NO_RAMP | DATA_SHEET_PARTS
 
@@ -127,10 +120,3 @@ def test_the_data_sheet_holds_unless_forecasts_gain(share, kept):
     assert {name for name in DATA_SHEET_PARTS if decisions[name].kept} == ({"geometry"} if kept else set())
     assert decisions["geometry"].growth == pytest.approx(1.0 / (1.0 - share) - 1.0)
     assert ("geometry" in found.left_out) is not kept
-
-
-def test_a_fit_goes_on_until_it_is_settled_or_has_had_steps_enough():
-    for slow, fits in ((1, 1), (2, 2), (9, 2)):
-        windows = Windows(slow=slow)
-        tried = _settled(windows, ALL_PARTS, NOTHING, standing(0.1))
-        assert (windows.fits, tried.standing.converged) == (fits, slow <= fits)

@@ -11,6 +11,7 @@ from ddagr_gym.calibration.joint_fit import Standing
 from ddagr_gym.calibration.part_selection import (
     TRIED_DELAY,
     Candidate,
+    is_hopeless,
     select_parts,
     surely_above,
     worse_by,
@@ -21,7 +22,7 @@ from ddagr_gym.presets import get_robot
 def candidate(*losses: float, counts: tuple[int, ...] = (), settled: bool = True) -> Candidate:
     standing = Standing({}, np.zeros((0, 8)), settled)
     by_fold = dict(enumerate(losses))
-    return Candidate(standing, by_fold, dict(enumerate(counts or (1,) * len(losses))), by_fold)
+    return Candidate(standing, by_fold, dict(enumerate(counts or (1,) * len(losses))), by_fold, sum(losses))
 
 
 def test_equal_drives_have_the_mean_and_its_standard_error():
@@ -41,6 +42,21 @@ def test_a_short_drive_counts_for_less():
 def test_few_drives_must_show_more():
     assert surely_above(1000) == pytest.approx(1.0, abs=0.01)
     assert surely_above(2) > surely_above(3) > surely_above(6) > 1.0
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "hopeless"),
+    [
+        (150.0, 146.0, True),  # of what it is worse by, a step takes off less than a tenth
+        (150.0, 140.0, False),  # more than a tenth
+        (112.0, 109.0, False),  # near enough, however slow
+        (109.0, 109.0, False),
+        (96.0, 96.0, False),  # better
+    ],
+)
+def test_a_fit_is_hopeless_that_is_far_above_another_and_hardly_comes_nearer(before, after, hopeless):
+    assert is_hopeless(100.0, before, after) is hopeless
+    assert not is_hopeless(np.inf, before, after)
 
 
 class Made:
@@ -65,7 +81,7 @@ class Losses:
         self.losses = losses
         self.started_at: list[float | None] = []
 
-    def candidate(self, model: Made, start: Standing) -> Candidate:
+    def candidate(self, model: Made, start: Standing, rival: float) -> Candidate:
         loss = self.losses[model.out & {"command_delay", model.late}]
         self.started_at.append(start.values.get("command_delay"))
         return candidate(loss, 1.01 * loss, 0.99 * loss)
@@ -91,10 +107,10 @@ def test_a_dead_time_that_forecasts_as_well_takes_the_place_of_ramp_or_filter(la
     first = Losses({**losses.losses, alone: 1.1})
 
     class Once(Losses):
-        def candidate(self, model, start):
+        def candidate(self, model, start, rival):
             if start.values.get("command_delay") == TRIED_DELAY:
-                return losses.candidate(model, start)
-            return first.candidate(model, start)
+                return losses.candidate(model, start, rival)
+            return first.candidate(model, start, rival)
 
     found = select_parts(Once({}), Made(late=late), full, lambda name, make: make(), lambda line: None)
     left = {"command_delay": alone, "late": DELAY, "nothing": both}[stays]
@@ -116,7 +132,7 @@ def test_the_dead_time_is_kept_where_it_matters_and_another_part_only_where_that
     out = frozenset({name})
 
     class Scattered(Losses):
-        def candidate(self, model, start):
+        def candidate(self, model, start, rival):
             # worse by 4 % in the mean, in one fold alone
             return candidate(1.16, 1.0, 1.0, 1.0) if out <= model.out else candidate(1.0, 1.0, 1.0, 1.0)
 
@@ -148,7 +164,7 @@ def test_a_fit_without_a_part_goes_on_while_it_is_not_settled(losses, most, kept
     class Slow(Losses):
         settlings = most
 
-        def candidate(self, model, start):
+        def candidate(self, model, start, rival):
             if model.out & BOTH != RAMP or start.values.get("command_delay") == TRIED_DELAY:
                 return candidate(3.0, 3.01, 2.99)
             made.append(losses[min(len(made), len(losses) - 1)])

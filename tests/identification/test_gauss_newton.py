@@ -135,6 +135,20 @@ def test_a_step_that_rounds_over_a_bound_ends_on_it(one_drive, robot, soil, monk
     assert fitted.point.values[0] == lowest
 
 
+def test_a_fit_ends_where_it_is_given_up_with_the_derivatives_of_that_point(one_drive):
+    problem, seen = one_drive(), []
+
+    def second(before: float, after: float) -> bool:
+        seen.append((before, after))
+        return len(seen) == 2
+
+    ended = fit(problem, iterations=6, renewals=6, tolerance=1e-9, give_up=second)
+    two = fit(problem, iterations=2, renewals=2, tolerance=1e-9)
+    assert (ended.iterations, ended.converged) == (2, False)
+    assert seen[0][1] == seen[1][0] > seen[1][1] == pytest.approx(ended.cost, rel=1e-9)
+    np.testing.assert_array_equal(ended.by_parameter, two.by_parameter)
+
+
 def test_what_is_expected_of_a_parameter_may_be_changed_by_name(one_drive):
     problem = one_drive()
     strength, motor = (p.name for p in problem.nuisances.parameters)

@@ -213,7 +213,7 @@ def _change(
     problem: Problem, ordinary: OrdinaryRobot, ground: str, named: Named, certified: ChangeCertificate | None
 ) -> Change:
     first, last = named.models[0], named.models[-1]
-    shifts = _effect_shifts(first)
+    shifts = _effect_shifts(first, named.farther)
     parameters = tuple(
         ParameterShift(p.name, p.unit, float(a), float(b), p.prior)
         for p, a, b in zip(
@@ -257,8 +257,13 @@ def _channel_shifts(first: Model, last: Model) -> tuple[ChannelShift, ...]:
     )
 
 
-def _effect_shifts(model: Model) -> tuple[EffectShift, ...]:
-    """Shift of every effect, the most conspicuous first; the usual form stands for what is not conspicuous."""
+def _effect_shifts(model: Model, farther: Mapping[str, float]) -> tuple[EffectShift, ...]:
+    """Shift of every effect, the most conspicuous first; the usual form stands for what is not conspicuous.
+
+    Args:
+        model: without effects.
+        farther: of some effects, how many times as far as their first steps they go: so much larger must they be.
+    """
     usual: dict[str, Shift] = {}
     known = {id(shift.compared): shift for shift in model.shifts}
     for item in model.scan.compared:
@@ -269,14 +274,15 @@ def _effect_shifts(model: Model) -> tuple[EffectShift, ...]:
         probability = model.probability(best)
         shown = best if probability < LEVEL else usual[best.compared.name]
         limit = best.limit(model.tests)
-        sizes = _size_shifts(shown, model.tests)
-        found.append(EffectShift(best.compared.name, best.distance, limit, probability, best.degrees, sizes))
+        name = best.compared.name
+        sizes = _size_shifts(shown, model.tests, farther.get(name, 1.0))
+        found.append(EffectShift(name, best.distance, limit, probability, best.degrees, sizes))
     return tuple(found)
 
 
-def _size_shifts(shift: Shift, tests: int) -> Mapping[str, SizeShift]:
+def _size_shifts(shift: Shift, tests: int, farther: float) -> Mapping[str, SizeShift]:
     """By field; of a direction that which shows worst."""
-    candidate, reach = shift.compared.candidate, shift.detectable(tests)
+    candidate, reach = shift.compared.candidate, farther * shift.detectable(tests)
     found: dict[str, SizeShift] = {}
     for k, probe in enumerate(candidate.probes):
         name, data, away = moved_field(probe)

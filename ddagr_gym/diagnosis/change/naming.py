@@ -9,7 +9,7 @@ something changed is then known.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -18,7 +18,8 @@ from ddagr_gym.diagnosis.change.drive_scan import NAMED
 from ddagr_gym.diagnosis.change.model import Model, model_of
 from ddagr_gym.diagnosis.change.ordinary import Comparison
 from ddagr_gym.diagnosis.change.refits import MOST_RIVALS, Refit, joint_refits
-from ddagr_gym.diagnosis.change.shifts import LEVEL, Shift, refitted_shift
+from ddagr_gym.diagnosis.change.refitted_shift import refitted_shift, times_farther
+from ddagr_gym.diagnosis.change.shifts import LEVEL, Shift
 from ddagr_gym.diagnosis.mid_drive.search_in_time import LEAST_EVIDENCE
 from ddagr_gym.diagnosis.result.equivalence import equivalence_weights
 from ddagr_gym.diagnosis.search.initial_guess import same_lateness
@@ -82,11 +83,13 @@ class Named:
         models: from the one without effects to the last.
         steps: that led from each to the next.
         absent: limits and signs that stood out in a first step, and of which a refit found nothing.
+        farther: of effects that were refitted for nothing, how many times as far as the first step the refit went.
     """
 
     models: tuple[Model, ...]
     steps: tuple[Step, ...]
     absent: frozenset[str] = frozenset()
+    farther: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def complete(self) -> bool:
@@ -113,15 +116,17 @@ def name_changes(
         progress: called with what is being done.
     """
     progress("comparing every effect with ordinary drives")
-    models, steps = [model_of(problem, fitted, ordinary)], list[Step]()
+    models, steps, refitted = [model_of(problem, fitted, ordinary)], list[Step](), list[Refit]()
     while len(steps) < MOST_NAMES and (models[-1].conspicuous or models[-1].pulled or (not steps and models[-1].near)):
-        found = _next(models[-1], ordinary, rng, progress)
+        dispersion = dispersion_of(models[-1].problem, models[-1].fitted)
+        refitted = joint_refits(models[-1], ordinary, dispersion, progress)
+        found = _next(models[-1], refitted, dispersion, ordinary, rng, progress)
         if found is None or not _is_share(found, models):
             break
         models.append(found[0])
         steps.append(found[1])
     if not steps:
-        return Named(tuple(models), (), _absent(models[0]))
+        return Named(tuple(models), (), _absent(models[0]), _farther(models[0], refitted))
     return _without_idle(Named(tuple(models), tuple(steps)), ordinary, progress)
 
 
@@ -135,6 +140,13 @@ def _absent(model: Model) -> frozenset[str]:
     """What is there or not and stood out, where no refit found it: its first step is that of a probe, not of a size."""
     refitted = model.conspicuous if len(model.conspicuous) <= MOST_RIVALS else ()
     return frozenset(shift.compared.name for shift in refitted if not shift.compared.candidate.has_sizes)
+
+
+def _farther(model: Model, refitted: Sequence[Refit]) -> dict[str, float]:
+    """By name of an effect that was refitted to see, how many times as far as its first step it went."""
+    near = {shift.compared.name for shift in model.near}
+    effects = {item.rival.name: (item.shift, item.rival.fitted.point.effects[-1]) for item in refitted}
+    return {name: times_farther(*pair) for name, pair in effects.items() if name in near}
 
 
 def _without_idle(named: Named, ordinary: Comparison, progress: Callable[[str], None]) -> Named:
@@ -164,13 +176,13 @@ def _without(named: Named, place: int, ordinary: Comparison) -> Named:
 
 def _next(
     model: Model,
+    refitted: Sequence[Refit],
+    dispersion: float,
     ordinary: Comparison,
     rng: np.random.Generator,
     progress: Callable[[str], None],
 ) -> tuple[Model, Step] | None:
     """The model with the next name; None where no effect that exists has the shift."""
-    dispersion = dispersion_of(model.problem, model.fitted)
-    refitted = joint_refits(model, ordinary, dispersion, progress)
     alarming, usual = _compared_beside(model, ordinary, refitted, progress)
     if not alarming:
         return None

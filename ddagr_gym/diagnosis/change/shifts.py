@@ -21,17 +21,15 @@ of them share.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.diagnosis.change.drive_scan import NAMED, Compared, scattered
+from ddagr_gym.diagnosis.change.drive_scan import Compared, scattered
 from ddagr_gym.diagnosis.change.ordinary import Comparison, Scores
 from ddagr_gym.diagnosis.result.detectable import least_multiple
-from ddagr_gym.diagnosis.search.candidates import moved_field
-from ddagr_gym.physics.effects import Effect
 
 Array = NDArray[np.float64]
 
@@ -256,41 +254,6 @@ def away_from(
         scatter = _widened(scatter, structure, pieces, least, known)
     between = scatter + (scatter + of_mean) / (degrees + 1.0)
     return Away(here.value - mean, mean, here.within + between, between, known + degrees)
-
-
-def refitted_shift(
-    shift: Shift, effect: Effect, keys: Mapping[str, str], scores: Scores, stretched: bool = False
-) -> Shift | None:
-    """The shift of an effect as a refit with it finds it; None where its probes are not sizes of their own.
-
-    A change of many deviations lies where losses are linear: a first step from the fit without the effect goes part of
-    the way only. The size is that of the refit and one step further without the prior of likely sizes.
-
-    Args:
-        shift: before the refit, with what ordinary drives show.
-        effect: as it was fitted.
-        keys: of the columns of its fields, by field.
-        scores: of the drive at the refit.
-        stretched: whether sizes in ordinary drives, which are first steps too, are taken to scatter more by as much as
-            the refit goes farther than the first step.
-    """
-    candidate = shift.compared.candidate
-    moved = [moved_field(probe) for probe in candidate.probes] if candidate.has_sizes else []
-    names = [name for name, _, _ in moved]
-    if not names or candidate.is_direction or len(set(names)) < len(names) or not set(names) <= keys.keys():
-        return None
-    others = [key for key in scores.keys if key.startswith(NAMED) and key not in keys.values()]
-    further = sizes_of(scores, [keys[name] for name in names], np.zeros(len(names)), others)
-    if further is None:
-        return None
-    away = np.array([step for _, _, step in moved])
-    here = np.array([float(getattr(effect, name)) - data["neutral"] for name, data, _ in moved])
-    size, first = (here + further.value) / away, shift.value + shift.mean
-    farther = max(1.0, float(np.linalg.norm(size)) / max(float(np.linalg.norm(first)), _NOTHING)) if stretched else 1.0
-    value = size - shift.mean
-    covariance = further.within / np.outer(away, away) + farther**2 * shift.between
-    found = replace(shift, value=value, covariance=covariance)
-    return replace(found, probability=probability_of(candidate.has_sizes, value, covariance, shift.degrees))
 
 
 def _sizes_in(compared: Compared, drives: Sequence[Scores], beside: Sequence[str]) -> list[Sizes]:

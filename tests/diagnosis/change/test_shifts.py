@@ -9,11 +9,11 @@ from scipy import stats
 from ddagr_gym.diagnosis.change.drive_scan import Compared, scattered
 from ddagr_gym.diagnosis.change.expected_scatter import EXPECTED_DRIVES, ExpectedScatter
 from ddagr_gym.diagnosis.change.ordinary import Comparison, Scores
+from ddagr_gym.diagnosis.change.refitted_shift import refitted_shift, times_farther
 from ddagr_gym.diagnosis.change.shifts import (
     LEVEL,
     explained,
     family_probability,
-    refitted_shift,
     shift_of,
     single_level,
     sizes_of,
@@ -181,6 +181,18 @@ def test_a_refit_finds_the_size_that_a_first_step_found_in_part():
     assert found.probability < before.probability
     plain = refitted_shift(before, GyroBias(0.03), {"bias": "named 0"}, refit)
     assert plain.covariance[0, 0] == pytest.approx(0.01 + before.between[0, 0], rel=1e-6)
+
+
+@pytest.mark.parametrize("times", [0.5, 1.0, 2.5, -2.5])
+def test_a_refit_goes_so_many_times_as_far_as_a_first_step(times):
+    before = shift_of(BIAS, scores(BIAS.keys[0], 4.0, 0.5), ALIKE)
+    refit = GyroBias(times * 4.0 * BIAS.candidate.probes[0].bias)
+    assert times_farther(before, refit) == pytest.approx(max(abs(times), 1.0))
+
+
+def test_what_is_there_or_not_goes_no_farther():
+    before = shift_of(SIGN, scores(SIGN.keys[0], 0.5, 0.01), against(*(scores(SIGN.keys[0], 0.0, 0.01),) * 3))
+    assert times_farther(before, GyroSign(1.0)) == 1.0
 
 
 def test_what_is_there_or_not_has_no_refitted_size():

@@ -1,0 +1,86 @@
+"""Sizes of an effect as a refit with it finds them, against ordinary drives.
+
+A change of many deviations lies where losses are linear: a first step from the fit without the effect goes part of the
+way only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ddagr_gym.diagnosis.change.drive_scan import NAMED
+from ddagr_gym.diagnosis.change.ordinary import Scores
+from ddagr_gym.diagnosis.change.shifts import Shift, probability_of, sizes_of
+from ddagr_gym.diagnosis.search.candidates import moved_field
+from ddagr_gym.physics.effects import Effect
+
+Array = NDArray[np.float64]
+
+_NOTHING = 1e-9
+"""Multiples of probes that are none."""
+
+
+def refitted_shift(
+    shift: Shift, effect: Effect, keys: Mapping[str, str], scores: Scores, stretched: bool = False
+) -> Shift | None:
+    """The shift of an effect as a refit with it finds it; None where its probes are not sizes of their own.
+
+    The size is that of the refit and one step further without the prior of likely sizes.
+
+    Args:
+        shift: before the refit, with what ordinary drives show.
+        effect: as it was fitted.
+        keys: of the columns of its fields, by field.
+        scores: of the drive at the refit.
+        stretched: whether sizes in ordinary drives, which are first steps too, are taken to scatter more by as much as
+            the refit goes farther than the first step.
+    """
+    names, away = _fields_of_its_own(shift)
+    if not names or not set(names) <= keys.keys():
+        return None
+    others = [key for key in scores.keys if key.startswith(NAMED) and key not in keys.values()]
+    further = sizes_of(scores, [keys[name] for name in names], np.zeros(len(names)), others)
+    if further is None:
+        return None
+    size = _multiples(effect, names, away) + further.value / away
+    value = size - shift.mean
+    farther = _farther(shift, size) if stretched else 1.0
+    covariance = further.within / np.outer(away, away) + farther**2 * shift.between
+    found = replace(shift, value=value, covariance=covariance)
+    return replace(found, probability=probability_of(True, value, covariance, shift.degrees))
+
+
+def times_farther(shift: Shift, effect: Effect) -> float:
+    """How many times as far as its first step an effect goes in a refit: at least 1, and 1 where that has no meaning.
+
+    Args:
+        shift: before the refit.
+        effect: as it was fitted.
+    """
+    names, away = _fields_of_its_own(shift)
+    return _farther(shift, _multiples(effect, names, away)) if names else 1.0
+
+
+def _fields_of_its_own(shift: Shift) -> tuple[list[str], Array]:
+    """(k,) field that each probe moves, and by how much; none where the probes are not sizes of their own."""
+    candidate = shift.compared.candidate
+    moved = [moved_field(probe) for probe in candidate.probes] if candidate.has_sizes else []
+    names = [name for name, _, _ in moved]
+    alone = not candidate.is_direction and len(set(names)) == len(names)
+    return (names if alone else []), np.array([step for _, _, step in moved])
+
+
+def _multiples(effect: Effect, names: Sequence[str], away: Array) -> Array:
+    """(k,) sizes of an effect as multiples of probes that move these fields so far."""
+    here = [float(getattr(effect, name)) - effect.parameter(name).metadata["neutral"] for name in names]
+    return np.asarray(here) / away
+
+
+def _farther(shift: Shift, size: Array) -> float:
+    """How many times as far as the first step sizes are, at least 1."""
+    first = float(np.linalg.norm(shift.value + shift.mean))
+    return max(1.0, float(np.linalg.norm(size)) / max(first, _NOTHING))
