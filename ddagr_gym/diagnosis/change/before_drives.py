@@ -60,10 +60,6 @@ SAME_GROUND = {"soil_strength": 0.05, "soil_stiffness": 0.1, "shear_modulus": 0.
 SLOPES = ("slope_x", "slope_y")
 """Parameters of the ground's gradient."""
 
-OF_ANOTHER_GROUND = "on another ground it is another one in any case"
-SOIL_EFFECTS = ("soil_change", "soil_split", "slip_sinkage", "multipass", "lateral_bulldozing")
-"""Effects that say how a ground gives way."""
-
 
 @dataclass(frozen=True, eq=False)
 class JointFit:
@@ -145,7 +141,6 @@ def robot_of_before(
         pieces=tuple(piece for found in scanned for piece in found[1:]),
         known_scatter=scatter.same_ground,
         other_scatter=scatter.other_ground,
-        unnamed=dict.fromkeys(SOIL_EFFECTS, OF_ANOTHER_GROUND),
         given=True,
         slopes={} if joint.slope is None else {GROUND: joint.slope},
     )

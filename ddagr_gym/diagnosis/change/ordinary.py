@@ -31,6 +31,10 @@ Array = NDArray[np.float64]
 
 NEWER = "the calibration is older than this effect: calibrate again"
 
+OF_ANOTHER_GROUND = "on another ground it is another one in any case"
+SOIL_EFFECTS = ("soil_change", "soil_split", "slip_sinkage", "multipass", "lateral_bulldozing")
+"""Effects that say how a ground gives way, and that no drive on an unknown one can tell from that ground."""
+
 
 @dataclass(frozen=True, eq=False)
 class Scores:
@@ -149,7 +153,6 @@ class OrdinaryRobot:
         pieces: parts of the only drive, where there is one.
         known_scatter: expected between drives on the same ground.
         other_scatter: expected between drives on two grounds.
-        unnamed: effects that cannot be named on an unknown ground, with the reason.
         given: whether the drives were given as those from before, without a calibration.
         slopes: of grounds that are known to slope, or whose drives tell how far they do.
         slope: of the ground of drives that are asked about (:meth:`seen_by`); None where nothing is said of it.
@@ -167,7 +170,6 @@ class OrdinaryRobot:
     pieces: tuple[Reference, ...] = ()
     known_scatter: ExpectedScatter = field(default_factory=ExpectedScatter)
     other_scatter: ExpectedScatter = field(default_factory=ExpectedScatter)
-    unnamed: Mapping[str, str] = field(default_factory=dict)
     given: bool = False
     slopes: Mapping[str, GroundSlope] = field(default_factory=dict)
     slope: GroundSlope | None = None
@@ -228,7 +230,8 @@ class OrdinaryRobot:
             misfits, errors = tuple(item.misfit for item in known), tuple(item.misfit_error for item in known)
             return Comparison(tuple(drives), tuple(pieces), self.known_scatter, new, moved, misfits, errors)
         drives, pieces = ([item.other_ground for item in found] for found in (self.references, self.pieces))
-        return Comparison(tuple(drives), tuple(pieces), self.other_scatter, {**self.unnamed, **new}, moved)
+        unnamed = {**dict.fromkeys(SOIL_EFFECTS, OF_ANOTHER_GROUND), **new}
+        return Comparison(tuple(drives), tuple(pieces), self.other_scatter, unnamed, moved)
 
     @property
     def _unscanned(self) -> list[str]:

@@ -6,6 +6,7 @@ way only.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -21,15 +22,16 @@ from ddagr_gym.physics.effects import Effect
 Array = NDArray[np.float64]
 
 _NOTHING = 1e-9
-"""Multiples of probes that are none."""
+"""Multiples of probes, and shares of a bound, that are none."""
 
 
 def refitted_shift(
     shift: Shift, effect: Effect, keys: Mapping[str, str], scores: Scores, stretched: bool = False
 ) -> Shift | None:
-    """The shift of an effect as a refit with it finds it; None where its probes are not sizes of their own.
+    """The shift of an effect as a refit with it finds it.
 
-    The size is that of the refit and one step further without the prior of likely sizes.
+    The size is that of the refit and one step further without the prior of likely sizes. None where its probes are not
+    sizes of their own, and where the refit ran to the bound of what exists: that it found no end says no size.
 
     Args:
         shift: before the refit, with what ordinary drives show.
@@ -40,7 +42,7 @@ def refitted_shift(
             the refit goes farther than the first step.
     """
     names, away = _fields_of_its_own(shift)
-    if not names or not set(names) <= keys.keys():
+    if not names or not set(names) <= keys.keys() or any(_at_bound(effect, name) for name in names):
         return None
     others = [key for key in scores.keys if key.startswith(NAMED) and key not in keys.values()]
     further = sizes_of(scores, [keys[name] for name in names], np.zeros(len(names)), others)
@@ -72,6 +74,13 @@ def _fields_of_its_own(shift: Shift) -> tuple[list[str], Array]:
     names = [name for name, _, _ in moved]
     alone = not candidate.is_direction and len(set(names)) == len(names)
     return (names if alone else []), np.array([step for _, _, step in moved])
+
+
+def _at_bound(effect: Effect, name: str) -> bool:
+    """Whether a field stands at the bound of what exists, but for a bound at which it is neutral."""
+    data, value = effect.parameter(name).metadata, float(getattr(effect, name))
+    bounds = [bound for bound in (data["low"], data["high"]) if bound != data["neutral"]]
+    return any(math.isclose(value, bound, rel_tol=_NOTHING) for bound in bounds)
 
 
 def _multiples(effect: Effect, names: Sequence[str], away: Array) -> Array:

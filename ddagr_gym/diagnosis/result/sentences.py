@@ -108,10 +108,8 @@ def _reference(change: Change) -> str:
 
 
 def _soil_unnamed(change: Change) -> str:
-    """That another ground hides what changes in the soil; "" where it was the same or known to a calibration."""
-    if change.against != BEFORE or change.ground:
-        return ""
-    return "; the ground may be another one, so that no change of the soil has a name"
+    """That another ground hides what changes in the soil; "" where the ground is known."""
+    return "" if change.ground else "; the ground may be another one, so that no change of the soil has a name"
 
 
 def certificate_in_words(certificate: ChangeCertificate, against: str, named: bool) -> str:

@@ -11,7 +11,6 @@ import ddagr_gym
 from ddagr_gym.diagnosis.change.before_drives import (
     DAY,
     GROUND,
-    SOIL_EFFECTS,
     as_left_out,
     day_parameters,
     joint_fit,
@@ -19,7 +18,7 @@ from ddagr_gym.diagnosis.change.before_drives import (
 )
 from ddagr_gym.diagnosis.change.ground_slope import SAME_SLOPE, SLOPE_OF_FIELDS, GroundSlope
 from ddagr_gym.diagnosis.change.measured_scatter import measured_scatter
-from ddagr_gym.diagnosis.change.ordinary import OrdinaryRobot, Reference
+from ddagr_gym.diagnosis.change.ordinary import SOIL_EFFECTS, OrdinaryRobot, Reference
 from ddagr_gym.diagnosis.change.run import what_changed_since
 from ddagr_gym.diagnosis.preprocessing.mended_recordings import mend_recordings
 from ddagr_gym.diagnosis.result.files import as_mapping, validate

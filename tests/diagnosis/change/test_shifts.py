@@ -23,6 +23,7 @@ from ddagr_gym.diagnosis.search.candidates import candidates_of
 from ddagr_gym.physics.effects.base import DriveExtent
 from ddagr_gym.physics.effects.gyro_bias import GyroBias
 from ddagr_gym.physics.effects.gyro_sign import GyroSign
+from ddagr_gym.physics.effects.pose_latency import PoseLatency
 
 BIAS = Compared(candidates_of(GyroBias, DriveExtent(), 0)[0], ("gyro_bias 0",))
 SIGN = Compared(candidates_of(GyroSign, DriveExtent(), 0)[0], ("gyro_sign 0",))
@@ -181,6 +182,19 @@ def test_a_refit_finds_the_size_that_a_first_step_found_in_part():
     assert found.probability < before.probability
     plain = refitted_shift(before, GyroBias(0.03), {"bias": "named 0"}, refit)
     assert plain.covariance[0, 0] == pytest.approx(0.01 + before.between[0, 0], rel=1e-6)
+
+
+def test_a_refit_that_ran_to_the_bound_of_what_exists_says_no_size():
+    before = shift_of(BIAS, scores(BIAS.keys[0], 4.0, 0.5), ALIKE)
+    refit = scores("named 0", 0.002, 0.01)
+    data = GyroBias.parameter("bias").metadata
+    for bound in (data["low"], data["high"]):
+        assert refitted_shift(before, GyroBias(bound), {"bias": "named 0"}, refit) is None
+        assert refitted_shift(before, GyroBias(0.9 * bound), {"bias": "named 0"}, refit) is not None
+    # at nothing, which is the bound of what has no sign, a size is known
+    late = Compared(candidates_of(PoseLatency, DriveExtent(), 0)[0], ("pose_latency 0",))
+    usual = shift_of(late, scores(late.keys[0], 4.0, 0.5), against(*(scores(late.keys[0], 0.0, 0.5),) * 3))
+    assert refitted_shift(usual, PoseLatency(0.0), {"latency": "named 0"}, refit) is not None
 
 
 @pytest.mark.parametrize("times", [0.5, 1.0, 2.5, -2.5])
