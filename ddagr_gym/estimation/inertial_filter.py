@@ -5,7 +5,6 @@ Theory: filter, section 9.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -41,8 +40,8 @@ class InertialKnowledge(Validated):
         known_pull: while gravity along the robot less the accelerometer's bias is not known this well, slip is also
             taken to be as small as at launch [m/s^2]; 0.13 s of standing are enough.
         vibration: further noise of the accelerometer per speed of the rims [(m/s^2)/(m/s)]; the least that is taken.
-        vibration_weight: how many blocks of readings that counts for, where more is learnt on the way; infinite:
-            nothing is learnt (theory: filter, eq. (13d)).
+        learns_vibration: whether more is learnt on the way (theory: filter, eq. (13d)).
+        vibration_weight: how many blocks of readings what is known before counts for then.
         largest_acceleration: of the robot; a reading of the accelerometer that says more counts as missing [m/s^2].
         unknown_acceleration: random walk of the velocities where the accelerometer is missing [m/s^2/sqrt(Hz)].
         gravity_deviation: initial, of either component of gravity along the ground [m/s^2].
@@ -62,7 +61,8 @@ class InertialKnowledge(Validated):
     launch_floor: float = bounded("m/s", 0.0, 10.0, default=2e-3, open_low=True)
     known_pull: float = bounded("m/s^2", 0.0, 1e3, default=0.008, open_low=True)
     vibration: float = bounded("1/s", 0.0, 100.0, default=0.0)
-    vibration_weight: float = 10.0
+    learns_vibration: bool = True
+    vibration_weight: float = bounded("-", 0.0, 1e9, default=10.0, open_low=True)
     largest_acceleration: float = bounded("m/s^2", 0.0, 1e3, default=5.0, open_low=True)
     unknown_acceleration: float = bounded("m/s^2/sqrt(Hz)", 0.0, 1e3, default=0.1)
     gravity_deviation: float = bounded("m/s^2", 0.0, 10.0, default=0.6, open_low=True)
@@ -74,8 +74,6 @@ class InertialKnowledge(Validated):
     def _check(self) -> None:
         if self.balance_interval < 1:
             raise InputError(f"InertialKnowledge.balance_interval is {self.balance_interval}: give 1 or more.")
-        if not self.vibration_weight > 0.0:
-            raise InputError(f"InertialKnowledge.vibration_weight is {self.vibration_weight:g}: give more than 0.")
 
 
 @dataclass(frozen=True)
@@ -110,7 +108,7 @@ class InertialModel:
 
     def with_known_vibration(self) -> InertialModel:
         """The same, whose accelerometer shakes just as much as it is told; nothing is learnt of it on the way."""
-        return replace(self, knowledge=replace(self.knowledge, vibration_weight=math.inf))
+        return replace(self, knowledge=replace(self.knowledge, learns_vibration=False))
 
     def initial(self) -> tuple[Array, Array]:
         """State (15,) at rest and covariance (15, 15) before any sample."""
@@ -200,10 +198,15 @@ class InertialFilter:
             gravity: mean of its pull along body x and y [m/s^2]; the model's knowledge has its deviation.
         """
         self._work[:] = 0.0
+        self._work[layout.LEARNS_VIBRATION] = float(self.model.knowledge.learns_vibration)
         self.state[:], self.covariance[:] = self.model.initial()
         self.state[layout.GRAVITY : layout.GRAVITY + 2] = gravity
         self.pose[:] = pose
         self._count = 0
+
+    def learn_vibration(self) -> None:
+        """Learn until the next reset how much the accelerometer shakes, whatever the model says."""
+        self._work[layout.LEARNS_VIBRATION] = 1.0
 
     def run(self, commands: Array, readings: Array, durations: Array | None = None) -> tuple[Array, Array]:
         """Predict and correct through samples.
@@ -283,9 +286,14 @@ class InertialBatch:
         indices = np.arange(self.count) if chosen is None else np.atleast_1d(np.asarray(chosen))
         state, covariance = self.model.initial()
         self.works[indices] = 0.0
+        self.works[indices, layout.LEARNS_VIBRATION] = float(self.model.knowledge.learns_vibration)
         self.works[indices, X : X + len(state)] = state
         _covariances(self.works)[indices] = covariance
         self._counts[indices] = 0
+
+    def learn_vibration(self, chosen: ArrayLike) -> None:
+        """As :meth:`InertialFilter.learn_vibration`, for robots by index."""
+        self.works[np.asarray(chosen), layout.LEARNS_VIBRATION] = 1.0
 
     def step(self, commands: ArrayLike, readings: ArrayLike) -> Array:
         """Predict and correct through samples.

@@ -55,6 +55,7 @@ POSE_CROSS = _block(POSE_SIZE * STRIDE)  # covariances of the pose with the stat
 MEAN_FORCE = _block(2)  # sums of the specific force since the last balance [m/s^2]
 SUMMED = _block()  # samples in them
 LAST_RATE = _block()  # yaw rate at the last balance [rad/s]
+LEARNS_VIBRATION = _block()  # 1 where it is learnt
 VIBRATION_LEARNT = _block()  # [1/s]
 BLOCK_SUM = _block()  # of lateral specific force beyond the turning [m/s^2]
 BLOCK_COUNT = _block()  # samples in it

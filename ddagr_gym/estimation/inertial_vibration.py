@@ -18,6 +18,7 @@ from ddagr_gym.estimation.inertial_layout import (
     BLOCK_SUM,
     BLOCKS_IN_ROW,
     LAUNCH_SPEED,
+    LEARNS_VIBRATION,
     SCATTER,
     SCATTER_SPEED,
     SCATTER_WEIGHT,
@@ -66,7 +67,7 @@ def watch_vibration(model: Array, work: Array, believed: bool, duration: float) 
         believed: whether the accelerometer has a reading.
         duration: since the sample before [s].
     """
-    if not math.isfinite(model[VIBRATION_WEIGHT]):
+    if work[LEARNS_VIBRATION] == 0.0:
         return
     if not believed:
         work[BLOCK_SUM] = work[BLOCK_COUNT] = work[BLOCKS_IN_ROW] = 0.0

@@ -18,7 +18,13 @@ from ddagr_gym.estimation.columns import stack_columns
 from ddagr_gym.estimation.filter_model import FilterModel
 from ddagr_gym.estimation.inertial_filter import InertialBatch, InertialFilter, InertialModel
 from ddagr_gym.estimation.layout import CHANNELS, COMMANDS
-from ddagr_gym.estimation.learned_inputs import MEMORY_SIZE, Filtered, block_inputs, mean_rim_speed
+from ddagr_gym.estimation.learned_inputs import (
+    MEMORY_SIZE,
+    Filtered,
+    block_inputs,
+    mean_rim_speed,
+    rest_deviations,
+)
 from ddagr_gym.estimation.learned_network import VelocityNetwork, load_network, velocity_base
 from ddagr_gym.files import shipped_folder
 from ddagr_gym.parameters import Robot, Sensors
@@ -54,6 +60,13 @@ without it this one is nearer than ``pose``, the one of least errors in turns (:
 :mod:`benchmarks.learned_estimator`)."""
 
 
+NOISY = 2.0
+"""Times the data sheet's noise in the readings at rest before a drive, from which on the network is left out (ours)."""
+
+_LEAST_DEVIATION = 1e-9
+"""Of readings at rest that a data sheet may state [m/s^2, rad/s]: ideal sensors have none."""
+
+
 @dataclass(frozen=True)
 class LearnedModel:
     """Model of the learned estimator.
@@ -84,6 +97,12 @@ class LearnedModel:
         """Robot, sensors and soil, as for the filter that takes the ground for level."""
         return self.inertial.flat
 
+    @property
+    def rest_deviations(self) -> Array:
+        """(3,) of both axes of the accelerometer [m/s^2] and the gyro [rad/s] at rest, by the data sheet."""
+        noise = self.flat.noise
+        return np.array([noise.accelerometer, noise.accelerometer, noise.gyro])
+
 
 class _Corrections:
     """The network of N robots, what it remembers of them and what it says."""
@@ -100,6 +119,7 @@ class _Corrections:
         self._chosen = model.network.chosen
         self._period, self._outer_radius = flat.sample_period, flat.outer_radius
         self._prior = flat.soil_prior.logs(flat.wheel_load)[0]
+        self._known = np.maximum(model.rest_deviations, _LEAST_DEVIATION)
 
     def reset(self, chosen: NDArray[np.intp], covariance: Array) -> None:
         """Forget robots; they are at rest with a covariance (2, 2) of the velocities, and stand where they start."""
@@ -122,6 +142,20 @@ class _Corrections:
         self.places[:], self.place_covariances[:] = filtered.poses[:, :2], filtered.pose_covariances[:, :2, :2]
         if described.place:
             self.places[:], self.place_covariances[:] = self.network.place(outputs, filtered.poses[:, :2])
+        self._leave_out(self.noisy, filtered)
+
+    @property
+    def noisy(self) -> NDArray[np.intp]:
+        """Indices of the robots whose sensors scattered far beyond the data sheet at rest."""
+        times = rest_deviations(self.blocks) / self._known
+        return np.flatnonzero(np.sqrt((times**2).mean(axis=1)) > NOISY)
+
+    def _leave_out(self, chosen: NDArray[np.intp], filtered: Filtered) -> None:
+        """Let the inertial filter speak for some robots: with such sensors it is nearer than the network."""
+        self.estimates[chosen] = filtered.states[chosen, :2]
+        self.covariances[chosen] = filtered.covariances[chosen, :2, :2]
+        self.places[chosen] = filtered.poses[chosen, :2]
+        self.place_covariances[chosen] = filtered.pose_covariances[chosen, :2, :2]
 
 
 class LearnedBatch:
@@ -197,6 +231,7 @@ class LearnedBatch:
             inertial.states, inertial.covariances, innovations, inertial.poses, inertial.pose_covariances
         )
         self._corrections.update(drive, samples, filtered)
+        inertial.learn_vibration(self._corrections.noisy)
         return innovations
 
 
@@ -267,6 +302,8 @@ class LearnedFilter:
             own.state[None], own.covariance[None], innovations[None], own.pose[None], own.pose_covariance[None]
         )
         self._corrections.update(commands, readings[None], filtered)
+        if self._corrections.noisy.size:
+            own.learn_vibration()
         share = np.arange(1.0, len(readings) + 1.0)[:, None] / len(readings)
         states[:, :2] = before + share * (self._corrections.estimates[0] - before)
         return states, innovations

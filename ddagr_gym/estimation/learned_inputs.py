@@ -48,6 +48,9 @@ INPUTS = SENSOR_INPUTS + FILTER_INPUTS + POSE_INPUTS
 REST_SAMPLES = 125.0
 """Samples at rest that count as one in ``rest_share`` (ours)."""
 
+FEWEST_AT_REST = 25
+"""Samples at rest from which their scatter is known to a seventh (ours)."""
+
 _STATES = np.array([*range(3), *range(PARAMETER, PATCH_AHEAD + 1)])
 _DEVIATIONS = np.array([0, 1, *range(PARAMETER, PARAMETER + PARAMETER_SIZE), GRAVITY, GRAVITY + 1])
 _LARGEST_INNOVATION = 10.0  # (ours) an outlier beyond counts as this many standard deviations
@@ -55,9 +58,9 @@ _LEAST_VARIANCE = 1e-12
 _REST = 1e-9  # [rad/s] commands and counted speeds below are none
 
 # Memory of a robot between blocks
-_HEADING, _SUM, _COUNT, _MOVED = 0, slice(1, 4), 4, 5
-MEMORY_SIZE = 6
-"""Heading by the gyro [rad], sums of three channels at rest, samples in them, and whether it has moved."""
+_HEADING, _SUM, _COUNT, _MOVED, _SQUARES = 0, slice(1, 4), 4, 5, slice(6, 9)
+MEMORY_SIZE = 9
+"""Heading by the gyro [rad], sums of three channels at rest, samples in them, whether it has moved, sums of squares."""
 
 
 class Filtered(NamedTuple):
@@ -143,5 +146,22 @@ def _rest(memory: Array, commands: Array, readings: Array) -> None:
     moving |= (np.abs(np.nan_to_num(readings[..., ENCODER_CHANNEL:])) > _REST).any(axis=(1, 2))
     memory[:, _MOVED] = np.maximum(memory[:, _MOVED], moving)
     at_rest = (memory[:, _MOVED] == 0.0)[:, None] & np.isfinite(readings[..., :3]).all(axis=2)
-    memory[:, _SUM] += np.where(at_rest[..., None], readings[..., :3], 0.0).sum(axis=1)
+    resting = np.where(at_rest[..., None], readings[..., :3], 0.0)
+    memory[:, _SUM] += resting.sum(axis=1)
+    memory[:, _SQUARES] += (resting**2).sum(axis=1)
     memory[:, _COUNT] += at_rest.sum(axis=1)
+
+
+def rest_deviations(memory: Array) -> Array:
+    """Standard deviations (N, 3) of both axes of the accelerometer [m/s^2] and the gyro [rad/s] at rest before a drive.
+
+    Args:
+        memory: (N, MEMORY_SIZE) of :func:`block_inputs`.
+
+    Returns:
+        NaN where a robot did not rest long enough.
+    """
+    count = memory[:, _COUNT : _COUNT + 1]
+    squares = memory[:, _SQUARES] - memory[:, _SUM] ** 2 / np.maximum(count, 1.0)
+    deviations = np.sqrt(np.maximum(squares, 0.0) / np.maximum(count - 1.0, 1.0))
+    return np.where(count >= FEWEST_AT_REST, deviations, np.nan)

@@ -123,5 +123,5 @@ def test_alone_and_in_a_batch_to_the_bit(turn):
 
 
 def test_bad_weight():
-    with pytest.raises(InputError, match="vibration_weight is 0"):
+    with pytest.raises(InputError, match="vibration_weight"):
         InertialKnowledge(vibration_weight=0.0)

@@ -15,8 +15,17 @@ from ddagr_gym.estimation import (
     LearnedModel,
     run_learned_filter,
 )
+from ddagr_gym.estimation.inertial_layout import VIBRATION_LEARNT
 from ddagr_gym.estimation.learned_filter import estimator_names, find_network
-from ddagr_gym.estimation.learned_inputs import INPUTS, MEMORY_SIZE, SENSOR_INPUTS, Filtered, block_inputs
+from ddagr_gym.estimation.learned_inputs import (
+    INPUTS,
+    MEMORY_SIZE,
+    SENSOR_INPUTS,
+    Filtered,
+    block_inputs,
+    rest_deviations,
+)
+from ddagr_gym.estimation.learned_inputs import _rest as add_rest
 from ddagr_gym.estimation.learned_network import (
     FORMAT,
     OUTPUTS,
@@ -59,11 +68,15 @@ def make_model(**changes) -> LearnedModel:
     return LearnedModel(InertialModel.of(ddagr(), Sensors()), make_network(**changes))
 
 
-def drive(blocks=20, seed=1):
-    """Commands (B, 2) and readings (B, K, 5) of a robot that stands for 5 blocks and then drives."""
+def drive(blocks=20, seed=1, noise=1.0, standing=5):
+    """Commands (B, 2) and readings (B, K, 5) of a robot that stands for some blocks and then drives.
+
+    Its sensors have so many times the noise of their data sheets.
+    """
     rng = np.random.default_rng(seed)
-    commands = np.where(np.arange(blocks)[:, None] < 5, 0.0, np.array([1.0, 0.8]))
-    readings = 0.03 * rng.standard_normal((blocks, BLOCK, 5))
+    commands = np.where(np.arange(blocks)[:, None] < standing, 0.0, np.array([1.0, 0.8]))
+    readings = rng.standard_normal((blocks, BLOCK, 5))
+    readings[:, :, :3] *= noise * make_model().rest_deviations
     readings[:, :, 3:] = commands[:, None]
     return commands, readings
 
@@ -96,6 +109,57 @@ def test_layers_and_places_agree_in_a_batch_and_alone():
     assert one.pose[2] == one._inertial.pose[2]
     one.reset()
     assert not one.pose.any()
+
+
+def run(model, noise, standing=5):
+    """Learned filter after a drive."""
+    one = LearnedFilter(model)
+    commands, readings = drive(noise=noise, standing=standing)
+    for k in range(20):
+        one.run(commands[k : k + 1], readings[k])
+    return one
+
+
+def test_the_network_is_left_out_where_the_sensors_scatter_far_beyond_their_data_sheets():
+    model = make_model(layers=2, place=True)
+    for noise, standing, left_out in ((1.0, 5, False), (1.5, 5, False), (3.0, 5, True), (3.0, 0, False)):
+        one = run(model, noise, standing)
+        own = one._inertial
+        assert np.array_equal(one.pose[:2], own.pose[:2]) is left_out
+        assert np.array_equal(one.state, own.state) is left_out
+        assert np.array_equal(one.covariance[:2, :2], own.covariance[:2, :2]) is left_out
+        assert np.array_equal(one.place_covariance, own.pose_covariance[:2, :2]) is left_out
+    # nobody knows that its readings scatter without a rest
+    assert not run(model, 3.0, 0)._corrections.noisy.size
+
+
+def test_a_noisy_robot_learns_how_it_shakes_and_changes_nothing_for_others():
+    model = replace(make_model(), inertial=InertialModel.of(ddagr(), Sensors()).with_known_vibration())
+    batch, alone = LearnedBatch(model, 2), LearnedFilter(model)
+    (commands, quiet), (_, noisy) = drive(blocks=60), drive(blocks=60, noise=4.0)
+    for k in range(60):
+        batch.step(np.tile(commands[k], (2, 1)), np.stack([quiet[k], noisy[k]]))
+        alone.run(commands[k : k + 1], quiet[k])
+    assert np.array_equal(batch.states[0], alone.state)
+    learnt = batch.works[:, VIBRATION_LEARNT]
+    assert learnt[0] == alone._inertial.vibration == 0.0
+    assert learnt[1] > 0.0
+    batch.reset([1])
+    for k in range(20):
+        batch.step(np.tile(commands[k], (2, 1)), np.tile(quiet[k], (2, 1, 1)))
+    assert batch.works[1, VIBRATION_LEARNT] == 0.0
+
+
+def test_scatter_at_rest_is_told_from_enough_samples():
+    memory = np.zeros((2, MEMORY_SIZE))
+    commands, readings = drive(blocks=40, standing=30, noise=2.0)
+    known = make_model().rest_deviations
+    for k in range(40):
+        pair, both = np.stack([readings[k], readings[k]]), np.tile(commands[k], (2, 1))
+        both[1] += k >= 2  # the second one rests for two blocks only
+        add_rest(memory, both, pair)
+    np.testing.assert_allclose(rest_deviations(memory)[0], 2.0 * known, rtol=0.1)
+    assert np.isnan(rest_deviations(memory)[1]).all()
 
 
 def test_a_place_is_the_filters_where_the_network_corrects_none():
