@@ -16,6 +16,7 @@ from ddagr_gym.calibration.forecast_errors import Forecasts
 from ddagr_gym.calibration.left_out import ENCODERS
 from ddagr_gym.identification.fit_numerics import field_numerics
 from ddagr_gym.identification.window_model import WindowModel
+from ddagr_gym.identification.windows import STATE, WindowSet
 
 Array = NDArray[np.float64]
 
@@ -34,26 +35,42 @@ class Lateness:
         dead_times: (W,) [s]; NaN where the wheel speeds hardly change.
         prediction: (W, T, 8) with them, and with the calibrated dead time where they are not known.
         calibrated: dead time of the robot [s].
+        turning: (W,) by how much the commands change the difference of the banks [rad/s].
     """
 
     dead_times: Array
     prediction: Array
     calibrated: float
+    turning: Array
 
     @property
     def figures(self) -> dict[str, Any]:
-        """Quartiles, and how alike the dead times of neighbouring windows are, as JSON has them."""
+        """Quartiles, and what the dead times go with, as JSON has them."""
         known = self.dead_times[np.isfinite(self.dead_times)]
-        pairs = np.stack([self.dead_times[:-1], self.dead_times[1:]])
-        both = pairs[:, np.isfinite(pairs).all(axis=0)]
-        varies = both.shape[1] > 1 and bool((np.ptp(both, axis=1) > 0.0).all())
         return {
             "windows": len(known),
             "calibrated": self.calibrated,
             "quartiles": np.percentile(known, [25.0, 50.0, 75.0]).tolist(),
             "deviation": float(np.std(known)),
-            "correlation_with_next": float(np.corrcoef(both)[0, 1]) if varies else None,
+            "correlation_with_next": _correlation(self.dead_times[:-1], self.dead_times[1:]),
+            "correlation_with_turning": _correlation(self.dead_times, self.turning),
         }
+
+
+def _correlation(one: Array, other: Array) -> float | None:
+    """Of what is known of both; None where either does not vary."""
+    pairs = np.stack([one, other])
+    both = pairs[:, np.isfinite(pairs).all(axis=0)]
+    varies = both.shape[1] > 1 and bool((np.ptp(both, axis=1) > 0.0).all())
+    return float(np.corrcoef(both)[0, 1]) if varies else None
+
+
+def _change_of_turning(windows: WindowSet) -> Array:
+    """(W,) difference of the banks' commands in the first half of a window, less that of their speeds at its start."""
+    first = windows.commands[:, windows.history : windows.history + windows.samples // 2]
+    asked = np.nanmedian(first, axis=1)
+    right, left = windows.initial[:, STATE.index("omega_right")], windows.initial[:, STATE.index("omega_left")]
+    return np.abs(asked[:, 0] - asked[:, 1] - (right - left))
 
 
 def lateness_of(item: Forecasts, threads: int = 2) -> Lateness:
@@ -79,4 +96,4 @@ def lateness_of(item: Forecasts, threads: int = 2) -> Lateness:
         losses = np.nansum((tried[..., ENCODERS] - encoders) ** 2, axis=(1, 2))
         better = told & (losses < least)
         best[better], chosen[better], least[better] = tried[better], dead_time, losses[better]
-    return Lateness(chosen, best, robot.drivetrain.command_delay)
+    return Lateness(chosen, best, robot.drivetrain.command_delay, _change_of_turning(windows))

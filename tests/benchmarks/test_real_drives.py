@@ -123,6 +123,9 @@ def test_lateness_of_each_command_is_found_by_a_robot_with_another(windows: Wind
     np.testing.assert_allclose(known, 0.3, atol=0.021)
     assert found.figures["quartiles"][1] == pytest.approx(0.3, abs=0.001)
     assert found.figures["calibrated"] == 0.1
+    # from where the banks stand, the commands of a window ask for another difference of them
+    assert found.turning.shape == (12,)
+    assert found.turning.max() > 0.5
 
 
 def test_learned_model_predicts_a_drive_that_it_has_not_seen(windows: WindowSet):
