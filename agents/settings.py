@@ -165,6 +165,9 @@ class TrainingSettings:
             del content["design"]["tracker"]
         else:
             content["inertial"] = asdict(InertialModel.of(ddagr(), Sensors()).knowledge)
+            if content["inertial"]["learns_vibration"]:
+                # before there was a choice it always did
+                del content["inertial"]["learns_vibration"]
         if not self.task.randomisation.slope:
             del content["task"]["randomisation"]["slope"]
         for name in ("side_slip_lead", "sinkage_tilt"):

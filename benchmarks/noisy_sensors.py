@@ -2,7 +2,7 @@
 
     python -m benchmarks.noisy_sensors FOLDER [--workers 2]
 
-Drives B6 and B6_pose_wide on all four drawings of the set of stressed sensors (seven minutes of two cores; started
+Drives B6 and B6_pose_wide on all four drawings of the set of stressed sensors (five minutes of two cores; started
 again with the same folder, it goes on). They had been opened before the network was left out where the readings at rest
 scatter far beyond the data sheet, so this is no fresh reading. Writes ``noisy_sensors.json`` and a picture beside it.
 """

@@ -30,7 +30,7 @@ from ddagr_gym.estimation import FilterModel
 from ddagr_gym.estimation.dead_reckoning import DeadReckoning
 from ddagr_gym.estimation.force_balance import arc_bank_speeds
 from ddagr_gym.estimation.inertial_filter import InertialModel
-from ddagr_gym.estimation.learned_filter import LearnedModel
+from ddagr_gym.estimation.learned_filter import NOISY, LearnedModel
 from ddagr_gym.evaluation.calibration import calibrate_constant_speeds
 from ddagr_gym.evaluation.ladder_gains import LadderGains, ladder_gains
 from ddagr_gym.evaluation.policy_seeds import arm_and_seed, policy_version
@@ -317,13 +317,20 @@ def controller_version(name: str) -> str:
     if name in LEARNED_ESTIMATORS:
         model = learned_model(LEARNED_ESTIMATORS[name])
         settling = f" {SETTLING}" if model.network.description.place else ""
-        return f"{text} {_model_text(model.inertial)} {model.network.digest()}{settling}"
+        return f"{text} {_model_text(model.inertial)} {model.network.digest()} {NOISY:g}{settling}"
     return text
 
 
+_ADDED_LATER = (", sinkage_tilt=0.0", ", command_filter=0.0", ", learns_vibration=True")
+"""Fields at the values that stand for what was there before them."""
+
+
 def _model_text(model: InertialModel) -> str:
-    """All that a filter knows; a robot with neither of the fields that robots got later reads as before."""
-    return repr(model).replace(", sinkage_tilt=0.0", "").replace(", command_filter=0.0", "")
+    """All that a filter knows; what robots and filters got later, and these have none of, is left out."""
+    text = repr(model)
+    for added in _ADDED_LATER:
+        text = text.replace(added, "")
+    return text
 
 
 def find_controller(name: str, turn: RowTurn, gains: LadderGains | None = None) -> Controller:

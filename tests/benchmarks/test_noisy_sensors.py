@@ -1,7 +1,21 @@
 """What is kept of the turns with stressed sensors."""
 
-from benchmarks.noisy_sensors import CONTROLLERS, SETS, result_of
-from benchmarks.second_sets import for_picture, table
+import json
+
+import pytest
+
+pytest.importorskip("matplotlib", reason="needs the extra report")
+pytest.importorskip("pyarrow", reason="needs the extra io")
+
+from benchmarks.noisy_sensors import CONTROLLERS, RESULT, SETS, result_of
+from benchmarks.second_sets import for_picture, table, version_of
+from ddagr_gym.evaluation.scenarios import set_hash
+
+
+def test_the_record_is_of_what_ships():
+    committed = json.loads(RESULT.read_text())
+    assert committed["controllers"] == {name: version_of(name) for name in CONTROLLERS}
+    assert committed["scenarios"] == {name: set_hash(name) for name in SETS}
 
 
 def metric(value):

@@ -13,6 +13,7 @@ from ddagr_gym.estimation import (
     LearnedBatch,
     LearnedFilter,
     LearnedModel,
+    learned_filter,
     run_learned_filter,
 )
 from ddagr_gym.estimation.inertial_layout import VIBRATION_LEARNT
@@ -148,6 +149,17 @@ def test_a_noisy_robot_learns_how_it_shakes_and_changes_nothing_for_others():
     for k in range(20):
         batch.step(np.tile(commands[k], (2, 1)), np.tile(quiet[k], (2, 1, 1)))
     assert batch.works[1, VIBRATION_LEARNT] == 0.0
+
+
+@pytest.mark.parametrize("noise", [0.5, 1.0, 1.6])
+def test_with_sensors_near_their_data_sheets_nothing_changes_by_it(noise, monkeypatch):
+    model = make_model(layers=2, place=True)
+    found = run(model, noise)
+    monkeypatch.setattr(learned_filter, "NOISY", np.inf)
+    never = run(model, noise)
+    assert np.array_equal(found.state, never.state)
+    assert np.array_equal(found.pose, never.pose)
+    assert not np.array_equal(run(model, 4.0).state, found.state)
 
 
 def test_scatter_at_rest_is_told_from_enough_samples():
