@@ -16,14 +16,10 @@ from typing import Any
 
 from benchmarks.commits import commit_of
 from benchmarks.row_turns import CHECKOUT, rounded
-from benchmarks.second_sets import KEPT, for_picture, table, title, version_of
+from benchmarks.second_sets import driven, for_picture, kept_of, table, title, version_of
 from benchmarks.second_sets_figure import draw
-from ddagr_gym.evaluation.campaign import run_campaign, wanted_episodes, with_bounds
-from ddagr_gym.evaluation.dataset import EPISODES
 from ddagr_gym.evaluation.scenarios import set_hash
-from ddagr_gym.evaluation.summary import summaries
 from ddagr_gym.files import make_folder, write_json
-from ddagr_gym.progress import Progress
 
 RESULT = Path(__file__).resolve().parent / "results" / "noisy_sensors.json"
 SETS = ("S5", "S5b", "S5c", "S5d")
@@ -32,21 +28,12 @@ CONTROLLERS = ("B6", "B6_pose_wide")
 
 def result_of(summary: Mapping[str, Mapping[str, Any]], sets: Sequence[str]) -> dict[str, Any]:
     """As it is written: hashes, and the metrics that are kept, {set: {arm: ...}}."""
-    kept = (*KEPT[:7], f"improvement_over_{CONTROLLERS[0]}")
     return {
         "command": "python -m benchmarks.noisy_sensors FOLDER",
         "commit": commit_of(CHECKOUT),
         "scenarios": {name: set_hash(name) for name in sets},
         "controllers": {name: version_of(name) for name in CONTROLLERS},
-        "sets": rounded(
-            {
-                name: {
-                    arm: {key: summary[arm][name][key] for key in kept if key in summary[arm][name]}
-                    for arm in CONTROLLERS
-                }
-                for name in sets
-            }
-        ),
+        "sets": rounded(kept_of(summary, CONTROLLERS, sets, CONTROLLERS[:1])),
     }
 
 
@@ -57,10 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--output", type=Path, default=RESULT)
     given = parser.parse_args(arguments)
-    folder = make_folder(given.folder)
-    with Progress(len(wanted_episodes(with_bounds(CONTROLLERS), SETS)), "driving") as progress:
-        rows = run_campaign(CONTROLLERS, SETS, folder / EPISODES, processes=given.workers, progress=progress.advance)
-    result = result_of(summaries(rows, CONTROLLERS[:1]), SETS)
+    result = result_of(driven(make_folder(given.folder), CONTROLLERS, given.workers, SETS, CONTROLLERS[:1]), SETS)
     write_json(given.output, result)
     draw(for_picture(result), {name: title(name) for name in SETS}, given.output.with_suffix(".png"))
     print(table(result))

@@ -117,26 +117,31 @@ def default_by_rule(summary: Summary, reading: Reading = READING) -> dict[str, A
 
 
 def driven(
-    folder: Path, controllers: Sequence[str], workers: int, reading: Reading = READING
+    folder: Path, controllers: Sequence[str], workers: int, sets: Sequence[str], compared: Sequence[str]
 ) -> dict[str, dict[str, Any]]:
     """Summaries of the controllers on all sets, by episodes that the folder holds or that are driven now."""
-    sets = reading.sets
     total = len(wanted_episodes(with_bounds(controllers), sets))
     with Progress(total, "driving") as progress:
         rows = run_campaign(controllers, sets, folder / EPISODES, processes=workers, progress=progress.advance)
-    return summaries(rows, reading.compared)
+    return summaries(rows, compared)
+
+
+def kept_of(
+    summary: Summary, controllers: Sequence[str], sets: Sequence[str], compared: Sequence[str]
+) -> dict[str, dict[str, dict[str, Any]]]:
+    """What is kept of summaries, {set: {arm: metrics}}, with the share of turns closer than those compared with."""
+    metrics = dict.fromkeys([*KEPT, *(f"improvement_over_{name}" for name in compared)])
+    return {
+        name: {
+            arm: {key: summary[arm][name][key] for key in metrics if key in summary[arm][name]} for arm in controllers
+        }
+        for name in sets
+    }
 
 
 def result_of(summary: Summary, controllers: Sequence[str], reading: Reading = READING) -> dict[str, Any]:
     """As it is written: claims, the default by the rule, hashes, and the metrics that are kept, {set: {arm: ...}}."""
     claims = check_claims(load_claims(configs_dir() / "evaluation" / reading.claims), summary)
-    metrics = dict.fromkeys([*KEPT, *(f"improvement_over_{name}" for name in reading.compared)])
-    kept = {
-        name: {
-            arm: {key: summary[arm][name][key] for key in metrics if key in summary[arm][name]} for arm in controllers
-        }
-        for name in reading.sets
-    }
     return {
         "command": reading.command,
         "commit": commit_of(CHECKOUT),
@@ -144,7 +149,7 @@ def result_of(summary: Summary, controllers: Sequence[str], reading: Reading = R
         "controllers": {name: version_of(name) for name in controllers},
         "default": rounded(default_by_rule(summary, reading)),
         "claims": [rounded(asdict(claim)) for claim in claims],
-        "sets": rounded(kept),
+        "sets": rounded(kept_of(summary, controllers, reading.sets, reading.compared)),
     }
 
 
@@ -196,7 +201,7 @@ def main(arguments: Sequence[str] | None = None, reading: Reading = READING, abo
     if missing:
         parser.error(f"--controllers lacks {min(missing)}, against which the others are compared")
     try:
-        summary = driven(make_folder(given.folder), controllers, given.workers, reading)
+        summary = driven(make_folder(given.folder), controllers, given.workers, reading.sets, reading.compared)
     except InputError as error:
         parser.error(str(error))
     result = result_of(summary, controllers, reading)

@@ -127,8 +127,8 @@ class _Corrections:
             own[chosen] = 0.0
         self.covariances[chosen] = covariance
 
-    def update(self, commands: Array, readings: Array, filtered: Filtered) -> None:
-        """Through one block (:func:`~ddagr_gym.estimation.learned_inputs.block_inputs`)."""
+    def update(self, commands: Array, readings: Array, filtered: Filtered) -> NDArray[np.intp]:
+        """Through one block (:func:`~ddagr_gym.estimation.learned_inputs.block_inputs`); returns :attr:`noisy`."""
         described = self.network.description
         if readings.shape[1] != described.samples:
             raise InputError(
@@ -142,7 +142,9 @@ class _Corrections:
         self.places[:], self.place_covariances[:] = filtered.poses[:, :2], filtered.pose_covariances[:, :2, :2]
         if described.place:
             self.places[:], self.place_covariances[:] = self.network.place(outputs, filtered.poses[:, :2])
-        self._leave_out(self.noisy, filtered)
+        noisy = self.noisy
+        self._leave_out(noisy, filtered)
+        return noisy
 
     @property
     def noisy(self) -> NDArray[np.intp]:
@@ -230,8 +232,7 @@ class LearnedBatch:
         filtered = Filtered(
             inertial.states, inertial.covariances, innovations, inertial.poses, inertial.pose_covariances
         )
-        self._corrections.update(drive, samples, filtered)
-        inertial.learn_vibration(self._corrections.noisy)
+        inertial.learn_vibration(self._corrections.update(drive, samples, filtered))
         return innovations
 
 
@@ -301,8 +302,7 @@ class LearnedFilter:
         filtered = Filtered(
             own.state[None], own.covariance[None], innovations[None], own.pose[None], own.pose_covariance[None]
         )
-        self._corrections.update(commands, readings[None], filtered)
-        if self._corrections.noisy.size:
+        if self._corrections.update(commands, readings[None], filtered).size:
             own.learn_vibration()
         share = np.arange(1.0, len(readings) + 1.0)[:, None] / len(readings)
         states[:, :2] = before + share * (self._corrections.estimates[0] - before)
