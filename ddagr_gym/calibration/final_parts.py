@@ -2,8 +2,8 @@
 
 Few windows of each drive mislead about two kinds of parts. Values that the data sheet states, of wheels, masses and
 gyro, move far where a model lacks something else: they hold until the other parts are fitted, and are free only where
-forecasts of left-out drives gain by that, in all channels (forward selection). And a ramp of the commands that few
-windows asked for is kept only if all of them miss it, also from a longer dead time.
+forecasts of left-out drives gain by that, in all channels (forward selection). And a ramp or a filter of the commands
+that few windows asked for is kept only if all of them miss it, wherever else a fit without it may begin.
 """
 
 from __future__ import annotations
@@ -13,22 +13,20 @@ from functools import partial
 
 import numpy as np
 
+from ddagr_gym.calibration.exchanged_parts import FILTER, RAMP, other_starts
 from ddagr_gym.calibration.joint_fit import LAST_ITERATIONS, Standing
 from ddagr_gym.calibration.part_selection import (
-    DELAY,
-    RAMP,
-    TRIED_DELAY,
     Candidate,
     Comparison,
     Selection,
     is_missed,
-    late_start,
     mean_growth,
     worse_by,
 )
-from ddagr_gym.calibration.parts import PARTS, RobotModel
+from ddagr_gym.calibration.parts import PARTS, RobotModel, part_named
 from ddagr_gym.calibration.result import PartDecision
 from ddagr_gym.diagnosis.store import StepCache
+from ddagr_gym.parameters import Robot
 
 Fit = Callable[[frozenset[str], Standing, float, str], Candidate]
 """Model without some parts, fitted from a start unless its cost cannot come near that of a rival, and forecast; the
@@ -42,7 +40,7 @@ def decide_with_all_windows(
     cache: StepCache,
     progress: Callable[[str], None],
 ) -> Selection:
-    """A selection without a ramp that all windows do not miss, and with values of the data sheet that they correct.
+    """A selection without ramp or filter that all windows do not miss, and with data sheet values that they correct.
 
     Args:
         comparison: all windows that are fitted, and those that are forecast.
@@ -57,9 +55,10 @@ def decide_with_all_windows(
 
     left_out, decisions = selected.left_out, list(selected.decisions)
     best = fit(left_out, selected.standing, np.inf, "as selected")
-    if RAMP not in left_out:
-        progress("forecasts with all windows without the ramp of the commands")
-        best, left_out, decisions = _without_ramp(fit, best, left_out, decisions)
+    for name in (RAMP, FILTER):
+        if name not in left_out and name in model.free:
+            progress(f"forecasts with all windows without the {part_named(name).title}")
+            best, left_out, decisions = _without(name, fit, model.robot, best, left_out, decisions)
     for part in PARTS:
         if not part.on_data_sheet or not model.free & set(part.parameters):
             continue
@@ -73,20 +72,21 @@ def decide_with_all_windows(
     return Selection(left_out, tuple(decisions), best.standing)
 
 
-def _without_ramp(
-    fit: Fit, best: Candidate, left_out: frozenset[str], decisions: list[PartDecision]
+def _without(
+    part: str, fit: Fit, robot: Robot, best: Candidate, left_out: frozenset[str], decisions: list[PartDecision]
 ) -> tuple[Candidate, frozenset[str], list[PartDecision]]:
-    """Without the ramp, from the dead time as it is or else from a longer one, unless it is missed from both."""
-    without = left_out | {RAMP}
-    tried = fit(without, best.standing, best.cost, "without the ramp")
+    """Without ramp or filter, from where the fit stands or else from another start, unless it is missed from all."""
+    without = left_out | {part}
+    stage = f"without the {part_named(part).title}"
+    tried = fit(without, best.standing, best.cost, stage)
     growth, error = worse_by(best, tried)
-    short = DELAY not in left_out and best.standing.values[DELAY] < TRIED_DELAY
-    if short and is_missed(growth, error, len(tried.losses)):
-        late = fit(without, late_start(best), best.cost, f"without the ramp, dead time from {TRIED_DELAY:g}")
-        tried = min(tried, late, key=partial(mean_growth, best))
+    for name, start in other_starts(part, best.standing, robot, left_out):
+        if not is_missed(growth, error, len(tried.losses)):
+            break
+        tried = min(tried, fit(without, start, best.cost, stage + name), key=partial(mean_growth, best))
         growth, error = worse_by(best, tried)
     kept = is_missed(growth, error, len(tried.losses))
-    changed = [PartDecision(RAMP, kept, growth, error) if item.name == RAMP else item for item in decisions]
+    changed = [PartDecision(part, kept, growth, error) if item.name == part else item for item in decisions]
     return (best, left_out, changed) if kept else (tried, without, changed)
 
 

@@ -1,8 +1,8 @@
 """Where the joint fit begins: at the best of several starts.
 
 Delay, ramp and loop of a drivetrain stand for one another, and the fit has several minima: a command that acts late and
-at once looks much like one that is shaped slowly. A first-order loop without load gives the first start. The others
-have delays of real robots with a ramp that hardly shapes anything.
+at once looks much like one that is shaped slowly. A first-order loop without load gives the first start. Two others
+have delays of real robots with a ramp that hardly shapes anything, and one has slow motors in place of a filter.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.calibration.calibration_data import CalibrationData
+from ddagr_gym.calibration.exchanged_parts import with_slow_motors
 from ddagr_gym.calibration.independent_steps import IndependentSteps
 from ddagr_gym.calibration.joint_fit import (
     FittedModel,
@@ -137,10 +138,11 @@ def fit_from_several(
     rough, weights = rough_fit(data, windows, model, {**held, **start_values(data, windows, model.parameters)}, threads)
 
     common = steps.runner.share((data, windows, model, weights, threads, rough.fitted.point.states))
-    changes: tuple[dict[str, float], ...] = ({}, *OTHER_STARTS)
+    starts = {_name(change): {**rough.values, **change} for change in ({}, *OTHER_STARTS)}
+    starts["fit of all parts, slower motors"] = with_slow_motors(rough.standing, model.robot).values
     tasks = [
-        Task(_name(change), first_steps, (common, {**rough.values, **change}), f"start {number}")
-        for number, change in enumerate(changes)
+        Task(name, first_steps, (common, values), f"start {number}")
+        for number, (name, values) in enumerate(starts.items())
     ]
     tried = steps.results("fit of all parts from several starts", tasks)
     _, best = min(tried, key=lambda item: item[0])

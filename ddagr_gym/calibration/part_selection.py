@@ -9,9 +9,9 @@ Forecasts are compared in what a drivetrain moves by itself, wheel speeds and th
 follow from them through the soil, whose own errors a wrong wheel speed may make up for, and places are the integral of
 both, so that few large errors decide there.
 A part is missed only by a fit that is settled, that has had steps enough, or that stays far above the fit with it.
-What acts through parts that have all gone goes with them. Ramp, filter and dead time of the commands stand for one
-another: a fit without ramp or filter is also tried from a longer dead time, and one of them that stayed where the dead
-time went gives way to a dead time that forecasts as well.
+What acts through parts that have all gone goes with them. Parts that make the wheels late stand for one another: a fit
+without ramp or filter is also tried from a longer dead time, one without a filter from slower motors, and a ramp or a
+filter that stayed where the dead time went gives way to a dead time that forecasts as well.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from functools import partial
 import numpy as np
 
 from ddagr_gym.calibration.calibration_data import CalibrationData
+from ddagr_gym.calibration.exchanged_parts import DELAY, FILTER, RAMP, other_starts, with_late_commands
 from ddagr_gym.calibration.joint_fit import OFFSET, FittedModel, Standing, fit_model
 from ddagr_gym.calibration.left_out import Forecast, fold_sigma, forecast_losses, forecasts
 from ddagr_gym.calibration.parts import PARTS, RobotModel, idle_parts, part_named
@@ -45,12 +46,6 @@ HOPELESS = 0.1
 
 SLOW = 0.1
 """Share of a hopeless fit's growth that each step must take off lest it end (ours): all steps would take off half."""
-
-DELAY, RAMP, FILTER = "command_delay", "command_ramp", "command_filter"
-"""Parts that can stand for one another."""
-
-TRIED_DELAY = 0.3
-"""From which the fit with a dead time in place of them starts [s]: of a Husky and a Warthog (0.2 to 0.43 s)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -232,10 +227,11 @@ def select_parts(
         progress(f"forecasts of left-out drives without {part.title}")
         tried = _settled(comparison, model, left_out | {part.name}, best, least, cache, part.usual)
         growth, error = worse_by(least, tried)
-        late_too = part.name in (RAMP, FILTER) and DELAY not in left_out
-        if late_too and is_missed(growth, error, len(tried.losses)):
-            later = _later(comparison, model, left_out | {part.name}, best, cache)
-            tried = min(tried, later, key=partial(mean_growth, least))
+        for stage, start in other_starts(part.name, best.standing, model.robot, left_out):
+            if not is_missed(growth, error, len(tried.losses)):
+                break
+            other = _fitted_without(comparison, model, left_out | {part.name}, start, best.cost, cache, stage)
+            tried = min(tried, other, key=partial(mean_growth, least))
             growth, error = worse_by(least, tried)
         kept = is_missed(growth, error, len(tried.losses), part.usual)
         decisions.append(PartDecision(part.name, kept, growth, error))
@@ -293,19 +289,6 @@ def _settled(
     return tried
 
 
-def _later(
-    comparison: Comparison, model: RobotModel, left_out: frozenset[str], best: Candidate, cache: StepCache
-) -> Candidate:
-    """A model without ramp or filter from a longer dead time: a fit from a short one does not reach what they did."""
-    stage = f", dead time from {TRIED_DELAY:g}"
-    return _fitted_without(comparison, model, left_out, late_start(best), best.cost, cache, stage)
-
-
-def late_start(best: Candidate) -> Standing:
-    """Where a candidate stands, but for a longer dead time."""
-    return replace(best.standing, values={**best.standing.values, DELAY: TRIED_DELAY})
-
-
 def mean_growth(before: Candidate, after: Candidate) -> float:
     """That of :func:`worse_by` alone."""
     return worse_by(before, after)[0]
@@ -327,7 +310,8 @@ def _delay_for(
     """
     robot = comparison.data.robot
     exchanged, neither = (left_out - {DELAY}) | {part}, left_out | {part}
-    with_delay = partial(comparison.candidate, model.without(exchanged, robot), late_start(best), rival=best.cost)
+    start = with_late_commands(best.standing)
+    with_delay = partial(comparison.candidate, model.without(exchanged, robot), start, rival=best.cost)
     late = cache(f"{DELAY} for {part}", with_delay)
     growth, error = worse_by(best, late)
     if is_missed(growth, error, len(late.losses)):

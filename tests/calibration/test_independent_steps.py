@@ -8,7 +8,9 @@ from types import SimpleNamespace
 import pytest
 
 from ddagr_gym.calibration import files, fit_starts
+from ddagr_gym.calibration.exchanged_parts import with_slow_motors
 from ddagr_gym.calibration.independent_steps import IndependentSteps
+from ddagr_gym.calibration.joint_fit import Standing
 from ddagr_gym.calibration.ordinary_files import save_ordinary
 from ddagr_gym.calibration.run import calibrate_drives
 from ddagr_gym.calibration.settings import CalibrationSettings
@@ -60,7 +62,12 @@ def test_a_step_that_fails_is_named_and_the_others_are_kept(tmp_path):
 
 def test_starts_share_what_they_have_in_common_and_the_best_is_weighed_again(monkeypatch):
     shared, sent = [], []
-    states = SimpleNamespace(fitted=SimpleNamespace(point=SimpleNamespace(states="states")), values={"a": 1.0})
+    rough = {"motor_rate": 0.5, "command_filter": 0.2}
+    states = SimpleNamespace(
+        fitted=SimpleNamespace(point=SimpleNamespace(states="states")),
+        values=rough,
+        standing=Standing(rough, None, True),
+    )
     monkeypatch.setattr(fit_starts, "rough_fit", lambda *_: (states, "weights"))
     monkeypatch.setattr(fit_starts, "start_values", lambda *_: {})
     monkeypatch.setattr(fit_starts, "first_weights", lambda *_: "noise")
@@ -78,15 +85,16 @@ def test_starts_share_what_they_have_in_common_and_the_best_is_weighed_again(mon
         runner=SimpleNamespace(share=lambda value: shared.append(value) or "handle"),
         results=lambda label, tasks: sent.extend(tasks) or tried,
     )
-    model = SimpleNamespace(parameters=())
+    model = SimpleNamespace(parameters=(), robot=get_robot("warthog"))
     found, weights = fit_starts.fit_from_several("data", "windows", model, {}, 1, steps)
     assert found.standing.values == {"fits": 1 + fit_starts.WEIGHINGS}
     # weighed by what the fit before left, in turn
     assert weights == "weights of fit 2 with weights of fit 1 with weights"
     assert shared == [("data", "windows", model, "weights", 1, "states")]
-    assert [task.arguments for task in sent] == [
-        ("handle", {"a": 1.0} | change) for change in ({}, *fit_starts.OTHER_STARTS)
-    ]
+    starts = [rough | change for change in ({}, *fit_starts.OTHER_STARTS)]
+    starts.append(with_slow_motors(states.standing, model.robot).values)
+    assert [task.arguments for task in sent] == [("handle", start) for start in starts]
+    assert len({task.name for task in sent}) == len(sent)
 
 
 @pytest.fixture(scope="module")

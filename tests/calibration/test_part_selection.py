@@ -7,9 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from ddagr_gym.calibration.exchanged_parts import TRIED_DELAY
 from ddagr_gym.calibration.joint_fit import Standing
 from ddagr_gym.calibration.part_selection import (
-    TRIED_DELAY,
     Candidate,
     is_hopeless,
     select_parts,
@@ -19,8 +19,8 @@ from ddagr_gym.calibration.part_selection import (
 from ddagr_gym.presets import get_robot
 
 
-def candidate(*losses: float, counts: tuple[int, ...] = (), settled: bool = True) -> Candidate:
-    standing = Standing({}, np.zeros((0, 8)), settled)
+def candidate(*losses: float, counts: tuple[int, ...] = (), settled: bool = True, **values: float) -> Candidate:
+    standing = Standing(values, np.zeros((0, 8)), settled)
     by_fold = dict(enumerate(losses))
     return Candidate(standing, by_fold, dict(enumerate(counts or (1,) * len(losses))), by_fold, sum(losses))
 
@@ -61,6 +61,8 @@ def test_a_fit_is_hopeless_that_is_far_above_another_and_hardly_comes_nearer(bef
 
 class Made:
     """A model that knows which parts are out; its losses follow from that."""
+
+    robot = get_robot("warthog")
 
     def __init__(self, out: frozenset[str] = frozenset(), late: str = "command_ramp") -> None:
         self.out = out
@@ -117,6 +119,19 @@ def test_a_dead_time_that_forecasts_as_well_takes_the_place_of_ramp_or_filter(la
     assert found.left_out & both == left
     kept = {item.name: item.kept for item in found.decisions if item.name in both}
     assert kept == {name: name not in left for name in both}
+
+
+@pytest.mark.parametrize(("slow", "kept"), [(1.0, False), (1.2, True)])
+def test_a_filter_gives_way_to_slower_motors_that_forecast_as_well(slow, kept):
+    class Motors(Losses):
+        def candidate(self, model, start, rival):
+            slower = start.values.get("motor_rate", 1.0) < 0.0
+            return candidate(*(f * (slow if slower or "command_filter" not in model.out else 1.3) for f in (1.0, 1.01)))
+
+    full = candidate(1.0, 1.01, command_filter=0.4, motor_rate=1.0, command_delay=0.1)
+    made = Made(late="command_filter")
+    found = select_parts(Motors({}), made, full, lambda name, make: make(), lambda line: None)
+    assert {item.name: item.kept for item in found.decisions}["command_filter"] is kept
 
 
 def test_parts_that_are_missed_a_little_each_are_not_all_given_away():

@@ -1,0 +1,54 @@
+"""Where fits begin in which one part of a drivetrain does what another one did."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ddagr_gym.calibration.exchanged_parts import TRIED_DELAY, other_starts, with_late_commands, with_slow_motors
+from ddagr_gym.calibration.joint_fit import Standing
+from ddagr_gym.presets import get_robot
+
+WARTHOG = get_robot("warthog")
+FASTER = 1.6
+"""Logarithm of a factor on its motor rate."""
+
+
+def standing(**values: float) -> Standing:
+    return Standing({"motor_rate": FASTER, "command_filter": 0.4, "command_delay": 0.1} | values, np.ones((3, 8)), True)
+
+
+def starts(part: str, left_out: tuple[str, ...] = (), **values: float) -> list[str]:
+    return [name for name, _ in other_starts(part, standing(**values), WARTHOG, frozenset(left_out))]
+
+
+def test_slow_motors_lag_as_long_as_a_filter_and_faster_motors():
+    made = with_slow_motors(standing(), WARTHOG)
+    rate = WARTHOG.motor_rate * np.exp(made.values["motor_rate"])
+    assert 1.0 / rate == pytest.approx(0.4 + 1.0 / (WARTHOG.motor_rate * np.exp(FASTER)))
+    assert 0.0 < made.values["command_filter"] < 0.1
+    assert made.values["command_delay"] == 0.1
+    assert np.array_equal(made.states, np.ones((3, 8)))
+
+
+def test_late_commands_change_the_dead_time_alone():
+    assert with_late_commands(standing()).values == standing().values | {"command_delay": TRIED_DELAY}
+
+
+@pytest.mark.parametrize(
+    ("part", "left_out", "expected"),
+    [
+        ("command_filter", (), [", slower motors", ", dead time from 0.3"]),
+        ("command_filter", ("speed_loop",), [", dead time from 0.3"]),
+        ("command_filter", ("command_delay",), [", slower motors"]),
+        ("command_ramp", (), [", dead time from 0.3"]),
+        ("command_ramp", ("command_delay",), []),
+        ("integral", (), []),
+    ],
+)
+def test_a_fit_without_a_part_begins_where_one_that_is_free_can_do_the_same(part, left_out, expected):
+    assert starts(part, left_out) == expected
+
+
+def test_a_dead_time_that_is_long_already_is_not_tried_from_a_shorter_one():
+    assert starts("command_ramp", command_delay=0.5) == []
