@@ -32,6 +32,8 @@ PART_FAMILIES: dict[str, Family] = {
         ("motor_lag", "motor_saturation"),
         "speeds come late after a step; the library's saturation has the same ramp as its limit of acceleration",
     ),
+    "mean_ramp": Family(("motor_lag", "motor_saturation"), "the same of the mean of both banks"),
+    "turning_ramp": Family(("motor_lag", "motor_saturation"), "the same of how far the banks are apart"),
     "command_filter": Family(("motor_lag",), "its second pole is a filter of the commands"),
     "speed_loop": Family(("motor_lag",), "another rate of the loop is another time constant"),
     "integral": Family(("motor_droop",), "it tells how speed that was lost to a load comes back"),

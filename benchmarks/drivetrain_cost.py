@@ -35,7 +35,8 @@ def full_drivetrain(scale: float, inertia: float) -> Drivetrain:
         command_delay=0.2, command_deadband=0.05 * scale, command_ramp=20.0 * scale, integral_rate=2.0,
         load_compliance=1.0 / inertia, acceleration_limit=20.0 * scale, integral_limit=10.0 * scale,
         no_load_speed=4.0 * scale, power_limit=30.0 * scale**2, limit_imbalance=0.1, viscous_rate=0.1,
-        coulomb_friction=0.2, turning_limit=0.8 * scale, command_filter=0.2,
+        coulomb_friction=0.2, turning_limit=0.8 * scale, command_filter=0.2, mean_ramp=15.0 * scale,
+        turning_ramp=8.0 * scale,
     )  # fmt: skip
 
 

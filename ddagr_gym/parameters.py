@@ -89,7 +89,7 @@ class Drivetrain(Validated):
     Attributes:
         command_delay: dead time between a command and the set point of the loop [s].
         command_deadband: smallest command that moves the bank; smaller ones count as zero [rad/s].
-        command_ramp: largest change of the set point per time [rad/s^2].
+        command_ramp: largest change of each bank's set point per time [rad/s^2].
         command_filter: time constant of a first-order filter that smooths the set point behind the ramp [s].
         integral_rate: k_i, growth of the loop's integral part per speed error [1/s^2].
         integral_limit: largest integral part [rad/s^2].
@@ -103,6 +103,10 @@ class Drivetrain(Validated):
         coulomb_friction: friction of motor and gear, as the acceleration that it takes [rad/s^2].
         turning_limit: most by which the commands let a bank differ from the mean of both [rad/s]: the highest yaw rate
             of a drive controller, times half track over wheel radius; the mean stays.
+        mean_ramp: largest change per time of the mean of both banks' set points [rad/s^2]: the acceleration that a
+            drive controller allows, over the wheel radius.
+        turning_ramp: largest change per time of a set point's distance from that mean [rad/s^2]: the yaw acceleration
+            that it allows, times half track over wheel radius.
     """
 
     command_delay: float = bounded("s", 0.0, 1.0, default=0.0)
@@ -119,6 +123,8 @@ class Drivetrain(Validated):
     viscous_rate: float = bounded("1/s", 0.0, 1e3, default=0.0)
     coulomb_friction: float = bounded("rad/s^2", 0.0, 1e3, default=0.0)
     turning_limit: float = bounded("rad/s", 0.0, 1e3, default=1e3, open_low=True)
+    mean_ramp: float = bounded("rad/s^2", 0.0, 1e6, default=1e6, open_low=True)
+    turning_ramp: float = bounded("rad/s^2", 0.0, 1e6, default=1e6, open_low=True)
 
 
 UNCERTAIN = (

@@ -120,6 +120,8 @@ def build_row(robot: Robot, soil: Soils, sensors: Sensors) -> Array:
         layout.COMMAND_DELAY: robot.drivetrain.command_delay,
         layout.COMMAND_DEADBAND: robot.drivetrain.command_deadband,
         layout.TURNING_LIMIT: robot.drivetrain.turning_limit,
+        layout.MEAN_RAMP: robot.drivetrain.mean_ramp,
+        layout.TURNING_RAMP: robot.drivetrain.turning_ramp,
         layout.COMMAND_RAMP: robot.drivetrain.command_ramp,
         layout.COMMAND_FILTER: robot.drivetrain.command_filter,
         layout.BASE_SOIL: _soils(soil),
@@ -263,7 +265,7 @@ class Simulator:
 
     def _remembers(self) -> bool:
         """Whether any drivetrain depends on commands of the past."""
-        ramps = self.rows[:, layout.COMMAND_RAMP] < NO_LIMIT
+        ramps = self.rows[:, [layout.MEAN_RAMP, layout.TURNING_RAMP, layout.COMMAND_RAMP]].min(axis=1) < NO_LIMIT
         integral = self.rows[:, layout.BASE_DRIVETRAIN + layout.INTEGRAL_RATE] > 0.0
         late = self.rows[:, [layout.COMMAND_DELAY, layout.COMMAND_FILTER]].max(axis=1) > 0.0
         return bool((ramps | integral | late).any())

@@ -33,15 +33,15 @@ TITLES = (
 )
 LABELS = {
     "delay": "delay",
-    "ramp": "ramp",
+    "turning_limit": "turning limit",
+    "mean_ramp": "ramp of mean",
+    "turning_ramp": "ramp of turning",
     "top_speed": "top speed",
     "proportional": "proportional",
     "integral": "integral",
-    "integral_limit": "integral limit",
     "power": "power limit",
     "asymmetry": "asymmetry",
     "viscous": "viscous friction",
-    "yaw_inertia": "yaw inertia",
 }
 """Parameters in the figure."""
 

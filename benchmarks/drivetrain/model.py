@@ -1,9 +1,9 @@
 """The model: two banks, each with a speed loop within limits, a vehicle that they move, and a load that resists.
 
-Set point: command, after the delay, clamped and ramped. Torque: proportional and integral part on the speed error,
-within the limits. Wheel: inertia share e, friction, and the force f of the ground, which saturates in the slip speed.
-Vehicle: mean speed v and yaw rate y (as a difference of the banks), moved by f. Turning is resisted by a saturating
-load,
+Set point: command, after the delay, with turning and speed clamped, then ramped. Torque: proportional and integral part
+on the speed error, within the limits. Wheel: inertia share e, friction, and the force f of the ground, which saturates
+in the slip speed. Vehicle: mean speed v and yaw rate y (as a difference of the banks), moved by f. Turning is resisted
+by a saturating load,
 
     e w' = u - b w - R g(w / w0) - f,   f = F g((w - v -+ y/2) / s),   g(x) = x / sqrt(1 + x^2),
     (1 - e) v' = (f_right + f_left) / 2,   (1 - e) k y' = f_right - f_left - 2 M g(y / y0).
@@ -28,6 +28,9 @@ ROLLING_SPEED = 0.5
 """Speed at which rolling load is 71 % of its full size [rad/s]; only smooths the sign (ours)."""
 (
     DELAY,
+    TURNING_LIMIT,
+    MEAN_RAMP,
+    TURNING_RAMP,
     RAMP,
     TOP_SPEED,
     PROPORTIONAL,
@@ -74,24 +77,37 @@ def _slope(g: float) -> float:
 @njit(cache=True)
 def _ask(p: Array, command: Array, wanted: Array) -> None:
     """What a command asks of the set points, into wanted (2,)."""
-    top, gain, dead = p[TOP_SPEED], p[GAIN], p[DEAD_BAND]
+    top, gain, dead, limit = p[TOP_SPEED], p[GAIN], p[DEAD_BAND], p[TURNING_LIMIT]
+    middle, half = 0.5 * (command[0] + command[1]), 0.5 * (command[0] - command[1])
+    half = min(max(half, -limit), limit)
     for i in range(2):
-        value = gain * command[i]
+        value = gain * (middle + half if i == 0 else middle - half)
         wanted[i] = 0.0 if abs(value) < dead else min(max(value, -top), top)
+
+
+@njit(cache=True)
+def _approached(before: float, target: float, most: float, slowing: float) -> float:
+    """A value that goes towards its target by at most so much, or ``slowing`` times that where it comes nearer to 0."""
+    away = abs(target) > abs(before) and target * before >= 0.0
+    most *= 1.0 if away else slowing
+    return before + min(max(target - before, -most), most)
 
 
 @njit(cache=True)
 def _set_points(
     p: Array, wanted: Array, smooth: Array, point: Array, mean: Array, duration: float, step: float
 ) -> None:
-    """Move the set points (2,) in place, lag, then ramp; mean (2,) gathers what the loop sees of them in a step."""
-    ramp, slowing = p[RAMP], p[SLOWING_RAMP]
+    """Move the set points (2,) in place, lag, then ramps; mean (2,) gathers what the loop sees of them in a step."""
+    slowing = p[SLOWING_RAMP]
     follow = 1.0 - np.exp(-duration / p[LAG])
     for i in range(2):
         smooth[i] += follow * (wanted[i] - smooth[i])
-        away = abs(smooth[i]) > abs(point[i]) and smooth[i] * point[i] >= 0.0
-        rate = duration * ramp * (1.0 if away else slowing)
-        point[i] += min(max(smooth[i] - point[i], -rate), rate)
+    middle, asked = 0.5 * (point[0] + point[1]), 0.5 * (smooth[0] + smooth[1])
+    half = _approached(point[0] - middle, smooth[0] - asked, duration * p[TURNING_RAMP], slowing)
+    middle = _approached(middle, asked, duration * p[MEAN_RAMP], slowing)
+    for i in range(2):
+        target = middle + half if i == 0 else middle - half
+        point[i] = _approached(point[i], target, duration * p[RAMP], 1.0)
         mean[i] += duration / step * point[i]
 
 

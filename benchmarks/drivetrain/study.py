@@ -38,14 +38,14 @@ TWINS = {"asphalt": "asphalt 2", "asphalt 2": "asphalt", "sand": "sand 2", "sand
 WINDUP = "within_limit"
 WITHOUT: Mapping[str, tuple[str, ...]] = {
     "delay": ("delay",),
-    "ramp": ("ramp",),
+    "ramp of the mean": ("mean_ramp",),
+    "ramp of the turning": ("turning_ramp",),
+    "limit of the turning": ("turning_limit",),
     "top speed": ("top_speed",),
     "integral part": ("integral",),
-    "limit of the integral part": ("integral_limit",),
     "power limit": ("power",),
     "left weaker than right": ("asymmetry",),
     "viscous friction": ("viscous",),
-    "inertia in turning": ("yaw_inertia",),
     "rolling load": ("rolling_load",),
     "turning load": ("turning_load", "turning_speed"),
 }
@@ -53,9 +53,13 @@ WITHOUT: Mapping[str, tuple[str, ...]] = {
 WITH: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "gain": (("gain",), ()),
     "lag": (("lag",), ()),
-    "lag for ramp": (("lag",), ("ramp",)),
+    "lag for both ramps": (("lag",), ("mean_ramp", "turning_ramp")),
+    "ramp of each bank": (("ramp",), ()),
+    "ramp of each bank for both ramps": (("ramp",), ("mean_ramp", "turning_ramp")),
     "dead band": (("dead_band",), ()),
-    "other ramp when slowing": (("slowing_ramp",), ()),
+    "other ramps when slowing": (("slowing_ramp",), ()),
+    "limit of the integral part": (("integral_limit",), ()),
+    "inertia in turning": (("yaw_inertia",), ()),
     "constant torque limit": (("torque_limit",), ()),
     "speed line for power limit": (("stall_torque", "no_load_speed"), ("power",)),
     "speed line for power limit and top speed": (("stall_torque", "no_load_speed"), ("power", "top_speed")),

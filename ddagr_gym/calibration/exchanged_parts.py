@@ -1,6 +1,6 @@
 """Parts of a drivetrain that can stand for one another, and where fits begin in which one does what another did.
 
-A dead time, a ramp, a filter of the commands and slow motors all make the wheels late: a fit has a minimum for each,
+A dead time, ramps, a filter of the commands and slow motors all make the wheels late: a fit has a minimum for each,
 and does not get from one to the other by itself.
 """
 
@@ -16,6 +16,7 @@ from ddagr_gym.calibration.parts import FILTER_DEVIATION, FIRST_SHARE
 from ddagr_gym.parameters import Robot
 
 DELAY, RAMP, FILTER, SPEED_LOOP = "command_delay", "command_ramp", "command_filter", "speed_loop"
+MEAN_RAMP, TURNING_RAMP = "mean_ramp", "turning_ramp"
 """Names of these parts."""
 
 TRIED_DELAY = 0.3

@@ -108,6 +108,8 @@ PARTS = (
     _of_drivetrain("limit_imbalance", ("limit_imbalance",), ("torque_limit", "no_load_speed", "power_limit")),
     _of_drivetrain("command_ramp", ("command_ramp",)),
     _of_drivetrain("command_filter", ("command_filter",)),
+    _of_drivetrain("mean_ramp", ("mean_ramp",)),
+    _of_drivetrain("turning_ramp", ("turning_ramp",)),
     _of_drivetrain("power_limit", ("power_limit",)),
     _of_drivetrain("turning_limit", ("turning_limit",)),
     _of_drivetrain("speed_limit", ("maximum_wheel_speed",)),
@@ -123,6 +125,8 @@ DATA_SHEET_PARTS = frozenset(part.name for part in PARTS if part.on_data_sheet)
 
 LIMITS = {
     "turning_limit": "turning_limit",
+    "mean_ramp": "mean_ramp",
+    "turning_ramp": "turning_ramp",
     "command_ramp": "command_ramp",
     "integral_limit": "integral_limit",
     "acceleration_limit": "torque_limit",
@@ -170,6 +174,8 @@ def complete_robot(robot: Robot) -> Robot:
     strongest = top / TIME_TO_FULL_SPEED
     likely = {
         "turning_limit": TURNING_SHARE * top,
+        "mean_ramp": strongest,
+        "turning_ramp": TURNING_SHARE * strongest,
         "command_ramp": strongest,
         "integral_limit": INTEGRAL_SHARE * strongest,
         "acceleration_limit": strongest,

@@ -45,6 +45,8 @@ _UNITS = {
     "outer_radius": "m",
     "command_delay": "s",
     "turning_limit": "rad/s",
+    "mean_ramp": "rad/s^2",
+    "turning_ramp": "rad/s^2",
     "command_ramp": "rad/s^2",
     "command_filter": "s",
     "integral_rate": "1/s^2",

@@ -321,7 +321,10 @@ def controller_version(name: str) -> str:
     return text
 
 
-_ADDED_LATER = (", sinkage_tilt=0.0", ", command_filter=0.0", ", learns_vibration=True")
+_ADDED_LATER = (
+    ", sinkage_tilt=0.0", ", command_filter=0.0", ", learns_vibration=True", ", mean_ramp=1000000.0",
+    ", turning_ramp=1000000.0",
+)  # fmt: skip
 """Fields at the values that stand for what was there before them."""
 
 

@@ -223,11 +223,16 @@ _DRIVETRAIN_ENTRIES = {
     "command_delay": layout.COMMAND_DELAY,
     "command_deadband": layout.COMMAND_DEADBAND,
     "turning_limit": layout.TURNING_LIMIT,
+    "mean_ramp": layout.MEAN_RAMP,
+    "turning_ramp": layout.TURNING_RAMP,
     "command_ramp": layout.COMMAND_RAMP,
     "command_filter": layout.COMMAND_FILTER,
     **{name: layout.BASE_DRIVETRAIN + k for k, name in enumerate(layout.DRIVETRAIN_PARAMETERS)},
 }
-_LIMITS = ("turning_limit", "command_ramp", "integral_limit", "acceleration_limit", "no_load_speed", "power_limit")
+_LIMITS = (
+    "turning_limit", "mean_ramp", "turning_ramp", "command_ramp", "integral_limit", "acceleration_limit",
+    "no_load_speed", "power_limit",
+)  # fmt: skip
 
 
 def drivetrain_of(robot: Robot, values: Mapping[str, float]) -> Drivetrain:
@@ -272,7 +277,8 @@ def _drivetrain_parameters(robot: Robot) -> tuple[ModelParameter, ...]:
             continue
         value, entry = getattr(robot.drivetrain, name), (_DRIVETRAIN_ENTRIES[name],)
         if name in _LIMITS:
-            made.append(_log(name, entry, deviation / value))
+            # a limit that is not there must get beyond where it acts
+            made.append(_log(name, entry, deviation / value, max(_LOG_LIMIT, 3.0 * deviation / value)))
             continue
         field = next(item for item in fields(Drivetrain) if item.name == name)
         low, high = field.metadata["low"] - value, field.metadata["high"] - value

@@ -1,6 +1,6 @@
 """From a bank's speed command to its acceleration (theory: drivetrain, section 1).
 
-    r = filter(ramp(deadband(limit_turning(u))))(t - delay)
+    r = filter(ramps(deadband(limit_turning(u))))(t - delay)
     d omega/dt = limit(k_omega (r - omega) + z) + T/J - viscous omega - friction sgn(omega),  dz/dt = k_i (r - omega)
 
 T is the torque of the ground on the bank's wheels; a loop that carries it asks for -T/J besides. With the defaults of
@@ -42,6 +42,7 @@ from ddagr_gym.physics.layout import (
     LOAD_CARRIED,
     LOAD_COMPLIANCE,
     MAXIMUM_WHEEL_SPEED,
+    MEAN_RAMP,
     MOTOR_RATE,
     MOTOR_TARGET,
     NO_LOAD_SPEED,
@@ -53,6 +54,7 @@ from ddagr_gym.physics.layout import (
     TARGET_NODES,
     TARGET_RING,
     TURNING_LIMIT,
+    TURNING_RAMP,
     VISCOUS_RATE,
     WHEEL_ANGLE,
 )
@@ -137,18 +139,43 @@ def _smoothed(row: Array, bank: int) -> float:
     return target + mean
 
 
+@kernel(inline=True)
+def _approached(before: float, target: float, most: float) -> float:
+    """A value that goes towards its target by at most so much."""
+    return before + min(max(target - before, -most), most)
+
+
+@kernel(inline=True)
+def _ramped_together(row: Array, right: float, left: float) -> tuple[float, float]:
+    """Set points of both banks on the way to targets, with the ramps of their mean and of how far they are from it."""
+    period = row[SAMPLE_PERIOD]
+    mean, turning = mean_and_turning(row, SET_POINT)
+    asked = 0.5 * (right + left)
+    mean = _approached(mean, asked, row[MEAN_RAMP] * period)
+    turning = _approached(turning, right - asked, row[TURNING_RAMP] * period)
+    return mean + turning, mean - turning
+
+
+@kernel(inline=True)
+def _allowed(row: Array, bank: int) -> float:
+    """Command of a bank within its speed limit, or none in the deadband [rad/s]."""
+    limit = row[MAXIMUM_WHEEL_SPEED]
+    row[COMMAND + bank] = min(max(row[COMMAND + bank], -limit), limit)
+    return row[COMMAND + bank] if abs(row[COMMAND + bank]) >= row[COMMAND_DEADBAND] else 0.0
+
+
 @kernel()
 def set_targets(row: Array) -> None:
     """Set points of the coming sample from the commands, and the drivetrain as the robot has it."""
     if row[TURNING_LIMIT] < NO_SPEED_LIMIT:
         limit_turning(row, COMMAND, row[TURNING_LIMIT])
+    right, left = _allowed(row, 0), _allowed(row, 1)
+    if min(row[MEAN_RAMP], row[TURNING_RAMP]) < NO_LIMIT:
+        right, left = _ramped_together(row, right, left)
     for bank in range(2):
-        limit = row[MAXIMUM_WHEEL_SPEED]
-        row[COMMAND + bank] = min(max(row[COMMAND + bank], -limit), limit)
-        target = row[COMMAND + bank] if abs(row[COMMAND + bank]) >= row[COMMAND_DEADBAND] else 0.0
+        target = right if bank == 0 else left
         if row[COMMAND_RAMP] < NO_LIMIT:
-            most = row[COMMAND_RAMP] * row[SAMPLE_PERIOD]
-            target = row[SET_POINT + bank] + min(max(target - row[SET_POINT + bank], -most), most)
+            target = _approached(row[SET_POINT + bank], target, row[COMMAND_RAMP] * row[SAMPLE_PERIOD])
         row[SET_POINT + bank] = target
         row[MOTOR_TARGET + bank] = _smoothed(row, bank)
         row[MOTOR_RATE + bank] = row[BASE_MOTOR_RATE]
@@ -341,8 +368,8 @@ def motor_torque(row: Array, bank: int) -> float:
 @kernel()
 def follows_past(row: Array) -> bool:
     """Whether the drivetrain depends on the bank speeds of earlier samples."""
-    shaped = row[COMMAND_DELAY] > 0.0 or row[COMMAND_FILTER] > 0.0 or row[COMMAND_RAMP] < NO_LIMIT
-    return shaped or row[DYNAMIC_BANKS] != 0.0
+    ramped = min(row[MEAN_RAMP], row[TURNING_RAMP], row[COMMAND_RAMP]) < NO_LIMIT
+    return ramped or row[COMMAND_DELAY] > 0.0 or row[COMMAND_FILTER] > 0.0 or row[DYNAMIC_BANKS] != 0.0
 
 
 @kernel()

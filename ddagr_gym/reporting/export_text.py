@@ -28,7 +28,7 @@ _NOWHERE = (
     "Speed that is lost in turns, where soil holds a braked wheel better than a driven one.",
     "Sinkage, ruts, rolling resistance as a force, and soil that differs from place to place.",
     "The integral part, friction and power limit of the speed loop, which are in the delay, the lag and the gains.",
-    "The ramp, the dead band and the turning limit of the commands: shape the commands before you send them.",
+    "The ramps, the dead band and the turning limit of the commands: shape the commands before you send them.",
     "Noise that is not white, and quantisation of the sensors.",
 )
 

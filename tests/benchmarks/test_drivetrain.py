@@ -58,6 +58,18 @@ def test_top_speed_clamps_the_set_point():
     assert end_of(drive([(16.0, 16.0)], 30.0))[:2] == pytest.approx([13.2, 13.2], abs=0.02)
 
 
+def test_set_points_go_with_limited_mean_and_turning():
+    p = parameter_vector({"mean_ramp": 4.0, "turning_ramp": 2.0, "turning_limit": 3.0})
+    wanted, smooth, point, mean = np.zeros(2), np.zeros(2), np.zeros(2), np.zeros(2)
+    model._ask(p, np.array([9.0, 1.0]), wanted)
+    assert wanted == pytest.approx([8.0, 2.0])
+    for _ in range(25):
+        mean[:] = 0.0
+        model._set_points(p, wanted, smooth, point, mean, 0.02, 0.02)
+    assert point == pytest.approx([3.0, 1.0])
+    assert mean == pytest.approx(point)
+
+
 def test_at_the_power_limit_the_load_takes_all_power():
     changes = {"power": 60.0, "asymmetry": 0.0, "viscous": 0.5, "rolling_load": 3.0}
     speed = end_of(drive([(13.0, 13.0)], 30.0), **changes)[0]

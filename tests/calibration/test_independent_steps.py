@@ -91,8 +91,8 @@ def test_starts_share_what_they_have_in_common_and_the_best_is_weighed_again(mon
     # weighed by what the fit before left, in turn
     assert weights == "weights of fit 2 with weights of fit 1 with weights"
     assert shared == [("data", "windows", model, "weights", 1, "states")]
-    starts = [rough | change for change in ({}, *fit_starts.OTHER_STARTS)]
-    starts.append(with_slow_motors(states.standing, model.robot).values)
+    slow = with_slow_motors(states.standing, model.robot).values
+    starts = [rough, *(rough | change for change in fit_starts.OTHER_STARTS.values()), slow]
     assert [task.arguments for task in sent] == [("handle", start) for start in starts]
     assert len({task.name for task in sent}) == len(sent)
 

@@ -31,6 +31,9 @@ FILTER = 0.5  # [s]
 RAMP = 1.0
 """By which the commands of a robot change [rad/s^2]."""
 
+MEAN_RAMP, TURNING_RAMP = 1.5, 0.6
+"""By which the mean of its banks and their distance from it change [rad/s^2]."""
+
 WIDER = 1.1
 """Factor on the track of a robot whose data sheet is wrong."""
 
@@ -250,11 +253,23 @@ def test_a_ramp_of_the_commands_is_kept():
 
 
 @pytest.mark.slow
+def test_ramps_of_mean_and_turning_are_told_from_one_of_each_bank():
+    """A robot whose controller limits acceleration and yaw acceleration has neither late commands nor a slow loop."""
+    found, kept = calibrated_with(mean_ramp=MEAN_RAMP, turning_ramp=TURNING_RAMP)
+    assert {"speed_loop", "command_delay", "mean_ramp", "turning_ramp"} <= kept
+    assert not kept & {"command_ramp", "command_filter"}
+    drivetrain = found.robot.drivetrain
+    assert drivetrain.mean_ramp == pytest.approx(MEAN_RAMP, rel=0.05)
+    assert drivetrain.turning_ramp == pytest.approx(TURNING_RAMP, rel=0.05)
+    assert drivetrain.command_delay == pytest.approx(DELAY, rel=0.05)
+
+
+@pytest.mark.slow
 def test_a_filter_of_the_commands_is_found():
     """Neither a ramp nor a dead time stands for it; a loop and a filter in series may share their lag otherwise."""
     found, kept = calibrated_with(command_filter=FILTER)
     assert {"speed_loop", "command_delay", "command_filter"} <= kept
-    assert "command_ramp" not in kept
+    assert not kept & {"command_ramp", "mean_ramp", "turning_ramp"}
     lag = found.robot.drivetrain.command_filter + 1.0 / found.robot.motor_rate
     assert lag == pytest.approx(FILTER + 1.0 / true_robot().motor_rate, rel=0.05)
     assert found.robot.drivetrain.command_delay == pytest.approx(DELAY, abs=0.05)

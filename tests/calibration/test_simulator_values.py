@@ -15,7 +15,7 @@ from ddagr_gym.simulator import build_row
 
 CHANGES = {
     "motor_rate": -0.2, "half_track": 0.03, "outer_radius": -0.05, "command_delay": 0.3, "integral_rate": 2.0,
-    "integral_limit": -0.2, "turning_limit": 0.3,
+    "integral_limit": -0.2, "turning_limit": 0.3, "mean_ramp": -0.1, "turning_ramp": 0.2,
     "power_limit": 0.4, "limit_imbalance": 0.1, "viscous_rate": 0.3,
 }  # fmt: skip
 

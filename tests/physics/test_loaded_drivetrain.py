@@ -113,6 +113,38 @@ def test_commands_act_after_the_delay_and_the_ramp_and_outside_the_deadband():
     np.testing.assert_allclose(dead["true_omega_right"], prompt["true_omega_right"], atol=1e-12)
 
 
+def _speeds(drive) -> np.ndarray:
+    """(T, 2) mean of both banks, and how far the right one is from it [rad/s]."""
+    right, left = drive["true_omega_right"], drive["true_omega_left"]
+    return np.column_stack([right + left, right - left]) / 2.0
+
+
+def test_ramps_of_mean_and_turning_limit_each_at_its_own_rate():
+    """A drive controller limits acceleration and yaw acceleration: a turn leaves the speed alone."""
+    ramps = _with(DDAGR, mean_ramp=0.4, turning_ramp=0.25)
+    found = _speeds(_drive(ramps, _steps((4.0, 1.0, 1.0), (4.0, 1.4, 0.6))))
+    plain = _speeds(_drive(_with(DDAGR, mean_ramp=0.4), _steps((4.0, 1.0, 1.0), (4.0, 1.0, 1.0))))
+    np.testing.assert_allclose(np.diff(found[150:240, 0]) * 125.0, 0.4, rtol=0.02)
+    np.testing.assert_allclose(np.diff(found[625:680, 1]) * 125.0, 0.25, rtol=0.06)
+    np.testing.assert_allclose(found[:, 0], plain[:, 0], atol=1e-12)
+    np.testing.assert_allclose(found[-1], [1.0, 0.4], atol=1e-3)
+
+
+@pytest.mark.parametrize(("ramp", "commands"), [("mean_ramp", (0.9, 0.9)), ("turning_ramp", (0.9, -0.9))])
+def test_either_ramp_is_the_ramp_of_each_bank_where_it_acts_alone(ramp, commands):
+    steps = _steps((2.0, *commands), (2.0, *(-c for c in commands)))
+    by_both = _drive(_with(DDAGR, **{ramp: 0.7}), steps)
+    by_bank = _drive(_with(DDAGR, command_ramp=0.7), steps)
+    for name in ("true_omega_right", "true_omega_left"):
+        np.testing.assert_allclose(by_both[name], by_bank[name], atol=1e-12)
+
+
+def test_a_dead_time_may_stand_before_or_behind_the_ramps():
+    late = _drive(_with(DDAGR, mean_ramp=0.7, turning_ramp=0.3, command_delay=0.4), _steps((2.0, 1.0, 0.2)))
+    prompt = _drive(_with(DDAGR, mean_ramp=0.7, turning_ramp=0.3), _steps((2.0, 1.0, 0.2)))
+    np.testing.assert_allclose(late["true_omega_left"][50:], prompt["true_omega_left"][:-50], atol=1e-12)
+
+
 def test_a_filter_of_the_commands_is_a_second_pole_before_the_loop():
     """As the effect ``motor_lag`` with all of its lag in a second pole, which has a memory of its own."""
     commands = _steps((0.5, 1.0, 0.5), (0.5, 0.2, -0.4))

@@ -8,7 +8,9 @@ from dataclasses import dataclass
 PART_TITLES = {
     "command_delay": "dead time of the commands",
     "turning_limit": "limit of the commanded turning",
-    "command_ramp": "ramp of the commands",
+    "mean_ramp": "ramp of the commanded mean speed",
+    "turning_ramp": "ramp of the commanded turning",
+    "command_ramp": "ramp of each bank's commands",
     "command_filter": "filter of the commands",
     "speed_loop": "speed loop",
     "integral": "integral part of the speed loop",
@@ -31,11 +33,14 @@ STEPS = "steps of the commands held for 3 s or more, with wheel speeds recorded 
 FULL = "straight pieces at the highest speed that the robot takes, commanded beyond it"
 HARD = "full reversals of the commands on firm ground, with wheel speeds recorded at 10 Hz or more"
 _SPINS = "turns on the spot on loose ground at the highest yaw rate that the robot takes, commanded beyond it"
+_REVERSALS = "full reversals of turns on the spot, with wheel speeds recorded at 10 Hz or more"
 _TURNS = "turns on the spot and wide arcs on firm ground, each held for 3 s or more"
 
 PART_DRIVES = {
     "command_delay": f"{STEPS}, out of steady driving and with the time before each step recorded",
     "turning_limit": _SPINS,
+    "mean_ramp": HARD,
+    "turning_ramp": _REVERSALS,
     "command_ramp": HARD,
     "command_filter": STEPS,
     "speed_loop": STEPS,
