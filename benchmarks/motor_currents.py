@@ -57,9 +57,10 @@ RATES = {CurrentKind.SUPPLY: 1.0, CurrentKind.MOTOR: 10.0}
 WITHOUT = "without"
 QUANTILE = 1.645
 """Of a normal variable: half of a 90 % interval."""
-ABSENT = frozenset(
-    {"no_load_speed", "torque_limit", "integral_limit", "limit_imbalance", "command_ramp", "power_limit", "speed_limit"}
-)
+ABSENT = frozenset((
+    "no_load_speed", "torque_limit", "integral_limit", "limit_imbalance", "command_ramp", "mean_ramp", "turning_ramp",
+    "command_filter", "power_limit", "speed_limit",
+))  # fmt: skip
 """Parts that the simulated robots do not have and that no fit of them asks for."""
 SHOWN = (
     "soil_strength", "soil_stiffness", "shear_modulus", "mass", "motor_rate", "integral_rate", "load_compliance",

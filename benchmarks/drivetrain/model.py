@@ -49,6 +49,7 @@ ROLLING_SPEED = 0.5
     STALL_TORQUE,
     NO_LOAD_SPEED,
     COUPLING,
+    START_DELAY,
     AVERAGING,
     TURNING_LOAD,
     TURNING_SPEED,
@@ -189,6 +190,17 @@ def _move(p: Array, u: Array, w: Array, body: Array, work: Array, step: float) -
 
 
 @njit(cache=True)
+def _with_late_starts(times: Array, events: Array, before: Array, wait: float) -> Array:
+    """Times (m,) of commands, those to a robot that was told to stand so much later, but not after the next one."""
+    late = times.copy()
+    for k in range(times.size):
+        last = before if k == 0 else events[k - 1]
+        if last[0] == 0.0 and last[1] == 0.0:
+            late[k] = times[k] + wait if k + 1 == times.size else min(times[k] + wait, times[k + 1])
+    return late
+
+
+@njit(cache=True)
 def simulate(
     p: Array, times: Array, events: Array, before: Array, speeds: Array, count: int, step: float, windup: int
 ) -> Array:
@@ -219,6 +231,7 @@ def simulate(
         load = viscous * w[i] + rolling * _saturating(w[i] / ROLLING_SPEED) + (resisting if i == 0 else -resisting)
         z[i] = min(max(load - kp * (point[i] - w[i]), -most), most)
     work, mean = np.empty((4, 2)), np.zeros(2)
+    times = _with_late_starts(times, events, before, p[START_DELAY])
     event = 0
     out[0, 0], out[0, 1], out[0, 2], out[0, 3] = w[0], w[1], body[0], body[1]
     for k in range(1, count + 1):

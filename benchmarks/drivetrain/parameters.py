@@ -62,6 +62,7 @@ ROBOT: Mapping[str, Parameter] = {
     "stall_torque": Parameter("rad/s^2", "limit at rest of one that falls with speed", 60.0, _NEVER, used=False),
     "no_load_speed": Parameter("rad/s", "where that limit is zero", 16.0, _NEVER, used=False),
     "coupling": Parameter("-", "power limit lost per power of the other bank", 0.1, 0.0, False, False),
+    "start_delay": Parameter("s", "further delay of a command to a robot that stands", 0.1, 0.0, False, False),
     "averaging": Parameter("s", "time over which an encoder reading is a mean", 0.1, 0.0, used=False),
 }  # fmt: skip
 """Parameters of the robot, which its drives share."""

@@ -51,6 +51,7 @@ WITHOUT: Mapping[str, tuple[str, ...]] = {
 }
 """Parts of the model and the parameters that go with them."""
 WITH: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "later starts from rest": (("start_delay",), ()),
     "gain": (("gain",), ()),
     "lag": (("lag",), ()),
     "lag for both ramps": (("lag",), ("mean_ramp", "turning_ramp")),

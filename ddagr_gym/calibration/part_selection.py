@@ -8,7 +8,9 @@ for few drives: of all parts together no more than that is given away. Of what n
 Forecasts are compared in what a drivetrain moves by itself, wheel speeds and the motors' currents: yaw rate and place
 follow from them through the soil, whose own errors a wrong wheel speed may make up for, and places are the integral of
 both, so that few large errors decide there.
-A part is missed only by a fit that is settled, that has had steps enough, or that stays far above the fit with it.
+A part is missed only by a fit that is settled, that has had steps enough, or that stays far above the fit with it. What
+is given away is compared with the best so far and with the same model with the part, whichever says more surely that it
+is missed: one drive that the best so far happens to forecast badly would hide what all others miss.
 What acts through parts that have all gone goes with them. Parts that make the wheels late stand for one another: a fit
 without ramp or filter is also tried from a longer dead time, one without a filter from slower motors, and a ramp or a
 filter that stayed where the dead time went gives way to a dead time that forecasts as well.
@@ -204,6 +206,18 @@ def is_missed(growth: float, error: float, folds: int, usual: bool = False) -> b
     return growth > least_growth(error, folds, usual)
 
 
+def most_worse_by(before: Sequence[Candidate], after: Candidate, usual: bool = False) -> tuple[float, float]:
+    """That of :func:`worse_by` which says most surely that a part is missed, of several models with it.
+
+    Args:
+        before: with the part.
+        after: without it.
+        usual: whether nearly every robot has the part.
+    """
+    found = [worse_by(one, after) for one in before]
+    return max(found, key=lambda pair: pair[0] / least_growth(pair[1], len(after.losses), usual))
+
+
 def select_parts(
     comparison: Comparison,
     model: RobotModel,
@@ -225,14 +239,15 @@ def select_parts(
         if not model.free & set(part.parameters):
             continue
         progress(f"forecasts of left-out drives without {part.title}")
-        tried = _settled(comparison, model, left_out | {part.name}, best, least, cache, part.usual)
-        growth, error = worse_by(least, tried)
+        before = (least, best)
+        tried = _settled(comparison, model, left_out | {part.name}, before, cache, part.usual)
+        growth, error = most_worse_by(before, tried, part.usual)
         for stage, start in other_starts(part.name, best.standing, model.robot, left_out):
             if not is_missed(growth, error, len(tried.losses)):
                 break
             other = _fitted_without(comparison, model, left_out | {part.name}, start, best.cost, cache, stage)
             tried = min(tried, other, key=partial(mean_growth, least))
-            growth, error = worse_by(least, tried)
+            growth, error = most_worse_by(before, tried, part.usual)
         kept = is_missed(growth, error, len(tried.losses), part.usual)
         decisions.append(PartDecision(part.name, kept, growth, error))
         if not kept:
@@ -269,18 +284,15 @@ def _settled(
     comparison: Comparison,
     model: RobotModel,
     left_out: frozenset[str],
-    best: Candidate,
-    least: Candidate,
+    before: tuple[Candidate, Candidate],
     cache: StepCache,
     usual: bool,
 ) -> Candidate:
-    """A model without some parts, fitted from where the best one stands; further while it seems to miss them.
-
-    It does where its forecasts are worse than those of the candidate with the least losses.
-    """
+    """A model without some parts, fitted from where the last of those before stands; further while it misses them."""
+    best = before[-1]
     tried = _fitted_without(comparison, model, left_out, best.standing, best.cost, cache)
     for time in range(comparison.settlings):
-        growth, error = worse_by(least, tried)
+        growth, error = most_worse_by(before, tried, usual)
         missed = is_missed(growth, error, len(tried.losses), usual)
         if not missed or tried.standing.converged or growth > HOPELESS:
             break

@@ -110,6 +110,13 @@ def test_a_delay_moves_the_answer_and_nothing_else():
     assert late[15:] == pytest.approx(early[:-15], abs=1e-9)
 
 
+def test_a_robot_that_stands_starts_later_and_goes_on_as_before():
+    p, late = parameter_vector(values()), parameter_vector(values(start_delay=0.3))
+    from_rest, rolling = drive([(8.0, 2.0)]), drive([(8.0, 2.0)], start=(3.0, 3.0))
+    assert run(late, from_rest, WITHIN)[15:] == pytest.approx(run(p, from_rest, WITHIN)[:-15], abs=1e-9)
+    assert np.array_equal(run(late, rolling, WITHIN), run(p, rolling, WITHIN))
+
+
 @pytest.mark.parametrize("windup", ANTI_WINDUP)
 def test_halving_the_step_changes_little(windup):
     stretch = drive([(12.0, -4.0), (-8.0, 6.0), (13.0, 13.0)], 4.0)

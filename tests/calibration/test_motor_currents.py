@@ -119,7 +119,7 @@ def test_the_file_names_currents_only_where_there_are_some(data, started, tmp_pa
 @pytest.mark.slow
 def test_currents_tell_their_gain_and_leave_the_load_as_known(data):
     """The gain that nobody told the fit; the load's deviation is about what it was (``benchmarks.motor_currents``)."""
-    absent = frozenset(p.name for p in PARTS if p.name.endswith("limit") or p.name in ("no_load_speed", "command_ramp"))
+    absent = frozenset(p.name for p in PARTS if p.name.endswith(("limit", "ramp")) or p.name == "no_load_speed")
     found = {}
     for name, chosen in (("with", data), ("without", no_currents(data))):
         complete, held = complete_model(chosen)

@@ -12,6 +12,7 @@ from ddagr_gym.calibration.joint_fit import Standing
 from ddagr_gym.calibration.part_selection import (
     Candidate,
     is_hopeless,
+    most_worse_by,
     select_parts,
     surely_above,
     worse_by,
@@ -140,6 +141,30 @@ def test_parts_that_are_missed_a_little_each_are_not_all_given_away():
     assert found.left_out & BOTH == RAMP
     growth = {item.name: item.growth for item in found.decisions}
     assert (growth["command_ramp"], growth["command_delay"]) == (pytest.approx(0.015), pytest.approx(0.03))
+
+
+def test_a_drive_that_the_best_so_far_forecasts_badly_hides_no_part():
+    """All parts forecast one drive well and one badly by chance; beside the model before, all drives miss the ramp."""
+
+    class Odd(Losses):
+        def candidate(self, model, start, rival):
+            return candidate(*([1.04 if "command_ramp" in model.out else 1.0] * 4))
+
+    odd = candidate(0.93, 0.99, 0.99, 1.1)
+    growth, error = worse_by(odd, candidate(*[1.04] * 4))
+    assert growth < surely_above(4) * error
+    assert most_worse_by((odd, candidate(*[1.0] * 4)), candidate(*[1.04] * 4)) == (pytest.approx(0.04), 0.0)
+
+    class Part(Made):
+        def __init__(self, out: frozenset[str] = frozenset()) -> None:
+            super().__init__(out)
+            self.free = {"no_load_speed", "command_ramp"} - out
+
+        def without(self, parts: frozenset[str], robot: object) -> Part:
+            return Part(frozenset(parts))
+
+    found = select_parts(Odd({}), Part(), odd, lambda _, make: make(), lambda line: None)
+    assert {item.name: item.kept for item in found.decisions} == {"no_load_speed": False, "command_ramp": True}
 
 
 @pytest.mark.parametrize(("name", "kept"), [("command_delay", True), ("command_ramp", False)])
