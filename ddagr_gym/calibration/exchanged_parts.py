@@ -23,6 +23,7 @@ TRIED_DELAY = 0.3
 """From which the fit with a dead time in place of the others starts [s]: of a Husky and a Warthog (0.2 to 0.43 s)."""
 
 MOTORS = "motor_rate"
+"""Parameter of the speed loop."""
 
 
 def other_starts(

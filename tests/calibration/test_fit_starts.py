@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ddagr_gym.calibration.fit_starts import LEAST_TURNING, _turning_start, held_turning
+from ddagr_gym.calibration.fit_starts import LEAST_TURNING, _turning_start, held_turning, size_of
 from ddagr_gym.calibration.parts import complete_robot
+from ddagr_gym.identification.residual_weights import Weights
 from ddagr_gym.presets import get_robot
 
 
@@ -40,3 +41,8 @@ def test_a_drive_that_hardly_turns_starts_at_a_share_of_a_likely_limit():
     robot = get_robot("warthog")
     assert _turning_start(robot, repeated(np.full(200, 5.0), np.full(200, 5.0))) == pytest.approx(np.log(LEAST_TURNING))
     assert _turning_start(robot, np.full((1, 200, 2), np.nan)) == 0.0
+
+
+def test_what_a_start_leaves_is_the_mean_logarithm_of_all_channels_that_count():
+    sigma = np.array([[[0.5, 2.0, np.inf]], [[0.5, 8.0, np.inf]]])
+    assert size_of(Weights(sigma, np.ones(3))) == pytest.approx(np.log(0.5 * 2.0 * 0.5 * 8.0) / 4.0)

@@ -80,7 +80,8 @@ def test_starts_share_what_they_have_in_common_and_the_best_is_weighed_again(mon
             standing=SimpleNamespace(values={"fits": values["fits"] + 1}, states=None),
         )
 
-    tried = [(2.0, None), (1.0, SimpleNamespace(values={"fits": 0}, states=None)), (3.0, None)]
+    monkeypatch.setattr(fit_starts, "size_of", len)
+    tried = [("much", None), ("few", SimpleNamespace(values={"fits": 0}, states=None)), ("most of it", None)]
     steps = SimpleNamespace(
         runner=SimpleNamespace(share=lambda value: shared.append(value) or "handle"),
         results=lambda label, tasks: sent.extend(tasks) or tried,
@@ -89,7 +90,7 @@ def test_starts_share_what_they_have_in_common_and_the_best_is_weighed_again(mon
     found, weights = fit_starts.fit_from_several("data", "windows", model, {}, 1, steps)
     assert found.standing.values == {"fits": 1 + fit_starts.WEIGHINGS}
     # weighed by what the fit before left, in turn
-    assert weights == "weights of fit 2 with weights of fit 1 with weights"
+    assert weights == "weights of fit 2 with weights of fit 1 with few"
     assert shared == [("data", "windows", model, "weights", 1, "states")]
     slow = with_slow_motors(states.standing, model.robot).values
     starts = [rough, *(rough | change for change in fit_starts.OTHER_STARTS.values()), slow]

@@ -27,7 +27,7 @@ GLOBAL = [p for p in nuisances(ROBOT, 1, 0.02).parameters if p.entries and p.sco
 DRIVETRAIN = Drivetrain(
     0.2, 0.05, 20.0, integral_rate=2.0, integral_limit=5.0, load_compliance=0.02, acceleration_limit=30.0,
     no_load_speed=5.0, power_limit=40.0, limit_imbalance=0.1, viscous_rate=0.3, coulomb_friction=0.2,
-    turning_limit=1.5,
+    turning_limit=1.5, mean_ramp=15.0, turning_ramp=8.0,
 )  # fmt: skip
 DRIVEN = replace(ROBOT, drivetrain=DRIVETRAIN, standard_deviations={f.name: 0.1 for f in fields(Drivetrain)})
 
