@@ -20,19 +20,17 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from benchmarks import second_sets
 from benchmarks.commits import commit_of
 from benchmarks.row_turn_plants import cell
 from benchmarks.row_turns import CHECKOUT, rounded
-from benchmarks.second_sets import KEPT, SETS, for_picture, mean_over_sets, title, version_of
 from benchmarks.second_sets import RESULT as SECOND_RESULT
+from benchmarks.second_sets import SETS, for_picture, kept_of, mean_over_sets, title, version_of
 from benchmarks.second_sets_figure import draw
 from ddagr_gym.errors import InputError
-from ddagr_gym.evaluation.campaign import run_campaign, wanted_episodes, with_bounds
-from ddagr_gym.evaluation.dataset import EPISODES
 from ddagr_gym.evaluation.scenarios import set_hash
-from ddagr_gym.evaluation.summary import improvement, summaries
+from ddagr_gym.evaluation.summary import BASELINES
 from ddagr_gym.files import make_folder, write_json
-from ddagr_gym.progress import Progress
 
 RESULT = Path(__file__).resolve().parent / "results" / "path_policies.json"
 VALIDATION = "V"
@@ -50,18 +48,8 @@ Found = dict[str, dict[str, Any]]
 
 def driven(folder: Path, controllers: Sequence[str], workers: int, sets: Sequence[str] = ALL_SETS) -> Found:
     """Metrics of the controllers by episodes that the folder holds or that are driven now."""
-    total = len(wanted_episodes(with_bounds(controllers), sets))
-    with Progress(total, "driving") as progress:
-        rows = run_campaign(controllers, sets, folder / EPISODES, processes=workers, progress=progress.advance)
-    summary = summaries(rows)
-    found: Found = {}
-    for name in sets:
-        found[name] = {}
-        for arm in controllers:
-            metrics = {key: summary[arm][name][key] for key in KEPT if key in summary[arm][name]}
-            closer = improvement(rows, arm, BASE, name) if arm != BASE and BASE in controllers else None
-            found[name][arm] = metrics if closer is None else metrics | {CLOSER: closer}
-    return found
+    compared = (*BASELINES, BASE)
+    return kept_of(second_sets.driven(folder, controllers, workers, sets, compared), controllers, sets, compared)
 
 
 def from_before(sets: Sequence[str], path: Path = SECOND_RESULT) -> Found:

@@ -9,7 +9,6 @@ that few windows asked for is kept only if all of them miss it, wherever else a 
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 
 import numpy as np
 
@@ -19,8 +18,8 @@ from ddagr_gym.calibration.part_selection import (
     Candidate,
     Comparison,
     Selection,
+    from_other_starts,
     is_missed,
-    mean_growth,
     worse_by,
 )
 from ddagr_gym.calibration.parts import PARTS, RobotModel, part_named
@@ -78,13 +77,12 @@ def _without(
     """Without ramp or filter, from where the fit stands or else from another start, unless it is missed from all."""
     without = left_out | {part}
     stage = f"without the {part_named(part).title}"
-    tried = fit(without, best.standing, best.cost, stage)
-    growth, error = worse_by(best, tried)
-    for name, start in other_starts(part, best.standing, robot, left_out):
-        if not is_missed(growth, error, len(tried.losses)):
-            break
-        tried = min(tried, fit(without, start, best.cost, stage + name), key=partial(mean_growth, best))
-        growth, error = worse_by(best, tried)
+    tried, growth, error = from_other_starts(
+        fit(without, best.standing, best.cost, stage),
+        (best,),
+        other_starts(part, best.standing, robot, left_out),
+        lambda name, start: fit(without, start, best.cost, stage + name),
+    )
     kept = is_missed(growth, error, len(tried.losses))
     changed = [PartDecision(part, kept, growth, error) if item.name == part else item for item in decisions]
     return (best, left_out, changed) if kept else (tried, without, changed)

@@ -18,7 +18,7 @@ filter that stayed where the dead time went gives way to a dead time that foreca
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -48,6 +48,10 @@ HOPELESS = 0.1
 
 SLOW = 0.1
 """Share of a hopeless fit's growth that each step must take off lest it end (ours): all steps would take off half."""
+
+
+FitFrom = Callable[[str, Standing], "Candidate"]
+"""A model, fitted from a start; the text tells fits of the same parts apart among the finished steps."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,14 +244,10 @@ def select_parts(
             continue
         progress(f"forecasts of left-out drives without {part.title}")
         before = (least, best)
-        tried = _settled(comparison, model, left_out | {part.name}, before, cache, part.usual)
-        growth, error = most_worse_by(before, tried, part.usual)
-        for stage, start in other_starts(part.name, best.standing, model.robot, left_out):
-            if not is_missed(growth, error, len(tried.losses)):
-                break
-            other = _fitted_without(comparison, model, left_out | {part.name}, start, best.cost, cache, stage)
-            tried = min(tried, other, key=partial(mean_growth, least))
-            growth, error = most_worse_by(before, tried, part.usual)
+        fit = partial(_fitted_without, comparison, model, cache, left_out | {part.name}, best.cost)
+        starts = other_starts(part.name, best.standing, model.robot, left_out)
+        tried = _settled(fit, before, comparison.settlings, part.usual)
+        tried, growth, error = from_other_starts(tried, before, starts, fit, part.usual)
         kept = is_missed(growth, error, len(tried.losses), part.usual)
         decisions.append(PartDecision(part.name, kept, growth, error))
         if not kept:
@@ -260,7 +260,7 @@ def select_parts(
     idle = idle_parts(left_out, comparison.data.robot)
     if idle:
         left_out |= idle
-        best = _fitted_without(comparison, model, left_out, best.standing, best.cost, cache)
+        best = _fitted_without(comparison, model, cache, left_out, best.cost, "", best.standing)
         decisions = [replace(item, kept=item.kept and item.name not in idle) for item in decisions]
     return Selection(left_out, tuple(decisions), best.standing)
 
@@ -268,11 +268,11 @@ def select_parts(
 def _fitted_without(
     comparison: Comparison,
     model: RobotModel,
-    left_out: frozenset[str],
-    start: Standing,
-    rival: float,
     cache: StepCache,
-    stage: str = "",
+    left_out: frozenset[str],
+    rival: float,
+    stage: str,
+    start: Standing,
 ) -> Candidate:
     """A model without some parts, fitted from a start; ``stage`` tells fits of the same parts apart in the cache."""
     without = model.without(left_out, comparison.data.robot)
@@ -280,25 +280,44 @@ def _fitted_without(
     return cache(f"without {' '.join(sorted(left_out))}{stage}", made)
 
 
-def _settled(
-    comparison: Comparison,
-    model: RobotModel,
-    left_out: frozenset[str],
-    before: tuple[Candidate, Candidate],
-    cache: StepCache,
-    usual: bool,
-) -> Candidate:
-    """A model without some parts, fitted from where the last of those before stands; further while it misses them."""
-    best = before[-1]
-    tried = _fitted_without(comparison, model, left_out, best.standing, best.cost, cache)
-    for time in range(comparison.settlings):
+def _settled(fit: FitFrom, before: tuple[Candidate, ...], settlings: int, usual: bool) -> Candidate:
+    """A model without a part, fitted from where the last of those before stands; further while it misses the part."""
+    tried = fit("", before[-1].standing)
+    for time in range(settlings):
         growth, error = most_worse_by(before, tried, usual)
         missed = is_missed(growth, error, len(tried.losses), usual)
         if not missed or tried.standing.converged or growth > HOPELESS:
             break
-        stage = f", settling {time + 1}"
-        tried = _fitted_without(comparison, model, left_out, tried.standing, best.cost, cache, stage)
+        tried = fit(f", settling {time + 1}", tried.standing)
     return tried
+
+
+def from_other_starts(
+    tried: Candidate,
+    before: tuple[Candidate, ...],
+    starts: Iterable[tuple[str, Standing]],
+    fit: FitFrom,
+    usual: bool = False,
+) -> tuple[Candidate, float, float]:
+    """The best of a model without a part and of fits of it from other starts, as long as the part is missed.
+
+    Args:
+        tried: the model.
+        before: models with the part; the first one judges which fit is best.
+        starts: where else it may begin, as of :func:`~ddagr_gym.calibration.exchanged_parts.other_starts`.
+        fit: from such a start.
+        usual: whether nearly every robot has the part.
+
+    Returns:
+        The model, and growth and standard error of its losses as of :func:`most_worse_by`.
+    """
+    growth, error = most_worse_by(before, tried, usual)
+    for stage, start in starts:
+        if not is_missed(growth, error, len(tried.losses), usual):
+            break
+        tried = min(tried, fit(stage, start), key=partial(mean_growth, before[0]))
+        growth, error = most_worse_by(before, tried, usual)
+    return tried, growth, error
 
 
 def mean_growth(before: Candidate, after: Candidate) -> float:

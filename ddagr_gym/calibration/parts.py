@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 
 from ddagr_gym.diagnosis.answer.drivetrain import HARD, PART_DRIVES, PART_TITLES
-from ddagr_gym.identification.parameters import ModelParameter, robot_parameters
+from ddagr_gym.identification.parameters import LIMITS, ModelParameter, robot_parameters
 from ddagr_gym.parameters import Drivetrain, Robot
 from ddagr_gym.physics import layout
 
@@ -123,18 +123,6 @@ PARTS = (
 DATA_SHEET_PARTS = frozenset(part.name for part in PARTS if part.on_data_sheet)
 """Names of the parts whose values a data sheet states."""
 
-LIMITS = {
-    "turning_limit": "turning_limit",
-    "mean_ramp": "mean_ramp",
-    "turning_ramp": "turning_ramp",
-    "command_ramp": "command_ramp",
-    "integral_limit": "integral_limit",
-    "acceleration_limit": "torque_limit",
-    "no_load_speed": "no_load_speed",
-    "power_limit": "power_limit",
-}
-"""Fields of a drivetrain that no data sheet may state (a very large number stands for that), with their parts."""
-
 
 def idle_parts(left_out: frozenset[str], robot: Robot) -> frozenset[str]:
     """Parts that do nothing, because a robot has none of those that they act through.
@@ -143,7 +131,7 @@ def idle_parts(left_out: frozenset[str], robot: Robot) -> frozenset[str]:
         left_out: names of parts that its drives do not support.
         robot: of the data sheet, which may state such a part itself.
     """
-    stated = {part for name, part in LIMITS.items() if is_stated(robot, name)}
+    stated = {part_of(name).name for name in LIMITS if is_stated(robot, name)}
     stated |= {"integral"} if robot.drivetrain.integral_rate > 0.0 else set()
     absent = left_out - stated
     return frozenset(part.name for part in PARTS if part.needs and set(part.needs) <= absent) - left_out
@@ -232,7 +220,7 @@ class RobotModel:
 
     def held(self, names: frozenset[str], data_sheet: Robot) -> RobotModel:
         """The same with some parameters as the data sheet has them."""
-        gone = {name: getattr(data_sheet.drivetrain, name) for name in names & LIMITS.keys()}
+        gone = {name: getattr(data_sheet.drivetrain, name) for name in names & LIMITS}
         robot = replace(self.robot, drivetrain=replace(self.robot.drivetrain, **gone))
         return RobotModel(robot, tuple(replace(p, prior=0.0) if p.name in names else p for p in self.parameters))
 

@@ -9,12 +9,12 @@ from dataclasses import dataclass, fields, replace
 from ddagr_gym.calibration.accelerometer_results import ImuMounting
 from ddagr_gym.calibration.calibration_data import CalibrationData
 from ddagr_gym.calibration.joint_fit import FittedModel
-from ddagr_gym.calibration.parts import LIMITS, RobotModel, is_stated, part_of
+from ddagr_gym.calibration.parts import RobotModel, is_stated, part_of
 from ddagr_gym.calibration.result import CalibratedParameter, Calibration
 from ddagr_gym.envs.calibrated_draws import CalibratedDraws, GroundDraws
 from ddagr_gym.identification.fitted_values import with_values
-from ddagr_gym.identification.parameters import ModelParameter
-from ddagr_gym.parameters import Robot, Soil
+from ddagr_gym.identification.parameters import LIMITS, ModelParameter
+from ddagr_gym.parameters import Drivetrain, Robot, Soil
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.effects.gyro_scale import GyroScale
 from ddagr_gym.physics.effects.imu_lever_arm import ImuLeverArm
@@ -43,26 +43,12 @@ _UNITS = {
     "maximum_wheel_speed": "rad/s",
     "half_width": "m",
     "outer_radius": "m",
-    "command_delay": "s",
-    "turning_limit": "rad/s",
-    "mean_ramp": "rad/s^2",
-    "turning_ramp": "rad/s^2",
-    "command_ramp": "rad/s^2",
-    "command_filter": "s",
-    "integral_rate": "1/s^2",
-    "integral_limit": "rad/s^2",
-    "load_compliance": "1/(kg m^2)",
-    "acceleration_limit": "rad/s^2",
-    "no_load_speed": "rad/s",
-    "power_limit": "rad^2/s^3",
-    "limit_imbalance": "-",
-    "viscous_rate": "1/s",
-    "coulomb_friction": "rad/s^2",
     "gyro_scale": "-",
     "soil_strength": "-",
     "soil_stiffness": "-",
     "shear_modulus": "m",
     "exit_angle_ratio": "-",
+    **{item.name: item.metadata["unit"] for item in fields(Drivetrain)},
 }
 
 

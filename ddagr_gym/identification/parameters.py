@@ -229,10 +229,11 @@ _DRIVETRAIN_ENTRIES = {
     "command_filter": layout.COMMAND_FILTER,
     **{name: layout.BASE_DRIVETRAIN + k for k, name in enumerate(layout.DRIVETRAIN_PARAMETERS)},
 }
-_LIMITS = (
+LIMITS = frozenset((
     "turning_limit", "mean_ramp", "turning_ramp", "command_ramp", "integral_limit", "acceleration_limit",
     "no_load_speed", "power_limit",
-)  # fmt: skip
+))  # fmt: skip
+"""Fields of a drivetrain that no data sheet may state: a very large number stands for that."""
 
 
 def drivetrain_of(robot: Robot, values: Mapping[str, float]) -> Drivetrain:
@@ -245,7 +246,7 @@ def drivetrain_of(robot: Robot, values: Mapping[str, float]) -> Drivetrain:
     own = robot.drivetrain
     found = {name: float(values[name]) for name in _DRIVETRAIN_ENTRIES if name in values}
     changed = {
-        name: getattr(own, name) * math.exp(value) if name in _LIMITS else getattr(own, name) + value
+        name: getattr(own, name) * math.exp(value) if name in LIMITS else getattr(own, name) + value
         for name, value in found.items()
     }
     return replace(own, **changed)
@@ -255,7 +256,7 @@ def drivetrain_of(robot: Robot, values: Mapping[str, float]) -> Drivetrain:
 def added_numbers() -> frozenset[str]:
     """Names of pure numbers of robot and ground to which a fit adds its value, in place of a factor's logarithm."""
     ground = (*soil_parameters(), *slope_parameters((0.0, 0.0)))
-    drivetrain = (item for item in fields(Drivetrain) if item.name in _DRIVETRAIN_ENTRIES and item.name not in _LIMITS)
+    drivetrain = (item for item in fields(Drivetrain) if item.name in _DRIVETRAIN_ENTRIES and item.name not in LIMITS)
     return frozenset(
         [item.name for item in ground if item.unit == "-" and not item.factor]
         + [item.name for item in drivetrain if item.metadata["unit"] == "-"]
@@ -276,7 +277,7 @@ def _drivetrain_parameters(robot: Robot) -> tuple[ModelParameter, ...]:
         if name not in _DRIVETRAIN_ENTRIES or deviation <= 0.0:
             continue
         value, entry = getattr(robot.drivetrain, name), (_DRIVETRAIN_ENTRIES[name],)
-        if name in _LIMITS:
+        if name in LIMITS:
             # a limit that is not there must get beyond where it acts
             made.append(_log(name, entry, deviation / value, max(_LOG_LIMIT, 3.0 * deviation / value)))
             continue

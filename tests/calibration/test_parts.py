@@ -7,7 +7,6 @@ from dataclasses import replace
 import pytest
 
 from ddagr_gym.calibration.parts import (
-    LIMITS,
     PARTS,
     RobotModel,
     complete_robot,
@@ -16,6 +15,7 @@ from ddagr_gym.calibration.parts import (
     part_of,
     shared_parameters,
 )
+from ddagr_gym.identification.parameters import LIMITS
 from ddagr_gym.parameters import Drivetrain
 from ddagr_gym.presets import get_robot
 
