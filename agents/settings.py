@@ -15,8 +15,11 @@ from ddagr_gym.estimation import FilterModel, InertialModel
 from ddagr_gym.parameters import Drivetrain, Sensors
 from ddagr_gym.physics.effects import load_effects
 from ddagr_gym.policies.design import PolicyDesign
-from ddagr_gym.presets import ddagr
+from ddagr_gym.presets import get_robot
 from ddagr_gym.validated import Validated, bounded
+
+ROBOT = "ddagr"
+"""Robot of the published policies."""
 
 
 @dataclass(frozen=True)
@@ -24,17 +27,19 @@ class TaskSettings(Validated):
     """The turns that are trained on.
 
     Attributes:
-        soil: distribution that each episode draws from.
+        robot: its data sheet: name or YAML file, such as `ddagr diagnose` and `ddagr adapt` write.
+        soil: distribution that each episode draws from, or a single soil by name or YAML file.
         radius: R*, lowest and highest [m].
         speed: reference speed, lowest and highest [m/s].
         randomisation: what differs from episode to episode besides the soil.
         reward: weights of the terms.
         effects: missing physics, name=size or the path of an effects file such as `ddagr diagnose` writes.
         calibration: folder that `ddagr calibrate` wrote: its robot and soils, drawn as they differ between drives, in
-            place of ``soil``; "" for the DDAGR of its data sheet.
+            place of ``robot`` and ``soil``; "" for these.
         ground: one of its grounds; "" for all of them.
     """
 
+    robot: str = ROBOT
     soil: str = "thesis_a1_range"
     radius: tuple[float, float] = (0.65, 1.20)
     speed: tuple[float, float] = (0.16, 0.30)
@@ -43,6 +48,14 @@ class TaskSettings(Validated):
     effects: tuple[str, ...] = ()
     calibration: str = ""
     ground: str = ""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.calibration and self.robot != ROBOT:
+            raise InputError(
+                f"task.robot is {self.robot!r} beside task.calibration, which has a robot of its own: leave one of the "
+                "two out."
+            )
 
     def environment(self, design: PolicyDesign) -> dict[str, Any]:
         """Keyword arguments of the environment."""
@@ -57,7 +70,7 @@ class TaskSettings(Validated):
 
     def _robot_and_soil(self) -> dict[str, Any]:
         if not self.calibration:
-            return {"soil": self.soil, "randomisation": self.randomisation}
+            return {"robot": self.robot, "soil": self.soil, "randomisation": self.randomisation}
         # a calibration has a spread of its own in place of the default one
         chosen = True if self.randomisation == Randomisation() else self.randomisation
         return {"calibration": self.calibration, "ground": self.ground, "randomisation": chosen}
@@ -155,8 +168,9 @@ class TrainingSettings:
         content = asdict(self)
         for name in ("description", "seeds", "validation_interval"):
             del content[name]
+        robot = get_robot(content["task"].pop("robot"))
         # the policy is fitted to this filter: with another one it has to be trained anew
-        content["filter"] = asdict(FilterModel.of(ddagr(), Sensors()))
+        content["filter"] = asdict(FilterModel.of(robot, Sensors()))
         if content["filter"]["robot"]["drivetrain"] == asdict(Drivetrain()):
             # one without parts is no part: digests of before robots had one stay as they were
             del content["filter"]["robot"]["drivetrain"]
@@ -164,7 +178,7 @@ class TrainingSettings:
             # likewise before policies had one
             del content["design"]["tracker"]
         else:
-            content["inertial"] = asdict(InertialModel.of(ddagr(), Sensors()).knowledge)
+            content["inertial"] = asdict(InertialModel.of(robot, Sensors()).knowledge)
             if content["inertial"]["learns_vibration"]:
                 # before there was a choice it always did
                 del content["inertial"]["learns_vibration"]

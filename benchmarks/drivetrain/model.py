@@ -202,8 +202,9 @@ def _with_late_starts(times: Array, events: Array, before: Array, wait: float) -
 
 @njit(cache=True)
 def simulate(
-    p: Array, times: Array, events: Array, before: Array, speeds: Array, count: int, step: float, windup: int
-) -> Array:
+    p: Array, times: Array, events: Array, before: Array, speeds: Array, count: int, step: float, windup: int,
+    loads: Array,
+) -> Array:  # fmt: skip
     """Bank speeds and the vehicle's motion at every step.
 
     Args:
@@ -215,6 +216,7 @@ def simulate(
         count: number of steps.
         step: [s].
         windup: of ANTI_WINDUP.
+        loads: factors (m,) on the turning load from each command on.
 
     Returns:
         (count + 1, 4) bank speeds right and left, yaw rate as a difference of the banks, vehicle speed [rad/s].
@@ -231,6 +233,7 @@ def simulate(
         load = viscous * w[i] + rolling * _saturating(w[i] / ROLLING_SPEED) + (resisting if i == 0 else -resisting)
         z[i] = min(max(load - kp * (point[i] - w[i]), -most), most)
     work, mean = np.empty((4, 2)), np.zeros(2)
+    p = p.copy()
     times = _with_late_starts(times, events, before, p[START_DELAY])
     event = 0
     out[0, 0], out[0, 1], out[0, 2], out[0, 3] = w[0], w[1], body[0], body[1]
@@ -241,6 +244,7 @@ def simulate(
         while event < times.size and times[event] < end:
             _set_points(p, wanted, smooth, point, mean, max(times[event] - now, 0.0), step)
             _ask(p, events[event], wanted)
+            p[TURNING_LOAD] = loads[event] * turning
             now = max(times[event], now)
             event += 1
         _set_points(p, wanted, smooth, point, mean, end - now, step)
@@ -250,17 +254,18 @@ def simulate(
     return out
 
 
-def run(p: Array, stretch: Stretch, windup: int, step: float = STEP) -> Array:
-    """Motion (n, 4) over a stretch, as :func:`simulate`."""
+def run(p: Array, stretch: Stretch, windup: int, step: float = STEP, loads: Array | None = None) -> Array:
+    """Motion (n, 4) over a stretch, as :func:`simulate`; ``loads`` are 1 by default."""
     count = int(np.ceil(stretch.duration / step)) + 1
     times, events = stretch.times, stretch.events
     before = events[0] if stretch.known else stretch.speeds
-    return simulate(p, times, events, before, stretch.speeds, count, step, windup)
+    factors = np.ones(len(times)) if loads is None else loads
+    return simulate(p, times, events, before, stretch.speeds, count, step, windup, factors)
 
 
-def predict(p: Array, stretch: Stretch, windup: int, step: float = STEP) -> Array:
-    """Encoder readings (n,) that the model gives for those of a stretch [rad/s]."""
-    motion = run(p, stretch, windup, step)
+def predict(p: Array, stretch: Stretch, windup: int, step: float = STEP, loads: Array | None = None) -> Array:
+    """Encoder readings (n,) that the model gives for those of a stretch [rad/s]; ``loads`` as of :func:`run`."""
+    motion = run(p, stretch, windup, step, loads)
     return read(motion, stretch, float(p[AVERAGING]), step)
 
 

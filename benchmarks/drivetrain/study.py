@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 
 from benchmarks.drivetrain.fit import Drives, Fit, Problem, Values, fit_drives
+from benchmarks.drivetrain.load_conditions import all_tried
 from benchmarks.drivetrain.model import STEP, residuals, run
 from benchmarks.drivetrain.parameters import ALL, ANTI_WINDUP, LOAD, OWN, ROBOT, USED, parameter_vector
 from benchmarks.drivetrain.scores import compare, held_out, residual_tables, shares_of_square, size
+from benchmarks.drivetrain.single_commands import summary
 from benchmarks.drivetrain.stretches import Stretch, find_stretches
-from benchmarks.drivetrain.timing import imu_timing, shift_summary
+from benchmarks.drivetrain.timing import imu_timing
 from ddagr_gym.recordings.load import load_recording
 from ddagr_gym.recordings.schema import Recording
 
@@ -225,7 +227,8 @@ def run_study(folder: Path, progress: Progress = lambda line: None) -> dict[str,
         "grass": own_load_forecast("grass", grass, robot, {"grass": whole.values["gravel"]}),
         "husky": husky(folder),
         "timing": {d: imu_timing(r, -1.0 if d in REVERSED_GYRO else 1.0) for d, r in recordings.items()},
-        "shifts": {d: shift_summary(drives[d], whole.values[d], WINDUP) for d in drives},
+        "single_commands": {d: summary(drives[d], whole.values[d], WINDUP) for d in drives},
+        "load_conditions": all_tried(drives, whole.values, WINDUP),
         "parts": parts_table(drives, folds, progress),
         "examples": examples(drives, folds[0]),
     }  # fmt: skip

@@ -1,18 +1,13 @@
-"""When the wheels answer: encoders against the IMU, and how much earlier or later than on average."""
+"""When the wheels answer: encoders against the IMU."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.drivetrain.model import predict
-from benchmarks.drivetrain.parameters import ANTI_WINDUP, parameter_vector
-from benchmarks.drivetrain.scores import loss, rms
-from benchmarks.drivetrain.stretches import BANKS, Stretch
+from benchmarks.drivetrain.stretches import BANKS
 from ddagr_gym.recordings.schema import Recording
 
 Array = NDArray[np.float64]
@@ -23,11 +18,6 @@ SMALLEST = {"turn": 0.5, "straight": 1.0}
 """Answers that are used: yaw rate [rad/s], speed [m/s]; several times what noise and slopes make of them."""
 BEFORE, FROM, UNTIL = 0.15, 1.0, 1.5
 """An answer goes from the mean before BEFORE to the mean between FROM and UNTIL after the start of the step [s]."""
-SHIFTS = np.arange(-0.30, 0.501, 0.04)
-"""Shifts that are tried [s], about the mean delay of 0.2 s."""
-FINER = np.array([-0.02, -0.01, 0.0, 0.01, 0.02])
-ROUNDS = 2
-"""Rounds over the commands of a stretch; the third changes nothing by more than FINER."""
 GRAVITY_FROM = 3.0
 """From this time of a step on, the accelerometer's median is its offset: the speed has settled [s]."""
 
@@ -92,40 +82,4 @@ def _lateness(pairs: Array) -> dict[str, float]:
         "error": float(0.93 * (quarter[1] - quarter[0]) / np.sqrt(len(late))),
         "steps": len(late),
         "correlation": float(np.corrcoef(pairs.T)[0, 1]),
-    }
-
-
-def shifted(stretch: Stretch, values: Mapping[str, float], windup: str) -> tuple[Array, Array]:
-    """Shift (m,) of each command that suits the readings best [s], and the residuals (n,) that are left [rad/s]."""
-    p, form = parameter_vector(values), ANTI_WINDUP[windup]
-    shifts = np.zeros(len(stretch.times))
-
-    def left(moves: Array) -> Array:
-        return stretch.value - predict(p, replace(stretch, times=np.maximum.accumulate(stretch.times + moves)), form)
-
-    for number in range(ROUNDS):
-        for event in range(1 if stretch.known else 0, len(shifts)):
-            trials = SHIFTS if number == 0 else shifts[event] + FINER
-            costs = []
-            for trial in trials:
-                moved = shifts.copy()
-                moved[event] = trial
-                costs.append(float(loss(left(moved)).sum()))
-            shifts[event] = trials[int(np.argmin(costs))]
-    return shifts, left(shifts)
-
-
-def shift_summary(stretches: list[Stretch], values: Mapping[str, float], windup: str) -> dict[str, Any]:
-    """Scatter of the shifts of a drive, and residuals before and after; in sample, one number per command."""
-    form, p = ANTI_WINDUP[windup], parameter_vector(values)
-    pairs = [shifted(s, values, windup) for s in stretches]
-    shifts = np.concatenate([s[1:] for s, _ in pairs])
-    before = np.concatenate([s.value - predict(p, s, form) for s in stretches])
-    quarter = np.percentile(shifts, [5, 25, 50, 75, 95])
-    return {
-        "quantiles_5_25_50_75_95": quarter.tolist(),
-        "robust_deviation": float(0.741 * (quarter[3] - quarter[1])),
-        "commands": len(shifts),
-        "rms_before": rms(before),
-        "rms_after": rms(np.concatenate([left for _, left in pairs])),
     }

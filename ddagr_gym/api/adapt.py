@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from ddagr_gym.adaptation.run import Adapted
     from ddagr_gym.adaptation.turns import CorrectedTurns
     from ddagr_gym.diagnosis.answer.verdict import Diagnosis
+    from ddagr_gym.parameters import Robot
 
 _ROBOT, _SOIL = "ddagr", "thesis_a1"
 _UNKNOWN = "unknown"
@@ -111,8 +112,8 @@ def adapt(
     Args:
         recordings: one or several recordings of the robot on the ground in question; None with a diagnosis or
             calibration that is finished.
-        robot: nominal: name, YAML file or object.
-        soil: nominal: name, YAML file or object.
+        robot: nominal: name, YAML file or object; with a diagnosis, that with which the drives were diagnosed.
+        soil: nominal, likewise.
         diagnosis: folder that ``ddagr diagnose`` wrote, in place of recordings.
         calibration: folder that ``ddagr calibrate`` wrote, in place of robot and soil: alone, or with recordings that
             are compared with its ordinary drives.
@@ -166,6 +167,7 @@ def adapt(
             found = replace(found, sensors=measured_sensors(taken, found.robot))
     elif diagnosis is not None:
         found = corrected_by_diagnosis(Path(diagnosis))
+        _check_same_robot(found, robot_from(robot))
     else:
         assert calibration is not None
         found = corrected_by_calibration(Path(calibration), ground)
@@ -197,6 +199,14 @@ def _check_sources(recordings: object, diagnosis: object, calibration: object, g
         raise InputError("a diagnosis and recordings or a calibration are given: leave out one of them.")
     if ground and calibration is None:
         raise InputError(f"the ground is {ground!r} and there is no calibration: give its folder.")
+
+
+def _check_same_robot(found: Corrected, nominal: Robot) -> None:
+    if found.robot.name != nominal.name:
+        raise InputError(
+            f"the diagnosis is of the robot {found.robot.name!r} and the controller knew {nominal.name!r}: name the "
+            "robot with whose data sheet the drives were diagnosed, and its soil."
+        )
 
 
 def _diagnosed(

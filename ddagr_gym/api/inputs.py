@@ -35,7 +35,7 @@ Sources: TypeAlias = Source | Sequence[Source]
 """One recording or several; the path of a folder stands for the recordings in it."""
 
 ENDINGS = (".csv", ".csv.gz", ".parquet", ".mcap", ".bag")
-"""Of the recordings that are taken from a folder."""
+"""Of the files that are taken from a folder; ROS 2 bags, which are folders themselves, are taken too."""
 
 
 def recordings_from(
@@ -79,8 +79,17 @@ def recording_from(
 def is_folder_of_drives(item: Any) -> bool:
     """Whether this is the path of a folder that is no recording itself (a ROS 2 bag)."""
     path = Path(item) if isinstance(item, str | os.PathLike) else None
-    bag = path is not None and ((path / "metadata.yaml").exists() or any(path.glob("*.db3")))
-    return path is not None and path.is_dir() and not bag
+    return path is not None and path.is_dir() and not _is_bag(path)
+
+
+def _is_bag(path: Path) -> bool:
+    """Whether a folder is a ROS 2 bag."""
+    return path.is_dir() and ((path / "metadata.yaml").exists() or any(path.glob("*.db3")))
+
+
+def _is_recording(path: Path) -> bool:
+    """Whether something in a folder of drives is one."""
+    return _is_bag(path) or (path.is_file() and path.name.endswith(ENDINGS))
 
 
 def sources_in(given: Sources) -> list[Any]:
@@ -100,9 +109,10 @@ def sources_in(given: Sources) -> list[Any]:
             found.append(item)
             continue
         path = Path(item)
-        inside = sorted(file for file in path.iterdir() if file.is_file() and file.name.endswith(ENDINGS))
+        inside = sorted(filter(_is_recording, path.iterdir()))
         if not inside:
-            raise InputError(f"the folder {path} holds no recording ({', '.join(ENDINGS)}): name another one.")
+            kinds = f"{', '.join(ENDINGS)}, or the folder of a ROS 2 bag"
+            raise InputError(f"the folder {path} holds no recording ({kinds}): name another one.")
         found += inside
     return found
 

@@ -240,6 +240,19 @@ def test_a_calibration_counts_by_what_it_says(calibration):
         make_environment(after)
 
 
+def test_a_robot_of_a_file_is_trained_on_and_counts_by_what_it_says(tmp_path, calibration):
+    path = tmp_path / "robot.yaml"
+    heavy = replace(get_robot("ddagr"), mass=200.0)
+    path.write_text(dump_config(heavy))
+    settings = load_settings("ppo_ekf", [f"task.robot={path}", "task.soil=thesis_a1", "environments=2"])
+    assert make_environment(settings).unwrapped.env.settings.robot == heavy
+    digest = settings.digest()
+    path.write_text(dump_config(replace(heavy, mass=201.0)))
+    assert len({digest, settings.digest(), load_settings("ppo_ekf", ["task.soil=thesis_a1"]).digest()}) == 3
+    with pytest.raises(InputError, match="which has a robot of its own"):
+        load_settings("ppo_ekf", [f"task.robot={path}", f"task.calibration={calibration}"])
+
+
 def test_a_file_of_effects_counts_by_what_it_says(tmp_path):
     path = tmp_path / "effects.yaml"
     before = load_settings("ppo_ekf")

@@ -74,6 +74,11 @@ def test_what_has_no_name_is_refused(diagnosis):
         ddagr_gym.adapt(diagnosis=folder)
 
 
+def test_a_diagnosis_of_another_robot_is_refused(diagnosis):
+    with pytest.raises(InputError, match="of the robot 'ddagr' and the controller knew 'husky'"):
+        ddagr_gym.adapt(robot="husky", diagnosis=diagnosis())
+
+
 def test_an_incomplete_diagnosis_is_warned_of(diagnosis, few_turns):
     with pytest.warns(InputWarning, match="not complete"):
         result = ddagr_gym.adapt(diagnosis=diagnosis(complete=False), turns=2)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import ddagr_gym
-from ddagr_gym.api.inputs import recording_from, recordings_from
+from ddagr_gym.api.inputs import recording_from, recordings_from, sources_in
 from ddagr_gym.api.nominal import OWN, nominal_from, thresholds_from
 from ddagr_gym.config import dump_config
 from ddagr_gym.diagnosis.gates.threshold_files import default_thresholds, save_thresholds
@@ -119,6 +119,16 @@ def test_files_folders_and_recordings_may_stand_side_by_side(drive, tmp_path):
     found = recordings_from([str(folder), tmp_path / "c.parquet", drive.recording, drive])
     assert [recording.meta.source for recording in found] == ["a.sim", "b.sim", "c.parquet", *["simulation"] * 2]
     assert len({len(recording) for recording in found}) == 1
+
+
+def test_bags_that_are_folders_count_among_the_drives_of_a_folder(tmp_path):
+    for name in ("b_bag", "c_bag", "notes"):
+        (tmp_path / name).mkdir()
+    (tmp_path / "b_bag" / "metadata.yaml").touch()
+    (tmp_path / "c_bag" / "c_bag_0.db3").touch()
+    (tmp_path / "a.csv.gz").touch()
+    assert [path.name for path in sources_in(tmp_path)] == ["a.csv.gz", "b_bag", "c_bag"]
+    assert sources_in(tmp_path / "b_bag") == [tmp_path / "b_bag"]
 
 
 @pytest.mark.parametrize(

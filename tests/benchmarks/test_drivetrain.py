@@ -9,11 +9,12 @@ import pytest
 
 from benchmarks.drivetrain import model
 from benchmarks.drivetrain.fit import Problem, fit_drives
+from benchmarks.drivetrain.load_conditions import quantities, tried
 from benchmarks.drivetrain.model import predict, read, run
 from benchmarks.drivetrain.parameters import ANTI_WINDUP, LOAD, NAMES, USED, parameter_vector, starting_values
 from benchmarks.drivetrain.scores import compare, size
+from benchmarks.drivetrain.single_commands import best_loads, best_shifts, summary, turning_errors, with_shifts
 from benchmarks.drivetrain.stretches import Stretch, find_stretches
-from benchmarks.drivetrain.timing import shifted
 from ddagr_gym.errors import InputError
 from ddagr_gym.recordings.schema import Recording
 
@@ -187,10 +188,45 @@ def test_late_commands_are_found(simulated):
     truth, _ = simulated
     stretch = drive([(8.0, 3.0), (-6.0, 2.0), (4.0, 9.0)])
     late = np.array([0.0, 0.1, -0.1, 0.2])
-    reading = predict(parameter_vector(truth["first"]), replace(stretch, times=stretch.times + late), WITHIN)
-    shifts, left = shifted(replace(stretch, value=reading), truth["first"], "within_limit")
+    reading = predict(parameter_vector(truth["first"]), with_shifts(stretch, late), WITHIN)
+    shifts = best_shifts(replace(stretch, value=reading), truth["first"], "within_limit")
     assert shifts == pytest.approx(late, abs=0.02)
-    assert size(left)["rms"] < 0.1
+
+
+def test_commands_under_which_turning_is_resisted_more_are_found(simulated):
+    truth, _ = simulated
+    stretch = drive([(8.0, 3.0), (-6.0, 2.0), (4.0, 9.0)])
+    p, loads = parameter_vector(truth["first"]), np.array([1.0, 1.3, 0.5, 1.0])
+    reading = predict(p, stretch, WITHIN, loads=loads)
+    read = replace(stretch, value=reading)
+    # under the first command nothing turns
+    assert best_loads(read, truth["first"], "within_limit")[1:] == pytest.approx(loads[1:])
+    found = summary([read], truth["first"], "within_limit")
+    assert found["turning_rms"]["own_load"] < 0.1 * found["turning_rms"]["as_fitted"]
+    assert found["second_halves_loss"]["load_of_first_half"] < 0.3 * found["second_halves_loss"]["as_fitted"]
+
+
+def test_a_load_that_falls_with_speed_is_told_from_one_that_depends_on_other_things(simulated):
+    truth, _ = simulated
+    rng = np.random.default_rng(0)
+    stretch = drive(rng.uniform(-9.0, 9.0, (24, 2)))
+    speed = np.array([quantities(stretch.events[0], command, 0.0)["speed"] for command in stretch.events])
+    p = parameter_vector(truth["first"])
+    reading = predict(p, stretch, WITHIN, loads=np.exp(0.1 - 0.3 * speed))
+    noisy = replace(stretch, value=reading + 0.02 * rng.standard_normal(len(reading)))
+    found = tried([noisy], truth["first"], "within_limit")
+    assert found["speed"]["multiple"] == pytest.approx(-0.3, abs=0.06)
+    assert found["speed"]["change"] < -3.0 * found["speed"]["deviation"]
+    assert all(found[name]["change"] > 0.5 * found["speed"]["change"] for name in ("time", "forwards", "to the left"))
+
+
+def test_the_error_of_a_turning_is_summed_over_its_first_seconds():
+    stretch = drive([(6.0, 2.0), (6.0, 2.0)])
+    p = parameter_vector(values())
+    motion = run(p, stretch, WITHIN)
+    speeds = predict(p, stretch, WITHIN)
+    faster = replace(stretch, value=speeds + np.where(stretch.bank == 0, 0.2, 0.0))
+    assert turning_errors(faster, motion) == pytest.approx([0.5, 0.5], abs=0.01)
 
 
 def recording(commands, encoders, spans, command_valid=None):
