@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.drivetrain.model import STEP, predict, run
+from benchmarks.drivetrain.model import STEP, predict
 from benchmarks.drivetrain.parameters import ANTI_WINDUP, parameter_vector
 from benchmarks.drivetrain.scores import loss, rms
 from benchmarks.drivetrain.stretches import Stretch
@@ -87,30 +87,22 @@ def best_loads(stretch: Stretch, values: Mapping[str, float], windup: str) -> Ar
     )
 
 
-def turning_errors(stretch: Stretch, motion: Array) -> Array:
+def turning_errors(stretch: Stretch, left: Array) -> Array:
     """Half the difference of both banks' residuals, summed over 5 s of every step that is long enough (k,) [rad].
 
     Args:
-        stretch: that is read.
-        motion: (n, 4) of the model.
+        stretch: that is read; between readings a bank's residual is a straight line.
+        left: residuals (n,) of its readings [rad/s].
     """
-    grid = STEP * np.arange(len(motion))
     ends = np.append(stretch.times[1:], stretch.duration)
     found = []
     for start, end in zip(stretch.times, ends, strict=True):
         if end - start < SHORTEST:
             continue
         t = np.arange(start, min(start + HORIZON, end), STEP)
-        right, left = (_residual(stretch, motion, grid, bank, t) for bank in (0, 1))
-        found.append(STEP * float((right - left).sum()) / 2.0)
+        right, other = (np.interp(t, stretch.time[mine], left[mine]) for mine in (stretch.bank == 0, stretch.bank == 1))
+        found.append(STEP * float((right - other).sum()) / 2.0)
     return np.array(found)
-
-
-def _residual(stretch: Stretch, motion: Array, grid: Array, bank: int, t: Array) -> Array:
-    """Residual of a bank's readings, in straight lines between them, at times (m,)."""
-    mine = stretch.bank == bank
-    left = stretch.value[mine] - np.interp(stretch.time[mine], grid, motion[:, bank])
-    return np.interp(t, stretch.time[mine], left)
 
 
 def second_halves(stretch: Stretch, values: Mapping[str, float], windup: str) -> tuple[Array, Array]:
@@ -159,9 +151,8 @@ def summary(stretches: Sequence[Stretch], values: Mapping[str, float], windup: s
         "both": (late, both),
     }
     errors = {name: _errors(stretches, of, factors, p, form) for name, (of, factors) in moved.items()}
-    before, after = (
-        np.concatenate(x) for x in zip(*(second_halves(s, values, windup) for s in stretches), strict=True)
-    )
+    halves = [second_halves(s, values, windup) for s in stretches]
+    before, after = (np.concatenate(losses) for losses in zip(*halves, strict=True))
     in_a_row = np.concatenate([np.log(np.maximum(f, LOADS[1])) for f in loads])
     return {
         "lateness": _quantiles(np.concatenate([s[1:] for s in shifts])),
@@ -184,11 +175,9 @@ def _errors(
     """Residuals (n,) [rad/s] and errors of the turning (k,) [rad] of a drive with some commands' numbers changed."""
     residuals, turnings = [], []
     for number, (stretch, driven) in enumerate(zip(stretches, moved, strict=True)):
-        motion = run(p, driven, form, loads=None if loads is None else loads[number])
-        grid = STEP * np.arange(len(motion))
-        speeds = [np.interp(stretch.time, grid, motion[:, bank]) for bank in (0, 1)]
-        residuals.append(stretch.value - np.where(stretch.bank == 0, *speeds))
-        turnings.append(turning_errors(stretch, motion))
+        left = stretch.value - predict(p, driven, form, loads=None if loads is None else loads[number])
+        residuals.append(left)
+        turnings.append(turning_errors(stretch, left))
     return np.concatenate(residuals), np.concatenate(turnings)
 
 
