@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from benchmarks.drivetrain.fit import SCALE
 from benchmarks.drivetrain.model import predict
 from benchmarks.drivetrain.parameters import ANTI_WINDUP, parameter_vector
-from benchmarks.drivetrain.scores import joined
+from benchmarks.drivetrain.scores import by_step, joined, summed
 from benchmarks.drivetrain.stretches import Stretch
 
 Array = NDArray[np.float64]
@@ -68,7 +68,10 @@ def tried(stretches: Sequence[Stretch], values: Mapping[str, float], windup: str
     names: tuple[str, ...] = ()
     for stretch in stretches:
         as_it_is = predict(p, stretch, form)
-        known = [_quantities(stretch, k, count) for k in range(len(stretch.times))]
+        known = [
+            quantities(stretch.command_before(k), command, (stretch.first + k) / count)
+            for k, command in enumerate(stretch.events)
+        ]
         names = tuple(known[0])
         by_command = np.stack([_sensitivity(p, stretch, form, k, as_it_is) for k in range(len(known))], axis=1)
         residuals.append(stretch.value - as_it_is)
@@ -76,11 +79,6 @@ def tried(stretches: Sequence[Stretch], values: Mapping[str, float], windup: str
     left, x, step = np.concatenate(residuals), np.concatenate(columns), joined(stretches, "step")
     weight = 1.0 / np.sqrt(1.0 + (left / SCALE) ** 2)
     return {name: _judged(left, x[:, [0, k]], weight, step) for k, name in enumerate(names, 1)}
-
-
-def _quantities(stretch: Stretch, number: int, count: int) -> dict[str, float]:
-    before = stretch.events[number - 1] if number else stretch.events[0] if stretch.known else stretch.speeds
-    return quantities(before, stretch.events[number], (stretch.first + number) / count)
 
 
 def _sensitivity(p: Array, stretch: Stretch, form: int, number: int, as_it_is: Array) -> Array:
@@ -97,10 +95,10 @@ def _judged(left: Array, columns: Array, weight: Array, step: NDArray[np.int64])
     for k in range(PARTS):
         mine = part == k
         after[mine] -= columns[mine] @ _fitted(left[~mine], columns[~mine], weight[~mine])
-    change = np.bincount(np.unique(step, return_inverse=True)[1], weight * (after**2 - left**2))
+    change, deviation = summed(by_step(step, weight * (after**2 - left**2)))
     return {
-        "change": float(change.sum()),
-        "deviation": float(np.sqrt(len(change)) * np.std(change)),
+        "change": change,
+        "deviation": deviation,
         "multiple": float(_fitted(left, columns, weight)[1]),
     }
 

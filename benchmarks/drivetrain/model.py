@@ -257,10 +257,10 @@ def simulate(
 def run(p: Array, stretch: Stretch, windup: int, step: float = STEP, loads: Array | None = None) -> Array:
     """Motion (n, 4) over a stretch, as :func:`simulate`; ``loads`` are 1 by default."""
     count = int(np.ceil(stretch.duration / step)) + 1
-    times, events = stretch.times, stretch.events
-    before = events[0] if stretch.known else stretch.speeds
-    factors = np.ones(len(times)) if loads is None else loads
-    return simulate(p, times, events, before, stretch.speeds, count, step, windup, factors)
+    factors = np.ones(len(stretch.times)) if loads is None else loads
+    return simulate(
+        p, stretch.times, stretch.events, stretch.command_before(0), stretch.speeds, count, step, windup, factors
+    )
 
 
 def predict(p: Array, stretch: Stretch, windup: int, step: float = STEP, loads: Array | None = None) -> Array:

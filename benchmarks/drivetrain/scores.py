@@ -54,6 +54,16 @@ def held_out(folds: Sequence[Fit]) -> dict[str, Array]:
     return {d: np.where(first.fitted[d], second.residuals[d], first.residuals[d]) for d in first.values}
 
 
+def by_step(step: NDArray[np.int64], values: Array) -> Array:
+    """Sums (k,) of values (n,) over the readings of each step."""
+    return np.bincount(np.unique(step, return_inverse=True)[1], values)
+
+
+def summed(values: Array) -> tuple[float, float]:
+    """Sum of values (k,) that are independent of each other, and its standard deviation."""
+    return float(values.sum()), float(np.sqrt(len(values)) * np.std(values))
+
+
 def compare(drives: Drives, base: Mapping[str, Array], other: Mapping[str, Array]) -> dict[str, Any]:
     """What a changed model does to the held-out loss: its change summed over steps, in standard deviations too.
 
@@ -64,12 +74,10 @@ def compare(drives: Drives, base: Mapping[str, Array], other: Mapping[str, Array
     """
     changes = []
     for drive, stretches in drives.items():
-        steps = np.unique(joined(stretches, "step"), return_inverse=True)[1]
-        changes.append(np.bincount(steps, loss(other[drive]) - loss(base[drive])))
-    change = np.concatenate(changes)
-    deviation = float(np.sqrt(len(change)) * np.std(change))
+        changes.append(by_step(joined(stretches, "step"), loss(other[drive]) - loss(base[drive])))
+    change, deviation = summed(np.concatenate(changes))
     return {
-        "loss_change": float(change.sum()),
+        "loss_change": change,
         "deviation": deviation,
         "drives": {drive: size(found) for drive, found in other.items()},
     }

@@ -59,6 +59,12 @@ class Stretch:
     since: Array
     first: int = 0
 
+    def command_before(self, number: int) -> Array:
+        """Command (2,) before one of these, counted from 0; before an unknown one, the speeds at the start [rad/s]."""
+        if number:
+            return np.asarray(self.events[number - 1])
+        return np.asarray(self.events[0] if self.known else self.speeds)
+
 
 @dataclass(frozen=True)
 class _Piece:

@@ -181,7 +181,7 @@ def examples(drives: Drives, fit: Fit) -> list[dict[str, Any]]:
             t = STEP * np.arange(len(motion)) - start
             keep = (t > -0.5) & (t < 6.1)
             mine = (stretch.time - start > -0.5) & (stretch.time - start < 6.1)
-            before = stretch.events[max(event - 1, 0)] if event or stretch.known else stretch.speeds
+            before = stretch.command_before(event)
             found.append({
                 "drive": drive, "before": before.tolist(), "command": stretch.events[event].tolist(),
                 "model_t": t[keep][::2].round(3).tolist(), "model": motion[keep][::2, :2].round(3).tolist(),
