@@ -311,8 +311,8 @@ class Numerics(Validated):
         substeps: least number of integrator steps per sensor sample.
         maximum_step: longest integrator step [s].
         launch_substeps: steps into which a step is divided at a launch, and where its error estimate is too large.
-        launch_change: change of a rim speed within a step, relative to the wheel's speed, above which it is divided
-            beforehand, as at a start from rest (the damping varies as 1/speed).
+        launch_change: change of a rim speed within a step, relative to the wheel's speed (at least ``rest_speed``),
+            above which it is divided beforehand, as at a start from rest (the damping varies as 1/speed).
         accepted_error: embedded error estimate of a step above which it is redone, divided [m/s]; more at speed,
             twice that at 0.33 m/s.
         force_extrapolation: relative change of a wheel's motion up to which the forces that begin a step are

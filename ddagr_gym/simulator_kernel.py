@@ -122,14 +122,17 @@ def _speed_change(row: Array, bank: int, step: float) -> float:
 
 @kernel()
 def _division(row: Array, numerics: StepNumerics) -> int:
-    """Steps for the coming sample: more while a bank's rim speed changes fast against the wheel's speed."""
+    """Steps for the coming sample: more while a bank's rim speed changes fast against the wheel's speed.
+
+    A wheel slower than the rest speed counts as that fast: one that hardly begins to turn divides nothing.
+    """
     steps = max(numerics.substeps, math.ceil(row[SAMPLE_PERIOD] / numerics.maximum_step - 1e-9))
     step = row[SAMPLE_PERIOD] / steps
     for bank in range(2):
         rim = row[WHEEL + bank] + row[WHEEL + 8 + bank]
         change = _speed_change(row, bank, step)
-        speed = max(abs(rim * row[OMEGA + bank]), abs(row[V_X]))
-        if abs(rim * change) > numerics.launch_change * speed and change != 0.0:
+        speed = max(abs(rim * row[OMEGA + bank]), abs(row[V_X]), numerics.forces.rest_speed)
+        if abs(rim * change) > numerics.launch_change * speed:
             return steps * numerics.launch_substeps
     return steps
 

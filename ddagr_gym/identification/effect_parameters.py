@@ -115,10 +115,11 @@ def effect_columns(
         return columns
     values = read(point.effects, parameters)
     reference = problem.reference(point) if reference is None else reference
-    for k, parameter in enumerate(parameters):
-        step = parameter.step if parameter.low <= values[k] + parameter.step <= parameter.high else -parameter.step
-        tried = values.copy()
-        tried[k] += step
-        changed = problem.varied(replace(point, effects=moved(point.effects, parameters, tried)), reference)
-        columns[..., k] = problem.blocked.change(changed, reference.prediction) / step
+    steps = [
+        p.step if p.low <= value + p.step <= p.high else -p.step for p, value in zip(parameters, values, strict=True)
+    ]
+    beside = [moved(point.effects, parameters, tried) for tried in values + np.diag(steps)]
+    changes = problem.changes([(None, replace(point, effects=effects)) for effects in beside], reference)
+    for k, (change, step) in enumerate(zip(changes, steps, strict=True)):
+        columns[..., k] = change / step
     return columns

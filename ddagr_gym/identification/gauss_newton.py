@@ -247,9 +247,13 @@ def fit_states(problem: Problem, values: Array, iterations: int = 2) -> tuple[Ar
 
 def _raw_columns(problem: Problem, here: _Iterate) -> Array:
     """Residual and sensitivities as columns (W, R, 1 + P)."""
-    sensitivities = np.concatenate([here.by_parameter[..., problem.free], here.by_effect], axis=2)
-    residual = problem.residual(here.point, here.prediction)[..., None]
-    return np.concatenate([residual, problem.padded(sensitivities)], axis=2)
+    residual = problem.residual(here.point, here.prediction)
+    readings, free = here.by_parameter.shape[1], np.flatnonzero(problem.free)
+    columns = np.zeros((*residual.shape, 1 + free.size + here.by_effect.shape[2]))
+    columns[..., 0] = residual
+    columns[:, :readings, 1 : 1 + free.size] = here.by_parameter[..., free]
+    columns[:, :readings, 1 + free.size :] = here.by_effect
+    return columns
 
 
 def _linearised(problem: Problem, here: _Iterate, raw: Array, parameters: Sequence[EffectParameter]) -> Linearised:

@@ -72,7 +72,8 @@ class Elimination:
     def project(self, columns: Array) -> Array:
         """Columns (W, R, K), robustly weighted, without what the local unknowns explain."""
         columns = self._weighted(columns)
-        return np.asarray(columns - np.matmul(self.basis, np.matmul(self.basis.transpose(0, 2, 1), columns)))
+        explained = np.matmul(self.basis, np.matmul(self.basis.transpose(0, 2, 1), columns))
+        return np.subtract(columns, explained, out=explained)
 
     def explain(self, columns: Array) -> Array:
         """(W, S, K) changes of the local unknowns that explain columns (W, R, K) best."""

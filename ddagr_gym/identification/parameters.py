@@ -71,7 +71,10 @@ class ModelParameter:
         """(W,) whether it acts in windows of these recordings (W,)."""
         if self.scope is None:
             return np.ones(len(recording), dtype=bool)
-        return np.isin(recording, tuple(self.scope))
+        acts = np.zeros(len(recording), dtype=bool)
+        for number in self.scope:
+            acts |= recording == number
+        return acts
 
     def apply(self, rows: Array, value: float, recording: NDArray[np.int64]) -> None:
         """Change the rows (W, SIZE) of the windows in which it acts, in place."""

@@ -8,7 +8,7 @@ sensitivities are; :mod:`~ddagr_gym.identification.least_squares` has the algebr
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 
@@ -22,6 +22,7 @@ from ddagr_gym.identification.least_squares import Elimination, huber_loss, hube
 from ddagr_gym.identification.motor_currents import CurrentModel
 from ddagr_gym.identification.nuisances import SHIFT_AS_EFFECT, Nuisances
 from ddagr_gym.identification.parameters import disjoint_scopes
+from ddagr_gym.identification.side_by_side import side_by_side
 from ddagr_gym.identification.spells import Spell
 from ddagr_gym.identification.window_model import Reference, WindowModel
 from ddagr_gym.identification.windows import CHANNELS, WindowSet
@@ -65,6 +66,13 @@ class Point:
     values: Array
     states: Array
     effects: tuple[Effect, ...] = ()
+
+
+def _beside(point: Point, chosen: Sequence[int], steps: Array | float) -> Point:
+    """A point with some parameters beside it."""
+    values = point.values.copy()
+    values[chosen] += steps
+    return replace(point, values=values)
 
 
 class Problem:
@@ -208,10 +216,26 @@ class Problem:
         """(W, T, 8)."""
         return self.model.predict(point.values, point.states, point.effects)
 
-    def varied(self, point: Point, reference: Reference) -> Array:
-        """The same where it only serves a sensitivity, near a reference."""
+    def varied(self, point: Point, reference: Reference, threads: int | None = None) -> Array:
+        """The same where it only serves a sensitivity, near a reference; on as many threads as the model by default."""
         model = self._slopes or self.model
+        model = model if threads is None else model.on_threads(threads)
         return model.predict(point.values, point.states, point.effects, near=reference)
+
+    def changes(self, pairs: Sequence[tuple[Point | None, Point]], reference: Reference) -> Iterator[Array]:
+        """Weighted changes (W, M) of such predictions between pairs of points.
+
+        Args:
+            pairs: begin and end of each change; it begins at the reference where there is None.
+            reference: of :meth:`reference`, near which all points are.
+        """
+
+        def change(pair: tuple[Point | None, Point], threads: int) -> Array:
+            begin, end = pair
+            before = reference.prediction if begin is None else self.varied(begin, reference, threads)
+            return self.blocked.change(self.varied(end, reference, threads), before)
+
+        return side_by_side(change, pairs, self.model.threads)
 
     def reference(self, point: Point) -> Reference:
         """What predictions for sensitivities are held against: that at a point, by the same numerics."""
@@ -274,21 +298,17 @@ class Problem:
             elif not parameter.heading and (self.prior[k] > 0.0 or k in self._varied):
                 simulated.append(k)
         reference = self.reference(point) if reference is None else reference
-        for together in disjoint_scopes(self.nuisances.parameters, simulated):
-            spans = np.array([self._difference(k, point.values[k]) for k in together])
-            centred = spans[:, 0].any()
-            begin = self._beside(point, together, spans[:, 0], reference) if centred else reference.prediction
-            change = self.blocked.change(self._beside(point, together, spans[:, 1], reference), begin)
-            for k, (start, end) in zip(together, spans, strict=True):
+        groups = disjoint_scopes(self.nuisances.parameters, simulated)
+        spans = [np.array([self._difference(k, point.values[k]) for k in group]) for group in groups]
+        pairs = [
+            (_beside(point, group, span[:, 0]) if span[:, 0].any() else None, _beside(point, group, span[:, 1]))
+            for group, span in zip(groups, spans, strict=True)
+        ]
+        for group, span, change in zip(groups, spans, self.changes(pairs, reference), strict=True):
+            for k, (start, end) in zip(group, span, strict=True):
                 acts = self.nuisances.parameters[k].acts_in(self.blocked.windows.recording)
                 columns[acts, :, k] = change[acts] / (end - start)
         return self.heading_columns(point, columns, reference)
-
-    def _beside(self, point: Point, chosen: Sequence[int], steps: Array, reference: Reference) -> Array:
-        """Prediction with some parameters beside a point."""
-        moved = point.values.copy()
-        moved[chosen] += steps
-        return self.varied(replace(point, values=moved), reference)
 
     def _difference(self, k: int, value: float) -> tuple[float, float]:
         """Begin and end of the finite difference to parameter k, from its value.
@@ -304,12 +324,9 @@ class Problem:
     def local_columns(self, point: Point, reference: Reference) -> Array:
         """The sensitivities (W, M, P) to the parameters that have a local unknown; 0 for all others."""
         columns = np.zeros((*self.blocked.mask.shape, len(self.prior)))
-        for index in self._varied:
-            moved = point.values.copy()
-            moved[index] += self.nuisances.parameters[index].step
-            varied = self.varied(replace(point, values=moved), reference)
-            change = self.blocked.change(varied, reference.prediction)
-            columns[..., index] = change / self.nuisances.parameters[index].step
+        pairs = [(None, _beside(point, [k], self.nuisances.parameters[k].step)) for k in self._varied]
+        for k, change in zip(self._varied, self.changes(pairs, reference), strict=True):
+            columns[..., k] = change / self.nuisances.parameters[k].step
         return columns
 
     @property
@@ -333,7 +350,7 @@ class Problem:
         values = point.values.copy()
         values[own] += step
         reference = self.reference(point) if reference is None else reference
-        change = self.blocked.change(self.varied(self.moved(point, values), reference), reference.prediction) / step
+        change = next(self.changes([(None, self.moved(point, values))], reference)) / step
         for k in own:
             chosen = self.nuisances.parameters[k].acts_in(self.blocked.windows.recording)
             found[..., k] = np.where(chosen[:, None], change, 0.0)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ddagr_gym.identification.fit_numerics import FOLLOWED_CHANGE, reference_numerics, run_in_numerics
 from ddagr_gym.identification.motor_currents import CurrentModel
 from ddagr_gym.identification.parameters import ModelParameter
+from ddagr_gym.identification.side_by_side import side_by_side
 from ddagr_gym.identification.spells import Spell
 from ddagr_gym.identification.windows import CHANNELS, STATE, RunIn, WindowSet
 from ddagr_gym.parameters import Drivetrain, Imu, Numerics, PoseReceiver, Robot, Sensors, Soil, WheelEncoder
@@ -127,7 +128,7 @@ class WindowModel:
         self.currents = currents
         self.parameters = tuple(parameters)
         self._numerics = Numerics.smooth() if numerics is None else numerics
-        self._threads = threads
+        self.threads = threads
         self._delay = delay
         self._imposed = imposed
         if imposed:
@@ -168,6 +169,12 @@ class WindowModel:
         if integrals is None:
             integrals = model._integrals_near(near.run_in, values, effects)
         return model._channels(values, states, effects, integrals, to_follow(near.forces))
+
+    def on_threads(self, threads: int) -> WindowModel:
+        """The same model on another number of threads."""
+        model = copy(self)
+        model.threads = threads
+        return model
 
     def _integrals_near(self, run_in: ForceRecord | None, values: Array, effects: Sequence[Effect]) -> Array:
         return self.first_integrals(values, effects, None if run_in is None else to_follow(run_in))
@@ -235,7 +242,7 @@ class WindowModel:
             forces: that are kept, or followed.
         """
         chosen = tuple(e for e in (*self._known, *effects) if not (self._imposed and e.group == _MOTORS))
-        simulator = Simulator(self.windows.count, numerics=self._numerics, effects=chosen, threads=self._threads)
+        simulator = Simulator(self.windows.count, numerics=self._numerics, effects=chosen, threads=self.threads)
         simulator.rows[:] = self._row
         self._silence(simulator)
         for parameter, value in zip(self.parameters, values, strict=True):
@@ -327,10 +334,15 @@ class WindowModel:
         base = near.prediction
         derivatives = np.zeros((*base.shape, len(STATE)))
         derivatives[..., :3] = pose_derivatives(states, base)
-        # imposed wheel speeds leave nothing of the initial ones
-        for k in range(3, _OMEGA.start) if self._imposed else _MOVING_STATE:
+
+        def derivative(k: int, threads: int) -> Array:
             moved = states.copy()
             moved[:, k] += STATE_STEPS[k]
-            varied = self.predict(values, moved, effects, near.integrals, near=near)
-            derivatives[..., k] = (varied - base) / STATE_STEPS[k]
+            varied = self.on_threads(threads).predict(values, moved, effects, near.integrals, near=near)
+            return np.asarray((varied - base) / STATE_STEPS[k])
+
+        # imposed wheel speeds leave nothing of the initial ones
+        moving = range(3, _OMEGA.start) if self._imposed else _MOVING_STATE
+        for k, found in zip(moving, side_by_side(derivative, moving, self.threads), strict=True):
+            derivatives[..., k] = found
         return derivatives

@@ -330,6 +330,9 @@ def evaluate_forces(row: Array, refresh: float, numerics: StepNumerics, actions:
 
 @kernel()
 def _may_extrapolate(row: Array, limit: float) -> bool:
+    """Whether no wheel's velocity has changed by more than a share of its speed; never where that share is 0."""
+    if limit <= 0.0:
+        return False
     for i in range(4):
         v_x, _, rim, speed = relative_motion(row, i)
         change = limit * max(abs(v_x), abs(rim)) * speed
@@ -337,7 +340,7 @@ def _may_extrapolate(row: Array, limit: float) -> bool:
         d_y = row[V_Y] + row[YAW_RATE] * side_slip_x(row, i) - row[WHEEL_V_Y + i]
         d_rim = (row[WHEEL + i] + row[WHEEL + 8 + i]) * (row[OMEGA + i % 2] - row[WHEEL_OMEGA + i])
         carried = row[LOAD + i] > 0.0 and row[BOGGED + i] == 0.0 and stiffness_of(row, i) > 0.0
-        if not (carried and abs(d_x) < change and abs(d_y) < change and abs(d_rim) < change):
+        if not (carried and abs(d_x) <= change and abs(d_y) <= change and abs(d_rim) <= change):
             return False
     return True
 

@@ -41,7 +41,7 @@ class StepNumerics(NamedTuple):
         force_extrapolation: relative change of a wheel's motion up to which forces are extrapolated.
         accepted_error: of a step [m/s].
         launch_substeps: parts of a step that is divided.
-        launch_change: relative change of a rim speed above which a step is divided.
+        launch_change: change of a rim speed above which a step is divided, relative to the wheel's.
         substeps: least number of steps per sample.
         maximum_step: [s].
     """

@@ -217,7 +217,7 @@ def gates() -> None:
 def window_elimination() -> None:
     """What a slope and a gyro bias do to one window, before and after its free initial state has its say."""
     from ddagr_gym.diagnosis.planning.planned_drive import plan
-    from ddagr_gym.diagnosis.search.scan import probe_column
+    from ddagr_gym.diagnosis.search.scan import probe_columns
     from ddagr_gym.identification.windows import CHANNELS
     from ddagr_gym.physics.effects.gyro_bias import GyroBias
     from ddagr_gym.physics.effects.slope import Slope
@@ -228,7 +228,7 @@ def window_elimination() -> None:
     figure, panels = plt.subplots(2, 2, figsize=(8.0, 4.4), sharex=True)
     length = problem.blocked.weights.shape[2] * problem.blocked.windows.period
     for column, (effect, title) in enumerate(((Slope(0.02), "slope of 1.1 degrees"), (GyroBias(0.005), "gyro bias"))):
-        raw = problem.padded(probe_column(problem, fitted, effect)[..., None])
+        raw = problem.padded(next(probe_columns(problem, fitted, [effect]))[..., None])
         after = fitted.elimination.project(raw)
         for row, channel in enumerate(("pose_x", "yaw_rate")):
             place = CHANNELS.index(channel)

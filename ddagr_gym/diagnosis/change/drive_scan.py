@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ddagr_gym.diagnosis.change.ordinary import Scores
 from ddagr_gym.diagnosis.search.candidates import Candidate, candidates_of, moved_field
 from ddagr_gym.diagnosis.search.inner_products import InnerProducts
-from ddagr_gym.diagnosis.search.scan import drive_extent, probe_column
+from ddagr_gym.diagnosis.search.scan import drive_extent, probe_columns
 from ddagr_gym.diagnosis.search.sensor_effects import record_drives
 from ddagr_gym.identification.effect_parameters import effect_columns, effect_parameters
 from ddagr_gym.identification.gauss_newton import Fitted
@@ -211,7 +211,7 @@ def scan_drive(problem: Problem, fitted: Fitted) -> DriveScan:
     drives = record_drives(problem, fitted.point)
     named = effect_parameters(fitted.point.effects)
     probes = [probe for item in compared for probe in item.candidate.probes]
-    columns = [probe_column(problem, fitted, probe, drives) for probe in probes]
+    columns = list(probe_columns(problem, fitted, probes, drives))
     columns = with_dead_time_of_robot(problem, fitted, probes, columns)
     by_effect = effect_columns(problem, fitted.point, named)
     free = problem.open_at(fitted.point)

@@ -24,7 +24,7 @@ from ddagr_gym.diagnosis.planning.planned_drive import RATE, SENSORS, Plan, plan
 from ddagr_gym.diagnosis.preprocessing.session import DiagnosisSession
 from ddagr_gym.diagnosis.search.candidates import Candidate, candidates_of
 from ddagr_gym.diagnosis.search.initial_guess import looped
-from ddagr_gym.diagnosis.search.scan import drive_extent, probe_column
+from ddagr_gym.diagnosis.search.scan import drive_extent, probe_columns
 from ddagr_gym.diagnosis.setting import Setting
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.least_squares import explained_by
@@ -188,11 +188,11 @@ def _columns(prepared: Plan, rivals: Sequence[Effect]) -> _Columns:
     whole, probes = [], []
     for rival in rivals:
         whole.append(len(columns))
-        columns.append(probe_column(problem, fitted, rival))
+        columns += probe_columns(problem, fitted, [rival])
         own = []
         for candidate in _close(candidates_of(type(rival), extent, 0), rival):
             places = tuple(range(len(columns), len(columns) + len(candidate.probes)))
-            columns += [probe_column(problem, fitted, probe) for probe in candidate.probes]
+            columns += probe_columns(problem, fitted, candidate.probes)
             own.append((places, 1.0 / np.array(candidate.scales) ** 2))
         probes.append(tuple(own))
     table = fitted.elimination.project(problem.padded(np.stack(columns, axis=2)))

@@ -7,7 +7,7 @@ probes are kept (:class:`~ddagr_gym.diagnosis.search.inner_products.Terms`), fro
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -21,6 +21,7 @@ from ddagr_gym.diagnosis.search.sensor_effects import Drives, acts_on_readings_o
 from ddagr_gym.identification.gauss_newton import Fitted
 from ddagr_gym.identification.nuisances import absorbed_sizes
 from ddagr_gym.identification.problem import Problem
+from ddagr_gym.identification.side_by_side import side_by_side
 from ddagr_gym.parameters import STANDARD_GRAVITY, Robot
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.effects.base import DriveExtent
@@ -73,15 +74,25 @@ def touched(probe: Effect, problem: Problem, prediction: Array) -> NDArray[np.bo
     return result
 
 
-def probe_column(problem: Problem, fitted: Fitted, probe: Effect, drives: Drives | None = None) -> Array:
-    """Weighted change of the block means by a probe at the fitted model, (W, M).
+def probe_columns(
+    problem: Problem, fitted: Fitted, probes: Sequence[Effect], drives: Drives | None = None
+) -> Iterator[Array]:
+    """Weighted change of the block means by each probe at the fitted model, (W, M).
 
     Args:
         problem: what was fitted.
         fitted: the model.
-        probe: effect at a size.
+        probes: effects at a size.
         drives: simulation of the fitted model, with which an effect on readings needs none of its own.
     """
+
+    def column(probe: Effect, threads: int) -> Array:
+        return _probe_column(problem, fitted, probe, drives, threads)
+
+    return side_by_side(column, probes, problem.model.threads)
+
+
+def _probe_column(problem: Problem, fitted: Fitted, probe: Effect, drives: Drives | None, threads: int) -> Array:
     if drives is not None and acts_on_readings_only(probe):
         column = problem.blocked.change(drives.readings(probe), fitted.prediction)
         return np.where(problem.present(probe.name)[:, None], column, 0.0)
@@ -91,7 +102,8 @@ def probe_column(problem: Problem, fitted: Fitted, probe: Effect, drives: Drives
         return column
     part = problem if chosen.all() else problem.subset(chosen)
     point = replace(fitted.point, states=fitted.point.states[chosen], effects=(*fitted.point.effects, probe))
-    column[chosen] = part.blocked.change(part.predict(point), fitted.prediction[chosen])
+    prediction = part.model.on_threads(threads).predict(point.values, point.states, point.effects)
+    column[chosen] = part.blocked.change(prediction, fitted.prediction[chosen])
     return column
 
 
@@ -113,17 +125,22 @@ def scan(
     extent = drive_extent(problem, fitted.prediction)
     assumed = {effect.name for effect in fitted.point.effects}
     candidates: list[Candidate] = []
-    columns: list[Array] = []
+    probes: list[Effect] = []
     drives = record_drives(problem, fitted.point)
     tried = absolute_effect_kinds(problem.blocked.windows.frames_apart) if kinds is None else kinds
     for name, kind in tried.items():
         # repeated readings are found in the values themselves (ddagr_gym.diagnosis.preprocessing.repeated_readings)
         if name in assumed or name == "sensor_hold":
             continue
-        for candidate in candidates_of(kind, extent, len(columns)):
+        for candidate in candidates_of(kind, extent, len(probes)):
             candidates.append(candidate)
-            columns += [probe_column(problem, fitted, probe, drives) for probe in candidate.probes]
-        progress(name)
+            probes += candidate.probes
+    columns = []
+    following = [*(probe.name for probe in probes[1:]), None]
+    for probe, after, column in zip(probes, following, probe_columns(problem, fitted, probes, drives), strict=True):
+        columns.append(column)
+        if probe.name != after:
+            progress(probe.name)
     lean = lean_column(problem, fitted)
     columns += [] if lean is None else [lean]
     free = problem.open_at(fitted.point)
