@@ -21,7 +21,7 @@ from ddagr_gym.identification.effect_parameters import (
     moved,
     read,
 )
-from ddagr_gym.identification.least_squares import Elimination, Linearised
+from ddagr_gym.identification.least_squares import Elimination, Linearised, beside_residual
 from ddagr_gym.identification.problem import STATE_PRIOR, Point, Problem
 from ddagr_gym.identification.size_prior import size_penalty
 from ddagr_gym.identification.window_model import Reference
@@ -248,12 +248,7 @@ def fit_states(problem: Problem, values: Array, iterations: int = 2) -> tuple[Ar
 def _raw_columns(problem: Problem, here: _Iterate) -> Array:
     """Residual and sensitivities as columns (W, R, 1 + P)."""
     residual = problem.residual(here.point, here.prediction)
-    readings, free = here.by_parameter.shape[1], np.flatnonzero(problem.free)
-    columns = np.zeros((*residual.shape, 1 + free.size + here.by_effect.shape[2]))
-    columns[..., 0] = residual
-    columns[:, :readings, 1 : 1 + free.size] = here.by_parameter[..., free]
-    columns[:, :readings, 1 + free.size :] = here.by_effect
-    return columns
+    return beside_residual(residual, here.by_parameter[..., problem.free], here.by_effect)
 
 
 def _linearised(problem: Problem, here: _Iterate, raw: Array, parameters: Sequence[EffectParameter]) -> Linearised:

@@ -157,6 +157,17 @@ class Linearised:
         return np.sqrt(np.diag(covariance)), np.sqrt((scores**2).sum(axis=0))
 
 
+def beside_residual(residual: Array, *sensitivities: Array) -> Array:
+    """Columns (W, R, 1 + K): the residual (W, R), then sensitivities (W, M, K) with zeros in the priors' rows."""
+    columns = np.zeros((*residual.shape, 1 + sum(part.shape[2] for part in sensitivities)))
+    columns[..., 0] = residual
+    first = 1
+    for part in sensitivities:
+        columns[:, : part.shape[1], first : first + part.shape[2]] = part
+        first += part.shape[2]
+    return columns
+
+
 def explained_by(inner: Array, precision: Array, right: Array, ridge: float = 0.0) -> Array:
     """Changes of parameters that explain columns best: the minimum of (1) without bounds, one column at a time.
 

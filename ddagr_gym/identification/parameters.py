@@ -71,6 +71,7 @@ class ModelParameter:
         """(W,) whether it acts in windows of these recordings (W,)."""
         if self.scope is None:
             return np.ones(len(recording), dtype=bool)
+        # np.isin takes ten times as long for the few recordings of a scope, and every prediction asks
         acts = np.zeros(len(recording), dtype=bool)
         for number in self.scope:
             acts |= recording == number

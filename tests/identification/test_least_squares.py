@@ -3,7 +3,14 @@
 import numpy as np
 import pytest
 
-from ddagr_gym.identification.least_squares import Elimination, Linearised, bounded_step, huber_loss, huber_roots
+from ddagr_gym.identification.least_squares import (
+    Elimination,
+    Linearised,
+    beside_residual,
+    bounded_step,
+    huber_loss,
+    huber_roots,
+)
 
 
 def linear_problem(rng: np.random.Generator, windows: int = 40, noise: float = 1.0):
@@ -109,3 +116,13 @@ def test_the_step_in_many_bounds_is_the_best_there(seed: int) -> None:
     )
     assert ((step >= low - 1e-9) & (step <= high + 1e-9)).all()
     assert 0.5 * step @ information @ step - gradient @ step <= best.fun + 1e-6
+
+
+def test_sensitivities_stand_beside_the_residual_and_are_zero_in_the_rows_of_the_priors() -> None:
+    rng = np.random.default_rng(0)
+    residual, first, second = rng.normal(size=(4, 7)), rng.normal(size=(4, 5, 3)), rng.normal(size=(4, 5, 2))
+    columns = beside_residual(residual, first, second)
+    assert columns.shape == (4, 7, 6)
+    np.testing.assert_array_equal(columns[..., 0], residual)
+    np.testing.assert_array_equal(columns[:, :5, 1:], np.concatenate([first, second], axis=2))
+    assert not columns[:, 5:, 1:].any()

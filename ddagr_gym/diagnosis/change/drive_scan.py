@@ -20,6 +20,7 @@ from ddagr_gym.diagnosis.search.scan import drive_extent, probe_columns
 from ddagr_gym.diagnosis.search.sensor_effects import record_drives
 from ddagr_gym.identification.effect_parameters import effect_columns, effect_parameters
 from ddagr_gym.identification.gauss_newton import Fitted
+from ddagr_gym.identification.least_squares import beside_residual
 from ddagr_gym.identification.problem import Problem
 from ddagr_gym.physics.effects import DriveExtent, Effect
 from ddagr_gym.physics.effects.command_delay import CommandDelay
@@ -215,15 +216,8 @@ def scan_drive(problem: Problem, fitted: Fitted) -> DriveScan:
     columns = with_dead_time_of_robot(problem, fitted, probes, columns)
     by_effect = effect_columns(problem, fitted.point, named)
     free = problem.open_at(fitted.point)
-    raw = np.concatenate(
-        [
-            problem.residual(fitted.point, fitted.prediction)[..., None],
-            problem.padded(
-                np.concatenate([fitted.by_parameter[..., free], by_effect, np.stack(columns, axis=2)], axis=2)
-            ),
-        ],
-        axis=2,
-    )
+    residual = problem.residual(fitted.point, fitted.prediction)
+    raw = beside_residual(residual, fitted.by_parameter[..., free], by_effect, np.stack(columns, axis=2))
     projected = fitted.elimination.project(raw)
     products = InnerProducts(
         np.matmul(projected.transpose(0, 2, 1), projected), problem.prior[free] ** -2.0, fitted.point.values[free]

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ from ddagr_gym.diagnosis.search.lean import imitated_gains, lean_column
 from ddagr_gym.diagnosis.search.overlap import overlaps
 from ddagr_gym.diagnosis.search.sensor_effects import Drives, acts_on_readings_only, record_drives
 from ddagr_gym.identification.gauss_newton import Fitted
+from ddagr_gym.identification.least_squares import beside_residual
 from ddagr_gym.identification.nuisances import absorbed_sizes
 from ddagr_gym.identification.problem import Problem
 from ddagr_gym.identification.side_by_side import side_by_side
@@ -126,6 +128,7 @@ def scan(
     assumed = {effect.name for effect in fitted.point.effects}
     candidates: list[Candidate] = []
     probes: list[Effect] = []
+    ends: dict[str, int] = {}
     drives = record_drives(problem, fitted.point)
     tried = absolute_effect_kinds(problem.blocked.windows.frames_apart) if kinds is None else kinds
     for name, kind in tried.items():
@@ -135,22 +138,16 @@ def scan(
         for candidate in candidates_of(kind, extent, len(probes)):
             candidates.append(candidate)
             probes += candidate.probes
-    columns = []
-    following = [*(probe.name for probe in probes[1:]), None]
-    for probe, after, column in zip(probes, following, probe_columns(problem, fitted, probes, drives), strict=True):
-        columns.append(column)
-        if probe.name != after:
-            progress(probe.name)
+        ends[name] = len(probes)
+    made, columns = probe_columns(problem, fitted, probes, drives), list[Array]()
+    for name, end in ends.items():
+        columns += islice(made, end - len(columns))
+        progress(name)
     lean = lean_column(problem, fitted)
     columns += [] if lean is None else [lean]
     free = problem.open_at(fitted.point)
-    raw = np.concatenate(
-        [
-            problem.residual(fitted.point, fitted.prediction)[..., None],
-            problem.padded(np.concatenate([fitted.by_parameter[..., free], np.stack(columns, axis=2)], axis=2)),
-        ],
-        axis=2,
-    )
+    residual = problem.residual(fitted.point, fitted.prediction)
+    raw = beside_residual(residual, fitted.by_parameter[..., free], np.stack(columns, axis=2))
     projected = fitted.elimination.project(raw)
     overlap = overlaps(problem, fitted, candidates, projected[..., 1 + len(free) :])
     windows = problem.blocked.windows

@@ -32,6 +32,7 @@ from ddagr_gym.diagnosis.unnamed.stability_selection import (
     select,
 )
 from ddagr_gym.identification.effect_parameters import effect_columns, effect_parameters
+from ddagr_gym.identification.least_squares import beside_residual
 from ddagr_gym.identification.problem import Problem
 from ddagr_gym.identification.windows import CHANNELS
 
@@ -135,9 +136,9 @@ def _raw(problem: Problem, model: ScannedModel, columns: Array) -> Array:
     free = problem.open_at(fitted.point)
     parameters = effect_parameters(fitted.point.effects)
     by_effect = effect_columns(problem, fitted.point, parameters)
-    sensitivities = np.concatenate([fitted.by_parameter[..., free], by_effect, columns], axis=2)
-    residual = problem.residual(fitted.point, fitted.prediction)[..., None]
-    return np.concatenate([residual, problem.padded(np.nan_to_num(sensitivities))], axis=2)
+    sensitivities = (fitted.by_parameter[..., free], by_effect, columns)
+    residual = problem.residual(fitted.point, fitted.prediction)
+    return beside_residual(residual, *(np.nan_to_num(part) for part in sensitivities))
 
 
 def stretches(problem: Problem) -> NDArray[np.int64]:
