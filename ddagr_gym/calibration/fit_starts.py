@@ -54,7 +54,7 @@ OTHER_STARTS: Mapping[str, Mapping[str, float]] = {
 """Values of other starts [s], [logarithm of a factor]: delays of a Husky and a Warthog (0.2 to 0.43 s). On three drives
 two or three of them lowered the cost by 7 to 11 %."""
 
-TRIAL_ITERATIONS = (6, 4)
+TRIAL_ITERATIONS = (4, 3)
 """Steps of the fit from each start, weighed again between (ours): enough to tell minima apart by some per cent."""
 
 MOST_ITERATIONS = 36
@@ -200,7 +200,9 @@ def first_steps(
     data, windows, model, weights, threads, states = common
     noise = first_weights(data, windows)
     for iterations in TRIAL_ITERATIONS:
-        found = fit_model(data, windows, model, weights, values, threads, states=states, iterations=iterations)
+        found = fit_model(
+            data, windows, model, weights, values, threads, states=states, iterations=iterations, renewed=False
+        )
         values, states = found.values, found.fitted.point.states
         weights = weights_by_drive(windows, found.fitted.prediction, noise)
     return weights, found.standing

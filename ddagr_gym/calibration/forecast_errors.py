@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,6 +17,7 @@ from ddagr_gym.calibration.simulator_values import fitted_robot, fitted_sensors,
 from ddagr_gym.identification.fit_numerics import field_numerics
 from ddagr_gym.identification.motor_currents import without_currents
 from ddagr_gym.identification.residual_weights import ROBUST
+from ddagr_gym.identification.side_by_side import side_by_side
 from ddagr_gym.identification.window_model import WindowModel
 from ddagr_gym.identification.windows import CHANNELS, WindowSet
 from ddagr_gym.parameters import Robot, Soil
@@ -82,10 +83,10 @@ def all_forecasts(
     """
     fitted = model.problem.blocked.windows
     by_window = folds(data, fitted)
-    found = []
-    for forecast in made:
+
+    def compared(forecast: Forecast, own_threads: int) -> Forecasts:
         windows = without_currents(forecast.windows)
-        before = _by_data_sheet(data, model, windows, held, threads)
+        before = _by_data_sheet(data, model, windows, held, own_threads)
         predictions = {DATA_SHEET: before, CALIBRATED: forecast.prediction[..., : len(CHANNELS)]}
         kinematic = _kinematic(data, without_currents(fitted.subset(np.asarray(by_window != forecast.fold))))
         if kinematic is not None:
@@ -93,14 +94,13 @@ def all_forecasts(
         ground = data.grounds[int(windows.recording[0])]
         alone = data.count > 1 and len(data.drives_on[ground]) == 1
         values = forecast.values_of(model)
-        found.append(
-            Forecasts(
-                fold_name(data, forecast.fold), ground, ITSELF if alone else OTHER_DRIVES, windows, predictions,
-                fitted_robot(model.model.robot, values), fitted_soil(data, ground, values), fitted_sensors(values),
-                None if data.currents is None else _currents(forecast),
-            )
+        return Forecasts(
+            fold_name(data, forecast.fold), ground, ITSELF if alone else OTHER_DRIVES, windows, predictions,
+            fitted_robot(model.model.robot, values), fitted_soil(data, ground, values), fitted_sensors(values),
+            None if data.currents is None else _currents(forecast),
         )  # fmt: skip
-    return tuple(found)
+
+    return tuple(side_by_side(compared, made, threads))
 
 
 def _by_data_sheet(
@@ -149,19 +149,30 @@ def _kinematic(data: CalibrationData, windows: WindowSet) -> KinematicModel | No
     return fit_track(windows, robot.outer_radius, robot.half_track, motor, sigma=float(sigma[_GYRO]), robust=ROBUST)
 
 
-def forecast_errors(forecasts: Sequence[Forecasts], seed: int) -> tuple[ForecastError, ...]:
-    """Table of errors by drive, model, metric and horizon, with 95 % intervals."""
-    found = []
-    for item in forecasts:
-        for model, prediction in item.predictions.items():
-            for horizon in (h for h in HORIZONS if h <= item.windows.duration + 1e-9):
-                samples = round(horizon / item.windows.period)
-                short = _shortened(item.windows, samples)
-                errors = horizon_errors(short, prediction[:, :samples])
-                clusters = np.arange(short.count)
-                found += [_error(item, model, m, horizon, METRICS[m][0], errors[m], clusters, seed) for m in SHOWN]
-            found += _samples(item, model, prediction, seed)
-    return tuple(found)
+def forecast_errors(forecasts: Sequence[Forecasts], seed: int, threads: int = 1) -> tuple[ForecastError, ...]:
+    """Table of errors by drive, model, metric and horizon, with 95 % intervals.
+
+    Args:
+        forecasts: of left-out drives.
+        seed: of resampled intervals.
+        threads: for the drives.
+    """
+
+    def of_drive(item: Forecasts, own_threads: int) -> list[ForecastError]:
+        return [error for model, made in item.predictions.items() for error in _errors(item, model, made, seed)]
+
+    return tuple(error for found in side_by_side(of_drive, forecasts, threads) for error in found)
+
+
+def _errors(item: Forecasts, model: str, prediction: Array, seed: int) -> Iterator[ForecastError]:
+    """Errors of one model after every horizon, and of all samples."""
+    for horizon in (h for h in HORIZONS if h <= item.windows.duration + 1e-9):
+        samples = round(horizon / item.windows.period)
+        short = _shortened(item.windows, samples)
+        errors = horizon_errors(short, prediction[:, :samples])
+        clusters = np.arange(short.count)
+        yield from (_error(item, model, m, horizon, METRICS[m][0], errors[m], clusters, seed) for m in SHOWN)
+    yield from _samples(item, model, prediction, seed)
 
 
 def _shortened(windows: WindowSet, samples: int) -> WindowSet:

@@ -44,7 +44,12 @@ Progress = Callable[[str], None]
 ITERATIONS = 12
 """Most Gauss-Newton steps of a fit (ours): field drives take 4 to 8, a robot with limits that it does not have more."""
 
-FIRST_ITERATIONS = 8
+REPEATS = 1
+"""Further steps with the sensitivities of each step (ours): of five fits to drives of a Warthog without some parts, 6
+such pairs ended at lower costs than 8 single steps in three and at up to 0.2 % higher ones in two, in 0.73 of the
+time."""
+
+FIRST_ITERATIONS = 6
 """Steps of the fit that only serves to weigh residuals (ours)."""
 
 FIRST_TOLERANCE = 5e-3
@@ -226,6 +231,7 @@ def fit_model(
     iterations: int = ITERATIONS,
     tolerance: float = FIELD_TOLERANCE,
     give_up: Callable[[float, float], bool] = lambda before, after: False,
+    renewed: bool = True,
 ) -> FittedModel:
     """Fit parameters to windows with given weights.
 
@@ -240,11 +246,15 @@ def fit_model(
         iterations: most steps, with coarse sensitivities; 0 only computes fine ones at the start.
         tolerance: relative gain of a step that ends the fit.
         give_up: called with the cost before and after each step; the fit ends where it says so.
+        renewed: whether the sensitivities of the result are needed.
     """
     slopes = field_slope_numerics() if iterations > 0 else None
     problem = make_problem(data, windows, model, weights, threads, slopes)
     point = point_at(problem, start, states)
-    found = fit(problem, point, iterations=iterations, tolerance=tolerance, renewals=iterations, give_up=give_up)
+    found = fit(
+        problem, point, iterations=iterations, tolerance=tolerance, renewals=iterations, repeats=REPEATS,
+        give_up=give_up, renewed=renewed,
+    )  # fmt: skip
     return FittedModel(model, problem, found)
 
 
@@ -260,8 +270,9 @@ def rough_fit(
     problem = make_problem(data, windows, model, noise, threads)
     weights = weights_by_drive(windows, problem.predict(point_at(problem, start)), noise)
     found = fit_model(
-        data, windows, model, weights, start, threads, iterations=FIRST_ITERATIONS, tolerance=FIRST_TOLERANCE
-    )
+        data, windows, model, weights, start, threads, iterations=FIRST_ITERATIONS, tolerance=FIRST_TOLERANCE,
+        renewed=False,
+    )  # fmt: skip
     return found, weights_by_drive(windows, found.fitted.prediction, noise)
 
 

@@ -24,6 +24,7 @@ from ddagr_gym.identification.gauss_newton import fit, values_after_step
 from ddagr_gym.identification.least_squares import huber_loss
 from ddagr_gym.identification.problem import Point, Problem
 from ddagr_gym.identification.residual_weights import Weights, residuals
+from ddagr_gym.identification.side_by_side import side_by_side
 from ddagr_gym.identification.windows import CHANNELS, WindowSet
 from ddagr_gym.recordings.channels import CURRENTS
 
@@ -149,16 +150,20 @@ def forecasts(
     """
     fitted = model.problem.blocked.windows
     by_window, by_judged = folds(data, fitted), folds(data, judged)
-    for fold in np.unique(by_judged):
+
+    def forecast(fold: int, own_threads: int) -> Forecast:
         out, inside = by_window == fold, by_judged == fold
         values = without(model, out)
-        alone = data.count > 1 and len(data.drives_on[data.grounds[int(fold)]]) == 1
+        alone = data.count > 1 and len(data.drives_on[data.grounds[fold]]) == 1
         if alone:
-            values = _with_own(data, model, values, out, weights, threads)
+            values = _with_own(data, model, values, out, weights, own_threads)
             # what was fitted to the first half judges the second only
             inside &= judged.time >= float(np.median(fitted.time[out]))
         chosen = judged.subset(np.asarray(inside))
-        yield Forecast(int(fold), chosen, values, model.problem.model_of(chosen).predict(values, chosen.initial))
+        prediction = model.problem.model_of(chosen).on_threads(own_threads).predict(values, chosen.initial)
+        return Forecast(fold, chosen, values, prediction)
+
+    return side_by_side(forecast, np.unique(by_judged).tolist(), threads)
 
 
 def forecast_losses(forecast: Forecast, sigma: Array, robust: Array) -> tuple[float, float]:

@@ -39,7 +39,7 @@ from ddagr_gym.identification.windows import WindowSet
 CONFIDENCE = 0.84
 """One-sided, with which a part must help: one standard error where there are many drives."""
 
-ITERATIONS = 8
+ITERATIONS = 6
 """Steps of a fit without one part, from where the fit with it stands (ours): with 3 the fits of a simulated robot were
 not settled, and parts were kept that it does not have."""
 

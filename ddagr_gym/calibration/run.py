@@ -213,7 +213,7 @@ def calibrate_drives(
         parts=selection.decisions,
         parameters=parameter_results(data, complete, model, selection.left_out, final.refused, estimates),
         covariance=Covariance(model.free, tuple(tuple(row) for row in covariance(model).tolist())),
-        forecasts=forecast_errors(compared, settings.seed),
+        forecasts=forecast_errors(compared, settings.seed, settings.threads),
         spectra=spectra(compared),
         unexplained=unexplained(compared, data.prepared.sigma),
         converged=final.standing.converged,

@@ -44,16 +44,16 @@ def field_numerics() -> Numerics:
 
 
 def far_off_numerics() -> Numerics:
-    """For a diagnosis of a fast robot whose nominal model is far off: :func:`field_numerics`, fewer nodes in a contact.
+    """For a diagnosis of a fast robot whose nominal model is far off: :func:`field_numerics`, five nodes in a contact.
 
     On drives of a Warthog block means are within 0.008 deviations of their noise (r.m.s.) of converged ones, those of
-    :func:`block_mean_numerics` within 0.007, at 0.38 times the cost; the nominal model leaves 5 to 10 deviations.
+    :func:`block_mean_numerics` within 0.007, at 0.62 times the cost; the nominal model leaves 5 to 10 deviations.
     """
     return replace(field_numerics(), contact_nodes=5)
 
 
 def field_slope_numerics() -> Numerics:
-    """For the sensitivities of fits to many field drives (a calibration): one step of 50 ms, fewer nodes in a contact.
+    """For the sensitivities of fits to many field drives (a calibration): one step of 50 ms, five nodes in a contact.
 
     On drives of a Warthog they err by 5 % in the median window and by 33 % in one of ten, those of
     :func:`field_numerics` by 4 % and 23 % at 1.3 times the cost (benchmarks/sensitivities.py).

@@ -14,13 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.identification.effect_parameters import (
-    EffectParameter,
-    effect_columns,
-    effect_parameters,
-    moved,
-    read,
-)
+from ddagr_gym.identification.effect_parameters import EffectParameter, effect_columns, effect_parameters, moved, read
 from ddagr_gym.identification.least_squares import Elimination, Linearised, beside_residual
 from ddagr_gym.identification.problem import STATE_PRIOR, Point, Problem
 from ddagr_gym.identification.size_prior import size_penalty
@@ -115,6 +109,8 @@ def fit(
     iterations: int = 10,
     tolerance: float = 2e-4,
     renewals: int = 2,
+    repeats: int = 0,
+    renewed: bool = True,
     reuse: Fitted | None = None,
     first: Fitted | None = None,
     fixed: frozenset[str] = frozenset(),
@@ -130,6 +126,11 @@ def fit(
         tolerance: relative gain of a step that ends the fit.
         renewals: how often the nuisances' sensitivities are computed before they are kept; those of the result are new,
             or from a step before where that step was too small to matter.
+        repeats: further whole steps with the sensitivities of each step, as long as one gains more than the tolerance
+            (Shamanskii's method; C. T. Kelley, Iterative Methods for Linear and Nonlinear Equations, 1995, section
+            5.4.3): one costs a prediction, new sensitivities one for every parameter.
+        renewed: whether the result has sensitivities of its own, too, where the last step was not too small to matter;
+            they serve what comes after, and do not move it.
         reuse: fit whose nuisance sensitivities are kept throughout, so that only those of the effects are simulated.
         first: fit at ``start`` whose nuisance sensitivities serve for the first step only.
         fixed: names of effect parameters to leave alone.
@@ -143,7 +144,7 @@ def fit(
     while done < iterations and not (converged or hopeless):
         done += 1
         before = here.cost
-        here = _step(problem, here, parameters, tolerance)
+        here = _steps(problem, here, parameters, tolerance, repeats)
         progress()
         hopeless = give_up(before, here.cost)
         small = before - here.cost < tolerance * here.cost
@@ -159,7 +160,7 @@ def fit(
             here = replace(here, by_effect=effect_columns(problem, here.point, parameters, reference))
         if anew and not fresh:
             here = replace(here, by_parameter=problem.heading_columns(here.point, here.by_parameter, reference))
-    if reuse is None and done and not converged and not fresh:
+    if renewed and reuse is None and done and not converged and not fresh:
         here = _renewed(problem, here, problem.reference(here.point))
     cost, shares = cost_of(problem, here.point, here.prediction, here.elimination)
     return Fitted(here.point, here.prediction, cost, here.elimination, here.by_parameter, done, converged, shares)
@@ -266,10 +267,28 @@ def _linearised(problem: Problem, here: _Iterate, raw: Array, parameters: Sequen
     )
 
 
-def _step(problem: Problem, here: _Iterate, parameters: Sequence[EffectParameter], tolerance: float) -> _Iterate:
-    """One damped Gauss-Newton step; the point itself where none lowers the cost.
+def _steps(
+    problem: Problem, here: _Iterate, parameters: Sequence[EffectParameter], tolerance: float, repeats: int
+) -> _Iterate:
+    """A step, and whole ones with the same sensitivities for as long as they gain more than ``tolerance``."""
+    for dampings in (DAMPING, *repeats * [(1.0,)]):
+        before = here.cost
+        here = _step(problem, here, parameters, tolerance, dampings)
+        if before - here.cost < tolerance * here.cost:
+            break
+    return here
 
-    Shares of it that promise a relative gain below ``tolerance`` are not tried.
+
+def _step(
+    problem: Problem,
+    here: _Iterate,
+    parameters: Sequence[EffectParameter],
+    tolerance: float,
+    dampings: Sequence[float],
+) -> _Iterate:
+    """One of some shares of a Gauss-Newton step; the point itself where none lowers the cost.
+
+    Those that promise a relative gain below ``tolerance`` are not tried.
     """
     point, elimination, least = here.point, here.elimination, tolerance * here.cost
     raw = _raw_columns(problem, here)
@@ -278,7 +297,7 @@ def _step(problem: Problem, here: _Iterate, parameters: Sequence[EffectParameter
     promised = float(step.linear.gradient @ step.change)
     if not problem.nuisances.local:
         promised += elimination.explained_square(raw[..., 0])
-    for damping in DAMPING:
+    for damping in dampings:
         if damping < 1.0 and damping * promised < least:
             break
         stepped, start = step.share(problem, point, parameters, damping)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
+Integers = NDArray[np.integer[Any]]
 
 CONFIDENCE = 0.95
 """Of the intervals, as is usual."""
@@ -76,7 +77,8 @@ def resampled_counts(clusters: Integers, rng: np.random.Generator) -> Integers |
         return None
     draws = rng.integers(count, size=(RESAMPLES, count))
     drawn = np.bincount((draws + count * np.arange(RESAMPLES)[:, None]).ravel(), minlength=RESAMPLES * count)
-    return np.asarray(drawn.reshape(RESAMPLES, count)[:, index])
+    # samples of long drives make tables of a hundred megabytes
+    return np.asarray(drawn.reshape(RESAMPLES, count).astype(np.int32)[:, index])
 
 
 def resampled_rms(errors: Array, counts: Integers) -> Array:
@@ -87,10 +89,11 @@ def resampled_rms(errors: Array, counts: Integers) -> Array:
 def resampled_median(errors: Array, counts: Integers) -> Array:
     """Median absolute value (RESAMPLES,) of errors (W,) in bootstrap samples (RESAMPLES, W)."""
     order = np.argsort(np.abs(errors))
-    sizes, reached = np.abs(errors)[order], np.cumsum(counts[:, order], axis=1)
-    total = reached[:, -1:]
-    low = np.argmax(reached > (total - 1) // 2, axis=1)
-    high = np.argmax(reached > total // 2, axis=1)
+    sizes, reached = np.abs(errors)[order], np.cumsum(counts[:, order], axis=1, dtype=counts.dtype)
+    middle = ((reached[:, -1] - 1) // 2, reached[:, -1] // 2)
+    low, high = (
+        [np.searchsorted(row, rank, side="right") for row, rank in zip(reached, ranks, strict=True)] for ranks in middle
+    )
     return np.asarray(0.5 * (sizes[low] + sizes[high]))
 
 

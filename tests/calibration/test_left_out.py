@@ -97,6 +97,16 @@ def test_forecasts_may_come_from_fits_of_their_own(data, fitted):
         assert not np.array_equal(one.prediction, other.prediction)
 
 
+def test_forecasts_have_the_same_bits_on_one_thread_and_on_two(data, fitted):
+    joint, weights = fitted
+    judged = data.spread(SETTINGS.judged)
+    alone, both = (list(forecasts(data, joint, judged, weights, threads)) for threads in (1, 2))
+    assert [item.fold for item in both] == [0, 1, 2]
+    for one, other in zip(alone, both, strict=True):
+        np.testing.assert_array_equal(other.values, one.values)
+        np.testing.assert_array_equal(other.prediction, one.prediction)
+
+
 def test_what_acts_in_the_left_out_drive_alone_is_left_as_it_is(joint, out):
     names = [p.name for p in joint.parameters]
     moved = values_without(joint, out) != joint.fitted.point.values
