@@ -78,6 +78,10 @@ class CalibrationData:
             for ground in dict.fromkeys(self.grounds)
         }
 
+    def is_alone(self, drive: int) -> bool:
+        """Whether no other one of several drives was on the ground of a drive."""
+        return self.count > 1 and len(self.drives_on[self.grounds[drive]]) == 1
+
     def spread(self, most: int) -> WindowSet:
         """At most ``most`` windows of each drive, evenly over it."""
         chosen = []

@@ -91,11 +91,12 @@ def all_forecasts(
         kinematic = _kinematic(data, without_currents(fitted.subset(np.asarray(by_window != forecast.fold))))
         if kinematic is not None:
             predictions[KINEMATIC] = kinematic.predict(windows)
-        ground = data.grounds[int(windows.recording[0])]
-        alone = data.count > 1 and len(data.drives_on[ground]) == 1
+        drive = int(windows.recording[0])
+        ground = data.grounds[drive]
+        soil_from = ITSELF if data.is_alone(drive) else OTHER_DRIVES
         values = forecast.values_of(model)
         return Forecasts(
-            fold_name(data, forecast.fold), ground, ITSELF if alone else OTHER_DRIVES, windows, predictions,
+            fold_name(data, forecast.fold), ground, soil_from, windows, predictions,
             fitted_robot(model.model.robot, values), fitted_soil(data, ground, values), fitted_sensors(values),
             None if data.currents is None else _currents(forecast),
         )  # fmt: skip

@@ -153,15 +153,14 @@ def forecasts(
 
     def forecast(fold: int, own_threads: int) -> Forecast:
         out, inside = by_window == fold, by_judged == fold
-        values = without(model, out)
-        alone = data.count > 1 and len(data.drives_on[data.grounds[fold]]) == 1
-        if alone:
-            values = _with_own(data, model, values, out, weights, own_threads)
+        own = replace(model, problem=model.problem.on_threads(own_threads))
+        values = without(own, out)
+        if data.is_alone(fold):
+            values = _with_own(data, own, values, out, weights, own_threads)
             # what was fitted to the first half judges the second only
             inside &= judged.time >= float(np.median(fitted.time[out]))
         chosen = judged.subset(np.asarray(inside))
-        prediction = model.problem.model_of(chosen).on_threads(own_threads).predict(values, chosen.initial)
-        return Forecast(fold, chosen, values, prediction)
+        return Forecast(fold, chosen, values, own.problem.model_of(chosen).predict(values, chosen.initial))
 
     return side_by_side(forecast, np.unique(by_judged).tolist(), threads)
 

@@ -8,9 +8,10 @@ sensitivities are; :mod:`~ddagr_gym.identification.least_squares` has the algebr
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,15 +113,12 @@ class Problem:
         self.robot = robot
         self.blocked = blocked
         self.nuisances = nuisances
-        self.model = WindowModel(
-            robot, soil, blocked.windows, nuisances.parameters, imposed=imposed,
-            numerics=block_mean_numerics() if numerics is None else numerics, threads=threads,
+        model = partial(
+            WindowModel, robot, soil, blocked.windows, nuisances.parameters, imposed=imposed, threads=threads,
             delay=delay, currents=currents, known=known,
         )  # fmt: skip
-        self._slopes = None if slopes is None else WindowModel(
-            robot, soil, blocked.windows, nuisances.parameters, imposed=imposed, numerics=slopes, threads=threads,
-            delay=delay, currents=currents, known=known,
-        )  # fmt: skip
+        self.model = model(numerics=block_mean_numerics() if numerics is None else numerics)
+        self._slopes = None if slopes is None else model(numerics=slopes)
         self.prior = np.array([p.prior for p in nuisances.parameters])
         self.low = np.array([p.low for p in nuisances.parameters])
         self.high = np.array([p.high for p in nuisances.parameters])
@@ -151,17 +149,13 @@ class Problem:
 
     def on(self, blocked: BlockedWindows) -> Problem:
         """The same problem on other windows of the same recordings."""
-        other = copy(self)
-        other.blocked, other.model = blocked, self.model.on(blocked.windows)
-        other._slopes = None if self._slopes is None else self._slopes.on(blocked.windows)
+        other = self._simulated(lambda model: model.on(blocked.windows))
+        other.blocked = blocked
         return other
 
     def during(self, spells: Mapping[str, Spell]) -> Problem:
         """The same problem with effects that are present in a part of the windows only, by name."""
-        other = copy(self)
-        other.model = self.model.during(spells)
-        other._slopes = None if self._slopes is None else self._slopes.during(spells)
-        return other
+        return self._simulated(lambda model: model.during(spells))
 
     @property
     def spells(self) -> Mapping[str, Spell]:
@@ -172,6 +166,16 @@ class Problem:
         """(W,) windows in which an effect of a name is present where it is assumed."""
         windows, spell = self.blocked.windows, self.spells.get(name)
         return np.ones(windows.count, dtype=bool) if spell is None else spell.in_windows(windows)
+
+    def on_threads(self, threads: int) -> Problem:
+        """The same problem, simulated on another number of threads."""
+        return self._simulated(lambda model: model.on_threads(threads))
+
+    def _simulated(self, changed: Callable[[WindowModel], WindowModel]) -> Problem:
+        """The same problem with a change of its models, that of the sensitivities included."""
+        other = copy(self)
+        other.model, other._slopes = changed(self.model), self._slopes and changed(self._slopes)
+        return other
 
     def model_of(self, windows: WindowSet) -> WindowModel:
         """The same model over other windows of the same recordings."""
@@ -216,10 +220,9 @@ class Problem:
         """(W, T, 8)."""
         return self.model.predict(point.values, point.states, point.effects)
 
-    def varied(self, point: Point, reference: Reference, threads: int | None = None) -> Array:
-        """The same where it only serves a sensitivity, near a reference; on as many threads as the model by default."""
+    def varied(self, point: Point, reference: Reference) -> Array:
+        """The same where it only serves a sensitivity, near a reference."""
         model = self._slopes or self.model
-        model = model if threads is None else model.on_threads(threads)
         return model.predict(point.values, point.states, point.effects, near=reference)
 
     def changes(self, pairs: Sequence[tuple[Point | None, Point]], reference: Reference) -> Iterator[Array]:
@@ -231,9 +234,9 @@ class Problem:
         """
 
         def change(pair: tuple[Point | None, Point], threads: int) -> Array:
-            begin, end = pair
-            before = reference.prediction if begin is None else self.varied(begin, reference, threads)
-            return self.blocked.change(self.varied(end, reference, threads), before)
+            (begin, end), own = pair, self.on_threads(threads)
+            before = reference.prediction if begin is None else own.varied(begin, reference)
+            return self.blocked.change(own.varied(end, reference), before)
 
         return side_by_side(change, pairs, self.model.threads)
 

@@ -156,8 +156,10 @@ def test_a_fit_has_the_same_bits_on_one_thread_and_on_two(one_drive):
     np.testing.assert_array_equal(alone.point.values, both.point.values)
 
 
-def test_repeated_steps_lower_the_cost_with_sensitivities_of_one_point(one_drive, monkeypatch):
-    problem, points = one_drive(), []
+@pytest.fixture
+def differentiated(monkeypatch) -> list[Point]:
+    """Points at which sensitivities were computed, in that order."""
+    points: list[Point] = []
     columns = Problem.parameter_columns
 
     def seen(self, point, *given):
@@ -165,25 +167,26 @@ def test_repeated_steps_lower_the_cost_with_sensitivities_of_one_point(one_drive
         return columns(self, point, *given)
 
     monkeypatch.setattr(Problem, "parameter_columns", seen)
+    return points
+
+
+def test_repeated_steps_lower_the_cost_with_sensitivities_of_one_point(one_drive, differentiated):
+    problem = one_drive()
     once, twice = (fit(problem, iterations=1, renewals=1, tolerance=1e-6, repeats=more) for more in (0, 1))
-    assert len(points) == 4
+    assert len(differentiated) == 4
     assert twice.cost < 0.9 * once.cost
-    np.testing.assert_array_equal(points[-1].values, twice.point.values)
+    np.testing.assert_array_equal(differentiated[-1].values, twice.point.values)
     settled, repeated = (fit(problem, iterations=40, renewals=40, tolerance=1e-5, repeats=more) for more in (0, 2))
     assert repeated.iterations < settled.iterations
     assert repeated.cost == pytest.approx(settled.cost, rel=5e-3)
 
 
-def test_a_fit_ends_at_the_same_point_without_sensitivities_of_its_result(one_drive, monkeypatch):
-    problem, points = one_drive(), []
-    columns = Problem.parameter_columns
-    monkeypatch.setattr(
-        Problem, "parameter_columns", lambda self, point, *given: points.append(point) or columns(self, point, *given)
-    )
+def test_a_fit_ends_at_the_same_point_without_sensitivities_of_its_result(one_drive, differentiated):
+    problem = one_drive()
     whole, short = (
         fit(problem, iterations=2, renewals=2, tolerance=1e-9, renewed=renewed) for renewed in (True, False)
     )
-    assert len(points) == 3 + 2
+    assert len(differentiated) == 3 + 2
     np.testing.assert_array_equal(short.point.values, whole.point.values)
     np.testing.assert_array_equal(short.point.states, whole.point.states)
     np.testing.assert_array_equal(short.prediction, whole.prediction)

@@ -104,7 +104,7 @@ def _probe_column(problem: Problem, fitted: Fitted, probe: Effect, drives: Drive
         return column
     part = problem if chosen.all() else problem.subset(chosen)
     point = replace(fitted.point, states=fitted.point.states[chosen], effects=(*fitted.point.effects, probe))
-    prediction = part.model.on_threads(threads).predict(point.values, point.states, point.effects)
+    prediction = part.on_threads(threads).predict(point)
     column[chosen] = part.blocked.change(prediction, fitted.prediction[chosen])
     return column
 
