@@ -47,19 +47,27 @@ NEWTON_ITERATIONS = 15  # at most (ours): each leaves at most half of the work a
 LENGTHS = 12  # of a Newton step that are tried
 LEFT_WORK = 0.5  # share of the work before a Newton step that may be left after it
 LONGEST = 30.0  # length of a Newton step that is tried
+STUCK = 0.01  # of the tolerance (ours): a step that moves by less leads nowhere
 
 
 @kernel(inline=True)
-def _defect(row: Array, start: Array, step: float, defect: Array) -> float:
-    """v - v_n - h f(v) of backward Euler, and its size [m/s]."""
+def _size(row: Array, motion: Array) -> float:
+    """Largest velocity of a (5,) motion or a change of one, at the wheels [m/s]."""
+    size = max(max(abs(motion[0]), abs(motion[1])), row[HALF_TRACK] * abs(motion[2]))
+    if moving_entries(row) == 5:
+        for bank in range(2):
+            size = max(size, (row[WHEEL + bank] + row[WHEEL + 8 + bank]) * abs(motion[3 + bank]))
+    return size
+
+
+@kernel(inline=True)
+def _set_defect(row: Array, start: Array, step: float, defect: Array) -> None:
+    """v - v_n - h f(v) of backward Euler."""
     for j in range(3):
         defect[j] = row[V_X + j] - start[j] - step * row[ACCELERATION + j]
-    size = max(max(abs(defect[0]), abs(defect[1])), row[HALF_TRACK] * abs(defect[2]))
     if moving_entries(row) == 5:
         for bank in range(2):
             defect[3 + bank] = row[OMEGA + bank] - start[3 + bank] - step * bank_acceleration(row, bank)
-            size = max(size, (row[WHEEL + bank] + row[WHEEL + 8 + bank]) * abs(defect[3 + bank]))
-    return size
 
 
 @kernel(inline=True)
@@ -75,8 +83,10 @@ def _work(row: Array, defect: Array, change: Array) -> float:
 @kernel()
 def _newton_step(
     row: Array, start: Array, defect: Array, change: Array, step: float, numerics: StepNumerics, actions: EffectActions
-) -> None:
+) -> float:
     """Move along ``change`` until the residual, ``defect``, is orthogonal to it (false position, Illinois).
+
+    Returns the length of the move in steps, 0 where none has finite forces.
 
     Args:
         row: the environment; moved.
@@ -96,7 +106,7 @@ def _newton_step(
         for j in range(moving):
             row[V_X + j] = before[j] - length * change[j]
         evaluate_forces(row, -1.0, numerics, actions)
-        _defect(row, start, step, defect)
+        _set_defect(row, start, step, defect)
         work = _work(row, defect, change)
         if abs(work) <= LEFT_WORK * whole:
             break
@@ -117,6 +127,8 @@ def _newton_step(
     if not math.isfinite(work):
         for j in range(moving):
             row[V_X + j] = before[j]
+        return 0.0
+    return length
 
 
 @kernel()
@@ -140,9 +152,11 @@ def backward_euler_step(
     if moving == 3:
         advance_motors(row, step)
     row[TIME] += step
+    stuck = False
     for _ in range(NEWTON_ITERATIONS):
         evaluate_forces(row, 0.0, numerics, actions)
-        if _defect(row, start, step, defect) <= tolerance:
+        _set_defect(row, start, step, defect)
+        if _size(row, defect) <= tolerance:
             break
         damping_inverse(row, step, inverse, drive, banks, actions)
         for j in range(moving):
@@ -151,10 +165,13 @@ def backward_euler_step(
             solve_with_banks(step, inverse, drive, banks, right, change)
         else:
             solve_body(inverse, right, change)
-        if not _work(row, defect, change) > 0.0:
+        if stuck or not _work(row, defect, change) > 0.0:
             for j in range(moving):
                 change[j] = defect[j]  # which does work whatever the derivative says
-        _newton_step(row, start, defect, change, step, numerics, actions)
+        length = _newton_step(row, start, defect, change, step, numerics, actions)
+        before, stuck = stuck, length * _size(row, change) <= STUCK * tolerance
+        if before and stuck:
+            break
     rate_x, rate_y = world_rates(row)
     row[X] += step * rate_x
     row[Y] += step * rate_y

@@ -8,9 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ddagr_gym.parameters import STANDARD_GRAVITY, Imu, Numerics, Sensors
+from ddagr_gym.identification.fit_numerics import block_mean_numerics
+from ddagr_gym.identification.parameters import soil_entries
+from ddagr_gym.identification.window_model import ideal_sensors
+from ddagr_gym.parameters import STANDARD_GRAVITY, Drivetrain, Imu, Numerics, Sensors, TorusWheel
+from ddagr_gym.physics import layout
 from ddagr_gym.presets import get_robot, get_soil, soil_names
-from ddagr_gym.simulator import simulate
+from ddagr_gym.simulator import Simulator, simulate
 
 ROBOT, SOIL = get_robot("ddagr"), get_soil("thesis_a1")
 NOISELESS = Sensors(imu=Imu(accelerometer_noise=0.0, gyro_noise=0.0, accelerometer_resolution=0.0, gyro_resolution=0.0))
@@ -93,6 +97,43 @@ def test_fine_steps_follow_the_converged_solution_where_friction_changes_sign_wi
     error = _stack(_drive(commands, soil=soil, numerics=fine))
     error -= _stack(_drive(commands, soil=soil, numerics=replace(fine, maximum_step=1e-3, accepted_error=1e-6)))
     assert np.sqrt(np.mean(error**2, axis=1)).max() < 5e-4
+
+
+SLOW = (
+    (0.099, 0.036, -0.172, 0.095, 1.259),
+    (-0.078, -0.068, -0.996, -3.855, 2.933),
+    (-0.132, 0.068, -0.425, -1.8, 1.0),
+)
+"""Robots that turn slowly: v_x, v_y, yaw rate and speeds of the right and the left bank."""
+
+
+def test_long_steps_follow_the_converged_solution_in_soil_as_strong_as_a_refit_makes_it():
+    """Ten times the load of friction, within 1.6 mm of sliding, under motors whose speeds depend on the ground."""
+    wheels = (TorusWheel(0.05, 0.068, 0.108),) * 4
+    robot = replace(
+        get_robot("husky"), mass=88.0, yaw_inertia=2.5, half_track=0.29, half_wheelbase=0.25, wheels=wheels,
+        motor_rate=7.0, drivetrain=Drivetrain(integral_rate=0.09),
+    )  # fmt: skip
+    soil = replace(
+        get_soil("firm_ground"), sinkage_exponent=0.95, frictional_modulus=3.1e5, shear_modulus=1.6e-3,
+        peak_stress_coefficient_0=0.18, peak_stress_coefficient_1=0.05, exit_angle_ratio=1.0,
+    )  # fmt: skip
+
+    def yaw_rates(numerics):
+        simulator = Simulator(len(SLOW), numerics=numerics)
+        for number in range(len(SLOW)):
+            simulator.configure(number, robot, soil, ideal_sensors(0.05))
+        simulator.rows[:, soil_entries(layout.SOIL_FRICTION_TANGENT)] = 10.0
+        simulator.reset(
+            state=dict(zip(("v_x", "v_y", "yaw_rate", "omega_right", "omega_left"), np.array(SLOW).T, strict=True))
+        )
+        commands = np.tile([0.5, 1.16], (len(SLOW), 100, 1))
+        return simulator.step(commands, recorded=(layout.YAW_RATE,))[1][..., 0]
+
+    long = block_mean_numerics()
+    converged = replace(long, maximum_step=5e-4, accepted_error=2e-5, sinkage_tolerance=1e-6)
+    error = yaw_rates(long) - yaw_rates(converged)
+    assert np.sqrt(np.mean(error**2, axis=1)).max() < 3e-3
 
 
 @pytest.mark.parametrize("limit", [0.0, 0.03])
