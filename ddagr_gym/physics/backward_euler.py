@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ddagr_gym.jit import kernel, stack_array
 from ddagr_gym.physics.body_dynamics import evaluate_forces, world_rates
-from ddagr_gym.physics.body_jacobian import BANKS, damping_inverse, solve_body, solve_with_banks
+from ddagr_gym.physics.body_jacobian import BANKS, damping_inverse, solve_body, solve_with_banks, velocity_size
 from ddagr_gym.physics.callbacks import EffectActions
 from ddagr_gym.physics.drivetrain import (
     advance_motors,
@@ -25,13 +25,11 @@ from ddagr_gym.physics.drivetrain import (
 )
 from ddagr_gym.physics.layout import (
     ACCELERATION,
-    HALF_TRACK,
     INTEGRAL,
     MASS,
     OMEGA,
     TIME,
     V_X,
-    WHEEL,
     WHEEL_ANGLE,
     YAW,
     YAW_INERTIA,
@@ -48,16 +46,6 @@ LENGTHS = 12  # of a Newton step that are tried
 LEFT_WORK = 0.5  # share of the work before a Newton step that may be left after it
 LONGEST = 30.0  # length of a Newton step that is tried
 STUCK = 0.01  # of the tolerance (ours): a step that moves by less leads nowhere
-
-
-@kernel(inline=True)
-def _size(row: Array, motion: Array) -> float:
-    """Largest velocity of a (5,) motion or a change of one, at the wheels [m/s]."""
-    size = max(max(abs(motion[0]), abs(motion[1])), row[HALF_TRACK] * abs(motion[2]))
-    if moving_entries(row) == 5:
-        for bank in range(2):
-            size = max(size, (row[WHEEL + bank] + row[WHEEL + 8 + bank]) * abs(motion[3 + bank]))
-    return size
 
 
 @kernel(inline=True)
@@ -156,7 +144,7 @@ def backward_euler_step(
     for _ in range(NEWTON_ITERATIONS):
         evaluate_forces(row, 0.0, numerics, actions)
         _set_defect(row, start, step, defect)
-        if _size(row, defect) <= tolerance:
+        if velocity_size(row, defect) <= tolerance:
             break
         damping_inverse(row, step, inverse, drive, banks, actions)
         for j in range(moving):
@@ -169,7 +157,7 @@ def backward_euler_step(
             for j in range(moving):
                 change[j] = defect[j]  # which does work whatever the derivative says
         length = _newton_step(row, start, defect, change, step, numerics, actions)
-        before, stuck = stuck, length * _size(row, change) <= STUCK * tolerance
+        before, stuck = stuck, length * velocity_size(row, change) <= STUCK * tolerance
         if before and stuck:
             break
     rate_x, rate_y = world_rates(row)

@@ -15,6 +15,7 @@ from ddagr_gym.physics.body_dynamics import extra_forces, hub_x, hub_y, set_kine
 from ddagr_gym.physics.callbacks import EffectActions
 from ddagr_gym.physics.drivetrain import bank_damping, felt_compliance, moving_entries
 from ddagr_gym.physics.layout import (
+    HALF_TRACK,
     LOAD,
     MASS,
     POINT_BODY_FORCES,
@@ -160,6 +161,16 @@ def _invert(matrix: Array, inverse: Array) -> None:
     inverse[0], inverse[1], inverse[2] = (e * i - f * h) * scale, (c * h - b * i) * scale, (b * f - c * e) * scale
     inverse[3], inverse[4], inverse[5] = (f * g - d * i) * scale, (a * i - c * g) * scale, (c * d - a * f) * scale
     inverse[6], inverse[7], inverse[8] = (d * h - e * g) * scale, (b * g - a * h) * scale, (a * e - b * d) * scale
+
+
+@kernel(inline=True)
+def velocity_size(row: Array, motion: Array) -> float:
+    """Largest velocity at the wheels of a (5,) motion, or of a change of one [m/s] (theory: wheel model, eq. (31))."""
+    size = max(max(abs(motion[0]), abs(motion[1])), row[HALF_TRACK] * abs(motion[2]))
+    if moving_entries(row) == 5:
+        for bank in range(2):
+            size = max(size, (row[WHEEL + bank] + row[WHEEL + 8 + bank]) * abs(motion[3 + bank]))
+    return size
 
 
 @kernel(inline=True)

@@ -31,7 +31,7 @@ from ddagr_gym.physics.body_dynamics import (
     extrapolate_forces,
     world_rates,
 )
-from ddagr_gym.physics.body_jacobian import BANKS, damping_inverse, solve_body, solve_with_banks
+from ddagr_gym.physics.body_jacobian import BANKS, damping_inverse, solve_body, solve_with_banks, velocity_size
 from ddagr_gym.physics.callbacks import EffectActions
 from ddagr_gym.physics.drivetrain import advance_motors, bank_acceleration, integral_growth, moving_entries
 from ddagr_gym.physics.force_record import (
@@ -48,7 +48,6 @@ from ddagr_gym.physics.force_record import (
 )
 from ddagr_gym.physics.layout import (
     ACCELERATION,
-    HALF_TRACK,
     INTEGRAL,
     OMEGA,
     STEPPED,
@@ -187,16 +186,10 @@ def _w_step(
     row[X] = x + 0.5 * step * (rate_x + end_x)
     row[Y] = y + 0.5 * step * (rate_y + end_y)
     row[YAW] = yaw + 0.5 * step * (yaw_rate + row[YAW_RATE])
-    estimate = 0.0
-    for j in range(3):
+    for j in range(moving_entries(row)):
         row[V_X + j] = start[j] + 1.5 * first[j] + 0.5 * second[j]
-        weight = row[HALF_TRACK] if j == 2 else 1.0
-        estimate = max(estimate, 0.5 * weight * abs(first[j] + second[j]))
-    if dynamic:
-        for bank in range(2):
-            row[OMEGA + bank] = start[3 + bank] + 1.5 * first[3 + bank] + 0.5 * second[3 + bank]
-            rim = row[WHEEL + bank] + row[WHEEL + 8 + bank]
-            estimate = max(estimate, 0.5 * rim * abs(first[3 + bank] + second[3 + bank]))
+        right[j] = 0.5 * (first[j] + second[j])
+    estimate = velocity_size(row, right)
     _forces_at_stage(row, numerics.jacobian_refresh, numerics.force_extrapolation, numerics, actions, record)
     return estimate
 
