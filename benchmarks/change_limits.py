@@ -40,6 +40,7 @@ from benchmarks.what_changed import (
 from ddagr_gym.calibration.ordinary_robot import load_ordinary_robot
 from ddagr_gym.diagnosis.change.ordinary import OrdinaryRobot
 from ddagr_gym.errors import InputError
+from ddagr_gym.recordings.files import write_atomically
 from ddagr_gym.rendering import palette
 from ddagr_gym.reporting.figures import house_style
 
@@ -164,7 +165,7 @@ def draw(found: Mapping[str, Any], path: Path) -> None:
             panel.plot(value, row, "o", color=colour, ms=6)
         panel.set_yticks(range(len(names)), [f"{name} (of {found[name]['count']})" for name in names])
         panel.set(xlim=(-0.02, 1.02), xlabel="share with its 95 % interval (alarms: small is good; delays: large)")
-        figure.savefig(path, dpi=120)
+        write_atomically(path, lambda to: figure.savefig(to, format="png", dpi=120))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

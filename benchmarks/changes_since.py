@@ -28,6 +28,7 @@ from ddagr_gym.diagnosis.answer.verdict import NONE, Diagnosis
 from ddagr_gym.diagnosis.change.run import what_changed_since
 from ddagr_gym.files import write_json
 from ddagr_gym.presets import get_robot, get_soil
+from ddagr_gym.recordings.files import write_atomically
 from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.rendering import palette
 from ddagr_gym.reporting.figures import house_style
@@ -213,7 +214,7 @@ def draw(answers: Sequence[dict[str, Any]], path: Path) -> None:
         right.axvline(1.0, color=palette.INK, lw=0.9)
         right.set_yticks(range(len(nulls)), [item["case"] for item in nulls])
         right.set_xlabel("nothing changed: largest shift over its limit")
-        figure.savefig(path, dpi=110)
+        write_atomically(path, lambda to: figure.savefig(to, format="png", dpi=110))
 
 
 def _label(item: dict[str, Any]) -> str:

@@ -61,6 +61,7 @@ from ddagr_gym.diagnosis.wording import title
 from ddagr_gym.files import write_text
 from ddagr_gym.identification.misfit import channel_misfit
 from ddagr_gym.presets import get_robot, get_soil
+from ddagr_gym.recordings.files import write_atomically
 from ddagr_gym.rendering import palette
 from ddagr_gym.reporting.figures import house_style
 from ddagr_gym.tasks import ResultStore, Task, TaskRunner, run_tasks
@@ -90,7 +91,7 @@ def compared(pair: Pair) -> dict[str, Any]:
     robot = get_robot(pair.robot)
     before, after = recordings_of(pair, SEED)
     mended = mend_recordings(after)
-    known = robot_of_before(before, robot, get_soil(SOIL)).seen_by(mended.recordings, GROUND)
+    known = robot_of_before(mend_recordings(before), robot, get_soil(SOIL)).seen_by(mended.recordings, GROUND)
     problem, fitted = fit_ordinary(mended, known, GROUND)
     scan = scan_drive(problem, fitted)
     scores = scan.scores()
@@ -289,7 +290,7 @@ def draw(pairs: Sequence[Mapping[str, Any]], expected: ExpectedScatter, path: Pa
         axis.set_xscale("log")
         axis.set_yticks(range(len(names)), [title(name) for name in names])
         axis.set_xlabel("probability of as much in an ordinary drive (line: an alarm)")
-        figure.savefig(path, dpi=110)
+        write_atomically(path, lambda to: figure.savefig(to, format="png", dpi=110))
 
 
 def summary(pairs: Iterable[Mapping[str, Any]]) -> dict[str, Any]:

@@ -26,6 +26,7 @@ from ddagr_gym.calibration.left_out import ENCODERS, Forecast, forecasts, refitt
 from ddagr_gym.calibration.run import Outcome
 from ddagr_gym.calibration.settings import CalibrationSettings
 from ddagr_gym.files import write_json
+from ddagr_gym.recordings.files import write_atomically
 from ddagr_gym.rendering import palette
 from ddagr_gym.replay_analysis.horizons import sample_errors
 from ddagr_gym.replay_analysis.intervals import error_statistics
@@ -88,7 +89,7 @@ def draw(rows: Sequence[dict[str, Any]], path: Path) -> None:
         panel.set_ylabel("median error of wheel speeds [rad/s]")
         panel.margins(y=0.3)
         panel.legend(title="forecast by the fit of", ncols=len(FITS), loc="upper center")
-        figure.savefig(path, dpi=120)
+        write_atomically(path, lambda to: figure.savefig(to, format="png", dpi=120))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -38,6 +38,7 @@ from ddagr_gym.identification.gauss_newton import fit
 from ddagr_gym.identification.misfit import dispersion_of
 from ddagr_gym.physics.effects.registry import effect_kinds
 from ddagr_gym.presets import get_robot, get_soil
+from ddagr_gym.recordings.files import write_atomically
 from ddagr_gym.rendering import palette
 from ddagr_gym.reporting.figures import house_style
 
@@ -144,7 +145,7 @@ def draw(answers: Sequence[dict[str, Any]], path: Path) -> None:
         right.axvline(THRESHOLD, color=palette.INK, lw=0.9)
         right.set_yticks(range(len(constant)), [_label(item) for item in constant], fontsize=7)
         right.set_xlabel("constant: evidence of a change (line: threshold)")
-        figure.savefig(path, dpi=110)
+        write_atomically(path, lambda to: figure.savefig(to, format="png", dpi=110))
 
 
 def _draw_time(axis: Any, place: int, item: dict[str, Any]) -> None:

@@ -43,6 +43,7 @@ from ddagr_gym.identification.motor_currents import without_currents
 from ddagr_gym.identification.residual_weights import Weights
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.checks.currents import CurrentKind
+from ddagr_gym.recordings.files import write_atomically
 from ddagr_gym.recordings.load import load_recording
 from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.rendering import palette
@@ -207,7 +208,7 @@ def save_figure(content: dict[str, Any], path: Path) -> None:
             axis.set_xlim(left=0.0)
         panels[0].set_yticks(range(len(SHOWN)), [name.replace("_", " ") for name in reversed(SHOWN)])
         figure.legend(*panels[0].get_legend_handles_labels(), ncols=2, loc="outside upper left")
-        figure.savefig(path, dpi=160, metadata={"Software": None})
+        write_atomically(path, lambda to: figure.savefig(to, format="png", dpi=160, metadata={"Software": None}))
 
 
 def main() -> None:

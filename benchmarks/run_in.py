@@ -32,6 +32,7 @@ from ddagr_gym.identification.fit_numerics import field_numerics
 from ddagr_gym.identification.window_model import WindowModel
 from ddagr_gym.identification.windows import WindowSet, cut_windows, with_presumed_past
 from ddagr_gym.physics.effects.files import load_effects
+from ddagr_gym.recordings.files import write_atomically
 from ddagr_gym.rendering import palette
 from ddagr_gym.replay_analysis.horizons import sample_errors
 from ddagr_gym.replay_analysis.intervals import error_statistics
@@ -113,7 +114,7 @@ def draw(rows: Sequence[dict[str, Any]], path: Path) -> None:
         panel.set_ylabel("median error of wheel speeds [rad/s]")
         panel.margins(y=0.25)
         panel.legend(title="known of before the window", ncols=3, loc="upper center")
-        figure.savefig(path, dpi=120)
+        write_atomically(path, lambda to: figure.savefig(to, format="png", dpi=120))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -33,6 +33,7 @@ from ddagr_gym.identification.fit_numerics import field_numerics, field_slope_nu
 from ddagr_gym.identification.window_model import STATE_STEPS, WindowModel
 from ddagr_gym.identification.windows import STATE, WindowSet
 from ddagr_gym.parameters import Numerics
+from ddagr_gym.recordings.files import write_atomically
 from ddagr_gym.rendering import palette
 from ddagr_gym.reporting.figures import house_style
 
@@ -162,7 +163,7 @@ def draw(table: dict[str, Any], path: Path) -> None:
         right.set_yticks([])
         right.invert_yaxis()
         right.set_xlabel("seconds of CPU of all")
-        figure.savefig(path, dpi=120)
+        write_atomically(path, lambda to: figure.savefig(to, format="png", dpi=120))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

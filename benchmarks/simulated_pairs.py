@@ -57,6 +57,7 @@ from ddagr_gym.files import write_json
 from ddagr_gym.identification.parameters import ModelParameter
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.presets import get_robot, get_soil
+from ddagr_gym.recordings.files import write_atomically
 from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.rendering import palette
 from ddagr_gym.reporting.figures import house_style
@@ -257,7 +258,7 @@ def draw(pairs: Sequence[dict[str, Any]], shipped: dict[str, Any], path: Path) -
             axis.set_title(f"{ground.replace('_', ' ')}: {shipped[ground]['degrees']:g} degrees of freedom")
             axis.set_yticks(range(len(names)), [title(name) for name in names])
             axis.set_xlabel("difference, in expected deviations (line: limit)")
-        figure.savefig(path, dpi=110)
+        write_atomically(path, lambda to: figure.savefig(to, format="png", dpi=110))
 
 
 def with_independent(own: dict[str, Any], other: dict[str, Any]) -> dict[str, Any]:

@@ -22,6 +22,7 @@ from ddagr_gym.calibration.ordinary_robot import load_ordinary_robot
 from ddagr_gym.diagnosis.change.run import what_changed
 from ddagr_gym.diagnosis.wording import title
 from ddagr_gym.files import make_folder, write_json
+from ddagr_gym.recordings.files import write_atomically
 from ddagr_gym.rendering import palette
 from ddagr_gym.reporting.figures import house_style
 
@@ -91,7 +92,7 @@ def draw(fields: Mapping[str, Mapping[str, Any]], path: Path) -> None:
         axes.axvline(1.0, color=palette.INK, lw=0.9)
         axes.set_yticks(range(len(SHOWN)), [f"{title(effect)}, {field}" for effect, field in reversed(SHOWN)])
         axes.set_xlabel("least change that is told on the sloping field, over that on the level one")
-        figure.savefig(path, dpi=110)
+        write_atomically(path, lambda to: figure.savefig(to, format="png", dpi=110))
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

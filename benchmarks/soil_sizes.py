@@ -47,6 +47,7 @@ from ddagr_gym.identification.misfit import dispersion_of
 from ddagr_gym.identification.problem import Problem
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.presets import get_robot
+from ddagr_gym.recordings.files import write_atomically
 from ddagr_gym.rendering import palette
 from ddagr_gym.reporting.figures import house_style
 
@@ -190,7 +191,7 @@ def draw(answers: Sequence[dict[str, Any]], path: Path) -> None:
         panels[2].set_xlabel("difference in traction less the true one [%]")
         figure.suptitle("90 % intervals: thin before, thick now; orange where the truth lies outside", fontsize=9)
         panels[0].set_yticks(range(len(shown)), [_label(item) for item in shown], fontsize=7)
-        figure.savefig(path, dpi=110)
+        write_atomically(path, lambda to: figure.savefig(to, format="png", dpi=110))
 
 
 def _bar(axis: Any, place: float, ends: Any, width: float, alpha: float, truth: float = 1.0) -> None:

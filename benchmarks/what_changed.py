@@ -49,6 +49,7 @@ from ddagr_gym.diagnosis.change.run import what_changed
 from ddagr_gym.errors import InputError
 from ddagr_gym.files import write_json
 from ddagr_gym.presets import get_robot
+from ddagr_gym.recordings.files import write_atomically
 from ddagr_gym.recordings.load import load_recording
 from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.rendering import palette
@@ -212,7 +213,7 @@ def draw(cases: Sequence[Mapping[str, Any]], path: Path) -> None:
         panel.grid(visible=False)
         panel.tick_params(length=0)
         panel.set_title("Right (green), sure and wrong (orange), neither (grey)")
-        figure.savefig(path, dpi=120)
+        write_atomically(path, lambda to: figure.savefig(to, format="png", dpi=120))
 
 
 def _cell(x: float, y: float, colour: str) -> Any:

@@ -67,7 +67,7 @@ def find_config(folder: str, name: str | os.PathLike[str]) -> Path:
     path = expanded(name)
     if path.suffix in (".yaml", ".yml"):
         if not path.exists():
-            raise InputError(f"{path}: no such configuration file.")
+            raise InputError(f"{path}: no such configuration file, give the path of one that exists.")
         if not path.is_file():
             raise InputError(f"{path} is not a regular file: give a configuration's file.")
         return path

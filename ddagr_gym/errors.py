@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Iterable
+from numbers import Integral, Real
 
 
 class InputError(ValueError):
@@ -30,14 +32,27 @@ def unknown_name(kind: str, name: object, known: Iterable[str], where: str = "")
 
 
 def at_least(**bounds: tuple[float | None, float]) -> None:
-    """Refuse numbers below their least value; those that are None pass.
+    """Refuse what is no finite number or below its least value; None passes.
 
     Args:
-        bounds: value and least value by name.
+        bounds: value and least value by name; where the least value is an integer, the value has to be one too.
 
     Raises:
-        InputError: with the first one that is below, or no number.
+        InputError: with the first one that is refused.
     """
     for name, (given, least) in bounds.items():
-        if given is not None and not given >= least:
+        if given is None:
+            continue
+        whole = isinstance(least, int)
+        if not _is_number(given, whole):
+            needed = "a whole number" if whole else "a finite number"
+            raise InputError(f"{name} is {given!r}: give {needed} of at least {least}.")
+        if given < least:
             raise InputError(f"{name} is {given}: give at least {least}.")
+
+
+def _is_number(value: object, whole: bool) -> bool:
+    """Whether a value is a whole or else a finite number, of Python or numpy; True and False are neither."""
+    if isinstance(value, Integral):
+        return not isinstance(value, bool)
+    return not whole and isinstance(value, Real) and math.isfinite(value)

@@ -84,7 +84,7 @@ def take_array(
     if value.shape != shape or value.dtype != number:
         raise InputError(f"{file}: {name} is {value.dtype} of shape {value.shape}: {number.__name__} {shape} expected.")
     if not np.isfinite(value).all():
-        raise InputError(f"{file}: {name} holds values that are not finite.")
+        raise InputError(f"{file}: {name} holds values that are not finite: give {kind} of another training.")
     return value
 
 

@@ -126,6 +126,11 @@ def full_name(name: str) -> str:
     return str(expanded(name).resolve()) if is_file(name) else name
 
 
+def robot_option(name: str) -> str:
+    """``--robot`` for a robot of that name: its file where it is no preset, whose name alone is refused."""
+    return f"--robot {name}" if name in _ROBOTS else "--robot FILE.yaml (the file that describes it)"
+
+
 def soil_source(name: str) -> str:
     """Where the soil ``name`` comes from."""
     get_soil(name)

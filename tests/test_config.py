@@ -245,5 +245,5 @@ def test_configs_are_found_by_name_and_by_path(tmp_path, monkeypatch):
         find_config("soils", "cley")
     with pytest.raises(InputError, match="configs/tasks is empty"):
         find_config("tasks", "turn")
-    with pytest.raises(InputError, match="no such configuration file"):
+    with pytest.raises(InputError, match=r"sand\.yaml: no such configuration file, give the path of one that exists"):
         find_config("soils", tmp_path / "sand.yaml")

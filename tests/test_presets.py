@@ -8,7 +8,7 @@ import pytest
 
 from ddagr_gym.config import configs_dir, dump_config
 from ddagr_gym.errors import InputError
-from ddagr_gym.presets import get_robot, get_soil, robot_names, soil_names, soil_source
+from ddagr_gym.presets import get_robot, get_soil, robot_names, robot_option, soil_names, soil_source
 
 
 def test_ddagr_is_tables_6_1_and_a_1():
@@ -109,3 +109,8 @@ def test_files_that_do_not_fit_are_refused_with_the_place(tmp_path):
         get_soil(str(path))
     with pytest.raises(InputError, match="unknown key 'cohesion'"):
         get_robot(str(path))
+
+
+def test_a_robot_that_is_no_preset_is_named_by_its_file():
+    assert robot_option("husky") == "--robot husky"
+    assert robot_option("rover") == "--robot FILE.yaml (the file that describes it)"

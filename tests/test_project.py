@@ -135,3 +135,9 @@ def test_the_hooks_before_a_commit_call_programs_of_the_environment(repository, 
         folder, _, program = hook["entry"].split()[0].rpartition("/")
         assert (folder, hook["language"]) == (".venv/bin", "system")
         assert program in tools
+
+
+def test_benchmarks_write_their_pictures_whole(repository):
+    """To a temporary file that is renamed: an interruption leaves the picture of before."""
+    modules = (repository / "benchmarks").rglob("*.py")
+    assert [module.name for module in modules if "savefig(path" in module.read_text()] == []

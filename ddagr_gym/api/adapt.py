@@ -10,10 +10,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ddagr_gym.api.inputs import Sources, recordings_from
-from ddagr_gym.api.nominal import RobotLike, SoilLike, robot_from, soil_from
+from ddagr_gym.api.nominal import (
+    DEFAULT_ROBOT,
+    DEFAULT_SOIL,
+    RobotLike,
+    SoilLike,
+    check_left_out,
+    robot_from,
+    soil_from,
+)
 from ddagr_gym.api.results import Report, Table
 from ddagr_gym.errors import InputError, InputWarning, at_least
 from ddagr_gym.extras import need
+from ddagr_gym.files import expanded
 from ddagr_gym.progress import counting
 
 if TYPE_CHECKING:
@@ -23,7 +32,6 @@ if TYPE_CHECKING:
     from ddagr_gym.diagnosis.answer.verdict import Diagnosis
     from ddagr_gym.parameters import Robot
 
-_ROBOT, _SOIL = "ddagr", "thesis_a1"
 _UNKNOWN = "unknown"
 
 
@@ -83,8 +91,8 @@ class AdaptationResult(Report):
 
 def adapt(
     recordings: Sources | None = None,
-    robot: RobotLike = _ROBOT,
-    soil: SoilLike = _SOIL,
+    robot: RobotLike = DEFAULT_ROBOT,
+    soil: SoilLike = DEFAULT_SOIL,
     *,
     diagnosis: str | os.PathLike[str] | None = None,
     calibration: str | os.PathLike[str] | None = None,
@@ -129,14 +137,15 @@ def adapt(
         threads: of the diagnosis.
         column_map: of files that are not imported yet.
         progress: called with a line of text from time to time.
-        cache: folder in which finished steps are kept, so that the same call goes on after an interruption.
+        cache: folder in which finished steps are kept, so that the same call goes on after an interruption; of
+            recordings against a calibration the turns alone.
 
     Returns:
         The controller, what was kept and why, turns before and after; ``report`` writes the bundle.
 
     Raises:
         InputError: recordings that cannot be diagnosed, a diagnosis that says "unknown", a turn that the robot cannot
-            make, another controller.
+            make, another controller, a robot or soil beside a calibration.
         InputWarning: (a warning) the diagnosis is not complete, or names what the controller does not use.
 
     Examples:
@@ -157,7 +166,9 @@ def adapt(
     need("matplotlib", "jinja2")
     nominal_settings(controller)
     _check_sources(recordings, diagnosis, calibration, ground)
-    place = None if cache is None else Path(cache)
+    if calibration is not None:
+        check_left_out(Path(calibration), robot, soil)
+    place = None if cache is None else expanded(cache)
     if recordings is not None:
         options = {"seed": seed, "threads": threads, "column_map": column_map, "progress": progress}
         found = _diagnosed(recordings, robot, soil, calibration, ground, place, options)

@@ -8,10 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
-from ddagr_gym.api.inputs import ENDINGS, Source, Sources, recordings_from
+from ddagr_gym.api.inputs import ENDINGS, Source, Sources, recordings_from, sources_in
 from ddagr_gym.api.nominal import OWN, RobotLike, SoilLike, robot_from, soil_from, soil_name_of
 from ddagr_gym.api.results import Report, Table
 from ddagr_gym.errors import InputError, at_least
+from ddagr_gym.files import expanded
+from ddagr_gym.recordings.files import DEFAULT_LIMITS, Limits
 
 if TYPE_CHECKING:
     from ddagr_gym.calibration.result import CalibratedParameter, Calibration
@@ -22,6 +24,9 @@ if TYPE_CHECKING:
 
 DriveLike: TypeAlias = int | Source
 """A drive among those that are calibrated: its number, its path or file name, or the object itself."""
+
+DrivesLike: TypeAlias = int | str | os.PathLike[str] | Sequence[DriveLike]
+"""Drives among those, or a single one by its number, path or file name."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -124,7 +129,7 @@ def calibrate(
     recordings: Sources,
     robot: RobotLike,
     soil: SoilLike | Mapping[str, SoilLike] = "firm_ground",
-    grounds: Mapping[str, Sequence[DriveLike]] | None = None,
+    grounds: Mapping[str, DrivesLike] | None = None,
     *,
     seed: int = 0,
     threads: int = 1,
@@ -133,6 +138,7 @@ def calibrate(
     processes: int = 1,
     cluster: str = "",
     column_map: str | os.PathLike[str] | None = None,
+    limits: Limits = DEFAULT_LIMITS,
     progress: Callable[[str], None] | None = None,
     cache: str | os.PathLike[str] | None = None,
 ) -> CalibrationResult:
@@ -146,7 +152,8 @@ def calibrate(
         recordings: ordinary drives of one robot: recordings, tables, paths of files or folders.
         robot: its data sheet: name, YAML file or object.
         soil: nominal one: name, YAML file or object, or one of these for each ground by its name.
-        grounds: drives on each ground by its name, as numbers, paths or objects; all on one where it is None.
+        grounds: drives on each ground by its name, as numbers, paths or objects; all on one where it is None. Of files
+            of one name, the end of the path that tells them apart.
         seed: of the resampled intervals.
         threads: of the simulator, in each process.
         supply_currents: also fit currents that motors draw from their supply; their own current is always fitted.
@@ -156,6 +163,7 @@ def calibrate(
         cluster: a Ray cluster to run them on: "local" starts one of so many processors here, an address takes one that
             runs. The result is the same.
         column_map: shipped map by name or the path of one's own, for files that are not imported yet.
+        limits: on rows and bytes of files.
         progress: called with a line of text at each step; ``print`` will do.
         cache: folder in which finished steps are kept. After an interruption (KeyboardInterrupt) the same call goes on
             from it; it stays when all is done, and is emptied when it is of another calibration.
@@ -189,13 +197,12 @@ def calibrate(
 
     at_least(threads=(threads, 1), seed=(seed, 0), processes=(processes, 1))
     data_sheet = robot_from(robot)
-    given = _listed(recordings)
-    found = _named_apart(recordings_from(given, robot, column_map) if given else ())
+    sources = sources_in(recordings)
+    found = _named_apart(recordings_from(sources, robot, column_map, limits) if sources else ())
     check_drives(found, data_sheet)
     check_map(found, np.random.default_rng(seed))
     names = [recording.meta.source for recording in found]
-    numbers = {ground: [_number(drive, given, found) for drive in drives] for ground, drives in (grounds or {}).items()}
-    by_drive = grounds_of(names, numbers)
+    by_drive = grounds_of(names, _numbers(grounds or {}, sources, found))
     for ground in dict.fromkeys(by_drive):
         check_ground_name(ground)
     soils = _soils(soil, by_drive)
@@ -216,11 +223,6 @@ def calibrate(
     return CalibrationResult(outcome)
 
 
-def _listed(recordings: Sources) -> list[Source]:
-    several = isinstance(recordings, Sequence) and not isinstance(recordings, str)
-    return list(recordings) if several else [recordings]  # type: ignore[arg-type]
-
-
 def _named_apart(recordings: Sequence[Recording]) -> tuple[Recording, ...]:
     """Recordings of which those with one name are numbered."""
     names = [recording.meta.source for recording in recordings]
@@ -230,27 +232,52 @@ def _named_apart(recordings: Sequence[Recording]) -> tuple[Recording, ...]:
     )
 
 
-def _number(drive: DriveLike, given: Sequence[Source], found: Sequence[Recording]) -> int:
-    """Number of a drive among the recordings."""
+def _numbers(
+    grounds: Mapping[str, DrivesLike], sources: Sequence[Source], found: Sequence[Recording]
+) -> dict[str, list[int]]:
+    """Numbers of the drives on each ground."""
+    numbers: dict[str, list[int]] = {}
+    for ground, drives in grounds.items():
+        several = [drives] if isinstance(drives, int | str | os.PathLike) else drives
+        numbers[ground] = [_number(drive, sources, found) for drive in several]
+    return numbers
+
+
+def _number(drive: DriveLike, sources: Sequence[Source], found: Sequence[Recording]) -> int:
+    """Number of a drive among the recordings, each of which has one source."""
     if isinstance(drive, int) and not isinstance(drive, bool):
         if not 0 <= drive < len(found):
             raise InputError(f"drive number {drive} has a ground: give numbers from 0 to {len(found) - 1}.")
         return drive
     if isinstance(drive, str | os.PathLike):
-        name = Path(drive).name
-        sources = [recording.meta.source for recording in found]
-        matching = [n for n, source in enumerate(sources) if source in (str(drive), name)]
-        # an imported file still says what it was imported from
-        matching = matching or [n for n, source in enumerate(sources) if _stem(source) == _stem(name)]
+        matching = _of_path(drive, sources) or _of_name(drive, found)
     else:
-        matching = [n for n, item in enumerate(given) if item is drive and len(given) == len(found)]
+        matching = [n for n, item in enumerate(sources) if item is drive]
     if not matching:
-        raise InputError(
-            f"{drive} has a ground and is not among the drives: {', '.join(r.meta.source for r in found)}."
-        )
+        said = drive if isinstance(drive, str | os.PathLike) else f"a {type(drive).__name__}"
+        names = ", ".join(recording.meta.source for recording in found)
+        raise InputError(f"{said} has a ground and is not among the drives {names}: give the name or path of one.")
     if len(matching) > 1:
-        raise InputError(f"{drive} is the name of {len(matching)} drives: give grounds by their numbers.")
+        raise InputError(
+            f"{drive} is the name of {len(matching)} drives: give the whole path of one (or, in Python, its number)."
+        )
     return matching[0]
+
+
+def _of_path(drive: str | os.PathLike[str], sources: Sequence[Source]) -> list[int]:
+    """Numbers of the files that a path names: that one itself, else those whose paths end so."""
+    path = expanded(drive)
+    places = {n: Path(os.path.abspath(item)) for n, item in enumerate(sources) if isinstance(item, Path)}
+    same = [n for n, place in places.items() if place == Path(os.path.abspath(path))]
+    return same or [n for n, place in places.items() if place.parts[-len(path.parts) :] == path.parts]
+
+
+def _of_name(drive: str | os.PathLike[str], found: Sequence[Recording]) -> list[int]:
+    """Numbers of the recordings that bear a name."""
+    name, names = Path(drive).name, [recording.meta.source for recording in found]
+    same = [n for n, known in enumerate(names) if known in (str(drive), name)]
+    # an imported file still says what it was imported from
+    return same or [n for n, known in enumerate(names) if _stem(known) == _stem(name)]
 
 
 def _stem(name: str) -> str:

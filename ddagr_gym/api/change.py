@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from ddagr_gym.api.diagnosis_report import DiagnosisReport
 from ddagr_gym.api.results import Table
+from ddagr_gym.files import write_text
 
 if TYPE_CHECKING:
     from ddagr_gym.diagnosis.change.run import Outcome
@@ -60,7 +61,7 @@ class ChangeResult(DiagnosisReport):
         self._save_effects(folder)
         self.to_json(folder / "diagnosis.json")
         for name, fitted in zip(("robot.yaml", "soil.yaml"), self.nominal or (), strict=False):
-            (folder / name).write_text(f"# fitted to the drives before: {self.sentence}\n{dump_config(fitted)}")
+            write_text(folder / name, f"# fitted to the drives before: {self.sentence}\n{dump_config(fitted)}")
         if self.with_page:
             write_page(folder, self.diagnosis)
 

@@ -147,9 +147,11 @@ def check(
 
     at_least(seed=(seed, 0))
     found = recordings_from(recordings, robot, column_map)
-    robots = {recording.meta.robot for recording in found}
+    robots = sorted({recording.meta.robot for recording in found} - {""})
     if len(robots) > 1:
-        raise InputError(f"the runs are of the robots {', '.join(sorted(robots))}: check one robot at a time.")
+        raise InputError(
+            f"the runs are of the robots {', '.join(robots)}: check one robot at a time, with --robot NAME."
+        )
     reports = tuple(check_recording(recording, np.random.default_rng(seed)) for recording in found)
     return CheckResult(reports, tuple(across_runs(list(found), list(reports))), found, seed)
 

@@ -13,7 +13,17 @@ from typing import TYPE_CHECKING, overload
 from ddagr_gym.api.change import ChangeResult, changed, changed_since
 from ddagr_gym.api.diagnosis_result import DiagnosisResult
 from ddagr_gym.api.inputs import Sources, recordings_from
-from ddagr_gym.api.nominal import Nominal, RobotLike, SoilLike, ThresholdsLike, nominal_from, thresholds_from
+from ddagr_gym.api.nominal import (
+    DEFAULT_ROBOT,
+    DEFAULT_SOIL,
+    Nominal,
+    RobotLike,
+    SoilLike,
+    ThresholdsLike,
+    check_left_out,
+    nominal_from,
+    thresholds_from,
+)
 from ddagr_gym.errors import InputError, InputWarning, at_least
 from ddagr_gym.extras import need
 from ddagr_gym.progress import counting
@@ -40,15 +50,11 @@ _SAME_WINDOW = 0.5
 """Difference of lengths of windows up to which gates are taken to hold [s] (ours; short segments shorten windows)."""
 
 
-_ROBOT, _SOIL = "ddagr", "thesis_a1"
-"""Nominal ones where none are given, which say nothing beside a calibration."""
-
-
 @overload
 def diagnose(
     recordings: Sources,
-    robot: RobotLike = _ROBOT,
-    soil: SoilLike = _SOIL,
+    robot: RobotLike = DEFAULT_ROBOT,
+    soil: SoilLike = DEFAULT_SOIL,
     *,
     calibration: None = None,
     ground: str = "",
@@ -70,8 +76,8 @@ def diagnose(
 @overload
 def diagnose(
     recordings: Sources,
-    robot: RobotLike = _ROBOT,
-    soil: SoilLike = _SOIL,
+    robot: RobotLike = DEFAULT_ROBOT,
+    soil: SoilLike = DEFAULT_SOIL,
     *,
     calibration: str | os.PathLike[str],
     ground: str = "",
@@ -93,8 +99,8 @@ def diagnose(
 @overload
 def diagnose(
     recordings: Sources,
-    robot: RobotLike = _ROBOT,
-    soil: SoilLike = _SOIL,
+    robot: RobotLike = DEFAULT_ROBOT,
+    soil: SoilLike = DEFAULT_SOIL,
     *,
     calibration: None = None,
     ground: str = "",
@@ -115,8 +121,8 @@ def diagnose(
 
 def diagnose(
     recordings: Sources,
-    robot: RobotLike = _ROBOT,
-    soil: SoilLike = _SOIL,
+    robot: RobotLike = DEFAULT_ROBOT,
+    soil: SoilLike = DEFAULT_SOIL,
     *,
     calibration: str | os.PathLike[str] | None = None,
     ground: str = "",
@@ -166,15 +172,16 @@ def diagnose(
         names_only: only name what is missing: no errors on unseen drives, no unnamed terms, no next drive, no page.
         column_map: shipped map by name or the path of one's own, for files that are not imported yet.
         progress: called with a line of text when a step begins and on what it does; ``print`` will do.
-        cache: folder in which finished steps are kept. After an interruption (KeyboardInterrupt) the same call goes on
-            from it; it stays when all is done, and is emptied when it is of another diagnosis.
+        cache: folder in which finished steps are kept, of a diagnosis without calibration and drives from before only.
+            After an interruption (KeyboardInterrupt) the same call goes on from it; it stays when all is done, and is
+            emptied when it is of another diagnosis.
 
     Returns:
         Verdict, findings with sizes and intervals, effects and refitted robot and soil for the simulator; with a
         calibration or drives from before what changed, and the least change of every effect that would have been found.
 
     Raises:
-        InputError: recordings that cannot be diagnosed, unknown names, no thresholds for the robot.
+        InputError: recordings that cannot be diagnosed, unknown names, no thresholds for the robot, options at odds.
         InputWarning: (a warning) the thresholds were made for another robot, soil, uncertainty or window.
 
     Examples:
@@ -193,6 +200,7 @@ def diagnose(
     from ddagr_gym.identification.nuisances import NuisancePriors
 
     at_least(threads=(threads, 1), window=(window, 1.0), stride=(stride, 0.1), seed=(seed, 0))
+    _check_no_cache(cache if calibration is not None or before is not None else None)
     if before is not None:
         _check_only_before(calibration, ground, thresholds=thresholds, stride=stride, soil_uncertainty=soil_uncertainty)
         nominal = nominal_from(robot, soil)
@@ -206,7 +214,7 @@ def diagnose(
         raise InputError("whether the ground is the same is said, and no drive from before: name one with --before.")
     if calibration is not None:
         folder = Path(calibration)
-        _check_left_out(folder, robot, soil, thresholds=thresholds, window=window, stride=stride)
+        check_left_out(folder, robot, soil, thresholds=thresholds, window=window, stride=stride)
         _check_known_soil(folder, soil_uncertainty)
         given = recordings_from(recordings, _robot_of(folder), column_map)
         say = (lambda line: None) if progress is None else progress
@@ -298,12 +306,12 @@ class _Drivetrain:
             self.progress(f"  {line}")
 
 
-def _check_left_out(folder: Path, robot: RobotLike, soil: SoilLike, **options: object) -> None:
-    """Refuse what a calibration already says; InputError."""
-    beside = {"robot": None if robot == _ROBOT else robot, "soil": None if soil == _SOIL else soil, **options}
-    given = [name for name, value in beside.items() if value is not None]
-    if given:
-        raise InputError(f"a calibration and {given[0]} are given: leave out one of them, {folder} has both.")
+def _check_no_cache(cache: object) -> None:
+    """Refuse a cache beside ordinary drives; InputError."""
+    if cache is not None:
+        raise InputError(
+            f"the cache {cache} is given with a calibration or drives from before: leave it out, nothing is kept then."
+        )
 
 
 def _check_only_before(calibration: object, ground: str, **options: object) -> None:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from ddagr_gym.api.diagnosis_report import DiagnosisReport
 from ddagr_gym.api.results import Table
 from ddagr_gym.errors import InputError
+from ddagr_gym.files import write_text
 
 if TYPE_CHECKING:
     from ddagr_gym.calibration.run import Outcome as CalibrationOutcome
@@ -121,4 +122,4 @@ class DiagnosisResult(DiagnosisReport):
 
         for name, fitted in (("robot.yaml", self.robot), ("soil.yaml", self.soil)):
             if fitted is not None:
-                (folder / name).write_text(f"# refitted: {self.sentence}\n{dump_config(fitted)}")
+                write_text(folder / name, f"# refitted: {self.sentence}\n{dump_config(fitted)}")

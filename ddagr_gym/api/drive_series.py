@@ -24,6 +24,7 @@ from ddagr_gym.api.drive_tasks import (
 from ddagr_gym.api.inputs import Sources
 from ddagr_gym.api.results import Report, Table
 from ddagr_gym.errors import at_least, unknown_name
+from ddagr_gym.files import expanded
 from ddagr_gym.recordings.files import DEFAULT_LIMITS, Limits
 
 if TYPE_CHECKING:
@@ -161,7 +162,7 @@ def diagnose_drives(
         >>> print(result.headline)  # doctest: +SKIP
     """
     at_least(threads=(threads, 1), processes=(processes, 1), seed=(seed, 0))
-    folder = Path(calibration)
+    folder = expanded(calibration)
     calibrated = load_calibrated(folder)
     ordinary, _ = calibrated
     if ground and ground not in ordinary.soils:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 import os
 import traceback
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -62,7 +63,7 @@ class DriveTask:
 
     Attributes:
         source: path, or the recording itself.
-        name: of its file, with its folder where another drive has the same.
+        name: of its file, with as many of its folders as tell it from others, and a number for what is there again.
         sha256: of the file or of the values; "" where the file cannot be read.
         unread: why not; "" where it can.
     """
@@ -74,7 +75,7 @@ class DriveTask:
 
 
 def tasks_of(given: Sources) -> list[DriveTask]:
-    """One task for each drive that is given, files as they are found in folders.
+    """One task for each drive that is given, each with a name of its own, files as they are found in folders.
 
     Raises:
         InputError: nothing given, or a folder without recordings.
@@ -82,13 +83,39 @@ def tasks_of(given: Sources) -> list[DriveTask]:
     found = [_task(item, number) for number, item in enumerate(sources_in(given))]
     if not found:
         raise InputError("no recording is given: name one or more files, or a folder of them.")
-    names = [task.name for task in found]
-    return [_named_apart(task, number) if names.count(task.name) > 1 else task for number, task in enumerate(found)]
+    names = _numbered(_with_folders(found))
+    return [replace(task, name=name) for task, name in zip(found, names, strict=True)]
 
 
-def _named_apart(task: DriveTask, number: int) -> DriveTask:
-    apart = f"{task.source.parent.name}/{task.name}" if isinstance(task.source, Path) else f"{task.name} ({number + 1})"
-    return DriveTask(task.source, apart, task.sha256, task.unread)
+def _with_folders(tasks: Sequence[DriveTask]) -> list[str]:
+    """Names of drives, those of files of one name with folders."""
+    places = [_place(task) for task in tasks]
+    alike: dict[str, set[Path]] = {}
+    for place in places:
+        if place is not None:
+            alike.setdefault(place.name, set()).add(place)
+    apart = {place: name for found in alike.values() for place, name in _apart(found).items()}
+    return [task.name if place is None else apart[place] for task, place in zip(tasks, places, strict=True)]
+
+
+def _place(task: DriveTask) -> Path | None:
+    """Whole path of a file; None for a recording."""
+    return Path(os.path.abspath(task.source)) if isinstance(task.source, Path) else None
+
+
+def _apart(paths: Collection[Path]) -> dict[Path, str]:
+    """Whole paths shortened to as many folders as tell them apart."""
+    kept = next(n for n in itertools.count(1) if len({path.parts[-n:] for path in paths}) == len(paths))
+    return {path: Path(*path.parts[-kept:]).as_posix() for path in paths}
+
+
+def _numbered(names: Sequence[str]) -> list[str]:
+    """Names of which one that is there again has a number."""
+    found: dict[str, None] = {}
+    for name in names:
+        more = (f"{name} ({number})" for number in itertools.count(2))
+        found[next(item for item in itertools.chain([name], more) if item not in found)] = None
+    return list(found)
 
 
 def _task(item: Source, number: int) -> DriveTask:

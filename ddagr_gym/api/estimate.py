@@ -161,7 +161,7 @@ def estimate(
         motor_rate: of the speed loop [1/s], where it is not the robot's.
         filter: ours, or the thesis's eight-state filter.
         law: force law of our filter.
-        attitude: use the recorded roll and pitch [rad]; only right where they count from the horizon.
+        attitude: our filter uses the recorded roll and pitch [rad]; only right where they count from the horizon.
         seed: of the simulated run, and of what is resampled.
         column_map: shipped map by name or the path of one's own, for a file that is not imported yet.
 
@@ -169,7 +169,8 @@ def estimate(
         States, soil parameters, errors where the recording holds the truth, figures.
 
     Raises:
-        InputError: neither a recording nor a table of the thesis, or both; unknown names; no rows.
+        InputError: neither a recording nor a table of the thesis, or both; unknown names; no rows; the attitude for
+            the thesis's filter or run, which are level.
 
     Examples:
         >>> import ddagr_gym
@@ -191,9 +192,14 @@ def estimate(
     chosen = ForceLaw[_known("force law", law, ForceLaw.__members__)]
     _known("filter", filter, ("ours", "thesis"))
     if thesis is not None:
-        _refuse_own(robot=(robot, "ddagr"), motor_rate=(motor_rate, None), map=(column_map, None))
+        own = {"motor_rate": (motor_rate, None), "map": (column_map, None), "attitude": (attitude, False)}
+        _refuse_own(robot=(robot, "ddagr"), **own)
         return EstimateResult(estimate_thesis_run(thesis, str(soil or ""), filter, chosen, seed), thesis)
     assert recording is not None
+    if attitude and filter == "thesis":
+        raise InputError(
+            "attitude True with the thesis's filter, which knows level ground alone: leave one of them out."
+        )
     found = robot_from(robot)
     if motor_rate is not None:
         found = replace(found, motor_rate=motor_rate)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias, Union
 from ddagr_gym.api.nominal import RobotLike
 from ddagr_gym.api.tables import is_table, recording_of_table
 from ddagr_gym.errors import InputError
+from ddagr_gym.files import expanded
 from ddagr_gym.parameters import Robot
 from ddagr_gym.recordings.files import DEFAULT_LIMITS, Limits
 from ddagr_gym.recordings.schema import Recording, RobotGeometry
@@ -78,7 +79,7 @@ def recording_from(
 
 def is_folder_of_drives(item: Any) -> bool:
     """Whether this is the path of a folder that is no recording itself (a ROS 2 bag)."""
-    path = Path(item) if isinstance(item, str | os.PathLike) else None
+    path = expanded(item) if isinstance(item, str | os.PathLike) else None
     return path is not None and path.is_dir() and not _is_bag(path)
 
 
@@ -98,17 +99,20 @@ def sources_in(given: Sources) -> list[Any]:
     Args:
         given: see :data:`Sources`.
 
+    Returns:
+        Recordings and tables as they are given; paths with ``~`` written out.
+
     Raises:
-        InputError: a folder without recordings.
+        InputError: a folder without recordings, or a path whose ``~`` names no user.
     """
     several = isinstance(given, Sequence) and not isinstance(given, str)
     items: list[Any] = list(given) if several else [given]  # type: ignore[arg-type]
     found: list[Any] = []
     for item in items:
-        if not is_folder_of_drives(item):
-            found.append(item)
+        path = expanded(item) if isinstance(item, str | os.PathLike) else None
+        if path is None or not is_folder_of_drives(path):
+            found.append(item if path is None else path)
             continue
-        path = Path(item)
         inside = sorted(filter(_is_recording, path.iterdir()))
         if not inside:
             kinds = f"{', '.join(ENDINGS)}, or the folder of a ROS 2 bag"

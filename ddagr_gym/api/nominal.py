@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias, Union
 
-from ddagr_gym.errors import InputWarning
+from ddagr_gym.errors import InputError, InputWarning
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.presets import full_name, get_robot, get_soil, is_file, robot_names, soil_names
 
@@ -23,6 +23,9 @@ SoilLike: TypeAlias = str | os.PathLike[str] | Soil
 
 ThresholdsLike: TypeAlias = Union["Thresholds", str, os.PathLike[str]]
 """Thresholds, or the path of a file that ``ddagr null-bank`` wrote."""
+
+DEFAULT_ROBOT, DEFAULT_SOIL = "ddagr", "thesis_a1"
+"""Nominal ones where none are given, which say nothing beside a calibration."""
 
 OWN = "given in Python"
 """In reports the name of a soil, or the file of a robot, that is an object and no preset: nothing loads it."""
@@ -52,6 +55,28 @@ def nominal_from(robot: RobotLike, soil: SoilLike) -> Nominal:
         InputError: an unknown name, with the closest ones; a file that is missing or not valid.
     """
     return Nominal(robot_from(robot), soil_from(soil), _robot_file(robot), soil_name_of(soil))
+
+
+def check_left_out(calibration: Path, robot: RobotLike, soil: SoilLike, **options: object) -> None:
+    """Refuse what a calibration already says.
+
+    Args:
+        calibration: its folder.
+        robot: :data:`DEFAULT_ROBOT` where none is given.
+        soil: :data:`DEFAULT_SOIL` where none is given.
+        options: further ones by name; None where they are not given.
+
+    Raises:
+        InputError: one of them is given.
+    """
+    beside = {
+        "robot": None if robot == DEFAULT_ROBOT else robot,
+        "soil": None if soil == DEFAULT_SOIL else soil,
+        **options,
+    }
+    given = [name for name, value in beside.items() if value is not None]
+    if given:
+        raise InputError(f"a calibration and {given[0]} are given: leave out one of them, {calibration} has both.")
 
 
 def robot_from(given: RobotLike) -> Robot:

@@ -139,7 +139,8 @@ def simulate(
         pose_rate: fixes of a pose receiver per second [Hz]; 0 for none.
         noise: sensor noise; False for ideal sensors.
         seed: of the sensor noise.
-        fine: converged numerics, about forty times slower, instead of the default (force errors below 1e-3).
+        fine: converged numerics, about forty times slower, instead of the default (nine in ten force errors below
+            1.3e-3).
 
     Returns:
         Columns of the drive, its recording, figure and video.

@@ -26,6 +26,7 @@ from ddagr_gym.calibration.ground_slopes import LIMIT
 from ddagr_gym.calibration.joint_fit import FittedModel
 from ddagr_gym.calibration.left_out import folds
 from ddagr_gym.calibration.part_selection import surely_above
+from ddagr_gym.diagnosis.result.uncertainty import student_quantile
 from ddagr_gym.identification.least_squares import huber_loss
 from ddagr_gym.identification.residual_weights import MAD_TO_DEVIATION
 from ddagr_gym.identification.windows import CHANNELS
@@ -46,9 +47,6 @@ FEWEST_READINGS = 40
 
 FARTHEST = 3.0
 """Of the sensor from the body's origin [m] (ours)."""
-
-LEVEL = 0.9
-"""Of intervals."""
 
 YAW, PLACE = "imu_yaw", "imu_place"
 SIZES = {"imu_yaw": (YAW, "rad"), "imu_x": (PLACE, "m"), "imu_y": (PLACE, "m")}
@@ -258,7 +256,7 @@ def _size(
     jackknife = np.array([fit.values[name] for fit in left_out])
     count = len(jackknife)
     deviation = float(np.sqrt((count - 1) / count * ((jackknife - jackknife.mean()) ** 2).sum()))
-    half = max(_quantile(count - 1) * deviation, _quantile(np.inf) * whole.deviations[name])
+    half = max(student_quantile(count - 1) * deviation, student_quantile(np.inf) * whole.deviations[name])
     value = whole.values[name]
     return MountingSize(name, unit, value, (value - half, value + half), True, growth, error, "")
 
@@ -267,16 +265,10 @@ def _tilt(name: str, whole: _Fit, groups: Integers) -> MountingSize:
     """The tilt that all drives have in common; what differs between them is their ground."""
     axis, sign = TILTS[name]
     found = sign * np.array([whole.biases[g][axis] for g in groups.tolist()]) / STANDARD_GRAVITY
-    half = float(_quantile(len(found) - 1) * found.std(ddof=1) / np.sqrt(len(found)))
+    half = float(student_quantile(len(found) - 1) * found.std(ddof=1) / np.sqrt(len(found)))
     value = float(found.mean())
     kept = abs(value) >= LEAST[name] and abs(value) > half
     interval = (value - half, value + half)
     if kept:
         return MountingSize(name, "rad", value, interval, True, None, None, "")
     return MountingSize(name, "rad", 0.0, None, False, None, None, HELPS["imu_tilt"])
-
-
-def _quantile(degrees: float) -> float:
-    from scipy.special import stdtrit
-
-    return float(stdtrit(degrees, 0.5 + 0.5 * LEVEL))

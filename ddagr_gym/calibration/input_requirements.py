@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ddagr_gym.diagnosis.answer.amounts import amounts
+from ddagr_gym.diagnosis.change.requirements import NEEDED
 from ddagr_gym.diagnosis.preprocessing.channel_faults import find_channel_faults
 from ddagr_gym.diagnosis.preprocessing.input_requirements import check_different
 from ddagr_gym.diagnosis.preprocessing.reversed_gyro import with_gyro_reversed
@@ -16,12 +17,11 @@ from ddagr_gym.diagnosis.wording import describe
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.windows import PERIOD_TOLERANCE
 from ddagr_gym.parameters import Robot
+from ddagr_gym.presets import robot_option
 from ddagr_gym.recordings.checks.travel import travelled_over_rolled
 from ddagr_gym.recordings.checks.turning import effective_track, gyro_against_pose, turns
+from ddagr_gym.recordings.drive_requirements import check_rows
 from ddagr_gym.recordings.schema import Recording
-
-NEEDED = ("command_right", "command_left", "encoder_right", "encoder_left", "yaw_rate")
-"""Channels without which neither the drivetrain nor the turning can be fitted."""
 
 SHORTEST_DRIVE = 60.0
 """Time under command that a drive must have [s] (ours): ten windows of 6 s."""
@@ -79,6 +79,7 @@ def check_drives(recordings: Sequence[Recording], robot: Robot) -> None:
         raise InputError("no ordinary drive is given: name one or more recordings of the robot as it should be.")
     for recording in recordings:
         _check_robot(recording, robot)
+        check_rows(recording, "a calibration")
         _check_channels(recording)
         _check_length(recording)
     check_different(recordings)
@@ -92,7 +93,7 @@ def _check_robot(recording: Recording, robot: Robot) -> None:
     if recording.meta.robot not in ("", robot.name):
         raise InputError(
             f"{recording.meta.source} is a drive of the robot {recording.meta.robot!r}: "
-            f"calibrate one robot at a time, this one with --robot {recording.meta.robot}."
+            f"calibrate one robot at a time, this one with {robot_option(recording.meta.robot)}."
         )
 
 

@@ -138,7 +138,10 @@ def forecasts(
     threads: int,
     without: Callable[[FittedModel, Booleans], Array] = values_without,
 ) -> Iterator[Forecast]:
-    """Forecast of every fold by the model fitted without it.
+    """Forecast of every fold that the fit has windows of, by the model fitted without it.
+
+    Few windows spread over a single drive may miss a quarter with hardly any commands. Its first and its last quarter
+    always have one, so that at least two folds are forecast.
 
     Args:
         data: drives.
@@ -162,7 +165,7 @@ def forecasts(
         chosen = judged.subset(np.asarray(inside))
         return Forecast(fold, chosen, values, own.problem.model_of(chosen).predict(values, chosen.initial))
 
-    return side_by_side(forecast, np.unique(by_judged).tolist(), threads)
+    return side_by_side(forecast, np.intersect1d(by_window, by_judged).tolist(), threads)
 
 
 def forecast_losses(forecast: Forecast, sigma: Array, robust: Array) -> tuple[float, float]:

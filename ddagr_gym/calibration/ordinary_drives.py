@@ -26,7 +26,13 @@ from ddagr_gym.diagnosis.change.ground_slope import deviations_of, effects_of
 from ddagr_gym.diagnosis.change.ordinary import Reference, field_deviations, uncertain_parameters
 from ddagr_gym.diagnosis.change.reference import OrdinaryDrive, scan_ordinary
 from ddagr_gym.diagnosis.change.robot_on_ground import RobotOnGround, uncertain_robot
-from ddagr_gym.diagnosis.change.weighing import LEAST_ACCELEROMETER_BIAS, LEAST_GYRO_BIAS, SensorBias, Weighing
+from ddagr_gym.diagnosis.change.weighing import (
+    LEAST_ACCELEROMETER_BIAS,
+    LEAST_GYRO_BIAS,
+    UNKNOWN_ACCELEROMETER_BIAS,
+    SensorBias,
+    Weighing,
+)
 from ddagr_gym.identification.recording_noise import RecordingNoise
 from ddagr_gym.identification.relative_readings import usual_turning
 from ddagr_gym.identification.residual_weights import UNKNOWN_GYRO_BIAS, noise_weights
@@ -36,9 +42,6 @@ from ddagr_gym.parameters import Robot
 from ddagr_gym.tasks import Task
 
 Array = NDArray[np.float64]
-
-UNKNOWN_ACCELEROMETER_BIAS = 1.0
-"""Prior before any drive was fitted [m/s^2] (ours): an IMU that is tilted by 6 degrees."""
 
 MENDED_SIGN = "sign was turned"
 """In a calibration's note on a drive whose gyro was reversed."""

@@ -35,7 +35,8 @@ class Arguments:
         output: folder to write: robot.yaml and soil_GROUND.yaml for every --robot, --soil and gym.make, effects.yaml,
             draws.yaml, bank.json (two drives or more), calibration.json, and one page, calibration.html.
         robot: its data sheet: a name (see `ddagr robots`), or the path of a YAML file with one's own.
-        ground: NAME=DRIVE,DRIVE: drives on one ground; may be repeated. Without it all drives are on one ground.
+        ground: NAME=DRIVE,DRIVE: drives on one ground, by the name of the file or the end of its path; may be repeated.
+            Without it all drives are on one ground.
         soil: nominal soil (see `ddagr soils`) of all grounds, or NAME=SOIL of one; may be repeated.
         map: shipped map by name or the path of one's own YAML file, for sources that are not imported yet.
         seed: of the resampled intervals.
@@ -72,7 +73,6 @@ class Arguments:
 def run(arguments: Arguments) -> None:
     """Calibrate, write the folder, print the tables."""
     import ddagr_gym
-    from ddagr_gym.api.inputs import recordings_from
     from ddagr_gym.diagnosis.store import part_folder
     from ddagr_gym.recordings.files import Limits
 
@@ -83,7 +83,7 @@ def run(arguments: Arguments) -> None:
     grounds = {name: tuple(text.split(",")) for name, text in by_name("ground", arguments.ground).items()}
     with resumable(parts):
         result = ddagr_gym.calibrate(
-            recordings_from(arguments.drives, arguments.robot, arguments.map or None, limits),
+            arguments.drives,
             arguments.robot,
             soils_from(arguments.soil),
             grounds,
@@ -93,6 +93,8 @@ def run(arguments: Arguments) -> None:
             processes=arguments.processes,
             cluster=arguments.cluster,
             supply_currents=arguments.supply_currents,
+            column_map=arguments.map or None,
+            limits=limits,
             progress=LinePrinter("ddagr calibrate: "),
             cache=parts,
         )

@@ -37,9 +37,10 @@ def run(arguments: Arguments) -> int | None:
     parts = part_folder(arguments.output.expanduser().resolve())
     if arguments.calibration is not None and any(map(is_folder_of_drives, arguments.runs)):
         return run_drives(arguments, limits, parts)
-    if arguments.cluster:
-        raise InputError("--cluster is for a folder of drives with --calibration: leave it out.")
-    with resumable(parts):
+    _check_one_group(arguments)
+    # a comparison with ordinary drives takes minutes and keeps no steps
+    kept = None if arguments.before or arguments.calibration is not None else parts
+    with resumable(kept):
         result = ddagr_gym.diagnose(
             recordings_from(arguments.runs, read_as, arguments.map or None, limits),
             arguments.robot,
@@ -53,7 +54,7 @@ def run(arguments: Arguments) -> int | None:
             threads=arguments.threads,
             names_only=arguments.names_only,
             progress=LinePrinter("ddagr diagnose: "),
-            cache=parts,
+            cache=kept,
         )
         # before the folder, whose presence would end a repetition of the command
         written = _write_viewer_files(arguments, result)
@@ -65,6 +66,13 @@ def run(arguments: Arguments) -> int | None:
     for line in written:
         print(line)
     return None
+
+
+def _check_one_group(arguments: Arguments) -> None:
+    """Refuse what only drives that are answered one by one have a use for; InputError."""
+    for name in ("processes", "cluster"):
+        if getattr(arguments, name) != getattr(Arguments, name):
+            raise InputError(f"--{name} is for a folder of drives with --calibration: leave it out.")
 
 
 def _check_viewer_files(arguments: Arguments) -> None:

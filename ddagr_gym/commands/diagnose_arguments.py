@@ -29,7 +29,7 @@ class Arguments:
 
     With --calibration the question is what changed against the ordinary drives of that robot: the page shows every
     effect against them, and from which size on a change would have been found. With --before the same is asked against
-    drives from before, without a calibration.
+    drives from before, without a calibration. Either takes minutes; stopped, it begins anew.
 
     A folder with --calibration is many drives over time: each has an answer of its own, and the page shows all sizes as
     control charts and the first drive at which something changed. A drive that cannot be read or compared is a row with

@@ -34,7 +34,7 @@ class Arguments:
         map: column map, for sources that are not imported yet.
         filter: ours, or the thesis's eight-state filter.
         law: force law of our filter.
-        attitude: use the recorded roll and pitch; only right where they count from the horizon.
+        attitude: our filter uses the recorded roll and pitch; only right where they count from the horizon.
         output: folder to write.
         overwrite: replace an output folder that an earlier command wrote.
         seed: of the simulated run, and of what is resampled.

@@ -31,12 +31,12 @@ class Arguments:
     say which scenarios are feasible, and are in the tables only where they are asked for.
 
     Attributes:
-        controllers: names, separated by commas: B0 to B6, upper bounds, trained policies or their files, folders of
-            `ddagr adapt`; a * stands for any letters of the trained ones, so that ppo_ekf_seed_* are all training
-            seeds, which are judged together.
+        controllers: names, separated by commas: B0 to B6, B6_pose_wide (which `ddagr demo` drives) and other kinds of
+            B6, upper bounds, trained policies or their files, folders of `ddagr adapt`; a * stands for any letters of
+            the trained ones, so that ppo_ekf_seed_* are all training seeds, which are judged together.
         scenarios: names of frozen sets, separated by commas: S0 to S8, V for tuning, T for another soil law, S1b to
-            S8b and Tb drawn a second time, S1c to S8c and Tc a third time, on_slope_3, on_slope_3_c and others for
-            robots and ground that differ.
+            S8b and Tb drawn a second time, S1c to S8c and Tc a third, S1d to S8d and Td a fourth, on_slope_3,
+            on_slope_3_c and others for robots and ground that differ.
         output: folder for report.html, summary.json, claims.json, the figure, episodes.parquet, and the dataset
             `episodes` by which it resumes.
         workers: processes, or processors of a local cluster.

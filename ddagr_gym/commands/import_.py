@@ -102,7 +102,8 @@ def _propose(arguments: Arguments, target: Path) -> None:
         maximum_bytes=arguments.maximum_bytes,
     )
     print(guess)
-    if target.exists() and (not target.is_file() or target.read_text(encoding="utf-8") != guess.yaml()):
+    # errors are replaced, so that what is no UTF-8 text differs too
+    if target.exists() and not (target.is_file() and target.read_text("utf-8", errors="replace") == guess.yaml()):
         raise InputError(
             f"{target} exists and differs from the proposal: go on with `{_next_command(arguments, target)}`, or give "
             "another --map-output."

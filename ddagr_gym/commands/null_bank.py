@@ -77,6 +77,7 @@ class Arguments:
 
 def run(arguments: Arguments) -> None:
     """Make what is missing of the bank, then write the thresholds."""
+    from ddagr_gym.api.inputs import recordings_from
     from ddagr_gym.diagnosis.gates.threshold_files import save_thresholds
     from ddagr_gym.diagnosis.gates.thresholds import thresholds_from
     from ddagr_gym.diagnosis.null_bank.bank import NullBank
@@ -87,13 +88,12 @@ def run(arguments: Arguments) -> None:
     from ddagr_gym.identification.noise import noise_from_differences
     from ddagr_gym.identification.nuisances import NuisancePriors
     from ddagr_gym.presets import get_robot, get_soil
-    from ddagr_gym.recordings.load import load_recording
 
     _check_options(arguments)
     check_output_file(arguments.output)
     robot, soil = get_robot(arguments.robot), get_soil(arguments.soil)
-    loaded = [load_recording(path, arguments.map or None, arguments.robot) for path in arguments.runs]
-    recordings = _mended(loaded)
+    given = recordings_from(arguments.runs, arguments.robot, arguments.map or None) if arguments.runs else ()
+    recordings = _mended(given)
     priors = NuisancePriors().with_soil(arguments.soil_uncertainty)
     setting = Setting(priors=priors).with_windows(arguments.window, arguments.stride)
     template: Template | None = None

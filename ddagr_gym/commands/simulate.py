@@ -34,7 +34,8 @@ class Arguments:
         pose_rate: fixes of a pose receiver per second [Hz]; 0 for none.
         noise: sensor noise; --no-noise for ideal sensors.
         seed: of the sensor noise.
-        fine: converged numerics, about forty times slower, instead of the default (force errors below 1e-3).
+        fine: converged numerics, about forty times slower, instead of the default (nine in ten force errors below
+            1.3e-3).
     """
 
     manoeuvre: str = "table_6_2"

@@ -18,6 +18,9 @@ WINDOW = (math.radians(30.0), math.radians(150.0))
 STRAIGHT = 1e-6
 """Ours: extent over radius below which points are on a line, not on a circle [-]."""
 
+LEAST_ARC = 0.35
+"""Heading change inside that window before the radius of a turn still going on is given [rad] (ours: 20 degrees)."""
+
 
 class CircleFit(NamedTuple):
     """Circle through points: centre (x, y) [m], radius [m], root mean square of the points' radial residuals [m]."""
@@ -87,19 +90,18 @@ def turn_window(yaw: ArrayLike, side: str) -> tuple[slice | None, float]:
     return slice(first, last), largest
 
 
-def running_radius(x: ArrayLike, y: ArrayLike, yaw: ArrayLike, side: str, minimum_arc: float = 0.35) -> float | None:
+def running_radius(x: ArrayLike, y: ArrayLike, yaw: ArrayLike, side: str) -> float | None:
     """Radius [m] of a turn that is still going on, for display, from the samples of its window so far.
 
     Args:
         x, y, yaw: pose of the robot's centre so far, each (T,) [m, m, rad].
         side: "left" or "right".
-        minimum_arc: heading change inside the window before a radius is given [rad] (ours: 20 degrees).
 
     Returns:
         The radius, or None where the arc is too short or not a circle.
     """
     window, largest = turn_window(yaw, side)
-    if window is None or largest - WINDOW[0] < minimum_arc:
+    if window is None or largest - WINDOW[0] < LEAST_ARC:
         return None
     fit = taubin_circle(np.asarray(x)[window], np.asarray(y)[window])
     return None if fit is None else fit.radius

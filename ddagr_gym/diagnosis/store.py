@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.errors import InputError
-from ddagr_gym.files import atomic_path, make_folder
+from ddagr_gym.files import atomic_path, expanded, make_folder
 from ddagr_gym.physics.effects.base import Effect, build_effect
 from ddagr_gym.physics.effects.registry import effect_kind
 from ddagr_gym.tasks.store import Kept
@@ -56,6 +56,7 @@ class StepStore:
     """
 
     def __init__(self, folder: Path | None, key: str, progress: Callable[[str], None] = lambda line: None) -> None:
+        folder = None if folder is None else expanded(folder)
         self.folder, self._progress = folder, progress
         self._read: dict[str, Kept] = {}
         if folder is None:

@@ -102,7 +102,7 @@ def read_answer(path: Path) -> Diagnosis | None:
     content = read_json(path, fault, remedy)
     if not isinstance(content, dict):
         raise InputError(f"{path} {fault} (it holds no mapping): {remedy}.")
-    return validate(content) if content.get("schema") == SCHEMA else None
+    return validate(content, str(path)) if content.get("schema") == SCHEMA else None
 
 
 def refitted_draws(answer: Diagnosis, robot: Robot, soil: Soil, most: float) -> RefittedDraws | None:

@@ -165,15 +165,15 @@ def open_text(path: Path, limits: Limits) -> Iterator[BoundedStream]:
 
 
 def write_atomically(path: Path, write: Callable[[Path], None]) -> None:
-    """Let ``write`` fill a temporary file beside ``path`` and rename it over ``path`` only when that succeeded.
+    """:func:`~ddagr_gym.files.atomic_path` for a function that writes a file.
+
+    Args:
+        path: file to end up with; parents are made.
+        write: fills the temporary file.
 
     Raises:
-        InputError: the folder is absent or not writable.
+        InputError: what ``atomic_path`` refuses, and a disk that is full or may not be written to.
     """
-    if path.is_dir():
-        raise InputError(f"{path} is a folder: give the name of the file to write.")
-    if not path.parent.is_dir():
-        raise InputError(f"{path} cannot be written: the folder {path.parent} does not exist.")
     try:
         with atomic_path(path) as temporary:
             write(temporary)

@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
+import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ddagr_gym.errors import InputError
@@ -178,9 +179,11 @@ def transform(source: TopicSource, tree: FrameTree) -> Extractor:
             return None
         if len(moving) > 1 and not renewed:
             return None
-        renewed = False
         matrix = tree.between(source.child, source.parent)
-        return None if matrix is None else _pose_of_matrix(matrix)
+        if matrix is None or not np.isfinite(matrix).all():
+            return None
+        renewed = False
+        return _pose_of_matrix(matrix)
 
     return extract
 
@@ -191,13 +194,15 @@ def _pose_of_matrix(matrix: FloatArray) -> Sample:
 
 
 def attitude(message: Any, path: str, mounting: FloatArray | None = None) -> tuple[float, float, float]:
-    """Roll, pitch, yaw [rad] of the quaternion at a dotted path; NaN where it is not one.
+    """Roll, pitch, yaw [rad] of the quaternion at a dotted path; NaN where it is not one or the mounting is not known.
 
     Args:
         message: any.
         path: of the quaternion, which turns the sensor's axes into the world's.
         mounting: rotation (3, 3) of the sensor's axes into the robot's; None where they are the same.
     """
+    if mounting is not None and not np.isfinite(mounting).all():
+        return math.nan, math.nan, math.nan
     quaternion = [number(message, f"{path}.{name}") for name in "xyzw"]
     if mounting is None or not 0.5 < math.hypot(*quaternion) < 2.0:
         return angles(*quaternion)

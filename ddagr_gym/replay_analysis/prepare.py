@@ -18,6 +18,8 @@ from ddagr_gym.parameters import Robot
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.effects.pose_latency import PoseLatency
 from ddagr_gym.physics.effects.sensor_hold import SensorHold
+from ddagr_gym.presets import robot_option
+from ddagr_gym.recordings.drive_requirements import check_rows
 from ddagr_gym.recordings.schema import Recording, RobotGeometry
 from ddagr_gym.replay_analysis.fitting import LATEST_CLOCK
 
@@ -114,10 +116,9 @@ def prepare(
         if recording.meta.robot not in ("", robot.name):
             raise InputError(
                 f"{recording.meta.source} is a recording of the robot {recording.meta.robot!r}: "
-                f"replay it with --robot {recording.meta.robot}, not {robot.name}."
+                f"replay it with {robot_option(recording.meta.robot)}, not {robot.name}."
             )
-        if not np.isfinite(recording.period):
-            raise InputError(f"{recording.meta.source} has {len(recording)} rows: a replay needs a drive.")
+        check_rows(recording, "a replay")
     noise = tuple(recording_noise(recording, rng) for recording in recordings)
     known = sum(effect.latency for effect in effects if isinstance(effect, PoseLatency))
     late = [item.pose_lateness or known for item in noise]

@@ -20,7 +20,7 @@ from ddagr_gym.calibration.result import (
 from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.rendering import palette
 from ddagr_gym.reporting.calibration_text import MODEL_LABELS, error_label, is_difference, parameter_label
-from ddagr_gym.reporting.figures import DASHED
+from ddagr_gym.reporting.figures import DASHED, PAGE_WIDTH, blank_figure
 
 Array = NDArray[np.float64]
 Figure = Any
@@ -35,20 +35,10 @@ MODEL_STYLES: dict[str, tuple[str, Any]] = {
 DRAWN = (("wheel_speed", None), ("heading", 5.0), ("position", 5.0))
 """Errors of the picture of errors: metric and horizon."""
 
-_WIDTH = 5.4
-"""Of a figure [inches]: half of the page."""
-
 _FARTHEST = 8.0
 """Data-sheet deviations beyond which a parameter is drawn at the edge (ours)."""
 
 _CHANNELS = (("encoder_right", "right wheels"), ("encoder_left", "left wheels"), ("yaw_rate", "yaw rate"))
-
-
-def blank(height: float, width: float = _WIDTH) -> Figure:
-    """Empty figure of a size [inches] on nothing, for light pages."""
-    from matplotlib.figure import Figure as Canvas
-
-    return Canvas(figsize=(width, height), layout="constrained", facecolor="none")
 
 
 def typical_window(forecasts: Forecasts) -> int:
@@ -67,7 +57,7 @@ def typical_window(forecasts: Forecasts) -> int:
 def drive_figure(forecasts: Forecasts) -> Figure:
     """Wheel speeds and yaw rate of a typical window: command, measured, data sheet, calibrated."""
     w, windows = typical_window(forecasts), forecasts.windows
-    figure = blank(4.6)
+    figure = blank_figure(4.6)
     axes = figure.subplots(3, 1, sharex=True)
     t = windows.period * np.arange(1, windows.samples + 1)
     commands = windows.commands[w, windows.history : windows.history + windows.samples]
@@ -89,7 +79,7 @@ def drive_figure(forecasts: Forecasts) -> Figure:
 
 def parameter_figure(items: Sequence[CalibratedParameter]) -> Figure:
     """Calibrated parameters with their intervals and the drives' own estimates, in deviations of the data sheet."""
-    figure = blank(0.9 + 0.27 * len(items), 2.0 * _WIDTH)
+    figure = blank_figure(0.9 + 0.27 * len(items), PAGE_WIDTH)
     axis = figure.subplots()
     axis.axvspan(-1.0, 1.0, color=palette.SHADE, zorder=0)
     axis.axvline(0.0, color=palette.GREY, lw=0.8, zorder=1)
@@ -124,7 +114,7 @@ def _inside(x: float) -> float:
 def error_figure(calibration: Calibration) -> Figure:
     """Errors on left-out drives of all models, with their intervals, one panel for each kind."""
     drives = list(dict.fromkeys(item.drive for item in calibration.forecasts))
-    figure = blank(1.2 + 0.42 * len(drives), 2.0 * _WIDTH)
+    figure = blank_figure(1.2 + 0.42 * len(drives), PAGE_WIDTH)
     panels = [figure.subplots(1, len(DRAWN), sharey=True)][0]
     for axis, (metric, horizon) in zip(panels, DRAWN, strict=True):
         chosen = [e for e in calibration.forecasts if (e.metric, e.horizon) == (metric, horizon)]
@@ -170,7 +160,7 @@ def spectrum_figure(calibration: Calibration) -> Figure:
     """Spectra of the residuals on left-out drives, before and after."""
     from matplotlib.ticker import LogLocator, NullFormatter
 
-    figure = blank(2.6, 2.0 * _WIDTH)
+    figure = blank_figure(2.6, PAGE_WIDTH)
     panels = figure.subplots(1, max(len(calibration.spectra), 1), squeeze=False)[0]
     for axis, item in zip(panels, calibration.spectra, strict=False):
         for model, density in ((DATA_SHEET, item.before), (CALIBRATED, item.after)):
@@ -191,7 +181,7 @@ def unexplained_figure(calibration: Calibration) -> Figure:
     """What is left of wheel speeds and yaw rate under each condition, over the sensor's noise."""
     channels = list(dict.fromkeys(item.channel for item in calibration.unexplained))
     conditions = list(dict.fromkeys(item.condition for item in calibration.unexplained))
-    figure = blank(0.9 + 0.27 * len(conditions), 2.0 * _WIDTH)
+    figure = blank_figure(0.9 + 0.27 * len(conditions), PAGE_WIDTH)
     panels = figure.subplots(1, max(len(channels), 1), sharey=True, squeeze=False)[0]
     for axis, channel in zip(panels, channels, strict=True):
         for item in calibration.unexplained:

@@ -9,13 +9,10 @@ from ddagr_gym.diagnosis.answer.change import BEFORE
 from ddagr_gym.diagnosis.wording import CHANNEL_NAMES, title
 from ddagr_gym.physics.effects.registry import effect_kind
 from ddagr_gym.rendering import palette
-from ddagr_gym.reporting.calibration_figures import blank
+from ddagr_gym.reporting.figures import PAGE_WIDTH, blank_figure
 
 if TYPE_CHECKING:
     from ddagr_gym.diagnosis.answer.change import Change, ChangeCertificate, EffectShift
-
-_WIDTH = 10.8
-"""Of a figure [inches]: the page."""
 
 _NINETY = 1.645
 """Normal quantile of a 90 % interval."""
@@ -32,7 +29,7 @@ def shift_figure(change: Change, named: tuple[str, ...]) -> Any:
         named: effects of the verdict.
     """
     shifts = list(reversed(change.shifts))
-    figure = blank(1.1 + 0.24 * len(shifts), _WIDTH)
+    figure = blank_figure(1.1 + 0.24 * len(shifts), PAGE_WIDTH)
     left, right = figure.subplots(1, 2, sharey=True, width_ratios=(3.0, 2.0))
     for place, item in enumerate(shifts):
         over = item.distance / item.limit
@@ -74,7 +71,7 @@ def size_figure(change: Change, named: tuple[str, ...]) -> Any:
         named: effects of the verdict.
     """
     rows = [row for item in reversed(change.shifts) for row in _sizes_of(item)]
-    figure = blank(1.2 + 0.22 * len(rows), _WIDTH)
+    figure = blank_figure(1.2 + 0.22 * len(rows), PAGE_WIDTH)
     axes = figure.subplots(1, 2, sharey=True, sharex=True)
     for place, (_, effect, before, after, half) in enumerate(rows):
         colour = palette.VERMILLION if effect in named else palette.BLUE
@@ -119,7 +116,7 @@ def forecast_figure(certificate: ChangeCertificate, named: bool) -> Any:
         ("before", certificate.losses_of_ordinary, palette.GREY),
     ]
     shown = rows if named else rows[1:]
-    figure = blank(1.0 + 0.35 * len(shown), _WIDTH)
+    figure = blank_figure(1.0 + 0.35 * len(shown), PAGE_WIDTH)
     axis = figure.subplots()
     for place, (_, (low, middle, high), colour) in enumerate(shown):
         axis.plot([low, high], [place, place], color=colour, lw=5.0, alpha=0.5, solid_capstyle="butt")
@@ -135,7 +132,7 @@ def forecast_figure(certificate: ChangeCertificate, named: bool) -> Any:
 def parameter_figure(change: Change) -> Any:
     """Parameters of robot and ground before and after the named effects, in deviations of ordinary drives."""
     items = [item for item in reversed(change.parameters) if item.expected_deviation > 0.0]
-    figure = blank(1.0 + 0.25 * len(items), _WIDTH)
+    figure = blank_figure(1.0 + 0.25 * len(items), PAGE_WIDTH)
     axis = figure.subplots()
     axis.axvspan(-2.0, 2.0, color=palette.SHADE, zorder=0)
     axis.axvline(0.0, color=palette.GREY, lw=0.8, zorder=1)
@@ -158,7 +155,7 @@ def parameter_figure(change: Change) -> Any:
 def channel_figure(change: Change) -> Any:
     """What the model leaves of each channel before, and after without and with what changed, with its limit."""
     items = list(reversed(change.channels))
-    figure = blank(1.0 + 0.3 * len(items), _WIDTH)
+    figure = blank_figure(1.0 + 0.3 * len(items), PAGE_WIDTH)
     axis = figure.subplots()
     for place, item in enumerate(items):
         rows = (

@@ -10,11 +10,9 @@ import numpy as np
 from ddagr_gym.calibration.forecast_errors import Forecasts
 from ddagr_gym.identification.motor_currents import BANKS
 from ddagr_gym.rendering import palette
+from ddagr_gym.reporting.figures import PAGE_WIDTH, blank_figure
 
 Figure = Any
-
-_WIDTH = 10.8
-"""Of the figure [inches]: that of the page."""
 
 
 def current_figure(forecasts: Sequence[Forecasts]) -> Figure:
@@ -23,9 +21,7 @@ def current_figure(forecasts: Sequence[Forecasts]) -> Figure:
     Args:
         forecasts: of one drive, or of its parts, with currents.
     """
-    from matplotlib.figure import Figure as Canvas
-
-    figure = Canvas(figsize=(_WIDTH, 4.4), layout="constrained", facecolor="none")
+    figure = blank_figure(4.4, PAGE_WIDTH)
     grid = figure.add_gridspec(2, 2, width_ratios=(3.2, 1.0))
     first = None
     for k, bank in enumerate(BANKS):

@@ -16,7 +16,7 @@ from ddagr_gym.diagnosis.wording import CHANNEL_NAMES
 from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.recordings.channels import CHANNELS as SCHEMA
 from ddagr_gym.rendering import palette
-from ddagr_gym.reporting.figures import DASHED
+from ddagr_gym.reporting.figures import DASHED, blank_figure
 
 Array = NDArray[np.float64]
 
@@ -51,17 +51,7 @@ _LEAST_GAIN = 0.5
 _FEWEST_EFFECTS = 8
 """Effects with a line at least, however small their gains (ours)."""
 
-_WIDTH = 5.4
-"""Of a figure [inches]: half of the page."""
-
 Figure = Any
-
-
-def blank_figure(height: float, width: float = _WIDTH) -> Figure:
-    """Empty figure of a size [inches] on nothing, for light pages."""
-    from matplotlib.figure import Figure as Canvas
-
-    return Canvas(figsize=(width, height), layout="constrained", facecolor="none")
 
 
 def unit_of(channel: str) -> str:
@@ -85,10 +75,10 @@ def thinned(evidence: Evidence) -> Array:
     return np.asarray(evidence.path[:, kept, :2])
 
 
-def best_stretch(evidence: Evidence, seconds: float = STRETCH) -> NDArray[np.int64]:
+def best_stretch(evidence: Evidence) -> NDArray[np.int64]:
     """Successive windows of one recording in which the corrected model gains most; from the start where none does."""
     fall = (evidence.roughness("nominal") - evidence.roughness("corrected")).mean(axis=1)
-    count = max(round(seconds / evidence.duration), 1)
+    count = max(round(STRETCH / evidence.duration), 1)
     best, chosen = -np.inf, np.arange(0)
     for number in np.unique(evidence.recording):
         rows = np.flatnonzero(evidence.recording == number)

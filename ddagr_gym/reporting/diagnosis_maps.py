@@ -13,7 +13,8 @@ from ddagr_gym.diagnosis.answer.location import Place
 from ddagr_gym.diagnosis.answer.verdict import Finding
 from ddagr_gym.frames import body_to_world
 from ddagr_gym.rendering import palette
-from ddagr_gym.reporting.diagnosis_figures import BEFORE, MODELS, MOST_PATHS, Figure, blank_figure, thinned
+from ddagr_gym.reporting.diagnosis_figures import BEFORE, MODELS, MOST_PATHS, Figure, thinned
+from ddagr_gym.reporting.figures import blank_figure
 
 Array = NDArray[np.float64]
 

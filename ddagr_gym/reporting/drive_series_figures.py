@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from ddagr_gym.diagnosis.answer.drive_series import SINGLE
 from ddagr_gym.rendering import palette
-from ddagr_gym.reporting.calibration_figures import blank
 from ddagr_gym.reporting.drive_series_text import moved_label
+from ddagr_gym.reporting.figures import PAGE_WIDTH, blank_figure
 
 if TYPE_CHECKING:
     from ddagr_gym.diagnosis.answer.drive_series import DriveSeries, SizeChart
@@ -17,22 +17,17 @@ if TYPE_CHECKING:
 PANEL = (3.5, 1.75)
 """Width and height of one chart [inches]."""
 
-_WIDTH = 10.8
-"""Of a figure [inches]: the page."""
-
 MOST_NAMED_DRIVES = 30
 """Drives up to which each has a number at the axis (ours)."""
 
+MOST_SIZES = 12
+"""Sizes in the map over the drives (ours): those that moved most, and the charts below hold all."""
 
-def overview_figure(series: DriveSeries, most: int = 12) -> Any:
-    """Distance of each drive over its limit, for the sizes that moved most, as a map over the drives.
 
-    Args:
-        series: of drives.
-        most: sizes.
-    """
-    charts = series.charts[:most]
-    figure = blank(1.2 + 0.26 * len(charts), _WIDTH)
+def overview_figure(series: DriveSeries) -> Any:
+    """Distance of each drive over its limit, for the sizes that moved most, as a map over the drives."""
+    charts = series.charts[:MOST_SIZES]
+    figure = blank_figure(1.2 + 0.26 * len(charts), PAGE_WIDTH)
     axis = figure.subplots()
     drives = len(series.rows)
     cells = [[math.nan] * drives for _ in charts]
@@ -59,7 +54,7 @@ def chart_figure(chart: SizeChart, series: DriveSeries) -> Any:
         chart: of the size.
         series: of drives.
     """
-    figure = blank(PANEL[1], PANEL[0])
+    figure = blank_figure(PANEL[1], PANEL[0])
     axis = figure.subplots()
     known = len(chart.ordinary)
     places = [k - known - 0.5 for k in range(known)]

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 
 from ddagr_gym.diagnosis.answer.drivetrain import PART_TITLES, DrivetrainAnswer
 from ddagr_gym.rendering import palette
-from ddagr_gym.reporting.diagnosis_figures import AFTER, RAW, blank_figure
+from ddagr_gym.reporting.diagnosis_figures import AFTER, RAW
 from ddagr_gym.reporting.drivetrain_section import forecast_label, grouped_forecasts, root_mean_square
+from ddagr_gym.reporting.figures import blank_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

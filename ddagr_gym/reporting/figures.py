@@ -69,6 +69,9 @@ COLOURS = (
 )  # fmt: skip
 """Cycle of line colours."""
 
+PAGE_WIDTH = 10.8
+"""Of a figure that takes the whole page [inches]."""
+
 WHEELS = (
     (1, "front right", palette.RIGHT, "-"),
     (2, "front left", palette.LEFT, "-"),
@@ -98,6 +101,13 @@ TURN_FIGURE_COLUMNS = (
 
 _MOST_READINGS = 800
 """Of a line of readings, about (ours: two for each pixel of its width)."""
+
+
+def blank_figure(height: float, width: float = 0.5 * PAGE_WIDTH) -> Any:
+    """Empty figure of a size [inches] on nothing, for light pages."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), layout="constrained", facecolor="none")
 
 
 @contextmanager
@@ -135,7 +145,7 @@ def save_figure(figure: Any, path: str | Path) -> tuple[Path, Path]:
 
     Args:
         figure: a matplotlib figure.
-        path: where, with or without a suffix; the folder exists.
+        path: where, with or without a suffix; parent folders are made.
 
     Returns:
         Paths of the PNG and of the SVG.

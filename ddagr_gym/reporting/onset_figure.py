@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from ddagr_gym.diagnosis.answer.onset import CONSTANT
 from ddagr_gym.diagnosis.wording import title
 from ddagr_gym.rendering import palette
-from ddagr_gym.reporting.calibration_figures import blank
+from ddagr_gym.reporting.figures import PAGE_WIDTH, blank_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -40,7 +40,7 @@ def onset_figure(findings: Sequence[Finding], recordings: Sequence[str]) -> Any:
     """
     rows = timed(findings)
     numbers = _shown(rows)
-    figure = blank(0.7 + 1.9 * len(rows), 10.8)
+    figure = blank_figure(0.7 + 1.9 * len(rows), PAGE_WIDTH)
     grid = figure.subplots(len(rows), len(numbers), squeeze=False, sharey="row", sharex="col")
     for axes, (name, onset) in zip(grid, rows, strict=True):
         for axis, number in zip(axes, numbers, strict=True):

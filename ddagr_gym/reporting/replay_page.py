@@ -12,15 +12,12 @@ from ddagr_gym.replay_analysis.report import MODELS, DriveModeReport, ReplayRepo
 from ddagr_gym.reporting.page_template import page_template
 from ddagr_gym.reporting.parameter_units import unit_in_words
 from ddagr_gym.reporting.replay_figures import MODEL_STYLES
+from ddagr_gym.reporting.replay_text import DRIVEN_BY, PULLED
 
-DRIVEN = {"commands": "commands", "encoders": "wheel speeds"}
 RECORDED = "recorded"
 """Stands for a drive mode with figures of what no model is compared with: currents and voltages."""
 LEAD = 5.0
 """Horizon [s] of the table at the head."""
-
-_PULLED = 3.0
-"""Value over prior from which a fitted parameter is marked [-]: one in 370 normal variables lies beyond (ours)."""
 
 Figures = Mapping[tuple[int, str], Sequence[Path]]
 
@@ -51,7 +48,7 @@ def replay_page(report: ReplayReport, figures: Figures) -> str:
             found = lead_errors(mode, LEAD)
             leads.append((number, mode, [found[m].error if m in found else None for m in MODELS]))
     page: str = page_template("replay.html").render(
-        report=report, figures=figures, recorded=RECORDED, lead=LEAD, leads=leads, driven=DRIVEN, tables=_tables,
+        report=report, figures=figures, recorded=RECORDED, lead=LEAD, leads=leads, driven=DRIVEN_BY, tables=_tables,
         models=[MODEL_STYLES[m][0] for m in MODELS],
     )  # fmt: skip
     return page
@@ -92,7 +89,7 @@ def _parameter_table(mode: DriveModeReport) -> _Table | None:
         return None
     rows = []
     for p in mode.refit.parameters:
-        doubt = "at its bound" if p.at_bound else "pulled" if abs(p.pull) > _PULLED else ""
+        doubt = "at its bound" if p.at_bound else "pulled" if abs(p.pull) > PULLED else ""
         numbers = [f"{p.value:+.3g}", f"{p.window_deviation:.2g}", f"{p.prior:.2g}", f"{p.pull:+.1f}", doubt]
         rows.append([f"{p.name.replace('_', ' ')} [{unit_in_words(p.name, p.unit)}]", *numbers])
     return _Table(["refitted parameter, 0 is nominal", "value", "deviation", "prior", "value / prior", ""], rows)

@@ -9,6 +9,9 @@ from ddagr_gym.reporting.text_table import format_table, short
 DRIVEN_BY = {"commands": "commands", "encoders": "wheel speeds"}
 """What drove the simulator, in words."""
 
+PULLED = 3.0
+"""Value over prior from which a fitted parameter is marked [-]: one in 370 normal variables lies beyond (ours)."""
+
 LEAD_HEADER = ("heading error after 5 s [rad]", "driven by", "simulator", "refitted", "no slip", "effective track")
 """Of :func:`lead_rows`; the models in their order."""
 
@@ -70,7 +73,7 @@ def _fit_text(mode: DriveModeReport) -> str:
         return ""
     rows = [
         (p.name, unit_in_words(p.name, p.unit), f"{p.value:+.3f}", f"{p.window_deviation:.3f}",
-         f"{p.prior:.3f}", f"{p.pull:+.1f}", "at bound" if p.at_bound else "pulled" if abs(p.pull) > 3.0 else "")
+         f"{p.prior:.3f}", f"{p.pull:+.1f}", "at bound" if p.at_bound else "pulled" if abs(p.pull) > PULLED else "")
         for p in mode.refit.parameters
     ]  # fmt: skip
     return format_table(("refitted", "unit", "value", "deviation", "prior", "pull", ""), rows)

@@ -79,10 +79,12 @@ def test_a_diagnosis_of_another_robot_is_refused(diagnosis):
         ddagr_gym.adapt(robot="husky", diagnosis=diagnosis())
 
 
-def test_an_incomplete_diagnosis_is_warned_of(diagnosis, few_turns):
+def test_an_incomplete_diagnosis_is_warned_of(diagnosis, few_turns, tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
     with pytest.warns(InputWarning, match="not complete"):
-        result = ddagr_gym.adapt(diagnosis=diagnosis(complete=False), turns=2)
+        result = ddagr_gym.adapt(diagnosis=diagnosis(complete=False), turns=2, cache="~/steps")
     assert "not complete" in str(result)
+    assert len(list((tmp_path / "steps").iterdir())) == 1  # the journal of turns
 
 
 @pytest.mark.parametrize(
@@ -91,6 +93,8 @@ def test_an_incomplete_diagnosis_is_warned_of(diagnosis, few_turns):
         ({}, "nothing to adapt to"),
         ({"recordings": ["a.csv"], "diagnosis": "d"}, "leave out one"),
         ({"diagnosis": "d", "ground": "sand"}, "no calibration"),
+        ({"calibration": "cal", "robot": "husky"}, "a calibration and robot are given: leave out one of them, cal has"),
+        ({"calibration": "cal", "soil": "firm_ground"}, "a calibration and soil are given"),
         ({"diagnosis": "absent"}, "cannot be read as a diagnosis"),
         ({"diagnosis": "d", "turns": 1}, "turns is 1"),
     ],

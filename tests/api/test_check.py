@@ -76,3 +76,11 @@ def test_two_robots_and_bad_seeds_are_refused(drive):
         ddagr_gym.check([drive, other])
     with pytest.raises(InputError, match="seed is -1"):
         ddagr_gym.check(drive, seed=-1)
+
+
+def test_a_run_that_does_not_name_its_robot_goes_with_those_that_do(drive):
+    unnamed = drive.recording.with_meta(robot="", geometry=None)
+    assert len(ddagr_gym.check([drive, unnamed]).reports) == 2
+    runs = [drive, drive.recording.with_meta(robot="rover"), unnamed]
+    with pytest.raises(InputError, match="of the robots ddagr, rover: check one robot at a time, with --robot NAME"):
+        ddagr_gym.check(runs)

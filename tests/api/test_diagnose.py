@@ -9,12 +9,15 @@ import json
 import math
 import shutil
 from dataclasses import replace
+from types import SimpleNamespace
 
 import gymnasium
 import numpy as np
 import pytest
 
 import ddagr_gym
+from ddagr_gym.api.change import ChangeResult
+from ddagr_gym.api.diagnosis_result import DiagnosisResult
 from ddagr_gym.diagnosis.answer.next_drive_plan import NextDrivePlan
 from ddagr_gym.diagnosis.result.files import load
 from ddagr_gym.errors import InputError, InputWarning
@@ -249,6 +252,11 @@ def test_a_cache_of_something_else_is_left_alone(tables, tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["notes.txt"]
 
 
+def test_a_cache_that_nothing_would_be_kept_in_is_refused(tables, tmp_path):
+    with pytest.raises(InputError, match="is given with a calibration or drives from before: leave it out"):
+        ddagr_gym.diagnose(tables, calibration=tmp_path / "calibration", cache=tmp_path / "cache")
+
+
 def test_windows_unlike_those_of_the_thresholds_are_warned_of(tables):
     with pytest.warns(InputWarning, match="windows of 6 s instead of 3 s"), pytest.raises(InputError, match="overlap"):
         ddagr_gym.diagnose(tables, names_only=True, window=3.0, stride=1.0)
@@ -258,3 +266,20 @@ def test_drives_given_twice_are_refused(tables):
     with pytest.raises(InputError, match="the same values"):
         ddagr_gym.diagnose([tables[0], tables[0]], names_only=True)
     assert np.isfinite(tables[0]["t"]).all()
+
+
+@pytest.fixture
+def ascii_locale(monkeypatch):
+    """Texts that are written without an encoding are written as on a machine that knows ASCII only."""
+    monkeypatch.setattr("io.text_encoding", lambda encoding, level=2: encoding or "ascii")
+
+
+def test_refitted_robots_are_utf_8_on_any_machine(ascii_locale, tmp_path):
+    robot, soil = replace(get_robot("ddagr"), name="r\u00e4um"), get_soil("thesis_a1")
+    answer = SimpleNamespace(robot=robot, soil=soil, sentence="M\u00fcll.", with_page=False, nominal=(robot, soil))
+    answer._save_effects = answer.to_json = lambda path: None
+    DiagnosisResult._save_refitted(answer, tmp_path)
+    assert get_robot(str(tmp_path / "robot.yaml")) == robot
+    (tmp_path / "robot.yaml").unlink()
+    ChangeResult._fill(answer, tmp_path, None)
+    assert get_robot(str(tmp_path / "robot.yaml")) == robot

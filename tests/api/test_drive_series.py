@@ -110,6 +110,44 @@ def test_drives_of_one_name_are_told_apart(drives, tmp_path):
         tasks_of(tmp_path / "cal")
 
 
+def test_drives_of_one_name_and_folder_name_get_their_own_answers(drives, asked, tmp_path):
+    for place, content in (("a", "0 1"), ("b", "14 2")):
+        (tmp_path / place / "day1").mkdir(parents=True)
+        (tmp_path / place / "day1" / "drive.csv").write_text(content)
+    given = [tmp_path / place / "day1" / "drive.csv" for place in "ab"]
+    for _ in range(2):
+        result = ddagr_gym.diagnose_drives(given, tmp_path / "cal", cache=tmp_path / "kept")
+        assert [(row.drive, row.verdict) for row in result.drives] == [
+            ("a/day1/drive.csv", ("none",)),
+            ("b/day1/drive.csv", ("gyro_bias",)),
+        ]
+    assert len(asked) == 2
+
+
+def test_a_file_that_is_given_twice_counts_once(drives, asked, tmp_path):
+    run = drives / "run_1.csv"
+    result = ddagr_gym.diagnose_drives([drives, run, str(run)], tmp_path / "cal", cache=tmp_path / "kept")
+    assert [row.sentence for row in result.refused] == [
+        f"run_1.csv ({number}) has the content of run_1.csv: it counts once." for number in (2, 3)
+    ]
+    assert len(asked) == len(set(result.kept)) == len(result.kept) == 6
+
+
+def test_names_are_told_apart_whatever_they_are():
+    given = ["a/x.csv", "b/a/x.csv", "a/x.csv", "c/a/x.csv", "y.csv", "c/y.csv"]
+    here = Path.cwd().name
+    assert [task.name for task in tasks_of(given)] == [
+        f"{here}/a/x.csv", "b/a/x.csv", f"{here}/a/x.csv (2)", "c/a/x.csv", f"{here}/y.csv", "c/y.csv",
+    ]  # fmt: skip
+
+
+def test_a_calibration_and_drives_in_the_home_folder_are_found(drives, asked, tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    for _ in range(2):
+        assert len(ddagr_gym.diagnose_drives("~/drives", "~/cal", cache="~/kept").drives) == 6
+    assert len(asked) == len(list((tmp_path / "kept").iterdir())) == 6
+
+
 def test_an_unknown_ground_is_refused_before_any_work(drives, asked, tmp_path):
     with pytest.raises(InputError, match="unknown ground 'mud'"):
         ddagr_gym.diagnose_drives(drives, tmp_path / "cal", "mud")
@@ -179,6 +217,13 @@ def test_options_that_a_calibration_has_are_refused(drives, asked, capsys):
     assert main([*words(drives), "--window", "3"]) == 2
     assert "--window is given with a folder of drives and a calibration: leave it out" in capsys.readouterr().err
     assert not asked
+
+
+def test_processes_are_for_folders_of_drives(drives, asked, tmp_path, capsys):
+    line = ["diagnose", str(drives / "run_1.csv"), "--output", str(tmp_path / "one"), "--processes", "2"]
+    for more in ([], ["--calibration", str(tmp_path / "cal")]):
+        assert main([*line, *more]) == 2
+        assert "--processes is for a folder of drives with --calibration: leave it out" in capsys.readouterr().err
 
 
 def test_a_cluster_is_for_folders_of_drives_and_needs_its_extra(drives, asked, tmp_path, monkeypatch, capsys):

@@ -54,6 +54,8 @@ def test_text_and_notebook(estimated, page_text):
         ({}, "give either a recording or"),
         ({"recording": "nothing.parquet"}, "nothing.parquet"),
         ({"thesis": "6.2", "robot": "husky"}, "the thesis's runs have their own"),
+        ({"thesis": "6.2", "attitude": True}, "attitude True: the thesis's runs have their own"),
+        ({"recording": "a.csv", "filter": "thesis", "attitude": True}, "with the thesis's filter, which knows level"),
         ({"thesis": "6.2", "soil": "mud"}, "unknown soil 'mud'"),
         ({"thesis": "6.2", "law": "couple"}, "unknown force law 'couple'.*coupled"),
         ({"thesis": "6.2", "filter": "our"}, "unknown filter 'our'.*ours"),

@@ -131,6 +131,17 @@ def test_bags_that_are_folders_count_among_the_drives_of_a_folder(tmp_path):
     assert sources_in(tmp_path / "b_bag") == [tmp_path / "b_bag"]
 
 
+def test_paths_in_the_home_folder_are_written_out(drive, tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    (tmp_path / "drives").mkdir()
+    drive.save(tmp_path / "drives" / "run.parquet")
+    for given in ("~/drives", Path("~/drives"), ["~/drives/run.parquet"]):
+        assert sources_in(given) == [tmp_path / "drives" / "run.parquet"]
+        assert len(recordings_from(given)) == 1
+    with pytest.raises(InputError, match="names the home folder of no user"):
+        recordings_from("~nobody-of-this-name/drives")
+
+
 @pytest.mark.parametrize(
     ("given", "message"),
     [

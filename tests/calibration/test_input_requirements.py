@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import ddagr_gym
+from ddagr_gym.api.calibrate import _number, _numbers
 from ddagr_gym.calibration.input_requirements import (
     SHORTEST_DRIVE,
     DriveScale,
@@ -40,6 +41,14 @@ def test_no_drive_at_all_is_refused():
 def test_a_drive_of_another_robot_is_refused_by_its_name(field_drive):
     with pytest.raises(InputError, match="drive of the robot 'ddagr'"):
         check_drives([field_drive], get_robot("husky"))
+    with pytest.raises(InputError, match=r"'rover': .* with --robot FILE\.yaml \(the file that describes it\)"):
+        check_drives([field_drive.with_meta(robot="rover")], get_robot("husky"))
+
+
+def test_a_drive_in_segments_of_one_row_is_refused(field_drive):
+    single = tuple((row, row + 1) for row in range(len(field_drive)))
+    with pytest.raises(InputError, match="no two are in one segment"):
+        check_drives([field_drive.with_meta(segments=single)], get_robot("ddagr"))
 
 
 def test_a_drive_without_encoders_is_refused(field_drive):
@@ -146,8 +155,6 @@ def test_soils_by_ground_need_one_for_each(field_drive):
 
 def test_an_imported_drive_is_known_by_the_name_of_its_file(field_drive):
     """The Parquet file of an import still says what it was imported from."""
-    from ddagr_gym.api.calibrate import _number
-
     found = [field_drive.with_meta(source="monday.csv.gz"), field_drive.with_meta(source="tuesday.bag")]
     assert [_number(name, found, found) for name in ("monday.parquet", "data/tuesday.parquet", "tuesday.bag")] == [
         0,
@@ -156,3 +163,24 @@ def test_an_imported_drive_is_known_by_the_name_of_its_file(field_drive):
     ]
     with pytest.raises(InputError, match=r"wednesday.parquet has a ground and is not among the drives"):
         _number("wednesday.parquet", found, found)
+
+
+def test_drives_of_one_file_name_are_told_apart_by_their_paths(field_drive, tmp_path, monkeypatch):
+    paths = [tmp_path / day / "run.csv" for day in ("monday", "tuesday")]
+    found = [field_drive.with_meta(source=f"run.csv ({number})") for number in (1, 2)]
+    monkeypatch.chdir(tmp_path)
+    for given in (paths[1], str(paths[1]), "tuesday/run.csv", "./monday/../tuesday/run.csv"):
+        assert _numbers({"sand": [given], "yard": paths[0]}, paths, found) == {"sand": [1], "yard": [0]}
+    monkeypatch.chdir("/")
+    assert _number("tuesday/run.csv", paths, found) == 1
+    with pytest.raises(InputError, match=r"run.csv is the name of 2 drives: give the whole path of one \(or"):
+        _number("run.csv", paths, found)
+    with pytest.raises(InputError, match=r"not among the drives run.csv \(1\), .*: give the name or path of one\.$"):
+        _number("friday/run.csv", paths, found)
+    with pytest.raises(InputError, match="a Recording has a ground and is not among"):
+        _number(field_drive, paths, found)
+
+
+def test_a_single_drive_needs_no_list(field_drive):
+    found = [field_drive.with_meta(source="a.csv"), field_drive.with_meta(source="b.csv")]
+    assert _numbers({"sand": "a.csv", "yard": 1}, found, found) == {"sand": [0], "yard": [1]}

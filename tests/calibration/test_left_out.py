@@ -9,7 +9,8 @@ import pytest
 
 from ddagr_gym.calibration.calibration_data import CalibrationData
 from ddagr_gym.calibration.joint_fit import FittedModel, complete_model, fit_model, weigh_and_fit
-from ddagr_gym.calibration.left_out import forecast_losses, forecasts, refitted_without, values_without
+from ddagr_gym.calibration.left_out import folds, forecast_losses, forecasts, refitted_without, values_without
+from ddagr_gym.calibration.part_selection import Comparison
 from ddagr_gym.calibration.parts import PARTS
 from ddagr_gym.calibration.run import ready_drives
 from ddagr_gym.calibration.settings import CalibrationSettings
@@ -136,3 +137,22 @@ def test_a_loss_of_wheels_is_of_their_speeds_alone(data, fitted, channel, of_whe
     assert whole_off > whole
     assert (wheels_off > wheels) is of_wheels
     assert wheels_off == wheels or of_wheels
+
+
+def test_a_quarter_with_no_fitted_window_is_not_forecast():
+    """Of a drive with pauses in its commands few windows are spread over all, and a lone one of a quarter is missed."""
+    data = ready_drives([drive("field", 1)], ["field"], get_robot("ddagr"), {"field": get_soil("thesis_a1")}, SETTINGS)
+    quarter = folds(data, data.windows)
+    third = np.flatnonzero(quarter == 2)
+    data = replace(data, windows=data.windows.subset(np.sort(np.append(np.flatnonzero(quarter != 2), third[0]))))
+    settings = CalibrationSettings(compared=3)
+    windows = data.spread(settings.compared)
+    assert set(folds(data, windows)) == {0, 1, 3}
+    assert set(folds(data, data.spread(settings.judged))) == {0, 1, 2, 3}
+    complete, held = complete_model(data)
+    model = complete.without(frozenset(part.name for part in PARTS) - KEPT, data.robot)
+    fitted, weights = weigh_and_fit(data, windows, model, {**held, "command_delay": 0.1}, 1, 1)
+    comparison = Comparison.of(data, windows, weights, settings)
+    judged = comparison.judge(fitted, comparison.forecasts(fitted))
+    assert list(judged.losses) == list(judged.counts) == [0, 1, 3]
+    assert np.isfinite(list(judged.losses.values())).all()

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from ddagr_gym.cli import main
+from ddagr_gym.errors import InputError
 from ddagr_gym.parameters import Imu, PoseReceiver, Sensors
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.channels import CHANNELS
@@ -55,7 +56,7 @@ def drives(tmp_path_factory):
 
 TWO = ("monday", "tuesday")
 REFUSED = {
-    "no drive": ((), (), "no recording is given"),
+    "no drive": ((), (), "no ordinary drive is given"),
     "no such file": (("sunday",), (), "sunday"),
     "no recording": (("notes",), (), "notes.parquet"),
     "an empty folder": (("empty/",), (), "empty"),
@@ -81,6 +82,28 @@ REFUSED = {
     "no processes": (TWO, ("--processes", "0"), "processes"),
     "a negative seed": (TWO, ("--seed", "-1"), "-1"),
 }
+
+
+def test_grounds_of_drives_of_one_file_name(drives, tmp_path, monkeypatch, capsys):
+    paths = [tmp_path / name / "run.parquet" for name in TWO]
+    for name, path in zip(TWO, paths, strict=True):
+        path.parent.mkdir()
+        path.write_bytes((drives / f"{name}.parquet").read_bytes())
+
+    def grounds_alone(found, grounds, *others, **options):
+        raise InputError(f"{[item.meta.source for item in found]} on {grounds}")
+
+    monkeypatch.setattr("ddagr_gym.calibration.run.calibrate_drives", grounds_alone)
+    grounds = ["--ground", "sand=tuesday/run.parquet", "--ground", f"yard={paths[0]}"]
+    words = ["calibrate", *map(str, paths), "--robot", "ddagr", *grounds, "-o", str(tmp_path / "calibration")]
+    assert main(words) == 2
+    assert "['monday', 'tuesday'] on ('yard', 'sand')" in capsys.readouterr().err
+
+
+def test_limits_of_the_command_are_kept(drives, tmp_path, capsys):
+    words = ["calibrate", str(drives / "monday.parquet"), "--robot", "ddagr", "--maximum-rows", "10"]
+    assert main([*words, "-o", str(tmp_path / "calibration")]) == 2
+    assert "more than 10 rows" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("given", "options", "said"), REFUSED.values(), ids=REFUSED)

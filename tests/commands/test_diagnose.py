@@ -298,6 +298,26 @@ def test_drives_from_before_are_taken_by_the_command(work: Path, tmp_path: Path,
     assert get_robot(str(tmp_path / "changed" / "robot.yaml")).name == "ddagr"
 
 
+@pytest.mark.parametrize("option", ["--before", "--calibration"])
+def test_a_stopped_comparison_promises_nothing_and_leaves_the_steps_of_a_diagnosis(
+    option: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    given: dict[str, object] = {}
+
+    def stopped(*arguments: object, **options: object) -> None:
+        given.update(options)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("ddagr_gym.diagnose", stopped)
+    monkeypatch.setattr("ddagr_gym.api.inputs.recordings_from", lambda *arguments: ())
+    earlier = part_folder(tmp_path / "changed")
+    earlier.mkdir()
+    assert main(["diagnose", "run.csv", option, "ordinary", "--output", str(tmp_path / "changed")]) == 130
+    assert capsys.readouterr().err == "ddagr: interrupted.\n"
+    assert given["cache"] is None
+    assert earlier.is_dir()
+
+
 def test_a_ground_that_is_the_same_and_another_is_refused(
     work: Path, tmp_path: Path, capsys: pytest.CaptureFixture
 ) -> None:

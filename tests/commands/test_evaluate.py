@@ -109,3 +109,11 @@ def test_without_casadi_nothing_is_driven(tmp_path, capsys, monkeypatch):
     assert run_evaluation(tmp_path / "out", "--controllers", "B1,B5", "--episodes", "1") == 2
     assert ".[mpc]" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+def test_the_help_knows_the_default_controller_and_every_drawing(capsys):
+    assert main(["evaluate", "--help"]) == 0
+    said = " ".join(capsys.readouterr().out.replace("│", " ").split())
+    assert controllers.DEFAULT in said
+    for name in ("S8b and Tb", "S8c and Tc", "S8d and Td"):
+        assert name in said

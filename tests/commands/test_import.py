@@ -51,7 +51,7 @@ def test_a_csv_becomes_a_recording(source, tmp_path, capsys):
         (["--map", "drive_step"], "drive_steps"),
         (["--map", "absent.yaml"], "absent.yaml"),
         (["--output", "run.csv"], ".parquet"),
-        (["--output", "absent/folder/run.parquet"], "does not exist"),
+        (["--output", "map.yaml/run.parquet"], "a file is in the way"),
         (["--maximum-rows", "10"], "--maximum-rows"),
     ],
 )

@@ -96,11 +96,12 @@ def test_accepted_beforehand_with_a_map_elsewhere(folder, capsys):
     assert main([*WORDS, "--yes", "--map-output", "maps/own.yaml"]) == 0  # the same proposal again
 
 
-def test_a_map_that_somebody_edited_stays(folder, capsys):
-    (folder / "run.topics.yaml").write_text("topics: {imu: {}}\n")
+@pytest.mark.parametrize("content", [b"topics: {imu: {}}\n", b"\xff\xfe topics"])
+def test_a_map_that_somebody_edited_stays(folder, capsys, content):
+    (folder / "run.topics.yaml").write_bytes(content)
     assert main([*WORDS, "--yes"]) == 2
     assert "run.topics.yaml exists and differs from the proposal: go on with `ddagr import" in capsys.readouterr().err
-    assert (folder / "run.topics.yaml").read_text() == "topics: {imu: {}}\n"
+    assert (folder / "run.topics.yaml").read_bytes() == content
     assert not (folder / "run.parquet").exists()
 
 

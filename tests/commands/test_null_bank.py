@@ -244,3 +244,11 @@ def test_banks_of_given_drives_are_drawn_about_the_nominal_model_that_fits_them(
     about.clear()
     assert main(words(tmp_path)) == 0
     assert about == [None] * 20
+
+
+def test_a_folder_of_drives_is_taken(quick_nulls: list[int], tmp_path: Path) -> None:
+    (tmp_path / "drives").mkdir()
+    for name, turn in (("a", 1.0), ("b", 0.5)):
+        save_drive(tmp_path / "drives" / f"{name}.parquet", 200.0, yaw_rate=turn)
+    assert main([*words(tmp_path), str(tmp_path / "drives"), "--ordinary", "--piece", "20"]) == 0
+    assert load_thresholds(tmp_path / "thresholds.json").nulls == 20

@@ -28,6 +28,13 @@ def test_a_stop_keeps_them_and_says_where_they_are(parts):
     assert (parts / "step").is_file()
 
 
+@pytest.mark.parametrize("kept", [True, False])
+def test_a_stop_promises_nothing_where_nothing_is_kept(kept, tmp_path):
+    with pytest.raises(KeyboardInterrupt) as stop, resumable(tmp_path / "absent.part" if kept else None):
+        raise KeyboardInterrupt
+    assert not stop.value.args
+
+
 def test_a_fault_keeps_them(parts):
     with pytest.raises(InputError, match="wrong"), resumable(parts):
         raise InputError("wrong")

@@ -76,6 +76,16 @@ def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
     assert (tmp_path / "notes.txt").read_text() == "mine"
 
 
+def test_a_folder_in_the_home_folder_is_found_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path))
+    StepStore(Path("~/steps"), "key").step("one", lambda: 1)
+    assert StepStore(Path("~/steps"), "key").step("one", never) == 1
+    (tmp_path / "notes").mkdir()
+    (tmp_path / "notes" / "notes.txt").write_text("mine")
+    with pytest.raises(InputError, match="something else"):
+        StepStore(Path("~/notes"), "key")
+
+
 def test_without_a_folder_nothing_is_kept() -> None:
     store = StepStore(None, "")
     assert [store.step("one", lambda: 1), store.step("one", lambda: 2)] == [1, 2]

@@ -113,5 +113,5 @@ def test_answers_are_read_and_those_of_before_have_no_draws(tmp_path):
     with pytest.raises(InputError, match=r"cannot be read as a diagnosis \(it holds no mapping\)"):
         read_answer(path)
     path.write_text(json.dumps({**as_mapping(ANSWER), "nuisance_spread": {"shared": []}}))
-    with pytest.raises(InputError, match=r"wrong at nuisance_spread: .*: make it again"):
+    with pytest.raises(InputError, match=r"diagnosis\.json is wrong at nuisance_spread: .*: make it again"):
         read_answer(path)

@@ -136,7 +136,7 @@ def test_a_header_that_promises_too_much_is_refused(stored):
         ("mean", np.zeros(3), "shape"),
         ("mean", np.zeros(SIZE, dtype=np.float32), "float32"),
         ("weight_0", np.zeros((8, 3), dtype=np.float32), "shape"),
-        ("weight_1", np.full((8, 8), np.nan, dtype=np.float32), "finite"),
+        ("weight_1", np.full((8, 8), np.nan, dtype=np.float32), "not finite: give a policy of another training"),
         ("bias_2", np.zeros(3, dtype=np.float32), "shape"),
         ("deviation", np.zeros(SIZE), "positive"),
         ("more", np.zeros(3), "'more'"),

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ddagr_gym.errors import InputError
+from ddagr_gym.recordings.frames import FrameTree
 from ddagr_gym.recordings.message_fields import header_stamp
 from ddagr_gym.recordings.ros_messages import extractor, imu, joint_state, metres_from, nav_sat_fix, pose
 from ddagr_gym.recordings.topic_map import TopicSource
@@ -118,3 +119,39 @@ def test_fixes_without_satellites_are_no_samples():
 def test_twists_need_the_robot():
     with pytest.raises(InputError, match="--robot"):
         extractor("Twist", TopicSource(), None, "file.bag")
+
+
+def transform_of(child, parent, x=0.0, w=1.0):
+    """A message of /tf; without a turn, or with a quaternion of zeros where ``w`` is 0."""
+    rotation = dict.fromkeys("xyz", 0.0) | {"w": w}
+    moved = {"translation": {"x": x, "y": 0.0, "z": 0.0}, "rotation": rotation}
+    return {"header": {"frame_id": parent}, "child_frame_id": child, "transform": moved}
+
+
+def test_a_transform_with_a_quaternion_of_zeros_is_no_pose():
+    pose_of = extractor("TFMessage", TopicSource(parent="odom", child="base_link"), None, "drive.bag")
+    assert pose_of(transform_of("base_link", "odom", 1.0))["pose_x"] == 1.0
+    assert pose_of(transform_of("base_link", "odom", 2.0, w=0.0)) is None
+    assert pose_of(transform_of("base_link", "odom", 3.0))["pose_x"] == 3.0
+
+
+def test_a_pose_that_was_not_known_comes_with_the_next_transform():
+    """The lower transform is bad once: the upper one's news is told with the next one."""
+    pose_of = extractor("TFMessage", TopicSource(parent="map", child="base_link"), None, "drive.bag")
+    for message in (transform_of("base_link", "odom"), transform_of("odom", "map", 10.0)):
+        assert pose_of(message) is None
+    assert pose_of(transform_of("base_link", "odom", 1.0, w=0.0)) is None
+    assert pose_of(transform_of("base_link", "odom", 2.0))["pose_x"] == 12.0
+
+
+def test_an_imu_whose_mounting_is_not_known_has_no_readings():
+    tree = FrameTree()
+    tree.add(transform_of("imu_link", "base_link", w=0.0), static=True)
+    readings = extractor("Imu", TopicSource(frame="base_link", orientation=True), None, "drive.bag", tree)
+    message = {
+        "header": {"frame_id": "imu_link"},
+        "linear_acceleration": {"x": 1, "y": 2, "z": 9.8},
+        "angular_velocity": dict.fromkeys("xyz", 0.1),
+        "orientation": quaternion(0.1, 0.2, 0.3),
+    }
+    assert all(math.isnan(value) for value in readings(message).values())

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
@@ -17,7 +18,7 @@ from ddagr_gym.presets import get_robot
 from ddagr_gym.recordings.files import Limits
 from ddagr_gym.recordings.load import load_recording
 from ddagr_gym.recordings.schema import Recording
-from ddagr_gym.recordings.storage import META_KEY, is_recording, load_parquet, save_parquet
+from ddagr_gym.recordings.storage import META_KEY, is_recording, load_parquet, save_drive, save_parquet
 
 VALUES = hnp.arrays(np.float64, 12, elements=st.floats(-1e6, 1e6) | st.just(np.nan))
 
@@ -134,10 +135,19 @@ def test_a_failed_write_leaves_the_old_file_and_nothing_else(tmp_path, make_driv
     assert [p.name for p in tmp_path.iterdir()] == ["run.parquet"]
 
 
-@pytest.mark.parametrize("target", ["absent/run.parquet", "."])
+@pytest.mark.parametrize("target", ["taken/run.parquet", "."])
 def test_places_that_cannot_be_written(tmp_path, make_drive, target):
+    (tmp_path / "taken").write_text("a file")
     with pytest.raises(InputError, match="folder"):
         save_parquet(make_drive(seconds=10), tmp_path / target)
+
+
+@pytest.mark.parametrize("name", ["run.parquet", "run.csv"])
+def test_the_home_folder_and_new_folders_are_written_to(tmp_path, make_drive, monkeypatch, name):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    drive = make_drive(seconds=10)
+    save_drive(Path("~/new/drives") / name, drive.columns(), get_robot("warthog"))
+    assert len(load_recording(tmp_path / "new" / "drives" / name, robot="warthog")) == len(drive)
 
 
 def test_another_robot_than_the_imported_one_is_refused(tmp_path, make_drive):

@@ -19,11 +19,16 @@ def prepared(recordings, robot, **more):
 def test_a_recording_of_another_robot_is_refused(make_recording):
     with pytest.raises(InputError, match=r"recording of the robot 'ddagr': replay it with --robot ddagr, not husky"):
         prepared([make_recording()], get_robot("husky"))
+    with pytest.raises(InputError, match=r"'rover': replay it with --robot FILE\.yaml"):
+        prepared([make_recording().with_meta(robot="rover")], get_robot("husky"))
 
 
 def test_one_row_is_no_drive(make_recording, robot):
     with pytest.raises(InputError, match="has 1 rows: a replay needs a drive"):
         prepared([make_recording(seconds=0.05)], robot)
+    single = tuple((row, row + 1) for row in range(20))
+    with pytest.raises(InputError, match="has 20 rows of which no two are in one segment"):
+        prepared([make_recording(seconds=1.0).with_meta(segments=single)], robot)
 
 
 def test_dead_channels_are_named(make_recording, robot):

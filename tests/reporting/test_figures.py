@@ -102,8 +102,10 @@ def test_a_turn_that_never_turned_is_drawn_too(tmp_path):
 def test_bad_input_is_one_sentence_and_writes_nothing(tmp_path, monkeypatch):
     turn = RowTurn()
     columns = columns_of(turn)
-    with pytest.raises(InputError, match=r"folder .* does not exist"):
-        turn_figure(columns, turn, tmp_path / "absent" / "turn", robot=ROBOT, soil_name="soil")
+    (tmp_path / "turn.png").mkdir()
+    with pytest.raises(InputError, match=r"turn\.png is a folder"):
+        turn_figure(columns, turn, tmp_path / "turn", robot=ROBOT, soil_name="soil")
+    (tmp_path / "turn.png").rmdir()
     monkeypatch.setitem(sys.modules, "matplotlib.style", None)
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     with pytest.raises(InputError, match=r"-e '\.\[report\]'"):

@@ -8,7 +8,7 @@ difference.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,9 +19,14 @@ from ddagr_gym.diagnosis.change.ground_slope import SLOPE_OF_FIELDS, GroundSlope
 from ddagr_gym.diagnosis.change.measured_scatter import measured_scatter
 from ddagr_gym.diagnosis.change.ordinary import OrdinaryRobot, Reference, uncertain_parameters
 from ddagr_gym.diagnosis.change.reference import OrdinaryDrive, scan_pieces
-from ddagr_gym.diagnosis.change.weighing import LEAST_ACCELEROMETER_BIAS, LEAST_GYRO_BIAS, Weighing
+from ddagr_gym.diagnosis.change.weighing import (
+    LEAST_ACCELEROMETER_BIAS,
+    LEAST_GYRO_BIAS,
+    UNKNOWN_ACCELEROMETER_BIAS,
+    Weighing,
+)
 from ddagr_gym.diagnosis.preprocessing.input_requirements import content_hash
-from ddagr_gym.diagnosis.preprocessing.mended_recordings import MendedRecordings, mend_recordings
+from ddagr_gym.diagnosis.preprocessing.mended_recordings import MendedRecordings
 from ddagr_gym.diagnosis.setting import HISTORY
 from ddagr_gym.identification.fitted_values import with_values
 from ddagr_gym.identification.gauss_newton import Fitted, linearised
@@ -33,7 +38,6 @@ from ddagr_gym.identification.residual_weights import UNKNOWN_GYRO_BIAS, Weights
 from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.recordings.pose_frames import in_one_frame
-from ddagr_gym.recordings.schema import Recording
 
 Array = NDArray[np.float64]
 
@@ -45,9 +49,6 @@ WINDOW = 4.0
 
 PIECES = 4
 """Most parts of a single drive from before whose scatter counts (ours)."""
-
-UNKNOWN_ACCELEROMETER_BIAS = 1.0
-"""Prior before any drive was fitted [m/s^2] (ours): an IMU that is tilted by 6 degrees."""
 
 DAY = {"motor_rate": 0.03, "maximum_wheel_speed": 0.03}
 """Deviations of the logarithms of a robot's parameters from one day to another (ours: a battery's charge, temperature);
@@ -93,7 +94,7 @@ class JointFit:
 
 
 def robot_of_before(
-    recordings: Sequence[Recording],
+    mended: MendedRecordings,
     robot: Robot,
     soil: Soil,
     *,
@@ -105,7 +106,7 @@ def robot_of_before(
     """The robot as drives from before show it, with what each of them says of every effect.
 
     Args:
-        recordings: from before, of one robot on one ground.
+        mended: drives from before, of one robot on one ground.
         robot: nominal.
         soil: nominal.
         window: length of the windows [s].
@@ -116,11 +117,11 @@ def robot_of_before(
     Raises:
         InputError: too few windows.
     """
-    mended = mend_recordings(recordings)
     progress("fitting robot and soil to the drives from before")
     joint = joint_fit(mended, robot, soil, window, np.random.default_rng(seed), threads)
     parameters = day_parameters(joint.robot)
-    most = PIECES if len(recordings) == 1 else 1
+    count = len(mended.recordings)
+    most = PIECES if count == 1 else 1
     scanned: list[list[Reference]] = []
     for recording in mended.recordings:
         progress(f"every effect of the library in {recording.meta.source}")
@@ -136,8 +137,8 @@ def robot_of_before(
         parameters,
         {GROUND: joint.same_ground},
         joint.weighing,
-        tuple(as_left_out(found[0], len(recordings)) for found in scanned),
-        digest=hashlib.sha256("".join(content_hash(item) for item in recordings).encode()).hexdigest(),
+        tuple(as_left_out(found[0], count) for found in scanned),
+        digest=hashlib.sha256("".join(content_hash(item) for item in mended.given).encode()).hexdigest(),
         pieces=tuple(piece for found in scanned for piece in found[1:]),
         known_scatter=scatter.same_ground,
         other_scatter=scatter.other_ground,

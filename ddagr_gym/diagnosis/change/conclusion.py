@@ -29,7 +29,7 @@ from ddagr_gym.diagnosis.change.shifts import LEVEL, POWER, Pull, Shift, family_
 from ddagr_gym.diagnosis.preprocessing.mended_recordings import MendedRecordings
 from ddagr_gym.diagnosis.result.conclusion import data_source, reversed_gyro_findings
 from ddagr_gym.diagnosis.result.sentences import change_headline
-from ddagr_gym.diagnosis.result.uncertainty import LEVEL as INTERVAL
+from ddagr_gym.diagnosis.result.uncertainty import student_quantile
 from ddagr_gym.diagnosis.search.candidates import moved_field
 from ddagr_gym.identification.effect_parameters import effect_parameters
 from ddagr_gym.identification.misfit import channel_misfit
@@ -148,7 +148,7 @@ def _estimates(model: Model, number: int, step: Step) -> dict[str, Estimate]:
     effect = model.fitted.point.effects[number]
     ordinary, between = _in_ordinary(step.shift)
     beyond = _without_size_prior(model)
-    quantile = _quantile(step.shift.degrees)
+    quantile = student_quantile(step.shift.degrees)
     found = {}
     for name in (*effect.size_names(), *effect.shape_names()):
         further, within = beyond.get((number, name), (0.0, math.nan))
@@ -166,12 +166,6 @@ def _that_exists(effect: Effect, name: str, value: float, half: float) -> Estima
     about = effect.parameter(name).metadata
     value, low, high = np.clip((value, value - half, value + half), about["low"], about["high"]).tolist()
     return Estimate(value, str(about["unit"]), (low, high) if math.isfinite(half) else None)
-
-
-def _quantile(degrees: float) -> float:
-    from scipy.special import stdtrit
-
-    return float(stdtrit(degrees, 0.5 + 0.5 * INTERVAL))
 
 
 def _in_ordinary(shift: Shift) -> tuple[dict[str, float], dict[str, float]]:

@@ -13,7 +13,7 @@ from ddagr_gym.parameters import Robot
 from ddagr_gym.recordings.schema import Recording
 
 NEEDED = ("command_right", "command_left", "encoder_right", "encoder_left", "yaw_rate")
-"""Channels without which shifts of robot, ground and sensors cannot be told apart: those that a calibration needs."""
+"""Channels without which a calibration fits neither drivetrain nor turning, and shifts cannot be told apart."""
 
 
 def check_comparable(recordings: Sequence[Recording], ordinary: OrdinaryRobot, ground: str) -> None:
@@ -68,7 +68,8 @@ def check_before(after: Sequence[Recording], before: Sequence[Recording], robot:
     if abs(later.period - first.period) > PERIOD_TOLERANCE * first.period:
         raise InputError(
             f"{later.meta.source} has {1.0 / later.period:.3g} Hz and {first.meta.source} from before "
-            f"{1.0 / first.period:.3g} Hz: compare drives of one rate (`ddagr import --rate` makes others)."
+            f"{1.0 / first.period:.3g} Hz: compare drives of one rate (a topic map with `rate: 50` reads a bag at 50 "
+            "Hz; resample CSV files before the import)."
         )
     _check_apart(after, before)
     _check_channels((*before, *after))

@@ -134,8 +134,8 @@ def what_changed_since(
     """
     began = time.monotonic()
     check_before(after, before, robot, window)
-    known = robot_of_before(before, robot, soil, window=window, seed=seed, threads=threads, progress=progress)
     usual = mend_recordings(before, seed)
+    known = robot_of_before(usual, robot, soil, window=window, seed=seed, threads=threads, progress=progress)
     outcome = what_changed(
         after, known, GROUND if same_ground else "", usual=usual, seed=seed, threads=threads, progress=progress
     )

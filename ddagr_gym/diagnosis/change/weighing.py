@@ -17,6 +17,9 @@ LEAST_GYRO_BIAS = 2e-4
 LEAST_ACCELEROMETER_BIAS = 0.02
 """Least prior [m/s^2] (ours): a tenth of a degree of slope under a drive."""
 
+UNKNOWN_ACCELEROMETER_BIAS = 1.0
+"""Prior before any drive was fitted [m/s^2] (ours): an IMU that is tilted by 6 degrees."""
+
 SLOPE_ON_A_GROUND = 0.05
 """Deviation [m/s^2] of what accelerometers read too much between drives on one ground (ours): 0.3 degrees of slope."""
 

@@ -11,6 +11,8 @@ from ddagr_gym.diagnosis.setting import LEAST_WINDOWS, Setting, window_duration
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.windows import PERIOD_TOLERANCE
 from ddagr_gym.parameters import Robot
+from ddagr_gym.presets import robot_option
+from ddagr_gym.recordings.drive_requirements import check_rows
 from ddagr_gym.recordings.schema import Recording
 
 LEAST_SPEED = 0.02
@@ -59,13 +61,12 @@ def _check_robot(recording: Recording, robot: Robot) -> None:
     if recording.meta.robot not in ("", robot.name):
         raise InputError(
             f"{recording.meta.source} is a recording of the robot {recording.meta.robot!r}: "
-            f"diagnose it with --robot {recording.meta.robot}, and not together with one of {robot.name!r}."
+            f"diagnose it with {robot_option(recording.meta.robot)}, and not together with one of {robot.name!r}."
         )
 
 
 def _check_channels(recording: Recording) -> None:
-    if not np.isfinite(recording.period):
-        raise InputError(f"{recording.meta.source} has {len(recording)} rows: a diagnosis needs a drive.")
+    check_rows(recording, "a diagnosis")
     if not recording.has("command_right", "command_left"):
         raise InputError(
             f"{recording.meta.source} has no commands (command_right, command_left): "

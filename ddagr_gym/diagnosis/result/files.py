@@ -66,19 +66,24 @@ def finite_or_null(value: Any) -> Any:
     return value
 
 
-def validate(mapping: Mapping[str, Any]) -> Diagnosis:
+def validate(mapping: Mapping[str, Any], source: str = "the diagnosis") -> Diagnosis:
     """Check a mapping as it stands in ``diagnosis.json`` and read it; further entries are allowed.
+
+    Args:
+        mapping: to be read.
+        source: what holds it, for messages: the path of its file.
 
     Raises:
         InputError: another schema, a missing or wrong entry, names that no library has.
     """
     if mapping.get("schema") != SCHEMA:
-        raise InputError(f"the diagnosis has schema {mapping.get('schema')!r}: this version reads {SCHEMA!r}.")
+        schema = mapping.get("schema")
+        raise InputError(f"{source} has schema {schema!r} instead of {SCHEMA!r}: make it again with `ddagr diagnose`.")
     try:
         diagnosis = msgspec.convert(with_nan(mapping, _form()), Diagnosis)
     except msgspec.ValidationError as error:
-        raise InputError(f"{_sentence(str(error))}: make it again with `ddagr diagnose`.") from None
-    _check_names(diagnosis)
+        raise InputError(f"{source} {_sentence(str(error))}: make it again with `ddagr diagnose`.") from None
+    _check_names(diagnosis, source)
     return diagnosis
 
 
@@ -111,10 +116,10 @@ def _sentence(message: str) -> str:
     what, _, place = message.partition(" - at ")
     where = place.strip("`").removeprefix("$").removeprefix(".")
     what = what[:1].lower() + what[1:]
-    return f"the diagnosis is wrong at {where}: {what}" if where else f"the diagnosis is wrong: {what}"
+    return f"is wrong at {where}: {what}" if where else f"is wrong: {what}"
 
 
-def _check_names(diagnosis: Diagnosis) -> None:
+def _check_names(diagnosis: Diagnosis, source: str) -> None:
     """Names that exist, and findings on all of them."""
     from ddagr_gym.physics.effects.registry import effect_kinds
 
@@ -122,12 +127,12 @@ def _check_names(diagnosis: Diagnosis) -> None:
     verdict = list(diagnosis.verdict)
     if not verdict or not known.issuperset(verdict):
         raise InputError(
-            f"the diagnosis has the verdict {verdict!r}: give names of effects, of parts of the drivetrain or of "
+            f"{source} has the verdict {verdict!r}: give names of effects, of parts of the drivetrain or of "
             f"faults of channels ({', '.join(CHANNEL_FAULT_TITLES)}), none or unknown."
         )
     named = [finding.name for finding in diagnosis.findings]
     if sorted(named) != sorted(name for name in verdict if name not in (NONE, UNKNOWN)):
-        raise InputError(f"the diagnosis names {verdict!r} and has findings on {named!r}: make them agree.")
+        raise InputError(f"{source} names {verdict!r} and has findings on {named!r}: make them agree.")
 
 
 def save(diagnosis: Diagnosis, path: Path) -> None:
@@ -151,4 +156,4 @@ def load(path: Path) -> Diagnosis:
     mapping = read_json(path, "cannot be read as a diagnosis", "make it with `ddagr diagnose`")
     if not isinstance(mapping, dict):
         raise InputError(f"{path} holds no mapping: make it with `ddagr diagnose`.")
-    return validate(mapping)
+    return validate(mapping, str(path))

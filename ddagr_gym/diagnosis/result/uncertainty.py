@@ -134,6 +134,17 @@ def intervals(draws: Array, level: float = LEVEL) -> list[tuple[float, float]]:
     return [(float(a), float(b)) for a, b in np.quantile(draws, [tail, 1.0 - tail], axis=0).T]
 
 
+def student_quantile(degrees: float) -> float:
+    """Half the width of an interval in standard deviations, by Student's t.
+
+    Args:
+        degrees: of freedom; infinite for a normal variable.
+    """
+    from scipy.special import stdtrit
+
+    return float(stdtrit(degrees, 0.5 + 0.5 * LEVEL))
+
+
 def nuisance_spread(problem: Problem, fitted: Fitted, draws: Resampled) -> NuisanceSpread:
     """How sure the free nuisances are, and how those of robot and soil go together.
 

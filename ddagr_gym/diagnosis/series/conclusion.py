@@ -57,9 +57,14 @@ def drive_row(drive: str, sha256: str, answer: DriveAnswer | str) -> DriveRow:
 
 
 def _date(started: float) -> str | None:
+    """Date and time of a clock reading [s since 1970]; None where it is none, as after the year 9999."""
     if not started >= EARLIEST_CLOCK:
         return None
-    return datetime.fromtimestamp(started, UTC).isoformat(timespec="seconds").replace("+00:00", "Z")
+    try:
+        date = datetime.fromtimestamp(started, UTC)
+    except (ValueError, OverflowError, OSError):
+        return None
+    return date.isoformat(timespec="seconds").replace("+00:00", "Z")
 
 
 def natural(name: str) -> list[tuple[int, int, str]]:

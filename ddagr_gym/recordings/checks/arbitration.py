@@ -110,8 +110,15 @@ def arbitration(recording: Recording, rng: np.random.Generator) -> list[CheckFin
     """
     found = arbitrated(recording, rng)
     if found is None:
-        return [not_testable(CHECK, "all", "The wheel radius is not known.", "Name the robot with --robot.")]
+        return [_not_arbitrated(recording)]
     return arbitration_findings(found)
+
+
+def _not_arbitrated(recording: Recording) -> CheckFinding:
+    if recording.meta.geometry is None:
+        return not_testable(CHECK, "all", "The wheel radius is not known.", "Name the robot with --robot.")
+    why = "The drive is too short or its rows come too seldom to show how the robot moves."
+    return not_testable(CHECK, "all", why, "Record for longer, with several rows a second.")
 
 
 def arbitration_findings(found: Arbitration) -> list[CheckFinding]:

@@ -64,7 +64,7 @@ def motion_windows(recording: Recording, offsets: Mapping[str, Offset | None]) -
         offsets: of the clocks, by pair.
     """
     geometry, pieces = recording.meta.geometry, stretches(recording)
-    instants = _instants(recording, pieces)
+    instants, block = _in_blocks(recording, _instants(recording, pieces))
     if geometry is None or not len(instants):
         return None
     late = {pair: known_lag(found) for pair, found in offsets.items()}
@@ -77,7 +77,7 @@ def motion_windows(recording: Recording, offsets: Mapping[str, Offset | None]) -
     paths = {source: r.mean(axis=-1) for source, r in rolled.items()}
     force = [_second(sample.integral(_integrated(recording, f"specific_force_{axis}"), 0.0)) for axis in "xyz"]
     return MotionWindows(
-        block=_blocks(recording, instants[:, 1]),
+        block=block,
         turn={source: _first(angle) for source, angle in angles.items()} | {COURSE: _course(position)},
         forward={source: _first(path) for source, path in paths.items()} | {POSITION: _along(position, heading[:, 1])},
         turn_change={source: _second(angle) for source, angle in angles.items()},
@@ -195,6 +195,9 @@ def _change(position: FloatArray, heading: FloatArray) -> FloatArray:
     return np.asarray((along[1] - along[0]) / STEP**2)
 
 
-def _blocks(recording: Recording, middle: FloatArray) -> FloatArray:
+def _in_blocks(recording: Recording, instants: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Windows and the number of the block in which the middle of each lies, or after which."""
     starts = [recording.t[block.start] for block in cut_blocks(recording)]
-    return np.asarray(np.searchsorted(starts, middle, side="right") - 1)
+    block = np.asarray(np.searchsorted(starts, instants[:, 1], side="right") - 1, dtype=np.float64)
+    # rows that come seconds apart make pieces that are too short for a block, also before the first one
+    return instants[block >= 0], block[block >= 0]

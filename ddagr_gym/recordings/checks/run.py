@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from copy import deepcopy
 
 import numpy as np
@@ -13,11 +14,11 @@ from ddagr_gym.recordings.checks.clock_drift import clock_drift
 from ddagr_gym.recordings.checks.clock_offsets import clock_offsets
 from ddagr_gym.recordings.checks.currents import currents
 from ddagr_gym.recordings.checks.extremes import extremes
-from ddagr_gym.recordings.checks.findings import CheckFinding, CheckReport
+from ddagr_gym.recordings.checks.findings import CheckFinding, CheckReport, not_testable
 from ddagr_gym.recordings.checks.gravity import gravity
 from ddagr_gym.recordings.checks.noise import noise
 from ddagr_gym.recordings.checks.repeated_readings import repeated_readings
-from ddagr_gym.recordings.checks.timing import timing
+from ddagr_gym.recordings.checks.timing import CHECK, timing
 from ddagr_gym.recordings.checks.travel import travel
 from ddagr_gym.recordings.checks.turning import turning
 from ddagr_gym.recordings.schema import Recording
@@ -31,7 +32,10 @@ def check_recording(recording: Recording, rng: np.random.Generator) -> CheckRepo
         rng: for the resampled intervals.
     """
     findings: list[CheckFinding] = []
-    if len(recording) >= 3:
+    if len(recording) >= 3 and not _rows_follow(recording):
+        why = "No two rows are in one segment and one span, so that no time passes between rows."
+        findings.append(not_testable(CHECK, "t", why, "Correct segment_columns or span_columns in the map."))
+    elif len(recording) >= 3:
         # Draws of their own, so that these checks leave the intervals of the others as they are.
         apart = deepcopy(rng)
         findings += arbitration(recording, apart) + clock_drift(recording, apart) + bank_limits(recording, apart)
@@ -40,3 +44,8 @@ def check_recording(recording: Recording, rng: np.random.Generator) -> CheckRepo
         findings += accelerometer(recording, rng) + noise(recording) + gravity(recording)
         findings += currents(recording, apart)
     return CheckReport.of(recording, findings)
+
+
+def _rows_follow(recording: Recording) -> bool:
+    """Whether a segment and a span hold two rows."""
+    return math.isfinite(recording.period) and any(span.stop - span.start > 1 for span in recording.spans())

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import ddagr_gym
+from ddagr_gym.diagnosis.change import run
 from ddagr_gym.diagnosis.change.before_drives import (
     DAY,
     GROUND,
@@ -197,12 +198,35 @@ def test_what_the_robot_has_wrong_before_and_after_is_no_change():
 
 @pytest.mark.slow
 def test_pieces_are_of_a_single_drive():
-    known = robot_of_before([drive(1)], ROBOT, SOIL)
+    known = robot_of_before(mend_recordings([drive(1)]), ROBOT, SOIL)
     assert len(known.references) == 1
     assert len(known.pieces) == 2  # of twelve windows, five at least
     assert len(known.losses) == 12
-    several = robot_of_before([drive(1), drive(2)], ROBOT, SOIL)
+    several = robot_of_before(mend_recordings([drive(1), drive(2)]), ROBOT, SOIL)
     assert (len(several.references), len(several.pieces)) == (2, 0)
+
+
+def test_drives_from_before_are_mended_once_and_with_the_seed(monkeypatch):
+    """What is wrong with their channels is what they are fitted without, whatever the seed."""
+    before, seeds, used = drive(1, seconds=45.0), [], []
+
+    def mend(recordings, seed=0):
+        seeds.append(seed)
+        return mend_recordings(recordings, seed)
+
+    monkeypatch.setattr(run, "mend_recordings", mend)
+    monkeypatch.setattr(run, "robot_of_before", lambda mended, *nominal, **options: used.append(mended))
+
+    def stop(*given, usual, **options):
+        used.append(usual)
+        raise InterruptedError
+
+    monkeypatch.setattr(run, "what_changed", stop)
+    with pytest.raises(InterruptedError):
+        what_changed_since([drive(2, seconds=45.0)], [before], ROBOT, SOIL, seed=7)
+    assert seeds == [7]
+    assert used[0] is used[1]
+    assert used[0].given == (before,)
 
 
 def test_only_what_a_day_changes_in_a_robot_is_free():
@@ -233,12 +257,15 @@ def test_drives_that_cannot_be_compared_are_refused_with_a_sentence(tmp_path):
     refused("a calibration and drives from before are given", fresh, known, calibration=tmp_path)
     refused("the ground is 'sand' and there is no calibration", fresh, known, ground="sand")
     refused("thresholds is given with drives from before", fresh, known, thresholds=tmp_path / "thresholds.json")
+    refused(
+        "the cache kept is given with a calibration or drives from before: leave it out", fresh, known, cache="kept"
+    )
     refused("are too few to compare with ordinary drives: give 32 s at least", drive(43, seconds=20.0), known)
     refused("has no yaw_rate", without(fresh, "yaw_rate"), known)
     still = ddagr_gym.simulate(np.zeros((900, 2)), ROBOT, SOIL, rate=20.0, seed=1).recording
     refused("commanded to stand still", fresh, still)
     slow = ddagr_gym.simulate(np.full((450, 2), 0.7), ROBOT, SOIL, rate=10.0, seed=1).recording
-    refused("20 Hz and .* from before 10 Hz", fresh, slow)
+    refused(r"20 Hz and .* from before 10 Hz: .*\(a topic map with `rate: 50` reads a bag at 50 Hz", fresh, slow)
     with pytest.raises(InputError, match="whether the ground is the same is said, and no drive from before"):
         ddagr_gym.diagnose(fresh, same_ground=True)
 

@@ -124,6 +124,21 @@ def test_another_schema_is_refused() -> None:
         validate(entries(schema="ddagr-diagnosis/0"))
 
 
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"schema": "ddagr-diagnosis/0"}, "d.json has schema 'ddagr-diagnosis/0' .*: make it again with `ddagr diag"),
+        ({"robot": 3}, "d.json is wrong at robot: .*: make it again with `ddagr diagnose`"),
+        ({"verdict": ["incline"]}, r"d.json has the verdict \['incline'\]: give names of effects"),
+        ({"findings": []}, r"d.json names \['slope'\] and has findings on \[\]: make them agree"),
+    ],
+)
+def test_a_wrong_file_is_named(tmp_path: Path, change: dict[str, Any], words: str) -> None:
+    (tmp_path / "d.json").write_text(json.dumps(entries(detectable={}, **change)))
+    with pytest.raises(InputError, match=words):
+        load(tmp_path / "d.json")
+
+
 def test_what_later_steps_add_is_kept(tmp_path: Path) -> None:
     full = replace(
         GOOD,

@@ -94,6 +94,11 @@ def test_drives_are_in_the_order_of_time_where_all_have_a_clock():
     assert in_order(rows) == (BY_NAME, [2, 1, 0, 3])
 
 
+@pytest.mark.parametrize("wild", [3e11, 1e18, float("inf"), float("nan"), -3e11])
+def test_a_wild_clock_gives_no_date(wild):
+    assert drive_row("a", "0", answer([0.0], started=wild)).started is None
+
+
 def test_numbers_in_names_sort_as_numbers():
     assert sorted(["run_10.csv", "run_9.csv", "Run_1.csv"], key=natural) == ["Run_1.csv", "run_9.csv", "run_10.csv"]
 

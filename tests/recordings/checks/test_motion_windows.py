@@ -7,12 +7,15 @@ import tracemalloc
 import numpy as np
 import pytest
 
+from ddagr_gym.diagnosis.preprocessing.mended_recordings import mend_recordings
+from ddagr_gym.presets import get_robot
 from ddagr_gym.recordings.checks.arbitration import arbitrated
+from ddagr_gym.recordings.checks.blocks import cut_blocks
 from ddagr_gym.recordings.checks.clock_offsets import ENCODER, POSE, RESPONSE
 from ddagr_gym.recordings.checks.findings import Status
 from ddagr_gym.recordings.checks.motion_windows import ENCODERS, STEP, motion_windows, stretches
 from ddagr_gym.recordings.checks.run import check_recording
-from ddagr_gym.recordings.schema import Recording
+from ddagr_gym.recordings.schema import Recording, RobotGeometry
 
 NO_OFFSETS = dict.fromkeys((RESPONSE, ENCODER, POSE))
 
@@ -69,3 +72,29 @@ def test_the_pause_is_a_finding_and_a_doubt(whole):
     assert gaps.status is Status.SUSPICIOUS
     assert any("no rows come for 9e+05 s after row 1500" in sentence for sentence in report.sentences)
     assert not any(f.check == "arbitration" for f in report.suspicious)
+
+
+def seldom(t, spans=None):
+    """A drive of which rows come only at these times [s]."""
+    rng = np.random.default_rng(0)
+    names = ("encoder_right", "encoder_left", "command_right", "command_left", "yaw_rate", "pose_x", "pose_y")
+    columns = {"t": t, **{name: rng.uniform(0.0, 1.0, len(t)) for name in names}}
+    return Recording.from_columns(columns, RobotGeometry.of(get_robot("husky")), spans=spans)
+
+
+@pytest.mark.parametrize("period", [1.5, 2.0, 3.0])
+def test_rows_that_come_seldom_are_no_error(period):
+    slow = seldom(period * np.arange(20))
+    windows = motion_windows(slow, NO_OFFSETS)
+    assert windows is None or min(windows.block) >= 0
+    said = next(f for f in check_recording(slow, np.random.default_rng(0)).findings if f.check == "arbitration")
+    assert said.status is Status.NOT_TESTABLE
+    assert windows is not None or "rows come too seldom" in said.meaning
+    assert mend_recordings([slow]).names == ()
+
+
+def test_windows_after_the_last_block_count_with_it():
+    slow = seldom(np.r_[np.arange(20.0), 21.0, 23.0], ((0, 20), (20, 22)))
+    blocks, windows = cut_blocks(slow), motion_windows(slow, NO_OFFSETS)
+    assert blocks[-1].stop == 20
+    assert windows.block.tolist()[-2:] == [len(blocks) - 1] * 2

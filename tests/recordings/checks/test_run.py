@@ -9,6 +9,7 @@ import pytest
 
 from ddagr_gym.parameters import Imu, PoseReceiver, Sensors
 from ddagr_gym.presets import get_robot, get_soil
+from ddagr_gym.recordings.checks.findings import Status
 from ddagr_gym.recordings.checks.run import check_recording
 from ddagr_gym.recordings.load import load_recording
 from ddagr_gym.recordings.schema import Recording
@@ -122,3 +123,16 @@ def test_a_fault_written_into_any_open_drive_is_found(recordings_dir, name, faul
 @pytest.mark.parametrize("name", ["warthog_asphalt", pytest.param("warthog_sand", marks=pytest.mark.slow)])
 def test_a_turned_imu_is_found_on_drives_that_turn_at_speed(recordings_dir, name, angle):
     assert ("mounting", "specific_force") in suspicious(turned_imu(angle)(load(recordings_dir, name)))
+
+
+SINGLE = tuple((row, row + 1) for row in range(100))
+
+
+@pytest.mark.parametrize("ranges", [{"spans": SINGLE}, {"segments": SINGLE}, {"spans": ()}])
+@pytest.mark.parametrize("robot", ["husky", None])
+def test_rows_that_are_all_apart_are_one_question_that_cannot_be_answered(ranges, robot):
+    columns = {name: np.arange(100.0) / 20.0 for name in ("t", "yaw_rate", "encoder_right", "encoder_left")}
+    drive = Recording.from_columns(columns, None if robot is None else get_robot(robot), **ranges)
+    (finding,) = check_recording(drive, np.random.default_rng(0)).findings
+    assert finding.status is Status.NOT_TESTABLE
+    assert finding.remedy == "Correct segment_columns or span_columns in the map."
