@@ -6,6 +6,7 @@ import hashlib
 import json
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -15,7 +16,7 @@ import numpy as np
 from ddagr_gym.calibration.accelerometer_results import SlopeOfGround
 from ddagr_gym.calibration.calibration_data import CalibrationData, prepare_drives
 from ddagr_gym.calibration.current_evidence import current_evidence
-from ddagr_gym.calibration.drive_scatter import drive_estimates
+from ddagr_gym.calibration.drive_scatter import DriveEstimates, drive_estimates
 from ddagr_gym.calibration.final_parts import decide_with_all_windows
 from ddagr_gym.calibration.fit_starts import fit_from_several
 from ddagr_gym.calibration.forecast_errors import Forecasts, all_forecasts, explained_when_left_out, forecast_errors
@@ -169,16 +170,56 @@ def calibrate_drives(
         LittleExplainedError: less than ``settings.least_explained`` is explained.
         FailedTasksError: some of the independent steps failed; the others are kept.
     """
-    if runner is None:
-        with TaskRunner() as own:
-            return calibrate_drives(
-                recordings, grounds, robot, soils, settings, data_sheet=data_sheet, soil_names=soil_names,
-                with_bank=with_bank, ready=ready, runner=own, cache=cache, progress=progress,
-            )  # fmt: skip
     began = time.monotonic()
     data = ready_drives(recordings, grounds, robot, soils, settings, progress) if ready is None else ready
     store = StepStore(cache, "" if cache is None else _key(recordings, grounds, robot, soils, settings), progress)
-    steps = IndependentSteps(runner, store, progress)
+    with TaskRunner() if runner is None else nullcontext(runner) as shared:
+        steps = IndependentSteps(shared, store, progress)
+        fit = _fit_supported_parts(data, settings, store, steps)
+        progress("forecasts of left-out drives")
+        made = fit.comparison.forecasts(fit.model)
+        compared = all_forecasts(data, fit.model, made, fit.held, settings.threads)
+        soils_used = {ground: (soil_names or {}).get(ground, "") for ground in data.drives_on}
+        names = (data_sheet or robot.name, soils_used)
+        calibration = _answer(data, fit, recordings, compared, settings, names, began)
+        found = {ground: fitted_soil(data, ground, fit.model.values) for ground in data.drives_on}
+        calibrated = calibrated_robot(data, fit.model, calibration)
+        ordinary = (
+            ordinary_drives(data, fit.model, made, calibration, fit.estimates, calibrated, settings.threads, steps)
+            if with_bank and data.count > 1
+            else None
+        )
+    return Outcome(calibration, calibrated, found, data, compared, fit.model, fit.final.weights, ordinary)
+
+
+@dataclass(frozen=True, eq=False)
+class _SupportedFit:
+    """Joint fit of the parts that the drives support.
+
+    Attributes:
+        complete: model with all parts.
+        held: values at which parameters that never move are held.
+        selection: parts that were kept and left out.
+        final: joint fit, and parameters that the drives do not identify.
+        comparison: windows and weights that models were compared by.
+        model: the fit with its sensitivities.
+        estimates: of every drive by itself.
+    """
+
+    complete: RobotModel
+    held: dict[str, float]
+    selection: Selection
+    final: FinalFit
+    comparison: Comparison
+    model: FittedModel
+    estimates: DriveEstimates
+
+
+def _fit_supported_parts(
+    data: CalibrationData, settings: CalibrationSettings, store: StepStore, steps: IndependentSteps
+) -> _SupportedFit:
+    """Choose parts by forecasts of left-out drives, fit them jointly, and each drive by itself about that fit."""
+    progress, robot = steps.progress, data.robot
     complete, held = complete_model(data)
     selection = _select(data, complete, held, settings, store, steps)
     kept = complete.without(selection.left_out, robot)
@@ -198,39 +239,43 @@ def calibrate_drives(
     model = model_at(data, windows, kept, final.weights, final.standing, settings.threads)
     progress("every drive by itself")
     estimates = store.step("drives", partial(drive_estimates, data, model, final.weights, settings.threads))
-    progress("forecasts of left-out drives")
-    made = comparison.forecasts(model)
-    compared = all_forecasts(data, model, made, held, settings.threads)
-    calibration = Calibration(
+    return _SupportedFit(complete, held, selection, final, comparison, model, estimates)
+
+
+def _answer(
+    data: CalibrationData,
+    fit: _SupportedFit,
+    recordings: Sequence[Recording],
+    compared: Sequence[Forecasts],
+    settings: CalibrationSettings,
+    names: tuple[str, dict[str, str]],
+    began: float,
+) -> Calibration:
+    """What a calibration says; ``names`` are those of the data sheet and of the soils by ground."""
+    model, windows = fit.model, fit.comparison.windows
+    left_out, refused = fit.selection.left_out, fit.final.refused
+    return Calibration(
         schema=SCHEMA,
         schema_version=SCHEMA_VERSION,
         program=__version__,
-        robot=robot.name,
-        data_sheet=data_sheet or robot.name,
-        soils={ground: (soil_names or {}).get(ground, "") for ground in data.drives_on},
+        robot=data.robot.name,
+        data_sheet=names[0],
+        soils=names[1],
         drives=drive_summaries(data, recordings, windows, compared),
         window=windows.duration,
-        parts=selection.decisions,
-        parameters=parameter_results(data, complete, model, selection.left_out, final.refused, estimates),
+        parts=fit.selection.decisions,
+        parameters=parameter_results(data, fit.complete, model, left_out, refused, fit.estimates),
         covariance=Covariance(model.free, tuple(tuple(row) for row in covariance(model).tolist())),
         forecasts=forecast_errors(compared, settings.seed, settings.threads),
         spectra=spectra(compared),
         unexplained=unexplained(compared, data.prepared.sigma),
-        converged=final.standing.converged,
+        converged=fit.final.standing.converged,
         seed=settings.seed,
         seconds=time.monotonic() - began,
         currents=current_evidence(data, model, compared),
         imu=imu_mounting(data, model),
         slopes=tuple(SlopeOfGround(ground, s.gradient, s.deviations) for ground, s in data.slopes.items()),
     )
-    found = {ground: fitted_soil(data, ground, model.values) for ground in data.drives_on}
-    calibrated = calibrated_robot(data, model, calibration)
-    ordinary = (
-        ordinary_drives(data, model, made, calibration, estimates, calibrated, settings.threads, steps)
-        if with_bank and data.count > 1
-        else None
-    )
-    return Outcome(calibration, calibrated, found, data, compared, model, final.weights, ordinary)
 
 
 def _rng(settings: CalibrationSettings) -> np.random.Generator:

@@ -15,7 +15,7 @@ from typing import ParamSpec, TypeVar
 
 from ddagr_gym.diagnosis.answer.evidence import Evidence
 from ddagr_gym.diagnosis.answer.location import EffectLocation
-from ddagr_gym.diagnosis.answer.verdict import Diagnosis, Options
+from ddagr_gym.diagnosis.answer.verdict import DataDoubt, Diagnosis, Options
 from ddagr_gym.diagnosis.certification.certify import certify
 from ddagr_gym.diagnosis.evidence import gather_evidence
 from ddagr_gym.diagnosis.gates.thresholds import Thresholds
@@ -179,19 +179,40 @@ def diagnose(
     unlike = {} if complete_nominal is None else unlike_commands(accepted.chosen, session.gates)
     nominal = complete_nominal(unlike) if complete_nominal is not None and unlike else None
     if nominal is not None and is_an_answer(nominal):
-        made = _beside_drivetrain(session, standing(found, session.gates), nominal, steps)
-        answer = replace(
-            made.diagnosis,
-            next_drive=None if names_only else drivetrain_drive(nominal.answer),
-            checks=checks,
-            robot=robot.name,
-            soil=soil_name,
-            options=_options(session, names_only, robot_file),
-            seconds=time.monotonic() - began,
-        )
-        return replace(made, diagnosis=answer)
-    if nominal is not None:
-        progress(f"a drivetrain explains {nominal.answer.explained:.0%} of the wheel speeds' errors: no answer")
+        made = _beside_drivetrain(session, standing(found, session.gates), nominal, names_only, steps)
+    else:
+        if nominal is not None:
+            progress(f"a drivetrain explains {nominal.answer.explained:.0%} of the wheel speeds' errors: no answer")
+        made = _by_library(session, found, accepted, checks, names_only, steps)
+    answer = replace(
+        made.diagnosis,
+        checks=checks,
+        robot=robot.name,
+        soil=soil_name,
+        options=_options(session, names_only, robot_file),
+        seconds=time.monotonic() - began,
+    )
+    return replace(made, diagnosis=answer)
+
+
+def _by_library(
+    session: DiagnosisSession,
+    found: SearchResult,
+    accepted: SearchResult,
+    checks: tuple[DataDoubt, ...],
+    names_only: bool,
+    steps: Steps,
+) -> Outcome:
+    """The answer by the effects of the library.
+
+    Args:
+        session: of the diagnosis.
+        found: by the search.
+        accepted: the same without the names that were not accepted.
+        checks: of the data.
+        names_only: leave out certification, unnamed terms and the next drive.
+        steps: of the diagnosis.
+    """
     diagnosis, effects = steps.run("verdict", conclude, session, found, accepted)
     fit = None if names_only else steps.run("certification", certify, session, accepted)
     steps.begin("localisation")
@@ -203,19 +224,8 @@ def diagnose(
     unnamed = None if names_only else steps.run("unnamed terms", unnamed_terms, session, accepted, diagnosis)
     following = None if names_only else steps.run("next drive", plan_next_drive, session, diagnosis)
     evidence = steps.run("evidence", gather_evidence, session, accepted, traces)
-    diagnosis = replace(
-        diagnosis,
-        fit=fit,
-        localisation=located,
-        unnamed=unnamed,
-        next_drive=following,
-        checks=checks,
-        robot=robot.name,
-        soil=soil_name,
-        options=_options(session, names_only, robot_file),
-        seconds=time.monotonic() - began,
-    )
-    return Outcome(diagnosis, effects, session, accepted, evidence)
+    answer = replace(diagnosis, fit=fit, localisation=located, unnamed=unnamed, next_drive=following)
+    return Outcome(answer, effects, session, accepted, evidence)
 
 
 def _where_repeated(session: DiagnosisSession) -> EffectLocation | None:
@@ -224,7 +234,7 @@ def _where_repeated(session: DiagnosisSession) -> EffectLocation | None:
 
 
 def _beside_drivetrain(
-    given: DiagnosisSession, before: SearchResult, nominal: CompletedNominal, steps: Steps
+    given: DiagnosisSession, before: SearchResult, nominal: CompletedNominal, names_only: bool, steps: Steps
 ) -> Outcome:
     """The answer beside a nominal simulator whose drivetrain was fitted: its parts, and where something is left.
 
@@ -232,6 +242,7 @@ def _beside_drivetrain(
         given: session with the nominal simulator as it was given.
         before: what stands by itself beside that one.
         nominal: the completed one.
+        names_only: leave out the next drive.
         steps: of the diagnosis.
     """
     session = given.with_nominal(nominal.robot, nominal.soil)
@@ -248,7 +259,8 @@ def _beside_drivetrain(
     every = (*(effect for effect in effects if effect.name not in own), *nominal.effects)
     places = {"sensor_hold": _where_repeated(session)}
     findings = tuple(replace(item, where=places.get(item.name, item.where)) for item in diagnosis.findings)
-    located_too = replace(diagnosis, localisation=located, findings=findings)
+    following = None if names_only else drivetrain_drive(nominal.answer)
+    located_too = replace(diagnosis, localisation=located, findings=findings, next_drive=following)
     diagnosis = with_contradictions(located_too, session.mended.contradictions)
     return Outcome(diagnosis, every, session, found, evidence)
 
