@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, overload
 
 from ddagr_gym.api.change import ChangeResult, changed, changed_since
 from ddagr_gym.api.diagnosis_result import DiagnosisResult
+from ddagr_gym.api.drivetrain_fit import DrivetrainFit
 from ddagr_gym.api.inputs import Sources, recordings_from
 from ddagr_gym.api.nominal import (
     DEFAULT_ROBOT,
@@ -29,22 +29,12 @@ from ddagr_gym.extras import need
 from ddagr_gym.progress import counting
 
 if TYPE_CHECKING:
-    from ddagr_gym.calibration.run import Outcome as CalibrationOutcome
     from ddagr_gym.diagnosis.gates.thresholds import Thresholds
-    from ddagr_gym.diagnosis.result.drivetrain_names import CompletedNominal
-    from ddagr_gym.recordings.schema import Recording
 
 __all__ = ["ChangeResult", "DiagnosisResult", "diagnose"]
 
-_GROUND = "ground"
-"""Name of the one that all recordings of a diagnosis are on."""
-
 _SIMULATED = "ddagr"
 """Robot with a shipped bank of simulated drives."""
-
-_ONE_DRIVE = {"fitted": 36, "compared": 20, "settlings": 1}
-"""Windows of a single drive that a fit of its drivetrain uses, and those that decide on parts (ours): a quarter of them
-is left out at a time; and how often a fit without a part goes on (more changed no name on real drives)."""
 
 _SAME_WINDOW = 0.5
 """Difference of lengths of windows up to which gates are taken to hold [s] (ours; short segments shorten windows)."""
@@ -227,7 +217,7 @@ def diagnose(
     priors = NuisancePriors().with_soil(soil_uncertainty)
     gates = _gates(thresholds, nominal, soil_uncertainty)
     setting = Setting(priors=priors, threads=threads).with_windows(_window(window, gates), stride)
-    drivetrain = _Drivetrain(found, nominal, threads, seed, cache, progress)
+    drivetrain = DrivetrainFit(found, nominal, threads, seed, cache, progress)
     with _steps(len(steps_of(names_only)), progress) as on_step:
         outcome = diagnosed(
             found,
@@ -245,65 +235,6 @@ def diagnose(
             progress=lambda line: None if progress is None else progress(f"  {line}"),
         )
     return DiagnosisResult(outcome, drivetrain.made if outcome.diagnosis.drivetrain is not None else None)
-
-
-@dataclass
-class _Drivetrain:
-    """Fits the drivetrain to the recordings that are diagnosed, where that is asked for.
-
-    Attributes:
-        recordings: that are diagnosed.
-        nominal: simulator.
-        threads: of the simulator.
-        seed: of resampled intervals.
-        cache: of the diagnosis; the fit's own is a folder in it.
-        progress: of the diagnosis.
-        made: the calibration behind the fit; None before it.
-    """
-
-    recordings: Sequence[Recording]
-    nominal: Nominal
-    threads: int
-    seed: int
-    cache: str | os.PathLike[str] | None
-    progress: Callable[[str], None] | None
-    made: CalibrationOutcome | None = None
-
-    def complete(self, misfit: Mapping[str, float]) -> CompletedNominal | None:
-        """The nominal simulator with the drivetrain that the recordings ask for; None where they cannot tell it."""
-        from ddagr_gym.calibration.drivetrain_answer import drivetrain_answer, drivetrain_findings, late_poses
-        from ddagr_gym.calibration.run import LittleExplainedError, calibrate_drives, ready_drives
-        from ddagr_gym.calibration.settings import CalibrationSettings
-        from ddagr_gym.diagnosis.result.drivetrain_names import LEAST_EXPLAINED, CompletedNominal
-
-        settings = CalibrationSettings(threads=self.threads, seed=self.seed, least_explained=LEAST_EXPLAINED)
-        if len(self.recordings) == 1:
-            fitted, compared, settlings = (_ONE_DRIVE[name] for name in ("fitted", "compared", "settlings"))
-            settings = replace(settings, fitted=fitted, compared=compared, settlings=settlings)
-        self._say("the wheels do not follow their commands as the simulator says: fitting its drivetrain")
-        grounds, soils = [_GROUND] * len(self.recordings), {_GROUND: self.nominal.soil}
-        drives = (self.recordings, grounds, self.nominal.robot, soils, settings)
-        try:
-            ready = ready_drives(*drives, self._say)
-        except InputError as error:
-            warnings.warn(f"the drivetrain cannot be fitted: {error}", InputWarning, stacklevel=2)
-            return None
-        try:
-            self.made = calibrate_drives(
-                *drives, soil_names={_GROUND: self.nominal.soil_name}, ready=ready,
-                cache=None if self.cache is None else Path(self.cache) / _GROUND, progress=self._say,
-            )  # fmt: skip
-        except LittleExplainedError as error:
-            self._say(f"{error}: no answer")
-            return None
-        found = self.made.calibration
-        answer = drivetrain_answer(found, misfit)
-        robot, soil = self.made.robot, self.made.soils[_GROUND]
-        return CompletedNominal(robot, soil, answer, drivetrain_findings(found), late_poses(found))
-
-    def _say(self, line: str) -> None:
-        if self.progress is not None:
-            self.progress(f"  {line}")
 
 
 def _check_no_cache(cache: object) -> None:

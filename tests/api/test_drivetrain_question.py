@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 import ddagr_gym
-from ddagr_gym.api import diagnose as door
+from ddagr_gym.api import drivetrain_fit
 from ddagr_gym.calibration.run import LittleExplainedError
 from ddagr_gym.diagnosis import pipeline
 from ddagr_gym.diagnosis.search.scanned_model import SearchResult, scan_model
@@ -39,7 +39,7 @@ def search_nothing(session, start, cache, enough):
 def asked(monkeypatch):
     monkeypatch.setattr(pipeline, "search", search_nothing)
     monkeypatch.setattr(pipeline, "unlike_commands", lambda accepted, gates: {"encoder_left": 9.0})
-    monkeypatch.setattr(door, "_ONE_DRIVE", {"fitted": 16, "compared": 12, "settlings": 1})
+    monkeypatch.setattr(drivetrain_fit, "_ONE_DRIVE", {"fitted": 16, "compared": 12, "settlings": 1})
 
 
 @pytest.mark.slow
