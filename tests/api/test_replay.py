@@ -87,3 +87,8 @@ def test_a_table_needs_a_robot(sloping):
     pytest.importorskip("pandas")
     with pytest.raises(InputError, match="in Python"):
         ddagr_gym.replay(sloping.to_pandas())
+
+
+def test_a_robot_of_ones_own_is_asked_for_by_its_file(sloping):
+    with pytest.raises(InputError, match=r"of the robot 'mule': name it with --robot FILE\.yaml"):
+        ddagr_gym.replay(sloping.recording.with_meta(robot="mule"))
