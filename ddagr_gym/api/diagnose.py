@@ -190,7 +190,8 @@ def diagnose(
     from ddagr_gym.identification.nuisances import NuisancePriors
 
     at_least(threads=(threads, 1), window=(window, 1.0), stride=(stride, 0.1), seed=(seed, 0))
-    _check_no_cache(cache if calibration is not None or before is not None else None)
+    if calibration is not None or before is not None:
+        _check_no_cache(cache)
     if before is not None:
         _check_only_before(calibration, ground, thresholds=thresholds, stride=stride, soil_uncertainty=soil_uncertainty)
         nominal = nominal_from(robot, soil)

@@ -28,14 +28,13 @@ from ddagr_gym.diagnosis.change.reference import OrdinaryDrive, scan_ordinary
 from ddagr_gym.diagnosis.change.robot_on_ground import RobotOnGround, uncertain_robot
 from ddagr_gym.diagnosis.change.weighing import (
     LEAST_ACCELEROMETER_BIAS,
-    LEAST_GYRO_BIAS,
     UNKNOWN_ACCELEROMETER_BIAS,
     SensorBias,
     Weighing,
 )
 from ddagr_gym.identification.recording_noise import RecordingNoise
 from ddagr_gym.identification.relative_readings import usual_turning
-from ddagr_gym.identification.residual_weights import UNKNOWN_GYRO_BIAS, noise_weights
+from ddagr_gym.identification.residual_weights import LEAST_GYRO_BIAS, UNKNOWN_GYRO_BIAS, noise_weights
 from ddagr_gym.identification.timing_repair import aligned_poses
 from ddagr_gym.identification.window_model import RUN_IN
 from ddagr_gym.parameters import Robot

@@ -11,6 +11,7 @@ from ddagr_gym.recordings.channels import CURRENTS, VOLTAGES
 from ddagr_gym.recordings.checks.signals import filled
 from ddagr_gym.recordings.schema import FloatArray, Recording
 from ddagr_gym.rendering import palette
+from ddagr_gym.reporting.figures import PAGE_WIDTH
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -21,8 +22,8 @@ _MOST_POINTS = 6000
 ABOVE: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0)}
 """Place of a legend above its axes."""
 
-_WIDTH, _ROW = 10.8, 2.3
-"""Of the figure, and height of each recording in it [inches]."""
+_ROW = 2.3
+"""Height of each recording in the figure [inches]."""
 
 
 def has_currents(recording: Recording) -> bool:
@@ -40,7 +41,7 @@ def currents_figure(recordings: Sequence[Recording], facecolor: str = "white") -
     """
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(_WIDTH, 0.2 + _ROW * len(recordings)), layout="constrained", facecolor=facecolor)
+    figure = Figure(figsize=(PAGE_WIDTH, 0.2 + _ROW * len(recordings)), layout="constrained", facecolor=facecolor)
     for axes, recording in zip(figure.subplots(len(recordings), 1, squeeze=False)[:, 0], recordings, strict=True):
         draw_currents(axes, recording)
         axes.set_xlabel(f"time of {recording.meta.source} [s]")

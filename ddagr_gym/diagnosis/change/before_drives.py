@@ -21,7 +21,6 @@ from ddagr_gym.diagnosis.change.ordinary import OrdinaryRobot, Reference, uncert
 from ddagr_gym.diagnosis.change.reference import OrdinaryDrive, scan_pieces
 from ddagr_gym.diagnosis.change.weighing import (
     LEAST_ACCELEROMETER_BIAS,
-    LEAST_GYRO_BIAS,
     UNKNOWN_ACCELEROMETER_BIAS,
     Weighing,
 )
@@ -34,7 +33,7 @@ from ddagr_gym.identification.parameters import ModelParameter, robot_parameters
 from ddagr_gym.identification.problem import Problem
 from ddagr_gym.identification.recording_noise import recording_noise
 from ddagr_gym.identification.relative_readings import usual_turning
-from ddagr_gym.identification.residual_weights import UNKNOWN_GYRO_BIAS, Weights, noise_weights
+from ddagr_gym.identification.residual_weights import LEAST_GYRO_BIAS, UNKNOWN_GYRO_BIAS, Weights, noise_weights
 from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.recordings.pose_frames import in_one_frame

@@ -11,9 +11,6 @@ from ddagr_gym.diagnosis.change.expected_scatter import EXPECTED_DRIVES
 
 Array = NDArray[np.float64]
 
-LEAST_GYRO_BIAS = 2e-4
-"""Least prior [rad/s] (ours): the bias of a gyro wanders by so much in a drive."""
-
 LEAST_ACCELEROMETER_BIAS = 0.02
 """Least prior [m/s^2] (ours): a tenth of a degree of slope under a drive."""
 
