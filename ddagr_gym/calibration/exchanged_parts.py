@@ -1,7 +1,8 @@
 """Parts of a drivetrain that can stand for one another, and where fits begin in which one does what another did.
 
 A dead time, ramps, a filter of the commands and slow motors all make the wheels late: a fit has a minimum for each,
-and does not get from one to the other by itself.
+and does not get from one to the other by itself. An integral part undoes what friction does: a fit finds its way back
+to neither only where both are taken out.
 """
 
 from __future__ import annotations
@@ -16,14 +17,14 @@ from ddagr_gym.calibration.parts import FILTER_DEVIATION, FIRST_SHARE
 from ddagr_gym.parameters import Robot
 
 DELAY, RAMP, FILTER, SPEED_LOOP = "command_delay", "command_ramp", "command_filter", "speed_loop"
-MEAN_RAMP, TURNING_RAMP = "mean_ramp", "turning_ramp"
+MEAN_RAMP, TURNING_RAMP, FRICTION, INTEGRAL = "mean_ramp", "turning_ramp", "friction", "integral"
 """Names of these parts."""
 
 TRIED_DELAY = 0.3
 """From which the fit with a dead time in place of the others starts [s]: of a Husky and a Warthog (0.2 to 0.43 s)."""
 
-MOTORS = "motor_rate"
-"""Parameter of the speed loop."""
+MOTORS, INTEGRAL_RATE, VISCOUS_RATE = "motor_rate", "integral_rate", "viscous_rate"
+"""Parameters of the speed loop, its integral part and friction."""
 
 
 def other_starts(
@@ -39,6 +40,8 @@ def other_starts(
     """
     if part == FILTER and SPEED_LOOP not in left_out and FILTER in standing.values:
         yield ", slower motors", with_slow_motors(standing, robot)
+    if part == FRICTION and INTEGRAL not in left_out and standing.values.get(VISCOUS_RATE, 0.0) > 0.0:
+        yield ", less integral", with_integral_less_friction(standing, robot)
     if part in (RAMP, FILTER) and DELAY not in left_out and standing.values.get(DELAY, 0.0) < TRIED_DELAY:
         yield f", dead time from {TRIED_DELAY:g}", with_late_commands(standing)
 
@@ -60,3 +63,18 @@ def with_slow_motors(standing: Standing, robot: Robot) -> Standing:
     lag = np.exp(-standing.values[MOTORS]) + standing.values[FILTER] * robot.motor_rate
     slow = {MOTORS: -float(np.log(lag)), FILTER: FIRST_SHARE * FILTER_DEVIATION}
     return replace(standing, values={**standing.values, **slow})
+
+
+def with_integral_less_friction(standing: Standing, robot: Robot) -> Standing:
+    """Where a fit stands, but for an integral part without its share that undoes friction.
+
+    Where k_i = k c_v nothing tells both from a loop with neither (drivetrain.md, eq. (5a)), and a fit finds no way
+    there with one of them alone.
+
+    Args:
+        standing: of a fit with both; its motor rate is the logarithm of a factor on that of the robot.
+        robot: of the model.
+    """
+    rate = robot.motor_rate * float(np.exp(standing.values[MOTORS]))
+    integral = max(standing.values[INTEGRAL_RATE] - rate * standing.values[VISCOUS_RATE], 0.0)
+    return replace(standing, values={**standing.values, INTEGRAL_RATE: integral})

@@ -19,8 +19,7 @@ from ddagr_gym.calibration.part_selection import (
     Comparison,
     Selection,
     from_other_starts,
-    is_missed,
-    worse_by,
+    misses,
 )
 from ddagr_gym.calibration.parts import PARTS, RobotModel, part_named
 from ddagr_gym.calibration.result import PartDecision
@@ -63,8 +62,7 @@ def decide_with_all_windows(
             continue
         progress(f"forecasts with all windows with {part.title} free")
         tried = fit(left_out - {part.name}, best.standing, best.cost, f"with {part.name}")
-        growth, error = worse_by(tried.by_all_channels, best.by_all_channels)
-        kept = is_missed(growth, error, len(best.losses))
+        kept, growth, error = misses((tried.by_all_channels,), best.by_all_channels)
         decisions.append(PartDecision(part.name, kept, growth, error))
         if kept:
             best, left_out = tried, left_out - {part.name}
@@ -77,13 +75,12 @@ def _without(
     """Without ramp or filter, from where the fit stands or else from another start, unless it is missed from all."""
     without = left_out | {part}
     stage = f"without the {part_named(part).title}"
-    tried, growth, error = from_other_starts(
+    tried, (kept, growth, error) = from_other_starts(
         fit(without, best.standing, best.cost, stage),
         (best,),
         other_starts(part, best.standing, robot, left_out),
         lambda name, start: fit(without, start, best.cost, stage + name),
     )
-    kept = is_missed(growth, error, len(tried.losses))
     changed = [PartDecision(part, kept, growth, error) if item.name == part else item for item in decisions]
     return (best, left_out, changed) if kept else (tried, without, changed)
 

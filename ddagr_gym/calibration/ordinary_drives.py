@@ -26,15 +26,10 @@ from ddagr_gym.diagnosis.change.ground_slope import deviations_of, effects_of
 from ddagr_gym.diagnosis.change.ordinary import Reference, field_deviations, uncertain_parameters
 from ddagr_gym.diagnosis.change.reference import OrdinaryDrive, scan_ordinary
 from ddagr_gym.diagnosis.change.robot_on_ground import RobotOnGround, uncertain_robot
-from ddagr_gym.diagnosis.change.weighing import (
-    LEAST_ACCELEROMETER_BIAS,
-    UNKNOWN_ACCELEROMETER_BIAS,
-    SensorBias,
-    Weighing,
-)
+from ddagr_gym.diagnosis.change.weighing import UNKNOWN_ACCELEROMETER_BIAS, SensorBias, Weighing
 from ddagr_gym.identification.recording_noise import RecordingNoise
 from ddagr_gym.identification.relative_readings import usual_turning
-from ddagr_gym.identification.residual_weights import LEAST_GYRO_BIAS, UNKNOWN_GYRO_BIAS, noise_weights
+from ddagr_gym.identification.residual_weights import UNKNOWN_GYRO_BIAS, noise_weights
 from ddagr_gym.identification.timing_repair import aligned_poses
 from ddagr_gym.identification.window_model import RUN_IN
 from ddagr_gym.parameters import Robot
@@ -238,19 +233,8 @@ def pooled(blank: Weighing, left: Sequence[_Left]) -> Weighing:
         blank: how drives are cut.
         left: of each drive.
     """
-    sigma = np.stack([item.sigma for item in left])
-    known = np.isfinite(sigma)
-    square = np.where(known, sigma, 0.0) ** 2
-    with np.errstate(divide="ignore", invalid="ignore"):
-        mean = np.where(known.any(axis=0), np.sqrt(square.sum(axis=0) / known.sum(axis=0)), np.inf)
     biases = np.array([item.bias.value for item in left])
     scatter = biases.std(axis=0, ddof=1) if len(left) > 1 else np.abs(biases[0])
-    return replace(
-        blank,
-        sigma=mean,
-        robust=np.min([item.robust for item in left], axis=0),
-        gyro_bias=max(LEAST_GYRO_BIAS, float(scatter[0])),
-        accelerometer_bias=max(LEAST_ACCELEROMETER_BIAS, float(np.sqrt(np.mean(scatter[1:] ** 2)))),
-        offsets=biases.mean(axis=0) if len(left) > 1 else np.zeros(3),
-        biases=tuple(item.bias for item in left),
-    )
+    offsets = biases.mean(axis=0) if len(left) > 1 else np.zeros(3)
+    sigma, robust = np.stack([item.sigma for item in left]), np.min([item.robust for item in left], axis=0)
+    return replace(blank.of_fits(sigma, robust, scatter, offsets), biases=tuple(item.bias for item in left))

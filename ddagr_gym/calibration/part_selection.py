@@ -8,8 +8,9 @@ for few drives: of all parts together no more than that is given away. Of what n
 Forecasts are compared in what a drivetrain moves by itself, wheel speeds and the motors' currents: yaw rate and place
 follow from them through the soil, whose own errors a wrong wheel speed may make up for, and places are the integral of
 both, so that few large errors decide there.
-A part is missed only by a fit that is settled, that has had steps enough, or that stays far above the fit with it. What
-is given away is compared with the best so far and with the same model with the part, whichever says more surely that it
+A part is missed only by a fit that is settled, that has had steps enough, or that stays far above the fit with it, and
+never by one that fits as well: that is a point of the model with the part, which its own fit would have found. What is
+given away is compared with the best so far and with the same model with the part, whichever says more surely that it
 is missed: one drive that the best so far happens to forecast badly would hide what all others miss.
 What acts through parts that have all gone goes with them. Parts that make the wheels late stand for one another: a fit
 without ramp or filter is also tried from a longer dead time, one without a filter from slower motors, and a ramp or a
@@ -210,6 +211,18 @@ def is_missed(growth: float, error: float, folds: int, usual: bool = False) -> b
     return growth > least_growth(error, folds, usual)
 
 
+def misses(before: Sequence[Candidate], after: Candidate, usual: bool = False) -> tuple[bool, float, float]:
+    """Whether a model misses a part, and growth and standard error of its losses as of :func:`most_worse_by`.
+
+    Args:
+        before: with the part; the last one is what it was taken out of.
+        after: without it.
+        usual: whether nearly every robot has the part.
+    """
+    growth, error = most_worse_by(before, after, usual)
+    return after.cost > before[-1].cost and is_missed(growth, error, len(after.losses), usual), growth, error
+
+
 def most_worse_by(before: Sequence[Candidate], after: Candidate, usual: bool = False) -> tuple[float, float]:
     """That of :func:`worse_by` which says most surely that a part is missed, of several models with it.
 
@@ -247,8 +260,7 @@ def select_parts(
         fit = partial(_fitted_without, comparison, model, cache, left_out | {part.name}, best.cost)
         starts = other_starts(part.name, best.standing, model.robot, left_out)
         tried = _settled(fit, before, comparison.settlings, part.usual)
-        tried, growth, error = from_other_starts(tried, before, starts, fit, part.usual)
-        kept = is_missed(growth, error, len(tried.losses), part.usual)
+        tried, (kept, growth, error) = from_other_starts(tried, before, starts, fit, part.usual)
         decisions.append(PartDecision(part.name, kept, growth, error))
         if not kept:
             best, left_out = tried, left_out | {part.name}
@@ -284,8 +296,7 @@ def _settled(fit: FitFrom, before: tuple[Candidate, ...], settlings: int, usual:
     """A model without a part, fitted from where the last of those before stands; further while it misses the part."""
     tried = fit("", before[-1].standing)
     for time in range(settlings):
-        growth, error = most_worse_by(before, tried, usual)
-        missed = is_missed(growth, error, len(tried.losses), usual)
+        missed, growth, _ = misses(before, tried, usual)
         if not missed or tried.standing.converged or growth > HOPELESS:
             break
         tried = fit(f", settling {time + 1}", tried.standing)
@@ -298,26 +309,26 @@ def from_other_starts(
     starts: Iterable[tuple[str, Standing]],
     fit: FitFrom,
     usual: bool = False,
-) -> tuple[Candidate, float, float]:
+) -> tuple[Candidate, tuple[bool, float, float]]:
     """The best of a model without a part and of fits of it from other starts, as long as the part is missed.
 
     Args:
         tried: the model.
-        before: models with the part; the first one judges which fit is best.
+        before: models with the part, as of :func:`misses`.
         starts: where else it may begin, as of :func:`~ddagr_gym.calibration.exchanged_parts.other_starts`.
         fit: from such a start.
         usual: whether nearly every robot has the part.
 
     Returns:
-        The model, and growth and standard error of its losses as of :func:`most_worse_by`.
+        The model, and what :func:`misses` says of it.
     """
-    growth, error = most_worse_by(before, tried, usual)
+    found = misses(before, tried, usual)
     for stage, start in starts:
-        if not is_missed(growth, error, len(tried.losses), usual):
+        if not found[0]:
             break
-        tried = min(tried, fit(stage, start), key=partial(mean_growth, before[0]))
-        growth, error = most_worse_by(before, tried, usual)
-    return tried, growth, error
+        tried = min(tried, fit(stage, start), key=lambda item: item.cost)
+        found = misses(before, tried, usual)
+    return tried, found
 
 
 def mean_growth(before: Candidate, after: Candidate) -> float:

@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 
 import ddagr_gym
+from benchmarks.simulated_robots import RATE, steps
 from ddagr_gym.api import drivetrain_fit
 from ddagr_gym.calibration.run import LittleExplainedError
 from ddagr_gym.diagnosis import pipeline
@@ -15,7 +16,6 @@ from ddagr_gym.errors import InputError, InputWarning
 from ddagr_gym.presets import get_robot
 from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.reporting.drivetrain_section import DRIVETRAIN_FOLDER
-from tests.calibration.conftest import RATE, steps
 
 DELAY = 0.3
 LOAD = 0.06  # 1/(kg m^2): the turning torque of the soil takes a tenth of the bank speeds until the integral part is up

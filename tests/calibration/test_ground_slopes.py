@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.simulated_robots import drive
 from ddagr_gym.calibration.ground_slopes import QUARTERS, Readings, readings_of, slope_from, slopes_of
 from ddagr_gym.identification.windows import cut_windows
 from ddagr_gym.parameters import STANDARD_GRAVITY
 from ddagr_gym.physics.effects.slope import Slope
 from ddagr_gym.presets import get_robot
-from tests.calibration.conftest import drive
 
 ROBOT = get_robot("ddagr")
 SLOPING = "slope=0.05,direction=0.8"

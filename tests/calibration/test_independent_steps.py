@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from benchmarks.simulated_robots import drive
 from ddagr_gym.calibration import files, fit_starts
 from ddagr_gym.calibration.exchanged_parts import with_slow_motors
 from ddagr_gym.calibration.independent_steps import IndependentSteps
@@ -19,7 +20,6 @@ from ddagr_gym.errors import InputError
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.tasks import FailedTasksError, Task, TaskRunner
 from ddagr_gym.tasks.store import Kept
-from tests.calibration.conftest import drive
 from tests.needs_ray import NEEDS_RAY
 from tests.tasks import work
 

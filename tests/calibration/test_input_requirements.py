@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import ddagr_gym
+from benchmarks.simulated_robots import drive
 from ddagr_gym.api.calibrate import _number, _numbers
 from ddagr_gym.calibration.input_requirements import (
     SHORTEST_DRIVE,
@@ -20,7 +21,6 @@ from ddagr_gym.calibration.input_requirements import (
 )
 from ddagr_gym.errors import InputError
 from ddagr_gym.presets import get_robot
-from tests.calibration.conftest import drive
 
 
 def without(recording, *names):

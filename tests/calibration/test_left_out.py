@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.simulated_robots import drive, true_robot
 from ddagr_gym.calibration.calibration_data import CalibrationData
 from ddagr_gym.calibration.joint_fit import FittedModel, complete_model, fit_model, weigh_and_fit
 from ddagr_gym.calibration.left_out import folds, forecast_losses, forecasts, refitted_without, values_without
@@ -19,7 +20,6 @@ from ddagr_gym.identification.problem import Point, Problem
 from ddagr_gym.identification.residual_weights import Weights
 from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.presets import get_robot, get_soil
-from tests.calibration.conftest import drive, true_robot
 
 SETTINGS = CalibrationSettings(fitted=4, compared=4, judged=4)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,6 +13,7 @@ from ddagr_gym.calibration.joint_fit import Standing
 from ddagr_gym.calibration.part_selection import (
     Candidate,
     is_hopeless,
+    misses,
     most_worse_by,
     select_parts,
     surely_above,
@@ -133,6 +135,27 @@ def test_a_filter_gives_way_to_slower_motors_that_forecast_as_well(slow, kept):
     made = Made(late="command_filter")
     found = select_parts(Motors({}), made, full, lambda name, make: make(), lambda line: None)
     assert {item.name: item.kept for item in found.decisions}["command_filter"] is kept
+
+
+def test_friction_goes_with_the_share_of_the_integral_part_that_undoes_it():
+    class Loop(Losses):
+        def candidate(self, model, start, rival):
+            undone = start.values["integral_rate"] == 0.0
+            grown = 1.0 if undone or "friction" not in model.out else 3.0
+            return candidate(grown, 1.01 * grown, **start.values)
+
+    rate = get_robot("warthog").motor_rate
+    full = candidate(1.0, 1.01, motor_rate=0.0, integral_rate=0.8 * rate, viscous_rate=0.8)
+    found = select_parts(Loop({}), Made(late="viscous_rate"), full, lambda name, make: make(), lambda line: None)
+    assert "friction" in found.left_out
+    assert found.standing.values["integral_rate"] == 0.0
+
+
+def test_a_part_is_not_missed_by_a_fit_that_fits_as_well():
+    """Such a fit is a point of the model with the part: that its forecasts differ is where fits stop."""
+    with_part, without = candidate(1.0, 2.0), candidate(1.5, 3.0)
+    assert misses((with_part,), without)[0]
+    assert not misses((with_part,), replace(without, cost=with_part.cost))[0]
 
 
 def test_parts_that_are_missed_a_little_each_are_not_all_given_away():

@@ -8,36 +8,27 @@ from pathlib import Path
 import pytest
 
 import ddagr_gym
+from benchmarks.simulated_robots import (
+    CASES,
+    DELAY,
+    FEW,
+    GROUNDS,
+    MOTOR_RATE,
+    STRENGTH,
+    case_drives,
+    drive,
+    kept_parts,
+)
 from ddagr_gym import cli
 from ddagr_gym.api.calibrate import CalibrationResult
 from ddagr_gym.calibration import files
 from ddagr_gym.calibration.result import CALIBRATED, DATA_SHEET
 from ddagr_gym.calibration.run import LittleExplainedError, calibrate_drives
-from ddagr_gym.calibration.settings import CalibrationSettings
 from ddagr_gym.config import load_config
 from ddagr_gym.errors import InputError
 from ddagr_gym.parameters import Robot
 from ddagr_gym.physics.effects import load_effects
 from ddagr_gym.presets import get_robot, get_soil
-from tests.calibration.conftest import DELAY, MOTOR_RATE, STRENGTH, drive, true_robot
-
-FEW = CalibrationSettings(fitted=10, compared=6, judged=12)
-"""Enough windows for three parameters and two grounds, at a fifth of the cost."""
-
-TURNING_LIMIT = 0.6
-"""Of a robot whose controller limits the yaw rate [rad/s]."""
-
-FILTER = 0.5  # [s]
-RAMP = 1.0
-"""By which the commands of a robot change [rad/s^2]."""
-
-MEAN_RAMP, TURNING_RAMP = 1.5, 0.6
-"""By which the mean of its banks and their distance from it change [rad/s^2]."""
-
-WIDER = 1.1
-"""Factor on the track of a robot whose data sheet is wrong."""
-
-GROUNDS = ("field", "field", "track")
 
 
 def calibrated(drives, cache=None, lines=None):
@@ -227,62 +218,52 @@ def test_the_page_stands_alone(folder):
     assert page.count("<figure>") == 3 + 4
 
 
-def calibrated_with(**drivetrain):
-    """What drives of a robot with further parts of its drivetrain say, and the parts that are kept."""
-    robot = true_robot()
-    robot = replace(robot, drivetrain=replace(robot.drivetrain, **drivetrain))
-    found = calibrated([drive(ground, seed, robot=robot) for seed, ground in enumerate(GROUNDS, 1)])
-    return found, {part.name for part in found.calibration.parts if part.kept}
+def calibrated_case(name):
+    """What drives of a simulated robot say, the parts that are kept, and the robot as it is."""
+    case = CASES[name]
+    soils = {ground: get_soil("thesis_a1") for ground in GROUNDS}
+    found = calibrate_drives(case_drives(case), GROUNDS, case.sheet, soils, FEW)
+    kept = kept_parts(found.calibration)
+    assert case.parts <= kept
+    return found.robot, kept, case.robot
 
 
 @pytest.mark.slow
 def test_a_limit_of_the_commanded_turning_is_found():
     """Half of the turns of these steps are cut by the robot's controller; its data sheet does not say so."""
-    found, kept = calibrated_with(turning_limit=TURNING_LIMIT)
-    assert {"speed_loop", "command_delay", "turning_limit"} <= kept
-    assert found.robot.drivetrain.turning_limit == pytest.approx(TURNING_LIMIT, rel=0.02)
+    found, _, true = calibrated_case("limit of turning")
+    assert found.drivetrain.turning_limit == pytest.approx(true.drivetrain.turning_limit, rel=0.02)
 
 
 @pytest.mark.slow
 def test_a_ramp_of_the_commands_is_kept():
     """A robot that takes a second and a half to its commanded speed in equal steps has no dead time in its stead."""
-    found, kept = calibrated_with(command_ramp=RAMP)
-    assert {"speed_loop", "command_delay", "command_ramp"} <= kept
-    assert found.robot.drivetrain.command_ramp == pytest.approx(RAMP, rel=0.05)
-    assert found.robot.drivetrain.command_delay == pytest.approx(DELAY, rel=0.05)
+    found, _, true = calibrated_case("ramp of each bank")
+    assert found.drivetrain.command_ramp == pytest.approx(true.drivetrain.command_ramp, rel=0.05)
+    assert found.drivetrain.command_delay == pytest.approx(DELAY, rel=0.05)
 
 
 @pytest.mark.slow
 def test_ramps_of_mean_and_turning_are_told_from_one_of_each_bank():
     """A robot whose controller limits acceleration and yaw acceleration has neither late commands nor a slow loop."""
-    found, kept = calibrated_with(mean_ramp=MEAN_RAMP, turning_ramp=TURNING_RAMP)
-    assert {"speed_loop", "command_delay", "mean_ramp", "turning_ramp"} <= kept
+    found, kept, true = calibrated_case("ramps of mean and turning")
     assert not kept & {"command_ramp", "command_filter"}
-    drivetrain = found.robot.drivetrain
-    assert drivetrain.mean_ramp == pytest.approx(MEAN_RAMP, rel=0.05)
-    assert drivetrain.turning_ramp == pytest.approx(TURNING_RAMP, rel=0.05)
-    assert drivetrain.command_delay == pytest.approx(DELAY, rel=0.05)
+    assert found.drivetrain.mean_ramp == pytest.approx(true.drivetrain.mean_ramp, rel=0.05)
+    assert found.drivetrain.turning_ramp == pytest.approx(true.drivetrain.turning_ramp, rel=0.05)
+    assert found.drivetrain.command_delay == pytest.approx(DELAY, rel=0.05)
 
 
 @pytest.mark.slow
 def test_a_filter_of_the_commands_is_found():
     """Neither a ramp nor a dead time stands for it; a loop and a filter in series may share their lag otherwise."""
-    found, kept = calibrated_with(command_filter=FILTER)
-    assert {"speed_loop", "command_delay", "command_filter"} <= kept
+    found, kept, true = calibrated_case("filter of commands")
     assert not kept & {"command_ramp", "mean_ramp", "turning_ramp"}
-    lag = found.robot.drivetrain.command_filter + 1.0 / found.robot.motor_rate
-    assert lag == pytest.approx(FILTER + 1.0 / true_robot().motor_rate, rel=0.05)
-    assert found.robot.drivetrain.command_delay == pytest.approx(DELAY, abs=0.05)
+    lag = found.drivetrain.command_filter + 1.0 / found.motor_rate
+    assert lag == pytest.approx(true.drivetrain.command_filter + 1.0 / true.motor_rate, rel=0.05)
+    assert found.drivetrain.command_delay == pytest.approx(DELAY, abs=0.05)
 
 
 @pytest.mark.slow
 def test_wheels_that_are_not_as_on_the_data_sheet_are_found():
-    sheet = replace(
-        get_robot("ddagr"), standard_deviations={**get_robot("ddagr").standard_deviations, "half_track": 0.05}
-    )
-    robot = replace(true_robot(), half_track=WIDER * sheet.half_track)
-    soils = {ground: get_soil("thesis_a1") for ground in GROUNDS}
-    made = [drive(ground, seed, robot=robot) for seed, ground in enumerate(GROUNDS, 1)]
-    found = calibrate_drives(made, GROUNDS, sheet, soils, FEW)
-    assert {part.name for part in found.calibration.parts if part.kept} >= {"geometry", "speed_loop", "command_delay"}
-    assert found.robot.half_track == pytest.approx(robot.half_track, rel=0.02)
+    found, _, true = calibrated_case("wider track")
+    assert found.half_track == pytest.approx(true.half_track, rel=0.02)

@@ -19,11 +19,7 @@ from ddagr_gym.diagnosis.change.ground_slope import SLOPE_OF_FIELDS, GroundSlope
 from ddagr_gym.diagnosis.change.measured_scatter import measured_scatter
 from ddagr_gym.diagnosis.change.ordinary import OrdinaryRobot, Reference, uncertain_parameters
 from ddagr_gym.diagnosis.change.reference import OrdinaryDrive, scan_pieces
-from ddagr_gym.diagnosis.change.weighing import (
-    LEAST_ACCELEROMETER_BIAS,
-    UNKNOWN_ACCELEROMETER_BIAS,
-    Weighing,
-)
+from ddagr_gym.diagnosis.change.weighing import UNKNOWN_ACCELEROMETER_BIAS, Weighing
 from ddagr_gym.diagnosis.preprocessing.input_requirements import content_hash
 from ddagr_gym.diagnosis.preprocessing.mended_recordings import MendedRecordings
 from ddagr_gym.diagnosis.setting import HISTORY
@@ -33,7 +29,7 @@ from ddagr_gym.identification.parameters import ModelParameter, robot_parameters
 from ddagr_gym.identification.problem import Problem
 from ddagr_gym.identification.recording_noise import recording_noise
 from ddagr_gym.identification.relative_readings import usual_turning
-from ddagr_gym.identification.residual_weights import LEAST_GYRO_BIAS, UNKNOWN_GYRO_BIAS, Weights, noise_weights
+from ddagr_gym.identification.residual_weights import UNKNOWN_GYRO_BIAS, Weights, noise_weights
 from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.recordings.pose_frames import in_one_frame
@@ -198,7 +194,10 @@ def joint_fit(
     fitted = fit_nominal(problem, begun.point)
     values = {p.name: float(value) for p, value in zip(parameters, fitted.point.values, strict=True)}
     left = misfit_of_compared(problem.blocked, fitted.prediction, of_noise)
-    weighing = _weighing(blank, left, _biases(fitted, len(noise)))
+    biases = _biases(fitted, len(noise))
+    scatter = biases.std(axis=0, ddof=1) if len(biases) > 1 else np.zeros(3)
+    sigma = left.sigma.reshape(-1, len(CHANNELS))
+    weighing = blank.of_fits(sigma, left.robust, scatter, biases.mean(axis=0))
     gradient = (values[SLOPES[0]], values[SLOPES[1]]) if slopes else None
     return JointFit(*with_values(robot, soil, values), weighing, _deviations(problem, fitted), gradient)
 
@@ -213,21 +212,3 @@ def _deviations(problem: Problem, fitted: Fitted) -> dict[str, float]:
 def _biases(fitted: Fitted, recordings: int) -> Array:
     """(R, 3) of gyro and accelerometers, which are the last parameters."""
     return fitted.point.values[-3 * recordings :].reshape(recordings, 3)
-
-
-def _weighing(blank: Weighing, left: Weights, biases: Array) -> Weighing:
-    """Weights by what a fit leaves, pooled over the windows; the mean bias of the drives is taken off."""
-    sigma = left.sigma.reshape(-1, len(CHANNELS))
-    known = np.isfinite(sigma)
-    square = np.where(known, sigma, 0.0) ** 2
-    with np.errstate(divide="ignore", invalid="ignore"):
-        mean = np.where(known.any(axis=0), np.sqrt(square.sum(axis=0) / known.sum(axis=0)), np.inf)
-    scatter = biases.std(axis=0, ddof=1) if len(biases) > 1 else np.zeros(3)
-    return replace(
-        blank,
-        sigma=mean,
-        robust=left.robust,
-        gyro_bias=max(LEAST_GYRO_BIAS, float(scatter[0])),
-        accelerometer_bias=max(LEAST_ACCELEROMETER_BIAS, float(np.sqrt(np.mean(scatter[1:] ** 2)))),
-        offsets=biases.mean(axis=0),
-    )

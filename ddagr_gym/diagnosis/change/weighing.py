@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.diagnosis.change.expected_scatter import EXPECTED_DRIVES
+from ddagr_gym.identification.residual_weights import LEAST_GYRO_BIAS
 
 Array = NDArray[np.float64]
 
@@ -84,6 +85,29 @@ class Weighing:
         offsets = np.array([self.offsets[0], *np.mean(here, axis=0)[1:]])
         scatter = self._accelerometers_on_one_ground * float(np.sqrt(1.0 + 1.0 / len(here)))
         return replace(self, offsets=offsets, accelerometer_bias=max(LEAST_ACCELEROMETER_BIAS, scatter))
+
+    def of_fits(self, sigma: Array, robust: Array, scatter: Array, offsets: Array) -> Weighing:
+        """The same drives, weighed by what fits leave of them.
+
+        Args:
+            sigma: (K, 8) standard deviations of the channels' samples in windows or drives; infinite where there are
+                none.
+            robust: (8,) weighted residuals from which the loss is linear.
+            scatter: (3,) of what sensors read too much, between drives.
+            offsets: (3,) what they read too much in all of them.
+        """
+        known = np.isfinite(sigma)
+        square = np.where(known, sigma, 0.0) ** 2
+        with np.errstate(divide="ignore", invalid="ignore"):
+            mean = np.where(known.any(axis=0), np.sqrt(square.sum(axis=0) / known.sum(axis=0)), np.inf)
+        return replace(
+            self,
+            sigma=mean,
+            robust=robust,
+            gyro_bias=max(LEAST_GYRO_BIAS, float(scatter[0])),
+            accelerometer_bias=max(LEAST_ACCELEROMETER_BIAS, float(np.sqrt(np.mean(scatter[1:] ** 2)))),
+            offsets=offsets,
+        )
 
     def without(self, drive: str) -> Weighing:
         """The same without what one of the drives says of biases."""
