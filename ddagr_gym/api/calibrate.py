@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
+from ddagr_gym.api.drive_names import names_apart
 from ddagr_gym.api.inputs import ENDINGS, Source, Sources, recordings_from, sources_in
 from ddagr_gym.api.nominal import OWN, RobotLike, SoilLike, robot_from, soil_from, soil_name_of
 from ddagr_gym.api.results import Report, Table
@@ -198,10 +199,11 @@ def calibrate(
     at_least(threads=(threads, 1), seed=(seed, 0), processes=(processes, 1))
     data_sheet = robot_from(robot)
     sources = sources_in(recordings)
-    found = _named_apart(recordings_from(sources, robot, column_map, limits) if sources else ())
+    read = recordings_from(sources, robot, column_map, limits) if sources else ()
+    names = names_apart([recording.meta.source for recording in read], sources)
+    found = tuple(recording.with_meta(source=name) for recording, name in zip(read, names, strict=True))
     check_drives(found, data_sheet)
     check_map(found, np.random.default_rng(seed))
-    names = [recording.meta.source for recording in found]
     by_drive = grounds_of(names, _numbers(grounds or {}, sources, found))
     for ground in dict.fromkeys(by_drive):
         check_ground_name(ground)
@@ -221,15 +223,6 @@ def calibrate(
             progress=(lambda line: None) if progress is None else progress,
         )
     return CalibrationResult(outcome)
-
-
-def _named_apart(recordings: Sequence[Recording]) -> tuple[Recording, ...]:
-    """Recordings of which those with one name are numbered."""
-    names = [recording.meta.source for recording in recordings]
-    return tuple(
-        recording.with_meta(source=f"{name} ({1 + names[:number].count(name)})") if names.count(name) > 1 else recording
-        for number, (name, recording) in enumerate(zip(names, recordings, strict=True))
-    )
 
 
 def _numbers(

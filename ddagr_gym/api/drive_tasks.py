@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import hashlib
-import itertools
 import os
 import traceback
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+from ddagr_gym.api.drive_names import names_apart
 from ddagr_gym.api.inputs import Source, Sources, recordings_from, sources_in
 from ddagr_gym.errors import InputError
 from ddagr_gym.recordings.files import DEFAULT_LIMITS, Limits
@@ -83,39 +83,8 @@ def tasks_of(given: Sources) -> list[DriveTask]:
     found = [_task(item, number) for number, item in enumerate(sources_in(given))]
     if not found:
         raise InputError("no recording is given: name one or more files, or a folder of them.")
-    names = _numbered(_with_folders(found))
+    names = names_apart([task.name for task in found], [task.source for task in found])
     return [replace(task, name=name) for task, name in zip(found, names, strict=True)]
-
-
-def _with_folders(tasks: Sequence[DriveTask]) -> list[str]:
-    """Names of drives, those of files of one name with folders."""
-    places = [_place(task) for task in tasks]
-    alike: dict[str, set[Path]] = {}
-    for place in places:
-        if place is not None:
-            alike.setdefault(place.name, set()).add(place)
-    apart = {place: name for found in alike.values() for place, name in _apart(found).items()}
-    return [task.name if place is None else apart[place] for task, place in zip(tasks, places, strict=True)]
-
-
-def _place(task: DriveTask) -> Path | None:
-    """Whole path of a file; None for a recording."""
-    return Path(os.path.abspath(task.source)) if isinstance(task.source, Path) else None
-
-
-def _apart(paths: Collection[Path]) -> dict[Path, str]:
-    """Whole paths shortened to as many folders as tell them apart."""
-    kept = next(n for n in itertools.count(1) if len({path.parts[-n:] for path in paths}) == len(paths))
-    return {path: Path(*path.parts[-kept:]).as_posix() for path in paths}
-
-
-def _numbered(names: Sequence[str]) -> list[str]:
-    """Names of which one that is there again has a number."""
-    found: dict[str, None] = {}
-    for name in names:
-        more = (f"{name} ({number})" for number in itertools.count(2))
-        found[next(item for item in itertools.chain([name], more) if item not in found)] = None
-    return list(found)
 
 
 def _task(item: Source, number: int) -> DriveTask:
