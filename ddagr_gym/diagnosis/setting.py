@@ -9,7 +9,7 @@ import numpy as np
 
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.block_means import BLOCK, block_windows, located
-from ddagr_gym.identification.fit_numerics import block_mean_numerics, far_off_numerics
+from ddagr_gym.identification.fit_numerics import block_mean_numerics, far_off_numerics, field_slope_numerics
 from ddagr_gym.identification.headings import without_poses
 from ddagr_gym.identification.noise import noise_from_differences
 from ddagr_gym.identification.nuisances import NuisancePriors, nuisances
@@ -111,4 +111,5 @@ def make_problem(
     unplaced = reckoned[1:] if len(reckoned) == len(recordings) else reckoned
     uncertain = nuisances(robot, len(recordings), windows.period, setting.priors, unplaced)
     numerics = far_off_numerics() if setting.far_off else block_mean_numerics()
-    return Problem(robot, soil, blocked, uncertain, threads=setting.threads, numerics=numerics)
+    slopes = field_slope_numerics() if setting.far_off else None
+    return Problem(robot, soil, blocked, uncertain, threads=setting.threads, numerics=numerics, slopes=slopes)

@@ -53,7 +53,7 @@ def far_off_numerics() -> Numerics:
 
 
 def field_slope_numerics() -> Numerics:
-    """For the sensitivities of fits to many field drives (a calibration): one step of 50 ms, five nodes in a contact.
+    """For the sensitivities of calibrations and of diagnoses that are far off: steps of 50 ms, five nodes in a contact.
 
     On drives of a Warthog they err by 5 % in the median window and by 33 % in one of ten, those of
     :func:`field_numerics` by 4 % and 23 % at 1.3 times the cost (benchmarks/sensitivities.py).

@@ -136,7 +136,7 @@ def turned_into(frame: str, tree: FrameTree, file_name: str) -> Callable[[Any], 
         file_name: for the message.
 
     Raises:
-        InputError: at a message whose frame does not hang together with ``frame``.
+        InputError: at a message whose frame does not hang together with ``frame``, or by a rotation that is not known.
     """
     known: dict[str, FloatArray] = {}
 
@@ -148,6 +148,11 @@ def turned_into(frame: str, tree: FrameTree, file_name: str) -> Callable[[Any], 
                 raise InputError(
                     f"{file_name} has no transform from {source!r} to {frame!r} (it knows "
                     f"{', '.join(sorted(tree.frames())[:12]) or 'none'}): correct or leave out frame in the topic map."
+                )
+            if not np.isfinite(matrix).all():
+                raise InputError(
+                    f"the rotation from {source!r} to {frame!r} in {file_name} has no quaternion of length 1 (all "
+                    "zeros mean that it is not known): correct the transform, or leave out frame in the topic map."
                 )
             known[source] = matrix[:3, :3]
         return known[source]

@@ -77,6 +77,13 @@ def test_an_unknown_frame_lists_what_is_known(tmp_path):
         read(tmp_path, [*imus(), *WHEELS, *static], MOUNTED)
 
 
+def test_a_mounting_that_is_not_known_is_said(tmp_path):
+    static = transform(0.0, "base_link", "imu_link", topic="/tf_static")
+    static.values["transforms"][0]["transform"]["rotation"] = dict.fromkeys("xyzw", 0.0)
+    with pytest.raises(InputError, match=r"from 'imu_link' to 'base_link' in run has no quaternion of length 1"):
+        read(tmp_path, [*imus(), *WHEELS, static], MOUNTED)
+
+
 def odom(t):
     return {"x": 0.5 * t, "y": 0.0, "yaw": 0.1 * t}
 
