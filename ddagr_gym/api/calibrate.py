@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
-from ddagr_gym.api.drive_names import names_apart
+from ddagr_gym.api.drive_names import names_apart, without_number
 from ddagr_gym.api.inputs import ENDINGS, Source, Sources, recordings_from, sources_in
 from ddagr_gym.api.nominal import OWN, RobotLike, SoilLike, robot_from, soil_from, soil_name_of
 from ddagr_gym.api.results import Report, Table
@@ -268,7 +268,8 @@ def _of_path(drive: str | os.PathLike[str], sources: Sequence[Source]) -> list[i
 def _of_name(drive: str | os.PathLike[str], found: Sequence[Recording]) -> list[int]:
     """Numbers of the recordings that bear a name."""
     name, names = Path(drive).name, [recording.meta.source for recording in found]
-    same = [n for n, known in enumerate(names) if known in (str(drive), name)]
+    numbered = [n for n, known in enumerate(names) if known == str(drive) and without_number(known) != known]
+    same = numbered or [n for n, known in enumerate(names) if without_number(known) in (str(drive), name)]
     # an imported file still says what it was imported from
     return same or [n for n, known in enumerate(names) if _stem(known) == _stem(name)]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import os
+import re
 from collections import Counter
 from collections.abc import Collection, Sequence
 from pathlib import Path
@@ -29,6 +30,11 @@ def names_apart(names: Sequence[str], sources: Sequence[Source]) -> list[str]:
             alike.setdefault(place.name, set()).add(place)
     apart = {place: name for found in alike.values() for place, name in _with_folders(found).items()}
     return _numbered([name if place is None else apart[place] for name, place in zip(names, places, strict=True)])
+
+
+def without_number(name: str) -> str:
+    """Name of a drive without the number that :func:`names_apart` gave it."""
+    return re.sub(r" \(\d+\)$", "", name)
 
 
 def _with_folders(paths: Collection[Path]) -> dict[Path, str]:

@@ -1,8 +1,8 @@
 """Parts of a drivetrain that can stand for one another, and where fits begin in which one does what another did.
 
 A dead time, ramps, a filter of the commands and slow motors all make the wheels late: a fit has a minimum for each,
-and does not get from one to the other by itself. An integral part undoes what friction does: a fit finds its way back
-to neither only where both are taken out.
+and does not get from one to the other by itself. An integral part undoes what friction does: a fit gets from both to
+neither only where friction goes together with the share that undoes it.
 """
 
 from __future__ import annotations
@@ -38,9 +38,10 @@ def other_starts(
         robot: of the model.
         left_out: names of parts that are out already.
     """
-    if part == FILTER and SPEED_LOOP not in left_out and FILTER in standing.values:
+    if part == FILTER and SPEED_LOOP not in left_out and has_slow_motors(standing):
         yield ", slower motors", with_slow_motors(standing, robot)
-    if part == FRICTION and INTEGRAL not in left_out and standing.values.get(VISCOUS_RATE, 0.0) > 0.0:
+    undone = INTEGRAL not in left_out and INTEGRAL_RATE in standing.values
+    if part == FRICTION and undone and standing.values.get(VISCOUS_RATE, 0.0) > 0.0:
         yield ", less integral", with_integral_less_friction(standing, robot)
     if part in (RAMP, FILTER) and DELAY not in left_out and standing.values.get(DELAY, 0.0) < TRIED_DELAY:
         yield f", dead time from {TRIED_DELAY:g}", with_late_commands(standing)
@@ -49,6 +50,11 @@ def other_starts(
 def with_late_commands(standing: Standing) -> Standing:
     """Where a fit stands, but for a longer dead time."""
     return replace(standing, values={**standing.values, DELAY: TRIED_DELAY})
+
+
+def has_slow_motors(standing: Standing) -> bool:
+    """Whether a fit has what :func:`with_slow_motors` moves: data sheets may be sure of their motors."""
+    return {FILTER, MOTORS} <= standing.values.keys()
 
 
 def with_slow_motors(standing: Standing, robot: Robot) -> Standing:
@@ -72,9 +78,10 @@ def with_integral_less_friction(standing: Standing, robot: Robot) -> Standing:
     there with one of them alone.
 
     Args:
-        standing: of a fit with both; its motor rate is the logarithm of a factor on that of the robot.
+        standing: of a fit with both; its motor rate is the logarithm of a factor on that of the robot, which holds
+            where there is none.
         robot: of the model.
     """
-    rate = robot.motor_rate * float(np.exp(standing.values[MOTORS]))
-    integral = max(standing.values[INTEGRAL_RATE] - rate * standing.values[VISCOUS_RATE], 0.0)
+    rate = robot.motor_rate * float(np.exp(standing.values.get(MOTORS, 0.0)))
+    integral = standing.values[INTEGRAL_RATE] - rate * standing.values[VISCOUS_RATE]
     return replace(standing, values={**standing.values, INTEGRAL_RATE: integral})

@@ -16,7 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.calibration.calibration_data import CalibrationData
-from ddagr_gym.calibration.exchanged_parts import DELAY, MEAN_RAMP, RAMP, TURNING_RAMP, with_slow_motors
+from ddagr_gym.calibration.exchanged_parts import (
+    DELAY,
+    MEAN_RAMP,
+    RAMP,
+    TURNING_RAMP,
+    has_slow_motors,
+    with_slow_motors,
+)
 from ddagr_gym.calibration.independent_steps import IndependentSteps
 from ddagr_gym.calibration.joint_fit import (
     FittedModel,
@@ -153,7 +160,8 @@ def fit_from_several(
     common = steps.runner.share((data, windows, model, weights, threads, rough.fitted.point.states))
     starts = {"as a first-order loop": rough.values}
     starts |= {name: {**rough.values, **change} for name, change in OTHER_STARTS.items()}
-    starts["slow motors"] = with_slow_motors(rough.standing, model.robot).values
+    if has_slow_motors(rough.standing):
+        starts["slow motors"] = with_slow_motors(rough.standing, model.robot).values
     tasks = [
         Task(f"fit of all parts, {name}", first_steps, (common, values), f"start {number}")
         for number, (name, values) in enumerate(starts.items())

@@ -9,12 +9,13 @@ Forecasts are compared in what a drivetrain moves by itself, wheel speeds and th
 follow from them through the soil, whose own errors a wrong wheel speed may make up for, and places are the integral of
 both, so that few large errors decide there.
 A part is missed only by a fit that is settled, that has had steps enough, or that stays far above the fit with it, and
-never by one that fits as well: that is a point of the model with the part, which its own fit would have found. What is
-given away is compared with the best so far and with the same model with the part, whichever says more surely that it
-is missed: one drive that the best so far happens to forecast badly would hide what all others miss.
+never by one that fits as well: that is a point of the model with the part, so that what forecasts differ by is where
+fits stop. What is given away is compared with the best so far and with the same model with the part, whichever says
+more surely that it is missed: one drive that the best so far happens to forecast badly would hide what all others miss.
 What acts through parts that have all gone goes with them. Parts that make the wheels late stand for one another: a fit
 without ramp or filter is also tried from a longer dead time, one without a filter from slower motors, and a ramp or a
-filter that stayed where the dead time went gives way to a dead time that forecasts as well.
+filter that stayed where the dead time went gives way to a dead time that forecasts as well. One without friction is
+also tried from an integral part that is less by what undoes friction.
 """
 
 from __future__ import annotations
@@ -310,7 +311,7 @@ def from_other_starts(
     fit: FitFrom,
     usual: bool = False,
 ) -> tuple[Candidate, tuple[bool, float, float]]:
-    """The best of a model without a part and of fits of it from other starts, as long as the part is missed.
+    """A model without a part or, as long as that misses the part, what fits best of it and of fits from other starts.
 
     Args:
         tried: the model.
@@ -361,8 +362,8 @@ def _delay_for(
     without = model.without(neither, robot)
     made = partial(comparison.candidate, without, late.standing, rival=late.cost)
     prompt = cache(f"neither {DELAY} nor {part}", made)
-    missed, its_error = worse_by(late, prompt)
-    if not is_missed(missed, its_error, len(late.losses), usual=True):
+    missed, its_growth, its_error = misses((late,), prompt, usual=True)
+    if not missed:
         return best, left_out, decisions
-    changed = {DELAY: PartDecision(DELAY, True, missed, its_error), part: PartDecision(part, False, growth, error)}
+    changed = {DELAY: PartDecision(DELAY, True, its_growth, its_error), part: PartDecision(part, False, growth, error)}
     return late, exchanged, [changed.get(item.name, item) for item in decisions]

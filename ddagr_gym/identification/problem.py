@@ -90,7 +90,7 @@ class Problem:
         delay: by which the commands act late besides the shift parameters [s].
         threads: of the simulator.
         numerics: of the simulator.
-        slopes: of the simulator where it only serves sensitivities to nuisances and states; the same by default.
+        slopes: of the simulator where it only serves sensitivities; the same by default.
         currents: how motor currents follow, where the windows compare them.
     """
 

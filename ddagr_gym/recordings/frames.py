@@ -66,16 +66,23 @@ class FrameTree:
             return ()
         return tuple(frame for frame in chain[: chain.index(parent)] if frame not in self._static)
 
+    def unknown_rotations(self) -> tuple[str, ...]:
+        """Frames whose rotation to the next one up is not known."""
+        return tuple(name for name, (_, matrix) in self._edges.items() if not np.isfinite(matrix[:3, :3]).all())
+
     def between(self, frame: str, other: str) -> FloatArray | None:
         """Matrix (4, 4) that takes coordinates of ``frame`` to those of ``other``; None where nothing connects them."""
         up, down = self.chain(frame), self.chain(other)
         if up[-1] != down[-1]:
             return None
-        return np.asarray(np.linalg.inv(self._to_root(down)) @ self._to_root(up))
+        # what is above both may not be known
+        shared = next(name for name in up if name in down)
+        below = np.linalg.inv(self._to(shared, down))
+        return np.asarray(below @ self._to(shared, up))
 
-    def _to_root(self, chain: tuple[str, ...]) -> FloatArray:
+    def _to(self, top: str, chain: tuple[str, ...]) -> FloatArray:
         total = np.eye(4)
-        for frame in chain[:-1]:
+        for frame in chain[: chain.index(top)]:
             total = self._edges[frame][1] @ total
         return total
 
@@ -149,10 +156,11 @@ def turned_into(frame: str, tree: FrameTree, file_name: str) -> Callable[[Any], 
                     f"{file_name} has no transform from {source!r} to {frame!r} (it knows "
                     f"{', '.join(sorted(tree.frames())[:12]) or 'none'}): correct or leave out frame in the topic map."
                 )
-            if not np.isfinite(matrix).all():
+            if not np.isfinite(matrix[:3, :3]).all():
                 raise InputError(
-                    f"the rotation from {source!r} to {frame!r} in {file_name} has no quaternion of length 1 (all "
-                    "zeros mean that it is not known): correct the transform, or leave out frame in the topic map."
+                    f"the rotation of {' or '.join(map(repr, tree.unknown_rotations()))} to the frame above in "
+                    f"{file_name} has no quaternion of length 1 (all zeros mean that it is not known): correct it, or "
+                    "leave out frame in the topic map."
                 )
             known[source] = matrix[:3, :3]
         return known[source]

@@ -2,23 +2,40 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import pytest
 
+from benchmarks import simulated_robots
 from benchmarks.simulated_robots import CASES, COMMON, WIDER, draw
-from ddagr_gym.calibration.parts import PARTS, is_stated
-from ddagr_gym.presets import get_robot
+from ddagr_gym.calibration.parts import part_of
+from ddagr_gym.calibration.result import PartDecision
 
 
 def test_every_robot_has_the_parts_that_it_is_said_to_have():
-    names = {part.name for part in PARTS}
-    sheet = get_robot("ddagr")
     for case in CASES.values():
-        assert case.parts <= names
-        stated = {name for name in case.drivetrain if getattr(case.robot.drivetrain, name) > 0.0}
-        assert stated == set(case.drivetrain)
-        assert not any(is_stated(case.sheet, name) for name in case.drivetrain if name != "command_filter")
-        assert case.robot.half_track / sheet.half_track == pytest.approx(WIDER if case.wider else 1.0)
+        sheet, robot = case.sheet.drivetrain, case.robot.drivetrain
+        differs = {name for name in case.drivetrain if getattr(robot, name) != getattr(sheet, name)}
+        assert differs == set(case.drivetrain)
+        geometry = {"geometry"} if case.robot.half_track != case.sheet.half_track else set()
+        assert {part_of(name).name for name in differs} | geometry == case.part_names
         assert ("half_track" in case.sheet.standard_deviations) is case.wider
+    assert CASES["wider track"].robot.half_track == pytest.approx(WIDER * CASES["wider track"].sheet.half_track)
+
+
+def test_false_and_lacking_parts_are_those_beside_the_truth(monkeypatch):
+    parts = [
+        PartDecision(name, name != "speed_loop", 0.1, 0.01) for name in ("speed_loop", "command_delay", "friction")
+    ]
+    outcome = SimpleNamespace(
+        robot=CASES["limit of turning"].robot, calibration=SimpleNamespace(parts=parts, seconds=1.0)
+    )
+    monkeypatch.setattr(simulated_robots, "case_drives", lambda case, seed: [])
+    monkeypatch.setattr(simulated_robots, "calibrate_drives", lambda *given: outcome)
+    row = simulated_robots.row_of("limit of turning", 0)
+    assert (row["false"], row["lacking"]) == (["friction"], ["speed_loop", "turning_limit"])
+    assert row["relative_errors"]["turning_limit"] == 0.0
+    assert row["relative_errors"]["command_delay"] == -1.0
 
 
 def test_the_picture_is_drawn(tmp_path):

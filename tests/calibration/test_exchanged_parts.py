@@ -88,8 +88,16 @@ def test_the_rest_of_an_integral_part_stays_without_friction():
     rate = WARTHOG.motor_rate * np.exp(FASTER)
     made = with_integral_less_friction(standing(viscous_rate=0.5, integral_rate=0.5 * rate + 4.0), WARTHOG)
     assert made.values["integral_rate"] == pytest.approx(4.0)
-    least = with_integral_less_friction(standing(viscous_rate=0.5, integral_rate=0.1), WARTHOG)
-    assert least.values["integral_rate"] == 0.0
+
+
+def test_a_robot_whose_data_sheet_is_sure_of_its_motors_is_tried_too():
+    known = standing(viscous_rate=0.5, integral_rate=9.0)
+    del known.values["motor_rate"]
+    ((_, made),) = other_starts("friction", known, WARTHOG, frozenset())
+    assert made.values["integral_rate"] == pytest.approx(9.0 - 0.5 * WARTHOG.motor_rate)
+    assert [name for name, _ in other_starts("command_filter", known, WARTHOG, frozenset())] == [", dead time from 0.3"]
+    del known.values["integral_rate"]
+    assert not list(other_starts("friction", known, WARTHOG, frozenset()))
 
 
 def test_a_fit_without_friction_has_no_other_start():

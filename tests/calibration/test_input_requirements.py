@@ -10,6 +10,7 @@ import pytest
 import ddagr_gym
 from benchmarks.simulated_robots import drive
 from ddagr_gym.api.calibrate import _number, _numbers
+from ddagr_gym.api.drive_names import names_apart
 from ddagr_gym.calibration.input_requirements import (
     SHORTEST_DRIVE,
     DriveScale,
@@ -167,7 +168,7 @@ def test_an_imported_drive_is_known_by_the_name_of_its_file(field_drive):
 
 def test_drives_of_one_file_name_are_told_apart_by_their_paths(field_drive, tmp_path, monkeypatch):
     paths = [tmp_path / day / "run.csv" for day in ("monday", "tuesday")]
-    found = [field_drive.with_meta(source=f"run.csv ({number})") for number in (1, 2)]
+    found = [field_drive.with_meta(source=name) for name in names_apart(["run.csv"] * 2, paths)]
     monkeypatch.chdir(tmp_path)
     for given in (paths[1], str(paths[1]), "tuesday/run.csv", "./monday/../tuesday/run.csv"):
         assert _numbers({"sand": [given], "yard": paths[0]}, paths, found) == {"sand": [1], "yard": [0]}
@@ -175,10 +176,17 @@ def test_drives_of_one_file_name_are_told_apart_by_their_paths(field_drive, tmp_
     assert _number("tuesday/run.csv", paths, found) == 1
     with pytest.raises(InputError, match=r"run.csv is the name of 2 drives: give the whole path of one \(or"):
         _number("run.csv", paths, found)
-    with pytest.raises(InputError, match=r"not among the drives run.csv \(1\), .*: give the name or path of one\.$"):
+    with pytest.raises(InputError, match=r"not among the drives monday/run.csv, .*: give the name or path of one\.$"):
         _number("friday/run.csv", paths, found)
     with pytest.raises(InputError, match="a Recording has a ground and is not among"):
         _number(field_drive, paths, found)
+
+
+def test_recordings_of_one_name_are_told_apart_by_their_numbers(field_drive):
+    found = [field_drive.with_meta(source=name) for name in names_apart(["run.csv"] * 2, [field_drive] * 2)]
+    assert _number("run.csv (2)", found, found) == 1
+    with pytest.raises(InputError, match=r"run.csv is the name of 2 drives"):
+        _number("run.csv", found, found)
 
 
 def test_a_single_drive_needs_no_list(field_drive):

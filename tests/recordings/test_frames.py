@@ -80,8 +80,16 @@ def test_an_unknown_frame_lists_what_is_known(tmp_path):
 def test_a_mounting_that_is_not_known_is_said(tmp_path):
     static = transform(0.0, "base_link", "imu_link", topic="/tf_static")
     static.values["transforms"][0]["transform"]["rotation"] = dict.fromkeys("xyzw", 0.0)
-    with pytest.raises(InputError, match=r"from 'imu_link' to 'base_link' in run has no quaternion of length 1"):
+    with pytest.raises(InputError, match=r"rotation of 'imu_link' to the frame above in run has no quaternion"):
         read(tmp_path, [*imus(), *WHEELS, static], MOUNTED)
+
+
+def test_what_is_above_both_frames_need_not_be_known(tmp_path):
+    above = transform(0.0, "base_footprint", "base_link", topic="/tf_static")
+    above.values["transforms"][0]["transform"]["rotation"] = dict.fromkeys("xyzw", 0.0)
+    mounted = transform(0.0, "base_link", "imu_link", yaw=math.pi / 2, topic="/tf_static")
+    found = read(tmp_path, [*imus(), *WHEELS, above, mounted], MOUNTED)
+    np.testing.assert_allclose(found["specific_force_y"], 1.0, atol=1e-12)
 
 
 def odom(t):
