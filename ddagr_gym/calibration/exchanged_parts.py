@@ -74,8 +74,8 @@ def with_slow_motors(standing: Standing, robot: Robot) -> Standing:
 def with_integral_less_friction(standing: Standing, robot: Robot) -> Standing:
     """Where a fit stands, but for an integral part without its share that undoes friction.
 
-    Where k_i = k c_v nothing tells both from a loop with neither (drivetrain.md, eq. (5a)), and a fit finds no way
-    there with one of them alone.
+    Where k_i = k c_v nothing tells both from a loop with neither (docs/theory/drivetrain.md, eq. (5a)), and a fit finds
+    no way there with one of them alone.
 
     Args:
         standing: of a fit with both; its motor rate is the logarithm of a factor on that of the robot, which holds

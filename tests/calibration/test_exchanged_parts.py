@@ -70,7 +70,7 @@ def test_a_dead_time_that_is_long_already_is_not_tried_from_a_shorter_one():
 
 
 def closed_loop(rate: float, integral: float, friction: float) -> np.ndarray:
-    """Response to a step of a linear speed loop, drivetrain.md, eqs. (2) to (4) far from all limits."""
+    """Response to a step of a linear speed loop, docs/theory/drivetrain.md, eqs. (2) to (4) far from all limits."""
     from scipy.signal import StateSpace, step
 
     system = StateSpace([[-rate - friction, 1.0], [-integral, 0.0]], [[rate], [integral]], [[1.0, 0.0]], [[0.0]])

@@ -144,7 +144,7 @@ def test_a_pose_that_was_not_known_comes_with_the_next_transform():
     assert pose_of(transform_of("base_link", "odom", 2.0))["pose_x"] == 12.0
 
 
-def test_an_imu_whose_mounting_is_not_known_has_no_readings():
+def test_an_imu_whose_mounting_is_not_known_is_refused():
     tree = FrameTree()
     tree.add(transform_of("imu_link", "base_link", w=0.0), static=True)
     readings = extractor("Imu", TopicSource(frame="base_link", orientation=True), None, "drive.bag", tree)
@@ -154,4 +154,5 @@ def test_an_imu_whose_mounting_is_not_known_has_no_readings():
         "angular_velocity": dict.fromkeys("xyz", 0.1),
         "orientation": quaternion(0.1, 0.2, 0.3),
     }
-    assert all(math.isnan(value) for value in readings(message).values())
+    with pytest.raises(InputError, match=r"rotation of 'imu_link' to the frame above in drive\.bag has no quaternion"):
+        readings(message)
