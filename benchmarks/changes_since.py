@@ -20,10 +20,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 import ddagr_gym
 from benchmarks.simulated_pairs import drives_of
+from benchmarks.simulated_robots import steps, stronger
 from ddagr_gym.diagnosis.answer.verdict import NONE, Diagnosis
 from ddagr_gym.diagnosis.change.run import what_changed_since
 from ddagr_gym.files import write_json
@@ -32,8 +32,6 @@ from ddagr_gym.recordings.files import write_atomically
 from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.rendering import palette
 from ddagr_gym.reporting.figures import house_style
-
-Array = NDArray[np.float64]
 
 RESULT = Path(__file__).resolve().parent / "results" / "changes_since.json"
 SEED = 11
@@ -112,13 +110,8 @@ def drive(seed: int, effect: str = "", seconds: float = SECONDS) -> Recording:
     rng = np.random.default_rng([SEED, seed])
     robot, soil = get_robot("ddagr"), get_soil("thesis_a1")
     robot = replace(robot, motor_rate=robot.motor_rate * float(np.exp(MOTORS * rng.normal())))
-    factor = float(np.exp(SOIL * rng.normal()))
-    angle = float(np.arctan(factor * np.tan(soil.friction_angle)))
-    soil = replace(soil, cohesion=factor * soil.cohesion, friction_angle=angle)
-    rows: list[Array] = []
-    while len(rows) < seconds * RATE:
-        rows += [rng.uniform(-1.6, 1.6, 2)] * int(rng.uniform(2.0, 4.0) * RATE)
-    commands = np.array(rows[: int(seconds * RATE)])
+    soil = stronger(soil, float(np.exp(SOIL * rng.normal())))
+    commands = steps(rng, seconds, 4.0, RATE)
     effects = (effect,) if effect else ()
     made = ddagr_gym.simulate(commands, robot, soil, effects, rate=RATE, pose_rate=5.0, seed=seed)
     return made.recording.with_meta(source=f"drive_{seed}")

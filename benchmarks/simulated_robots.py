@@ -18,11 +18,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 import ddagr_gym
-from ddagr_gym.calibration.parts import PARTS
+from ddagr_gym.calibration.parts import PARTS, part_of
 from ddagr_gym.calibration.result import Calibration
-from ddagr_gym.calibration.run import calibrate_drives
+from ddagr_gym.calibration.run import Outcome, calibrate_drives
 from ddagr_gym.calibration.settings import CalibrationSettings
 from ddagr_gym.files import write_json
 from ddagr_gym.parameters import Robot, Soil
@@ -31,7 +32,7 @@ from ddagr_gym.recordings.files import write_atomically
 from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.rendering import palette
 from ddagr_gym.reporting.figures import house_style
-from ddagr_gym.tasks import Task, TaskRunner, results_of
+from ddagr_gym.tasks import Task, TaskRunner, run_tasks
 
 RESULT = Path(__file__).resolve().parent / "results" / "simulated_robots.json"
 
@@ -68,19 +69,18 @@ class Case:
     """A robot that is not as its data sheet says.
 
     Attributes:
-        part_names: of the parts that it has besides the common ones.
-        drivetrain: values of those of its drivetrain.
+        drivetrain: values of what it has besides the common parts.
         wider: whether its track is wider than the data sheet says, which calls it uncertain.
     """
 
-    part_names: frozenset[str] = frozenset()
     drivetrain: Mapping[str, float] = field(default_factory=dict)
     wider: bool = False
 
     @property
     def parts(self) -> frozenset[str]:
         """Names of all parts that differ from the data sheet."""
-        return COMMON | self.part_names
+        parameters = (*self.drivetrain, *(("half_track",) if self.wider else ()))
+        return COMMON | {part_of(name).name for name in parameters}
 
     @property
     def sheet(self) -> Robot:
@@ -99,13 +99,11 @@ class Case:
 
 CASES = {
     "slower motors, late": Case(),
-    "limit of turning": Case(frozenset({"turning_limit"}), {"turning_limit": 0.6}),
-    "ramp of each bank": Case(frozenset({"command_ramp"}), {"command_ramp": 1.0}),
-    "ramps of mean and turning": Case(
-        frozenset({"mean_ramp", "turning_ramp"}), {"mean_ramp": 1.5, "turning_ramp": 0.6}
-    ),
-    "filter of commands": Case(frozenset({"command_filter"}), {"command_filter": 0.5}),
-    "wider track": Case(frozenset({"geometry"}), wider=True),
+    "limit of turning": Case({"turning_limit": 0.6}),
+    "ramp of each bank": Case({"command_ramp": 1.0}),
+    "ramps of mean and turning": Case({"mean_ramp": 1.5, "turning_ramp": 0.6}),
+    "filter of commands": Case({"command_filter": 0.5}),
+    "wider track": Case(wider=True),
 }
 """Robots by what they have besides [rad/s], [rad/s^2], [s]."""
 
@@ -115,20 +113,28 @@ def true_robot() -> Robot:
     return replace(get_robot("ddagr"), motor_rate=MOTOR_RATE)
 
 
-def true_soil(ground: str) -> Soil:
-    """Of a ground."""
-    soil, factor = get_soil("thesis_a1"), STRENGTH[ground]
+def stronger(soil: Soil, factor: float) -> Soil:
+    """A soil with cohesion and tan(phi) times a factor."""
     angle = float(np.arctan(factor * np.tan(soil.friction_angle)))
     return replace(soil, cohesion=factor * soil.cohesion, friction_angle=angle)
 
 
-def steps(seed: int, seconds: float) -> np.ndarray:
-    """(T, 2) bank speed commands, each held for 2 to 5 s [rad/s]."""
+def steps(
+    seed: int | np.random.Generator, seconds: float, longest: float = 5.0, rate: float = RATE
+) -> NDArray[np.float64]:
+    """(T, 2) bank speed commands, each held for 2 s to the longest time [rad/s].
+
+    Args:
+        seed: or the random numbers themselves.
+        seconds: of all commands.
+        longest: that one is held [s].
+        rate: of the commands [Hz].
+    """
     rng = np.random.default_rng(seed)
-    rows: list[np.ndarray] = []
-    while len(rows) < seconds * RATE:
-        rows += [rng.uniform(-1.6, 1.6, 2)] * int(rng.uniform(2.0, 5.0) * RATE)
-    return np.array(rows[: int(seconds * RATE)])
+    rows: list[NDArray[np.float64]] = []
+    while len(rows) < seconds * rate:
+        rows += [rng.uniform(-1.6, 1.6, 2)] * int(rng.uniform(2.0, longest) * rate)
+    return np.array(rows[: int(seconds * rate)])
 
 
 def drive(
@@ -149,8 +155,9 @@ def drive(
         robot: that of :func:`true_robot` where it is None.
         effects: besides the dead time.
     """
+    soil = stronger(get_soil("thesis_a1"), STRENGTH[ground])
     made = ddagr_gym.simulate(
-        steps(seed, seconds), robot or true_robot(), true_soil(ground), [f"command_delay={DELAY}", *effects], rate=RATE,
+        steps(seed, seconds), robot or true_robot(), soil, [f"command_delay={DELAY}", *effects], rate=RATE,
         pose_rate=5.0, seed=seed,
     )  # fmt: skip
     return made.recording.with_meta(source=name or f"{ground}_{seed}.csv")
@@ -166,6 +173,12 @@ def case_drives(case: Case, seed: int = 0) -> list[Recording]:
     return [drive(ground, number + seed, robot=case.robot) for number, ground in enumerate(GROUNDS, 1)]
 
 
+def calibrated_case(case: Case, seed: int = 0) -> Outcome:
+    """What those drives say, from the data sheet; arguments as of :func:`case_drives`."""
+    soils = {ground: get_soil("thesis_a1") for ground in GROUNDS}
+    return calibrate_drives(case_drives(case, seed), GROUNDS, case.sheet, soils, FEW)
+
+
 def kept_parts(calibration: Calibration) -> frozenset[str]:
     """Names of the parts that a calibration keeps."""
     return frozenset(part.name for part in calibration.parts if part.kept)
@@ -174,8 +187,7 @@ def kept_parts(calibration: Calibration) -> frozenset[str]:
 def row_of(name: str, seed: int) -> dict[str, Any]:
     """What a calibration says of a robot's drives beside the truth; workers call it by name."""
     case = CASES[name]
-    soils = {ground: get_soil("thesis_a1") for ground in GROUNDS}
-    outcome = calibrate_drives(case_drives(case, seed), GROUNDS, case.sheet, soils, FEW)
+    outcome = calibrated_case(case, seed)
     found, kept = outcome.robot, kept_parts(outcome.calibration)
     truth = {"motor_rate": MOTOR_RATE, "command_delay": DELAY, **case.drivetrain}
     said = {key: found.motor_rate if key == "motor_rate" else getattr(found.drivetrain, key) for key in truth}
@@ -192,7 +204,6 @@ def row_of(name: str, seed: int) -> dict[str, Any]:
 def draw(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
     """How often each part was kept, with what the robots have outlined, as PNG."""
     from matplotlib.figure import Figure
-    from matplotlib.patches import Rectangle
 
     robots, parts = list(dict.fromkeys(row["robot"] for row in rows)), [part.name for part in PARTS]
     with house_style():
@@ -201,20 +212,27 @@ def draw(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
         for down, robot in enumerate(robots):
             mine = [row for row in rows if row["robot"] == robot]
             for across, part in enumerate(parts):
-                count, has = sum(part in row["kept"] for row in mine), part in CASES[robot].parts
-                colour = palette.BLUE if has else palette.ORANGE
-                panel.add_patch(Rectangle((across - 0.4, down - 0.4), 0.8, 0.8, facecolor=colour if count else "none",
-                                          alpha=count / len(mine), edgecolor="none"))  # fmt: skip
-                if has:
-                    panel.add_patch(Rectangle((across - 0.44, down - 0.44), 0.88, 0.88, fill=False, edgecolor="black"))
-                if count or has:
-                    panel.text(across, down, f"{count}/{len(mine)}", ha="center", va="center", fontsize=8)
+                count = sum(part in row["kept"] for row in mine)
+                _draw_cell(panel, across, down, count, len(mine), part in CASES[robot].parts)
         panel.set_xlim(-0.6, len(parts) - 0.4)
         panel.set_ylim(len(robots) - 0.4, -0.6)
         panel.set_xticks(range(len(parts)), [part.title for part in PARTS], rotation=40, ha="right")
         panel.set_yticks(range(len(robots)), robots)
         panel.set_title("Parts kept, of all calibrations; framed: the robot has it", fontsize=10)
         write_atomically(path, lambda to: figure.savefig(to, format="png", dpi=120))
+
+
+def _draw_cell(panel: Any, across: int, down: int, count: int, of: int, has: bool) -> None:
+    from matplotlib.patches import Rectangle
+
+    colour = palette.BLUE if has else palette.ORANGE
+    if count:
+        corner = (across - 0.4, down - 0.4)
+        panel.add_patch(Rectangle(corner, 0.8, 0.8, facecolor=colour, alpha=count / of, edgecolor="none"))
+    if has:
+        panel.add_patch(Rectangle((across - 0.44, down - 0.44), 0.88, 0.88, fill=False, edgecolor="black"))
+    if count or has:
+        panel.text(across, down, f"{count}/{of}", ha="center", va="center", fontsize=8)
 
 
 def main(words: Sequence[str] | None = None) -> int:
@@ -227,7 +245,7 @@ def main(words: Sequence[str] | None = None) -> int:
     given = parser.parse_args(words)
     tasks = [Task(f"{name}, seed {seed}", row_of, (name, seed)) for name in given.robots for seed in given.seeds]
     with TaskRunner(given.processes) as runner:
-        rows = results_of(tasks, runner)
+        rows = run_tasks(tasks, "calibrations", runner)
     write_json(given.output, {"command": "python -m benchmarks.simulated_robots", "rows": rows})
     draw(rows, given.output.with_suffix(".png"))
     for row in rows:

@@ -15,7 +15,7 @@ from benchmarks.simulated_robots import (
     GROUNDS,
     MOTOR_RATE,
     STRENGTH,
-    case_drives,
+    calibrated_case,
     drive,
     kept_parts,
 )
@@ -218,11 +218,10 @@ def test_the_page_stands_alone(folder):
     assert page.count("<figure>") == 3 + 4
 
 
-def calibrated_case(name):
+def found_of(name):
     """What drives of a simulated robot say, the parts that are kept, and the robot as it is."""
     case = CASES[name]
-    soils = {ground: get_soil("thesis_a1") for ground in GROUNDS}
-    found = calibrate_drives(case_drives(case), GROUNDS, case.sheet, soils, FEW)
+    found = calibrated_case(case)
     kept = kept_parts(found.calibration)
     assert case.parts <= kept
     return found.robot, kept, case.robot
@@ -231,14 +230,14 @@ def calibrated_case(name):
 @pytest.mark.slow
 def test_a_limit_of_the_commanded_turning_is_found():
     """Half of the turns of these steps are cut by the robot's controller; its data sheet does not say so."""
-    found, _, true = calibrated_case("limit of turning")
+    found, _, true = found_of("limit of turning")
     assert found.drivetrain.turning_limit == pytest.approx(true.drivetrain.turning_limit, rel=0.02)
 
 
 @pytest.mark.slow
 def test_a_ramp_of_the_commands_is_kept():
     """A robot that takes a second and a half to its commanded speed in equal steps has no dead time in its stead."""
-    found, _, true = calibrated_case("ramp of each bank")
+    found, _, true = found_of("ramp of each bank")
     assert found.drivetrain.command_ramp == pytest.approx(true.drivetrain.command_ramp, rel=0.05)
     assert found.drivetrain.command_delay == pytest.approx(DELAY, rel=0.05)
 
@@ -246,7 +245,7 @@ def test_a_ramp_of_the_commands_is_kept():
 @pytest.mark.slow
 def test_ramps_of_mean_and_turning_are_told_from_one_of_each_bank():
     """A robot whose controller limits acceleration and yaw acceleration has neither late commands nor a slow loop."""
-    found, kept, true = calibrated_case("ramps of mean and turning")
+    found, kept, true = found_of("ramps of mean and turning")
     assert not kept & {"command_ramp", "command_filter"}
     assert found.drivetrain.mean_ramp == pytest.approx(true.drivetrain.mean_ramp, rel=0.05)
     assert found.drivetrain.turning_ramp == pytest.approx(true.drivetrain.turning_ramp, rel=0.05)
@@ -256,7 +255,7 @@ def test_ramps_of_mean_and_turning_are_told_from_one_of_each_bank():
 @pytest.mark.slow
 def test_a_filter_of_the_commands_is_found():
     """Neither a ramp nor a dead time stands for it; a loop and a filter in series may share their lag otherwise."""
-    found, kept, true = calibrated_case("filter of commands")
+    found, kept, true = found_of("filter of commands")
     assert not kept & {"command_ramp", "mean_ramp", "turning_ramp"}
     lag = found.drivetrain.command_filter + 1.0 / found.motor_rate
     assert lag == pytest.approx(true.drivetrain.command_filter + 1.0 / true.motor_rate, rel=0.05)
@@ -265,5 +264,5 @@ def test_a_filter_of_the_commands_is_found():
 
 @pytest.mark.slow
 def test_wheels_that_are_not_as_on_the_data_sheet_are_found():
-    found, _, true = calibrated_case("wider track")
+    found, _, true = found_of("wider track")
     assert found.half_track == pytest.approx(true.half_track, rel=0.02)

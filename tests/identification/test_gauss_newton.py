@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.simulated_robots import stronger
 from ddagr_gym.control.manoeuvres import MANOEUVRES
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification import gauss_newton
@@ -303,11 +304,7 @@ def four_drives(robot, soil):
     manoeuvres = ("arcs", "spin", "arcs", "spin")
     made = []
     for strength, numbers in GROUNDS.values():
-        ground = replace(
-            soil,
-            cohesion=strength * soil.cohesion,
-            friction_angle=float(np.arctan(strength * np.tan(soil.friction_angle))),
-        )
+        ground = stronger(soil, strength)
         slow = replace(robot, motor_rate=MOTOR_RATE * robot.motor_rate)
         for number in numbers:
             commands = MANOEUVRES[manoeuvres[number]].commands(50.0)

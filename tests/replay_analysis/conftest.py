@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.simulated_robots import stronger
 from ddagr_gym.control.manoeuvres import MANOEUVRES
 from ddagr_gym.identification.windows import CHANNELS as PREDICTED
 from ddagr_gym.identification.windows import WindowSet
@@ -32,11 +33,7 @@ def as_recording(columns: dict, robot=None, **more) -> Recording:
 def simulated(parts: tuple[str, ...], sensors: Sensors, seed: int = 3) -> Recording:
     """A drive of the DDAGR on soil of 0.8 times the preset's strength, with slower motors."""
     robot, soil = get_robot("ddagr"), get_soil(SOIL)
-    true_soil = replace(
-        soil,
-        cohesion=STRENGTH * soil.cohesion,
-        friction_angle=float(np.arctan(STRENGTH * np.tan(soil.friction_angle))),
-    )
+    true_soil = stronger(soil, STRENGTH)
     commands = np.concatenate([MANOEUVRES[name].commands(RATE) for name in parts])
     columns = simulate(
         replace(robot, motor_rate=MOTOR_RATE * robot.motor_rate), true_soil, commands, sensors=sensors, seed=seed

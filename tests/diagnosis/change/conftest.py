@@ -8,15 +8,14 @@ import numpy as np
 import pytest
 
 import ddagr_gym
+from benchmarks import simulated_robots
+from benchmarks.simulated_robots import RATE, stronger
 from ddagr_gym.diagnosis.change.ordinary import OrdinaryRobot
 from ddagr_gym.diagnosis.change.reference import OrdinaryDrive, scan_ordinary
 from ddagr_gym.diagnosis.change.weighing import Weighing
 from ddagr_gym.identification.parameters import robot_parameters
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.recordings.schema import Recording
-
-RATE = 20.0
-"""Of the recordings [Hz]."""
 
 PICTURES = (
     "Shift of every effect over its limit", "Size of every effect before and after", "Losses of forecasts",
@@ -45,11 +44,7 @@ WEIGHING = Weighing(
 
 def steps(seed: int, seconds: float) -> np.ndarray:
     """(T, 2) bank speed commands, each held for 2 to 4 s [rad/s]."""
-    rng = np.random.default_rng(seed)
-    rows: list[np.ndarray] = []
-    while len(rows) < seconds * RATE:
-        rows += [rng.uniform(-1.6, 1.6, 2)] * int(rng.uniform(2.0, 4.0) * RATE)
-    return np.array(rows[: int(seconds * RATE)])
+    return simulated_robots.steps(seed, seconds, 4.0)
 
 
 def drive(seed: int, *effects: str, seconds: float = 50.0) -> Recording:
@@ -57,9 +52,7 @@ def drive(seed: int, *effects: str, seconds: float = 50.0) -> Recording:
     rng = np.random.default_rng(1000 + seed)
     robot = get_robot("ddagr")
     robot = replace(robot, motor_rate=robot.motor_rate * float(np.exp(MOTOR_RATE * rng.normal())))
-    soil, factor = get_soil("thesis_a1"), float(np.exp(STRENGTH * rng.normal()))
-    angle = float(np.arctan(factor * np.tan(soil.friction_angle)))
-    soil = replace(soil, cohesion=factor * soil.cohesion, friction_angle=angle)
+    soil = stronger(get_soil("thesis_a1"), float(np.exp(STRENGTH * rng.normal())))
     made = ddagr_gym.simulate(steps(seed, seconds), robot, soil, effects, rate=RATE, pose_rate=5.0, seed=seed)
     return made.recording.with_meta(source=f"drive_{seed}.csv")
 
