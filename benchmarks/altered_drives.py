@@ -39,7 +39,14 @@ import numpy as np
 
 from benchmarks.altered_changes import CHANGES, CONTROL, DRIVES, STEPS, Change, packed, read_table
 from benchmarks.altered_figure import draw
-from benchmarks.answers.run_diagnoses import REAL_BANK, UNKNOWN_GROUND, Case, InterruptedRunError, diagnose, shared
+from benchmarks.answers.run_diagnoses import (
+    CHECKOUT,
+    UNKNOWN_GROUND,
+    Case,
+    InterruptedRunError,
+    diagnose,
+    shared,
+)
 from benchmarks.concealed_truth import is_detectable, sizes
 from benchmarks.score_concealed import figure_line, in_set, mean, names_of, right, share
 from ddagr_gym.physics.effects.registry import effect_kind
@@ -50,6 +57,12 @@ from ddagr_gym.recordings.load import load_recording
 RESULT = Path(__file__).resolve().parent / "results" / "altered_drives.json"
 ROBOT = "warthog"
 OPTIONS = ("--names-only",)
+
+REAL_BANK = CHECKOUT / "ddagr_gym" / "data" / "null_bank_warthog.json"
+"""Thresholds from ordinary Warthog drives."""
+
+WINDOWS = ("--stride", "8")
+"""One window in four of drives of ten minutes is enough."""
 
 LIMIT = 1800.0
 """Of one run [s]."""
@@ -81,7 +94,7 @@ def answer_of(path: Path, parts: Path, threads: int) -> dict[str, Any]:
         parts: folder of finished answers.
         threads: of the simulator.
     """
-    arguments = (str(path), "--robot", ROBOT, *UNKNOWN_GROUND, "--thresholds", str(REAL_BANK))
+    arguments = (str(path), "--robot", ROBOT, *UNKNOWN_GROUND, *WINDOWS, "--thresholds", str(REAL_BANK))
     answer = diagnose(Case(path.name.split(".", 1)[0], arguments, OPTIONS), parts, threads, LIMIT)
     report = check_recording(load_recording(path, None, ROBOT), np.random.default_rng(0))
     return {**answer, "suspects": sorted({name for finding in report.suspicious for name in finding.suspects})}

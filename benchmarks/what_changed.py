@@ -149,6 +149,11 @@ def _said(diagnosis: Diagnosis, change: Change) -> dict[str, Any]:
             name: {key: [item.value, *(item.interval or (None, None))] for key, item in finding.parameters.items()}
             for name, finding in named.items()
         },
+        "onsets": {
+            name: {"kind": item.onset.kind, "value": item.onset.value, "interval": item.onset.interval}
+            for name, item in named.items()
+            if item.onset is not None
+        },
         "least_detectable": {name: least.get(name) for name in change.truth},
         "checks": sorted({f"{doubt.finding}: {doubt.sentence}" for doubt in diagnosis.checks}),
         "seconds": round(diagnosis.seconds, 1),

@@ -51,15 +51,12 @@ HERE = Path(__file__).resolve().parent
 CHECKOUT = HERE.parents[1]
 ENTRIES = (
     "verdict", "complete", "findings", "rejected", "sentence", "fit", "detectable", "detectable_alone", "misfit",
-    "change", "seconds", "version",
+    "change", "drivetrain", "seconds", "version",
 )  # fmt: skip
 """What an answer keeps of a diagnosis.json."""
 
-UNKNOWN_GROUND = ("--soil", "firm_ground", "--soil-uncertainty", "4", "--stride", "8")
-"""Where a file does not say what it was driven on; one window in four of drives of ten minutes is enough."""
-
-REAL_BANK = CHECKOUT / "ddagr_gym" / "data" / "null_bank_warthog.json"
-"""Thresholds from ordinary Warthog drives; no ordinary Husky drive is at hand, so they serve for it too."""
+UNKNOWN_GROUND = ("--soil", "firm_ground", "--soil-uncertainty", "4")
+"""Where a file does not say what it was driven on."""
 
 _RECORDING = ".csv.gz"
 
@@ -102,8 +99,7 @@ def real_cases(folder: Path) -> Iterator[Case]:
     """Real drives, one a case; the robot is in the file's name."""
     for path in sorted((folder / "concealed").glob("*.csv.gz")) + sorted((folder / "open").glob("*.csv.gz")):
         robot = path.name.split("_", 1)[0]
-        options = ("--robot", robot, *UNKNOWN_GROUND, "--thresholds", str(REAL_BANK))
-        yield Case(path.name.split(".", 1)[0], (str(path), *options))
+        yield Case(path.name.split(".", 1)[0], (str(path), "--robot", robot, *UNKNOWN_GROUND))
 
 
 def changed_cases(folder: Path, calibration: Path) -> Iterator[Case]:

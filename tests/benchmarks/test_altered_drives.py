@@ -193,5 +193,5 @@ def test_the_committed_result_is_of_these_changes(tmp_path: Path) -> None:
 
 
 def test_the_committed_result_is_of_the_bank_that_ships():
-    bank = hashlib.sha256(run_diagnoses.REAL_BANK.read_bytes()).hexdigest()
+    bank = hashlib.sha256(altered_drives.REAL_BANK.read_bytes()).hexdigest()
     assert json.loads(RESULT.read_text())["bank_sha256"] == bank

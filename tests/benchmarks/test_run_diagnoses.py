@@ -87,7 +87,7 @@ def test_answers_keep_what_was_said_and_how(runs: list[list[str]], tmp_path: Pat
 
 
 def test_arguments_are_kept_without_places_of_this_machine() -> None:
-    bank = str(run_diagnoses.REAL_BANK)
+    bank = str(run_diagnoses.CHECKOUT / "ddagr_gym/data/null_bank_warthog.json")
     kept = run_diagnoses.shown(("/home/me/run_1.csv.gz", "--soil", "firm_ground", "--thresholds", bank))
     assert kept == ["run_1.csv.gz", "--soil", "firm_ground", "--thresholds", "ddagr_gym/data/null_bank_warthog.json"]
 

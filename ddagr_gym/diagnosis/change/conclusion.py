@@ -25,7 +25,8 @@ from ddagr_gym.diagnosis.change.left_out import probability_of_ordinary
 from ddagr_gym.diagnosis.change.model import FORM, Model
 from ddagr_gym.diagnosis.change.naming import Named, Step
 from ddagr_gym.diagnosis.change.ordinary import OrdinaryRobot
-from ddagr_gym.diagnosis.change.shifts import LEVEL, POWER, Pull, Shift, family_probability, sizes_of
+from ddagr_gym.diagnosis.change.refitted_shift import further_sizes
+from ddagr_gym.diagnosis.change.shifts import LEVEL, POWER, Pull, Shift, family_probability
 from ddagr_gym.diagnosis.preprocessing.mended_recordings import MendedRecordings
 from ddagr_gym.diagnosis.result.conclusion import data_source, reversed_gyro_findings
 from ddagr_gym.diagnosis.result.sentences import change_headline
@@ -185,19 +186,20 @@ def _in_ordinary(shift: Shift) -> tuple[dict[str, float], dict[str, float]]:
 def _without_size_prior(model: Model) -> dict[tuple[int, str], tuple[float, float]]:
     """How much further the drive alone moves fields of named effects, and their variances within it.
 
-    A fit draws sizes to what is likely of them, which a change that the drive knows is not to be judged by.
+    A fit draws sizes to what is likely of them, which a change that the drive knows is not to be judged by. What is
+    known to be present in a part of the drives is taken against the rest of them.
     """
     parameters = effect_parameters(model.fitted.point.effects)
     keys = [f"{NAMED}{k}" for k in range(len(parameters))]
     if not keys:
         return {}
-    scores = model.scan.scores()
     found: dict[tuple[int, str], tuple[float, float]] = {}
+    effects = model.fitted.point.effects
+    scores = model.scan.scores()
     for k, item in enumerate(parameters):
-        others = [key for key in keys if key != keys[k]]
-        size = sizes_of(scores, [keys[k]], np.zeros(1), others)
+        size = further_sizes(scores, [keys[k]], model.named[item.effect].apart)
         if size is not None:
-            here = float(getattr(model.fitted.point.effects[item.effect], item.field))
+            here = float(getattr(effects[item.effect], item.field))
             further = float(np.clip(here + size.value[0], item.low, item.high)) - here
             found[item.effect, item.field] = further, float(size.within[0, 0])
     return found

@@ -18,7 +18,7 @@ from ddagr_gym.diagnosis.search.candidates import Candidate, candidates_of, move
 from ddagr_gym.diagnosis.search.inner_products import InnerProducts
 from ddagr_gym.diagnosis.search.scan import drive_extent, probe_columns
 from ddagr_gym.diagnosis.search.sensor_effects import record_drives
-from ddagr_gym.identification.effect_parameters import effect_columns, effect_parameters
+from ddagr_gym.identification.effect_parameters import EffectParameter, effect_columns, effect_parameters
 from ddagr_gym.identification.gauss_newton import Fitted
 from ddagr_gym.identification.least_squares import beside_residual
 from ddagr_gym.identification.problem import Problem
@@ -36,6 +36,9 @@ NOT_COMPARED: Mapping[str, str] = {
 
 NAMED = "named "
 """Begins the keys of the fitted parameters of named effects."""
+
+ELSEWHERE = "elsewhere "
+"""Begins the keys of what an effect that is present in a part of the drives would do in the rest of them."""
 
 FEWEST_IN_PIECE = 5
 """Windows of a piece of a drive, whose scatter is known from them (ours)."""
@@ -57,6 +60,11 @@ class Compared:
     def name(self) -> str:
         """Of the effect."""
         return self.candidate.name
+
+    @property
+    def elsewhere(self) -> tuple[str, ...]:
+        """(k,) keys of the same in the rest of the drives."""
+        return tuple(f"{ELSEWHERE}{key}" for key in self.keys)
 
     @property
     def ridge(self) -> Array:
@@ -127,7 +135,8 @@ class DriveScan:
 
     Attributes:
         compared: candidates.
-        keys: (K,) of the columns: parameters of the fit's effects, then probes.
+        keys: (K,) of the columns: parameters of the fit's effects, probes, then those of both elsewhere, where an
+            effect is present in a part of the drives.
         products: inner products by window of residual, what may differ between drives, and these columns.
         free: (P,) indices of the fit's parameters among those of the problem.
     """
@@ -146,6 +155,22 @@ class DriveScan:
             replace(self, products=InnerProducts(products.normals[a:b], products.precision, products.values))
             for a, b in pairwise(ends.tolist())
         )
+
+    def parted(self, present: NDArray[np.bool_]) -> DriveScan:
+        """The same with every candidate in some windows, and elsewhere in the others.
+
+        Args:
+            present: (W,) windows in which it is.
+        """
+        first = 1 + self.products.nuisances
+        probes = [first + k for item in self.compared for k in map(self.keys.index, item.keys)]
+        chosen = [*range(first + len(self.keys)), *probes]
+        acts = np.ones((len(present), len(chosen)))
+        acts[:, probes] = present[:, None]
+        acts[:, first + len(self.keys) :] = ~present[:, None]
+        normals = self.products.normals[:, chosen][:, :, chosen] * acts[:, :, None] * acts[:, None, :]
+        keys = (*self.keys, *(key for item in self.compared for key in item.elsewhere))
+        return replace(self, keys=keys, products=replace(self.products, normals=normals))
 
     def scores(self, priors: Priors | None = None) -> Scores:
         """Gradient and information of the columns, with their covariances.
@@ -212,15 +237,59 @@ def scan_drive(problem: Problem, fitted: Fitted) -> DriveScan:
     drives = record_drives(problem, fitted.point)
     named = effect_parameters(fitted.point.effects)
     probes = [probe for item in compared for probe in item.candidate.probes]
-    columns = list(probe_columns(problem, fitted, probes, drives))
+    present = {effect.name for effect in fitted.point.effects}
+    everywhere = problem.during({name: spell for name, spell in problem.spells.items() if name in present})
+    columns = list(probe_columns(everywhere, fitted, probes, drives))
     columns = with_dead_time_of_robot(problem, fitted, probes, columns)
     by_effect = effect_columns(problem, fitted.point, named)
+    by_key = dict(zip((key for item in compared for key in item.keys), columns, strict=True))
+    by_key |= _in_parts(problem, compared, by_key) | _named_elsewhere(problem, fitted, named)
     free = problem.open_at(fitted.point)
     residual = problem.residual(fitted.point, fitted.prediction)
-    raw = beside_residual(residual, fitted.by_parameter[..., free], by_effect, np.stack(columns, axis=2))
+    raw = beside_residual(residual, fitted.by_parameter[..., free], by_effect, np.stack([*by_key.values()], axis=2))
     projected = fitted.elimination.project(raw)
     products = InnerProducts(
         np.matmul(projected.transpose(0, 2, 1), projected), problem.prior[free] ** -2.0, fitted.point.values[free]
     )
-    keys = (*(f"{NAMED}{k}" for k in range(len(named))), *(key for item in compared for key in item.keys))
+    keys = (*(f"{NAMED}{k}" for k in range(len(named))), *by_key)
     return DriveScan(compared, keys, products, free)
+
+
+def _in_parts(problem: Problem, compared: Sequence[Compared], columns: Mapping[str, Array]) -> dict[str, Array]:
+    """Columns of what is sought in a part of the drives: there, and elsewhere."""
+    found: dict[str, Array] = {}
+    for item in (item for item in compared if item.name in problem.spells):
+        present = problem.present(item.name)[:, None]
+        found |= {key: np.where(present, columns[key], 0.0) for key in item.keys}
+        pairs = zip(item.elsewhere, item.keys, strict=True)
+        found |= {away: np.where(present, 0.0, columns[key]) for away, key in pairs}
+    return found
+
+
+def _named_elsewhere(problem: Problem, fitted: Fitted, named: Sequence[EffectParameter]) -> dict[str, Array]:
+    """Columns of the sizes of named effects, by unit, in the windows in which these are absent."""
+    found: dict[str, Array] = {}
+    for k, item in enumerate(named):
+        effects = fitted.point.effects
+        effect = effects[item.effect]
+        probe = _of_one_size(effect, item.field, drive_extent(problem, fitted.prediction))
+        if effect.name not in problem.spells or probe is None:
+            continue
+        spell = problem.spells[effect.name]
+        rest = problem.during({**problem.spells, effect.name: replace(spell, ends=not spell.ends)})
+        # where an effect is absent, the model with it is the one without
+        beside = replace(fitted.point, effects=(*effects[: item.effect], *effects[item.effect + 1 :]))
+        (column,) = probe_columns(rest, replace(fitted, point=beside), [probe])
+        found[f"{ELSEWHERE}{NAMED}{k}"] = column / moved_field(probe)[2]
+    return found
+
+
+def _of_one_size(effect: Effect, field: str, extent: DriveExtent) -> Effect | None:
+    """An effect with one of its sizes, as large as the library tries it; None for a field that is no such size."""
+    if not effect.differentiable:
+        return None
+    tried = {name: away for name, _, away in map(moved_field, effect.probes(extent))}
+    if field not in tried:
+        return None
+    sizes = {name: float(effect.parameter(name).metadata["neutral"]) for name in effect.size_names()}
+    return effect.with_values(**{**sizes, field: sizes[field] + tried[field]})

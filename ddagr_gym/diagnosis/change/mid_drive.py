@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from ddagr_gym.diagnosis.change.contrasts import begun_in_drive
 from ddagr_gym.diagnosis.change.naming import Named, name_changes
 from ddagr_gym.diagnosis.change.ordinary import Comparison
 from ddagr_gym.diagnosis.mid_drive.onsets import spells_of
@@ -34,18 +35,34 @@ def name_in_parts(
         rng: of resampled windows.
         progress: called with what is being done.
     """
-    last = named.models[-1]
-    spells = spells_of(problem, last.fitted, progress)
-    if not spells and not named.complete:
-        spells = _of_scan(problem, named)
-    if not spells:
-        return problem, named
-    progress(f"comparing once more, {' and '.join(spells)} in a part of the drive")
-    again = name_changes(problem.during(spells), fitted, ordinary, rng, progress)
-    effects = {effect.name for effect in again.models[-1].fitted.point.effects}
-    fall = last.fitted.cost - again.models[-1].fitted.cost
-    kept = spells_that_hold(spells, effects, fall, dispersion_of(problem, again.models[-1].fitted))
-    return (problem.during(kept), again) if kept else (problem, named)
+    for spells in _spells(problem, named, ordinary, progress):
+        progress(f"comparing once more, {' and '.join(spells)} in a part of the drive")
+        again = name_changes(problem.during(spells), fitted, ordinary, rng, progress)
+        effects = {effect.name for effect in again.models[-1].fitted.point.effects}
+        fall = named.models[-1].fitted.cost - again.models[-1].fitted.cost
+        kept = spells_that_hold(spells, effects, fall, dispersion_of(problem, again.models[-1].fitted))
+        if kept:
+            return problem.during(kept), again
+    return problem, named
+
+
+def _spells(
+    problem: Problem, named: Named, ordinary: Comparison, progress: Callable[[str], None]
+) -> Iterator[dict[str, Spell]]:
+    """Parts of the drive to try, each where the one before did not hold: of names whose size changes, of what changes
+    within the drive, and of what explains most where an answer is open.
+    """
+    first, last = named.models[0], named.models[-1]
+    of_names = spells_of(problem, last.fitted, progress)
+    if of_names:
+        yield of_names
+    begun = begun_in_drive(first.scan, problem.blocked.windows, first.tests, ordinary.unnamed)
+    if begun and begun != of_names:
+        yield begun
+    if not (of_names or begun or named.complete):
+        found = _of_scan(problem, named)
+        if found:
+            yield found
 
 
 def _of_scan(problem: Problem, named: Named) -> dict[str, Spell]:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Container, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ddagr_gym.diagnosis.change.channel_rises import ChannelRise, channel_rises
+from ddagr_gym.diagnosis.change.contrasts import contrast_of, looks_of
 from ddagr_gym.diagnosis.change.drive_fit import moved_parameters
 from ddagr_gym.diagnosis.change.drive_scan import NAMED, Compared, DriveScan, scan_drive
-from ddagr_gym.diagnosis.change.ordinary import Comparison
+from ddagr_gym.diagnosis.change.ordinary import Comparison, Scores
 from ddagr_gym.diagnosis.change.shifts import LEVEL, Pull, Shift, family_probability, shift_of
 from ddagr_gym.diagnosis.mid_drive.search_in_time import parts_tried
 from ddagr_gym.identification.gauss_newton import Fitted
@@ -60,7 +61,7 @@ class Model:
 
         What is present in a part of the drives was looked at in every part: that these overlap matters little far out.
         """
-        parts = self.parts_of(shift.compared.name) if isinstance(shift, Shift) else 1
+        parts = shift.looks if isinstance(shift, Shift) else 1
         return family_probability(shift.probability, looks * parts * self.tests)
 
     def parts_of(self, name: str) -> int:
@@ -128,7 +129,8 @@ def model_of(problem: Problem, fitted: Fitted, ordinary: Comparison, named: Sequ
     in_ordinary = [key for shift in named for key in shift.compared.keys]
     compared = _further(scan.compared, ordinary.unnamed, in_ordinary)
     found = [shift_of(item, scores, ordinary, beside, in_ordinary) for item in compared]
-    shifts = sorted((item for item in found if item is not None), key=lambda item: (item.probability, -item.distance))
+    known = [item for item in found if item is not None]
+    shifts = sorted(_in_parts(known, problem, scores), key=lambda item: (item.probability, -item.distance))
     pulls = tuple(
         Pull(name, moved / ordinary.usual_move(name), ordinary.move_degrees)
         for name, moved in moved_parameters(problem, fitted).items()
@@ -136,6 +138,24 @@ def model_of(problem: Problem, fitted: Fitted, ordinary: Comparison, named: Sequ
     misfit = {name: value for name, value in channel_misfit(problem, fitted).items() if name in CHANNELS}
     rises = channel_rises(misfit, ordinary.misfits, ordinary.expected, ordinary.misfit_errors)
     return Model(problem, fitted, scan, tuple(shifts), pulls, tuple(named), rises)
+
+
+def _in_parts(shifts: Sequence[Shift], problem: Problem, scores: Scores) -> list[Shift]:
+    """Shifts, those of effects in a part of the drives against the rest of them where that says more surely."""
+    windows = problem.blocked.windows
+    parts, looks = parts_tried(windows), looks_of(windows)
+    return [
+        _surer(replace(shift, looks=parts), contrast_of(shift.compared, scores, looks))
+        if shift.compared.name in problem.spells
+        else shift
+        for shift in shifts
+    ]
+
+
+def _surer(shift: Shift, other: Shift | None) -> Shift:
+    """Whichever ordinary drives show less often."""
+    found = [shift] if other is None else [shift, other]
+    return min(found, key=lambda item: family_probability(item.probability, item.looks))
 
 
 def _further(library: Sequence[Compared], unnamed: Container[str], known: Sequence[str]) -> list[Compared]:

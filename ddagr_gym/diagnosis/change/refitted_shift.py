@@ -13,9 +13,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.diagnosis.change.drive_scan import NAMED
+from ddagr_gym.diagnosis.change.contrasts import contrast_sizes, named_in
+from ddagr_gym.diagnosis.change.drive_scan import ELSEWHERE
 from ddagr_gym.diagnosis.change.ordinary import Scores
-from ddagr_gym.diagnosis.change.shifts import Shift, probability_of, sizes_of
+from ddagr_gym.diagnosis.change.shifts import Shift, Sizes, probability_of, sizes_of
 from ddagr_gym.diagnosis.search.candidates import moved_field
 from ddagr_gym.physics.effects import Effect
 
@@ -44,8 +45,7 @@ def refitted_shift(
     names, away = _fields_of_its_own(shift)
     if not names or not set(names) <= keys.keys() or any(_at_bound(effect, name) for name in names):
         return None
-    others = [key for key in scores.keys if key.startswith(NAMED) and key not in keys.values()]
-    further = sizes_of(scores, [keys[name] for name in names], np.zeros(len(names)), others)
+    further = further_sizes(scores, [keys[name] for name in names], shift.apart)
     if further is None:
         return None
     size = _multiples(effect, names, away) + further.value / away
@@ -54,6 +54,22 @@ def refitted_shift(
     covariance = further.within / np.outer(away, away) + farther**2 * shift.between
     found = replace(shift, value=value, covariance=covariance)
     return replace(found, probability=probability_of(True, value, covariance, shift.degrees))
+
+
+def further_sizes(scores: Scores, keys: Sequence[str], apart: bool) -> Sizes | None:
+    """How much further a drive moves sizes of a named effect; None where it shows nothing of them.
+
+    Args:
+        scores: at the fit with the effect.
+        keys: (k,) of the columns of the sizes.
+        apart: whether they are taken against those in the rest of the drive, as far as these have columns.
+    """
+    others, nothing = [key for key in named_in(scores) if key not in keys], np.zeros(len(keys))
+    if not apart or not all(f"{ELSEWHERE}{key}" in scores.keys for key in keys):
+        return sizes_of(scores, keys, nothing, others)
+    elsewhere = [key for key in (f"{ELSEWHERE}{key}" for key in others) if key in scores.keys]
+    found = contrast_sizes(scores, keys, nothing, [*others, *elsewhere])
+    return None if found is None else found.sizes
 
 
 def times_farther(shift: Shift, effect: Effect) -> float:

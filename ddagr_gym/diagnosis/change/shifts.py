@@ -43,7 +43,7 @@ MOST_LIMITS = 4.0
 """Multiples of its limit at which a change is found for sure, for the search of where it is (ours): five degrees of
 freedom need one and a half."""
 
-_NOTHING = 1e-9
+NOTHING = 1e-9
 """Share of the information before projection below which there is nothing but rounding."""
 
 
@@ -74,6 +74,8 @@ class Shift:
         between: (k, k) share of ordinary drives in it.
         degrees: of freedom.
         probability: of an ordinary drive to show as much, for this candidate alone.
+        looks: as how many tests it counts: in so many parts of the drive it was looked for.
+        apart: whether it is against the rest of the drive in place of ordinary drives.
     """
 
     compared: Compared
@@ -83,6 +85,8 @@ class Shift:
     between: Array
     degrees: float
     probability: float
+    looks: int = 1
+    apart: bool = False
 
     @property
     def distance(self) -> float:
@@ -91,7 +95,7 @@ class Shift:
 
     def limit(self, tests: int) -> float:
         """Distance that ordinary drives exceed for any of so many candidates at the level."""
-        return distance_at(single_level(tests), len(self.value), self.degrees)
+        return distance_at(single_level(tests * self.looks), len(self.value), self.degrees)
 
     def detectable(self, tests: int) -> Array:
         """(k,) multiples of each probe alone that pass the limit with the power."""
@@ -136,13 +140,13 @@ def sizes_of(scores: Scores, keys: Sequence[str], ridge: Array, beside: Sequence
         ridge: (k,) information on their multiples before any data.
         beside: keys of columns that are estimated with them.
     """
-    known = _shown(scores, beside)
+    known = shown(scores, beside)
     rows = [scores.keys.index(key) for key in (*keys, *known)]
     inner = scores.information[np.ix_(rows, rows)]
     k = len(keys)
-    if not (np.diag(inner)[:k] > _NOTHING).all():
+    if not (np.diag(inner)[:k] > NOTHING).all():
         return None
-    prior = np.concatenate([ridge, np.zeros(len(known))]) + _NOTHING * np.diag(inner)
+    prior = np.concatenate([ridge, np.zeros(len(known))]) + NOTHING * np.diag(inner)
     inverse = np.asarray(np.linalg.inv(inner + np.diag(prior))[:k], dtype=np.float64)
     gradient = scores.gradient[rows]
     within = (
@@ -153,12 +157,12 @@ def sizes_of(scores: Scores, keys: Sequence[str], ridge: Array, beside: Sequence
     expected = scores.between[np.ix_(rows, rows)]
     # what independent readings make of the gradient, without what the priors do: that is between drives
     independent = inverse @ (inner - expected) @ inverse.T
-    return Sizes(inverse @ gradient, _at_least(within, independent), inverse @ expected @ inverse.T)
+    return Sizes(inverse @ gradient, at_least(within, independent), inverse @ expected @ inverse.T)
 
 
-def _shown(scores: Scores, keys: Sequence[str]) -> tuple[str, ...]:
+def shown(scores: Scores, keys: Sequence[str]) -> tuple[str, ...]:
     """Those of some columns of which a drive shows anything: a limit that it does not reach has none."""
-    return tuple(key for key in keys if scores.information[(scores.keys.index(key),) * 2] > _NOTHING)
+    return tuple(key for key in keys if scores.information[(scores.keys.index(key),) * 2] > NOTHING)
 
 
 def explained(scores: Scores, keys: Sequence[str], ridge: Array, beside: Sequence[str] = ()) -> float:
@@ -166,14 +170,14 @@ def explained(scores: Scores, keys: Sequence[str], ridge: Array, beside: Sequenc
 
     Arguments as of :func:`sizes_of`.
     """
-    known = _shown(scores, beside)
-    if len(_shown(scores, keys)) < len(keys):
+    known = shown(scores, beside)
+    if len(shown(scores, keys)) < len(keys):
         return 0.0
     falls = []
     for chosen, prior in (((*keys, *known), ridge), (known, np.zeros(0))):
         rows = [scores.keys.index(key) for key in chosen]
         inner, right = scores.information[np.ix_(rows, rows)], scores.gradient[rows]
-        whole = np.concatenate([prior, np.zeros(len(known))]) + _NOTHING * np.diag(inner)
+        whole = np.concatenate([prior, np.zeros(len(known))]) + NOTHING * np.diag(inner)
         falls.append(0.5 * float(right @ np.linalg.solve(inner + np.diag(whole), right)) if rows else 0.0)
     return falls[0] - falls[1]
 
@@ -188,7 +192,7 @@ def _within(scores: Scores, rows: Sequence[int], sizes: Array) -> Array:
     return scattered(scores.gradients[:, rows] - scores.informations[:, rows][:, :, rows] @ sizes)
 
 
-def _at_least(scattered: Array, independent: Array) -> Array:
+def at_least(scattered: Array, independent: Array) -> Array:
     """The windows' covariance, with deviations that are at least those of independent rows."""
     size = np.diag(scattered)
     wide = np.sqrt(np.maximum(np.maximum(size, np.diag(independent)), 0.0) / np.where(size > 0.0, size, 1.0))

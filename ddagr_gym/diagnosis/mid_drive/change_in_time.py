@@ -18,7 +18,7 @@ R. DerSimonian and N. Laird, Control. Clin. Trials 7 (1986) 177).
 The step at the best time, or the line, counts where L exceeds a threshold. The 90 % interval of the time holds all t
 whose L is at most half of 5.94 below the best (B. E. Hansen, Econometrica 68 (2000) 575, table 1: the likelihood ratio
 of a change point is not chi-squared), and is widened to whole windows, since a window's state is free at its start and
-takes up part of what happens inside it.
+takes up part of what happens inside it, and to the gaps beside them, of which no window tells anything.
 """
 
 from __future__ import annotations
@@ -53,6 +53,9 @@ _HALVINGS = 10
 
 _ANCHOR = 1e4
 """Information of a mean that is taken as known, over that of all windows."""
+
+_SAME = 1e-6
+"""Time between the end of a window and the start of the next one that is none [s]."""
 
 _SMALLEST = 1e-12
 """Share of the information below which there is nothing but rounding."""
@@ -256,11 +259,14 @@ class TimeRegression:
         return np.stack([own * (1.0 - share), own * share], axis=1)
 
     def _to_windows(self, number: int, low: float, high: float) -> tuple[float, float]:
-        """An interval widened to the windows that its ends lie in; at an edge of two windows to both."""
+        """An interval widened to the windows that its ends lie in, at an edge to both, and to the gaps beside these."""
         own = self.sizes.recording == number
         start, end = np.sort(self.sizes.start[own]), np.sort(self.sizes.end[own])
         before, after = start[start < low], end[end > high]
-        return float(before[-1]) if before.size else low, float(after[0]) if after.size else high
+        low, high = float(before[-1]) if before.size else low, float(after[0]) if after.size else high
+        # between windows nothing is known of when it was
+        earlier, later = end[end <= low + _SAME], start[start >= high - _SAME]
+        return float(earlier[-1]) if earlier.size else low, float(later[0]) if later.size else high
 
 
 def _scatter(sizes: WindowSizes, found: Alternative) -> float:

@@ -18,7 +18,9 @@ def model(cost: float, names=(), conspicuous=(), pulled=(), rougher=()):
     """A model with a cost, and what is out of the ordinary beside it."""
     effects = tuple(SimpleNamespace(name=name) for name in names)
     fitted = SimpleNamespace(cost=cost, point=SimpleNamespace(effects=effects))
-    return SimpleNamespace(fitted=fitted, conspicuous=conspicuous, pulled=pulled, rougher=rougher)
+    return SimpleNamespace(
+        fitted=fitted, conspicuous=conspicuous, pulled=pulled, rougher=rougher, scan=None, tests=1
+    )  # fmt: skip
 
 
 @pytest.fixture
@@ -26,6 +28,7 @@ def later(monkeypatch):
     """A drive of which an effect from 42 s on explains 100 of the cost."""
     found = Named((model(900.0), model(800.0, names=("motor_droop",))), (SimpleNamespace(),))
     monkeypatch.setattr(mid_drive, "spells_of", lambda *_: {})
+    monkeypatch.setattr(mid_drive, "begun_in_drive", lambda *_: {})
     monkeypatch.setattr(mid_drive, "_of_scan", lambda *_: {"motor_droop": SPELL})
     monkeypatch.setattr(mid_drive, "name_changes", lambda *_: found)
     monkeypatch.setattr(mid_drive, "dispersion_of", lambda *_: 1.0)
@@ -34,8 +37,10 @@ def later(monkeypatch):
 
 def asked_again(first: Named) -> tuple[str, Named]:
     """The problem and names that stand after the question."""
-    problem = SimpleNamespace(during=lambda spells: " and ".join(spells))
-    return mid_drive.name_in_parts(problem, None, first, None, np.random.default_rng(0))
+    blocked = SimpleNamespace(windows=None)
+    problem = SimpleNamespace(during=lambda spells: " and ".join(spells), blocked=blocked)
+    ordinary = SimpleNamespace(unnamed={})
+    return mid_drive.name_in_parts(problem, None, first, ordinary, np.random.default_rng(0))
 
 
 @pytest.mark.parametrize("left", [{"rougher": ("encoder_left",)}, {"pulled": ("soil_strength",)}])
@@ -49,3 +54,14 @@ def test_an_answer_that_leaves_nothing_open_is_not_asked_again(later):
     limit = SimpleNamespace(compared=SimpleNamespace(name="motor_saturation"))
     absent = Named((model(900.0, conspicuous=(limit,)),), (), frozenset({"motor_saturation"}))
     assert asked_again(absent)[1] is absent
+
+
+def test_what_changes_within_a_drive_is_asked_though_nothing_is_left_open(later, monkeypatch):
+    monkeypatch.setattr(mid_drive, "begun_in_drive", lambda *_: {"motor_droop": SPELL})
+    assert asked_again(Named((model(900.0),), ())) == ("motor_droop", later)
+
+
+def test_a_change_within_a_drive_counts_where_it_explains_more(later, monkeypatch):
+    monkeypatch.setattr(mid_drive, "begun_in_drive", lambda *_: {"motor_droop": SPELL})
+    first = Named((model(900.0), model(805.0, names=("encoder_scale",))), (SimpleNamespace(),))
+    assert asked_again(first)[1] is first

@@ -1,5 +1,7 @@
 """Change points of sizes by window, of which the truth is known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -36,6 +38,19 @@ def test_a_step_is_found_where_it_is(time):
     assert best.interval[1] - best.interval[0] <= 3.0 * WINDOW
     assert best.before == pytest.approx(0.0, abs=4.0 * best.deviation[0])
     assert best.after == pytest.approx(1.0, abs=4.0 * best.deviation[1])
+
+
+@pytest.mark.parametrize("gap", [0.0, 11.0])
+def test_an_interval_reaches_over_the_gap_between_windows_in_which_a_step_may_lie(gap):
+    """Windows that are compared are spread over a long drive: between two of them nothing is known."""
+    found = sizes(np.arange(30) >= 15, np.random.default_rng(7), information=400.0)
+    start = (WINDOW + gap) * np.arange(30)
+    best = TimeRegression(replace(found, start=start, end=start + WINDOW)).best()
+    low, high = best.interval
+    assert low <= start[14] + WINDOW
+    assert high >= start[15]
+    # both windows that the edge may be of, the gap between them, and those beside them: there the sizes are the same
+    assert high - low <= 2.0 * WINDOW + 3.0 * gap + 1e-9
 
 
 def test_nine_in_ten_intervals_hold_a_weak_step():

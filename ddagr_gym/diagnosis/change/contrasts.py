@@ -1,0 +1,224 @@
+"""What began in mid-drive: sizes of effects after a time of a drive against those before it.
+
+Before and after that time robot, ground and sensors are the same, so that what ordinary drives differ by, which hides
+small changes between drives, does not count. With an effect's columns in the windows after a time and in those before
+it as two effects of sizes a and b beside all that may differ between drives (equation (1) of
+:mod:`ddagr_gym.diagnosis.change.shifts`),
+
+    d = a - b,    S = V + B + F,                                                                                    (1)
+
+and d' S^-1 d/k is compared with F(k, v - 2). V is the covariance of d by leaving out every window in turn (the
+jackknife), which holds where few windows lie on one side of the time and some show more than others. They then are few
+in effect: with the share u_w of window w in the variance of d as independent readings would make it,
+
+    v = (sum_w u_w)^2 / sum_w u_w^2                                                                                 (2)
+
+(F. E. Satterthwaite, Biometrics Bull. 2 (1946) 110). B is what the priors of robot and ground leave of d, F are the
+squares of a fifth of the least sizes that matter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Container, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ddagr_gym.diagnosis.change.drive_scan import ELSEWHERE, NAMED, Compared, DriveScan
+from ddagr_gym.diagnosis.change.expected_scatter import ExpectedScatter
+from ddagr_gym.diagnosis.change.ordinary import Scores
+from ddagr_gym.diagnosis.change.shifts import (
+    LEVEL,
+    NOTHING,
+    Shift,
+    Sizes,
+    at_least,
+    explained,
+    family_probability,
+    probability_of,
+    shown,
+)
+from ddagr_gym.diagnosis.mid_drive.change_in_time import FEWEST_ASIDE, FEWEST_WINDOWS
+from ddagr_gym.diagnosis.mid_drive.search_in_time import ALIKE
+from ddagr_gym.diagnosis.result.detectable import least_multiple
+from ddagr_gym.identification.spells import Spell
+from ddagr_gym.identification.windows import WindowSet
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+MOST_TIMES = 15
+"""Times of the drives at which effects are first looked for (ours): the tests at more of them hardly differ."""
+
+TIMES_AS_TESTS = 3
+"""As how many tests these times count: they share most windows, and the smallest of their probabilities is below a
+level as often as that of two or three tests, in drawn readings (tests/diagnosis/change/test_contrasts.py)."""
+
+SEARCHES = 2
+"""For a change between drives and for one within a drive: the level of false alarms is that of both together."""
+
+FEWEST_DEGREES = 1.0
+"""Of freedom, below which the windows do not tell how far a size is known."""
+
+
+@dataclass(frozen=True, eq=False)
+class Contrast:
+    """Sizes in a part of the drives less those in the rest.
+
+    Attributes:
+        sizes: with their covariances, equation (1) without F.
+        degrees: of freedom, from equation (2).
+        gain: fall of the cost by sizes that differ, over those that are alike in all of the drives.
+    """
+
+    sizes: Sizes
+    degrees: float
+    gain: float
+
+
+def contrast_sizes(scores: Scores, keys: Sequence[str], ridge: Array, beside: Sequence[str]) -> Contrast | None:
+    """Sizes where an effect is present less those elsewhere; None where the drives hardly show one of them.
+
+    Args:
+        scores: with those of every window.
+        keys: (k,) of columns that have others elsewhere.
+        ridge: (k,) information on their multiples before any data.
+        beside: keys of columns that are estimated with them.
+    """
+    both, known = [*keys, *(f"{ELSEWHERE}{key}" for key in keys)], shown(scores, beside)
+    if scores.gradients is None or scores.informations is None or len(shown(scores, both)) < len(both):
+        return None
+    rows = [scores.keys.index(key) for key in (*both, *known)]
+    inner, expected = (matrix[np.ix_(rows, rows)] for matrix in (scores.information, scores.between))
+    informations = scores.informations[:, rows][:, :, rows]
+    prior = np.diag(np.concatenate([ridge, ridge, np.zeros(len(known))]) + NOTHING * np.diag(inner))
+    one = np.eye(len(keys))
+    apart = np.concatenate([one, -one, np.zeros((len(keys), len(known)))], axis=1)
+    answer = np.asarray(np.linalg.solve(inner + prior, apart.T).T)
+    degrees = _degrees(answer @ informations @ answer.T)
+    if degrees < FEWEST_DEGREES:
+        return None
+    gradients = (scores.gradient - scores.gradients)[:, rows, None]
+    without = np.linalg.solve(inner + prior - informations, gradients)[..., 0] @ apart.T
+    value, between = answer @ scores.gradient[rows], answer @ expected @ answer.T
+    independent = answer @ inner @ answer.T - between
+    within = at_least(_jackknife(without - value), independent)
+    return Contrast(Sizes(value, within, between), degrees, 0.5 * float(value @ np.linalg.solve(independent, value)))
+
+
+def _jackknife(away: Array) -> Array:
+    """(k, k) covariance of a value, of (W, k) by how much it differs without each window."""
+    return (len(away) - 1.0) / len(away) * away.T @ away
+
+
+def _degrees(shares: Array) -> float:
+    """Equation (2), less two: of the (W, k, k) shares of windows in a covariance, by their sizes in it."""
+    sizes = np.einsum("kl,wlk->w", np.linalg.pinv(shares.sum(axis=0), hermitian=True), shares)
+    return float(sizes.sum() ** 2 / (sizes**2).sum()) - 2.0
+
+
+def contrast_of(compared: Compared, scores: Scores, looks: int) -> Shift | None:
+    """Sizes of a candidate in a part of the drives against those in the rest, equation (1).
+
+    Args:
+        compared: the candidate.
+        scores: with its columns elsewhere.
+        looks: as how many tests it counts.
+    """
+    found = _contrast(compared, scores)
+    return None if found is None else _shift(compared, found, looks)
+
+
+def _contrast(compared: Compared, scores: Scores) -> Contrast | None:
+    return contrast_sizes(scores, compared.keys, compared.ridge, named_in(scores))
+
+
+def _shift(compared: Compared, found: Contrast, looks: int) -> Shift:
+    candidate, sizes = compared.candidate, found.sizes
+    least = np.array([least_multiple(candidate, k) for k in range(len(compared.keys))])
+    between = sizes.between + np.diag((ExpectedScatter().of(candidate) * least) ** 2)
+    covariance = sizes.within + between
+    probability = probability_of(candidate.has_sizes, sizes.value, covariance, found.degrees)
+    nothing = np.zeros(len(compared.keys))
+    return Shift(compared, sizes.value, nothing, covariance, between, found.degrees, probability, looks, apart=True)
+
+
+def named_in(scores: Scores) -> list[str]:
+    """Keys of the parameters of named effects."""
+    return [key for key in scores.keys if key.startswith(NAMED)]
+
+
+def in_order(windows: WindowSet) -> Integers:
+    """(W,) place of each window in the order of recordings and time."""
+    place = np.empty(windows.count, dtype=np.int64)
+    place[np.lexsort((windows.time, windows.recording))] = np.arange(windows.count)
+    return place
+
+
+def places_tried(windows: WindowSet) -> list[int]:
+    """Places of windows from which on an effect is first looked for; none in drives that are too short."""
+    if windows.count < FEWEST_WINDOWS:
+        return []
+    first, last = FEWEST_ASIDE, windows.count - FEWEST_ASIDE
+    return sorted({round(place) for place in np.linspace(first, last, min(MOST_TIMES, last - first + 1)).tolist()})
+
+
+def looks_of(windows: WindowSet) -> int:
+    """As how many tests a change of an effect counts, over all times and both searches; at least 1."""
+    return max(SEARCHES * min(TIMES_AS_TESTS, len(places_tried(windows))), 1)
+
+
+@dataclass(frozen=True)
+class _Surest:
+    """The surest change of an effect over the times that were tried."""
+
+    probability: float
+    gain: float
+    first: int
+    compared: Compared
+
+
+def begun_in_drive(scan: DriveScan, windows: WindowSet, tests: int, unnamed: Container[str]) -> dict[str, Spell]:
+    """Effects that change within the drives, with what explains about as much, and from when on or up to when.
+
+    Args:
+        scan: of the drives, with all candidates present everywhere.
+        windows: of the scan.
+        tests: number of candidates that are compared.
+        unnamed: effects that cannot be what changed.
+    """
+    best = _surest(scan, windows, unnamed)
+    tried = looks_of(windows) * tests
+    sure = [item for item in best.values() if family_probability(item.probability, tried) < LEVEL]
+    most = max((item.gain for item in sure), default=np.inf)
+    return {name: _spell(scan, windows, item) for name, item in best.items() if item.gain >= ALIKE * most}
+
+
+def _surest(scan: DriveScan, windows: WindowSet, unnamed: Container[str]) -> dict[str, _Surest]:
+    """By effect the surest change."""
+    place, best = in_order(windows), dict[str, _Surest]()
+    for first in places_tried(windows):
+        scores = scan.parted(place >= first).scores()
+        for item in (item for item in scan.compared if item.name not in unnamed):
+            found = _contrast(item, scores)
+            if found is None:
+                continue
+            probability = _shift(item, found, 1).probability
+            if item.name not in best or probability < best[item.name].probability:
+                best[item.name] = _Surest(probability, found.gain, first, item)
+    return best
+
+
+def _spell(scan: DriveScan, windows: WindowSet, found: _Surest) -> Spell:
+    """From when on, or up to when, the effect explains most, near the time at which it was found."""
+    place, item, tried = in_order(windows), found.compared, places_tried(windows)
+    step = max((later - earlier for earlier, later in pairwise(tried)), default=1)
+    near = [first for first in range(found.first - step, found.first + step + 1) if tried[0] <= first <= tried[-1]]
+    scores = {first: scan.parted(place >= first).scores() for first in near}
+    gains = {first: made.gain for first in near if (made := _contrast(item, scores[first])) is not None}
+    first = max(gains, key=gains.__getitem__)
+    at, named = int(np.flatnonzero(place == first)[0]), named_in(scores[first])
+    later, earlier = (explained(scores[first], keys, item.ridge, named) for keys in (item.keys, item.elsewhere))
+    return Spell(int(windows.recording[at]), float(windows.time[at]), ends=earlier > later)
