@@ -91,21 +91,26 @@ def contrast_sizes(scores: Scores, keys: Sequence[str], ridge: Array, beside: Se
     if scores.gradients is None or scores.informations is None or len(shown(scores, both)) < len(both):
         return None
     rows = [scores.keys.index(key) for key in (*both, *known)]
-    inner, expected = (matrix[np.ix_(rows, rows)] for matrix in (scores.information, scores.between))
-    informations = scores.informations[:, rows][:, :, rows]
+    inner = scores.information[np.ix_(rows, rows)]
     prior = np.diag(np.concatenate([ridge, ridge, np.zeros(len(known))]) + NOTHING * np.diag(inner))
     one = np.eye(len(keys))
     apart = np.concatenate([one, -one, np.zeros((len(keys), len(known)))], axis=1)
     answer = np.asarray(np.linalg.solve(inner + prior, apart.T).T)
+    informations = scores.informations[:, rows][:, :, rows]
     degrees = _degrees(answer @ informations @ answer.T)
     if degrees < FEWEST_DEGREES:
         return None
     gradients = (scores.gradient - scores.gradients)[:, rows, None]
     without = np.linalg.solve(inner + prior - informations, gradients)[..., 0] @ apart.T
-    value, between = answer @ scores.gradient[rows], answer @ expected @ answer.T
-    independent = answer @ inner @ answer.T - between
+    expected = answer @ scores.between[np.ix_(rows, rows)] @ answer.T
+    return _known_to(answer @ scores.gradient[rows], without, answer @ inner @ answer.T - expected, expected, degrees)
+
+
+def _known_to(value: Array, without: Array, independent: Array, expected: Array, degrees: float) -> Contrast:
+    """A contrast (k,) with the covariance of values (W, k) without each window, or of independent rows if more."""
     within = at_least(_jackknife(without - value), independent)
-    return Contrast(Sizes(value, within, between), degrees, 0.5 * float(value @ np.linalg.solve(independent, value)))
+    gain = 0.5 * float(value @ np.linalg.solve(independent, value))
+    return Contrast(Sizes(value, within, expected), degrees, gain)
 
 
 def _jackknife(away: Array) -> Array:
