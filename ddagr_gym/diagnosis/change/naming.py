@@ -16,6 +16,7 @@ import numpy as np
 from ddagr_gym.diagnosis.change.drive_fit import fit_nominal
 from ddagr_gym.diagnosis.change.drive_scan import NAMED
 from ddagr_gym.diagnosis.change.model import Model, model_of
+from ddagr_gym.diagnosis.change.nested import beside, containing
 from ddagr_gym.diagnosis.change.ordinary import Comparison
 from ddagr_gym.diagnosis.change.refits import MOST_RIVALS, Refit, joint_refits
 from ddagr_gym.diagnosis.change.refitted_shift import refitted_shift, times_farther
@@ -200,6 +201,9 @@ def _next(
     name = max(weights, key=weights.__getitem__)
     chosen = next(item for item in kept if item[1].name == name)
     rivals = (chosen[1], *(rival for _, rival in kept if rival is not chosen[1]))
+    larger = containing(model, *chosen, dispersion)
+    if larger is not None:
+        rivals, weights = (*rivals, larger), beside(weights, name, larger.name)
     alarm = None if chosen in alarming else max(alarming, key=lambda item: item[1].gain)[0].named[-1]
     return chosen[0], Step(chosen[0].named[-1], weights, rivals, dispersion, alarm)
 

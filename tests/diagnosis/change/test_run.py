@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -23,6 +24,9 @@ CHANGES = (
     (24, "motor_lag=0.15", "motor_lag", "lag", 0.15),
 )
 """Seed, what is written into the drive, its name and size."""
+
+BEGINS, SCALE = 41.0, 1.03
+"""From when on a gyro reads too much [s], and by how much."""
 
 
 @pytest.mark.slow
@@ -46,6 +50,24 @@ def test_nothing_is_named_in_an_ordinary_drive(ordinary_robot, seed):
     least = {item.effect: item.sizes for item in change.shifts}
     assert 0.0 < least["gyro_bias"]["bias"].least_detectable < 0.02
     assert all(item.limit > 3.0 for item in change.shifts)  # of a single normal test it would be 1.96
+
+
+@pytest.mark.slow
+def test_a_gyro_that_reads_too_much_from_a_time_on_is_told_with_that_time(ordinary_robot):
+    """On average over the drive it is less than what would be found between drives."""
+    usual = drive(34, seconds=80.0)
+    yaw_rate = np.where(usual.t < BEGINS, 1.0, SCALE) * usual["yaw_rate"]
+    later = replace(usual, channels={**usual.channels, "yaw_rate": yaw_rate})
+    diagnosis = what_changed([later], ordinary_robot, "field").diagnosis
+    (finding,) = diagnosis.findings
+    least = {item.effect: item.sizes for item in diagnosis.change.shifts}["gyro_scale"]["scale"].least_detectable
+    assert finding.name == "gyro_scale"
+    assert finding.onset.kind == "begins"
+    low, high = finding.onset.interval
+    assert low <= BEGINS <= high
+    low, high = finding.parameters["scale"].interval
+    assert low <= SCALE <= high
+    assert 0.5 * (SCALE - 1.0) < least
 
 
 def known_effects() -> list[str]:
