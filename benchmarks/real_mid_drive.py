@@ -74,10 +74,16 @@ def time_of(drive: Drive, change: Change) -> float:
 
 
 def first_difference(before: Recording, after: Recording) -> float:
-    """Time of the first sample in which two recordings of the same rows differ [s]."""
+    """Time of the first sample in which two recordings of the same rows differ [s].
+
+    Raises:
+        ValueError: they do not.
+    """
     differs = np.zeros(len(before.t), dtype=bool)
     for name, values in before.channels.items():
         differs |= ~np.isclose(values, after.channels[name], rtol=1e-7, atol=1e-9, equal_nan=True)
+    if not differs.any():
+        raise ValueError("the change alters no sample")
     return float(before.t[np.argmax(differs)])
 
 
@@ -91,7 +97,8 @@ def ask(drive: Drive, name: str, ordinary: OrdinaryRobot, threads: int) -> dict[
         threads: of the simulator.
     """
     change = later(ALL[name])
-    return {**answer(drive, change, ordinary, threads), "begins": time_of(drive, change)}
+    said = answer(drive, change, ordinary, threads)
+    return said if "refused" in said else {**said, "begins": time_of(drive, change)}
 
 
 def onset_of(case: Mapping[str, Any]) -> Mapping[str, Any] | None:

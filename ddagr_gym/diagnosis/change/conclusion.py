@@ -197,7 +197,8 @@ def _without_size_prior(model: Model) -> dict[tuple[int, str], tuple[float, floa
     effects = model.fitted.point.effects
     scores = model.scan.scores()
     for k, item in enumerate(parameters):
-        size = further_sizes(scores, [keys[k]], model.named[item.effect].apart)
+        apart = model.named[item.effect].apart
+        size = further_sizes(scores, [keys[k]], apart) or further_sizes(scores, [keys[k]], apart=False)
         if size is not None:
             here = float(getattr(effects[item.effect], item.field))
             further = float(np.clip(here + size.value[0], item.low, item.high)) - here

@@ -1,20 +1,22 @@
-"""What began in mid-drive: sizes of effects after a time of a drive against those before it.
+"""Whether the sizes of effects differ before and after some time of one drive.
 
 Before and after that time robot, ground and sensors are the same, so that what ordinary drives differ by, which hides
 small changes between drives, does not count. With an effect's columns in the windows after a time and in those before
-it as two effects of sizes a and b beside all that may differ between drives (equation (1) of
+it as two effects of k sizes, a and b, beside all that may differ between drives (equation (1) of
 :mod:`ddagr_gym.diagnosis.change.shifts`),
 
-    d = a - b,    S = V + B + F,                                                                                    (1)
+    d = a - b,    S = V + B + L,                                                                                    (1)
 
-and d' S^-1 d/k is compared with F(k, v - 2). V is the covariance of d by leaving out every window in turn (the
-jackknife), which holds where few windows lie on one side of the time and some show more than others. They then are few
-in effect: with the share u_w of window w in the variance of d as independent readings would make it,
+and d' S^-1 d/k is compared with an F distribution of k and v - 2 degrees of freedom. V is the covariance of d by
+leaving out every window in turn (the jackknife), which holds where few windows lie on one side of the time and some
+show more than others. They then are few in effect: with the share u_w of window w in the variance of d as independent
+readings would make it,
 
     v = (sum_w u_w)^2 / sum_w u_w^2                                                                                 (2)
 
-(F. E. Satterthwaite, Biometrics Bull. 2 (1946) 110). B is what the priors of robot and ground leave of d, F are the
-squares of a fifth of the least sizes that matter.
+(F. E. Satterthwaite, Biometrics Bull. 2 (1946) 110). B is what the priors of robot, ground and sizes leave of d, L are
+the squares of a fifth of the least sizes that matter, of limits and signs of a fiftieth of the whole. Windows are taken
+as independent: where a size drifts with the ground, neighbours are alike and V is too small.
 """
 
 from __future__ import annotations
@@ -26,7 +28,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.diagnosis.change.drive_scan import ELSEWHERE, NAMED, Compared, DriveScan
+from ddagr_gym.diagnosis.change.drive_scan import ELSEWHERE, Compared, DriveScan, named_in
 from ddagr_gym.diagnosis.change.expected_scatter import ExpectedScatter
 from ddagr_gym.diagnosis.change.ordinary import Scores
 from ddagr_gym.diagnosis.change.shifts import (
@@ -57,7 +59,7 @@ TIMES_AS_TESTS = 3
 level as often as that of two or three tests, in drawn readings (tests/diagnosis/change/test_contrasts.py)."""
 
 SEARCHES = 2
-"""For a change between drives and for one within a drive: the level of false alarms is that of both together."""
+"""By which the level of false alarms is divided within a drive (ours): that between drives comes on top."""
 
 FEWEST_DEGREES = 1.0
 """Of freedom, below which the windows do not tell how far a size is known."""
@@ -68,7 +70,7 @@ class Contrast:
     """Sizes in a part of the drives less those in the rest.
 
     Attributes:
-        sizes: with their covariances, equation (1) without F.
+        sizes: with their covariances, equation (1) without L.
         degrees: of freedom, from equation (2).
         gain: fall of the cost by sizes that differ, over those that are alike in all of the drives.
     """
@@ -102,15 +104,12 @@ def contrast_sizes(scores: Scores, keys: Sequence[str], ridge: Array, beside: Se
         return None
     gradients = (scores.gradient - scores.gradients)[:, rows, None]
     without = np.linalg.solve(inner + prior - informations, gradients)[..., 0] @ apart.T
-    expected = answer @ scores.between[np.ix_(rows, rows)] @ answer.T
-    return _known_to(answer @ scores.gradient[rows], without, answer @ inner @ answer.T - expected, expected, degrees)
-
-
-def _known_to(value: Array, without: Array, independent: Array, expected: Array, degrees: float) -> Contrast:
-    """A contrast (k,) with the covariance of values (W, k) without each window, or of independent rows if more."""
-    within = at_least(_jackknife(without - value), independent)
-    gain = 0.5 * float(value @ np.linalg.solve(independent, value))
-    return Contrast(Sizes(value, within, expected), degrees, gain)
+    robot = answer @ scores.between[np.ix_(rows, rows)] @ answer.T
+    value, whole = answer @ scores.gradient[rows], answer @ inner @ answer.T
+    within = at_least(_jackknife(without - value), whole - robot)
+    gain = 0.5 * float(value @ np.linalg.solve(whole, value))
+    # the prior of the sizes draws both to nothing, and most where the drive shows least
+    return Contrast(Sizes(value, within, robot + answer @ prior @ answer.T), degrees, gain)
 
 
 def _jackknife(away: Array) -> Array:
@@ -137,7 +136,7 @@ def contrast_of(compared: Compared, scores: Scores, looks: int) -> Shift | None:
 
 
 def _contrast(compared: Compared, scores: Scores) -> Contrast | None:
-    return contrast_sizes(scores, compared.keys, compared.ridge, named_in(scores))
+    return contrast_sizes(scores, compared.keys, compared.ridge, named_in(scores.keys))
 
 
 def _shift(compared: Compared, found: Contrast, looks: int) -> Shift:
@@ -150,11 +149,6 @@ def _shift(compared: Compared, found: Contrast, looks: int) -> Shift:
     return Shift(compared, sizes.value, nothing, covariance, between, found.degrees, probability, looks, apart=True)
 
 
-def named_in(scores: Scores) -> list[str]:
-    """Keys of the parameters of named effects."""
-    return [key for key in scores.keys if key.startswith(NAMED)]
-
-
 def in_order(windows: WindowSet) -> Integers:
     """(W,) place of each window in the order of recordings and time."""
     place = np.empty(windows.count, dtype=np.int64)
@@ -163,8 +157,11 @@ def in_order(windows: WindowSet) -> Integers:
 
 
 def places_tried(windows: WindowSet) -> list[int]:
-    """Places of windows from which on an effect is first looked for; none in drives that are too short."""
-    if windows.count < FEWEST_WINDOWS:
+    """Places of windows from which on an effect is first looked for; none in a drive that is too short.
+
+    Nor in several drives: what differs between two of them differs between ordinary drives too.
+    """
+    if windows.count < FEWEST_WINDOWS or len(np.unique(windows.recording)) > 1:
         return []
     first, last = FEWEST_ASIDE, windows.count - FEWEST_ASIDE
     return sorted({round(place) for place in np.linspace(first, last, min(MOST_TIMES, last - first + 1)).tolist()})
@@ -185,32 +182,33 @@ class _Surest:
     compared: Compared
 
 
-def begun_in_drive(scan: DriveScan, windows: WindowSet, tests: int, unnamed: Container[str]) -> dict[str, Spell]:
-    """Effects that change within the drives, with what explains about as much, and from when on or up to when.
+def begun_in_drive(scan: DriveScan, windows: WindowSet, tests: int, names: Container[str]) -> dict[str, Spell]:
+    """Effects that change within a drive, with what explains about as much, and from when on or up to when.
 
     Args:
-        scan: of the drives, with all candidates present everywhere.
+        scan: of the drive, with all candidates present everywhere.
         windows: of the scan.
         tests: number of candidates that are compared.
-        unnamed: effects that cannot be what changed.
+        names: of effects that can be what changed.
     """
-    best = _surest(scan, windows, unnamed)
+    best = _surest(scan, windows, names)
     tried = looks_of(windows) * tests
     sure = [item for item in best.values() if family_probability(item.probability, tried) < LEVEL]
     most = max((item.gain for item in sure), default=np.inf)
     return {name: _spell(scan, windows, item) for name, item in best.items() if item.gain >= ALIKE * most}
 
 
-def _surest(scan: DriveScan, windows: WindowSet, unnamed: Container[str]) -> dict[str, _Surest]:
-    """By effect the surest change."""
+def _surest(scan: DriveScan, windows: WindowSet, names: Container[str]) -> dict[str, _Surest]:
+    """By effect the surest change, whether it begins or ends."""
     place, best = in_order(windows), dict[str, _Surest]()
     for first in places_tried(windows):
         scores = scan.parted(place >= first).scores()
-        for item in (item for item in scan.compared if item.name not in unnamed):
+        for item in (item for item in scan.compared if item.name in names):
             found = _contrast(item, scores)
             if found is None:
                 continue
-            probability = _shift(item, found, 1).probability
+            shift = _shift(item, found, 1)
+            probability = probability_of(True, shift.value, shift.covariance, shift.degrees)
             if item.name not in best or probability < best[item.name].probability:
                 best[item.name] = _Surest(probability, found.gain, first, item)
     return best
@@ -224,6 +222,6 @@ def _spell(scan: DriveScan, windows: WindowSet, found: _Surest) -> Spell:
     scores = {first: scan.parted(place >= first).scores() for first in near}
     gains = {first: made.gain for first in near if (made := _contrast(item, scores[first])) is not None}
     first = max(gains, key=gains.__getitem__)
-    at, named = int(np.flatnonzero(place == first)[0]), named_in(scores[first])
+    at, named = int(np.flatnonzero(place == first)[0]), named_in(scores[first].keys)
     later, earlier = (explained(scores[first], keys, item.ridge, named) for keys in (item.keys, item.elsewhere))
     return Spell(int(windows.recording[at]), float(windows.time[at]), ends=earlier > later)

@@ -44,6 +44,11 @@ FEWEST_IN_PIECE = 5
 """Windows of a piece of a drive, whose scatter is known from them (ours)."""
 
 
+def named_in(keys: Sequence[str]) -> list[str]:
+    """Those of the parameters of named effects among the keys of columns."""
+    return [key for key in keys if key.startswith(NAMED)]
+
+
 @dataclass(frozen=True, eq=False)
 class Compared:
     """A candidate of the library whose probes mean the same in every drive.

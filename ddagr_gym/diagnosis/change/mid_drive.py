@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from ddagr_gym.diagnosis.change.contrasts import begun_in_drive
+from ddagr_gym.diagnosis.change.model import Model
 from ddagr_gym.diagnosis.change.naming import Named, name_changes
 from ddagr_gym.diagnosis.change.ordinary import Comparison
 from ddagr_gym.diagnosis.mid_drive.onsets import spells_of
@@ -42,27 +44,38 @@ def name_in_parts(
         fall = named.models[-1].fitted.cost - again.models[-1].fitted.cost
         kept = spells_that_hold(spells, effects, fall, dispersion_of(problem, again.models[-1].fitted))
         if kept:
-            return problem.during(kept), again
+            return problem.during(kept), _compared_all_along(again, named)
     return problem, named
+
+
+def _compared_all_along(again: Named, first: Named) -> Named:
+    """Names in a part of the drive, with the shifts of every effect all along it from ordinary drives."""
+    usual = replace(again.models[0], scan=first.models[0].scan, shifts=first.models[0].shifts)
+    return replace(again, models=(usual, *again.models[1:]))
 
 
 def _spells(
     problem: Problem, named: Named, ordinary: Comparison, progress: Callable[[str], None]
 ) -> Iterator[dict[str, Spell]]:
-    """Parts of the drive to try, each where the one before did not hold: of names whose size changes, of what changes
-    within the drive, and of what explains most where an answer is open.
+    """Parts of the drive to try: of names whose size changes, of what differs within the drive, without names or beside
+    them, and where neither is there and an answer is open, of what explains most.
     """
-    first, last = named.models[0], named.models[-1]
-    of_names = spells_of(problem, last.fitted, progress)
+    of_names = spells_of(problem, named.models[-1].fitted, progress)
     if of_names:
         yield of_names
-    begun = begun_in_drive(first.scan, problem.blocked.windows, first.tests, ordinary.unnamed)
-    if begun and begun != of_names:
+    found = [_begun(model, ordinary) for model in (named.models[0], named.models[-1])]
+    begun = next((spells for spells in found if spells), {})
+    if begun.keys() - of_names.keys():
         yield begun
     if not (of_names or begun or named.complete):
-        found = _of_scan(problem, named)
-        if found:
-            yield found
+        most = _of_scan(problem, named)
+        if most:
+            yield most
+
+
+def _begun(model: Model, ordinary: Comparison) -> dict[str, Spell]:
+    names = {shift.compared.name for shift in model.shifts} - ordinary.unnamed.keys()
+    return begun_in_drive(model.scan, model.problem.blocked.windows, model.tests, names)
 
 
 def _of_scan(problem: Problem, named: Named) -> dict[str, Spell]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from ddagr_gym.diagnosis.change.channel_rises import ChannelRise, channel_rises
 from ddagr_gym.diagnosis.change.contrasts import contrast_of, looks_of
 from ddagr_gym.diagnosis.change.drive_fit import moved_parameters
-from ddagr_gym.diagnosis.change.drive_scan import NAMED, Compared, DriveScan, scan_drive
+from ddagr_gym.diagnosis.change.drive_scan import Compared, DriveScan, named_in, scan_drive
 from ddagr_gym.diagnosis.change.ordinary import Comparison, Scores
 from ddagr_gym.diagnosis.change.shifts import LEVEL, Pull, Shift, family_probability, shift_of
 from ddagr_gym.diagnosis.mid_drive.search_in_time import parts_tried
@@ -125,12 +125,12 @@ def model_of(problem: Problem, fitted: Fitted, ordinary: Comparison, named: Sequ
     """
     scan = scan_drive(problem, fitted)
     scores = scan.scores()
-    beside = [key for key in scan.keys if key.startswith(NAMED)]
+    beside = named_in(scan.keys)
     in_ordinary = [key for shift in named for key in shift.compared.keys]
     compared = _further(scan.compared, ordinary.unnamed, in_ordinary)
     found = [shift_of(item, scores, ordinary, beside, in_ordinary) for item in compared]
     known = [item for item in found if item is not None]
-    shifts = sorted(_in_parts(known, problem, scores), key=lambda item: (item.probability, -item.distance))
+    shifts = sorted(_against_the_rest(known, problem, scores), key=lambda item: (item.probability, -item.distance))
     pulls = tuple(
         Pull(name, moved / ordinary.usual_move(name), ordinary.move_degrees)
         for name, moved in moved_parameters(problem, fitted).items()
@@ -140,7 +140,7 @@ def model_of(problem: Problem, fitted: Fitted, ordinary: Comparison, named: Sequ
     return Model(problem, fitted, scan, tuple(shifts), pulls, tuple(named), rises)
 
 
-def _in_parts(shifts: Sequence[Shift], problem: Problem, scores: Scores) -> list[Shift]:
+def _against_the_rest(shifts: Sequence[Shift], problem: Problem, scores: Scores) -> list[Shift]:
     """Shifts, those of effects in a part of the drives against the rest of them where that says more surely."""
     windows = problem.blocked.windows
     parts, looks = parts_tried(windows), looks_of(windows)

@@ -1,4 +1,4 @@
-"""What contains a named effect: another one that does the same and something more, of which the drives know nothing.
+"""What contains a named effect: another one that does the same, and has one more size that drives hardly tell.
 
 Encoders that a speed loop believes turn the wheels as unevenly as uneven radii let them roll, and both may be wrong by
 the same share besides. A load that is not at the centre shifts the centre of mass, and is a mass besides.
@@ -31,14 +31,15 @@ def containing(before: Model, named: Model, rival: Rival, dispersion: float) -> 
     if found is None:
         return None
     larger = found.effects[-1].name
-    if rival.name in problem.spells:
-        problem = problem.during({**problem.spells, larger: problem.spells[rival.name]})
-    fitted = fit(problem, found, iterations=TRIAL_STEPS, renewals=2, reuse=rival.fitted)
+    spells = {name: spell for name, spell in problem.spells.items() if name != larger}
+    if rival.name in spells:
+        spells[larger] = spells[rival.name]
+    fitted = fit(problem.during(spells), found, iterations=TRIAL_STEPS, reuse=rival.fitted)
     gain = (before.fitted.cost - fitted.cost) / dispersion
     return Rival(larger, fitted, min(gain, rival.gain), equivalent=True) if gain >= AS_GOOD * rival.gain else None
 
 
 def beside(weights: dict[str, float], name: str, larger: str) -> dict[str, float]:
     """Weights in which what contains a name weighs as much as the name: nothing tells them apart."""
-    raised = {**weights, larger: max(weights.get(larger, 0.0), weights[name])}
+    raised = {**weights, larger: weights[name]}
     return {other: weight / sum(raised.values()) for other, weight in raised.items()}

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.diagnosis.change.drive_fit import ITERATIONS
-from ddagr_gym.diagnosis.change.drive_scan import NAMED, scan_drive
+from ddagr_gym.diagnosis.change.drive_scan import named_in, scan_drive
 from ddagr_gym.diagnosis.change.model import MOST_NEAR, Model, farthest
 from ddagr_gym.diagnosis.change.ordinary import Comparison, Scores
 from ddagr_gym.diagnosis.change.shifts import Shift, explained, shift_of, sizes_of
@@ -113,7 +113,7 @@ def _explaining_alike(model: Model, ordinary: Comparison) -> list[Shift]:
     if not (model.conspicuous or model.pulled):
         return []
     scores = model.scan.scores()
-    own = [key for key in scores.keys if key.startswith(NAMED)]
+    own = named_in(scores.keys)
     before = [key for shift in model.named for key in shift.compared.keys]
     gains: list[tuple[float, Shift]] = []
     for shift in model.best:
@@ -277,7 +277,7 @@ def _where_parameters_stay(problem: Problem, model: Model) -> tuple[Point, Start
     fitted = fit(held, point, iterations=ITERATIONS, tolerance=FIELD_TOLERANCE, renewals=2)
     scan = scan_drive(held, fitted)
     scores = scan.scores()
-    beside = [key for key in scan.keys if key.startswith(NAMED)]
+    beside = named_in(scan.keys)
     shifts = {shift.compared.keys: shift for shift in model.shifts}
     # a step goes three deviations at most, and what has been taken over may be many
     calibrated = replace(fitted.point, values=np.zeros(len(own)))
@@ -303,7 +303,7 @@ def _preselected(model: Model, ordinary: Comparison) -> list[Shift]:
 
 def _left_beside(shift: Shift, model: Model, scores: Scores, ordinary: Comparison) -> float:
     """Largest distance over its limit of any other effect beside one, to first order."""
-    own = [key for key in scores.keys if key.startswith(NAMED)]
+    own = named_in(scores.keys)
     before = [key for item in model.named for key in item.compared.keys]
     keys = shift.compared.keys
     others = [item.compared for item in model.best if item.compared.name != shift.compared.name]

@@ -13,8 +13,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.diagnosis.change.contrasts import contrast_sizes, named_in
-from ddagr_gym.diagnosis.change.drive_scan import ELSEWHERE
+from ddagr_gym.diagnosis.change.contrasts import contrast_sizes
+from ddagr_gym.diagnosis.change.drive_scan import ELSEWHERE, named_in
 from ddagr_gym.diagnosis.change.ordinary import Scores
 from ddagr_gym.diagnosis.change.shifts import Shift, Sizes, probability_of, sizes_of
 from ddagr_gym.diagnosis.search.candidates import moved_field
@@ -32,7 +32,8 @@ def refitted_shift(
     """The shift of an effect as a refit with it finds it.
 
     The size is that of the refit and one step further without the prior of likely sizes. None where its probes are not
-    sizes of their own, and where the refit ran to the bound of what exists: that it found no end says no size.
+    sizes of their own, and where the refit ran to the bound of what exists: that it found no end says no size. What was
+    against the rest of a drive, and is not known there beside the refit, is nothing that ordinary drives do not show.
 
     Args:
         shift: before the refit, with what ordinary drives show.
@@ -47,7 +48,7 @@ def refitted_shift(
         return None
     further = further_sizes(scores, [keys[name] for name in names], shift.apart)
     if further is None:
-        return None
+        return replace(shift, probability=1.0) if shift.apart else None
     size = _multiples(effect, names, away) + further.value / away
     value = size - shift.mean
     farther = _farther(shift, size) if stretched else 1.0
@@ -64,7 +65,7 @@ def further_sizes(scores: Scores, keys: Sequence[str], apart: bool) -> Sizes | N
         keys: (k,) of the columns of the sizes.
         apart: whether they are taken against those in the rest of the drive, as far as these have columns.
     """
-    others, nothing = [key for key in named_in(scores) if key not in keys], np.zeros(len(keys))
+    others, nothing = [key for key in named_in(scores.keys) if key not in keys], np.zeros(len(keys))
     if not apart or not all(f"{ELSEWHERE}{key}" in scores.keys for key in keys):
         return sizes_of(scores, keys, nothing, others)
     elsewhere = [key for key in (f"{ELSEWHERE}{key}" for key in others) if key in scores.keys]

@@ -42,6 +42,7 @@ SCALE = 0.01
 """Of the effects' columns, so that what is not noise hardly counts beside it."""
 
 BIAS, DRAG = candidate("gyro_bias"), candidate("viscous_drag")
+BOTH = {BIAS.name, DRAG.name}
 
 
 def scan_of(rng: np.random.Generator, later: float = 0.0, always: float = 0.0, rough=1.0, overall=0.3) -> DriveScan:
@@ -96,7 +97,7 @@ def test_times_that_share_windows_count_as_three_tests():
     """Of 300 drives with two effects 5 in 100 may have any time as improbable: 30, with a deviation of 5.3."""
     rng = np.random.default_rng(9)
     rough = np.where(np.arange(COUNT) % 5 == 0, 4.0, 1.0)
-    found = [_surest(scan_of(rng, rough=rough), WINDOWS, ()) for _ in range(300)]
+    found = [_surest(scan_of(rng, rough=rough), WINDOWS, BOTH) for _ in range(300)]
     low = sum(family_probability(item.probability, TIMES_AS_TESTS) < 0.05 for best in found for item in best.values())
     assert low < 40
 
@@ -114,11 +115,32 @@ def test_few_windows_on_one_side_are_few_degrees_of_freedom():
     assert 1.0 < end.degrees < 3.0
 
 
+def test_an_effect_that_hardly_shows_in_one_part_does_not_seem_to_be_absent_there():
+    """The prior of its size draws it to nothing where the drive says nothing of it, and not where it shows."""
+    rng = np.random.default_rng(10)
+    columns = rng.standard_normal((COUNT, ROWS, 3))
+    information = float(DRAG.ridge[0])
+    visible = np.where(LATER, 1e-4 * information, 1e4 * information) / (ROWS * COUNT / 2)
+    columns[..., 2] *= np.sqrt(visible)[:, None]
+    size = 2.0 / np.sqrt(information)
+    residual = size * columns[..., 2] + rng.standard_normal((COUNT, ROWS))
+    raw = np.concatenate([residual[..., None], columns], axis=2)
+    products = InnerProducts(np.matmul(raw.transpose(0, 2, 1), raw), np.ones(1), np.zeros(1))
+    scan = DriveScan((BIAS, DRAG), (*BIAS.keys, *DRAG.keys), products, np.zeros(1, dtype=np.int64))
+    found = contrast_of(DRAG, scan.parted(LATER).scores(), 1)
+    assert found is None or found.probability > 0.01
+
+
+def test_several_drives_are_not_asked():
+    two = SimpleNamespace(recording=np.repeat([0, 1], COUNT // 2), time=WINDOWS.time, count=COUNT)
+    assert not begun_in_drive(scan_of(np.random.default_rng(11), later=9.0), two, 2, BOTH)
+
+
 @pytest.mark.parametrize("ends", [False, True])
 def test_an_effect_that_begins_or_ends_is_found_with_its_time(ends):
     rng = np.random.default_rng(5)
     later, always = (-0.8, 0.8) if ends else (0.8, 0.0)
-    (found,) = begun_in_drive(scan_of(rng, later, always), WINDOWS, 2, ()).items()
+    (found,) = begun_in_drive(scan_of(rng, later, always), WINDOWS, 2, BOTH).items()
     assert found[0] == "gyro_bias"
     assert found[1].ends == ends
     assert abs(found[1].time - WINDOWS.time[LATER][0]) <= 4.0
@@ -126,15 +148,15 @@ def test_an_effect_that_begins_or_ends_is_found_with_its_time(ends):
 
 def test_nothing_begins_in_ordinary_drives_nor_what_may_not_be_named():
     rng = np.random.default_rng(6)
-    assert not any(begun_in_drive(scan_of(rng), WINDOWS, 2, ()) for _ in range(20))
-    assert not begun_in_drive(scan_of(rng, later=0.8), WINDOWS, 2, {"gyro_bias"})
+    assert not any(begun_in_drive(scan_of(rng), WINDOWS, 2, BOTH) for _ in range(20))
+    assert not begun_in_drive(scan_of(rng, later=0.8), WINDOWS, 2, {"viscous_drag"})
 
 
 def test_short_drives_are_not_asked():
     short = SimpleNamespace(recording=np.zeros(7, dtype=int), time=4.0 * np.arange(7), count=7)
     assert places_tried(short) == []
     assert looks_of(short) == 1
-    assert not begun_in_drive(scan_of(np.random.default_rng(7), later=9.0), short, 2, ())
+    assert not begun_in_drive(scan_of(np.random.default_rng(7), later=9.0), short, 2, BOTH)
 
 
 def test_times_leave_three_windows_on_either_side():

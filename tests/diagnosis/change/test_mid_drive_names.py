@@ -18,8 +18,10 @@ def model(cost: float, names=(), conspicuous=(), pulled=(), rougher=()):
     """A model with a cost, and what is out of the ordinary beside it."""
     effects = tuple(SimpleNamespace(name=name) for name in names)
     fitted = SimpleNamespace(cost=cost, point=SimpleNamespace(effects=effects))
+    problem = SimpleNamespace(blocked=SimpleNamespace(windows=None))
     return SimpleNamespace(
-        fitted=fitted, conspicuous=conspicuous, pulled=pulled, rougher=rougher, scan=None, tests=1
+        fitted=fitted, conspicuous=conspicuous, pulled=pulled, rougher=rougher, scan=None, tests=1, shifts=(),
+        problem=problem,
     )  # fmt: skip
 
 
@@ -29,6 +31,7 @@ def later(monkeypatch):
     found = Named((model(900.0), model(800.0, names=("motor_droop",))), (SimpleNamespace(),))
     monkeypatch.setattr(mid_drive, "spells_of", lambda *_: {})
     monkeypatch.setattr(mid_drive, "begun_in_drive", lambda *_: {})
+    monkeypatch.setattr(mid_drive, "_compared_all_along", lambda again, first: again)
     monkeypatch.setattr(mid_drive, "_of_scan", lambda *_: {"motor_droop": SPELL})
     monkeypatch.setattr(mid_drive, "name_changes", lambda *_: found)
     monkeypatch.setattr(mid_drive, "dispersion_of", lambda *_: 1.0)
@@ -37,8 +40,7 @@ def later(monkeypatch):
 
 def asked_again(first: Named) -> tuple[str, Named]:
     """The problem and names that stand after the question."""
-    blocked = SimpleNamespace(windows=None)
-    problem = SimpleNamespace(during=lambda spells: " and ".join(spells), blocked=blocked)
+    problem = SimpleNamespace(during=lambda spells: " and ".join(spells))
     ordinary = SimpleNamespace(unnamed={})
     return mid_drive.name_in_parts(problem, None, first, ordinary, np.random.default_rng(0))
 

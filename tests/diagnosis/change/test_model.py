@@ -45,7 +45,7 @@ def test_an_effect_in_a_part_of_the_drive_is_judged_by_what_says_more_surely(mon
     apart = replace(shift("towed_drag", against_the_rest, 2), apart=True)
     monkeypatch.setattr(model, "contrast_of", lambda *_: apart)
     problem = SimpleNamespace(spells={"towed_drag": Spell(0, 30.0)}, blocked=SimpleNamespace(windows=WINDOWS))
-    drag, payload = model._in_parts([shift("towed_drag", 1e-4), shift("payload", 1e-3)], problem, None)
+    drag, payload = model._against_the_rest([shift("towed_drag", 1e-4), shift("payload", 1e-3)], problem, None)
     assert drag.apart == chosen
     assert drag.looks == (2 if chosen else 18)
     assert (payload.apart, payload.looks) == (False, 1)
