@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ddagr_gym import simulate
 from ddagr_gym.diagnosis.answer.verdict import DataDoubt, GatesUsed
 from ddagr_gym.physics.effects.registry import effect_kinds
 from ddagr_gym.reporting.diagnosis_figures import MOST_BARS, MOST_POINTS, _bars, channel_figure, thinned
@@ -156,6 +157,20 @@ def test_later_steps_may_be_absent(tmp_path):
     ):  # fmt: skip
         assert absent not in text
     assert "No operating condition stands out" in text
+
+
+def test_currents_are_drawn_where_the_drivetrain_was_not_asked_for(tmp_path):
+    drive = simulate("straight").recording
+    drive = replace(drive, channels={**drive.channels, "current_left": 2.0 + np.sin(drive.t)})
+    write_report(
+        tmp_path,
+        diagnosis(findings=[], verdict=["none"], sentence="Nothing is missing."),
+        evidence(),
+        recordings=[drive],
+    )
+    text = (tmp_path / PAGE).read_text()
+    assert "Currents and voltages as recorded" in text
+    assert "its page" not in text
 
 
 def test_the_same_evidence_gives_the_same_picture(tmp_path):
