@@ -15,7 +15,7 @@ cases in the folder of parts.
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -30,16 +30,13 @@ from benchmarks.what_changed import RESULT as CHANGES_RESULT
 from benchmarks.what_changed import (
     Drive,
     answer,
-    answered,
     drives,
     is_right,
     is_sure_and_wrong,
     parser_of,
-    write_figures,
+    run,
 )
-from ddagr_gym.calibration.ordinary_robot import load_ordinary_robot
 from ddagr_gym.diagnosis.change.ordinary import OrdinaryRobot
-from ddagr_gym.errors import InputError
 from ddagr_gym.recordings.files import write_atomically
 from ddagr_gym.rendering import palette
 from ddagr_gym.reporting.figures import house_style
@@ -171,17 +168,11 @@ def draw(found: Mapping[str, Any], path: Path) -> None:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Ask, score, draw."""
     given = parser_of(__doc__, RESULT).parse_args(arguments)
-    try:
-        ordinary = load_ordinary_robot(given.calibration)
-    except InputError as error:
-        print(f"{error}", file=sys.stderr)
-        return 2
-    asked = ((question.name, partial(question.answer, ordinary, given.threads)) for question in questions())
-    cases = answered(asked, given.parts / ordinary.digest[:12], not given.summary)
-    found = figures(cases)
-    write_figures(given.output, COMMAND, found, cases)
-    draw(found, given.output.with_suffix(".png"))
-    return 0
+
+    def asked(ordinary: OrdinaryRobot) -> Iterator[tuple[str, Callable[[], dict[str, Any]]]]:
+        return ((question.name, partial(question.answer, ordinary, given.threads)) for question in questions())
+
+    return run(given, COMMAND, asked, figures, lambda found, cases, path: draw(found, path))
 
 
 if __name__ == "__main__":

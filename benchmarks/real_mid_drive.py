@@ -19,24 +19,19 @@ from typing import Any
 import numpy as np
 
 from benchmarks.altered_changes import CONTROL, Change, Table
-from benchmarks.real_drives.__main__ import DRIVES
 from benchmarks.score_concealed import share
 from benchmarks.what_changed import (
     ALL,
     Drive,
     answer,
-    answered,
     coverage_of,
-    draw,
-    drives,
     is_right,
     is_sure_and_wrong,
     parser_of,
-    write_figures,
+    run_changes,
 )
-from ddagr_gym.calibration.ordinary_robot import OrdinaryRobot, load_ordinary_robot
 from ddagr_gym.diagnosis.answer.onset import BEGINS, STEPS
-from ddagr_gym.errors import InputError
+from ddagr_gym.diagnosis.change.ordinary import OrdinaryRobot
 from ddagr_gym.recordings.schema import Recording
 
 RESULT = Path(__file__).resolve().parent / "results" / "real_mid_drive.json"
@@ -132,24 +127,7 @@ def figures(cases: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Write, compare, score."""
     parser = parser_of(__doc__, RESULT)
-    parser.add_argument("--drives", nargs="+", choices=tuple(DRIVES), default=tuple(DRIVES))
-    parser.add_argument("--changes", nargs="+", choices=CHANGES, default=CHANGES)
-    given = parser.parse_args(arguments)
-    try:
-        ordinary = load_ordinary_robot(given.calibration)
-    except InputError as error:
-        print(f"{error}", file=sys.stderr)
-        return 2
-    by_name = drives()
-    questions = (
-        (f"{drive.replace('/', '_')} {change}", partial(ask, by_name[drive], change, ordinary, given.threads))
-        for change in given.changes
-        for drive in given.drives
-    )
-    cases = answered(questions, given.parts / ordinary.digest[:12], not given.summary)
-    write_figures(given.output, "python -m benchmarks.real_mid_drive", figures(cases), cases)
-    draw(cases, given.output.with_suffix(".png"))
-    return 0
+    return run_changes(parser, arguments, "python -m benchmarks.real_mid_drive", CHANGES, ask, figures)
 
 
 if __name__ == "__main__":

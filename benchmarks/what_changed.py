@@ -286,27 +286,75 @@ def write_figures(path: Path, command: str, scored: Mapping[str, Any], cases: Se
         print(f"{name}: {entry['value']} {entry['interval']} of {entry['count']}")
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Write, compare, score."""
-    parser = parser_of(__doc__, RESULT)
-    parser.add_argument("--drives", nargs="+", choices=tuple(DRIVES), default=tuple(DRIVES))
-    parser.add_argument("--changes", nargs="+", choices=tuple(ALL), default=tuple(ALL))
-    given = parser.parse_args(arguments)
+def run(
+    given: argparse.Namespace,
+    command: str,
+    questions: Callable[[OrdinaryRobot], Iterable[tuple[str, Callable[[], dict[str, Any]]]]],
+    score: Callable[[Sequence[Mapping[str, Any]]], dict[str, Any]],
+    picture: Callable[[dict[str, Any], Sequence[Mapping[str, Any]], Path], None],
+) -> int:
+    """Ask, score, draw; returns the exit code.
+
+    Args:
+        given: options of :func:`parser_of`.
+        command: that does it.
+        questions: about a calibrated robot, as of :func:`answered`.
+        score: figures of answers.
+        picture: draws figures and answers to a file.
+    """
     try:
         ordinary = load_ordinary_robot(given.calibration)
     except InputError as error:
         print(f"{error}", file=sys.stderr)
         return 2
-    by_name = drives()
-    questions = (
-        (f"{drive.replace('/', '_')} {change}", partial(answer, by_name[drive], ALL[change], ordinary, given.threads))
-        for change in given.changes
-        for drive in given.drives
-    )
-    cases = answered(questions, given.parts / ordinary.digest[:12], not given.summary)
-    write_figures(given.output, "python -m benchmarks.what_changed", figures(cases), cases)
-    draw(cases, given.output.with_suffix(".png"))
+    cases = answered(questions(ordinary), given.parts / ordinary.digest[:12], not given.summary)
+    found = score(cases)
+    write_figures(given.output, command, found, cases)
+    picture(found, cases, given.output.with_suffix(".png"))
     return 0
+
+
+def run_changes(
+    parser: argparse.ArgumentParser,
+    arguments: Sequence[str] | None,
+    command: str,
+    changes: Sequence[str],
+    ask: Callable[[Drive, str, OrdinaryRobot, int], dict[str, Any]],
+    score: Callable[[Sequence[Mapping[str, Any]]], dict[str, Any]],
+) -> int:
+    """The same with changes of ordinary drives, of which the command line chooses.
+
+    Args:
+        parser: of :func:`parser_of`.
+        arguments: of the command line.
+        command: see :func:`run`.
+        changes: names of :data:`ALL`.
+        ask: what is said of a drive with a change, of a robot, on so many threads.
+        score: see :func:`run`.
+    """
+    parser.add_argument("--drives", nargs="+", choices=tuple(DRIVES), default=tuple(DRIVES))
+    parser.add_argument("--changes", nargs="+", choices=changes, default=changes)
+    given = parser.parse_args(arguments)
+    by_name = drives()
+
+    def questions(ordinary: OrdinaryRobot) -> Iterable[tuple[str, Callable[[], dict[str, Any]]]]:
+        return (
+            (f"{drive.replace('/', '_')} {change}", partial(ask, by_name[drive], change, ordinary, given.threads))
+            for change in given.changes
+            for drive in given.drives
+        )
+
+    return run(given, command, questions, score, lambda found, cases, path: draw(cases, path))
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Write, compare, score."""
+
+    def ask(drive: Drive, name: str, ordinary: OrdinaryRobot, threads: int) -> dict[str, Any]:
+        return answer(drive, ALL[name], ordinary, threads)
+
+    parser = parser_of(__doc__, RESULT)
+    return run_changes(parser, arguments, "python -m benchmarks.what_changed", tuple(ALL), ask, figures)
 
 
 if __name__ == "__main__":

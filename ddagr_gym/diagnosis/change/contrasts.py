@@ -28,7 +28,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.diagnosis.change.drive_scan import ELSEWHERE, Compared, DriveScan, named_in
+from ddagr_gym.diagnosis.change.drive_scan import Compared, DriveScan, elsewhere, named_in
 from ddagr_gym.diagnosis.change.expected_scatter import ExpectedScatter
 from ddagr_gym.diagnosis.change.ordinary import Scores
 from ddagr_gym.diagnosis.change.shifts import (
@@ -89,7 +89,7 @@ def contrast_sizes(scores: Scores, keys: Sequence[str], ridge: Array, beside: Se
         ridge: (k,) information on their multiples before any data.
         beside: keys of columns that are estimated with them.
     """
-    both, known = [*keys, *(f"{ELSEWHERE}{key}" for key in keys)], shown(scores, beside)
+    both, known = (*keys, *elsewhere(keys)), shown(scores, beside)
     if scores.gradients is None or scores.informations is None or len(shown(scores, both)) < len(both):
         return None
     rows = [scores.keys.index(key) for key in (*both, *known)]
@@ -150,10 +150,8 @@ def _shift(compared: Compared, found: Contrast, looks: int) -> Shift:
 
 
 def in_order(windows: WindowSet) -> Integers:
-    """(W,) place of each window in the order of recordings and time."""
-    place = np.empty(windows.count, dtype=np.int64)
-    place[np.lexsort((windows.time, windows.recording))] = np.arange(windows.count)
-    return place
+    """(W,) place of each window of a single drive in the order of time."""
+    return np.argsort(np.argsort(windows.time, kind="stable"))
 
 
 def places_tried(windows: WindowSet) -> list[int]:

@@ -49,6 +49,11 @@ def named_in(keys: Sequence[str]) -> list[str]:
     return [key for key in keys if key.startswith(NAMED)]
 
 
+def elsewhere(keys: Sequence[str]) -> tuple[str, ...]:
+    """Keys of the same columns in the rest of the drives."""
+    return tuple(f"{ELSEWHERE}{key}" for key in keys)
+
+
 @dataclass(frozen=True, eq=False)
 class Compared:
     """A candidate of the library whose probes mean the same in every drive.
@@ -69,7 +74,7 @@ class Compared:
     @property
     def elsewhere(self) -> tuple[str, ...]:
         """(k,) keys of the same in the rest of the drives."""
-        return tuple(f"{ELSEWHERE}{key}" for key in self.keys)
+        return elsewhere(self.keys)
 
     @property
     def ridge(self) -> Array:
@@ -277,8 +282,10 @@ def _named_elsewhere(problem: Problem, fitted: Fitted, named: Sequence[EffectPar
     for k, item in enumerate(named):
         effects = fitted.point.effects
         effect = effects[item.effect]
+        if effect.name not in problem.spells:
+            continue
         probe = _of_one_size(effect, item.field, drive_extent(problem, fitted.prediction))
-        if effect.name not in problem.spells or probe is None:
+        if probe is None:
             continue
         spell = problem.spells[effect.name]
         rest = problem.during({**problem.spells, effect.name: replace(spell, ends=not spell.ends)})

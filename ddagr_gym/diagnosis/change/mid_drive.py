@@ -63,8 +63,8 @@ def _spells(
     of_names = spells_of(problem, named.models[-1].fitted, progress)
     if of_names:
         yield of_names
-    found = [_begun(model, ordinary) for model in (named.models[0], named.models[-1])]
-    begun = next((spells for spells in found if spells), {})
+    first_and_last = named.models[:: max(len(named.models) - 1, 1)]
+    begun = next((spells for model in first_and_last if (spells := _begun(model, ordinary))), {})
     if begun.keys() - of_names.keys():
         yield begun
     if not (of_names or begun or named.complete):

@@ -201,8 +201,8 @@ def _next(
     name = max(weights, key=weights.__getitem__)
     chosen = next(item for item in kept if item[1].name == name)
     rivals = (chosen[1], *(rival for _, rival in kept if rival is not chosen[1]))
-    larger = containing(model, *chosen, dispersion)
-    if larger is not None and larger.name not in [rival.name for rival in rivals]:
+    larger = containing(model, *chosen, dispersion, {rival.name for rival in rivals})
+    if larger is not None:
         rivals, weights = (*rivals, larger), beside(weights, name, larger.name)
     alarm = None if chosen in alarming else max(alarming, key=lambda item: item[1].gain)[0].named[-1]
     return chosen[0], Step(chosen[0].named[-1], weights, rivals, dispersion, alarm)

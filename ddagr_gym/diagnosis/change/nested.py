@@ -6,6 +6,8 @@ the same share besides. A load that is not at the centre shifts the centre of ma
 
 from __future__ import annotations
 
+from collections.abc import Container
+
 from ddagr_gym.diagnosis.change.model import Model
 from ddagr_gym.diagnosis.search.equivalents import TRIAL_STEPS
 from ddagr_gym.diagnosis.search.initial_guess import looped_encoders, off_centre_load
@@ -17,7 +19,9 @@ AS_GOOD = 0.9
 library's forms of them differ by."""
 
 
-def containing(before: Model, named: Model, rival: Rival, dispersion: float) -> Rival | None:
+def containing(
+    before: Model, named: Model, rival: Rival, dispersion: float, known: Container[str] = ()
+) -> Rival | None:
     """The effect that contains a named one, refitted; None where there is none, or where it explains less.
 
     Args:
@@ -25,10 +29,11 @@ def containing(before: Model, named: Model, rival: Rival, dispersion: float) -> 
         named: the model with it.
         rival: the refit of it.
         dispersion: of the model before.
+        known: names that stand beside it anyway.
     """
     point, problem = rival.fitted.point, named.problem
     found = looped_encoders(point) or off_centre_load(problem.robot, point)
-    if found is None:
+    if found is None or found.effects[-1].name in known:
         return None
     larger = found.effects[-1].name
     spells = {name: spell for name, spell in problem.spells.items() if name != larger}

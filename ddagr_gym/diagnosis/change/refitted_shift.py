@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.diagnosis.change.contrasts import contrast_sizes
-from ddagr_gym.diagnosis.change.drive_scan import ELSEWHERE, named_in
+from ddagr_gym.diagnosis.change.drive_scan import elsewhere, named_in
 from ddagr_gym.diagnosis.change.ordinary import Scores
 from ddagr_gym.diagnosis.change.shifts import Shift, Sizes, probability_of, sizes_of
 from ddagr_gym.diagnosis.search.candidates import moved_field
@@ -66,10 +66,9 @@ def further_sizes(scores: Scores, keys: Sequence[str], apart: bool) -> Sizes | N
         apart: whether they are taken against those in the rest of the drive, as far as these have columns.
     """
     others, nothing = [key for key in named_in(scores.keys) if key not in keys], np.zeros(len(keys))
-    if not apart or not all(f"{ELSEWHERE}{key}" in scores.keys for key in keys):
+    if not apart or not set(elsewhere(keys)) <= set(scores.keys):
         return sizes_of(scores, keys, nothing, others)
-    elsewhere = [key for key in (f"{ELSEWHERE}{key}" for key in others) if key in scores.keys]
-    found = contrast_sizes(scores, keys, nothing, [*others, *elsewhere])
+    found = contrast_sizes(scores, keys, nothing, [*others, *(key for key in elsewhere(others) if key in scores.keys)])
     return None if found is None else found.sizes
 
 
