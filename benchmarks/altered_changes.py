@@ -11,10 +11,13 @@ import io
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ddagr_gym.presets import get_robot
 
 Array = NDArray[np.float64]
 Table = Mapping[str, Sequence[str]]
@@ -23,8 +26,10 @@ Table = Mapping[str, Sequence[str]]
 DRIVES = ("warthog_asphalt", "warthog_grass", "warthog_sand")
 """Names of the open drives, which are ordinary."""
 
-STEPS = 16
-"""Of a drive in steps, from its start: 96 s under command, about as long as the drive on grass is (135 s)."""
+ROBOT = "warthog"
+
+STEPS = 30
+"""Of a drive in steps, from its start: 180 s under command."""
 
 LATE_POSES = 0.5
 """A pose computer whose clock was never synchronised, or a solution stamped on arrival [s]."""
@@ -283,6 +288,23 @@ CHANGES = (
         lambda table: turned(table, about_vertical(QUARTER_TURN)),
     ),
 )  # fmt: skip
+
+
+FURTHER = (
+    Change(
+        "encoder_scaled", f"left encoder times {ONE_ENCODER:g}", "encoder_scale", {"left": ONE_ENCODER, "right": 1.0},
+        lambda table: scaled(table, layout_of(table).encoders[:1], ONE_ENCODER),
+    ),
+    Change("gyro_biased", f"yaw rate + {BIASED:g} rad/s", "gyro_bias", {"bias": BIASED}, biased),
+    Change(
+        "one_side_commanded", "commands of the right side times 0.85", "command_gain",
+        {"right": 1.0 / WEAKENED, "left": 1.0},
+        partial(one_side_commanded, half_track=get_robot(ROBOT).half_track),
+    ),
+    Change("encoders_exchanged", "encoders exchanged", "encoders_exchanged", {}, encoders_exchanged),
+)  # fmt: skip
+ALL = {change.name: change for change in (*CHANGES, *FURTHER)}
+"""By name."""
 
 
 def read_table(path: Path, steps: int = STEPS) -> Table:

@@ -25,21 +25,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from benchmarks.altered_changes import (
-    BIASED,
-    CHANGES,
-    ONE_ENCODER,
-    WEAKENED,
-    Change,
-    Table,
-    biased,
-    encoders_exchanged,
-    layout_of,
-    one_side_commanded,
-    packed,
-    read_table,
-    scaled,
-)
+from benchmarks.altered_changes import ALL, ROBOT, Change, Table, packed, read_table
 from benchmarks.real_drives.__main__ import DRIVES, recordings_folder
 from benchmarks.score_concealed import names_of, share
 from ddagr_gym.calibration.ordinary_robot import load_ordinary_robot
@@ -48,7 +34,6 @@ from ddagr_gym.diagnosis.change.ordinary import OrdinaryRobot
 from ddagr_gym.diagnosis.change.run import what_changed
 from ddagr_gym.errors import InputError
 from ddagr_gym.files import write_json
-from ddagr_gym.presets import get_robot
 from ddagr_gym.recordings.files import write_atomically
 from ddagr_gym.recordings.load import load_recording
 from ddagr_gym.recordings.schema import Recording
@@ -56,7 +41,6 @@ from ddagr_gym.rendering import palette
 from ddagr_gym.reporting.figures import house_style
 
 RESULT = Path(__file__).resolve().parent / "results" / "what_changed.json"
-ROBOT = "warthog"
 REVERSED = "concealed/warthog_4"
 """Whose gyro turns the wrong way; it is turned before anything is written into the drive."""
 
@@ -64,20 +48,6 @@ REVERSED = "concealed/warthog_4"
 MOST_IN_SET = 3
 """Names of a set that still is an answer."""
 
-FURTHER = (
-    Change(
-        "encoder_scaled", f"left encoder times {ONE_ENCODER:g}", "encoder_scale", {"left": ONE_ENCODER, "right": 1.0},
-        lambda table: scaled(table, layout_of(table).encoders[:1], ONE_ENCODER),
-    ),
-    Change("gyro_biased", f"yaw rate + {BIASED:g} rad/s", "gyro_bias", {"bias": BIASED}, biased),
-    Change(
-        "one_side_commanded", "commands of the right side times 0.85", "command_gain",
-        {"right": 1.0 / WEAKENED, "left": 1.0},
-        partial(one_side_commanded, half_track=get_robot(ROBOT).half_track),
-    ),
-    Change("encoders_exchanged", "encoders exchanged", "encoders_exchanged", {}, encoders_exchanged),
-)  # fmt: skip
-ALL = {change.name: change for change in (*CHANGES, *FURTHER)}
 WHOLE = sys.maxsize
 """Steps of a drive that are kept."""
 

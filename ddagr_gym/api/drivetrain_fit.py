@@ -47,14 +47,23 @@ class DrivetrainFit:
     progress: Callable[[str], None] | None
     made: CalibrationOutcome | None = None
 
-    def complete(self, misfit: Mapping[str, float]) -> CompletedNominal | None:
-        """The nominal simulator with the drivetrain that the recordings ask for; None where they cannot tell it."""
-        from ddagr_gym.calibration.drivetrain_answer import drivetrain_answer, drivetrain_findings, late_poses
+    def complete(self, misfit: Mapping[str, float], encoders_doubted: bool = False) -> CompletedNominal | None:
+        """The nominal simulator with the drivetrain that the recordings ask for; None where they cannot tell it.
+
+        Args:
+            misfit: of the encoders over their limits.
+            encoders_doubted: whether the gyro contradicts the encoders of one bank, whose scales are fitted then.
+        """
+        from ddagr_gym.calibration.drivetrain_answer import drivetrain_answer, drivetrain_findings
         from ddagr_gym.calibration.run import LittleExplainedError, calibrate_drives, ready_drives
+        from ddagr_gym.calibration.sensor_findings import named_sensors
         from ddagr_gym.calibration.settings import CalibrationSettings
         from ddagr_gym.diagnosis.result.drivetrain_names import LEAST_EXPLAINED, CompletedNominal
 
-        settings = CalibrationSettings(threads=self.threads, seed=self.seed, least_explained=LEAST_EXPLAINED)
+        settings = CalibrationSettings(
+            threads=self.threads, seed=self.seed, least_explained=LEAST_EXPLAINED,
+            encoder_scales=encoders_doubted,
+        )  # fmt: skip
         if len(self.recordings) == 1:
             fitted, compared, settlings = (_ONE_DRIVE[name] for name in ("fitted", "compared", "settlings"))
             settings = replace(settings, fitted=fitted, compared=compared, settlings=settlings)
@@ -77,7 +86,9 @@ class DrivetrainFit:
         found = self.made.calibration
         answer = drivetrain_answer(found, misfit)
         robot, soil = self.made.robot, self.made.soils[_GROUND]
-        return CompletedNominal(robot, soil, answer, drivetrain_findings(found), late_poses(found))
+        sensors = named_sensors(found)
+        findings = (*drivetrain_findings(found), *(finding for finding, _ in sensors))
+        return CompletedNominal(robot, soil, answer, findings, tuple(effect for _, effect in sensors))
 
     def _say(self, line: str) -> None:
         if self.progress is not None:

@@ -23,7 +23,6 @@ from ddagr_gym.diagnosis.answer.drivetrain import (
     Remaining,
 )
 from ddagr_gym.diagnosis.answer.verdict import Estimate, Finding
-from ddagr_gym.physics.effects.pose_latency import PoseLatency
 
 WHEEL_SPEED = "wheel_speed"
 
@@ -60,23 +59,10 @@ def named_parts(calibration: Calibration) -> dict[str, list[CalibratedParameter]
 
 
 def drivetrain_findings(calibration: Calibration) -> tuple[Finding, ...]:
-    """One finding per part that the recordings ask for, in the order of the signal; then late poses."""
+    """One finding per part that the recordings ask for, in the order of the signal."""
     decisions = {item.name: item for item in calibration.parts}
     folds = len({item.drive for item in calibration.forecasts})
-    parts = tuple(_finding(decisions[name], found, folds) for name, found in named_parts(calibration).items())
-    late = tuple(_late_poses(effect) for effect in late_poses(calibration))
-    return (*parts, *late)
-
-
-def late_poses(calibration: Calibration) -> tuple[PoseLatency, ...]:
-    """The effect of poses that come behind the gyro, by as much as makes their headings agree best; none where soon."""
-    late = max((drive.pose_lateness for drive in calibration.drives), default=0.0)
-    return (PoseLatency(late),) if late >= PoseLatency.parameter("latency").metadata["least"] else ()
-
-
-def _late_poses(effect: PoseLatency) -> Finding:
-    latency = Estimate(effect.latency, "s")
-    return Finding(effect.name, {"latency": latency}, 0.0, 0.0, 0.0, 0.0, {}, {effect.name: 1.0})
+    return tuple(_finding(decisions[name], found, folds) for name, found in named_parts(calibration).items())
 
 
 def _finding(part: PartDecision, parameters: list[CalibratedParameter], folds: int) -> Finding:

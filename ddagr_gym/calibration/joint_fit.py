@@ -113,11 +113,15 @@ class FittedModel:
         return tuple(parameter.name for parameter in self.parameters if parameter.prior > 0.0)
 
 
-def complete_model(data: CalibrationData) -> tuple[RobotModel, dict[str, float]]:
+def complete_model(data: CalibrationData, encoder_scales: bool = False) -> tuple[RobotModel, dict[str, float]]:
     """The joint model with all parts, and the values at which parameters that never move are held.
 
     Soils of the grounds differ from the first one's by offsets that are held; what is fitted of a ground acts on top.
     Slopes that the accelerometers tell are held too.
+
+    Args:
+        data: drives.
+        encoder_scales: with scales of the encoders as a part.
     """
     offsets, held = _soil_offsets(data)
     slopes, gradients = _slope_offsets(data)
@@ -134,7 +138,7 @@ def complete_model(data: CalibrationData) -> tuple[RobotModel, dict[str, float]]
     biases = [p for p in sensor_parameters(data.count, bias, 1.0) if p.name.startswith("gyro_bias")]
     robot = complete_robot(data.robot)
     constants = () if data.currents is None else data.currents.parameters
-    return RobotModel(robot, (*offsets, *soil, *shared_parameters(robot), *biases, *constants)), held
+    return RobotModel(robot, (*offsets, *soil, *shared_parameters(robot, encoder_scales), *biases, *constants)), held
 
 
 def _soil_offsets(data: CalibrationData) -> tuple[list[ModelParameter], dict[str, float]]:

@@ -12,6 +12,10 @@ from ddagr_gym.physics import layout
 GYRO_SCALE_DEVIATION = 0.03
 """Prior of the gyro's scale [-]: data sheets of low-cost gyros promise 3 %."""
 
+ENCODER_DEVIATION = 0.1
+"""Prior of the scale of an encoder that the readings themselves make suspicious [-] (ours): a gear or a tyre exchanged,
+and within reach a count doubled."""
+
 DELAY_DEVIATION = 0.3
 """Prior of the dead time between command and wheels [s] (ours): 0.2 to 0.43 s on a Husky and a Warthog."""
 
@@ -79,6 +83,12 @@ def _of_drivetrain(name: str, parameters: tuple[str, ...], needs: tuple[str, ...
     return Part(name, PART_TITLES[name], parameters, PART_DRIVES[name], needs, usual)
 
 
+ENCODER_SCALES = ("encoder_scale_right", "encoder_scale_left")
+"""Parameters of the encoders, which only fits have whose readings make them suspicious."""
+
+SENSOR_SCALES = ("gyro_scale", *ENCODER_SCALES)
+"""Parameters of sensors, which have no place in a robot."""
+
 PARTS = (
     Part(
         "gyro_scale",
@@ -100,6 +110,12 @@ PARTS = (
         ("half_wheelbase", "half_track", "half_width", "outer_radius"),
         "slow straight pieces and slow arcs to both sides on firm ground, with poses",
         on_data_sheet=True,
+    ),
+    Part(
+        "encoder_scale",
+        "scales of the encoders",
+        ENCODER_SCALES,
+        "straight pieces at several speeds, with poses",
     ),
     _of_drivetrain("no_load_speed", ("no_load_speed",)),
     _of_drivetrain("torque_limit", ("acceleration_limit",)),
@@ -189,11 +205,21 @@ def complete_robot(robot: Robot) -> Robot:
     return replace(robot, drivetrain=drivetrain, standard_deviations={**deviations, **robot.standard_deviations})
 
 
-def shared_parameters(robot: Robot) -> tuple[ModelParameter, ...]:
-    """Every parameter of the parts of a complete robot that it states as uncertain, and the scale of its gyro."""
+def shared_parameters(robot: Robot, encoder_scales: bool = False) -> tuple[ModelParameter, ...]:
+    """Every parameter of the parts of a complete robot that it states as uncertain, and scales of its sensors.
+
+    Args:
+        robot: with every part.
+        encoder_scales: with those of the encoders beside that of the gyro.
+    """
     scale = ModelParameter("gyro_scale", "-", (layout.GYRO_SCALE,), True, GYRO_SCALE_DEVIATION, 0.01, -0.3, 0.3)
     known = {name for part in PARTS for name in part.parameters}
-    return (*(p for p in robot_parameters(robot) if p.name in known), scale)
+    encoders = tuple(
+        ModelParameter(name, "-", (layout.ENCODER_SCALE + bank,), True, ENCODER_DEVIATION, 0.01, -1.0, 1.0)
+        for bank, name in enumerate(ENCODER_SCALES)
+        if encoder_scales
+    )
+    return (*(p for p in robot_parameters(robot) if p.name in known), scale, *encoders)
 
 
 def first_values(parameters: tuple[ModelParameter, ...]) -> dict[str, float]:

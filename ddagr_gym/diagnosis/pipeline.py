@@ -26,7 +26,7 @@ from ddagr_gym.diagnosis.mid_drive.again import onsets_of_names, search_in_parts
 from ddagr_gym.diagnosis.mid_drive.onsets import with_onsets
 from ddagr_gym.diagnosis.planning.drivetrain_drive import drivetrain_drive
 from ddagr_gym.diagnosis.planning.next_drive import plan_next_drive
-from ddagr_gym.diagnosis.preprocessing.data_checks import data_doubts
+from ddagr_gym.diagnosis.preprocessing.data_checks import data_doubts, encoders_doubted
 from ddagr_gym.diagnosis.preprocessing.session import DiagnosisSession, Progress, be_silent, prepare
 from ddagr_gym.diagnosis.result.channel_fault_findings import with_contradictions
 from ddagr_gym.diagnosis.result.conclusion import accept, conclude, standing
@@ -38,6 +38,7 @@ from ddagr_gym.diagnosis.result.drivetrain_names import (
     unlike_commands,
     with_drivetrain,
 )
+from ddagr_gym.diagnosis.result.gyro_findings import gyro_findings
 from ddagr_gym.diagnosis.review import review
 from ddagr_gym.diagnosis.search.scanned_model import SearchResult
 from ddagr_gym.diagnosis.search.starting_models import refit_nominal, starting_models
@@ -59,8 +60,9 @@ LATER = ("certification", "unnamed terms", "next drive")
 OnStep = Callable[[str, bool], None]
 """Function that takes the name of a step that begins, and whether its result was kept from before."""
 
-CompleteNominal = Callable[[Mapping[str, float]], CompletedNominal | None]
-"""Function that fits the drivetrain of the nominal robot to the recordings; takes the encoders' misfit over its limit.
+CompleteNominal = Callable[[Mapping[str, float], bool], CompletedNominal | None]
+"""Function that fits the drivetrain of the nominal robot to the recordings; takes the encoders' misfit over its limit,
+and whether the gyro contradicts the encoders of one bank.
 
 None where the recordings cannot tell it. It is given from outside, since a calibration knows the stages of a diagnosis
 and not the other way round."""
@@ -177,7 +179,7 @@ def diagnose(
     session = session.during(spells) if spells else session
     accepted = accept(found, session.gates)
     unlike = {} if complete_nominal is None else unlike_commands(accepted.chosen, session.gates)
-    nominal = complete_nominal(unlike) if complete_nominal is not None and unlike else None
+    nominal = complete_nominal(unlike, encoders_doubted(checks)) if complete_nominal is not None and unlike else None
     if nominal is not None and is_an_answer(nominal):
         made = _beside_drivetrain(session, standing(found, session.gates), nominal, names_only, steps)
     else:
@@ -250,19 +252,19 @@ def _beside_drivetrain(
     found = steps.keep("completed scan", beside_completed, session, refitted, before.chosen.fitted.point.effects)
     diagnosis, effects = steps.run("verdict", conclude, session, found, found)
     diagnosis = with_onsets(diagnosis, steps.keep("onsets", onsets_of_names, session, found))
-    diagnosis = with_drivetrain(diagnosis, nominal, before.nominal.misfit)
+    seen = steps.keep("gyro against poses", gyro_findings, session.mended.recordings, session.rng("gyro"))
+    diagnosis = with_drivetrain(diagnosis, nominal, before.nominal.misfit, [finding for finding, _ in seen])
     steps.begin("localisation")
     traces = steps.keep("localisation traces", trace_mismatch, session, found)
     located = steps.keep("localisation", locate, session, found, traces)
     evidence = steps.run("evidence", gather_evidence, session, found, traces)
-    own = {effect.name for effect in nominal.effects}
-    every = (*(effect for effect in effects if effect.name not in own), *nominal.effects)
+    told = {effect.name: effect for effect in (*effects, *nominal.effects, *(effect for _, effect in seen))}
     places = {"sensor_hold": _where_repeated(session)}
     findings = tuple(replace(item, where=places.get(item.name, item.where)) for item in diagnosis.findings)
     following = None if names_only else drivetrain_drive(nominal.answer)
     located_too = replace(diagnosis, localisation=located, findings=findings, next_drive=following)
     diagnosis = with_contradictions(located_too, session.mended.contradictions)
-    return Outcome(diagnosis, every, session, found, evidence)
+    return Outcome(diagnosis, tuple(told.values()), session, found, evidence)
 
 
 def _options(session: DiagnosisSession, names_only: bool, robot_file: str) -> Options:

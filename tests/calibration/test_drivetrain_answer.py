@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from ddagr_gym.calibration.drivetrain_answer import drivetrain_answer, drivetrain_findings, late_poses
+from ddagr_gym.calibration.drivetrain_answer import drivetrain_answer, drivetrain_findings
 from ddagr_gym.calibration.part_selection import LEAST_GROWTH, is_missed, surely_above
 from ddagr_gym.calibration.result import (
     CALIBRATED,
@@ -101,10 +101,3 @@ def test_the_gate_of_a_part_is_the_one_that_its_selection_used(error):
     assert gate == max(LEAST_GROWTH, surely_above(2) * error)
     assert not is_missed(gate, error, 2)
     assert is_missed(gate + 1e-9, error, 2)
-
-
-@pytest.mark.parametrize(("lateness", "named"), [(0.01, False), (0.4, True)])
-def test_late_poses_are_named_from_the_least_latency_that_matters(lateness, named):
-    names = [finding.name for finding in drivetrain_findings(calibration(lateness))]
-    assert ("pose_latency" in names) is named
-    assert [effect.latency for effect in late_poses(calibration(lateness))] == ([lateness] if named else [])

@@ -21,7 +21,7 @@ from ddagr_gym.calibration.input_requirements import (
     with_gyro_forward,
 )
 from ddagr_gym.errors import InputError
-from ddagr_gym.presets import get_robot
+from ddagr_gym.presets import get_robot, get_soil
 
 
 def without(recording, *names):
@@ -93,16 +93,31 @@ def test_wheels_of_another_size_are_refused_by_what_the_poses_travel(field_drive
     check_scales(["a"], scales[:1], get_robot("ddagr"))
 
 
+def test_a_robot_on_ice_is_not_refused_for_its_slip():
+    """Wheels that spin on most of the drive roll with little slip on some of it; with a wrong radius none does."""
+    ice = replace(get_soil("firm_ground"), cohesion=300.0, friction_angle=np.radians(5.0))
+    held = np.random.default_rng(0).uniform(-5.0, 12.0, (24, 2))
+    made = ddagr_gym.simulate(np.repeat(held, 100, axis=0), rate=20.0, robot="warthog", soil=ice, pose_rate=5.0)
+    scale = drive_scale(made.recording, np.random.default_rng(0))
+    assert scale.travel is not None
+    assert scale.travel < 0.5
+    assert scale.rolling == pytest.approx(0.95, abs=0.1)
+    check_scales(["ice", "asphalt"], [scale, DriveScale(0.96, 1.04, 1.7, (1.6, 1.8))], get_robot("warthog"))
+    wrong = replace(scale, rolling=0.5 * scale.rolling)
+    with pytest.raises(InputError, match=r"travel 0\.4\d of what wheels of 0\.3 m roll where they slip least"):
+        check_scales(["ice"], [wrong], get_robot("warthog"))
+
+
 def test_a_track_below_the_geometric_one_is_refused():
     with pytest.raises(InputError, match=r"track were 0\.50 times"):
-        check_scales(["a"], [DriveScale(0.95, 0.5, (0.45, 0.55))], get_robot("ddagr"))
+        check_scales(["a"], [DriveScale(0.95, 1.0, 0.5, (0.45, 0.55))], get_robot("ddagr"))
 
 
 def test_a_track_that_may_be_right_is_not_refused():
     """Where a robot hardly turns the track is the inverse of a small number, and its interval says so."""
-    check_scales(["a"], [DriveScale(0.95, -18.0, (-629.0, 172.0))], get_robot("ddagr"))
+    check_scales(["a"], [DriveScale(0.95, 1.0, -18.0, (-629.0, 172.0))], get_robot("ddagr"))
     with pytest.raises(InputError, match=r"track were 9\.00 times"):
-        check_scales(["a"], [DriveScale(0.95, 9.0, (7.0, 12.0))], get_robot("ddagr"))
+        check_scales(["a"], [DriveScale(0.95, 1.0, 9.0, (7.0, 12.0))], get_robot("ddagr"))
 
 
 def test_a_straight_drive_says_nothing_of_the_track(field_drive):

@@ -16,6 +16,7 @@ from ddagr_gym.diagnosis.answer.verdict import Diagnosis, GatesUsed
 from ddagr_gym.diagnosis.gates.thresholds import Thresholds
 from ddagr_gym.diagnosis.pipeline import LATER, STEPS
 from ddagr_gym.diagnosis.setting import Setting
+from ddagr_gym.physics.effects.gyro_scale import GyroScale
 from ddagr_gym.physics.effects.pose_latency import PoseLatency
 from ddagr_gym.presets import get_robot, get_soil
 
@@ -123,7 +124,10 @@ def test_the_drivetrain_is_fitted_where_the_library_leaves_too_much_in_the_encod
     monkeypatch.setattr(pipeline, "standing", lambda found, gates: found)
     monkeypatch.setattr(pipeline, "refit_nominal", lambda problem, progress: ("raw", "refitted"))
     monkeypatch.setattr(pipeline, "beside_completed", lambda session, refitted, effects: f"{effects} beside {refitted}")
-    monkeypatch.setattr(pipeline, "with_drivetrain", lambda answer, made, misfit: replace(answer, verdict=("load",)))
+    monkeypatch.setattr(
+        pipeline, "with_drivetrain", lambda answer, made, misfit, seen: replace(answer, verdict=("load", *seen))
+    )
+    monkeypatch.setattr(pipeline, "gyro_findings", lambda recordings, rng: (("gyro_scale", GyroScale(1.1)),))
     monkeypatch.setattr(
         pipeline,
         "search",
@@ -135,16 +139,16 @@ def test_the_drivetrain_is_fitted_where_the_library_leaves_too_much_in_the_encod
     monkeypatch.setattr(pipeline, "search_in_parts", lambda session, start, found: ({}, found))
     asked: list[Any] = []
 
-    def complete(misfit: Any) -> Any:
-        asked.append(misfit)
+    def complete(misfit: Any, doubted: bool) -> Any:
+        asked.append((misfit, doubted))
         return None if explained is None else nominal
 
     outcome, _ = stages.run(complete_nominal=complete)
-    assert asked == [{"encoder_left": 9.0}]
-    assert outcome.diagnosis.verdict == (("load",) if told else ("none",))
+    assert asked == [({"encoder_left": 9.0}, False)]
+    assert outcome.diagnosis.verdict == (("load", "gyro_scale") if told else ("none",))
     assert outcome.nominal[0].name == ("warthog" if told else "ddagr")
     assert ("certify" in stages.called) is not told
-    assert (late in outcome.effects) is told
+    assert ({late, GyroScale(1.1)} <= set(outcome.effects)) is told
     if told:
         assert outcome.diagnosis.next_drive is not None
         assert "ddagr calibrate" in outcome.diagnosis.next_drive.why

@@ -11,6 +11,7 @@ from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.recordings.checks.across import across_runs
 from ddagr_gym.recordings.checks.findings import CheckFinding, Status
 from ddagr_gym.recordings.checks.run import check_recording
+from ddagr_gym.recordings.checks.turning import BANKS
 from ddagr_gym.recordings.pose_frames import frames_apart
 from ddagr_gym.recordings.schema import Recording
 
@@ -50,6 +51,11 @@ def _frames_doubt(recording: Recording) -> DataDoubt:
 def _doubt(recording: str, finding: CheckFinding) -> DataDoubt:
     sentence = f"{finding.meaning} {finding.remedy}".strip()
     return DataDoubt(recording, finding.channel, finding.check, sentence, finding.suspects)
+
+
+def encoders_doubted(doubts: Sequence[DataDoubt]) -> bool:
+    """Whether a turn of one bank's encoder turns the robot otherwise than one of the other's."""
+    return any(doubt.channel == BANKS for doubt in doubts)
 
 
 def suspects_of(doubts: Sequence[DataDoubt]) -> tuple[str, ...]:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
+
 import numpy as np
 
 from ddagr_gym.recordings.checks.blocks import cut_blocks
@@ -59,6 +62,9 @@ SETTLED = 2.0
 """Time after a command's change from which the bank counts as steady [s]."""
 WINDOW = 2.0
 """Time over which distances are compared [s]."""
+LEAST_SLIPPING = 0.1
+"""Share of the windows that counts as those that slip least (ours)."""
+_TRAVEL_CHANNELS = ("pose_x", "pose_y", "pose_yaw", "yaw_rate", "encoder_right", "encoder_left")
 
 
 def travel(recording: Recording, rng: np.random.Generator) -> list[CheckFinding]:
@@ -81,16 +87,42 @@ def travelled_over_rolled(recording: Recording, rng: np.random.Generator) -> Est
     Returns:
         None without pose, gyro, motion or the robot's geometry.
     """
-    geometry = recording.meta.geometry
-    needed = ("pose_x", "pose_y", "pose_yaw", "yaw_rate", "encoder_right", "encoder_left")
-    if geometry is None or not recording.has(*needed):
+    sums = [_moments(*vectors) for vectors in _vectors(recording, rng)]
+    return estimate([s for s in sums if s[2] > 0 and s[3] > 0], _shares, rng)
+
+
+def share_with_least_slip(recording: Recording, rng: np.random.Generator) -> float | None:
+    """Travelled over rolled distance where the robot slips least: in the best tenth of the longer half of windows [-].
+
+    It is near 1 on any ground, on ice too, where the wheels mostly spin: some windows are gentle. A wrong wheel radius
+    changes it as much as all others. In windows in which the robot hardly gets on, it is noise.
+
+    Returns:
+        None without pose, gyro, motion or the robot's geometry.
+    """
+    pairs = [np.zeros((2, 0))]
+    pairs += [np.stack([np.hypot(*rolled), np.hypot(*travelled)]) for rolled, travelled in _vectors(recording, rng)]
+    rolled, travelled = np.concatenate(pairs, axis=1)
+    known = np.isfinite(travelled) & (rolled > _radius(recording))
+    if not known.any():
         return None
+    far = known & (rolled >= np.median(rolled[known]))
+    return float(np.quantile(travelled[far] / rolled[far], 1.0 - LEAST_SLIPPING))
+
+
+def _radius(recording: Recording) -> float:
+    return math.nan if recording.meta.geometry is None else recording.meta.geometry.wheel_radius
+
+
+def _vectors(recording: Recording, rng: np.random.Generator) -> Iterator[tuple[FloatArray, FloatArray]]:
+    """Rolled and travelled vectors (2, n) in the pose's frame over windows, block by block; none without channels."""
+    if recording.meta.geometry is None or not recording.has(*_TRAVEL_CHANNELS):
+        return
     lag = known_lag(pose_offset(recording, rng))
-    speed = 0.5 * geometry.wheel_radius * (filled(recording, "encoder_right") + filled(recording, "encoder_left"))
+    speed = 0.5 * _radius(recording) * (filled(recording, "encoder_right") + filled(recording, "encoder_left"))
     heading = gyro_direction(recording) * integral(recording, recording["yaw_rate"])
     rolled = [integral(recording, speed * np.cos(heading)), integral(recording, speed * np.sin(heading))]
     pose_heading = unwrapped_heading(recording)
-    sums = []
     for span, block in blocks_in_spans(recording):
         rows = block.start + np.flatnonzero(np.isfinite(pose_heading[block]))
         at = recording.t[rows] - lag
@@ -98,12 +130,13 @@ def travelled_over_rolled(recording: Recording, rng: np.random.Generator) -> Est
         path = np.stack([sampled(recording, span, component, at) for component in rolled])
         turn = pose_heading[rows] - sampled(recording, span, heading, at)
         position = np.stack([recording["pose_x"][rows], recording["pose_y"][rows]])
-        sums.append(_moments(at, path, position, turn))
-    return estimate([s for s in sums if s[2] > 0 and s[3] > 0], _shares, rng)
+        yield _over_windows(at, path, position, turn)
 
 
-def _moments(at: FloatArray, path: FloatArray, position: FloatArray, turn: FloatArray) -> FloatArray:
-    """Sums over windows of rolled and travelled vectors: along, across, squared rolled and travelled length.
+def _over_windows(
+    at: FloatArray, path: FloatArray, position: FloatArray, turn: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Rolled and travelled vectors (2, n) over windows.
 
     Args:
         at: times of the poses (n,) [s].
@@ -117,7 +150,11 @@ def _moments(at: FloatArray, path: FloatArray, position: FloatArray, turn: Float
     angle = 0.5 * (turn[first] + turn[last])
     dx, dy = path[:, last] - path[:, first]
     rolled = np.stack([np.cos(angle) * dx - np.sin(angle) * dy, np.sin(angle) * dx + np.cos(angle) * dy])
-    travelled = position[:, last] - position[:, first]
+    return rolled, position[:, last] - position[:, first]
+
+
+def _moments(rolled: FloatArray, travelled: FloatArray) -> FloatArray:
+    """Sums of rolled and travelled vectors: along, across, squared rolled and travelled length."""
     along = np.sum(rolled * travelled)
     across = np.sum(rolled[0] * travelled[1] - rolled[1] * travelled[0])
     moments = np.array([along, across, np.sum(rolled**2), np.sum(travelled**2)])

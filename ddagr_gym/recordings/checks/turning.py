@@ -45,7 +45,8 @@ recordings."""
 LEAST_TURN = 0.05
 """Root mean square yaw rate below which turns tell nothing [rad/s]."""
 
-_BANKS = "encoder_right to encoder_left"
+BANKS = "encoder_right to encoder_left"
+"""Channel of the findings on the share of each bank in the yaw rate."""
 _DRIVE = "Drive turns to both sides at several speeds."
 
 
@@ -56,7 +57,7 @@ def turning(recording: Recording, rng: np.random.Generator) -> list[CheckFinding
         recording: any; what needs wheel radius and track is not testable without the robot.
         rng: for the resampling.
     """
-    return [*_gyro_findings(recording, rng), *_track_findings(recording, rng)]
+    return [*against_poses(recording, rng), *_track_findings(recording, rng)]
 
 
 def gyro_against_pose(recording: Recording, rng: np.random.Generator) -> Estimate | None:
@@ -142,7 +143,13 @@ def turns(recording: Recording) -> bool:
     return bool(rate.size) and float(np.sqrt(np.mean(rate**2))) >= LEAST_TURN
 
 
-def _gyro_findings(recording: Recording, rng: np.random.Generator) -> list[CheckFinding]:
+def against_poses(recording: Recording, rng: np.random.Generator) -> list[CheckFinding]:
+    """Findings on the gyro's scale and bias against the headings of the poses.
+
+    Args:
+        recording: any; not testable without turns or poses.
+        rng: for the resampling.
+    """
     pair = "yaw_rate to pose_yaw"
     found = gyro_against_pose(recording, rng) if turns(recording) else None
     if found is None:
@@ -181,9 +188,9 @@ def _track_findings(recording: Recording, rng: np.random.Generator) -> list[Chec
     )
     if not np.isfinite(found.intervals[1][0]):
         why = "Both banks do the same throughout, so that nothing tells what a turn of either does."
-        return [track, not_testable(BALANCE.check, _BANKS, why, _DRIVE)]
+        return [track, not_testable(BALANCE.check, BANKS, why, _DRIVE)]
     meaning = f"A turn of the right wheels turns the robot {share:.3f} times as much as one of the left."
-    return [track, BALANCE.answer(_BANKS, share, found.intervals[1], meaning=meaning)]
+    return [track, BALANCE.answer(BANKS, share, found.intervals[1], meaning=meaning)]
 
 
 def _track_sentence(chi: float) -> str:

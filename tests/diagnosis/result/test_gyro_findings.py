@@ -1,0 +1,48 @@
+"""A gyro that the headings of the poses contradict is named by what it reads, without a simulator."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ddagr_gym.diagnosis.result.gyro_findings import gyro_findings
+from ddagr_gym.physics.effects.gyro_bias import GyroBias
+from ddagr_gym.physics.effects.gyro_scale import GyroScale
+from ddagr_gym.recordings.schema import RobotGeometry
+from tests.recordings.conftest import Faults, drive
+
+GEOMETRY = RobotGeometry("warthog", 0.3, 0.54)
+
+
+def found_in(*faults: Faults):
+    drives = [drive(GEOMETRY, item, seed=seed) for seed, item in enumerate(faults)]
+    return gyro_findings(drives, np.random.default_rng(0))
+
+
+def test_a_sound_gyro_is_not_named():
+    assert found_in(Faults()) == ()
+
+
+@pytest.mark.parametrize(
+    ("faults", "kind", "field", "size"),
+    [
+        (Faults(gyro_scale=1.1), GyroScale, "scale", 1.1),
+        (Faults(gyro_scale=0.9, pose_latency=0.4), GyroScale, "scale", 0.9),
+        (Faults(gyro_bias=0.05), GyroBias, "bias", 0.05),
+    ],
+)
+def test_what_the_poses_contradict_is_named_with_its_size(faults, kind, field, size):
+    ((finding, effect),) = found_in(faults)
+    assert finding.name == kind.name == effect.name
+    told = finding.parameters[field]
+    assert told.value == getattr(effect, field) == pytest.approx(size, rel=0.1)
+    low, high = told.interval
+    assert low < size < high
+    # it needed no fit, and passed no gate
+    assert finding.gain == finding.gate == 0.0
+
+
+def test_of_several_drives_all_must_say_so():
+    assert found_in(Faults(gyro_scale=1.1), Faults()) == ()
+    ((finding, _),) = found_in(Faults(gyro_scale=1.1), Faults(gyro_scale=1.1))
+    assert finding.parameters["scale"].value == pytest.approx(1.1, rel=0.02)
