@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 import ddagr_gym
@@ -59,6 +60,28 @@ def test_parts_are_named_and_the_pages_say_so(asked, tmp_path):
     assert f'href="{DRIVETRAIN_FOLDER}/calibration.html"' in page
     assert (folder / DRIVETRAIN_FOLDER / "calibration.html").is_file()
     assert "dead time of the commands" in str(result)
+
+
+@pytest.mark.slow
+def test_sensors_are_named_beside_it(asked):
+    """A turned IMU, an encoder with other counts and a gyro with another sensitivity, in one drive."""
+    made = driven(180.0)
+    along, across, angle = made["specific_force_x"], made["specific_force_y"], 0.3
+    turned = {
+        "specific_force_x": np.cos(angle) * along + np.sin(angle) * across,
+        "specific_force_y": np.cos(angle) * across - np.sin(angle) * along,
+        "encoder_left": 1.2 * made["encoder_left"],
+        "yaw_rate": 1.1 * made["yaw_rate"],
+    }
+    result = ddagr_gym.diagnose(replace(made, channels={**made.channels, **turned}), names_only=True)
+    found = {finding.name: finding.parameters for finding in result.findings}
+    assert {"encoder_scale", "gyro_scale", "imu_misalignment", "command_delay"} <= set(found)
+    assert float(found["encoder_scale"]["left"]) == pytest.approx(1.2, abs=0.02)
+    assert float(found["encoder_scale"]["right"]) == pytest.approx(1.0, abs=0.02)
+    assert float(found["gyro_scale"]["scale"]) == pytest.approx(1.1, abs=0.02)
+    assert float(found["imu_misalignment"]["yaw"]) == pytest.approx(angle, abs=0.05)
+    assert {"encoder_scale", "gyro_scale", "imu_misalignment"} <= {effect.name for effect in result.effects}
+    assert "the left encoder reads" in str(result)
 
 
 def test_a_recording_that_cannot_tell_its_drivetrain_keeps_its_answer_and_says_why(asked, monkeypatch):
