@@ -9,6 +9,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ddagr_gym.api.nominal import Nominal
 from ddagr_gym.errors import InputError, InputWarning
 
@@ -55,10 +57,13 @@ class DrivetrainFit:
             encoders_doubted: whether the gyro contradicts the encoders of one bank, whose scales are fitted then.
         """
         from ddagr_gym.calibration.drivetrain_answer import drivetrain_answer, drivetrain_findings
+        from ddagr_gym.calibration.input_requirements import with_gyro_forward
         from ddagr_gym.calibration.run import LittleExplainedError, calibrate_drives, ready_drives
         from ddagr_gym.calibration.sensor_findings import named_sensors
         from ddagr_gym.calibration.settings import CalibrationSettings
+        from ddagr_gym.diagnosis.preprocessing.scaled_readings import without_scales
         from ddagr_gym.diagnosis.result.drivetrain_names import LEAST_EXPLAINED, CompletedNominal
+        from ddagr_gym.diagnosis.result.gyro_findings import gyro_findings
 
         settings = CalibrationSettings(
             threads=self.threads, seed=self.seed, least_explained=LEAST_EXPLAINED,
@@ -68,8 +73,11 @@ class DrivetrainFit:
             fitted, compared, settlings = (_ONE_DRIVE[name] for name in ("fitted", "compared", "settlings"))
             settings = replace(settings, fitted=fitted, compared=compared, settlings=settlings)
         self._say("the wheels do not follow their commands as the simulator says: fitting its drivetrain")
-        grounds, soils = [_GROUND] * len(self.recordings), {_GROUND: self.nominal.soil}
-        drives = (self.recordings, grounds, self.nominal.robot, soils, settings)
+        rng = np.random.default_rng(self.seed)
+        gyro = gyro_findings([with_gyro_forward(item, rng)[0] for item in self.recordings], rng)
+        recordings = [without_scales(item, [effect for _, effect in gyro]) for item in self.recordings]
+        grounds, soils = [_GROUND] * len(recordings), {_GROUND: self.nominal.soil}
+        drives = (recordings, grounds, self.nominal.robot, soils, settings)
         try:
             ready = ready_drives(*drives, self._say)
         except InputError as error:
@@ -86,7 +94,7 @@ class DrivetrainFit:
         found = self.made.calibration
         answer = drivetrain_answer(found, misfit)
         robot, soil = self.made.robot, self.made.soils[_GROUND]
-        sensors = named_sensors(found)
+        sensors = (*named_sensors(found), *gyro)
         findings = (*drivetrain_findings(found), *(finding for finding, _ in sensors))
         return CompletedNominal(robot, soil, answer, findings, tuple(effect for _, effect in sensors))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from ddagr_gym.calibration.forecast_findings import folds_of, forecast_finding
 from ddagr_gym.calibration.part_selection import least_growth
 from ddagr_gym.calibration.parts import part_named
 from ddagr_gym.calibration.result import (
@@ -61,17 +62,14 @@ def named_parts(calibration: Calibration) -> dict[str, list[CalibratedParameter]
 def drivetrain_findings(calibration: Calibration) -> tuple[Finding, ...]:
     """One finding per part that the recordings ask for, in the order of the signal."""
     decisions = {item.name: item for item in calibration.parts}
-    folds = len({item.drive for item in calibration.forecasts})
+    folds = folds_of(calibration)
     return tuple(_finding(decisions[name], found, folds) for name, found in named_parts(calibration).items())
 
 
 def _finding(part: PartDecision, parameters: list[CalibratedParameter], folds: int) -> Finding:
-    """A part as a finding: its gain is the growth of the forecasts' loss without it."""
-    error = part.error or 0.0
     estimates = {p.name: Estimate(p.value, p.unit, p.interval) for p in parameters if p.value is not None}
-    score = part.growth / error if error > 0.0 else 0.0
-    gate = least_growth(error, folds, part_named(part.name).usual)
-    return Finding(part.name, estimates, part.growth, gate, score, part.growth, {}, {part.name: 1.0})
+    gate = least_growth(part.error or 0.0, folds, part_named(part.name).usual)
+    return forecast_finding(part.name, estimates, part.growth, part.error, gate)
 
 
 def _comparisons(calibration: Calibration) -> list[ForecastComparison]:

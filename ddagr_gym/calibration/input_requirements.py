@@ -32,7 +32,7 @@ LEAST_MOVING = 0.1
 LEAST_SPEED = 0.02
 """Bank speed that counts as moving [rad/s] (ours: 5 mm/s at the rim of the thesis's robot)."""
 
-LEAST_TRAVEL = 0.7
+LEAST_TRAVEL = 0.85
 """Least travelled over rolled distance where an ordinary drive slips least [-] (ours): 1.01 to 1.12 in six real ones,
 whose mean is 0.83 to 0.93."""
 

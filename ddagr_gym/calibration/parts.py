@@ -115,7 +115,7 @@ PARTS = (
         "encoder_scale",
         "scales of the encoders",
         ENCODER_SCALES,
-        "straight pieces at several speeds, with poses",
+        "straight pieces and arcs to both sides at several speeds, with poses",
     ),
     _of_drivetrain("no_load_speed", ("no_load_speed",)),
     _of_drivetrain("torque_limit", ("acceleration_limit",)),

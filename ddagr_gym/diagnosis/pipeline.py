@@ -38,7 +38,6 @@ from ddagr_gym.diagnosis.result.drivetrain_names import (
     unlike_commands,
     with_drivetrain,
 )
-from ddagr_gym.diagnosis.result.gyro_findings import gyro_findings
 from ddagr_gym.diagnosis.review import review
 from ddagr_gym.diagnosis.search.scanned_model import SearchResult
 from ddagr_gym.diagnosis.search.starting_models import refit_nominal, starting_models
@@ -247,18 +246,17 @@ def _beside_drivetrain(
         names_only: leave out the next drive.
         steps: of the diagnosis.
     """
-    session = given.with_nominal(nominal.robot, nominal.soil)
+    session = given.with_nominal(nominal.robot, nominal.soil, nominal.effects)
     refitted = steps.keep("completed refit", refit_nominal, session.problem, session.progress)[1]
     found = steps.keep("completed scan", beside_completed, session, refitted, before.chosen.fitted.point.effects)
     diagnosis, effects = steps.run("verdict", conclude, session, found, found)
     diagnosis = with_onsets(diagnosis, steps.keep("onsets", onsets_of_names, session, found))
-    seen = steps.keep("gyro against poses", gyro_findings, session.mended.recordings, session.rng("gyro"))
-    diagnosis = with_drivetrain(diagnosis, nominal, before.nominal.misfit, [finding for finding, _ in seen])
+    diagnosis = with_drivetrain(diagnosis, nominal, before.nominal.misfit)
     steps.begin("localisation")
     traces = steps.keep("localisation traces", trace_mismatch, session, found)
     located = steps.keep("localisation", locate, session, found, traces)
     evidence = steps.run("evidence", gather_evidence, session, found, traces)
-    told = {effect.name: effect for effect in (*effects, *nominal.effects, *(effect for _, effect in seen))}
+    told = {effect.name: effect for effect in (*effects, *nominal.effects)}
     places = {"sensor_hold": _where_repeated(session)}
     findings = tuple(replace(item, where=places.get(item.name, item.where)) for item in diagnosis.findings)
     following = None if names_only else drivetrain_drive(nominal.answer)

@@ -119,7 +119,7 @@ def finding_card(finding: Finding, recordings: Sequence[str]) -> dict[str, Any]:
         "soil": None if finding.soil is None else soil_section(finding.soil),
         "spans": "" if where is None else _spans(where.spans, recordings),
         "equivalents": equivalents,
-        "equivalence_note": _equivalence_note(name, equivalents, seen=finding.gate <= 0.0),
+        "equivalence_note": _equivalence_note(finding, equivalents),
     }
 
 
@@ -131,6 +131,9 @@ def rejected(items: Sequence[Finding]) -> list[dict[str, str]]:
 def _evidence(finding: Finding) -> str:
     if finding.gain == finding.gate == 0.0:
         return "seen in the values"
+    if finding.by_forecasts:
+        growth, gate = (f"{100.0 * value:.1f} %" for value in (finding.gain, finding.gate))
+        return f"forecasts of what was left out are worse by {growth} without it, at least {gate} is asked for"
     parts = [f"gain {number(finding.gain, 3)}"]
     if finding.gate > 0.0:
         parts.append(f"{number(finding.gain / finding.gate)} times its gate of {number(finding.gate, 3)}")
@@ -161,15 +164,17 @@ def _equivalents(name: str, weights: Mapping[str, float]) -> list[dict[str, Any]
     ]
 
 
-def _equivalence_note(name: str, equivalents: Sequence[Mapping[str, Any]], seen: bool) -> str:
-    if seen:
+def _equivalence_note(finding: Finding, equivalents: Sequence[Mapping[str, Any]]) -> str:
+    if finding.gate <= 0.0:
         return "Seen in the values themselves, before any model: no other effect was compared with it."
+    if finding.by_forecasts:
+        return "Decided by forecasts of what was left out of the fit: no other effect was compared with it."
     if len(equivalents) > 1:
         others = " or ".join(in_sentence(item["name"]) for item in equivalents if not item["own"])
         return f"These recordings do not separate it from {others}: weights by resampling the windows."
     from ddagr_gym.physics.effects.registry import effect_kinds
 
-    kind = effect_kinds().get(name)
+    kind = effect_kinds().get(finding.name)
     rivals = ", ".join(in_sentence(other) for other in (kind.confused_with if kind else ()))
     usual = f" It is often confused with {rivals}; not here." if rivals else ""
     return f"Nothing else in the library explains these windows nearly as well.{usual}"

@@ -78,14 +78,18 @@ def finding_rows(
 def _finding_rows(finding: Finding, evidence: AgainstGate) -> Iterator[tuple[str, ...]]:
     """One row per parameter; what belongs to the whole finding is in the first."""
     others = [f"{name} {weight:.2f}" for name, weight in finding.equivalence_set.items() if name != finding.name]
-    none = "nothing else" if finding.gate > 0.0 else "seen in the values"
-    gated = ("–", "–") if evidence is None else tuple(f"{value:.1f}" for value in evidence)
+    none = "not compared" if finding.by_forecasts else "nothing else" if finding.gate > 0.0 else "seen in the values"
+    gated = ("–", "–") if evidence is None else tuple(_number(finding, value) for value in evidence)
     whole = (*gated, ", ".join(others) or none)
     for number, (name, estimate) in enumerate(shown_parameters(finding).items()):
         interval = "" if estimate.interval is None else f"{estimate.interval[0]:.3g} to {estimate.interval[1]:.3g}"
         first = number == 0
         label = f"{finding.name if first else ''} {name}".strip()
         yield label, f"{estimate.value:.3g}", interval, estimate.unit, *(whole if first else ("", "", ""))
+
+
+def _number(finding: Finding, value: float) -> str:
+    return f"{100.0 * value:+.1f} %" if finding.by_forecasts else f"{value:.1f}"
 
 
 def fit_rows(fit: Certificate) -> list[tuple[str, ...]]:

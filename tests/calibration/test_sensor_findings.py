@@ -11,6 +11,7 @@ from ddagr_gym.calibration.accelerometer_results import ImuMounting, MountingSiz
 from ddagr_gym.calibration.part_selection import surely_above
 from ddagr_gym.calibration.result import PartDecision
 from ddagr_gym.calibration.sensor_findings import named_sensors
+from ddagr_gym.diagnosis.answer.verdict import Estimate
 from ddagr_gym.physics.effects.encoder_scale import EncoderScale
 from ddagr_gym.physics.effects.imu_lever_arm import ImuLeverArm
 from ddagr_gym.physics.effects.imu_misalignment import ImuMisalignment
@@ -23,10 +24,6 @@ def with_scales(part: str, kept: bool = True, **scales: float):
     parts = (*made.parts, PartDecision(part, kept, 0.3, 0.02))
     sizes = [replace(parameter(name, part, value, kept), change=np.log(value)) for name, value in scales.items()]
     return replace(made, parts=parts, parameters=(*made.parameters, *sizes))
-
-
-def with_gyro(value: float, kept: bool = True):
-    return with_scales("gyro_scale", kept, gyro_scale=value)
 
 
 def with_imu(*kept: str):
@@ -47,34 +44,38 @@ def test_late_poses_are_named_from_the_least_latency_that_matters(lateness, effe
     assert [finding.name for finding, _ in found] == [effect.name for effect in effects]
 
 
-@pytest.mark.parametrize(
-    ("given", "scales"),
-    [
-        (with_gyro(1.1), [1.1]),
-        (with_gyro(1.004), []),
-        (with_gyro(1.1, kept=False), []),
-    ],
-)
-def test_a_gyro_is_named_where_forecasts_ask_for_another_scale_that_matters(given, scales):
-    assert [effect.scale for _, effect in named_sensors(given)] == pytest.approx(scales)
+def with_encoders(right: float, left: float, kept: bool = True):
+    scales = {"encoder_scale_right": right, "encoder_scale_left": left}
+    return with_scales("encoder_scale", kept, **scales)
 
 
-def test_encoders_are_named_with_both_scales():
-    ((finding, effect),) = named_sensors(
-        with_scales("encoder_scale", encoder_scale_right=1.004, encoder_scale_left=1.2)
-    )
+def test_encoders_are_named_with_both_scales_and_what_speaks_for_them():
+    ((finding, effect),) = named_sensors(with_encoders(1.004, 1.2))
     assert isinstance(effect, EncoderScale)
     scales = {name: item.value for name, item in finding.parameters.items()}
     assert scales == pytest.approx({"right": 1.004, "left": 1.2})
     assert (effect.right, effect.left) == (scales["right"], scales["left"])
-
-
-def test_a_gyro_finding_holds_size_interval_and_what_speaks_for_it():
-    ((finding, _),) = named_sensors(with_gyro(1.1))
-    scale = finding.parameters["scale"]
-    assert (scale.value, scale.interval) == (pytest.approx(1.1), (0.1, 0.3))
+    assert finding.parameters["left"].interval == (0.1, 0.3)
     assert (finding.gain, finding.score) == (0.3, pytest.approx(15.0))
     assert finding.gain > finding.gate == surely_above(2) * 0.02
+    assert finding.by_forecasts
+
+
+@pytest.mark.parametrize("given", [with_encoders(0.93, 0.95), with_encoders(1.0, 1.2, kept=False)])
+def test_encoders_that_agree_or_that_forecasts_do_not_ask_for_are_not_named(given):
+    assert named_sensors(given) == ()
+
+
+def test_an_encoder_that_is_not_identified_is_stated_as_it_should_be():
+    made = with_encoders(1.0, 1.2)
+    held = [replace(p, calibrated=p.name != "encoder_scale_right") for p in made.parameters]
+    ((finding, _),) = named_sensors(replace(made, parameters=tuple(held)))
+    assert finding.parameters["right"] == Estimate(1.0, "-", None)
+
+
+def test_a_gyro_is_not_named_by_forecasts():
+    """The poses say more of it, and its scale is undone before the fit."""
+    assert named_sensors(with_scales("gyro_scale", gyro_scale=1.1)) == ()
 
 
 @pytest.mark.parametrize(
@@ -90,6 +91,17 @@ def test_a_gyro_finding_holds_size_interval_and_what_speaks_for_it():
 )
 def test_the_mounting_of_the_imu_is_named_as_far_as_left_out_readings_ask_for_it(kept, effects):
     assert [effect for _, effect in named_sensors(with_imu(*kept))] == effects
+
+
+def test_a_mounting_of_which_no_size_is_surely_something_is_not_named():
+    made = with_imu("imu_x", "imu_y")
+    wide = [replace(item, interval=(item.value - 1.0, item.value + 1.0)) for item in made.imu.sizes if item.kept]
+    assert named_sensors(replace(made, imu=replace(made.imu, sizes=tuple(wide)))) == ()
+
+
+def test_a_simulator_keeps_no_more_of_the_past_than_its_effect():
+    ((finding, effect),) = named_sensors(calibration(1.2))
+    assert (finding.parameters["latency"].value, effect.latency) == (1.2, 1.0)
 
 
 def test_a_mounting_holds_the_sizes_of_its_fields():

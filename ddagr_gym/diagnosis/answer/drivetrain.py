@@ -84,7 +84,7 @@ class ForecastComparison:
         horizon: time from the start of the forecast [s]; null for all samples.
         unit: of the errors.
         nominal: of the simulator as it was given.
-        corrected: with the drivetrain that was found; what else of robot and soil was fitted is in it too.
+        corrected: with the drivetrain that was found; what else of robot, sensors and soil was fitted is in it too.
         kinematic: of an effective track with delay and lag, which knows no forces.
         corrected_interval: 95 % of ``corrected``, by resampling windows; null where too few were measured.
     """
@@ -124,7 +124,7 @@ class DrivetrainAnswer:
         remaining: where the residual of the wheel speeds is, after the correction.
         explained: share of the nominal simulator's squared error of the wheel speeds, on what was left out, that the
             correction takes away [-].
-        other: names of further parameters of robot and soil that were fitted along.
+        other: names of further parameters of robot, sensors and soil that were fitted along.
         misfit: of the encoders beside the nominal simulator, over its limit, for which the drivetrain was asked.
     """
 

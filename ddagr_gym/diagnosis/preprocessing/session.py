@@ -13,10 +13,12 @@ from ddagr_gym.diagnosis.gates.source_digest import source_digest
 from ddagr_gym.diagnosis.gates.thresholds import Thresholds
 from ddagr_gym.diagnosis.preprocessing.input_requirements import check_recordings, content_hash
 from ddagr_gym.diagnosis.preprocessing.mended_recordings import MendedRecordings, mend_recordings
+from ddagr_gym.diagnosis.preprocessing.scaled_readings import without_scales
 from ddagr_gym.diagnosis.setting import Setting, make_problem
 from ddagr_gym.identification.problem import Problem
 from ddagr_gym.identification.spells import Spell
 from ddagr_gym.parameters import Robot, Soil
+from ddagr_gym.physics.effects import Effect
 from ddagr_gym.recordings.schema import Recording
 
 Progress = Callable[[str], None]
@@ -78,11 +80,18 @@ class DiagnosisSession:
         """The same recordings with effects that are present in a part of them only, by name."""
         return replace(self, problem=self.problem.during(spells))
 
-    def with_nominal(self, robot: Robot, soil: Soil) -> DiagnosisSession:
-        """The same recordings beside another nominal simulator."""
-        problem = make_problem(robot, soil, self.mended.recordings, self.setting).during(self.problem.spells)
-        gates = self.bank.for_length(problem.covered)
-        return replace(self, robot=robot, soil=soil, problem=problem, gates=gates)
+    def with_nominal(self, robot: Robot, soil: Soil, sensors: Sequence[Effect] = ()) -> DiagnosisSession:
+        """The same drives beside another nominal simulator.
+
+        Args:
+            robot: nominal.
+            soil: nominal.
+            sensors: what is known of the sensors; their scales are undone in the readings.
+        """
+        read = tuple(without_scales(recording, sensors) for recording in self.mended.recordings)
+        problem = make_problem(robot, soil, read, self.setting).during(self.problem.spells)
+        gates, mended = self.bank.for_length(problem.covered), replace(self.mended, recordings=read)
+        return replace(self, robot=robot, soil=soil, mended=mended, problem=problem, gates=gates)
 
     def key(self) -> str:
         """SHA-256 of all that results depend on; the number of threads is not among it."""

@@ -68,8 +68,8 @@ class CompletedNominal:
         robot: with the parts that it needs.
         soil: as it was fitted along.
         answer: parts, and what they are worth on what was left out.
-        findings: one per part that is named.
-        effects: of those findings that have no place in a robot.
+        findings: one per part or sensor that is named.
+        effects: of those findings that have no place in a robot: sensors.
     """
 
     robot: Robot
@@ -107,9 +107,7 @@ def beside_completed(session: DiagnosisSession, refitted: Fitted, effects: Seque
     return standing(SearchResult(tuple(models)), session.gates)
 
 
-def with_drivetrain(
-    diagnosis: Diagnosis, nominal: CompletedNominal, misfit: Mapping[str, float], seen: Sequence[Finding] = ()
-) -> Diagnosis:
+def with_drivetrain(diagnosis: Diagnosis, nominal: CompletedNominal, misfit: Mapping[str, float]) -> Diagnosis:
     """A diagnosis beside a completed nominal simulator, with the names of what that one has more.
 
     What is left beside it has no name: its gates are those of simulated drives, which real ground and sensors exceed
@@ -119,12 +117,9 @@ def with_drivetrain(
         diagnosis: beside the completed simulator; what was seen in the values is named, and what stands by itself.
         nominal: the completed simulator.
         misfit: of the channels beside the simulator as it was given, refitted.
-        seen: what channels say against each other, without any simulator.
     """
-    seen_names = {finding.name for finding in seen}
-    told = [*(finding for finding in nominal.findings if finding.name not in seen_names), *seen]
-    own = {finding.name for finding in told}
-    findings = (*(item for item in diagnosis.findings if item.name not in own), *told)
+    own = {finding.name for finding in nominal.findings}
+    findings = (*(item for item in diagnosis.findings if item.name not in own), *nominal.findings)
     names = tuple(finding.name for finding in findings) or (UNKNOWN,)
     complete = diagnosis.complete and bool(findings)
     parts = [PART_TITLES[name] for name in nominal.answer.names]

@@ -6,12 +6,14 @@ What two channels say of the same turns is judged by the recording alone, with t
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 from scipy.special import ndtri
 
 from ddagr_gym.diagnosis.answer.verdict import Estimate, Finding
+from ddagr_gym.diagnosis.result.uncertainty import student_quantile
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.effects.gyro_bias import GyroBias
 from ddagr_gym.physics.effects.gyro_scale import GyroScale
@@ -26,14 +28,14 @@ _FIELDS: dict[str, tuple[type[Effect], str]] = {
 }
 """Effect and its field by family of checks."""
 
-_NARROWER = float(ndtri(0.95) / ndtri(0.5 + 0.5 * CONFIDENCE))
-"""Of an interval of 90 % over that of the checks."""
+_NARROWER = student_quantile(math.inf) / float(ndtri(0.5 + 0.5 * CONFIDENCE))
+"""Of an interval of an answer over that of the checks, which are surer."""
 
 
 def gyro_findings(recordings: Sequence[Recording], rng: np.random.Generator) -> tuple[tuple[Finding, Effect], ...]:
-    """Scale and bias of the gyro where every recording that tells them is outside what counts as sound.
+    """Scale and bias of the gyro where every recording that tells them is beyond what counts as sound, to one side.
 
-    Each with the effect that it is.
+    Each with the effect that it is. A gyro that turns the wrong way has no scale.
 
     Args:
         recordings: with the gyro turned the right way.
@@ -42,17 +44,22 @@ def gyro_findings(recordings: Sequence[Recording], rng: np.random.Generator) -> 
     said = [finding for recording in recordings for finding in against_poses(recording, rng)]
     found = []
     for check, (kind, field) in _FIELDS.items():
-        told = [item for item in said if item.check == check and item.status is not Status.NOT_TESTABLE]
-        if told and all(item.status is Status.SUSPICIOUS for item in told):
-            size = _size(told)
+        told = [item for item in said if item.check == check and item.value is not None and item.interval is not None]
+        size, limits = _size(told) if _beyond(told) else None, kind.parameter(field).metadata
+        if size is not None and limits["low"] <= size.value <= limits["high"]:
             finding = Finding(kind.name, {field: size}, 0.0, 0.0, 0.0, 0.0, {}, {kind.name: 1.0})
             found.append((finding, kind(**{field: size.value})))
     return tuple(found)
 
 
+def _beyond(told: Sequence[CheckFinding]) -> bool:
+    """Whether all of them are suspicious, and all too large or all too small."""
+    sides = {item.value > item.expected[1] for item in told if item.value is not None and item.expected is not None}
+    return len(sides) == 1 and all(item.status is Status.SUSPICIOUS for item in told)
+
+
 def _size(told: Sequence[CheckFinding]) -> Estimate:
-    """Mean of what the recordings tell, with an interval as wide as the widest to either side."""
-    values = [item.value for item in told if item.value is not None]
-    ends = [_NARROWER * (end - item.value) for item in told if item.value and item.interval for end in item.interval]
-    value = float(np.mean(values))
-    return Estimate(value, told[0].unit, (value + min(ends), value + max(ends)))
+    """Mean of what the recordings tell, with an interval that holds that of each."""
+    values = np.array([item.value for item in told])
+    ends = values[:, None] + _NARROWER * (np.array([item.interval for item in told]) - values[:, None])
+    return Estimate(float(values.mean()), told[0].unit, (float(ends.min()), float(ends.max())))

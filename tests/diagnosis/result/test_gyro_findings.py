@@ -42,7 +42,18 @@ def test_what_the_poses_contradict_is_named_with_its_size(faults, kind, field, s
     assert finding.gain == finding.gate == 0.0
 
 
-def test_of_several_drives_all_must_say_so():
-    assert found_in(Faults(gyro_scale=1.1), Faults()) == ()
-    ((finding, _),) = found_in(Faults(gyro_scale=1.1), Faults(gyro_scale=1.1))
-    assert finding.parameters["scale"].value == pytest.approx(1.1, rel=0.02)
+def test_a_gyro_that_turns_the_wrong_way_has_no_scale():
+    assert found_in(Faults(gyro_scale=-1.0)) == ()
+
+
+@pytest.mark.parametrize("other", [Faults(), Faults(gyro_scale=0.85)])
+def test_of_several_drives_all_must_say_so_to_one_side(other):
+    assert found_in(Faults(gyro_scale=1.15), other) == ()
+
+
+def test_an_interval_of_several_drives_holds_what_each_says():
+    ((finding, _),) = found_in(Faults(gyro_scale=1.08), Faults(gyro_scale=1.25))
+    scale = finding.parameters["scale"]
+    assert scale.value == pytest.approx(1.165, rel=0.01)
+    assert scale.interval[0] < 1.08
+    assert scale.interval[1] > 1.25

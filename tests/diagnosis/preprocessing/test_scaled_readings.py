@@ -1,0 +1,35 @@
+"""Readings of sensors whose scale is known to be wrong."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ddagr_gym.diagnosis.preprocessing.scaled_readings import without_scales
+from ddagr_gym.physics.effects.encoder_scale import EncoderScale
+from ddagr_gym.physics.effects.gyro_scale import GyroScale
+from ddagr_gym.physics.effects.imu_tilt import ImuTilt
+from ddagr_gym.recordings.schema import RobotGeometry
+from tests.recordings.conftest import Faults, drive
+
+MADE = drive(RobotGeometry("warthog", 0.3, 0.54), Faults(), seconds=20.0)
+
+
+def test_what_scales_did_to_the_readings_is_undone():
+    wrong = {
+        "yaw_rate": 1.1 * MADE["yaw_rate"],
+        "encoder_right": 0.9 * MADE["encoder_right"],
+        "encoder_left": 1.2 * MADE["encoder_left"],
+    }
+    found = without_scales(
+        replace(MADE, channels={**MADE.channels, **wrong}), [GyroScale(1.1), EncoderScale(0.9, 1.2), ImuTilt(0.1, 0.0)]
+    )
+    for name, values in MADE.channels.items():
+        np.testing.assert_allclose(found[name], values, rtol=1e-12, err_msg=name)
+
+
+def test_a_recording_without_these_channels_stays_as_it_is():
+    bare = replace(MADE, channels={n: v for n, v in MADE.channels.items() if n != "yaw_rate"})
+    assert without_scales(bare, [GyroScale(1.1)]) is bare
+    assert without_scales(MADE, []) is MADE
