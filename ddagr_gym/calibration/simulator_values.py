@@ -12,7 +12,7 @@ from ddagr_gym.calibration.joint_fit import FittedModel
 from ddagr_gym.calibration.parts import SENSOR_SCALES, RobotModel, is_stated, part_of
 from ddagr_gym.calibration.result import CalibratedParameter, Calibration
 from ddagr_gym.envs.calibrated_draws import CalibratedDraws, GroundDraws
-from ddagr_gym.identification.fitted_values import with_values
+from ddagr_gym.identification.fitted_values import soil_with_values, with_values
 from ddagr_gym.identification.parameters import LIMITS, ModelParameter
 from ddagr_gym.parameters import Drivetrain, Robot, Soil
 from ddagr_gym.physics.effects import Effect
@@ -166,8 +166,7 @@ def _after(robot: Robot, name: str, change: float) -> float:
 def fitted_soil(data: CalibrationData, ground: str, values: Mapping[str, float]) -> Soil:
     """Nominal soil of a ground at values of the fit."""
     own = {base: values.get(f"{base}_{ground}", 0.0) for base in SOIL_PARAMETERS}
-    _, soil = with_values(data.robot, data.soils[ground], own)
-    return soil
+    return soil_with_values(data.soils[ground], own)
 
 
 def fitted_sensors(values: Mapping[str, float]) -> tuple[Effect, ...]:

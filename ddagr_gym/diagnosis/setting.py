@@ -72,9 +72,28 @@ class Setting:
 def window_duration(recordings: Sequence[Recording], setting: Setting) -> float:
     """Length of windows [s]: as set, or shorter where short recordings or segments have no room for enough of them."""
     lengths: list[float] = [(s.stop - s.start - 1) * item.period for item in recordings for s in item.segments()]
-    wanted = min(setting.duration, max(sum(lengths) / LEAST_WINDOWS, SHORT))
+    commanded = [seconds for item in recordings for seconds in commanded_seconds(item)]
+    wanted = min(setting.duration, max(_longest(commanded), SHORT))
     usual = float(np.median(lengths)) if lengths else 0.0
     return min(wanted, usual) if usual >= SHORTEST else wanted
+
+
+def commanded_seconds(recording: Recording) -> list[float]:
+    """Time under known commands in each segment [s]."""
+    right, left = recording.held_commands()
+    known = np.isfinite(right) & np.isfinite(left)
+    return [max(int(known[s].sum()) - 1, 0) * recording.period for s in recording.segments()]
+
+
+def windows_in(seconds: Sequence[float], duration: float) -> int:
+    """Windows of one duration that stretches have room for."""
+    return sum(int(item / duration + 1e-6) for item in seconds)
+
+
+def _longest(seconds: Sequence[float]) -> float:
+    """Longest windows of which stretches have room for as many as are needed; 0 without stretches."""
+    lengths = {item / count for item in seconds for count in range(1, LEAST_WINDOWS + 1) if item > 0.0}
+    return next((d for d in sorted(lengths, reverse=True) if windows_in(seconds, d) >= LEAST_WINDOWS), 0.0)
 
 
 def make_problem(

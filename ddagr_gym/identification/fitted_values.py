@@ -26,7 +26,7 @@ def with_values(robot: Robot, soil: Soil, values: Mapping[str, float], *, held: 
     Raises:
         InputError: the values are no robot, or no soil.
     """
-    return robot_with_values(robot, values), _soil(soil, values, held)
+    return robot_with_values(robot, values), soil_with_values(soil, values, held=held)
 
 
 def robot_with_values(robot: Robot, values: Mapping[str, float]) -> Robot:
@@ -46,7 +46,9 @@ def robot_with_values(robot: Robot, values: Mapping[str, float]) -> Robot:
     return replace(robot, wheels=wheels, drivetrain=drivetrain, side_slip_lead=lead, sinkage_tilt=tilt, **factors)
 
 
-def _soil(soil: Soil, values: Mapping[str, float], held: bool) -> Soil:
+def soil_with_values(soil: Soil, values: Mapping[str, float], *, held: bool = False) -> Soil:
+    """The same of a soil alone."""
+
     def factor(*names: str) -> float:
         return math.exp(sum(values.get(name, 0.0) for name in names))
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from ddagr_gym.errors import InputError
-from ddagr_gym.identification.fitted_values import with_values
+from ddagr_gym.identification.fitted_values import soil_with_values, with_values
 
 
 def test_strength_scales_cohesion_and_the_tangent_of_friction(robot, soil):
@@ -39,3 +39,10 @@ def test_a_fit_that_no_soil_has_is_refused(robot, soil):
 def test_what_is_felt_of_a_tilt_by_sinkage_is_kept_within_none_and_all(robot, soil, own, found, kept):
     changed = with_values(replace(robot, sinkage_tilt=own), soil, {"sinkage_tilt": found})[0]
     assert changed.sinkage_tilt == pytest.approx(kept)
+
+
+def test_draws_of_a_soil_do_not_ask_whether_the_wheels_can_be(robot, soil):
+    """Of a draw with a radius that no wheel has, the soil is still one."""
+    with pytest.raises(InputError, match="minor_radius"):
+        with_values(robot, soil, {"outer_radius": -2.0})
+    assert soil_with_values(soil, {"outer_radius": -2.0}) == soil

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ddagr_gym.diagnosis.setting import LEAST_WINDOWS, Setting, window_duration
+from ddagr_gym.diagnosis.setting import LEAST_WINDOWS, Setting, commanded_seconds, window_duration, windows_in
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.windows import PERIOD_TOLERANCE
 from ddagr_gym.parameters import Robot
@@ -96,14 +96,9 @@ def check_different(recordings: Sequence[Recording]) -> None:
 
 def _check_length(recordings: Sequence[Recording], setting: Setting) -> None:
     duration = window_duration(recordings, setting)
-    total, commanded = 0, 0.0
-    for recording in recordings:
-        right, left = recording.held_commands()
-        known = np.isfinite(right) & np.isfinite(left)
-        commanded += float(known.sum()) * recording.period
-        for s in recording.segments():
-            # segments are exactly one window long in logs that were cut into steps
-            total += int((int(known[s].sum()) - 1) * recording.period / duration + 1e-6)
+    # segments are exactly one window long in logs that were cut into steps
+    stretches = [seconds for recording in recordings for seconds in commanded_seconds(recording)]
+    total, commanded = windows_in(stretches, duration), sum(stretches)
     if total < LEAST_WINDOWS:
         names = ", ".join(recording.meta.source for recording in recordings)
         raise InputError(

@@ -25,7 +25,7 @@ from ddagr_gym.diagnosis.answer.soil_at_work import (
 from ddagr_gym.diagnosis.result.factor_sizes import factors
 from ddagr_gym.diagnosis.result.uncertainty import Resampled, intervals
 from ddagr_gym.identification.effect_parameters import moved
-from ddagr_gym.identification.fitted_values import with_values
+from ddagr_gym.identification.fitted_values import soil_with_values
 from ddagr_gym.identification.gauss_newton import Fitted
 from ddagr_gym.identification.problem import Problem
 from ddagr_gym.parameters import Soil, TorusWheel
@@ -137,7 +137,7 @@ def _scaled(problem: Problem, soil: Soil, named: Mapping[str, float], strength: 
         "soil_strength": named.get("soil_strength", 0.0) + math.log(strength),
         "soil_stiffness": named.get("soil_stiffness", 0.0) + math.log(stiffness),
     }
-    return with_values(problem.robot, soil, changed, held=True)[1]
+    return soil_with_values(soil, changed, held=True)
 
 
 def _models(problem: Problem, fitted: Fitted, number: int, draws: Resampled) -> list[tuple[Array, Effect]]:

@@ -8,7 +8,7 @@ import pytest
 
 from ddagr_gym.diagnosis.preprocessing.input_requirements import check_recordings, content_hash
 from ddagr_gym.diagnosis.result.conclusion import data_source
-from ddagr_gym.diagnosis.setting import Setting, window_duration
+from ddagr_gym.diagnosis.setting import Setting, commanded_seconds, window_duration, windows_in
 from ddagr_gym.errors import InputError
 from ddagr_gym.presets import get_robot
 from ddagr_gym.recordings.schema import Recording
@@ -77,6 +77,29 @@ def test_logs_cut_into_steps_of_one_window_pass() -> None:
 def test_short_recordings_get_shorter_windows(seconds: float, duration: float) -> None:
     recording = made(rate=50.0, seconds=seconds)
     assert window_duration([recording], Setting().with_windows(6.0)) == pytest.approx(duration, rel=0.01)
+
+
+def test_windows_are_as_short_as_what_was_commanded_asks_for() -> None:
+    """A drive of 60 s of which an operator drove 36 s by hand has room for eight windows of 3 s."""
+    drive = made(rate=50.0, seconds=60.0)
+    commands = {name: drive[name].copy() for name in ("command_right", "command_left")}
+    for values in commands.values():
+        values[600:2401] = np.nan
+    by_hand = replace(
+        drive, channels={**drive.channels, **commands}, command_valid=np.isfinite(commands["command_left"])
+    )
+    assert sum(commanded_seconds(by_hand)) == pytest.approx(24.0, abs=0.1)
+    assert window_duration([by_hand], Setting().with_windows(6.0)) == pytest.approx(3.0, rel=0.01)
+    check_recordings([by_hand], ROBOT, Setting())
+
+
+def test_windows_fit_into_stretches() -> None:
+    """Eight windows in stretches of 10 and 7 s: two of 3.33 s less than the mean of all would have room for."""
+    recording = made(rate=50.0, seconds=17.0)
+    cut = replace(recording, meta=replace(recording.meta, segments=((0, 501), (501, 850))))
+    duration = window_duration([cut], Setting().with_windows(6.0))
+    assert duration == pytest.approx(2.0, abs=0.01)
+    assert windows_in(commanded_seconds(cut), duration) >= 8
 
 
 def test_windows_may_not_overlap() -> None:
