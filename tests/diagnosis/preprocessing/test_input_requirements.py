@@ -94,12 +94,12 @@ def test_windows_are_as_short_as_what_was_commanded_asks_for() -> None:
 
 
 def test_windows_fit_into_stretches() -> None:
-    """Eight windows in stretches of 10 and 7 s: two of 3.33 s less than the mean of all would have room for."""
-    recording = made(rate=50.0, seconds=17.0)
-    cut = replace(recording, meta=replace(recording.meta, segments=((0, 501), (501, 850))))
+    """Five windows of 4 s in 20 s and three in 14 s; of an eighth of the whole time there would be seven."""
+    recording = made(rate=50.0, seconds=34.1)
+    cut = replace(recording, meta=replace(recording.meta, segments=((0, 1001), (1001, 1702))))
     duration = window_duration([cut], Setting().with_windows(6.0))
-    assert duration == pytest.approx(2.0, abs=0.01)
-    assert windows_in(commanded_seconds(cut), duration) >= 8
+    assert duration == pytest.approx(4.0, abs=0.01)
+    assert windows_in(commanded_seconds(cut), duration) == 8
 
 
 def test_windows_may_not_overlap() -> None:
