@@ -218,7 +218,7 @@ def diagnose(
     priors = NuisancePriors().with_soil(soil_uncertainty)
     gates = _gates(thresholds, nominal, soil_uncertainty)
     setting = Setting(priors=priors, threads=threads).with_windows(_window(window, gates), stride)
-    drivetrain = DrivetrainFit(found, nominal, threads, seed, cache, progress)
+    drivetrain = DrivetrainFit(nominal, threads, seed, cache, progress)
     with _steps(len(steps_of(names_only)), progress) as on_step:
         outcome = diagnosed(
             found,

@@ -16,6 +16,8 @@ from ddagr_gym.errors import InputError, InputWarning
 
 if TYPE_CHECKING:
     from ddagr_gym.calibration.run import Outcome as CalibrationOutcome
+    from ddagr_gym.calibration.settings import CalibrationSettings
+    from ddagr_gym.diagnosis.preprocessing.mended_recordings import MendedRecordings
     from ddagr_gym.diagnosis.result.drivetrain_names import CompletedNominal
     from ddagr_gym.recordings.schema import Recording
 
@@ -32,7 +34,6 @@ class DrivetrainFit:
     """Fits the drivetrain to the recordings that are diagnosed, where that is asked for.
 
     Attributes:
-        recordings: that are diagnosed.
         nominal: simulator.
         threads: of the simulator.
         seed: of resampled intervals.
@@ -41,7 +42,6 @@ class DrivetrainFit:
         made: the calibration behind the fit; None before it.
     """
 
-    recordings: Sequence[Recording]
     nominal: Nominal
     threads: int
     seed: int
@@ -49,33 +49,54 @@ class DrivetrainFit:
     progress: Callable[[str], None] | None
     made: CalibrationOutcome | None = None
 
-    def complete(self, misfit: Mapping[str, float], encoders_doubted: bool = False) -> CompletedNominal | None:
-        """The nominal simulator with the drivetrain that the recordings ask for; None where they cannot tell it.
+    def complete(
+        self, misfit: Mapping[str, float], mended: MendedRecordings, encoders_doubted: bool
+    ) -> CompletedNominal | None:
+        """The nominal simulator with the drivetrain that recordings ask for; None where they cannot tell it.
 
         Args:
             misfit: of the encoders over their limits.
+            mended: recordings.
             encoders_doubted: whether the gyro contradicts the encoders of one bank, whose scales are fitted then.
         """
         from ddagr_gym.calibration.drivetrain_answer import drivetrain_answer, drivetrain_findings
-        from ddagr_gym.calibration.input_requirements import with_gyro_forward
-        from ddagr_gym.calibration.run import LittleExplainedError, calibrate_drives, ready_drives
         from ddagr_gym.calibration.sensor_findings import named_sensors
-        from ddagr_gym.calibration.settings import CalibrationSettings
         from ddagr_gym.diagnosis.preprocessing.scaled_readings import without_scales
-        from ddagr_gym.diagnosis.result.drivetrain_names import LEAST_EXPLAINED, CompletedNominal
+        from ddagr_gym.diagnosis.result.drivetrain_names import CompletedNominal
         from ddagr_gym.diagnosis.result.gyro_findings import gyro_findings
 
-        settings = CalibrationSettings(
-            threads=self.threads, seed=self.seed, least_explained=LEAST_EXPLAINED,
-            encoder_scales=encoders_doubted,
-        )  # fmt: skip
-        if len(self.recordings) == 1:
-            fitted, compared, settlings = (_ONE_DRIVE[name] for name in ("fitted", "compared", "settlings"))
-            settings = replace(settings, fitted=fitted, compared=compared, settlings=settlings)
         self._say("the wheels do not follow their commands as the simulator says: fitting its drivetrain")
-        rng = np.random.default_rng(self.seed)
-        gyro = gyro_findings([with_gyro_forward(item, rng)[0] for item in self.recordings], rng)
-        recordings = [without_scales(item, [effect for _, effect in gyro]) for item in self.recordings]
+        gyro = gyro_findings(mended.recordings, np.random.default_rng(self.seed))
+        read = [without_scales(item, [effect for _, effect in gyro]) for item in mended.in_their_channels]
+        self.made = self._calibrated(read, self._settings(len(read), encoders_doubted))
+        if self.made is None:
+            return None
+        found = self.made.calibration
+        sensors = (*named_sensors(found), *gyro)
+        return CompletedNominal(
+            robot=self.made.robot,
+            soil=self.made.soils[_GROUND],
+            answer=drivetrain_answer(found, misfit),
+            findings=(*drivetrain_findings(found), *(finding for finding, _ in sensors)),
+            effects=tuple(effect for _, effect in sensors),
+        )
+
+    def _settings(self, count: int, encoder_scales: bool) -> CalibrationSettings:
+        from ddagr_gym.calibration.settings import CalibrationSettings
+        from ddagr_gym.diagnosis.result.drivetrain_names import LEAST_EXPLAINED
+
+        usual = CalibrationSettings(
+            threads=self.threads, seed=self.seed, least_explained=LEAST_EXPLAINED, encoder_scales=encoder_scales
+        )
+        if count > 1:
+            return usual
+        fitted, compared, settlings = (_ONE_DRIVE[name] for name in ("fitted", "compared", "settlings"))
+        return replace(usual, fitted=fitted, compared=compared, settlings=settlings)
+
+    def _calibrated(self, recordings: Sequence[Recording], settings: CalibrationSettings) -> CalibrationOutcome | None:
+        """The joint fit; None, and why is said, where recordings are not fit for one or it explains little."""
+        from ddagr_gym.calibration.run import LittleExplainedError, calibrate_drives, ready_drives
+
         grounds, soils = [_GROUND] * len(recordings), {_GROUND: self.nominal.soil}
         drives = (recordings, grounds, self.nominal.robot, soils, settings)
         try:
@@ -84,19 +105,13 @@ class DrivetrainFit:
             warnings.warn(f"the drivetrain cannot be fitted: {error}", InputWarning, stacklevel=2)
             return None
         try:
-            self.made = calibrate_drives(
+            return calibrate_drives(
                 *drives, soil_names={_GROUND: self.nominal.soil_name}, ready=ready,
                 cache=None if self.cache is None else Path(self.cache) / _GROUND, progress=self._say,
             )  # fmt: skip
         except LittleExplainedError as error:
             self._say(f"{error}: no answer")
             return None
-        found = self.made.calibration
-        answer = drivetrain_answer(found, misfit)
-        robot, soil = self.made.robot, self.made.soils[_GROUND]
-        sensors = (*named_sensors(found), *gyro)
-        findings = (*drivetrain_findings(found), *(finding for finding, _ in sensors))
-        return CompletedNominal(robot, soil, answer, findings, tuple(effect for _, effect in sensors))
 
     def _say(self, line: str) -> None:
         if self.progress is not None:

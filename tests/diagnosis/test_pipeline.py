@@ -141,7 +141,8 @@ def test_the_drivetrain_is_fitted_where_the_library_leaves_too_much_in_the_encod
     monkeypatch.setattr(pipeline, "search_in_parts", lambda session, start, found: ({}, found))
     asked: list[Any] = []
 
-    def complete(misfit: Any, doubted: bool) -> Any:
+    def complete(misfit: Any, mended: Any, doubted: bool) -> Any:
+        assert mended is stages.session.mended
         asked.append((misfit, doubted))
         return None if explained is None else nominal
 

@@ -44,6 +44,14 @@ class MendedRecordings:
     left_out: tuple[RepeatedReadings, ...] = ()
 
     @property
+    def in_their_channels(self) -> tuple[Recording, ...]:
+        """Recordings as they were read, but for readings that belong to other channels."""
+        found = self.given
+        for fault in self.channel_faults:
+            found = tuple(with_channels(recording, fault.takes) for recording in found)
+        return found
+
+    @property
     def held(self) -> tuple[RepeatedReadings, ...]:
         """Sensors whose readings repeat, in the file as it is."""
         return (*self.repeated, *self.left_out)
