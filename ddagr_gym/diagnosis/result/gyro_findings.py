@@ -1,7 +1,8 @@
-"""A gyro whose scale or bias the headings of the poses contradict: no simulator is needed to see that.
+"""A gyro whose scale or bias rests or the headings of the poses contradict: no simulator is needed to see that.
 
 Beside a real robot's drivetrain no gate of simulated drives holds, so that effects of the library have no name there.
-What two channels say of the same turns is judged by the recording alone, with the limits of ``ddagr check``.
+What two channels say of the same turns, or one of a robot that stands, is judged by the recording alone, with the
+limits of ``ddagr check``.
 """
 
 from __future__ import annotations
@@ -19,12 +20,13 @@ from ddagr_gym.physics.effects.gyro_bias import GyroBias
 from ddagr_gym.physics.effects.gyro_scale import GyroScale
 from ddagr_gym.recordings.checks.blocks import CONFIDENCE
 from ddagr_gym.recordings.checks.findings import CheckFinding, Status
-from ddagr_gym.recordings.checks.turning import GYRO_BIAS, GYRO_SCALE, against_poses
+from ddagr_gym.recordings.checks.noise import BIAS, noise
+from ddagr_gym.recordings.checks.turning import GYRO_SCALE, against_poses
 from ddagr_gym.recordings.schema import Recording
 
 _FIELDS: dict[str, tuple[type[Effect], str]] = {
     GYRO_SCALE.check: (GyroScale, "scale"),
-    GYRO_BIAS.check: (GyroBias, "bias"),
+    BIAS.check: (GyroBias, "bias"),
 }
 """Effect and its field by family of checks."""
 
@@ -41,7 +43,7 @@ def gyro_findings(recordings: Sequence[Recording], rng: np.random.Generator) -> 
         recordings: with the gyro turned the right way.
         rng: of the resampled intervals.
     """
-    said = [finding for recording in recordings for finding in against_poses(recording, rng)]
+    said = [finding for recording in recordings for finding in _told(recording, rng)]
     found = []
     for check, (kind, field) in _FIELDS.items():
         told = [item for item in said if item.check == check and item.value is not None and item.interval is not None]
@@ -50,6 +52,13 @@ def gyro_findings(recordings: Sequence[Recording], rng: np.random.Generator) -> 
             finding = Finding(kind.name, {field: size}, 0.0, 0.0, 0.0, 0.0, {}, {kind.name: 1.0})
             found.append((finding, kind(**{field: size.value})))
     return tuple(found)
+
+
+def _told(recording: Recording, rng: np.random.Generator) -> list[CheckFinding]:
+    """Of the scale by the poses, of the bias at rest and by the poses only where the robot never stands."""
+    at_rest = [finding for finding in noise(recording) if finding.check == BIAS.check]
+    left = [finding for finding in against_poses(recording, rng) if not (at_rest and finding.check == BIAS.check)]
+    return [*at_rest, *left]
 
 
 def _beyond(told: Sequence[CheckFinding]) -> bool:

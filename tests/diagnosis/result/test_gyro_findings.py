@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -40,6 +42,17 @@ def test_what_the_poses_contradict_is_named_with_its_size(faults, kind, field, s
     assert low < size < high
     # it needed no fit, and passed no gate
     assert finding.gain == finding.gate == 0.0
+
+
+def test_a_bias_is_that_at_rest_and_by_the_poses_where_the_robot_never_stands():
+    standing = drive(GEOMETRY, Faults(gyro_bias=0.05))
+    rolling = {name: standing[name] + 0.5 for name in ("encoder_right", "encoder_left")}
+    never = replace(standing, channels={**standing.channels, **rolling})
+    (at_rest,), (by_poses,) = (gyro_findings([given], np.random.default_rng(0)) for given in (standing, never))
+    known, wide = (finding.parameters["bias"] for finding, _ in (at_rest, by_poses))
+    assert known.value == pytest.approx(0.05, abs=5e-4)
+    assert wide.value == pytest.approx(0.05, abs=5e-3)
+    assert np.ptp(known.interval) < 0.5 * np.ptp(wide.interval)
 
 
 def test_a_gyro_that_turns_the_wrong_way_has_no_scale():
