@@ -14,8 +14,8 @@ if its size has moved by half of what was written, at least. Its own size then c
 is one that is neither told of the unaltered drive nor a part of the drivetrain.
 
 Copies lie in a temporary folder while they are diagnosed. Finished cases are kept in the folder of parts, under a hash
-of the altered file; the same command goes on from there, and several may share the folder. A part is not made anew when
-the diagnosis itself was changed: then remove the folder.
+of the altered file; the same command goes on from there, and several with different drives may share the folder. A part
+is not made anew when the diagnosis itself was changed: then remove the folder.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from benchmarks.concealed_truth import sizes
 from benchmarks.score_concealed import figure_line, mean, names_of, share
 from ddagr_gym.diagnosis.answer.drivetrain import PART_TITLES
 from ddagr_gym.files import write_json
-from ddagr_gym.physics.effects.registry import effect_kinds
+from ddagr_gym.physics.effects.registry import effect_kind
 from ddagr_gym.recordings.checks.run import check_recording
 from ddagr_gym.recordings.load import load_recording
 
@@ -146,7 +146,7 @@ def with_own(change: Change, control: Mapping[str, Any]) -> dict[str, float]:
 
 def neutral(change: Change, name: str) -> float:
     """Value of a field of a change's effect at which nothing acts."""
-    return float(effect_kinds()[change.effect].parameter(name).metadata["neutral"])
+    return float(effect_kind(change.effect).parameter(name).metadata["neutral"])
 
 
 def named(change: Change, answer: Mapping[str, Any], control: Mapping[str, Any]) -> bool:

@@ -217,9 +217,9 @@ def shared_parameters(robot: Robot, encoder_scales: bool = False) -> tuple[Model
     encoders = tuple(
         ModelParameter(name, "-", (layout.ENCODER_SCALE + bank,), True, ENCODER_DEVIATION, 0.01, -1.0, 1.0)
         for bank, name in enumerate(ENCODER_SCALES)
-        if encoder_scales
     )
-    return (*(p for p in robot_parameters(robot) if p.name in known), scale, *encoders)
+    usual = (*(p for p in robot_parameters(robot) if p.name in known), scale)
+    return (*usual, *encoders) if encoder_scales else usual
 
 
 def first_values(parameters: tuple[ModelParameter, ...]) -> dict[str, float]:

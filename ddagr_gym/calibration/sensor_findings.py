@@ -13,6 +13,7 @@ from collections.abc import Mapping
 
 from ddagr_gym.calibration.accelerometer_results import MountingSize
 from ddagr_gym.calibration.forecast_findings import folds_of, forecast_finding
+from ddagr_gym.calibration.imu_mounting import LEAST
 from ddagr_gym.calibration.part_selection import least_growth, surely_above
 from ddagr_gym.calibration.parts import ENCODER_SCALES
 from ddagr_gym.calibration.result import Calibration
@@ -60,8 +61,7 @@ def _late_poses(calibration: Calibration) -> list[Named]:
     late = max((drive.pose_lateness for drive in calibration.drives), default=0.0)
     if late < latency["least"]:
         return []
-    size = {"latency": Estimate(late, latency["unit"])}
-    finding = Finding(PoseLatency.name, size, 0.0, 0.0, 0.0, 0.0, {}, {PoseLatency.name: 1.0})
+    finding = Finding.seen(PoseLatency.name, {"latency": Estimate(late, latency["unit"])})
     return [(finding, PoseLatency(min(late, latency["high"])))]
 
 
@@ -83,7 +83,7 @@ def _mounting(calibration: Calibration, effect: Effect) -> Finding | None:
     """A mounting of which some size that matters is surely not nothing."""
     found = {} if calibration.imu is None else {item.name: item for item in calibration.imu.sizes}
     items = {field: found[name] for field, name in OF_MOUNTING[type(effect)].items()}
-    if not any(_is_sure(item, effect.parameter(field).metadata["least"]) for field, item in items.items()):
+    if not any(_is_sure(item) for item in items.values()):
         return None
     one = next(iter(items.values()))
     sizes = {field: Estimate(item.value, item.unit, item.interval) for field, item in items.items()}
@@ -91,6 +91,10 @@ def _mounting(calibration: Calibration, effect: Effect) -> Finding | None:
     return forecast_finding(effect.name, sizes, one.growth or 0.0, one.error, gate)
 
 
-def _is_sure(item: MountingSize, least: float) -> bool:
-    """Whether a size matters and its interval leaves nothing out."""
-    return abs(item.value) >= least and item.interval is not None and not item.interval[0] <= 0.0 <= item.interval[1]
+def _is_sure(item: MountingSize) -> bool:
+    """Whether a size matters and its interval does not hold zero."""
+    return (
+        abs(item.value) >= LEAST[item.name]
+        and item.interval is not None
+        and not item.interval[0] <= 0.0 <= item.interval[1]
+    )

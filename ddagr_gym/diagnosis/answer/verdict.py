@@ -87,6 +87,11 @@ class Finding:
     onset: Onset | None = None
     soil: SoilAtWork | None = None
 
+    @classmethod
+    def seen(cls, name: str, parameters: Mapping[str, Estimate]) -> Finding:
+        """One that the values themselves show: no fit speaks for it, and it passed no gate."""
+        return cls(name, parameters, 0.0, 0.0, 0.0, 0.0, {}, {name: 1.0})
+
     @property
     def by_forecasts(self) -> bool:
         """Whether gain and gate are growths of the forecasts' loss: gates of gains are above 1."""

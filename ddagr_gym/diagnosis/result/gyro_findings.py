@@ -49,8 +49,7 @@ def gyro_findings(recordings: Sequence[Recording], rng: np.random.Generator) -> 
         told = [item for item in said if item.check == check and item.value is not None and item.interval is not None]
         size, limits = _size(told) if _beyond(told) else None, kind.parameter(field).metadata
         if size is not None and limits["low"] <= size.value <= limits["high"]:
-            finding = Finding(kind.name, {field: size}, 0.0, 0.0, 0.0, 0.0, {}, {kind.name: 1.0})
-            found.append((finding, kind(**{field: size.value})))
+            found.append((Finding.seen(kind.name, {field: size}), kind(**{field: size.value})))
     return tuple(found)
 
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -64,6 +63,8 @@ WINDOW = 2.0
 """Time over which distances are compared [s]."""
 LEAST_SLIPPING = 0.1
 """Share of the windows that counts as those that slip least (ours)."""
+Vectors = tuple[FloatArray, FloatArray]
+"""Rolled and travelled vectors, (2, n) each."""
 _TRAVEL_CHANNELS = ("pose_x", "pose_y", "pose_yaw", "yaw_rate", "encoder_right", "encoder_left")
 
 
@@ -78,51 +79,69 @@ def travel(recording: Recording, rng: np.random.Generator) -> list[CheckFinding]
 
 
 def travelled_over_rolled(recording: Recording, rng: np.random.Generator) -> Estimate | None:
+    """:func:`travelled_shares` of a drive; None also without pose, gyro or the robot's geometry."""
+    return travelled_shares(rolled_and_travelled(recording, rng), rng)
+
+
+def travelled_shares(vectors: Sequence[Vectors], rng: np.random.Generator) -> Estimate | None:
     """Travelled over rolled distance as forward and sideways shares, and their coherence, (3,).
 
-    The rolled path is the wheel radius times the banks' mean speed, laid along the gyro's heading; both paths are
-    compared as vectors over :data:`WINDOW`, the pose's clock matched. Coherence is the cosine between them, weighted
-    by length: 1 where every rolled piece is travelled in its direction in one proportion.
+    Coherence is the cosine between both paths, weighted by length: 1 where every rolled piece is travelled in its
+    direction in one proportion.
+
+    Args:
+        vectors: of the blocks of a drive.
+        rng: for the resampling of the blocks.
 
     Returns:
-        None without pose, gyro, motion or the robot's geometry.
+        None without motion.
     """
-    sums = [_moments(*vectors) for vectors in _vectors(recording, rng)]
+    sums = [_moments(*pair) for pair in vectors]
     return estimate([s for s in sums if s[2] > 0 and s[3] > 0], _shares, rng)
 
 
-def share_with_least_slip(recording: Recording, rng: np.random.Generator) -> float | None:
+def share_with_least_slip(vectors: Sequence[Vectors], wheel_radius: float) -> float | None:
     """Travelled over rolled distance where the robot slips least: in the best tenth of the longer half of windows [-].
 
     It is near 1 on any ground, on ice too, where the wheels mostly spin: some windows are gentle. A wrong wheel radius
     changes it as much as all others. In windows in which the robot hardly gets on, it is noise.
 
+    Args:
+        vectors: of the blocks of a drive.
+        wheel_radius: that windows must roll at least [m].
+
     Returns:
-        None without pose, gyro, motion or the robot's geometry.
+        None without motion.
     """
     pairs = [np.zeros((2, 0))]
-    pairs += [np.stack([np.hypot(*rolled), np.hypot(*travelled)]) for rolled, travelled in _vectors(recording, rng)]
+    pairs += [np.stack([np.hypot(*rolled), np.hypot(*travelled)]) for rolled, travelled in vectors]
     rolled, travelled = np.concatenate(pairs, axis=1)
-    known = np.isfinite(travelled) & (rolled > _radius(recording))
+    known = np.isfinite(travelled) & (rolled > wheel_radius)
     if not known.any():
         return None
     far = known & (rolled >= np.median(rolled[known]))
     return float(np.quantile(travelled[far] / rolled[far], 1.0 - LEAST_SLIPPING))
 
 
-def _radius(recording: Recording) -> float:
-    return math.nan if recording.meta.geometry is None else recording.meta.geometry.wheel_radius
+def rolled_and_travelled(recording: Recording, rng: np.random.Generator) -> list[Vectors]:
+    """Rolled and travelled vectors of a drive over :data:`WINDOW` in the pose's frame, block by block.
 
+    The rolled path is the wheel radius times the banks' mean speed, laid along the gyro's heading; the pose's clock is
+    matched to it.
 
-def _vectors(recording: Recording, rng: np.random.Generator) -> Iterator[tuple[FloatArray, FloatArray]]:
-    """Rolled and travelled vectors (2, n) in the pose's frame over windows, block by block; none without channels."""
-    if recording.meta.geometry is None or not recording.has(*_TRAVEL_CHANNELS):
-        return
+    Args:
+        recording: any; without pose, gyro, encoders or the robot's geometry there are none.
+        rng: for the resampling behind the clocks' offset.
+    """
+    geometry = recording.meta.geometry
+    if geometry is None or not recording.has(*_TRAVEL_CHANNELS):
+        return []
     lag = known_lag(pose_offset(recording, rng))
-    speed = 0.5 * _radius(recording) * (filled(recording, "encoder_right") + filled(recording, "encoder_left"))
+    speed = 0.5 * geometry.wheel_radius * (filled(recording, "encoder_right") + filled(recording, "encoder_left"))
     heading = gyro_direction(recording) * integral(recording, recording["yaw_rate"])
     rolled = [integral(recording, speed * np.cos(heading)), integral(recording, speed * np.sin(heading))]
     pose_heading = unwrapped_heading(recording)
+    vectors = []
     for span, block in blocks_in_spans(recording):
         rows = block.start + np.flatnonzero(np.isfinite(pose_heading[block]))
         at = recording.t[rows] - lag
@@ -130,12 +149,11 @@ def _vectors(recording: Recording, rng: np.random.Generator) -> Iterator[tuple[F
         path = np.stack([sampled(recording, span, component, at) for component in rolled])
         turn = pose_heading[rows] - sampled(recording, span, heading, at)
         position = np.stack([recording["pose_x"][rows], recording["pose_y"][rows]])
-        yield _over_windows(at, path, position, turn)
+        vectors.append(_over_windows(at, path, position, turn))
+    return vectors
 
 
-def _over_windows(
-    at: FloatArray, path: FloatArray, position: FloatArray, turn: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+def _over_windows(at: FloatArray, path: FloatArray, position: FloatArray, turn: FloatArray) -> Vectors:
     """Rolled and travelled vectors (2, n) over windows.
 
     Args:
