@@ -117,6 +117,7 @@ def build_row(robot: Robot, soil: Soils, sensors: Sensors) -> Array:
         layout.BASE_MOTOR_RATE: robot.motor_rate,
         layout.MAXIMUM_WHEEL_SPEED: robot.maximum_wheel_speed,
         layout.BASE_DRIVETRAIN: [getattr(robot.drivetrain, name) for name in layout.DRIVETRAIN_PARAMETERS],
+        layout.COMMAND_GAIN: (1.0, 1.0),
         layout.COMMAND_DELAY: robot.drivetrain.command_delay,
         layout.COMMAND_DEADBAND: robot.drivetrain.command_deadband,
         layout.TURNING_LIMIT: robot.drivetrain.turning_limit,

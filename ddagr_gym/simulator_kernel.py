@@ -40,6 +40,7 @@ from ddagr_gym.physics.integrators import advance_body
 from ddagr_gym.physics.layout import (
     COMMAND,
     COMMAND_DELAY,
+    COMMAND_GAIN,
     DERIVATIVE_VALID,
     DYNAMIC_BANKS,
     FELT_DEPTH,
@@ -101,8 +102,8 @@ class Stretch(NamedTuple):
 @kernel()
 def _drive(row: Array, command: Array, actions: EffectActions) -> None:
     """Commands and motor loops for the coming sample."""
-    row[COMMAND] = command[0]
-    row[COMMAND + 1] = command[1]
+    row[COMMAND] = row[COMMAND_GAIN] * command[0]
+    row[COMMAND + 1] = row[COMMAND_GAIN + 1] * command[1]
     apply_effects(POINT_COMMANDS, row, actions)
     set_targets(row)
     if row[COMMAND_DELAY] > 0.0:

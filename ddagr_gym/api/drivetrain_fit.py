@@ -50,43 +50,46 @@ class DrivetrainFit:
     made: CalibrationOutcome | None = None
 
     def complete(
-        self, misfit: Mapping[str, float], mended: MendedRecordings, encoders_doubted: bool
+        self, misfit: Mapping[str, float], mended: MendedRecordings, doubted: Sequence[str]
     ) -> CompletedNominal | None:
         """The nominal simulator with the drivetrain that recordings ask for; None where they cannot tell it.
 
         Args:
             misfit: of the encoders over their limits.
             mended: recordings.
-            encoders_doubted: whether the gyro contradicts the encoders of one bank, whose scales are fitted then.
+            doubted: scales of encoders or gains of commands that are fitted too.
         """
         from ddagr_gym.calibration.drivetrain_answer import drivetrain_answer, drivetrain_findings
+        from ddagr_gym.calibration.encoder_findings import encoder_findings
         from ddagr_gym.calibration.sensor_findings import named_sensors
         from ddagr_gym.diagnosis.preprocessing.scaled_readings import without_scales
         from ddagr_gym.diagnosis.result.drivetrain_names import CompletedNominal
         from ddagr_gym.diagnosis.result.gyro_findings import gyro_findings
 
         self._say("the wheels do not follow their commands as the simulator says: fitting its drivetrain")
-        gyro = gyro_findings(mended.recordings, np.random.default_rng(self.seed))
-        read = [without_scales(item, [effect for _, effect in gyro]) for item in mended.in_their_channels]
-        self.made = self._calibrated(read, self._settings(len(read), encoders_doubted))
+        rng = np.random.default_rng(self.seed)
+        encoders = encoder_findings(mended.recordings, rng)
+        seen = (*gyro_findings(mended.recordings, rng), *encoders)
+        read = [without_scales(item, [effect for _, effect in seen]) for item in mended.in_their_channels]
+        self.made = self._calibrated(read, self._settings(len(read), () if encoders else doubted))
         if self.made is None:
             return None
         found = self.made.calibration
-        sensors = (*named_sensors(found), *gyro)
+        sensors = (*named_sensors(found), *seen)
         return CompletedNominal(
             robot=self.made.robot,
             soil=self.made.soils[_GROUND],
             answer=drivetrain_answer(found, misfit),
-            findings=(*drivetrain_findings(found), *(finding for finding, _ in sensors)),
+            findings=(*drivetrain_findings(found), *(finding for finding, _ in sensors if finding is not None)),
             effects=tuple(effect for _, effect in sensors),
         )
 
-    def _settings(self, count: int, encoder_scales: bool) -> CalibrationSettings:
+    def _settings(self, count: int, doubted: Sequence[str]) -> CalibrationSettings:
         from ddagr_gym.calibration.settings import CalibrationSettings
         from ddagr_gym.diagnosis.result.drivetrain_names import LEAST_EXPLAINED
 
         usual = CalibrationSettings(
-            threads=self.threads, seed=self.seed, least_explained=LEAST_EXPLAINED, encoder_scales=encoder_scales
+            threads=self.threads, seed=self.seed, least_explained=LEAST_EXPLAINED, doubted=tuple(doubted)
         )
         if count > 1:
             return usual

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -113,7 +113,7 @@ class FittedModel:
         return tuple(parameter.name for parameter in self.parameters if parameter.prior > 0.0)
 
 
-def complete_model(data: CalibrationData, encoder_scales: bool = False) -> tuple[RobotModel, dict[str, float]]:
+def complete_model(data: CalibrationData, doubted: Sequence[str] = ()) -> tuple[RobotModel, dict[str, float]]:
     """The joint model with all parts, and the values at which parameters that never move are held.
 
     Soils of the grounds differ from the first one's by offsets that are held; what is fitted of a ground acts on top.
@@ -121,7 +121,7 @@ def complete_model(data: CalibrationData, encoder_scales: bool = False) -> tuple
 
     Args:
         data: drives.
-        encoder_scales: with scales of the encoders as a part.
+        doubted: further parts, see :func:`~ddagr_gym.calibration.parts.shared_parameters`.
     """
     offsets, held = _soil_offsets(data)
     slopes, gradients = _slope_offsets(data)
@@ -138,7 +138,7 @@ def complete_model(data: CalibrationData, encoder_scales: bool = False) -> tuple
     biases = [p for p in sensor_parameters(data.count, bias, 1.0) if p.name.startswith("gyro_bias")]
     robot = complete_robot(data.robot)
     constants = () if data.currents is None else data.currents.parameters
-    return RobotModel(robot, (*offsets, *soil, *shared_parameters(robot, encoder_scales), *biases, *constants)), held
+    return RobotModel(robot, (*offsets, *soil, *shared_parameters(robot, doubted), *biases, *constants)), held
 
 
 def _soil_offsets(data: CalibrationData) -> tuple[list[ModelParameter], dict[str, float]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
 from ddagr_gym.diagnosis.answer.drivetrain import HARD, PART_DRIVES, PART_TITLES
@@ -12,9 +13,9 @@ from ddagr_gym.physics import layout
 GYRO_SCALE_DEVIATION = 0.03
 """Prior of the gyro's scale [-]: data sheets of low-cost gyros promise 3 %."""
 
-ENCODER_DEVIATION = 0.1
-"""Prior of the scale of an encoder that the readings themselves make suspicious [-] (ours): a gear or a tyre exchanged,
-and within reach a count doubled."""
+DOUBTED_DEVIATION = 0.1
+"""Prior of the scale of an encoder and of the gain of a bank's commands that the readings themselves make suspicious
+[-] (ours): a gear or a tyre exchanged, and within reach a count doubled."""
 
 DELAY_DEVIATION = 0.3
 """Prior of the dead time between command and wheels [s] (ours): 0.2 to 0.43 s on a Husky and a Warthog."""
@@ -83,11 +84,14 @@ def _of_drivetrain(name: str, parameters: tuple[str, ...], needs: tuple[str, ...
     return Part(name, PART_TITLES[name], parameters, PART_DRIVES[name], needs, usual)
 
 
-ENCODER_SCALES = ("encoder_scale_right", "encoder_scale_left")
-"""Parameters of the encoders, which only fits have whose readings make them suspicious."""
+OF_BANKS = {
+    "encoder_scale": ("encoder_scale_right", "encoder_scale_left"),
+    "command_gain": ("command_gain_right", "command_gain_left"),
+}
+"""Parameters of the right and the left bank by the part, which only fits have whose readings make it suspicious."""
 
-SENSOR_SCALES = ("gyro_scale", *ENCODER_SCALES)
-"""Parameters of sensors, which have no place in a robot."""
+SCALES = ("gyro_scale", *(name for names in OF_BANKS.values() for name in names))
+"""Factors on readings and commands, which have no place in a robot."""
 
 PARTS = (
     Part(
@@ -114,8 +118,14 @@ PARTS = (
     Part(
         "encoder_scale",
         "scales of the encoders",
-        ENCODER_SCALES,
+        OF_BANKS["encoder_scale"],
         "straight pieces and arcs to both sides at several speeds, with poses",
+    ),
+    Part(
+        "command_gain",
+        "gains of the banks' commands",
+        OF_BANKS["command_gain"],
+        "commands held for seconds, slow and fast, of both banks in both directions",
     ),
     _of_drivetrain("no_load_speed", ("no_load_speed",)),
     _of_drivetrain("torque_limit", ("acceleration_limit",)),
@@ -205,21 +215,24 @@ def complete_robot(robot: Robot) -> Robot:
     return replace(robot, drivetrain=drivetrain, standard_deviations={**deviations, **robot.standard_deviations})
 
 
-def shared_parameters(robot: Robot, encoder_scales: bool = False) -> tuple[ModelParameter, ...]:
+_ENTRIES = {"encoder_scale": layout.ENCODER_SCALE, "command_gain": layout.COMMAND_GAIN}
+
+
+def shared_parameters(robot: Robot, doubted: Sequence[str] = ()) -> tuple[ModelParameter, ...]:
     """Every parameter of the parts of a complete robot that it states as uncertain, and scales of its sensors.
 
     Args:
         robot: with every part.
-        encoder_scales: with those of the encoders beside that of the gyro.
+        doubted: parts of :data:`OF_BANKS` to have beside the scale of the gyro.
     """
     scale = ModelParameter("gyro_scale", "-", (layout.GYRO_SCALE,), True, GYRO_SCALE_DEVIATION, 0.01, -0.3, 0.3)
     known = {name for part in PARTS for name in part.parameters}
-    encoders = tuple(
-        ModelParameter(name, "-", (layout.ENCODER_SCALE + bank,), True, ENCODER_DEVIATION, 0.01, -1.0, 1.0)
-        for bank, name in enumerate(ENCODER_SCALES)
+    of_banks = (
+        ModelParameter(name, "-", (_ENTRIES[part] + bank,), True, DOUBTED_DEVIATION, 0.01, -1.0, 1.0)
+        for part in doubted
+        for bank, name in enumerate(OF_BANKS[part])
     )
-    usual = (*(p for p in robot_parameters(robot) if p.name in known), scale)
-    return (*usual, *encoders) if encoder_scales else usual
+    return (*(p for p in robot_parameters(robot) if p.name in known), scale, *of_banks)
 
 
 def first_values(parameters: tuple[ModelParameter, ...]) -> dict[str, float]:

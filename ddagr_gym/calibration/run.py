@@ -220,7 +220,7 @@ def _fit_supported_parts(
 ) -> _SupportedFit:
     """Choose parts by forecasts of left-out drives, fit them jointly, and each drive by itself about that fit."""
     progress, robot = steps.progress, data.robot
-    complete, held = complete_model(data, settings.encoder_scales)
+    complete, held = complete_model(data, settings.doubted)
     selection = _select(data, complete, held, settings, store, steps)
     kept = complete.without(selection.left_out, robot)
     progress("joint fit")

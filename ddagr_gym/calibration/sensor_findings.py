@@ -1,8 +1,8 @@
-"""What a calibration says of the sensors, in the words of a diagnosis.
+"""What a calibration says of sensors and of the gains of commands, in the words of a diagnosis.
 
-A data sheet states that poses come at once, what an encoder counts, and where the IMU sits. Where the drives say
-otherwise, that is a finding as a missing part of the drivetrain is: decided by forecasts of what was left out of the
-fit, and named from the least size that matters. The gyro is held against the poses instead
+A data sheet states that poses come at once, what an encoder counts, that both banks obey alike, and where the IMU sits.
+Where the drives say otherwise, that is a finding as a missing part of the drivetrain is: decided by forecasts of what
+was left out of the fit, and named from the least size that matters. The gyro is held against the poses instead
 (:mod:`ddagr_gym.diagnosis.result.gyro_findings`), which say more of it than forecasts do.
 """
 
@@ -15,15 +15,18 @@ from ddagr_gym.calibration.accelerometer_results import MountingSize
 from ddagr_gym.calibration.forecast_findings import folds_of, forecast_finding
 from ddagr_gym.calibration.imu_mounting import LEAST
 from ddagr_gym.calibration.part_selection import least_growth, surely_above
-from ddagr_gym.calibration.parts import ENCODER_SCALES
+from ddagr_gym.calibration.parts import OF_BANKS
 from ddagr_gym.calibration.result import Calibration
 from ddagr_gym.calibration.simulator_values import calibrated_effects
 from ddagr_gym.diagnosis.answer.verdict import Estimate, Finding
 from ddagr_gym.physics.effects import Effect
+from ddagr_gym.physics.effects.command_gain import CommandGain
 from ddagr_gym.physics.effects.encoder_scale import EncoderScale
 from ddagr_gym.physics.effects.imu_lever_arm import ImuLeverArm
 from ddagr_gym.physics.effects.imu_misalignment import ImuMisalignment
 from ddagr_gym.physics.effects.pose_latency import PoseLatency
+from ddagr_gym.recordings.checks.findings import Question
+from ddagr_gym.recordings.checks.travel import GAIN_BALANCE
 from ddagr_gym.recordings.checks.turning import BALANCE
 
 OF_MOUNTING: Mapping[type[Effect], Mapping[str, str]] = {
@@ -32,23 +35,26 @@ OF_MOUNTING: Mapping[type[Effect], Mapping[str, str]] = {
 }
 """What the fields of an effect are called in a mounting of the IMU; in one drive nothing tells a tilt from a bias."""
 
-Named = tuple[Finding, Effect]
+BALANCES: Mapping[str, Question] = {EncoderScale.name: BALANCE, CommandGain.name: GAIN_BALANCE}
+"""What the right bank may be over the left one, by what is fitted of each."""
+
+Named = tuple[Finding | None, Effect]
 
 
 def named_sensors(calibration: Calibration) -> tuple[Named, ...]:
-    """Findings on poses, encoders and IMU with the effects of the library that they are.
+    """Findings on poses, encoders, commands and IMU with the effects of the library that they are.
+
+    What was fitted of both banks counts even where it has no name, since the rest was fitted beside it.
 
     Args:
         calibration: of the recordings that are diagnosed.
     """
     named = [*_late_poses(calibration)]
     for effect in calibrated_effects(calibration):
-        finding = None
-        if isinstance(effect, EncoderScale):
-            finding = _encoders(calibration, effect)
-        elif type(effect) in OF_MOUNTING:
-            finding = _mounting(calibration, effect)
-        named += [] if finding is None else [(finding, effect)]
+        if isinstance(effect, EncoderScale | CommandGain):
+            named.append((_of_banks(calibration, effect), effect))
+        elif type(effect) in OF_MOUNTING and (finding := _mounting(calibration, effect)) is not None:
+            named.append((finding, effect))
     return tuple(named)
 
 
@@ -65,15 +71,15 @@ def _late_poses(calibration: Calibration) -> list[Named]:
     return [(finding, PoseLatency(min(late, latency["high"])))]
 
 
-def _encoders(calibration: Calibration, effect: EncoderScale) -> Finding | None:
-    """Encoders that differ by more than the balance of both banks may: what they have in common was not in doubt."""
-    if abs(math.log(effect.left / effect.right)) < math.log(BALANCE.expected[1]):
+def _of_banks(calibration: Calibration, effect: EncoderScale | CommandGain) -> Finding | None:
+    """Banks that differ by more than their balance may: what they have in common was not in doubt."""
+    if abs(math.log(effect.left / effect.right)) < math.log(BALANCES[effect.name].expected[1]):
         return None
     part = next(item for item in calibration.parts if item.name == effect.name)
     intervals = {item.name: item.interval for item in calibration.parameters if item.calibrated}
     sizes = {
         field: Estimate(getattr(effect, field), "-", intervals.get(name))
-        for field, name in zip(("right", "left"), ENCODER_SCALES, strict=True)
+        for field, name in zip(("right", "left"), OF_BANKS[effect.name], strict=True)
     }
     gate = least_growth(part.error or 0.0, folds_of(calibration))
     return forecast_finding(effect.name, sizes, part.growth, part.error, gate)

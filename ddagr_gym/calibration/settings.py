@@ -30,8 +30,8 @@ class CalibrationSettings:
             drives those of the supply, at 1 Hz, made nothing better known (benchmarks/motor_currents.py).
         least_explained: share of the squared error of left-out wheel speeds that all parts together must take away from
             the data sheet's; below it no single part is asked for.
-        encoder_scales: whether the encoders' scales are a part that forecasts may ask for; where nothing makes them
-            suspicious, they would be one more way for the wheels to fall short of their commands.
+        doubted: names of parts that forecasts may ask for as well, encoder_scale and command_gain; where nothing makes
+            them suspicious, they would be one more way for the wheels to fall short of their commands.
     """
 
     window: float = 6.0
@@ -43,4 +43,4 @@ class CalibrationSettings:
     seed: int = 0
     supply_currents: bool = False
     least_explained: float = 0.0
-    encoder_scales: bool = False
+    doubted: tuple[str, ...] = ()

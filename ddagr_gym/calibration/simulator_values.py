@@ -9,13 +9,14 @@ from dataclasses import dataclass, fields, replace
 from ddagr_gym.calibration.accelerometer_results import ImuMounting
 from ddagr_gym.calibration.calibration_data import CalibrationData
 from ddagr_gym.calibration.joint_fit import FittedModel
-from ddagr_gym.calibration.parts import SENSOR_SCALES, RobotModel, is_stated, part_of
+from ddagr_gym.calibration.parts import OF_BANKS, SCALES, RobotModel, is_stated, part_of
 from ddagr_gym.calibration.result import CalibratedParameter, Calibration
 from ddagr_gym.envs.calibrated_draws import CalibratedDraws, GroundDraws
 from ddagr_gym.identification.fitted_values import soil_with_values, with_values
 from ddagr_gym.identification.parameters import LIMITS, ModelParameter
 from ddagr_gym.parameters import Drivetrain, Robot, Soil
 from ddagr_gym.physics.effects import Effect
+from ddagr_gym.physics.effects.command_gain import CommandGain
 from ddagr_gym.physics.effects.encoder_scale import EncoderScale
 from ddagr_gym.physics.effects.gyro_scale import GyroScale
 from ddagr_gym.physics.effects.imu_lever_arm import ImuLeverArm
@@ -44,7 +45,7 @@ _UNITS = {
     "maximum_wheel_speed": "rad/s",
     "half_width": "m",
     "outer_radius": "m",
-    **dict.fromkeys(SENSOR_SCALES, "-"),
+    **dict.fromkeys(SCALES, "-"),
     "soil_strength": "-",
     "soil_stiffness": "-",
     "shear_modulus": "m",
@@ -123,7 +124,7 @@ def _robot_scale(robot: Robot, name: str) -> tuple[float, float]:
     special = {
         "outer_radius": (robot.outer_radius, wheel.major_radius),
         "half_width": (wheel.half_width, wheel.half_width),
-        **dict.fromkeys(SENSOR_SCALES, (1.0, 1.0)),
+        **dict.fromkeys(SCALES, (1.0, 1.0)),
     }
     if name in special:
         return special[name]
@@ -171,9 +172,12 @@ def fitted_soil(data: CalibrationData, ground: str, values: Mapping[str, float])
 
 def fitted_sensors(values: Mapping[str, float]) -> tuple[Effect, ...]:
     """What has no place in a robot or a soil, at values of the fit."""
-    gyro, right, left = (math.exp(values.get(name, 0.0)) for name in SENSOR_SCALES)
-    found = [] if gyro == 1.0 else [GyroScale(gyro)]
-    return (*found, *([] if right == left == 1.0 else [EncoderScale(right, left)]))
+    factors = {name: math.exp(values.get(name, 0.0)) for name in SCALES}
+    found: list[Effect] = [] if factors["gyro_scale"] == 1.0 else [GyroScale(factors["gyro_scale"])]
+    for kind in (EncoderScale, CommandGain):
+        right, left = (factors[name] for name in OF_BANKS[kind.name])
+        found += [] if right == left == 1.0 else [kind(right, left)]
+    return tuple(found)
 
 
 def calibrated_robot(data: CalibrationData, model: FittedModel, calibration: Calibration) -> Robot:
@@ -184,7 +188,7 @@ def calibrated_robot(data: CalibrationData, model: FittedModel, calibration: Cal
         model: joint fit.
         calibration: for the deviations.
     """
-    found = [i for i in calibration.parameters if i.calibrated and not i.ground and i.name not in SENSOR_SCALES]
+    found = [i for i in calibration.parameters if i.calibrated and not i.ground and i.name not in SCALES]
     known = {p.name: quantity(data, model.model, p) for p in model.parameters if p.prior > 0.0 and p.scope is None}
     sizes = {item.name: known[item.name].deviation(item.change, _of_another_drive(item)) for item in found}
     sources = ", ".join(drive.source for drive in calibration.drives)
@@ -229,7 +233,7 @@ def calibrated_draws(calibration: Calibration, robot: Robot, soils: Mapping[str,
         robot: calibrated.
         soils: calibrated, by ground.
     """
-    found = [item for item in calibration.parameters if item.calibrated and item.name not in SENSOR_SCALES]
+    found = [item for item in calibration.parameters if item.calibrated and item.name not in SCALES]
     grounds = tuple(
         GroundDraws(ground, soil, {i.name.partition("/")[0]: _on_another_day(i) for i in found if i.ground == ground})
         for ground, soil in soils.items()

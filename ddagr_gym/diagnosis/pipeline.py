@@ -26,7 +26,7 @@ from ddagr_gym.diagnosis.mid_drive.again import onsets_of_names, search_in_parts
 from ddagr_gym.diagnosis.mid_drive.onsets import with_onsets
 from ddagr_gym.diagnosis.planning.drivetrain_drive import drivetrain_drive
 from ddagr_gym.diagnosis.planning.next_drive import plan_next_drive
-from ddagr_gym.diagnosis.preprocessing.data_checks import data_doubts, encoders_doubted
+from ddagr_gym.diagnosis.preprocessing.data_checks import data_doubts, doubted_banks
 from ddagr_gym.diagnosis.preprocessing.mended_recordings import MendedRecordings
 from ddagr_gym.diagnosis.preprocessing.session import DiagnosisSession, Progress, be_silent, prepare
 from ddagr_gym.diagnosis.result.channel_fault_findings import with_contradictions
@@ -60,9 +60,9 @@ LATER = ("certification", "unnamed terms", "next drive")
 OnStep = Callable[[str, bool], None]
 """Function that takes the name of a step that begins, and whether its result was kept from before."""
 
-CompleteNominal = Callable[[Mapping[str, float], MendedRecordings, bool], CompletedNominal | None]
+CompleteNominal = Callable[[Mapping[str, float], MendedRecordings, Sequence[str]], CompletedNominal | None]
 """Function that fits the drivetrain of the nominal robot to recordings; takes the encoders' misfit over its limit, the
-recordings, and whether the gyro contradicts the encoders of one bank.
+recordings, and effects by which the banks may differ.
 
 None where the recordings cannot tell it. It is given from outside, since a calibration knows the stages of a diagnosis
 and not the other way round."""
@@ -181,7 +181,9 @@ def diagnose(
     unlike = {} if complete_nominal is None else unlike_commands(accepted.chosen, session.gates)
     nominal = None
     if complete_nominal is not None and unlike:
-        nominal = complete_nominal(unlike, session.mended, encoders_doubted(checks))
+        nominal = complete_nominal(
+            unlike, session.mended, doubted_banks(session.mended.recordings, checks, session.rng("checks"))
+        )
     if nominal is not None and is_an_answer(nominal):
         made = _beside_drivetrain(session, standing(found, session.gates), nominal, names_only, steps)
     else:

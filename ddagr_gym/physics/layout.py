@@ -93,6 +93,7 @@ SIDE_SLIP_LEAD = _block()  # [m]
 SINKAGE_TILT = _block()  # share of the tilt by unequal sinkage that the accelerometer feels [-]
 BASE_MOTOR_RATE = _block()
 BASE_DRIVETRAIN = _block(9)
+COMMAND_GAIN = _block(2)  # factors on the commands, right and left [-]
 COMMAND_DELAY = _block()  # [s]
 COMMAND_DEADBAND = _block()  # [rad/s]
 TURNING_LIMIT = _block()  # [rad/s]

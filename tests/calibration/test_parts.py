@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from ddagr_gym.calibration.parts import (
-    ENCODER_SCALES,
+    OF_BANKS,
     PARTS,
     RobotModel,
     complete_robot,
@@ -49,11 +49,12 @@ def test_every_parameter_belongs_to_one_part(name):
     assert len(listed) == len(set(listed))
 
 
-def test_scales_of_the_encoders_are_there_only_when_asked_for():
+@pytest.mark.parametrize("part", OF_BANKS)
+def test_what_differs_between_banks_is_there_only_when_asked_for(part: str):
     robot = complete_robot(get_robot("warthog"))
-    usual, asked = (shared_parameters(robot, encoder_scales=flag) for flag in (False, True))
+    usual, asked = (shared_parameters(robot, doubted) for doubted in ((), (part,)))
     assert asked[: len(usual)] == usual
-    assert [p.name for p in asked[len(usual) :]] == list(ENCODER_SCALES)
+    assert [p.name for p in asked[len(usual) :]] == list(OF_BANKS[part])
 
 
 def test_what_may_be_nothing_starts_above_it():
@@ -84,7 +85,7 @@ def test_a_part_that_is_left_out_is_gone_from_the_robot_and_from_the_fit():
 
 def test_every_parameter_of_a_part_is_one_of_the_robot():
     """A field that is renamed must not leave its part empty."""
-    known = {p.name for p in shared_parameters(complete_robot(get_robot("warthog")), encoder_scales=True)}
+    known = {p.name for p in shared_parameters(complete_robot(get_robot("warthog")), tuple(OF_BANKS))}
     assert {parameter for part in PARTS for parameter in part.parameters} == known
 
 

@@ -12,6 +12,7 @@ from ddagr_gym.calibration.part_selection import surely_above
 from ddagr_gym.calibration.result import PartDecision
 from ddagr_gym.calibration.sensor_findings import named_sensors
 from ddagr_gym.diagnosis.answer.verdict import Estimate
+from ddagr_gym.physics.effects.command_gain import CommandGain
 from ddagr_gym.physics.effects.encoder_scale import EncoderScale
 from ddagr_gym.physics.effects.imu_lever_arm import ImuLeverArm
 from ddagr_gym.physics.effects.imu_misalignment import ImuMisalignment
@@ -61,8 +62,33 @@ def test_encoders_are_named_with_both_scales_and_what_speaks_for_them():
     assert finding.by_forecasts
 
 
-@pytest.mark.parametrize("given", [with_encoders(0.93, 0.95), with_encoders(1.0, 1.2, kept=False)])
-def test_encoders_that_agree_or_that_forecasts_do_not_ask_for_are_not_named(given):
+def with_gains(right: float, left: float, kept: bool = True):
+    return with_scales("command_gain", kept, command_gain_right=right, command_gain_left=left)
+
+
+def test_commands_that_the_banks_obey_differently_are_named_with_both_gains():
+    ((finding, effect),) = named_sensors(with_gains(1.15, 0.95))
+    assert finding.name == effect.name == CommandGain.name
+    assert (effect.right, effect.left) == pytest.approx((1.15, 0.95))
+    assert {name: item.value for name, item in finding.parameters.items()} == pytest.approx(
+        {"right": 1.15, "left": 0.95}
+    )
+
+
+@pytest.mark.parametrize(
+    ("given", "kind", "sizes"),
+    [(with_encoders(0.93, 0.95), EncoderScale, (0.93, 0.95)), (with_gains(0.98, 0.9), CommandGain, (0.98, 0.9))],
+)
+def test_banks_that_agree_have_no_name_but_count(given, kind, sizes):
+    """The rest was fitted beside what both have in common."""
+    ((finding, effect),) = named_sensors(given)
+    assert finding is None
+    assert isinstance(effect, kind)
+    assert (effect.right, effect.left) == pytest.approx(sizes)
+
+
+@pytest.mark.parametrize("given", [with_encoders(1.0, 1.2, kept=False), with_gains(1.0, 1.3, kept=False)])
+def test_what_forecasts_do_not_ask_for_is_not_there(given):
     assert named_sensors(given) == ()
 
 

@@ -141,13 +141,13 @@ def test_the_drivetrain_is_fitted_where_the_library_leaves_too_much_in_the_encod
     monkeypatch.setattr(pipeline, "search_in_parts", lambda session, start, found: ({}, found))
     asked: list[Any] = []
 
-    def complete(misfit: Any, mended: Any, doubted: bool) -> Any:
+    def complete(misfit: Any, mended: Any, doubted: Any) -> Any:
         assert mended is stages.session.mended
         asked.append((misfit, doubted))
         return None if explained is None else nominal
 
     outcome, _ = stages.run(complete_nominal=complete)
-    assert asked == [({"encoder_left": 9.0}, False)]
+    assert asked == [({"encoder_left": 9.0}, ())]
     assert outcome.diagnosis.verdict == (("load",) if told else ("none",))
     assert outcome.nominal[0].name == ("warthog" if told else "ddagr")
     assert ("certify" in stages.called) is not told

@@ -26,6 +26,7 @@ class Faults:
     gyro_bias: float = 0.0
     right_scale: float = 1.0
     left_scale: float = 1.0
+    command_scale: float = 1.0
     mounting_yaw: float = 0.0
     force_x_sign: float = 1.0
     force_y_sign: float = 1.0
@@ -70,7 +71,7 @@ def drive(
     late = [delayed(t, value, faults.pose_latency) for value in (x, y, yaw)]
     columns = {
         "t": t,
-        "command_right": command[:, 0],
+        "command_right": faults.command_scale * command[:, 0],
         "command_left": command[:, 1],
         "encoder_right": faults.right_scale * delayed(t, omega[:, 0], faults.encoder_latency),
         "encoder_left": faults.left_scale * delayed(t, omega[:, 1], faults.encoder_latency),

@@ -8,15 +8,22 @@ import numpy as np
 
 from ddagr_gym.diagnosis.answer.verdict import DataDoubt
 from ddagr_gym.identification.windows import CHANNELS
+from ddagr_gym.physics.effects.command_gain import CommandGain
+from ddagr_gym.physics.effects.encoder_scale import EncoderScale
 from ddagr_gym.recordings.checks.across import across_runs
 from ddagr_gym.recordings.checks.findings import CheckFinding, Status
 from ddagr_gym.recordings.checks.run import check_recording
+from ddagr_gym.recordings.checks.travel import command_gains
 from ddagr_gym.recordings.checks.turning import BANKS
 from ddagr_gym.recordings.pose_frames import frames_apart
 from ddagr_gym.recordings.schema import Recording
 
 STUCK = "stuck"
 """Family of checks on channels that never change."""
+
+UNLIKE_GAINS = float(np.log(1.08))
+"""Right over left bank's gain from which a fit is asked, as a logarithm (ours): it is 0.94 to 1.1 in three minutes of
+ordinary drives, so that nothing is said before forecasts have decided."""
 
 FRAMES = "frames"
 """Doubt about the frames of poses."""
@@ -53,9 +60,26 @@ def _doubt(recording: str, finding: CheckFinding) -> DataDoubt:
     return DataDoubt(recording, finding.channel, finding.check, sentence, finding.suspects)
 
 
-def encoders_doubted(doubts: Sequence[DataDoubt]) -> bool:
-    """Whether a turn of one bank's encoder turns the robot otherwise than one of the other's."""
-    return any(doubt.channel == BANKS for doubt in doubts)
+def doubted_banks(
+    recordings: Sequence[Recording], doubts: Sequence[DataDoubt], rng: np.random.Generator
+) -> tuple[str, ...]:
+    """Names of effects by which the banks may differ in these recordings, for a fit to decide.
+
+    Scales of the encoders where a turn of one bank's turns the robot otherwise than one of the other's, by the gyro;
+    else gains of the commands where one bank settles at another share of them than the other in every recording that
+    tells.
+
+    Args:
+        recordings: with faults mended that show in the values.
+        doubts: of the checks.
+        rng: of resampled intervals.
+    """
+    if any(doubt.channel == BANKS for doubt in doubts):
+        return (EncoderScale.name,)
+    found = [command_gains(recording, rng) for recording in recordings]
+    logs = [float(np.log(gains.values[2])) for gains in found if gains is not None and gains.values[2] > 0.0]
+    apart = bool(logs) and min(np.abs(logs)) >= UNLIKE_GAINS and len(set(np.sign(logs))) == 1
+    return (CommandGain.name,) if apart else ()
 
 
 def suspects_of(doubts: Sequence[DataDoubt]) -> tuple[str, ...]:

@@ -69,7 +69,7 @@ class CompletedNominal:
         soil: as it was fitted along.
         answer: parts, and what they are worth on what was left out.
         findings: one per part or sensor that is named.
-        effects: of those findings that have no place in a robot: sensors.
+        effects: that have no place in a robot: of sensors and of the gains of commands, named or not.
     """
 
     robot: Robot

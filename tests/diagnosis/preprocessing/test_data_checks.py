@@ -8,10 +8,12 @@ import pytest
 
 from ddagr_gym.diagnosis.answer.location import EffectLocation, Localisation
 from ddagr_gym.diagnosis.answer.verdict import DataDoubt, Diagnosis, GatesUsed
-from ddagr_gym.diagnosis.preprocessing.data_checks import data_doubts, dead_channels
+from ddagr_gym.diagnosis.preprocessing.data_checks import data_doubts, dead_channels, doubted_banks
 from ddagr_gym.diagnosis.result.sentences import dead_in_words
 from ddagr_gym.diagnosis.review import review
-from ddagr_gym.recordings.schema import Recording
+from ddagr_gym.recordings.schema import Recording, RobotGeometry
+from tests.recordings.conftest import Faults
+from tests.recordings.conftest import drive as made_drive
 from tests.recordings.test_pose_frames import in_a_frame_of_its_own
 
 _NOTHING = EffectLocation((), 0.0, (), (), None, "")
@@ -57,6 +59,25 @@ def test_stretches_whose_poses_may_be_in_frames_of_their_own(sound: Recording) -
     assert "2 stretches" in told[0].sentence
     without = replace(moved, channels={k: v for k, v in moved.channels.items() if not k.startswith("pose")})
     assert not any(doubt.finding == "frames" for doubt in doubts(without))
+
+
+@pytest.mark.parametrize(
+    ("faults", "names"),
+    [
+        ([Faults()], ()),
+        # gyro and commands speak against one encoder
+        ([Faults(left_scale=1.2)], ("encoder_scale",)),
+        # only the commands speak against one bank: what it does, the gyro feels
+        ([Faults(command_scale=0.85)], ("command_gain",)),
+        ([Faults(command_scale=0.85), Faults(command_scale=0.8)], ("command_gain",)),
+        ([Faults(command_scale=0.85), Faults()], ()),
+        ([Faults(command_scale=0.85), Faults(command_scale=1.2)], ()),
+    ],
+)
+def test_banks_that_differ_are_asked_for(faults: list[Faults], names: tuple[str, ...]) -> None:
+    geometry = RobotGeometry("warthog", 0.3, 0.54)
+    drives = [made_drive(geometry, item, seed=seed) for seed, item in enumerate(faults)]
+    assert doubted_banks(drives, doubts(*drives), np.random.default_rng(0)) == names
 
 
 def test_channels_that_no_diagnosis_compares_are_not_called_dead() -> None:

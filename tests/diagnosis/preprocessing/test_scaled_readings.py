@@ -1,4 +1,4 @@
-"""Readings of sensors whose scale is known to be wrong."""
+"""Readings and commands whose scale is known to be wrong."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ddagr_gym.diagnosis.preprocessing.scaled_readings import without_scales
+from ddagr_gym.physics.effects.command_gain import CommandGain
 from ddagr_gym.physics.effects.encoder_scale import EncoderScale
 from ddagr_gym.physics.effects.gyro_scale import GyroScale
 from ddagr_gym.physics.effects.imu_tilt import ImuTilt
@@ -21,10 +22,12 @@ def test_what_scales_did_to_the_readings_is_undone():
         "yaw_rate": 1.1 * MADE["yaw_rate"],
         "encoder_right": 0.9 * MADE["encoder_right"],
         "encoder_left": 1.2 * MADE["encoder_left"],
+        # the banks do 0.8 and 1.25 times what the log says that they were told
+        "command_right": MADE["command_right"] / 0.8,
+        "command_left": MADE["command_left"] / 1.25,
     }
-    found = without_scales(
-        replace(MADE, channels={**MADE.channels, **wrong}), [GyroScale(1.1), EncoderScale(0.9, 1.2), ImuTilt(0.1, 0.0)]
-    )
+    effects = [GyroScale(1.1), EncoderScale(0.9, 1.2), CommandGain(0.8, 1.25), ImuTilt(0.1, 0.0)]
+    found = without_scales(replace(MADE, channels={**MADE.channels, **wrong}), effects)
     for name, values in MADE.channels.items():
         np.testing.assert_allclose(found[name], values, rtol=1e-12, err_msg=name)
 
