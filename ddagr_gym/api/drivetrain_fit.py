@@ -64,12 +64,12 @@ class DrivetrainFit:
         from ddagr_gym.calibration.sensor_findings import named_sensors
         from ddagr_gym.diagnosis.preprocessing.scaled_readings import without_scales
         from ddagr_gym.diagnosis.result.drivetrain_names import CompletedNominal
-        from ddagr_gym.diagnosis.result.gyro_findings import gyro_findings
+        from ddagr_gym.diagnosis.result.inertial_findings import inertial_findings
 
         self._say("the wheels do not follow their commands as the simulator says: fitting its drivetrain")
         rng = np.random.default_rng(self.seed)
         encoders = encoder_findings(mended.recordings, rng)
-        seen = (*gyro_findings(mended.recordings, rng), *encoders)
+        seen = (*inertial_findings(mended.recordings, rng), *encoders)
         read = [without_scales(item, [effect for _, effect in seen]) for item in mended.in_their_channels]
         self.made = self._calibrated(read, self._settings(len(read), () if encoders else doubted))
         if self.made is None:

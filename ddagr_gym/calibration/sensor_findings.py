@@ -3,7 +3,7 @@
 A data sheet states that poses come at once, what an encoder counts, that both banks obey alike, and where the IMU sits.
 Where the drives say otherwise, that is a finding as a missing part of the drivetrain is: decided by forecasts of what
 was left out of the fit, and named from the least size that matters. The gyro is held against the poses instead
-(:mod:`ddagr_gym.diagnosis.result.gyro_findings`), which say more of it than forecasts do.
+(:mod:`ddagr_gym.diagnosis.result.inertial_findings`), which say more of it than forecasts do.
 """
 
 from __future__ import annotations

@@ -17,7 +17,8 @@ class CommandGain(Effect):
     """Factors on the commanded bank speeds, as of a motor controller whose speed calibration is off or worn.
 
     The speed by command of a real robot is seldom that of its data sheet, for many reasons. So drives from before have
-    to say what is usual: a diagnosis against a data sheet does not look for this effect.
+    to say what is usual: a diagnosis against a data sheet does not look for this effect by itself. Beside a whole
+    drivetrain it is fitted where one bank settles at another share of its commands than the other.
 
     Attributes:
         right: least: 3 percent, a tenth of a row's width in a turn.

@@ -1,4 +1,4 @@
-"""A gyro that the headings of the poses contradict is named by what it reads, without a simulator."""
+"""Gyro and accelerometer that rests or poses contradict are named by what they read, without a simulator."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ddagr_gym.diagnosis.result.gyro_findings import gyro_findings
+from ddagr_gym.diagnosis.result.inertial_findings import inertial_findings
 from ddagr_gym.physics.effects.gyro_bias import GyroBias
 from ddagr_gym.physics.effects.gyro_scale import GyroScale
+from ddagr_gym.physics.effects.imu_tilt import ImuTilt
 from ddagr_gym.recordings.schema import RobotGeometry
 from tests.recordings.conftest import Faults, drive
 
@@ -18,7 +19,7 @@ GEOMETRY = RobotGeometry("warthog", 0.3, 0.54)
 
 def found_in(*faults: Faults):
     drives = [drive(GEOMETRY, item, seed=seed) for seed, item in enumerate(faults)]
-    return gyro_findings(drives, np.random.default_rng(0))
+    return inertial_findings(drives, np.random.default_rng(0))
 
 
 def test_a_sound_gyro_is_not_named():
@@ -48,7 +49,7 @@ def test_a_bias_is_that_at_rest_and_by_the_poses_where_the_robot_never_stands():
     standing = drive(GEOMETRY, Faults(gyro_bias=0.05))
     rolling = {name: standing[name] + 0.5 for name in ("encoder_right", "encoder_left")}
     never = replace(standing, channels={**standing.channels, **rolling})
-    (at_rest,), (by_poses,) = (gyro_findings([given], np.random.default_rng(0)) for given in (standing, never))
+    (at_rest,), (by_poses,) = (inertial_findings([given], np.random.default_rng(0)) for given in (standing, never))
     known, wide = (finding.parameters["bias"] for finding, _ in (at_rest, by_poses))
     assert known.value == pytest.approx(0.05, abs=5e-4)
     assert wide.value == pytest.approx(0.05, abs=5e-3)
@@ -70,3 +71,28 @@ def test_an_interval_of_several_drives_holds_what_each_says():
     assert scale.value == pytest.approx(1.165, rel=0.01)
     assert scale.interval[0] < 1.08
     assert scale.interval[1] > 1.25
+
+
+@pytest.mark.parametrize(
+    ("offset", "sizes"),
+    [
+        ((-0.5, 0.0), {"pitch": 0.051}),
+        ((0.0, -0.4), {"roll": -0.0408}),
+        ((0.6, 0.5), {"pitch": -0.0612, "roll": 0.051}),
+    ],
+)
+def test_gravity_along_an_axis_of_the_robot_is_a_tilt_or_a_bias(offset, sizes):
+    """A slope turns with the heading and is told from it."""
+    ((finding, effect),) = found_in(Faults(force_offset=offset, slope=(0.8, -0.5)))
+    assert isinstance(effect, ImuTilt)
+    assert finding.equivalence_set == {"imu_tilt": 0.5, "accelerometer_bias": 0.5}
+    assert {name: item.value for name, item in finding.parameters.items()} == pytest.approx(sizes, abs=2e-3)
+    for name, item in finding.parameters.items():
+        low, high = item.interval
+        assert low < sizes[name] < high
+        assert getattr(effect, name) == item.value
+
+
+@pytest.mark.parametrize("others", [(Faults(),), (Faults(force_offset=(0.6, 0.0)),)])
+def test_a_tilt_is_one_of_all_drives(others):
+    assert found_in(Faults(force_offset=(-0.6, 0.0)), *others) == ()

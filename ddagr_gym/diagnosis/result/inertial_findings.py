@@ -1,4 +1,4 @@
-"""A gyro whose scale or bias rests or the headings of the poses contradict: no simulator is needed to see that.
+"""Gyro and accelerometer that rests or the poses contradict: no simulator is needed to see that.
 
 Beside a real robot's drivetrain no gate of simulated drives holds, so that effects of the library have no name there.
 What two channels say of the same turns, or one of a robot that stands, is judged by the recording alone, with the
@@ -9,17 +9,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.special import ndtri
 
 from ddagr_gym.diagnosis.answer.verdict import Estimate, Finding
 from ddagr_gym.diagnosis.result.uncertainty import student_quantile
+from ddagr_gym.parameters import STANDARD_GRAVITY
 from ddagr_gym.physics.effects import Effect
+from ddagr_gym.physics.effects.accelerometer_bias import AccelerometerBias
 from ddagr_gym.physics.effects.gyro_bias import GyroBias
 from ddagr_gym.physics.effects.gyro_scale import GyroScale
+from ddagr_gym.physics.effects.imu_tilt import ImuTilt
 from ddagr_gym.recordings.checks.blocks import CONFIDENCE
 from ddagr_gym.recordings.checks.findings import CheckFinding, Status
+from ddagr_gym.recordings.checks.gravity import gravity
 from ddagr_gym.recordings.checks.noise import BIAS, noise
 from ddagr_gym.recordings.checks.turning import GYRO_SCALE, against_poses
 from ddagr_gym.recordings.schema import Recording
@@ -34,15 +39,26 @@ _NARROWER = student_quantile(math.inf) / float(ndtri(0.5 + 0.5 * CONFIDENCE))
 """Of an interval of an answer over that of the checks, which are surer."""
 
 
-def gyro_findings(recordings: Sequence[Recording], rng: np.random.Generator) -> tuple[tuple[Finding, Effect], ...]:
-    """Scale and bias of the gyro where every recording that tells them is beyond what counts as sound, to one side.
+_TILT = {"specific_force_y": ("roll", 1.0), "specific_force_x": ("pitch", -1.0)}
+"""Tilt by the axis along which the accelerometer reads gravity, and its sign."""
 
-    Each with the effect that it is. A gyro that turns the wrong way has no scale.
+Named = tuple[Finding, Effect]
+
+
+def inertial_findings(recordings: Sequence[Recording], rng: np.random.Generator) -> tuple[Named, ...]:
+    """What of the IMU every recording that tells it finds beyond what counts as sound, to one side.
+
+    Each with the effect that it is.
 
     Args:
         recordings: with the gyro turned the right way.
         rng: of the resampled intervals.
     """
+    return (*_gyro(recordings, rng), *_accelerometer(recordings))
+
+
+def _gyro(recordings: Sequence[Recording], rng: np.random.Generator) -> tuple[Named, ...]:
+    """Scale and bias of the gyro; one that turns the wrong way has no scale."""
     said = [finding for recording in recordings for finding in _told(recording, rng)]
     found = []
     for check, (kind, field) in _FIELDS.items():
@@ -51,6 +67,30 @@ def gyro_findings(recordings: Sequence[Recording], rng: np.random.Generator) -> 
         if size is not None and limits["low"] <= size.value <= limits["high"]:
             found.append((Finding.seen(kind.name, {field: size}), kind(**{field: size.value})))
     return tuple(found)
+
+
+def _accelerometer(recordings: Sequence[Recording]) -> tuple[Named, ...]:
+    """A tilt by what rests read beside the attitude of the poses, or at any heading.
+
+    A bias of the accelerometer does the same.
+    """
+    said = [finding for recording in recordings for finding in gravity(recording) if finding.interval is not None]
+    sizes = {}
+    for channel, (field, sign) in _TILT.items():
+        told = [item for item in said if item.channel == channel]
+        if told and _beyond(told):
+            sizes[field] = _as_tilt(_size(told), sign)
+    if not sizes:
+        return ()
+    weights = {ImuTilt.name: 0.5, AccelerometerBias.name: 0.5}
+    finding = replace(Finding.seen(ImuTilt.name, sizes), equivalence_set=weights)
+    return ((finding, ImuTilt(**{"roll": 0.0} | {field: size.value for field, size in sizes.items()})),)
+
+
+def _as_tilt(offset: Estimate, sign: float) -> Estimate:
+    """Angle by which gravity is read along an axis as much."""
+    low, high = sorted(sign * end / STANDARD_GRAVITY for end in offset.interval or (math.nan, math.nan))
+    return Estimate(sign * offset.value / STANDARD_GRAVITY, "rad", (low, high))
 
 
 def _told(recording: Recording, rng: np.random.Generator) -> list[CheckFinding]:
