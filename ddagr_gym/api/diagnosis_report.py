@@ -63,7 +63,10 @@ class DiagnosisReport(Report):
 
     @property
     def effects(self) -> tuple[Effect, ...]:
-        """Named effects at their fitted sizes, as ``gym.make(effects=...)``, simulate and replay take them."""
+        """Named effects at their fitted sizes, as ``gym.make(effects=...)``, simulate and replay take them.
+
+        With the factors of both banks that were fitted beside a drivetrain and are too much alike for a name.
+        """
         return self.outcome.effects
 
     @property

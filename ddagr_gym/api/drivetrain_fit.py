@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from ddagr_gym.calibration.settings import CalibrationSettings
     from ddagr_gym.diagnosis.preprocessing.mended_recordings import MendedRecordings
     from ddagr_gym.diagnosis.result.drivetrain_names import CompletedNominal
+    from ddagr_gym.diagnosis.result.encoder_findings import Named
     from ddagr_gym.recordings.schema import Recording
 
 _GROUND = "ground"
@@ -60,22 +61,22 @@ class DrivetrainFit:
             doubted: scales of encoders or gains of commands that are fitted too.
         """
         from ddagr_gym.calibration.drivetrain_answer import drivetrain_answer, drivetrain_findings
-        from ddagr_gym.calibration.encoder_findings import encoder_findings
         from ddagr_gym.calibration.sensor_findings import named_sensors
         from ddagr_gym.diagnosis.preprocessing.scaled_readings import without_scales
         from ddagr_gym.diagnosis.result.drivetrain_names import CompletedNominal
-        from ddagr_gym.diagnosis.result.inertial_findings import inertial_findings
+        from ddagr_gym.diagnosis.result.encoder_findings import with_encoders
 
         self._say("the wheels do not follow their commands as the simulator says: fitting its drivetrain")
-        rng = np.random.default_rng(self.seed)
-        encoders = encoder_findings(mended.recordings, rng)
-        seen = (*inertial_findings(mended.recordings, rng), *encoders)
-        read = [without_scales(item, [effect for _, effect in seen]) for item in mended.in_their_channels]
-        self.made = self._calibrated(read, self._settings(len(read), () if encoders else doubted))
+        seen, encoders = self._seen(mended.recordings)
+        undone = [effect for _, effect in (*seen, *encoders)]
+        read = [without_scales(item, undone) for item in mended.in_their_channels]
+        # what is undone is roughly known: the fit says the rest
+        asked = dict.fromkeys((*(effect.name for _, effect in encoders), *doubted))
+        self.made = self._calibrated(read, self._settings(len(read), tuple(asked)))
         if self.made is None:
             return None
         found = self.made.calibration
-        sensors = (*named_sensors(found), *seen)
+        sensors = (*with_encoders(encoders, named_sensors(found)), *seen)
         return CompletedNominal(
             robot=self.made.robot,
             soil=self.made.soils[_GROUND],
@@ -83,6 +84,18 @@ class DrivetrainFit:
             findings=(*drivetrain_findings(found), *(finding for finding, _ in sensors if finding is not None)),
             effects=tuple(effect for _, effect in sensors),
         )
+
+    def _seen(self, recordings: Sequence[Recording]) -> tuple[Sequence[Named], Sequence[Named]]:
+        """What rests, poses and commands say of the IMU and of the encoders before any fit."""
+        from ddagr_gym.diagnosis.result.encoder_findings import encoder_findings, or_wheel_radius
+        from ddagr_gym.diagnosis.result.inertial_findings import inertial_findings
+
+        rng = np.random.default_rng(self.seed)
+        seen, encoders = inertial_findings(recordings, rng), encoder_findings(recordings, rng)
+        for _, scale in encoders:
+            if scale.right == scale.left:
+                warnings.warn(or_wheel_radius(scale, self.nominal.robot.name), InputWarning, stacklevel=3)
+        return seen, encoders
 
     def _settings(self, count: int, doubted: Sequence[str]) -> CalibrationSettings:
         from ddagr_gym.calibration.settings import CalibrationSettings

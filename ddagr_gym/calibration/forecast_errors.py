@@ -13,7 +13,7 @@ from ddagr_gym.calibration.calibration_data import CalibrationData
 from ddagr_gym.calibration.joint_fit import FittedModel
 from ddagr_gym.calibration.left_out import ENCODERS, Forecast, fold_name, folds
 from ddagr_gym.calibration.result import CALIBRATED, DATA_SHEET, KINEMATIC, ForecastError
-from ddagr_gym.calibration.simulator_values import fitted_robot, fitted_sensors, fitted_soil
+from ddagr_gym.calibration.simulator_values import fitted_factors, fitted_robot, fitted_soil
 from ddagr_gym.identification.fit_numerics import field_numerics
 from ddagr_gym.identification.motor_currents import without_currents
 from ddagr_gym.identification.residual_weights import ROBUST
@@ -50,7 +50,7 @@ class Forecasts:
         predictions: (W, T, 8) by model.
         robot: as calibrated without the drive.
         soil: of its ground, likewise.
-        sensors: what was calibrated of the sensors, likewise.
+        sensors: what was calibrated of sensors and gains of commands, likewise.
         currents: measured and forecast currents of both banks (W, T, 2) [A]; None where none is compared.
     """
 
@@ -97,7 +97,7 @@ def all_forecasts(
         values = forecast.values_of(model)
         return Forecasts(
             fold_name(data, forecast.fold), ground, soil_from, windows, predictions,
-            fitted_robot(model.model.robot, values), fitted_soil(data, ground, values), fitted_sensors(values),
+            fitted_robot(model.model.robot, values), fitted_soil(data, ground, values), fitted_factors(values),
             None if data.currents is None else _currents(forecast),
         )  # fmt: skip
 

@@ -14,8 +14,8 @@ GYRO_SCALE_DEVIATION = 0.03
 """Prior of the gyro's scale [-]: data sheets of low-cost gyros promise 3 %."""
 
 DOUBTED_DEVIATION = 0.1
-"""Prior of the scale of an encoder and of the gain of a bank's commands that the readings themselves make suspicious
-[-] (ours): a gear or a tyre exchanged, and within reach a count doubled."""
+"""Prior of a bank's factor where readings make it suspicious [-] (ours): a gear or a tyre exchanged, a motor controller
+with another gain, and within reach a count doubled."""
 
 DELAY_DEVIATION = 0.3
 """Prior of the dead time between command and wheels [s] (ours): 0.2 to 0.43 s on a Husky and a Warthog."""
@@ -84,13 +84,17 @@ def _of_drivetrain(name: str, parameters: tuple[str, ...], needs: tuple[str, ...
     return Part(name, PART_TITLES[name], parameters, PART_DRIVES[name], needs, usual)
 
 
-OF_BANKS = {
-    "encoder_scale": ("encoder_scale_right", "encoder_scale_left"),
-    "command_gain": ("command_gain_right", "command_gain_left"),
-}
-"""Parameters of the right and the left bank by the part, which only fits have whose readings make it suspicious."""
+OF_BANKS = {"encoder_scale": layout.ENCODER_SCALE, "command_gain": layout.COMMAND_GAIN}
+"""Parts that are a factor for each bank, with the entry of a simulator's row that is the right one's. A fit has them
+only where readings make them suspicious."""
 
-SCALES = ("gyro_scale", *(name for names in OF_BANKS.values() for name in names))
+
+def factors_of_banks(part: str) -> tuple[str, str]:
+    """Names of the parameters of the right and the left bank, of one of :data:`OF_BANKS`."""
+    return f"{part}_right", f"{part}_left"
+
+
+SCALES = ("gyro_scale", *(name for part in OF_BANKS for name in factors_of_banks(part)))
 """Factors on readings and commands, which have no place in a robot."""
 
 PARTS = (
@@ -118,13 +122,13 @@ PARTS = (
     Part(
         "encoder_scale",
         "scales of the encoders",
-        OF_BANKS["encoder_scale"],
+        factors_of_banks("encoder_scale"),
         "straight pieces and arcs to both sides at several speeds, with poses",
     ),
     Part(
         "command_gain",
         "gains of the banks' commands",
-        OF_BANKS["command_gain"],
+        factors_of_banks("command_gain"),
         "commands held for seconds, slow and fast, of both banks in both directions",
     ),
     _of_drivetrain("no_load_speed", ("no_load_speed",)),
@@ -215,22 +219,19 @@ def complete_robot(robot: Robot) -> Robot:
     return replace(robot, drivetrain=drivetrain, standard_deviations={**deviations, **robot.standard_deviations})
 
 
-_ENTRIES = {"encoder_scale": layout.ENCODER_SCALE, "command_gain": layout.COMMAND_GAIN}
-
-
 def shared_parameters(robot: Robot, doubted: Sequence[str] = ()) -> tuple[ModelParameter, ...]:
-    """Every parameter of the parts of a complete robot that it states as uncertain, and scales of its sensors.
+    """Every parameter of the parts of a complete robot that it states as uncertain, and factors beside the robot.
 
     Args:
         robot: with every part.
-        doubted: parts of :data:`OF_BANKS` to have beside the scale of the gyro.
+        doubted: those of :data:`OF_BANKS` that are in doubt.
     """
     scale = ModelParameter("gyro_scale", "-", (layout.GYRO_SCALE,), True, GYRO_SCALE_DEVIATION, 0.01, -0.3, 0.3)
     known = {name for part in PARTS for name in part.parameters}
     of_banks = (
-        ModelParameter(name, "-", (_ENTRIES[part] + bank,), True, DOUBTED_DEVIATION, 0.01, -1.0, 1.0)
+        ModelParameter(name, "-", (OF_BANKS[part] + bank,), True, DOUBTED_DEVIATION, 0.01, -1.0, 1.0)
         for part in doubted
-        for bank, name in enumerate(OF_BANKS[part])
+        for bank, name in enumerate(factors_of_banks(part))
     )
     return (*(p for p in robot_parameters(robot) if p.name in known), scale, *of_banks)
 
@@ -246,7 +247,7 @@ class RobotModel:
 
     Attributes:
         robot: in which limits of the parts that are left out are not there.
-        parameters: of all parts, of the soils and of the sensors; held ones have a prior of 0.
+        parameters: of all parts, of the soils, and factors on readings and commands; held ones have a prior of 0.
     """
 
     robot: Robot

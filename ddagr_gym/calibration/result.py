@@ -101,7 +101,7 @@ class Scatter:
 
 @dataclass(frozen=True)
 class CalibratedParameter:
-    """One parameter of the robot, its sensors, or the soil of a ground.
+    """One parameter of the robot, of its sensors and commands, or of the soil of a ground.
 
     Attributes:
         name: identifier; of a soil with its ground behind a slash.

@@ -15,10 +15,11 @@ from ddagr_gym.calibration.accelerometer_results import MountingSize
 from ddagr_gym.calibration.forecast_findings import folds_of, forecast_finding
 from ddagr_gym.calibration.imu_mounting import LEAST
 from ddagr_gym.calibration.part_selection import least_growth, surely_above
-from ddagr_gym.calibration.parts import OF_BANKS
+from ddagr_gym.calibration.parts import factors_of_banks
 from ddagr_gym.calibration.result import Calibration
 from ddagr_gym.calibration.simulator_values import calibrated_effects
 from ddagr_gym.diagnosis.answer.verdict import Estimate, Finding
+from ddagr_gym.diagnosis.result.encoder_findings import BANKS, Named
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.effects.command_gain import CommandGain
 from ddagr_gym.physics.effects.encoder_scale import EncoderScale
@@ -37,8 +38,6 @@ OF_MOUNTING: Mapping[type[Effect], Mapping[str, str]] = {
 
 BALANCES: Mapping[str, Question] = {EncoderScale.name: BALANCE, CommandGain.name: GAIN_BALANCE}
 """What the right bank may be over the left one, by what is fitted of each."""
-
-Named = tuple[Finding | None, Effect]
 
 
 def named_sensors(calibration: Calibration) -> tuple[Named, ...]:
@@ -79,7 +78,7 @@ def _of_banks(calibration: Calibration, effect: EncoderScale | CommandGain) -> F
     intervals = {item.name: item.interval for item in calibration.parameters if item.calibrated}
     sizes = {
         field: Estimate(getattr(effect, field), "-", intervals.get(name))
-        for field, name in zip(("right", "left"), OF_BANKS[effect.name], strict=True)
+        for field, name in zip(BANKS, factors_of_banks(effect.name), strict=True)
     }
     gate = least_growth(part.error or 0.0, folds_of(calibration))
     return forecast_finding(effect.name, sizes, part.growth, part.error, gate)

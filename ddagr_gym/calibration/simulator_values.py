@@ -9,7 +9,7 @@ from dataclasses import dataclass, fields, replace
 from ddagr_gym.calibration.accelerometer_results import ImuMounting
 from ddagr_gym.calibration.calibration_data import CalibrationData
 from ddagr_gym.calibration.joint_fit import FittedModel
-from ddagr_gym.calibration.parts import OF_BANKS, SCALES, RobotModel, is_stated, part_of
+from ddagr_gym.calibration.parts import SCALES, RobotModel, factors_of_banks, is_stated, part_of
 from ddagr_gym.calibration.result import CalibratedParameter, Calibration
 from ddagr_gym.envs.calibrated_draws import CalibratedDraws, GroundDraws
 from ddagr_gym.identification.fitted_values import soil_with_values, with_values
@@ -170,12 +170,12 @@ def fitted_soil(data: CalibrationData, ground: str, values: Mapping[str, float])
     return soil_with_values(data.soils[ground], own)
 
 
-def fitted_sensors(values: Mapping[str, float]) -> tuple[Effect, ...]:
+def fitted_factors(values: Mapping[str, float]) -> tuple[Effect, ...]:
     """What has no place in a robot or a soil, at values of the fit."""
     factors = {name: math.exp(values.get(name, 0.0)) for name in SCALES}
     found: list[Effect] = [] if factors["gyro_scale"] == 1.0 else [GyroScale(factors["gyro_scale"])]
     for kind in (EncoderScale, CommandGain):
-        right, left = (factors[name] for name in OF_BANKS[kind.name])
+        right, left = (factors[name] for name in factors_of_banks(kind.name))
         found += [] if right == left == 1.0 else [kind(right, left)]
     return tuple(found)
 
@@ -205,9 +205,9 @@ def _of_another_drive(item: CalibratedParameter) -> float:
 
 
 def calibrated_effects(calibration: Calibration) -> tuple[Effect, ...]:
-    """What was calibrated and has no place in a robot or a soil: sensors."""
+    """What was calibrated and has no place in a robot or a soil: sensors, and gains of commands."""
     changes = {item.name: item.change for item in calibration.parameters if item.calibrated}
-    return (*fitted_sensors(changes), *mounting_effects(calibration.imu))
+    return (*fitted_factors(changes), *mounting_effects(calibration.imu))
 
 
 def mounting_effects(found: ImuMounting | None) -> tuple[Effect, ...]:

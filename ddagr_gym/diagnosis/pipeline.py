@@ -182,7 +182,7 @@ def diagnose(
     nominal = None
     if complete_nominal is not None and unlike:
         nominal = complete_nominal(
-            unlike, session.mended, doubted_banks(session.mended.recordings, checks, session.rng("checks"))
+            unlike, session.mended, doubted_banks(session.mended.recordings, session.rng("checks"))
         )
     if nominal is not None and is_an_answer(nominal):
         made = _beside_drivetrain(session, standing(found, session.gates), nominal, names_only, steps)
@@ -261,7 +261,8 @@ def _beside_drivetrain(
     traces = steps.keep("localisation traces", trace_mismatch, session, found)
     located = steps.keep("localisation", locate, session, found, traces)
     evidence = steps.run("evidence", gather_evidence, session, found, traces)
-    told = {effect.name: effect for effect in (*effects, *nominal.effects)}
+    others = [effect for effect in effects if effect.name not in nominal.meant]
+    told = {effect.name: effect for effect in (*others, *nominal.effects)}
     places = {"sensor_hold": _where_repeated(session)}
     findings = tuple(replace(item, where=places.get(item.name, item.where)) for item in diagnosis.findings)
     following = None if names_only else drivetrain_drive(nominal.answer)

@@ -215,7 +215,7 @@ def _delay(a: Amounts) -> str:
 def _gain(a: Amounts) -> str:
     parts = [
         f"the {bank} wheels turn {quantity(a[bank].scaled(100.0, -100.0), '%')} "
-        f"{'faster' if a[bank].value >= 1.0 else 'slower'} for the same command"
+        f"{'faster' if a[bank].value >= 1.0 else 'slower'} than the model's for the same command"
         for bank in ("right", "left")
     ]
     return _pair(a, ("right", "left"), (parts[0], parts[1]), 0.002, 1.0)

@@ -84,6 +84,21 @@ def test_sensors_are_named_beside_it(asked):
     assert "the left encoder reads" in str(result)
 
 
+@pytest.mark.slow
+def test_a_bank_with_another_gain_is_named_beside_it(asked):
+    """The right bank does what it is told over 0.85: its log holds less than the robot obeyed."""
+    made = driven(180.0)
+    told = {"command_right": 0.85 * made["command_right"]}
+    result = ddagr_gym.diagnose(replace(made, channels={**made.channels, **told}), names_only=True)
+    found = {finding.name: finding.parameters for finding in result.findings}
+    assert {"command_gain", "command_delay", "load"} <= set(found)
+    gains = found["command_gain"]
+    assert float(gains["right"]) / float(gains["left"]) == pytest.approx(1.0 / 0.85, abs=0.02)
+    assert "than the model's for the same command" in str(result)
+    (effect,) = [item for item in result.effects if item.name == "command_gain"]
+    assert (effect.right, effect.left) == (float(gains["right"]), float(gains["left"]))
+
+
 def test_a_recording_that_cannot_tell_its_drivetrain_keeps_its_answer_and_says_why(asked, monkeypatch):
     def refuse(*inputs, **named):
         raise InputError("yard.csv has 3 windows: give a longer drive.")

@@ -11,6 +11,7 @@ from ddagr_gym.calibration.parts import (
     PARTS,
     RobotModel,
     complete_robot,
+    factors_of_banks,
     first_values,
     idle_parts,
     part_of,
@@ -54,7 +55,7 @@ def test_what_differs_between_banks_is_there_only_when_asked_for(part: str):
     robot = complete_robot(get_robot("warthog"))
     usual, asked = (shared_parameters(robot, doubted) for doubted in ((), (part,)))
     assert asked[: len(usual)] == usual
-    assert [p.name for p in asked[len(usual) :]] == list(OF_BANKS[part])
+    assert [p.name for p in asked[len(usual) :]] == list(factors_of_banks(part))
 
 
 def test_what_may_be_nothing_starts_above_it():

@@ -116,7 +116,9 @@ def test_the_drivetrain_is_fitted_where_the_library_leaves_too_much_in_the_encod
     stages: Stages, monkeypatch: pytest.MonkeyPatch, explained: float | None, told: bool
 ) -> None:
     late, answer = PoseLatency(0.2), SimpleNamespace(explained=explained, parts=())
-    nominal = SimpleNamespace(robot=get_robot("warthog"), soil=get_soil("thesis_a1"), effects=(late,), answer=answer)
+    nominal = SimpleNamespace(
+        robot=get_robot("warthog"), soil=get_soil("thesis_a1"), effects=(late,), answer=answer, meant=frozenset()
+    )
     undone: list[Any] = []
 
     def with_nominal(robot: Any, soil: Any, sensors: Any) -> Any:
@@ -126,6 +128,7 @@ def test_the_drivetrain_is_fitted_where_the_library_leaves_too_much_in_the_encod
     stages.session.with_nominal = with_nominal
     stages.session.progress = lambda line: None
     monkeypatch.setattr(pipeline, "unlike_commands", lambda accepted, gates: {"encoder_left": 9.0})
+    monkeypatch.setattr(pipeline, "doubted_banks", lambda recordings, rng: ("command_gain",))
     monkeypatch.setattr(pipeline, "standing", lambda found, gates: found)
     monkeypatch.setattr(pipeline, "refit_nominal", lambda problem, progress: ("raw", "refitted"))
     monkeypatch.setattr(pipeline, "beside_completed", lambda session, refitted, effects: f"{effects} beside {refitted}")
@@ -147,7 +150,7 @@ def test_the_drivetrain_is_fitted_where_the_library_leaves_too_much_in_the_encod
         return None if explained is None else nominal
 
     outcome, _ = stages.run(complete_nominal=complete)
-    assert asked == [({"encoder_left": 9.0}, ())]
+    assert asked == [({"encoder_left": 9.0}, ("command_gain",))]
     assert outcome.diagnosis.verdict == (("load",) if told else ("none",))
     assert outcome.nominal[0].name == ("warthog" if told else "ddagr")
     assert ("certify" in stages.called) is not told

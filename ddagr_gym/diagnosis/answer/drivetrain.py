@@ -124,7 +124,7 @@ class DrivetrainAnswer:
         remaining: where the residual of the wheel speeds is, after the correction.
         explained: share of the nominal simulator's squared error of the wheel speeds, on what was left out, that the
             correction takes away [-].
-        other: names of further parameters of robot, sensors and soil that were fitted along.
+        other: names of further parameters of robot, sensors, commands and soil that were fitted along.
         misfit: of the encoders beside the nominal simulator, over its limit, for which the drivetrain was asked.
     """
 

@@ -58,8 +58,8 @@ class Finding:
             than the map says, which were mended before anything was fitted: `encoders_exchanged`, `encoders_reversed`,
             `commands_exchanged`, `commands_reversed`, `imu_upside_down`, `heading_reversed`, `path_mirrored`.
         parameters: by field.
-        gain: fall of the cost over the dispersion when it was added; of a part of the drivetrain, and of a sensor that
-            was fitted with it, the relative growth of the forecasts' loss without it.
+        gain: fall of the cost over the dispersion when it was added; of a part of the drivetrain, and of a sensor or
+            a gain of commands that was fitted with it, the relative growth of the forecasts' loss without it.
         gate: what the gain had to pass: beside other names more than alone (`thresholds` has the gates of first names);
             0 where it was seen in the values themselves.
         score: cluster-robust, along the fitted direction.

@@ -14,16 +14,16 @@ from ddagr_gym.recordings.checks.across import across_runs
 from ddagr_gym.recordings.checks.findings import CheckFinding, Status
 from ddagr_gym.recordings.checks.run import check_recording
 from ddagr_gym.recordings.checks.travel import command_gains
-from ddagr_gym.recordings.checks.turning import BANKS
+from ddagr_gym.recordings.checks.turning import left_over_right
 from ddagr_gym.recordings.pose_frames import frames_apart
 from ddagr_gym.recordings.schema import Recording
 
 STUCK = "stuck"
 """Family of checks on channels that never change."""
 
-UNLIKE_GAINS = float(np.log(1.08))
-"""Right over left bank's gain from which a fit is asked, as a logarithm (ours): it is 0.94 to 1.1 in three minutes of
-ordinary drives, so that nothing is said before forecasts have decided."""
+UNLIKE_GAINS = 1.08
+"""Right over left bank's gain, or one over it, from which a fit is asked [-] (ours). Three minutes of ordinary drives
+reach 1.1: this only asks, and forecasts decide."""
 
 FRAMES = "frames"
 """Doubt about the frames of poses."""
@@ -60,26 +60,28 @@ def _doubt(recording: str, finding: CheckFinding) -> DataDoubt:
     return DataDoubt(recording, finding.channel, finding.check, sentence, finding.suspects)
 
 
-def doubted_banks(
-    recordings: Sequence[Recording], doubts: Sequence[DataDoubt], rng: np.random.Generator
-) -> tuple[str, ...]:
-    """Names of effects by which the banks may differ in these recordings, for a fit to decide.
+def doubted_banks(recordings: Sequence[Recording], rng: np.random.Generator) -> tuple[str, ...]:
+    """Names of effects by which the banks may differ, for a fit to decide.
 
     Scales of the encoders where a turn of one bank's turns the robot otherwise than one of the other's, by the gyro;
-    else gains of the commands where one bank settles at another share of them than the other in every recording that
-    tells.
+    else gains of the commands where one bank settles at another share of them than the other. Every recording that
+    tells must say so, to one side.
 
     Args:
         recordings: with faults mended that show in the values.
-        doubts: of the checks.
         rng: of resampled intervals.
     """
-    if any(doubt.channel == BANKS for doubt in doubts):
+    scales = [left_over_right(recording, rng) for recording in recordings]
+    if _to_one_side([scale for scale in scales if scale is not None], 1.0):
         return (EncoderScale.name,)
-    found = [command_gains(recording, rng) for recording in recordings]
-    logs = [float(np.log(gains.values[2])) for gains in found if gains is not None and gains.values[2] > 0.0]
-    apart = bool(logs) and min(np.abs(logs)) >= UNLIKE_GAINS and len(set(np.sign(logs))) == 1
-    return (CommandGain.name,) if apart else ()
+    gains = [command_gains(recording, rng) for recording in recordings]
+    ratios = [float(item.values[2]) for item in gains if item is not None and item.values[2] > 0.0]
+    return (CommandGain.name,) if _to_one_side(ratios, UNLIKE_GAINS) else ()
+
+
+def _to_one_side(ratios: Sequence[float], limit: float) -> bool:
+    """Whether there are ratios, and all are above a limit or all below one over it."""
+    return bool(ratios) and (min(ratios) > limit or max(ratios) < 1.0 / limit)
 
 
 def suspects_of(doubts: Sequence[DataDoubt]) -> tuple[str, ...]:

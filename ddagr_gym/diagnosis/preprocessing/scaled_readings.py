@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from ddagr_gym.physics.effects import Effect
@@ -19,13 +19,23 @@ def without_scales(recording: Recording, effects: Sequence[Effect]) -> Recording
         recording: with or without these channels.
         effects: scales of the gyro and of the encoders and gains of commands are undone, others stay.
     """
-    factors: dict[str, float] = {}
     for effect in effects:
         if isinstance(effect, GyroScale):
-            factors["yaw_rate"] = effect.scale
+            recording = with_readings_over(recording, {"yaw_rate": effect.scale})
         elif isinstance(effect, EncoderScale):
-            factors |= {"encoder_right": effect.right, "encoder_left": effect.left}
+            recording = with_readings_over(recording, {"encoder_right": effect.right, "encoder_left": effect.left})
         elif isinstance(effect, CommandGain):
-            factors |= {"command_right": 1.0 / effect.right, "command_left": 1.0 / effect.left}
+            obeyed = {"command_right": 1.0 / effect.right, "command_left": 1.0 / effect.left}
+            recording = with_readings_over(recording, obeyed)
+    return recording
+
+
+def with_readings_over(recording: Recording, factors: Mapping[str, float]) -> Recording:
+    """A recording whose readings are divided by factors.
+
+    Args:
+        recording: with or without these channels.
+        factors: by channel.
+    """
     known = {name: recording[name] / factor for name, factor in factors.items() if recording.has(name)}
     return replace(recording, channels={**recording.channels, **known}) if known else recording

@@ -86,7 +86,7 @@ class DiagnosisSession:
         Args:
             robot: nominal.
             soil: nominal.
-            sensors: what is known of the sensors; their scales are undone in the readings.
+            sensors: what is known of sensors and of the gains of commands; such factors are undone in the recordings.
         """
         read = tuple(without_scales(recording, sensors) for recording in self.mended.recordings)
         problem = make_problem(robot, soil, read, self.setting).during(self.problem.spells)

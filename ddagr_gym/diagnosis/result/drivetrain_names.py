@@ -78,6 +78,11 @@ class CompletedNominal:
     findings: tuple[Finding, ...]
     effects: tuple[Effect, ...] = ()
 
+    @property
+    def meant(self) -> frozenset[str]:
+        """Names of all effects that the findings may be: each of them would be in the simulator twice."""
+        return frozenset(name for finding in self.findings for name in (finding.name, *finding.equivalence_set))
+
 
 def is_an_answer(nominal: CompletedNominal) -> bool:
     """Whether a fitted drivetrain explains most of why the wheels do not follow their commands.
@@ -118,8 +123,7 @@ def with_drivetrain(diagnosis: Diagnosis, nominal: CompletedNominal, misfit: Map
         nominal: the completed simulator.
         misfit: of the channels beside the simulator as it was given, refitted.
     """
-    own = {finding.name for finding in nominal.findings}
-    findings = (*(item for item in diagnosis.findings if item.name not in own), *nominal.findings)
+    findings = (*(item for item in diagnosis.findings if item.name not in nominal.meant), *nominal.findings)
     names = tuple(finding.name for finding in findings) or (UNKNOWN,)
     complete = diagnosis.complete and bool(findings)
     parts = [PART_TITLES[name] for name in nominal.answer.names]

@@ -35,12 +35,16 @@ _FIELDS: dict[str, tuple[type[Effect], str]] = {
 }
 """Effect and its field by family of checks."""
 
+_READ_AS = (("pitch", "specific_force_x", -1.0), ("roll", "specific_force_y", 1.0))
+"""Tilt, the axis along which it reads gravity, and its sign; the roll comes behind the pitch."""
+
 _NARROWER = student_quantile(math.inf) / float(ndtri(0.5 + 0.5 * CONFIDENCE))
 """Of an interval of an answer over that of the checks, which are surer."""
 
 
-_TILT = {"specific_force_y": ("roll", 1.0), "specific_force_x": ("pitch", -1.0)}
-"""Tilt by the axis along which the accelerometer reads gravity, and its sign."""
+LARGEST_TILT = 0.3
+"""Up to which gravity along an axis is called a tilt [rad] (ours): beyond it the gyro reads 5 % less of every turn,
+too, and its axes are not those of the robot."""
 
 Named = tuple[Finding, Effect]
 
@@ -70,27 +74,30 @@ def _gyro(recordings: Sequence[Recording], rng: np.random.Generator) -> tuple[Na
 
 
 def _accelerometer(recordings: Sequence[Recording]) -> tuple[Named, ...]:
-    """A tilt by what rests read beside the attitude of the poses, or at any heading.
+    """A tilt by what rests read along the robot's axes beside the attitude of the poses, or at several headings alike.
 
     A bias of the accelerometer does the same.
     """
     said = [finding for recording in recordings for finding in gravity(recording) if finding.interval is not None]
     sizes = {}
-    for channel, (field, sign) in _TILT.items():
+    pitched = 0.0
+    for field, channel, sign in _READ_AS:
         told = [item for item in said if item.channel == channel]
         if told and _beyond(told):
-            sizes[field] = _as_tilt(_size(told), sign)
-    if not sizes:
+            sizes[field] = _angle(_size(told), sign * STANDARD_GRAVITY * math.cos(pitched))
+            pitched = sizes[field].value
+    if not sizes or max(abs(size.value) for size in sizes.values()) > LARGEST_TILT:
         return ()
     weights = {ImuTilt.name: 0.5, AccelerometerBias.name: 0.5}
     finding = replace(Finding.seen(ImuTilt.name, sizes), equivalence_set=weights)
-    return ((finding, ImuTilt(**{"roll": 0.0} | {field: size.value for field, size in sizes.items()})),)
+    return ((finding, ImuTilt(**{"roll": 0.0, **{field: size.value for field, size in sizes.items()}})),)
 
 
-def _as_tilt(offset: Estimate, sign: float) -> Estimate:
-    """Angle by which gravity is read along an axis as much."""
-    low, high = sorted(sign * end / STANDARD_GRAVITY for end in offset.interval or (math.nan, math.nan))
-    return Estimate(sign * offset.value / STANDARD_GRAVITY, "rad", (low, high))
+def _angle(read: Estimate, gravity: float) -> Estimate:
+    """Angle at which an axis reads so much of gravity [m/s^2]; more than all of it is a right angle."""
+    low, high = read.interval or (read.value, read.value)
+    value, *ends = (math.asin(max(-1.0, min(1.0, item / gravity))) for item in (read.value, low, high))
+    return Estimate(value, "rad", (min(ends), max(ends)))
 
 
 def _told(recording: Recording, rng: np.random.Generator) -> list[CheckFinding]:

@@ -46,15 +46,15 @@ GAIN = Question(
     (0.6, 1.15),
     "-",
     "Check units and signs; if they are right, the motors droop or saturate.",
-    ("encoder_scale", "motor_droop", "motor_saturation"),
+    ("encoder_scale", "motor_droop", "motor_saturation", "command_gain"),
 )
 """Steady bank speed over its command [-]: motors droop under load and do not overshoot for long."""
 GAIN_BALANCE = Question(
     "balance",
     (0.9, 1.11),
     "-",
-    "Compare the banks' encoder scales and loads.",
-    ("encoder_scale", "soil_split", "centre_of_mass_offset"),
+    "Compare the banks' encoder scales, loads and gains of their motor controllers.",
+    ("encoder_scale", "command_gain", "soil_split", "centre_of_mass_offset"),
 )
 """Right bank's gain over the left's [-]."""
 SETTLED = 2.0

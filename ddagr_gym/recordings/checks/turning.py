@@ -137,6 +137,24 @@ def _track_sums(recording: Recording, lag: float) -> list[FloatArray]:
     return sums
 
 
+def left_over_right(recording: Recording, rng: np.random.Generator) -> float | None:
+    """Scale of the left encoder over that of the right one, by the turns of each [-]; 1 where they may be alike.
+
+    Args:
+        recording: any.
+        rng: for the resampling.
+
+    Returns:
+        None where both banks do the same throughout, or without encoders, gyro or the robot's geometry.
+    """
+    track = effective_track(recording, rng) if turns(recording) else None
+    if track is None or not np.isfinite(track.intervals[1]).all():
+        return None
+    low, high = track.intervals[1]
+    apart = low > BALANCE.expected[1] or 0.0 < low <= high < BALANCE.expected[0]
+    return float(track.values[1]) if apart else 1.0
+
+
 def turns(recording: Recording) -> bool:
     """Whether a drive turns enough to tell a scale by."""
     rate = recording["yaw_rate"][np.isfinite(recording["yaw_rate"])]

@@ -9,6 +9,7 @@ import pytest
 from ddagr_gym.diagnosis.answer.location import EffectLocation, Localisation
 from ddagr_gym.diagnosis.answer.verdict import DataDoubt, Diagnosis, GatesUsed
 from ddagr_gym.diagnosis.preprocessing.data_checks import data_doubts, dead_channels, doubted_banks
+from ddagr_gym.diagnosis.preprocessing.mended_recordings import mend_recordings
 from ddagr_gym.diagnosis.result.sentences import dead_in_words
 from ddagr_gym.diagnosis.review import review
 from ddagr_gym.recordings.schema import Recording, RobotGeometry
@@ -77,7 +78,17 @@ def test_stretches_whose_poses_may_be_in_frames_of_their_own(sound: Recording) -
 def test_banks_that_differ_are_asked_for(faults: list[Faults], names: tuple[str, ...]) -> None:
     geometry = RobotGeometry("warthog", 0.3, 0.54)
     drives = [made_drive(geometry, item, seed=seed) for seed, item in enumerate(faults)]
-    assert doubted_banks(drives, doubts(*drives), np.random.default_rng(0)) == names
+    assert doubted_banks(drives, np.random.default_rng(0)) == names
+
+
+def test_banks_are_judged_as_they_were_mended() -> None:
+    """Encoders that count backwards are no encoders of another scale."""
+    geometry = RobotGeometry("warthog", 0.3, 0.54)
+    made = made_drive(geometry, Faults(command_scale=0.8))
+    backwards = replace(made, channels={**made.channels, "encoder_left": -made["encoder_left"]})
+    mended = mend_recordings([backwards])
+    assert "encoders_reversed" in mended.names
+    assert doubted_banks(mended.recordings, np.random.default_rng(0)) == ("command_gain",)
 
 
 def test_channels_that_no_diagnosis_compares_are_not_called_dead() -> None:

@@ -75,6 +75,19 @@ def test_parts_are_the_verdict_with_what_was_seen_and_it_is_never_complete_witho
     assert not with_drivetrain(replace(LEFT, complete=True), completed(), {}).complete
 
 
+def test_what_a_name_may_be_is_not_named_beside_it():
+    """A tilt that the rests show, and the bias by which the library explains the same."""
+    bias = Finding("accelerometer_bias", {"x": Estimate(-0.5, "m/s^2")}, 30.0, 10.0, 7.0, 30.0)
+    tilt = replace(
+        Finding.seen("imu_tilt", {"pitch": Estimate(0.05, "rad")}),
+        equivalence_set={"imu_tilt": 0.5, "accelerometer_bias": 0.5},
+    )
+    beside = replace(LEFT, verdict=("accelerometer_bias",), findings=(bias,))
+    nominal = completed(tilt)
+    assert nominal.meant == {"imu_tilt", "accelerometer_bias"}
+    assert with_drivetrain(beside, nominal, {}).verdict == ("imu_tilt",)
+
+
 def test_an_answer_with_parts_is_read_back_as_it_was_written():
     load = Finding("load", {"load_compliance": Estimate(0.01, "1/(kg m^2)")}, 0.2, 0.1, 4.0, 0.2)
     answer = with_drivetrain(LEFT, completed(load), {})
