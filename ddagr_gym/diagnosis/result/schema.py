@@ -28,10 +28,11 @@ _TAIL = """
 The named effects with values, units, intervals and the hash of the data, in the form of
 `ddagr_gym.physics.effects.files`. Both load in `gym.make("DDAGR-Turn-v0", effects="effects.yaml")`,
 `ddagr simulate --effect effects.yaml` and `ddagr replay --effect effects.yaml`. The list is empty where nothing, or
-nothing with a name, was found; scales of encoders and gains of commands that were fitted beside a drivetrain are in
-it even where they are too small for a name. `robot.yaml` and `soil.yaml` are the nominal ones with the refitted `nuisances` (biases,
-clocks, headings and a difference between left and right soil are not in them): together with the effects they are the
-corrected simulator, `gym.make("DDAGR-Turn-v0", robot="robot.yaml", soil="soil.yaml", effects="effects.yaml")`.
+nothing with a name, was found; scales of encoders and gains of commands that were fitted beside a drivetrain are in it
+even where they are too small for a name. `robot.yaml` and `soil.yaml` are the nominal ones with the refitted
+`nuisances` (biases, clocks, headings and a difference between left and right soil are not in them): together with the
+effects they are the corrected simulator, `gym.make("DDAGR-Turn-v0", robot="robot.yaml", soil="soil.yaml",
+effects="effects.yaml")`.
 """
 
 
