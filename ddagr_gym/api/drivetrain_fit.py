@@ -62,14 +62,14 @@ class DrivetrainFit:
         """
         from ddagr_gym.calibration.drivetrain_answer import drivetrain_answer, drivetrain_findings
         from ddagr_gym.calibration.sensor_findings import named_sensors
-        from ddagr_gym.diagnosis.preprocessing.scaled_readings import without_scales
+        from ddagr_gym.diagnosis.preprocessing.known_errors import without_known_errors
         from ddagr_gym.diagnosis.result.drivetrain_names import CompletedNominal
         from ddagr_gym.diagnosis.result.encoder_findings import with_encoders
 
         self._say("the wheels do not follow their commands as the simulator says: fitting its drivetrain")
         seen, encoders = self._seen(mended.recordings)
         undone = [effect for _, effect in (*seen, *encoders)]
-        read = [without_scales(item, undone) for item in mended.in_their_channels]
+        read = [without_known_errors(item, undone) for item in mended.in_their_channels]
         # what is undone is roughly known: the fit says the rest
         asked = dict.fromkeys((*(effect.name for _, effect in encoders), *doubted))
         self.made = self._calibrated(read, self._settings(len(read), tuple(asked)))

@@ -71,9 +71,19 @@ def test_what_was_fitted_without_a_name_is_in_the_simulator_only(complete):
     assert [(effect.right, effect.left) for effect in nominal.effects] == [pytest.approx((0.98, 0.9))]
 
 
-def test_what_rests_and_poses_show_is_named_and_undone(complete):
-    nominal = complete(Faults(gyro_scale=1.1))
+@pytest.mark.parametrize(
+    ("faults", "name"),
+    [
+        (Faults(gyro_scale=1.1), "gyro_scale"),
+        (Faults(gyro_bias=0.06), "gyro_bias"),
+        # read with the other sign: a bias is that of the gyro as it was turned
+        (Faults(gyro_scale=-1.0, gyro_bias=0.06), "gyro_bias"),
+    ],
+)
+def test_what_rests_and_poses_show_is_named_and_undone(complete, faults, name):
+    nominal = complete(faults)
     (((read,), _),) = complete.asked
     sound = drive(RobotGeometry("warthog", 0.3, 0.54))
     assert np.std(read["yaw_rate"]) == pytest.approx(np.std(sound["yaw_rate"]), rel=0.02)
-    assert "gyro_scale" in [finding.name for finding in nominal.findings]
+    assert np.mean(read["yaw_rate"]) == pytest.approx(np.mean(sound["yaw_rate"]), abs=0.003)
+    assert name in [finding.name for finding in nominal.findings]

@@ -45,11 +45,11 @@ class MendedRecordings:
 
     @property
     def in_their_channels(self) -> tuple[Recording, ...]:
-        """Recordings as they were read, but for readings that belong to other channels."""
+        """Recordings as they were read, repeats too, but for readings of other channels and a reversed gyro."""
         found = self.given
         for fault in self.channel_faults:
             found = tuple(with_channels(recording, fault.takes) for recording in found)
-        return found
+        return found if self.reversed_gyro is None else tuple(with_gyro_reversed(recording) for recording in found)
 
     @property
     def held(self) -> tuple[RepeatedReadings, ...]:

@@ -12,8 +12,8 @@ import numpy as np
 from ddagr_gym.diagnosis.gates.source_digest import source_digest
 from ddagr_gym.diagnosis.gates.thresholds import Thresholds
 from ddagr_gym.diagnosis.preprocessing.input_requirements import check_recordings, content_hash
+from ddagr_gym.diagnosis.preprocessing.known_errors import without_known_errors
 from ddagr_gym.diagnosis.preprocessing.mended_recordings import MendedRecordings, mend_recordings
-from ddagr_gym.diagnosis.preprocessing.scaled_readings import without_scales
 from ddagr_gym.diagnosis.setting import Setting, make_problem
 from ddagr_gym.identification.problem import Problem
 from ddagr_gym.identification.spells import Spell
@@ -88,7 +88,7 @@ class DiagnosisSession:
             soil: nominal.
             sensors: what is known of sensors and of the gains of commands; such factors are undone in the recordings.
         """
-        read = tuple(without_scales(recording, sensors) for recording in self.mended.recordings)
+        read = tuple(without_known_errors(recording, sensors) for recording in self.mended.recordings)
         problem = make_problem(robot, soil, read, self.setting).during(self.problem.spells)
         gates, mended = self.bank.for_length(problem.covered), replace(self.mended, recordings=read)
         return replace(self, robot=robot, soil=soil, mended=mended, problem=problem, gates=gates)

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.diagnosis.answer.verdict import Estimate, Finding
-from ddagr_gym.diagnosis.preprocessing.scaled_readings import with_readings_over
+from ddagr_gym.diagnosis.preprocessing.known_errors import with_readings_over
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.effects.encoder_scale import EncoderScale
 from ddagr_gym.recordings.checks.travel import GAIN, command_gains, rolled_and_travelled, share_with_least_slip

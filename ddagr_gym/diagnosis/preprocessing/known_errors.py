@@ -1,4 +1,4 @@
-"""Readings and commands whose scale is known to be wrong, as they should have been."""
+"""Readings and commands whose factor or offset is known to be wrong, as they should have been."""
 
 from __future__ import annotations
 
@@ -8,19 +8,24 @@ from dataclasses import replace
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.effects.command_gain import CommandGain
 from ddagr_gym.physics.effects.encoder_scale import EncoderScale
+from ddagr_gym.physics.effects.gyro_bias import GyroBias
 from ddagr_gym.physics.effects.gyro_scale import GyroScale
 from ddagr_gym.recordings.schema import Recording
 
 
-def without_scales(recording: Recording, effects: Sequence[Effect]) -> Recording:
+def without_known_errors(recording: Recording, effects: Sequence[Effect]) -> Recording:
     """A recording whose gyro and encoders read what there was, and whose commands are those that the banks obeyed.
 
     Args:
         recording: with or without these channels.
-        effects: scales of the gyro and of the encoders and gains of commands are undone, others stay.
+        effects: in the order in which they act. Scale and bias of the gyro, scales of the encoders and gains of
+            commands are undone; others stay.
     """
-    for effect in effects:
-        if isinstance(effect, GyroScale):
+    for effect in reversed(effects):
+        if isinstance(effect, GyroBias) and recording.has("yaw_rate"):
+            sound = {"yaw_rate": recording["yaw_rate"] - effect.bias}
+            recording = replace(recording, channels={**recording.channels, **sound})
+        elif isinstance(effect, GyroScale):
             recording = with_readings_over(recording, {"yaw_rate": effect.scale})
         elif isinstance(effect, EncoderScale):
             recording = with_readings_over(recording, {"encoder_right": effect.right, "encoder_left": effect.left})
