@@ -76,12 +76,23 @@ def _of_banks(calibration: Calibration, effect: EncoderScale | CommandGain) -> F
         return None
     part = next(item for item in calibration.parts if item.name == effect.name)
     intervals = {item.name: item.interval for item in calibration.parameters if item.calibrated}
+    common = math.sqrt(effect.right * effect.left) if isinstance(effect, CommandGain) else 1.0
     sizes = {
-        field: Estimate(getattr(effect, field), "-", intervals.get(name))
+        field: _reaching(getattr(effect, field), intervals.get(name), common)
         for field, name in zip(BANKS, factors_of_banks(effect.name), strict=True)
     }
     gate = least_growth(part.error or 0.0, folds_of(calibration))
     return forecast_finding(effect.name, sizes, part.growth, part.error, gate)
+
+
+def _reaching(value: float, interval: tuple[float, float] | None, common: float) -> Estimate:
+    """Factor of a bank whose interval reaches to it without what both banks have in common.
+
+    Friction, load or the highest speed of a drivetrain may be what makes both banks of commands unlike 1.
+    """
+    alone = value / common
+    reaching = None if interval is None else (min(interval[0], alone), max(interval[1], alone))
+    return Estimate(value, "-", reaching)
 
 
 def _mounting(calibration: Calibration, effect: Effect) -> Finding | None:

@@ -75,6 +75,18 @@ def test_commands_that_the_banks_obey_differently_are_named_with_both_gains():
     )
 
 
+def test_intervals_of_gains_reach_to_those_with_nothing_in_common():
+    """What both banks have in common may be friction, load or the highest speed."""
+    made = with_gains(1.3, 1.1)
+    sure = {"command_gain_right": (1.28, 1.32), "command_gain_left": (1.08, 1.12)}
+    items = [replace(p, interval=sure.get(p.name, p.interval)) for p in made.parameters]
+    ((finding, _),) = named_sensors(replace(made, parameters=tuple(items)))
+    right, left = (finding.parameters[name].interval for name in ("right", "left"))
+    common = (1.3 * 1.1) ** 0.5
+    assert right == pytest.approx((1.3 / common, 1.32))
+    assert left == pytest.approx((1.1 / common, 1.12))
+
+
 @pytest.mark.parametrize(
     ("given", "kind", "sizes"),
     [(with_encoders(0.93, 0.95), EncoderScale, (0.93, 0.95)), (with_gains(0.98, 0.9), CommandGain, (0.98, 0.9))],
