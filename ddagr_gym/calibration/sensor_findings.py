@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 from ddagr_gym.calibration.accelerometer_results import MountingSize
 from ddagr_gym.calibration.forecast_findings import folds_of, forecast_finding
@@ -76,23 +77,25 @@ def _of_banks(calibration: Calibration, effect: EncoderScale | CommandGain) -> F
         return None
     part = next(item for item in calibration.parts if item.name == effect.name)
     intervals = {item.name: item.interval for item in calibration.parameters if item.calibrated}
-    common = math.sqrt(effect.right * effect.left) if isinstance(effect, CommandGain) else 1.0
     sizes = {
-        field: _reaching(getattr(effect, field), intervals.get(name), common)
+        field: Estimate(getattr(effect, field), "-", intervals.get(name))
         for field, name in zip(BANKS, factors_of_banks(effect.name), strict=True)
     }
+    if isinstance(effect, CommandGain):
+        common = math.sqrt(effect.right * effect.left)
+        sizes = {field: _reaching(size, size.value / common) for field, size in sizes.items()}
     gate = least_growth(part.error or 0.0, folds_of(calibration))
     return forecast_finding(effect.name, sizes, part.growth, part.error, gate)
 
 
-def _reaching(value: float, interval: tuple[float, float] | None, common: float) -> Estimate:
-    """Factor of a bank whose interval reaches to it without what both banks have in common.
+def _reaching(gain: Estimate, alone: float) -> Estimate:
+    """Gain of a bank whose interval reaches to that without what both banks have in common.
 
-    Friction, load or the highest speed of a drivetrain may be what makes both banks of commands unlike 1.
+    Friction, load or the highest speed of a drivetrain may be what both have in common.
     """
-    alone = value / common
-    reaching = None if interval is None else (min(interval[0], alone), max(interval[1], alone))
-    return Estimate(value, "-", reaching)
+    if gain.interval is None:
+        return gain
+    return replace(gain, interval=(min(gain.interval[0], alone), max(gain.interval[1], alone)))
 
 
 def _mounting(calibration: Calibration, effect: Effect) -> Finding | None:
