@@ -17,9 +17,11 @@ from ddagr_gym.errors import InputError, InputWarning
 if TYPE_CHECKING:
     from ddagr_gym.calibration.run import Outcome as CalibrationOutcome
     from ddagr_gym.calibration.settings import CalibrationSettings
+    from ddagr_gym.diagnosis.answer.verdict import Finding
     from ddagr_gym.diagnosis.preprocessing.mended_recordings import MendedRecordings
     from ddagr_gym.diagnosis.result.drivetrain_names import CompletedNominal
-    from ddagr_gym.diagnosis.result.encoder_findings import Named
+    from ddagr_gym.physics.effects import Effect
+    from ddagr_gym.physics.effects.encoder_scale import EncoderScale
     from ddagr_gym.recordings.schema import Recording
 
 _GROUND = "ground"
@@ -85,7 +87,9 @@ class DrivetrainFit:
             effects=tuple(effect for _, effect in sensors),
         )
 
-    def _seen(self, recordings: Sequence[Recording]) -> tuple[Sequence[Named], Sequence[Named]]:
+    def _seen(
+        self, recordings: Sequence[Recording]
+    ) -> tuple[Sequence[tuple[Finding, Effect]], Sequence[tuple[Finding, EncoderScale]]]:
         """What rests, poses and commands say of the IMU and of the encoders before any fit."""
         from ddagr_gym.diagnosis.result.encoder_findings import encoder_findings, or_wheel_radius
         from ddagr_gym.diagnosis.result.inertial_findings import inertial_findings
@@ -97,12 +101,12 @@ class DrivetrainFit:
                 warnings.warn(or_wheel_radius(scale, self.nominal.robot.name), InputWarning, stacklevel=3)
         return seen, encoders
 
-    def _settings(self, count: int, doubted: Sequence[str]) -> CalibrationSettings:
+    def _settings(self, count: int, doubted: tuple[str, ...]) -> CalibrationSettings:
         from ddagr_gym.calibration.settings import CalibrationSettings
         from ddagr_gym.diagnosis.result.drivetrain_names import LEAST_EXPLAINED
 
         usual = CalibrationSettings(
-            threads=self.threads, seed=self.seed, least_explained=LEAST_EXPLAINED, doubted=tuple(doubted)
+            threads=self.threads, seed=self.seed, least_explained=LEAST_EXPLAINED, doubted=doubted
         )
         if count > 1:
             return usual

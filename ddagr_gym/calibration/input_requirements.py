@@ -19,7 +19,7 @@ from ddagr_gym.identification.windows import PERIOD_TOLERANCE
 from ddagr_gym.parameters import Robot
 from ddagr_gym.presets import robot_option
 from ddagr_gym.recordings.checks.travel import rolled_and_travelled, share_with_least_slip, travelled_shares
-from ddagr_gym.recordings.checks.turning import effective_track, gyro_against_pose, turns
+from ddagr_gym.recordings.checks.turning import effective_track, gyro_against_pose, track_in_turns
 from ddagr_gym.recordings.drive_requirements import check_rows
 from ddagr_gym.recordings.schema import Recording
 
@@ -165,8 +165,7 @@ def drive_scale(recording: Recording, rng: np.random.Generator) -> DriveScale:
     """
     geometry, vectors = recording.meta.geometry, rolled_and_travelled(recording, rng)
     travel = travelled_shares(vectors, rng)
-    # on a straight drive the track is a ratio of noise to noise
-    track = effective_track(recording, rng) if turns(recording) else None
+    track = track_in_turns(recording, rng)
     travelled = None if travel is None else float(travel.values[0])
     rolling = None if geometry is None else share_with_least_slip(vectors, geometry.wheel_radius)
     if track is None:

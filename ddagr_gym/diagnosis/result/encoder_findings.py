@@ -36,6 +36,7 @@ FAR = 1.25
 """Mean scale of both encoders, or one over it, from which they are found here (ours): less may be slip, tyres and
 motors."""
 
+_LIMITS = EncoderScale.parameter("right").metadata
 
 Named = tuple[Finding | None, Effect]
 """A finding, None where it is not worth a name, with the effect that it is."""
@@ -57,16 +58,15 @@ def encoder_findings(
         return ()
     low, likely, high = np.stack([scales for scales, _ in told], axis=-1).transpose(1, 0, 2)
     scales = np.exp(np.log(likely).mean(axis=1))
-    limits = EncoderScale.parameter("right").metadata
     agree = bool(np.all(low.max(axis=1) <= high.min(axis=1)))
-    if not agree or scales.min() < limits["low"] or scales.max() > limits["high"]:
+    if not agree or scales.min() < _LIMITS["low"] or scales.max() > _LIMITS["high"]:
         return ()
     ends = zip(low.min(axis=1).tolist(), high.max(axis=1).tolist(), strict=True)
     sizes = {name: Estimate(value, "-", end) for name, value, end in zip(BANKS, scales.tolist(), ends, strict=True)}
     return ((Finding.seen(EncoderScale.name, sizes), EncoderScale(*scales.tolist())),)
 
 
-def with_encoders(encoders: Sequence[Named], sensors: Sequence[Named]) -> tuple[Named, ...]:
+def with_encoders(encoders: Sequence[tuple[Finding, EncoderScale]], sensors: Sequence[Named]) -> tuple[Named, ...]:
     """Findings of a fit with encoders that were undone before it; what it found of them on top goes into their scales.
 
     Args:
@@ -77,16 +77,15 @@ def with_encoders(encoders: Sequence[Named], sensors: Sequence[Named]) -> tuple[
         return tuple(sensors)
     left = [effect for _, effect in sensors if isinstance(effect, EncoderScale)]
     others = [item for item in sensors if not isinstance(item[1], EncoderScale)]
-    return (*others, *(_refined(item, left) for item in encoders))
+    return (*others, *(_refined(finding, seen, left) for finding, seen in encoders))
 
 
-def _refined(named: Named, fitted: Sequence[EncoderScale]) -> Named:
-    finding, seen = named
-    scales = {name: math.prod(getattr(effect, name) for effect in (seen, *fitted)) for name in BANKS}
-    if finding is not None:
-        sizes = {name: _at(size, scales[name]) for name, size in finding.parameters.items()}
-        finding = replace(finding, parameters=sizes)
-    return finding, EncoderScale(**scales)
+def _refined(finding: Finding, seen: EncoderScale, fitted: Sequence[EncoderScale]) -> tuple[Finding, EncoderScale]:
+    """Scales times those of a fit, as far as a simulator has them."""
+    products = {name: math.prod(getattr(effect, name) for effect in (seen, *fitted)) for name in BANKS}
+    scales = {name: min(max(product, _LIMITS["low"]), _LIMITS["high"]) for name, product in products.items()}
+    sizes = {name: _at(size, scales[name]) for name, size in finding.parameters.items()}
+    return replace(finding, parameters=sizes), EncoderScale(**scales)
 
 
 def or_wheel_radius(scale: EncoderScale, robot: str) -> str:

@@ -79,13 +79,12 @@ def _accelerometer(recordings: Sequence[Recording]) -> tuple[Named, ...]:
     A bias of the accelerometer does the same.
     """
     said = [finding for recording in recordings for finding in gravity(recording) if finding.interval is not None]
-    sizes = {}
-    pitched = 0.0
+    sizes: dict[str, Estimate] = {}
     for field, channel, sign in _READ_AS:
         told = [item for item in said if item.channel == channel]
         if told and _beyond(told):
+            pitched = sizes["pitch"].value if "pitch" in sizes else 0.0
             sizes[field] = _angle(_size(told), sign * STANDARD_GRAVITY * math.cos(pitched))
-            pitched = sizes[field].value
     if not sizes or max(abs(size.value) for size in sizes.values()) > LARGEST_TILT:
         return ()
     weights = {ImuTilt.name: 0.5, AccelerometerBias.name: 0.5}

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ddagr_gym.recordings.checks.clock_offsets import encoder_offset, pose_offset, unwrapped_heading
-from ddagr_gym.recordings.checks.findings import CheckFinding, Question, not_testable
+from ddagr_gym.recordings.checks.findings import CheckFinding, Question, Status, not_testable
 from ddagr_gym.recordings.checks.regression import (
     MOST_INFLATION,
     Estimate,
@@ -147,12 +147,17 @@ def left_over_right(recording: Recording, rng: np.random.Generator) -> float | N
     Returns:
         None where both banks do the same throughout, or without encoders, gyro or the robot's geometry.
     """
-    track = effective_track(recording, rng) if turns(recording) else None
+    track = track_in_turns(recording, rng)
     if track is None or not np.isfinite(track.intervals[1]).all():
         return None
-    low, high = track.intervals[1]
-    apart = low > BALANCE.expected[1] or 0.0 < low <= high < BALANCE.expected[0]
-    return float(track.values[1]) if apart else 1.0
+    share, interval = float(track.values[1]), track.intervals[1]
+    apart = BALANCE.answer(BANKS, share, interval, meaning="").status is Status.SUSPICIOUS
+    return share if apart and interval[0] > 0.0 else 1.0
+
+
+def track_in_turns(recording: Recording, rng: np.random.Generator) -> Estimate | None:
+    """:func:`effective_track`; None also on a straight drive, where it is a ratio of noise to noise."""
+    return effective_track(recording, rng) if turns(recording) else None
 
 
 def turns(recording: Recording) -> bool:
@@ -191,7 +196,7 @@ def against_poses(recording: Recording, rng: np.random.Generator) -> list[CheckF
 
 def _track_findings(recording: Recording, rng: np.random.Generator) -> list[CheckFinding]:
     pair = "encoder to yaw_rate"
-    found = effective_track(recording, rng) if turns(recording) else None
+    found = track_in_turns(recording, rng)
     if found is None:
         missing = "The robot's wheel radius and track are not known." if recording.meta.geometry is None else ""
         why = missing or "Encoders and gyro share too few turns."

@@ -93,3 +93,10 @@ def test_what_a_fit_finds_on_top_goes_into_the_scales():
     # an interval always holds its value
     assert finding.parameters["left"].interval[0] == effect.left
     assert with_encoders_named((), [late]) == (late,)
+
+
+def test_a_scale_that_a_fit_takes_beyond_a_simulator_ends_there():
+    """Turns per minute that were taken for radians per second are 9.5 times too many."""
+    found = found_in(with_encoders(8.5, 8.5))
+    ((_, effect),) = with_encoders_named(found, [(None, EncoderScale(1.4, 1.4))])
+    assert (effect.right, effect.left) == (10.0, 10.0)
