@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from ddagr_gym.calibration.run import Outcome as CalibrationOutcome
     from ddagr_gym.calibration.settings import CalibrationSettings
     from ddagr_gym.diagnosis.answer.verdict import Finding
+    from ddagr_gym.diagnosis.preprocessing.data_checks import DoubtedBanks
     from ddagr_gym.diagnosis.preprocessing.mended_recordings import MendedRecordings
     from ddagr_gym.diagnosis.result.drivetrain_names import CompletedNominal
     from ddagr_gym.physics.effects import Effect
@@ -53,14 +54,14 @@ class DrivetrainFit:
     made: CalibrationOutcome | None = None
 
     def complete(
-        self, misfit: Mapping[str, float], mended: MendedRecordings, doubted: Sequence[str]
+        self, misfit: Mapping[str, float], mended: MendedRecordings, doubted: DoubtedBanks
     ) -> CompletedNominal | None:
         """The nominal simulator with the drivetrain that recordings ask for; None where they cannot tell it.
 
         Args:
             misfit: of the encoders over their limits.
             mended: recordings.
-            doubted: scales of encoders or gains of commands that are fitted too.
+            doubted: what of the banks is fitted too.
         """
         from ddagr_gym.calibration.drivetrain_answer import drivetrain_answer, drivetrain_findings
         from ddagr_gym.calibration.sensor_findings import named_sensors
@@ -73,12 +74,12 @@ class DrivetrainFit:
         undone = [effect for _, effect in (*seen, *encoders)]
         read = [without_known_errors(item, undone) for item in mended.in_their_channels]
         # what is undone is roughly known: the fit says the rest
-        asked = dict.fromkeys((*(effect.name for _, effect in encoders), *doubted))
+        asked = dict.fromkeys((*(effect.name for _, effect in encoders), *doubted.factors))
         self.made = self._calibrated(read, self._settings(len(read), tuple(asked)))
         if self.made is None:
             return None
         found = self.made.calibration
-        sensors = (*with_encoders(encoders, named_sensors(found)), *seen)
+        sensors = (*with_encoders(encoders, named_sensors(found, doubted.common)), *seen)
         return CompletedNominal(
             robot=self.made.robot,
             soil=self.made.soils[_GROUND],

@@ -9,7 +9,7 @@ was left out of the fit, and named from the least size that matters. The gyro is
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from ddagr_gym.calibration.accelerometer_results import MountingSize
@@ -27,8 +27,8 @@ from ddagr_gym.physics.effects.encoder_scale import EncoderScale
 from ddagr_gym.physics.effects.imu_lever_arm import ImuLeverArm
 from ddagr_gym.physics.effects.imu_misalignment import ImuMisalignment
 from ddagr_gym.physics.effects.pose_latency import PoseLatency
+from ddagr_gym.recordings.checks.command_gains import GAIN_BALANCE
 from ddagr_gym.recordings.checks.findings import Question
-from ddagr_gym.recordings.checks.travel import GAIN_BALANCE
 from ddagr_gym.recordings.checks.turning import BALANCE
 
 OF_MOUNTING: Mapping[type[Effect], Mapping[str, str]] = {
@@ -40,19 +40,24 @@ OF_MOUNTING: Mapping[type[Effect], Mapping[str, str]] = {
 BALANCES: Mapping[str, Question] = {EncoderScale.name: BALANCE, CommandGain.name: GAIN_BALANCE}
 """What the right bank may be over the left one, by what is fitted of each."""
 
+FASTER = 1.05
+"""What both banks have in common from which it is named [-] (ours): no load, friction or limit makes wheels faster than
+they were told."""
 
-def named_sensors(calibration: Calibration) -> tuple[Named, ...]:
+
+def named_sensors(calibration: Calibration, common: Sequence[str] = ()) -> tuple[Named, ...]:
     """Findings on poses, encoders, commands and IMU with the effects of the library that they are.
 
     What was fitted of both banks counts even where it has no name, since the rest was fitted beside it.
 
     Args:
         calibration: of the recordings that are diagnosed.
+        common: names of effects that may be what both banks have in common; empty where that was not in doubt.
     """
     named = [*_late_poses(calibration)]
     for effect in calibrated_effects(calibration):
         if isinstance(effect, EncoderScale | CommandGain):
-            named.append((_of_banks(calibration, effect), effect))
+            named.append((_of_banks(calibration, effect, common), effect))
         elif type(effect) in OF_MOUNTING and (finding := _mounting(calibration, effect)) is not None:
             named.append((finding, effect))
     return tuple(named)
@@ -71,31 +76,54 @@ def _late_poses(calibration: Calibration) -> list[Named]:
     return [(finding, PoseLatency(min(late, latency["high"])))]
 
 
-def _of_banks(calibration: Calibration, effect: EncoderScale | CommandGain) -> Finding | None:
-    """Banks that differ by more than their balance may: what they have in common was not in doubt."""
-    if abs(math.log(effect.left / effect.right)) < math.log(BALANCES[effect.name].expected[1]):
+def _of_banks(
+    calibration: Calibration, effect: EncoderScale | CommandGain, common: Sequence[str] = ()
+) -> Finding | None:
+    """Banks that differ by more than their balance may, or have much in common where that was in doubt.
+
+    Args:
+        calibration: of the recordings that are diagnosed.
+        effect: that was fitted.
+        common: names of effects that may be what both banks have in common.
+    """
+    differ = abs(math.log(effect.left / effect.right)) >= math.log(BALANCES[effect.name].expected[1])
+    both = math.sqrt(effect.right * effect.left)
+    if not differ and (effect.name not in common or both < FASTER):
         return None
+    sizes = _sizes_of_banks(calibration, effect)
+    if not differ:
+        sizes = _alike(sizes)
+    elif isinstance(effect, CommandGain):
+        sizes = {field: _reaching(size, size.value / both) for field, size in sizes.items()}
     part = next(item for item in calibration.parts if item.name == effect.name)
+    gate = least_growth(part.error or 0.0, folds_of(calibration))
+    finding = forecast_finding(effect.name, sizes, part.growth, part.error, gate)
+    return finding if differ else replace(finding, equivalence_set=dict.fromkeys(common, 1.0 / len(common)))
+
+
+def _sizes_of_banks(calibration: Calibration, effect: EncoderScale | CommandGain) -> dict[str, Estimate]:
     intervals = {item.name: item.interval for item in calibration.parameters if item.calibrated}
-    sizes = {
+    return {
         field: Estimate(getattr(effect, field), "-", intervals.get(name))
         for field, name in zip(BANKS, factors_of_banks(effect.name), strict=True)
     }
-    if isinstance(effect, CommandGain):
-        common = math.sqrt(effect.right * effect.left)
-        sizes = {field: _reaching(size, size.value / common) for field, size in sizes.items()}
-    gate = least_growth(part.error or 0.0, folds_of(calibration))
-    return forecast_finding(effect.name, sizes, part.growth, part.error, gate)
 
 
-def _reaching(gain: Estimate, alone: float) -> Estimate:
-    """Gain of a bank whose interval reaches to that without what both banks have in common.
+def _alike(sizes: Mapping[str, Estimate]) -> dict[str, Estimate]:
+    """Factors of both banks with the interval that holds those of both: motors may differ by as little as they do."""
+    ends = [end for size in sizes.values() for end in size.interval or ()]
+    return {field: _reaching(size, *ends) for field, size in sizes.items()}
 
-    Friction, load or the highest speed of a drivetrain may be what both have in common.
+
+def _reaching(size: Estimate, *values: float) -> Estimate:
+    """Factor of a bank whose interval, where it has one, reaches to further values.
+
+    What both banks have in common may be friction, load or the highest speed of a drivetrain.
     """
-    if gain.interval is None:
-        return gain
-    return replace(gain, interval=(min(gain.interval[0], alone), max(gain.interval[1], alone)))
+    if size.interval is None:
+        return size
+    ends = (*size.interval, *values)
+    return replace(size, interval=(min(ends), max(ends)))
 
 
 def _mounting(calibration: Calibration, effect: Effect) -> Finding | None:

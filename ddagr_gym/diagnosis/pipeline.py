@@ -26,7 +26,7 @@ from ddagr_gym.diagnosis.mid_drive.again import onsets_of_names, search_in_parts
 from ddagr_gym.diagnosis.mid_drive.onsets import with_onsets
 from ddagr_gym.diagnosis.planning.drivetrain_drive import drivetrain_drive
 from ddagr_gym.diagnosis.planning.next_drive import plan_next_drive
-from ddagr_gym.diagnosis.preprocessing.data_checks import data_doubts, doubted_banks
+from ddagr_gym.diagnosis.preprocessing.data_checks import DoubtedBanks, data_doubts, doubted_banks
 from ddagr_gym.diagnosis.preprocessing.mended_recordings import MendedRecordings
 from ddagr_gym.diagnosis.preprocessing.session import DiagnosisSession, Progress, be_silent, prepare
 from ddagr_gym.diagnosis.result.channel_fault_findings import with_contradictions
@@ -60,7 +60,7 @@ LATER = ("certification", "unnamed terms", "next drive")
 OnStep = Callable[[str, bool], None]
 """Function that takes the name of a step that begins, and whether its result was kept from before."""
 
-CompleteNominal = Callable[[Mapping[str, float], MendedRecordings, Sequence[str]], CompletedNominal | None]
+CompleteNominal = Callable[[Mapping[str, float], MendedRecordings, DoubtedBanks], CompletedNominal | None]
 """Function that fits the drivetrain of the nominal robot to recordings; takes the encoders' misfit over its limit, the
 recordings, and effects by which the banks may differ.
 

@@ -11,6 +11,7 @@ import pytest
 
 from ddagr_gym.api.drivetrain_fit import DrivetrainFit
 from ddagr_gym.calibration.result import Calibration
+from ddagr_gym.diagnosis.preprocessing.data_checks import DoubtedBanks
 from ddagr_gym.diagnosis.preprocessing.mended_recordings import mend_recordings
 from ddagr_gym.diagnosis.result.drivetrain_names import CompletedNominal
 from ddagr_gym.errors import InputWarning
@@ -39,7 +40,9 @@ def complete(monkeypatch: pytest.MonkeyPatch):
 
         monkeypatch.setattr(DrivetrainFit, "_calibrated", calibrated)
         mended = mend_recordings([drive(RobotGeometry("warthog", 0.3, 0.54), faults)])
-        return DrivetrainFit(NOMINAL, 1, 0, None, None).complete({"encoder_left": 9.0}, mended, doubted)
+        return DrivetrainFit(NOMINAL, 1, 0, None, None).complete(
+            {"encoder_left": 9.0}, mended, DoubtedBanks(tuple(doubted))
+        )
 
     completed.asked = asked
     return completed

@@ -99,6 +99,37 @@ def test_banks_that_agree_have_no_name_but_count(given, kind, sizes):
     assert (effect.right, effect.left) == pytest.approx(sizes)
 
 
+@pytest.mark.parametrize(
+    ("given", "common", "set_of"),
+    [
+        (with_encoders(1.12, 1.1), ("encoder_scale", "command_gain"), {"encoder_scale": 0.5, "command_gain": 0.5}),
+        (with_gains(1.12, 1.1), ("command_gain",), {"command_gain": 1.0}),
+    ],
+)
+def test_banks_that_are_faster_than_told_are_named_with_what_may_be_it(given, common, set_of):
+    ((finding, _),) = named_sensors(given, common)
+    assert finding.equivalence_set == set_of
+    assert {name: item.value for name, item in finding.parameters.items()} == pytest.approx(
+        {"right": 1.12, "left": 1.1}
+    )
+    assert finding.parameters["right"].interval == (0.1, 0.3)
+
+
+def test_intervals_of_banks_that_are_faster_alike_hold_those_of_both():
+    """Motors may differ by as little as the banks do."""
+    made = with_encoders(1.12, 1.1)
+    sure = {"encoder_scale_right": (1.11, 1.13), "encoder_scale_left": (1.09, 1.105)}
+    items = [replace(p, interval=sure.get(p.name, p.interval)) for p in made.parameters]
+    ((finding, _),) = named_sensors(replace(made, parameters=tuple(items)), ("encoder_scale",))
+    assert [finding.parameters[name].interval for name in ("right", "left")] == [(1.09, 1.13)] * 2
+
+
+@pytest.mark.parametrize("given", [with_encoders(1.03, 1.04), with_encoders(0.9, 0.9)])
+def test_what_a_drivetrain_may_do_itself_has_no_name(given):
+    ((finding, _),) = named_sensors(given, ("encoder_scale", "command_gain"))
+    assert finding is None
+
+
 @pytest.mark.parametrize("given", [with_encoders(1.0, 1.2, kept=False), with_gains(1.0, 1.3, kept=False)])
 def test_what_forecasts_do_not_ask_for_is_not_there(given):
     assert named_sensors(given) == ()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,9 +12,10 @@ from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.physics.effects.command_gain import CommandGain
 from ddagr_gym.physics.effects.encoder_scale import EncoderScale
 from ddagr_gym.recordings.checks.across import across_runs
+from ddagr_gym.recordings.checks.command_gains import STRAIGHT_GAIN, command_gains, straight_gain
 from ddagr_gym.recordings.checks.findings import CheckFinding, Status
 from ddagr_gym.recordings.checks.run import check_recording
-from ddagr_gym.recordings.checks.travel import command_gains
+from ddagr_gym.recordings.checks.travel import LEAST_SLIP, rolled_and_travelled, share_with_least_slip
 from ddagr_gym.recordings.checks.turning import left_over_right
 from ddagr_gym.recordings.pose_frames import frames_apart
 from ddagr_gym.recordings.schema import Recording
@@ -60,12 +62,26 @@ def _doubt(recording: str, finding: CheckFinding) -> DataDoubt:
     return DataDoubt(recording, finding.channel, finding.check, sentence, finding.suspects)
 
 
-def doubted_banks(recordings: Sequence[Recording], rng: np.random.Generator) -> tuple[str, ...]:
-    """Names of effects by which the banks may differ, for a fit to decide.
+@dataclass(frozen=True)
+class DoubtedBanks:
+    """What a fit is asked of the banks.
+
+    Attributes:
+        factors: names of effects whose factor of each bank is fitted.
+        common: names of effects that may be what both banks have in common; empty where that is not in doubt.
+    """
+
+    factors: tuple[str, ...] = ()
+    common: tuple[str, ...] = ()
+
+
+def doubted_banks(recordings: Sequence[Recording], rng: np.random.Generator) -> DoubtedBanks:
+    """Effects by which the banks may differ from each other or from their commands, for a fit to decide.
 
     Scales of the encoders where a turn of one bank's turns the robot otherwise than one of the other's, by the gyro;
-    else gains of the commands where one bank settles at another share of them than the other. Every recording that
-    tells must say so, to one side.
+    else gains of the commands where one bank settles at another share of them than the other. Where both are faster
+    than they were told, either may be it, unless poses speak against one. Every recording that tells must say so, to
+    one side.
 
     Args:
         recordings: with faults mended that show in the values.
@@ -73,10 +89,38 @@ def doubted_banks(recordings: Sequence[Recording], rng: np.random.Generator) -> 
     """
     scales = [left_over_right(recording, rng) for recording in recordings]
     if _to_one_side([scale for scale in scales if scale is not None], 1.0):
-        return (EncoderScale.name,)
+        return DoubtedBanks((EncoderScale.name,))
     gains = [command_gains(recording, rng) for recording in recordings]
     ratios = [float(item.values[2]) for item in gains if item is not None and item.values[2] > 0.0]
-    return (CommandGain.name,) if _to_one_side(ratios, UNLIKE_GAINS) else ()
+    if _to_one_side(ratios, UNLIKE_GAINS):
+        return DoubtedBanks((CommandGain.name,))
+    common = _faster_than_told(recordings, rng)
+    return DoubtedBanks(common[:1], common)
+
+
+def _faster_than_told(recordings: Sequence[Recording], rng: np.random.Generator) -> tuple[str, ...]:
+    """What makes both banks faster than their commands, the likelier first; empty where they are not.
+
+    Encoders of another scale read as if the wheels slipped, or were pushed; gains of the commands do not.
+    """
+    found = [item[0] for item in map(straight_gain, recordings) if item is not None]
+    if not found or min(found) <= STRAIGHT_GAIN.expected[1]:
+        return ()
+    gain, (low, high) = float(np.mean(found)), LEAST_SLIP
+    shares = [item for item in (_share(one, rng) for one in recordings) if item is not None]
+    possible = {
+        EncoderScale.name: all(low <= share * gain <= high for share in shares),
+        CommandGain.name: all(low <= share <= high for share in shares),
+    }
+    return tuple(name for name in possible if possible[name]) or tuple(possible)
+
+
+def _share(recording: Recording, rng: np.random.Generator) -> float | None:
+    """Travelled over rolled distance where the robot slips least [-]; None where poses or geometry do not tell."""
+    geometry = recording.meta.geometry
+    if geometry is None:
+        return None
+    return share_with_least_slip(rolled_and_travelled(recording, rng), geometry.wheel_radius)
 
 
 def _to_one_side(ratios: Sequence[float], limit: float) -> bool:

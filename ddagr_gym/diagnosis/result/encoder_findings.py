@@ -22,15 +22,12 @@ from ddagr_gym.diagnosis.answer.verdict import Estimate, Finding
 from ddagr_gym.diagnosis.preprocessing.known_errors import with_readings_over
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.effects.encoder_scale import EncoderScale
-from ddagr_gym.recordings.checks.travel import GAIN, command_gains, rolled_and_travelled, share_with_least_slip
+from ddagr_gym.recordings.checks.command_gains import GAIN, command_gains
+from ddagr_gym.recordings.checks.travel import LEAST_SLIP, rolled_and_travelled, share_with_least_slip
 from ddagr_gym.recordings.checks.turning import left_over_right
 from ddagr_gym.recordings.schema import Recording
 
 Array = NDArray[np.float64]
-
-LEAST_SLIP = (0.97, 1.17)
-"""Travelled over rolled distance where a sound robot slips least [-] (ours): 0.99 to 1.17 in three minutes of six
-ordinary drives, 0.97 on simulated ice."""
 
 FAR = 1.25
 """Mean scale of both encoders, or one over it, from which they are found here (ours): less may be slip, tyres and

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ddagr_gym.recordings.checks.blocks import interval_of, resample
+from ddagr_gym.recordings.checks.command_gains import settled
 from ddagr_gym.recordings.checks.findings import CheckFinding, Interval, Question, not_testable
-from ddagr_gym.recordings.checks.travel import settled
 from ddagr_gym.recordings.schema import BoolArray, FloatArray, Recording
 
 CHECK = "wheel_limit"

@@ -13,7 +13,7 @@ from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
-from scipy.special import ndtri, stdtrit
+from scipy.special import bdtr, ndtri, stdtrit
 
 from ddagr_gym.recordings.checks.findings import Interval
 from ddagr_gym.recordings.schema import FloatArray, Recording
@@ -82,6 +82,19 @@ def interval_of(estimate: float, resampled: npt.ArrayLike, blocks: int) -> Inter
     low, high = np.quantile(values, [tail, 1.0 - tail])
     widen = float(stdtrit(blocks - 1, 1.0 - tail) / ndtri(1.0 - tail)) * math.sqrt(blocks / (blocks - 1))
     return (estimate + widen * min(float(low) - estimate, 0.0), estimate + widen * max(float(high) - estimate, 0.0))
+
+
+def quantile_interval(values: FloatArray, share: float) -> Interval:
+    """99 % interval of a quantile of independent values by their order; infinite where they are too few.
+
+    Args:
+        values: (n,), in ascending order.
+        share: of the distribution that lies below the quantile.
+    """
+    # the k-th of them lies above the quantile where fewer than k lie below it
+    tail, fewer = (1.0 - CONFIDENCE) / 2, bdtr(np.arange(len(values)), len(values), share)
+    ends = np.concatenate([[-math.inf], values, [math.inf]])
+    return float(ends[np.searchsorted(fewer, tail, "right")]), float(ends[np.searchsorted(fewer, 1.0 - tail) + 1])
 
 
 def mean_interval(values: FloatArray) -> tuple[float, Interval]:

@@ -17,11 +17,11 @@ from enum import StrEnum
 import numpy as np
 
 from ddagr_gym.recordings.channels import CURRENTS, VOLTAGES
+from ddagr_gym.recordings.checks.command_gains import settled
 from ddagr_gym.recordings.checks.extremes import stuck
 from ddagr_gym.recordings.checks.findings import CheckFinding, Question, not_testable
 from ddagr_gym.recordings.checks.regression import Estimate, blocks_in_spans, estimate, normal_equations, solve
 from ddagr_gym.recordings.checks.signals import filled, moving_mask
-from ddagr_gym.recordings.checks.travel import settled
 from ddagr_gym.recordings.schema import BoolArray, FloatArray, Recording
 
 DIRECTION = Question(

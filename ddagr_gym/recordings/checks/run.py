@@ -12,6 +12,7 @@ from ddagr_gym.recordings.checks.arbitration import arbitration
 from ddagr_gym.recordings.checks.bank_limits import bank_limits
 from ddagr_gym.recordings.checks.clock_drift import clock_drift
 from ddagr_gym.recordings.checks.clock_offsets import clock_offsets
+from ddagr_gym.recordings.checks.command_gains import gain_findings
 from ddagr_gym.recordings.checks.currents import currents
 from ddagr_gym.recordings.checks.extremes import extremes
 from ddagr_gym.recordings.checks.findings import CheckFinding, CheckReport, not_testable
@@ -40,7 +41,8 @@ def check_recording(recording: Recording, rng: np.random.Generator) -> CheckRepo
         apart = deepcopy(rng)
         findings += arbitration(recording, apart) + clock_drift(recording, apart) + bank_limits(recording, apart)
         findings += timing(recording) + repeated_readings(recording) + extremes(recording)
-        findings += clock_offsets(recording, rng) + turning(recording, rng) + travel(recording, rng)
+        findings += clock_offsets(recording, rng) + turning(recording, rng)
+        findings += travel(recording, rng) + gain_findings(recording, rng)
         findings += accelerometer(recording, rng) + noise(recording) + gravity(recording)
         findings += currents(recording, apart)
     return CheckReport.of(recording, findings)

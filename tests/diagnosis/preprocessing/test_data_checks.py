@@ -78,7 +78,7 @@ def test_stretches_whose_poses_may_be_in_frames_of_their_own(sound: Recording) -
 def test_banks_that_differ_are_asked_for(faults: list[Faults], names: tuple[str, ...]) -> None:
     geometry = RobotGeometry("warthog", 0.3, 0.54)
     drives = [made_drive(geometry, item, seed=seed) for seed, item in enumerate(faults)]
-    assert doubted_banks(drives, np.random.default_rng(0)) == names
+    assert doubted_banks(drives, np.random.default_rng(0)).factors == names
 
 
 def test_banks_are_judged_as_they_were_mended() -> None:
@@ -88,7 +88,27 @@ def test_banks_are_judged_as_they_were_mended() -> None:
     backwards = replace(made, channels={**made.channels, "encoder_left": -made["encoder_left"]})
     mended = mend_recordings([backwards])
     assert "encoders_reversed" in mended.names
-    assert doubted_banks(mended.recordings, np.random.default_rng(0)) == ("command_gain",)
+    assert doubted_banks(mended.recordings, np.random.default_rng(0)).factors == ("command_gain",)
+
+
+@pytest.mark.parametrize(
+    ("faults", "commands", "common"),
+    [
+        # encoders of another scale read as slip of another tenth; of 0.95 travelled a sixth less is too little
+        (Faults(right_scale=1.1, left_scale=1.1, travel=1.1), 1.0, ("encoder_scale", "command_gain")),
+        (Faults(right_scale=1.2, left_scale=1.2, travel=1.05), 1.0, ("encoder_scale",)),
+        (Faults(travel=1.05), 1.2, ("command_gain",)),
+        (Faults(right_scale=0.9, left_scale=0.9), 1.0, ()),
+    ],
+)
+def test_banks_faster_than_told_are_asked_for_what_they_have_in_common(
+    faults: Faults, commands: float, common: tuple[str, ...]
+) -> None:
+    made = made_drive(RobotGeometry("warthog", 0.3, 0.54), faults, seconds=300.0)
+    told = {name: made[name] / commands for name in ("command_right", "command_left")}
+    found = doubted_banks([replace(made, channels={**made.channels, **told})], np.random.default_rng(0))
+    assert found.common == common
+    assert found.factors == common[:1]
 
 
 def test_channels_that_no_diagnosis_compares_are_not_called_dead() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ddagr_gym.recordings.checks.findings import Status
-from ddagr_gym.recordings.checks.travel import command_gains, travel, travelled_over_rolled
+from ddagr_gym.recordings.checks.travel import travel, travelled_over_rolled
 
 
 def rng():
@@ -31,11 +31,6 @@ def test_a_turned_heading_is_found(make_drive):
     assert np.arctan2(across, along) == pytest.approx(-0.3, abs=0.01)
 
 
-def test_command_gains_are_found(make_drive):
-    found = command_gains(make_drive(right_scale=1.1, left_scale=0.9), rng())
-    assert found.values == pytest.approx([1.1, 0.9, 1.1 / 0.9], rel=0.01)
-
-
 @pytest.mark.parametrize(
     ("functions", "check", "channel"),
     [
@@ -43,8 +38,6 @@ def test_command_gains_are_found(make_drive):
         ({"encoder_right": lambda v: -v, "encoder_left": lambda v: -v}, "sign_and_scale", "encoder to pose"),
         ({"pose_yaw": lambda v: v + 0.4}, "direction", "pose"),
         ({"pose_y": lambda v: -v}, "coherence", "encoder to pose"),
-        ({"encoder_left": lambda v: -v}, "sign_and_scale", "command_left to encoder_left"),
-        ({"encoder_right": lambda v: 1.3 * v}, "balance", "command to encoder, right to left"),
     ],
 )
 def test_faults_are_suspicious(make_drive, functions, check, channel):
