@@ -20,7 +20,9 @@ from ddagr_gym.identification.window_model import RUN_IN
 from ddagr_gym.identification.windows import WindowSet, cut_windows, with_presumed_past
 from ddagr_gym.parameters import Robot, Soil
 from ddagr_gym.recordings.channels import CURRENTS
+from ddagr_gym.recordings.checks.command_gains import straight_finding
 from ddagr_gym.recordings.checks.currents import CurrentKind
+from ddagr_gym.recordings.checks.findings import Status
 from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.replay_analysis.prepare import Prepared, prepare
 
@@ -144,6 +146,8 @@ def _mended(recording: Recording, seed: int) -> tuple[Recording, tuple[str, ...]
     said = [f"the {item.sensor} repeats its readings: repeats are left out." for item in found.repeated]
     said += [f"{in_sentence(fault.name)}: readings were put where they belong." for fault in found.channel_faults]
     said += ["the gyro turns the wrong way: its sign was turned."] if found.reversed_gyro is not None else []
+    faster = [item for item in straight_finding(found.recordings[0]) if item.status is Status.SUSPICIOUS]
+    said += [f"{item.meaning} {item.remedy}" for item in faster]
     return found.recordings[0], tuple(said)
 
 

@@ -99,6 +99,20 @@ def test_a_bank_with_another_gain_is_named_beside_it(asked):
     assert (effect.right, effect.left) == (float(gains["right"]), float(gains["left"]))
 
 
+@pytest.mark.slow
+def test_encoders_that_both_read_too_much_are_named_beside_it(asked):
+    """No drivetrain makes wheels faster than they were told; commands of another scale would do the same."""
+    made = driven(180.0)
+    read = {name: 1.1 * made[name] for name in ("encoder_right", "encoder_left")}
+    result = ddagr_gym.diagnose(replace(made, channels={**made.channels, **read}), names_only=True)
+    found = {finding.name: finding for finding in result.findings}
+    assert {"command_delay", "load"} <= set(found)
+    (scale,) = [found[name] for name in ("encoder_scale", "command_gain") if name in found]
+    assert "encoder_scale" in scale.equivalence_set
+    for size in scale.parameters.values():
+        assert float(size) == pytest.approx(1.1, abs=0.03)
+
+
 def test_a_recording_that_cannot_tell_its_drivetrain_keeps_its_answer_and_says_why(asked, monkeypatch):
     def refuse(*inputs, **named):
         raise InputError("yard.csv has 3 windows: give a longer drive.")

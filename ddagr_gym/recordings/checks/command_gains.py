@@ -139,7 +139,7 @@ def gain_findings(recording: Recording, rng: np.random.Generator) -> list[CheckF
             found.intervals[2],
             meaning=f"The right bank reaches {balance:.3f} times the share of its command that the left reaches.",
         ),
-        *_straight_finding(recording),
+        *straight_finding(recording),
     ]
 
 
@@ -148,8 +148,12 @@ def _gain_of(bank: str, gain: float, interval: Interval) -> CheckFinding:
     return GAIN.answer(f"command_{bank} to encoder_{bank}", gain, interval, meaning=meaning)
 
 
-def _straight_finding(recording: Recording) -> list[CheckFinding]:
-    """Nothing where no commands were held nearly straight ahead."""
+def straight_finding(recording: Recording) -> list[CheckFinding]:
+    """Whether both banks are faster than they were told; nothing where no commands were held nearly straight ahead.
+
+    Args:
+        recording: any.
+    """
     found = straight_gain(recording)
     if found is None:
         return []
