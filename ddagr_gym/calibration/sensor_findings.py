@@ -40,9 +40,8 @@ OF_MOUNTING: Mapping[type[Effect], Mapping[str, str]] = {
 BALANCES: Mapping[str, Question] = {EncoderScale.name: BALANCE, CommandGain.name: GAIN_BALANCE}
 """What the right bank may be over the left one, by what is fitted of each."""
 
-FASTER = 1.05
-"""What both banks have in common from which it is named [-] (ours): no load, friction or limit makes wheels faster than
-they were told."""
+IN_COMMON = 1.05
+"""What both banks have in common, or one over it, from which it is named [-] (ours)."""
 
 
 def named_sensors(calibration: Calibration, common: Sequence[str] = ()) -> tuple[Named, ...]:
@@ -88,7 +87,7 @@ def _of_banks(
     """
     differ = abs(math.log(effect.left / effect.right)) >= math.log(BALANCES[effect.name].expected[1])
     both = math.sqrt(effect.right * effect.left)
-    if not differ and (effect.name not in common or both < FASTER):
+    if not differ and (effect.name not in common or abs(math.log(both)) < math.log(IN_COMMON)):
         return None
     sizes = _sizes_of_banks(calibration, effect)
     if not differ:

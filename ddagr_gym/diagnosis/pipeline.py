@@ -178,12 +178,11 @@ def diagnose(
     spells, found = steps.keep("search in parts of the drives", search_in_parts, session, start, found)
     session = session.during(spells) if spells else session
     accepted = accept(found, session.gates)
-    unlike = {} if complete_nominal is None else unlike_commands(accepted.chosen, session.gates)
     nominal = None
-    if complete_nominal is not None and unlike:
-        nominal = complete_nominal(
-            unlike, session.mended, doubted_banks(session.mended.recordings, session.rng("checks"))
-        )
+    if complete_nominal is not None:
+        doubted = doubted_banks(session.mended.recordings, session.rng("checks"))
+        unlike = unlike_commands(accepted.chosen, session.gates, doubted.common)
+        nominal = complete_nominal(unlike, session.mended, doubted) if unlike else None
     if nominal is not None and is_an_answer(nominal):
         made = _beside_drivetrain(session, standing(found, session.gates), nominal, names_only, steps)
     else:

@@ -39,7 +39,7 @@ def search_nothing(session, start, cache, enough):
 @pytest.fixture
 def asked(monkeypatch):
     monkeypatch.setattr(pipeline, "search", search_nothing)
-    monkeypatch.setattr(pipeline, "unlike_commands", lambda accepted, gates: {"encoder_left": 9.0})
+    monkeypatch.setattr(pipeline, "unlike_commands", lambda accepted, gates, common: {"encoder_left": 9.0})
     monkeypatch.setattr(drivetrain_fit, "_ONE_DRIVE", {"fitted": 16, "compared": 12, "settlings": 1})
 
 

@@ -100,18 +100,17 @@ def test_banks_that_agree_have_no_name_but_count(given, kind, sizes):
 
 
 @pytest.mark.parametrize(
-    ("given", "common", "set_of"),
+    ("fitted", "sizes", "common", "set_of"),
     [
-        (with_encoders(1.12, 1.1), ("encoder_scale", "command_gain"), {"encoder_scale": 0.5, "command_gain": 0.5}),
-        (with_gains(1.12, 1.1), ("command_gain",), {"command_gain": 1.0}),
+        (with_encoders, (1.12, 1.1), ("encoder_scale", "command_gain"), {"encoder_scale": 0.5, "command_gain": 0.5}),
+        (with_encoders, (0.9, 0.92), ("encoder_scale",), {"encoder_scale": 1.0}),
+        (with_gains, (1.12, 1.1), ("command_gain",), {"command_gain": 1.0}),
     ],
 )
-def test_banks_that_are_faster_than_told_are_named_with_what_may_be_it(given, common, set_of):
-    ((finding, _),) = named_sensors(given, common)
+def test_what_both_banks_have_in_common_is_named_with_what_may_be_it(fitted, sizes, common, set_of):
+    ((finding, _),) = named_sensors(fitted(*sizes), common)
     assert finding.equivalence_set == set_of
-    assert {name: item.value for name, item in finding.parameters.items()} == pytest.approx(
-        {"right": 1.12, "left": 1.1}
-    )
+    assert [finding.parameters[name].value for name in ("right", "left")] == pytest.approx(sizes)
     assert finding.parameters["right"].interval == (0.1, 0.3)
 
 
@@ -124,8 +123,8 @@ def test_intervals_of_banks_that_are_faster_alike_hold_those_of_both():
     assert [finding.parameters[name].interval for name in ("right", "left")] == [(1.09, 1.13)] * 2
 
 
-@pytest.mark.parametrize("given", [with_encoders(1.03, 1.04), with_encoders(0.9, 0.9)])
-def test_what_a_drivetrain_may_do_itself_has_no_name(given):
+@pytest.mark.parametrize("given", [with_encoders(1.03, 1.04), with_encoders(0.97, 0.98)])
+def test_little_that_both_banks_have_in_common_has_no_name(given):
     ((finding, _),) = named_sensors(given, ("encoder_scale", "command_gain"))
     assert finding is None
 

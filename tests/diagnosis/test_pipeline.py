@@ -15,6 +15,7 @@ from ddagr_gym.diagnosis.answer.unnamed_terms import UnnamedTerms
 from ddagr_gym.diagnosis.answer.verdict import Diagnosis, GatesUsed
 from ddagr_gym.diagnosis.gates.thresholds import Thresholds
 from ddagr_gym.diagnosis.pipeline import LATER, STEPS
+from ddagr_gym.diagnosis.preprocessing.data_checks import DoubtedBanks
 from ddagr_gym.diagnosis.setting import Setting
 from ddagr_gym.physics.effects.pose_latency import PoseLatency
 from ddagr_gym.presets import get_robot, get_soil
@@ -127,8 +128,8 @@ def test_the_drivetrain_is_fitted_where_the_library_leaves_too_much_in_the_encod
 
     stages.session.with_nominal = with_nominal
     stages.session.progress = lambda line: None
-    monkeypatch.setattr(pipeline, "unlike_commands", lambda accepted, gates: {"encoder_left": 9.0})
-    monkeypatch.setattr(pipeline, "doubted_banks", lambda recordings, rng: ("command_gain",))
+    monkeypatch.setattr(pipeline, "unlike_commands", lambda accepted, gates, common: {"encoder_left": 9.0})
+    monkeypatch.setattr(pipeline, "doubted_banks", lambda recordings, rng: DoubtedBanks(("command_gain",)))
     monkeypatch.setattr(pipeline, "standing", lambda found, gates: found)
     monkeypatch.setattr(pipeline, "refit_nominal", lambda problem, progress: ("raw", "refitted"))
     monkeypatch.setattr(pipeline, "beside_completed", lambda session, refitted, effects: f"{effects} beside {refitted}")
@@ -150,7 +151,7 @@ def test_the_drivetrain_is_fitted_where_the_library_leaves_too_much_in_the_encod
         return None if explained is None else nominal
 
     outcome, _ = stages.run(complete_nominal=complete)
-    assert asked == [({"encoder_left": 9.0}, ("command_gain",))]
+    assert asked == [({"encoder_left": 9.0}, DoubtedBanks(("command_gain",)))]
     assert outcome.diagnosis.verdict == (("load",) if told else ("none",))
     assert outcome.nominal[0].name == ("warthog" if told else "ddagr")
     assert ("certify" in stages.called) is not told

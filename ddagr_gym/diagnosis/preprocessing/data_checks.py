@@ -27,6 +27,10 @@ UNLIKE_GAINS = 1.08
 """Right over left bank's gain, or one over it, from which a fit is asked [-] (ours). Three minutes of ordinary drives
 reach 1.1: this only asks, and forecasts decide."""
 
+SLOWER = 0.95
+"""Gain straight ahead below which both encoders may read too little [-] (ours): 0.97 at least on six ordinary
+drives."""
+
 FRAMES = "frames"
 """Doubt about the frames of poses."""
 
@@ -80,8 +84,8 @@ def doubted_banks(recordings: Sequence[Recording], rng: np.random.Generator) -> 
 
     Scales of the encoders where a turn of one bank's turns the robot otherwise than one of the other's, by the gyro;
     else gains of the commands where one bank settles at another share of them than the other. Where both are faster
-    than they were told, either may be it, unless poses speak against one. Every recording that tells must say so, to
-    one side.
+    than they were told, either may be it, unless poses speak against one; where they are slower and poses travel
+    further than they roll, it is the encoders. Every recording that tells must say so, to one side.
 
     Args:
         recordings: with faults mended that show in the values.
@@ -94,25 +98,28 @@ def doubted_banks(recordings: Sequence[Recording], rng: np.random.Generator) -> 
     ratios = [float(item.values[2]) for item in gains if item is not None and item.values[2] > 0.0]
     if _to_one_side(ratios, UNLIKE_GAINS):
         return DoubtedBanks((CommandGain.name,))
-    common = _faster_than_told(recordings, rng)
+    common = _both_banks(recordings, rng)
     return DoubtedBanks(common[:1], common)
 
 
-def _faster_than_told(recordings: Sequence[Recording], rng: np.random.Generator) -> tuple[str, ...]:
-    """What makes both banks faster than their commands, the likelier first; empty where they are not.
+def _both_banks(recordings: Sequence[Recording], rng: np.random.Generator) -> tuple[str, ...]:
+    """What both banks have in common that no drivetrain does, the likelier first; empty where there is nothing.
 
-    Encoders of another scale read as if the wheels slipped, or were pushed; gains of the commands do not.
+    Encoders of another scale read as if the wheels slipped, or were pushed; gains of the commands do not. Wheels that
+    are slower than they were told have other reasons, unless poses travel further than they roll.
     """
     found = [item[0] for item in map(straight_gain, recordings) if item is not None]
-    if not found or min(found) <= STRAIGHT_GAIN.expected[1]:
+    if not found:
         return ()
     gain, (low, high) = float(np.mean(found)), LEAST_SLIP
     shares = [item for item in (_share(one, rng) for one in recordings) if item is not None]
-    possible = {
-        EncoderScale.name: all(low <= share * gain <= high for share in shares),
-        CommandGain.name: all(low <= share <= high for share in shares),
-    }
-    return tuple(name for name in possible if possible[name]) or tuple(possible)
+    encoders = all(low <= share * gain <= high for share in shares)
+    commands = all(low <= share <= high for share in shares)
+    if min(found) > STRAIGHT_GAIN.expected[1]:
+        possible = ((EncoderScale.name, encoders or not commands), (CommandGain.name, commands or not encoders))
+        return tuple(name for name, is_possible in possible if is_possible)
+    pushed = bool(shares) and min(shares) > high
+    return (EncoderScale.name,) if max(found) < SLOWER and pushed and encoders else ()
 
 
 def _share(recording: Recording, rng: np.random.Generator) -> float | None:

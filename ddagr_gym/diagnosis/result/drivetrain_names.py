@@ -39,15 +39,18 @@ DRIVETRAIN_GROUP = "commands and motors"
 ENCODERS = tuple(name for name in CHANNELS if name.startswith("encoder"))
 
 
-def unlike_commands(model: ScannedModel, gates: Thresholds) -> dict[str, float]:
+def unlike_commands(model: ScannedModel, gates: Thresholds, in_common: Sequence[str] = ()) -> dict[str, float]:
     """Misfit of the encoders over their limits, by channel, beside a model; empty where none is too large.
 
     Args:
         model: of a search.
         gates: with the limits.
+        in_common: names of effects that both banks have in common, any of which the model must have: a droop of the
+            motors may leave as little.
     """
     shares = {name: model.misfit[name] / gates.misfit[name] for name in ENCODERS if gates.misfit.get(name, 0.0) > 0.0}
-    return shares if max(shares.values(), default=0.0) > UNLIKE else {}
+    missed = bool(in_common) and not set(in_common) & set(model.names)
+    return shares if missed or max(shares.values(), default=0.0) > UNLIKE else {}
 
 
 def drivetrain_is_missing(model: ScannedModel, gates: Thresholds) -> bool:

@@ -98,10 +98,12 @@ def test_banks_are_judged_as_they_were_mended() -> None:
         (Faults(right_scale=1.1, left_scale=1.1, travel=1.1), 1.0, ("encoder_scale", "command_gain")),
         (Faults(right_scale=1.2, left_scale=1.2, travel=1.05), 1.0, ("encoder_scale",)),
         (Faults(travel=1.05), 1.2, ("command_gain",)),
+        # motors may droop, and robots are not pushed
         (Faults(right_scale=0.9, left_scale=0.9), 1.0, ()),
+        (Faults(right_scale=0.85, left_scale=0.85, travel=1.05), 1.0, ("encoder_scale",)),
     ],
 )
-def test_banks_faster_than_told_are_asked_for_what_they_have_in_common(
+def test_what_both_banks_have_in_common_is_asked_for_where_no_drivetrain_does_it(
     faults: Faults, commands: float, common: tuple[str, ...]
 ) -> None:
     made = made_drive(RobotGeometry("warthog", 0.3, 0.54), faults, seconds=300.0)

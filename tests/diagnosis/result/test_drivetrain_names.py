@@ -46,6 +46,16 @@ def test_it_is_asked_for_where_names_leave_too_much_in_an_encoder(misfit, asked)
 
 
 @pytest.mark.parametrize(
+    ("names", "asked"), [(("motor_droop",), True), (("pose_latency", "command_gain"), False), ((), True)]
+)
+def test_it_is_asked_for_where_no_name_is_what_both_banks_have_in_common(names, asked):
+    """A droop of the motors leaves little of encoders that read too little."""
+    common = ("encoder_scale", "command_gain")
+    assert bool(unlike_commands(model(names, 0.1), GATES, common)) is asked
+    assert unlike_commands(model(names, 0.1), GATES) == {}
+
+
+@pytest.mark.parametrize(
     ("names", "misfit", "missing"),
     [
         (("motor_lag",), 50.0, False),
