@@ -34,6 +34,7 @@ class DriveSummary:
         judged_seconds: that were forecast when it was left out.
         pose_lateness: by which its poses come behind the gyro [s]; 0 where that is not known.
         notes: sentences on what was mended or left out.
+        lateness_interval: 99 % interval of the poses' lateness [s]; null where that is not known.
     """
 
     source: str
@@ -44,6 +45,7 @@ class DriveSummary:
     judged_seconds: float
     pose_lateness: float
     notes: tuple[str, ...]
+    lateness_interval: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)

@@ -51,6 +51,7 @@ def drive_summaries(
                 judged * windows.duration,
                 data.prepared.noise[number].pose_lateness,
                 data.notes[number],
+                data.prepared.noise[number].lateness_interval,
             )
         )
     return tuple(found)

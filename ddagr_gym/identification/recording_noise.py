@@ -41,6 +41,7 @@ class RecordingNoise:
         pose_jitter: scatter of that lateness [s].
         gyro_bias: mean gyro reading at rest [rad/s] and its standard deviation, None where the robot never stood.
         opposed: whether poses and gyro clearly turn opposite ways, so that one of them has the wrong sign.
+        lateness_interval: 99 % interval of the poses' lateness [s]; None where it cannot be told.
     """
 
     channels: dict[str, ChannelNoise]
@@ -48,6 +49,7 @@ class RecordingNoise:
     pose_jitter: float
     gyro_bias: tuple[float, float] | None
     opposed: bool = False
+    lateness_interval: tuple[float, float] | None = None
 
     @property
     def sigma(self) -> Array:
@@ -71,7 +73,8 @@ def recording_noise(recording: Recording, rng: np.random.Generator) -> Recording
         channels[name] = ChannelNoise(max(INSTRUMENT_NOISE[name], jitter * speed))
     channels["pose_yaw"] = ChannelNoise(max(INSTRUMENT_NOISE["pose_yaw"], heading))
     opposed = offset is not None and offset.correlation < -LEAST_CORRELATION
-    return RecordingNoise(channels, lateness, jitter, _gyro_bias(recording), opposed)
+    interval = offset.interval if offset is not None and lateness > 0.0 else None
+    return RecordingNoise(channels, lateness, jitter, _gyro_bias(recording), opposed, interval)
 
 
 def dead_channels(recording: Recording) -> tuple[str, ...]:

@@ -45,6 +45,16 @@ def test_late_poses_are_named_from_the_least_latency_that_matters(lateness, effe
     assert [finding.name for finding, _ in found] == [effect.name for effect in effects]
 
 
+def test_the_lateness_of_poses_has_an_interval_as_sure_as_other_answers():
+    """The checks are surer: at 99 %."""
+    made = calibration(0.4)
+    drives = tuple(replace(drive, lateness_interval=(0.3, 0.6)) for drive in made.drives)
+    ((finding, _),) = named_sensors(replace(made, drives=drives))
+    low, high = finding.parameters["latency"].interval
+    assert (0.4 - low) / 0.1 == pytest.approx((high - 0.4) / 0.2)
+    assert (high - 0.4) / 0.2 == pytest.approx(1.645 / 2.576, rel=1e-3)
+
+
 def with_encoders(right: float, left: float, kept: bool = True):
     scales = {"encoder_scale_right": right, "encoder_scale_left": left}
     return with_scales("encoder_scale", kept, **scales)

@@ -50,6 +50,14 @@ def test_the_gyro_bias_is_that_at_rest(moving):
     assert deviation < 0.002
 
 
+def test_the_lateness_of_poses_has_an_interval_where_it_is_told(moving):
+    found = recording_noise(moving(0.5), np.random.default_rng(1))
+    low, high = found.lateness_interval
+    assert low <= found.pose_lateness <= high
+    assert high - low < 0.3
+    assert recording_noise(moving(-0.2), np.random.default_rng(1)).lateness_interval is None
+
+
 @pytest.mark.parametrize("lateness", [0.0, 0.5])
 def test_the_lateness_of_poses_is_found(moving, lateness):
     found = recording_noise(moving(lateness), np.random.default_rng(1))

@@ -12,17 +12,15 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.special import ndtri
 
 from ddagr_gym.diagnosis.answer.verdict import Estimate, Finding
-from ddagr_gym.diagnosis.result.uncertainty import student_quantile
+from ddagr_gym.diagnosis.result.uncertainty import of_answer
 from ddagr_gym.parameters import STANDARD_GRAVITY
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.effects.accelerometer_bias import AccelerometerBias
 from ddagr_gym.physics.effects.gyro_bias import GyroBias
 from ddagr_gym.physics.effects.gyro_scale import GyroScale
 from ddagr_gym.physics.effects.imu_tilt import ImuTilt
-from ddagr_gym.recordings.checks.blocks import CONFIDENCE
 from ddagr_gym.recordings.checks.findings import CheckFinding, Status
 from ddagr_gym.recordings.checks.gravity import gravity
 from ddagr_gym.recordings.checks.noise import BIAS, noise
@@ -37,10 +35,6 @@ _FIELDS: dict[str, tuple[type[Effect], str]] = {
 
 _READ_AS = (("pitch", "specific_force_x", -1.0), ("roll", "specific_force_y", 1.0))
 """Tilt, the axis along which it reads gravity, and its sign; the roll comes behind the pitch."""
-
-_NARROWER = student_quantile(math.inf) / float(ndtri(0.5 + 0.5 * CONFIDENCE))
-"""Of an interval of an answer over that of the checks, which are surer."""
-
 
 LARGEST_TILT = 0.3
 """Up to which gravity along an axis is called a tilt [rad] (ours): beyond it the gyro reads 5 % less of every turn,
@@ -115,5 +109,10 @@ def _beyond(told: Sequence[CheckFinding]) -> bool:
 def _size(told: Sequence[CheckFinding]) -> Estimate:
     """Mean of what the recordings tell, with an interval that holds that of each."""
     values = np.array([item.value for item in told])
-    ends = values[:, None] + _NARROWER * (np.array([item.interval for item in told]) - values[:, None])
-    return Estimate(float(values.mean()), told[0].unit, (float(ends.min()), float(ends.max())))
+    ends = [
+        end
+        for item in told
+        if item.value is not None and item.interval is not None
+        for end in of_answer(item.value, item.interval)
+    ]
+    return Estimate(float(values.mean()), told[0].unit, (min(ends), max(ends)))

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtri
 
 from ddagr_gym.diagnosis.answer.nuisance_spread import NuisanceSpread
 from ddagr_gym.diagnosis.result.factor_sizes import (
@@ -22,6 +23,7 @@ from ddagr_gym.identification.gauss_newton import Fitted, linearised
 from ddagr_gym.identification.least_squares import Linearised, bounded_step
 from ddagr_gym.identification.problem import Problem
 from ddagr_gym.physics.effects import Effect
+from ddagr_gym.recordings.checks.blocks import CONFIDENCE
 
 Array = NDArray[np.float64]
 
@@ -143,6 +145,18 @@ def student_quantile(degrees: float) -> float:
     from scipy.special import stdtrit
 
     return float(stdtrit(degrees, 0.5 + 0.5 * LEVEL))
+
+
+def of_answer(value: float, interval: tuple[float, float]) -> tuple[float, float]:
+    """Interval of an answer from that of ``ddagr check``, which is surer.
+
+    Args:
+        value: estimate.
+        interval: of the check.
+    """
+    narrower = student_quantile(math.inf) / float(ndtri(0.5 + 0.5 * CONFIDENCE))
+    low, high = (value + narrower * (end - value) for end in interval)
+    return low, high
 
 
 def nuisance_spread(problem: Problem, fitted: Fitted, draws: Resampled) -> NuisanceSpread:
