@@ -21,7 +21,7 @@ from ddagr_gym.calibration.result import Calibration
 from ddagr_gym.calibration.simulator_values import calibrated_effects
 from ddagr_gym.diagnosis.answer.verdict import Estimate, Finding
 from ddagr_gym.diagnosis.result.encoder_findings import BANKS, Named
-from ddagr_gym.diagnosis.result.uncertainty import of_answer
+from ddagr_gym.diagnosis.result.uncertainty import answer_interval
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.effects.command_gain import CommandGain
 from ddagr_gym.physics.effects.encoder_scale import EncoderScale
@@ -73,7 +73,7 @@ def _late_poses(calibration: Calibration) -> list[Named]:
     if late < latency["least"]:
         return []
     told = [(item.pose_lateness, item.lateness_interval) for item in calibration.drives]
-    ends = [end for value, interval in told if interval is not None for end in of_answer(value, interval)]
+    ends = [end for value, interval in told if interval is not None for end in answer_interval(value, interval)]
     interval = (max(min(ends), 0.0), max(ends)) if ends else None
     finding = Finding.seen(PoseLatency.name, {"latency": Estimate(late, latency["unit"], interval)})
     return [(finding, PoseLatency(min(late, latency["high"])))]

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from ddagr_gym.diagnosis.answer.verdict import Estimate, Finding
-from ddagr_gym.diagnosis.result.uncertainty import of_answer
+from ddagr_gym.diagnosis.result.uncertainty import answer_interval
 from ddagr_gym.parameters import STANDARD_GRAVITY
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.effects.accelerometer_bias import AccelerometerBias
@@ -113,6 +113,6 @@ def _size(told: Sequence[CheckFinding]) -> Estimate:
         end
         for item in told
         if item.value is not None and item.interval is not None
-        for end in of_answer(item.value, item.interval)
+        for end in answer_interval(item.value, item.interval)
     ]
     return Estimate(float(values.mean()), told[0].unit, (min(ends), max(ends)))

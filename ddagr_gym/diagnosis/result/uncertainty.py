@@ -147,7 +147,7 @@ def student_quantile(degrees: float) -> float:
     return float(stdtrit(degrees, 0.5 + 0.5 * LEVEL))
 
 
-def of_answer(value: float, interval: tuple[float, float]) -> tuple[float, float]:
+def answer_interval(value: float, interval: tuple[float, float]) -> tuple[float, float]:
     """Interval of an answer from that of ``ddagr check``, which is surer.
 
     Args:
