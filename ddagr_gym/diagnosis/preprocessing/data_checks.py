@@ -12,7 +12,7 @@ from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.physics.effects.command_gain import CommandGain
 from ddagr_gym.physics.effects.encoder_scale import EncoderScale
 from ddagr_gym.recordings.checks.across import across_runs
-from ddagr_gym.recordings.checks.command_gains import STRAIGHT_GAIN, command_gains, straight_gain
+from ddagr_gym.recordings.checks.command_gains import GAIN_BALANCE, STRAIGHT_GAIN, command_gains, straight_gain
 from ddagr_gym.recordings.checks.findings import CheckFinding, Status
 from ddagr_gym.recordings.checks.run import check_recording
 from ddagr_gym.recordings.checks.travel import LEAST_SLIP, rolled_and_travelled, share_with_least_slip
@@ -30,6 +30,10 @@ reach 1.1: this only asks, and forecasts decide."""
 SLOWER = 0.95
 """Gain straight ahead below which both encoders may read too little [-] (ours): 0.97 at least on six ordinary
 drives."""
+
+EACH = 1.02
+"""Gain of either bank, or one over it, from which both differ from their commands [-] (ours): where one side of three
+ordinary drives obeys 1.18 times its commands, the other one is at 1.005 at most."""
 
 FRAMES = "frames"
 """Doubt about the frames of poses."""
@@ -96,30 +100,38 @@ def doubted_banks(recordings: Sequence[Recording], rng: np.random.Generator) -> 
         return DoubtedBanks((EncoderScale.name,))
     gains = [command_gains(recording, rng) for recording in recordings]
     ratios = [float(item.values[2]) for item in gains if item is not None and item.values[2] > 0.0]
-    if _to_one_side(ratios, UNLIKE_GAINS):
-        return DoubtedBanks((CommandGain.name,))
-    common = _both_banks(recordings, rng)
-    return DoubtedBanks(common[:1], common)
+    common = _both_banks(recordings, ratios, rng)
+    if common:
+        return DoubtedBanks(common[:1], common)
+    return DoubtedBanks((CommandGain.name,) if _to_one_side(ratios, UNLIKE_GAINS) else ())
 
 
-def _both_banks(recordings: Sequence[Recording], rng: np.random.Generator) -> tuple[str, ...]:
+def _both_banks(recordings: Sequence[Recording], ratios: Sequence[float], rng: np.random.Generator) -> tuple[str, ...]:
     """What both banks have in common that no drivetrain does, the likelier first; empty where there is nothing.
 
     Encoders of another scale read as if the wheels slipped, or were pushed; gains of the commands do not. Wheels that
     are slower than they were told have other reasons, unless poses travel further than they roll.
+
+    Args:
+        recordings: with faults mended that show in the values.
+        ratios: of the gain of the right bank to that of the left, of those that tell it.
+        rng: of resampled intervals.
     """
     found = [item[0] for item in map(straight_gain, recordings) if item is not None]
-    if not found:
+    unlike = max((max(ratio, 1.0 / ratio) for ratio in ratios), default=1.0)
+    if not found or unlike > GAIN_BALANCE.expected[1]:
         return ()
+    # the mean of both banks may be above a command because one of them is
+    slower, faster = min(found) * 2.0 / (1.0 + unlike), max(found) * 2.0 * unlike / (1.0 + unlike)
     gain, (low, high) = float(np.mean(found)), LEAST_SLIP
     shares = [item for item in (_share(one, rng) for one in recordings) if item is not None]
     encoders = all(low <= share * gain <= high for share in shares)
     commands = all(low <= share <= high for share in shares)
-    if min(found) > STRAIGHT_GAIN.expected[1]:
+    if min(found) > STRAIGHT_GAIN.expected[1] and slower > EACH:
         possible = ((EncoderScale.name, encoders or not commands), (CommandGain.name, commands or not encoders))
         return tuple(name for name, is_possible in possible if is_possible)
     pushed = bool(shares) and min(shares) > high
-    return (EncoderScale.name,) if max(found) < SLOWER and pushed and encoders else ()
+    return (EncoderScale.name,) if max(found) < SLOWER and faster < 1.0 / EACH and pushed and encoders else ()
 
 
 def _share(recording: Recording, rng: np.random.Generator) -> float | None:
