@@ -79,7 +79,7 @@ class DrivetrainFit:
         if self.made is None:
             return None
         found = self.made.calibration
-        sensors = (*with_encoders(encoders, named_sensors(found, doubted.common)), *seen)
+        sensors = (*with_encoders(encoders, named_sensors(found, doubted)), *seen)
         return CompletedNominal(
             robot=self.made.robot,
             soil=self.made.soils[_GROUND],

@@ -9,7 +9,7 @@ was left out of the fit, and named from the least size that matters. The gyro is
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 
 from ddagr_gym.calibration.accelerometer_results import MountingSize
@@ -20,6 +20,7 @@ from ddagr_gym.calibration.parts import factors_of_banks
 from ddagr_gym.calibration.result import Calibration
 from ddagr_gym.calibration.simulator_values import calibrated_effects
 from ddagr_gym.diagnosis.answer.verdict import Estimate, Finding
+from ddagr_gym.diagnosis.preprocessing.data_checks import NO_DOUBT, DoubtedBanks
 from ddagr_gym.diagnosis.result.encoder_findings import BANKS, Named
 from ddagr_gym.diagnosis.result.uncertainty import answer_interval
 from ddagr_gym.physics.effects import Effect
@@ -45,19 +46,19 @@ IN_COMMON = 1.05
 """What both banks have in common, or one over it, from which it is named [-] (ours)."""
 
 
-def named_sensors(calibration: Calibration, common: Sequence[str] = ()) -> tuple[Named, ...]:
+def named_sensors(calibration: Calibration, doubted: DoubtedBanks = NO_DOUBT) -> tuple[Named, ...]:
     """Findings on poses, encoders, commands and IMU with the effects of the library that they are.
 
     What was fitted of both banks counts even where it has no name, since the rest was fitted beside it.
 
     Args:
         calibration: of the recordings that are diagnosed.
-        common: names of effects that may be what both banks have in common; empty where that was not in doubt.
+        doubted: what of the banks was in doubt.
     """
     named = [*_late_poses(calibration)]
     for effect in calibrated_effects(calibration):
         if isinstance(effect, EncoderScale | CommandGain):
-            named.append((_of_banks(calibration, effect, common), effect))
+            named.append((_of_banks(calibration, effect, doubted), effect))
         elif type(effect) in OF_MOUNTING and (finding := _mounting(calibration, effect)) is not None:
             named.append((finding, effect))
     return tuple(named)
@@ -79,23 +80,22 @@ def _late_poses(calibration: Calibration) -> list[Named]:
     return [(finding, PoseLatency(min(late, latency["high"])))]
 
 
-def _of_banks(
-    calibration: Calibration, effect: EncoderScale | CommandGain, common: Sequence[str] = ()
-) -> Finding | None:
+def _of_banks(calibration: Calibration, effect: EncoderScale | CommandGain, doubted: DoubtedBanks) -> Finding | None:
     """Banks that differ by more than their balance may, or have much in common where that was in doubt.
 
     Args:
         calibration: of the recordings that are diagnosed.
         effect: that was fitted.
-        common: names of effects that may be what both banks have in common.
+        doubted: what of the banks was in doubt.
     """
+    common = doubted.common
     differ = abs(math.log(effect.left / effect.right)) >= math.log(BALANCES[effect.name].expected[1])
     both = math.sqrt(effect.right * effect.left)
     if not differ and (effect.name not in common or abs(math.log(both)) < math.log(IN_COMMON)):
         return None
     sizes = _sizes_of_banks(calibration, effect)
     if not differ:
-        sizes = _alike(sizes)
+        sizes = _alike(sizes, doubted)
     elif isinstance(effect, CommandGain):
         sizes = {field: _reaching(size, size.value / both) for field, size in sizes.items()}
     part = next(item for item in calibration.parts if item.name == effect.name)
@@ -112,9 +112,13 @@ def _sizes_of_banks(calibration: Calibration, effect: EncoderScale | CommandGain
     }
 
 
-def _alike(sizes: Mapping[str, Estimate]) -> dict[str, Estimate]:
-    """Factors of both banks with the interval that holds those of both: motors may differ by as little as they do."""
+def _alike(sizes: Mapping[str, Estimate], doubted: DoubtedBanks) -> dict[str, Estimate]:
+    """Factors of both banks with the interval that holds those of both, and that of banks that follow their commands.
+
+    Motors may differ by as little as the banks do, and may fall less short of held commands than those of the fit.
+    """
     ends = [end for size in sizes.values() for end in size.interval or ()]
+    ends += [answer_interval(gain, (low, gain))[0] for gain, (low, _) in doubted.held if math.isfinite(low)]
     return {field: _reaching(size, *ends) for field, size in sizes.items()}
 
 

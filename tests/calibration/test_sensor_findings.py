@@ -12,6 +12,7 @@ from ddagr_gym.calibration.part_selection import surely_above
 from ddagr_gym.calibration.result import PartDecision
 from ddagr_gym.calibration.sensor_findings import named_sensors
 from ddagr_gym.diagnosis.answer.verdict import Estimate
+from ddagr_gym.diagnosis.preprocessing.data_checks import DoubtedBanks
 from ddagr_gym.physics.effects.command_gain import CommandGain
 from ddagr_gym.physics.effects.encoder_scale import EncoderScale
 from ddagr_gym.physics.effects.imu_lever_arm import ImuLeverArm
@@ -118,7 +119,7 @@ def test_banks_that_agree_have_no_name_but_count(given, kind, sizes):
     ],
 )
 def test_what_both_banks_have_in_common_is_named_with_what_may_be_it(fitted, sizes, common, set_of):
-    ((finding, _),) = named_sensors(fitted(*sizes), common)
+    ((finding, _),) = named_sensors(fitted(*sizes), DoubtedBanks((), common))
     assert finding.equivalence_set == set_of
     assert [finding.parameters[name].value for name in ("right", "left")] == pytest.approx(sizes)
     assert finding.parameters["right"].interval == (0.1, 0.3)
@@ -129,13 +130,26 @@ def test_intervals_of_banks_that_are_faster_alike_hold_those_of_both():
     made = with_encoders(1.12, 1.1)
     sure = {"encoder_scale_right": (1.11, 1.13), "encoder_scale_left": (1.09, 1.105)}
     items = [replace(p, interval=sure.get(p.name, p.interval)) for p in made.parameters]
-    ((finding, _),) = named_sensors(replace(made, parameters=tuple(items)), ("encoder_scale",))
+    ((finding, _),) = named_sensors(replace(made, parameters=tuple(items)), DoubtedBanks((), ("encoder_scale",)))
     assert [finding.parameters[name].interval for name in ("right", "left")] == [(1.09, 1.13)] * 2
+
+
+def test_intervals_reach_to_the_gain_at_held_commands():
+    """A fit that lets motors fall short of their commands finds a larger scale."""
+    made = with_encoders(1.12, 1.1)
+    sure = {"encoder_scale_right": (1.11, 1.13), "encoder_scale_left": (1.09, 1.105)}
+    items = [replace(p, interval=sure.get(p.name, p.interval)) for p in made.parameters]
+    held = ((1.08, (1.05, np.inf)), (1.07, (-np.inf, np.inf)))
+    doubted = DoubtedBanks((), ("encoder_scale",), held)
+    ((finding, _),) = named_sensors(replace(made, parameters=tuple(items)), doubted)
+    low, high = finding.parameters["right"].interval
+    assert high == 1.13
+    assert low == pytest.approx(1.08 - 0.03 * 1.645 / 2.576, rel=1e-4)
 
 
 @pytest.mark.parametrize("given", [with_encoders(1.03, 1.04), with_encoders(0.97, 0.98)])
 def test_little_that_both_banks_have_in_common_has_no_name(given):
-    ((finding, _),) = named_sensors(given, ("encoder_scale", "command_gain"))
+    ((finding, _),) = named_sensors(given, DoubtedBanks((), ("encoder_scale", "command_gain")))
     assert finding is None
 
 

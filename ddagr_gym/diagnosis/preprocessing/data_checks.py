@@ -13,7 +13,7 @@ from ddagr_gym.physics.effects.command_gain import CommandGain
 from ddagr_gym.physics.effects.encoder_scale import EncoderScale
 from ddagr_gym.recordings.checks.across import across_runs
 from ddagr_gym.recordings.checks.command_gains import GAIN_BALANCE, STRAIGHT_GAIN, command_gains, straight_gain
-from ddagr_gym.recordings.checks.findings import CheckFinding, Status
+from ddagr_gym.recordings.checks.findings import CheckFinding, Interval, Status
 from ddagr_gym.recordings.checks.run import check_recording
 from ddagr_gym.recordings.checks.travel import LEAST_SLIP, rolled_and_travelled, share_with_least_slip
 from ddagr_gym.recordings.checks.turning import left_over_right
@@ -77,10 +77,16 @@ class DoubtedBanks:
     Attributes:
         factors: names of effects whose factor of each bank is fitted.
         common: names of effects that may be what both banks have in common; empty where that is not in doubt.
+        held: gain straight ahead with its interval, of every recording that tells it, where that is in doubt.
     """
 
     factors: tuple[str, ...] = ()
     common: tuple[str, ...] = ()
+    held: tuple[tuple[float, Interval], ...] = ()
+
+
+NO_DOUBT = DoubtedBanks()
+"""Banks that do as they are told, and as their encoders say."""
 
 
 def doubted_banks(recordings: Sequence[Recording], rng: np.random.Generator) -> DoubtedBanks:
@@ -100,13 +106,16 @@ def doubted_banks(recordings: Sequence[Recording], rng: np.random.Generator) -> 
         return DoubtedBanks((EncoderScale.name,))
     gains = [command_gains(recording, rng) for recording in recordings]
     ratios = [float(item.values[2]) for item in gains if item is not None and item.values[2] > 0.0]
-    common = _both_banks(recordings, ratios, rng)
+    held = tuple(item for item in map(straight_gain, recordings) if item is not None)
+    common = _both_banks(recordings, [gain for gain, _ in held], ratios, rng)
     if common:
-        return DoubtedBanks(common[:1], common)
+        return DoubtedBanks(common[:1], common, held)
     return DoubtedBanks((CommandGain.name,) if _to_one_side(ratios, UNLIKE_GAINS) else ())
 
 
-def _both_banks(recordings: Sequence[Recording], ratios: Sequence[float], rng: np.random.Generator) -> tuple[str, ...]:
+def _both_banks(
+    recordings: Sequence[Recording], found: Sequence[float], ratios: Sequence[float], rng: np.random.Generator
+) -> tuple[str, ...]:
     """What both banks have in common that no drivetrain does, the likelier first; empty where there is nothing.
 
     Encoders of another scale read as if the wheels slipped, or were pushed; gains of the commands do not. Wheels that
@@ -114,10 +123,10 @@ def _both_banks(recordings: Sequence[Recording], ratios: Sequence[float], rng: n
 
     Args:
         recordings: with faults mended that show in the values.
+        found: gains straight ahead, of those that tell it.
         ratios: of the gain of the right bank to that of the left, of those that tell it.
         rng: of resampled intervals.
     """
-    found = [item[0] for item in map(straight_gain, recordings) if item is not None]
     unlike = max((max(ratio, 1.0 / ratio) for ratio in ratios), default=1.0)
     if not found or unlike > GAIN_BALANCE.expected[1]:
         return ()
