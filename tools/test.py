@@ -22,6 +22,8 @@ EXAMPLES = (
     "ddagr test --paths tests/test_config.py",
 )
 
+# named at the end, so that one sees what a run's time goes into
+_SLOWEST = ("--durations=20", "--durations-min=10")
 # pytest's exit code when a selection holds no test
 _NOTHING_SELECTED = 5
 
@@ -119,7 +121,7 @@ def _tests(root: Path, arguments: Arguments) -> Outcome:
 def _pytest(python: list[str], folder: Path, *words: str, may_be_empty: bool = False) -> Outcome:
     with tempfile.TemporaryDirectory(prefix="ddagr-test-") as temporary:
         report = Path(temporary) / "report.xml"
-        command = [*python, "-m", "pytest", "-q", f"--junitxml={report}", *words]
+        command = [*python, "-m", "pytest", "-q", *_SLOWEST, f"--junitxml={report}", *words]
         code = subprocess.run(command, cwd=folder, stdin=subprocess.DEVNULL).returncode
         if code == _NOTHING_SELECTED and may_be_empty:
             return Outcome()
