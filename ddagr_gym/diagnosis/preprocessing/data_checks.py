@@ -132,15 +132,19 @@ def _both_banks(
         return ()
     # the mean of both banks may be above a command because one of them is
     slower, faster = min(found) * 2.0 / (1.0 + unlike), max(found) * 2.0 * unlike / (1.0 + unlike)
+    above = min(found) > STRAIGHT_GAIN.expected[1] and slower > EACH
+    below = max(found) < SLOWER and faster < 1.0 / EACH
+    if not (above or below):
+        return ()
     gain, (low, high) = float(np.mean(found)), LEAST_SLIP
     shares = [item for item in (_share(one, rng) for one in recordings) if item is not None]
     encoders = all(low <= share * gain <= high for share in shares)
     commands = all(low <= share <= high for share in shares)
-    if min(found) > STRAIGHT_GAIN.expected[1] and slower > EACH:
+    if above:
         possible = ((EncoderScale.name, encoders or not commands), (CommandGain.name, commands or not encoders))
         return tuple(name for name, is_possible in possible if is_possible)
     pushed = bool(shares) and min(shares) > high
-    return (EncoderScale.name,) if max(found) < SLOWER and faster < 1.0 / EACH and pushed and encoders else ()
+    return (EncoderScale.name,) if pushed and encoders else ()
 
 
 def _share(recording: Recording, rng: np.random.Generator) -> float | None:
