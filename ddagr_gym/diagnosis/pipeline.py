@@ -62,7 +62,7 @@ OnStep = Callable[[str, bool], None]
 
 CompleteNominal = Callable[[Mapping[str, float], MendedRecordings, DoubtedBanks], CompletedNominal | None]
 """Function that fits the drivetrain of the nominal robot to recordings; takes the encoders' misfit over its limit, the
-recordings, and effects by which the banks may differ.
+recordings, and what of the banks is in doubt.
 
 None where the recordings cannot tell it. It is given from outside, since a calibration knows the stages of a diagnosis
 and not the other way round."""

@@ -15,7 +15,7 @@ from ddagr_gym.recordings.checks.across import across_runs
 from ddagr_gym.recordings.checks.command_gains import GAIN_BALANCE, STRAIGHT_GAIN, command_gains, straight_gain
 from ddagr_gym.recordings.checks.findings import CheckFinding, Interval, Status
 from ddagr_gym.recordings.checks.run import check_recording
-from ddagr_gym.recordings.checks.travel import LEAST_SLIP, rolled_and_travelled, share_with_least_slip
+from ddagr_gym.recordings.checks.travel import LEAST_SLIP, drive_share_with_least_slip
 from ddagr_gym.recordings.checks.turning import left_over_right
 from ddagr_gym.recordings.pose_frames import frames_apart
 from ddagr_gym.recordings.schema import Recording
@@ -137,7 +137,7 @@ def _both_banks(
     if not (above or below):
         return ()
     gain, (low, high) = float(np.mean(found)), LEAST_SLIP
-    shares = [item for item in (_share(one, rng) for one in recordings) if item is not None]
+    shares = [item for item in (drive_share_with_least_slip(one, rng) for one in recordings) if item is not None]
     encoders = all(low <= share * gain <= high for share in shares)
     commands = all(low <= share <= high for share in shares)
     if above:
@@ -145,14 +145,6 @@ def _both_banks(
         return tuple(name for name, is_possible in possible if is_possible)
     pushed = bool(shares) and min(shares) > high
     return (EncoderScale.name,) if pushed and encoders else ()
-
-
-def _share(recording: Recording, rng: np.random.Generator) -> float | None:
-    """Travelled over rolled distance where the robot slips least [-]; None where poses or geometry do not tell."""
-    geometry = recording.meta.geometry
-    if geometry is None:
-        return None
-    return share_with_least_slip(rolled_and_travelled(recording, rng), geometry.wheel_radius)
 
 
 def _to_one_side(ratios: Sequence[float], limit: float) -> bool:

@@ -23,7 +23,7 @@ from ddagr_gym.diagnosis.preprocessing.known_errors import with_readings_over
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.effects.encoder_scale import EncoderScale
 from ddagr_gym.recordings.checks.command_gains import GAIN, command_gains
-from ddagr_gym.recordings.checks.travel import LEAST_SLIP, rolled_and_travelled, share_with_least_slip
+from ddagr_gym.recordings.checks.travel import LEAST_SLIP, drive_share_with_least_slip
 from ddagr_gym.recordings.checks.turning import left_over_right
 from ddagr_gym.recordings.schema import Recording
 
@@ -110,12 +110,12 @@ def _scales_and_gains(recording: Recording, rng: np.random.Generator) -> tuple[A
 
     The gains are bank speeds by the encoders over commands. None where a drive cannot tell them.
     """
-    geometry, gains = recording.meta.geometry, command_gains(recording, rng)
-    if geometry is None or gains is None:
+    gains = command_gains(recording, rng)
+    if recording.meta.geometry is None or gains is None:
         return None
     ratio = left_over_right(recording, rng) or 1.0
     alike = with_readings_over(recording, {"encoder_left": ratio})
-    share = share_with_least_slip(rolled_and_travelled(alike, rng), geometry.wheel_radius)
+    share = drive_share_with_least_slip(alike, rng)
     if share is None or share <= 0.0:
         return None
     low, high = LEAST_SLIP

@@ -7,9 +7,8 @@ import numpy as np
 from ddagr_gym.recordings.checks.blocks import FEWEST_BLOCKS, cut_blocks, quantile_interval
 from ddagr_gym.recordings.checks.findings import CheckFinding, Interval, Question, not_testable
 from ddagr_gym.recordings.checks.regression import Estimate, estimate
+from ddagr_gym.recordings.checks.travel import CHECK
 from ddagr_gym.recordings.schema import BoolArray, FloatArray, Recording
-
-CHECK = "sign_and_scale"
 
 GAIN = Question(
     CHECK,

@@ -127,6 +127,14 @@ def share_with_least_slip(vectors: Sequence[Vectors], wheel_radius: float) -> fl
     return float(np.quantile(travelled[far] / rolled[far], 1.0 - LEAST_SLIPPING))
 
 
+def drive_share_with_least_slip(recording: Recording, rng: np.random.Generator) -> float | None:
+    """:func:`share_with_least_slip` of a drive; None also without pose, gyro or the robot's geometry."""
+    geometry = recording.meta.geometry
+    if geometry is None:
+        return None
+    return share_with_least_slip(rolled_and_travelled(recording, rng), geometry.wheel_radius)
+
+
 def rolled_and_travelled(recording: Recording, rng: np.random.Generator) -> list[Vectors]:
     """Rolled and travelled vectors of a drive over :data:`WINDOW` in the pose's frame, block by block.
 
