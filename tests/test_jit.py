@@ -1,7 +1,5 @@
 """What the package's kernels promise: arrays on the stack, the same bits wherever inlined."""
 
-import os
-import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 
@@ -148,30 +146,3 @@ def test_every_cached_kernel_keeps_its_code_apart():
     from ddagr_gym.simulator_kernel import advance_rows
 
     assert isinstance(advance_rows._cache._cache_file, jit._CacheFile)
-
-
-DRIVE = """
-import hashlib
-import numpy as np
-from ddagr_gym.presets import get_robot, get_soil
-from ddagr_gym.simulator import simulate
-
-commands = np.repeat([(0.7, 0.7), (0.9, 0.3), (0.0, 0.0), (-0.5, 0.5)], 50, axis=0)
-for effects in ((), ("towed_drag=60,rope=0.5",), ("motor_lag=0.1,second_pole=0.5",), ("lateral_bulldozing=2",)):
-    columns = simulate(get_robot("ddagr"), get_soil("thesis_a1"), commands, effects=effects, seed=1)
-    data = b"".join(np.ascontiguousarray(values, dtype=float).tobytes() for values in columns.values())
-    print(effects, hashlib.sha256(data).hexdigest())
-"""
-
-
-def test_the_process_that_compiles_gives_the_bits_of_those_that_load(tmp_path, repository):
-    """A kernel on its own and its copy inside a larger one differ in the last bits: only one of them may ever run."""
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(repository)}
-    words = [sys.executable, "-c", DRIVE]
-    outputs = [
-        subprocess.run(words, env=environment, cwd=tmp_path, capture_output=True, text=True, check=True).stdout
-        for _ in range(2)
-    ]
-    assert list(tmp_path.rglob("*.nbc"))
-    assert outputs[0].count("\n") == 4
-    assert outputs[0] == outputs[1]

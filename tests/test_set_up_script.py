@@ -51,7 +51,7 @@ case "$*" in *"-e ."*)
     mkdir -p "$1/ddagr_gym"
     cat >"$1/ddagr_gym/__main__.py" <<'END' ;;
 import os, sys
-print(os.getcwd(), sys.argv[1:], os.environ.get("OMP_NUM_THREADS"))
+print(os.getcwd(), sys.argv[1:], *["without bytecode"] * sys.dont_write_bytecode, os.environ.get("OMP_NUM_THREADS"))
 END
 esac
 """
@@ -134,6 +134,11 @@ def test_second_start_is_fast_and_calls_no_pip(checkout):
 
 def test_threads_are_the_users_when_set(checkout):
     assert checkout.run(OMP_NUM_THREADS="3").stdout.endswith(" 3\n")
+
+
+def test_what_python_compiles_is_kept(checkout):
+    done = checkout.run(PYTHONDONTWRITEBYTECODE="1")
+    assert (done.returncode, "without bytecode" in done.stdout) == (0, False), done.stderr
 
 
 def test_tools_come_from_the_checkout_whatever_the_path_says(checkout):

@@ -132,16 +132,23 @@ def svg_data(figure: Any, dpi: float | None = None) -> str:
     """
     if dpi is not None:
         figure.set_dpi(dpi)
-    figure.draw_without_rendering()
-    figure.set_layout_engine("none")
+    _lay_out(figure)
     stream = io.StringIO()
     figure.savefig(stream, format="svg", metadata={"Date": None}, **({} if dpi is None else {"dpi": dpi}))
     svg = re.sub(r'(?<= )(?:d|x|y)="[^"]*"', lambda found: re.sub(r"(\.\d\d)\d+", r"\1", found[0]), stream.getvalue())
     return f"data:image/svg+xml;base64,{base64.b64encode(svg.encode()).decode()}"
 
 
+def _lay_out(figure: Any) -> None:
+    """Place everything once and for all; with a layout engine matplotlib draws a figure twice for each file."""
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        engine.execute(figure)
+        figure.set_layout_engine(None)
+
+
 def save_figure(figure: Any, path: str | Path) -> tuple[Path, Path]:
-    """Save a figure as PNG and SVG, each file whole or absent; call inside :func:`house_style`.
+    """Save a figure as PNG and SVG, each file whole or absent, and fix its layout; call inside :func:`house_style`.
 
     Args:
         figure: a matplotlib figure.
@@ -152,6 +159,7 @@ def save_figure(figure: Any, path: str | Path) -> tuple[Path, Path]:
     """
     stem = Path(path).with_suffix("") if Path(path).suffix in (".png", ".svg") else Path(path)
     png, svg = stem.with_name(stem.name + ".png"), stem.with_name(stem.name + ".svg")
+    _lay_out(figure)
     write_atomically(png, lambda to: figure.savefig(to, format="png", metadata={"Software": None}))
     write_atomically(svg, lambda to: figure.savefig(to, format="svg", metadata={"Date": None}))
     return png, svg

@@ -28,7 +28,7 @@ from ddagr_gym.errors import InputError
 from ddagr_gym.progress import Progress
 from tests.needs_ray import NEEDS_RAY
 
-WORDS = ("steps=64", "environments=4", "ppo.rollout=8", "ppo.batch=16", "validation_interval=32")
+WORDS = ("steps=64", "environments=4", "ppo.rollout=8", "ppo.batch=16")
 """Changes that make a training tiny."""
 
 
@@ -37,9 +37,12 @@ def on_ray(test):
     return pytest.mark.ray(pytest.mark.slow(NEEDS_RAY(test)))
 
 
-def sweep_file(folder: Path, *lines: str, second: str = "ppo.learning_rate=1e-2", seeds: int = 2) -> Path:
+def sweep_file(
+    folder: Path, *lines: str, second: str = "ppo.learning_rate=1e-2", seeds: int = 2, interval: int = 64
+) -> Path:
     """A sweep of two configurations, of which the second has one more change."""
-    plain, other = (", ".join(words) for words in (WORDS, (*WORDS, second)))
+    both = (*WORDS, f"validation_interval={interval}")
+    plain, other = (", ".join(words) for words in (both, (*both, second)))
     text = ["description: test", f"seeds: {seeds}", *lines, "configurations:"]
     text += [f"  plain: {{config: ppo_raw, set: [{plain}]}}", f"  other: {{config: ppo_raw, set: [{other}]}}"]
     path = folder / "sweep.yaml"
@@ -222,7 +225,8 @@ def test_a_killed_sweep_on_ray_goes_on_to_the_same_bits(trained, tmp_path):
 def test_what_falls_behind_is_stopped_and_stays_so(tmp_path):
     """Without the feed-forward a policy that has not learnt yet cannot turn at all."""
     out = tmp_path / "out"
-    file = sweep_file(tmp_path, "median_stopping: true", second="design.action=absolute", seeds=3)
+    stopping = {"second": "design.action=absolute", "interval": 32}
+    file = sweep_file(tmp_path, "median_stopping: true", seeds=3, **stopping)
     rows = run_sweep(file, out, workers=2, cluster="local")
     ended = {(row["configuration"], row["seed"]): row["ended"] for row in rows}
     assert set(ended.values()) == {"finished", "stopped"}
@@ -234,9 +238,7 @@ def test_what_falls_behind_is_stopped_and_stays_so(tmp_path):
     assert (out / TABLE).read_bytes() == before
     # one more seed: those that have ended report what they had, and are not trained again
     kept = {path: path.stat().st_mtime_ns for path in out.glob(f"*/*/{RESULT}")}
-    more = run_sweep(
-        sweep_file(tmp_path, "median_stopping: true", second="design.action=absolute", seeds=4), out, 2, "local"
-    )
+    more = run_sweep(sweep_file(tmp_path, "median_stopping: true", seeds=4, **stopping), out, 2, "local")
     assert [row for row in more if row["seed"] < 3] == rows
     assert next(row["ended"] for row in more if row["configuration"] == "other" and row["seed"] == 3) == "stopped"
     assert {path: path.stat().st_mtime_ns for path in kept} == kept

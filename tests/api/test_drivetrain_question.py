@@ -43,6 +43,12 @@ def asked(monkeypatch):
     monkeypatch.setattr(drivetrain_fit, "_ONE_DRIVE", {"fitted": 16, "compared": 12, "settlings": 1})
 
 
+@pytest.fixture(scope="module")
+def searched(tmp_path_factory):
+    """Cache of a diagnosis of 70 s whose checks and search need not be done again."""
+    return tmp_path_factory.mktemp("searched") / "cache"
+
+
 @pytest.mark.slow
 def test_parts_are_named_and_the_pages_say_so(asked, tmp_path):
     result = ddagr_gym.diagnose(driven(180.0), cache=tmp_path / "cache")
@@ -123,25 +129,25 @@ def test_a_recording_that_cannot_tell_its_drivetrain_keeps_its_answer_and_says_w
     assert result.diagnosis.drivetrain is None
 
 
-def test_a_drivetrain_that_explains_little_is_no_answer_and_that_is_said(asked, monkeypatch):
+def test_a_drivetrain_that_explains_little_is_no_answer_and_that_is_said(asked, searched, monkeypatch):
     def fit(*inputs, **named):
         assert 0.0 < inputs[4].least_explained < 0.5
         raise LittleExplainedError(0.07)
 
     monkeypatch.setattr("ddagr_gym.calibration.run.calibrate_drives", fit)
     lines = []
-    result = ddagr_gym.diagnose(driven(70.0), names_only=True, progress=lines.append)
+    result = ddagr_gym.diagnose(driven(70.0), names_only=True, cache=searched, progress=lines.append)
     assert result.diagnosis.drivetrain is None
     assert any("explain 7% of the squared error of left-out wheel speeds: no answer" in line for line in lines)
 
 
-def test_an_error_inside_the_fit_is_no_property_of_the_recording(asked, monkeypatch):
+def test_an_error_inside_the_fit_is_no_property_of_the_recording(asked, searched, monkeypatch):
     def fail(*inputs, **named):
         raise InputError("Drivetrain.coulomb_friction is -2e-13.")
 
     monkeypatch.setattr("ddagr_gym.calibration.run.calibrate_drives", fail)
     with pytest.raises(InputError, match="coulomb_friction"):
-        ddagr_gym.diagnose(driven(70.0), names_only=True)
+        ddagr_gym.diagnose(driven(70.0), names_only=True, cache=searched)
 
 
 def test_thresholds_of_ordinary_drives_ask_what_differs_from_them():

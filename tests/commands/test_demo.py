@@ -43,7 +43,9 @@ def test_the_shipped_drive_is_sound_and_of_known_origin(repository):
 
 
 def test_a_given_recording_is_replayed_and_linked(monkeypatch, recording, tmp_path, capsys):
-    # the row turn has its test below
+    # the row turn has its test below, the evaluation one beside its report
+    left_out = "ddagr_gym.commands.demo_evaluation.evaluation_step"
+    monkeypatch.setattr(left_out, lambda _: Section("Evaluation", "left out", "<p>left out</p>"))
     monkeypatch.setattr(demo, "turn_step", lambda *_: Section("Turn", "left out", "<p>left out</p>"))
     path, output = tmp_path / "mine.parquet", tmp_path / "out"
     save_parquet(recording, path)

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from ddagr_gym import extras
+from ddagr_gym.api.replay import ReplayResult
 from ddagr_gym.cli import main
 from ddagr_gym.diagnosis import pipeline
 from ddagr_gym.diagnosis.answer.verdict import DataDoubt, Diagnosis, GatesUsed
@@ -177,11 +178,13 @@ def test_both_effects_files_hold_what_the_diagnosis_says(found: Path) -> None:
         assert effect.as_mapping()["parameters"] == {key: item.value for key, item in named.items()}
 
 
-def test_the_loop_closes(found: Path, work: Path) -> None:
+def test_the_loop_closes(found: Path, work: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Replayed and refitted with the effects file, the drives' errors fall as the diagnosis certified.
 
     A replay compares with the last pose alone, whose noise of 13 mm along each axis the certification averages.
     """
+    # the replay's tests look at its page
+    monkeypatch.setattr(ReplayResult, "_fill", lambda result, folder, _: result.to_json(folder / "replay.json"))
     output = work / "replayed"
     runs = [str(path) for path in sorted((work / "drives").iterdir())]
     options = ["--soil", "thesis_a1", "--robot", "ddagr", "--refit", "--together", "--output"]

@@ -46,7 +46,9 @@ def test_tables_summary_and_figure(tmp_path, capsys):
     assert not (folder / "claims.json").exists()  # two episodes decide no claim
 
 
-def test_a_second_run_drives_nothing_and_agrees(tmp_path, capsys):
+def test_a_second_run_drives_nothing_and_agrees(tmp_path, monkeypatch):
+    # the page is looked at above
+    monkeypatch.setattr("ddagr_gym.commands.evaluation_report.write_report", lambda folder, *_: folder / "report.html")
     folder = tmp_path / "out"
     arguments = ("--controllers", "B1", "--episodes", "2")
     assert run_evaluation(folder, *arguments) == 0

@@ -19,6 +19,19 @@ from ddagr_gym.config import configs_dir
 ENVIRONMENT = Path(sys.prefix).resolve()
 DDAGR = Path(sys.prefix) / "bin" / "ddagr"
 
+DRIVE = """
+import hashlib
+import numpy as np
+from ddagr_gym.presets import get_robot, get_soil
+from ddagr_gym.simulator import simulate
+
+commands = np.repeat([(0.7, 0.7), (0.9, 0.3), (0.0, 0.0), (-0.5, 0.5)], 50, axis=0)
+for effects in ((), ("towed_drag=60,rope=0.5",), ("motor_lag=0.1,second_pole=0.5",), ("lateral_bulldozing=2",)):
+    columns = simulate(get_robot("ddagr"), get_soil("thesis_a1"), commands, effects=effects, seed=1)
+    data = b"".join(np.ascontiguousarray(values, dtype=float).tobytes() for values in columns.values())
+    print(effects, hashlib.sha256(data).hexdigest())
+"""
+
 
 def run(*words: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([str(DDAGR), *words], capture_output=True, text=True, stdin=subprocess.DEVNULL)
@@ -57,6 +70,17 @@ def test_soils_are_listed():
     done = run("soils")
     assert done.returncode == 0, done.stderr.splitlines()[-1:]
     assert "thesis_a1" in done.stdout
+
+
+def test_the_process_that_compiles_gives_the_bits_of_those_that_load():
+    """A kernel on its own and its copy inside a larger one differ in the last bits: only one of them may ever run.
+
+    Nothing was compiled in this environment before.
+    """
+    words = [sys.executable, "-c", DRIVE]
+    first, second = (subprocess.run(words, capture_output=True, text=True, check=True).stdout for _ in range(2))
+    assert first.count("\n") == 4
+    assert first == second
 
 
 def test_an_episode_runs():

@@ -117,7 +117,9 @@ def test_bad_input_is_one_sentence_and_writes_nothing(tmp_path, monkeypatch):
 
 
 def test_failed_save_leaves_no_file(tmp_path):
-    class Broken:
+    from matplotlib.figure import Figure
+
+    class Broken(Figure):
         def savefig(self, path, **options):
             path.write_text("half")
             raise RuntimeError("no memory")
