@@ -7,6 +7,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -24,6 +25,8 @@ EXAMPLES = (
 
 # named at the end, so that one sees what a run's time goes into
 _SLOWEST = ("--durations=20", "--durations-min=10")
+# These take one processor each, the tests take all.
+_SIDE_BY_SIDE = ("wheel", "types", "docs")
 # pytest's exit code when a selection holds no test
 _NOTHING_SELECTED = 5
 
@@ -45,9 +48,9 @@ sys.exit(lint_imports(no_logo=True))
 class Arguments:
     """Run everything that continuous integration runs.
 
-    In order: lint, format, types, import contracts, tests (all but the slow ones), the documentation site with broken
-    links as errors, and the tests of the wheel installed
-    in an environment of its own outside the checkout. The exit code is 1 when anything failed.
+    Lint, format, import contracts and tests (all but the slow ones), then side by side: types, the documentation site
+    with broken links as errors, and the tests of the wheel installed in an environment of its own outside the checkout.
+    The exit code is 1 when anything failed.
 
     Attributes:
         slow: run the tests marked slow instead of everything else.
@@ -79,24 +82,29 @@ def run(arguments: Arguments) -> int:
     selected = checks if arguments.only == "all" else {arguments.only: checks[arguments.only]}
     if arguments.slow or arguments.paths:
         selected = {"tests": checks["tests"]}
-    outcomes: dict[str, tuple[Outcome, float]] = {}
-    for name, check in selected.items():
-        print(f"\n==== {name}", flush=True)
-        start = time.monotonic()
-        outcomes[name] = (check(), time.monotonic() - start)
+    alone = {name: _timed(name, check) for name, check in selected.items() if name not in _SIDE_BY_SIDE}
+    with ThreadPoolExecutor(arguments.workers) as pool:
+        begun = {name: pool.submit(_timed, name, check) for name, check in selected.items() if name in _SIDE_BY_SIDE}
+        outcomes = alone | {name: future.result() for name, future in begun.items()}
     _print_summary(outcomes)
     return 1 if any(outcome.failed for outcome, _ in outcomes.values()) else 0
+
+
+def _timed(name: str, check: Callable[[], Outcome]) -> tuple[Outcome, float]:
+    print(f"\n==== {name}", flush=True)
+    start = time.monotonic()
+    return check(), time.monotonic() - start
 
 
 def _checks(root: Path, arguments: Arguments) -> dict[str, Callable[[], Outcome]]:
     return {
         "lint": lambda: _tool(root, "-m", "ruff", "check", "."),
         "format": lambda: _tool(root, "-m", "ruff", "format", "--check", "."),
-        "types": lambda: _tool(root, "-m", "mypy"),
         "contracts": lambda: _tool(root, "-c", _LINT_IMPORTS),
         "tests": lambda: _tests(root, arguments),
+        "wheel": lambda: _installed_wheel(root),  # takes longest of those that follow, so it begins
+        "types": lambda: _tool(root, "-m", "mypy"),
         "docs": lambda: _site(root),
-        "wheel": lambda: _installed_wheel(root),
     }
 
 
@@ -107,7 +115,11 @@ def _site(root: Path) -> Outcome:
 
 
 def _tool(root: Path, *words: str) -> Outcome:
-    done = subprocess.run([sys.executable, *words], cwd=root, stdin=subprocess.DEVNULL)
+    command = [sys.executable, *words]
+    done = subprocess.run(
+        command, cwd=root, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    )
+    print(done.stdout, end="", flush=True)
     return Outcome(passed=1) if done.returncode == 0 else Outcome(failed=1)
 
 

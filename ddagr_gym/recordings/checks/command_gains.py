@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
+
 import numpy as np
+import numpy.typing as npt
 
 from ddagr_gym.recordings.checks.blocks import FEWEST_BLOCKS, cut_blocks, quantile_interval
 from ddagr_gym.recordings.checks.findings import CheckFinding, Interval, Question, not_testable
@@ -43,8 +47,13 @@ SLOWEST = 0.25
 """Mean speed of a hold over the fastest from which its gain counts [-] (ours): slower ones are noise."""
 FOLLOWED_BEST = 0.75
 """Quantile of the gains of holds that counts (ours): limits and loads make others less."""
+SAME_SPEED = 0.01
+"""Part by which the mean of both commands may change while it counts as held (ours): a robot that follows a row keeps
+its speed, but never its steering."""
 SHORTEST_HOLD = 0.8
 """Time behind the settling from which a hold counts [s] (ours)."""
+LONGEST_PIECE = 8.0
+"""Of a hold that lasts [s] (ours)."""
 _READINGS = 2
 """Of each bank in a hold, at least."""
 
@@ -92,30 +101,46 @@ def straight_gain(recording: Recording) -> tuple[float, Interval] | None:
     Returns:
         Upper quartile over the holds and its 99 % interval, of order statistics, None without such holds.
     """
-    holds = _holds(recording)
-    mean, turning = 0.5 * (holds[0] + holds[1]), 0.5 * (holds[0] - holds[1])
-    fast = (mean != 0.0) & (np.abs(mean) >= SLOWEST * np.abs(mean).max(initial=0.0))
-    told = fast & (np.abs(turning) <= NEARLY_STRAIGHT * np.abs(mean))
-    if np.count_nonzero(told) < FEWEST_BLOCKS:
+    commanded, reached = _straight_holds(recording)
+    fast = np.abs(commanded) >= SLOWEST * np.abs(commanded).max(initial=0.0)
+    if np.count_nonzero(fast) < FEWEST_BLOCKS:
         return None
-    gains = np.sort(0.5 * (holds[2] + holds[3])[told] / mean[told])
+    gains = np.sort(reached[fast] / commanded[fast])
     return float(np.quantile(gains, FOLLOWED_BEST)), quantile_interval(gains, FOLLOWED_BEST)
 
 
-def _holds(recording: Recording) -> FloatArray:
-    """Commands of the right and the left bank and the mean readings of both, of every settled hold (4, n)."""
-    commands = np.stack(recording.held_commands())
+def _straight_holds(recording: Recording) -> FloatArray:
+    """Mean speed of both banks, as commanded and as read, of every settled piece nearly straight ahead (2, n)."""
+    right, left = recording.held_commands()
     readings = np.stack([recording["encoder_right"], recording["encoder_left"]])
-    steady, holds = settled(recording, (commands[0], commands[1])), []
-    for span in recording.spans():
-        rows = np.arange(span.start, span.stop)[steady[span]]
-        breaks = np.any(np.diff(commands[:, rows]) != 0.0, axis=0) | (np.diff(rows) > 1)
-        for hold in np.split(rows, np.flatnonzero(breaks) + 1):
-            known = np.isfinite(readings[:, hold])
-            if known.sum(axis=1).min() >= _READINGS and recording.t[hold[-1]] - recording.t[hold[0]] >= SHORTEST_HOLD:
-                means = np.nanmean(readings[:, hold], axis=1)
-                holds.append(np.concatenate([commands[:, hold[0]], means]))
-    return np.array(holds).reshape(-1, 4).T
+    mean = 0.5 * (right + left)
+    straight = (mean != 0.0) & (0.5 * np.abs(right - left) <= NEARLY_STRAIGHT * np.abs(mean))
+    pieces = [
+        piece
+        for span in recording.spans()
+        for hold in _stretches(np.where(straight, mean, np.nan), span)
+        for piece in _settled_pieces(recording.t, hold)
+        if np.isfinite(readings[:, piece]).sum(axis=1).min() >= _READINGS
+    ]
+    holds = [(mean[piece].mean(), np.nanmean(readings[:, piece], axis=1).mean()) for piece in pieces]
+    return np.array(holds).reshape(-1, 2).T
+
+
+def _stretches(speed: FloatArray, span: slice) -> Iterator[slice]:
+    """Stretches of a span in which a speed keeps to that of their begin; it is never the same where it is NaN."""
+    start = span.start
+    for row in range(span.start, span.stop):
+        if not abs(speed[row] - speed[start]) <= SAME_SPEED * abs(speed[start]):
+            yield slice(start, row)
+            start = row
+    yield slice(start, span.stop)
+
+
+def _settled_pieces(t: FloatArray, hold: slice) -> list[npt.NDArray[np.int64]]:
+    """Rows of a hold in which it is settled, cut where they last long, none where that is too short."""
+    rows = np.arange(hold.start, hold.stop)[t[hold] - t[hold.start] >= SETTLED] if hold.stop > hold.start else []
+    lasts = float(t[rows[-1]] - t[rows[0]]) if len(rows) else 0.0
+    return np.array_split(rows, math.ceil(lasts / LONGEST_PIECE)) if lasts >= SHORTEST_HOLD else []
 
 
 def gain_findings(recording: Recording, rng: np.random.Generator) -> list[CheckFinding]:
@@ -128,7 +153,8 @@ def gain_findings(recording: Recording, rng: np.random.Generator) -> list[CheckF
     found = command_gains(recording, rng)
     if found is None:
         why = "No command was held long enough for the banks to settle."
-        return [not_testable(CHECK, "command to encoder", why, f"Hold commands for more than {SETTLED:g} s.")]
+        remedy = f"Hold commands for more than {SETTLED:g} s."
+        return [not_testable(CHECK, "command to encoder", why, remedy), *straight_finding(recording)]
     balance = float(found.values[2])
     return [
         *(_gain_of(bank, float(found.values[k]), found.intervals[k]) for k, bank in enumerate(("right", "left"))),

@@ -8,6 +8,8 @@ import pytest
 from ddagr_gym.recordings.checks.command_gains import command_gains, gain_findings, straight_gain
 from ddagr_gym.recordings.checks.findings import Status
 
+BANKS = ("right", "left")
+
 
 def rng():
     return np.random.default_rng(0)
@@ -46,6 +48,38 @@ def test_readings_that_come_seldom_and_apart_count(make_drive):
         encoder_left=lambda v: np.where(rows % 12 == 6, v, np.nan),
     )
     assert straight_gain(seldom)[0] == pytest.approx(1.1, rel=2e-3)
+
+
+def test_steering_may_go_on_while_the_speed_is_held(make_drive):
+    """A robot that follows a row never holds a bank's command; its wheels lag behind the steering."""
+    made = make_drive(seconds=300.0)
+    speed = 4.0 + 2.0 * (made.t // 30.0 % 2.0)
+    steering = [np.sin(0.7 * (made.t - late)) for late in (0.0, 0.3)]
+    following = changed(
+        made,
+        command_right=lambda _: speed + steering[0],
+        command_left=lambda _: speed - steering[0],
+        encoder_right=lambda _: 1.1 * (speed + steering[1]),
+        encoder_left=lambda _: 1.1 * (speed - steering[1]),
+    )
+    gain, (low, high) = straight_gain(following)
+    assert gain == pytest.approx(1.1, rel=1e-6)
+    assert low <= gain <= high
+    found = {item.channel: item.status for item in gain_findings(following, rng())}
+    assert found == {
+        "command to encoder": Status.NOT_TESTABLE,
+        "command to encoder, straight": Status.SUSPICIOUS,
+    }
+
+
+def test_a_speed_that_never_stays_is_not_held(make_drive):
+    made = make_drive(seconds=300.0)
+    waves = {
+        f"{kind}_{bank}": lambda _: 4.0 + 2.0 * np.sin(0.5 * made.t)
+        for kind in ("command", "encoder")
+        for bank in BANKS
+    }
+    assert straight_gain(changed(made, **waves)) is None
 
 
 def test_without_straight_holds_there_is_no_gain(make_drive):
