@@ -46,6 +46,9 @@ TURNED = 0.3
 TILTED = math.radians(3.0)
 """An IMU on a deck that hangs forward [rad]."""
 
+SHORT = 0.9
+"""Of encoders whose table has wheels a tenth too small, or gears that were exchanged for those of another model."""
+
 DOUBLED = 2.0
 """Encoders of which both edges are counted where the driver expects one."""
 
@@ -56,7 +59,7 @@ BIASED = 0.05
 """A gyro that was switched on cold [rad/s]."""
 
 WEAKENED = 0.85
-"""Commands of one side, as if its motor had another gain than the others."""
+"""Commands of one side, as if its motor had another gain; of both, as if converted with too large a wheel radius."""
 
 QUARTER_TURN = math.pi / 2.0
 """An IMU whose axes were taken from the wrong drawing [rad]."""
@@ -303,8 +306,21 @@ FURTHER = (
     ),
     Change("encoders_exchanged", "encoders exchanged", "encoders_exchanged", {}, encoders_exchanged),
 )  # fmt: skip
+BOTH_SIDES = (
+    Change(
+        "encoders_short", f"encoders times {SHORT:g}", "encoder_scale", _both(SHORT),
+        lambda table: scaled(table, layout_of(table).encoders, SHORT),
+    ),
+    Change(
+        "both_commanded", f"commands times {WEAKENED:g}", "command_gain", _both(1.0 / WEAKENED),
+        lambda table: scaled(table, layout_of(table).commands[-2:], WEAKENED),
+    ),
+)  # fmt: skip
+"""Encoders or commands that are wrong alike on both sides, which a data sheet leaves open."""
 ALL = {change.name: change for change in (*CHANGES, *FURTHER)}
-"""By name."""
+"""By name, what is also asked against a calibration."""
+ABSOLUTE = ALL | {change.name: change for change in BOTH_SIDES}
+"""By name, what is asked without one."""
 
 
 def read_table(path: Path, steps: int = STEPS) -> Table:

@@ -9,9 +9,9 @@ are arithmetic on the columns of the file and share no code with the effects or 
 that a field engineer meets; they were fixed before the first run and are not tuned to what is found.
 
 The drives have delays, biases and a mounting of their own, which the data sheet lacks: what is told of the unaltered
-drive is no alarm. A change counts as named where its effect is, and where that is told of the unaltered drive too, only
-if its size has moved by half of what was written, at least. Its own size then counts as part of the truth. Another name
-is one that is neither told of the unaltered drive nor a part of the drivetrain.
+drive is no alarm. A change counts as named where its effect is, alone or in a set of at most three; where that is told
+of the unaltered drive too, only if its size has moved by half of what was written, at least. Its own size then counts
+as part of the truth. Another name is one that is neither told of the unaltered drive nor a part of the drivetrain.
 
 Copies lie in a temporary folder while they are diagnosed. Finished cases are kept in the folder of parts, under a hash
 of the altered file; the same command goes on from there, and several with different drives may share the folder. A part
@@ -31,7 +31,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.altered_changes import ALL, CONTROL, DRIVES, ROBOT, Change, packed, read_table
+from benchmarks.altered_changes import ABSOLUTE, CONTROL, DRIVES, ROBOT, Change, packed, read_table
 from benchmarks.altered_figure import draw
 from benchmarks.answers.run_diagnoses import UNKNOWN_GROUND, Case, InterruptedRunError, diagnose, shared
 from benchmarks.concealed_truth import sizes
@@ -51,6 +51,9 @@ OF_PART = {"command_delay": {"delay": "command_delay"}}
 MOVED = 0.5
 """Share of what was written by which a size that the unaltered drive has too must move, at least (ours)."""
 
+LARGEST_SET = 3
+"""Of names that stand for one finding where that counts as told."""
+
 LIMIT = 3600.0
 """Of one run [s]."""
 
@@ -67,7 +70,7 @@ def altered_files(
         changes: names of the changes; the control is always among them.
     """
     for drive in drives:
-        for change in (CONTROL, *(ALL[name] for name in changes if name != CONTROL.name)):
+        for change in (CONTROL, *(ABSOLUTE[name] for name in changes if name != CONTROL.name)):
             content = packed(change.write(read_table(folder / f"{drive}.csv.gz")))
             path = to / f"{drive}_{change.name}_{hashlib.sha256(content).hexdigest()[:12]}.csv.gz"
             path.write_bytes(content)
@@ -106,7 +109,7 @@ def scored(drive: str, change: Change, answer: Mapping[str, Any], control: Mappi
         "truth": truth,
         "verdict": answer["verdict"],
         "named": named(change, answer, control),
-        "others": [name for name in names_of(answer) if name not in _expected(change, control)],
+        "others": others(change, answer, control),
         "suspected_by_checks": change.effect in answer["suspects"],
         "suspects_of_checks": answer["suspects"],
         "found": sizes_of(change, answer),
@@ -120,15 +123,24 @@ def scored(drive: str, change: Change, answer: Mapping[str, Any], control: Mappi
     }
 
 
-def _expected(change: Change, control: Mapping[str, Any]) -> set[str]:
-    return {change.effect, *control["verdict"], *PART_TITLES}
+def others(change: Change, answer: Mapping[str, Any], control: Mapping[str, Any]) -> list[str]:
+    """Names that are neither the change nor told of the unaltered drive nor parts of the drivetrain."""
+    expected = {told_as(change, answer), *control["verdict"], *PART_TITLES}
+    return [name for name in names_of(answer) if name not in expected]
+
+
+def told_as(change: Change, answer: Mapping[str, Any]) -> str | None:
+    """Name under which an answer tells a change: its effect, else the first of a small set that holds it."""
+    if change.effect in answer["verdict"]:
+        return change.effect
+    sets = {finding["name"]: finding.get("equivalence_set", ()) for finding in answer["findings"]}
+    held = [name for name, names in sets.items() if change.effect in names and len(names) <= LARGEST_SET]
+    return next((name for name in held if name in answer["verdict"]), None)
 
 
 def sizes_of(change: Change, answer: Mapping[str, Any]) -> dict[str, Any]:
-    """What an answer says of the fields of a change, with intervals; empty where it does not name it."""
-    if change.effect not in answer["verdict"]:
-        return {}
-    told = sizes(answer).get(change.effect, {})
+    """What an answer says of the fields of a change, with intervals; empty where it does not tell it."""
+    told = sizes(answer).get(told_as(change, answer) or "", {})
     called = {name: OF_PART.get(change.effect, {}).get(name, name) for name in change.truth}
     return {
         name: told[name if name in told else other] for name, other in called.items() if name in told or other in told
@@ -152,10 +164,10 @@ def neutral(change: Change, name: str) -> float:
 def named(change: Change, answer: Mapping[str, Any], control: Mapping[str, Any]) -> bool:
     """Whether the change is told: its effect, with a size that moved where the unaltered drive has one too."""
     if change is CONTROL:
-        return not [name for name in names_of(answer) if name not in _expected(change, control)]
+        return not others(change, answer, control)
     found, own = sizes_of(change, answer), sizes_of(change, control)
-    if change.effect not in answer["verdict"] or not own:
-        return change.effect in answer["verdict"]
+    if told_as(change, answer) is None or not own:
+        return told_as(change, answer) is not None
     return any(
         abs(found[name]["value"] - own[name]["value"]) >= MOVED * abs(value - neutral(change, name))
         for name, value in change.truth.items()
@@ -215,7 +227,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--output", type=Path, default=RESULT, help="JSON; the picture has the same name")
     parser.add_argument("--parts", type=Path, help="folder of finished cases; beside the output if absent")
     parser.add_argument("--drives", nargs="+", choices=DRIVES, default=list(DRIVES), metavar="NAME")
-    parser.add_argument("--changes", nargs="+", choices=list(ALL), default=list(ALL), metavar="NAME")
+    parser.add_argument("--changes", nargs="+", choices=list(ABSOLUTE), default=list(ABSOLUTE), metavar="NAME")
     parser.add_argument("--threads", type=int, default=1, help="of the simulator")
     given = parser.parse_args(arguments)
     if given.threads < 1:

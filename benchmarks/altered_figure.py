@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks.altered_changes import ALL, CONTROL
+from benchmarks.altered_changes import ABSOLUTE, CONTROL
 from ddagr_gym.diagnosis.answer.drivetrain import PART_TITLES
 from ddagr_gym.recordings.files import write_atomically
 from ddagr_gym.rendering import palette
@@ -55,7 +55,7 @@ def draw(cases: Sequence[Mapping[str, Any]], path: Path) -> None:
         cases: entries of :func:`benchmarks.altered_drives.scored`.
         path: where.
     """
-    shown = [change for change in ALL.values() if any(case["change"] == change.name for case in cases)]
+    shown = [change for change in ABSOLUTE.values() if any(case["change"] == change.name for case in cases)]
     rows, drives = [change.name for change in shown], list(dict.fromkeys(case["drive"] for case in cases))
     with house_style():
         from matplotlib.figure import Figure

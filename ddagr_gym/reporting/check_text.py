@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from ddagr_gym.recordings.checks.findings import CheckFinding, CheckReport
@@ -46,4 +47,10 @@ def _number(finding: CheckFinding) -> str:
     unit = "" if finding.unit in ("-", "SI") else f" {finding.unit}"
     if finding.interval is None or finding.interval[0] == finding.interval[1]:
         return f"{finding.value:.3g}{unit}"
-    return f"{finding.value:.3g} ({finding.interval[0]:.3g} to {finding.interval[1]:.3g}){unit}"
+    return f"{finding.value:.3g} ({_range(*finding.interval)}){unit}"
+
+
+def _range(low: float, high: float) -> str:
+    if math.isinf(high):
+        return f"{low:.3g} or more"
+    return f"{high:.3g} or less" if math.isinf(low) else f"{low:.3g} to {high:.3g}"

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from benchmarks.altered_changes import (
+    BOTH_SIDES,
     CHANGES,
     CONTINUOUS,
     DRIVES,
@@ -17,6 +18,7 @@ from benchmarks.altered_changes import (
     LATE_SENSORS,
     SCALE,
     TILTED,
+    WEAKENED,
     Change,
     Layout,
     Table,
@@ -30,7 +32,7 @@ from ddagr_gym.physics import layout
 from ddagr_gym.physics.effects.registry import effect_kind
 from ddagr_gym.recordings.load import load_recording
 
-BY_NAME = {change.name: change for change in CHANGES}
+BY_NAME = {change.name: change for change in (*CHANGES, *BOTH_SIDES)}
 
 
 def in_steps() -> Table:
@@ -90,7 +92,7 @@ def test_the_control_is_the_drive_itself(table: Table) -> None:
 
 
 def test_every_change_is_an_effect_of_the_library_in_its_range() -> None:
-    for change in CHANGES[1:]:
+    for change in (*CHANGES[1:], *BOTH_SIDES):
         kind = effect_kind(change.effect)
         assert bool(change.truth) != kind.categorical
         for name, value in change.truth.items():
@@ -108,6 +110,13 @@ def test_poses_are_those_of_half_a_second_ago_and_nothing_else_changes(table: Ta
         assert found[name][last] == table[name][before]
         # before the first late sample the log repeats the first one
         assert found[name][:10] == [table[name][0]] * 10
+
+
+def test_commands_of_both_sides_are_scaled(table: Table) -> None:
+    found, changed = altered(table, "both_commanded")
+    assert changed == set(layout_of(table).commands[-2:])
+    for column in changed:
+        np.testing.assert_allclose(numbers(found, column), WEAKENED * numbers(table, column), rtol=1e-8)
 
 
 def test_sensors_lag_and_commands_do_not(table: Table) -> None:
@@ -137,7 +146,7 @@ def test_jitter_moves_no_row() -> None:
     assert np.array_equal(before[10:], np.arange(390))
 
 
-@pytest.mark.parametrize("name", ["encoders_scaled", "encoders_doubled"])
+@pytest.mark.parametrize("name", ["encoders_scaled", "encoders_doubled", "encoders_short"])
 def test_both_encoders_are_scaled(table: Table, name: str) -> None:
     found, changed = altered(table, name)
     assert changed == set(layout_of(table).encoders)
@@ -223,5 +232,5 @@ def test_the_open_drives_have_the_columns_that_are_altered(drive: str, shared_di
     if not path.is_file():
         pytest.skip(f"{path.name} is not at hand")
     table = read_table(path)
-    for change in CHANGES[1:]:
+    for change in (*CHANGES[1:], *BOTH_SIDES):
         assert altered(table, change.name)[1]

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from benchmarks import altered_drives
-from benchmarks.altered_changes import ALL, CONTROL, DRIVES, LATE_POSES, LATE_SENSORS, packed
+from benchmarks.altered_changes import ABSOLUTE, CONTROL, DRIVES, LATE_POSES, LATE_SENSORS, packed
 from benchmarks.altered_drives import RESULT, figures, main, scored
 from benchmarks.altered_figure import draw, outcome
 from benchmarks.answers import run_diagnoses
@@ -59,6 +59,17 @@ def test_a_size_that_the_unaltered_drive_has_too_must_have_moved(late: float, to
     case = scored("d", BY_NAME["late_poses"], said, PLAIN)
     assert case["truth"] == {"latency": pytest.approx(LATE_POSES + 0.7)}
     assert (case["named"], case["covered"]) == (told, {})
+
+
+def test_a_set_of_names_counts_where_it_is_small() -> None:
+    said = an_answer([*OWN, "encoder_scale"], encoder_scale=dict.fromkeys(("right", "left"), (1.18, [1.1, 1.2])))
+    (finding,) = said["findings"]
+    finding["equivalence_set"] = ["encoder_scale", "command_gain"]
+    case = scored("d", ABSOLUTE["both_commanded"], said, PLAIN)
+    assert (case["named"], case["others"], case["covered"]) == (True, [], {"right": True, "left": True})
+    finding["equivalence_set"] += ["wheel_radius_uneven", "motor_droop"]
+    case = scored("d", ABSOLUTE["both_commanded"], said, PLAIN)
+    assert (case["named"], case["others"], case["covered"]) == (False, ["encoder_scale"], {})
 
 
 def test_a_part_of_the_drivetrain_has_the_field_of_its_effect() -> None:
@@ -157,7 +168,7 @@ def test_the_committed_result_is_of_these_changes(tmp_path: Path) -> None:
     result = json.loads(RESULT.read_text())
     cases = result["cases"]
     drives = {case["drive"] for case in cases}
-    assert {(case["drive"], case["change"]) for case in cases} == {(d, name) for d in drives for name in ALL}
-    assert all(case["written"] == dict(ALL[case["change"]].truth) for case in cases)
+    assert {(case["drive"], case["change"]) for case in cases} == {(d, name) for d in drives for name in ABSOLUTE}
+    assert all(case["written"] == dict(ABSOLUTE[case["change"]].truth) for case in cases)
     assert {name: result[name] for name in figures(cases)} == figures(cases)
     draw(cases, tmp_path / "again.png")

@@ -98,3 +98,11 @@ def test_the_table_counts_what_it_does_not_show():
     assert "  -> b, y: mend it" in text
     assert text.endswith("1 pass, 1 suspicious, 1 not testable")
     assert "fine" in findings_text(findings, everything=True)
+
+
+@pytest.mark.parametrize(
+    ("interval", "said"), [((4.0, np.inf), "5 (4 or more) s"), ((-np.inf, 6.0), "5 (6 or less) s")]
+)
+def test_an_interval_with_an_open_end_is_said_in_words(interval, said):
+    finding = judge("b", "y", 5.0, interval, (0, 2), "s", meaning="far out", remedy="mend it")
+    assert said in findings_text([finding], everything=True)
