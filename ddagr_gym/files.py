@@ -15,7 +15,8 @@ from typing import Any
 from ddagr_gym.errors import InputError
 
 FOLDER_MARK = ".ddagr-output"
-"""Empty file in every folder that a command wrote; only such a folder is ever replaced."""
+"""List of files in every folder that a command wrote; only such a folder is ever replaced, and only while it holds
+nothing else."""
 
 MAXIMUM_JSON = 50_000_000
 """Bytes of the largest JSON file that is read (ours): an answer on thousands of drives has fewer."""
@@ -249,7 +250,8 @@ def output_folder(path: str | os.PathLike[str], *, overwrite: bool = False) -> I
 
     Args:
         path: folder to end up with; parents are made.
-        overwrite: replace a folder that an earlier command wrote. One that holds anything else is never touched.
+        overwrite: replace a folder that an earlier command wrote. One that holds anything else, files that were put
+            there later among it, is never touched.
 
     Raises:
         InputError: ``path`` is a file, holds the current folder, or has content that may not be replaced.
@@ -260,7 +262,7 @@ def output_folder(path: str | os.PathLike[str], *, overwrite: bool = False) -> I
     temporary = Path(tempfile.mkdtemp(prefix=f".{final.name}-", dir=final.parent))
     try:
         yield temporary
-        (temporary / FOLDER_MARK).touch()
+        (temporary / FOLDER_MARK).write_text("".join(f"{name}\n" for name in _files_in(temporary)))
         mask = os.umask(0)
         os.umask(mask)
         temporary.chmod(0o777 & ~mask)
@@ -290,6 +292,18 @@ def _check_replaceable(folder: Path, overwrite: bool) -> None:
         raise InputError(
             f"{folder} holds an earlier output: choose another folder, or add --overwrite (overwrite=True in Python)."
         )
+    # a version before left its mark empty
+    written = (folder / FOLDER_MARK).read_text().splitlines()
+    added = [name for name in _files_in(folder) if name not in {FOLDER_MARK, *written}] if written else []
+    if added:
+        raise InputError(
+            f"{folder} also holds {added[0]}, which no ddagr command wrote: move it, or choose another folder."
+        )
+
+
+def _files_in(folder: Path) -> list[str]:
+    """Files below a folder by their relative paths, in order."""
+    return sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if not path.is_dir())
 
 
 def _replace_folder(temporary: Path, final: Path) -> None:

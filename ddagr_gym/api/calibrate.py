@@ -231,7 +231,7 @@ def _numbers(
     """Numbers of the drives on each ground."""
     numbers: dict[str, list[int]] = {}
     for ground, drives in grounds.items():
-        several = [drives] if isinstance(drives, int | str | os.PathLike) else drives
+        several = drives if isinstance(drives, Sequence) and not isinstance(drives, str) else [drives]
         numbers[ground] = [_number(drive, sources, found) for drive in several]
     return numbers
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -157,5 +158,12 @@ def check(
 
 
 def _unique(names: list[str]) -> list[str]:
-    """Names with a number where one occurs again."""
-    return [f"{n}_{names[:i].count(n) + 1}" if names.count(n) > 1 else n for i, n in enumerate(names)]
+    """Names of which one that is there again has a number that no other name ends in."""
+    taken = set(names)
+    found = []
+    for k, name in enumerate(names):
+        if name in names[:k]:
+            name = next(other for n in itertools.count(2) if (other := f"{name}_{n}") not in taken)
+            taken.add(name)
+        found.append(name)
+    return found

@@ -42,7 +42,7 @@ def _errors(item: Forecasts) -> Iterator[CurrentError]:
         return
     for k, bank in enumerate(BANKS):
         measured, forecast = (values[..., k] for values in item.currents)
-        known = np.isfinite(measured)
+        known = np.isfinite(measured) & np.isfinite(forecast)
         if known.sum() > 1:
             left = float(np.sqrt(np.mean((measured - forecast)[known] ** 2)))
             yield CurrentError(item.drive, bank, int(known.sum()), float(np.std(measured[known])), left)

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import json
-import math
-from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 import msgspec
 
 from ddagr_gym.calibration.result import SCHEMA, SCHEMA_VERSION, Calibration
 from ddagr_gym.config import load_config
+from ddagr_gym.diagnosis.result.files import finite_or_null, with_nan
 from ddagr_gym.errors import InputError
 from ddagr_gym.files import read_json, write_text
 from ddagr_gym.parameters import Robot, Soil
@@ -42,17 +40,7 @@ def as_text(calibration: Calibration) -> str:
     for name in ("currents", "imu"):
         if content[name] is None:
             del content[name]
-    return json.dumps(_finite(content), indent=1, allow_nan=False) + "\n"
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, Mapping):
-        return {str(key): _finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
-    return value
+    return json.dumps(finite_or_null(content), indent=1, allow_nan=False) + "\n"
 
 
 def save(calibration: Calibration, path: Path) -> None:
@@ -76,9 +64,16 @@ def load(folder: Path) -> Calibration:
             f"{SCHEMA_VERSION}: calibrate again."
         )
     try:
-        return msgspec.convert(mapping, Calibration)
+        return msgspec.convert(with_nan(mapping, msgspec.inspect.type_info(Calibration)), Calibration)
     except msgspec.ValidationError as error:
         raise InputError(f"{path}: {error}: make it again with `ddagr calibrate`.") from None
+
+
+def robot_file(folder: Path) -> str:
+    """Path of the calibrated robot of a folder; InputError where ``ddagr calibrate`` did not write it."""
+    if not (folder / ROBOT).is_file():
+        raise InputError(f"{folder} is no folder that `ddagr calibrate` wrote, it has no {ROBOT}: give its path.")
+    return str(folder / ROBOT)
 
 
 def load_robot(folder: Path) -> Robot:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass
 
 import numpy as np
@@ -137,7 +138,7 @@ def check_map(recordings: Sequence[Recording], rng: np.random.Generator) -> None
         InputError: exchanged or reversed encoders or commands, an IMU upside down, a pose that turns the wrong way.
     """
     for recording in recordings:
-        for fault in find_channel_faults([recording], rng):
+        for fault in find_channel_faults([recording], deepcopy(rng)):
             raise InputError(
                 f"{recording.meta.source}: {describe(fault.name, amounts(fault.sizes))}. {fault.remedy} "
                 "A calibration needs drives that are mapped right."

@@ -60,7 +60,7 @@ def load_ordinary(path: Path) -> Ordinary:
         )
     try:
         return ordinary_from_mapping(body["ordinary"])
-    except (KeyError, TypeError, ValueError) as error:
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise _no_bank(path, error) from None
 
 
@@ -183,7 +183,10 @@ def _scores_of(mapping: Mapping[str, Any]) -> Scores:
 
     def matrix(name: str) -> Array:
         found = np.zeros((len(keys), len(keys)))
-        found[upper] = _array(mapping[name])
+        values = _array(mapping[name])
+        if len(values) != len(upper[0]):
+            raise ValueError(f"{name} has {len(values)} numbers, {len(upper[0])} belong there")
+        found[upper] = values
         return np.asarray(found + np.triu(found, 1).T)
 
     return Scores(keys, _array(mapping["gradient"]), matrix("information"), matrix("within"), matrix("between"))

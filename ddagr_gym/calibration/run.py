@@ -365,7 +365,9 @@ def _key(
         digest.update(code_digest(path.read_text()).encode())
     for recording in recordings:
         digest.update(content_hash(recording).encode())
-        digest.update(repr((recording.meta.source, recording.meta.segments, recording.meta.spans)).encode())
+        meta = recording.meta
+        told = (meta.source, meta.segments, meta.spans, sorted(meta.held.items()), meta.column_map)
+        digest.update(repr(told).encode())
     texts = [list(grounds), repr(robot), repr(soils), repr(replace(settings, threads=1))]
     digest.update(json.dumps(texts).encode())
     return digest.hexdigest()

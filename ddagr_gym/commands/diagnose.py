@@ -24,15 +24,18 @@ def run(arguments: Arguments) -> int | None:
     import ddagr_gym
     from ddagr_gym.api.diagnosis_result import DiagnosisResult
     from ddagr_gym.api.inputs import is_folder_of_drives, recordings_from
-    from ddagr_gym.calibration.files import ROBOT
+    from ddagr_gym.calibration.files import robot_file
     from ddagr_gym.commands.diagnose_drives import run_drives
     from ddagr_gym.diagnosis.store import part_folder
     from ddagr_gym.recordings.files import Limits
 
     check_output_folder(arguments.output, overwrite=arguments.overwrite)
+    if arguments.before and not arguments.runs:
+        taken = " ".join(map(str, arguments.before))
+        raise InputError(f"--before takes all that follows it ({taken}): put the drive in question in front of it.")
     need(*(() if arguments.names_only else ("jinja2", "matplotlib")))
     _check_viewer_files(arguments)
-    read_as = arguments.robot if arguments.calibration is None else str(arguments.calibration / ROBOT)
+    read_as = arguments.robot if arguments.calibration is None else robot_file(arguments.calibration)
     limits = Limits(arguments.maximum_rows, arguments.maximum_bytes)
     parts = part_folder(arguments.output.expanduser().resolve())
     if arguments.calibration is not None and any(map(is_folder_of_drives, arguments.runs)):
@@ -62,7 +65,10 @@ def run(arguments: Arguments) -> int | None:
     if isinstance(result, DiagnosisResult) and result.robot is None:
         print(f"ddagr: robot.yaml and soil.yaml are left out, {result.refit_note}", file=sys.stderr)
     print(result)
-    print(f"\n{'' if arguments.names_only else 'page, figures, '}diagnosis.json and effects.json: {arguments.output}")
+    files = (
+        "diagnosis.json and effects.yaml" if arguments.names_only else "page, figures, diagnosis.json and effects.yaml"
+    )
+    print(f"\n{files} are in {arguments.output}")
     for line in written:
         print(line)
     return None

@@ -73,14 +73,14 @@ def run(arguments: Arguments) -> None:
     """Replay, print the tables, write report, figures and page."""
     import ddagr_gym
     from ddagr_gym.api.inputs import recordings_from
-    from ddagr_gym.calibration.files import ROBOT
+    from ddagr_gym.calibration.files import robot_file
     from ddagr_gym.recordings.files import Limits
 
     if not arguments.soil and arguments.calibration is None:
         raise InputError("no ground is given: name a --soil, or the folder of a --calibration.")
     check_output_folder(arguments.output, overwrite=arguments.overwrite)
     robot, limits = arguments.robot or None, Limits(arguments.maximum_rows, arguments.maximum_bytes)
-    drove = robot if arguments.calibration is None else str(arguments.calibration / ROBOT)
+    drove = robot if arguments.calibration is None else robot_file(arguments.calibration)
     result = ddagr_gym.replay(
         recordings_from(arguments.runs, drove, arguments.map or None, limits),
         robot,

@@ -39,7 +39,7 @@ from ddagr_gym.diagnosis.result.drivetrain_names import (
     unlike_commands,
     with_drivetrain,
 )
-from ddagr_gym.diagnosis.review import review
+from ddagr_gym.diagnosis.review import review, with_dead_channels
 from ddagr_gym.diagnosis.search.scanned_model import SearchResult
 from ddagr_gym.diagnosis.search.starting_models import refit_nominal, starting_models
 from ddagr_gym.diagnosis.search.stepwise import search
@@ -184,7 +184,7 @@ def diagnose(
         unlike = unlike_commands(accepted.chosen, session.gates, doubted.common)
         nominal = complete_nominal(unlike, session.mended, doubted) if unlike else None
     if nominal is not None and is_an_answer(nominal):
-        made = _beside_drivetrain(session, standing(found, session.gates), nominal, names_only, steps)
+        made = _beside_drivetrain(session, standing(found, session.gates), nominal, checks, names_only, steps)
     else:
         if nominal is not None:
             progress(f"a drivetrain explains {nominal.answer.explained:.0%} of the wheel speeds' errors: no answer")
@@ -239,7 +239,12 @@ def _where_repeated(session: DiagnosisSession) -> EffectLocation | None:
 
 
 def _beside_drivetrain(
-    given: DiagnosisSession, before: SearchResult, nominal: CompletedNominal, names_only: bool, steps: Steps
+    given: DiagnosisSession,
+    before: SearchResult,
+    nominal: CompletedNominal,
+    checks: Sequence[DataDoubt],
+    names_only: bool,
+    steps: Steps,
 ) -> Outcome:
     """The answer beside a nominal simulator whose drivetrain was fitted: its parts, and where something is left.
 
@@ -247,6 +252,7 @@ def _beside_drivetrain(
         given: session with the nominal simulator as it was given.
         before: what stands by itself beside that one.
         nominal: the completed one.
+        checks: of the recordings.
         names_only: leave out the next drive.
         steps: of the diagnosis.
     """
@@ -266,7 +272,7 @@ def _beside_drivetrain(
     findings = tuple(replace(item, where=places.get(item.name, item.where)) for item in diagnosis.findings)
     following = None if names_only else drivetrain_drive(nominal.answer)
     located_too = replace(diagnosis, localisation=located, findings=findings, next_drive=following)
-    diagnosis = with_contradictions(located_too, session.mended.contradictions)
+    diagnosis = with_contradictions(with_dead_channels(located_too, checks), session.mended.contradictions)
     return Outcome(diagnosis, tuple(told.values()), session, found, evidence)
 
 

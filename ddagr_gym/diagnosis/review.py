@@ -62,6 +62,20 @@ def review(
     return replace(diagnosis, findings=findings, complete=whole and not doubts, sentence=sentence)
 
 
+def with_dead_channels(diagnosis: Diagnosis, checks: Sequence[DataDoubt]) -> Diagnosis:
+    """An answer that also says which channels never change; it is not the whole truth then.
+
+    Args:
+        diagnosis: the answer.
+        checks: of the recordings.
+    """
+    dead = dead_channels(checks)
+    if not dead:
+        return diagnosis
+    said = dead_in_words(dead)
+    return replace(diagnosis, complete=False, sentence=f"{diagnosis.sentence} {said[0].upper()}{said[1:]}.")
+
+
 def _doubts_of_names(diagnosis: Diagnosis, places: Mapping[str, EffectLocation], fit: Certificate | None) -> list[str]:
     """Sentences on findings that are uneven, at a bound, or predict unseen drives worse."""
     named = [finding.name for finding in diagnosis.findings]

@@ -169,6 +169,7 @@ class ColumnMap:
             if channel not in CHANNELS:
                 raise unknown_name("channel", channel, CHANNELS)
             check_channel_unit(channel, source.unit)
+        _check_each_has_its_own(self.channels)
         if self.body_commands and any(command in self.channels for command in COMMANDS):
             raise InputError("body_commands and bank commands are both given: keep one of them.")
         for group in self.held:
@@ -197,6 +198,15 @@ class ColumnMap:
         """Columns without which this map does not fit a file."""
         optional = {s.column for s in self.sources() if s.optional}
         return tuple(c for c in dict.fromkeys((*self.number_columns(), *self.label_columns())) if c not in optional)
+
+
+def _check_each_has_its_own(channels: Mapping[str, ColumnSource]) -> None:
+    """Refuse two channels of one column: one of them is the other's, and checks would blame a sensor."""
+    read: dict[str, str] = {}
+    for channel, source in channels.items():
+        other = read.setdefault(source.column, channel)
+        if other != channel:
+            raise InputError(f"{other} and {channel} both read the column {source.column!r}: give each its own.")
 
 
 def shipped_column_maps() -> tuple[str, ...]:

@@ -27,6 +27,10 @@ from ddagr_gym.recordings.schema import (
 )
 from ddagr_gym.recordings.units import channel_factor, factor
 
+MOST_REPEATED = 0.5
+"""Share of rows that repeat the time of the row before up to which they are left out (ours): a log that writes rows
+twice. With more the clock stands still, or is coarser than the log."""
+
 
 @dataclass(frozen=True, eq=False)
 class RawTable:
@@ -124,6 +128,11 @@ def _without_duplicates(table: RawTable, column_map: ColumnMap, notes: list[str]
     repeated = np.zeros(clock.size, dtype=bool)
     repeated[1:] = (np.diff(clock) == 0) & ~new_span[1:]
     count = int(np.count_nonzero(repeated))
+    if count > MOST_REPEATED * clock.size:
+        raise InputError(
+            f"{count} of {clock.size} rows repeat the time of the row before: {column_map.time.column} stands still or "
+            "is too coarse; name a finer column under time in the column map."
+        )
     if count:
         notes.append(f"{count} rows that repeated the time of the row before were left out.")
         table = table.rows(~repeated)

@@ -63,7 +63,10 @@ def load_recording(
         return recording if robot is None else with_robot(recording, robot, geometry_of)
     table, column_map = _table(path, kind, map_name, limits)
     geometry = _geometry(robot or column_map.robot, geometry_of)
-    return build_recording(table, column_map, geometry, source=path.name, source_sha256=sha256_of(path))
+    try:
+        return build_recording(table, column_map, geometry, source=path.name, source_sha256=sha256_of(path))
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
 
 
 def _geometry(robot: str, geometry_of: GeometryByName) -> RobotGeometry | None:

@@ -301,6 +301,19 @@ def test_drives_from_before_are_taken_by_the_command(work: Path, tmp_path: Path,
     assert get_robot(str(tmp_path / "changed" / "robot.yaml")).name == "ddagr"
 
 
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        (["--before", "a.parquet", "b.parquet"], "--before takes all that follows it (a.parquet b.parquet)"),
+        (["a.parquet", "--calibration", "nowhere"], "nowhere is no folder that `ddagr calibrate` wrote"),
+    ],
+)
+def test_what_is_compared_with_is_looked_at_first(more: list[str], said: str, capsys: pytest.CaptureFixture) -> None:
+    assert main(["diagnose", *more, "--output", "nothing"]) == 2
+    assert said in capsys.readouterr().err
+    assert not Path("nothing").exists()
+
+
 @pytest.mark.parametrize("option", ["--before", "--calibration"])
 def test_a_stopped_comparison_promises_nothing_and_leaves_the_steps_of_a_diagnosis(
     option: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
@@ -315,7 +328,10 @@ def test_a_stopped_comparison_promises_nothing_and_leaves_the_steps_of_a_diagnos
     monkeypatch.setattr("ddagr_gym.api.inputs.recordings_from", lambda *arguments: ())
     earlier = part_folder(tmp_path / "changed")
     earlier.mkdir()
-    assert main(["diagnose", "run.csv", option, "ordinary", "--output", str(tmp_path / "changed")]) == 130
+    ordinary = tmp_path / "ordinary"
+    ordinary.mkdir()
+    (ordinary / "robot.yaml").touch()
+    assert main(["diagnose", "run.csv", option, str(ordinary), "--output", str(tmp_path / "changed")]) == 130
     assert capsys.readouterr().err == "ddagr: interrupted.\n"
     assert given["cache"] is None
     assert earlier.is_dir()

@@ -108,7 +108,7 @@ def fill(path: Path, text: str, **options) -> None:
 
 def test_output_folder_is_made_with_its_parents(tmp_path, umask):
     fill(tmp_path / "a" / "b", "one")
-    assert content(tmp_path) == {f"a/b/{FOLDER_MARK}": "", "a/b/report.html": "one"}
+    assert content(tmp_path) == {f"a/b/{FOLDER_MARK}": "report.html\n", "a/b/report.html": "one"}
     assert stat.S_IMODE((tmp_path / "a" / "b").stat().st_mode) == 0o777 & ~umask
 
 
@@ -121,12 +121,21 @@ def test_a_failed_output_leaves_no_folder(tmp_path):
 
 def test_an_earlier_output_is_replaced_only_on_request(tmp_path):
     fill(tmp_path / "a", "one")
-    (tmp_path / "a" / "stale").write_text("")
     with pytest.raises(InputError, match="--overwrite"):
         fill(tmp_path / "a", "two")
     assert (tmp_path / "a" / "report.html").read_text() == "one"
     fill(tmp_path / "a", "two", overwrite=True)
-    assert content(tmp_path) == {f"a/{FOLDER_MARK}": "", "a/report.html": "two"}
+    assert content(tmp_path) == {f"a/{FOLDER_MARK}": "report.html\n", "a/report.html": "two"}
+
+
+def test_what_was_put_into_an_output_later_is_never_deleted(tmp_path):
+    fill(tmp_path / "a", "one")
+    (tmp_path / "a" / "notes").mkdir()
+    (tmp_path / "a" / "notes" / "mine.txt").write_text("kept")
+    with pytest.raises(InputError, match=r"also holds notes/mine\.txt, which no ddagr command wrote"):
+        fill(tmp_path / "a", "two", overwrite=True)
+    assert (tmp_path / "a" / "notes" / "mine.txt").read_text() == "kept"
+    assert (tmp_path / "a" / "report.html").read_text() == "one"
 
 
 def test_foreign_files_are_never_replaced(tmp_path):

@@ -8,7 +8,7 @@ from ddagr_gym.diagnosis.answer.certificate import Certificate, Gains, Measured
 from ddagr_gym.diagnosis.answer.location import EffectLocation, Localisation, Unevenness
 from ddagr_gym.diagnosis.answer.verdict import DataDoubt, Diagnosis, Estimate, Finding, GatesUsed
 from ddagr_gym.diagnosis.result.files import as_mapping, validate
-from ddagr_gym.diagnosis.review import review
+from ddagr_gym.diagnosis.review import review, with_dead_channels
 
 MISFIT = {"yaw_rate": 4.0}
 BANK = GatesUsed(nulls=60, bank="f", level=0.05)
@@ -100,6 +100,14 @@ def test_what_is_seen_in_the_values_has_no_share_of_the_mismatch() -> None:
     made = review(seen, located(explained=0.0))
     assert made.complete
     assert "mismatch" not in made.sentence
+
+
+def test_a_dead_channel_leaves_no_answer_complete() -> None:
+    given = replace(diagnosis("command_delay", "delay", 0.1), sentence="The commands come late.")
+    assert with_dead_channels(given, ()) is given
+    made = with_dead_channels(given, (DataDoubt("a.csv", "yaw_rate", "stuck", "It never changes."),))
+    assert not made.complete
+    assert made.sentence.startswith("The commands come late. Yaw rate never changes")
 
 
 def test_without_a_name_the_sentence_has_what_the_recordings_own_checks_suspect() -> None:

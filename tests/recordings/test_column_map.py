@@ -47,6 +47,12 @@ def test_the_commented_example_is_valid():
     assert example.channels["encoder_left"].sign == -1
 
 
+def test_two_channels_of_one_column_are_refused(tmp_path):
+    text = BASIC + "  encoder_right: {column: enc}\n  encoder_left: {column: enc}\n"
+    with pytest.raises(InputError, match=r"encoder_right and encoder_left both read the column 'enc'"):
+        load_column_map(write(tmp_path, text))
+
+
 def test_a_map_of_ones_own_takes_the_name_of_its_file(tmp_path):
     column_map = load_column_map(write(tmp_path, BASIC))
     assert column_map.name == "map"

@@ -73,6 +73,12 @@ def test_repeated_rows_are_left_out_and_counted():
     assert recording.meta.duplicates_dropped == 1
 
 
+@pytest.mark.parametrize("times", [np.full(10, 5.0), np.floor(np.arange(10) / 4.0)])
+def test_a_clock_that_stands_still_or_is_coarse_is_refused(times):
+    with pytest.raises(InputError, match=r"of 10 rows repeat the time of the row before: t stands still"):
+        build_recording(table(t=times, gz=np.arange(10)), ColumnMap(TimeSource("t"), YAW), None)
+
+
 def test_units_and_signs():
     sources = {
         "yaw_rate": ColumnSource("gz", "deg/s", -1),

@@ -39,6 +39,15 @@ def test_preset_robots_give_their_geometry():
         preset_geometry("wart_hog")
 
 
+def test_what_is_wrong_inside_a_file_is_said_with_its_name(tmp_path):
+    path = tmp_path / "monday.csv"
+    path.write_text("t,yaw_rate\n0,0.1\n2,0.1\n1,0.1\n")
+    column_map = tmp_path / "map.yaml"
+    column_map.write_text("time: {column: t}\nchannels: {yaw_rate: {column: yaw_rate}}\n")
+    with pytest.raises(InputError, match=r"monday\.csv: time goes back from 2 s to 1 s"):
+        load_recording(path, str(column_map))
+
+
 def test_steps_layout_of_a_real_drive(recordings_dir):
     recording = load_recording(recordings_dir / "open" / "warthog_sand.csv.gz", robot="warthog")
     assert recording.meta.column_map == "drive_steps"

@@ -85,7 +85,7 @@ def conclude_change(
         ),
         0.0,
         __version__,
-        data=tuple(data_source(recording) for recording in mended.recordings),
+        data=tuple(data_source(recording) for recording in mended.given),
         robot=ordinary.robot.name,
         soil=ground,
         options=Options(window=ordinary.weighing.window, robot_file=ordinary.source or None),

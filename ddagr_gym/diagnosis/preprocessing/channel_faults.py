@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass
 
 import numpy as np
@@ -59,7 +60,7 @@ def find_channel_faults(recordings: Sequence[Recording], rng: np.random.Generato
         recordings: at least one, of one robot and one map; without its geometry nothing is found.
         rng: of the intervals.
     """
-    found = [item for item in (arbitrated(recording, rng) for recording in recordings) if item is not None]
+    found = _arbitrations(recordings, rng)
     faults: list[ChannelFault] = []
     for source in (ENCODERS, COMMANDS):
         faults += _agreed([item for item in (_wheel_faults(one, source) for one in found) if item is not None])
@@ -75,9 +76,14 @@ def contradictions(recordings: Sequence[Recording], rng: np.random.Generator) ->
         recordings: mended.
         rng: of the intervals.
     """
-    found = [item for item in (arbitrated(recording, rng) for recording in recordings) if item is not None]
-    said = [finding for item in found for finding in arbitration_findings(item)]
+    said = [finding for item in _arbitrations(recordings, rng) for finding in arbitration_findings(item)]
     return tuple(finding for finding in said if finding.status is Status.SUSPICIOUS)
+
+
+def _arbitrations(recordings: Sequence[Recording], rng: np.random.Generator) -> list[Arbitration]:
+    """Of each recording that can tell, as if it were alone."""
+    found = (arbitrated(recording, deepcopy(rng)) for recording in recordings)
+    return [item for item in found if item is not None]
 
 
 def _agreed(found: Sequence[tuple[ChannelFault, ...]]) -> tuple[ChannelFault, ...]:

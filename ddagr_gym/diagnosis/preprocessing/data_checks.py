@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import deepcopy
 from dataclasses import dataclass
 
 import numpy as np
@@ -46,7 +47,8 @@ def data_doubts(recordings: Sequence[Recording], rng: np.random.Generator) -> tu
         recordings: at least one, of one robot.
         rng: for the resampled intervals of the checks.
     """
-    reports = [check_recording(recording, rng) for recording in recordings]
+    # each as if it were alone: what is doubted of one must not depend on the others
+    reports = [check_recording(recording, deepcopy(rng)) for recording in recordings]
     found = []
     for report in reports:
         found += [DataDoubt(report.source, "", "schema", sentence) for sentence in report.sentences]

@@ -130,7 +130,7 @@ def readings_left_out(recordings: Sequence[Recording]) -> tuple[RepeatedReadings
             continue
         rows = sum(len(r) for r in held)
         read = float(np.mean([np.isfinite(r[name]).sum() for r in held for name in names])) * len(held)
-        between = float(np.median([1.0 / r.rate(name) for r in held for name in names]))
+        between = float(np.median([1.0 / rate for r in held for name in names if (rate := r.rate(name)) > 0.0]))
         repeat = between - float(np.median([r.period for r in held]))
         share = 1.0 - read / rows
         if share > LEAST_SHARE and repeat > 0.0:
@@ -141,7 +141,8 @@ def readings_left_out(recordings: Sequence[Recording]) -> tuple[RepeatedReadings
 def _repeats_unstated(recording: Recording, name: str) -> bool:
     """Whether a channel is held for a time that its map does not state, or far beyond the one that it states."""
     stated = recording.meta.held.get(name)
-    return stated is not None and 1.0 / recording.rate(name) > _BEYOND * stated
+    rate = recording.rate(name)
+    return stated is not None and rate > 0.0 and 1.0 / rate > _BEYOND * stated
 
 
 def repeat_runs(repeat: Flags) -> tuple[Rows, Rows]:

@@ -98,7 +98,8 @@ class DiagnosisSession:
         digest = hashlib.sha256(source_digest().encode())
         for recording in self.mended.given:
             digest.update(content_hash(recording).encode())
-            digest.update(repr((recording.meta.source, recording.meta.segments, recording.meta.spans)).encode())
+            meta = recording.meta
+            digest.update(repr((meta.source, meta.segments, meta.spans, sorted(meta.held.items()))).encode())
         setting = replace(self.setting, threads=1)
         texts = [repr(self.robot), repr(self.soil), repr(setting), asdict(self.bank), self.seed]
         digest.update(json.dumps(texts, sort_keys=True).encode())

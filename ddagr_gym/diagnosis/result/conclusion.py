@@ -90,7 +90,7 @@ def conclude(
         _gates_used(gates),
         0.0,
         __version__,
-        data=tuple(data_source(recording) for recording in mended.recordings),
+        data=tuple(data_source(recording) for recording in mended.given),
         rejected=rejected,
         detectable_alone=alone,
         nuisance_spread=nuisance_spread(session.problem, accepted.chosen.fitted, draws),

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ddagr_gym.recordings.checks.clock_offsets import encoder_offset
+from ddagr_gym.recordings.checks.clock_offsets import encoder_lag, encoder_offset
 from ddagr_gym.recordings.checks.findings import CheckFinding, Interval, Question, judge, not_testable
 from ddagr_gym.recordings.checks.regression import (
     MOST_INFLATION,
@@ -101,7 +101,7 @@ def force_coefficients(recording: Recording, rng: np.random.Generator) -> Estima
 def _regressors_and_forces(recording: Recording, wheel_radius: float, rng: np.random.Generator) -> FloatArray:
     """Columns dv/dt, v w, w^2, dw/dt, 1, f_x, f_y (n, 7), each a running mean over :data:`WINDOW`."""
     offset = encoder_offset(recording, rng)
-    lag = offset.lag if offset is not None and abs(offset.lag) < 0.5 else 0.0
+    lag = encoder_lag(offset)
     v = _advanced(
         recording, 0.5 * wheel_radius * (filled(recording, "encoder_right") + filled(recording, "encoder_left")), lag
     )

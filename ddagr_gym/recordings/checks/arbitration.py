@@ -33,7 +33,7 @@ from ddagr_gym.recordings.checks.motion_windows import (
     motion_windows,
 )
 from ddagr_gym.recordings.checks.regression import Estimate
-from ddagr_gym.recordings.checks.votes import Pair, Votes, votes
+from ddagr_gym.recordings.checks.votes import Pair, Votes, votes, with_other_majority
 from ddagr_gym.recordings.checks.wheels import (
     followed_commands,
     followed_findings,
@@ -189,7 +189,8 @@ def _decided_by_gravity(
     upside_down = fit.decided and fit.best.upside_down
     if not upside_down and fit.best.faults < 2:
         return turning
-    return replace(turning, camps=(wheels, camp) if upside_down else (camp, wheels), third="gravity")
+    decided = replace(turning, camps=(wheels, camp) if upside_down else (camp, wheels), third="gravity")
+    return decided if decided.camps == turning.camps else with_other_majority(decided)
 
 
 def _pairs(signals: Mapping[str, FloatArray]) -> list[Pair]:

@@ -35,6 +35,8 @@ POSE_RANGE = (-0.15, 1.0)
 earlier than the gyro is not possible."""
 LEAST_CORRELATION = 0.5
 """Of two signals at their best offset, below which it says nothing (ours: a quarter of the variance is common)."""
+LONGEST_ENCODER_LAG = 0.5
+"""Of the encoders behind the gyro [s] (ours): what seems longer is that one of the two does not tell of turns."""
 WIDEST_INTERVAL = 0.8
 """Interval [s] beyond which the offset counts as not testable."""
 
@@ -63,6 +65,12 @@ class Offset:
 def known_lag(offset: Offset | None) -> float:
     """Lag of a pair [s], 0 where the drive does not tell it: the best lag of two noises is any."""
     return 0.0 if offset is None or abs(offset.correlation) < LEAST_CORRELATION else offset.lag
+
+
+def encoder_lag(offset: Offset | None) -> float:
+    """Lag of the encoders behind the gyro [s], 0 where the drive does not tell it or it is none of a clock."""
+    lag = known_lag(offset)
+    return lag if abs(lag) < LONGEST_ENCODER_LAG else 0.0
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from ddagr_gym.recordings.checks.blocks import cut_blocks
-from ddagr_gym.recordings.checks.clock_offsets import ENCODER, POSE, RESPONSE, Offset, known_lag, unwrapped_heading
+from ddagr_gym.recordings.checks.clock_offsets import (
+    ENCODER,
+    POSE,
+    RESPONSE,
+    Offset,
+    encoder_lag,
+    known_lag,
+    unwrapped_heading,
+)
 from ddagr_gym.recordings.checks.signals import filled, integral, wrap
 from ddagr_gym.recordings.checks.timing import LONGEST_HOLE
 from ddagr_gym.recordings.schema import FloatArray, Recording, cut_at_gaps
@@ -67,7 +75,7 @@ def motion_windows(recording: Recording, offsets: Mapping[str, Offset | None]) -
     instants, block = _in_blocks(recording, _instants(recording, pieces))
     if geometry is None or not len(instants):
         return None
-    late = {pair: known_lag(found) for pair, found in offsets.items()}
+    late = {pair: (encoder_lag if pair == ENCODER else known_lag)(found) for pair, found in offsets.items()}
     sample = _Sampler(recording, pieces, instants)
     rolled = {s: geometry.wheel_radius * r for s, r in _rolled(recording, sample, late).items()}
     heading = sample.values(unwrapped_heading(recording), late[POSE])
@@ -75,7 +83,7 @@ def motion_windows(recording: Recording, offsets: Mapping[str, Offset | None]) -
     angles = {GYRO: sample.integral(recording["yaw_rate"], 0.0), HEADING: heading}
     angles |= {source: (r[..., 0] - r[..., 1]) / (2 * geometry.half_track) for source, r in rolled.items()}
     paths = {source: r.mean(axis=-1) for source, r in rolled.items()}
-    force = [_second(sample.integral(_integrated(recording, f"specific_force_{axis}"), 0.0)) for axis in "xyz"]
+    force = [_second(sample.double_integral(recording[f"specific_force_{axis}"])) for axis in "xyz"]
     return MotionWindows(
         block=block,
         turn={source: _first(angle) for source, angle in angles.items()} | {COURSE: _course(position)},
@@ -90,7 +98,7 @@ def motion_windows(recording: Recording, offsets: Mapping[str, Offset | None]) -
 
 def _rolled(recording: Recording, sample: _Sampler, late: Mapping[str, float]) -> dict[str, FloatArray]:
     """Angles that right and left wheels have rolled, as encoders and as commands say, (n, 3, 2) [rad]."""
-    encoder = late[ENCODER] if abs(late[ENCODER]) < 0.5 else 0.0
+    encoder = late[ENCODER]
     speeds = [filled(recording, f"encoder_{bank}") for bank in ("right", "left")]
     both = ((ENCODERS, speeds, encoder), (COMMANDS, recording.held_commands(), encoder - late[RESPONSE]))
     return {source: np.stack([sample.integral(v, shift) for v in pair], axis=-1) for source, pair, shift in both}
@@ -147,6 +155,11 @@ class _Sampler:
         holes = self.values(missing, late)
         return np.where((holes[:, 2] - holes[:, 0] == 0)[:, None], total, np.nan)
 
+    def double_integral(self, values: FloatArray) -> FloatArray:
+        """Integral of a channel's integral, whose second difference is a mean of the channel; NaN as above, (n, 3)."""
+        total = self.values(integral(self.recording, integral(self.recording, values)), 0.0)
+        return np.where(np.isfinite(self.integral(values, 0.0)), total, np.nan)
+
 
 def filled_between(recording: Recording, values: FloatArray) -> FloatArray:
     """Values with one missing sample at a time interpolated; longer holes stay NaN."""
@@ -154,11 +167,6 @@ def filled_between(recording: Recording, values: FloatArray) -> FloatArray:
     inner = np.flatnonzero(~np.isfinite(out[1:-1]) & np.isfinite(out[:-2]) & np.isfinite(out[2:])) + 1
     out[inner] = 0.5 * (out[inner - 1] + out[inner + 1])
     return out
-
-
-def _integrated(recording: Recording, name: str) -> FloatArray:
-    """Integral of a force channel, so that a second difference of its integral is a mean of the force."""
-    return integral(recording, recording[name]) if recording.has(name) else recording[name]
 
 
 def _first(values: FloatArray) -> FloatArray:

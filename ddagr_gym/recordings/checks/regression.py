@@ -109,8 +109,8 @@ def inside(recording: Recording, span: slice, at: FloatArray) -> BoolArray:
 
 
 def sampled(recording: Recording, span: slice, values: FloatArray, at: FloatArray) -> FloatArray:
-    """A channel of one span, interpolated at times inside it; NaN where it holds fewer than two samples."""
+    """A channel of one span, interpolated at times between its samples; NaN elsewhere, and with fewer than two."""
     known = np.isfinite(values[span])
     if np.count_nonzero(known) < 2:
         return np.full(at.shape, np.nan)
-    return np.interp(at, recording.t[span][known], values[span][known])
+    return np.interp(at, recording.t[span][known], values[span][known], left=np.nan, right=np.nan)

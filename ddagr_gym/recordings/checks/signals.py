@@ -10,14 +10,19 @@ STILL_SPEED = 0.02
 """Bank speed below which a wheel counts as at rest [rad/s] (6 mm/s at the rim of a 0.3 m wheel)."""
 
 
+LONGEST_AGE = 1.0
+"""Time after the last reading of a span from which a channel is no longer known [s] (ours): its sensor has stopped."""
+
+
 def filled(recording: Recording, name: str) -> FloatArray:
-    """Channel with the last reading carried forward inside each span, NaN before the first."""
+    """Channel with the last reading carried forward inside each span, NaN before the first and after it has ended."""
     values = recording[name]
     out = np.full(len(recording), np.nan)
     for span in recording.spans():
         rows = np.arange(span.start, span.stop)
         last = np.maximum.accumulate(np.where(np.isfinite(values[span]), rows, -1))
-        out[span] = np.where(last >= 0, values[last], np.nan)
+        ended = recording.t[span] > recording.t[last[-1]] + LONGEST_AGE
+        out[span] = np.where((last >= 0) & ~ended, values[last], np.nan)
     return out
 
 
@@ -27,18 +32,20 @@ def new_rows(recording: Recording, *names: str) -> BoolArray:
 
 
 def integral(recording: Recording, values: FloatArray) -> FloatArray:
-    """Trapezoidal integral over time from the start of each span; missing values count as interpolated."""
+    """Trapezoidal integral over time from the first value of each span to its last; between them missing ones count as
+    interpolated."""
     out = np.full(len(recording), np.nan)
     for span in recording.spans():
         t, known = recording.t[span], np.isfinite(values[span])
         if np.count_nonzero(known) >= 2:
             v = np.interp(t, t[known], values[span][known])
-            out[span] = np.concatenate([[0.0], np.cumsum(0.5 * (v[1:] + v[:-1]) * np.diff(t))])
+            total = np.concatenate([[0.0], np.cumsum(0.5 * (v[1:] + v[:-1]) * np.diff(t))])
+            out[span] = np.where(_between_known(known), total, np.nan)
     return out
 
 
 def smoothed(recording: Recording, values: FloatArray, width: float) -> FloatArray:
-    """Running mean over ``width`` seconds inside each span; NaN near the ends and where a span lacks samples."""
+    """Running mean over ``width`` seconds inside each span; NaN near the first and last value, and with few of them."""
     half = max(1, round(0.5 * width / recording.period))
     out = np.full(len(recording), np.nan)
     for span in recording.spans():
@@ -47,8 +54,14 @@ def smoothed(recording: Recording, values: FloatArray, width: float) -> FloatArr
             t = recording.t[span]
             total = np.concatenate([[0.0], np.cumsum(np.interp(t, t[known], values[span][known]))])
             mean = (total[2 * half + 1 :] - total[: -2 * half - 1]) / (2 * half + 1)
-            out[span.start + half : span.stop - half] = mean
+            told = _between_known(known)
+            out[span.start + half : span.stop - half] = np.where(told[2 * half :] & told[: -2 * half], mean, np.nan)
     return out
+
+
+def _between_known(known: BoolArray) -> BoolArray:
+    """Rows from the first known one to the last."""
+    return np.asarray(np.logical_or.accumulate(known) & np.logical_or.accumulate(known[::-1])[::-1])
 
 
 def slope(recording: Recording, values: FloatArray) -> FloatArray:

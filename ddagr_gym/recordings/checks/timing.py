@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
-
 import numpy as np
 
 from ddagr_gym.recordings.channels import CHANNELS, COMMANDS, VOLTAGES
@@ -92,15 +90,14 @@ def waits(recording: Recording, name: str, driving: BoolArray) -> FloatArray:
         name: channel.
         driving: (n,) rows in which the robot moves; a wait counts when most of its rows do.
     """
-    found: list[float] = []
+    found = [np.empty(0)]
+    moved = np.concatenate([[0], np.cumsum(driving)])
     for span in recording.spans():
         rows = span.start + np.flatnonzero(np.isfinite(recording[name][span]))
         rows = np.unique(np.concatenate([[span.start], rows, [span.stop - 1]]))
-        moved = np.concatenate([[0], np.cumsum(driving)])
-        for a, b in itertools.pairwise(rows.tolist()):
-            if 2 * (moved[b] - moved[a]) > b - a:
-                found.append(float(recording.t[b] - recording.t[a]))
-    return np.array(found)
+        counts = 2 * np.diff(moved[rows]) > np.diff(rows)
+        found.append(np.diff(recording.t[rows])[counts])
+    return np.concatenate(found)
 
 
 def _hold_findings(recording: Recording, name: str, driving: BoolArray) -> list[CheckFinding]:

@@ -6,7 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from ddagr_gym.recordings.checks.clock_offsets import encoder_offset, pose_offset, unwrapped_heading
+from ddagr_gym.recordings.checks.clock_offsets import (
+    encoder_lag,
+    encoder_offset,
+    known_lag,
+    pose_offset,
+    unwrapped_heading,
+)
 from ddagr_gym.recordings.checks.findings import CheckFinding, Question, Status, not_testable
 from ddagr_gym.recordings.checks.regression import (
     MOST_INFLATION,
@@ -45,6 +51,9 @@ recordings."""
 LEAST_TURN = 0.05
 """Root mean square yaw rate below which turns tell nothing [rad/s]."""
 
+APART = 1.0
+"""Time between two headings by which a rate is told beside their noise [s] (ours)."""
+
 BANKS = "encoder_right to encoder_left"
 """Channel of the findings on the share of each bank in the yaw rate."""
 _DRIVE = "Drive turns to both sides at several speeds."
@@ -75,7 +84,7 @@ def gyro_against_pose(recording: Recording, rng: np.random.Generator) -> Estimat
     sums = []
     for span, block in blocks_in_spans(recording):
         rows = block.start + np.flatnonzero(np.isfinite(heading[block]))
-        at = recording.t[rows] - offset.lag
+        at = recording.t[rows] - known_lag(offset)
         rows, at = rows[inside(recording, span, at)], at[inside(recording, span, at)]
         gyro = sampled(recording, span, turned, at)
         if rows.size >= 5 and np.all(np.isfinite(gyro)):
@@ -103,8 +112,7 @@ def effective_track(recording: Recording, rng: np.random.Generator) -> Estimate 
     if geometry is None or not recording.has("encoder_right", "encoder_left", "yaw_rate"):
         return None
     offset = encoder_offset(recording, rng)
-    lag = offset.lag if offset is not None and abs(offset.lag) < 0.5 else 0.0
-    sums = _track_sums(recording, lag)
+    sums = _track_sums(recording, encoder_lag(offset))
     ratio = geometry.wheel_radius / geometry.half_track
 
     def of_banks(totals: FloatArray) -> FloatArray:
@@ -161,9 +169,36 @@ def track_in_turns(recording: Recording, rng: np.random.Generator) -> Estimate |
 
 
 def turns(recording: Recording) -> bool:
-    """Whether a drive turns enough to tell a scale by."""
-    rate = recording["yaw_rate"][np.isfinite(recording["yaw_rate"])]
-    return bool(rate.size) and float(np.sqrt(np.mean(rate**2))) >= LEAST_TURN
+    """Whether a drive turns enough to tell a scale by: as the gyro says, or poses and wheels together, against it."""
+    if not recording.has("yaw_rate"):
+        return False
+    return _turns(recording["yaw_rate"]) or (_turns(_pose_rate(recording)) and _turns(_wheel_rate(recording)))
+
+
+def _turns(rate: FloatArray) -> bool:
+    known = rate[np.isfinite(rate)]
+    return bool(known.size) and float(np.sqrt(np.mean(known**2))) >= LEAST_TURN
+
+
+def _pose_rate(recording: Recording) -> FloatArray:
+    """Yaw rate by headings :data:`APART` apart [rad/s]; a turn by more than half a round between two poses is lost."""
+    rates = [np.empty(0)]
+    for span in recording.spans():
+        rows = span.start + np.flatnonzero(np.isfinite(recording["pose_yaw"][span]))
+        t, heading = recording.t[rows], np.unwrap(recording["pose_yaw"][rows])
+        if rows.size >= 2:
+            later = np.arange(t[0] + APART, t[-1], APART)
+            rates.append(np.diff(np.interp(later, t, heading)) / APART)
+    return np.concatenate(rates)
+
+
+def _wheel_rate(recording: Recording) -> FloatArray:
+    """Yaw rate of wheels that roll without slip [rad/s]; nothing without the robot's geometry."""
+    geometry = recording.meta.geometry
+    if geometry is None:
+        return np.empty(0)
+    difference = filled(recording, "encoder_right") - filled(recording, "encoder_left")
+    return np.asarray(geometry.wheel_radius * difference / (2.0 * geometry.half_track))
 
 
 def against_poses(recording: Recording, rng: np.random.Generator) -> list[CheckFinding]:

@@ -109,6 +109,14 @@ def supported(found: Votes, resampled: Mapping[Pair, FloatArray], blocks: int) -
     return replace(found, support=support, support_interval=interval)
 
 
+def with_other_majority(found: Votes) -> Votes:
+    """Votes whose camps have changed places: what supported one speaks against the other."""
+    support = {source: -value for source, value in found.support.items()}
+    return replace(
+        found, support=support, support_interval={s: (-high, -low) for s, (low, high) in found.support_interval.items()}
+    )
+
+
 def _moments(x: FloatArray, y: FloatArray, block: FloatArray) -> FloatArray:
     """Sums of x x, x y, y y over each block (blocks, 3)."""
     known = np.isfinite(x) & np.isfinite(y)
@@ -125,7 +133,7 @@ def _correlations(totals: FloatArray) -> FloatArray:
 
 
 def _camps(signs: Mapping[Pair, float]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Split of the sources that are connected with the first of them, the larger camp first."""
+    """Split of the largest set of sources that are connected with each other, the larger camp first."""
     sources = _connected([pair for pair, value in signs.items() if value])
     if not sources:
         return (), ()

@@ -131,5 +131,16 @@ def test_a_sensor_that_keeps_the_period_of_its_map_is_known_to_be_slow(stated: f
     assert bool(readings_left_out([by_map])) is named
 
 
+def test_spans_with_a_single_reading_each_have_no_rate() -> None:
+    whole = drive({})
+    rows = np.arange(COUNT)
+    pose = np.where((rows == 50) | (rows == COUNT - 50), 1.0, np.nan)
+    halves = ((0, COUNT // 2), (COUNT // 2, COUNT))
+    seldom = Recording.from_columns(
+        {"t": whole.t, **whole.channels, **dict.fromkeys(("pose_x", "pose_y", "pose_yaw"), pose)}, spans=halves
+    ).with_meta(held=dict.fromkeys(("pose_x", "pose_y", "pose_yaw"), 0.0))
+    assert readings_left_out([seldom]) == ()
+
+
 def test_a_map_that_leaves_out_hardly_anything_holds_nothing() -> None:
     assert readings_left_out([drive({}).with_meta(held={"encoder_right": 0.0, "encoder_left": 0.0})]) == ()

@@ -48,6 +48,11 @@ def test_stages_draw_alike_whatever_was_done_before(session: DiagnosisSession) -
     assert replace(session, seed=6).rng("verdict").random() != first
 
 
+def held(recording: Recording) -> Recording:
+    """The same values by a map that says how long readings are repeated."""
+    return recording.with_meta(held={"yaw_rate": 0.2})
+
+
 def test_the_key_knows_data_and_choices_but_not_threads(session: DiagnosisSession) -> None:
     key = session.key()
     assert replace(session, setting=replace(session.setting, threads=4)).key() == key
@@ -56,6 +61,7 @@ def test_the_key_knows_data_and_choices_but_not_threads(session: DiagnosisSessio
         replace(session, bank=replace(BANK, level=0.1)),
         replace(session, setting=session.setting.with_windows(2.0)),
         replace(session, mended=replace(session.mended, given=session.mended.given * 2)),
+        replace(session, mended=replace(session.mended, given=tuple(held(one) for one in session.mended.given))),
         replace(session, robot=replace(session.robot, mass=session.robot.mass + 1.0)),
     ]
     assert len({key, *(other.key() for other in others)}) == 1 + len(others)

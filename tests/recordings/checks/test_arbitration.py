@@ -43,6 +43,14 @@ def without(recording, *names):
     return replace(recording, channels={k: v for k, v in recording.channels.items() if k not in names})
 
 
+def stopped(recording, share, *names):
+    """Channels without a reading from a share of the drive on."""
+    late = np.arange(len(recording)) > share * len(recording)
+    return replace(
+        recording, channels={**recording.channels, **{n: np.where(late, np.nan, recording[n]) for n in names}}
+    )
+
+
 POSE = ("pose_x", "pose_y", "pose_yaw")
 
 
@@ -166,11 +174,19 @@ def test_the_remedy_of_a_turned_imu_mends_it(make_drive):
 
 def test_without_a_pose_gravity_tells_an_imu_upside_down_from_exchanged_sides(make_drive):
     down = without(mounted(make_drive(), (1, 0, 0), (0, -1, 0), (0, 0, -1)), *POSE)
-    assert "upside down" in suspicious(down)["imu_mounting", "specific_force and yaw_rate"].meaning
+    found = suspicious(down)
+    assert "upside down" in found["imu_mounting", "specific_force and yaw_rate"].meaning
+    assert {channel for check, channel in found if check == "arbitration"} == {"yaw_rate, turning"}
     both = without(exchanged(exchanged(make_drive(), "encoder"), "command"), *POSE)
     found = suspicious(both)
     assert "as gravity confirms" in found["arbitration", "encoders, turning"].meaning
     assert ("imu_mounting", "specific_force and yaw_rate") not in found
+
+
+@pytest.mark.parametrize("share", [0.4, 0.7])
+def test_a_turned_imu_is_named_where_its_accelerometer_stops(make_drive, share):
+    turned = stopped(mounted(make_drive(), (0, 1, 0), (-1, 0, 0), (0, 0, 1)), share, *IMU)
+    assert ("imu_mounting", "specific_force and yaw_rate") in suspicious(turned)
 
 
 def test_two_sources_that_disagree_decide_nothing(make_drive):

@@ -32,6 +32,22 @@ def test_sound_drives_that_were_written_down_pass(make_drive, seed):
     assert suspicious(make_drive(seed=seed)) == set()
 
 
+@pytest.mark.parametrize("share", [0.4, 0.7])
+@pytest.mark.parametrize("kind", ["yaw_rate", "encoder", "specific_force", "pose"])
+def test_a_sensor_that_stops_is_not_accused_of_what_it_did_not_say(make_drive, kind, share):
+    """Its last value was taken for the rest of the drive: a gyro then turned too much, wheels rolled too far."""
+    made = make_drive(seconds=300.0)
+    late = np.arange(len(made)) > share * len(made)
+    channels = {n: np.where(late, np.nan, v) if n.startswith(kind) else v for n, v in made.channels.items()}
+    assert {check for check, _ in suspicious(replace(made, channels=channels))} == {"wait"}
+
+
+def test_a_gyro_that_hardly_turns_beside_poses_and_wheels_that_do_is_suspicious(make_drive):
+    """Of rad/s that were taken for degrees."""
+    found = suspicious(scaled("yaw_rate", np.pi / 180.0)(make_drive(seconds=300.0)))
+    assert ("sign_and_scale", "yaw_rate to pose_yaw") in found
+
+
 @pytest.mark.parametrize("soil", ["thesis_a1", "firm_ground"])
 @pytest.mark.parametrize("seed", [0, 1])
 def test_sound_simulated_drives_pass(soil, seed):
