@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
+import tyro
 from tyro.conf import Positional
 
+from ddagr_gym.commands.output import check_output_folder
 from ddagr_gym.progress import LinePrinter
 
 EXAMPLES = (
@@ -22,7 +25,7 @@ class Arguments:
 
     Every question is answered with pass, suspicious or not testable, and what to do. Values carry 99 % intervals; one
     is suspicious only when its whole interval lies outside its sound range. The exit code is 1 when anything is
-    suspicious.
+    suspicious or in doubt, such as a channel that is not there.
 
     Attributes:
         runs: recordings: Parquet of `ddagr import`, or any source that it takes. Several runs of one robot are also
@@ -32,7 +35,7 @@ class Arguments:
         output: folder for one figure and one JSON report for each run.
         overwrite: replace an output folder that an earlier check wrote.
         all: list the questions that passed, too.
-        seed: of the resampled intervals.
+        seed: of the random resampling behind the intervals.
         maximum_rows: refuse a recording with more rows or messages.
         maximum_bytes: refuse a recording that unpacks to more bytes.
     """
@@ -40,7 +43,7 @@ class Arguments:
     runs: Positional[tuple[Path, ...]]
     map: str = ""
     robot: str = ""
-    output: Path | None = None
+    output: Annotated[Path | None, tyro.conf.arg(aliases=("-o",))] = None
     overwrite: bool = False
     all: bool = False
     seed: int = 0
@@ -54,6 +57,8 @@ def run(arguments: Arguments) -> int:
     from ddagr_gym.api.inputs import recordings_from
     from ddagr_gym.recordings.files import Limits
 
+    if arguments.output is not None:
+        check_output_folder(arguments.output, overwrite=arguments.overwrite)
     limits = Limits(arguments.maximum_rows, arguments.maximum_bytes)
     recordings = recordings_from(arguments.runs, arguments.robot or None, arguments.map or None, limits)
     result = ddagr_gym.check(recordings, seed=arguments.seed)

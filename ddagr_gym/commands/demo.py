@@ -8,7 +8,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
+
+import tyro
 
 from ddagr_gym.commands.output import Section, output_folder, write_text
 from ddagr_gym.errors import at_least
@@ -54,7 +56,7 @@ class Arguments:
         soil: from which the replay's refit starts.
     """
 
-    output: Path = Path("ddagr_demo")
+    output: Annotated[Path, tyro.conf.arg(aliases=("-o",))] = Path("ddagr_demo")
     radius: float = 0.80
     side: str = "left"
     seed: int = 1

@@ -55,7 +55,7 @@ def _overview(kinds: list[type[Effect]]) -> str:
         main = kind.size_names()[0]
         item = kind.parameter(main).metadata
         bounds = (item["neutral"], item["low"], item["high"], _matters_from(item))
-        rows.append((kind.group, kind.name, f"{main} [{item['unit']}]", *bounds, kind.title))
+        rows.append((kind.group, kind.name, f"{main} [{item['unit']}]", *bounds, kind.description().split("\n")[0]))
     header = ("acts on", "effect", "size", "none at", "from", "to", "matters from", "what it is")
     return f"{format_table(header, rows)}\n\nEquation, signature and rivals of one: ddagr effects NAME"
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
+import tyro
 from tyro.conf import Positional
 
 from ddagr_gym.progress import LinePrinter
@@ -49,7 +50,7 @@ class Arguments:
     filter: Literal["ours", "thesis"] = "ours"
     law: Literal["coupled", "thesis"] = "coupled"
     attitude: bool = False
-    output: Path = Path("ddagr_estimate")
+    output: Annotated[Path, tyro.conf.arg(aliases=("-o",))] = Path("ddagr_estimate")
     overwrite: bool = False
     seed: int = 0
 

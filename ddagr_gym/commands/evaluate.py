@@ -6,7 +6,9 @@ import fnmatch
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+import tyro
 
 from ddagr_gym.commands.output import format_table, make_folder, write_json
 from ddagr_gym.errors import InputError, unknown_name
@@ -47,7 +49,7 @@ class Arguments:
 
     controllers: str = "B0,B1,B2,B3,B4,ppo_ekf"
     scenarios: str = "S0"
-    output: Path = Path("ddagr_evaluation")
+    output: Annotated[Path, tyro.conf.arg(aliases=("-o",))] = Path("ddagr_evaluation")
     workers: int = 2
     cluster: str = ""
     episodes: int | None = None

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
+
+import tyro
 
 from ddagr_gym.commands.output import check_output_folder
 from ddagr_gym.progress import LinePrinter
@@ -35,7 +38,7 @@ class Arguments:
         overwrite: replace an output folder that an earlier command wrote.
     """
 
-    output: Path | None = None
+    output: Annotated[Path | None, tyro.conf.arg(aliases=("-o",))] = None
     manoeuvres: tuple[str, ...] = ("stops", "arcs", "spin", "s_weave")
     sensors: tuple[str, ...] = ("imu", "encoders", "pose")
     robot: str = "ddagr"

@@ -37,7 +37,7 @@ class Arguments:
 
     diagnosis: Positional[Path | None] = None
     rival: Annotated[tuple[str, ...], tyro.conf.UseAppendAction] = ()
-    output: Path | None = None
+    output: Annotated[Path | None, tyro.conf.arg(aliases=("-o",))] = None
     robot: str | None = None
     soil: str | None = None
     sensors: tuple[str, ...] = ()

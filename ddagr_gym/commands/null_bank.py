@@ -7,8 +7,9 @@ import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
+import tyro
 from tyro.conf import Positional
 
 from ddagr_gym.errors import InputError, at_least
@@ -59,7 +60,7 @@ class Arguments:
         cluster: a Ray cluster to work on: "local" starts one here, an address (ray://HOST:PORT) takes one that runs.
     """
 
-    output: Path
+    output: Annotated[Path, tyro.conf.arg(aliases=("-o",))]
     runs: Positional[tuple[Path, ...]] = ()
     robot: str = "ddagr"
     soil: str = "thesis_a1"

@@ -42,7 +42,7 @@ class Arguments:
     soil: str = "thesis_a1"
     robot: str = "ddagr"
     effect: Annotated[tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(aliases=("--effects",))] = ()
-    output: Path | None = None
+    output: Annotated[Path | None, tyro.conf.arg(aliases=("-o",))] = None
     figure: Path | None = None
     video: Path | None = None
     rate: float = 125.0

@@ -6,7 +6,7 @@ import importlib
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import tyro
 
@@ -49,7 +49,7 @@ class Arguments:
     what: tyro.conf.Positional[Literal["ppo", "sac", "all"] | None] = None
     config: str = "ppo_ekf"
     seed: int = 0
-    output: Path = Path("ddagr_training")
+    output: Annotated[Path, tyro.conf.arg(aliases=("-o",))] = Path("ddagr_training")
     set: tuple[str, ...] = ()
     publish: bool = False
     sweep: Path | None = None

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
+
+import tyro
 
 from ddagr_gym import __version__
 from ddagr_gym.commands.output import format_table, output_folder, write_json
@@ -33,7 +35,7 @@ class Arguments:
     """
 
     data: Path
-    output: Path
+    output: Annotated[Path, tyro.conf.arg(aliases=("-o",))]
     overwrite: bool = False
 
 

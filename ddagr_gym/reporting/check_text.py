@@ -28,6 +28,8 @@ def findings_text(findings: Sequence[CheckFinding], everything: bool = False) ->
     rows = [finding_row(f) for f in shown]
     lines = [format_table(FINDING_HEADER, rows)] if rows else []
     lines += [f"  -> {f.check}, {f.channel}: {f.remedy}" for f in shown if f.status == "suspicious"]
+    lacking = dict.fromkeys(f.remedy for f in shown if f.status == "not_testable" and f.remedy)
+    lines += [f"  to test more: {remedy}" for remedy in lacking]
     count = {kind: sum(f.status == kind for f in findings) for kind in ("pass", "suspicious", "not_testable")}
     lines.append(f"{count['pass']} pass, {count['suspicious']} suspicious, {count['not_testable']} not testable")
     return "\n".join(lines)

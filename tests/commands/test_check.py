@@ -91,12 +91,14 @@ def test_the_table_counts_what_it_does_not_show():
         judge("a", "x", 1.0, (0.9, 1.1), (0, 2), "s", meaning="fine", remedy="none"),
         judge("b", "y", 5.0, (4.0, 6.0), (0, 2), "s", meaning="far out", remedy="mend it"),
         not_testable("c", "z", "too short", "drive on"),
+        not_testable("d", "z", "too short", "drive on"),
     ]
     text = findings_text(findings)
     assert "fine" not in text
     assert "5 (4 to 6) s" in text
     assert "  -> b, y: mend it" in text
-    assert text.endswith("1 pass, 1 suspicious, 1 not testable")
+    assert text.count("  to test more: drive on") == 1
+    assert text.endswith("1 pass, 1 suspicious, 2 not testable")
     assert "fine" in findings_text(findings, everything=True)
 
 

@@ -22,7 +22,7 @@ def test_table_holds_every_effect_under_its_group_in_order(capsys):
         (line,) = (line for line in lines if f"  {name} " in line)
         main = kind.size_names()[0]
         assert f"{main} [{kind.parameter(main).metadata['unit']}]" in line
-        assert line.endswith(kind.title)
+        assert line.endswith(kind.description().split("\n")[0])
 
 
 def test_table_says_where_a_size_begins_to_matter(capsys):
