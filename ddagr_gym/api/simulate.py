@@ -187,7 +187,7 @@ def _commands(manoeuvre: Any, rate: float) -> tuple[Any, str]:
 def _sensors(rate: float, pose_rate: float, noise: bool) -> Sensors:
     for name, value in (("rate", rate), ("pose_rate", pose_rate)):
         if not value >= 0.0:
-            raise InputError(f"{name} is {value:g} Hz: a sensor gives no fewer samples than none.")
+            raise InputError(f"{name} is {value:g} Hz: give 0 or more.")
     if pose_rate > rate:
         raise InputError(f"pose_rate is {pose_rate:g} Hz: give at most the {rate:g} Hz of the other sensors.")
     imu, encoder, pose = Imu(sample_rate=rate), WheelEncoder(), PoseReceiver(rate=pose_rate)

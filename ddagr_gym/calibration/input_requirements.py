@@ -12,15 +12,15 @@ import numpy as np
 from ddagr_gym.diagnosis.answer.amounts import amounts
 from ddagr_gym.diagnosis.change.requirements import NEEDED
 from ddagr_gym.diagnosis.preprocessing.channel_faults import find_channel_faults
-from ddagr_gym.diagnosis.preprocessing.input_requirements import check_different
+from ddagr_gym.diagnosis.preprocessing.input_requirements import LEAST_SPEED, check_different
 from ddagr_gym.diagnosis.preprocessing.reversed_gyro import with_gyro_reversed
 from ddagr_gym.diagnosis.wording import describe
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.windows import PERIOD_TOLERANCE
 from ddagr_gym.parameters import Robot
 from ddagr_gym.presets import robot_option
-from ddagr_gym.recordings.checks.travel import rolled_and_travelled, share_with_least_slip, travelled_shares
-from ddagr_gym.recordings.checks.turning import effective_track, gyro_against_pose, track_in_turns
+from ddagr_gym.recordings.checks.travel import TRAVEL, rolled_and_travelled, share_with_least_slip, travelled_shares
+from ddagr_gym.recordings.checks.turning import TRACK, effective_track, gyro_against_pose, track_in_turns
 from ddagr_gym.recordings.drive_requirements import check_rows
 from ddagr_gym.recordings.schema import Recording
 
@@ -30,20 +30,17 @@ SHORTEST_DRIVE = 60.0
 LEAST_MOVING = 0.1
 """Share of that time in which the robot must be commanded to move (ours)."""
 
-LEAST_SPEED = 0.02
-"""Bank speed that counts as moving [rad/s] (ours: 5 mm/s at the rim of the thesis's robot)."""
-
 LEAST_TRAVEL = 0.85
 """Least travelled over rolled distance where an ordinary drive slips least [-] (ours): 1.01 to 1.12 in six real ones,
 whose mean is 0.83 to 0.93."""
 
-PUSHED = 0.05
+PUSHED = TRAVEL.expected[1] - 1.0
 """Mean travelled beyond rolled distance that readings explain [-]: that of ``ddagr check``."""
 
 LIKELY_DEVIATIONS = 3.0
 """Deviations of the data sheet by which a radius or a track may be off."""
 
-WIDEST_TRACK = 6.0
+WIDEST_TRACK = TRACK.expected[1]
 """Largest effective over geometric track [-]: that of ``ddagr check``."""
 
 TWO_ROBOTS = 1.35

@@ -39,10 +39,6 @@ ITERATIONS = 6
 OFFSET_CHANNELS = ("yaw_rate", "specific_force_x", "specific_force_y")
 """Whose biases belong to a drive."""
 
-SHORTEST_SHARE = 0.5
-"""Of the calibration's windows, to which those of short segments may be cut (ours): other effects show in shorter
-ones."""
-
 
 def change_windows(recordings: Sequence[Recording], robot: Robot, weighing: Weighing) -> WindowSet:
     """Windows of drives, poses and gyro as ordinary drives have them.

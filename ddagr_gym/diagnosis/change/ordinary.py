@@ -82,11 +82,6 @@ class Comparison:
     misfit_errors: tuple[Mapping[str, float], ...] = ()
 
     @property
-    def degrees(self) -> float:
-        """Of freedom of the scatter between drives."""
-        return self.expected.degrees + len(self.drives) - 1.0
-
-    @property
     def move_degrees(self) -> float:
         """Of freedom of the parameters' moves."""
         known = self.expected.degrees if self.expected.moves else EXPECTED_DRIVES

@@ -114,7 +114,7 @@ def _scales_and_gains(recording: Recording, rng: np.random.Generator) -> tuple[A
     if recording.meta.geometry is None or gains is None:
         return None
     ratio = left_over_right(recording, rng) or 1.0
-    alike = with_readings_over(recording, {"encoder_left": ratio})
+    alike = recording if ratio == 1.0 else with_readings_over(recording, {"encoder_left": ratio})
     share = drive_share_with_least_slip(alike, rng)
     if share is None or share <= 0.0:
         return None

@@ -213,7 +213,7 @@ def dead_in_words(channels: Sequence[str]) -> str:
     Args:
         channels: at least one, by name.
     """
-    names = " and ".join(", ".join(name.replace("_", " ") for name in channels).rsplit(", ", 1))
+    names = _joined_names([name.replace("_", " ") for name in channels])
     verb, pronoun = ("never change", "they say") if len(channels) > 1 else ("never changes", "it says")
     return f"{names} {verb} while the robot drives, so that {pronoun} nothing"
 
