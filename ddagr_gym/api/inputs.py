@@ -128,10 +128,19 @@ def _recording(
 
     label, geometry_of = _robot(robot)
     if isinstance(item, str | os.PathLike):
-        return load_recording(Path(item), None if column_map is None else str(column_map), label, limits, geometry_of)
+        path, given = Path(item), None if column_map is None else str(column_map)
+        return _named_as(load_recording(path, given, label, limits, geometry_of), path)
     if not isinstance(item, Recording):
         item = item.recording if _is_simulated(item) else _from_table(item, name)
     return item if label is None else with_robot(item, label, geometry_of)
+
+
+def _named_as(recording: Recording, path: Path) -> Recording:
+    """Recording by the name of its file: many are imported from logs of one name."""
+    meta = recording.meta
+    if path.name == meta.source:
+        return recording
+    return recording.with_meta(source=path.name, notes=(*meta.notes, f"imported from {meta.source}."))
 
 
 def _is_simulated(item: Any) -> bool:

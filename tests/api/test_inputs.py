@@ -117,7 +117,12 @@ def test_files_folders_and_recordings_may_stand_side_by_side(drive, tmp_path):
     (folder / "notes.txt").write_text("windy")
     drive.save(tmp_path / "c.parquet")
     found = recordings_from([str(folder), tmp_path / "c.parquet", drive.recording, drive])
-    assert [recording.meta.source for recording in found] == ["a.sim", "b.sim", "c.parquet", *["simulation"] * 2]
+    assert [recording.meta.source for recording in found] == [
+        "a.parquet",
+        "b.parquet",
+        "c.parquet",
+        *["simulation"] * 2,
+    ]
     assert len({len(recording) for recording in found}) == 1
 
 

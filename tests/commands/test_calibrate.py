@@ -97,7 +97,7 @@ def test_grounds_of_drives_of_one_file_name(drives, tmp_path, monkeypatch, capsy
     grounds = ["--ground", "sand=tuesday/run.parquet", "--ground", f"yard={paths[0]}"]
     words = ["calibrate", *map(str, paths), "--robot", "ddagr", *grounds, "-o", str(tmp_path / "calibration")]
     assert main(words) == 2
-    assert "['monday', 'tuesday'] on ('yard', 'sand')" in capsys.readouterr().err
+    assert "['monday/run.parquet', 'tuesday/run.parquet'] on ('yard', 'sand')" in capsys.readouterr().err
 
 
 def test_limits_of_the_command_are_kept(drives, tmp_path, capsys):

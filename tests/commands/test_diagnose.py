@@ -154,7 +154,7 @@ def test_the_slope_is_named_and_certified(found: Path) -> None:
     share = fit.gain_share["5"]
     assert share is not None
     assert share.value > 0.7
-    assert [source.source for source in diagnosis.data] == ["run_1", "run_2"]
+    assert [source.source for source in diagnosis.data] == ["run_1.parquet", "run_2.parquet"]
     assert diagnosis.findings[0].where is not None
     assert diagnosis.next_drive is not None
     assert diagnosis.next_drive.why

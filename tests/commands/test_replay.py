@@ -80,8 +80,8 @@ def test_the_page_is_sound_and_names_only_files_that_are_there(replayed):
     assert page.open == []
     assert len(page.files) > 8
     assert all((replayed / name).is_file() for name in page.files)
-    assert "one.sim" in text
-    assert "two.sim" in text
+    assert "one.parquet" in text
+    assert "two.parquet" in text
     assert "times as fast as the robot" in text
 
 
@@ -91,7 +91,7 @@ def report_in(folder):
 
 def test_the_report_holds_both_runs_and_the_speed(replayed):
     report = report_in(replayed)
-    assert [run.sources for run in report.runs] == [("one.sim",), ("two.sim",)]
+    assert [run.sources for run in report.runs] == [("one.parquet",), ("two.parquet",)]
     for run in report.runs:
         for mode in run.arms:
             assert mode.speed.times_real_time >= 100.0
@@ -113,7 +113,7 @@ def test_runs_replayed_together_share_their_parameters(runs, tmp_path, capsys):
     assert main(["replay", *paths, "--soil", "thesis_a1", "--together", "--refit", "-o", str(output)]) == 0
     content = json.loads((output / "replay.json").read_text())
     (run,) = content["runs"]
-    assert run["sources"] == ["one.sim", "two.sim"]
+    assert run["sources"] == ["one.parquet", "two.parquet"]
     names = [p["name"] for p in run["arms"][0]["refit"]["parameters"]]
     assert names.count("soil_strength") == 1
     assert {"gyro_bias_1", "gyro_bias_2"} <= set(names)
