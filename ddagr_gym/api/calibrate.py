@@ -270,7 +270,7 @@ def _of_name(drive: str | os.PathLike[str], found: Sequence[Recording]) -> list[
     name, names = Path(drive).name, [recording.meta.source for recording in found]
     numbered = [n for n, known in enumerate(names) if known == str(drive) and without_number(known) != known]
     same = numbered or [n for n, known in enumerate(names) if without_number(known) in (str(drive), name)]
-    # an imported file still says what it was imported from
+    # one may name a drive by the log that it was imported from, whose ending alone differs
     return same or [n for n, known in enumerate(names) if _stem(known) == _stem(name)]
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import itertools
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ddagr_gym.api.drive_names import numbered
 from ddagr_gym.api.inputs import Sources, recordings_from
 from ddagr_gym.api.nominal import RobotLike
 from ddagr_gym.api.results import Report, Table
@@ -97,7 +97,7 @@ class CheckResult(Report):
         from ddagr_gym.reporting.check_figure import save_check_figure
 
         stems = [Path(report.source).name.split(".", 1)[0] or "run" for report in self.reports]
-        names = _unique(["together", *stems])[1:]
+        names = numbered(["together", *stems], "{}_{}")[1:]
         with counting(len(self.reports), "drawing", progress) as steps:
             for name, recording, report in zip(names, self.recordings, self.reports, strict=True):
                 save_check_figure(recording, report, np.random.default_rng(self.seed), folder / f"{name}.png")
@@ -155,15 +155,3 @@ def check(
         )
     reports = tuple(check_recording(recording, np.random.default_rng(seed)) for recording in found)
     return CheckResult(reports, tuple(across_runs(list(found), list(reports))), found, seed)
-
-
-def _unique(names: list[str]) -> list[str]:
-    """Names of which one that is there again has a number that no other name ends in."""
-    taken = set(names)
-    found = []
-    for k, name in enumerate(names):
-        if name in names[:k]:
-            name = next(other for n in itertools.count(2) if (other := f"{name}_{n}") not in taken)
-            taken.add(name)
-        found.append(name)
-    return found

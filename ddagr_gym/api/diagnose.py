@@ -277,10 +277,10 @@ def _check_known_soil(folder: Path, soil_uncertainty: float) -> None:
 
 def _robot_of(folder: Path) -> str:
     """File of a calibration's robot; InputError where the folder is none."""
-    from ddagr_gym.calibration.files import ROBOT, load
+    from ddagr_gym.calibration.files import load, robot_file
 
     load(folder)
-    return str(folder / ROBOT)
+    return robot_file(folder)
 
 
 def _gates(given: ThresholdsLike | None, nominal: Nominal, soil_uncertainty: float) -> Thresholds:

@@ -29,7 +29,7 @@ def names_apart(names: Sequence[str], sources: Sequence[Source]) -> list[str]:
         if place is not None:
             alike.setdefault(place.name, set()).add(place)
     apart = {place: name for found in alike.values() for place, name in _with_folders(found).items()}
-    return _numbered([name if place is None else apart[place] for name, place in zip(names, places, strict=True)])
+    return numbered([name if place is None else apart[place] for name, place in zip(names, places, strict=True)])
 
 
 def without_number(name: str) -> str:
@@ -43,10 +43,17 @@ def _with_folders(paths: Collection[Path]) -> dict[Path, str]:
     return {path: Path(*path.parts[-kept:]).as_posix() for path in paths}
 
 
-def _numbered(names: Sequence[str]) -> list[str]:
-    """Names of which one that is there again has a number."""
-    found: dict[str, None] = {}
+def numbered(names: Sequence[str], form: str = "{} ({})") -> list[str]:
+    """Names of which one that is there again has a number, by which it is like no other.
+
+    Args:
+        names: of anything.
+        form: of a name and its number.
+    """
+    taken, found = set(names), list[str]()
     for name in names:
-        more = (f"{name} ({number})" for number in itertools.count(2))
-        found[next(item for item in itertools.chain([name], more) if item not in found)] = None
-    return list(found)
+        if name in found:
+            name = next(new for n in itertools.count(2) if (new := form.format(name, n)) not in taken)
+            taken.add(name)
+        found.append(name)
+    return found

@@ -41,7 +41,7 @@ from ddagr_gym.calibration.settings import CalibrationSettings
 from ddagr_gym.calibration.simulator_values import calibrated_robot, fitted_soil
 from ddagr_gym.calibration.summary import drive_summaries, parameter_results
 from ddagr_gym.diagnosis.gates.source_digest import code_digest, source_digest
-from ddagr_gym.diagnosis.preprocessing.input_requirements import content_hash
+from ddagr_gym.diagnosis.preprocessing.input_requirements import reading_hash
 from ddagr_gym.diagnosis.store import StepStore
 from ddagr_gym.identification.residual_weights import Weights
 from ddagr_gym.identification.windows import WindowSet
@@ -364,10 +364,7 @@ def _key(
     for path in sorted(path for folder in _SOURCES for path in (package / folder).rglob("*.py")):
         digest.update(code_digest(path.read_text()).encode())
     for recording in recordings:
-        digest.update(content_hash(recording).encode())
-        meta = recording.meta
-        told = (meta.source, meta.segments, meta.spans, sorted(meta.held.items()), meta.column_map)
-        digest.update(repr(told).encode())
+        digest.update(reading_hash(recording).encode())
     texts = [list(grounds), repr(robot), repr(soils), repr(replace(settings, threads=1))]
     digest.update(json.dumps(texts).encode())
     return digest.hexdigest()

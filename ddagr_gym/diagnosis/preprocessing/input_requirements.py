@@ -31,6 +31,13 @@ def content_hash(recording: Recording) -> str:
     return digest.hexdigest()
 
 
+def reading_hash(recording: Recording) -> str:
+    """SHA-256 of the values and of how they were read: an answer depends on both."""
+    meta = recording.meta
+    read = (meta.source, meta.segments, meta.spans, sorted(meta.held.items()), meta.column_map)
+    return hashlib.sha256(f"{content_hash(recording)}{read!r}".encode()).hexdigest()
+
+
 def check_recordings(recordings: Sequence[Recording], robot: Robot, setting: Setting) -> None:
     """Refuse what cannot be diagnosed.
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from ddagr_gym.diagnosis.gates.source_digest import source_digest
 from ddagr_gym.diagnosis.gates.thresholds import Thresholds
-from ddagr_gym.diagnosis.preprocessing.input_requirements import check_recordings, content_hash
+from ddagr_gym.diagnosis.preprocessing.input_requirements import check_recordings, reading_hash
 from ddagr_gym.diagnosis.preprocessing.known_errors import without_known_errors
 from ddagr_gym.diagnosis.preprocessing.mended_recordings import MendedRecordings, mend_recordings
 from ddagr_gym.diagnosis.setting import Setting, make_problem
@@ -97,9 +97,7 @@ class DiagnosisSession:
         """SHA-256 of all that results depend on; the number of threads is not among it."""
         digest = hashlib.sha256(source_digest().encode())
         for recording in self.mended.given:
-            digest.update(content_hash(recording).encode())
-            meta = recording.meta
-            digest.update(repr((meta.source, meta.segments, meta.spans, sorted(meta.held.items()))).encode())
+            digest.update(reading_hash(recording).encode())
         setting = replace(self.setting, threads=1)
         texts = [repr(self.robot), repr(self.soil), repr(setting), asdict(self.bank), self.seed]
         digest.update(json.dumps(texts, sort_keys=True).encode())

@@ -130,7 +130,7 @@ def _stretches(speed: FloatArray, span: slice) -> Iterator[slice]:
     """Stretches of a span in which a speed keeps to that of their begin; it is never the same where it is NaN."""
     start = span.start
     for row in range(span.start, span.stop):
-        if not abs(speed[row] - speed[start]) <= SAME_SPEED * abs(speed[start]):
+        if row > start and not abs(speed[row] - speed[start]) <= SAME_SPEED * abs(speed[start]):
             yield slice(start, row)
             start = row
     yield slice(start, span.stop)
@@ -138,8 +138,8 @@ def _stretches(speed: FloatArray, span: slice) -> Iterator[slice]:
 
 def _settled_pieces(t: FloatArray, hold: slice) -> list[npt.NDArray[np.int64]]:
     """Rows of a hold in which it is settled, cut where they last long, none where that is too short."""
-    rows = np.arange(hold.start, hold.stop)[t[hold] - t[hold.start] >= SETTLED] if hold.stop > hold.start else []
-    lasts = float(t[rows[-1]] - t[rows[0]]) if len(rows) else 0.0
+    rows = hold.start + np.flatnonzero(t[hold] - t[hold.start] >= SETTLED)
+    lasts = float(t[rows[-1]] - t[rows[0]]) if rows.size else 0.0
     return np.array_split(rows, math.ceil(lasts / LONGEST_PIECE)) if lasts >= SHORTEST_HOLD else []
 
 

@@ -150,15 +150,17 @@ class _Sampler:
 
     def integral(self, values: FloatArray, late: float) -> FloatArray:
         """Time integral of a channel; NaN in windows that hold rows in which it is not known, (n, 3)."""
-        total = self.values(integral(self.recording, values), late)
-        missing = np.cumsum(~np.isfinite(filled_between(self.recording, values))).astype(np.float64)
-        holes = self.values(missing, late)
-        return np.where((holes[:, 2] - holes[:, 0] == 0)[:, None], total, np.nan)
+        return self._known(values, integral(self.recording, values), late)
 
     def double_integral(self, values: FloatArray) -> FloatArray:
         """Integral of a channel's integral, whose second difference is a mean of the channel; NaN as above, (n, 3)."""
-        total = self.values(integral(self.recording, integral(self.recording, values)), 0.0)
-        return np.where(np.isfinite(self.integral(values, 0.0)), total, np.nan)
+        return self._known(values, integral(self.recording, integral(self.recording, values)), 0.0)
+
+    def _known(self, values: FloatArray, total: FloatArray, late: float) -> FloatArray:
+        """What was made of a channel, in windows that hold no row in which it is not known, (n, 3)."""
+        missing = np.cumsum(~np.isfinite(filled_between(self.recording, values))).astype(np.float64)
+        holes = self.values(missing, late)
+        return np.where((holes[:, 2] - holes[:, 0] == 0)[:, None], self.values(total, late), np.nan)
 
 
 def filled_between(recording: Recording, values: FloatArray) -> FloatArray:
