@@ -9,6 +9,7 @@ import numpy as np
 
 from ddagr_gym.recordings.checks.blocks import FEWEST_BLOCKS, cut_blocks, interval_of, resample
 from ddagr_gym.recordings.checks.findings import Interval
+from ddagr_gym.recordings.checks.signals import near_known
 from ddagr_gym.recordings.schema import BoolArray, FloatArray, Recording
 
 
@@ -109,8 +110,8 @@ def inside(recording: Recording, span: slice, at: FloatArray) -> BoolArray:
 
 
 def sampled(recording: Recording, span: slice, values: FloatArray, at: FloatArray) -> FloatArray:
-    """A channel of one span, interpolated at times between its samples; NaN elsewhere, and with fewer than two."""
-    known = np.isfinite(values[span])
+    """A channel of one span, interpolated at times inside it; NaN with fewer than two samples, and without a sensor."""
+    t, known = recording.t[span], np.isfinite(values[span])
     if np.count_nonzero(known) < 2:
         return np.full(at.shape, np.nan)
-    return np.interp(at, recording.t[span][known], values[span][known], left=np.nan, right=np.nan)
+    return np.where(near_known(t, known, at), np.interp(at, t[known], values[span][known]), np.nan)

@@ -9,9 +9,9 @@ from ddagr_gym.recordings.schema import BoolArray, FloatArray, Recording
 STILL_SPEED = 0.02
 """Bank speed below which a wheel counts as at rest [rad/s] (6 mm/s at the rim of a 0.3 m wheel)."""
 
-
 LONGEST_AGE = 1.0
-"""Time after the last reading of a span from which a channel is no longer known [s] (ours): its sensor has stopped."""
+"""Time before the first reading of a span and after its last beyond which a channel is not known [s] (ours): a sensor
+that has stopped. Within it a slow sensor's next reading would come."""
 
 
 def filled(recording: Recording, name: str) -> FloatArray:
@@ -21,8 +21,8 @@ def filled(recording: Recording, name: str) -> FloatArray:
     for span in recording.spans():
         rows = np.arange(span.start, span.stop)
         last = np.maximum.accumulate(np.where(np.isfinite(values[span]), rows, -1))
-        ended = recording.t[span] > recording.t[last[-1]] + LONGEST_AGE
-        out[span] = np.where((last >= 0) & ~ended, values[last], np.nan)
+        told = (last >= 0) & near_known(recording.t[span], np.isfinite(values[span]))
+        out[span] = np.where(told, values[last], np.nan)
     return out
 
 
@@ -32,20 +32,20 @@ def new_rows(recording: Recording, *names: str) -> BoolArray:
 
 
 def integral(recording: Recording, values: FloatArray) -> FloatArray:
-    """Trapezoidal integral over time from the first value of each span to its last; between them missing ones count as
-    interpolated."""
+    """Trapezoidal integral over time from the start of each span; missing values count as interpolated, those of a
+    sensor that has stopped are NaN."""
     out = np.full(len(recording), np.nan)
     for span in recording.spans():
         t, known = recording.t[span], np.isfinite(values[span])
         if np.count_nonzero(known) >= 2:
             v = np.interp(t, t[known], values[span][known])
             total = np.concatenate([[0.0], np.cumsum(0.5 * (v[1:] + v[:-1]) * np.diff(t))])
-            out[span] = np.where(_between_known(known), total, np.nan)
+            out[span] = np.where(near_known(t, known), total, np.nan)
     return out
 
 
 def smoothed(recording: Recording, values: FloatArray, width: float) -> FloatArray:
-    """Running mean over ``width`` seconds inside each span; NaN near the first and last value, and with few of them."""
+    """Running mean over ``width`` seconds inside each span; NaN near the ends, with few values, without a sensor."""
     half = max(1, round(0.5 * width / recording.period))
     out = np.full(len(recording), np.nan)
     for span in recording.spans():
@@ -54,14 +54,23 @@ def smoothed(recording: Recording, values: FloatArray, width: float) -> FloatArr
             t = recording.t[span]
             total = np.concatenate([[0.0], np.cumsum(np.interp(t, t[known], values[span][known]))])
             mean = (total[2 * half + 1 :] - total[: -2 * half - 1]) / (2 * half + 1)
-            told = _between_known(known)
+            told = near_known(t, known)
             out[span.start + half : span.stop - half] = np.where(told[2 * half :] & told[: -2 * half], mean, np.nan)
     return out
 
 
-def _between_known(known: BoolArray) -> BoolArray:
-    """Rows from the first known one to the last."""
-    return np.asarray(np.logical_or.accumulate(known) & np.logical_or.accumulate(known[::-1])[::-1])
+def near_known(t: FloatArray, known: BoolArray, at: FloatArray | None = None) -> BoolArray:
+    """Times from the first known row of a span to the last, and as far beyond as :data:`LONGEST_AGE`.
+
+    Args:
+        t: of the rows (n,) [s].
+        known: rows with a reading (n,).
+        at: times that are asked for, the rows' own by default [s].
+    """
+    read, at = t[known], t if at is None else at
+    if not read.size:
+        return np.zeros(at.shape, dtype=bool)
+    return np.asarray((at >= read[0] - LONGEST_AGE) & (at <= read[-1] + LONGEST_AGE))
 
 
 def slope(recording: Recording, values: FloatArray) -> FloatArray:
