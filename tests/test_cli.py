@@ -258,6 +258,13 @@ def test_soils_and_robots_show_their_presets(capsys):
     assert "'thesis_a1'" in refused(capsys, "soils", "thesis_a")
 
 
+def test_the_list_of_soils_says_how_strong_and_how_firm_they_are(capsys):
+    """Thesis Table A.1: 13 degrees; (13.19 / b + 692) 0.01^0.5 kPa under a plate of b = 0.203 m."""
+    assert cli.main(["soils"]) == 0
+    row = next(line.split() for line in capsys.readouterr().out.splitlines() if line.startswith("thesis_a1"))
+    assert row[1:5] == ["4.14", "13.0", "75.7", "6"]
+
+
 def test_python_m_is_the_same_command(tmp_path: Path):
     done = subprocess.run(
         [sys.executable, "-m", "ddagr_gym", "robots", "no-such"],

@@ -14,7 +14,6 @@ from ddagr_gym.api.diagnosis_result import DiagnosisResult
 from ddagr_gym.api.drivetrain_fit import DrivetrainFit
 from ddagr_gym.api.inputs import Sources, recordings_from
 from ddagr_gym.api.nominal import (
-    DEFAULT_ROBOT,
     DEFAULT_SOIL,
     Nominal,
     RobotLike,
@@ -22,6 +21,9 @@ from ddagr_gym.api.nominal import (
     ThresholdsLike,
     check_left_out,
     nominal_from,
+    robot_from,
+    robot_or_recorded,
+    soil_or_usual,
     thresholds_from,
 )
 from ddagr_gym.errors import InputError, InputWarning, at_least
@@ -30,6 +32,7 @@ from ddagr_gym.progress import counting
 
 if TYPE_CHECKING:
     from ddagr_gym.diagnosis.gates.thresholds import Thresholds
+    from ddagr_gym.recordings.schema import Recording
 
 __all__ = ["ChangeResult", "DiagnosisResult", "diagnose"]
 
@@ -43,15 +46,15 @@ _SAME_WINDOW = 0.5
 @overload
 def diagnose(
     recordings: Sources,
-    robot: RobotLike = DEFAULT_ROBOT,
-    soil: SoilLike = DEFAULT_SOIL,
+    robot: RobotLike | None = None,
+    soil: SoilLike | None = None,
     *,
     calibration: None = None,
     ground: str = "",
     before: None = None,
     same_ground: bool | None = None,
     thresholds: ThresholdsLike | None = None,
-    soil_uncertainty: float = 1.0,
+    soil_uncertainty: float | None = None,
     window: float | None = None,
     stride: float | None = None,
     seed: int = 0,
@@ -66,15 +69,15 @@ def diagnose(
 @overload
 def diagnose(
     recordings: Sources,
-    robot: RobotLike = DEFAULT_ROBOT,
-    soil: SoilLike = DEFAULT_SOIL,
+    robot: RobotLike | None = None,
+    soil: SoilLike | None = None,
     *,
     calibration: str | os.PathLike[str],
     ground: str = "",
     before: None = None,
     same_ground: bool | None = None,
     thresholds: ThresholdsLike | None = None,
-    soil_uncertainty: float = 1.0,
+    soil_uncertainty: float | None = None,
     window: float | None = None,
     stride: float | None = None,
     seed: int = 0,
@@ -89,15 +92,15 @@ def diagnose(
 @overload
 def diagnose(
     recordings: Sources,
-    robot: RobotLike = DEFAULT_ROBOT,
-    soil: SoilLike = DEFAULT_SOIL,
+    robot: RobotLike | None = None,
+    soil: SoilLike | None = None,
     *,
     calibration: None = None,
     ground: str = "",
     before: Sources,
     same_ground: bool | None = None,
     thresholds: ThresholdsLike | None = None,
-    soil_uncertainty: float = 1.0,
+    soil_uncertainty: float | None = None,
     window: float | None = None,
     stride: float | None = None,
     seed: int = 0,
@@ -111,15 +114,15 @@ def diagnose(
 
 def diagnose(
     recordings: Sources,
-    robot: RobotLike = DEFAULT_ROBOT,
-    soil: SoilLike = DEFAULT_SOIL,
+    robot: RobotLike | None = None,
+    soil: SoilLike | None = None,
     *,
     calibration: str | os.PathLike[str] | None = None,
     ground: str = "",
     before: Sources | None = None,
     same_ground: bool | None = None,
     thresholds: ThresholdsLike | None = None,
-    soil_uncertainty: float = 1.0,
+    soil_uncertainty: float | None = None,
     window: float | None = None,
     stride: float | None = None,
     seed: int = 0,
@@ -141,8 +144,11 @@ def diagnose(
 
     Args:
         recordings: one or several recordings, tables with the schema's columns, paths of files or folders.
-        robot: nominal: name, YAML file or object.
-        soil: nominal: name, YAML file or object.
+        robot: nominal: name, YAML file or object. Where it is None, the one that the recordings name, else the ddagr
+            with a warning.
+        soil: nominal: name, YAML file or object. Where it is None, that of the thresholds (thesis_a1 for the ddagr),
+            else firm_ground at four times the usual uncertainty, which stands for ground that is not known; but for the
+            ddagr a warning says so.
         calibration: folder that ``ddagr calibrate`` wrote: the robot, its grounds and its ordinary drives stand
             for robot, soil, thresholds and windows, which are left out then.
         ground: of the calibration that the recordings are on; "" for one of which only the kind is known, where far
@@ -154,7 +160,7 @@ def diagnose(
         thresholds: of ``ddagr null-bank``, made with these or similar drives; those that ship with the package when it
             is None.
         soil_uncertainty: factor on how far the soil may be from the nominal one; larger where it is only guessed. The
-            thresholds must be of the same.
+            thresholds must be of the same. 1 beside a soil that is given.
         window: length of the windows [s]; that of the thresholds when it is None, against drives before 4 s.
         stride: seconds between the starts of windows; their length, which uses all samples, when it is None.
         seed: of the resampling.
@@ -172,7 +178,8 @@ def diagnose(
 
     Raises:
         InputError: recordings that cannot be diagnosed, unknown names, no thresholds for the robot, options at odds.
-        InputWarning: (a warning) the thresholds were made for another robot, soil, uncertainty or window.
+        InputWarning: (a warning) the thresholds were made for another robot, soil, uncertainty or window; no robot or
+            soil is given.
 
     Examples:
         >>> import ddagr_gym
@@ -194,8 +201,9 @@ def diagnose(
         _check_no_cache(cache)
     if before is not None:
         _check_only_before(calibration, ground, thresholds=thresholds, stride=stride, soil_uncertainty=soil_uncertainty)
-        nominal = nominal_from(robot, soil)
         given, earlier = (recordings_from(drives, robot, column_map) for drives in (recordings, _some(before)))
+        nominal, _ = _nominal((*given, *earlier), robot, soil, soil_uncertainty, None)
+        given, earlier = (recordings_from(drives, nominal.robot) for drives in (given, earlier))
         say = (lambda line: None) if progress is None else progress
         return changed_since(
             given, earlier, nominal.robot, nominal.soil, same_ground=bool(same_ground), window=window, seed=seed,
@@ -213,10 +221,13 @@ def diagnose(
     if ground:
         raise InputError(f"the ground is {ground!r} and there is no calibration: name its folder with --calibration.")
     need("ruptures", *(() if names_only else ("sklearn",)))
-    nominal = nominal_from(robot, soil)
     found = recordings_from(recordings, robot, column_map)
-    priors = NuisancePriors().with_soil(soil_uncertainty)
-    gates = _gates(thresholds, nominal, soil_uncertainty)
+    nominal, uncertainty = _nominal(found, robot, soil, soil_uncertainty, thresholds)
+    if soil is None:
+        _say_usual_soil(nominal, uncertainty)
+    found = recordings_from(found, nominal.robot)
+    priors = NuisancePriors().with_soil(uncertainty)
+    gates = _gates(thresholds, nominal, uncertainty)
     setting = Setting(priors=priors, threads=threads).with_windows(_window(window, gates), stride)
     drivetrain = DrivetrainFit(nominal, threads, seed, cache, progress)
     with _steps(len(steps_of(names_only)), progress) as on_step:
@@ -254,8 +265,7 @@ def _check_only_before(calibration: object, ground: str, **options: object) -> N
         )
     if ground:
         raise InputError(f"the ground is {ground!r} and there is no calibration: say --same-ground or --other-ground.")
-    usual: dict[str, object] = {"soil_uncertainty": 1.0}
-    given = [name for name, value in options.items() if value != usual.get(name)]
+    given = [name for name, value in options.items() if value is not None]
     if given:
         raise InputError(f"{given[0]} is given with drives from before: leave it out, these say what is ordinary.")
 
@@ -267,8 +277,8 @@ def _some(before: Sources) -> Sources:
     return before
 
 
-def _check_known_soil(folder: Path, soil_uncertainty: float) -> None:
-    if soil_uncertainty != 1.0:
+def _check_known_soil(folder: Path, soil_uncertainty: float | None) -> None:
+    if soil_uncertainty is not None:
         raise InputError(
             f"the soil uncertainty is {soil_uncertainty:g} and there is a calibration: leave it out, {folder} says how "
             "much soils differ; for another ground leave out the ground."
@@ -281,6 +291,37 @@ def _robot_of(folder: Path) -> str:
 
     load(folder)
     return robot_file(folder)
+
+
+def _nominal(
+    recordings: Sequence[Recording],
+    robot: RobotLike | None,
+    soil: SoilLike | None,
+    soil_uncertainty: float | None,
+    thresholds: ThresholdsLike | None,
+) -> tuple[Nominal, float]:
+    """Robot and soil as given, else the usual ones, and how uncertain the soil is; InputError for unknown names."""
+    from ddagr_gym.diagnosis.gates.threshold_files import load_thresholds, shipped_thresholds
+    from ddagr_gym.diagnosis.gates.thresholds import Thresholds
+
+    chosen = robot_or_recorded(robot, recordings)
+    banks = [shipped_thresholds(robot_from(chosen).name)]
+    if thresholds is not None:
+        banks.insert(0, thresholds if isinstance(thresholds, Thresholds) else load_thresholds(Path(thresholds)))
+    nominal_soil, uncertainty = soil_or_usual(soil, soil_uncertainty, banks)
+    return nominal_from(chosen, nominal_soil), uncertainty
+
+
+def _say_usual_soil(nominal: Nominal, soil_uncertainty: float) -> None:
+    """Warn of a soil that was not given, but of the ddagr's own."""
+    if nominal.soil_name != DEFAULT_SOIL:
+        warnings.warn(
+            f"no soil is given: the {nominal.robot.name} is taken to be on {nominal.soil_name}, at "
+            f"{soil_uncertainty:g} times a soil's usual uncertainty; name a soil with --soil (soil=... in Python) "
+            "where it is known.",
+            InputWarning,
+            stacklevel=3,
+        )
 
 
 def _gates(given: ThresholdsLike | None, nominal: Nominal, soil_uncertainty: float) -> Thresholds:

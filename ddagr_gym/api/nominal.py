@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import os
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias, Union
 
 from ddagr_gym.errors import InputError, InputWarning
 from ddagr_gym.parameters import Robot, Soil
-from ddagr_gym.presets import full_name, get_robot, get_soil, is_file, robot_names, soil_names
+from ddagr_gym.presets import full_name, get_robot, get_soil, is_file, robot_names, robot_option, soil_names
+from ddagr_gym.recordings.schema import Recording
 
 if TYPE_CHECKING:
     from ddagr_gym.diagnosis.gates.thresholds import Thresholds
@@ -26,6 +28,9 @@ ThresholdsLike: TypeAlias = Union["Thresholds", str, os.PathLike[str]]
 
 DEFAULT_ROBOT, DEFAULT_SOIL = "ddagr", "thesis_a1"
 """Nominal ones where none are given, which say nothing beside a calibration."""
+
+UNKNOWN_GROUND = ("firm_ground", 4.0)
+"""Nominal soil of ground that nobody named, and the factor on its uncertainty."""
 
 OWN = "given in Python"
 """In reports the name of a soil, or the file of a robot, that is an object and no preset: nothing loads it."""
@@ -57,13 +62,64 @@ def nominal_from(robot: RobotLike, soil: SoilLike) -> Nominal:
     return Nominal(robot_from(robot), soil_from(soil), _robot_file(robot), soil_name_of(soil))
 
 
-def check_left_out(calibration: Path, robot: RobotLike, soil: SoilLike, **options: object) -> None:
+def recorded_robot(recordings: Sequence[Recording]) -> str | None:
+    """Robot that recordings name; None where they name none.
+
+    Raises:
+        InputError: recordings of two robots, or of one that is not built in.
+    """
+    names = sorted({recording.meta.robot for recording in recordings} - {""})
+    if len(names) > 1:
+        raise InputError(f"the recordings are of the robots {', '.join(names)}: give those of one robot at a time.")
+    if names and names[0] not in robot_names():
+        raise InputError(f"the recordings are of the robot {names[0]!r}: name it with {robot_option(names[0])}.")
+    return names[0] if names else None
+
+
+def robot_or_recorded(robot: RobotLike | None, recordings: Sequence[Recording]) -> RobotLike:
+    """Robot as given, else the recordings' own, else :data:`DEFAULT_ROBOT` with an InputWarning.
+
+    Raises:
+        InputError: none is given, and the recordings are of two robots or of one that is not built in.
+    """
+    if robot is not None:
+        return robot
+    recorded = recorded_robot(recordings)
+    if recorded is None:
+        warnings.warn(
+            f"{recordings[0].meta.source} does not say which robot drove: it is taken for the {DEFAULT_ROBOT}; name "
+            "the robot with --robot (robot=... in Python).",
+            InputWarning,
+            stacklevel=3,
+        )
+    return DEFAULT_ROBOT if recorded is None else recorded
+
+
+def soil_or_usual(
+    soil: SoilLike | None, soil_uncertainty: float | None, banks: Sequence[Thresholds | None]
+) -> tuple[SoilLike, float]:
+    """Nominal soil and its uncertainty as given, else those of the thresholds, else of unknown ground.
+
+    Args:
+        soil: None where none is given.
+        soil_uncertainty: None where it is not given; then 1 beside a soil.
+        banks: thresholds that are given, and those that ship for the robot; the first whose soil can be loaded counts.
+    """
+    if soil is not None:
+        return soil, 1.0 if soil_uncertainty is None else soil_uncertainty
+    origins = [bank.origin for bank in banks if bank is not None and bank.origin is not None]
+    known = [(item.soil, item.soil_uncertainty) for item in origins if item.soil in soil_names() or is_file(item.soil)]
+    soil, usual = [*known, UNKNOWN_GROUND][0]
+    return soil, usual if soil_uncertainty is None else soil_uncertainty
+
+
+def check_left_out(calibration: Path, robot: RobotLike | None, soil: SoilLike | None, **options: object) -> None:
     """Refuse what a calibration already says.
 
     Args:
         calibration: its folder.
-        robot: :data:`DEFAULT_ROBOT` where none is given.
-        soil: :data:`DEFAULT_SOIL` where none is given.
+        robot: None or :data:`DEFAULT_ROBOT` where none is given.
+        soil: None or :data:`DEFAULT_SOIL` where none is given.
         options: further ones by name; None where they are not given.
 
     Raises:

@@ -9,13 +9,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ddagr_gym.api.inputs import Sources, recordings_from
-from ddagr_gym.api.nominal import RobotLike, SoilLike, robot_from, soil_from, soil_label
+from ddagr_gym.api.nominal import RobotLike, SoilLike, recorded_robot, robot_from, soil_from, soil_label
 from ddagr_gym.api.results import Report, Table
 from ddagr_gym.api.simulate import EffectsLike
 from ddagr_gym.errors import InputError, at_least
 from ddagr_gym.files import atomic_path, write_text
 from ddagr_gym.parameters import Robot
-from ddagr_gym.presets import robot_names, robot_option
 from ddagr_gym.progress import counting
 from ddagr_gym.recordings.schema import Recording
 
@@ -185,14 +184,10 @@ def driven_robot(robot: RobotLike | None, recordings: Sequence[Recording]) -> Ro
     Raises:
         InputError: recordings of two robots, none named, or one that is not built in.
     """
-    names = sorted({recording.meta.robot for recording in recordings} - {""})
-    if len(names) > 1:
-        raise InputError(f"the runs are of the robots {', '.join(names)}: replay one robot at a time.")
-    if robot is None and not names:
+    chosen = recorded_robot(recordings) if robot is None else robot
+    if chosen is None:
         raise InputError("the recordings do not say which robot drove: name it with --robot (robot=... in Python).")
-    if robot is None and names[0] not in robot_names():
-        raise InputError(f"the recordings are of the robot {names[0]!r}: name it with {robot_option(names[0])}.")
-    return robot_from(names[0] if robot is None else robot)
+    return robot_from(chosen)
 
 
 def _draw(

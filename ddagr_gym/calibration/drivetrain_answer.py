@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from ddagr_gym.calibration.forecast_findings import folds_of, forecast_finding
-from ddagr_gym.calibration.part_selection import least_growth
+from ddagr_gym.calibration.part_comparison import least_growth
 from ddagr_gym.calibration.parts import part_named
 from ddagr_gym.calibration.result import (
     CALIBRATED,

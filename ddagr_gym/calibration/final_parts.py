@@ -14,13 +14,8 @@ import numpy as np
 
 from ddagr_gym.calibration.exchanged_parts import FILTER, RAMP, other_starts
 from ddagr_gym.calibration.joint_fit import LAST_ITERATIONS, Standing
-from ddagr_gym.calibration.part_selection import (
-    Candidate,
-    Comparison,
-    Selection,
-    from_other_starts,
-    misses,
-)
+from ddagr_gym.calibration.part_comparison import Candidate, Comparison, misses
+from ddagr_gym.calibration.part_selection import Selection, from_other_starts
 from ddagr_gym.calibration.parts import PARTS, RobotModel, part_named
 from ddagr_gym.calibration.result import PartDecision
 from ddagr_gym.diagnosis.store import StepCache

@@ -25,7 +25,7 @@ from ddagr_gym.calibration.calibration_data import CalibrationData
 from ddagr_gym.calibration.ground_slopes import LIMIT
 from ddagr_gym.calibration.joint_fit import FittedModel
 from ddagr_gym.calibration.left_out import folds
-from ddagr_gym.calibration.part_selection import surely_above
+from ddagr_gym.calibration.part_comparison import surely_above
 from ddagr_gym.diagnosis.result.uncertainty import student_quantile
 from ddagr_gym.identification.least_squares import huber_loss
 from ddagr_gym.identification.residual_weights import MAD_TO_DEVIATION

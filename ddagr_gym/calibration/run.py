@@ -33,7 +33,8 @@ from ddagr_gym.calibration.joint_fit import (
     weigh_and_fit,
 )
 from ddagr_gym.calibration.ordinary_drives import Ordinary, ordinary_drives
-from ddagr_gym.calibration.part_selection import Candidate, Comparison, Selection, select_parts
+from ddagr_gym.calibration.part_comparison import Candidate, Comparison
+from ddagr_gym.calibration.part_selection import Selection, select_parts
 from ddagr_gym.calibration.parts import DATA_SHEET_PARTS, RobotModel
 from ddagr_gym.calibration.residual_tables import spectra, unexplained
 from ddagr_gym.calibration.result import SCHEMA, SCHEMA_VERSION, Calibration, Covariance

@@ -15,7 +15,7 @@ from dataclasses import replace
 from ddagr_gym.calibration.accelerometer_results import MountingSize
 from ddagr_gym.calibration.forecast_findings import folds_of, forecast_finding
 from ddagr_gym.calibration.imu_mounting import LEAST
-from ddagr_gym.calibration.part_selection import least_growth, surely_above
+from ddagr_gym.calibration.part_comparison import least_growth, surely_above
 from ddagr_gym.calibration.parts import factors_of_banks
 from ddagr_gym.calibration.result import Calibration
 from ddagr_gym.calibration.simulator_values import calibrated_effects

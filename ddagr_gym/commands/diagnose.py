@@ -35,7 +35,7 @@ def run(arguments: Arguments) -> int | None:
         raise InputError(f"--before takes all that follows it ({taken}): put the drive in question in front of it.")
     need(*(() if arguments.names_only else ("jinja2", "matplotlib")))
     _check_viewer_files(arguments)
-    read_as = arguments.robot if arguments.calibration is None else robot_file(arguments.calibration)
+    read_as = (arguments.robot or None) if arguments.calibration is None else robot_file(arguments.calibration)
     limits = Limits(arguments.maximum_rows, arguments.maximum_bytes)
     parts = part_folder(arguments.output.expanduser().resolve())
     if arguments.calibration is not None and any(map(is_folder_of_drives, arguments.runs)):
@@ -46,8 +46,8 @@ def run(arguments: Arguments) -> int | None:
     with resumable(kept):
         result = ddagr_gym.diagnose(
             recordings_from(arguments.runs, read_as, arguments.map or None, limits),
-            arguments.robot,
-            arguments.soil,
+            arguments.robot or None,
+            arguments.soil or None,
             **_compared_with(arguments, read_as, limits),
             thresholds=arguments.thresholds,
             soil_uncertainty=arguments.soil_uncertainty,
@@ -115,7 +115,7 @@ def _write_viewer_files(arguments: Arguments, result: DiagnosisReport) -> list[s
     return lines
 
 
-def _compared_with(arguments: Arguments, read_as: str, limits: Limits) -> dict[str, Any]:
+def _compared_with(arguments: Arguments, read_as: str | None, limits: Limits) -> dict[str, Any]:
     """What the recordings are compared with, as `diagnose` takes it; InputError where the ground is said twice."""
     from ddagr_gym.api.inputs import recordings_from
 

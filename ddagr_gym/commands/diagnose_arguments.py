@@ -43,8 +43,11 @@ class Arguments:
             `ddagr simulate` and `ddagr replay` load: effects.json or effects.yaml with the effects that were named, and
             robot.yaml and soil.yaml with the refitted nominal parameters. Of many drives: index.html, drives.csv,
             drives.json, and a diagnosis.json of each.
-        robot: nominal robot (see `ddagr robots`), or the path of a YAML file with one's own.
-        soil: nominal soil (see `ddagr soils`), or the path of a YAML file with one's own.
+        robot: nominal robot (see `ddagr robots`), or the path of a YAML file with one's own; the one that the
+            recordings name when it is left out.
+        soil: nominal soil (see `ddagr soils`), or the path of a YAML file with one's own; when it is left out that of
+            the thresholds (thesis_a1 for the ddagr), else firm_ground at four times a soil's usual uncertainty, for
+            ground that is not known.
         calibration: folder that `ddagr calibrate` wrote, whose robot, grounds and ordinary drives the recordings
             are compared with; robot, soil, thresholds, window and stride are left out then.
         ground: of the calibration that the recordings are on; left out for one that it does not know.
@@ -57,7 +60,7 @@ class Arguments:
         thresholds: of `ddagr null-bank`, made with these or similar drives; those that ship with the package when it is
             left out.
         soil_uncertainty: factor on how far the soil may be from the nominal one; larger where it is only guessed. The
-            thresholds must be of the same.
+            thresholds must be of the same. 1 beside a soil.
         window: length of the windows [s]; that of the thresholds when it is left out, with --before 4 s.
         stride: seconds between the starts of windows; their length, which uses all samples, when it is left out.
         seed: of the resampling.
@@ -77,8 +80,8 @@ class Arguments:
 
     runs: Positional[tuple[Path, ...]]
     output: Annotated[Path, tyro.conf.arg(aliases=("-o",))]
-    robot: str = "ddagr"
-    soil: str = "thesis_a1"
+    robot: str = ""
+    soil: str = ""
     calibration: Path | None = None
     ground: str = ""
     before: tuple[Path, ...] = ()
@@ -86,7 +89,7 @@ class Arguments:
     other_ground: bool = False
     map: str = ""
     thresholds: Path | None = None
-    soil_uncertainty: float = 1.0
+    soil_uncertainty: float | None = None
     window: float | None = None
     stride: float | None = None
     seed: int = 0

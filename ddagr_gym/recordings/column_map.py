@@ -145,7 +145,7 @@ class ColumnMap:
         held: groups of channels that the file repeats between updates.
         command_valid: where commands count; everywhere if absent.
         robot: robot to assume where none is named.
-        delimiter: between the fields of a CSV line.
+        delimiter: between the fields of a CSV line; "" for comma, semicolon or tab as its header has them.
         description: for people.
         name: of the map; the file's name where absent.
 
@@ -160,7 +160,7 @@ class ColumnMap:
     held: tuple[HeldChannels, ...] = ()
     command_valid: ValidCommands | None = None
     robot: str = ""
-    delimiter: str = ","
+    delimiter: str = ""
     description: str = field(default="", compare=False)
     name: str = ""
 
@@ -176,7 +176,7 @@ class ColumnMap:
             for channel in group.channels:
                 if channel not in self.channels:
                     raise unknown_name("channel under held (it must be under channels, too)", channel, self.channels)
-        if len(self.delimiter) != 1 or self.delimiter in '"\r\n\0' or ord(self.delimiter) > 126:
+        if self.delimiter and (len(self.delimiter) != 1 or self.delimiter in '"\r\n\0' or ord(self.delimiter) > 126):
             raise InputError(f"delimiter is {self.delimiter!r}: give one character such as ',', ';' or a tab.")
 
     def sources(self) -> tuple[ColumnSource, ...]:

@@ -81,6 +81,8 @@ def build_recording(
     channels = _channels(table, column_map, geometry, notes)
     held = _mark_held(channels, table, column_map, t, spans, notes)
     valid = _command_valid(table, column_map, channels, notes)
+    if not any(np.isfinite(values).any() for values in channels.values()):
+        raise InputError(f"no channel of the map {column_map.name} holds a number: correct the map or the file.")
     meta = RecordingMeta(
         robot=geometry.name if geometry else "",
         source=source,

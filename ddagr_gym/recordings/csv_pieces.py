@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ddagr_gym.errors import InputError
+from ddagr_gym.recordings.csv_head import CsvHead
 from ddagr_gym.recordings.files import BoundedStream, damaged
 
 if TYPE_CHECKING:
@@ -24,24 +25,29 @@ class PieceParser:
 
     Args:
         path: of the file, for messages.
-        names: of all columns, in their order.
-        delimiter: between fields.
-        texts: columns to parse, and whether each holds text instead of numbers.
+        head: of the file.
+        numbers: columns to parse as numbers, or as time stamps where they begin with one.
+        labels: columns to parse as text, also where they are among the numbers.
     """
 
-    def __init__(self, path: Path, names: tuple[str, ...], delimiter: str, texts: Mapping[str, bool]) -> None:
+    def __init__(self, path: Path, head: CsvHead, numbers: Sequence[str], labels: Sequence[str]) -> None:
         import pyarrow as pa
         from pyarrow import csv as arrow_csv
 
         self._path = path
-        self._names = names
+        self._names = head.names
         self._rows = 1
-        self._extra_row = delimiter.join("0" * len(names)).encode()
-        self._parse = arrow_csv.ParseOptions(delimiter=delimiter)
+        self._extra_row = head.delimiter.join("0" * len(head.names)).encode()
+        self._parse = arrow_csv.ParseOptions(delimiter=head.delimiter)
+        kinds = dict.fromkeys(numbers, pa.float64())
+        zones = {name: "UTC" if zoned else None for name, zoned in head.time_stamps.items() if name in kinds}
+        kinds |= {name: pa.timestamp("ns", zone) for name, zone in zones.items()}
+        kinds |= dict.fromkeys(labels, pa.string())
         self._convert = arrow_csv.ConvertOptions(
-            include_columns=list(texts),
-            column_types={name: pa.string() if text else pa.float64() for name, text in texts.items()},
+            include_columns=list(kinds),
+            column_types=kinds,
             strings_can_be_null=False,
+            decimal_point=head.decimal_point,
         )
 
     def batches(self, stream: BoundedStream) -> Iterator[pa.RecordBatch]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +11,7 @@ import numpy.typing as npt
 from ddagr_gym.errors import InputError, unknown_name
 from ddagr_gym.recordings.column_map import ColumnMap
 from ddagr_gym.recordings.conversion import RawTable
+from ddagr_gym.recordings.csv_head import csv_head
 from ddagr_gym.recordings.csv_pieces import PieceParser
 from ddagr_gym.recordings.files import DEFAULT_LIMITS, Limits, damaged, open_text
 from ddagr_gym.recordings.schema import FloatArray
@@ -19,34 +19,7 @@ from ddagr_gym.recordings.schema import FloatArray
 if TYPE_CHECKING:
     import pyarrow as pa
 
-_LONGEST_HEADER = 64 * 1024  # bytes (ours): beyond it a first line names no columns
 _MOST_LABELS = 100_000  # different values of a column that numbers spans (ours): more are readings, not labels
-
-
-def csv_columns(path: Path, limits: Limits = DEFAULT_LIMITS, delimiter: str = ",") -> tuple[str, ...]:
-    """Names in the header of a CSV file.
-
-    Raises:
-        InputError: no text, no header, or a name that occurs twice.
-    """
-    with open_text(path, limits) as stream:
-        head = b""
-        while b"\n" not in head and len(head) < _LONGEST_HEADER and (block := stream.read(_LONGEST_HEADER)):
-            head += block
-    line = head.split(b"\n", 1)[0]
-    try:
-        text = line.decode("utf-8-sig").rstrip("\r")
-    except UnicodeDecodeError:
-        raise InputError(f"{path.name} is not a text file in UTF-8: give CSV, Parquet, MCAP or a bag.") from None
-    if not text.isprintable() and not text.replace("\t", "").isprintable():
-        raise InputError(f"{path.name} has unprintable characters in its header: give CSV, Parquet, MCAP or a bag.")
-    names = tuple(name.strip() for name in next(csv.reader([text], delimiter=delimiter), []))
-    if not any(names) or len(line) >= _LONGEST_HEADER:
-        raise InputError(f"{path.name} has no header line with column names: add one.")
-    for name in names:
-        if names.count(name) > 1:
-            raise InputError(f"{path.name} has the column {name!r} twice: rename one.")
-    return names
 
 
 def read_csv(path: Path, column_map: ColumnMap, limits: Limits = DEFAULT_LIMITS) -> RawTable:
@@ -60,11 +33,11 @@ def read_csv(path: Path, column_map: ColumnMap, limits: Limits = DEFAULT_LIMITS)
     Raises:
         InputError: missing columns, text where numbers belong, damage, or too large a file.
     """
-    names = csv_columns(path, limits, column_map.delimiter)
-    numbers, labels = wanted_columns(path, column_map, names)
+    head = csv_head(path, limits, column_map.delimiter)
+    numbers, labels = wanted_columns(path, column_map, head.names)
     collector = Collector(numbers, labels, limits, path)
     # A column may serve both as a number and as a label; text converts to either.
-    parser = PieceParser(path, names, column_map.delimiter, {name: name in labels for name in (*numbers, *labels)})
+    parser = PieceParser(path, head, numbers, labels)
     with open_text(path, limits) as stream:
         for batch in parser.batches(stream):
             collector.add(batch)

@@ -8,7 +8,8 @@ from pathlib import Path
 from ddagr_gym.errors import InputError
 from ddagr_gym.recordings.column_map import ColumnMap, load_column_map, most_specific_map
 from ddagr_gym.recordings.conversion import RawTable, build_recording
-from ddagr_gym.recordings.csv_reader import csv_columns, read_csv
+from ddagr_gym.recordings.csv_head import csv_head
+from ddagr_gym.recordings.csv_reader import read_csv
 from ddagr_gym.recordings.files import DEFAULT_LIMITS, Limits, kind_of, sha256_of
 from ddagr_gym.recordings.parquet_reader import parquet_columns, read_parquet
 from ddagr_gym.recordings.rosbag_reader import BAG_KINDS, read_rosbag
@@ -97,7 +98,7 @@ def _table(path: Path, kind: str, map_name: str | None, limits: Limits) -> tuple
     if map_name is not None:
         column_map = load_column_map(map_name)
     else:
-        names = parquet_columns(path, limits) if kind == "parquet" else csv_columns(path, limits)
+        names = parquet_columns(path, limits) if kind == "parquet" else csv_head(path, limits).names
         column_map = most_specific_map(names, path.name)
     read = read_parquet if kind == "parquet" else read_csv
     return read(path, column_map, limits), column_map

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from ddagr_gym.calibration.drivetrain_answer import drivetrain_answer, drivetrain_findings
-from ddagr_gym.calibration.part_selection import LEAST_GROWTH, is_missed, surely_above
+from ddagr_gym.calibration.part_comparison import is_missed, surely_above
 from ddagr_gym.calibration.result import (
     CALIBRATED,
     DATA_SHEET,
@@ -21,6 +21,7 @@ from ddagr_gym.calibration.result import (
     Scatter,
     Unexplained,
 )
+from ddagr_gym.diagnosis.answer.drivetrain import LEAST_GROWTH
 
 RMS = {DATA_SHEET: 4.0, CALIBRATED: 1.0, KINEMATIC: 2.0}
 

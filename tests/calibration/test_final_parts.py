@@ -12,7 +12,8 @@ import pytest
 from ddagr_gym.calibration.exchanged_parts import TRIED_DELAY
 from ddagr_gym.calibration.final_parts import decide_with_all_windows
 from ddagr_gym.calibration.joint_fit import Standing
-from ddagr_gym.calibration.part_selection import Candidate, Selection
+from ddagr_gym.calibration.part_comparison import Candidate
+from ddagr_gym.calibration.part_selection import Selection
 from ddagr_gym.calibration.parts import DATA_SHEET_PARTS, RobotModel, complete_robot, shared_parameters
 from ddagr_gym.calibration.result import PartDecision
 from ddagr_gym.presets import get_robot

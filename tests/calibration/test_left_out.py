@@ -11,7 +11,7 @@ from benchmarks.simulated_robots import drive, true_robot
 from ddagr_gym.calibration.calibration_data import CalibrationData
 from ddagr_gym.calibration.joint_fit import FittedModel, complete_model, fit_model, weigh_and_fit
 from ddagr_gym.calibration.left_out import folds, forecast_losses, forecasts, refitted_without, values_without
-from ddagr_gym.calibration.part_selection import Comparison
+from ddagr_gym.calibration.part_comparison import Comparison
 from ddagr_gym.calibration.parts import PARTS
 from ddagr_gym.calibration.run import ready_drives
 from ddagr_gym.calibration.settings import CalibrationSettings

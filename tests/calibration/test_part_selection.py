@@ -10,15 +10,8 @@ import pytest
 
 from ddagr_gym.calibration.exchanged_parts import TRIED_DELAY
 from ddagr_gym.calibration.joint_fit import Standing
-from ddagr_gym.calibration.part_selection import (
-    Candidate,
-    is_hopeless,
-    misses,
-    most_worse_by,
-    select_parts,
-    surely_above,
-    worse_by,
-)
+from ddagr_gym.calibration.part_comparison import Candidate, is_hopeless, misses, most_worse_by, surely_above, worse_by
+from ddagr_gym.calibration.part_selection import select_parts
 from ddagr_gym.presets import get_robot
 
 
@@ -156,6 +149,30 @@ def test_a_part_is_not_missed_by_a_fit_that_fits_as_well():
     with_part, without = candidate(1.0, 2.0), candidate(1.5, 3.0)
     assert misses((with_part,), without)[0]
     assert not misses((with_part,), replace(without, cost=with_part.cost))[0]
+
+
+def test_a_model_with_more_parts_whose_fit_is_no_better_says_nothing_of_a_part():
+    """All parts together forecast better by where their fit stopped; the model before is the better fit."""
+    every, with_part = replace(candidate(0.8, 0.81), cost=2.0), replace(candidate(1.0, 1.01), cost=1.0)
+    without = replace(candidate(1.0, 1.01), cost=1.1)
+    assert not misses((every, with_part), without)[0]
+    assert misses((replace(every, cost=1.05), with_part), without)[0]
+
+
+@pytest.mark.parametrize(("alone", "kept"), [(1.05, True), (1.0, False)])
+def test_what_was_kept_by_little_is_asked_for_again_when_others_have_gone(alone, kept):
+    """Without friction the fit stops short while the dead time is free; without both it is as good, or not."""
+
+    class Short(Losses):
+        def candidate(self, model, start, rival):
+            grown = {frozenset({"friction"}): 1.05, frozenset({"friction", "command_delay"}): alone}
+            return candidate(*(f * grown.get(model.out, 1.0) for f in (1.0, 1.01, 0.99)))
+
+    lines = []
+    full = candidate(1.0, 1.01, 0.99)
+    found = select_parts(Short({}), Made(late="viscous_rate"), full, lambda name, make: make(), lines.append)
+    assert {item.name: item.kept for item in found.decisions} == {"friction": kept, "command_delay": False}
+    assert sum("friction" in line for line in lines) == 2
 
 
 def test_parts_that_are_missed_a_little_each_are_not_all_given_away():

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ddagr_gym.calibration.accelerometer_results import ImuMounting, MountingSize
-from ddagr_gym.calibration.part_selection import surely_above
+from ddagr_gym.calibration.part_comparison import surely_above
 from ddagr_gym.calibration.result import PartDecision
 from ddagr_gym.calibration.sensor_findings import named_sensors
 from ddagr_gym.diagnosis.answer.verdict import Estimate

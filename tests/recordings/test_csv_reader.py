@@ -10,7 +10,8 @@ import pytest
 
 from ddagr_gym.errors import InputError
 from ddagr_gym.recordings.column_map import ColumnMap, ColumnSource, Pieces, TimeSource, ValidCommands
-from ddagr_gym.recordings.csv_reader import csv_columns, read_csv
+from ddagr_gym.recordings.csv_head import csv_head
+from ddagr_gym.recordings.csv_reader import read_csv
 from ddagr_gym.recordings.files import Limits, kind_of
 from ddagr_gym.recordings.load import load_recording
 
@@ -43,7 +44,7 @@ def test_numbers_come_through_and_empty_fields_are_nan(tmp_path):
 )
 def test_other_spellings_of_the_same_file(tmp_path, data):
     path = write(tmp_path, data)
-    assert csv_columns(path) == ("t", "gz", "other")
+    assert csv_head(path).names == ("t", "gz", "other")
     np.testing.assert_array_equal(read_csv(path, MAP).numbers["gz"], [1.5, np.nan, np.nan, -2e-3])
 
 
@@ -56,9 +57,45 @@ def test_labels_are_coded_by_their_text(tmp_path):
     assert [table.label_values["state"][c] for c in table.labels["state"]] == ["", "on", "on"]
 
 
-def test_other_delimiters(tmp_path):
-    column_map = ColumnMap(TimeSource("t"), MAP.channels, delimiter=";")
-    np.testing.assert_array_equal(read_csv(write(tmp_path, "t;gz\n0;4\n"), column_map).numbers["gz"], [4])
+@pytest.mark.parametrize(
+    "data",
+    [
+        "t;gz\n0;4\n0.5;-1.5\n",
+        "t\tgz\n0\t4\n0.5\t-1.5\n",
+        "t;gz;place\n0;4;here\n0,5;-1,5;there\n",
+        "gz;t\n4;0\n-1,5;0,5\n",
+        't,gz\n"0","4"\n"0,5","-1,5"\n',
+        't,gz,pair\n0,4,"1,2"\n0.5,-1.5,"3,4"\n',
+    ],
+    ids=["semicolon", "tab", "decimal comma", "another order", "quoted decimal comma", "commas in text"],
+)
+def test_delimiters_and_decimal_commas_are_found(tmp_path, data):
+    table = read_csv(write(tmp_path, data), MAP)
+    np.testing.assert_array_equal(table.numbers["t"], [0.0, 0.5])
+    np.testing.assert_array_equal(table.numbers["gz"], [4.0, -1.5])
+
+
+def test_a_delimiter_of_the_map_is_kept(tmp_path):
+    column_map = ColumnMap(TimeSource("t"), {"yaw_rate": ColumnSource("gz;x")}, delimiter=",")
+    np.testing.assert_array_equal(
+        read_csv(write(tmp_path, "t,gz;x;y;z,gz;x\n0,9,4\n"), column_map).numbers["gz;x"], [4]
+    )
+
+
+@pytest.mark.parametrize("zone", ["", "Z", "+02:00"])
+@pytest.mark.parametrize("between", ["T", " "])
+def test_dates_with_a_time_of_day_are_seconds(tmp_path, zone, between):
+    """From the second on a row begins, or without its time, which then is not a number."""
+    rows = "".join(f"2026-05-04{between}10:00:00.{k}{zone},{k}\n" for k in range(3)) + ",3\n"
+    table = read_csv(write(tmp_path, "t,gz\n" + rows), MAP)
+    np.testing.assert_allclose(np.diff(table.numbers["t"]), [0.1, 0.1, np.nan], atol=1e-6)
+    hours = 8 if zone == "+02:00" else 10
+    assert table.numbers["t"][0] == np.datetime64(f"2026-05-04T{hours:02}", "s").astype(np.int64)
+
+
+def test_a_file_without_a_number_is_refused(tmp_path):
+    with pytest.raises(InputError, match="no channel of the map own holds a number: correct the map"):
+        load_recording(write(tmp_path, "t,gz\n0,\n1,nan\n"), own_map(tmp_path))
 
 
 def test_many_blocks_are_joined_in_order(tmp_path):

@@ -1,0 +1,75 @@
+"""Robot and soil where none are given: the recordings' own, the thresholds' own, and what is said of a guess."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import ddagr_gym
+from ddagr_gym.api.nominal import UNKNOWN_GROUND, robot_or_recorded, soil_or_usual
+from ddagr_gym.diagnosis.gates.threshold_files import shipped_thresholds
+from ddagr_gym.errors import InputError, InputWarning
+from ddagr_gym.recordings.schema import Recording
+
+
+def drive(robot: str) -> Recording:
+    table = {name: np.zeros(3) for name in ("command_right", "command_left", "yaw_rate")}
+    return ddagr_gym.load_recording({"t": np.arange(3.0), **table}).with_meta(robot=robot)
+
+
+def test_a_given_robot_is_taken_before_the_recorded_one():
+    assert robot_or_recorded("husky", [drive("warthog")]) == "husky"
+
+
+def test_the_recorded_robot_is_taken_where_none_is_given(recwarn):
+    assert robot_or_recorded(None, [drive("warthog"), drive("")]) == "warthog"
+    assert not recwarn.list
+
+
+def test_a_robot_that_nobody_names_is_said():
+    with pytest.warns(InputWarning, match="does not say which robot drove: it is taken for the ddagr; name the robot"):
+        assert robot_or_recorded(None, [drive("")]) == "ddagr"
+
+
+def test_recordings_of_two_robots_or_of_an_unknown_one_are_refused():
+    with pytest.raises(InputError, match="of the robots husky, warthog: give those of one robot"):
+        robot_or_recorded(None, [drive("warthog"), drive("husky")])
+    with pytest.raises(InputError, match="of the robot 'my_rover': name it with --robot FILE"):
+        robot_or_recorded(None, [drive("my_rover")])
+
+
+def test_the_soil_is_that_of_the_thresholds_or_unknown_ground():
+    assert soil_or_usual(None, None, [shipped_thresholds("ddagr")]) == ("thesis_a1", 1.0)
+    assert soil_or_usual(None, None, [shipped_thresholds("warthog")]) == ("firm_ground", 4.0)
+    assert soil_or_usual(None, None, [None]) == UNKNOWN_GROUND
+
+
+def test_thresholds_of_a_soil_that_cannot_be_loaded_leave_it_to_those_of_the_robot():
+    own = shipped_thresholds("warthog")
+    own = replace(own, origin=replace(own.origin, soil="given in Python"))
+    assert soil_or_usual(None, None, [own, shipped_thresholds("ddagr")]) == ("thesis_a1", 1.0)
+
+
+def test_what_is_given_of_a_soil_is_kept():
+    bank = [shipped_thresholds("warthog")]
+    assert soil_or_usual("lete_sand_wong", None, bank) == ("lete_sand_wong", 1.0)
+    assert soil_or_usual("lete_sand_wong", 2.0, bank) == ("lete_sand_wong", 2.0)
+    assert soil_or_usual(None, 2.0, bank) == ("firm_ground", 2.0)
+
+
+@pytest.mark.parametrize(("robot", "said"), [("husky", True), ("ddagr", False)])
+def test_a_diagnosis_says_a_soil_that_it_assumes(robot, said):
+    """The drive is too short for a diagnosis, which is found after robot and soil."""
+    with pytest.warns(InputWarning) as warned, pytest.raises(InputError, match=r"few|rows"):
+        ddagr_gym.diagnose(drive(""), robot, names_only=True, window=3.0)
+    lines = [str(item.message) for item in warned if "no soil is given" in str(item.message)]
+    assert lines == (
+        [
+            "no soil is given: the husky is taken to be on firm_ground, at 4 times a soil's usual uncertainty; name a "
+            "soil with --soil (soil=... in Python) where it is known."
+        ]
+        if said
+        else []
+    )
