@@ -81,6 +81,7 @@ def run(arguments: Arguments) -> None:
     if arguments.workers < 1:
         raise InputError(f"--workers {arguments.workers}: give at least 1.")
     total = len(wanted_episodes(with_bounds(controllers), sets, arguments.episodes))
+    _check_folder(arguments.output.expanduser())
     folder = make_folder(arguments.output)
     with Progress(total, "driving") as progress:
         rows = run_campaign(
@@ -98,6 +99,14 @@ def run(arguments: Arguments) -> None:
     claims = _check_claims(folder, summary) if arguments.episodes is None else []
     page = write_report(folder, rows, summary, claims, arguments.workers)
     print(f"\nThe page is {page.resolve()}; episodes and summary are beside it.")
+
+
+def _check_folder(folder: Path) -> None:
+    """Refuse a folder with other files than those of an evaluation, which goes on where it was; InputError."""
+    from ddagr_gym.evaluation.dataset import EPISODES
+
+    if folder.is_dir() and any(folder.iterdir()) and not (folder / EPISODES).exists():
+        raise InputError(f"{folder} holds files and no evaluation ({EPISODES}): choose another folder.")
 
 
 def _names(text: str, option: str) -> list[str]:

@@ -6,7 +6,7 @@ Progress bars are in :mod:`ddagr_gym.progress`.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import fields, is_dataclass
+from dataclasses import MISSING, Field, fields, is_dataclass
 from typing import Any, NamedTuple
 
 from ddagr_gym.files import (
@@ -62,4 +62,10 @@ def _field_lines(instance: Any, indent: str) -> Iterator[str]:
                 yield from _field_lines(child, indent + "  ")
         else:
             unit = item.metadata.get("unit", "-")
-            yield f"{indent}{item.name:<{width}}  {format_value(value)} {unit if unit != '-' else ''}".rstrip()
+            shown = f"{format_value(value)} {unit if unit != '-' else ''}".rstrip()
+            yield f"{indent}{item.name:<{width}}  {'no limit' if _is_no_limit(item, value) else shown}"
+
+
+def _is_no_limit(item: Field[Any], value: object) -> bool:
+    """Whether a field is at the highest number that it may have, where that is what it usually has."""
+    return item.default is not MISSING and value == item.default == item.metadata.get("high")

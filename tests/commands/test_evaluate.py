@@ -97,6 +97,13 @@ def test_bad_input_is_one_sentence(tmp_path, capsys, arguments, message):
     assert not (tmp_path / "out").exists()
 
 
+def test_a_folder_of_something_else_is_left_alone(tmp_path, capsys):
+    (tmp_path / "thesis.txt").write_text("mine")
+    assert main(["evaluate", "--controllers", "B1", "--scenarios", "V", "--output", str(tmp_path)]) == 2
+    assert "holds files and no evaluation (episodes): choose another folder" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["thesis.txt"]
+
+
 def test_without_ray_nothing_is_made_ready(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("ddagr_gym.extras.find_spec", lambda name: None if name == "ray" else find_spec(name))
     monkeypatch.setattr("ddagr_gym.evaluation.campaign.wanted_episodes", None)

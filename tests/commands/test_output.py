@@ -19,7 +19,7 @@ from ddagr_gym.commands.output import (
     write_text,
 )
 from ddagr_gym.errors import InputError
-from ddagr_gym.parameters import TorusWheel
+from ddagr_gym.parameters import Drivetrain, TorusWheel
 
 
 @pytest.fixture
@@ -189,3 +189,10 @@ def test_fields_show_units_and_equal_parts_once():
     ]
     different = format_fields(Cart("cart", (wheel, TorusWheel(0.04, 0.1, 0.2)))).splitlines()
     assert [line for line in different if line.startswith("wheels")] == ["wheels 1", "wheels 2"]
+
+
+def test_a_limit_that_nothing_reaches_is_called_so():
+    lines = format_fields(Drivetrain(turning_limit=4.0)).splitlines()
+    assert "turning_limit       4 rad/s" in lines
+    assert "power_limit         no limit" in lines
+    assert "viscous_rate        0 1/s" in lines
