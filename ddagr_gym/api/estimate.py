@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from ddagr_gym.api.inputs import Source, recording_from
-from ddagr_gym.api.nominal import RobotLike, SoilLike, robot_from, soil_from
+from ddagr_gym.api.nominal import RobotLike, SoilLike, robot_from, robot_or_recorded, soil_from
 from ddagr_gym.api.results import Report, Table
 from ddagr_gym.errors import InputError, at_least, unknown_name
 from ddagr_gym.files import atomic_path, write_json
@@ -140,7 +140,7 @@ class EstimateResult(Report):
 
 def estimate(
     recording: Source | None = None,
-    robot: RobotLike = "ddagr",
+    robot: RobotLike | None = None,
     *,
     thesis: ThesisTable | None = None,
     soil: SoilLike | None = None,
@@ -155,7 +155,8 @@ def estimate(
 
     Args:
         recording: one recording, table with the schema's columns, or path; None with ``thesis``.
-        robot: that drove: name, YAML file or object.
+        robot: that drove: name, YAML file or object; where it is None the one that the recording names, else the
+            ddagr with a warning.
         thesis: drive and estimate the run of this table of the thesis's chapter 6 instead.
         soil: with ``thesis`` the name of the soil to drive on; else the soil whose parameters are shown for comparison.
         motor_rate: of the speed loop [1/s], where it is not the robot's.
@@ -193,17 +194,17 @@ def estimate(
     _known("filter", filter, ("ours", "thesis"))
     if thesis is not None:
         own = {"motor_rate": (motor_rate, None), "map": (column_map, None), "attitude": (attitude, False)}
-        _refuse_own(robot=(robot, "ddagr"), **own)
+        _refuse_own(robot=(robot, None), **own)
         return EstimateResult(estimate_thesis_run(thesis, str(soil or ""), filter, chosen, seed), thesis)
     assert recording is not None
     if attitude and filter == "thesis":
         raise InputError(
             "attitude True with the thesis's filter, which knows level ground alone: leave one of them out."
         )
-    found = robot_from(robot)
-    if motor_rate is not None:
-        found = replace(found, motor_rate=motor_rate)
     read = recording_from(recording, robot, column_map)
+    known = robot_from(robot_or_recorded(robot, [read]))
+    read = recording_from(read, known)
+    found = known if motor_rate is None else replace(known, motor_rate=motor_rate)
     expected = None if soil is None else soil_from(soil)
     return EstimateResult(estimate_recording(read, found, expected, filter, chosen, attitude, seed))
 

@@ -29,7 +29,7 @@ class Arguments:
     Attributes:
         run: recording, as `ddagr check` takes it; none with --thesis.
         thesis: drive and estimate the run of this table of the thesis's chapter 6 instead.
-        robot: robot that drove (ddagr robots).
+        robot: robot that drove (ddagr robots); the one that the recording names when it is left out.
         motor_rate: of its speed loop [1/s], where it is not the preset's.
         soil: with --thesis the soil to drive on; else the soil whose parameters the figures shall show for comparison.
         map: column map, for sources that are not imported yet.
@@ -43,7 +43,7 @@ class Arguments:
 
     run: Positional[Path | None] = None
     thesis: Literal["6.2", "6.3"] | None = None
-    robot: str = "ddagr"
+    robot: str = ""
     motor_rate: float | None = None
     soil: str = ""
     map: str = ""
@@ -61,7 +61,7 @@ def run(arguments: Arguments) -> None:
 
     result = ddagr_gym.estimate(
         arguments.run,
-        arguments.robot,
+        arguments.robot or None,
         thesis=arguments.thesis,
         soil=arguments.soil or None,
         motor_rate=arguments.motor_rate,
