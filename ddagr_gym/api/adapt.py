@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from ddagr_gym.adaptation.run import Adapted
     from ddagr_gym.adaptation.turns import CorrectedTurns
     from ddagr_gym.diagnosis.answer.verdict import Diagnosis
-    from ddagr_gym.parameters import Robot
+    from ddagr_gym.parameters import Robot, Soil
 
 _UNKNOWN = "unknown"
 
@@ -91,8 +91,8 @@ class AdaptationResult(Report):
 
 def adapt(
     recordings: Sources | None = None,
-    robot: RobotLike = DEFAULT_ROBOT,
-    soil: SoilLike = DEFAULT_SOIL,
+    robot: RobotLike | None = None,
+    soil: SoilLike | None = None,
     *,
     diagnosis: str | os.PathLike[str] | None = None,
     calibration: str | os.PathLike[str] | None = None,
@@ -120,7 +120,8 @@ def adapt(
     Args:
         recordings: one or several recordings of the robot on the ground in question; None with a diagnosis or
             calibration that is finished.
-        robot: nominal: name, YAML file or object; with a diagnosis, that with which the drives were diagnosed.
+        robot: nominal: name, YAML file or object; with a diagnosis, that with which the drives were diagnosed, which is
+            taken where it is None; of recordings None as in :func:`ddagr_gym.diagnose`.
         soil: nominal, likewise.
         diagnosis: folder that ``ddagr diagnose`` wrote, in place of recordings.
         calibration: folder that ``ddagr calibrate`` wrote, in place of robot and soil: alone, or with recordings that
@@ -171,19 +172,21 @@ def adapt(
     place = None if cache is None else expanded(cache)
     if recordings is not None:
         options = {"seed": seed, "threads": threads, "column_map": column_map, "progress": progress}
-        found = _diagnosed(recordings, robot, soil, calibration, ground, place, options)
+        found, answer = _diagnosed(recordings, robot, soil, calibration, ground, place, options)
         if controller == "B6":
-            known = robot if calibration is None else None
-            taken = recordings_from(recordings, known, column_map)
+            taken = recordings_from(recordings, None if calibration is not None else found.robot, column_map)
             found = replace(found, sensors=measured_sensors(taken, found.robot))
     elif diagnosis is not None:
-        found = corrected_by_diagnosis(Path(diagnosis))
-        _check_same_robot(found, robot_from(robot))
+        found, answer = corrected_by_diagnosis(Path(diagnosis)), _answer_in(Path(diagnosis))
     else:
         assert calibration is not None
-        found = corrected_by_calibration(Path(calibration), ground)
+        found, answer = corrected_by_calibration(Path(calibration), ground), None
     usable = _usable(found, anyway)
-    nominal = (usable.robot, usable.soil) if calibration is not None else (robot_from(robot), soil_from(soil))
+    if calibration is not None or answer is None:
+        nominal = usable.robot, usable.soil
+    else:
+        nominal = _nominal_of(answer, robot, soil)
+        _check_same_robot(usable, nominal[0])
     effort = Effort(report=turns)
     simulated = CorrectedTurns(usable, radius, speed, seed)
     with counting(effort.turns(controller), "turns", progress) as counter:
@@ -220,15 +223,24 @@ def _check_same_robot(found: Corrected, nominal: Robot) -> None:
         )
 
 
+def _nominal_of(answer: Diagnosis, robot: RobotLike | None, soil: SoilLike | None) -> tuple[Robot, Soil]:
+    """Robot and soil as given, else those with which drives were diagnosed."""
+    named = answer.options.robot_file or answer.robot or DEFAULT_ROBOT
+    return (
+        robot_from(named if robot is None else robot),
+        soil_from((answer.soil or DEFAULT_SOIL) if soil is None else soil),
+    )
+
+
 def _diagnosed(
     recordings: Sources,
-    robot: RobotLike,
-    soil: SoilLike,
+    robot: RobotLike | None,
+    soil: SoilLike | None,
     calibration: str | os.PathLike[str] | None,
     ground: str,
     cache: Path | None,
     options: Mapping[str, Any],
-) -> Corrected:
+) -> tuple[Corrected, Diagnosis]:
     """What recordings say: against the nominal simulator, or against a calibration's ordinary drives."""
     from ddagr_gym.adaptation.corrected import Corrected
     from ddagr_gym.api.diagnose import diagnose
@@ -243,12 +255,13 @@ def _diagnosed(
     else:
         result = diagnose(recordings, calibration=calibration, ground=ground, names_only=True, **options)
         base = corrected_by_calibration(Path(calibration), ground)
-    return replace(
+    found = replace(
         base,
         effects=result.effects,
         intervals=tuple(effect_intervals(result.diagnosis, result.effects)),
         **_answer(result.diagnosis),
     )
+    return found, result.diagnosis
 
 
 def _answer(diagnosis: Diagnosis) -> dict[str, Any]:
@@ -262,13 +275,10 @@ def corrected_by_diagnosis(folder: Path) -> Corrected:
         InputError: a file is missing or wrong.
     """
     from ddagr_gym.adaptation.corrected import Corrected
-    from ddagr_gym.diagnosis.result.files import load
     from ddagr_gym.physics.effects import load_effects, load_intervals
     from ddagr_gym.presets import get_robot, get_soil
 
-    place = folder.expanduser()
-    place = place.parent if place.is_file() else place
-    answer = load(place / "diagnosis.json")
+    answer, place = _answer_in(folder), _folder_of(folder)
     for name in ("robot.yaml", "soil.yaml", "effects.yaml"):
         if not (place / name).is_file():
             raise InputError(f"{place} holds no {name}, so that there is no corrected simulator: diagnose again.")
@@ -279,6 +289,19 @@ def corrected_by_diagnosis(folder: Path) -> Corrected:
         load_intervals(place / "effects.yaml"),
         **_answer(answer),
     )
+
+
+def _folder_of(place: Path) -> Path:
+    """Folder of a diagnosis by itself, or by the diagnosis.json in it."""
+    place = place.expanduser()
+    return place.parent if place.is_file() else place
+
+
+def _answer_in(folder: Path) -> Diagnosis:
+    """What a folder of ``ddagr diagnose`` says; InputError where it cannot be read."""
+    from ddagr_gym.diagnosis.result.files import load
+
+    return load(_folder_of(folder) / "diagnosis.json")
 
 
 def corrected_by_calibration(folder: Path, ground: str = "") -> Corrected:

@@ -14,16 +14,12 @@ from ddagr_gym.api.diagnosis_result import DiagnosisResult
 from ddagr_gym.api.drivetrain_fit import DrivetrainFit
 from ddagr_gym.api.inputs import Sources, recordings_from
 from ddagr_gym.api.nominal import (
-    DEFAULT_SOIL,
     Nominal,
     RobotLike,
     SoilLike,
     ThresholdsLike,
     check_left_out,
-    nominal_from,
-    robot_from,
-    robot_or_recorded,
-    soil_or_usual,
+    nominal_or_usual,
     thresholds_from,
 )
 from ddagr_gym.errors import InputError, InputWarning, at_least
@@ -32,7 +28,6 @@ from ddagr_gym.progress import counting
 
 if TYPE_CHECKING:
     from ddagr_gym.diagnosis.gates.thresholds import Thresholds
-    from ddagr_gym.recordings.schema import Recording
 
 __all__ = ["ChangeResult", "DiagnosisResult", "diagnose"]
 
@@ -145,10 +140,10 @@ def diagnose(
     Args:
         recordings: one or several recordings, tables with the schema's columns, paths of files or folders.
         robot: nominal: name, YAML file or object. Where it is None, the one that the recordings name, else the ddagr
-            with a warning.
-        soil: nominal: name, YAML file or object. Where it is None, that of the thresholds (thesis_a1 for the ddagr),
-            else firm_ground at four times the usual uncertainty, which stands for ground that is not known; but for the
-            ddagr a warning says so.
+            with a warning; files that cannot be read without it are refused.
+        soil: nominal: name, YAML file or object. Where it is None, that of thresholds that are given or ship for the
+            robot (thesis_a1 for the ddagr), else firm_ground at four times the usual uncertainty, which stands for
+            ground that is not known. But for the ddagr, and with drives from before, a warning says so.
         calibration: folder that ``ddagr calibrate`` wrote: the robot, its grounds and its ordinary drives stand
             for robot, soil, thresholds and windows, which are left out then.
         ground: of the calibration that the recordings are on; "" for one of which only the kind is known, where far
@@ -202,7 +197,7 @@ def diagnose(
     if before is not None:
         _check_only_before(calibration, ground, thresholds=thresholds, stride=stride, soil_uncertainty=soil_uncertainty)
         given, earlier = (recordings_from(drives, robot, column_map) for drives in (recordings, _some(before)))
-        nominal, _ = _nominal((*given, *earlier), robot, soil, soil_uncertainty, None)
+        nominal, _ = nominal_or_usual((*given, *earlier), robot, soil, say_soil=False)
         given, earlier = (recordings_from(drives, nominal.robot) for drives in (given, earlier))
         say = (lambda line: None) if progress is None else progress
         return changed_since(
@@ -222,9 +217,7 @@ def diagnose(
         raise InputError(f"the ground is {ground!r} and there is no calibration: name its folder with --calibration.")
     need("ruptures", *(() if names_only else ("sklearn",)))
     found = recordings_from(recordings, robot, column_map)
-    nominal, uncertainty = _nominal(found, robot, soil, soil_uncertainty, thresholds)
-    if soil is None:
-        _say_usual_soil(nominal, uncertainty)
+    nominal, uncertainty = nominal_or_usual(found, robot, soil, soil_uncertainty, thresholds)
     found = recordings_from(found, nominal.robot)
     priors = NuisancePriors().with_soil(uncertainty)
     gates = _gates(thresholds, nominal, uncertainty)
@@ -291,37 +284,6 @@ def _robot_of(folder: Path) -> str:
 
     load(folder)
     return robot_file(folder)
-
-
-def _nominal(
-    recordings: Sequence[Recording],
-    robot: RobotLike | None,
-    soil: SoilLike | None,
-    soil_uncertainty: float | None,
-    thresholds: ThresholdsLike | None,
-) -> tuple[Nominal, float]:
-    """Robot and soil as given, else the usual ones, and how uncertain the soil is; InputError for unknown names."""
-    from ddagr_gym.diagnosis.gates.threshold_files import load_thresholds, shipped_thresholds
-    from ddagr_gym.diagnosis.gates.thresholds import Thresholds
-
-    chosen = robot_or_recorded(robot, recordings)
-    banks = [shipped_thresholds(robot_from(chosen).name)]
-    if thresholds is not None:
-        banks.insert(0, thresholds if isinstance(thresholds, Thresholds) else load_thresholds(Path(thresholds)))
-    nominal_soil, uncertainty = soil_or_usual(soil, soil_uncertainty, banks)
-    return nominal_from(chosen, nominal_soil), uncertainty
-
-
-def _say_usual_soil(nominal: Nominal, soil_uncertainty: float) -> None:
-    """Warn of a soil that was not given, but of the ddagr's own."""
-    if nominal.soil_name != DEFAULT_SOIL:
-        warnings.warn(
-            f"no soil is given: the {nominal.robot.name} is taken to be on {nominal.soil_name}, at "
-            f"{soil_uncertainty:g} times a soil's usual uncertainty; name a soil with --soil (soil=... in Python) "
-            "where it is known.",
-            InputWarning,
-            stacklevel=3,
-        )
 
 
 def _gates(given: ThresholdsLike | None, nominal: Nominal, soil_uncertainty: float) -> Thresholds:

@@ -27,7 +27,7 @@ ThresholdsLike: TypeAlias = Union["Thresholds", str, os.PathLike[str]]
 """Thresholds, or the path of a file that ``ddagr null-bank`` wrote."""
 
 DEFAULT_ROBOT, DEFAULT_SOIL = "ddagr", "thesis_a1"
-"""Nominal ones where none are given, which say nothing beside a calibration."""
+"""Nominal ones where nothing says others."""
 
 UNKNOWN_GROUND = ("firm_ground", 4.0)
 """Nominal soil of ground that nobody named, and the factor on its uncertainty."""
@@ -90,7 +90,7 @@ def robot_or_recorded(robot: RobotLike | None, recordings: Sequence[Recording]) 
             f"{recordings[0].meta.source} does not say which robot drove: it is taken for the {DEFAULT_ROBOT}; name "
             "the robot with --robot (robot=... in Python).",
             InputWarning,
-            stacklevel=3,
+            stacklevel=4,
         )
     return DEFAULT_ROBOT if recorded is None else recorded
 
@@ -113,24 +113,60 @@ def soil_or_usual(
     return soil, usual if soil_uncertainty is None else soil_uncertainty
 
 
+def nominal_or_usual(
+    recordings: Sequence[Recording],
+    robot: RobotLike | None,
+    soil: SoilLike | None,
+    soil_uncertainty: float | None = None,
+    thresholds: ThresholdsLike | None = None,
+    *,
+    say_soil: bool = True,
+) -> tuple[Nominal, float]:
+    """Robot and soil as given, else the usual ones, and how uncertain the soil is.
+
+    Args:
+        recordings: of the robot.
+        robot: as of :func:`robot_or_recorded`.
+        soil: as of :func:`soil_or_usual`.
+        soil_uncertainty: likewise.
+        thresholds: as of :func:`thresholds_from`.
+        say_soil: whether an InputWarning says a soil that is not given, but the ddagr's own.
+
+    Raises:
+        InputError: an unknown name, with the closest ones; a file that is missing or not valid.
+    """
+    from ddagr_gym.diagnosis.gates.threshold_files import load_thresholds, shipped_thresholds
+    from ddagr_gym.diagnosis.gates.thresholds import Thresholds
+
+    chosen = robot_or_recorded(robot, recordings)
+    banks = [shipped_thresholds(robot_from(chosen).name)]
+    if thresholds is not None:
+        banks.insert(0, thresholds if isinstance(thresholds, Thresholds) else load_thresholds(Path(thresholds)))
+    nominal_soil, uncertainty = soil_or_usual(soil, soil_uncertainty, banks)
+    nominal = nominal_from(chosen, nominal_soil)
+    if say_soil and soil is None and (nominal.robot.name, nominal.soil_name) != (DEFAULT_ROBOT, DEFAULT_SOIL):
+        warnings.warn(
+            f"no soil is given: the {nominal.robot.name} is taken to be on {nominal.soil_name}, at {uncertainty:g} "
+            "times a soil's usual uncertainty; name a soil with --soil (soil=... in Python) where it is known.",
+            InputWarning,
+            stacklevel=3,
+        )
+    return nominal, uncertainty
+
+
 def check_left_out(calibration: Path, robot: RobotLike | None, soil: SoilLike | None, **options: object) -> None:
     """Refuse what a calibration already says.
 
     Args:
         calibration: its folder.
-        robot: None or :data:`DEFAULT_ROBOT` where none is given.
-        soil: None or :data:`DEFAULT_SOIL` where none is given.
-        options: further ones by name; None where they are not given.
+        robot: None where none is given, as the others.
+        soil: likewise.
+        options: further ones by name.
 
     Raises:
         InputError: one of them is given.
     """
-    beside = {
-        "robot": None if robot == DEFAULT_ROBOT else robot,
-        "soil": None if soil == DEFAULT_SOIL else soil,
-        **options,
-    }
-    given = [name for name, value in beside.items() if value is not None]
+    given = [name for name, value in {"robot": robot, "soil": soil, **options}.items() if value is not None]
     if given:
         raise InputError(f"a calibration and {given[0]} are given: leave out one of them, {calibration} has both.")
 

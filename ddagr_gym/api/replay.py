@@ -9,7 +9,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ddagr_gym.api.inputs import Sources, recordings_from
-from ddagr_gym.api.nominal import RobotLike, SoilLike, recorded_robot, robot_from, soil_from, soil_label
+from ddagr_gym.api.nominal import (
+    DEFAULT_ROBOT,
+    DEFAULT_SOIL,
+    RobotLike,
+    SoilLike,
+    recorded_robot,
+    robot_from,
+    soil_from,
+    soil_label,
+)
 from ddagr_gym.api.results import Report, Table
 from ddagr_gym.api.simulate import EffectsLike
 from ddagr_gym.errors import InputError, at_least
@@ -111,7 +120,7 @@ def replay(
     Args:
         recordings: one or several recordings, tables with the schema's columns, paths of files or folders.
         robot: that drove: name, YAML file or object; the recordings' own when it is None.
-        soil: nominal: name, YAML file or object; thesis_a1 when it is None and there is no calibration.
+        soil: nominal: name, YAML file or object; None with a calibration, and for the ddagr on thesis_a1.
         effects: missing physics to add: ``name=size`` texts, objects (``result.effects`` of a diagnosis) or a file.
         calibration: folder that ``ddagr calibrate`` wrote, whose robot, soil and sensors are taken as they are.
         ground: of the calibration; may be left out where it has only one.
@@ -150,10 +159,12 @@ def replay(
         effects = (*known, *load_effects(effects))
     elif ground:
         raise InputError(f"the ground is {ground!r} and there is no calibration: name its folder with --calibration.")
-    soil = "thesis_a1" if soil is None else soil
     found = recordings_from(recordings, robot, column_map)
     added = (*load_effects(effects), *(slopes if slopes and in_one_frame(found) else ()))
     nominal = driven_robot(robot, found)
+    if soil is None and nominal.name != DEFAULT_ROBOT:
+        raise InputError(f"no soil is given for the robot {nominal.name}: name one, or the folder of a calibration.")
+    soil = DEFAULT_SOIL if soil is None else soil
     settings = ReplaySettings(window, refit, added, threads=threads, seed=seed)
     groups = [found] if together else [(recording,) for recording in found]
     with counting(steps(len(groups)), "replaying", progress) as count:

@@ -99,6 +99,10 @@ class Comparison:
             states=start.states, iterations=iterations, give_up=partial(is_hopeless, rival),
         )  # fmt: skip
 
+    def cost(self, model: RobotModel, standing: Standing) -> float:
+        """Cost of a model where the fit of another one stands."""
+        return self.fitted(model, standing, iterations=0).fitted.cost
+
     def forecasts(self, fitted: FittedModel) -> tuple[Forecast, ...]:
         """Of every fold, by a fitted model."""
         return tuple(forecasts(self.data, fitted, self.judged, self.weights, self.threads))
@@ -175,15 +179,14 @@ def is_missed(growth: float, error: float, folds: int, usual: bool = False) -> b
 def misses(before: Sequence[Candidate], after: Candidate, usual: bool = False) -> tuple[bool, float, float]:
     """Whether a model misses a part, and growth and standard error of its losses as of :func:`most_worse_by`.
 
-    One of those before whose fit is no better says nothing of the part: its fit stopped short of one without it.
-
     Args:
-        before: with the part; the last one is what it was taken out of.
+        before: with the part: the first has all parts, the last is what it was taken out of. One between them whose
+            fit is no better says nothing: it stopped short of a fit without the part.
         after: without it.
         usual: whether nearly every robot has the part.
     """
-    better = [one for one in before if one.cost < after.cost]
-    growth, error = most_worse_by(better or before, after, usual)
+    between = [one for one in before[1:-1] if one.cost < after.cost]
+    growth, error = most_worse_by((before[0], *between, before[-1]), after, usual)
     is_worse = before[-1].cost < after.cost
     return is_worse and is_missed(growth, error, len(after.losses), usual), growth, error
 

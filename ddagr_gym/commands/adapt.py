@@ -36,8 +36,9 @@ class Arguments:
         runs: recordings (Parquet of `ddagr import`, or any source that it takes); none with a finished diagnosis.
         output: folder to write: controller.yaml, robot.yaml, soil.yaml and effects.yaml, which `ddagr evaluate
             --controllers FOLDER` loads, adaptation.json, and the page, index.html.
-        robot: nominal robot (see `ddagr robots`), or the path of a YAML file with one's own.
-        soil: nominal soil (see `ddagr soils`), or the path of a YAML file with one's own.
+        robot: nominal robot (see `ddagr robots`), or the path of a YAML file with one's own; when it is left out that
+            of the diagnosis, or as for `ddagr diagnose`.
+        soil: nominal soil (see `ddagr soils`), or the path of a YAML file with one's own; likewise.
         diagnosis: folder that `ddagr diagnose` wrote, in place of recordings.
         calibration: folder that `ddagr calibrate` wrote, in place of robot and soil: alone, or with recordings that are
             compared with its ordinary drives (made without --no-bank then).
@@ -56,8 +57,8 @@ class Arguments:
 
     output: Annotated[Path, tyro.conf.arg(aliases=("-o",))]
     runs: Positional[tuple[Path, ...]] = ()
-    robot: str = "ddagr"
-    soil: str = "thesis_a1"
+    robot: str = ""
+    soil: str = ""
     diagnosis: Path | None = None
     calibration: Path | None = None
     ground: str = ""
@@ -84,8 +85,8 @@ def run(arguments: Arguments) -> None:
     with resumable(parts):
         result = ddagr_gym.adapt(
             list(arguments.runs) or None,
-            arguments.robot,
-            arguments.soil,
+            arguments.robot or None,
+            arguments.soil or None,
             **_options(arguments),
             progress=LinePrinter("ddagr adapt: "),
             cache=parts,

@@ -46,8 +46,8 @@ class Arguments:
         robot: nominal robot (see `ddagr robots`), or the path of a YAML file with one's own; the one that the
             recordings name when it is left out.
         soil: nominal soil (see `ddagr soils`), or the path of a YAML file with one's own; when it is left out that of
-            the thresholds (thesis_a1 for the ddagr), else firm_ground at four times a soil's usual uncertainty, for
-            ground that is not known.
+            thresholds that are given or ship for the robot (thesis_a1 for the ddagr), else firm_ground at four times a
+            soil's usual uncertainty, for ground that is not known.
         calibration: folder that `ddagr calibrate` wrote, whose robot, grounds and ordinary drives the recordings
             are compared with; robot, soil, thresholds, window and stride are left out then.
         ground: of the calibration that the recordings are on; left out for one that it does not know.

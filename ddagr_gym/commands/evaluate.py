@@ -101,12 +101,20 @@ def run(arguments: Arguments) -> None:
     print(f"\nThe page is {page.resolve()}; episodes and summary are beside it.")
 
 
-def _check_folder(folder: Path) -> None:
-    """Refuse a folder with other files than those of an evaluation, which goes on where it was; InputError."""
-    from ddagr_gym.evaluation.dataset import EPISODES
+_WRITTEN = ("report.html", "summary.json", "claims.json", "episodes.parquet")
+"""Files of an evaluation, beside the dataset and the figures."""
 
-    if folder.is_dir() and any(folder.iterdir()) and not (folder / EPISODES).exists():
-        raise InputError(f"{folder} holds files and no evaluation ({EPISODES}): choose another folder.")
+
+def _check_folder(folder: Path) -> None:
+    """Refuse a folder whose files would be replaced though no evaluation wrote them; InputError."""
+    from ddagr_gym.evaluation.campaign import EARLIER
+    from ddagr_gym.evaluation.dataset import EPISODES, MANIFEST
+
+    if (folder / EPISODES / MANIFEST).is_file() or (folder / EARLIER).is_file():
+        return
+    for name in (EPISODES, *_WRITTEN):
+        if (folder / name).exists():
+            raise InputError(f"{folder} holds {name}, which no evaluation wrote: choose another folder.")
 
 
 def _names(text: str, option: str) -> list[str]:

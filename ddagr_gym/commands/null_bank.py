@@ -17,6 +17,7 @@ from ddagr_gym.files import check_output_file, make_folder
 from ddagr_gym.tasks import ResultStore, Task, TaskRunner, run_tasks
 
 if TYPE_CHECKING:
+    from ddagr_gym.api.nominal import Nominal
     from ddagr_gym.diagnosis.gates.thresholds import NullKind, NullRun, Origin
     from ddagr_gym.diagnosis.null_bank.bank import NullBank
     from ddagr_gym.diagnosis.null_bank.drives import Template
@@ -49,7 +50,7 @@ class Arguments:
         piece: length of such a piece [s], at least 16 (8 windows of 2 s).
         output: thresholds to write, .json; the runs themselves lie beside it.
         robot: nominal robot: name (ddagr robots) or YAML file.
-        soil: nominal soil: name (ddagr soils) or YAML file.
+        soil: nominal soil: name (ddagr soils) or YAML file; as for `ddagr diagnose` when it is left out.
         map: column map, for sources that are not imported yet.
         count: null drives to simulate; at least 20 for the level of 5 percent.
         seed: of the bank.
@@ -63,13 +64,13 @@ class Arguments:
     output: Annotated[Path, tyro.conf.arg(aliases=("-o",))]
     runs: Positional[tuple[Path, ...]] = ()
     robot: str = "ddagr"
-    soil: str = "thesis_a1"
+    soil: str = ""
     map: str = ""
     ordinary: bool = False
     piece: float = 60.0
     count: int = 60
     seed: int = 0
-    soil_uncertainty: float = 1.0
+    soil_uncertainty: float | None = None
     window: float = 6.0
     stride: float | None = None
     processes: int = 2
@@ -79,6 +80,7 @@ class Arguments:
 def run(arguments: Arguments) -> None:
     """Make what is missing of the bank, then write the thresholds."""
     from ddagr_gym.api.inputs import recordings_from
+    from ddagr_gym.api.nominal import nominal_or_usual
     from ddagr_gym.diagnosis.gates.threshold_files import save_thresholds
     from ddagr_gym.diagnosis.gates.thresholds import thresholds_from
     from ddagr_gym.diagnosis.null_bank.bank import NullBank
@@ -88,14 +90,14 @@ def run(arguments: Arguments) -> None:
     from ddagr_gym.diagnosis.setting import Setting
     from ddagr_gym.identification.noise import noise_from_differences
     from ddagr_gym.identification.nuisances import NuisancePriors
-    from ddagr_gym.presets import get_robot, get_soil
 
     _check_options(arguments)
     check_output_file(arguments.output)
-    robot, soil = get_robot(arguments.robot), get_soil(arguments.soil)
     given = recordings_from(arguments.runs, arguments.robot, arguments.map or None) if arguments.runs else ()
+    nominal, uncertainty = nominal_or_usual(given, arguments.robot, arguments.soil or None, arguments.soil_uncertainty)
+    robot, soil = nominal.robot, nominal.soil
     recordings = _mended(given)
-    priors = NuisancePriors().with_soil(arguments.soil_uncertainty)
+    priors = NuisancePriors().with_soil(uncertainty)
     setting = Setting(priors=priors).with_windows(arguments.window, arguments.stride)
     template: Template | None = None
     centre: _Centre = None
@@ -112,7 +114,7 @@ def run(arguments: Arguments) -> None:
     bank, folder = made_of.key(), make_folder(arguments.output.with_suffix(".bank"))
     made = _make(made_of, [f"{bank[:16]}_{n:03d}" for n in range(len(drives))], folder, arguments)
     runs = [replace(run, own=number < len(drives) - len(longer)) for number, run in enumerate(made)]
-    found = thresholds_from(runs, bank, origin=_origin(arguments, robot))
+    found = thresholds_from(runs, bank, origin=_origin(arguments, nominal, uncertainty))
     save_thresholds(found, arguments.output)
     beside = f" and {len(longer)} longer ones" if longer else ""
     print(f"{arguments.output}: thresholds of {found.nulls} null drives{beside}, bank {bank[:12]}")
@@ -168,12 +170,11 @@ def _pieces(
     return pieces, [run for recording in recordings for run in longer_runs(recording, length)]
 
 
-def _origin(arguments: Arguments, robot: Robot) -> Origin:
+def _origin(arguments: Arguments, nominal: Nominal, soil_uncertainty: float) -> Origin:
     from ddagr_gym.diagnosis.gates.thresholds import Origin
-    from ddagr_gym.presets import full_name
 
     kind: NullKind = "ordinary" if arguments.ordinary else "simulated"
-    return Origin(robot.name, full_name(arguments.soil), arguments.soil_uncertainty, arguments.seed, kind)
+    return Origin(nominal.robot.name, nominal.soil_name, soil_uncertainty, arguments.seed, kind)
 
 
 def _make(bank: NullBank, keys: Sequence[str], folder: Path, arguments: Arguments) -> list[NullRun]:

@@ -79,10 +79,10 @@ def build_recording(
     table, duplicates = _without_duplicates(table, column_map, notes)
     t, start_time, spans, segments = _time_base(table, column_map, notes)
     channels = _channels(table, column_map, geometry, notes)
-    held = _mark_held(channels, table, column_map, t, spans, notes)
-    valid = _command_valid(table, column_map, channels, notes)
     if not any(np.isfinite(values).any() for values in channels.values()):
         raise InputError(f"no channel of the map {column_map.name} holds a number: correct the map or the file.")
+    held = _mark_held(channels, table, column_map, t, spans, notes)
+    valid = _command_valid(table, column_map, channels, notes)
     meta = RecordingMeta(
         robot=geometry.name if geometry else "",
         source=source,

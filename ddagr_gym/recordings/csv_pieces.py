@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,11 +26,11 @@ class PieceParser:
     Args:
         path: of the file, for messages.
         head: of the file.
-        numbers: columns to parse as numbers, or as time stamps where they begin with one.
-        labels: columns to parse as text, also where they are among the numbers.
+        numbers: columns to parse as numbers.
+        texts: columns to parse as text, also where they are among the numbers.
     """
 
-    def __init__(self, path: Path, head: CsvHead, numbers: Sequence[str], labels: Sequence[str]) -> None:
+    def __init__(self, path: Path, head: CsvHead, numbers: Sequence[str], texts: Iterable[str]) -> None:
         import pyarrow as pa
         from pyarrow import csv as arrow_csv
 
@@ -39,15 +39,13 @@ class PieceParser:
         self._rows = 1
         self._extra_row = head.delimiter.join("0" * len(head.names)).encode()
         self._parse = arrow_csv.ParseOptions(delimiter=head.delimiter)
-        kinds = dict.fromkeys(numbers, pa.float64())
-        zones = {name: "UTC" if zoned else None for name, zoned in head.time_stamps.items() if name in kinds}
-        kinds |= {name: pa.timestamp("ns", zone) for name, zone in zones.items()}
-        kinds |= dict.fromkeys(labels, pa.string())
+        self._decimal = head.decimal_sign(numbers)
+        kinds = {**dict.fromkeys(numbers, pa.float64()), **dict.fromkeys(texts, pa.string())}
         self._convert = arrow_csv.ConvertOptions(
             include_columns=list(kinds),
             column_types=kinds,
             strings_can_be_null=False,
-            decimal_point=head.decimal_point,
+            decimal_point=self._decimal,
         )
 
     def batches(self, stream: BoundedStream) -> Iterator[pa.RecordBatch]:
@@ -82,7 +80,8 @@ class PieceParser:
             if self._is_open(piece, table.num_rows):
                 raise self._unsound(f"the quoted field in row {self._rows + table.num_rows} does not end with its line")
         except pa.ArrowException as error:
-            raise self._unsound(re.sub(r"Row #(\d+)", self._row_of_the_file, str(error))) from None
+            reason = re.sub(r"Row #(\d+)", self._row_of_the_file, str(error))
+            raise (self._no_number(reason) if "conversion error" in reason else self._unsound(reason)) from None
         self._rows += table.num_rows
         yield from table.to_batches()
 
@@ -103,6 +102,13 @@ class PieceParser:
 
     def _row_of_the_file(self, found: re.Match[str]) -> str:
         return f"Row #{self._rows + int(found[1])}"
+
+    def _no_number(self, reason: str) -> InputError:
+        sign = {".": "point", ",": "comma"}[self._decimal]
+        return damaged(
+            self._path, ValueError(reason), "holds something else where a number belongs",
+            f"correct it; numbers have a decimal {sign} here, and times may be dates such as 2026-05-04T10:00:00.05",
+        )  # fmt: skip
 
     def _unsound(self, reason: str) -> InputError:
         return damaged(self._path, ValueError(reason), "is not a sound CSV file", "correct or delete that place")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +20,15 @@ from ddagr_gym.recordings.schema import FloatArray
 if TYPE_CHECKING:
     import pyarrow as pa
 
+_DATE_SPELLINGS = (
+    (r"^\s+|\s+$", ""),
+    ("t", "T"),
+    (r"\s*(z|UTC|GMT)$", "Z"),
+    (r"\s+([+-][0-9:]+)$", r"\1"),
+    (r"[,.]([0-9]{1,9})[0-9]*", r".\1"),
+)
+"""Patterns in dates with a time of day, and what a parser of ISO 8601 takes in their place."""
+
 _MOST_LABELS = 100_000  # different values of a column that numbers spans (ours): more are readings, not labels
 
 
@@ -35,9 +45,11 @@ def read_csv(path: Path, column_map: ColumnMap, limits: Limits = DEFAULT_LIMITS)
     """
     head = csv_head(path, limits, column_map.delimiter)
     numbers, labels = wanted_columns(path, column_map, head.names)
-    collector = Collector(numbers, labels, limits, path)
+    zones = head.time_zones(time_columns(column_map))
+    check_unit_of_dates(path, column_map, zones)
+    collector = Collector(numbers, labels, limits, path, zones)
     # A column may serve both as a number and as a label; text converts to either.
-    parser = PieceParser(path, head, numbers, labels)
+    parser = PieceParser(path, head, numbers, (*labels, *(name for name in zones if name in numbers)))
     with open_text(path, limits) as stream:
         for batch in parser.batches(stream):
             collector.add(batch)
@@ -61,14 +73,46 @@ def wanted_columns(
     return tuple(dict.fromkeys(numbers)), tuple(c for c in column_map.label_columns() if c in names)
 
 
+def time_columns(column_map: ColumnMap) -> tuple[str, ...]:
+    """Columns that a map takes time from."""
+    time = column_map.time
+    return (time.column,) if time.absolute_column is None else (time.column, time.absolute_column)
+
+
+def check_unit_of_dates(path: Path, column_map: ColumnMap, names: Iterable[str]) -> None:
+    """Refuse a unit of time for columns that hold dates, which say their own; InputError."""
+    for name in names:
+        if column_map.time.unit != "s":
+            raise InputError(
+                f"column {name!r} of {path.name} holds dates, whose unit is their own, and the column map says unit: "
+                f"{column_map.time.unit}: leave unit out under time in the map."
+            )
+
+
 def _absolute(column_map: ColumnMap, names: tuple[str, ...]) -> bool:
     return column_map.time.absolute_column in names
 
 
 class Collector:
-    """Gathers record batches into float arrays and coded labels under the limits."""
+    """Gathers record batches into float arrays and coded labels under the limits.
 
-    def __init__(self, numbers: tuple[str, ...], labels: tuple[str, ...], limits: Limits, path: Path) -> None:
+    Args:
+        numbers: columns that become float arrays.
+        labels: columns that become codes.
+        limits: on rows.
+        path: of the file, for messages.
+        zones: columns of text that holds dates with a time of day, and whether it says the time zone.
+    """
+
+    def __init__(
+        self,
+        numbers: tuple[str, ...],
+        labels: tuple[str, ...],
+        limits: Limits,
+        path: Path,
+        zones: Mapping[str, bool] | None = None,
+    ) -> None:
+        self._zones = zones or {}
         self._numbers: dict[str, list[FloatArray]] = {name: [] for name in numbers}
         self._labels: dict[str, list[npt.NDArray[np.int64]]] = {name: [] for name in labels}
         self._codes: dict[str, dict[str, int]] = {name: {} for name in labels}
@@ -98,6 +142,8 @@ class Collector:
         import pyarrow as pa
 
         try:
+            if name in self._zones:
+                column = as_dates(column, zoned=self._zones[name])
             if pa.types.is_temporal(column.type):
                 # Time stamps count in the unit of their own type; the map's unit is then seconds.
                 column = column.cast(pa.timestamp("ns")).cast(pa.int64())
@@ -122,3 +168,19 @@ class Collector:
             )
         codes = np.asarray(encoded.indices.to_numpy(zero_copy_only=False), dtype=np.int64)
         return np.asarray(local, dtype=np.int64)[codes] if local else codes
+
+
+def as_dates(column: pa.StringArray, *, zoned: bool) -> pa.TimestampArray:
+    """Text with dates and times of day as times; empty where the text is.
+
+    Args:
+        column: as ISO 8601, also with a decimal comma, more than nine digits, small letters or a name of the zone.
+        zoned: whether it says the time zone.
+    """
+    import pyarrow as pa
+    from pyarrow import compute
+
+    for pattern, replacement in _DATE_SPELLINGS:
+        column = compute.replace_substring_regex(column, pattern=pattern, replacement=replacement)
+    column = compute.if_else(compute.equal(column, ""), None, column)
+    return column.cast(pa.timestamp("ns", "UTC" if zoned else None))

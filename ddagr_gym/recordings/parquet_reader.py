@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from ddagr_gym.errors import InputError
 from ddagr_gym.recordings.column_map import ColumnMap
 from ddagr_gym.recordings.conversion import RawTable
-from ddagr_gym.recordings.csv_reader import Collector, wanted_columns
+from ddagr_gym.recordings.csv_reader import Collector, check_unit_of_dates, time_columns, wanted_columns
 from ddagr_gym.recordings.files import DEFAULT_LIMITS, Limits, damaged, open_source
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ def read_parquet(path: Path, column_map: ColumnMap, limits: Limits = DEFAULT_LIM
     """
     with open_parquet(path, limits) as file:
         numbers, labels = wanted_columns(path, column_map, tuple(file.schema_arrow.names))
-        _check_time_stamps(path, column_map, file.schema_arrow)
+        check_unit_of_dates(path, column_map, _dates(column_map, file.schema_arrow))
         collector = Collector(numbers, labels, limits, path)
         columns = list(dict.fromkeys((*numbers, *labels)))
         for batch in file.iter_batches(batch_size=_BATCH, columns=columns):
@@ -77,14 +77,9 @@ def read_parquet(path: Path, column_map: ColumnMap, limits: Limits = DEFAULT_LIM
         return collector.table()
 
 
-def _check_time_stamps(path: Path, column_map: ColumnMap, schema: pa.Schema) -> None:
-    """Refuse a unit of time for a column whose type says its own."""
+def _dates(column_map: ColumnMap, schema: pa.Schema) -> list[str]:
+    """Columns of time whose type says their unit."""
     import pyarrow as pa
 
-    time = column_map.time
-    for name in (time.column, time.absolute_column):
-        if time.unit != "s" and name in schema.names and pa.types.is_temporal(schema.field(name).type):
-            raise InputError(
-                f"column {name!r} of {path.name} holds time stamps with a unit of their own and the column map says "
-                f"unit: {time.unit}: leave unit out under time in the map."
-            )
+    names = (name for name in time_columns(column_map) if name in schema.names)
+    return [name for name in names if pa.types.is_temporal(schema.field(name).type)]

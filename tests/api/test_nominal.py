@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import ddagr_gym
-from ddagr_gym.api.nominal import UNKNOWN_GROUND, robot_or_recorded, soil_or_usual
+from ddagr_gym.api.nominal import UNKNOWN_GROUND, nominal_or_usual, robot_or_recorded, soil_or_usual
 from ddagr_gym.diagnosis.gates.threshold_files import shipped_thresholds
 from ddagr_gym.errors import InputError, InputWarning
 from ddagr_gym.recordings.schema import Recording
@@ -59,17 +60,36 @@ def test_what_is_given_of_a_soil_is_kept():
     assert soil_or_usual(None, 2.0, bank) == ("firm_ground", 2.0)
 
 
-@pytest.mark.parametrize(("robot", "said"), [("husky", True), ("ddagr", False)])
-def test_a_diagnosis_says_a_soil_that_it_assumes(robot, said):
+@pytest.mark.parametrize(
+    ("robot", "thresholds", "ground"),
+    [("husky", None, "firm_ground, at 4 times"), ("husky", "ddagr", "thesis_a1, at 1 times"), ("ddagr", None, None)],
+)
+def test_a_soil_that_is_assumed_is_said_but_for_the_ddagr(robot, thresholds, ground):
+    bank = None if thresholds is None else shipped_thresholds(thresholds)
+    with warnings.catch_warnings(record=True) as warned:
+        warnings.simplefilter("always")
+        nominal_or_usual([drive("")], robot, None, None, bank)
+    lines = [str(item.message) for item in warned]
+    assert lines == (
+        []
+        if ground is None
+        else [
+            f"no soil is given: the {robot} is taken to be on {ground} a soil's usual uncertainty; name a soil with "
+            "--soil (soil=... in Python) where it is known."
+        ]
+    )
+
+
+def test_a_diagnosis_warns_where_it_is_called():
     """The drive is too short for a diagnosis, which is found after robot and soil."""
     with pytest.warns(InputWarning) as warned, pytest.raises(InputError, match=r"few|rows"):
-        ddagr_gym.diagnose(drive(""), robot, names_only=True, window=3.0)
-    lines = [str(item.message) for item in warned if "no soil is given" in str(item.message)]
-    assert lines == (
-        [
-            "no soil is given: the husky is taken to be on firm_ground, at 4 times a soil's usual uncertainty; name a "
-            "soil with --soil (soil=... in Python) where it is known."
-        ]
-        if said
-        else []
-    )
+        ddagr_gym.diagnose(drive(""), names_only=True)
+    (said,) = [item for item in warned if "which robot drove" in str(item.message)]
+    assert said.filename == __file__
+
+
+@pytest.mark.parametrize("given", [{"robot": "ddagr"}, {"soil": "thesis_a1"}, {"soil_uncertainty": 1.0}])
+def test_nothing_that_a_calibration_says_is_given_beside_it(given, tmp_path):
+    said = r"calibration and (robot|soil) are given|soil uncertainty is 1 and there is a"
+    with pytest.raises(InputError, match=said):
+        ddagr_gym.diagnose(drive(""), calibration=tmp_path, **given)

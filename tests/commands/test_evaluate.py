@@ -98,10 +98,10 @@ def test_bad_input_is_one_sentence(tmp_path, capsys, arguments, message):
 
 
 def test_a_folder_of_something_else_is_left_alone(tmp_path, capsys):
-    (tmp_path / "thesis.txt").write_text("mine")
+    (tmp_path / "report.html").write_text("mine")
     assert main(["evaluate", "--controllers", "B1", "--scenarios", "V", "--output", str(tmp_path)]) == 2
-    assert "holds files and no evaluation (episodes): choose another folder" in capsys.readouterr().err
-    assert [path.name for path in tmp_path.iterdir()] == ["thesis.txt"]
+    assert "holds report.html, which no evaluation wrote: choose another folder" in capsys.readouterr().err
+    assert [path.read_text() for path in tmp_path.iterdir()] == ["mine"]
 
 
 def test_without_ray_nothing_is_made_ready(tmp_path, capsys, monkeypatch):

@@ -4,6 +4,7 @@ import gzip
 import os
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -66,13 +67,39 @@ def test_labels_are_coded_by_their_text(tmp_path):
         "gz;t\n4;0\n-1,5;0,5\n",
         't,gz\n"0","4"\n"0,5","-1,5"\n',
         't,gz,pair\n0,4,"1,2"\n0.5,-1.5,"3,4"\n',
+        't,gz,"state (off;idle;run;stop)"\n0,4,off\n0.5,-1.5,run\n',
+        "t;gz;firmware\n0;4;1.2\n0,5;-1,5;1.2\n",
+        't;gz;"a;b"\r\n\r\n0;4;1\r\n0,5;-1,5;2\r\n',
     ],
-    ids=["semicolon", "tab", "decimal comma", "another order", "quoted decimal comma", "commas in text"],
-)
+    ids=[
+        "semicolon", "tab", "decimal comma", "another order", "quoted decimal comma", "commas in text",
+        "semicolons in a name", "a point in another column", "quotes and an empty first row",
+    ],
+)  # fmt: skip
 def test_delimiters_and_decimal_commas_are_found(tmp_path, data):
     table = read_csv(write(tmp_path, data), MAP)
     np.testing.assert_array_equal(table.numbers["t"], [0.0, 0.5])
     np.testing.assert_array_equal(table.numbers["gz"], [4.0, -1.5])
+
+
+def test_the_decimal_sign_is_told_by_what_is_read_at_first(tmp_path):
+    """The first 64 KB hold whole numbers, and are cut inside the last of them; behind semicolons a comma is likely."""
+    whole = "".join(f"{i};{i}\n" for i in range(9000))
+    assert len(whole) + 5 > (2**16)
+    table = read_csv(write(tmp_path, "t;gz\n" + whole + "9000,5;-1,5\n"), MAP)
+    assert (table.numbers["t"][-1], table.numbers["gz"][-1]) == (9000.5, -1.5)
+    commas = whole.replace(";", ",")
+    table = read_csv(write(tmp_path, "t,gz\n" + commas + "9000.5,-1.5\n"), MAP)
+    assert (table.numbers["t"][-1], table.numbers["gz"][-1]) == (9000.5, -1.5)
+
+
+@pytest.mark.parametrize("filler", range(8))
+def test_a_number_that_the_end_of_the_head_cuts_says_nothing(tmp_path, filler):
+    """Half of "1.25,x" would be "1", or the text "1,2" of the last column a decimal comma."""
+    row = '1.25,7,"1,25"\n'
+    rows = "x" * filler + "\n" + row * (2**16 // len(row) + 3)
+    table = read_csv(write(tmp_path, "t,gz,x" + rows), MAP)
+    assert set(table.numbers["t"]) == {1.25}
 
 
 def test_a_delimiter_of_the_map_is_kept(tmp_path):
@@ -82,15 +109,23 @@ def test_a_delimiter_of_the_map_is_kept(tmp_path):
     )
 
 
-@pytest.mark.parametrize("zone", ["", "Z", "+02:00"])
-@pytest.mark.parametrize("between", ["T", " "])
-def test_dates_with_a_time_of_day_are_seconds(tmp_path, zone, between):
-    """From the second on a row begins, or without its time, which then is not a number."""
-    rows = "".join(f"2026-05-04{between}10:00:00.{k}{zone},{k}\n" for k in range(3)) + ",3\n"
-    table = read_csv(write(tmp_path, "t,gz\n" + rows), MAP)
-    np.testing.assert_allclose(np.diff(table.numbers["t"]), [0.1, 0.1, np.nan], atol=1e-6)
-    hours = 8 if zone == "+02:00" else 10
-    assert table.numbers["t"][0] == np.datetime64(f"2026-05-04T{hours:02}", "s").astype(np.int64)
+@pytest.mark.parametrize("zone", ["", "Z", "z", " UTC", "+02:00", " +0200"])
+@pytest.mark.parametrize(
+    "stamp", ["2026-05-04T10:00:00.{}", "2026-05-04 10:00:00,{}00", "2026-05-04t10:00:00.{}0000000000"]
+)
+def test_dates_with_a_time_of_day_are_seconds(tmp_path, zone, stamp):
+    """A row without its time has none, also where it is the first."""
+    rows = ";1\n" + "".join(f"{stamp.format(k)}{zone};{k}\n" for k in range(3)) + ";3\n"
+    table = read_csv(write(tmp_path, "t;gz\n" + rows), MAP)
+    np.testing.assert_allclose(np.diff(table.numbers["t"]), [np.nan, 0.1, 0.1, np.nan], atol=1e-6)
+    hours = 8 if "+" in zone else 10
+    assert table.numbers["t"][1] == np.datetime64(f"2026-05-04T{hours:02}", "s").astype(np.int64)
+
+
+def test_dates_have_a_unit_of_their_own(tmp_path):
+    path = write(tmp_path, "t,gz\n2026-05-04T10:00:00,1\n2026-05-04T10:00:01,1\n")
+    with pytest.raises(InputError, match=r"column 't' of run\.csv holds dates, whose unit is their own, .* unit: ms"):
+        read_csv(path, replace(MAP, time=TimeSource("t", "ms")))
 
 
 def test_a_file_without_a_number_is_refused(tmp_path):
@@ -122,10 +157,15 @@ def own_map(tmp_path):
         (b"t,other\n0,0\n", "gz"),
         (b"t,gz\n0,fast\n", "fast"),
         (b"t,gz\n0,1\n1,2,3\n", "Expected 2 columns"),
-        (b"t,gz\n0,\0\n", "not a sound CSV"),
+        (b"t,gz\n0,\0\n", "where a number belongs"),
         (b"t,g\0z\n0,1\n", "unprintable"),
+        (b"t,gz\r0,1\n0.1,1\n", "unprintable"),
+        (b"t;gz\n0;1\n0.5;1,5\n", "invalid value '1,5'.*decimal point"),
+        (b"t;gz\n0;1\n0,5;1.5\n", "invalid value '0,5'.*decimal point"),
+        (b"t,gz\n4 May 10:00,1\n", "times may be dates such as 2026-05-04T10:00:00.05"),
+        (b"t,gz\n0,2026-05-04T10:00:00\n", "where a number belongs"),
         (b"\xff\xfe\x00\x01,,\n", "UTF-8"),
-        (b"t,gz\n0,\xff\n", "not a sound CSV"),
+        (b"t,gz\n0,\xff\n", "where a number belongs"),
         (b"x" * 100_000, "no header"),
         (b"PK\x03\x04zip", "zip archive"),
         (gzip.compress(GOOD.encode(), mtime=0)[:-12], "damaged or truncated"),
