@@ -74,6 +74,22 @@ def test_what_has_no_name_is_refused(diagnosis):
         ddagr_gym.adapt(diagnosis=folder)
 
 
+@pytest.mark.parametrize(
+    ("given", "known"),
+    [
+        ({}, ("husky", "lete_sand_wong")),
+        ({"robot": "warthog"}, ("warthog", "lete_sand_wong")),
+        ({"soil": "firm_ground"}, ("husky", "firm_ground")),
+    ],
+)
+def test_a_controller_knew_what_drives_were_diagnosed_with(diagnosis, monkeypatch, given, known):
+    seen = []
+    monkeypatch.setattr("ddagr_gym.api.adapt._check_same_robot", lambda found, nominal: None)
+    monkeypatch.setattr(run, "adapted", lambda usable, *nominal, **_: seen.extend(nominal[:2]))
+    ddagr_gym.adapt(diagnosis=diagnosis(robot="husky", soil="lete_sand_wong"), **given)
+    assert (seen[0].name, seen[1]) == (known[0], get_soil(known[1]))
+
+
 def test_a_diagnosis_of_another_robot_is_refused(diagnosis):
     with pytest.raises(InputError, match="of the robot 'ddagr' and the controller knew 'husky'"):
         ddagr_gym.adapt(robot="husky", diagnosis=diagnosis())
