@@ -18,8 +18,7 @@ without ramp or filter is also tried from a longer dead time, one without a filt
 filter that stayed where the dead time went gives way to a dead time that forecasts as well. One without friction is
 also tried from an integral part that is less by what undoes friction.
 What was kept by little, or hardly acts where the fit stands in the end, is asked for again when others have gone: with
-all parts free, a fit without it may stop where others half stand in for it. Where it goes then, all that are kept are
-asked for once more.
+all parts free, a fit without it may stop where others half stand in for it.
 """
 
 from __future__ import annotations
@@ -143,25 +142,19 @@ class Elimination:
         return not kept
 
     def ask_again(self) -> None:
-        """Ask again for what was kept by little beside parts that have gone since, and for all if one of these goes."""
-        kept = [part_named(name) for name, item in self.decisions.items() if item.kept]
-        gone = [part for part in kept if self._is_doubtful(part) and self.ask(part)]
-        if gone:
-            for part in kept:
-                if part not in gone and self._others_went(part):
-                    self.ask(part)
+        """Ask again for what is doubtful until nothing goes."""
+        went = True
+        while went:
+            kept = [part_named(name) for name, item in self.decisions.items() if item.kept]
+            went = sum(self.ask(part) for part in kept if self._is_doubtful(part)) > 0
 
     def _is_doubtful(self, part: Part) -> bool:
-        """Whether other parts have gone since, and it was kept by little or hardly acts where the fit stands."""
-        if not self._others_went(part):
+        """Whether others have gone since a part was asked for, and it was kept by little or hardly acts now."""
+        if self._asked_with[part.name] == self.left_out | {part.name}:
             return False
         without = self._model.without(self.left_out | {part.name}, self._comparison.data.robot)
         little = self.decisions[part.name].growth < DOUBTFUL
         return little or self._comparison.cost(without, self.best.standing) < (1.0 + DOUBTFUL) * self.best.cost
-
-    def _others_went(self, part: Part) -> bool:
-        """Whether parts have gone since one was asked for, which may ask the same of it anew."""
-        return self._asked_with[part.name] != self.left_out | {part.name}
 
 
 def _fitted_without(

@@ -219,12 +219,14 @@ def test_what_is_doubtful_is_asked_for_again_when_others_have_gone(first, acts, 
     assert sum("friction" in line for line in lines) == asked
 
 
-def test_where_a_part_goes_in_the_end_all_that_are_kept_are_asked_for_once_more():
-    """Without friction nothing misses the limit of the turning, which was missed beside it."""
-    grown = {FRICTION: 1.05, LIMIT: 2.0, frozenset(LIMIT | DELAY): 2.0}
+def test_what_is_doubtful_is_asked_for_until_nothing_goes():
+    """Friction is missed as long as the turning is limited, and the limit as long as there is a dead time."""
+    grown = {FRICTION: 1.05, LIMIT: 1.05, FRICTION | DELAY: 1.05}
     full = candidate(1.0, 1.01, 0.99)
-    found = select_parts(Again(grown), Three(), full, lambda name, make: make(), lambda line: None)
+    lines = []
+    found = select_parts(Again(grown), Three(), full, lambda name, make: make(), lines.append)
     assert found.left_out == FRICTION | LIMIT | DELAY
+    assert sum("friction" in line for line in lines) == 3
 
 
 def test_nothing_is_asked_for_again_where_no_part_has_gone_since():
