@@ -128,7 +128,8 @@ class Elimination:
 
     def ask(self, part: Part) -> bool:
         """Take a part out unless forecasts miss it; whether it went."""
-        self._progress(f"forecasts of left-out drives without {part.title}")
+        again = ", once more" if part.name in self.decisions else ""
+        self._progress(f"forecasts of left-out drives without {part.title}{again}")
         before, out = (self._full, self._least, self.best), self.left_out | {part.name}
         fit = partial(_fitted_without, self._comparison, self._model, self._cache, out, self.best.cost)
         starts = other_starts(part.name, self.best.standing, self._model.robot, self.left_out)
