@@ -34,6 +34,7 @@ from ddagr_gym.calibration.part_comparison import (
     Candidate,
     Comparison,
     is_missed,
+    least_growth,
     mean_growth,
     misses,
     worse_by,
@@ -42,10 +43,13 @@ from ddagr_gym.calibration.parts import PARTS, Part, RobotModel, idle_parts, par
 from ddagr_gym.calibration.result import PartDecision
 from ddagr_gym.diagnosis.store import StepCache
 
-DOUBTFUL = 0.1
-"""Growth of losses, or of the cost where a fit stands, below which a part that was kept is asked for again (ours): a
-simulated robot without friction was forecast worse by 6 % without it beside an integral part that undid it, another one
-kept friction of 0 because a fit without it had stopped far off beside a filter."""
+DOUBTFUL = 2.0
+"""Times the growth by which a part is missed, up to which one that was kept is asked for again (ours): a simulated
+robot without friction missed it by 1.06 times that beside an integral part that undid it."""
+
+HARDLY = 0.1
+"""Growth of the cost where a fit stands, below which a part hardly acts there (ours): a simulated robot kept friction of
+0, because a fit without it had stopped far off beside a filter."""
 
 FitFrom = Callable[[str, Standing], "Candidate"]
 """A model, fitted from a start; the text tells fits of the same parts apart among the finished steps."""
@@ -153,9 +157,14 @@ class Elimination:
         """Whether others have gone since a part was asked for, and it was kept by little or hardly acts now."""
         if self._asked_with[part.name] == self.left_out | {part.name}:
             return False
+        decision = self.decisions[part.name]
+        needed = least_growth(decision.error or 0.0, len(self.best.losses), part.usual)
+        return decision.growth < DOUBTFUL * needed or self._hardly_acts(part)
+
+    def _hardly_acts(self, part: Part) -> bool:
+        """Whether a part may be taken out where the fit stands, without another step."""
         without = self._model.without(self.left_out | {part.name}, self._comparison.data.robot)
-        little = self.decisions[part.name].growth < DOUBTFUL
-        return little or self._comparison.cost(without, self.best.standing) < (1.0 + DOUBTFUL) * self.best.cost
+        return self._comparison.cost(without, self.best.standing) < (1.0 + HARDLY) * self.best.cost
 
 
 def _fitted_without(
