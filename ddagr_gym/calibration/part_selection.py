@@ -48,8 +48,8 @@ DOUBTFUL = 2.0
 robot without friction missed it by 1.06 times that beside an integral part that undid it."""
 
 HARDLY = 0.1
-"""Growth of the cost where a fit stands, below which a part hardly acts there (ours): a simulated robot kept friction of
-0, because a fit without it had stopped far off beside a filter."""
+"""Growth of the cost where a fit stands, below which a part hardly acts there (ours): a simulated robot kept friction
+of 0, because a fit without it had stopped far off beside a filter."""
 
 FitFrom = Callable[[str, Standing], "Candidate"]
 """A model, fitted from a start; the text tells fits of the same parts apart among the finished steps."""
