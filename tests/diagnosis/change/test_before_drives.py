@@ -250,7 +250,8 @@ def refused(match: str, after, before, **options) -> None:
 def test_drives_that_cannot_be_compared_are_refused_with_a_sentence(tmp_path):
     fresh, known = drive(41, seconds=45.0), drive(42, seconds=45.0)
     refused("no drive from before is given", fresh, [])
-    refused("was imported for the robot 'husky'", fresh, known.with_meta(robot="husky"))
+    refused("are of the robots ddagr, husky: give those of one robot", fresh, known.with_meta(robot="husky"))
+    refused("was imported for the robot 'husky'", fresh, known.with_meta(robot="husky"), robot="ddagr")
     with pytest.raises(InputError, match="of the robot 'husky', compared with --robot ddagr"):
         since([fresh.with_meta(robot="husky")], [known])
     refused("hold the same values: leave it out on one side", [fresh, known], known)
