@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 from ddagr_gym.api.inputs import Sources, recordings_from
 from ddagr_gym.api.nominal import (
-    DEFAULT_ROBOT,
-    DEFAULT_SOIL,
     RobotLike,
     SoilLike,
     check_left_out,
+    diagnosed_with,
     robot_from,
     soil_from,
 )
@@ -177,7 +176,7 @@ def adapt(
             taken = recordings_from(recordings, None if calibration is not None else found.robot, column_map)
             found = replace(found, sensors=measured_sensors(taken, found.robot))
     elif diagnosis is not None:
-        found, answer = corrected_by_diagnosis(Path(diagnosis)), _answer_in(Path(diagnosis))
+        found, answer = _read_diagnosis(Path(diagnosis))
     else:
         assert calibration is not None
         found, answer = corrected_by_calibration(Path(calibration), ground), None
@@ -225,11 +224,8 @@ def _check_same_robot(found: Corrected, nominal: Robot) -> None:
 
 def _nominal_of(answer: Diagnosis, robot: RobotLike | None, soil: SoilLike | None) -> tuple[Robot, Soil]:
     """Robot and soil as given, else those with which drives were diagnosed."""
-    named = answer.options.robot_file or answer.robot or DEFAULT_ROBOT
-    return (
-        robot_from(named if robot is None else robot),
-        soil_from((answer.soil or DEFAULT_SOIL) if soil is None else soil),
-    )
+    known_robot, known_soil = diagnosed_with(answer)
+    return robot_from(known_robot if robot is None else robot), soil_from(known_soil if soil is None else soil)
 
 
 def _diagnosed(
@@ -274,34 +270,30 @@ def corrected_by_diagnosis(folder: Path) -> Corrected:
     Raises:
         InputError: a file is missing or wrong.
     """
+    return _read_diagnosis(folder)[0]
+
+
+def _read_diagnosis(folder: Path) -> tuple[Corrected, Diagnosis]:
+    """The corrected simulator and the answer; as :func:`corrected_by_diagnosis`."""
     from ddagr_gym.adaptation.corrected import Corrected
+    from ddagr_gym.diagnosis.result.files import load
     from ddagr_gym.physics.effects import load_effects, load_intervals
     from ddagr_gym.presets import get_robot, get_soil
 
-    answer, place = _answer_in(folder), _folder_of(folder)
+    place = folder.expanduser()
+    place = place.parent if place.is_file() else place
+    answer = load(place / "diagnosis.json")
     for name in ("robot.yaml", "soil.yaml", "effects.yaml"):
         if not (place / name).is_file():
             raise InputError(f"{place} holds no {name}, so that there is no corrected simulator: diagnose again.")
-    return Corrected(
+    found = Corrected(
         get_robot(str(place / "robot.yaml")),
         get_soil(str(place / "soil.yaml")),
         load_effects(place / "effects.yaml"),
         load_intervals(place / "effects.yaml"),
         **_answer(answer),
     )
-
-
-def _folder_of(place: Path) -> Path:
-    """Folder of a diagnosis by itself, or by the diagnosis.json in it."""
-    place = place.expanduser()
-    return place.parent if place.is_file() else place
-
-
-def _answer_in(folder: Path) -> Diagnosis:
-    """What a folder of ``ddagr diagnose`` says; InputError where it cannot be read."""
-    from ddagr_gym.diagnosis.result.files import load
-
-    return load(_folder_of(folder) / "diagnosis.json")
+    return found, answer
 
 
 def corrected_by_calibration(folder: Path, ground: str = "") -> Corrected:

@@ -8,7 +8,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias, Union
 
-from ddagr_gym.api.nominal import RobotLike, SoilLike, robot_from, soil_from
+from ddagr_gym.api.nominal import (
+    DEFAULT_ROBOT,
+    DEFAULT_SOIL,
+    RobotLike,
+    SoilLike,
+    diagnosed_with,
+    robot_from,
+    soil_from,
+)
 from ddagr_gym.api.results import Result, Table, names_of
 from ddagr_gym.errors import InputError, at_least
 from ddagr_gym.files import write_json
@@ -26,9 +34,6 @@ RivalsLike: TypeAlias = "Sequence[str | Effect]"
 
 QuestionLike: TypeAlias = Union["DiagnosisResult", str, os.PathLike[str], RivalsLike]
 """A diagnosis (result, its folder or its diagnosis.json), or rivals."""
-
-ROBOT, SOIL = "ddagr", "thesis_a1"
-"""Nominal for rivals without a diagnosis."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -168,8 +173,7 @@ def _question(given: QuestionLike) -> _Question | DrivetrainAnswer:
     if isinstance(given, str | os.PathLike):
         path = Path(given)
         diagnosis = load(path / "diagnosis.json" if path.is_dir() else path)
-        robot = diagnosis.options.robot_file or diagnosis.robot or ROBOT
-        return _of_diagnosis(diagnosis, robot, diagnosis.soil or SOIL)
+        return _of_diagnosis(diagnosis, *diagnosed_with(diagnosis))
     return _of_rivals(given)
 
 
@@ -189,4 +193,4 @@ def _of_rivals(given: RivalsLike) -> _Question:
 
     if not isinstance(given, Sequence) or not all(isinstance(item, str | Effect) for item in given):
         raise InputError(f"{given!r} is neither a diagnosis nor a list of effects: give one of them.")
-    return _Question(list(load_effects(given)), tuple(SENSORS), ROBOT, SOIL, Setting())
+    return _Question(list(load_effects(given)), tuple(SENSORS), DEFAULT_ROBOT, DEFAULT_SOIL, Setting())

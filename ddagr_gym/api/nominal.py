@@ -15,6 +15,7 @@ from ddagr_gym.presets import full_name, get_robot, get_soil, is_file, robot_nam
 from ddagr_gym.recordings.schema import Recording
 
 if TYPE_CHECKING:
+    from ddagr_gym.diagnosis.answer.verdict import Diagnosis
     from ddagr_gym.diagnosis.gates.thresholds import Thresholds
 
 RobotLike: TypeAlias = str | os.PathLike[str] | Robot
@@ -135,13 +136,11 @@ def nominal_or_usual(
     Raises:
         InputError: an unknown name, with the closest ones; a file that is missing or not valid.
     """
-    from ddagr_gym.diagnosis.gates.threshold_files import load_thresholds, shipped_thresholds
-    from ddagr_gym.diagnosis.gates.thresholds import Thresholds
+    from ddagr_gym.diagnosis.gates.threshold_files import shipped_thresholds
 
     chosen = robot_or_recorded(robot, recordings)
-    banks = [shipped_thresholds(robot_from(chosen).name)]
-    if thresholds is not None:
-        banks.insert(0, thresholds if isinstance(thresholds, Thresholds) else load_thresholds(Path(thresholds)))
+    given = None if thresholds is None else _loaded(thresholds)
+    banks = (given, shipped_thresholds(robot_from(chosen).name))
     nominal_soil, uncertainty = soil_or_usual(soil, soil_uncertainty, banks)
     nominal = nominal_from(chosen, nominal_soil)
     if say_soil and soil is None and (nominal.robot.name, nominal.soil_name) != (DEFAULT_ROBOT, DEFAULT_SOIL):
@@ -199,6 +198,19 @@ def _robot_file(given: RobotLike) -> str:
     return full_name(str(given)) if is_file(given) else ""
 
 
+def diagnosed_with(answer: Diagnosis) -> tuple[str, str]:
+    """Robot, by its file where it has one, and soil that a diagnosis names; the usual ones where it names none."""
+    return answer.options.robot_file or answer.robot or DEFAULT_ROBOT, answer.soil or DEFAULT_SOIL
+
+
+def _loaded(given: ThresholdsLike) -> Thresholds:
+    """Thresholds as they are, or from a file; InputError where it cannot be read."""
+    from ddagr_gym.diagnosis.gates.threshold_files import load_thresholds
+    from ddagr_gym.diagnosis.gates.thresholds import Thresholds
+
+    return given if isinstance(given, Thresholds) else load_thresholds(Path(given))
+
+
 def thresholds_from(
     given: ThresholdsLike | None, robot: Robot, soil_name: str, soil_uncertainty: float = 1.0
 ) -> Thresholds | None:
@@ -215,13 +227,9 @@ def thresholds_from(
     Raises:
         InputError: the file cannot be read.
     """
-    from ddagr_gym.diagnosis.gates.threshold_files import load_thresholds, shipped_thresholds
-    from ddagr_gym.diagnosis.gates.thresholds import Thresholds
+    from ddagr_gym.diagnosis.gates.threshold_files import shipped_thresholds
 
-    if given is None:
-        found = shipped_thresholds(robot.name)
-    else:
-        found = given if isinstance(given, Thresholds) else load_thresholds(Path(given))
+    found = shipped_thresholds(robot.name) if given is None else _loaded(given)
     if found is not None and found.origin is not None:
         warning = found.origin.mismatch(robot.name, soil_name, soil_uncertainty)
         if warning:

@@ -91,29 +91,14 @@ def select_parts(
         if model.free & set(part.parameters):
             elimination.ask(part)
     elimination.ask_again()
-    best, left_out, decisions = elimination.best, elimination.left_out, list(elimination.decisions.values())
     for name in (RAMP, FILTER):
-        if DELAY in left_out and name not in left_out and name in model.free:
-            progress(f"forecasts of left-out drives with a dead time in place of the {part_named(name).title}")
-            best, left_out, decisions = _delay_for(name, comparison, model, best, left_out, decisions, cache)
-    idle = idle_parts(left_out, comparison.data.robot)
-    if idle:
-        left_out |= idle
-        best = _fitted_without(comparison, model, cache, left_out, best.cost, "", best.standing)
-        decisions = [replace(item, kept=item.kept and item.name not in idle) for item in decisions]
-    return Selection(left_out, tuple(decisions), best.standing)
+        elimination.try_delay_for(name)
+    elimination.drop_idle()
+    return Selection(elimination.left_out, tuple(elimination.decisions.values()), elimination.best.standing)
 
 
 class Elimination:
-    """Parts taken out of a model one after the other, as far as they have been asked for.
-
-    Args:
-        comparison: what models are fitted to and forecast.
-        model: with all parts that may be taken out.
-        full: the same, fitted.
-        cache: of models that are fitted already.
-        progress: called with a line of text for each part.
-    """
+    """Parts taken out of a model one after the other, as far as they were asked for; made as :func:`select_parts`."""
 
     def __init__(
         self,
@@ -135,7 +120,7 @@ class Elimination:
         again = ", once more" if part.name in self.decisions else ""
         self._progress(f"forecasts of left-out drives without {part.title}{again}")
         before, out = (self._full, self._least, self.best), self.left_out | {part.name}
-        fit = partial(_fitted_without, self._comparison, self._model, self._cache, out, self.best.cost)
+        fit = partial(self._fitted_without, out)
         starts = other_starts(part.name, self.best.standing, self._model.robot, self.left_out)
         tried = _settled(fit, before, self._comparison.settlings, part.usual)
         tried, (kept, growth, error) = from_other_starts(tried, before, starts, fit, part.usual)
@@ -163,23 +148,52 @@ class Elimination:
 
     def _hardly_acts(self, part: Part) -> bool:
         """Whether a part may be taken out where the fit stands, without another step."""
-        without = self._model.without(self.left_out | {part.name}, self._comparison.data.robot)
-        return self._comparison.cost(without, self.best.standing) < (1.0 + HARDLY) * self.best.cost
+        cost = self._comparison.cost(self._without(self.left_out | {part.name}), self.best.standing)
+        return cost < (1.0 + HARDLY) * self.best.cost
 
+    def try_delay_for(self, name: str) -> None:
+        """A dead time in place of ramp or filter where it has gone and they stayed: all make the wheels late.
 
-def _fitted_without(
-    comparison: Comparison,
-    model: RobotModel,
-    cache: StepCache,
-    left_out: frozenset[str],
-    rival: float,
-    stage: str,
-    start: Standing,
-) -> Candidate:
-    """A model without some parts, fitted from a start; ``stage`` tells fits of the same parts apart in the cache."""
-    without = model.without(left_out, comparison.data.robot)
-    made = partial(comparison.candidate, without, start, rival=rival)
-    return cache(f"without {' '.join(sorted(left_out))}{stage}", made)
+        Nearly every robot has a dead time and few have the others. Where forecasts do not suffer it takes their place,
+        and is kept as any other part is, if forecasts without it are worse.
+        """
+        if DELAY not in self.left_out or name in self.left_out or name not in self._model.free:
+            return
+        self._progress(f"forecasts of left-out drives with a dead time in place of the {part_named(name).title}")
+        exchanged, neither = (self.left_out - {DELAY}) | {name}, self.left_out | {name}
+        start = with_late_commands(self.best.standing)
+        late = self._fitted(f"{DELAY} for {name}", exchanged, start, self.best)
+        growth, error = worse_by(self.best, late)
+        if is_missed(growth, error, len(late.losses)):
+            return
+        prompt = self._fitted(f"neither {DELAY} nor {name}", neither, late.standing, late)
+        missed, its_growth, its_error = misses((late,), prompt, usual=True)
+        if not missed:
+            return
+        self.decisions[DELAY] = PartDecision(DELAY, True, its_growth, its_error)
+        self.decisions[name] = PartDecision(name, False, growth, error)
+        self.best, self.left_out = late, exchanged
+
+    def drop_idle(self) -> None:
+        """Take out what acts through parts that have all gone."""
+        idle = idle_parts(self.left_out, self._comparison.data.robot)
+        if not idle:
+            return
+        self.left_out |= idle
+        self.best = self._fitted_without(self.left_out, "", self.best.standing)
+        for name in idle & self.decisions.keys():
+            self.decisions[name] = replace(self.decisions[name], kept=False)
+
+    def _without(self, parts: frozenset[str]) -> RobotModel:
+        return self._model.without(parts, self._comparison.data.robot)
+
+    def _fitted_without(self, parts: frozenset[str], stage: str, start: Standing) -> Candidate:
+        """Model without some parts, fitted from a start; ``stage`` tells fits of the same parts apart in the cache."""
+        return self._fitted(f"without {' '.join(sorted(parts))}{stage}", parts, start, self.best)
+
+    def _fitted(self, key: str, parts: frozenset[str], start: Standing, rival: Candidate) -> Candidate:
+        made = partial(self._comparison.candidate, self._without(parts), start, rival=rival.cost)
+        return self._cache(key, made)
 
 
 def _settled(fit: FitFrom, before: tuple[Candidate, ...], settlings: int, usual: bool) -> Candidate:
@@ -219,35 +233,3 @@ def from_other_starts(
         tried = min(tried, fit(stage, start), key=lambda item: item.cost)
         found = misses(before, tried, usual)
     return tried, found
-
-
-def _delay_for(
-    part: str,
-    comparison: Comparison,
-    model: RobotModel,
-    best: Candidate,
-    left_out: frozenset[str],
-    decisions: list[PartDecision],
-    cache: StepCache,
-) -> tuple[Candidate, frozenset[str], list[PartDecision]]:
-    """A dead time in place of ramp or filter where forecasts do not suffer: all make the wheels late.
-
-    Nearly every robot has a dead time and few have the others. It is kept as any other part is, if forecasts without it
-    are worse.
-    """
-    robot = comparison.data.robot
-    exchanged, neither = (left_out - {DELAY}) | {part}, left_out | {part}
-    start = with_late_commands(best.standing)
-    with_delay = partial(comparison.candidate, model.without(exchanged, robot), start, rival=best.cost)
-    late = cache(f"{DELAY} for {part}", with_delay)
-    growth, error = worse_by(best, late)
-    if is_missed(growth, error, len(late.losses)):
-        return best, left_out, decisions
-    without = model.without(neither, robot)
-    made = partial(comparison.candidate, without, late.standing, rival=late.cost)
-    prompt = cache(f"neither {DELAY} nor {part}", made)
-    missed, its_growth, its_error = misses((late,), prompt, usual=True)
-    if not missed:
-        return best, left_out, decisions
-    changed = {DELAY: PartDecision(DELAY, True, its_growth, its_error), part: PartDecision(part, False, growth, error)}
-    return late, exchanged, [changed.get(item.name, item) for item in decisions]
