@@ -12,10 +12,8 @@ from ddagr_gym.api.nominal import (
     RobotLike,
     SoilLike,
     ThresholdsLike,
-    robot_from,
-    soil_from,
+    planned_nominal,
     soil_label,
-    soil_name_of,
     thresholds_from,
 )
 from ddagr_gym.api.results import Report, Table, names_of
@@ -86,9 +84,9 @@ def isolability(
     manoeuvres: ManoeuvreLike | Sequence[ManoeuvreLike] = ("stops", "arcs", "spin", "s_weave"),
     sensors: str | Sequence[str] = ("imu", "encoders", "pose"),
     robot: RobotLike = "ddagr",
-    soil: SoilLike = "thesis_a1",
+    soil: SoilLike | None = None,
     *,
-    soil_uncertainty: float = 1.0,
+    soil_uncertainty: float | None = None,
     thresholds: ThresholdsLike | None = None,
     seed: int = 0,
     progress: Callable[[str], None] | None = None,
@@ -102,8 +100,10 @@ def isolability(
         manoeuvres: one or several: names of built-in drives, CSV files of commands, or manoeuvres.
         sensors: some of imu, encoders, pose.
         robot: nominal: name, YAML file or object.
-        soil: nominal: name, YAML file or object.
-        soil_uncertainty: factor on how far the soil may be from the nominal one, as for a diagnosis.
+        soil: nominal: name, YAML file or object; where it is None, that of the thresholds, else firm_ground, at four
+            times its usual uncertainty.
+        soil_uncertainty: factor on how far the soil may be from the nominal one, as for a diagnosis; None for 1 beside
+            a soil.
         thresholds: gates of ``ddagr null-bank``; by default those that ship for the robot, and where none do those that
             normal noise alone asks for (chi-square): real drives need larger sizes then.
         seed: of the sensor noise.
@@ -114,7 +114,8 @@ def isolability(
 
     Raises:
         InputError: unknown names, or drives too short for a diagnosis.
-        InputWarning: (a warning) the thresholds were made for another robot, soil or uncertainty.
+        InputWarning: (a warning) no soil is given for another robot than the ddagr; the thresholds were made for
+            another robot, soil or uncertainty.
 
     Examples:
         >>> import ddagr_gym
@@ -129,19 +130,19 @@ def isolability(
     from ddagr_gym.physics.effects.registry import absolute_effect_kinds
 
     at_least(seed=(seed, 0))
-    priors = NuisancePriors().with_soil(soil_uncertainty)
-    nominal, ground = robot_from(robot), soil_from(soil)
+    nominal, uncertainty = planned_nominal(robot, soil, soil_uncertainty, thresholds)
+    priors = NuisancePriors().with_soil(uncertainty)
     drives = _manoeuvres(manoeuvres)
-    gates = thresholds_from(thresholds, nominal, soil_name_of(soil), soil_uncertainty)
+    gates = thresholds_from(thresholds, nominal.robot, nominal.soil_name, uncertainty)
     with counting(len(absolute_effect_kinds()), "effects", progress) as steps:
         table = tabulated(
-            nominal,
-            ground,
+            nominal.robot,
+            nominal.soil,
             drives,
             names_of(sensors),
             thresholds=gates,
             seed=seed,
-            soil_name=soil_label(soil),
+            soil_name=nominal.soil_name if soil is None else soil_label(soil),
             priors=priors,
             progress=lambda name: steps.advance(),
         )

@@ -136,9 +136,39 @@ def nominal_or_usual(
     Raises:
         InputError: an unknown name, with the closest ones; a file that is missing or not valid.
     """
+    chosen = robot_or_recorded(robot, recordings)
+    return _on_usual_soil(chosen, soil, soil_uncertainty, thresholds, say_soil=say_soil, stacklevel=4)
+
+
+def planned_nominal(
+    robot: RobotLike, soil: SoilLike | None, soil_uncertainty: float | None, thresholds: ThresholdsLike | None
+) -> tuple[Nominal, float]:
+    """Robot and soil of drives that are yet to be made, and how uncertain the soil is.
+
+    Args:
+        robot: as :func:`robot_from` takes it.
+        soil: as of :func:`soil_or_usual`; an InputWarning says one that is not given, but the ddagr's own.
+        soil_uncertainty: likewise.
+        thresholds: as of :func:`thresholds_from`.
+
+    Raises:
+        InputError: an unknown name, with the closest ones; a file that is missing or not valid.
+    """
+    return _on_usual_soil(robot, soil, soil_uncertainty, thresholds, say_soil=True, stacklevel=4)
+
+
+def _on_usual_soil(
+    chosen: RobotLike,
+    soil: SoilLike | None,
+    soil_uncertainty: float | None,
+    thresholds: ThresholdsLike | None,
+    *,
+    say_soil: bool,
+    stacklevel: int,
+) -> tuple[Nominal, float]:
+    """Robot on the soil as given, else on the usual one, which a warning of the caller's caller says."""
     from ddagr_gym.diagnosis.gates.threshold_files import shipped_thresholds
 
-    chosen = robot_or_recorded(robot, recordings)
     given = None if thresholds is None else _loaded(thresholds)
     banks = (given, shipped_thresholds(robot_from(chosen).name))
     nominal_soil, uncertainty = soil_or_usual(soil, soil_uncertainty, banks)
@@ -148,7 +178,7 @@ def nominal_or_usual(
             f"no soil is given: the {nominal.robot.name} is taken to be on {nominal.soil_name}, at {uncertainty:g} "
             "times a soil's usual uncertainty; name a soil with --soil (soil=... in Python) where it is known.",
             InputWarning,
-            stacklevel=3,
+            stacklevel=stacklevel,
         )
     return nominal, uncertainty
 

@@ -14,6 +14,7 @@ from ddagr_gym.api.nominal import (
     DEFAULT_SOIL,
     RobotLike,
     SoilLike,
+    check_left_out,
     recorded_robot,
     robot_from,
     soil_from,
@@ -181,9 +182,7 @@ def _calibrated(
     from ddagr_gym.physics.effects import load_effects
     from ddagr_gym.physics.effects.slope import Slope
 
-    if robot is not None or soil is not None:
-        given = "robot" if robot is not None else "soil"
-        raise InputError(f"a calibration and a {given} are given: leave out one of them, {folder} has both.")
+    check_left_out(folder, robot, soil)
     chosen, _ = load_soil(folder, ground)
     slopes = tuple(Slope.of_gradient(*item.gradient) for item in load(folder).slopes if item.ground == chosen)
     return load_robot(folder), folder / soil_file(chosen), load_effects(folder / EFFECTS), slopes

@@ -143,7 +143,7 @@ class Elimination:
         if self._asked_with[part.name] == self.left_out | {part.name}:
             return False
         decision = self.decisions[part.name]
-        needed = least_growth(decision.error or 0.0, len(self.best.losses), part.usual)
+        needed = least_growth(decision.error, len(self.best.losses), part.usual)
         return decision.growth < DOUBTFUL * needed or self._hardly_acts(part)
 
     def _hardly_acts(self, part: Part) -> bool:

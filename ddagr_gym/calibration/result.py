@@ -56,13 +56,13 @@ class PartDecision:
         name: of :data:`ddagr_gym.calibration.parts.PARTS`.
         kept: whether it is in the calibrated robot.
         growth: relative growth of the forecasts' loss without it, mean over left-out drives [-].
-        error: standard error of that growth between drives; null for a single fold.
+        error: standard error of that growth between drives [-].
     """
 
     name: str
     kept: bool
     growth: float
-    error: float | None
+    error: float
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,7 @@ from ddagr_gym.progress import LinePrinter
 
 EXAMPLES = (
     "ddagr isolability --manoeuvres straight two_headings --output isolability",
-    "ddagr isolability --robot warthog --soil firm_ground --soil-uncertainty 4 --manoeuvres stops arcs spin "
-    "--sensors imu encoders",
+    "ddagr isolability --robot warthog --manoeuvres stops arcs spin --sensors imu encoders",
 )
 
 
@@ -30,7 +29,7 @@ class Arguments:
         manoeuvres: names of built-in drives, or CSV files of commands.
         sensors: some of imu, encoders, pose.
         robot: nominal robot: name (ddagr robots) or YAML file.
-        soil: nominal soil: name (ddagr soils) or YAML file.
+        soil: nominal soil: name (ddagr soils) or YAML file; as for `ddagr diagnose` when it is left out.
         soil_uncertainty: as for `ddagr diagnose`.
         thresholds: gates of `ddagr null-bank`; by default those that ship for the robot, and where none do those that
             normal noise alone asks for (chi-square): real drives need larger sizes then.
@@ -42,8 +41,8 @@ class Arguments:
     manoeuvres: tuple[str, ...] = ("stops", "arcs", "spin", "s_weave")
     sensors: tuple[str, ...] = ("imu", "encoders", "pose")
     robot: str = "ddagr"
-    soil: str = "thesis_a1"
-    soil_uncertainty: float = 1.0
+    soil: str = ""
+    soil_uncertainty: float | None = None
     thresholds: Path | None = None
     seed: int = 0
     overwrite: bool = False
@@ -59,7 +58,7 @@ def run(arguments: Arguments) -> None:
         arguments.manoeuvres,
         arguments.sensors,
         arguments.robot,
-        arguments.soil,
+        arguments.soil or None,
         soil_uncertainty=arguments.soil_uncertainty,
         thresholds=arguments.thresholds,
         seed=arguments.seed,

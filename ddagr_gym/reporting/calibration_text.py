@@ -130,7 +130,7 @@ def part_rows(calibration: Calibration) -> list[tuple[str, ...]]:
             _TITLES[item.name],
             "yes" if item.kept else "no",
             f"{100.0 * item.growth:+.1f} %",
-            "" if item.error is None else f"{100.0 * item.error:.1f} %",
+            f"{100.0 * item.error:.1f} %",
         )
         for item in calibration.parts
     ]

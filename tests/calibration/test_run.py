@@ -204,7 +204,7 @@ def test_replay_takes_the_calibration_without_a_fit(folder, drives, tmp_path):
     after = ddagr_gym.replay(fresh, calibration=folder, ground="track")
     sizes = [result.errors(5.0, "heading")[0].error.rms for result in (before, after)]
     assert sizes[1] < 0.2 * sizes[0]
-    with pytest.raises(InputError, match="a calibration and a robot are given"):
+    with pytest.raises(InputError, match="a calibration and robot are given"):
         ddagr_gym.replay(fresh, "ddagr", calibration=folder, ground="track")
 
 

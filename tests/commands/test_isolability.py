@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from ddagr_gym.api.nominal import thresholds_from
+from ddagr_gym.api.nominal import planned_nominal, thresholds_from
 from ddagr_gym.cli import main, warnings_as_lines
 from ddagr_gym.diagnosis.gates.threshold_files import default_thresholds, save_thresholds
 from ddagr_gym.diagnosis.planning.isolability import Detectable, Isolability
@@ -55,6 +55,17 @@ def test_without_output_the_table_is_printed_and_nothing_written(tmp_path, capsy
     assert "gyro_scale" in said
     assert "figure" not in said
     assert list(tmp_path.iterdir()) == [drive_csv]
+
+
+@warnings_as_lines()
+def test_soil_that_is_not_named_is_that_of_the_robots_thresholds_and_said(capsys):
+    nominal, uncertainty = planned_nominal("ddagr", None, None, None)
+    assert (nominal.soil_name, uncertainty, capsys.readouterr().err) == ("thesis_a1", 1.0, "")
+    nominal, uncertainty = planned_nominal("warthog", None, None, None)
+    assert (nominal.soil_name, uncertainty) == ("firm_ground", 4.0)
+    assert "no soil is given: the warthog is taken to be on firm_ground" in capsys.readouterr().err
+    nominal, uncertainty = planned_nominal("warthog", "lete_sand_wong", None, None)
+    assert (nominal.soil_name, uncertainty, capsys.readouterr().err) == ("lete_sand_wong", 1.0, "")
 
 
 def test_negative_seed_is_one_sentence(tmp_path, capsys):

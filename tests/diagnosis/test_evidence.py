@@ -89,6 +89,16 @@ def test_a_file_that_holds_no_evidence_is_one_sentence(tmp_path):
     path.write_text("no archive")
     with pytest.raises(InputError, match="cannot be read as evidence"):
         Evidence.load(path)
+    path.write_bytes(b"")
+    with pytest.raises(InputError, match="cannot be read as evidence"):
+        Evidence.load(path)
+    with path.open("wb") as stream:
+        np.save(stream, np.zeros(3))
+    with pytest.raises(InputError, match="cannot be read as evidence"):
+        Evidence.load(path)
+    np.savez(path, version=np.array([1, 2]), time=np.zeros(3))
+    with pytest.raises(InputError, match="no evidence of version 1"):
+        Evidence.load(path)
     np.savez(path, version=np.array(1), time=np.zeros(3))
     with pytest.raises(InputError, match="no evidence of version 1"):
         Evidence.load(path)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 import zipfile
+import zlib
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -147,11 +148,11 @@ class Evidence:
         try:
             with np.load(Path(path), allow_pickle=False) as stored:
                 body = {name: stored[name] for name in stored.files}
-        except (OSError, ValueError, zipfile.BadZipFile) as error:
+        except (OSError, EOFError, TypeError, ValueError, zipfile.BadZipFile, zlib.error) as error:
             raise InputError(f"{os.fspath(path)} cannot be read as evidence ({error}): {remedy}.") from None
         version = body.pop("version", None)
         names = {item.name for item in fields(cls)}
-        if version is None or int(version) != VERSION or set(body) != names:
+        if version is None or version.size != 1 or version.item() != VERSION or set(body) != names:
             raise InputError(f"{os.fspath(path)} holds no evidence of version {VERSION}: {remedy}.")
         restored: dict[str, Any] = {name: _restored(value) for name, value in body.items()}
         return cls(**restored)
