@@ -46,6 +46,32 @@ def test_every_call_has_its_own_stack_array():
     np.testing.assert_array_equal(result, np.add.outer(np.arange(6), np.arange(4)))
 
 
+@kernel(cached=False)
+def first_of_depth(level, result):
+    depth(level, result)
+    return result[level, 0]
+
+
+def test_a_kernel_that_calls_itself_may_be_called_by_another_first():
+    assert first_of_depth(0, np.zeros((6, 4))) == 0.0
+    assert first_of_depth(3, np.zeros((6, 4))) == 3.0
+
+
+def test_what_kernels_call_is_compiled_without_code_for_python():
+    @kernel(cached=False)
+    def half(x):
+        return 0.5 * x
+
+    @kernel(cached=False)
+    def quarter(x):
+        return half(half(x))
+
+    assert quarter(4.0) == 1.0
+    assert not half.overloads
+    assert half(4.0) == 2.0
+    assert len(half.overloads) == 1
+
+
 def test_stack_array_needs_a_constant_size():
     @kernel(cached=False)
     def variable(size):
