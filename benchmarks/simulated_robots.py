@@ -1,16 +1,18 @@
 """Which parts a calibration finds in simulated robots, whose parts are known.
 
-    python -m benchmarks.simulated_robots [--processes 2] [--output FILE]
+    python -m benchmarks.simulated_robots [--processes 2] [--parts DIR] [--output FILE]
 
 Six robots differ from the data sheet of the DDAGR by slower motors and a dead time; five of them by one thing more.
 Each drives three times for two minutes, on two soils, from several seeds, and is calibrated by few windows. A part that
 a robot has is to be kept, one that it lacks is not. Writes the parts and the values beside the true ones, and a picture
-(``benchmarks/results/simulated_robots.json``, ``.png``). About 15 minutes of two cores.
+(``benchmarks/results/simulated_robots.json``, ``.png``). About 15 minutes of two cores. An interrupted run goes
+on after the calibrations in the folder of parts, where the same code made them.
 """
 
 from __future__ import annotations
 
 import argparse
+import hashlib
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -23,7 +25,7 @@ from numpy.typing import NDArray
 import ddagr_gym
 from ddagr_gym.calibration.parts import PARTS, part_of
 from ddagr_gym.calibration.result import Calibration
-from ddagr_gym.calibration.run import Outcome, calibrate_drives
+from ddagr_gym.calibration.run import Outcome, calibrate_drives, calibration_digest
 from ddagr_gym.calibration.settings import CalibrationSettings
 from ddagr_gym.files import write_json
 from ddagr_gym.parameters import Robot, Soil
@@ -32,7 +34,7 @@ from ddagr_gym.recordings.files import write_atomically
 from ddagr_gym.recordings.schema import Recording
 from ddagr_gym.rendering import palette
 from ddagr_gym.reporting.figures import house_style
-from ddagr_gym.tasks import Task, TaskRunner, run_tasks
+from ddagr_gym.tasks import ResultStore, Task, TaskRunner, run_tasks
 
 RESULT = Path(__file__).resolve().parent / "results" / "simulated_robots.json"
 
@@ -201,6 +203,14 @@ def row_of(name: str, seed: int) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def tasks_of(robots: Sequence[str], seeds: Sequence[int]) -> list[Task]:
+    """A calibration of every robot from every seed, under keys that change with the code."""
+    code = hashlib.sha256(calibration_digest().encode() + Path(__file__).read_bytes()).hexdigest()[:16]
+    cases = [(name, seed) for name in robots for seed in seeds]
+    keys = [f"{name.replace(', ', '_').replace(' ', '_')}_{seed}_{code}" for name, seed in cases]
+    return [Task(f"{case[0]}, seed {case[1]}", row_of, case, key=key) for case, key in zip(cases, keys, strict=True)]
+
+
 def draw(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
     """How often each part was kept, with what the robots have outlined, as PNG."""
     from matplotlib.figure import Figure
@@ -241,11 +251,12 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--robots", nargs="+", choices=CASES, default=list(CASES))
     parser.add_argument("--seeds", nargs="+", type=int, default=list(SEEDS))
+    parser.add_argument("--parts", type=Path, help="folder of finished calibrations; beside the output if absent")
     parser.add_argument("--output", type=Path, default=RESULT)
     given = parser.parse_args(words)
-    tasks = [Task(f"{name}, seed {seed}", row_of, (name, seed)) for name in given.robots for seed in given.seeds]
+    tasks = tasks_of(given.robots, given.seeds)
     with TaskRunner(given.processes) as runner:
-        rows = run_tasks(tasks, "calibrations", runner)
+        rows = run_tasks(tasks, "calibrations", runner, ResultStore(given.parts or given.output.with_suffix(".parts")))
     write_json(given.output, {"command": "python -m benchmarks.simulated_robots", "rows": rows})
     draw(rows, given.output.with_suffix(".png"))
     for row in rows:

@@ -352,6 +352,15 @@ def _identified(comparison: Comparison, model: RobotModel, standing: Standing) -
     return FinalFit(standing, comparison.weights, refused)
 
 
+def calibration_digest() -> str:
+    """SHA-256 over the code on which calibrations depend; docstrings, comments and layout do not count."""
+    digest = hashlib.sha256(source_digest().encode())
+    package = Path(__file__).resolve().parents[1]
+    for path in sorted(path for folder in _SOURCES for path in (package / folder).rglob("*.py")):
+        digest.update(code_digest(path.read_text()).encode())
+    return digest.hexdigest()
+
+
 def _key(
     recordings: Sequence[Recording],
     grounds: Sequence[str],
@@ -360,10 +369,7 @@ def _key(
     settings: CalibrationSettings,
 ) -> str:
     """SHA-256 of all that results depend on; the number of threads is not among it."""
-    digest = hashlib.sha256(source_digest().encode())
-    package = Path(__file__).resolve().parents[1]
-    for path in sorted(path for folder in _SOURCES for path in (package / folder).rglob("*.py")):
-        digest.update(code_digest(path.read_text()).encode())
+    digest = hashlib.sha256(calibration_digest().encode())
     for recording in recordings:
         digest.update(reading_hash(recording).encode())
     texts = [list(grounds), repr(robot), repr(soils), repr(replace(settings, threads=1))]

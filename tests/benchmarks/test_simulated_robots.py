@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from types import SimpleNamespace
 
 import pytest
@@ -42,6 +43,20 @@ def test_false_and_lacking_parts_are_those_beside_the_truth(monkeypatch):
     assert (row["false"], row["lacking"]) == (["friction"], ["speed_loop", "turning_limit"])
     assert row["relative_errors"]["turning_limit"] == 0.0
     assert row["relative_errors"]["command_delay"] == -1.0
+
+
+def test_finished_calibrations_are_not_done_again_but_by_other_code(monkeypatch, tmp_path):
+    done = {"robot": "wider track", "seed": 0, "kept": [], "false": [], "lacking": [], "relative_errors": {"a": 0.1}}
+    asked = []
+    monkeypatch.setattr(simulated_robots, "row_of", lambda name, seed: asked.append(seed) or {**done, "seed": seed})
+    words = ["--robots", "wider track", "--processes", "1", "--output", str(tmp_path / "made.json"), "--seeds"]
+    assert simulated_robots.main([*words, "0", "10"]) == 0
+    assert simulated_robots.main([*words, "0", "10", "20"]) == 0
+    assert asked == [0, 10, 20]
+    assert [row["seed"] for row in json.loads((tmp_path / "made.json").read_text())["rows"]] == [0, 10, 20]
+    monkeypatch.setattr(simulated_robots, "calibration_digest", lambda: "of other code")
+    assert simulated_robots.main([*words, "0"]) == 0
+    assert asked == [0, 10, 20, 0]
 
 
 def test_the_picture_is_drawn(tmp_path):
