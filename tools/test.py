@@ -25,8 +25,8 @@ EXAMPLES = (
 
 # named at the end, so that one sees what a run's time goes into
 _SLOWEST = ("--durations=20", "--durations-min=10")
-# These take one processor each, the tests take all.
-_SIDE_BY_SIDE = ("wheel", "types", "docs")
+# These take one processor each, one after another beside the tests: none is idle while the last of them ends.
+_BESIDE = ("wheel", "types", "docs")
 # pytest's exit code when a selection holds no test
 _NOTHING_SELECTED = 5
 
@@ -48,13 +48,13 @@ sys.exit(lint_imports(no_logo=True))
 class Arguments:
     """Run everything that continuous integration runs.
 
-    Lint, format, import contracts and tests (all but the slow ones), then side by side: types, the documentation site
-    with broken links as errors, and the tests of the wheel installed in an environment of its own outside the checkout.
-    The exit code is 1 when anything failed.
+    Lint, format, import contracts and tests (all but the slow ones); beside them, one after another, the tests of the
+    wheel installed in an environment of its own outside the checkout, types, and the documentation site with broken
+    links as errors. What those have to say is printed when they end. The exit code is 1 when anything failed.
 
     Attributes:
         slow: run the tests marked slow instead of everything else.
-        workers: processes that share the tests.
+        workers: processes that share the tests; with one, nothing is run beside them.
         only: one check instead of all.
         paths: test files or folders instead of all tests; nothing but tests is run then.
     """
@@ -82,16 +82,17 @@ def run(arguments: Arguments) -> int:
     selected = checks if arguments.only == "all" else {arguments.only: checks[arguments.only]}
     if arguments.slow or arguments.paths:
         selected = {"tests": checks["tests"]}
-    alone = {name: _timed(name, check) for name, check in selected.items() if name not in _SIDE_BY_SIDE}
-    with ThreadPoolExecutor(arguments.workers) as pool:
-        begun = {name: pool.submit(_timed, name, check) for name, check in selected.items() if name in _SIDE_BY_SIDE}
+    beside = {name: check for name, check in selected.items() if name in _BESIDE and arguments.workers > 1}
+    with ThreadPoolExecutor(1) as pool:
+        begun = {name: pool.submit(_timed, name, check) for name, check in beside.items()}
+        alone = {name: _timed(name, check) for name, check in selected.items() if name not in beside}
         outcomes = alone | {name: future.result() for name, future in begun.items()}
     _print_summary(outcomes)
     return 1 if any(outcome.failed for outcome, _ in outcomes.values()) else 0
 
 
 def _timed(name: str, check: Callable[[], Outcome]) -> tuple[Outcome, float]:
-    print(f"\n==== {name}", flush=True)
+    print(f"\n==== {name} begins", flush=True)
     start = time.monotonic()
     return check(), time.monotonic() - start
 
@@ -102,7 +103,7 @@ def _checks(root: Path, arguments: Arguments) -> dict[str, Callable[[], Outcome]
         "format": lambda: _tool(root, "-m", "ruff", "format", "--check", "."),
         "contracts": lambda: _tool(root, "-c", _LINT_IMPORTS),
         "tests": lambda: _tests(root, arguments),
-        "wheel": lambda: _installed_wheel(root),  # takes longest of those that follow, so it begins
+        "wheel": lambda: _installed_wheel(root),
         "types": lambda: _tool(root, "-m", "mypy"),
         "docs": lambda: _site(root),
     }
@@ -116,11 +117,16 @@ def _site(root: Path) -> Outcome:
 
 def _tool(root: Path, *words: str) -> Outcome:
     command = [sys.executable, *words]
+    return Outcome(passed=1) if _printed_whole(command, root) == 0 else Outcome(failed=1)
+
+
+def _printed_whole(command: list[str], folder: Path) -> int:
+    """Exit code of a command, whose output is printed when it ends: others print at the same time."""
     done = subprocess.run(
-        command, cwd=root, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+        command, cwd=folder, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
     )
     print(done.stdout, end="", flush=True)
-    return Outcome(passed=1) if done.returncode == 0 else Outcome(failed=1)
+    return done.returncode
 
 
 def _tests(root: Path, arguments: Arguments) -> Outcome:
@@ -130,11 +136,14 @@ def _tests(root: Path, arguments: Arguments) -> Outcome:
     return _pytest([sys.executable], root, "-m", marker, *parallel, *paths, may_be_empty=arguments.slow)
 
 
-def _pytest(python: list[str], folder: Path, *words: str, may_be_empty: bool = False) -> Outcome:
+def _pytest(python: list[str], folder: Path, *words: str, may_be_empty: bool = False, beside: bool = False) -> Outcome:
     with tempfile.TemporaryDirectory(prefix="ddagr-test-") as temporary:
         report = Path(temporary) / "report.xml"
         command = [*python, "-m", "pytest", "-q", *_SLOWEST, f"--junitxml={report}", *words]
-        code = subprocess.run(command, cwd=folder, stdin=subprocess.DEVNULL).returncode
+        if beside:
+            code = _printed_whole(command, folder)
+        else:
+            code = subprocess.run(command, cwd=folder, stdin=subprocess.DEVNULL).returncode
         if code == _NOTHING_SELECTED and may_be_empty:
             return Outcome()
         outcome = _read_report(report) if report.is_file() else Outcome(failed=1)
@@ -161,7 +170,7 @@ def _installed_wheel(root: Path) -> Outcome:
             return Outcome(failed=1)
         tests = wheel.copy_tests(root, folder)
         environment = ["env", "-u", "PYTHONPATH", str(python), "-P"]
-        return _pytest(environment, tests, "-p", "no:cacheprovider", "--import-mode=importlib", ".")
+        return _pytest(environment, tests, "-p", "no:cacheprovider", "--import-mode=importlib", ".", beside=True)
 
 
 def _print_summary(outcomes: dict[str, tuple[Outcome, float]]) -> None:

@@ -41,6 +41,7 @@ def test_truths_are_told_in_the_librarys_terms():
     assert split.strength == pytest.approx(math.exp(-0.4))  # left over right, the generator's is right over left
 
 
+@pytest.mark.slow
 def test_recordings_are_read_as_any_others(tmp_path, monkeypatch):
     monkeypatch.setattr("benchmarks.adaptation.plant.RECORDED", ("straight",))
     (path,) = TruePlant(TRUTHS["gyro"]).record(tmp_path)
@@ -80,6 +81,7 @@ class _Straight:
         return np.array([0.4, 0.4])
 
 
+@pytest.mark.slow
 def test_the_loop_is_that_of_the_other_simulator(monkeypatch):
     """A drive in pieces goes where the whole one goes, up to the load that settles beforehand."""
     monkeypatch.setattr("benchmarks.adaptation.plant.LONGEST", 4.0)
@@ -96,6 +98,7 @@ def test_the_loop_is_that_of_the_other_simulator(monkeypatch):
     assert np.mean([item[:, 3] for item in controller.samples[-5:]]) == pytest.approx(0.8, abs=0.02)
 
 
+@pytest.mark.slow
 def test_a_late_command_comes_late(monkeypatch):
     monkeypatch.setattr("benchmarks.adaptation.plant.LONGEST", 2.0)
     ways = [
@@ -104,6 +107,7 @@ def test_a_late_command_comes_late(monkeypatch):
     assert (ways[0][-1] - ways[1][-1]) / 0.2 == pytest.approx(0.16, abs=0.04)
 
 
+@pytest.mark.slow
 def test_lateral_forces_are_scaled_and_nothing_else():
     """The wheels' lateral forces in a turn follow the factor, so that the robot drifts further on weaker ground."""
     ways = {}
@@ -116,6 +120,7 @@ def test_lateral_forces_are_scaled_and_nothing_else():
     assert turned["strong_sideways"] < 0.98 * turned["nothing"]
 
 
+@pytest.mark.slow
 def test_a_turn_in_a_truth_is_judged_as_others_are():
     own = TrueTurns(TRUTHS["nothing"])
     columns = own.drive(nominal("B4").controller(own.turn(0)), 0)
@@ -139,6 +144,7 @@ def test_what_is_won_back_by_hand():
     assert worse["loses"]
 
 
+@pytest.mark.slow
 def test_fields_differ_in_soil_places_and_noise():
     first, second = (TruePlant(TRUTHS["nothing"], number) for number in (1, 2))
     assert first.noise != second.noise

@@ -67,6 +67,7 @@ def test_a_set_holds_what_the_plan_says():
     assert plan(4) != pairs
 
 
+@pytest.mark.slow
 def test_drives_of_a_pair_are_on_one_field_and_show_what_changed_from_its_time_on():
     (pair, *_) = (pair for pair in plan(3) if pair.begins is not None and pair.case.verdict == ["gyro_bias"])
     before, after = simulate(pair, 3)
@@ -83,6 +84,7 @@ def test_drives_of_a_pair_are_on_one_field_and_show_what_changed_from_its_time_o
     assert distance > 5.0
 
 
+@pytest.mark.slow
 def test_ruts_that_are_there_after_leave_the_state_of_the_robot_before_as_it_is():
     bare = nominal_plant()
     full = with_ground(bare, rut_mode=2, rut_gain=1.0)
@@ -101,6 +103,7 @@ def test_nothing_that_changes_in_a_second_drive_is_drawn():
     assert {pair.case.structure for pair in plan(3) if pair.kind == "structural null"} == set(ALL_STRUCTURES) - {""}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("robot", "turning"), [("ddagr", 0.17), ("warthog", 0.14), ("husky", 0.14)])
 def test_every_robot_drives_the_programme_and_turns_less_than_without_slip(robot, turning):
     (pair, *_) = (pair for pair in plan(3, robot) if pair.kind == "null")
@@ -140,6 +143,7 @@ def test_an_unknown_robot_is_refused():
         plan(3, "jackal")
 
 
+@pytest.mark.slow
 def test_motors_that_weaken_in_mid_drive_leave_the_drive_before_as_it_was():
     (pair, *_) = (pair for pair in plan(3) if pair.begins is not None and pair.case.verdict == ["payload"])
     after = simulate(pair, 3)[1]

@@ -29,6 +29,7 @@ def both(case: Case) -> tuple[list[Recording], list[Recording]]:
     return drives(case, SEED), drives(without(case, 0), SEED)
 
 
+@pytest.mark.slow
 def test_a_twin_has_the_same_noise(both: tuple[list[Recording], list[Recording]]) -> None:
     """At rest nothing slips, so that the first readings are the same; later ones differ by less than noise would."""
     for one, other in zip(*both, strict=True):
@@ -40,6 +41,7 @@ def test_a_twin_has_the_same_noise(both: tuple[list[Recording], list[Recording]]
         assert 0.0 < change < 0.3 * np.nanstd(np.diff(one["specific_force_x"]))
 
 
+@pytest.mark.slow
 def test_a_case_must_be_made_again(case: Case, tmp_path: Path) -> None:
     from benchmarks.concealed.simulate import simulate_case
     from benchmarks.concealed.storage import write_case

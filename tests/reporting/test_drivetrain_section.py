@@ -46,9 +46,8 @@ def test_the_page_has_parts_errors_and_what_is_left(tmp_path):
     assert 'href="drivetrain/calibration.html"' in page
 
 
-def test_without_it_the_page_has_no_such_section(tmp_path):
-    write_report(tmp_path, diagnosis(), evidence())
-    assert "Between command and wheel" not in (tmp_path / PAGE).read_text()
+def test_without_it_the_page_has_no_such_section(words_alone):
+    assert "Between command and wheel" not in words_alone(diagnosis(), evidence())
 
 
 def test_the_text_has_the_same_tables():

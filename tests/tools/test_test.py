@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from threading import Event
 
 import pytest
 
@@ -72,6 +73,16 @@ def test_summary_and_exit_code(monkeypatch, capsys, failing, code):
     assert sorted(ran) == sorted(names)
     last = capsys.readouterr().out.splitlines()[-1]
     assert last == ("12 passed, 0 failed" if failing is None else "10 passed, 1 failed")
+
+
+@pytest.mark.parametrize(("workers", "together"), [(2, True), (1, False)])
+def test_the_wheel_is_checked_beside_the_tests(monkeypatch, workers, together):
+    begun, met = Event(), []
+    checks = {"tests": lambda: met.append(begun.wait(2.0 if together else 0.1)) or Outcome(passed=1)}
+    checks["wheel"] = lambda: begun.set() or Outcome(passed=1)
+    monkeypatch.setattr(command, "_checks", lambda *_: checks)
+    assert command.run(Arguments(workers=workers)) == 0
+    assert met == [together]
 
 
 def test_selections(monkeypatch, capsys):
