@@ -6,7 +6,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
 
 OBSERVATION = (
     ("specific_force_x", "m/s^2", 1.0),
@@ -81,6 +83,70 @@ class TurnObservation(NamedTuple):
     target_speed: float
     heading_to_go: float
     run_in_to_go: float
+
+
+class TurnColumns(NamedTuple):
+    """Observations of N turns in their units, (N,) an entry; see :data:`OBSERVATION`."""
+
+    specific_force_x: Array
+    specific_force_y: Array
+    yaw_rate: Array
+    encoder_right: Array
+    encoder_left: Array
+    last_action_right: Array
+    last_action_left: Array
+    side: Array
+    target_radius: Array
+    target_speed: Array
+    heading_to_go: Array
+    run_in_to_go: Array
+
+
+class FilterColumns(NamedTuple):
+    """What filters of N turns append, in its units, (N,) an entry; see :data:`EKF_FEATURES`."""
+
+    estimated_v_x: Array
+    estimated_yaw_rate: Array
+    log_traction_limit: Array
+    log_traction_rate: Array
+    log_lateral_stiffness: Array
+    log_motion_resistance: Array
+    estimated_slip_right: Array
+    estimated_slip_left: Array
+    deviation_log_traction_limit: Array
+    deviation_log_traction_rate: Array
+    deviation_log_lateral_stiffness: Array
+    deviation_log_motion_resistance: Array
+
+    @property
+    def log_soil(self) -> tuple[Array, Array, Array, Array]:
+        """Logs of a1, a2, b, Rc over their prior medians."""
+        return self.log_traction_limit, self.log_traction_rate, self.log_lateral_stiffness, self.log_motion_resistance
+
+    @property
+    def deviations(self) -> tuple[Array, Array, Array, Array]:
+        """Standard deviations of :attr:`log_soil`."""
+        return (
+            self.deviation_log_traction_limit,
+            self.deviation_log_traction_rate,
+            self.deviation_log_lateral_stiffness,
+            self.deviation_log_motion_resistance,
+        )
+
+
+class PathColumns(NamedTuple):
+    """What poses of N turns append, in its units, (N,) an entry; see :data:`PATH_FEATURES`."""
+
+    estimated_x: Array
+    estimated_y: Array
+    estimated_yaw: Array
+    estimated_v_y: Array
+    gravity_x: Array
+    gravity_y: Array
+    cross_track_error: Array
+    course_error: Array
+    path_to_go: Array
+    path_curvature: Array
 
 
 def decode(observation: ArrayLike) -> TurnObservation:

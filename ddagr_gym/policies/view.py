@@ -12,7 +12,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.control.observation import FEATURE_SCALES, OBSERVATION, PATH_SCALES, SCALES
+from ddagr_gym.control.observation import (
+    FEATURE_SCALES,
+    OBSERVATION,
+    PATH_SCALES,
+    SCALES,
+    FilterColumns,
+    PathColumns,
+    TurnColumns,
+)
 from ddagr_gym.control.timing import CONTROL_PERIOD
 from ddagr_gym.errors import InputError
 from ddagr_gym.estimation import FilterModel
@@ -38,6 +46,7 @@ _LARGEST_STEERING = 0.8
 """Curvature with which the loop steers back to the reference at most, over 1/R* [-] (ours)."""
 
 _BASE = len(OBSERVATION)
+_FILTERED = _BASE + len(FEATURE_SCALES)
 _FORCE_SCALE = 1.0  # [m/s^2] (ours): inputs are then of the order of 1
 _SPEED_SCALE = 0.25  # [m/s] (ours): likewise
 
@@ -118,14 +127,13 @@ class PolicyView:
         """
         rows = np.arange(self.count) if chosen is None else chosen
         whole = self.si(observations)
-        seen = whole[:, :_BASE]
-        features = whole[:, _BASE:] if self.design.needs_filter else None
+        seen = TurnColumns(*whole[:, :_BASE].T)
         self._start(rows, seen)
         if self._paths is not None:
-            self._paths.start(rows[self._fresh[rows]], seen[self._fresh[rows]])
+            self._paths.start(rows[self._fresh[rows]], whole[self._fresh[rows], :_BASE])
             self._paths.observe(rows, whole)
         self._measure_response(rows, seen)
-        frame = self._frame(rows, seen, features)
+        frame = self._frame(rows, seen, whole)
         self._frames[rows, 1:] = self._frames[rows, :-1]
         self._frames[rows, 0] = frame
         fresh = rows[self._fresh[rows]]
@@ -134,61 +142,62 @@ class PolicyView:
         stacked = self._frames[rows, :: self.design.frame_interval].reshape(len(rows), -1)
         return np.clip(stacked, -INPUT_LIMIT, INPUT_LIMIT).astype(np.float32)
 
-    def _start(self, rows: NDArray[np.int64], seen: Array) -> None:
+    def _start(self, rows: NDArray[np.int64], seen: TurnColumns) -> None:
         new = self._fresh[rows]
         started = rows[new]
         self._outputs[started] = 0.0
         for memory in (self._integral, self._behind, self._response):
             memory[started] = 0.0
-        self._reckoning.start(started, seen[new, 11])
+        self._reckoning.start(started, seen.run_in_to_go[new])
 
-    def _measure_response(self, rows: NDArray[np.int64], seen: Array) -> None:
+    def _measure_response(self, rows: NDArray[np.int64], seen: TurnColumns) -> None:
         """Time by which the encoders are behind the commands, from the start from rest to the end of the run-in."""
-        command = self._limit * seen[:, 5:7].mean(axis=1)
-        straight = (seen[:, 11] > 0.0) & ~self._fresh[rows]
-        behind = np.where(straight, command - seen[:, 3:5].mean(axis=1), 0.0)
+        command = self._limit * (0.5 * (seen.last_action_right + seen.last_action_left))
+        straight = (seen.run_in_to_go > 0.0) & ~self._fresh[rows]
+        behind = np.where(straight, command - 0.5 * (seen.encoder_right + seen.encoder_left), 0.0)
         self._behind[rows] += CONTROL_PERIOD * behind
         measured = self._behind[rows] / np.maximum(command, _LEAST_COMMAND)
         self._response[rows] = np.where(straight, np.clip(measured, 0.0, _LONGEST_RESPONSE), self._response[rows])
 
-    def _frame(self, rows: NDArray[np.int64], seen: Array, features: Array | None) -> Array:
-        side, radius, speed = seen[:, 7], seen[:, 8], seen[:, 9]
+    def _frame(self, rows: NDArray[np.int64], seen: TurnColumns, whole: Array) -> Array:
+        side, radius, speed = seen.side, seen.target_radius, seen.target_speed
         rim, rate = self._radius / speed, radius / speed
         columns = [
-            seen[:, 0] / _FORCE_SCALE,
-            side * seen[:, 1] / _FORCE_SCALE,
-            side * seen[:, 2] * rate,
-            *(rim * bank for bank in _outer_inner(side, seen[:, 3], seen[:, 4])),
-            *(rim * self._limit * bank for bank in _outer_inner(side, seen[:, 5], seen[:, 6])),
+            seen.specific_force_x / _FORCE_SCALE,
+            side * seen.specific_force_y / _FORCE_SCALE,
+            side * seen.yaw_rate * rate,
+            *(rim * bank for bank in _outer_inner(side, seen.encoder_right, seen.encoder_left)),
+            *(rim * self._limit * bank for bank in _outer_inner(side, seen.last_action_right, seen.last_action_left)),
             *self._outputs[rows].T,
             self._response[rows],
             *self._task(rows, seen),
         ]
-        if self._paths is not None and features is not None:
-            columns += self._tracked(seen, features, self._paths.curvatures[rows])
-        elif features is not None:
-            columns += self._filtered(rows, seen, features)
+        if self._paths is not None:
+            columns += self._tracked(seen, whole, self._paths.curvatures[rows])
+        elif self.design.needs_filter:
+            columns += self._filtered(rows, seen, _filter_columns(whole))
         return np.stack(columns, axis=1)
 
-    def _task(self, rows: NDArray[np.int64], seen: Array) -> list[Array]:
+    def _task(self, rows: NDArray[np.int64], seen: TurnColumns) -> list[Array]:
         turning, leaving = self._phases(rows, seen)
-        going = [seen[:, 10] / math.pi, seen[:, 11] / seen[:, 8]]
-        return [turning.astype(float), leaving.astype(float), *going, seen[:, 8], seen[:, 9] / _SPEED_SCALE]
+        radius, speed = seen.target_radius, seen.target_speed
+        going = [seen.heading_to_go / math.pi, seen.run_in_to_go / radius]
+        return [turning.astype(float), leaving.astype(float), *going, radius, speed / _SPEED_SCALE]
 
-    def _lead(self, rows: NDArray[np.int64], seen: Array) -> Array:
+    def _lead(self, rows: NDArray[np.int64], seen: TurnColumns) -> Array:
         """Way gone at the reference speed until a command has its effect [m]."""
-        return np.asarray((self._response[rows] + self.design.lead_time) * seen[:, 9])
+        return np.asarray((self._response[rows] + self.design.lead_time) * seen.target_speed)
 
-    def _phases(self, rows: NDArray[np.int64], seen: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    def _phases(self, rows: NDArray[np.int64], seen: TurnColumns) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Whether in the turn, and whether in the run-out, as commanded now: ahead of the robot."""
         lead = self._lead(rows, seen)
-        entered = seen[:, 11] <= lead
-        to_turn = seen[:, 10] > lead / seen[:, 8]
+        entered = seen.run_in_to_go <= lead
+        to_turn = seen.heading_to_go > lead / seen.target_radius
         return entered & to_turn, entered & ~to_turn
 
-    def _filtered(self, rows: NDArray[np.int64], seen: Array, features: Array) -> list[Array]:
-        side, radius, speed = seen[:, 7], seen[:, 8], seen[:, 9]
-        forward, rate = features[:, 0], side * features[:, 1]
+    def _filtered(self, rows: NDArray[np.int64], seen: TurnColumns, known: FilterColumns) -> list[Array]:
+        side, radius, speed = seen.side, seen.target_radius, seen.target_speed
+        forward, rate = known.estimated_v_x, side * known.estimated_yaw_rate
         turning, _ = self._phases(rows, seen)
         curvature = radius * rate / np.maximum(forward, _LEAST_SPEED * speed)
         error = np.where(turning, curvature - 1.0, curvature)
@@ -200,7 +209,7 @@ class PolicyView:
         return [
             forward / speed,
             rate * radius / speed,
-            *_soil(side, features),
+            *_soil(side, known),
             error,
             self._integral[rows],
             # a hundredth of R* and half a degree are what matters
@@ -218,28 +227,28 @@ class PolicyView:
         ]
 
     @staticmethod
-    def _tracked(seen: Array, features: Array, wanted: Array) -> list[Array]:
+    def _tracked(seen: TurnColumns, whole: Array, wanted: Array) -> list[Array]:
         """Inputs of the path, see :data:`~ddagr_gym.policies.design.PATH_INPUTS`."""
-        side, radius, speed = seen[:, 7], seen[:, 8], seen[:, 9]
-        path = features[:, len(FEATURE_SCALES) :]
+        side, radius, speed = seen.side, seen.target_radius, seen.target_speed
+        known, path = _filter_columns(whole), PathColumns(*whole[:, _FILTERED:].T)
         return [
-            features[:, 0] / speed,
-            side * path[:, 3] / speed,
-            side * features[:, 1] * radius / speed,
-            *_soil(side, features),
-            path[:, 4] / _FORCE_SCALE,
-            side * path[:, 5] / _FORCE_SCALE,
+            known.estimated_v_x / speed,
+            side * path.estimated_v_y / speed,
+            side * known.estimated_yaw_rate * radius / speed,
+            *_soil(side, known),
+            path.gravity_x / _FORCE_SCALE,
+            side * path.gravity_y / _FORCE_SCALE,
             # a hundredth of R* and half a degree are what matters
-            10.0 * side * path[:, 6] / radius,
-            10.0 * side * path[:, 7],
-            path[:, 8] / radius,
-            side * path[:, 9] * radius,
+            10.0 * side * path.cross_track_error / radius,
+            10.0 * side * path.course_error,
+            path.path_to_go / radius,
+            side * path.path_curvature * radius,
             side * wanted * radius,
         ]
 
-    def _reckon(self, rows: NDArray[np.int64], seen: Array, forward: Array, rate: Array) -> None:
+    def _reckon(self, rows: NDArray[np.int64], seen: TurnColumns, forward: Array, rate: Array) -> None:
         moved = ~self._fresh[rows]
-        radius, lateral = seen[:, 8], seen[:, 7] * seen[:, 1]
+        radius, lateral = seen.target_radius, seen.side * seen.specific_force_y
         curvature = (1.0 + self.design.curvature_scale * self._outputs[rows, 0]) / radius
         self._reckoning.advance(rows[moved], forward[moved], rate[moved], lateral[moved], curvature[moved])
 
@@ -253,42 +262,41 @@ class PolicyView:
         wanted = np.clip(np.asarray(outputs, dtype=np.float64), -1.0, 1.0)
         change = np.clip(wanted - self._outputs, -self.design.rate_limit, self.design.rate_limit)
         self._outputs += change
-        given = np.asarray(observations, dtype=np.float64)
-        seen = given[:, :_BASE] * SCALES
+        whole = self.si(observations)
+        seen = TurnColumns(*whole[:, :_BASE].T)
         if self.design.action == "absolute":
-            right, left = _outer_inner(seen[:, 7], self._outputs[:, 0], self._outputs[:, 1])
+            right, left = _outer_inner(seen.side, self._outputs[:, 0], self._outputs[:, 1])
             driving = 1.0 if self._paths is None else np.where(self._paths.standing, 0.0, 1.0)
             return (np.stack([right, left]) * driving).T.astype(np.float32)
         if self._paths is not None:
             return self._corrected(self._paths, seen)
-        banks = self._feed_forward(seen, given) / self._limit
+        banks = self._feed_forward(seen, whole) / self._limit
         return np.clip(banks, -1.0, 1.0).astype(np.float32)
 
-    def _corrected(self, paths: TrackedPaths, seen: Array) -> NDArray[np.float32]:
+    def _corrected(self, paths: TrackedPaths, seen: TurnColumns) -> NDArray[np.float32]:
         """The path tracker's actions (N, 2) for its curvature and speed, each corrected."""
-        bend = seen[:, 7] * self.design.curvature_scale * self._outputs[:, 0] / seen[:, 8]
+        bend = seen.side * self.design.curvature_scale * self._outputs[:, 0] / seen.target_radius
         pace = 1.0 + self.design.speed_scale * self._outputs[:, 1]
-        return paths.act(pace * seen[:, 9], paths.curvatures + bend)
+        return paths.act(pace * seen.target_speed, paths.curvatures + bend)
 
-    def _feed_forward(self, seen: Array, given: Array) -> Array:
+    def _feed_forward(self, seen: TurnColumns, whole: Array) -> Array:
         """Bank speeds (N, 2) right, left [rad/s] of the corrected arc at the estimated, or the nominal, soil."""
-        side, radius, speed = seen[:, 7], seen[:, 8], seen[:, 9]
         curvature = self._reference_loop(seen) if self.design.needs_filter else self._nominal(seen)
-        curvature = side * (curvature + self.design.curvature_scale * self._outputs[:, 0] / radius)
-        logs = given[:, _BASE + 2 : _BASE + 6] * FEATURE_SCALES[2:6] if self.design.needs_filter else 0.0
-        parameters = np.exp(np.broadcast_to(self._prior + logs, (len(seen), 4)))
-        corrected = speed * (1.0 + self.design.speed_scale * self._outputs[:, 1])
+        curvature = seen.side * (curvature + self.design.curvature_scale * self._outputs[:, 0] / seen.target_radius)
+        logs = np.stack(_filter_columns(whole).log_soil, axis=1) if self.design.needs_filter else 0.0
+        parameters = np.exp(np.broadcast_to(self._prior + logs, (self.count, 4)))
+        corrected = seen.target_speed * (1.0 + self.design.speed_scale * self._outputs[:, 1])
         return arc_bank_speed_rows(self._model, parameters, corrected, curvature)
 
-    def _nominal(self, seen: Array) -> Array:
+    def _nominal(self, seen: TurnColumns) -> Array:
         """Commanded curvature, turn to the left, with heading hold by the gyro on straights [1/m]."""
         turning, leaving = self._phases(np.arange(self.count), seen)
-        heading_hold = self.design.heading_gain * (seen[:, 10] - np.where(leaving, 0.0, math.pi))
-        return np.where(turning, 1.0 / seen[:, 8], heading_hold)
+        heading_hold = self.design.heading_gain * (seen.heading_to_go - np.where(leaving, 0.0, math.pi))
+        return np.where(turning, 1.0 / seen.target_radius, heading_hold)
 
-    def _reference_loop(self, seen: Array) -> Array:
+    def _reference_loop(self, seen: TurnColumns) -> Array:
         """Curvature that follows the reference, bent and straightened ahead of time, turn to the left [1/m]."""
-        rows, radius = np.arange(self.count), seen[:, 8]
+        rows, radius = np.arange(self.count), seen.target_radius
         lead = self._lead(rows, seen)
         entered = self._reckoning.distances + lead > 0.0
         turning = entered & (self._reckoning.references[:, 2] + lead / radius < math.pi)
@@ -298,9 +306,15 @@ class PolicyView:
         return (turning - back) / radius
 
 
-def _soil(side: Array, features: Array) -> list[Array]:
-    """Inputs :data:`~ddagr_gym.policies.design.SOIL_INPUTS` of a filter's features (n, entries) in SI units."""
-    return [*features[:, 2:6].T, *_outer_inner(side, features[:, 6], features[:, 7]), *features[:, 8:12].T]
+def _filter_columns(whole: Array) -> FilterColumns:
+    """The filter's part of observations (n, entries) in SI units."""
+    return FilterColumns(*whole[:, _BASE:_FILTERED].T)
+
+
+def _soil(side: Array, known: FilterColumns) -> list[Array]:
+    """Inputs :data:`~ddagr_gym.policies.design.SOIL_INPUTS` of what a filter knows."""
+    slips = _outer_inner(side, known.estimated_slip_right, known.estimated_slip_left)
+    return [*known.log_soil, *slips, *known.deviations]
 
 
 def _outer_inner(side: Array, right: Array, left: Array) -> tuple[Array, Array]:
