@@ -132,10 +132,11 @@ class _Kernel(CPUDispatcher):
     Few kernels are called from Python, and without that code all of them compile in three quarters of the time.
     """
 
-    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
-        super().__init__(function, targetoptions=options, pipeline_class=_Compiler)
+    def __init__(self, function: Callable[..., Any], local_types: Any, options: dict[str, Any]) -> None:
+        # as numba calls it where a kernel is unpickled
+        super().__init__(function, local_types, options, _Compiler)
         alone = {**options, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-        self._twin = CPUDispatcher(function, targetoptions=alone, pipeline_class=_Compiler)
+        self._twin = CPUDispatcher(function, local_types, alone, _Compiler)
 
     def keep_apart(self, stamp: str) -> None:
         """Keep machine code on disk while the stamp is the same."""
@@ -188,7 +189,7 @@ def kernel(*, inline: bool = False, fused: bool = True, cached: bool = True) -> 
             "nogil": True,
             "forceinline": inline,
         }
-        compiled = _Kernel(function, options)
+        compiled = _Kernel(function, {}, options)
         if cached:
             compiled.keep_apart(_stamp(function.__module__))
         return compiled

@@ -72,6 +72,12 @@ def test_what_kernels_call_is_compiled_without_code_for_python():
     assert len(half.overloads) == 1
 
 
+def test_a_kernel_is_made_again_where_it_is_unpickled():
+    again = type(first_of_depth)._rebuild(**first_of_depth._reduce_states() | {"uuid": "of another process"})
+    assert again is not first_of_depth
+    assert again(2, np.zeros((6, 4))) == 2.0
+
+
 def test_stack_array_needs_a_constant_size():
     @kernel(cached=False)
     def variable(size):
