@@ -204,11 +204,18 @@ def row_of(name: str, seed: int) -> dict[str, Any]:
 
 
 def tasks_of(robots: Sequence[str], seeds: Sequence[int]) -> list[Task]:
-    """A calibration of every robot from every seed, under keys that change with the code."""
-    code = hashlib.sha256(calibration_digest().encode() + Path(__file__).read_bytes()).hexdigest()[:16]
+    """A calibration of every robot from every seed, under keys that change with code, robots and soil."""
     cases = [(name, seed) for name in robots for seed in seeds]
-    keys = [f"{name.replace(', ', '_').replace(' ', '_')}_{seed}_{code}" for name, seed in cases]
+    keys = [f"{name.replace(', ', '_').replace(' ', '_')}_{seed}_{_digest(CASES[name])}" for name, seed in cases]
     return [Task(f"{case[0]}, seed {case[1]}", row_of, case, key=key) for case, key in zip(cases, keys, strict=True)]
+
+
+def _digest(case: Case) -> str:
+    """Of all that a robot's calibrations depend on but the seed."""
+    digest = hashlib.sha256(calibration_digest().encode() + Path(__file__).read_bytes())
+    digest.update((Path(ddagr_gym.__file__).parent / "api" / "simulate.py").read_bytes())
+    digest.update(repr((case.sheet, case.robot, get_soil("thesis_a1"))).encode())
+    return digest.hexdigest()[:16]
 
 
 def draw(rows: Sequence[Mapping[str, Any]], path: Path) -> None:

@@ -100,10 +100,9 @@ class _CacheFile(IndexDataCacheFile):
 
 def _keep_apart(cache: Any, stamp: str) -> None:
     """Let a numba cache know the sources of all that its function may contain."""
-    numbered = getattr(cache, "_cache_file", None)
-    if numbered is not None:
-        name = numbered._index_name.removesuffix(".nbi")
-        cache._cache_file = _CacheFile(numbered._cache_path, name, (numbered._source_stamp, stamp))
+    numbered = cache._cache_file
+    name = numbered._index_name.removesuffix(".nbi")
+    cache._cache_file = _CacheFile(numbered._cache_path, name, (numbered._source_stamp, stamp))
 
 
 def _stamp(module: str) -> str:

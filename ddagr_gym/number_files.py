@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import struct
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Mapping
@@ -22,6 +23,12 @@ MAXIMUM_BYTES = 1_000_000
 MAXIMUM_UNPACKED = 8_000_000
 """Largest sum of its members, unpacked."""
 _DESCRIPTION = "description"
+
+DAMAGED = (
+    zipfile.BadZipFile, zlib.error, struct.error, tokenize.TokenError, ValueError, KeyError, EOFError,
+    NotImplementedError, RuntimeError, SyntaxError, TypeError, MemoryError,
+)  # fmt: skip
+"""What numpy raises for an .npz file that is damaged, or none at all."""
 
 
 def write_arrays(
@@ -68,8 +75,7 @@ def read_arrays(file: Path, kind: str) -> dict[str, NDArray[Any]]:
         raise
     except OSError as error:
         raise InputError(f"{file} cannot be read: {(error.strerror or f'not {kind}').lower()}.") from None
-    except (zipfile.BadZipFile, zlib.error, struct.error, ValueError, KeyError, EOFError, NotImplementedError,
-            RuntimeError, SyntaxError, TypeError, MemoryError):  # fmt: skip
+    except DAMAGED:
         raise InputError(f"{file} is not {kind}: give an .npz file that its training wrote.") from None
 
 

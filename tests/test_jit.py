@@ -70,6 +70,11 @@ def test_what_kernels_call_is_compiled_without_code_for_python():
     assert not half.overloads
     assert half(4.0) == 2.0
     assert len(half.overloads) == 1
+    for dispatcher, whether in ((half, True), (half._twin, False)):
+        (compiled,) = dispatcher.overloads.values()
+        names = {function.name for function in compiled.library.get_defined_functions()}
+        assert (compiled.fndesc.llvm_cpython_wrapper_name in names) is whether
+        assert (compiled.fndesc.llvm_cfunc_wrapper_name in names) is whether
 
 
 def test_a_kernel_is_made_again_where_it_is_unpickled():
@@ -177,4 +182,6 @@ def test_code_of_other_sources_or_signatures_is_never_taken(tmp_path):
 def test_every_cached_kernel_keeps_its_code_apart():
     from ddagr_gym.simulator_kernel import advance_rows
 
-    assert isinstance(advance_rows._cache._cache_file, jit._CacheFile)
+    files = [dispatcher._cache._cache_file for dispatcher in (advance_rows, advance_rows._twin)]
+    assert all(isinstance(file, jit._CacheFile) for file in files)
+    assert len({file._name(("float64",)) for file in files}) == 2

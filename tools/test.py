@@ -85,8 +85,12 @@ def run(arguments: Arguments) -> int:
     beside = {name: check for name, check in selected.items() if name in _BESIDE and arguments.workers > 1}
     with ThreadPoolExecutor(1) as pool:
         begun = {name: pool.submit(_timed, name, check) for name, check in beside.items()}
-        alone = {name: _timed(name, check) for name, check in selected.items() if name not in beside}
-        outcomes = alone | {name: future.result() for name, future in begun.items()}
+        try:
+            alone = {name: _timed(name, check) for name, check in selected.items() if name not in beside}
+            outcomes = alone | {name: future.result() for name, future in begun.items()}
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
     _print_summary(outcomes)
     return 1 if any(outcome.failed for outcome, _ in outcomes.values()) else 0
 
@@ -99,12 +103,12 @@ def _timed(name: str, check: Callable[[], Outcome]) -> tuple[Outcome, float]:
 
 def _checks(root: Path, arguments: Arguments) -> dict[str, Callable[[], Outcome]]:
     return {
-        "lint": lambda: _tool(root, "-m", "ruff", "check", "."),
-        "format": lambda: _tool(root, "-m", "ruff", "format", "--check", "."),
-        "contracts": lambda: _tool(root, "-c", _LINT_IMPORTS),
+        "lint": lambda: _tool("lint", root, "-m", "ruff", "check", "."),
+        "format": lambda: _tool("format", root, "-m", "ruff", "format", "--check", "."),
+        "contracts": lambda: _tool("contracts", root, "-c", _LINT_IMPORTS),
         "tests": lambda: _tests(root, arguments),
         "wheel": lambda: _installed_wheel(root),
-        "types": lambda: _tool(root, "-m", "mypy"),
+        "types": lambda: _tool("types", root, "-m", "mypy"),
         "docs": lambda: _site(root),
     }
 
@@ -112,20 +116,21 @@ def _checks(root: Path, arguments: Arguments) -> dict[str, Callable[[], Outcome]
 def _site(root: Path) -> Outcome:
     """Build the documentation site into a folder that is thrown away."""
     with tempfile.TemporaryDirectory(prefix="ddagr-site-") as temporary:
-        return _tool(root, "-m", "tools", "docs", "--output", temporary)
+        return _tool("docs", root, "-m", "tools", "docs", "--output", temporary)
 
 
-def _tool(root: Path, *words: str) -> Outcome:
+def _tool(name: str, root: Path, *words: str) -> Outcome:
     command = [sys.executable, *words]
-    return Outcome(passed=1) if _printed_whole(command, root) == 0 else Outcome(failed=1)
+    return Outcome(passed=1) if _printed_whole(name, command, root) == 0 else Outcome(failed=1)
 
 
-def _printed_whole(command: list[str], folder: Path) -> int:
+def _printed_whole(name: str, command: list[str], folder: Path) -> int:
     """Exit code of a command, whose output is printed when it ends: others print at the same time."""
     done = subprocess.run(
         command, cwd=folder, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
     )
-    print(done.stdout, end="", flush=True)
+    if done.stdout:
+        print(f"\n==== {name} says\n{done.stdout}", end="", flush=True)
     return done.returncode
 
 
@@ -136,12 +141,12 @@ def _tests(root: Path, arguments: Arguments) -> Outcome:
     return _pytest([sys.executable], root, "-m", marker, *parallel, *paths, may_be_empty=arguments.slow)
 
 
-def _pytest(python: list[str], folder: Path, *words: str, may_be_empty: bool = False, beside: bool = False) -> Outcome:
+def _pytest(python: list[str], folder: Path, *words: str, may_be_empty: bool = False, beside: str = "") -> Outcome:
     with tempfile.TemporaryDirectory(prefix="ddagr-test-") as temporary:
         report = Path(temporary) / "report.xml"
         command = [*python, "-m", "pytest", "-q", *_SLOWEST, f"--junitxml={report}", *words]
         if beside:
-            code = _printed_whole(command, folder)
+            code = _printed_whole(beside, command, folder)
         else:
             code = subprocess.run(command, cwd=folder, stdin=subprocess.DEVNULL).returncode
         if code == _NOTHING_SELECTED and may_be_empty:
@@ -166,11 +171,11 @@ def _installed_wheel(root: Path) -> Outcome:
         try:
             python = wheel.install(root, folder)
         except subprocess.CalledProcessError as error:
-            print(f"{' '.join(map(str, error.cmd))} ended with exit code {error.returncode}.", file=sys.stderr)
+            print(f"{error.stdout}{' '.join(error.cmd)} ended with exit code {error.returncode}.", file=sys.stderr)
             return Outcome(failed=1)
         tests = wheel.copy_tests(root, folder)
         environment = ["env", "-u", "PYTHONPATH", str(python), "-P"]
-        return _pytest(environment, tests, "-p", "no:cacheprovider", "--import-mode=importlib", ".", beside=True)
+        return _pytest(environment, tests, "-p", "no:cacheprovider", "--import-mode=importlib", ".", beside="wheel")
 
 
 def _print_summary(outcomes: dict[str, tuple[Outcome, float]]) -> None:

@@ -22,7 +22,7 @@ def install(root: Path, folder: Path) -> Path:
         The interpreter of the new environment; it also has pytest.
 
     Raises:
-        subprocess.CalledProcessError: a step failed; its output went to the terminal.
+        subprocess.CalledProcessError: a step failed; it has the step's output.
     """
     # A build removes nothing that it did not make, so it runs on a folder of its own.
     _call(root, sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", folder / "dist")
@@ -66,4 +66,6 @@ def _dependencies(root: Path, wheel: Path) -> Path:
 def _call(folder: Path, *words: object) -> None:
     environment = {**os.environ, "PIP_DISABLE_PIP_VERSION_CHECK": "1", "PIP_NO_INPUT": "1", "PIP_USER": "0"}
     command = [str(word) for word in words]
-    subprocess.run(command, cwd=folder, env=environment, stdin=subprocess.DEVNULL, check=True)
+    # told where it fails only: the tests print at the same time
+    pipes = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
+    subprocess.run(command, cwd=folder, env=environment, check=True, text=True, **pipes)  # type: ignore[call-overload]

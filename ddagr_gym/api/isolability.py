@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -102,8 +102,8 @@ def isolability(
         robot: nominal: name, YAML file or object.
         soil: nominal: name, YAML file or object; where it is None, that of the thresholds, else firm_ground, at four
             times its usual uncertainty.
-        soil_uncertainty: factor on how far the soil may be from the nominal one, as for a diagnosis; None for 1 beside
-            a soil.
+        soil_uncertainty: factor on how far the soil may be from the nominal one, as for a diagnosis; None is 1 where
+            a soil is given.
         thresholds: gates of ``ddagr null-bank``; by default those that ship for the robot, and where none do those that
             normal noise alone asks for (chi-square): real drives need larger sizes then.
         seed: of the sensor noise.
@@ -146,7 +146,7 @@ def isolability(
             priors=priors,
             progress=lambda name: steps.advance(),
         )
-    return IsolabilityResult(table)
+    return IsolabilityResult(replace(table, soil_uncertainty=uncertainty))
 
 
 def _manoeuvres(given: ManoeuvreLike | Sequence[ManoeuvreLike]) -> list[Manoeuvre]:

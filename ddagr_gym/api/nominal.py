@@ -137,7 +137,7 @@ def nominal_or_usual(
         InputError: an unknown name, with the closest ones; a file that is missing or not valid.
     """
     chosen = robot_or_recorded(robot, recordings)
-    return _on_usual_soil(chosen, soil, soil_uncertainty, thresholds, say_soil=say_soil, stacklevel=4)
+    return _on_usual_soil(chosen, soil, soil_uncertainty, thresholds, say_soil=say_soil)
 
 
 def planned_nominal(
@@ -147,14 +147,15 @@ def planned_nominal(
 
     Args:
         robot: as :func:`robot_from` takes it.
-        soil: as of :func:`soil_or_usual`; an InputWarning says one that is not given, but the ddagr's own.
+        soil: as of :func:`soil_or_usual`. Where it is not given an InputWarning says which one is taken, but for the
+            ddagr's own.
         soil_uncertainty: likewise.
         thresholds: as of :func:`thresholds_from`.
 
     Raises:
         InputError: an unknown name, with the closest ones; a file that is missing or not valid.
     """
-    return _on_usual_soil(robot, soil, soil_uncertainty, thresholds, say_soil=True, stacklevel=4)
+    return _on_usual_soil(robot, soil, soil_uncertainty, thresholds, say_soil=True)
 
 
 def _on_usual_soil(
@@ -164,7 +165,6 @@ def _on_usual_soil(
     thresholds: ThresholdsLike | None,
     *,
     say_soil: bool,
-    stacklevel: int,
 ) -> tuple[Nominal, float]:
     """Robot on the soil as given, else on the usual one, which a warning of the caller's caller says."""
     from ddagr_gym.diagnosis.gates.threshold_files import shipped_thresholds
@@ -178,7 +178,7 @@ def _on_usual_soil(
             f"no soil is given: the {nominal.robot.name} is taken to be on {nominal.soil_name}, at {uncertainty:g} "
             "times a soil's usual uncertainty; name a soil with --soil (soil=... in Python) where it is known.",
             InputWarning,
-            stacklevel=stacklevel,
+            stacklevel=4,
         )
     return nominal, uncertainty
 

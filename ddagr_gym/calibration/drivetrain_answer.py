@@ -68,7 +68,7 @@ def drivetrain_findings(calibration: Calibration) -> tuple[Finding, ...]:
 
 def _finding(part: PartDecision, parameters: list[CalibratedParameter], folds: int) -> Finding:
     estimates = {p.name: Estimate(p.value, p.unit, p.interval) for p in parameters if p.value is not None}
-    gate = least_growth(part.error or 0.0, folds, part_named(part.name).usual)
+    gate = least_growth(part.error, folds, part_named(part.name).usual)
     return forecast_finding(part.name, estimates, part.growth, part.error, gate)
 
 

@@ -99,7 +99,7 @@ def _of_banks(calibration: Calibration, effect: EncoderScale | CommandGain, doub
     elif isinstance(effect, CommandGain):
         sizes = {field: _reaching(size, size.value / both) for field, size in sizes.items()}
     part = next(item for item in calibration.parts if item.name == effect.name)
-    gate = least_growth(part.error or 0.0, folds_of(calibration))
+    gate = least_growth(part.error, folds_of(calibration))
     finding = forecast_finding(effect.name, sizes, part.growth, part.error, gate)
     return finding if differ else replace(finding, equivalence_set=dict.fromkeys(common, 1.0 / len(common)))
 

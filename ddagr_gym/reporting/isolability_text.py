@@ -23,8 +23,9 @@ def table_text(table: Isolability) -> str:
 
 def table_head(table: Isolability) -> str:
     """Robot, soil, manoeuvres, sensors and gates."""
+    unsure = "" if table.soil_uncertainty == 1.0 else f" ({table.soil_uncertainty:g} times as uncertain as usual)"
     return (
-        f"{table.robot} on {table.soil}: {', '.join(table.manoeuvres)} ({table.duration:.0f} s) with "
+        f"{table.robot} on {table.soil}{unsure}: {', '.join(table.manoeuvres)} ({table.duration:.0f} s) with "
         f"{', '.join(table.sensors)}; gates: {table.gates}"
     )
 

@@ -144,7 +144,6 @@ def test_what_is_won_back_by_hand():
     assert worse["loses"]
 
 
-@pytest.mark.slow
 def test_fields_differ_in_soil_places_and_noise():
     first, second = (TruePlant(TRUTHS["nothing"], number) for number in (1, 2))
     assert first.noise != second.noise

@@ -84,7 +84,6 @@ def test_drives_of_a_pair_are_on_one_field_and_show_what_changed_from_its_time_o
     assert distance > 5.0
 
 
-@pytest.mark.slow
 def test_ruts_that_are_there_after_leave_the_state_of_the_robot_before_as_it_is():
     bare = nominal_plant()
     full = with_ground(bare, rut_mode=2, rut_gain=1.0)

@@ -9,7 +9,8 @@ from ddagr_gym.api.nominal import planned_nominal, thresholds_from
 from ddagr_gym.cli import main, warnings_as_lines
 from ddagr_gym.diagnosis.gates.threshold_files import default_thresholds, save_thresholds
 from ddagr_gym.diagnosis.planning.isolability import Detectable, Isolability
-from ddagr_gym.presets import get_robot
+from ddagr_gym.identification.nuisances import NuisancePriors
+from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.reporting.isolability_figure import isolability_figure
 from ddagr_gym.reporting.isolability_text import table_text
 
@@ -66,6 +67,26 @@ def test_soil_that_is_not_named_is_that_of_the_robots_thresholds_and_said(capsys
     assert "no soil is given: the warthog is taken to be on firm_ground" in capsys.readouterr().err
     nominal, uncertainty = planned_nominal("warthog", "lete_sand_wong", None, None)
     assert (nominal.soil_name, uncertainty, capsys.readouterr().err) == ("lete_sand_wong", 1.0, "")
+
+
+@pytest.mark.parametrize(
+    ("words", "soil", "uncertainty", "said"),
+    [((), "firm_ground", 4.0, "(4 times as uncertain as usual)"), (("--soil", "firm_ground"), "firm_ground", 1.0, ":")],
+)
+def test_the_table_is_of_that_soil_as_uncertain_as_it_is(monkeypatch, capsys, tmp_path, words, soil, uncertainty, said):
+    asked = {}
+
+    def tabulated(robot, soil, *_, soil_name, priors, **__):
+        asked.update(soil=soil, soil_name=soil_name, priors=priors)
+        return replace(table(), robot=robot.name, soil=soil_name)
+
+    monkeypatch.setattr("ddagr_gym.diagnosis.planning.isolability.isolability", tabulated)
+    assert main(["isolability", "--robot", "warthog", *words, "--output", str(tmp_path / "out")]) == 0
+    assert asked == {
+        "soil": get_soil(soil), "soil_name": soil, "priors": NuisancePriors().with_soil(uncertainty)
+    }  # fmt: skip
+    assert f"warthog on {soil} {said}".replace(" :", ":") in capsys.readouterr().out
+    assert json.loads((tmp_path / "out" / "isolability.json").read_text())["soil_uncertainty"] == uncertainty
 
 
 def test_negative_seed_is_one_sentence(tmp_path, capsys):

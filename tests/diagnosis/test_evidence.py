@@ -96,6 +96,12 @@ def test_a_file_that_holds_no_evidence_is_one_sentence(tmp_path):
         np.save(stream, np.zeros(3))
     with pytest.raises(InputError, match="cannot be read as evidence"):
         Evidence.load(path)
+    np.savez_compressed(path, version=np.array(1), time=np.arange(300.0))
+    whole, rng = path.read_bytes(), np.random.default_rng(0)
+    for place in rng.choice(len(whole), 300):
+        path.write_bytes(whole[:place] + bytes([whole[place] ^ int(rng.integers(1, 256))]) + whole[place + 1 :])
+        with pytest.raises(InputError):
+            Evidence.load(path)
     np.savez(path, version=np.array([1, 2]), time=np.zeros(3))
     with pytest.raises(InputError, match="no evidence of version 1"):
         Evidence.load(path)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import time
 from threading import Event
 
 import pytest
@@ -50,13 +51,13 @@ def test_collection_errors_and_empty_selections_fail(folder):
 
 
 def test_a_failing_tool_is_counted(tmp_path):
-    assert command._tool(tmp_path, "-c", "pass") == Outcome(passed=1)
-    assert command._tool(tmp_path, "-c", "raise SystemExit(3)") == Outcome(failed=1)
+    assert command._tool("it", tmp_path, "-c", "pass") == Outcome(passed=1)
+    assert command._tool("it", tmp_path, "-c", "raise SystemExit(3)") == Outcome(failed=1)
 
 
 def test_what_a_tool_says_is_printed_whole(tmp_path, capsys):
-    command._tool(tmp_path, "-c", "import sys; print('found'); sys.exit('one error')")
-    assert sorted(capsys.readouterr().out.splitlines()) == ["found", "one error"]
+    command._tool("it", tmp_path, "-c", "import sys; print('found'); sys.exit('one error')")
+    assert sorted(capsys.readouterr().out.splitlines()) == ["", "==== it says", "found", "one error"]
 
 
 @pytest.mark.parametrize(("failing", "code"), [(None, 0), ("types", 1), ("wheel", 1)])
@@ -83,6 +84,26 @@ def test_the_wheel_is_checked_beside_the_tests(monkeypatch, workers, together):
     monkeypatch.setattr(command, "_checks", lambda *_: checks)
     assert command.run(Arguments(workers=workers)) == 0
     assert met == [together]
+
+
+def test_an_interrupt_begins_nothing_more(monkeypatch):
+    begun, ran = Event(), []
+
+    def interrupted():
+        assert begun.wait(2.0)
+        raise KeyboardInterrupt
+
+    def wheel():
+        begun.set()
+        time.sleep(0.2)
+        return Outcome(passed=1)
+
+    checks = {"tests": interrupted, "wheel": wheel}
+    checks |= {name: (lambda name=name: ran.append(name) or Outcome(passed=1)) for name in ("types", "docs")}
+    monkeypatch.setattr(command, "_checks", lambda *_: checks)
+    with pytest.raises(KeyboardInterrupt):
+        command.run(Arguments())
+    assert ran == []
 
 
 def test_selections(monkeypatch, capsys):

@@ -8,8 +8,6 @@ channels in the order of :data:`ddagr_gym.identification.windows.CHANNELS`.
 from __future__ import annotations
 
 import os
-import zipfile
-import zlib
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -19,6 +17,7 @@ from numpy.typing import NDArray
 
 from ddagr_gym.errors import InputError
 from ddagr_gym.files import atomic_path
+from ddagr_gym.number_files import DAMAGED
 
 Array = NDArray[np.float64]
 
@@ -148,11 +147,11 @@ class Evidence:
         try:
             with np.load(Path(path), allow_pickle=False) as stored:
                 body = {name: stored[name] for name in stored.files}
-        except (OSError, EOFError, TypeError, ValueError, zipfile.BadZipFile, zlib.error) as error:
+        except (OSError, *DAMAGED) as error:
             raise InputError(f"{os.fspath(path)} cannot be read as evidence ({error}): {remedy}.") from None
         version = body.pop("version", None)
         names = {item.name for item in fields(cls)}
-        if version is None or version.size != 1 or version.item() != VERSION or set(body) != names:
+        if getattr(version, "size", 0) != 1 or version.item() != VERSION or set(body) != names:
             raise InputError(f"{os.fspath(path)} holds no evidence of version {VERSION}: {remedy}.")
         restored: dict[str, Any] = {name: _restored(value) for name, value in body.items()}
         return cls(**restored)

@@ -64,6 +64,7 @@ class Isolability:
         detectable: one per size of an effect.
         share: (n, n) share of the row's sensitivity that the column cannot imitate; NaN on the diagonal.
         apart: (n, n) multiples of the row's least meaningful size from which it is told from the column.
+        soil_uncertainty: factor on how far the soil may be from the nominal one.
     """
 
     robot: str
@@ -76,6 +77,7 @@ class Isolability:
     detectable: tuple[Detectable, ...]
     share: tuple[tuple[float, ...], ...]
     apart: tuple[tuple[float, ...], ...]
+    soil_uncertainty: float = 1.0
 
     def of(self, effect: str) -> Detectable:
         """The size of an effect that shows best."""
@@ -93,6 +95,7 @@ class Isolability:
             "schema": SCHEMA,
             "robot": self.robot,
             "soil": self.soil,
+            "soil_uncertainty": self.soil_uncertainty,
             "manoeuvres": list(self.manoeuvres),
             "duration": self.duration,
             "sensors": list(self.sensors),
