@@ -6,7 +6,11 @@ import json
 import os
 import shutil
 import stat
+import struct
 import tempfile
+import tokenize
+import zipfile
+import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -23,6 +27,12 @@ MAXIMUM_JSON = 50_000_000
 
 MAXIMUM_JSON_LINES = 1_000_000_000
 """The same of a file with one JSON value a line (ours): a million episodes have fewer."""
+
+DAMAGED_ARRAYS = (
+    zipfile.BadZipFile, zlib.error, struct.error, tokenize.TokenError, ValueError, KeyError, EOFError,
+    NotImplementedError, RuntimeError, SyntaxError, TypeError, MemoryError,
+)  # fmt: skip
+"""What numpy raises for an .npz file that is damaged, or none at all."""
 
 
 def expanded(path: str | os.PathLike[str]) -> Path:

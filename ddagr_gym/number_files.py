@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-import struct
-import tokenize
 import zipfile
-import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -16,19 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.errors import InputError
-from ddagr_gym.files import atomic_path
+from ddagr_gym.files import DAMAGED_ARRAYS, atomic_path
 
 MAXIMUM_BYTES = 1_000_000
 """Largest file that is read."""
 MAXIMUM_UNPACKED = 8_000_000
 """Largest sum of its members, unpacked."""
 _DESCRIPTION = "description"
-
-DAMAGED = (
-    zipfile.BadZipFile, zlib.error, struct.error, tokenize.TokenError, ValueError, KeyError, EOFError,
-    NotImplementedError, RuntimeError, SyntaxError, TypeError, MemoryError,
-)  # fmt: skip
-"""What numpy raises for an .npz file that is damaged, or none at all."""
 
 
 def write_arrays(
@@ -75,7 +66,7 @@ def read_arrays(file: Path, kind: str) -> dict[str, NDArray[Any]]:
         raise
     except OSError as error:
         raise InputError(f"{file} cannot be read: {(error.strerror or f'not {kind}').lower()}.") from None
-    except DAMAGED:
+    except DAMAGED_ARRAYS:
         raise InputError(f"{file} is not {kind}: give an .npz file that its training wrote.") from None
 
 

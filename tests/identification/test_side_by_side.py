@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 
 import pytest
 
@@ -32,8 +33,10 @@ def test_an_error_ends_what_has_not_begun():
 
     def make(item: int, threads: int) -> None:
         begun.append(item)
-        raise ValueError(str(item))
+        if item == 0:
+            raise ValueError("the first")
+        time.sleep(0.01)
 
-    with pytest.raises(ValueError, match="0"):
+    with pytest.raises(ValueError, match="the first"):
         list(side_by_side(make, range(1000), 2))
     assert len(begun) < 1000

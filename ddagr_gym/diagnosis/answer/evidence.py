@@ -16,8 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.errors import InputError
-from ddagr_gym.files import atomic_path
-from ddagr_gym.number_files import DAMAGED
+from ddagr_gym.files import DAMAGED_ARRAYS, atomic_path
 
 Array = NDArray[np.float64]
 
@@ -147,7 +146,7 @@ class Evidence:
         try:
             with np.load(Path(path), allow_pickle=False) as stored:
                 body = {name: stored[name] for name in stored.files}
-        except (OSError, *DAMAGED) as error:
+        except (OSError, *DAMAGED_ARRAYS) as error:
             raise InputError(f"{os.fspath(path)} cannot be read as evidence ({error}): {remedy}.") from None
         version = body.pop("version", None)
         names = {item.name for item in fields(cls)}
