@@ -79,7 +79,7 @@ def test_summary_and_exit_code(monkeypatch, capsys, failing, code):
 @pytest.mark.parametrize(("workers", "together"), [(2, True), (1, False)])
 def test_the_wheel_is_checked_beside_the_tests(monkeypatch, workers, together):
     begun, met = Event(), []
-    checks = {"tests": lambda: met.append(begun.wait(2.0 if together else 0.1)) or Outcome(passed=1)}
+    checks = {"tests": lambda: met.append(begun.wait(30.0 if together else 0.1)) or Outcome(passed=1)}
     checks["wheel"] = lambda: begun.set() or Outcome(passed=1)
     monkeypatch.setattr(command, "_checks", lambda *_: checks)
     assert command.run(Arguments(workers=workers)) == 0
@@ -90,7 +90,7 @@ def test_an_interrupt_begins_nothing_more(monkeypatch):
     begun, ran = Event(), []
 
     def interrupted():
-        assert begun.wait(2.0)
+        assert begun.wait(30.0)
         raise KeyboardInterrupt
 
     def wheel():
