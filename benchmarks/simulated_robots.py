@@ -205,9 +205,12 @@ def row_of(name: str, seed: int) -> dict[str, Any]:
 
 def tasks_of(robots: Sequence[str], seeds: Sequence[int]) -> list[Task]:
     """A calibration of every robot from every seed, under keys that change with code, robots and soil."""
-    cases = [(name, seed) for name in robots for seed in seeds]
-    keys = [f"{name.replace(', ', '_').replace(' ', '_')}_{seed}_{_digest(CASES[name])}" for name, seed in cases]
-    return [Task(f"{case[0]}, seed {case[1]}", row_of, case, key=key) for case, key in zip(cases, keys, strict=True)]
+    keys = {name: f"{name.replace(', ', '_').replace(' ', '_')}_{_digest(CASES[name])}" for name in robots}
+    return [
+        Task(f"{name}, seed {seed}", row_of, (name, seed), key=f"{keys[name]}_{seed}")
+        for name in robots
+        for seed in seeds
+    ]
 
 
 def _digest(case: Case) -> str:

@@ -71,10 +71,10 @@ def test_what_kernels_call_is_compiled_without_code_for_python():
     assert half(4.0) == 2.0
     assert len(half.overloads) == 1
     for dispatcher, whether in ((half, True), (half._twin, False)):
-        (compiled,) = dispatcher.overloads.values()
-        names = {function.name for function in compiled.library.get_defined_functions()}
-        assert (compiled.fndesc.llvm_cpython_wrapper_name in names) is whether
-        assert (compiled.fndesc.llvm_cfunc_wrapper_name in names) is whether
+        (compiled,), (code,) = dispatcher.overloads.values(), dispatcher.inspect_llvm().values()
+        assert compiled.fndesc.mangled_name in code
+        assert (compiled.fndesc.llvm_cpython_wrapper_name in code) is whether
+        assert (compiled.fndesc.llvm_cfunc_wrapper_name in code) is whether
 
 
 def test_a_kernel_is_made_again_where_it_is_unpickled():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -126,12 +126,10 @@ def isolability(
         False
     """
     from ddagr_gym.diagnosis.planning.isolability import isolability as tabulated
-    from ddagr_gym.identification.nuisances import NuisancePriors
     from ddagr_gym.physics.effects.registry import absolute_effect_kinds
 
     at_least(seed=(seed, 0))
     nominal, uncertainty = planned_nominal(robot, soil, soil_uncertainty, thresholds)
-    priors = NuisancePriors().with_soil(uncertainty)
     drives = _manoeuvres(manoeuvres)
     gates = thresholds_from(thresholds, nominal.robot, nominal.soil_name, uncertainty)
     with counting(len(absolute_effect_kinds()), "effects", progress) as steps:
@@ -143,10 +141,10 @@ def isolability(
             thresholds=gates,
             seed=seed,
             soil_name=nominal.soil_name if soil is None else soil_label(soil),
-            priors=priors,
+            soil_uncertainty=uncertainty,
             progress=lambda name: steps.advance(),
         )
-    return IsolabilityResult(replace(table, soil_uncertainty=uncertainty))
+    return IsolabilityResult(table)
 
 
 def _manoeuvres(given: ManoeuvreLike | Sequence[ManoeuvreLike]) -> list[Manoeuvre]:

@@ -67,6 +67,9 @@ motion against the path's, the way to the next row's start line and the path's c
 
 PATH_SCALES = np.array([entry[2] for entry in PATH_FEATURES])
 
+PLACES = {name: place for place, (name, _, _) in enumerate((*OBSERVATION, *EKF_FEATURES, *PATH_FEATURES))}
+"""Places of all entries in an observation that has them, by name."""
+
 
 class TurnObservation(NamedTuple):
     """An observation in its units; see :data:`OBSERVATION`."""

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.control.observation import FEATURE_SCALES, OBSERVATION
+from ddagr_gym.control.observation import FEATURE_SCALES, OBSERVATION, PLACES
 from ddagr_gym.envs.ekf_features import FEATURE_COUNT, EkfFeatureBatch
 from ddagr_gym.envs.turn_kernel import OBSERVATION_LIMIT
 from ddagr_gym.errors import InputError
@@ -22,6 +22,8 @@ from ddagr_gym.parameters import Robot, Sensors
 Observation = NDArray[np.float32]
 
 _BASE = len(OBSERVATION)
+_MOTION = [PLACES["estimated_v_x"], PLACES["estimated_yaw_rate"]]
+_SLIPS = [PLACES["estimated_slip_right"], PLACES["estimated_slip_left"]]
 
 _NEVER_LEARNS = 1e9
 """De-weighting with which the parameters do not move [-]."""
@@ -56,8 +58,8 @@ class TrueMotion:
         slip = given["true_slip_ratio"]
         changed = observation.copy()
         values = np.array([given["true_v_x"], given["true_yaw_rate"]])
-        changed[_BASE : _BASE + 2] = values / FEATURE_SCALES[:2]
-        changed[_BASE + 6 : _BASE + 8] = [0.5 * (slip[0] + slip[2]), 0.5 * (slip[1] + slip[3])]
+        changed[_MOTION] = values / FEATURE_SCALES[:2]
+        changed[_SLIPS] = [0.5 * (slip[0] + slip[2]), 0.5 * (slip[1] + slip[3])]
         return np.clip(changed, -OBSERVATION_LIMIT, OBSERVATION_LIMIT)
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.control.observation import EKF_FEATURES, OBSERVATION, PATH_FEATURES, TurnObservation
+from ddagr_gym.control.observation import OBSERVATION, PLACES, TurnObservation
 from ddagr_gym.control.path_tracker import MotionEstimate, PathFollower
 from ddagr_gym.control.row_turn import RowTurn
 from ddagr_gym.control.tracker_settings import STANDING, TrackerSettings
@@ -30,11 +30,10 @@ _TRACK_RATIO = 1.3
 """Effective over geometric track [-]: 1.26 to 1.34 there."""
 
 _BASE = len(OBSERVATION)
-_PLACES = {name: _BASE + k for k, (name, _, _) in enumerate((*EKF_FEATURES, *PATH_FEATURES))}
-_LOGS = slice(_PLACES["log_traction_limit"], _PLACES["log_motion_resistance"] + 1)
-_MOTION = [_PLACES[name] for name in ("estimated_x", "estimated_y", "estimated_yaw", "estimated_v_x", "estimated_v_y",
+_LOGS = slice(PLACES["log_traction_limit"], PLACES["log_motion_resistance"] + 1)
+_MOTION = [PLACES[name] for name in ("estimated_x", "estimated_y", "estimated_yaw", "estimated_v_x", "estimated_v_y",
                                       "estimated_yaw_rate")]  # fmt: skip
-_GRAVITY = slice(_PLACES["gravity_x"], _PLACES["gravity_y"] + 1)
+_GRAVITY = slice(PLACES["gravity_x"], PLACES["gravity_y"] + 1)
 
 
 class TrackedPaths:

@@ -127,7 +127,7 @@ class PolicyView:
         """
         rows = np.arange(self.count) if chosen is None else chosen
         whole = self.si(observations)
-        seen = TurnColumns(*whole[:, :_BASE].T)
+        seen = _turn_columns(whole)
         self._start(rows, seen)
         if self._paths is not None:
             self._paths.start(rows[self._fresh[rows]], whole[self._fresh[rows], :_BASE])
@@ -263,7 +263,7 @@ class PolicyView:
         change = np.clip(wanted - self._outputs, -self.design.rate_limit, self.design.rate_limit)
         self._outputs += change
         whole = self.si(observations)
-        seen = TurnColumns(*whole[:, :_BASE].T)
+        seen = _turn_columns(whole)
         if self.design.action == "absolute":
             right, left = _outer_inner(seen.side, self._outputs[:, 0], self._outputs[:, 1])
             driving = 1.0 if self._paths is None else np.where(self._paths.standing, 0.0, 1.0)
@@ -304,6 +304,11 @@ class PolicyView:
         back = self.design.offset_gain * offset / radius + self.design.course_gain * course_error
         back = np.clip(back, -_LARGEST_STEERING, _LARGEST_STEERING)
         return (turning - back) / radius
+
+
+def _turn_columns(whole: Array) -> TurnColumns:
+    """What every observation (n, entries) has, in SI units."""
+    return TurnColumns(*whole[:, :_BASE].T)
 
 
 def _filter_columns(whole: Array) -> FilterColumns:

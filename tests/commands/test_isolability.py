@@ -8,7 +8,8 @@ import pytest
 from ddagr_gym.api.nominal import planned_nominal, thresholds_from
 from ddagr_gym.cli import main, warnings_as_lines
 from ddagr_gym.diagnosis.gates.threshold_files import default_thresholds, save_thresholds
-from ddagr_gym.diagnosis.planning.isolability import Detectable, Isolability
+from ddagr_gym.diagnosis.planning.isolability import Detectable, Isolability, isolability
+from ddagr_gym.errors import InputError
 from ddagr_gym.identification.nuisances import NuisancePriors
 from ddagr_gym.presets import get_robot, get_soil
 from ddagr_gym.reporting.isolability_figure import isolability_figure
@@ -76,17 +77,29 @@ def test_soil_that_is_not_named_is_that_of_the_robots_thresholds_and_said(capsys
 def test_the_table_is_of_that_soil_as_uncertain_as_it_is(monkeypatch, capsys, tmp_path, words, soil, uncertainty, said):
     asked = {}
 
-    def tabulated(robot, soil, *_, soil_name, priors, **__):
-        asked.update(soil=soil, soil_name=soil_name, priors=priors)
-        return replace(table(), robot=robot.name, soil=soil_name)
+    def tabulated(robot, soil, *_, soil_name, soil_uncertainty, **__):
+        asked.update(soil=soil, soil_name=soil_name)
+        return replace(table(), robot=robot.name, soil=soil_name, soil_uncertainty=soil_uncertainty)
 
     monkeypatch.setattr("ddagr_gym.diagnosis.planning.isolability.isolability", tabulated)
     assert main(["isolability", "--robot", "warthog", *words, "--output", str(tmp_path / "out")]) == 0
-    assert asked == {
-        "soil": get_soil(soil), "soil_name": soil, "priors": NuisancePriors().with_soil(uncertainty)
-    }  # fmt: skip
+    assert asked == {"soil": get_soil(soil), "soil_name": soil}
     assert f"warthog on {soil} {said}".replace(" :", ":") in capsys.readouterr().out
     assert json.loads((tmp_path / "out" / "isolability.json").read_text())["soil_uncertainty"] == uncertainty
+
+
+def test_the_uncertainty_is_that_of_the_diagnosis_that_is_planned(monkeypatch):
+    asked = []
+
+    def plan(*_, setting, **__):
+        asked.append(setting.priors)
+        raise InputError("asked")
+
+    monkeypatch.setattr("ddagr_gym.diagnosis.planning.isolability.plan", plan)
+    for uncertainty in (1.0, 4.0):
+        with pytest.raises(InputError, match="asked"):
+            isolability(get_robot("warthog"), get_soil("firm_ground"), (), (), soil_uncertainty=uncertainty)
+    assert asked == [NuisancePriors(), NuisancePriors().with_soil(4.0)]
 
 
 def test_negative_seed_is_one_sentence(tmp_path, capsys):

@@ -136,7 +136,7 @@ def isolability(
     setting: Setting | None = None,
     seed: int = 0,
     soil_name: str = "",
-    priors: NuisancePriors | None = None,
+    soil_uncertainty: float = 1.0,
     progress: Callable[[str], None] = lambda name: None,
 ) -> Isolability:
     """Table of manoeuvres and sensors (theory: diagnosis, section 12).
@@ -151,14 +151,14 @@ def isolability(
         setting: of the diagnosis; windows as those of the thresholds, shorter where a manoeuvre is short, by default.
         seed: see :func:`ddagr_gym.diagnosis.planning.planned_drive.plan`.
         soil_name: for the table.
-        priors: of what is uncertain, where no setting is given.
+        soil_uncertainty: factor on how far the soil may be from the nominal one, where no setting is given.
         progress: called with the name of each effect when it is done.
 
     Raises:
         InputError: see :func:`ddagr_gym.diagnosis.planning.planned_drive.plan`.
     """
     if setting is None:
-        setting = Setting() if priors is None else Setting(priors=priors)
+        setting = Setting(priors=NuisancePriors().with_soil(soil_uncertainty))
         if thresholds is not None:
             setting = with_room(setting.with_windows(thresholds.duration), manoeuvres)
     planned = plan(robot, soil, manoeuvres, sensors, seed=seed, setting=setting)
@@ -184,6 +184,7 @@ def isolability(
         tuple(item for name in names for item in _best_by_field([d.size for d in sizes[name]])),
         tuple(map(tuple, share.tolist())),
         tuple(map(tuple, apart.tolist())),
+        soil_uncertainty,
     )
 
 
