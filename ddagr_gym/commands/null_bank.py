@@ -37,17 +37,18 @@ EXAMPLES = (
 class Arguments:
     """Make a bank of null drives and the thresholds of a diagnosis from it.
 
-    Each null drive follows the commands of the given recordings in a simulator of another structure (soil law, speed
-    loop, relief, soil that varies from place to place) with the recordings' noise, and goes through the same refit and
-    scan as real drives. Soils are drawn about the nominal one, or about robot and soil as fitted to the recordings (a
-    bootstrap of the fitted nominal simulator). An interrupted bank goes on where it stopped.
+    Each null run follows the commands of the given recordings, of three pieces of them where they are long, in a
+    simulator of another structure (soil law, speed loop, relief, soil that varies from place to place) with the
+    recordings' noise, and goes through the same refit and scan as real drives. Soils are drawn about the nominal one,
+    or about robot and soil as fitted to the recordings (a bootstrap of the fitted nominal simulator). An interrupted
+    bank goes on where it stopped.
 
     Attributes:
         runs: recordings of one robot, as `ddagr diagnose` takes them; without any, three drives of 60 s are drawn.
         ordinary: take the runs themselves for null drives: real ones in which nothing is wrong. They are cut into
             pieces, of which at least 20 are needed (the level is 5 percent), and no drive is simulated. Pieces of twice
             the length and whole drives say beside them how gains grow with the length.
-        piece: length of such a piece [s], at least 16 (8 windows of 2 s).
+        piece: length of a piece [s], at least 16 (8 windows of 2 s; three pieces of a simulated run have 8 windows).
         output: thresholds to write, .json; the runs themselves lie beside it.
         robot: nominal robot: name (ddagr robots) or YAML file.
         soil: nominal soil: name (ddagr soils) or YAML file; as for `ddagr diagnose` when it is left out.
@@ -84,11 +85,10 @@ def run(arguments: Arguments) -> None:
     from ddagr_gym.diagnosis.gates.threshold_files import save_thresholds
     from ddagr_gym.diagnosis.gates.thresholds import thresholds_from
     from ddagr_gym.diagnosis.null_bank.bank import NullBank
-    from ddagr_gym.diagnosis.null_bank.drives import template_of
+    from ddagr_gym.diagnosis.null_bank.drives import drawn_templates
     from ddagr_gym.diagnosis.null_bank.fitted_nominal import fitted_nominal
     from ddagr_gym.diagnosis.preprocessing.input_requirements import check_recordings
     from ddagr_gym.diagnosis.setting import Setting
-    from ddagr_gym.identification.noise import noise_from_differences
     from ddagr_gym.identification.nuisances import NuisancePriors
 
     _check_options(arguments)
@@ -99,17 +99,16 @@ def run(arguments: Arguments) -> None:
     recordings = _mended(given)
     priors = NuisancePriors().with_soil(uncertainty)
     setting = Setting(priors=priors).with_windows(arguments.window, arguments.stride)
-    template: Template | None = None
+    drives: list[Template | Recording | None] = [None] * arguments.count
     centre: _Centre = None
-    pieces: list[Recording] = []
     longer: list[Recording] = []
     if arguments.ordinary:
         pieces, longer = _pieces(recordings, arguments.piece, robot, setting)
+        drives = [*pieces, *longer]
     elif recordings:
         check_recordings(recordings, robot, setting)
-        template = template_of(recordings, noise_from_differences(recordings, robot.outer_radius))
+        drives = [*drawn_templates(recordings, robot.outer_radius, arguments.piece, arguments.count, arguments.seed)]
         centre = fitted_nominal(robot, soil, recordings, setting)
-    drives: list[Template | Recording | None] = [*pieces, *longer] or [template] * arguments.count
     made_of = NullBank(robot, soil, setting, tuple(drives), arguments.seed, centre)
     bank, folder = made_of.key(), make_folder(arguments.output.with_suffix(".bank"))
     made = _make(made_of, [f"{bank[:16]}_{n:03d}" for n in range(len(drives))], folder, arguments)
@@ -138,9 +137,11 @@ def _mended(loaded: Sequence[Recording]) -> Sequence[Recording]:
 
 def _check_options(arguments: Arguments) -> None:
     from ddagr_gym.diagnosis.gates.thresholds import LEVEL, least_nulls
+    from ddagr_gym.diagnosis.null_bank.drives import DRIVES
     from ddagr_gym.diagnosis.setting import LEAST_WINDOWS, SHORT, SHORTEST
 
-    for name, least in (("window", SHORTEST), ("stride", 0.1), ("piece", LEAST_WINDOWS * SHORT)):
+    shared = 0.0 if arguments.ordinary else LEAST_WINDOWS * arguments.window / DRIVES
+    for name, least in (("window", SHORTEST), ("stride", 0.1), ("piece", max(LEAST_WINDOWS * SHORT, shared))):
         given = getattr(arguments, name)
         if given is not None and not least <= given < math.inf:
             raise InputError(f"--{name} is {given:g}: give a finite time of at least {least:g} s.")

@@ -96,20 +96,27 @@ class NullBank:
 
     def key(self) -> str:
         """Hash of everything that the bank depends on, the sources of the diagnosis and the simulator included."""
-        template = next((drive for drive in self.drives if isinstance(drive, Template)), None)
         digest = hashlib.sha256(source_digest().encode())
-        noise = [None if n is None else asdict(n) for n in template.noise] if template else []
-        period, starts = (template.period, template.starts) if template else (0.0, ())
         nominal = [repr(self.robot), repr(self.soil), repr(self.setting)]
-        texts = [*nominal, noise, period, starts, len(self.drives), self.seed]
-        digest.update(json.dumps(texts, sort_keys=True).encode())
+        digest.update(json.dumps([*nominal, len(self.drives), self.seed]).encode())
         digest.update(b"" if self.centre is None else repr(self.centre).encode())
-        for values in (*template.commands, *template.present) if template else ():
-            digest.update(np.ascontiguousarray(values).tobytes())
-        for drive in self.drives:
-            if isinstance(drive, Recording):
-                digest.update(f"{content_hash(drive)}{drive.meta.segments}{drive.meta.spans}".encode())
+        # one template may stand for all runs: it is read once
+        for drive in dict.fromkeys(self.drives):
+            digest.update(_drive_digest(drive))
         return digest.hexdigest()
+
+
+def _drive_digest(drive: Template | Recording | None) -> bytes:
+    """What tells a drive of a bank from another one."""
+    if drive is None:
+        return b"drawn"
+    if isinstance(drive, Recording):
+        return f"{content_hash(drive)}{drive.meta.segments}{drive.meta.spans}".encode()
+    noise = [None if found is None else asdict(found) for found in drive.noise]
+    digest = hashlib.sha256(json.dumps([noise, drive.period, drive.starts], sort_keys=True).encode())
+    for values in (*drive.commands, *drive.present):
+        digest.update(np.ascontiguousarray(values).tobytes())
+    return digest.digest()
 
 
 def _is_meaningful(problem: Problem, gain: Gain, scan_: ScannedModel) -> bool:

@@ -8,9 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ddagr_gym.diagnosis.null_bank.ordinary_drives import pieces_of
 from ddagr_gym.diagnosis.null_bank.readings import PARTS
 from ddagr_gym.diagnosis.null_bank.structural_variants import NullWorld, draw_world
-from ddagr_gym.identification.noise import ChannelNoise
+from ddagr_gym.diagnosis.preprocessing.input_requirements import LEAST_MOVING, moving_share
+from ddagr_gym.identification.noise import ChannelNoise, noise_from_differences
 from ddagr_gym.identification.timing_repair import POSE_CHANNELS
 from ddagr_gym.identification.window_model import ideal_sensors
 from ddagr_gym.identification.windows import CHANNELS
@@ -22,6 +24,9 @@ Array = NDArray[np.float64]
 
 _MARGIN = 3.0
 """Ground beyond the straight-line reach of a drive [m] (ours: more than a robot's length)."""
+
+DRIVES = 3
+"""Drives of one null run (ours: what one is asked to record for a diagnosis)."""
 
 _FARTHEST = 40.0
 """Farthest place from its start for which ground is drawn [m] (ours: keeps the field of soil small)."""
@@ -44,6 +49,44 @@ class Template:
     present: tuple[NDArray[np.bool_], ...]
     noise: tuple[ChannelNoise | None, ...]
     starts: tuple[tuple[float, float, float], ...]
+
+
+def drawn_pieces(
+    recordings: Sequence[Recording], length: float, count: int, seed: int
+) -> tuple[tuple[Recording, ...], ...]:
+    """Pieces of recordings that each of some null runs copies: three, or all where there are fewer.
+
+    A null run then takes the same time however long the recordings are. Pieces in which the robot is hardly commanded
+    to move are left out where there are others.
+
+    Args:
+        recordings: of one robot.
+        length: of a piece, in time with commands [s]; a recording that is not half as long is one piece.
+        count: null runs.
+        seed: of the choice.
+    """
+    pieces = [piece for recording in recordings for piece in (pieces_of(recording, length) or [recording])]
+    pieces = [piece for piece in pieces if moving_share(piece) >= LEAST_MOVING] or pieces
+    size = min(DRIVES, len(pieces))
+    sources = (np.random.default_rng([seed, run, size]) for run in range(count))
+    choices = (np.sort(source.choice(len(pieces), size, replace=False)).tolist() for source in sources)
+    return tuple(tuple(pieces[k] for k in chosen) for chosen in choices)
+
+
+def drawn_templates(
+    recordings: Sequence[Recording], wheel_radius: float, length: float, count: int, seed: int
+) -> tuple[Template, ...]:
+    """Templates of null runs that copy pieces of recordings; the noise is that of all of them.
+
+    Args:
+        recordings: of one robot and one set of sensors.
+        wheel_radius: hub to tread [m].
+        length: as of :func:`drawn_pieces`, like the others.
+        count: likewise.
+        seed: likewise.
+    """
+    noise = noise_from_differences(recordings, wheel_radius)
+    return tuple(template_of(pieces, noise) for pieces in drawn_pieces(recordings, length, count, seed))
 
 
 def template_of(recordings: Sequence[Recording], noise: Sequence[ChannelNoise | None]) -> Template:

@@ -114,12 +114,15 @@ def _check_length(recordings: Sequence[Recording], setting: Setting) -> None:
         )
 
 
+def moving_share(recording: Recording) -> float:
+    """Share of the time with commands in which a robot is commanded to move."""
+    speed = np.max(np.abs(np.stack(recording.held_commands())), axis=0)
+    speed = speed[np.isfinite(speed)]
+    return float(np.mean(speed > LEAST_SPEED)) if speed.size else 0.0
+
+
 def _check_motion(recordings: Sequence[Recording]) -> None:
-    shares = []
-    for recording in recordings:
-        speed = np.max(np.abs(np.stack(recording.held_commands())), axis=0)
-        speed = speed[np.isfinite(speed)]
-        shares.append(float(np.mean(speed > LEAST_SPEED)) if speed.size else 0.0)
+    shares = [moving_share(recording) for recording in recordings]
     if max(shares) < LEAST_MOVING:
         names = ", ".join(recording.meta.source for recording in recordings)
         raise InputError(
