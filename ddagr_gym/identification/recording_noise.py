@@ -14,6 +14,7 @@ from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.recordings.checks.clock_offsets import Offset, pose_offset, unwrapped_heading
 from ddagr_gym.recordings.checks.noise import noise_at_rest
 from ddagr_gym.recordings.checks.signals import integral
+from ddagr_gym.recordings.checks.silences import heard_spans
 from ddagr_gym.recordings.schema import Recording
 
 Array = NDArray[np.float64]
@@ -133,9 +134,9 @@ def _jitter(square: Array, rate: Array) -> float:
 
 
 def _pieces(recording: Recording, seconds: float) -> Iterator[slice]:
-    """Pieces of spans, so short that a gyro's bias does not turn the heading within them."""
+    """Pieces of heard spans, so short that a gyro's bias does not turn the heading within them."""
     length = max(round(seconds / recording.period), 2)
-    for span in recording.spans():
+    for span in heard_spans(recording):
         for start in range(span.start, span.stop, length):
             yield slice(start, min(start + length, span.stop))
 

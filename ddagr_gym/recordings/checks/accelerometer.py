@@ -21,6 +21,7 @@ from ddagr_gym.recordings.checks.regression import (
     solve,
 )
 from ddagr_gym.recordings.checks.signals import filled, slope, smoothed
+from ddagr_gym.recordings.checks.silences import heard_spans
 from ddagr_gym.recordings.schema import FloatArray, Recording
 
 CHECK = "accelerometer"
@@ -115,7 +116,7 @@ def _regressors_and_forces(recording: Recording, wheel_radius: float, rng: np.ra
 def _advanced(recording: Recording, values: FloatArray, lag: float) -> FloatArray:
     """Values read ``lag`` later, so that a late channel is at its true time; the last value is repeated."""
     out = np.full(len(recording), np.nan)
-    for span in recording.spans():
+    for span in heard_spans(recording):
         out[span] = sampled(recording, span, values, recording.t[span] + lag)
     return out
 

@@ -16,6 +16,7 @@ import numpy.typing as npt
 from scipy.special import bdtr, ndtri, stdtrit
 
 from ddagr_gym.recordings.checks.findings import Interval
+from ddagr_gym.recordings.checks.silences import heard_spans
 from ddagr_gym.recordings.schema import FloatArray, Recording
 
 CONFIDENCE = 0.99
@@ -29,17 +30,17 @@ Estimator = Callable[[FloatArray], FloatArray]
 
 
 def cut_blocks(recording: Recording, shortest: float = 3.0, longest: float = 10.0) -> list[slice]:
-    """Pieces of the spans, long enough to be nearly independent and short enough to be many.
+    """Pieces of the heard spans, long enough to be nearly independent and short enough to be many.
 
     Args:
         recording: any.
         shortest: [s] no piece is meant to be shorter, except a short span itself.
         longest: [s].
     """
-    total = sum(float(recording.t[s.stop - 1] - recording.t[s.start]) for s in recording.spans())
+    total = sum(float(recording.t[s.stop - 1] - recording.t[s.start]) for s in heard_spans(recording))
     length = min(max(total / 40.0, shortest), longest)
     pieces: list[slice] = []
-    for span in recording.spans():
+    for span in heard_spans(recording):
         duration = float(recording.t[span.stop - 1] - recording.t[span.start])
         count = max(1, round(duration / length))
         edges = np.searchsorted(recording.t[span], recording.t[span.start] + np.linspace(0, duration, count + 1)[1:-1])

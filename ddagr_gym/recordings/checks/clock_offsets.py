@@ -16,6 +16,7 @@ import numpy as np
 from ddagr_gym.recordings.checks.blocks import FEWEST_BLOCKS, cut_blocks, interval_of, resample
 from ddagr_gym.recordings.checks.findings import CheckFinding, Interval, judge, not_testable
 from ddagr_gym.recordings.checks.signals import filled, integral, new_rows, wrap
+from ddagr_gym.recordings.checks.silences import heard_spans
 from ddagr_gym.recordings.schema import BoolArray, FloatArray, Recording
 
 CHECK = "clock_offset"
@@ -156,7 +157,7 @@ def gyro_direction(recording: Recording) -> float:
     """Sign (+1 or -1) by which heading and integrated gyro go together, from changes of less than a radian."""
     turned = integral(recording, recording["yaw_rate"])
     product = 0.0
-    for span in recording.spans():
+    for span in heard_spans(recording):
         rows = span.start + np.flatnonzero(np.isfinite(recording["pose_yaw"][span]) & np.isfinite(turned[span]))
         change, gyro = wrap(np.diff(recording["pose_yaw"][rows])), np.diff(turned[rows])
         small = (np.abs(change) < 1.0) & (np.abs(gyro) < 1.0)
@@ -172,7 +173,7 @@ def unwrapped_heading(recording: Recording) -> FloatArray:
     turned = gyro_direction(recording) * integral(recording, recording["yaw_rate"])
     heading = recording["pose_yaw"]
     out = np.full(len(recording), np.nan)
-    for span in recording.spans():
+    for span in heard_spans(recording):
         rows = span.start + np.flatnonzero(np.isfinite(heading[span]) & np.isfinite(turned[span]))
         if rows.size >= 2:
             expected = np.diff(turned[rows])
@@ -194,9 +195,13 @@ def _interpolated(recording: Recording, values: FloatArray) -> Reference:
 
 
 def _command_reference(recording: Recording, commands: FloatArray, encoder: FloatArray) -> Reference:
-    """Command in force; before the span the bank's first speed stands for the command that it had followed."""
+    """Command in force; before the span the bank's first speed stands for the command that it had followed.
 
-    def reference(span: slice, t: FloatArray) -> FloatArray:
+    A silence of a sensor ends a heard span, not what is known of the commands.
+    """
+
+    def reference(heard: slice, t: FloatArray) -> FloatArray:
+        span = next(s for s in recording.spans() if s.start <= heard.start < s.stop)
         rows = np.searchsorted(recording.t[span], t, side="right") - 1
         values = commands[span][np.clip(rows, 0, None)]
         first = encoder[span][np.isfinite(encoder[span])]
@@ -216,7 +221,7 @@ def _lag_sums(
         samples: y, NaN where there is no new sample.
         within: only samples in rows where this is finite, None for all.
     """
-    spans = list(recording.spans())
+    spans = list(heard_spans(recording))
     sums, times = [], []
     usable = np.isfinite(samples) & (True if within is None else np.isfinite(within))
     for block in cut_blocks(recording):

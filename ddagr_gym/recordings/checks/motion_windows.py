@@ -24,6 +24,7 @@ from ddagr_gym.recordings.checks.clock_offsets import (
     unwrapped_heading,
 )
 from ddagr_gym.recordings.checks.signals import filled, integral, wrap
+from ddagr_gym.recordings.checks.silences import heard_spans
 from ddagr_gym.recordings.checks.timing import LONGEST_HOLE
 from ddagr_gym.recordings.schema import FloatArray, Recording, cut_at_gaps
 
@@ -105,7 +106,7 @@ def _rolled(recording: Recording, sample: _Sampler, late: Mapping[str, float]) -
 
 
 def stretches(recording: Recording) -> tuple[slice, ...]:
-    """Rows of the spans between gaps longer than half a window: what happens inside a gap no window can tell.
+    """Rows of the heard spans between gaps longer than half a window: what happens inside a gap no window can tell.
 
     Args:
         recording: any.
@@ -113,7 +114,7 @@ def stretches(recording: Recording) -> tuple[slice, ...]:
     Returns:
         Slices in the order of time, each inside a span.
     """
-    spans = tuple((span.start, span.stop) for span in recording.spans())
+    spans = tuple((span.start, span.stop) for span in heard_spans(recording))
     longest = max(STEP, LONGEST_HOLE * recording.period)
     return tuple(slice(first, end) for first, end in cut_at_gaps(recording.t, spans, longest))
 

@@ -10,6 +10,7 @@ import numpy as np
 from ddagr_gym.recordings.checks.blocks import FEWEST_BLOCKS, cut_blocks, interval_of, resample
 from ddagr_gym.recordings.checks.findings import Interval
 from ddagr_gym.recordings.checks.signals import near_known
+from ddagr_gym.recordings.checks.silences import heard_spans
 from ddagr_gym.recordings.schema import BoolArray, FloatArray, Recording
 
 
@@ -98,8 +99,8 @@ def solve(totals: FloatArray) -> FloatArray:
 
 
 def blocks_in_spans(recording: Recording) -> Iterator[tuple[slice, slice]]:
-    """Every block with the span that it belongs to."""
-    spans = list(recording.spans())
+    """Every block with the heard span that it belongs to."""
+    spans = list(heard_spans(recording))
     for block in cut_blocks(recording):
         yield next(s for s in spans if s.start <= block.start < s.stop), block
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ddagr_gym.recordings.checks.silences import heard_rows, heard_spans
 from ddagr_gym.recordings.schema import BoolArray, FloatArray, Recording
 
 STILL_SPEED = 0.02
@@ -15,10 +16,13 @@ that has stopped. Within it a slow sensor's next reading would come."""
 
 
 def filled(recording: Recording, name: str) -> FloatArray:
-    """Channel with the last reading carried forward inside each span, NaN before the first and after it has ended."""
+    """Channel with the last reading carried forward inside each heard span.
+
+    NaN before the first reading and after the sensor has stopped.
+    """
     values = recording[name]
     out = np.full(len(recording), np.nan)
-    for span in recording.spans():
+    for span in heard_spans(recording):
         rows = np.arange(span.start, span.stop)
         last = np.maximum.accumulate(np.where(np.isfinite(values[span]), rows, -1))
         told = (last >= 0) & near_known(recording.t[span], np.isfinite(values[span]))
@@ -32,10 +36,12 @@ def new_rows(recording: Recording, *names: str) -> BoolArray:
 
 
 def integral(recording: Recording, values: FloatArray) -> FloatArray:
-    """Trapezoidal integral over time from the start of each span; missing values count as interpolated, those of a
-    sensor that has stopped are NaN."""
+    """Trapezoidal integral over time from the start of each heard span; missing values count as interpolated.
+
+    Those of a sensor that has stopped are NaN.
+    """
     out = np.full(len(recording), np.nan)
-    for span in recording.spans():
+    for span in heard_spans(recording):
         t, known = recording.t[span], np.isfinite(values[span])
         if np.count_nonzero(known) >= 2:
             v = np.interp(t, t[known], values[span][known])
@@ -45,10 +51,10 @@ def integral(recording: Recording, values: FloatArray) -> FloatArray:
 
 
 def smoothed(recording: Recording, values: FloatArray, width: float) -> FloatArray:
-    """Running mean over ``width`` seconds inside each span; NaN near the ends, with few values, without a sensor."""
+    """Running mean over ``width`` seconds inside each heard span; NaN near ends, with few values, without a sensor."""
     half = max(1, round(0.5 * width / recording.period))
     out = np.full(len(recording), np.nan)
-    for span in recording.spans():
+    for span in heard_spans(recording):
         known = np.isfinite(values[span])
         if np.count_nonzero(known) > max(2 * half, known.size // 2):
             t = recording.t[span]
@@ -74,9 +80,9 @@ def near_known(t: FloatArray, known: BoolArray, at: FloatArray | None = None) ->
 
 
 def slope(recording: Recording, values: FloatArray) -> FloatArray:
-    """Central difference over time inside each span [per s]; NaN beside missing values."""
+    """Central difference over time inside each heard span [per s]; NaN beside missing values."""
     out = np.full(len(recording), np.nan)
-    for span in recording.spans():
+    for span in heard_spans(recording):
         if span.stop - span.start >= 3:
             out[span] = np.gradient(values[span], recording.t[span])
     return out
@@ -103,7 +109,7 @@ def standstills(recording: Recording, margin: float = 0.5, shortest: float = 1.0
     # Before the first sample of a span the encoders are unknown; a command shows that the robot may move.
     unknown = ~(np.isfinite(right) & np.isfinite(left))
     commanded = np.nan_to_num(np.abs(recording["command_right"]) + np.abs(recording["command_left"])) > 0
-    moving = (moving & ~unknown) | (unknown & commanded)
+    moving = (moving & ~unknown) | (unknown & commanded) | ~heard_rows(recording)
     pieces = []
     for segment in recording.segments():
         pieces.extend(_quiet(recording.t, moving, segment, margin, shortest))
@@ -123,7 +129,10 @@ def _quiet(t: FloatArray, moving: BoolArray, segment: slice, margin: float, shor
 
 
 def moving_mask(recording: Recording) -> BoolArray:
-    """Rows in which a bank turns or the gyro shows a turn well above its noise at rest."""
+    """Rows in which a bank turns or the gyro shows a turn well above its noise at rest.
+
+    Those in which a sensor of a robot that is commanded to move is silent count with them.
+    """
     right, left = filled(recording, "encoder_right"), filled(recording, "encoder_left")
     turning = np.nan_to_num(np.maximum(np.abs(right), np.abs(left))) >= STILL_SPEED
-    return turning | (np.nan_to_num(np.abs(recording["yaw_rate"])) > 0.1)
+    return turning | (np.nan_to_num(np.abs(recording["yaw_rate"])) > 0.1) | ~heard_rows(recording)

@@ -7,6 +7,7 @@ import numpy as np
 from ddagr_gym.recordings.channels import CHANNELS, COMMANDS, VOLTAGES
 from ddagr_gym.recordings.checks.findings import CheckFinding, Question, judge, not_testable
 from ddagr_gym.recordings.checks.signals import moving_mask
+from ddagr_gym.recordings.checks.silences import longest_wait
 from ddagr_gym.recordings.schema import BoolArray, FloatArray, Recording
 
 CHECK = "timing"
@@ -27,9 +28,6 @@ HOLD = Question(
 )
 """Share of the driving time in which a channel waits more than five of its periods for a sample [-]; 0.07 at most on
 the open recordings, whose poses come irregularly."""
-LONGEST_WAIT = 2.0
-"""Longest wait for a sample while driving [s], or twelve of the channel's periods if that is longer; 1.25 s on the open
-recordings."""
 SLOWEST = {"encoder": 2.0, "specific_force": 10.0, "yaw_rate": 10.0, "pose": 1.0}
 """Rate below which a channel cannot follow a robot's motion [Hz] (ours), by the beginning of its name."""
 LONG_HOLD = 5.0
@@ -124,7 +122,7 @@ def _hold_findings(recording: Recording, name: str, driving: BoolArray) -> list[
             name,
             longest,
             (longest, longest),
-            (0.0, max(LONGEST_WAIT, 12 * median)),
+            (0.0, longest_wait(median)),
             "s",
             meaning=f"While driving it goes without a new sample for {longest:.2f} s at most.",
             remedy="Look for a sensor that stops or a logger that drops its messages.",
