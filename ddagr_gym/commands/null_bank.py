@@ -40,8 +40,8 @@ class Arguments:
     Each null run follows the commands of the given recordings, of three pieces of them where they are long, in a
     simulator of another structure (soil law, speed loop, relief, soil that varies from place to place) with the
     recordings' noise, and goes through the same refit and scan as real drives. Soils are drawn about the nominal one,
-    or about robot and soil as fitted to the recordings (a bootstrap of the fitted nominal simulator). An interrupted
-    bank goes on where it stopped.
+    or about robot and soil as fitted to the recordings (a bootstrap of the fitted nominal simulator), where that fit is
+    a robot that the data sheet allows. An interrupted bank goes on where it stopped.
 
     Attributes:
         runs: recordings of one robot, as `ddagr diagnose` takes them; without any, three drives of 60 s are drawn.
@@ -86,7 +86,6 @@ def run(arguments: Arguments) -> None:
     from ddagr_gym.diagnosis.gates.thresholds import thresholds_from
     from ddagr_gym.diagnosis.null_bank.bank import NullBank
     from ddagr_gym.diagnosis.null_bank.drives import drawn_templates
-    from ddagr_gym.diagnosis.null_bank.fitted_nominal import fitted_nominal
     from ddagr_gym.diagnosis.preprocessing.input_requirements import check_recordings
     from ddagr_gym.diagnosis.setting import Setting
     from ddagr_gym.identification.nuisances import NuisancePriors
@@ -108,7 +107,7 @@ def run(arguments: Arguments) -> None:
     elif recordings:
         check_recordings(recordings, robot, setting)
         drives = [*drawn_templates(recordings, robot.outer_radius, arguments.piece, arguments.count, arguments.seed)]
-        centre = fitted_nominal(robot, soil, recordings, setting)
+        centre = _centre(robot, soil, recordings, setting)
     made_of = NullBank(robot, soil, setting, tuple(drives), arguments.seed, centre)
     bank, folder = made_of.key(), make_folder(arguments.output.with_suffix(".bank"))
     made = _make(made_of, [f"{bank[:16]}_{n:03d}" for n in range(len(drives))], folder, arguments)
@@ -133,6 +132,21 @@ def _mended(loaded: Sequence[Recording]) -> Sequence[Recording]:
     if faults:
         print(f"ddagr: warning: the recordings have {' and '.join(faults)}, which is mended first.", file=sys.stderr)
     return found.recordings
+
+
+def _centre(robot: Robot, soil: Soil, recordings: Sequence[Recording], setting: Setting) -> _Centre:
+    """Robot and soil as fitted to recordings; None, which a warning says, where something is missing in the fit."""
+    from ddagr_gym.diagnosis.null_bank.fitted_nominal import fitted_nominal
+
+    fitted = fitted_nominal(robot, soil, recordings, setting)
+    if fitted.credible:
+        return fitted.robot, fitted.soil
+    print(
+        f"ddagr: warning: the simulator fits these recordings only with {fitted.farthest} {fitted.deviations:.0f} "
+        "standard deviations off, so that it lacks something: null drives are drawn about the nominal robot and soil.",
+        file=sys.stderr,
+    )
+    return None
 
 
 def _check_options(arguments: Arguments) -> None:

@@ -15,6 +15,7 @@ from ddagr_gym.cli import main, warnings_as_lines
 from ddagr_gym.diagnosis.gates.threshold_files import load_thresholds
 from ddagr_gym.diagnosis.gates.thresholds import NullRun, Origin, Thresholds
 from ddagr_gym.diagnosis.null_bank.bank import NullBank
+from ddagr_gym.diagnosis.null_bank.fitted_nominal import FittedNominal
 from ddagr_gym.diagnosis.null_bank.structural_variants import KINDS
 from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.presets import get_robot, get_soil
@@ -225,22 +226,28 @@ def test_ordinary_drives_are_asked_for(tmp_path, capsys):
 
 
 def test_banks_of_given_drives_are_drawn_about_the_nominal_model_that_fits_them(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     about: list[Any] = []
     centre = (get_robot("ddagr"), get_soil("firm_ground"))
+    fits = [FittedNominal(*centre, "mass", 1.0), FittedNominal(*centre, "mass", 9.0)]
 
     def run(bank: NullBank, number: int) -> NullRun:
         about.append(bank.centre)
         return drawn("plain", [number])
 
     monkeypatch.setattr(NullBank, "run", run)
-    monkeypatch.setattr("ddagr_gym.diagnosis.null_bank.fitted_nominal.fitted_nominal", lambda *given: centre)
+    monkeypatch.setattr("ddagr_gym.diagnosis.null_bank.fitted_nominal.fitted_nominal", lambda *given: fits.pop(0))
     columns = {name: np.linspace(0.0, 1.0, 3000) for name in ("command_right", "command_left", "yaw_rate")}
     columns["t"] = 0.01 * np.arange(1, 3001)
     save_parquet(Recording.from_columns(columns, get_robot("ddagr")), tmp_path / "run.parquet")
-    assert main([*words(tmp_path), str(tmp_path / "run.parquet")]) == 0
+    given = [*words(tmp_path), str(tmp_path / "run.parquet")]
+    assert main(given) == 0
     assert about == [centre] * 20
+    about.clear()
+    assert main(given) == 0
+    assert about == [None] * 20
+    assert "only with mass 9 standard deviations off" in capsys.readouterr().err
     about.clear()
     assert main(words(tmp_path)) == 0
     assert about == [None] * 20

@@ -9,7 +9,7 @@ import pytest
 from ddagr_gym.diagnosis.null_bank import fitted_nominal as module
 from ddagr_gym.diagnosis.null_bank.bank import NullBank
 from ddagr_gym.diagnosis.null_bank.drives import null_recordings, template_of
-from ddagr_gym.diagnosis.null_bank.fitted_nominal import fitted_nominal
+from ddagr_gym.diagnosis.null_bank.fitted_nominal import FARTHEST, fitted_nominal
 from ddagr_gym.diagnosis.setting import Setting
 from ddagr_gym.identification.fitted_values import with_values
 from ddagr_gym.identification.nuisances import nuisances
@@ -61,9 +61,12 @@ def test_shifts_stay_inside_what_a_soil_may_be() -> None:
 
 def test_null_drives_are_drawn_about_the_fit(drive: Callable[..., Recording], monkeypatch: pytest.MonkeyPatch) -> None:
     """A drive with slow motors gives null drives with slow motors, and a bank of its own."""
-    recording = drive(effects=("motor_lag=0.15",), seconds=20.0)
+    recording = drive(effects=("motor_lag=0.05",), seconds=20.0)
     setting = Setting().with_windows(2.0)
-    centre = fitted_nominal(ROBOT, SOIL, [recording], setting)
+    found = fitted_nominal(ROBOT, SOIL, [recording], setting)
+    assert found.credible
+    assert found.farthest == "motor_rate"
+    centre = (found.robot, found.soil)
     assert centre[0].motor_rate < 0.9 * ROBOT.motor_rate
     template = template_of([recording], (None,) * 8)
     slow, usual = (
@@ -76,3 +79,12 @@ def test_null_drives_are_drawn_about_the_fit(drive: Callable[..., Recording], mo
     }
     assert len(hashes) == 3
     assert module.with_values(ROBOT, SOIL, {}) == (ROBOT, SOIL)
+
+
+def test_a_fit_beyond_the_data_sheet_is_not_credible(drive: Callable[..., Recording]) -> None:
+    """Motors that are far slower than told are an effect; null drives with them would hide it."""
+    recording = drive(effects=("motor_lag=0.15",), seconds=20.0)
+    found = fitted_nominal(ROBOT, SOIL, [recording], Setting().with_windows(2.0))
+    assert found.farthest == "motor_rate"
+    assert found.deviations > FARTHEST
+    assert not found.credible
