@@ -1,3 +1,3 @@
 """The version, apart from the package door so that reading it registers nothing."""
 
-__version__ = "0.2.0"
+__version__ = "0.3.0"

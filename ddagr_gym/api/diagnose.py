@@ -31,9 +31,6 @@ if TYPE_CHECKING:
 
 __all__ = ["ChangeResult", "DiagnosisResult", "diagnose"]
 
-_SIMULATED = "ddagr"
-"""Robot with a shipped bank of simulated drives."""
-
 _SAME_WINDOW = 0.5
 """Difference of lengths of windows up to which gates are taken to hold [s] (ours; short segments shorten windows)."""
 
@@ -287,18 +284,11 @@ def _robot_of(folder: Path) -> str:
 
 
 def _gates(given: ThresholdsLike | None, nominal: Nominal, soil_uncertainty: float) -> Thresholds:
-    """Thresholds as given; else those that ship for simulated drives of the robot, or of the DDAGR with a warning.
+    """Thresholds as given, else the usual ones; those of something else are warned of."""
+    from ddagr_gym.diagnosis.gates.threshold_files import usual_thresholds
 
-    What a simulator lacks is not judged by real drives of which it may lack the same.
-    """
-    from ddagr_gym.diagnosis.gates.threshold_files import default_thresholds, shipped_thresholds
-
-    if given is None:
-        given = shipped_thresholds(nominal.robot.name)
-        if given is None or given.of_ordinary_drives:
-            given = default_thresholds(_SIMULATED)
-    found = thresholds_from(given, nominal.robot, nominal.soil_name, soil_uncertainty)
-    return found or default_thresholds(_SIMULATED)
+    usual = usual_thresholds(nominal.robot.name)
+    return thresholds_from(given or usual, nominal.robot, nominal.soil_name, soil_uncertainty) or usual
 
 
 def _window(window: float | None, gates: Thresholds) -> float:

@@ -18,7 +18,7 @@ from ddagr_gym.tasks import ResultStore, Task, TaskRunner, run_tasks
 
 if TYPE_CHECKING:
     from ddagr_gym.api.nominal import Nominal
-    from ddagr_gym.diagnosis.gates.thresholds import NullKind, NullRun, Origin
+    from ddagr_gym.diagnosis.gates.thresholds import NullKind, NullRun, Origin, Thresholds
     from ddagr_gym.diagnosis.null_bank.bank import NullBank
     from ddagr_gym.diagnosis.null_bank.drives import Template
     from ddagr_gym.diagnosis.setting import Setting
@@ -116,6 +116,20 @@ def run(arguments: Arguments) -> None:
     save_thresholds(found, arguments.output)
     beside = f" and {len(longer)} longer ones" if longer else ""
     print(f"{arguments.output}: thresholds of {found.nulls} null drives{beside}, bank {bank[:12]}")
+    _print_use([run for run in runs if run.own], found, robot)
+
+
+def _print_use(runs: Sequence[NullRun], found: Thresholds, robot: Robot) -> None:
+    """Say how many null runs pass these thresholds, and those that a diagnosis would take otherwise."""
+    from ddagr_gym.diagnosis.gates.threshold_files import usual_thresholds
+    from ddagr_gym.diagnosis.gates.thresholds import false_alarms
+
+    usual = usual_thresholds(robot.name)
+    owner = usual.origin.robot if usual.origin else "another robot"
+    print(
+        f"an effect passes them in {false_alarms(runs, found)} of {len(runs)} null drives, and the shipped ones of the "
+        f"{owner} in {false_alarms(runs, usual)}"
+    )
 
 
 def _mended(loaded: Sequence[Recording]) -> Sequence[Recording]:

@@ -150,8 +150,8 @@ def test_an_error_inside_the_fit_is_no_property_of_the_recording(asked, searched
         ddagr_gym.diagnose(driven(70.0), names_only=True, cache=searched)
 
 
-def test_thresholds_of_ordinary_drives_ask_what_differs_from_them():
+@pytest.mark.parametrize("robot", ["ddagr", "warthog"])
+def test_shipped_thresholds_ask_what_the_simulator_lacks(robot):
     from ddagr_gym.diagnosis.gates.threshold_files import default_thresholds
 
-    assert default_thresholds("warthog").of_ordinary_drives
-    assert not default_thresholds("ddagr").of_ordinary_drives
+    assert not default_thresholds(robot).of_ordinary_drives

@@ -47,8 +47,9 @@ def words(folder: Path, count: int = 20) -> list[str]:
     return ["null-bank", "--output", str(folder / "thresholds.json"), "--count", str(count), "--processes", "1"]
 
 
-def test_thresholds_of_a_bank_load(quick_nulls: list[int], tmp_path: Path) -> None:
+def test_thresholds_of_a_bank_load(quick_nulls: list[int], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(words(tmp_path)) == 0
+    assert "in 0 of 20 null drives, and the shipped ones of the ddagr in " in capsys.readouterr().out
     assert quick_nulls == list(range(20))
     found = load_thresholds(tmp_path / "thresholds.json")
     assert found.nulls == 20
@@ -210,12 +211,12 @@ def test_a_diagnosis_of_something_else_is_warned(
 
 
 def test_a_diagnosis_with_the_shipped_thresholds_is_warned_too(capsys: pytest.CaptureFixture[str]) -> None:
-    """What a simulator lacks is judged by simulated drives, also where a bank of ordinary ones ships."""
-    gates_of(None, robot="warthog", soil="firm_ground", soil_uncertainty=4.0)
+    gates_of(None, robot="husky", soil="firm_ground", soil_uncertainty=4.0)
     said = capsys.readouterr().err
-    assert "robot ddagr instead of warthog" in said
+    assert "robot ddagr instead of husky" in said
     assert "soil uncertainty 1 instead of 4" in said
     gates_of(None)
+    assert gates_of(None, robot="warthog", soil="firm_ground", soil_uncertainty=4.0).origin.robot == "warthog"
     assert capsys.readouterr().err == ""
 
 

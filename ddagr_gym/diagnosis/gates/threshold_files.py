@@ -12,6 +12,9 @@ from ddagr_gym.diagnosis.gates.thresholds import SHORT_WINDOW, VERSION, Gate, Nu
 from ddagr_gym.errors import InputError
 from ddagr_gym.files import atomic_path, read_json
 
+_GENERAL = "ddagr"
+"""Robot whose thresholds serve where a robot has none."""
+
 
 def save_thresholds(thresholds: Thresholds, path: Path) -> None:
     """Write thresholds as JSON, all or nothing."""
@@ -86,6 +89,15 @@ def shipped_thresholds(robot: str) -> Thresholds | None:
     """Thresholds that ship with the package for a robot, or None."""
     path = Path(__file__).resolve().parents[2] / "data" / f"null_bank_{robot}.json"
     return load_thresholds(path) if path.is_file() else None
+
+
+def usual_thresholds(robot: str) -> Thresholds:
+    """Thresholds that a diagnosis takes where none are given: the robot's own, else those of the DDAGR.
+
+    Shipped ones are of simulated drives: what a simulator lacks is not judged by real drives of which it may lack the
+    same.
+    """
+    return shipped_thresholds(robot) or default_thresholds(_GENERAL)
 
 
 def default_thresholds(robot: str) -> Thresholds:

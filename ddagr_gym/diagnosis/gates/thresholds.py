@@ -267,6 +267,21 @@ class NullRun:
         return gain / UNMISTAKABLE if name in self.meaningless else gain
 
 
+def false_alarms(runs: Sequence[NullRun], thresholds: Thresholds) -> int:
+    """Null runs in which some effect passes thresholds, brought to the length of each run.
+
+    Args:
+        runs: of a bank, which may be another one than the thresholds were taken from.
+        thresholds: of the gates.
+    """
+
+    def passed(run: NullRun) -> bool:
+        gates = thresholds.for_length(run.windows * run.duration)
+        return any(gates.passes(name, run.evidence(name), run) for name in run.gains)
+
+    return sum(map(passed, runs))
+
+
 def least_nulls(level: float = LEVEL) -> int:
     """Null runs that a level of false alarms takes at least."""
     return math.ceil(1.0 / level)

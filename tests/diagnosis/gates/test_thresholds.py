@@ -13,6 +13,7 @@ from ddagr_gym.diagnosis.gates.threshold_files import (
     load_thresholds,
     save_thresholds,
     shipped_thresholds,
+    usual_thresholds,
 )
 from ddagr_gym.diagnosis.gates.thresholds import (
     GROUND_MARGIN,
@@ -24,6 +25,7 @@ from ddagr_gym.diagnosis.gates.thresholds import (
     NullRun,
     Origin,
     Thresholds,
+    false_alarms,
     thresholds_from,
 )
 from ddagr_gym.errors import InputError
@@ -55,6 +57,21 @@ def test_false_alarms_over_the_library_are_at_the_level() -> None:
     )
     assert thresholds.of("payload").gain > 1.5 * thresholds.of("slope").gain
     assert 1.15 < thresholds.misfit["yaw_rate"] / MISFIT_MARGIN < 1.25
+
+
+def test_false_alarms_of_other_thresholds_are_counted() -> None:
+    runs = null_runs(400, 3)
+    own = thresholds_from(runs, "x", level=0.05)
+    assert false_alarms(runs, own) <= 20
+    lower = replace(own, gates={name: Gate(0.2 * gate.gain, 0.0) for name, gate in own.gates.items()})
+    assert 40 < false_alarms(runs, lower) < 300
+    unseen = [replace(run, held_out=dict.fromkeys(NAMES, -1.0)) for run in runs]
+    assert 0 < false_alarms(unseen, lower) < 0.8 * false_alarms(runs, lower)
+
+
+def test_a_robot_without_a_bank_has_that_of_the_ddagr() -> None:
+    assert usual_thresholds("husky") == default_thresholds("ddagr")
+    assert usual_thresholds("warthog") == shipped_thresholds("warthog")
 
 
 def test_gains_of_sizes_that_do_not_matter_count_less() -> None:
@@ -252,5 +269,5 @@ def test_shipped_banks_say_what_they_were_made_for() -> None:
     found = [thresholds.origin for robot in ("ddagr", "warthog") if (thresholds := shipped_thresholds(robot))]
     assert found == [
         Origin("ddagr", "thesis_a1", 1.0, 0, "simulated"),
-        Origin("warthog", "firm_ground", 4.0, 0, "ordinary"),
+        Origin("warthog", "firm_ground", 4.0, 0, "simulated"),
     ]
