@@ -120,16 +120,14 @@ def run(arguments: Arguments) -> None:
 
 
 def _print_use(runs: Sequence[NullRun], found: Thresholds, robot: Robot) -> None:
-    """Say how many null runs pass these thresholds, and those that a diagnosis would take otherwise."""
-    from ddagr_gym.diagnosis.gates.threshold_files import usual_thresholds
+    """Say how many null runs pass these thresholds, and those that ship for the robot and for the general case."""
+    from ddagr_gym.diagnosis.gates.threshold_files import GENERAL, shipped_thresholds
     from ddagr_gym.diagnosis.gates.thresholds import false_alarms
 
-    usual = usual_thresholds(robot.name)
-    owner = usual.origin.robot if usual.origin else "another robot"
-    print(
-        f"an effect passes them in {false_alarms(runs, found)} of {len(runs)} null drives, and the shipped ones of the "
-        f"{owner} in {false_alarms(runs, usual)}"
-    )
+    shipped = {owner: shipped_thresholds(owner) for owner in dict.fromkeys((robot.name, GENERAL))}
+    others = [f"those shipped for the {name} in {false_alarms(runs, own)}" for name, own in shipped.items() if own]
+    passed = ", ".join([f"in {false_alarms(runs, found)} of {len(runs)} null drives", *others])
+    print(f"an effect passes these thresholds {passed}")
 
 
 def _mended(loaded: Sequence[Recording]) -> Sequence[Recording]:

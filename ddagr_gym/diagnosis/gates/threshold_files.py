@@ -12,7 +12,7 @@ from ddagr_gym.diagnosis.gates.thresholds import SHORT_WINDOW, VERSION, Gate, Nu
 from ddagr_gym.errors import InputError
 from ddagr_gym.files import atomic_path, read_json
 
-_GENERAL = "ddagr"
+GENERAL = "ddagr"
 """Robot whose thresholds serve where a robot has none."""
 
 
@@ -97,7 +97,7 @@ def usual_thresholds(robot: str) -> Thresholds:
     Shipped ones are of simulated drives: what a simulator lacks is not judged by real drives of which it may lack the
     same.
     """
-    return shipped_thresholds(robot) or default_thresholds(_GENERAL)
+    return shipped_thresholds(robot) or default_thresholds(GENERAL)
 
 
 def default_thresholds(robot: str) -> Thresholds:
