@@ -88,3 +88,8 @@ def test_a_robot_that_nobody_heard_stopping_does_not_stand() -> None:
     for name in ("encoder_right", "encoder_left"):
         recording = with_hole(name, 400, 560, recording)
     assert standstills(recording) == []
+
+
+def test_a_channel_that_reports_changes_only_has_no_silences() -> None:
+    changes = np.where(ROW % 120 < 3, 2.0 + 0.1 * (ROW // 120), np.nan)
+    assert spans_of(drive({"encoder_right": changes})) == [(0, COUNT)]
